@@ -61,20 +61,17 @@ def main() -> None:
 
 
 def fitted_constants(answers: Answers, encode: EncodeWords) -> calibrate.Calibration:
-    """Fit every constant in turn, on clips as they are and the same clips in a room."""
-    known, strangers = answers.household, answers.strangers
-    heard = calibrate.joined([known.dry, known.wet])
-    kinds, rooms = np.tile(known.kinds, 2), np.repeat([0, 1], len(known.kinds))
+    """Fit every constant in turn, on clips as they are, the same clips in a room, and pieces in rooms and noise."""
+    heard, kinds = answers.household.every, answers.household.every_kind
     evidence = evidence_for(heard.cosines, heard.typical)
     c = replace(calibrate.START, temperature=calibrate.fit_temperature(evidence, kinds))
     c = calibrate.fit_phrases(encode, c)
-    unknown = calibrate.joined([strangers.dry, strangers.wet])
-    peers = calibrate.joined([answers.peers.dry, answers.peers.wet])  # of the same network
-    c = calibrate.fit_known(peers, unknown, c)
+    unknown = answers.strangers.every
+    c = calibrate.fit_known(answers.peers.every, unknown, c)  # of the same network
     c = calibrate.fit_taught(answers.lessons(3), c)
     left = [k for k in range(calibrate.RECORDED_COUNT) if k not in answers.without]
     c = calibrate.fit_word(heard, kinds, [(unknown, left)], encode, c)
-    return calibrate.fit_pairs(heard, kinds, rooms, c)
+    return calibrate.fit_pairs(heard, kinds, answers.household.every_room, c)
 
 
 def write_edition(

@@ -85,10 +85,6 @@ class Evidence:
     def __len__(self) -> int:
         return len(self.features)
 
-    def at(self, chosen: np.ndarray) -> "Evidence":
-        """Return some of the sounds."""
-        return Evidence(self.features[chosen], self.cosines[chosen], self.typical[chosen], self.near[chosen])
-
 
 FIELDS = ("features", "cosines", "typical", "near")
 

@@ -13,7 +13,7 @@ from training.sounds.export import opened_norms, read_onnx
 from training.sounds.fit import EncodeWords, encode, targets
 from training.sounds.kinds import ESC10, NAMES
 from training.sounds.network import SoundNet
-from training.sounds.upper import Settings, fit_upper, stored_maps
+from training.sounds.upper import Lessons, Settings, encode_maps, fit_upper, stored_maps
 
 from avlmaps.bench.sound_clips import room_response
 from avlmaps.core.progress import progress
@@ -56,11 +56,14 @@ class Networks:
         """Return the network without the tested fold and without some kinds; its upper part starts at random."""
         return self._fitted("stranger", TESTED, tuple(map(NAMES.index, LEFT_OUT)))
 
+    def lessons(self) -> Lessons:
+        """Return the maps of all sounds under the last block."""
+        return stored_maps(self.corpus, self._opened(), self.settings, self.work)
+
     def _fitted(self, name: str, fold: int, without: Sequence[int]) -> SoundNet:
         file, net = self.work / f"{name}.pt", self._opened()
         if not file.exists():
-            lessons = stored_maps(self.corpus, net, self.settings, self.work)
-            fitted = fit_upper(net, lessons, targets(self.encode_words), self.settings, fold, without)
+            fitted = fit_upper(net, self.lessons(), targets(self.encode_words), self.settings, fold, without)
             torch.save(fitted.state_dict(), file)
         net.load_state_dict(torch.load(file, weights_only=True))
         return net.eval()
@@ -79,16 +82,31 @@ class Held:
         wet: of the same clips 4 m away in a simulated room of RT60 ``ROOM_S``.
         kinds: the right kind of each.
         sources: the recording that each was cut from.
+        pieces: evidence of such clips as training draws them: most in rooms or noise, some cut as a map cuts them.
+        piece_kinds: the right kind of each of these.
     """
 
     dry: Evidence
     wet: Evidence
     kinds: np.ndarray
     sources: np.ndarray
+    pieces: Evidence
+    piece_kinds: np.ndarray
 
-    def at(self, chosen: np.ndarray) -> "Held":
-        """Return some of the clips."""
-        return Held(self.dry.at(chosen), self.wet.at(chosen), self.kinds[chosen], self.sources[chosen])
+    @property
+    def every(self) -> Evidence:
+        """All of it, one after another."""
+        return joined([self.dry, self.wet, self.pieces])
+
+    @property
+    def every_kind(self) -> np.ndarray:
+        """The right kind of each of ``every``."""
+        return np.concatenate([self.kinds, self.kinds, self.piece_kinds])
+
+    @property
+    def every_room(self) -> np.ndarray:
+        """Which of the three each of ``every`` is."""
+        return np.repeat([0, 1, 2], [len(self.dry), len(self.wet), len(self.pieces)])
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,14 +127,9 @@ class Answers:
 
     def lessons(self, clips: int) -> list[Lesson]:
         """Teach each kind left out from some clips; the peers and the other strangers are what it is not."""
-        every = held_together([self.peers, self.strangers])
-        return lessons(every.dry, every.kinds, every.sources, self.without, clips)
-
-
-def held_together(parts: Sequence[Held]) -> Held:
-    """Return the clips of several one after another."""
-    dry, wet = (joined([getattr(part, name) for part in parts]) for name in ("dry", "wet"))
-    return Held(dry, wet, *(np.concatenate([getattr(p, name) for p in parts]) for name in ("kinds", "sources")))
+        both = (self.peers, self.strangers)
+        kinds, sources = (np.concatenate([getattr(held, name) for held in both]) for name in ("kinds", "sources"))
+        return lessons(joined([held.dry for held in both]), kinds, sources, self.without, clips)
 
 
 def example_bank(net: SoundNet, examples: Examples) -> tuple[np.ndarray, np.ndarray]:
@@ -137,11 +150,15 @@ def hear_held_out(corpus: Corpus, networks: Networks, aims: np.ndarray) -> Answe
     tested = (corpus.kinds >= len(ESC10)) & (corpus.folds == TESTED)
     wet = wet_mels(corpus, tested | strange, networks.work)
     sources = np.array([clip.source for clip in corpus.clips])
+    drawn = networks.lessons().recorded[1]
 
     def held(chosen: np.ndarray, net: SoundNet, left: Sequence[int] = ()) -> Held:
         bank = example_bank(net, corpus.examples(TESTED, left))
-        dry, echoing = (evidence_of(encode(net, m[chosen]), aims, *bank, left) for m in (corpus.mels, wet))
-        return Held(dry, echoing, corpus.kinds[chosen], sources[chosen])
+        rows = np.flatnonzero(chosen[drawn.clips].all(axis=1) & (drawn.share == 0.0))
+        rows = np.random.default_rng(0).permutation(rows)[: int(chosen.sum())]  # as many as clips
+        features = (encode(net, corpus.mels[chosen]), encode(net, wet[chosen]), encode_maps(net, drawn.maps, rows))
+        dry, echoing, pieces = (evidence_of(f, aims, *bank, left) for f in features)
+        return Held(dry, echoing, corpus.kinds[chosen], sources[chosen], pieces, drawn.kinds[rows, 0])
 
     net = networks.stranger()
     peers, strangers = (held(chosen, net, without) for chosen in (tested & ~strange, strange))

@@ -33,13 +33,18 @@ def scores(heard: Evidence, phrases: Sequence[str], encode: EncodeWords, c: Cali
 def words_table(answers: Answers, encode: EncodeWords, c: Calibration) -> Table:
     """Return the questions by words: household clips among fifty names."""
     rows, held, group = [], answers.household, "household"
-    right = held.kinds[:, None] == np.arange(len(FIFTY))[None, :]
-    for room, heard in (("dry", held.dry), (f"RT60 {ROOM_S} s, 4 m", held.wet)):
+    rooms = (
+        ("dry", held.dry, held.kinds),
+        (f"RT60 {ROOM_S} s, 4 m", held.wet, held.kinds),
+        ("pieces in rooms and noise", held.pieces, held.piece_kinds),
+    )
+    for room, heard, kinds in rooms:
+        right = kinds[:, None] == np.arange(len(FIFTY))[None, :]
         found = scores(heard, FIFTY, encode, c)
         every = scores(heard, CALLED, encode, c)
         rows += [
-            [group, room, f"right name first among {len(FIFTY)} names", *share(found.argmax(axis=1) == held.kinds)],
-            [group, room, f"right name first among all {len(CALLED)}", *share(every.argmax(axis=1) == held.kinds)],
+            [group, room, f"right name first among {len(FIFTY)} names", *share(found.argmax(axis=1) == kinds)],
+            [group, room, f"right name first among all {len(CALLED)}", *share(every.argmax(axis=1) == kinds)],
             [group, room, "right kind says yes", *share(found[right] >= 0.5)],
             [group, room, "another kind says yes", *share(found[~right] >= 0.5)],
             [group, room, "some other kind says yes, of clips", *share(((found >= 0.5) & ~right).any(axis=1))],
@@ -91,7 +96,7 @@ def refusal_table(answers: Answers, c: Calibration) -> Table:
     """
     bias, slope = c.word
     rows = []
-    for room, where in (("dry", "dry"), ("wet", f"RT60 {ROOM_S} s, 4 m")):
+    for room, where in (("dry", "dry"), ("wet", f"RT60 {ROOM_S} s, 4 m"), ("pieces", "pieces in rooms and noise")):
         known, strange = (
             heard_kinds(getattr(held, room), c)[:, : len(RECORDED)].max(axis=1)
             for held in (answers.peers, answers.strangers)

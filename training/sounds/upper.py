@@ -66,13 +66,15 @@ class Mapped:
 
     Attributes:
         maps: under the last block (n, channels, bands, frames), in half precision.
-        kinds: of both clips (n, 2); the same twice where there is one.
+        clips: places of both clips in the corpus (n, 2); the same twice where there is one.
+        kinds: of both (n, 2).
         folds: of both clips (n, 2); 0 for a synthetic sound.
         share: of the second clip (n,).
         may: whether weights that ship may learn from it (n,).
     """
 
     maps: np.ndarray
+    clips: np.ndarray
     kinds: np.ndarray
     folds: np.ndarray
     share: np.ndarray
@@ -114,11 +116,22 @@ def stored_maps(corpus: Corpus, net: SoundNet, settings: Settings, work: Path) -
         with np.load(rows) as held:
             places, share = held["rows"], held["share"]
         itself = np.arange(len(mels))[:, None].repeat(2, axis=1)
+        still, both = np.zeros(len(mels), np.float32), may[places].all(axis=1)
         pairs.append((
-            Mapped(np.load(clean, mmap_mode="r"), kinds[itself], folds[itself], np.zeros(len(mels), np.float32), may),
-            Mapped(np.load(changed, mmap_mode="r"), kinds[places], folds[places], share, may[places].all(axis=1)),
+            Mapped(np.load(clean, mmap_mode="r"), itself, kinds[itself], folds[itself], still, may),
+            Mapped(np.load(changed, mmap_mode="r"), places, kinds[places], folds[places], share, both),
         ))  # fmt: skip
     return Lessons(*pairs)
+
+
+@torch.no_grad()
+def encode_maps(net: SoundNet, maps: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Return unit vectors for some maps under the last block."""
+    net.eval()
+    parts = [
+        net.upper(torch.from_numpy(maps[rows[i : i + BATCH]].astype(np.float32))) for i in range(0, len(rows), BATCH)
+    ]
+    return torch.cat(parts).numpy()
 
 
 def _maps(net: SoundNet, x: Tensor) -> np.ndarray:
