@@ -5,28 +5,42 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 torch = pytest.importorskip("torch")
 from training.sounds.augmentation import PADDED, SMOOTHED, Augmentation, segmented  # noqa: E402
-from training.sounds.clips import Examples  # noqa: E402
-from training.sounds.fit import Batches, Settings, fit_folds, share_of_rate  # noqa: E402
+from training.sounds.fit import share_of_rate  # noqa: E402
 from training.sounds.network import SoundNet  # noqa: E402
+from training.sounds.upper import Lessons, Mapped, Settings, fit_upper  # noqa: E402
 
 from avlmaps.maps.audio.segmentation import segment  # noqa: E402
 from avlmaps.perception.embedded import logmel  # noqa: E402
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac  # noqa: E402
 
-KINDS, DIM = 4, 16
+KINDS, DIM, WIDTH = 4, 16, 4
 WORDS = torch.nn.functional.normalize(torch.randn(2, KINDS, DIM, generator=torch.Generator().manual_seed(0)), dim=2)
-SETTINGS = Settings(steps=3, width=4, recorded=12, synthetic=4, spliced=0.5)
+SETTINGS = Settings(steps=3, made=4)
 
 
-def examples(seed: int = 0) -> Examples:
-    """Return twelve clips of three kinds in folds 2 to 5, and two synthetic ones of a fourth."""
-    rng = np.random.default_rng(seed)
-    power = (rng.random((14, logmel.WINDOW_FRAMES, logmel.BANDS)) + logmel.FLOOR).astype(np.float32)
-    kinds, folds = np.repeat(np.arange(3), 4), np.tile([2, 3, 4, 5], 3)
-    return Examples(power[:12], kinds, folds, power[12:], np.array([3, 3]))
+def network() -> SoundNet:
+    torch.manual_seed(0)
+    return SoundNet(DIM, WIDTH)
+
+
+def mapped(kinds: np.ndarray, folds: np.ndarray, seed: int = 0) -> Mapped:
+    """Return random maps of sounds, each mixed with a quarter of another of its kind and fold."""
+    rng, n = np.random.default_rng(seed), len(kinds)
+    maps = rng.random((n, 4 * WIDTH, 8, 28)).astype(np.float16)
+    both = np.arange(n)[:, None].repeat(2, axis=1)
+    return Mapped(maps, both, kinds[both], folds[both], np.full(n, 0.25, np.float32), np.ones(n, bool))
+
+
+def lessons() -> Lessons:
+    """Return twelve clips of three kinds in folds 2 to 5, and four synthetic ones of a fourth kind."""
+    clips = mapped(np.repeat(np.arange(3), 4), np.tile([2, 3, 4, 5], 3))
+    made = mapped(np.full(4, 3), np.zeros(4, int), seed=1)
+    return Lessons((clips, clips), (made, made))
 
 
 def numbers(net: SoundNet) -> np.ndarray:
@@ -44,33 +58,39 @@ def test_the_rate_rises_stays_and_falls(steps: int, falling: float) -> None:
     assert (np.diff(shares[top:]) <= 0.0).all()
 
 
-def test_every_sound_of_a_batch_is_accounted_for() -> None:
-    batch = Batches(examples(), WORDS, SETTINGS).draw()
-    np.testing.assert_allclose(batch.aim.sum(dim=1), 1.0, atol=1e-6)
-    assert batch.folds.shape == (16, 4)
-    assert not batch.folds[12:, :2].any()  # synthetic ones are of no fold
-    assert set(batch.folds[:12, :2].flatten().tolist()) <= {2, 3, 4, 5}
+@given(st.data())
+def test_no_row_holds_what_is_left_out(data: st.DataObject) -> None:
+    rows = st.lists(st.tuples(*[st.integers(0, 3)] * 2, *[st.sampled_from([0, 2, 3])] * 2, st.booleans()), min_size=1)
+    drawn = data.draw(rows)
+    fold, without = data.draw(st.sampled_from([0, 2, 3])), data.draw(st.lists(st.integers(0, 3), max_size=2))
+    kinds, folds = np.array([row[:2] for row in drawn]), np.array([row[2:4] for row in drawn])
+    may = np.array([row[4] for row in drawn])
+    chosen = Mapped(np.zeros((len(drawn), 1, 1, 1)), kinds, kinds, folds, np.zeros(len(drawn)), may).rows(fold, without)
+    for number, (first, second, one, other, allowed) in enumerate(drawn):
+        left_out = {first, second} & set(without) or (fold > 0 and fold in (one, other))
+        assert (number in chosen) == (allowed and not left_out)
 
 
 def test_a_folds_network_learns_nothing_from_its_clips() -> None:
-    given = examples()
-    changed = replace(given, recorded=given.recorded.copy())
-    changed.recorded[given.recorded_folds == 3] = examples(seed=1).recorded[given.recorded_folds == 3] ** 4
-    torch.manual_seed(0)
-    start = SoundNet(DIM, SETTINGS.width, dropout=0.0)
-    without, every = fit_folds(given, WORDS, SETTINGS, {3: start, 0: start}).values()
-    without_too, every_too = fit_folds(changed, WORDS, SETTINGS, {3: start, 0: start}).values()
-    np.testing.assert_allclose(numbers(without), numbers(without_too), atol=1e-6)
-    assert np.abs(numbers(every) - numbers(every_too)).max() > 1e-4
+    net = network()
+    given_lessons = lessons()
+    clips = given_lessons.recorded[0]
+    maps = clips.maps.copy()
+    maps[clips.folds[:, 0] == 3] *= 4.0
+    changed = replace(given_lessons, recorded=(replace(clips, maps=maps),) * 2)
+    without, without_too = (numbers(fit_upper(net, each, WORDS, SETTINGS, fold=3)) for each in (given_lessons, changed))
+    every, every_too = (numbers(fit_upper(net, each, WORDS, SETTINGS)) for each in (given_lessons, changed))
+    np.testing.assert_allclose(without, without_too, atol=1e-6)
+    assert np.abs(every - every_too).max() > 1e-4
 
 
-def test_the_first_layers_stay_and_the_others_are_fitted() -> None:
-    torch.manual_seed(0)
-    start = SoundNet(DIM, SETTINGS.width)
-    net = fit_folds(examples(), WORDS, SETTINGS, {2: start})[2]
+def test_the_lower_blocks_stay_and_the_upper_part_is_fitted() -> None:
+    start = network()
+    net = fit_upper(start, lessons(), WORDS, SETTINGS)
+    last = f"blocks.{len(start.blocks) - 1}."
     for name, weight in net.named_parameters():
-        stays = name.startswith(("stem", "blocks.0"))
-        assert torch.equal(weight, dict(start.named_parameters())[name]) == stays, name
+        fitted = name.startswith((last, "head."))
+        assert torch.equal(weight, dict(start.named_parameters())[name]) != fitted, name
 
 
 ALL_CUT = Augmentation(segmented=1.0)
