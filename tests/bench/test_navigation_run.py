@@ -71,9 +71,9 @@ def known() -> KnownScene:
     voxels = TrueVoxels.of(scene, GRID)
     index = np.stack([(voxels.key >> shift) & 0x1FFFFF for shift in (42, 21, 0)], axis=1) - (1 << 20)
     up = np.array([0.0, 0.0, 1.0])
-    stored = SimpleNamespace(
-        grid=GRID, voxels=SimpleNamespace(index=index, hits=np.full(len(index), 9)), up_in_world=up
-    )
+    voxels_seen = SimpleNamespace(index=index, hits=np.full(len(index), 9))
+    keyframes = SimpleNamespace(world_from_camera=np.eye(4)[None])
+    stored = SimpleNamespace(grid=GRID, voxels=voxels_seen, keyframes=keyframes, up_in_world=up)
     events = tuple(
         HeardEvent(float(i), i + 1.0, name, "", (x, y, 1.3), (x, y, 1.3), -1) for i, (name, x, y) in enumerate(HEARD)
     )

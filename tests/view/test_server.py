@@ -245,13 +245,14 @@ def test_memory_stays_flat_over_many_questions(room: AVLMap) -> None:
         session.ask(sentence)
     tracemalloc.start()
     sizes = []
-    for _ in range(3):
+    for _ in range(5):
         for k in range(12):
             session.ask(words[k % 4])
         gc.collect()
         sizes.append(tracemalloc.get_traced_memory()[0])
     tracemalloc.stop()
-    assert sizes[2] - sizes[1] < 100_000, sizes
+    # What leaks grows in every round; what other threads of the tests hold comes and goes.
+    assert np.diff(sizes).min() < 50_000, sizes
 
 
 @pytest.fixture
