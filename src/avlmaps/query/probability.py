@@ -3,9 +3,9 @@
     p = s(thing) * s(near) * s(marks) * s(room),   s the logistic function of a weight times a number, and a bias
 
 so that a goal is likely only where the thing, how near it is, what it is near and the room all are: beside a photo
-whose place is certain, a thing 4 m away is no nearer. The weights (``found.json``) are fitted by ``training/found``
-on homes that no table uses, half of the queries being for what is not there. A thing, a sound, an area or a photo
-alone is as likely as the models that made it out say: those are calibrated by themselves.
+whose place is certain, a thing 4 m away is no nearer. The weights (``found.json``) are fitted by ``training/found`` on
+homes that no table uses, half of the queries being for what is not there. A thing, a sound, an area or a photo alone is
+as likely as the models that made it out say: those are calibrated by themselves.
 """
 
 import json
