@@ -14,9 +14,9 @@ from campaign import report, run_case
 from mistakes import run_mistake
 from seeds import write_seeds
 
-CASES = 120
+CASES = 80
 BLOCKS = 4
-MISTAKES = 10
+MISTAKES = 6
 
 
 @pytest.fixture(scope="module")
