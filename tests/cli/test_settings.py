@@ -28,7 +28,7 @@ from avlmaps.navigate.skills import RobotSettings
 from avlmaps.perception.cache.feature_store import CacheSettings
 from avlmaps.perception.models.settings import ModelSettings, Precision
 from avlmaps.query.asking import Asked
-from avlmaps.query.avlmap import AVLMap
+from avlmaps.query.avlmap import AVLMap, QuerySettings
 from avlmaps.query.rules import Rules
 from avlmaps.recordings.add_sounds import add_sounds
 from avlmaps.recordings.consistency.verdict import Reason
@@ -114,6 +114,10 @@ SAME: dict[str, Callable[[], Any]] = {
     "import-map.sounds": of(ImportSettings, "track"),
     "import-map.hear_with": of(ImportSettings, "hear_with"),
     "query.top": of(AVLMap.ask, "top"),
+    "query.found_at": of(QuerySettings, "found_at"),
+    "go.found_at": of(QuerySettings, "found_at"),
+    "view.found_at": of(QuerySettings, "found_at"),
+    "serve.found_at": of(ServeSettings, "found_at"),
     "things.least": of(AVLMap.contents, "least_confidence"),
     "export.least": of(AVLMap.things, "least_confidence"),
     "export.radius_m": of(BodyShape, "radius_m"),

@@ -70,6 +70,8 @@ class Go(ModelVerb):
     """JSON file of the robot's frames and settings: namespace, radius, speed, timeouts (docs/robots.md)."""
     start: Annotated[str | None, arg(metavar="X,Y,HEADING")] = None
     """Start of the simulated robot: metres, degrees counter-clockwise from +x. Default: the start of the recording."""
+    found_at: Annotated[float, arg(metavar="PROBABILITY")] = 0.5
+    """Drive to what is found from this probability on, 0 to 1."""
     guess: bool = False
     """Go to the best guess where nothing is found."""
     image: Annotated[Path | None, arg(metavar="FILE")] = None
@@ -155,9 +157,9 @@ def plan_answer(translation: "Translation") -> dict[str, Any]:
 
 
 def _driven(verb: "Go", start: "GroundPose | None") -> dict[str, Any]:
-    from avlmaps.query.avlmap import AVLMap
+    from avlmaps.query.avlmap import AVLMap, QuerySettings
 
-    avlmap = AVLMap.open(verb.map)
+    avlmap = AVLMap.open(verb.map, QuerySettings(found_at=verb.found_at))
     translator = translator_for(verb, avlmap)
     if verb.explain:
         from avlmaps.language.rules import explanation

@@ -44,6 +44,8 @@ class Query(ModelVerb):
         None
     )
     """Part that is the goal; the others say where it is. Default: the first of object, image, sound, area."""
+    found_at: Annotated[float, arg(metavar="PROBABILITY")] = 0.5
+    """Call the query found from this probability of its first goal on, 0 to 1."""
     rules: Literal["ours", "paper"] = "ours"
     """Rules of scores and heat: ours, or the paper's with any models (docs/paper-models.md)."""
     top: Annotated[int, arg(metavar="N")] = 3
@@ -72,11 +74,11 @@ def ask(verb: "Query", opened: "AVLMap | None" = None) -> dict[str, Any]:
 
     primary = None if verb.primary is None else Modality(verb.primary)
     numbers = None if verb.intrinsics is None else numbers_of(verb.intrinsics)
-    settings = QuerySettings()
+    settings = QuerySettings(found_at=verb.found_at)
     if verb.rules != "ours":
         from avlmaps.query.rules import query_settings
 
-        settings = query_settings(verb.rules)
+        settings = query_settings(verb.rules, settings)
     if opened is not None and opened.settings != settings:
         opened = AVLMap(opened.stored, settings)
     given = {

@@ -56,6 +56,8 @@ class Serve(ModelVerb):
     """PEM key of the certificate."""
     allow_host: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME")] = ()
     """A further name of this server in the Host header, such as that of a reverse proxy; may be repeated."""
+    found_at: Annotated[float, arg(metavar="PROBABILITY")] = 0.5
+    """Call a query found, and drive to it, from this probability of its first goal on, 0 to 1."""
 
     drive: Annotated[Path | None, arg(metavar="ROBOT.json")] = None
     """Drive the robot of this file as well: plans, confirmations and stops under /drive, every order logged."""
@@ -93,6 +95,7 @@ def serve(verb: "Serve") -> None:
         allowed_hosts=verb.allow_host,
         tls_certificate=verb.tls_cert,
         tls_key=verb.tls_key,
+        found_at=verb.found_at,
     )
     maps = named_maps([verb.map, *verb.more])
     if verb.stdio:

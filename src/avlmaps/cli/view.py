@@ -49,6 +49,8 @@ class View(ModelVerb):
     """Do not open a browser."""
     scene: Annotated[str | None, arg(metavar="SCENE")] = None
     """Scene in which a simulated robot drives the commands typed in the page, as for `avlmaps go`."""
+    found_at: Annotated[float, arg(metavar="PROBABILITY")] = 0.5
+    """Call a query found from this probability of its first goal on, 0 to 1."""
     out: Annotated[Path | None, arg(metavar="FILE")] = None
     """Write one HTML file, and serve nothing."""
     questions: Annotated[tuple[str, ...], arg(metavar="SENTENCE ...")] = ()
@@ -82,9 +84,10 @@ def _require_fitting(verb: View) -> None:
 
 
 def _maps(verb: View) -> "list[AVLMap]":
-    from avlmaps.query.avlmap import AVLMap
+    from avlmaps.query.avlmap import AVLMap, QuerySettings
 
-    return [AVLMap.open(path) for path in (verb.map, verb.other) if path is not None]
+    settings = QuerySettings(found_at=verb.found_at)
+    return [AVLMap.open(path, settings) for path in (verb.map, verb.other) if path is not None]
 
 
 def _written(verb: View, out: Path) -> dict[str, Any]:

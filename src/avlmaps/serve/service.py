@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from avlmaps.query.avlmap import QuerySettings
 from avlmaps.serve.errors import Privacy
 from avlmaps.serve.lanes import Lane
 from avlmaps.serve.settings import ServeSettings
@@ -47,7 +48,7 @@ class Service:
         """
         settings = settings or ServeSettings()
         limits = settings.limits
-        shelf = Shelf(maps, limits, note)
+        shelf = Shelf(maps, limits, note, QuerySettings(found_at=settings.found_at))
         return cls(
             settings,
             shelf,

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from avlmaps.core.errors import AvlmapsError
 from avlmaps.core.network import is_loopback
+from avlmaps.query.factors import FOUND_AT
 
 DEFAULT_PORT = 8750
 MB = 1 << 20
@@ -61,6 +62,7 @@ class ServeSettings:
         allowed_hosts: more names in the Host header that are answered, such as that of a reverse proxy.
         tls_certificate: PEM file of the certificate and its chain; None for plain HTTP.
         tls_key: PEM file of its key.
+        found_at: a query is found from this probability of its first goal on.
         limits: limits of each request.
     """
 
@@ -70,6 +72,7 @@ class ServeSettings:
     allowed_hosts: tuple[str, ...] = ()
     tls_certificate: Path | None = None
     tls_key: Path | None = None
+    found_at: float = FOUND_AT
     limits: Limits = field(default_factory=Limits)
 
     def __post_init__(self) -> None:

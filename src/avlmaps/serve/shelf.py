@@ -97,9 +97,9 @@ class ServedMap:
         avlmap: the map.
     """
 
-    def __init__(self, name: str, stored: "StoredMap", cache_bytes: int) -> None:
+    def __init__(self, name: str, stored: "StoredMap", settings: QuerySettings | None, cache_bytes: int) -> None:
         self.name = name
-        self.avlmap = CachedMap(stored, None, cache_bytes)
+        self.avlmap = CachedMap(stored, settings, cache_bytes)
         self._once = threading.RLock()
         self._answers: OrderedDict[object, object] = OrderedDict()
 
@@ -175,9 +175,9 @@ class ServedMap:
 class _Slot:
     """One name, the map that answers for it now, and the one that is being opened."""
 
-    def __init__(self, name: str, path: Path, cache_bytes: int) -> None:
+    def __init__(self, name: str, path: Path, settings: QuerySettings | None, cache_bytes: int) -> None:
         self.name, self.path = name, path
-        self._cache_bytes = cache_bytes
+        self._settings, self._cache_bytes = settings, cache_bytes
         self._lock = threading.Lock()
         self._opening: threading.Thread | None = None
         self.fault: AvlmapsError | OSError | None = None
@@ -185,7 +185,7 @@ class _Slot:
 
     def _opened(self) -> tuple[object, ServedMap]:
         before = stamp(self.path / MANIFEST)
-        opened = ServedMap(self.name, open_stored(self.path), self._cache_bytes)
+        opened = ServedMap(self.name, open_stored(self.path), self._settings, self._cache_bytes)
         opened.prepare()
         return before, opened
 
@@ -224,7 +224,11 @@ class Shelf:
     """The maps of a server by their names."""
 
     def __init__(
-        self, maps: Mapping[str, Path], limits: Limits | None = None, note: Callable[[str], None] = lambda _: None
+        self,
+        maps: Mapping[str, Path],
+        limits: Limits | None = None,
+        note: Callable[[str], None] = lambda _: None,
+        settings: QuerySettings | None = None,
     ) -> None:
         """Open maps.
 
@@ -232,13 +236,14 @@ class Shelf:
             maps: folders by name; see ``named_maps``.
             limits: how much each map may remember.
             note: is given a line when a map was replaced.
+            settings: of each map's queries.
 
         Raises:
             MapError: one of them cannot be opened.
         """
         cache_bytes = (limits or Limits()).cache_bytes
         self._note = note
-        self._slots = {name: _Slot(name, path, cache_bytes) for name, path in maps.items()}
+        self._slots = {name: _Slot(name, path, settings, cache_bytes) for name, path in maps.items()}
 
     @property
     def names(self) -> tuple[str, ...]:
