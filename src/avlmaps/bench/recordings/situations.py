@@ -102,7 +102,7 @@ def _noisy(written: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 
 def _exchanged(draft: Draft, other: Draft, rng: np.random.Generator) -> Draft:
     order = np.arange(len(draft))
-    chosen = rng.choice(len(draft), 10, replace=False)
+    chosen = rng.choice(len(draft), min(10, len(draft)), replace=False)
     order[chosen] = np.roll(order[chosen], 1)
     return _reordered(draft, order, colour=True, depth=True)
 
