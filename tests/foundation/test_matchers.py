@@ -399,7 +399,8 @@ def test_a_map_on_the_disk_locates_by_superglue_and_says_so_where_it_has_no_scor
     found = locate(stored, walk.frame(0).rgb, None, np.random.default_rng(0))
     assert found.world_from_camera is not None
     assert np.linalg.norm(found.world_from_camera[:3, 3] - walk.frame(0).world_from_camera[:3, 3]) < 0.01
-    before = replace(stored, keyframes=replace(stored.keyframes, score=np.zeros(0, np.float16)))
+    keyframes = replace(stored.keyframes, score=np.zeros(0, np.float16))
+    before = replace(stored, arrays=replace(stored.arrays, keyframes=keyframes))
     with pytest.raises(
         BackendError, match=r"needs the score of each keypoint; these came without\. Build the map again"
     ):
