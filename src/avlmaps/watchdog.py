@@ -135,6 +135,9 @@ def run_ros2(watch: Watch, words: list[str]) -> None:
         rclpy.spin(node)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
+    except Exception:
+        if rclpy.ok():  # else a signal ended ROS in the middle of a step
+            raise
     finally:
         node.destroy_node()
         rclpy.try_shutdown()

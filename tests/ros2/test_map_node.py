@@ -86,7 +86,7 @@ def client(room, tmp_path_factory):
     looker.node.destroy_node()
     rclpy.try_shutdown()
     process.terminate()
-    process.wait(10.0)
+    process.wait(60.0)
 
 
 def read(message: PointCloud2) -> np.ndarray:

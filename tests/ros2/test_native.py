@@ -205,7 +205,7 @@ def test_a_program_that_is_ended_leaves_a_body_that_stands(robot, number):
         assert robot.last_moved_s() - ended_s < (12.0 if number in (signal.SIGSTOP, signal.SIGKILL) else 6.0)
         assert len(robot.rows("cancelled")) == 1
         if number in (signal.SIGTERM, signal.SIGINT):
-            said, _ = process.communicate(timeout=15.0)
+            said, _ = process.communicate(timeout=60.0)
             halt = json.loads(said.splitlines()[-1])
             assert halt["stopped"] and "the active goal was cancelled; the robot stands at" in halt["note"]
     finally:

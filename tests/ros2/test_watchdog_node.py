@@ -23,7 +23,7 @@ def robot(tmp_path):
         process = subprocess.Popen([sys.executable, "-m", "avlmaps.watchdog", "--silence", "1.0"])
         yield robot
         process.terminate()
-        assert process.wait(10.0) in (0, -15)
+        assert process.wait(60.0) in (0, -15)
 
 
 class Client:

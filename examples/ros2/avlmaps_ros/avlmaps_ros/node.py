@@ -1,7 +1,6 @@
 """The node: opens one map, publishes it, answers questions about it."""
 # pyright: reportMissingImports=false
 
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -143,8 +142,13 @@ def main() -> None:
     except AvlmapsError as fault:
         rclpy.try_shutdown()
         raise SystemExit(f"avlmaps_ros: {fault}") from None
-    with suppress(KeyboardInterrupt, ExternalShutdownException):
+    try:
         rclpy.spin(node)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except Exception:
+        if rclpy.ok():  # else a signal ended ROS in the middle of a step
+            raise
     rclpy.try_shutdown()
 
 
