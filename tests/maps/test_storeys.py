@@ -59,6 +59,13 @@ def test_without_cameras_a_floor_is_where_something_stands_and_a_ceiling_is_none
     assert [one.floor_m for one in storeys.all] == pytest.approx([one.floor_m for one in found().all])
 
 
+def test_a_floor_that_was_never_seen_under_the_camera_is_still_stood_on() -> None:
+    x, y, z = HOME.points.T
+    seen = (z > 1.0) | (x > 4.2) | (y > WELL[0][1])  # downstairs the camera saw the floor ahead of its walk alone
+    storeys = find_storeys(HOME.points[seen], VOXEL_M, HOME.cameras)
+    assert storeys is not None and len(storeys) == 2
+
+
 @pytest.mark.parametrize("gallery_m", [1.0, 1.5])
 def test_a_podium_and_a_bed_are_no_storeys(gallery_m: float) -> None:
     room = np.concatenate([box((0, 0, 0), (6, 5, 0.01)), box((0, 0, 3.0), (6, 5, 3.01)), box((0, 0, 0), (0.05, 5, 3.0)),

@@ -265,8 +265,12 @@ def _floors(
     known = [(float(np.median(height_m[(layer == at) | (layer == at + 1)])), float(pairs_m2[at])) for at in peaks]
     under_m = columns.under(surface, cameras)
     stood = [int(np.count_nonzero(np.abs(under_m - at_m) <= _SAME_M)) for at_m, _ in known]
-    if not sum(stood):
-        stood = [int(not len(cameras) and _bears(columns, floor)) for floor in known]
+    for camera_m in cameras[np.isnan(under_m), 2].tolist():  # it never saw what it stood on: the largest level below it
+        below = [k for k, (at_m, _) in enumerate(known) if _CARRIED_M[0] <= camera_m - at_m <= _CARRIED_M[1]]
+        if below:
+            stood[max(below, key=lambda k: known[k][1])] += 1
+    if not len(cameras):
+        stood = [int(_bears(columns, floor)) for floor in known]
     fewest = max(1.0, _STOOD_SHARE * len(cameras))
     chosen: list[tuple[float, float]] = []
     for number in sorted(range(len(known)), key=lambda number: (-stood[number], -known[number][1])):
