@@ -93,8 +93,9 @@ $(TORCH)/.ready: requirements/lock.txt requirements/foundation.txt pyproject.tom
 python312:  ## Say which Python 3.12 `make test-ros2` takes; fail where there is none.
 	@$(if $(PYTHON312),echo $(PYTHON312),echo "no Python 3.12 was found; say where one is with: make PYTHON312=/path/to/python3.12" >&2; exit 1)
 
+# These robots move in real time: what fails beside other processes is run once more, alone.
 test-ros2: $(ROS2)/.ready  ## Run the tests against real ROS 2 (rclpy from wheels, in a virtual environment of its own, 1 GB).
-	$(ROS2)/bin/python -m pytest -n 2 --dist loadgroup tests/ros2
+	$(ROS2)/bin/python -m pytest -n 2 --dist loadgroup tests/ros2 || $(ROS2)/bin/python -m pytest --last-failed -n 0 tests/ros2
 
 faults-ros2: $(ROS2)/.ready  ## Break a native drive on ROS 2 in 200 random ways (an hour): ros2_faults.jsonl.
 	$(ROS2)/bin/python tests/ros2/faults.py --cases $(or $(CASES),200) --seed $(or $(SEED),1)

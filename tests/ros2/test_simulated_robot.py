@@ -41,7 +41,12 @@ def test_a_plain_client_drives_it_cancels_it_and_sees_it_stand_when_its_server_d
     finished(robot.node, handle.cancel_goal_async())
     assert finished(robot.node, handle.get_result_async()).status == GoalStatus.STATUS_CANCELED
     assert robot.soon(lambda: not robot.moves)
-    assert {one.child_frame_id for message in heard for one in message.transforms} == {"base_link", "odom"}
+
+    def both_heard() -> bool:
+        rclpy.spin_once(robot.node, timeout_sec=0.05)
+        return {one.child_frame_id for message in heard for one in message.transforms} == {"base_link", "odom"}
+
+    assert robot.soon(both_heard)
 
     handle = finished(robot.node, client.send_goal_async(goal))
     assert robot.soon(lambda: robot.moves)
