@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from avlmaps.bench.rooms.scores import Listed, judged, median_interval
+from avlmaps.bench.harness.intervals import median_interval
+from avlmaps.bench.rooms.scores import Listed, judged
 from avlmaps.bench.rooms.truth import CELL_M, Floor, floors_of
 from avlmaps.sim.scene import Area
 

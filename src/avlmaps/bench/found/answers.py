@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from avlmaps.bench.found.queries import LabelledQuery, labelled_queries
-from avlmaps.bench.harness.workplace import Workplace, scene_jobs
+from avlmaps.bench.harness.workplace import SceneJob, Workplace, scene_jobs
 from avlmaps.bench.indexing.runs import IndexingSettings, scene_tasks
 from avlmaps.bench.indexing.tasks import Task
 from avlmaps.core.errors import QueryError
@@ -56,8 +56,12 @@ def judged_scene(
         open_spec: makes a scene of its name.
     """
     (job,) = scene_jobs(settings, settings.recorded, (spec,), work)
-    tasks = scene_tasks(job, open_spec, settings.tasks_a_scene)
-    return judged(Workplace(job, open_spec), tasks)
+    return judged_job(job, settings.tasks_a_scene, open_spec)
+
+
+def judged_job(job: SceneJob, most: int, open_spec: Callable[[str], Scene]) -> list[Judged]:
+    """Return the same for a job, with up to ``most`` tasks of each table."""
+    return judged(Workplace(job, open_spec), scene_tasks(job, open_spec, most))
 
 
 def judged(place: Workplace, tasks: Sequence[Task]) -> list[Judged]:

@@ -1,7 +1,7 @@
 """The suite ``avlmaps bench found``: Brier scores, what is reported as found, and a reliability diagram."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -10,10 +10,11 @@ import msgspec
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.bench.found.answers import Judged, judged_scene
+from avlmaps.bench.found.answers import Judged, judged_job
 from avlmaps.bench.harness.intervals import in_percent, wilson
 from avlmaps.bench.harness.provenance import in_words, provenance
 from avlmaps.bench.harness.workers import side_by_side
+from avlmaps.bench.harness.workplace import scene_jobs
 from avlmaps.bench.indexing.runs import IndexingSettings
 from avlmaps.bench.indexing.tables import TITLE
 from avlmaps.bench.indexing.tasks import TaskKind
@@ -32,21 +33,14 @@ NOTE = (
 _BINS = np.linspace(0.0, 1.0, 11)
 
 
-@dataclass(frozen=True, slots=True)
-class _Todo:
-    settings: IndexingSettings
-    spec: str
-    work: Path
-    open_spec: Callable[[str], Scene]
-
-
 def run_found(settings: IndexingSettings | None, out: Path, open_spec: Callable[[str], Scene] = open_scene) -> Any:
     """Query scenes, whose maps are those of the suite ``indexing`` in the same folder; write tables and a picture."""
     settings = settings or IndexingSettings()
     weights = settings.checked()
-    todo = [_Todo(settings, spec, out / "work", open_spec) for spec in settings.scenes]
+    todo = scene_jobs(settings, settings.recorded, settings.scenes, out / "work")
+    judge = partial(judged_job, most=settings.tasks_a_scene, open_spec=open_spec)
     answers = [
-        one for scene in side_by_side(_scene, todo, settings.jobs, "found", lambda one: one.spec) for one in scene
+        one for scene in side_by_side(judge, todo, settings.jobs, "found", lambda one: one.spec) for one in scene
     ]
     answer = {
         "suite": "found",
@@ -59,10 +53,6 @@ def run_found(settings: IndexingSettings | None, out: Path, open_spec: Callable[
     write_bytes_atomically(out / "found_answers.json", msgspec.json.encode(answers))
     draw_reliability(answers, out / "found.png")
     return written
-
-
-def _scene(todo: _Todo) -> list[Judged]:
-    return judged_scene(todo.settings, todo.spec, todo.work, todo.open_spec)
 
 
 def kinds_table(answers: Sequence[Judged]) -> Table:

@@ -29,6 +29,15 @@ def of_mean(shares: Float[np.ndarray, " n"]) -> tuple[float, float]:
     return max(0.0, float(shares.mean()) - half), min(1.0, float(shares.mean()) + half)
 
 
+def median_interval(values: Float[np.ndarray, " n"]) -> tuple[float, float, float]:
+    """Return the median and its 95 % interval, by the ranks between which it lies."""
+    ordered = np.sort(values)
+    half = 0.98 * np.sqrt(len(ordered))
+    low = int(max(0, np.floor(len(ordered) / 2 - half)))
+    high = int(min(len(ordered) - 1, np.ceil(len(ordered) / 2 + half)))
+    return float(np.median(ordered)), float(ordered[low]), float(ordered[high])
+
+
 def in_percent(interval: tuple[float, float]) -> str:
     """Return an interval of a share as tables show it: "48.7 to 67.0"."""
     low, high = interval

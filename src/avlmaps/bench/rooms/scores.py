@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool
 
 from avlmaps.bench.rooms.truth import CELL_M, Floor
 from avlmaps.core.lexicon import Kind, lexicon
@@ -104,12 +104,3 @@ def _same(name: str, kind: str) -> bool:
     known = lexicon()
     a, b = known.find(name, Kind.ROOM), known.find(kind, Kind.ROOM)
     return name == kind or (a is not None and a == b) or known.is_a(name, kind, Kind.ROOM)
-
-
-def median_interval(values: Float[np.ndarray, " n"]) -> tuple[float, float, float]:
-    """Return the median and its 95 % interval, by the ranks between which it lies."""
-    ordered = np.sort(values)
-    half = 0.98 * np.sqrt(len(ordered))
-    low = int(max(0, np.floor(len(ordered) / 2 - half)))
-    high = int(min(len(ordered) - 1, np.ceil(len(ordered) / 2 + half)))
-    return float(np.median(ordered)), float(ordered[low]), float(ordered[high])

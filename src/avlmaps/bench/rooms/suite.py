@@ -1,19 +1,19 @@
 """The suite ``avlmaps bench rooms``: the rooms of a map against those of its scene, before and after."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from avlmaps.bench.harness.intervals import in_percent, of_mean, wilson
+from avlmaps.bench.harness.intervals import in_percent, median_interval, of_mean, wilson
 from avlmaps.bench.harness.provenance import in_words, provenance
 from avlmaps.bench.harness.workers import side_by_side
-from avlmaps.bench.harness.workplace import Workplace, scene_jobs
+from avlmaps.bench.harness.workplace import SceneJob, Workplace, scene_jobs
 from avlmaps.bench.indexing.runs import IndexingSettings
 from avlmaps.bench.output import Table, draw, markdown, write_answer
-from avlmaps.bench.rooms.scores import Judged, Listed, Matched, judged, median_interval
+from avlmaps.bench.rooms.scores import Judged, Listed, Matched, judged
 from avlmaps.bench.rooms.truth import Floor, floors_of
 from avlmaps.query.floor_plan import CELL_M as PLAN_CELL_M
 from avlmaps.sim.scene import Scene
@@ -34,20 +34,12 @@ TABLES = {"rooms": True, "areas": False}
 _SEEN_VIEWS, _FEWEST_VIEWS = 0.1, 2
 
 
-@dataclass(frozen=True, slots=True)
-class _Todo:
-    settings: IndexingSettings
-    spec: str
-    work: Path
-    open_spec: Callable[[str], Scene]
-
-
 def run_rooms(settings: IndexingSettings | None, out: Path, open_spec: Callable[[str], Scene] = open_scene) -> Any:
     """List the rooms of scenes, whose maps are those of the suite ``indexing`` in the same folder; write tables."""
     settings = settings or IndexingSettings()
     weights = settings.checked()
-    todo = [_Todo(settings, spec, out / "work", open_spec) for spec in settings.scenes]
-    found = side_by_side(_scene, todo, settings.jobs, "rooms", lambda one: one.spec)
+    todo = scene_jobs(settings, settings.recorded, settings.scenes, out / "work")
+    found = side_by_side(partial(_scene, open_spec=open_spec), todo, settings.jobs, "rooms", lambda one: one.spec)
     tables: dict[str, Table] = {}
     for name in TABLES:
         ways = {way: [one[name, way] for one in found] for way in (BEFORE, AFTER)}
@@ -65,16 +57,15 @@ def run_rooms(settings: IndexingSettings | None, out: Path, open_spec: Callable[
     return written
 
 
-def _scene(todo: _Todo) -> dict[tuple[str, str], Judged]:
-    (job,) = scene_jobs(todo.settings, todo.settings.recorded, (todo.spec,), todo.work)
-    place = Workplace(job, todo.open_spec)
+def _scene(job: SceneJob, open_spec: Callable[[str], Scene]) -> dict[tuple[str, str], Judged]:
+    place = Workplace(job, open_spec)
     avlmap, truth = place.avlmap, place.truth
     cameras = np.asarray(avlmap.stored.keyframes.world_from_camera, np.float64)[:, :3, 3]
     out: dict[tuple[str, str], Judged] = {}
     for name, join in TABLES.items():
         floors = floors_of(truth.areas, place.wall_points, avlmap.space.centres, cameras, join)
         for way, listed in ((BEFORE, rooms_by_kind), (AFTER, rooms_by_walls)):
-            out[name, way] = judged(todo.spec, floors, [listed(avlmap, floor) for floor in floors])
+            out[name, way] = judged(job.spec, floors, [listed(avlmap, floor) for floor in floors])
     return out
 
 
