@@ -7,7 +7,8 @@ as viewers of GLB expect.
 
 import csv
 import io
-from collections.abc import Iterable, Sequence
+from collections.abc import Generator, Iterable, Sequence
+from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -315,10 +316,21 @@ def to_trimesh(points: Float[np.ndarray, "n 3"], colors: UInt8[np.ndarray, "n 3"
     return trimesh.PointCloud(np.asarray(points, np.float64), colors=np.asarray(colors))
 
 
-def _write(path: Path, content: bytes) -> Path:
+@contextmanager
+def explain_write_errors(path: Path) -> Generator[None]:
+    """Make the folder of a file that is written then; a fault of the disk is one sentence.
+
+    Raises:
+        QueryError: it cannot be written.
+    """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        write_bytes_atomically(path, content)
+        yield
     except OSError as fault:
-        raise QueryError(f"{path} cannot be written ({fault.strerror}); choose another place.") from fault
+        raise QueryError(f"{path} cannot be written ({fault.strerror or fault}); choose another place.") from fault
+
+
+def _write(path: Path, content: bytes) -> Path:
+    with explain_write_errors(path):
+        write_bytes_atomically(path, content)
     return path

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 
 from avlmaps.core.arrays import Float32, UInt8
-from avlmaps.core.errors import BackendError, QueryError
+from avlmaps.core.errors import BackendError
 from avlmaps.core.extras import install_command
 from avlmaps.core.files import replacing
 from avlmaps.core.poses import to_quaternion
-from avlmaps.query.export import heat_colors
+from avlmaps.query.export import explain_write_errors, heat_colors
 from avlmaps.query.export_layers import Heard, Layers
 
 CAMERA_FRAME = "camera"
@@ -40,14 +40,13 @@ def write_foxglove(path: Path, layers: Layers) -> Path:
         channels, messages = (import_module(f"foxglove.{name}") for name in ("channels", "messages"))
     except ImportError as fault:
         raise BackendError(f"An .mcap file needs the package foxglove-sdk; {install_command('foxglove')}.") from fault
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with replacing(path) as part:
-            context = foxglove.Context()
-            with foxglove.open_mcap(part, allow_overwrite=True, context=context):
-                _Writer(channels, messages, context, layers).write()
-    except OSError as fault:
-        raise QueryError(f"{path} cannot be written ({fault.strerror or fault}); choose another place.") from fault
+    context = foxglove.Context()
+    with (
+        explain_write_errors(path),
+        replacing(path) as part,
+        foxglove.open_mcap(part, allow_overwrite=True, context=context),
+    ):
+        _Writer(channels, messages, context, layers).write()
     return path
 
 

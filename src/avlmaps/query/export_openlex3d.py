@@ -14,6 +14,7 @@ import numpy as np
 from avlmaps.core.arrays import Float32, UInt8
 from avlmaps.core.errors import QueryError
 from avlmaps.core.files import write_bytes_atomically
+from avlmaps.query.export import explain_write_errors
 
 if TYPE_CHECKING:
     from avlmaps.query.avlmap import AVLMap
@@ -40,12 +41,9 @@ def write_openlex3d(folder: Path, opened: "AVLMap") -> tuple[Path, ...]:
         _npy(np.arange(len(rows), dtype=np.int64)),
         pcd_bytes(opened.points[rows].astype(np.float32), opened.colors[rows]),
     )
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for name, content in zip(FILES, contents, strict=True):
+    for name, content in zip(FILES, contents, strict=True):
+        with explain_write_errors(folder / name):
             write_bytes_atomically(folder / name, content)
-    except OSError as fault:
-        raise QueryError(f"{folder} cannot be written ({fault.strerror or fault}); choose another place.") from fault
     return tuple(folder / name for name in FILES)
 
 

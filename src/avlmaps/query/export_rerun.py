@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from avlmaps.core.errors import BackendError, QueryError
+from avlmaps.core.errors import BackendError
 from avlmaps.core.extras import install_command
 from avlmaps.core.files import replacing
 from avlmaps.core.frames import FrameName
 from avlmaps.core.poses import to_quaternion
-from avlmaps.query.export import heat_colors
+from avlmaps.query.export import explain_write_errors, heat_colors
 from avlmaps.query.export_layers import Layers
 
 TIMELINE = "recording"
@@ -36,16 +36,12 @@ def write_rerun(path: Path, layers: Layers) -> Path:
         rr: Any = import_module("rerun")
     except ImportError as fault:
         raise BackendError(f"A .rrd file needs the package rerun-sdk; {install_command('rerun')}.") from fault
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with replacing(path) as part, rr.RecordingStream("avlmaps") as stream:
-            stream.save(part)
-            _log_still(rr, stream, layers)
-            _log_drive(rr, stream, layers)
-            stream.flush()
-            stream.disconnect()
-    except OSError as fault:
-        raise QueryError(f"{path} cannot be written ({fault.strerror or fault}); choose another place.") from fault
+    with explain_write_errors(path), replacing(path) as part, rr.RecordingStream("avlmaps") as stream:
+        stream.save(part)
+        _log_still(rr, stream, layers)
+        _log_drive(rr, stream, layers)
+        stream.flush()
+        stream.disconnect()
     return path
 
 
