@@ -5,6 +5,7 @@ On each storey doorways are closed (``doorways``), and the free floor is parted 
 wider than ``doorways.WIDEST_M`` between them, are one region.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -234,6 +235,13 @@ class RoomRegions:
         points = np.asarray(points_world, np.float64).reshape(-1, 3)
         level, storey = self.plan.space.level(points), self.plan.storeys_of(points)
         return self._of(level[:, :2], storey)
+
+    def listed_at(self, listed: Sequence[int], points_world: Float[np.ndarray, "m 3"]) -> Int[np.ndarray, " m"]:
+        """Return the place in a list of rooms of the one that each point lies in; ``NONE`` for a room not in it."""
+        place = np.full(len(self) + 1, NONE, np.int64)
+        place[np.asarray(listed, np.int64)] = np.arange(len(listed))
+        place[-1] = NONE  # no region: of points outside, and of rooms that are groups of views
+        return place[self.at(points_world)]
 
     @cached_property
     def of_plan_cells(self) -> Int[np.ndarray, " c"]:

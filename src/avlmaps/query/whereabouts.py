@@ -86,11 +86,7 @@ class Whereabouts:
         nearest = KDTree(self._by_storey(level(places), places)).query(self._by_storey(level(points), points))[1]
         if self.regions is None:
             return number[nearest]
-        of_region = np.full(len(self.regions) + 1, NOWHERE, np.int64)
-        for own_number, room in enumerate(self.rooms):
-            of_region[room.region] = own_number
-        of_region[-1] = NOWHERE  # rooms that are groups of views have no region
-        own = of_region[self.regions.at(points)]
+        own = self.regions.listed_at([room.region for room in self.rooms], points)
         return np.where(own == NOWHERE, number[nearest], own)
 
     def _by_storey(self, level: Float[np.ndarray, "m 3"], points: Float[np.ndarray, "m 3"]) -> np.ndarray:

@@ -143,11 +143,9 @@ def _room_labels(
         return names, np.zeros(len(rows), np.uint8)
     space, regions = avlmap.space, avlmap.room_regions
     if regions is not None and len(regions):
-        of_region = np.full(len(regions) + 1, NONE, np.uint8)  # the last is that of no region
-        for room in rooms:
-            of_region[room.region] = 1 + names.index(room.name) if room.name in names else NONE
-        of_region[-1] = NONE
-        return names, of_region[regions.at(space.centres_of(rows))]
+        label_of = [1 + names.index(room.name) if room.name in names else NONE for room in rooms]
+        number = regions.listed_at([room.region for room in rooms], space.centres_of(rows))
+        return names, np.array([*label_of, NONE], np.uint8)[number]  # the last is that of no room
     places = np.concatenate([space.level(room.places)[:, :2] for room in rooms])
     label = np.concatenate([np.full(room.views, 1 + names.index(room.name), np.uint8) for room in rooms])
     if not _is_level(avlmap):
