@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from avlmaps.maps.settings import BuildSettings
+    from avlmaps.maps.store.reader import StoredMap
     from avlmaps.perception.encoders import Encoders
     from avlmaps.perception.profiles import Profile
     from avlmaps.query.avlmap import AVLMap
@@ -63,7 +64,7 @@ def build_map(
         overwrite=overwrite,
         progress=progress,
     )
-    return AVLMap(stored if encoders is None else replace(stored, encoders=encoders.over(stored.encoders)))
+    return AVLMap(_asked_with(stored, encoders))
 
 
 def open_map(path: str | Path, *, encoders: "Encoders | None" = None) -> "AVLMap":
@@ -80,5 +81,9 @@ def open_map(path: str | Path, *, encoders: "Encoders | None" = None) -> "AVLMap
     from avlmaps.maps.store.reader import open_stored
     from avlmaps.query.avlmap import AVLMap
 
-    stored = open_stored(path)
-    return AVLMap(stored if encoders is None else replace(stored, encoders=encoders.over(stored.encoders)))
+    return AVLMap(_asked_with(open_stored(path), encoders))
+
+
+def _asked_with(stored: "StoredMap", encoders: "Encoders | None") -> "StoredMap":
+    """Return a map with encoders in the place of those that it names."""
+    return stored if encoders is None else replace(stored, encoders=encoders.over(stored.encoders))
