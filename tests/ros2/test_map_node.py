@@ -86,7 +86,10 @@ def client(room, tmp_path_factory):
     looker.node.destroy_node()
     rclpy.try_shutdown()
     process.terminate()
-    process.wait(60.0)
+    try:
+        process.wait(60.0)
+    finally:
+        process.kill()
 
 
 def read(message: PointCloud2) -> np.ndarray:
