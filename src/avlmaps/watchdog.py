@@ -12,7 +12,9 @@ than the rest of avlmaps needs runs a copy of it, ``python3 watchdog.py``.
 from __future__ import annotations
 
 import argparse
+import signal
 import sys
+import threading
 import time
 from importlib.util import find_spec
 
@@ -99,11 +101,13 @@ def run_ros2(watch: Watch, words: list[str]) -> None:
     import rclpy
     from action_msgs.msg import GoalStatusArray
     from action_msgs.srv import CancelGoal
-    from rclpy.executors import ExternalShutdownException
     from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
     from std_msgs.msg import String
 
     rclpy.init(args=words)
+    ended = threading.Event()  # the handlers of rclpy end ROS beneath a step, which then raises or waits for ever
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: ended.set())
     node = rclpy.create_node("avlmaps_watchdog")
     log = node.get_logger()
     cancels = {name: node.create_client(CancelGoal, f"{name}/_action/cancel_goal") for name in ACTIONS}
@@ -132,12 +136,8 @@ def run_ros2(watch: Watch, words: list[str]) -> None:
     node.create_timer(LOOK_EVERY_S, look)
     log.info(f"watching {', '.join(ACTIONS)}: a goal without a heartbeat for {watch.silence_s:g} s is cancelled")
     try:
-        rclpy.spin(node)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    except Exception:
-        if rclpy.ok():  # else a signal ended ROS in the middle of a step
-            raise
+        while not ended.is_set():
+            rclpy.spin_once(node, timeout_sec=LOOK_EVERY_S)
     finally:
         node.destroy_node()
         rclpy.try_shutdown()

@@ -1,6 +1,8 @@
 """The node: opens one map, publishes it, answers questions about it."""
 # pyright: reportMissingImports=false
 
+import signal
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +11,6 @@ import rclpy
 from avlmaps_msgs.msg import Place, Thing
 from avlmaps_msgs.srv import Ask, Locate, Things
 from nav_msgs.msg import OccupancyGrid
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import PointCloud2
@@ -137,19 +138,20 @@ class MapNode(Node):
 def main() -> None:
     """Run the node until the process ends."""
     rclpy.init()
+    ended = threading.Event()  # the handlers of rclpy end ROS beneath a step, which then raises or waits for ever
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: ended.set())
     try:
         node = MapNode()
     except AvlmapsError as fault:
         rclpy.try_shutdown()
         raise SystemExit(f"avlmaps_ros: {fault}") from None
     try:
-        rclpy.spin(node)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    except Exception:
-        if rclpy.ok():  # else a signal ended ROS in the middle of a step
-            raise
-    rclpy.try_shutdown()
+        while not ended.is_set():
+            rclpy.spin_once(node, timeout_sec=0.5)
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown()
 
 
 if __name__ == "__main__":
