@@ -11,7 +11,7 @@ import pytest
 from avlmaps.core.lexicon import Kind, lexicon, squeezed
 from avlmaps.demo import questions
 from avlmaps.perception.embedded.words import EmbeddedWords
-from avlmaps.perception.foundation.prompts import THINGS
+from avlmaps.perception.models.prompts import THINGS
 from avlmaps.query.modalities.area import AREA_NAMES
 from avlmaps.sim.furniture import categories
 from avlmaps.sim.hearing import KINDS as SOUND_KINDS

@@ -14,7 +14,7 @@ from tiny.audioclip import DIM, MODEL, tiny_state, write_audioclip
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Kind, load
 from avlmaps.perception.conformance import check, example_sound
-from avlmaps.perception.foundation.sound_windows import windows
+from avlmaps.perception.models.sound_windows import windows
 from avlmaps.perception.paper.audioclip import AudioClipSounds
 from avlmaps.perception.paper.fbsp import FrontEnd
 from avlmaps.recordings.audio import Sound

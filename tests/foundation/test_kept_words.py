@@ -10,7 +10,7 @@ from tiny.clip import write_clip
 
 from avlmaps.perception.cache.text_features import KeptWords
 from avlmaps.perception.foundation.clip import ClipViews
-from avlmaps.perception.foundation.prompts import Prompted
+from avlmaps.perception.models.prompts import Prompted
 from avlmaps.perception.models.settings import ModelSettings, using_models
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.perception.user_folder import cache_folder

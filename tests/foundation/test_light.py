@@ -24,8 +24,6 @@ from avlmaps.core.lexicon import lexicon
 from avlmaps.core.registry import Kind, forget_loaded, load
 from avlmaps.perception.conformance import check, example_frame, example_sound
 from avlmaps.perception.foundation.clap import ClapSounds
-from avlmaps.perception.foundation.prompts import AREA_PROMPTS, THINGS, TIPS_PROMPTS, clean
-from avlmaps.perception.foundation.sound_scores import OTHERS
 from avlmaps.perception.foundation.tipsv2 import TipsPixels
 from avlmaps.perception.light import bundle as files
 from avlmaps.perception.light.mel import log_mel
@@ -33,7 +31,9 @@ from avlmaps.perception.light.pixels import LightPixels
 from avlmaps.perception.light.sounds import LightSounds
 from avlmaps.perception.light.tower import interpolation
 from avlmaps.perception.light.views import LightViews
+from avlmaps.perception.models.prompts import AREA_PROMPTS, THINGS, TIPS_PROMPTS, clean
 from avlmaps.perception.models.settings import ModelSettings, using_models
+from avlmaps.perception.models.sound_scores import OTHERS
 from avlmaps.query.modalities.area import AREA_NAMES
 
 CLAP = "laion/clap-htsat-unfused"

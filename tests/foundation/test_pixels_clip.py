@@ -12,7 +12,7 @@ from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Kind, load
 from avlmaps.perception.conformance import check, example_frame
 from avlmaps.perception.foundation.clip_patches import ClipPatches
-from avlmaps.perception.foundation.prompts import CLIP_PROMPTS
+from avlmaps.perception.models.prompts import CLIP_PROMPTS
 from avlmaps.perception.protocols import BatchPixelEncoder, ScaledEncoder
 
 HUB_ID = "openai/clip-vit-base-patch16"

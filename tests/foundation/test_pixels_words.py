@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import BackendError
-from avlmaps.perception.foundation.picture_sizes import working_size
 from avlmaps.perception.foundation.pictures import split_model_way
-from avlmaps.perception.foundation.prompts import CLIP_PROMPTS, THINGS, TIPS_PROMPTS, Prompted, mean_direction
+from avlmaps.perception.models.picture_sizes import working_size
+from avlmaps.perception.models.prompts import CLIP_PROMPTS, THINGS, TIPS_PROMPTS, Prompted, mean_direction
 
 
 def letters(texts: list[str]) -> np.ndarray:

@@ -14,7 +14,7 @@ from avlmaps.core.registry import Kind
 from avlmaps.perception.conformance import check, example_frame
 from avlmaps.perception.foundation.clip import ClipViews
 from avlmaps.perception.foundation.open_views import UNKNOWN_LICENCE, licence_of, note_of
-from avlmaps.perception.foundation.prompts import AREA_PROMPTS
+from avlmaps.perception.models.prompts import AREA_PROMPTS
 from avlmaps.perception.models.settings import ModelSettings, using_models
 from avlmaps.perception.protocols import ScaledEncoder
 

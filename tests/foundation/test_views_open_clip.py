@@ -12,7 +12,7 @@ from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Kind
 from avlmaps.perception.conformance import check, example_frame
 from avlmaps.perception.foundation.open_clip_views import OpenClipViews
-from avlmaps.perception.foundation.prompts import AREA_PROMPTS
+from avlmaps.perception.models.prompts import AREA_PROMPTS
 from avlmaps.perception.protocols import ScaledEncoder
 
 PE, VIT = "timm/PE-Core-B-16", "laion/CLIP-ViT-B-16-DataComp.XL-s13B-b90K"

@@ -18,8 +18,6 @@ from training.light.towers import PictureTower, PictureWords, SoundTower, SoundW
 from avlmaps.core.files import sha256_of_file
 from avlmaps.core.lexicon import Kind, lexicon
 from avlmaps.perception.foundation.clap import PROMPT as SOUND_PROMPT
-from avlmaps.perception.foundation.prompts import AREA_PROMPTS, TIPS_PROMPTS, clean, mean_direction
-from avlmaps.perception.foundation.sound_scores import OTHERS
 from avlmaps.perception.light import bundle as files
 from avlmaps.perception.light.mel import log_mel
 from avlmaps.perception.light.tokens import Tokens
@@ -27,6 +25,8 @@ from avlmaps.perception.light.tower import interpolation, resized
 from avlmaps.perception.models.checksums import checksum_of, weights_in
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.pretrained import load_helper, load_pretrained, pretrained_folder
+from avlmaps.perception.models.prompts import AREA_PROMPTS, TIPS_PROMPTS, clean, mean_direction
+from avlmaps.perception.models.sound_scores import OTHERS
 
 _CPU = torch.device("cpu")
 _OPSET = 17
@@ -260,7 +260,7 @@ def _small_vectors(path: Path, tokens: Tokens, phrases: Sequence[str], prompts: 
 
 
 def _picture_input(rgb: np.ndarray, note: files.PictureNote) -> dict[str, np.ndarray]:
-    from avlmaps.perception.foundation.picture_sizes import working_size
+    from avlmaps.perception.models.picture_sizes import working_size
 
     height, width = working_size(*rgb.shape[:2], note.short_side, note.patch)
     return {

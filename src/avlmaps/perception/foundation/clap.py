@@ -20,12 +20,12 @@ import torch
 from jaxtyping import Float32
 
 from avlmaps.perception.foundation.open_sounds import ContrastSounds
-from avlmaps.perception.foundation.sound_windows import by_portions, usable_samples, windows
 from avlmaps.perception.models.checksums import checksum_of, weights_in
 from avlmaps.perception.models.device import select_batch, select_device, unit_rows
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.precision import mixed_precision
 from avlmaps.perception.models.pretrained import load_helper, load_pretrained, pretrained_folder
+from avlmaps.perception.models.sound_windows import by_portions, usable_samples, windows
 from avlmaps.perception.models.texts import text_features
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.audio import Sound

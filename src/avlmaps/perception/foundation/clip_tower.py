@@ -9,11 +9,11 @@ from jaxtyping import Float, UInt8
 
 from avlmaps.perception.foundation.open_views import licence_of
 from avlmaps.perception.foundation.pictures import Size, stack_pictures
-from avlmaps.perception.foundation.prompts import CLIP_PROMPTS, Prompted
 from avlmaps.perception.models.checksums import checksum_of, weights_in
 from avlmaps.perception.models.device import inference, select_device, select_dtype, to_numpy
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.pretrained import load_helper, load_pretrained, pretrained_folder
+from avlmaps.perception.models.prompts import CLIP_PROMPTS, Prompted
 from avlmaps.perception.models.texts import text_features
 
 # Of red, green and blue in [0, 1], as published with the weights.

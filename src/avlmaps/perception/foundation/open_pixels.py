@@ -7,8 +7,8 @@ import numpy as np
 from jaxtyping import Float32, UInt8
 
 from avlmaps.perception.foundation.pictures import encode_in_batches
-from avlmaps.perception.foundation.prompts import THINGS, Prompted, clean
 from avlmaps.perception.models.device import select_batch
+from avlmaps.perception.models.prompts import THINGS, Prompted, clean
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.types import Frame
 

@@ -8,10 +8,10 @@ import numpy as np
 import torch
 from jaxtyping import Float32
 
-from avlmaps.perception.foundation.sound_scores import OTHERS, Contrast
-from avlmaps.perception.foundation.sound_windows import WORDS_AT_ONCE, by_portions
 from avlmaps.perception.models.device import select_device, unit_rows
 from avlmaps.perception.models.precision import mixed_precision
+from avlmaps.perception.models.sound_scores import OTHERS, Contrast
+from avlmaps.perception.models.sound_windows import WORDS_AT_ONCE, by_portions
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.audio import Sound
 

@@ -11,12 +11,12 @@ from jaxtyping import Float32, UInt8
 
 from avlmaps.core.errors import BackendError
 from avlmaps.perception.cache.text_features import KeptWords
-from avlmaps.perception.foundation.prompts import AREA_PROMPTS, Prompted
 from avlmaps.perception.models.checksums import checksum_of
 from avlmaps.perception.models.device import select_batch, select_device, unit_rows
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.precision import mixed_precision
 from avlmaps.perception.models.pretrained import load_helper, load_pretrained, pretrained_folder
+from avlmaps.perception.models.prompts import AREA_PROMPTS, Prompted
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.types import Frame
 

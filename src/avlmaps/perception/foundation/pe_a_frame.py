@@ -25,13 +25,13 @@ import numpy as np
 import torch
 from jaxtyping import Float, Float32
 
-from avlmaps.perception.foundation.sound_scores import OTHERS, QUIET, joined, one_kind, sigmoid
-from avlmaps.perception.foundation.sound_windows import WORDS_AT_ONCE, by_portions, usable_samples
 from avlmaps.perception.models.checksums import checksum_of, weights_in
 from avlmaps.perception.models.device import select_device, to_numpy
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.precision import mixed_precision
 from avlmaps.perception.models.pretrained import load_helper, load_pretrained, pretrained_folder
+from avlmaps.perception.models.sound_scores import OTHERS, QUIET, joined, one_kind, sigmoid
+from avlmaps.perception.models.sound_windows import WORDS_AT_ONCE, by_portions, usable_samples
 from avlmaps.perception.models.texts import text_tokens
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.audio import Sound

@@ -8,7 +8,7 @@ import torch
 from jaxtyping import Float32, UInt8
 
 from avlmaps.core.errors import BackendError
-from avlmaps.perception.foundation.picture_sizes import Size
+from avlmaps.perception.models.picture_sizes import Size
 from avlmaps.recordings.types import Frame
 
 

@@ -21,10 +21,10 @@ from jaxtyping import Float32, UInt8
 
 from avlmaps.perception.foundation.clip_tower import ClipTower
 from avlmaps.perception.foundation.open_pixels import OpenPixels
-from avlmaps.perception.foundation.picture_sizes import working_size
-from avlmaps.perception.foundation.prompts import CLIP_PROMPTS
 from avlmaps.perception.foundation.proposals import Proposals, ProposalSettings, Sam2Proposals
 from avlmaps.perception.models.device import inference, select_batch, to_numpy, unit_rows
+from avlmaps.perception.models.picture_sizes import working_size
+from avlmaps.perception.models.prompts import CLIP_PROMPTS
 from avlmaps.perception.protocols import ModelCard
 
 _PROPOSER = "facebook/sam2.1-hiera-tiny"

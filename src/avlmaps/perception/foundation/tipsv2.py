@@ -22,9 +22,7 @@ import torch
 from jaxtyping import Float32, UInt8
 
 from avlmaps.perception.foundation.open_pixels import OpenPixels
-from avlmaps.perception.foundation.picture_sizes import working_size
 from avlmaps.perception.foundation.pictures import split_model_way, stack_pictures
-from avlmaps.perception.foundation.prompts import TIPS_PROMPTS, Prompted
 from avlmaps.perception.models.checksums import checksum_of, weights_in
 from avlmaps.perception.models.device import (
     inference,
@@ -34,7 +32,9 @@ from avlmaps.perception.models.device import (
     unit_rows,
 )
 from avlmaps.perception.models.names import public_name
+from avlmaps.perception.models.picture_sizes import working_size
 from avlmaps.perception.models.pretrained import load_helper, load_pretrained, pretrained_folder
+from avlmaps.perception.models.prompts import TIPS_PROMPTS, Prompted
 from avlmaps.perception.models.texts import text_features
 from avlmaps.perception.protocols import ModelCard
 

@@ -16,9 +16,9 @@ from jaxtyping import Float, Float32
 
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Kind, load
-from avlmaps.perception.foundation.sound_windows import usable_samples, windows
 from avlmaps.perception.models.checksums import checksum_of
 from avlmaps.perception.models.files import local_model
+from avlmaps.perception.models.sound_windows import usable_samples, windows
 from avlmaps.perception.protocols import ModelCard, WordEncoder
 from avlmaps.recordings.audio import Sound
 

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float32
 
-from avlmaps.perception.foundation.prompts import THINGS, clean
 from avlmaps.perception.light.bundle import MODEL, PICTURE_TOKENS, PICTURE_WORDS, PICTURES, Bundle, open_bundle
 from avlmaps.perception.light.tower import tower_of
 from avlmaps.perception.light.words import LightWords, TextTower
+from avlmaps.perception.models.prompts import THINGS, clean
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.types import Frame
 

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float32
 
-from avlmaps.perception.foundation.sound_scores import OTHERS, Contrast
-from avlmaps.perception.foundation.sound_windows import usable_samples, windows
 from avlmaps.perception.light.bundle import MODEL, SOUND_TOKENS, SOUND_WORDS, SOUNDS, open_bundle
 from avlmaps.perception.light.mel import log_mel
 from avlmaps.perception.light.words import LightWords, TextTower
+from avlmaps.perception.models.sound_scores import OTHERS, Contrast
+from avlmaps.perception.models.sound_windows import usable_samples, windows
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.audio import Sound
 

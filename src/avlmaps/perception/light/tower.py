@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float32, UInt8
 
-from avlmaps.perception.foundation.picture_sizes import working_size
 from avlmaps.perception.light.bundle import PICTURES, Bundle
+from avlmaps.perception.models.picture_sizes import working_size
 
 _VIEWS = 4096
 

@@ -12,9 +12,9 @@ from jaxtyping import Float32
 
 from avlmaps.core.errors import BackendError
 from avlmaps.perception.cache.text_features import KeptWords
-from avlmaps.perception.foundation.prompts import Prompted, clean
 from avlmaps.perception.light.bundle import HOW_TO_GET, KNOWN_WORDS, Bundle
 from avlmaps.perception.light.tokens import Tokens, read_tokens
+from avlmaps.perception.models.prompts import Prompted, clean
 from avlmaps.perception.protocols import ModelCard
 
 

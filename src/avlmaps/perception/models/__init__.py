@@ -1,1 +1,1 @@
-"""Where the files of large models come from, on which device they run, and in which precision."""
+"""What published models share, on torch or not: files, names, prompts, sizes of pictures and sounds."""

@@ -22,13 +22,13 @@ from jaxtyping import Float32
 
 from avlmaps.core.errors import BackendError
 from avlmaps.perception.foundation.open_sounds import ContrastSounds
-from avlmaps.perception.foundation.sound_scores import OTHERS
-from avlmaps.perception.foundation.sound_windows import by_portions, usable_samples, windows
 from avlmaps.perception.models.checksums import checksum_of
 from avlmaps.perception.models.device import inference, select_batch, select_device, unit_rows
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.precision import mixed_precision
 from avlmaps.perception.models.published import load_strictly, published_file, read_tensors
+from avlmaps.perception.models.sound_scores import OTHERS
+from avlmaps.perception.models.sound_windows import by_portions, usable_samples, windows
 from avlmaps.perception.paper.audioclip_network import NOT_NEEDED, AudioClipNetwork, SoundSizes
 from avlmaps.perception.paper.clip_text import ClipTextSizes, padded
 from avlmaps.perception.paper.clip_tokens import clip_tokens

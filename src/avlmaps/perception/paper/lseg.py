@@ -22,12 +22,12 @@ from jaxtyping import Float32, UInt8
 
 from avlmaps.core.errors import BackendError
 from avlmaps.perception.foundation.open_pixels import OpenPixels
-from avlmaps.perception.foundation.prompts import Prompted
 from avlmaps.perception.models.checksums import checksum_of
 from avlmaps.perception.models.device import inference, select_device, to_numpy, unit_rows
 from avlmaps.perception.models.files import model_file
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.precision import mixed_precision
+from avlmaps.perception.models.prompts import Prompted
 from avlmaps.perception.models.published import network_from
 from avlmaps.perception.paper.archives import read_weights
 from avlmaps.perception.paper.clip_text import padded

@@ -22,14 +22,14 @@ from torch.nn import functional
 
 from avlmaps.core.errors import BackendError
 from avlmaps.perception.foundation.open_sounds import ContrastSounds
-from avlmaps.perception.foundation.sound_scores import OTHERS
-from avlmaps.perception.foundation.sound_windows import usable_samples, windows
 from avlmaps.perception.models.checksums import checksum_of, weights_in
 from avlmaps.perception.models.device import inference, select_device, unit_rows
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.models.precision import mixed_precision
 from avlmaps.perception.models.pretrained import load_helper, load_pretrained, pretrained_folder
 from avlmaps.perception.models.published import load_strictly, published_file, read_tensors
+from avlmaps.perception.models.sound_scores import OTHERS
+from avlmaps.perception.models.sound_windows import usable_samples, windows
 from avlmaps.perception.models.texts import text_features
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.audio import Sound
