@@ -19,9 +19,9 @@ from avlmaps.navigate.driver import MapDriver
 from avlmaps.navigate.footprint import Outline
 from avlmaps.navigate.instances import Thing
 from avlmaps.navigate.paths import PathFinder
+from avlmaps.navigate.rehearsal import FreeBody
 from avlmaps.navigate.skills import Robot
 from avlmaps.query.voxel_space import Space
-from avlmaps.view.route import MapBody
 from helpers.two_floors import SIZE_M, UPPER_M, VOXEL_M, WELL, two_floors
 
 DOWN, UP = (3.0, 3.0, 0.0), (6.5, 2.0, UPPER_M)
@@ -115,7 +115,7 @@ def test_on_one_storey_a_path_is_as_ever() -> None:
 
 
 def test_a_driver_on_the_ground_floor_goes_nowhere_for_a_place_upstairs() -> None:
-    driver = MapDriver(obstacles_for(HOME, BASE, 0), MapBody(GroundPose(3.0, 3.0, 0.0)))
+    driver = MapDriver(obstacles_for(HOME, BASE, 0), FreeBody(GroundPose(3.0, 3.0, 0.0)))
     refused = driver.go_to(np.array(UP))
     assert not refused.reached and "does not climb stairs" in refused.note and driver.pose == GroundPose(3.0, 3.0, 0.0)
     assert driver.go_to(np.array([5.0, 3.0, 0.7])).reached
@@ -123,7 +123,7 @@ def test_a_driver_on_the_ground_floor_goes_nowhere_for_a_place_upstairs() -> Non
 
 
 def test_a_skill_beside_a_thing_upstairs_is_refused_and_not_driven_on_the_floor_below() -> None:
-    driver = MapDriver(obstacles_for(HOME, BASE, 0), MapBody(GroundPose(3.0, 3.0, 0.0)))
+    driver = MapDriver(obstacles_for(HOME, BASE, 0), FreeBody(GroundPose(3.0, 3.0, 0.0)))
     robot = Robot(HOME, driver)
     with pytest.raises(NavigationError, match="does not climb stairs"):
         robot.move_north(Place(5.0, 2.0, UPPER_M + 0.5))
@@ -132,7 +132,7 @@ def test_a_skill_beside_a_thing_upstairs_is_refused_and_not_driven_on_the_floor_
 
 
 def test_of_things_on_two_storeys_those_of_the_robots_own_count_where_one_is_found() -> None:
-    robot = Robot(HOME, MapDriver(obstacles_for(HOME, BASE, 0), MapBody(GroundPose(3.0, 3.0, 0.0))))
+    robot = Robot(HOME, MapDriver(obstacles_for(HOME, BASE, 0), FreeBody(GroundPose(3.0, 3.0, 0.0))))
     up, down, unlikely = (
         Thing("bed", Outline.at(np.array([x, 2.0])), np.array([x, 2.0, z]), likely)
         for x, z, likely in ((3.0, UPPER_M + 0.5, 0.9), (5.0, 0.5, 0.8), (5.0, 0.5, 0.3))

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.core.motion import FORWARD_M, TURN_RAD, Action, GroundPose, Moved
+from avlmaps.core.motion import Action, GroundPose, Moved
 from avlmaps.language.program import Budget
 from avlmaps.language.rules import RulesTranslator
 from avlmaps.language.translator import Translation
@@ -22,7 +22,7 @@ NO_FILES = Readable((), ())
 
 
 class FreeBody:
-    """A body without a world: every movement is done exactly."""
+    """A body without a world: every movement is done exactly. The driver's own map holds it off the walls."""
 
     def __init__(self, pose: GroundPose) -> None:
         """Put it at a pose of the level frame."""
@@ -30,16 +30,12 @@ class FreeBody:
 
     def act(self, action: Action) -> Moved:
         """Take one of the paper's actions."""
-        if action is Action.FORWARD:
-            self.pose = self.pose.ahead(FORWARD_M)
-        elif action is not Action.STOP:
-            self.pose = self.pose.turned(TURN_RAD if action is Action.LEFT else -TURN_RAD)
+        self.pose = self.pose.after(action)
         return Moved(self.pose)
 
     def drive(self, speed_m_s: float, turn_rad_s: float, duration_s: float) -> Moved:
-        """Move at a velocity for a while; turns first by half."""
-        middle = self.pose.turned(0.5 * turn_rad_s * duration_s)
-        self.pose = middle.ahead(speed_m_s * duration_s).turned(0.5 * turn_rad_s * duration_s)
+        """Drive along an arc for a while."""
+        self.pose = self.pose.driven(speed_m_s, turn_rad_s, duration_s)
         return Moved(self.pose)
 
 
@@ -56,7 +52,7 @@ def rehearse(
     readable: Readable = NO_FILES,
     tell: Callable[[str], None] = lambda _: None,
 ) -> Outcome:
-    """Run a program on the map with a body that nothing meets; waits take no time.
+    """Run a program on the map alone, with a body that meets no obstacle; waits take no time.
 
     Args:
         words: the command; "" where there is only a program.

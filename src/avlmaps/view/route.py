@@ -2,14 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import cos, sin
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core.errors import NavigationError
-from avlmaps.core.motion import FORWARD_M, TURN_RAD, Action, GroundPose, Moved
+from avlmaps.core.motion import GroundPose
 from avlmaps.language.rules import RulesTranslator, explanation
 from avlmaps.language.sentence import Given
 from avlmaps.navigate.bodies import BASE, BodyShape
@@ -17,6 +16,7 @@ from avlmaps.navigate.costmap import costmap_of, obstacles_for
 from avlmaps.navigate.driver import MapDriver
 from avlmaps.navigate.file_access import Readable
 from avlmaps.navigate.instruct import Outcome, instruct
+from avlmaps.navigate.rehearsal import FreeBody
 from avlmaps.navigate.skills import RobotSettings
 
 if TYPE_CHECKING:
@@ -29,30 +29,6 @@ MakeRobot = Callable[["AVLMap"], "Driver"]
 """Puts a robot that really moves (a simulated one) into the world that a map was made of."""
 _MOST_READINGS = 5
 _MARGIN_M = 0.05
-
-
-class MapBody:
-    """A body that makes each movement exactly; the driver's own map holds it off the walls."""
-
-    def __init__(self, pose: GroundPose) -> None:
-        self.pose = pose
-
-    def act(self, action: Action) -> Moved:
-        """Take an action."""
-        if action is Action.FORWARD:
-            self.pose = self.pose.ahead(FORWARD_M)
-        elif action is not Action.STOP:
-            self.pose = self.pose.turned(TURN_RAD if action is Action.LEFT else -TURN_RAD)
-        return Moved(self.pose)
-
-    def drive(self, speed_m_s: float, turn_rad_s: float, duration_s: float) -> Moved:
-        """Move along an arc for a while."""
-        turn = turn_rad_s * duration_s
-        chord_m = speed_m_s * duration_s * float(np.sinc(0.5 * turn / np.pi))
-        heading = self.pose.heading_rad + 0.5 * turn
-        x_m, y_m = self.pose.x_m + chord_m * cos(heading), self.pose.y_m + chord_m * sin(heading)
-        self.pose = GroundPose(x_m, y_m, self.pose.heading_rad + turn)
-        return Moved(self.pose)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -141,7 +117,7 @@ class Guide:
         }
         robot = self._driver()
         start = self._start() if robot is None else robot.pose
-        planner = MapDriver(self.obstacles, MapBody(start), self._shape)
+        planner = MapDriver(self.obstacles, FreeBody(start), self._shape)
         answer["planned"] = run(planner).to_json()
         if robot is None:
             self._pose = planner.pose
