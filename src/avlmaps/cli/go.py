@@ -264,12 +264,11 @@ def read_start(words: str | None) -> "GroundPose | None":
 
 def simulated_robot(verb: "Go", avlmap: "AVLMap", start: "GroundPose | None") -> Ready:
     """Put a simulated robot into the scene that was mapped."""
-    from avlmaps.demo.driving import robot_in
     from avlmaps.navigate.bodies import SHAPES
     from avlmaps.navigate.interrupts import Halt
-    from avlmaps.sim.scenes import open_scene
+    from avlmaps.navigate.scenes import open_robot_scene
 
-    robot = robot_in(avlmap, open_scene(verb.scene or ""), SHAPES[verb.body], start)
+    robot = open_robot_scene(verb.scene or "").robot(avlmap, SHAPES[verb.body], start)
     halt = Halt(True, "the simulated robot moves only while the command runs")
     return Ready(
         robot.driver, robot.start, robot.obstacles, lambda: robot.contacts, lambda: halt, lambda: False, lambda: None

@@ -23,7 +23,7 @@ from avlmaps.cli.output import (
 from avlmaps.cli.pipes import READER_GONE, drop, reader_gone, settle_streams
 from avlmaps.cli.plain_query import PlainQuery, read_plain_query
 from avlmaps.cli.shortened_files import end_at_shortened_files
-from avlmaps.core.errors import AvlmapsError
+from avlmaps.core.errors import AvlmapsError, BackendError
 from avlmaps.core.printable import printable
 from avlmaps.core.progress import end_bars
 
@@ -79,7 +79,12 @@ def _main(words: list[str]) -> None:
         with _usage(words):
             from avlmaps.cli.verbs import read_command
 
-            verb = read_command(words)
+            try:
+                verb = read_command(words)
+            except BackendError as error:
+                if _wants_json(words):
+                    _emit_error(kind_of(error), str(error))
+                sys.exit(_complain(error, 1))
     sys.exit(_run(verb))
 
 

@@ -6,17 +6,13 @@ from typing import Annotated, Any, Union
 import tyro
 
 from avlmaps.cli.add_sounds import AddSounds
-from avlmaps.cli.bench import Bench
 from avlmaps.cli.build import Build
-from avlmaps.cli.demo import Demo
 from avlmaps.cli.export import Export
 from avlmaps.cli.go import Go
-from avlmaps.cli.import_map import ImportMap
 from avlmaps.cli.info import Info
 from avlmaps.cli.locate import Locate
 from avlmaps.cli.profiles import Profiles
 from avlmaps.cli.query import Query
-from avlmaps.cli.record import Record
 from avlmaps.cli.serve import Serve
 from avlmaps.cli.shell import Shell
 from avlmaps.cli.teach_sound import TeachSound
@@ -24,6 +20,9 @@ from avlmaps.cli.things import Things
 from avlmaps.cli.usage import CONFIG
 from avlmaps.cli.verb import Verb
 from avlmaps.cli.view import View
+from avlmaps.core.distributions import OTHERS, how_to_get
+from avlmaps.core.errors import BackendError
+from avlmaps.core.registry import brought, entry_points
 
 _DESCRIPTION = """Audio-Visual-Language Maps: one 3D map of what a robot saw and recorded, which you query with words.
 
@@ -31,12 +30,10 @@ Every verb takes --json (one JSON object on standard output) and --help. Progres
 Exit status: 0 done, 1 a known error (one sentence says which), 2 a wrong command line.
 With --json an error is {"error": {"kind": ..., "message": ...}} on standard output."""
 
-VERBS: dict[str, type[Verb]] = {
-    "demo": Demo,
-    "record": Record,
+ENTRY_POINT_GROUP = "avlmaps.verbs"
+_OWN: dict[str, type[Verb]] = {
     "add-sounds": AddSounds,
     "build": Build,
-    "import-map": ImportMap,
     "info": Info,
     "query": Query,
     "things": Things,
@@ -48,16 +45,40 @@ VERBS: dict[str, type[Verb]] = {
     "serve": Serve,
     "teach-sound": TeachSound,
     "profiles": Profiles,
-    "bench": Bench,
 }
+# As help lists them: in the order in which a person comes to use them; other packages' own verbs follow.
+_ORDER = (
+    "demo", "record", "add-sounds", "build", "import-map", "info", "query", "things", "shell", "view", "export",
+    "locate", "go", "serve", "teach-sound", "profiles", "bench",
+)  # fmt: skip
+
+
+def _verbs() -> tuple[dict[str, type[Verb]], dict[str, str]]:
+    """Return the verbs that are installed, and why each other one that is known cannot be had."""
+    found, missing = dict(_OWN), {}
+    for entry in entry_points(ENTRY_POINT_GROUP):
+        try:
+            found.setdefault(entry.name, brought(entry, "the verb"))
+        except BackendError as fault:  # it takes no other verb with it
+            missing[entry.name] = str(fault)
+    for name in (name for one in OTHERS for name in one.verbs if name not in found and name not in missing):
+        missing[name] = f"The verb {name} is not installed; get it with: {how_to_get('verbs', name)}"
+    ordered = {name: found[name] for name in (*_ORDER, *sorted(found)) if name in found}
+    return ordered, missing
+
+
+VERBS, NOT_INSTALLED = _verbs()
 
 
 def read_command(words: Sequence[str]) -> Verb:
     """Read the words after ``avlmaps``.
 
     Raises:
+        BackendError: the verb is one of a package that is not installed.
         SystemExit: they cannot be read, or request help; either is printed.
     """
+    if words and words[0] in NOT_INSTALLED:
+        raise BackendError(NOT_INSTALLED[words[0]])
     shortly = not words or words[0].startswith("-")
     return tyro.cli(_any_verb(shortly), prog="avlmaps", description=_DESCRIPTION, args=words, config=CONFIG)
 

@@ -108,11 +108,10 @@ def _lines(answer: dict[str, Any]) -> list[str]:
 
 
 def _robot(scene: str) -> "MakeRobot":
-    from avlmaps.demo.driving import robot_in
-    from avlmaps.sim.scenes import open_scene
+    from avlmaps.navigate.scenes import open_robot_scene
 
-    opened = open_scene(scene)
-    return lambda avlmap: robot_in(avlmap, opened).driver
+    opened = open_robot_scene(scene)
+    return lambda avlmap: opened.robot(avlmap).driver
 
 
 def _serve(verb: View) -> None:

@@ -1,5 +1,6 @@
 """The command that installs a group of further packages (an extra) for the avlmaps that runs here."""
 
+import shlex
 from functools import cache
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
@@ -13,16 +14,22 @@ class _Source(msgspec.Struct):
     url: str = ""
 
 
-def install_command(extra: str, *more: str) -> str:
+def install_command(extra: str = "", *more: str, distribution: str = "avlmaps") -> str:
     """Return the command that installs an extra: from the clone that avlmaps runs or was installed from, else by name.
 
     Args:
-        extra: such as ``serve``.
+        extra: such as ``serve``; without one the distribution is installed alone.
         more: further packages.
+        distribution: which of this project's (see ``distributions``).
     """
     clone = _clone()
-    source = "avlmaps" if clone is None else "." if clone == Path.cwd() else str(clone)
-    return " ".join(["pip install", f"'{source}[{extra}]'", *more])
+    if clone is None:
+        source = distribution
+    else:
+        within = "." if clone == Path.cwd() else str(clone)
+        source = within if distribution == "avlmaps" else f"{within}/packages/{distribution}"
+    what = f"'{source}[{extra}]'" if extra else shlex.quote(source)
+    return " ".join(["pip install", what, *more])
 
 
 @cache

@@ -2,24 +2,27 @@
 
 Other packages add theirs through the entry point group ``avlmaps.backends``; an entry's name is
 ``kind:name`` (``sounds:my-clap``) and its value ``package.module:Class``. The class is called without
-arguments. A backend of ours that can run several models is called with the chosen one, which a name carries behind an
-``@``: ``views:clip@openai/clip-vit-large-patch14``.
+arguments. A package with many backends, or with backends that can run several models, brings a list of `Backend`
+through the group ``avlmaps.backend_lists`` (``avlmaps-models`` does). A backend that can run several models is called
+with the chosen one, which a name carries behind an ``@``: ``views:clip@openai/clip-vit-large-patch14``.
 """
 
 import importlib
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import cache, partial
+from functools import cache
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
-from avlmaps.core.errors import BackendError
+from avlmaps.core.distributions import how_to_get
+from avlmaps.core.errors import AvlmapsError, BackendError
 from avlmaps.core.extras import install_command
 
 if TYPE_CHECKING:
-    from importlib.metadata import EntryPoints
+    from importlib.metadata import EntryPoint, EntryPoints
 
 ENTRY_POINT_GROUP = "avlmaps.backends"
+LISTS_GROUP = "avlmaps.backend_lists"
 
 
 class Kind(StrEnum):
@@ -48,6 +51,9 @@ class Backend:
             the name of a file; its class is called with it. ``""`` where the class takes no argument.
         licence: of that model's weights, for ``avlmaps profiles``; ``""`` where the class alone decides it.
         slow: whether its features take longer to make than to store and read; those of every backend on torch do.
+        also: further models that it needs.
+        matcher: of local features: the matcher that was made for them; ``""`` where any does.
+        distribution: which one of this project brings it.
         keyframes_only: of pixels: whether a build gives it keyframes alone, the other frames adding surfaces and
             colours: for a model that takes a second a frame.
     """
@@ -61,6 +67,9 @@ class Backend:
     licence: str = ""
     slow: bool = False
     keyframes_only: bool = False
+    also: tuple[str, ...] = ()
+    matcher: str = ""
+    distribution: str = "avlmaps"
 
     @property
     def is_slow(self) -> bool:
@@ -75,7 +84,9 @@ class Backend:
     @property
     def how_to_get(self) -> str:
         """The command that installs what is missing."""
-        return install_command(self.extra) if self.extra else f"pip install {' '.join(self.missing)}"
+        if self.extra:
+            return install_command(self.extra, distribution=self.distribution)
+        return f"pip install {' '.join(self.missing)}"
 
 
 _EMBEDDED = "avlmaps.perception.embedded"
@@ -91,12 +102,6 @@ _BUILT_IN = (
     Backend(Kind.PLACE, "vlad", f"{_EMBEDDED}.vlad:Vlad"),
     Backend(Kind.MATCHER, "mutual-ratio", f"{_EMBEDDED}.matching:MutualRatio"),
 )
-
-
-def _with_torch(package: str, kind: Kind, name: str, target: str, model: str, licence: str, *needs: str) -> Backend:
-    """Return the entry of a backend that needs the extra called like its package."""
-    place = f"avlmaps.perception.{package}.{target}"
-    return Backend(kind, name, place, extra=package, needs=("torch", *needs), model=model, licence=licence)
 
 
 def _light(kind: Kind, target: str) -> Backend:
@@ -129,65 +134,7 @@ _TRAINED = (
     Backend(Kind.PIXELS, "trained", f"{_EMBEDDED}.trained:trained_pixels", model="eyes", licence="your own"),
     Backend(Kind.VIEWS, "trained", f"{_EMBEDDED}.trained:trained_views", model="eyes", licence="your own"),
 )
-_foundation, _paper = partial(_with_torch, "foundation"), partial(_with_torch, "paper")
-_OF_TORCH = (
-    _foundation(Kind.PIXELS, "tipsv2", "tipsv2:TipsPixels", "google/tipsv2-b14", "Apache-2.0", "transformers"),
-    _foundation(
-        Kind.PIXELS, "clip-patches", "clip_patches:ClipPatches", "openai/clip-vit-base-patch16", "MIT", "transformers"
-    ),
-    _foundation(
-        Kind.PIXELS,
-        "regions",
-        "regions:RegionPixels",
-        "openai/clip-vit-base-patch16",
-        "MIT (CLIP) and Apache-2.0 (SAM 2)",
-        "transformers",
-    ),
-    _foundation(
-        Kind.VIEWS, "siglip2", "siglip2:SiglipViews", "google/siglip2-base-patch16-224", "Apache-2.0", "transformers"
-    ),
-    _foundation(Kind.VIEWS, "clip", "clip:ClipViews", "openai/clip-vit-large-patch14", "MIT", "transformers"),
-    _foundation(
-        Kind.VIEWS, "open-clip", "open_clip_views:OpenClipViews", "timm/PE-Core-B-16", "Apache-2.0", "open_clip"
-    ),
-    _foundation(Kind.SOUNDS, "clap", "clap:ClapSounds", "laion/larger_clap_general", "Apache-2.0", "transformers"),
-    _foundation(
-        Kind.SOUNDS, "pe-a-frame", "pe_a_frame:FrameSounds", "facebook/pe-a-frame-base", "Apache-2.0", "transformers"
-    ),
-    _foundation(Kind.LOCAL, "disk", "disk:DiskKeypoints", "disk-depth", "Apache-2.0", "kornia"),
-    _foundation(Kind.LOCAL, "aliked", "aliked:AlikedKeypoints", "aliked-n16", "BSD-3-Clause", "kornia"),
-    _foundation(Kind.PLACE, "megaloc", "megaloc:MegaLoc", "gberton/MegaLoc", "MIT", "transformers"),
-    _foundation(
-        Kind.PLACE, "eigenplaces", "eigenplaces:EigenPlaces", "ResNet50_2048_eigenplaces.pth", "MIT", "torchvision"
-    ),
-    _foundation(Kind.PLACE, "dinov2", "dinov2:DinoPlaces", "facebook/dinov2-small", "Apache-2.0", "transformers"),
-    _foundation(Kind.MATCHER, "lightglue-disk", "lightglue:LightGlue", "disk", "Apache-2.0", "kornia"),
-    _foundation(Kind.MATCHER, "lightglue-aliked", "lightglue:LightGlue", "aliked", "Apache-2.0", "kornia"),
-    _paper(Kind.PIXELS, "lseg", "lseg:LSegPixels", "demo_e200.ckpt", "MIT", "transformers"),
-    _paper(
-        Kind.VIEWS, "clip-paper", "clip_views:PaperClipViews", "openai/clip-vit-large-patch14", "MIT", "transformers"
-    ),
-    _paper(Kind.SOUNDS, "audioclip", "audioclip:AudioClipSounds", "AudioCLIP-Partial-Training.pt", "MIT", "tokenizers"),
-    _paper(Kind.SOUNDS, "wav2clip", "wav2clip:Wav2ClipSounds", "Wav2CLIP.pt", "MIT", "transformers"),
-    _paper(
-        Kind.LOCAL,
-        "superpoint",
-        "superpoint:SuperPointKeypoints",
-        "magic-leap-community/superpoint",
-        "Magic Leap, non-commercial",
-        "transformers",
-    ),
-    _paper(Kind.PLACE, "netvlad", "netvlad:NetVlad", "VGG16-NetVLAD-Pitts30K.mat", "research only"),
-    _paper(
-        Kind.MATCHER,
-        "superglue",
-        "superglue:SuperGlue",
-        "magic-leap-community/superglue_indoor",
-        "Magic Leap, non-commercial",
-        "transformers",
-    ),
-)
-_ALL = (*_BUILT_IN, *_LIGHT, *_TRAINED, *_OF_TORCH)
+_ALL = (*_BUILT_IN, *_LIGHT, *_TRAINED)
 _registered: dict[tuple[Kind, str], Backend] = {(b.kind, b.name): b for b in _ALL}
 
 
@@ -196,6 +143,26 @@ def entry_points(group: str) -> "EntryPoints":
     from importlib import metadata
 
     return metadata.entry_points(group=group)
+
+
+def brought(entry: "EntryPoint", what: str, error: type[AvlmapsError] = BackendError) -> Any:
+    """Return what an entry point of another package leads to.
+
+    Args:
+        entry: the entry point.
+        what: is brought, for the error: ``the verb``.
+        error: the class of the error.
+
+    Raises:
+        AvlmapsError: it cannot be imported.
+    """
+    try:
+        return entry.load()
+    except Exception as fault:  # an import runs another's code
+        raise error(
+            f"{what[0].upper()}{what[1:]} {entry.name!r} cannot be loaded from {entry.value} ({fault}); fix or remove "
+            "the package that brings it."
+        ) from fault
 
 
 def register(backend: Backend) -> None:
@@ -211,6 +178,9 @@ def backends() -> list[Backend]:
         kind, _, name = entry.name.partition(":")
         if kind in set(Kind) and name:
             found.setdefault((Kind(kind), name), Backend(Kind(kind), name, entry.value))
+    for entry in entry_points(group=LISTS_GROUP):
+        for backend in brought(entry, "the list of backends"):
+            found.setdefault((backend.kind, backend.name), backend)
     return sorted(found.values(), key=lambda b: (b.kind, b.name))
 
 
@@ -239,6 +209,8 @@ def find(kind: Kind, name: str) -> Backend:
         return _registered[kind, name]
     known = {b.name: b for b in backends() if b.kind == kind}
     if name not in known:
+        if get := how_to_get("backends", f"{kind}:{name}"):
+            raise BackendError(f"The {kind} backend {name!r} is not installed; get it with: {get}")
         raise BackendError(
             f"There is no {kind} backend called {name!r}; known are: {', '.join(sorted(known)) or 'none'}."
         )

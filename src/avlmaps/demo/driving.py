@@ -1,7 +1,6 @@
 """A simulated robot put into the scene that a map was made of: only its body meets the scene, its program the map."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -11,12 +10,11 @@ from avlmaps.core.motion import GroundPose
 from avlmaps.maps.obstacles import Obstacles
 from avlmaps.navigate.bodies import BASE, BodyShape
 from avlmaps.navigate.costmap import costmap_of, obstacles_for
+from avlmaps.navigate.scenes import SimulatedRobot
 from avlmaps.query.avlmap import AVLMap
+from avlmaps.sim import scenes
 from avlmaps.sim.free_space import FreeSpace, floor_heights, free_space
 from avlmaps.sim.scene import Scene
-
-if TYPE_CHECKING:
-    from avlmaps.navigate.driver import MapDriver
 
 _LEVEL_DEG = 2.0
 # Where the camera was, the scene must have room; a map of another home of the same size has it at up to four of five.
@@ -26,24 +24,20 @@ _NEAR_M = 0.5
 _CARRIED_M, _SWAY_M = 0.3, 0.12  # least height of a camera over its floor; how much it differs, off the stairs
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class SimulatedRobot:
-    """A robot that stands in a scene.
+@dataclass(frozen=True, slots=True)
+class DrivenScene:
+    """A scene that robots are put into; see `avlmaps.navigate.scenes.RobotScene`."""
 
-    Attributes:
-        driver: drives it by the map.
-        start: where it stands at first, level frame.
-        obstacles: what the map knows to stand in its way.
-    """
+    scene: Scene
 
-    driver: "MapDriver"
-    start: GroundPose
-    obstacles: Obstacles
+    def robot(self, avlmap: AVLMap, shape: BodyShape = BASE, start: GroundPose | None = None) -> SimulatedRobot:
+        """Put a robot into the scene; see `robot_in`."""
+        return robot_in(avlmap, self.scene, shape, start)
 
-    @property
-    def contacts(self) -> Float[np.ndarray, "m 2"]:
-        """The places where it touched something that the map does not know, level x and y."""
-        return self.obstacles.origin_m + (np.argwhere(self.driver.contacts.cells) + 0.5) * self.obstacles.cell_size_m
+
+def open_driven_scene(name: str) -> DrivenScene:
+    """Open a scene by its name for robots; see `avlmaps.sim.scenes.open_scene`."""
+    return DrivenScene(scenes.open_scene(name))
 
 
 def robot_in(avlmap: AVLMap, scene: Scene, shape: BodyShape = BASE, start: GroundPose | None = None) -> SimulatedRobot:

@@ -5,8 +5,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from avlmaps.core.distributions import how_to_get
 from avlmaps.core.errors import BackendError
-from avlmaps.core.registry import Kind, find, load
+from avlmaps.core.registry import Kind, brought, entry_points, find, load
 from avlmaps.core.suggestions import nearest
 from avlmaps.perception.protocols import (
     LocalEncoder,
@@ -18,6 +19,7 @@ from avlmaps.perception.protocols import (
     ViewEncoder,
 )
 
+ENTRY_POINT_GROUP = "avlmaps.profiles"
 GIVEN = "given:"
 MODULES = tuple(kind for kind in Kind if kind is not Kind.WORDS)
 
@@ -63,7 +65,9 @@ class Profile:
             find(kind, name.partition("@")[0])
         chosen: dict[str, Any] = {kind.value: name for kind, name in choices.items()}
         if Kind.LOCAL in choices and Kind.MATCHER not in choices:
-            chosen[Kind.MATCHER.value] = _MATCHER_OF.get(choices[Kind.LOCAL].partition("@")[0], "mutual-ratio")
+            # A matcher's training holds for the keypoints that it was trained on.
+            keypoints = find(Kind.LOCAL, choices[Kind.LOCAL].partition("@")[0])
+            chosen[Kind.MATCHER.value] = keypoints.matcher or "mutual-ratio"
         return replace(self, **chosen)
 
     def backend_name(self, kind: Kind) -> str:
@@ -123,8 +127,6 @@ def no_backend(profile: str, kind: Kind) -> str:
     return f"The profile {profile!r} has no {kind} backend; choose another profile (avlmaps profiles)."
 
 
-# A matcher's training holds for the keypoints that it was trained on.
-_MATCHER_OF = {"disk": "lightglue-disk", "aliked": "lightglue-aliked", "superpoint": "superglue"}
 _PROFILES: dict[str, Profile] = {}
 
 
@@ -135,7 +137,12 @@ def register_profile(profile: Profile) -> None:
 
 def profiles() -> list[Profile]:
     """Return every known profile."""
-    return list(_PROFILES.values())
+    own_first = {**_PROFILES, **_brought_profiles()}
+    return list({**own_first, **_PROFILES}.values())
+
+
+def _brought_profiles() -> dict[str, Profile]:
+    return {entry.name: brought(entry, "the profile") for entry in entry_points(group=ENTRY_POINT_GROUP)}
 
 
 def choose_models(name: str, words: Sequence[str] = ()) -> Profile:
@@ -185,10 +192,15 @@ def profile(name: str | Profile) -> Profile:
     """
     if isinstance(name, Profile):
         return name
-    if name not in _PROFILES:
-        close = f" Did you mean {near}?" if (near := nearest(name, _PROFILES)) else ""
-        raise BackendError(f"There is no profile called {name!r}; known are: {', '.join(_PROFILES)}.{close}")
-    return _PROFILES[name]
+    if name in _PROFILES:  # installed packages need not be searched
+        return _PROFILES[name]
+    known = {one.name: one for one in profiles()}
+    if name not in known:
+        if get := how_to_get("profiles", name):
+            raise BackendError(f"The profile {name!r} is not installed; get it with: {get}")
+        close = f" Did you mean {near}?" if (near := nearest(name, known)) else ""
+        raise BackendError(f"There is no profile called {name!r}; known are: {', '.join(known)}.{close}")
+    return known[name]
 
 
 _EMBEDDED = Profile(
@@ -214,31 +226,6 @@ register_profile(
         views="",
         weight_variance_m2=0.6,
         about="objects by their colour alone: the quickest, and no network for pictures",
-    )
-)
-register_profile(
-    Profile(
-        name="foundation",
-        pixels="tipsv2",
-        views="siglip2",
-        sounds="clap",
-        local="disk",
-        place="megaloc",
-        matcher="lightglue-disk",
-        about="today's open models under permissive licences; recommended where there is a network and better a GPU",
-        weight_variance_m2=50.0,
-    )
-)
-register_profile(
-    Profile(
-        name="paper",
-        pixels="lseg",
-        views="clip-paper",
-        sounds="audioclip",
-        local="superpoint",
-        place="netvlad",
-        matcher="superglue",
-        about="the models of the AVLMaps paper, to compare with; some of their weights are for research alone",
     )
 )
 register_profile(

@@ -14,7 +14,7 @@ from typing import Literal
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Backend, load
 from avlmaps.perception.models.files import folders_of
-from avlmaps.perception.models.published_models import ALSO, PUBLISHED, Published
+from avlmaps.perception.models.published_models import Published, published_models
 from avlmaps.perception.models.settings import model_settings
 
 State = Literal["ready", "package missing", "weights missing", "broken"]
@@ -52,7 +52,7 @@ def availability(backend: Backend, model: str = "") -> Availability:
     if not model:
         return _loaded(backend)
     licence = backend.licence if model == backend.model else ""
-    needed = (model.partition("#")[0], *ALSO.get(f"{backend.kind}:{backend.name}", ()))
+    needed = (model.partition("#")[0], *backend.also)
     missing = [one for one in needed if not is_here(one)]
     if not missing:
         return Availability("ready", model, licence)
@@ -80,7 +80,7 @@ def how_to_get(model: str) -> str:
 
 
 def _published(model: str) -> Published:
-    return PUBLISHED.get(model, Published())
+    return published_models().get(model, Published())
 
 
 def _size(size_mb: float) -> str:

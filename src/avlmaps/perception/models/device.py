@@ -11,7 +11,7 @@ from jaxtyping import Float32
 
 from avlmaps.core.errors import BackendError
 from avlmaps.perception.models.operators import declare_missing_operators
-from avlmaps.perception.models.settings import model_settings
+from avlmaps.perception.models.settings import model_settings, resolve_precision
 
 declare_missing_operators()
 _TYPES = {"float32": torch.float32, "float16": torch.float16, "bfloat16": torch.bfloat16}
@@ -75,3 +75,6 @@ def unit_rows(rows: torch.Tensor) -> Float32[np.ndarray, "... d"]:
     """Return rows scaled to unit length in float32; a row of zeros stays one."""
     rows = rows.detach().to(torch.float32)
     return to_numpy(rows / rows.norm(dim=-1, keepdim=True).clamp_min(1e-12))
+
+
+resolve_precision(lambda: str(select_dtype(select_device())).removeprefix("torch."))

@@ -4,12 +4,11 @@ What a map depends on (which model, its checksum) is in its cards; these say how
 """
 
 import os
-import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import forget_loaded
@@ -77,15 +76,18 @@ def environment_of(settings: ModelSettings) -> dict[str, str]:
 
 def precision_in_force() -> str:
     """Return the precision in which models on torch run here, ``auto`` resolved once one of them has been loaded."""
-    torch_side: Any = sys.modules.get("avlmaps.perception.models.device")  # this module stays without torch
-    if torch_side is None:
-        return model_settings().precision
-    return str(torch_side.select_dtype(torch_side.select_device())).removeprefix("torch.")
+    return model_settings().precision if _current.resolved is None else _current.resolved()
+
+
+def resolve_precision(resolved: Callable[[], str]) -> None:
+    """Take what says in which precision torch runs; who loads torch calls it, since this module stays without."""
+    _current.resolved = resolved
 
 
 @dataclass(slots=True)
 class _Current:
-    settings: ModelSettings | None = field(default=None)
+    settings: ModelSettings | None = None
+    resolved: Callable[[], str] | None = None
 
 
 _current = _Current()

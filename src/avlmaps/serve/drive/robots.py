@@ -12,6 +12,7 @@ from avlmaps.core.motion import GroundPose
 from avlmaps.navigate.bodies import SHAPES, BodyShape
 from avlmaps.navigate.costmap import obstacles_for
 from avlmaps.navigate.driver import Driver, MapDriver
+from avlmaps.navigate.scenes import open_robot_scene
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.serve.drive.brake import Brake, BrakedBody, BrakedDriver
 
@@ -138,13 +139,10 @@ class SimulatedMachine:
     def prepare(self, avlmap: AVLMap, version: str) -> "Obstacles":
         """Put the robot into the scene; see `Machine`."""
         if self._driver is None or version != self._version:
-            from avlmaps.demo.driving import robot_in
-            from avlmaps.sim.scenes import open_scene
-
             start = self._read.start
             pose = None if start is None else GroundPose(start[0], start[1], radians(start[2]))
             pose = pose if self._body is None else self._body.pose
-            robot = robot_in(avlmap, open_scene(self._read.scene or ""), self.shape, pose)
+            robot = open_robot_scene(self._read.scene or "").robot(avlmap, self.shape, pose)
             self._driver, self._body, self._version = robot.driver, robot.driver.body, version
         return self._driver.obstacles
 

@@ -1,0 +1,53 @@
+"""The distributions of this project: what the others add to ``avlmaps``, and the command that installs them.
+
+What is installed is found by entry points. This table is for errors alone: it names what is not installed.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from avlmaps.core.extras import install_command
+
+What = Literal["verbs", "profiles", "backends"]
+
+
+@dataclass(frozen=True, slots=True)
+class Distribution:
+    """One distribution beside ``avlmaps``.
+
+    Attributes:
+        name: as pip knows it.
+        verbs: of the command line.
+        profiles: their names.
+        backends: ``kind:name``.
+    """
+
+    name: str
+    verbs: tuple[str, ...] = ()
+    profiles: tuple[str, ...] = ()
+    backends: tuple[str, ...] = ()
+
+
+SIMULATOR = Distribution("avlmaps-sim", verbs=("demo", "record", "bench"))
+MODELS = Distribution(
+    "avlmaps-models",
+    verbs=("import-map",),
+    profiles=("foundation", "paper"),
+    backends=(
+        "pixels:tipsv2", "pixels:clip-patches", "pixels:regions", "pixels:lseg",
+        "views:siglip2", "views:clip", "views:open-clip", "views:clip-paper",
+        "sounds:clap", "sounds:pe-a-frame", "sounds:audioclip", "sounds:wav2clip",
+        "local:disk", "local:aliked", "local:superpoint",
+        "place:megaloc", "place:eigenplaces", "place:dinov2", "place:netvlad",
+        "matcher:lightglue-disk", "matcher:lightglue-aliked", "matcher:superglue",
+    ),
+)  # fmt: skip
+OTHERS = (SIMULATOR, MODELS)
+
+
+def how_to_get(what: What, name: str) -> str | None:
+    """Return the command that installs what brings a verb, a profile or a backend; None where no distribution does."""
+    for one in OTHERS:
+        if name in getattr(one, what):
+            return install_command(distribution=one.name)
+    return None
