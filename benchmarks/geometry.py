@@ -24,8 +24,8 @@ from avlmaps.maps.fusion.accumulator import VoxelAccumulator  # noqa: E402
 from avlmaps.maps.fusion.cleaning import clean  # noqa: E402
 from avlmaps.maps.fusion.free_space import FreeViewCollector  # noqa: E402
 from avlmaps.maps.fusion.sensor import NONE, SensorModel  # noqa: E402
-from avlmaps.maps.fusion.sensor_choice import find_sensor  # noqa: E402
 from avlmaps.maps.grid import GridSpec  # noqa: E402
+from avlmaps.maps.pipeline.estimate import estimate_sensor  # noqa: E402
 from avlmaps.maps.settings import BuildSettings  # noqa: E402
 from avlmaps.recordings.open import open_recording  # noqa: E402
 from avlmaps.recordings.types import Recording  # noqa: E402
@@ -113,7 +113,7 @@ def rows_of(spec: str, sensors: list[str], frames: int) -> list[dict[str, object
             record_scene(scene, path, settings)
             recording = open_recording(path)
             seen = seen_of(scene, recording) if seen is None else seen  # the walk is the same
-            info = find_sensor(recording, BuildSettings())
+            info = estimate_sensor(recording, BuildSettings())
             made(recording, info.model)  # compiles
             for name, model in (("before", NONE), (f"after ({info.name})", info.model)):
                 out.append(

@@ -23,7 +23,7 @@ import timing
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.camera import Rig as CameraRig
 from avlmaps.maps.fusion.voxel_sums import VoxelSums
-from avlmaps.maps.partial_maps import PartInfo
+from avlmaps.maps.pipeline.parts import PartInfo
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.checkpoints import save_checkpoint
 from avlmaps.maps.store.manifest import Box, Counts, MapInfo, RecordingInfo, RigInfo, Timings, UpInfo
@@ -51,7 +51,7 @@ print(json.dumps({"open_s": opened - before, "features": mapped, "then_5000_rows
 MERGE = """
 from pathlib import Path
 from avlmaps.maps.grid import GridSpec
-from avlmaps.maps.partial_maps import sum_parts, load_part
+from avlmaps.maps.pipeline.parts import sum_parts, load_part
 from avlmaps.maps.store.array_files import write_array
 before = time.perf_counter()
 folders = sorted(Path(sys.argv[1]).glob("part*"))

@@ -19,9 +19,9 @@ from recording_scenes import save_depth, shots, write_folder
 
 from avlmaps.core.errors import MapError, RecordingError
 from avlmaps.maps.build import build_map, build_part, describe, merge_parts
-from avlmaps.maps.partial_maps import load_part, plan_spans
-from avlmaps.maps.plan import audio_key
-from avlmaps.maps.prefetch import run_ahead
+from avlmaps.maps.pipeline.parts import load_part
+from avlmaps.maps.pipeline.plan import audio_key, plan_spans
+from avlmaps.maps.pipeline.prefetch import run_ahead
 from avlmaps.maps.settings import BuildSettings, FrameSettings
 from avlmaps.maps.store.array_validation import array_fields
 from avlmaps.maps.store.reader import StoredMap, open_stored, verify_stored
@@ -344,7 +344,7 @@ def test_finished_keyframes_and_sounds_are_not_made_again(tmp_path: Path, monkey
         patch.setattr("avlmaps.maps.build.merge", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
         with pytest.raises(KeyboardInterrupt):
             build(walk, tmp_path / "a")
-    monkeypatch.setattr("avlmaps.maps.keyframes.stage.describe_keyframe", None)
+    monkeypatch.setattr("avlmaps.maps.pipeline.keyframes.describe_keyframe", None)
     monkeypatch.setattr("avlmaps.maps.audio.events.detect_events", None)
     assert len(build(walk, tmp_path / "a").sounds) == 2
 

@@ -11,7 +11,7 @@ from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import RecordingError
 from avlmaps.maps.build import build_map
-from avlmaps.maps.doubts import carving_doubts
+from avlmaps.maps.pipeline.write import carving_doubts
 from avlmaps.maps.store.manifest import Removed
 from avlmaps.query.contents import Contents
 from avlmaps.recordings.open import open_recording

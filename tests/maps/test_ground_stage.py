@@ -11,7 +11,7 @@ from build_fakes import SETTINGS, Walk, register_fakes
 from avlmaps.cli.output import ground_lines
 from avlmaps.core.errors import MapError
 from avlmaps.maps.build import build_map, describe
-from avlmaps.maps.gravity.stage import estimate_ground, ground_notices
+from avlmaps.maps.pipeline.estimate import estimate_ground, ground_notices
 from avlmaps.maps.settings import DEFAULTS, BuildSettings, GravitySettings
 from avlmaps.maps.store.manifest import FloorGuess, FloorInfo, GroundInfo, UpInfo
 from avlmaps.maps.store.reader import StoredMap, open_stored

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from avlmaps.core.registry import Backend, Kind, register
 from avlmaps.maps.build import build_map, build_part
-from avlmaps.maps.encoding import encode_frames
 from avlmaps.maps.keyframes.describe import KeyframeSettings, select_keyframes
-from avlmaps.maps.partial_maps import encoded_frames, fusion_key
+from avlmaps.maps.pipeline.encode_fuse import encode_frames
+from avlmaps.maps.pipeline.plan import encoded_frames, fusion_key
 from avlmaps.maps.settings import FrameSettings
 from avlmaps.perception.cache.feature_store import CacheSettings
 from avlmaps.perception.encoders import Encoders

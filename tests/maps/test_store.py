@@ -17,9 +17,9 @@ from hypothesis.extra import numpy as hnp
 
 from avlmaps.core.errors import BackendError, MapError
 from avlmaps.core.registry import Kind
-from avlmaps.maps import integrity
 from avlmaps.maps.build import build_map
 from avlmaps.maps.repair import damaged_files, repair_map
+from avlmaps.maps.store import integrity
 from avlmaps.maps.store.array_files import SMALL_BYTES, read_array, write_array
 from avlmaps.maps.store.array_validation import array_fields, check_order, validate_arrays
 from avlmaps.maps.store.lock import is_locked, lock_folder

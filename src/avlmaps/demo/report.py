@@ -125,7 +125,7 @@ def _home(sheet: Sheet, home: Plan, evidence: "Evidence") -> str:
 def _strip(recording: "Recording", avlmap: "AVLMap", moments: int) -> Strip:
     """Encode some moments of the walk again, as the map's own pixel encoder does."""
     from avlmaps.core.progress import progress
-    from avlmaps.maps.gravity.stage import attach_estimated_ground
+    from avlmaps.maps.pipeline.estimate import attach_estimated_ground
     from avlmaps.maps.settings import DEFAULTS
     from avlmaps.perception.embedded.pixels import EmbeddedPixels
 

@@ -3,13 +3,18 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from avlmaps.core.errors import MapError
 from avlmaps.core.progress import silence_progress
-from avlmaps.maps.doubts import checked
-from avlmaps.maps.keyframes.stage import describe_keyframes
-from avlmaps.maps.partial_maps import build_part, merge_parts
-from avlmaps.maps.plan import claim, make_plan, require_unchanged
+from avlmaps.core.registry import Kind
+from avlmaps.maps.pipeline.check import checked
+from avlmaps.maps.pipeline.encode_fuse import encode_and_fuse, fuse_spans
+from avlmaps.maps.pipeline.estimate import attach_estimated_ground, estimate_sensor, find_floor, find_sensor, find_up
+from avlmaps.maps.pipeline.keyframes import describe_keyframes
+from avlmaps.maps.pipeline.parts import MapPart, load_part, merge_parts
+from avlmaps.maps.pipeline.plan import claim, fusion_key, make_plan, require_unchanged
+from avlmaps.maps.pipeline.sounds import detect_sounds
+from avlmaps.maps.pipeline.write import merge, write
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
-from avlmaps.maps.stages import detect_sounds, encode_and_fuse, find_floor, find_up, identify_sensor, merge, write
 from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.reader import StoredMap, describe, open_stored
 from avlmaps.perception.cache.cached_encoders import with_cache
@@ -62,8 +67,8 @@ def build_map(
         if claim(plan, resume, overwrite) is None:
             plan = checked(plan, allow)
             up = find_up(plan)
-            plan, floor = find_floor(plan, up)
-            sensor = identify_sensor(plan)
+            plan, floor = find_floor(plan, up.up)
+            sensor = find_sensor(plan)
             fused = encode_and_fuse(plan, parts, sensor)
             keyframes = describe_keyframes(plan, fused)  # their keypoints, places and views
             sounds = detect_sounds(plan)
@@ -71,3 +76,41 @@ def build_map(
             require_unchanged(plan, stamp)
             write(plan, up, floor, fused, keyframes, sounds, merged)
     return open_stored(plan.path)
+
+
+def build_part(
+    recording: Recording,
+    start: int,
+    stop: int,
+    out: Path | str,
+    profile: str | Profile | Encoders = "embedded",
+    settings: BuildSettings = DEFAULTS,
+    cache: CacheSettings = DEFAULT_CACHE,
+) -> MapPart:
+    """Fuse the frames ``start`` to ``stop - 1`` and keep their sums in a folder, as one machine's part of a map.
+
+    Args:
+        recording: what all machines read.
+        start: first frame, from 0.
+        stop: one past the last frame.
+        out: the part's folder; a part that is there already, of the same frames and settings, is returned.
+        profile: which models perceive.
+        settings: the same on all machines.
+        cache: whether features are stored for another build.
+
+    Raises:
+        MapError: there are no such frames, or too many of them cannot be read.
+    """
+    out, used = Path(out), with_cache(encoders_of(profile), cache)
+    settings = settings.for_profile(used.weight_variance_m2)
+    if not 0 <= start < stop <= len(recording):
+        raise MapError(f"There are no frames {start} to {stop}; {recording.path} has frames 0 to {len(recording)}.")
+    key, span = fusion_key(recording, settings, used), (start, stop, settings.frames.step)
+    if out.exists() and any(out.iterdir()):
+        part = load_part(out, key)
+        if part.info.spans != (span,):
+            raise MapError(f"{out} holds a part of other frames; give another folder, or remove it first.")
+        return part
+    known = attach_estimated_ground(recording, settings) if Kind.PIXELS in used else recording
+    fuse_spans(known, [(span, out)], used, settings, estimate_sensor(recording, settings).model)
+    return load_part(out, key)

@@ -21,18 +21,17 @@ from avlmaps.core.progress import silence_progress
 from avlmaps.core.registry import Kind
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
 from avlmaps.maps.fusion.free_space import FreeViewCollector
-from avlmaps.maps.fusion.sensor_choice import find_sensor
-from avlmaps.maps.gravity.stage import estimate_ground, estimate_up
 from avlmaps.maps.grid import GridSpec
-from avlmaps.maps.integrity import Guard
 from avlmaps.maps.keyframes.growing import GrowingKeyframes, SeenOnce
-from avlmaps.maps.keyframes.stage import RANDOMNESS
-from avlmaps.maps.partial_maps import BUILD_VERSION
 from avlmaps.maps.perceived import as_grid, encode_pixels, require_unit
-from avlmaps.maps.plan import Plan
+from avlmaps.maps.pipeline.estimate import estimate_ground, estimate_sensor, estimate_up
+from avlmaps.maps.pipeline.keyframes import RANDOMNESS
+from avlmaps.maps.pipeline.plan import BUILD_VERSION, Plan
+from avlmaps.maps.pipeline.sounds import silence
+from avlmaps.maps.pipeline.write import manifest_of, surfaces
 from avlmaps.maps.settings import BuildSettings
-from avlmaps.maps.stages import manifest_of, silence, surfaces
 from avlmaps.maps.store.checkpoints import key_of
+from avlmaps.maps.store.integrity import Guard
 from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.manifest import BadFrame, GroundInfo, MapInfo, ModelInfo, SensorInfo, Timings, UpInfo
 from avlmaps.maps.store.manifest_file import MANIFEST
@@ -230,7 +229,7 @@ class GrowingMap:
         with silence_progress(True):
             if self._sensor is None:
                 held = self._walk.held()
-                self._sensor, self._ground = find_sensor(held, self.settings), self._upright_of(held)[2]
+                self._sensor, self._ground = estimate_sensor(held, self.settings), self._upright_of(held)[2]
                 self._rehearsal = _Rehearsal()
             elif self._walk.has_doubled:
                 self._ground = self._upright_of(self._walk.held())[2]

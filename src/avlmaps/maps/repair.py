@@ -7,9 +7,9 @@ from pathlib import Path
 from avlmaps.core.errors import MapError
 from avlmaps.core.progress import say
 from avlmaps.maps.build import build_map
-from avlmaps.maps.integrity import Guard, remember_checked
-from avlmaps.maps.plan import make_plan
+from avlmaps.maps.pipeline.plan import make_plan
 from avlmaps.maps.store.array_files import FileInfo, explain_write_errors, refuse_links, sync_names, verify_file
+from avlmaps.maps.store.integrity import Guard, remember_checked
 from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.manifest import MapInfo
 from avlmaps.maps.store.manifest_file import MANIFEST, parse_manifest, read_manifest, write_manifest

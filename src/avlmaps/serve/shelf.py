@@ -17,7 +17,7 @@ from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import AvlmapsError, BackendError, QueryError
 from avlmaps.core.question import Modality, Part, Role
 from avlmaps.language.questions import parse_sentence
-from avlmaps.maps.integrity import stamp
+from avlmaps.maps.store.integrity import stamp
 from avlmaps.maps.store.manifest_file import MANIFEST
 from avlmaps.maps.store.reader import open_stored
 from avlmaps.query.avlmap import AVLMap, QuerySettings

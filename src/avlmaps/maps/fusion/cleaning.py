@@ -17,7 +17,6 @@ from avlmaps.maps.fusion.sensor import SensorModel
 from avlmaps.maps.fusion.voxel_kernels import rehash
 from avlmaps.maps.fusion.voxel_sums import Evidence
 from avlmaps.maps.grid import GridSpec
-from avlmaps.maps.store.manifest import Removed
 
 FEWEST_THROUGH = 2  # frames: one may have a wrong pose
 THROUGH_SHARE = 0.5  # a voxel goes when more frames see through it than this share of those that hit it
@@ -27,8 +26,8 @@ MOST_REACH = 4.0  # voxels: a smear is looked for no farther
 
 def clean(
     evidence: Evidence, views: Sequence[FreeViews], camera: Pinhole, grid: GridSpec, sensor: SensorModel
-) -> tuple[Bool[np.ndarray, " n"], Removed]:
-    """Return which voxels are a surface, and how many are not.
+) -> tuple[Bool[np.ndarray, " n"], dict[str, int]]:
+    """Return which voxels are a surface, and how many are not: ``seen_through``, ``smeared``, ``specks``.
 
     Args:
         evidence: of all voxels.
@@ -38,13 +37,13 @@ def clean(
         sensor: the camera's error.
     """
     kept = np.ones(len(evidence), bool)
-    counts: list[int] = []
-    for rule in (_through, _smeared, _specks):
+    removed: dict[str, int] = {}
+    for name, rule in (("seen_through", _through), ("smeared", _smeared), ("specks", _specks)):
         there = np.flatnonzero(kept)
         gone = rule(evidence.only(kept), views, camera, grid, sensor)
         kept[there[gone]] = False
-        counts.append(int(gone.sum()))
-    return kept, Removed(seen_through=counts[0], smeared=counts[1], specks=counts[2])
+        removed[name] = int(gone.sum())
+    return kept, removed
 
 
 def _through(

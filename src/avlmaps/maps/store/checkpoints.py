@@ -6,8 +6,8 @@ everything that the stage's outcome depends on; a checkpoint with another key is
 
 import hashlib
 import shutil
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
@@ -54,6 +54,21 @@ class Checkpoint(Generic[F]):
     facts: F
     arrays: dict[str, np.ndarray]
     files: dict[str, Path]
+
+
+@dataclass(frozen=True, slots=True)
+class Computed(Generic[F]):
+    """What a stage computed, for its checkpoint.
+
+    Attributes:
+        facts: all that is not an array.
+        arrays: by name.
+        files: other files by name; they are copied.
+    """
+
+    facts: F
+    arrays: Mapping[str, np.ndarray] = field(default_factory=dict[str, np.ndarray])
+    files: Mapping[str, Path] = field(default_factory=dict[str, Path])
 
 
 def key_of(*ingredients: Any) -> str:
@@ -120,3 +135,29 @@ def find_checkpoint(folder: Path, facts: type[F], key: str, *, verify: bool = Tr
     except MapError:
         shutil.rmtree(folder, ignore_errors=True)
         return None
+
+
+def load_or_compute(
+    folder: Path,
+    key: str,
+    facts: type[F],
+    compute: Callable[[], Computed[F]],
+    usable: Callable[[F], bool] = lambda _: True,
+) -> Checkpoint[F]:
+    """Return the checkpoint of a stage; compute and store it where there is none.
+
+    A stage is read back even when it was computed a moment ago, so that a resumed build sees the same.
+
+    Args:
+        folder: of this stage alone.
+        key: see ``key_of``.
+        facts: type of its facts.
+        compute: runs the stage; what it puts beside its folder it removes itself.
+        usable: whether a checkpoint may stand; else it is computed again.
+    """
+    found = find_checkpoint(folder, facts, key)
+    if found is not None and usable(found.facts):
+        return found
+    done = compute()
+    save_checkpoint(folder, key, done.facts, done.arrays, done.files)
+    return load_checkpoint(folder, facts, key)

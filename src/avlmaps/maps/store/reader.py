@@ -16,10 +16,10 @@ from avlmaps.core.poses import FRAME, rotation_to_level
 from avlmaps.core.registry import Kind
 from avlmaps.core.suggestions import near_path
 from avlmaps.maps.grid import GridSpec
-from avlmaps.maps.integrity import Guard
 from avlmaps.maps.store.array_files import MEND, FileInfo, read_array, verify_file
 from avlmaps.maps.store.array_validation import array_fields, check_extent, check_order, content_fault, validate_arrays
 from avlmaps.maps.store.consistency import arrays_fault
+from avlmaps.maps.store.integrity import Guard
 from avlmaps.maps.store.lock import is_locked
 from avlmaps.maps.store.manifest import GroundInfo, MapInfo
 from avlmaps.maps.store.manifest_file import MANIFEST, RESTORE, parse_manifest, read_manifest

@@ -11,9 +11,9 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from avlmaps.maps.integrity import remember_checked
 from avlmaps.maps.store.array_files import FileInfo, sync_names, write_array, write_copy
 from avlmaps.maps.store.array_validation import array_fields
+from avlmaps.maps.store.integrity import remember_checked
 from avlmaps.maps.store.lock import LOCK
 from avlmaps.maps.store.manifest import MapInfo
 from avlmaps.maps.store.manifest_file import MANIFEST, write_manifest

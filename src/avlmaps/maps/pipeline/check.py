@@ -1,8 +1,7 @@
 """The check of the recording at the beginning of a build: what cannot be is refused, what is odd stays with the map."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -10,16 +9,11 @@ import numpy as np
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.progress import say
 from avlmaps.maps.gravity.given_up import some_frames, up_doubts
-from avlmaps.maps.partial_maps import BUILD_VERSION
-from avlmaps.maps.plan import Computed, Plan, stage
-from avlmaps.maps.store.checkpoints import key_of
-from avlmaps.maps.store.manifest import Removed
+from avlmaps.maps.pipeline.plan import BUILD_VERSION, Plan
+from avlmaps.maps.store.checkpoints import Computed, key_of, load_or_compute
 from avlmaps.recordings.consistency.check import check_recording
 from avlmaps.recordings.consistency.verdict import Reason, Verdict
 from avlmaps.recordings.types import Recording
-
-# Share of the voxels that frames see through: 0 to 1 % in right recordings, 8 % with the drift of wheels.
-MOST_SEEN_THROUGH = 0.15
 
 
 class _Doubts(msgspec.Struct):
@@ -43,11 +37,12 @@ def checked(plan: Plan, allowed: Sequence[str]) -> Plan:
             raise RecordingError(f"There is nothing called {name!r} to allow; known are: {', '.join(known)}.")
     key = key_of("doubts", BUILD_VERSION, plan.recording.fingerprint, sorted(allowed))
 
-    def compute(_: Path) -> Computed[_Doubts]:
+    def compute() -> Computed[_Doubts]:
         return Computed(_doubts(plan.recording, allowed))
 
     # A frame that could not be read then may be readable now.
-    doubts = stage(plan, "doubts", key, _Doubts, compute, usable=lambda facts: facts.whole).facts.sentences
+    found = load_or_compute(plan.folder("doubts", key), key, _Doubts, compute, usable=lambda facts: facts.whole)
+    doubts = found.facts.sentences
     for doubt in doubts:
         say(f"note: {doubt}")
     return replace(plan, doubts=doubts)
@@ -77,18 +72,3 @@ def judge(recording: Recording) -> Verdict:
         return verdict
     tilted = up_doubts(recording, some_frames(recording), np.random.default_rng(0))
     return replace(verdict, findings=(*verdict.findings, *tilted))
-
-
-def carving_doubts(removed: Removed, voxels: int) -> Iterator[str]:
-    """Yield a sentence where too much of a map was seen through.
-
-    Args:
-        removed: voxels that were no surface.
-        voxels: that are.
-    """
-    share = removed.seen_through / max(removed.seen_through + voxels, 1)
-    if share > MOST_SEEN_THROUGH:
-        yield (
-            f"{share:.0%} of the voxels were seen through by other frames and removed, where right recordings have up "
-            "to 8 %: the poses drift far, or much was moved. Check the poses."
-        )

@@ -1,16 +1,23 @@
-"""Finding up and the floor in a recording: what the first stages of a build and of a part have in common."""
+"""What is estimated in some frames before all are fused: up, the floor, and the depth camera's error."""
 
 from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import replace
+from time import perf_counter
 from typing import Literal
 
+import msgspec
 import numpy as np
 
 from avlmaps.core.errors import RecordingError
+from avlmaps.maps.fusion.depth_noise import FRAMES, measure_noise, nearest_model
+from avlmaps.maps.fusion.sensor import MODELS, SensorModel
 from avlmaps.maps.gravity.floor import FoundFloor, GroundedRecording, find_ground
 from avlmaps.maps.gravity.floor_choice import Evidence, Expected
+from avlmaps.maps.pipeline.plan import BUILD_VERSION, Plan
 from avlmaps.maps.settings import BuildSettings
-from avlmaps.maps.store.manifest import FloorGuess, FloorInfo, GroundInfo, UpInfo
+from avlmaps.maps.store.checkpoints import Computed, key_of, load_or_compute
+from avlmaps.maps.store.manifest import FloorGuess, FloorInfo, GroundInfo, SensorInfo, UpInfo
 from avlmaps.recordings.types import Frame, Ground, Recording
 
 _LEAVES_OPEN = 0.7  # a floor of a lower confidence gets a notice,
@@ -19,15 +26,76 @@ _MUCH_BELOW = 0.1  # a floor that the user gave gets one when more surface than 
 _RANDOMNESS = 1  # number of the stage as a source of randomness (keyframes have 2)
 
 
+class EstimatedUp(msgspec.Struct, frozen=True):
+    """The up direction, and the seconds it took."""
+
+    up: UpInfo
+    elapsed_s: float
+
+
+class EstimatedFloor(msgspec.Struct, frozen=True):
+    """The floors, whether each frame that was to be looked at could be, and the seconds it took."""
+
+    ground: GroundInfo
+    whole: bool
+    elapsed_s: float
+
+
+class _EstimatedSensor(msgspec.Struct, frozen=True):
+    sensor: SensorInfo
+
+
+def find_up(plan: Plan) -> EstimatedUp:
+    """Return the up direction, from the recording or from the planes in view."""
+    if plan.recording.up_in_world is not None:
+        return EstimatedUp(UpInfo.of(plan.recording.up_in_world, "recording", 1.0), 0.0)
+    key = key_of("up", BUILD_VERSION, plan.recording.fingerprint, plan.settings.gravity, plan.settings.seed)
+
+    def compute() -> Computed[EstimatedUp]:
+        begin = perf_counter()
+        return Computed(EstimatedUp(estimate_up(plan.recording, plan.settings), perf_counter() - begin))
+
+    return load_or_compute(plan.folder("up", key), key, EstimatedUp, compute).facts
+
+
+def find_floor(plan: Plan, up: UpInfo) -> tuple[Plan, EstimatedFloor]:
+    """Return the plan with up and the floor in the recording's frames, and the floors."""
+    recording = plan.recording
+    key = key_of("ground", BUILD_VERSION, recording.fingerprint, recording.base_height, plan.settings.gravity, up)
+
+    def compute() -> Computed[EstimatedFloor]:
+        begin = perf_counter()
+        ground, info = estimate_ground(recording, plan.settings, up)
+        arrays = {name: getattr(ground, name) for name in ("up_in_world", "camera_m", "floor_m")}
+        whole = len(ground.camera_m) == len(spread(recording, plan.settings.gravity.frames))
+        return Computed(EstimatedFloor(info, whole, perf_counter() - begin), arrays)
+
+    # A frame that could not be read then may be readable now.
+    found = load_or_compute(plan.folder("ground", key), key, EstimatedFloor, compute, usable=lambda facts: facts.whole)
+    return replace(plan, recording=GroundedRecording(recording, Ground(**found.arrays))), found.facts
+
+
+def find_sensor(plan: Plan) -> SensorInfo:
+    """Return the depth camera, as the settings name it or as the frames show it."""
+    if plan.settings.fusion.sensor != "auto":
+        return estimate_sensor(plan.recording, plan.settings)
+    key = key_of("sensor", BUILD_VERSION, plan.recording.fingerprint)
+
+    def compute() -> Computed[_EstimatedSensor]:
+        return Computed(_EstimatedSensor(estimate_sensor(plan.recording, plan.settings)))
+
+    return load_or_compute(plan.folder("sensor", key), key, _EstimatedSensor, compute).facts.sensor
+
+
 def estimate_up(recording: Recording, settings: BuildSettings) -> UpInfo:
     """Return the up direction: as the recording says, else as the planes in view do, else as the camera was held."""
-    from avlmaps.maps.gravity.up import find_up
+    from avlmaps.maps.gravity.up import find_up as up_of_planes
 
     if recording.up_in_world is not None:
         return UpInfo.of(recording.up_in_world, "recording", 1.0)
     rng = np.random.default_rng([settings.seed, _RANDOMNESS])
     try:
-        up = find_up(spread_frames(recording, settings.gravity.frames), rng)
+        up = up_of_planes(spread_frames(recording, settings.gravity.frames), rng)
     except RecordingError:  # too little smooth surface: people and robots hold cameras upright, more or less
         held = -recording.world_from_camera[:, :3, 1].mean(axis=0)
         return UpInfo.of(held if np.linalg.norm(held) > 0.01 else np.array([0.0, 0.0, 1.0]), "camera", 0.0)
@@ -130,3 +198,20 @@ def ground_notices(ground: GroundInfo) -> Iterator[str]:
 def attach_estimated_ground(recording: Recording, settings: BuildSettings) -> Recording:
     """Return the recording with up and the floor in its frames; the same on every machine."""
     return GroundedRecording(recording, estimate_ground(recording, settings, estimate_up(recording, settings))[0])
+
+
+def estimate_sensor(recording: Recording, settings: BuildSettings) -> SensorInfo:
+    """Return the depth camera that the settings name, or the one whose error is nearest to what the frames show.
+
+    The choice is one of a few models and hence the same on every machine, though the measured number may differ in its
+    last digits.
+    """
+    chosen = settings.fusion.sensor
+    if isinstance(chosen, SensorModel):
+        return SensorInfo(name="custom", known_from="settings", noise_per_m=None, model=chosen)
+    if chosen != "auto":
+        return SensorInfo(name=chosen, known_from="settings", noise_per_m=None, model=MODELS[chosen])
+    noise = measure_noise(spread_frames(recording, FRAMES))
+    noise = None if noise is None else float(f"{noise:.2g}")  # as far as it is known, and alike on every machine
+    name = nearest_model(noise)
+    return SensorInfo(name=name, known_from="frames", noise_per_m=noise, model=MODELS[name])

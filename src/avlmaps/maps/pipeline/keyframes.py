@@ -14,11 +14,18 @@ from jaxtyping import Float32, Int
 from avlmaps.core.progress import progress
 from avlmaps.core.registry import Kind
 from avlmaps.maps.keyframes.describe import describe_keyframe, learn_places, select_keyframes, stack_keyframes
-from avlmaps.maps.partial_maps import BUILD_VERSION, Part
-from avlmaps.maps.plan import Computed, Plan, stage
-from avlmaps.maps.prefetch import run_ahead
+from avlmaps.maps.pipeline.parts import MapPart
+from avlmaps.maps.pipeline.plan import BUILD_VERSION, Plan
+from avlmaps.maps.pipeline.prefetch import run_ahead
 from avlmaps.maps.store.array_validation import RAGGED, ROWS_OR_NONE, array_fields, validate_arrays
-from avlmaps.maps.store.checkpoints import find_checkpoint, key_of, load_checkpoint, save_checkpoint
+from avlmaps.maps.store.checkpoints import (
+    Computed,
+    find_checkpoint,
+    key_of,
+    load_checkpoint,
+    load_or_compute,
+    save_checkpoint,
+)
 from avlmaps.maps.types import Keyframes
 from avlmaps.perception.cache.cached_encoders import cache_note
 from avlmaps.perception.protocols import LocalFeatures, ViewEncoder
@@ -43,7 +50,7 @@ class KeyframeResult:
     elapsed_s: float
 
 
-def describe_keyframes(plan: Plan, parts: Sequence[Part]) -> KeyframeResult:
+def describe_keyframes(plan: Plan, parts: Sequence[MapPart]) -> KeyframeResult:
     """Choose keyframes among the frames that were fused, and look at them."""
     fused = fused_frames(parts)
     good = Subset(plan.recording, fused)
@@ -68,13 +75,13 @@ def _learn(
     """Return the state of the place encoder, the keypoints that it learned from (if it did now), and the seconds."""
     local: dict[int, LocalFeatures] = {}
 
-    def compute(_: Path) -> Computed[_Facts]:
+    def compute() -> Computed[_Facts]:
         begin = perf_counter()
         state, keypoints = learn_places(good, chosen, plan.used, plan.rng(RANDOMNESS))
         local.update(keypoints)
         return Computed(_Facts(perf_counter() - begin), state)
 
-    found = stage(plan, "keyframes", key, _Facts, compute, within="places")
+    found = load_or_compute(plan.folder("keyframes", key) / "places", key, _Facts, compute)
     return found.arrays, local, found.facts.elapsed_s
 
 
@@ -136,7 +143,7 @@ def _from_store(plan: Plan) -> str:
     return min((words for words in notes if words), key=lambda words: int(words.split()[0]), default="")
 
 
-def fused_frames(parts: Sequence[Part]) -> Int[np.ndarray, " n"]:
+def fused_frames(parts: Sequence[MapPart]) -> Int[np.ndarray, " n"]:
     """Return the numbers of the frames that are in the parts, rising."""
     covered = [np.arange(*span) for part in parts for span in part.info.spans]
     bad = [frame.index for part in parts for frame in part.info.bad_frames]

@@ -1,37 +1,17 @@
-"""Which depth camera a recording was made with: measured in its frames where nobody says."""
+"""The error of a depth camera, measured in some frames, and the known camera that is nearest to it."""
 
 from collections.abc import Iterable
 
 import numpy as np
 
-from avlmaps.maps.fusion.sensor import MODELS, SensorModel, SensorName
-from avlmaps.maps.gravity.stage import spread_frames
-from avlmaps.maps.settings import BuildSettings
-from avlmaps.maps.store.manifest import SensorInfo
-from avlmaps.recordings.types import Frame, Recording
+from avlmaps.maps.fusion.sensor import MODELS, SensorName
+from avlmaps.recordings.types import Frame
 
 FRAMES = 12  # looked at, spread evenly
 _FEWEST = 500  # measured places; with fewer the error is not known
 _NEAREST_M = 1.0
 _STEPS_WIDE = 80  # second differences are taken over a row divided by this: noise that is alike nearby shows as well
 _PERFECT_PER_M = 4e-4  # below this a depth is wrong by less than a millimetre at 1.5 m: rounding
-
-
-def find_sensor(recording: Recording, settings: BuildSettings) -> SensorInfo:
-    """Return the depth camera that the settings name, or the one whose error is nearest to what the frames show.
-
-    The choice is one of a few models and hence the same on every machine, though the measured number may differ in its
-    last digits.
-    """
-    chosen = settings.fusion.sensor
-    if isinstance(chosen, SensorModel):
-        return SensorInfo(name="custom", known_from="settings", noise_per_m=None, model=chosen)
-    if chosen != "auto":
-        return SensorInfo(name=chosen, known_from="settings", noise_per_m=None, model=MODELS[chosen])
-    noise = measure_noise(spread_frames(recording, FRAMES))
-    noise = None if noise is None else float(f"{noise:.2g}")  # as far as it is known, and alike on every machine
-    name = nearest_model(noise)
-    return SensorInfo(name=name, known_from="frames", noise_per_m=noise, model=MODELS[name])
 
 
 def nearest_model(noise_per_m: float | None) -> SensorName:

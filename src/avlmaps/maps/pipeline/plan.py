@@ -1,26 +1,31 @@
-"""The plan of a build, and where it stores what it has finished."""
+"""The plan of a build: what it is made of, which frames it fuses, and where it stores what it has finished."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Generic
 
 import numpy as np
 
 from avlmaps.core.errors import MapError
 from avlmaps.core.files import sampled_digest
 from avlmaps.core.progress import say
-from avlmaps.maps.partial_maps import BUILD_VERSION, fusion_key
+from avlmaps.core.registry import Kind
+from avlmaps.maps.keyframes.describe import keyframes_by_motion
 from avlmaps.maps.settings import BuildSettings
-from avlmaps.maps.store.checkpoints import Checkpoint, F, find_checkpoint, key_of, load_checkpoint, save_checkpoint
+from avlmaps.maps.store.checkpoints import key_of
 from avlmaps.maps.store.manifest import MapInfo, ModelInfo
 from avlmaps.maps.store.manifest_file import MANIFEST, parse_manifest, read_manifest
 from avlmaps.maps.store.own_files import remove_stages
 from avlmaps.maps.store.reader import PARTS
 from avlmaps.maps.store.writer import is_map_or_free, sweep
 from avlmaps.perception.encoders import Encoders
+from avlmaps.perception.protocols import PixelEncoder
 from avlmaps.recordings.content import LARGEST_BUDGET_BYTES
 from avlmaps.recordings.types import Recording
+
+BUILD_VERSION = 4  # raise it when a stage comes to compute something else, so that no old checkpoint is taken for new
+
+Span = tuple[int, int, int]  # (first, last + 1, step) of frames
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,53 +61,6 @@ class Plan:
         return np.random.default_rng([self.settings.seed, stage])
 
 
-@dataclass(frozen=True, slots=True)
-class Computed(Generic[F]):
-    """What a stage computed and its checkpoint stores.
-
-    Attributes:
-        facts: all that is not an array.
-        arrays: by name.
-        files: other files by name; they are copied.
-    """
-
-    facts: F
-    arrays: Mapping[str, np.ndarray] = field(default_factory=dict[str, np.ndarray])
-    files: Mapping[str, Path] = field(default_factory=dict[str, Path])
-
-
-def stage(
-    plan: Plan,
-    name: str,
-    key: str,
-    facts: type[F],
-    compute: Callable[[Path], Computed[F]],
-    *,
-    within: str = "",
-    usable: Callable[[F], bool] = lambda _: True,
-) -> Checkpoint[F]:
-    """Return the checkpoint of a stage; compute and store it where there is none.
-
-    A stage is read back even when it was computed a moment ago, so that a resumed build sees the same.
-
-    Args:
-        plan: of the build.
-        name: of the stage, for its folder.
-        key: hash of all that it depends on (``key_of``).
-        facts: type of its facts.
-        compute: is given the folder of the checkpoint; what it puts beside that folder it removes itself.
-        within: a folder within the stage's, where it has several checkpoints.
-        usable: whether a checkpoint may stand; else it is computed again.
-    """
-    folder = plan.folder(name, key) / within
-    found = find_checkpoint(folder, facts, key)
-    if found is None or not usable(found.facts):
-        done = compute(folder)
-        save_checkpoint(folder, key, done.facts, done.arrays, done.files)
-        found = load_checkpoint(folder, facts, key)
-    return found
-
-
 def make_plan(recording: Recording, path: Path, used: Encoders, settings: BuildSettings) -> Plan:
     """Gather the ingredients and refuse what cannot be built.
 
@@ -118,6 +76,57 @@ def make_plan(recording: Recording, path: Path, used: Encoders, settings: BuildS
     models = {kind.value: ModelInfo.of(used.sources[kind].chosen, card) for kind, card in used.cards().items()}
     key = key_of("map", BUILD_VERSION, recording.fingerprint, audio_key(recording), used.name, models, settings)
     return Plan(recording, path, used, settings, models, key, fusion_key(recording, settings, used))
+
+
+def pixel_encoder_of(used: Encoders) -> PixelEncoder | None:
+    """Return the pixel encoder, None where there is none (the map is then one of surfaces and colours)."""
+    return used.pixels if Kind.PIXELS in used else None
+
+
+def fusion_key(recording: Recording, settings: BuildSettings, used: Encoders) -> str:
+    """Return the hash of all that the sums of a frame depend on; parts are only ever added to parts of the same key."""
+    encoder = pixel_encoder_of(used)
+    card = None if encoder is None else encoder.card
+    ground = (settings.gravity, settings.seed, recording.base_height) if encoder is not None else None
+    basis = recording.fingerprint, settings.voxel_size_m, settings.fusion, card, ground
+    chosen = (settings.keyframes, settings.frames.step) if used.keyframes_only else ()
+    return key_of("fusion", BUILD_VERSION, *basis, *chosen)
+
+
+def encoded_frames(recording: Recording, settings: BuildSettings, used: Encoders) -> frozenset[int] | None:
+    """Return the numbers of the frames whose pixels are encoded, None for all.
+
+    For a pixel encoder that is given keyframes alone they are those of every ``frames.step``-th frame of the whole
+    recording, by motion: the same on every machine that fuses a part of it, and known before a picture is read.
+    """
+    if not used.keyframes_only:
+        return None
+    numbers = np.arange(0, len(recording), settings.frames.step)
+    stamps, poses = recording.stamps_s[numbers], recording.world_from_camera[numbers]
+    return frozenset(numbers[keyframes_by_motion(stamps, poses, settings.keyframes)].tolist())
+
+
+def plan_spans(frames: int, settings: BuildSettings, covered: Sequence[Span] = ()) -> list[Span]:
+    """Return the stretches to fuse one after the other, each of ``frames.per_part`` frames or fewer.
+
+    Args:
+        frames: of the recording.
+        settings: step, and frames of a part.
+        covered: stretches that are fused already.
+    """
+    wanted = np.zeros(frames, bool)
+    wanted[:: settings.frames.step] = True
+    for start, stop, step in covered:
+        wanted[start:stop:step] = False
+    spans: list[Span] = []
+    stride = settings.frames.per_part * settings.frames.step
+    for start in range(0, frames, stride):
+        left = np.flatnonzero(wanted[start : start + stride])
+        for run in np.split(left, np.flatnonzero(np.diff(left) > settings.frames.step) + 1):
+            if len(run):
+                first, last = start + int(run[0]), start + int(run[-1])
+                spans.append((first, last + 1, settings.frames.step))
+    return spans
 
 
 def audio_key(recording: Recording) -> list[str | float] | None:
@@ -188,3 +197,8 @@ def _difference(plan: Plan, there: MapInfo) -> str:
     if there.models != plan.models:
         return "with other models"
     return "with another sound track or an older avlmaps"
+
+
+def strip_folder(sentence: str, recording: Recording) -> str:
+    """Return a sentence about a recording without the folders that it lies in: a map may travel."""
+    return sentence.replace(str(recording.path), recording.path.name)

@@ -1,0 +1,70 @@
+"""The stage of the sounds: the events in the recording's track, where there is one and a model for it."""
+
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+
+import msgspec
+import numpy as np
+
+from avlmaps.core.registry import Kind
+from avlmaps.maps.pipeline.plan import BUILD_VERSION, Plan, audio_key
+from avlmaps.maps.store.array_validation import array_fields, validate_arrays
+from avlmaps.maps.store.checkpoints import Computed, key_of, load_or_compute
+from avlmaps.maps.types import HeardSounds
+
+
+class _Facts(msgspec.Struct):
+    elapsed_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class SoundResult:
+    """Outcome of the sound stage: what was heard, where the clips lie, and the seconds it took."""
+
+    sounds: HeardSounds
+    clips_folder: Path
+    elapsed_s: float
+
+
+def detect_sounds(plan: Plan) -> SoundResult:
+    """Find the sounds in the track; none where there is no track, or no model for them."""
+    if plan.recording.audio is None or Kind.SOUNDS not in plan.used:
+        return SoundResult(silence(plan), plan.path, 0.0)
+    settings, model = plan.settings.hearing, plan.models[Kind.SOUNDS.value]
+    key = key_of("sounds", BUILD_VERSION, plan.recording.fingerprint, audio_key(plan.recording), settings, model)
+
+    folder = plan.folder("sounds", key)
+    scratch = folder.with_name("clips.unfinished")
+
+    def compute() -> Computed[_Facts]:
+        from avlmaps.maps.audio.events import detect_events
+
+        begin = perf_counter()
+        shutil.rmtree(scratch, ignore_errors=True)
+        scratch.mkdir(parents=True)
+        heard = detect_events(plan.recording, plan.used.sounds, settings, scratch)
+        arrays = {name: getattr(heard, name) for name in array_fields(HeardSounds)}
+        clips = {f"clips/{number:06d}": scratch / Path(clip).name for number, clip in enumerate(heard.clips)}
+        return Computed(_Facts(perf_counter() - begin), arrays, clips)
+
+    found = load_or_compute(folder, key, _Facts, compute)
+    shutil.rmtree(scratch, ignore_errors=True)
+    names = tuple(path.name for path in found.files.values())
+    sounds = validate_arrays(HeardSounds, {**found.arrays, "clips": names}, str(found.folder))
+    return SoundResult(sounds, found.folder / "clips", found.facts.elapsed_s)
+
+
+def silence(plan: Plan) -> HeardSounds:
+    """Return no sounds, with features as long as the model's."""
+    model = plan.models.get(Kind.SOUNDS.value)
+    return HeardSounds(
+        onset_s=np.zeros(0),
+        offset_s=np.zeros(0),
+        track_offsets=np.zeros(1, np.int64),
+        track=np.zeros((0, 3), np.float32),
+        feature_offsets=np.zeros(1, np.int64),
+        feature=np.zeros((0, model.dim if model else 0), np.float32),
+        clips=(),
+    )

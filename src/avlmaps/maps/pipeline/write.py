@@ -1,0 +1,181 @@
+"""The last stages: the parts become the voxels of the map, and all of it is written."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from time import perf_counter
+
+from avlmaps.core.errors import MapError
+from avlmaps.core.version import __version__
+from avlmaps.maps.fusion.accumulator import VoxelAccumulator
+from avlmaps.maps.fusion.cleaning import clean
+from avlmaps.maps.fusion.free_space import FreeViews
+from avlmaps.maps.grid import GridSpec
+from avlmaps.maps.pipeline.estimate import EstimatedFloor, EstimatedUp, ground_notices
+from avlmaps.maps.pipeline.keyframes import KeyframeResult
+from avlmaps.maps.pipeline.parts import MapPart, sum_parts
+from avlmaps.maps.pipeline.plan import Plan, strip_folder
+from avlmaps.maps.pipeline.sounds import SoundResult
+from avlmaps.maps.store.manifest import (
+    BadFrame,
+    Box,
+    Counts,
+    GroundInfo,
+    MapInfo,
+    RecordingInfo,
+    Removed,
+    RigInfo,
+    SensorInfo,
+    Timings,
+    UpInfo,
+)
+from avlmaps.maps.store.writer import MapContent, write_map
+from avlmaps.maps.types import Voxels
+from avlmaps.recordings.types import Recording
+
+# Below this share of agreeing surface the direction that was found is reported as a guess.
+_GUESS = 0.1
+# Share of the voxels that frames see through: 0 to 1 % in right recordings, 8 % with the drift of wheels.
+MOST_SEEN_THROUGH = 0.15
+
+
+@dataclass(frozen=True, slots=True)
+class Merged:
+    """The voxels of the map, what was removed from them, and the seconds that it took."""
+
+    voxels: Voxels
+    sensor: SensorInfo
+    removed: Removed
+    elapsed_s: float
+
+
+def merge(plan: Plan, parts: Sequence[MapPart], sensor: SensorInfo) -> Merged:
+    """Add the parts up to the voxels of the map, and remove those that are no surface."""
+    total = sum_parts(parts, GridSpec(plan.settings.voxel_size_m))
+    return surfaces(plan, total, [part.views() for part in parts], sensor)
+
+
+def surfaces(plan: Plan, total: VoxelAccumulator, views: Sequence[FreeViews], sensor: SensorInfo) -> Merged:
+    """Return the voxels of the sums that are a surface.
+
+    Raises:
+        MapError: there is none.
+    """
+    begin, grid = perf_counter(), total.grid
+    if len(total) == 0:
+        farthest = min(plan.settings.fusion.max_depth_m, sensor.model.farthest_m(grid.voxel_size_m))
+        raise MapError(
+            f"No pixel of {plan.recording.path} has a depth between {plan.settings.fusion.min_depth_m} and "
+            f"{farthest:.4g} m, so that the map would be empty; check the recording's depth scale."
+        )
+    kept, removed = clean(total.evidence(), views, plan.recording.rig.depth, grid, sensor.model)
+    if not kept.any():
+        raise MapError(
+            f"Every voxel of {plan.recording.path} is seen through or a speck, so that the map would be empty; check "
+            "its poses and its depth scale, or use every depth as it is (--sensor none)."
+        )
+    return Merged(total.voxels(kept=kept), sensor, Removed(**removed), perf_counter() - begin)
+
+
+def write(
+    plan: Plan,
+    up: EstimatedUp,
+    floor: EstimatedFloor,
+    parts: Sequence[MapPart],
+    pictures: KeyframeResult,
+    heard: SoundResult,
+    merged: Merged,
+) -> MapInfo:
+    """Write the map and, last of all, its manifest; then the parts go."""
+    content = MapContent(merged.voxels, pictures.keyframes, pictures.place_state, heard.sounds, heard.clips_folder)
+    stages_s = {
+        "up": up.elapsed_s,
+        "ground": floor.elapsed_s,
+        "fusion": sum(part.info.elapsed_s for part in parts),
+        "keyframes": pictures.elapsed_s,
+        "sounds": heard.elapsed_s,
+        "merging": merged.elapsed_s,
+    }
+    finished = datetime.now(UTC).isoformat(timespec="seconds")
+    timings = Timings(finished=finished, elapsed_s=sum(stages_s.values()), stages_s=stages_s)
+    bad = sorted((frame for part in parts for frame in part.info.bad_frames), key=lambda frame: frame.index)
+    fused = sum(part.info.fused for part in parts)
+    return write_map(plan.path, content, manifest_of(plan, up.up, floor.ground, content, merged, timings, fused, bad))
+
+
+def manifest_of(
+    plan: Plan,
+    up: UpInfo,
+    ground: GroundInfo,
+    content: MapContent,
+    merged: Merged,
+    timings: Timings,
+    fused: int,
+    bad: Sequence[BadFrame] = (),
+) -> MapInfo:
+    """Return the content of ``map.json`` but for its list of files."""
+    doubts = (*plan.doubts, *carving_doubts(merged.removed, len(content.voxels)))
+    return MapInfo(
+        avlmaps_version=__version__,
+        build_key=plan.key,
+        voxel_size_m=plan.settings.voxel_size_m,
+        up=up,
+        ground=ground,
+        rig=RigInfo.of(plan.recording.rig),
+        profile=plan.used.name,
+        models=plan.models,
+        settings=plan.settings,
+        sensor=merged.sensor,
+        removed=merged.removed,
+        seed=plan.settings.seed,
+        recording=_recording_info(plan.recording),
+        counts=Counts(
+            frames=fused,
+            keyframes=len(content.keyframes),
+            voxels=len(content.voxels),
+            sounds=len(content.sounds),
+        ),
+        bounding_box_m=Box.of(content.voxels.index, plan.settings.voxel_size_m),
+        bad_frames=tuple(bad),
+        notices=(*doubts, *_notices(plan, up, ground, len(bad))),
+        doubts=doubts,
+        timings=timings,
+    )
+
+
+def _recording_info(recording: Recording) -> RecordingInfo:
+    return RecordingInfo(
+        name=recording.path.name,
+        format=recording.format,
+        fingerprint=recording.fingerprint,
+        frames=len(recording),
+        duration_s=recording.duration_s,
+        notices=tuple(strip_folder(notice, recording) for notice in recording.notices),
+    )
+
+
+def _notices(plan: Plan, up: UpInfo, ground: GroundInfo, bad: int) -> Iterator[str]:
+    if up.known_from == "camera":
+        yield "The up direction is a guess from how the camera was held: too little smooth surface is in view."
+    elif up.support < _GUESS:
+        yield f"The up direction is a guess: only {up.support:.0%} of the surface in view agrees with it."
+    yield from ground_notices(ground)
+    if bad:
+        yield f"{bad} of {len(plan.recording)} frames could not be read and were left out (bad_frames in map.json)."
+    if plan.recording.audio is None:
+        yield "The recording has no sound track, so that the map holds no sounds."
+
+
+def carving_doubts(removed: Removed, voxels: int) -> Iterator[str]:
+    """Yield a sentence where too much of a map was seen through.
+
+    Args:
+        removed: voxels that were no surface.
+        voxels: that are.
+    """
+    share = removed.seen_through / max(removed.seen_through + voxels, 1)
+    if share > MOST_SEEN_THROUGH:
+        yield (
+            f"{share:.0%} of the voxels were seen through by other frames and removed, where right recordings have up "
+            "to 8 %: the poses drift far, or much was moved. Check the poses."
+        )
