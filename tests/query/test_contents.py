@@ -83,13 +83,12 @@ def test_what_is_surely_a_chair_but_of_no_sure_kind_is_listed_as_a_chair() -> No
     for name, share in (("chair", 0.3), ("office chair", 0.3), ("armchair", 0.3), ("other", 0.1)):
         likely[:, encoder.names.index(name)] = share
     avlmap = AVLMap(fake_map(voxels_of(index, features_of(likely, encoder.codes)), encoders=fake_encoders(encoder)))
-    assert (
-        avlmap.pieces("chair", alone=True).confidence.max(initial=0.0) < 0.5 < avlmap.pieces("chair").confidence.max()
-    )
+    chairs = avlmap.instances("chair")
+    assert avlmap.instances("chair", alone=True).best < 0.5 < chairs.best
     for least in (0.0, 0.5):
         (chair,) = avlmap.things(least_confidence=least)
         assert (chair.name, len(chair.rows)) == ("chair", len(index))
-        assert chair.confidence == pytest.approx(float(avlmap.pieces("chair").confidence.max()), abs=1e-3)
+        assert chair.confidence == pytest.approx(chairs.best, abs=1e-3)
 
 
 def test_names_choose_what_is_listed(furnished: AVLMap) -> None:

@@ -12,9 +12,10 @@ from avlmaps.maps.grid import GridSpec
 from avlmaps.perception.embedded.codes import features_of, orthonormal_codes
 from avlmaps.perception.protocols import ModelCard, NamedPixelEncoder
 from avlmaps.query import known_rivals
-from avlmaps.query.colour_filter import tint_of
+from avlmaps.query.colour_filter import colour_in
 from avlmaps.query.factors import HeatSettings, NearAnchors
 from avlmaps.query.heatmap import Heatmap
+from avlmaps.query.instances import FeatureVoxels
 from avlmaps.query.known_rivals import KnownRivals
 from avlmaps.query.loops import plain_loops
 from avlmaps.query.modalities.object import object_factor
@@ -75,7 +76,7 @@ def ask(word: str, rgb: np.ndarray | None = None, role: Role = Role.PRIMARY, lea
     rivals = Rivals.of(FEATURE, ENCODER, ENCODER.vocabulary)
     part = Part(Modality.OBJECT, word, role)
     settings = ObjectSettings(least_confidence=least_confidence)
-    return object_factor(SPACE, FEATURE, ENCODER, rivals, part, settings, HeatSettings(), rgb)
+    return object_factor(FeatureVoxels(SPACE, FEATURE, ENCODER, rivals, settings, rgb), part, HeatSettings())
 
 
 def clumps(factor) -> set[int]:
@@ -127,9 +128,9 @@ def test_a_colour_alone_is_whatever_has_it() -> None:
 
 
 def test_colours_are_taken_out_of_a_phrase() -> None:
-    tint = tint_of("dark red kitchen cabinet")
+    tint = colour_in("dark red kitchen cabinet")
     assert tint is not None and tint.text == "dark red" and tint.thing == "kitchen cabinet"
-    assert tint_of("kitchen cabinet") is None
+    assert colour_in("kitchen cabinet") is None
 
 
 def near(clump: int) -> Heatmap:
@@ -197,7 +198,7 @@ def test_the_best_guess_is_where_a_name_is_likeliest_of_what_it_may_be_at_all(p:
     feature = features_of(probability, ENCODER.codes).astype(np.float16)
     rivals = Rivals.of(feature, ENCODER, ENCODER.vocabulary)
     part = Part(Modality.OBJECT, "floor", Role.PRIMARY)
-    guess = object_factor(SPACE, feature, ENCODER, rivals, part, ObjectSettings(), HeatSettings())
+    guess = object_factor(FeatureVoxels(SPACE, feature, ENCODER, rivals, ObjectSettings()), part, HeatSettings())
     assert clumps(guess) == expected
     assert not guess.found
 
@@ -208,7 +209,7 @@ def test_a_guess_among_weaker_voxels_can_be_turned_off() -> None:
     rivals = Rivals.of(feature, ENCODER, ENCODER.vocabulary)
     part = Part(Modality.OBJECT, "floor", Role.PRIMARY)
     settings = ObjectSettings(guess_below=0.0)
-    assert not object_factor(SPACE, feature, ENCODER, rivals, part, settings, HeatSettings()).mask.any()
+    assert not object_factor(FeatureVoxels(SPACE, feature, ENCODER, rivals, settings), part, HeatSettings()).mask.any()
 
 
 @settings(max_examples=30, deadline=None)
@@ -232,7 +233,7 @@ def test_voxels_with_little_of_the_word_need_no_comparison(
         none_known, all_known = (KnownRivals.of(vocabulary, len(INDEX)) for _ in range(2))
         all_known.whole(feature)
         full, *short = (
-            object_factor(SPACE, feature, ENCODER, each, part, chosen, HeatSettings())
+            object_factor(FeatureVoxels(SPACE, feature, ENCODER, each, chosen), part, HeatSettings())
             for each in (Rivals.of(feature, ENCODER, NAMES), vocabulary, none_known, all_known)
         )
         for lazy in short:
@@ -290,7 +291,7 @@ def test_weak_voxels_round_a_chair_leave_it_as_it_is_in_company() -> None:
     feature = features_of(probability.astype(np.float32), ENCODER.codes).astype(np.float16)
     part = Part(Modality.OBJECT, "chair", Role.PRIMARY)
     rivals = Rivals.of(feature, ENCODER, ENCODER.vocabulary)
-    alone = object_factor(SPACE, feature, ENCODER, rivals, part, ObjectSettings(), HeatSettings())
+    alone = object_factor(FeatureVoxels(SPACE, feature, ENCODER, rivals, ObjectSettings()), part, HeatSettings())
     joined = Heatmap.of(alone) * near(0)
     assert alone.found and joined.found
     np.testing.assert_array_equal(alone.mask, is_chair)
@@ -305,7 +306,7 @@ def test_what_is_found_alone_is_the_same_in_company(word: str, evenness: float, 
     part = Part(Modality.OBJECT, word, Role.PRIMARY)
     with plain_loops():
         rivals = Rivals.of(feature, ENCODER, NAMES)
-        alone = object_factor(SPACE, feature, ENCODER, rivals, part, ObjectSettings(), HeatSettings())
+        alone = object_factor(FeatureVoxels(SPACE, feature, ENCODER, rivals, ObjectSettings()), part, HeatSettings())
     company = alone.include_uncertain()
     if not alone.found:
         return
@@ -342,9 +343,8 @@ def row_of_chairs(too_long: float):
     space = Space(GridSpec(0.05), index, np.array([0.0, 0.0, 1.0]))
     rivals = Rivals.of(feature, ENCODER, ENCODER.vocabulary)
     part = Part(Modality.OBJECT, "chair", Role.PRIMARY)
-    found = object_factor(
-        space, feature, ENCODER, rivals, part, ObjectSettings(too_long=too_long), HeatSettings()
-    )  # fmt: skip
+    voxels = FeatureVoxels(space, feature, ENCODER, rivals, ObjectSettings(too_long=too_long))
+    found = object_factor(voxels, part, HeatSettings())
     return found, index[found.mask, 0]
 
 

@@ -9,10 +9,10 @@ from avlmaps.core.question import Modality, Part
 from avlmaps.maps.grid import GridSpec
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.query.factors import HeatSettings
+from avlmaps.query.instances import FeatureVoxels, margin_confidence
 from avlmaps.query.kernels import feature_scores, linked
 from avlmaps.query.modalities.object import object_factor
 from avlmaps.query.object_settings import ObjectSettings
-from avlmaps.query.pieces import instance_confidence
 from avlmaps.query.voxel_space import Space
 from avlmaps.query.words import Rivals, object_margins
 
@@ -78,8 +78,8 @@ def test_voxels_within_reach_are_linked_and_no_others(seed, spread, reach) -> No
 
 def test_confidence_rises_with_margin_and_size() -> None:
     settings = ObjectSettings()
-    clear = np.array([instance_confidence(np.full(40, m), np.zeros(40, int), 0.05, settings)[0] for m in (0.1, 0.5)])
-    large = np.array([instance_confidence(np.full(n, 0.5), np.zeros(n, int), 0.05, settings)[0] for n in (1, 40)])
+    clear = np.array([margin_confidence(np.full(40, m), np.zeros(40, int), 0.05, settings)[0] for m in (0.1, 0.5)])
+    large = np.array([margin_confidence(np.full(n, 0.5), np.zeros(n, int), 0.05, settings)[0] for n in (1, 40)])
     assert clear[0] < clear[1] < 1.0
     assert large[0] < 0.5 < large[1]
     assert clear[0] == pytest.approx(0.5, abs=1e-3)  # as likely right as wrong
@@ -90,7 +90,7 @@ def asked_of(encoder, index: np.ndarray, feature: np.ndarray, word: str, vocabul
     space = Space(GridSpec(0.05), voxels.index, UP)
     rivals = Rivals.of(voxels.feature, encoder, encoder.vocabulary if vocabulary is None else vocabulary)
     part = Part(Modality.OBJECT, word)
-    return object_factor(space, voxels.feature, encoder, rivals, part, ObjectSettings(), HeatSettings())
+    return object_factor(FeatureVoxels(space, voxels.feature, encoder, rivals, ObjectSettings()), part, HeatSettings())
 
 
 def test_a_word_of_the_vocabulary_does_not_compete_with_itself() -> None:

@@ -10,9 +10,9 @@ from avlmaps.core.question import Modality, Part
 from avlmaps.maps.grid import GridSpec
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.query.factors import HeatSettings
+from avlmaps.query.instances import FeatureVoxels, fitting, margin_confidence
 from avlmaps.query.modalities.object import object_factor
 from avlmaps.query.object_settings import ObjectSettings
-from avlmaps.query.pieces import fitting, instance_confidence
 from avlmaps.query.synonyms import is_a, is_open
 from avlmaps.query.voxel_space import Space
 from avlmaps.query.words import Rivals
@@ -70,7 +70,7 @@ def asked(encoder: Closed, word: str, things: dict[str, float]):
     space = Space(GridSpec(0.05), voxels, UP)
     rivals = Rivals.of(features, encoder, encoder.vocabulary)
     part = Part(Modality.OBJECT, word)
-    return object_factor(space, features, encoder, rivals, part, ObjectSettings(), HeatSettings())
+    return object_factor(FeatureVoxels(space, features, encoder, rivals, ObjectSettings()), part, HeatSettings())
 
 
 def test_a_contrast_of_two_hundredths_is_found() -> None:
@@ -129,9 +129,9 @@ def test_confidence_hangs_on_the_logits_alone(scale: float, margin: float, count
     encoder = Open()
     encoder.logit_scale = scale
     settings, one = fitting(ObjectSettings(), encoder), np.zeros(count, np.int64)
-    sure = instance_confidence(np.full(count, margin), one, 0.05, settings)[0]
+    sure = margin_confidence(np.full(count, margin), one, 0.05, settings)[0]
     unscaled = ObjectSettings(margin_yes=1.0)
-    assert sure == pytest.approx(instance_confidence(np.full(count, margin * scale), one, 0.05, unscaled)[0], abs=1e-5)
+    assert sure == pytest.approx(margin_confidence(np.full(count, margin * scale), one, 0.05, unscaled)[0], abs=1e-5)
 
 
 @pytest.mark.parametrize(

@@ -32,8 +32,8 @@ from avlmaps.perception.embedded.scene_network import DEFAULT_WEIGHTS, InstanceN
 from avlmaps.perception.models.settings import model_settings, using_models
 from avlmaps.perception.profiles import profile
 from avlmaps.query.avlmap import AVLMap
+from avlmaps.query.instances import FeatureVoxels, confident_instances
 from avlmaps.query.object_settings import ObjectSettings
-from avlmaps.query.pieces import object_pieces
 from avlmaps.query.words import EncodedWord, Rivals
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Recording
@@ -100,21 +100,21 @@ def pieces_of(options: Options, number: int) -> Iterator[Pieces]:
     assert isinstance(encoder, EmbeddedPixels)
     things, feature, space = read_truth(recording).objects, asked.stored.voxels.feature, asked.space
     rivals = Rivals.of(feature, encoder, encoder.vocabulary)
-    settings = ObjectSettings(least_confidence=0.0)
+    voxels = FeatureVoxels(space, feature, encoder, rivals, ObjectSettings(least_confidence=0.0))
     for name in encoder.vocabulary:
         if name in STRUCTURE:
             continue
-        pieces = object_pieces(space, feature, encoder, rivals, EncodedWord.of_name(encoder, name), settings)
-        count = np.bincount(pieces.instance, minlength=len(pieces.mean_probability))
+        found = confident_instances(voxels, EncodedWord.of_name(encoder, name))
+        count = found.voxel_count
         held = np.zeros(len(space.centres), bool)
         for thing in things:
             if thing.category == name:
                 low, high = np.array(thing.low) - GROWN_M, np.array(thing.high) + GROWN_M
                 held |= ((space.centres >= low) & (space.centres <= high)).all(axis=1)
-        share = np.bincount(pieces.instance, weights=held[pieces.rows], minlength=len(count)) / np.maximum(count, 1)
+        share = np.bincount(found.instance, weights=held[found.rows], minlength=len(count)) / np.maximum(count, 1)
         large = count >= FEWEST_VOXELS // 3
         area = count * space.grid.voxel_size_m**2
-        yield Pieces(name, pieces.mean_probability[large], area[large], share[large] >= 0.5)
+        yield Pieces(name, found.mean_probability[large].astype(np.float32), area[large], share[large] >= 0.5)
 
 
 def _map_of(recording: Recording, path: Path, model: str) -> StoredMap:

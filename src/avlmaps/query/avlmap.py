@@ -1,5 +1,6 @@
 """The map as a user meets it: four modalities, each a heatmap, and whole questions."""
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -8,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from avlmaps.core.arrays import Float, Float16, Int32, UInt8
+from avlmaps.core.arrays import Float, Float16, Int, Int32, UInt8
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import BackendError, MapError, QueryError
 from avlmaps.core.question import Modality, Part, Question, Role
@@ -18,6 +19,7 @@ from avlmaps.perception.room_contents import read_room_contents
 from avlmaps.query.factors import FOUND_AT, HeatSettings
 from avlmaps.query.floor_plan import FloorPlan, storeys
 from avlmaps.query.heatmap import Heatmap
+from avlmaps.query.instances import FeatureVoxels, Instances, confident_instances
 from avlmaps.query.known_rivals import KnownRivals
 from avlmaps.query.modalities.area import AreaSettings, area_anchors, area_factor, area_names, name_shares
 from avlmaps.query.modalities.image import image_factor, read_picture, require_fitting
@@ -30,7 +32,6 @@ from avlmaps.query.modalities.sound import (
     sound_features,
 )
 from avlmaps.query.object_settings import ObjectSettings
-from avlmaps.query.pieces import Pieces, object_pieces
 from avlmaps.query.queryable import Attachment, Photo
 from avlmaps.query.room_regions import RoomRegions
 from avlmaps.query.rooms import NamedVoxels, RoomField, Rooms, voting_rows
@@ -123,29 +124,16 @@ class AVLMap:
         # Of names, most voxels have too little of the word to be compared with all others.
         known = self._known_rivals if vocabulary is None else None
         rivals = self._rivals_of(encoder, vocabulary) if known is None else known
-        settings, voxels = self.settings, self.stored.voxels
-        return Heatmap.of(
-            object_factor(
-                self.space,
-                voxels.feature,
-                encoder,
-                rivals,
-                part,
-                settings.objects,
-                settings.heat,
-                voxels.rgb,
-                lambda: self.things_in_rooms,
-            ),
-            settings.found_at,
-        )
+        voxels = self._feature_voxels(encoder, rivals, self.stored.voxels.rgb)
+        return Heatmap.of(object_factor(voxels, part, self.settings.heat), self.settings.found_at)
 
-    def pieces(self, word: str, alone: bool = False) -> Pieces:
-        """Return the voxels that a word wins against the vocabulary, and the instances that they make up.
+    def instances(self, word: str, alone: bool = False) -> Instances:
+        """Return the instances of a word: connected voxels that it wins against the vocabulary.
 
         Args:
             word: what it is called.
             alone: take one of the encoder's names for itself, without the narrower ones that it takes in: then an
-                armchair is no piece of "chair".
+                armchair is no "chair".
         """
         encoder = self.stored.encoders.pixels
         everywhere = self._rivals_of(encoder, None)
@@ -154,10 +142,18 @@ class AVLMap:
             encoded = EncodedWord.of_name(encoder, word)
         else:
             encoded = EncodedWord.of(encoder, word)
-        return object_pieces(
-            self.space, self.stored.voxels.feature, encoder, rivals, encoded, self.settings.objects,
-            lambda: self.things_in_rooms,
-        )  # fmt: skip
+        return confident_instances(self._feature_voxels(encoder, rivals), encoded)
+
+    def pieces(self, word: str, alone: bool = False) -> Instances:
+        """Return ``instances``, by the name that they had before."""
+        warnings.warn("AVLMap.pieces goes in the next release; use .instances.", DeprecationWarning, stacklevel=2)
+        return self.instances(word, alone)
+
+    def _feature_voxels(
+        self, encoder: PixelEncoder, rivals: Vocabulary, rgb: UInt8[np.ndarray, "n 3"] | None = None
+    ) -> FeatureVoxels:
+        feature, settings = self.stored.voxels.feature, self.settings.objects
+        return FeatureVoxels(self.space, feature, encoder, rivals, settings, rgb, _RoomsOnDemand(self))
 
     def rivals(self) -> Rivals:
         """Return the two words of the encoder's vocabulary closest to each voxel; the first query works them out."""
@@ -194,7 +190,7 @@ class AVLMap:
         """Return the things of the map, most confident first; see ``contents.find_things``."""
         from avlmaps.query.contents import find_things
 
-        return find_things(self.stored, self.space, self.pieces, names, least_confidence, structure, watch)
+        return find_things(self.stored, self.space, self.instances, names, least_confidence, structure, watch)
 
     def contents(
         self, least_confidence: float = 0.5, names: Sequence[str] | None = None, structure: bool = False
@@ -573,6 +569,19 @@ class AVLMap:
             top=top,
         )  # fmt: skip
         return ask(self, asked, files)
+
+
+@dataclass(frozen=True, slots=True)
+class _RoomsOnDemand:
+    """What the rooms of a map say about instances; they are found when an instance is scored for the first time."""
+
+    avlmap: AVLMap
+
+    def nats(
+        self, names: tuple[str, ...], rows: Int[np.ndarray, " a"], instance: Int[np.ndarray, " a"], count: int
+    ) -> Float[np.ndarray, " i"] | None:
+        evidence = self.avlmap.things_in_rooms
+        return None if evidence is None else evidence.nats(names, rows, instance, count)
 
 
 def _photo(picture: "str | Path | Photo | UInt8[np.ndarray, 'h w 3']", intrinsics: Pinhole | None) -> "Photo":

@@ -15,7 +15,7 @@ NOTHING = frozenset({"", "thing", "things", "something", "object", "objects", "a
 
 
 @dataclass(frozen=True, slots=True)
-class Tint:
+class ColourPhrase:
     """The colour in a phrase, and the phrase without it.
 
     Attributes:
@@ -35,31 +35,31 @@ def colour_words() -> ColourWords:
     return ColourWords()
 
 
-def tint_of(phrase: str) -> Tint | None:
+def colour_in(phrase: str) -> ColourPhrase | None:
     """Return the colour in a phrase, None where there is none."""
     words = colour_words()
     text = words.understood(phrase)
     if not text:
         return None
     thing = words.without_colours(phrase)
-    return Tint(text, words.encode_words([phrase])[0], "" if set(thing.split()) <= NOTHING else thing)
+    return ColourPhrase(text, words.encode_words([phrase])[0], "" if set(thing.split()) <= NOTHING else thing)
 
 
-def is_tinted(rgb: UInt8[np.ndarray, "n 3"], tint: Tint) -> Bool[np.ndarray, " n"]:
+def has_colour(rgb: UInt8[np.ndarray, "n 3"], said: ColourPhrase) -> Bool[np.ndarray, " n"]:
     """Return which voxels' colours are closer to the queried one than to any other term."""
     words = colour_words()
     colour = words.encode_colours(rgb)
     terms = words.encode_words(COLOURS)
-    own = terms @ tint.feature >= 0.5
-    return (colour @ tint.feature) > np.where(own, -1.0, colour @ terms.T).max(axis=1)
+    own = terms @ said.feature >= 0.5
+    return (colour @ said.feature) > np.where(own, -1.0, colour @ terms.T).max(axis=1)
 
 
-def tinted_share(
-    rgb: UInt8[np.ndarray, "n 3"], rows: Int[np.ndarray, " a"], instance: Int[np.ndarray, " a"], tint: Tint
+def colour_share(
+    rgb: UInt8[np.ndarray, "n 3"], rows: Int[np.ndarray, " a"], instance: Int[np.ndarray, " a"], said: ColourPhrase
 ) -> Float32[np.ndarray, " i"]:
     """Return for each instance the share of its voxels in the queried colour: 1 from four in ten on."""
     if not len(instance):
         return np.zeros(0, np.float32)
-    hits = is_tinted(np.asarray(rgb)[rows], tint)
+    hits = has_colour(np.asarray(rgb)[rows], said)
     share = np.bincount(instance, weights=hits) / np.maximum(np.bincount(instance), 1)
     return np.minimum(share / FULL_SHARE, 1.0).astype(np.float32)

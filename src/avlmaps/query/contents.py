@@ -1,6 +1,6 @@
 """The content of a map without a question: its things, sounds and rooms, each named with a confidence.
 
-A thing is a connected group of voxels that a word of the vocabulary wins (``query.pieces``). Several words may
+A thing is a connected group of voxels that a word of the vocabulary wins (``query.instances``). Several words may
 claim the same voxels ("desk", "dining table"); the most confident claim stands, and what overlaps it is left out. What
 is certainly a chair, and perhaps an armchair, is listed as a chair.
 """
@@ -18,9 +18,9 @@ from avlmaps.core.poses import FRAME, plain_point
 from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder
 from avlmaps.query.factors import FOUND_AT
+from avlmaps.query.instances import Instances
 from avlmaps.query.modalities.area import AreaSettings, area_names, modes, pooled_name_shares
 from avlmaps.query.modalities.sound import sound_features
-from avlmaps.query.pieces import Pieces
 from avlmaps.query.voxel_space import Space
 
 if TYPE_CHECKING:
@@ -195,7 +195,7 @@ class Contents:
 def find_things(
     stored: "StoredMap",
     space: Space,
-    pieces_of: Callable[[str, bool], Pieces],
+    instances_of: Callable[[str, bool], Instances],
     names: Sequence[str] | None = None,
     least_confidence: float = 0.5,
     structure: bool = False,
@@ -206,7 +206,7 @@ def find_things(
     Args:
         stored: the map.
         space: its voxels' places.
-        pieces_of: returns the voxels and instances of a word, with its narrower names or alone (``AVLMap.pieces``).
+        instances_of: returns the instances of a word, with its narrower names or alone (``AVLMap.instances``).
         names: what to list; by default the pixel encoder's vocabulary.
         least_confidence: things below it are left out, in [0, 1].
         structure: list walls, floors and the like as well.
@@ -224,7 +224,7 @@ def find_things(
     claims: list[tuple[bool, float, int, str, Int[np.ndarray, " m"]]] = []
     for number, (name, alone) in enumerate(searches):
         watch("things", number, len(searches))
-        for confidence, rows in _confident(pieces_of(name, alone), least_confidence):
+        for confidence, rows in _confident(instances_of(name, alone), least_confidence):
             claims.append((not alone or confidence < FOUND_AT, -confidence, -len(rows), name, rows))
     owned = np.zeros(len(space), bool)
     things: list[Thing] = []
@@ -244,13 +244,12 @@ def _is_wide(name: str, encoder: PixelEncoder) -> bool:
     return bool(np.count_nonzero(encoder.name_weights(name)) > 1)
 
 
-def _confident(pieces: Pieces, least: float) -> Iterator[tuple[float, Int[np.ndarray, " m"]]]:
+def _confident(found: Instances, least: float) -> Iterator[tuple[float, Int[np.ndarray, " m"]]]:
     """Yield the confidence and the voxels of each instance of at least some confidence."""
-    rows = pieces.rows
-    order = np.argsort(pieces.instance, kind="stable")
-    bounds = np.searchsorted(pieces.instance[order], np.arange(len(pieces.confidence) + 1))
-    for number in np.flatnonzero(pieces.confidence >= least):
-        yield float(pieces.confidence[number]), rows[order[bounds[number] : bounds[number + 1]]]
+    order = np.argsort(found.instance, kind="stable")
+    bounds = np.searchsorted(found.instance[order], np.arange(len(found) + 1))
+    for number in np.flatnonzero(found.confidence >= least):
+        yield float(found.confidence[number]), found.rows[order[bounds[number] : bounds[number + 1]]]
 
 
 def _thing(stored: "StoredMap", space: Space, name: str, confidence: float, rows: Int[np.ndarray, " m"]) -> Thing:

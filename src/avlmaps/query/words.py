@@ -166,6 +166,10 @@ class Scored:
     margin: Float32[np.ndarray, " m"]
     score: Float32[np.ndarray, " m"]
 
+    def only(self, which: Bool[np.ndarray, " m"]) -> "Scored":
+        """Return some of the voxels."""
+        return Scored(self.rows[which], self.margin[which], self.score[which])
+
 
 def object_margins(
     feature: Float16[np.ndarray, "n d"],

@@ -1,133 +1,172 @@
 """The heat of the object that a word names, or of everything of a colour."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
-from avlmaps.core.arrays import Float16, UInt8
+from avlmaps.core.arrays import UInt8
 from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import Kind, lexicon
 from avlmaps.core.question import Part
 from avlmaps.core.spelling import squeezed
-from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder
-from avlmaps.query.colour_filter import Tint, is_tinted, tint_of, tinted_share
+from avlmaps.perception.protocols import NamedPixelEncoder
+from avlmaps.query.colour_filter import ColourPhrase, colour_in, colour_share, has_colour
 from avlmaps.query.factors import FOUND_AT, HeatSettings, NearThings
-from avlmaps.query.instance_merging import likeliest, without_specks
+from avlmaps.query.instances import (
+    FeatureVoxels,
+    Instances,
+    Segmentation,
+    best_guesses,
+    link,
+    margin_confidence,
+    segment,
+)
 from avlmaps.query.object_settings import ObjectSettings
-from avlmaps.query.pieces import instance_confidence, instances_of, pieces_of
-from avlmaps.query.things_in_rooms import ThingsInRooms
 from avlmaps.query.unknown_names import unknown_note
-from avlmaps.query.voxel_space import Space
-from avlmaps.query.words import EncodedWord, Vocabulary, scored_once
+from avlmaps.query.words import EncodedWord, Scored, scored_once
 
 
-def object_factor(
-    space: Space,
-    feature: Float16[np.ndarray, "n d"],
-    encoder: PixelEncoder,
-    rivals: Vocabulary,
-    part: Part,
-    settings: ObjectSettings,
-    heat: HeatSettings,
-    rgb: UInt8[np.ndarray, "n 3"] | None = None,
-    rooms: Callable[[], ThingsInRooms | None] = lambda: None,
-) -> NearThings:
+def object_factor(voxels: FeatureVoxels, part: Part, heat: HeatSettings) -> NearThings:
     """Return the heat of the object that a word names; if no confidence suffices, of the best guesses, not ``found``.
 
     With the voxels' colours, an encoder that knows things but no colours is helped out with those.
 
     Args:
-        space: the map's voxels.
-        feature: theirs.
-        encoder: that made them.
-        rivals: what competes. Without the two words closest to each voxel (a ``Vocabulary`` only), the encoder is one
-            of names and these are all its names: then voxels with little of the word are not compared with the rivals.
+        voxels: of the map.
         part: of the query.
-        settings: from the word to instances.
         heat: how fast it falls.
-        rgb: colours of the voxels.
-        rooms: returns the evidence of the map's rooms; called only where there are instances.
 
     Raises:
         QueryError: the encoder understands nothing of the word.
     """
+    encoder = voxels.encoder
     compound = " " in part.query.strip() and lexicon().find(part.query, Kind.THING) is not None  # a white board
-    tint = tint_of(part.query) if rgb is not None and isinstance(encoder, NamedPixelEncoder) and not compound else None
-    if tint and rgb is not None and not tint.thing:
-        return colour_factor(space, rgb, tint, part, settings, heat)
-    encoded = EncodedWord.of(encoder, tint.thing if tint else part.query)
-    understood = f"{tint.text} {encoded.understood}" if tint and encoded.understood else encoded.understood
-    if not len(encoded.rows) and isinstance(encoder, NamedPixelEncoder):
-        note = unknown_note(tint.thing if tint else part.query)
-        nothing = np.zeros(0, np.int64), np.zeros(0, np.float32), False, "", note
-        return NearThings(space, part, heat.falloff_per_m(part.role), np.zeros(len(feature), bool), *nothing)
-    if not len(encoded.rows):
-        known = ", ".join(encoder.vocabulary[:20]) or "nothing that it could list"
-        raise QueryError(
-            f"The pixel encoder {encoder.card.id} understands nothing of {part.query!r}; it knows: {known}."
-            + (f" ({encoder.card.note})" if encoder.card.note else "")
+    by_colour = voxels.rgb is not None and isinstance(encoder, NamedPixelEncoder) and not compound
+    colour = colour_in(part.query) if by_colour else None
+    if colour is not None and voxels.rgb is not None and not colour.thing:
+        return colour_factor(voxels, voxels.rgb, colour, part, heat)
+    word = EncodedWord.of(encoder, colour.thing if colour else part.query)
+    if len(word.rows):
+        return _Search(voxels, part, heat, word, colour).factor()
+    if isinstance(encoder, NamedPixelEncoder):
+        note = unknown_note(colour.thing if colour else part.query)
+        understood = f"{colour.text} {word.understood}" if colour and word.understood else word.understood
+        nothing = np.zeros(0, np.int64), np.zeros(0, np.float32), False, understood, note
+        mask = np.zeros(len(voxels.space), np.bool_)
+        return NearThings(voxels.space, part, heat.falloff_per_m(part.role), mask, *nothing)
+    known = ", ".join(encoder.vocabulary[:20]) or "nothing that it could list"
+    raise QueryError(
+        f"The pixel encoder {encoder.card.id} understands nothing of {part.query!r}; it knows: {known}."
+        + (f" ({encoder.card.note})" if encoder.card.note else "")
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """A search for the instances of a word.
+
+    Attributes:
+        voxels: of the map.
+        part: of the query.
+        heat: how fast it falls.
+        word: as the encoder takes it.
+        colour: what the part says of colours beside it; None for nothing.
+    """
+
+    voxels: FeatureVoxels
+    part: Part
+    heat: HeatSettings
+    word: EncodedWord
+    colour: ColourPhrase | None
+
+    def factor(self) -> NearThings:
+        """Return the heat of the confident instances; where there are none, of the best guesses."""
+        confident = self._coloured(self._confident)
+        if len(confident.instances):
+            return self._factor(confident, self._uncertain_factor)
+        settings, voxel_size_m = self.voxels.settings, self.voxels.space.grid.voxel_size_m
+        uncertain = self._uncertain(settings)
+        guess = best_guesses(uncertain.instances, voxel_size_m)
+        if isinstance(self.voxels.encoder, NamedPixelEncoder) and guess.best < settings.guess_below:
+            weaker = self._uncertain(settings.for_guess())
+            weaker_guess = best_guesses(weaker.instances, voxel_size_m)
+            if len(weaker_guess):
+                uncertain, guess = weaker, weaker_guess
+        return replace(
+            self._factor(replace(uncertain, instances=guess)), with_uncertain=lambda: self._factor(uncertain)
         )
-    scored = scored_once(feature, encoder, rivals, encoded, settings)
-    is_named = not _is_colour_alone(encoded.understood, part.query)
 
-    confident = pieces_of(space, encoder, encoded, scored(1.0), settings, rooms)
+    @cached_property
+    def _scored(self) -> Callable[[float], Scored]:
+        voxels = self.voxels
+        return scored_once(voxels.feature, voxels.encoder, voxels.rivals, self.word, voxels.settings)
 
-    def things(with_uncertain: bool, chosen: ObjectSettings = settings) -> NearThings:
-        pieces = confident
-        if with_uncertain:
-            among = scored(chosen.share_in_company)
-            pieces = pieces_of(space, encoder, encoded, among, chosen, rooms, beside=confident)
-        if tint is not None and rgb is not None:
-            share = tinted_share(rgb, pieces.rows, pieces.instance, tint)
-            pieces = replace(pieces, confidence=pieces.confidence * share)
-        best = float(pieces.confidence.max(initial=0.0)) if tint else pieces.best
-        note = "" if best >= FOUND_AT else _absence(part.query, len(space), pieces.won, best)
-        if encoded.understood and not _is_whole(encoded.understood, tint.thing if tint else part.query):
-            half = f"understood only {understood!r} of {part.query!r}"
+    @cached_property
+    def _confident(self) -> Segmentation:
+        return segment(self.voxels, self.word, self._scored(1.0))
+
+    def _uncertain(self, settings: ObjectSettings) -> Segmentation:
+        """Return the confident instances, and those that the context of a query may select."""
+        scored = self._scored(settings.share_in_company)
+        voxels = replace(self.voxels, settings=settings)
+        return self._coloured(segment(voxels, self.word, scored, self._confident))
+
+    def _uncertain_factor(self) -> NearThings:
+        return self._factor(self._uncertain(self.voxels.settings))
+
+    def _coloured(self, found: Segmentation) -> Segmentation:
+        """Return instances that are as much less likely as they lack the colour that was named."""
+        if self.colour is None or self.voxels.rgb is None:
+            return found
+        one = found.instances
+        share = colour_share(self.voxels.rgb, one.rows, one.instance, self.colour)
+        one = replace(one, confidence=one.confidence * share)
+        return Segmentation(one, found.won, one.best)
+
+    def _factor(self, found: Segmentation, with_uncertain: Callable[[], NearThings] | None = None) -> NearThings:
+        space, part, colour = self.voxels.space, self.part, self.colour
+        understood, thing = self.word.understood, colour.thing if colour else part.query
+        said = f"{colour.text} {understood}" if colour and understood else understood
+        is_named = not _is_colour_alone(understood, part.query)
+        note = "" if found.best >= FOUND_AT else _absence(part.query, len(space), found)
+        if understood and not _is_whole(understood, thing):
+            half = f"understood only {said!r} of {part.query!r}"
             half += "" if is_named else ", and a colour alone is no thing: what has it is a guess"
             note = half + ("; " + note if note else "")
-        falloff, alone = heat.falloff_per_m(part.role), None if with_uncertain else lambda: things(True)
-        found = best >= FOUND_AT and is_named
-        mask = np.zeros(len(space), np.bool_)
-        mask[pieces.rows] = True
+        is_found = found.best >= FOUND_AT and is_named
+        falloff, mask = self.heat.falloff_per_m(part.role), _mask(len(space), found.instances)
+        one = found.instances
         return NearThings(
-            space, part, falloff, mask, pieces.instance, pieces.confidence, found, understood, note, alone,
-            is_named,
-        )  # fmt: skip
-
-    alone = things(False)
-    if len(alone.confidence):
-        return alone
-    guess = likeliest(things(True))
-    if isinstance(encoder, NamedPixelEncoder) and guess.confidence.max(initial=0.0) < settings.guess_below:
-        weaker = likeliest(things(True, settings.for_guess()))
-        return weaker if len(weaker.confidence) else guess
-    return guess
+            space, part, falloff, mask, one.instance, one.confidence, is_found, said, note, with_uncertain, is_named
+        )
 
 
 def colour_factor(
-    space: Space,
-    rgb: UInt8[np.ndarray, "n 3"],
-    tint: Tint,
-    part: Part,
-    settings: ObjectSettings,
-    heat: HeatSettings,
+    voxels: FeatureVoxels, rgb: UInt8[np.ndarray, "n 3"], colour: ColourPhrase, part: Part, heat: HeatSettings
 ) -> NearThings:
     """Return the heat of everything that has a colour."""
-    mask = is_tinted(np.asarray(rgb), tint)
-    instance = instances_of(space, mask, settings.link_m)
-    confidence = instance_confidence(np.ones(len(instance)), instance, space.grid.voxel_size_m, settings)
-    mask, instance, confidence = without_specks(mask, instance, confidence, settings.least_confidence)
-    best = float(confidence.max(initial=0.0))
-    note = "" if best >= FOUND_AT else f"nothing of some size is {tint.text}"
-    falloff = heat.falloff_per_m(part.role)
-    return NearThings(space, part, falloff, mask, instance, confidence, best >= FOUND_AT, tint.text, note)
+    space, settings = voxels.space, voxels.settings
+    rows = np.flatnonzero(has_colour(np.asarray(rgb), colour))
+    sure = np.ones(len(rows), np.float32)
+    found = link(space, Scored(rows, sure, sure), settings.link_m)
+    confidence = margin_confidence(found.margin, found.instance, space.grid.voxel_size_m, settings)
+    found = replace(found, confidence=confidence).only(confidence >= settings.least_confidence)
+    note = "" if found.best >= FOUND_AT else f"nothing of some size is {colour.text}"
+    falloff, mask, is_found = heat.falloff_per_m(part.role), _mask(len(space), found), found.best >= FOUND_AT
+    return NearThings(space, part, falloff, mask, found.instance, found.confidence, is_found, colour.text, note)
+
+
+def _mask(count: int, found: Instances) -> np.ndarray:
+    mask = np.zeros(count, np.bool_)
+    mask[found.rows] = True
+    return mask
 
 
 def _is_colour_alone(understood: str, name: str) -> bool:
     """Return whether an encoder understands of a name that speaks of a thing ("red elephant") nothing but a colour."""
-    said, taken = tint_of(name), tint_of(understood) if understood else None
+    said, taken = colour_in(name), colour_in(understood) if understood else None
     return said is not None and bool(said.thing) and taken is not None and not taken.thing
 
 
@@ -141,10 +180,10 @@ def _is_whole(understood: str, name: str) -> bool:
     return all(lexicon().is_a(kind, entry.name, Kind.THING) for kind in understood.split(" or "))
 
 
-def _absence(word: str, voxels: int, won: int, best: float) -> str:
+def _absence(word: str, voxels: int, found: Segmentation) -> str:
     if not voxels:
         return "the map holds no voxels"
-    if not won:
+    if not found.won:
         return f"no voxel is closer to {word!r} than to other things"
-    best_of = f"the best of the {won} voxels closest to {word!r} make an instance of confidence"
-    return f"{best_of} {best:.2f}, below {FOUND_AT:.2f}"
+    best_of = f"the best of the {found.won} voxels closest to {word!r} make an instance of confidence"
+    return f"{best_of} {found.best:.2f}, below {FOUND_AT:.2f}"

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps.query.instance_merging import merge_instances
+from avlmaps.query.instances import joined_columns
 
 CELL_M, JOIN_M, VOXEL_M = 0.1, 0.3, 0.05
 Box = tuple[tuple[float, float, float], tuple[float, float, float]]
@@ -22,7 +22,7 @@ def pieces(*boxes: Box) -> tuple[np.ndarray, np.ndarray]:
 
 
 def things(*boxes: Box) -> int:
-    return len(set(merge_instances(*pieces(*boxes), CELL_M, JOIN_M)))
+    return len(set(joined_columns(*pieces(*boxes), CELL_M, JOIN_M)))
 
 
 def brute_force(points: np.ndarray, instance: np.ndarray) -> np.ndarray:
@@ -69,11 +69,11 @@ def test_a_chair_before_a_row_of_cabinets_along_two_walls_is_none_of_them() -> N
     )
     points, instance = pieces(long, side, chair)
     instance = np.where(instance == 2, 1, 0)  # the two rows are one instance, whose box holds the chair
-    assert len(set(merge_instances(points, instance, CELL_M, JOIN_M))) == 2
+    assert len(set(joined_columns(points, instance, CELL_M, JOIN_M))) == 2
 
 
 def test_nothing_has_no_pieces() -> None:
-    assert merge_instances(np.zeros((0, 3)), np.zeros(0, np.int64), CELL_M, JOIN_M).shape == (0,)
+    assert joined_columns(np.zeros((0, 3)), np.zeros(0, np.int64), CELL_M, JOIN_M).shape == (0,)
 
 
 places = st.lists(
@@ -86,5 +86,5 @@ def test_sorting_agrees_with_the_definition(voxels: list[tuple[int, int, int, in
     array = np.array(voxels)
     points = (array[:, :3] + 0.5) * (0.05, 0.05, 0.2)
     instance = np.unique(array[:, 3], return_inverse=True)[1]
-    sorted_, brute = merge_instances(points, instance, CELL_M, JOIN_M), brute_force(points, instance)
+    sorted_, brute = joined_columns(points, instance, CELL_M, JOIN_M), brute_force(points, instance)
     assert ((sorted_[:, None] == sorted_) == (brute[:, None] == brute)).all()

@@ -1,0 +1,335 @@
+"""From the scores of voxels to instances: threshold, link, score, join, cut.
+
+A voxel counts where the queried word beats its rivals; connected voxels are linked to one instance; each is scored;
+parts over one another are joined, and what is too long for a thing of its name is cut.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from avlmaps.core.arrays import Bool, Float, Float16, Float32, Int, UInt8
+from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder, ScaledEncoder
+from avlmaps.query import loops, oversize
+from avlmaps.query.object_settings import ObjectSettings
+from avlmaps.query.synonyms import is_open
+from avlmaps.query.things_in_rooms import NO_ROOMS, RoomEvidence, with_rooms
+from avlmaps.query.voxel_space import Space
+from avlmaps.query.words import EncodedWord, Scored, Vocabulary, scored_once
+
+_SPECK_M2 = 0.0199  # a guess shows at least as much surface as a mug
+
+
+@dataclass(frozen=True, slots=True)
+class Instances:
+    """Groups of connected voxels, each of which may be one thing.
+
+    Attributes:
+        rows: numbers of their voxels in the map, ascending.
+        instance: which instance each of these voxels belongs to: 0 to i - 1, each with a voxel.
+        margin: by how much the word beats its best rival at each voxel.
+        score: of the word at each voxel (the root of its probability, for an encoder of names).
+        confidence: of each instance, in [0, 1]: the probability that it matches the query; 0 before it is scored.
+    """
+
+    rows: Int[np.ndarray, " a"]
+    instance: Int[np.ndarray, " a"]
+    margin: Float32[np.ndarray, " a"]
+    score: Float32[np.ndarray, " a"]
+    confidence: Float32[np.ndarray, " i"]
+
+    def __len__(self) -> int:
+        return len(self.confidence)
+
+    @property
+    def best(self) -> float:
+        """The highest confidence, 0 where there is no instance."""
+        return float(self.confidence.max(initial=0.0))
+
+    @property
+    def voxel_count(self) -> Int[np.ndarray, " i"]:
+        """How many voxels each instance has."""
+        return np.bincount(self.instance, minlength=len(self))
+
+    @property
+    def mean_probability(self) -> Float[np.ndarray, " i"]:
+        """The mean of the squared scores of each instance's voxels: for an encoder of names, of probabilities."""
+        squares = np.bincount(self.instance, weights=np.square(self.score), minlength=len(self))
+        return squares / np.maximum(self.voxel_count, 1)
+
+    def only(self, kept: Bool[np.ndarray, " i"]) -> "Instances":
+        """Return some of the instances."""
+        stays = kept[self.instance]
+        instance = (np.cumsum(kept) - 1)[self.instance[stays]]
+        return Instances(self.rows[stays], instance, self.margin[stays], self.score[stays], self.confidence[kept])
+
+    def relabelled(self, instance: Int[np.ndarray, " a"]) -> "Instances":
+        """Return the voxels in other instances, not scored yet; those of number -1 are left out."""
+        stays = instance >= 0
+        unscored = np.zeros(int(instance.max(initial=-1)) + 1, np.float32)
+        return Instances(self.rows[stays], instance[stays], self.margin[stays], self.score[stays], unscored)
+
+    def with_others(self, others: "Instances") -> "Instances":
+        """Return these instances and, after them, others, which have none of their voxels."""
+        rows = np.concatenate([self.rows, others.rows])
+        order = np.argsort(rows)
+        instance = np.concatenate([self.instance, len(self) + others.instance])
+        margin, score = np.concatenate([self.margin, others.margin]), np.concatenate([self.score, others.score])
+        confidence = np.concatenate([self.confidence, others.confidence])
+        return Instances(rows[order], instance[order], margin[order], score[order], confidence)
+
+
+@dataclass(frozen=True, slots=True)
+class FeatureVoxels:
+    """The voxels of a map, as a search for an object takes them.
+
+    Attributes:
+        space: their places.
+        feature: what was perceived in each.
+        encoder: that made the features.
+        rivals: what competes with a word. Without the two words closest to each voxel (a ``Vocabulary`` only), the
+            encoder is one of names and these are all its names: then voxels with little of the word are not compared.
+        settings: from a word to instances.
+        rgb: their colours, with which an encoder of names is helped out that knows none; None where they do not count.
+        rooms: what the map's rooms say about instances.
+    """
+
+    space: Space
+    feature: Float16[np.ndarray, "n d"]
+    encoder: PixelEncoder
+    rivals: Vocabulary
+    settings: ObjectSettings
+    rgb: UInt8[np.ndarray, "n 3"] | None = None
+    rooms: RoomEvidence = NO_ROOMS
+
+
+@dataclass(frozen=True, slots=True)
+class Segmentation:
+    """The instances of a word that are confident enough to count, and what is known of the others.
+
+    Attributes:
+        instances: those that count.
+        won: how many voxels the word won.
+        best: highest confidence of all instances.
+    """
+
+    instances: Instances
+    won: int
+    best: float
+
+
+def confident_instances(voxels: FeatureVoxels, word: EncodedWord) -> Instances:
+    """Return the instances of a word that are confident by themselves."""
+    scored = scored_once(voxels.feature, voxels.encoder, voxels.rivals, word, voxels.settings)
+    return segment(voxels, word, scored(1.0)).instances
+
+
+def segment(
+    voxels: FeatureVoxels, word: EncodedWord, scored: Scored, confident: Segmentation | None = None
+) -> Segmentation:
+    """Return the instances that scored voxels make up.
+
+    With ``confident`` instances, those stay as they are, and uncertain ones of the other voxels come after them: weak
+    voxels round a confident thing make it neither larger nor less likely.
+    """
+    space, settings = voxels.space, voxels.settings
+    won = int((scored.margin > 0.0).sum())
+    if confident is None:
+        least, counting = settings.least_confidence, threshold(scored)
+    else:
+        least, counting = settings.least_in_company, threshold_in_company(voxels, scored, confident.instances.rows)
+    linked = score(voxels, word, link(space, counting, settings.link_m))
+    found = linked.only(linked.confidence >= least)
+    joined = join(space, found, settings.link_m, settings.join_m)
+    if joined is not found:
+        found = score(voxels, word, joined)
+    longest_m = longest_of(voxels, word)
+    pieces, length_m = cut(space, found, longest_m, settings.link_m)
+    if pieces is not found:
+        found = score(voxels, word, pieces, length_m)
+        found = found.only(found.confidence >= least)
+    best = max(linked.best, found.best)
+    if confident is None:
+        return Segmentation(found, won, best)
+    return Segmentation(confident.instances.with_others(found), max(won, confident.won), max(best, confident.best))
+
+
+def threshold(scored: Scored) -> Scored:
+    """Return the voxels that the word wins."""
+    return scored.only(scored.margin > 0.0)
+
+
+def threshold_in_company(voxels: FeatureVoxels, scored: Scored, taken: Int[np.ndarray, " t"]) -> Scored:
+    """Return the voxels that count where the context may select among uncertain instances.
+
+    For an encoder of names a voxel counts that scores a part of its best rival's score.
+
+    Args:
+        voxels: of the map.
+        scored: with the score of the word.
+        taken: voxels that have an instance already.
+    """
+    counts, settings = scored.margin > 0.0, voxels.settings
+    if isinstance(voxels.encoder, NamedPixelEncoder):
+        rival = scored.score - scored.margin
+        counts |= scored.score > np.maximum(settings.score_in_company * rival, settings.least_score_in_company)
+    return scored.only(counts & ~np.isin(scored.rows, taken, assume_unique=True))
+
+
+def link(space: Space, counting: Scored, link_m: float) -> Instances:
+    """Return the connected components of voxels: those no farther apart than ``link_m`` along every axis."""
+    instance = loops.linked(np.asarray(space.index)[counting.rows], _reach(space, link_m))
+    unscored = np.zeros(int(instance.max(initial=-1)) + 1, np.float32)
+    return Instances(counting.rows, instance, counting.margin, counting.score, unscored)
+
+
+def score(
+    voxels: FeatureVoxels, word: EncodedWord, found: Instances, length_m: Float[np.ndarray, " i"] | None = None
+) -> Instances:
+    """Return instances with the confidence that each matches the word: by looks, by length and by its room.
+
+    Args:
+        voxels: of the map.
+        word: that was queried.
+        found: the instances.
+        length_m: how long each counts as; None measures it.
+    """
+    space, encoder, settings = voxels.space, voxels.encoder, voxels.settings
+    if not isinstance(encoder, NamedPixelEncoder):
+        fitted = fitting(settings, encoder)
+        return replace(
+            found, confidence=margin_confidence(found.margin, found.instance, space.grid.voxel_size_m, fitted)
+        )
+    confidence = named_confidence(encoder, word, found, space.grid.voxel_size_m)
+    longest_m = longest_of(voxels, word)
+    if math.isfinite(longest_m):
+        length_m = lengths_m(space, found) if length_m is None else length_m
+        confidence = oversize.less_likely(confidence, length_m, longest_m)
+    if settings.room_weight > 0.0 and len(confidence):
+        nats = voxels.rooms.nats(word.meant(encoder), found.rows, found.instance, len(confidence))
+        if nats is not None:
+            confidence = with_rooms(confidence, settings.room_weight * nats, settings.room_cost).astype(np.float32)
+    return replace(found, confidence=confidence)
+
+
+def join(space: Space, found: Instances, link_m: float, join_m: float) -> Instances:
+    """Return instances of which those over one another are one, not scored; the same object where none are."""
+    which = joined_columns(_points(space, found), found.instance, link_m, join_m)
+    return found if len(found) == which.max(initial=-1) + 1 else found.relabelled(which[found.instance])
+
+
+def cut(
+    space: Space, found: Instances, longest_m: float, link_m: float
+) -> tuple[Instances, Float[np.ndarray, " i"] | None]:
+    """Return instances of which those that are too long are cut where they score least, not scored.
+
+    Returns:
+        The instances, the same object where none is cut; and how long each counts as: a piece is as doubtful as what
+        it was cut from.
+    """
+    if not (math.isfinite(longest_m) and len(found)):
+        return found, None
+    index, points = np.asarray(space.index)[found.rows], _points(space, found)
+    pieces, piece_of = oversize.cut(index, points, found.score, found.instance, longest_m, _reach(space, link_m))
+    if np.array_equal(pieces, found.instance):
+        return found, None
+    return found.relabelled(pieces), lengths_m(space, found)[piece_of]
+
+
+def best_guesses(found: Instances, voxel_size_m: float) -> Instances:
+    """Return the likeliest of uncertain instances: no specks, and at least half of the highest confidence."""
+    solid = np.where(found.voxel_count * voxel_size_m**2 >= _SPECK_M2, found.confidence, 0.0).astype(np.float32)
+    least = max(float(solid.max(initial=0.0)) / 2, float(np.finfo(np.float32).tiny))
+    return replace(found, confidence=solid).only(solid >= least)
+
+
+def joined_columns(
+    points_level: Float[np.ndarray, "a 3"], instance: Int[np.ndarray, " a"], cell_m: float, join_m: float
+) -> Int[np.ndarray, " i"]:
+    """Return for each instance the number of the thing that it is a part of.
+
+    A thing of thin parts comes in several instances: the camera saw a chair's legs and its back and little between.
+    Two are one thing where at least half of the smaller one's columns (of ``cell_m``, top-down) hold the other too,
+    with nothing else between them and at most ``join_m`` in height.
+
+    Args:
+        points_level: the voxels' middles, metres, level frame.
+        instance: which each belongs to.
+        cell_m: edge of a column.
+        join_m: largest gap in height.
+    """
+    count = int(instance.max(initial=-1)) + 1
+    column = np.floor(points_level[:, :2] / cell_m).astype(np.int64)
+    column -= column.min(axis=0, initial=0)
+    cell = column[:, 0] * (column[:, 1].max(initial=0) + 1) + column[:, 1]
+    cells = int(cell.max(initial=0)) + 1
+    columns = np.bincount(loops.distinct(instance * cells + cell) // cells, minlength=count)
+    order = np.lexsort((points_level[:, 2], cell))
+    below, above = order[:-1], order[1:]
+    near = (cell[below] == cell[above]) & (points_level[above, 2] - points_level[below, 2] <= join_m)
+    meeting = near & (instance[below] != instance[above])
+    a, b = np.sort(np.stack([instance[below], instance[above]])[:, meeting], axis=0)
+    pairs, pair = np.unique(a * count + b, return_inverse=True)
+    times = np.bincount(loops.distinct(pair * cells + cell[below][meeting]) // cells, minlength=len(pairs))
+    a, b = np.divmod(pairs, max(count, 1))
+    same = 2 * times >= np.minimum(columns[a], columns[b])
+    return loops.connected(count, a[same], b[same])
+
+
+def margin_confidence(
+    margin: Float[np.ndarray, " a"], instance: Int[np.ndarray, " a"], voxel_size_m: float, settings: ObjectSettings
+) -> Float32[np.ndarray, " i"]:
+    """Return the confidence of each instance, in [0, 1]: m / (m + m_yes) · (1 − exp(−area / area_yes)).
+
+    m is the mean margin of its voxels, the area is a voxel's face for each of them.
+    """
+    count = np.bincount(instance)
+    mean_margin = np.bincount(instance, weights=margin) / np.maximum(count, 1)
+    clear = mean_margin / (mean_margin + settings.margin_yes)
+    large = 1.0 - np.exp(-count * voxel_size_m**2 / settings.area_yes_m2)
+    return (clear * large).astype(np.float32)
+
+
+def named_confidence(
+    encoder: NamedPixelEncoder, word: EncodedWord, found: Instances, voxel_size_m: float
+) -> Float32[np.ndarray, " i"]:
+    """Return the confidence that each instance matches the query, as the encoder was calibrated.
+
+    A phrase that means several names has the confidence that the most meant name would have with all their probability.
+    """
+    mean, area_m2 = found.mean_probability, found.voxel_count * voxel_size_m**2
+    sure = [encoder.instance_probability(name, mean, area_m2) for name in word.meant(encoder)]
+    nothing = np.zeros(len(found))  # of a word that names none of the encoder's names
+    return np.max([nothing, *sure], axis=0).astype(np.float32)
+
+
+def longest_of(voxels: FeatureVoxels, word: EncodedWord) -> float:
+    """Return the length from which an instance is too long for what is most meant, metres; infinity where unknown."""
+    encoder, settings = voxels.encoder, voxels.settings
+    if not isinstance(encoder, NamedPixelEncoder) or settings.too_long <= 0.0 or not word.name_weights.any():
+        return math.inf
+    most = word.name_weights >= 0.99 * word.name_weights.max()
+    return settings.too_long * oversize.longest_m([encoder.names[index] for index in np.flatnonzero(most)])
+
+
+def lengths_m(space: Space, found: Instances) -> Float[np.ndarray, " i"]:
+    """Return how long each instance is, top-down, metres."""
+    return oversize.lengths_m(_points(space, found), found.instance, len(found))
+
+
+def fitting(settings: ObjectSettings, encoder: PixelEncoder) -> ObjectSettings:
+    """Return the settings with the margin at which an encoder is confident, in its own cosines."""
+    if isinstance(encoder, ScaledEncoder) and is_open(encoder):
+        return replace(settings, margin_yes=settings.margin_yes_logits / encoder.logit_scale)
+    return settings
+
+
+def _points(space: Space, found: Instances) -> Float[np.ndarray, "a 3"]:
+    """Return the middles of the instances' voxels, metres, level frame."""
+    return space.level(space.grid.centre_of(np.asarray(space.index)[found.rows]))
+
+
+def _reach(space: Space, link_m: float) -> int:
+    """Return how many voxels apart, along each axis, two of one instance may be."""
+    return max(1, round(link_m / space.grid.voxel_size_m))
