@@ -25,6 +25,36 @@ def test_things_prints_a_table(built: Path, run: Callable[..., tuple[int, str, s
     assert "position of the robot" in out
 
 
+def test_things_are_selected_and_paged(
+    built: Path, answer: Callable[..., dict[str, Any]], run: Callable[..., tuple[int, str, str]], tmp_path: Path
+) -> None:
+    every = answer("things", built, "--least", "0.2")["things"]
+    words = ("things", built, "--least", "0.2", "--top", "1")
+    first = answer(*words, "--csv", tmp_path / "t.csv")
+    assert first["total"] == len(every) == first["pages"] and first["things"] == every[:1]
+    assert (tmp_path / "t.csv").read_text().count("\n") == 2
+    place = ",".join(map(str, every[0]["position"]))
+    nearest = answer(*words, "--near", place)["things"][0]
+    assert nearest["position"] == every[0]["position"] and nearest["distance_m"] == 0.0
+    level = answer(*words, "--frame", "level")["things"][0]["position"]
+    again = answer(*words, "--frame", "level", "--near", ",".join(map(str, level)))["things"][0]
+    assert again["distance_m"] == pytest.approx(0.0, abs=1e-3) and again["position"] == pytest.approx(level)
+    for wrong, status, says in ((("--page", "9999"), 1, "no page 9999"), (("--top", "0"), 2, "from 1 on")):
+        code, _, err = run("things", built, "--least", "0.2", "--top", "1", *wrong)
+        assert code == status and says in err, err
+
+
+def test_rooms_lists_and_draws_rooms(
+    built: Path, answer: Callable[..., dict[str, Any]], run: Callable[..., tuple[int, str, str]], tmp_path: Path
+) -> None:
+    listed = answer("rooms", built, "--plot", tmp_path / "r.png")
+    assert listed["rooms"] == answer("things", built)["rooms"] and Path(listed["plot"]).stat().st_size > 0
+    assert answer("rooms", built, "--least", "1")["rooms"] == [
+        room for room in listed["rooms"] if room["confidence"] >= 1
+    ]
+    assert run("rooms", built, "--least", "2")[0] == 2
+
+
 @pytest.mark.parametrize("name", ["a.ply", "a.glb", "a.csv", "a.pgm", "a.openlex3d"])
 def test_export_writes_each_format(
     built: Path, answer: Callable[..., dict[str, Any]], tmp_path: Path, name: str

@@ -30,6 +30,7 @@ from avlmaps.perception.models.settings import ModelSettings, Precision
 from avlmaps.query.asking import Asked
 from avlmaps.query.avlmap import AVLMap, QuerySettings
 from avlmaps.query.rules import Rules
+from avlmaps.query.selection import Wanted
 from avlmaps.recordings.add_sounds import add_sounds
 from avlmaps.recordings.consistency.verdict import Reason
 from avlmaps.recordings.open import open_recording
@@ -119,6 +120,8 @@ SAME: dict[str, Callable[[], Any]] = {
     "view.found_at": of(QuerySettings, "found_at"),
     "serve.found_at": of(ServeSettings, "found_at"),
     "things.least": of(AVLMap.contents, "least_confidence"),
+    "things.page": of(Wanted, "page"),
+    "rooms.least": of(AVLMap.rooms, "least_confidence"),
     "export.least": of(AVLMap.things, "least_confidence"),
     "export.radius_m": of(BodyShape, "radius_m"),
     "export.height_m": of(BodyShape, "height_m"),
@@ -153,7 +156,7 @@ SAME: dict[str, Callable[[], Any]] = {
 # What a person meets first: nothing behind them has such a default.
 OWN = {
     "build.rules", "query.rules", "query.sentence", "demo.out", "bench.out", "bench.indexing.size",
-    "go.language", "go.robot", "query.frame", "things.frame", "locate.frame",
+    "go.language", "go.robot", "query.frame", "things.frame", "rooms.frame", "locate.frame",
 }  # fmt: skip
 
 

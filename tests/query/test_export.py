@@ -82,7 +82,7 @@ def test_the_occupancy_grid_lies_as_map_server_reads_it(tmp_path: Path) -> None:
 def test_the_table_has_a_row_for_each_thing(tmp_path: Path) -> None:
     opened = AVLMap(furnished_map())
     things = opened.things(least_confidence=0.0)
-    write_table(tmp_path / "a.csv", things, opened.sounds())
+    write_table(tmp_path / "a.csv", [thing.to_json() for thing in things], [one.to_json() for one in opened.sounds()])
     rows = list(csv.DictReader((tmp_path / "a.csv").open()))
     assert [row["name"] for row in rows] == [thing.name for thing in things]
     assert float(rows[0]["x_m"]) == pytest.approx(things[0].position[0], abs=1e-3)

@@ -79,7 +79,9 @@ def test_ply_and_csv_say_their_frame(tmp_path: Path) -> None:
         np.testing.assert_allclose(stated, avlmap.space.level_from_recording, atol=1e-8)
         read: Any = trimesh.load(tmp_path / "a.ply")
         np.testing.assert_allclose(np.asarray(read.vertices), at, atol=1e-5)
-        write_table(tmp_path / "a.csv", things, [], avlmap.space, frame)
+        told = {"frame": "recording", "things": [thing.to_json() for thing in things]}
+        told = answer_in(told, frame, avlmap.space.level_from_recording)
+        write_table(tmp_path / "a.csv", told["things"], [], told["frame"])
         rows = list(csv.DictReader((tmp_path / "a.csv").open()))
         assert {row["frame"] for row in rows} == {str(frame)} and {row["size_frame"] for row in rows} == {"level"}
         given_at = np.array([thing.position for thing in things])

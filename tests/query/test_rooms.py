@@ -225,7 +225,7 @@ def test_the_rooms_of_the_map_are_listed_by_walls() -> None:
     assert sorted(room.name for room in rooms) == ["bedroom", "kitchen"]
     assert {room.name: room.views for room in rooms} == {"kitchen": 4, "bedroom": 4}
     for room in rooms:
-        told = room.to_json()
+        told = room.to_json("kitchen 1")
         assert told["probability"] == told["confidence"] == told["names"][0]["probability"]
         assert told["area_m2"] == pytest.approx(8.6, abs=1.0) and len(told["outline"]) >= 4
 

@@ -80,6 +80,7 @@ def export(verb: Export, opened: "AVLMap | None" = None) -> dict[str, Any]:
     """
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.export import write_table
+    from avlmaps.query.frames import answer_in
 
     kind = verb.out.suffix.lower()
     _require_sense(verb, kind)
@@ -90,8 +91,8 @@ def export(verb: Export, opened: "AVLMap | None" = None) -> dict[str, Any]:
     _require_new(written, verb.overwrite)
     opened = AVLMap.open(verb.map) if opened is None else opened
     if kind == ".csv":
-        things = opened.things(least_confidence=verb.least)
-        write_table(verb.out, things, opened.sounds(), opened.space, frame, opened.storeys)
+        listed = answer_in(opened.contents(verb.least).to_json(""), frame, opened.space.level_from_recording)
+        write_table(verb.out, listed["things"], listed["sounds"], frame)
     elif kind in _LAYERED:
         _write_layers(verb, opened, kind, frame)
     elif kind == ".openlex3d":

@@ -13,6 +13,7 @@ from avlmaps.cli import export as exporting
 from avlmaps.cli import go as going
 from avlmaps.cli import locate as locating
 from avlmaps.cli import query as querying
+from avlmaps.cli import rooms as naming
 from avlmaps.cli import things as listing
 from avlmaps.cli.info import Info, describe_path, info_lines, plot_named
 from avlmaps.cli.output import UsageError, query_lines
@@ -29,9 +30,9 @@ _HELP = """\
 A line is a question, as `avlmaps query` takes it, or begins with a verb:
   the red cabinet near the sound of a dog    places in the map
   query --object sofa --area kitchen         the same in parts, with the options of `avlmaps query`
-  things [--least 0.7] [--name chair ...]    the things, sounds and rooms of the map
+  things [--least 0.7] [--room kitchen] ...  the things, sounds and rooms of the map
   sounds                                     its sounds
-  rooms                                      its rooms
+  rooms [--plot FILE]                        its rooms
   info [--verify]                            a description of the map
   locate photo.jpg                           the pose of the camera that took a photo
   go to the sofa, then turn left             the plan of a command; with --scene the simulated robot drives it
@@ -179,21 +180,18 @@ class Session:
 
     def sounds(self, rest: str) -> Reply:
         """List the sounds."""
+        from avlmaps.core.poses import FRAME
+        from avlmaps.query.selection import MapLists
+
         _no_words("sounds", rest)
-        sounds = [sound.to_json() for sound in self.opened.sounds()]
-        return Reply(self._listed("sounds", sounds), listing.sound_lines(sounds))
+        sounds = MapLists(self.opened).sounds()
+        return Reply({"map": str(self.given.map), "frame": FRAME, "sounds": sounds}, listing.sound_lines(sounds))
 
     def rooms(self, rest: str) -> Reply:
         """List the rooms."""
-        _no_words("rooms", rest)
-        opened = self.opened
-        rooms = [room.to_json() for room in opened.rooms()] if "views" in opened.stored.info.models else []
-        return Reply(self._listed("rooms", rooms), listing.room_lines(rooms))
-
-    def _listed(self, key: str, entries: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-        from avlmaps.core.poses import FRAME
-
-        return {"map": str(self.given.map), "frame": FRAME, key: entries}
+        verb = read_verb(naming.Rooms, [str(self.given.map), *_split(rest)], "rooms")
+        answer = naming.rooms(verb, self.opened)
+        return Reply(answer, naming.rooms_lines(answer))
 
     def info(self, rest: str) -> Reply:
         """Describe the map."""

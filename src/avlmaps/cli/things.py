@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from tyro.conf import Positional, arg
 
@@ -12,17 +12,21 @@ from avlmaps.core.frames import FrameName
 from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from avlmaps.query.avlmap import AVLMap
-    from avlmaps.query.schema import ContentsAnswer, RoomAnswer, SoundAnswer, ThingAnswer
+    from avlmaps.query.schema import ListedThing, RoomAnswer, SoundAnswer
 
 
 @dataclass(frozen=True, kw_only=True)
 class Things(ModelVerb):
     """List the things, sounds and rooms of a map, each with its confidence; of rooms the area as well.
 
+    With --room, --near, --top or --page it lists things alone, each with its room.
+
     Example: avlmaps things home.avlmap --least 0.7 --csv things.csv
+    Example: avlmaps things home.avlmap --room kitchen --name chair table
+    Example: avlmaps things home.avlmap --near sofa --top 5
     """
 
     compiles: ClassVar[bool] = True
@@ -35,6 +39,14 @@ class Things(ModelVerb):
     """List these things only, such as: --name chair table."""
     structure: bool = False
     """List walls, floors and ceilings as well."""
+    room: Annotated[str | None, arg(metavar="ROOM")] = None
+    """List the things of this room, or of all rooms of a kind, as `avlmaps rooms` names them."""
+    near: Annotated[str | None, arg(metavar="NAME|X,Y,Z")] = None
+    """List the things nearest to a thing or to a place first: x,y,z in the frame of --frame, or level x,y."""
+    top: Annotated[int | None, arg(metavar="N")] = None
+    """Maximum number of things on a page. Default: all."""
+    page: Annotated[int, arg(metavar="N")] = 1
+    """Page, counted from 1."""
     frame: Annotated[Literal["recording", "level"], arg(metavar="recording|level")] = "recording"
     """Frame of the positions: the recording's own, or the level one (z up)."""
     csv: Annotated[Path | None, arg(metavar="FILE")] = None
@@ -46,37 +58,66 @@ class Things(ModelVerb):
         emit(answer, contents_lines(answer), self.json)
 
 
-def contents(verb: Things, opened: "AVLMap | None" = None) -> "ContentsAnswer":
-    """List the things, sounds and rooms of a map.
+def contents(verb: Things, opened: "AVLMap | None" = None) -> dict[str, Any]:
+    """List the things, sounds and rooms of a map, or a page of some of its things.
 
     Args:
         verb: what to list.
         opened: the map, where it is open already.
     """
+    from avlmaps.core.poses import FRAME
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.export import write_table
     from avlmaps.query.frames import answer_in
+    from avlmaps.query.selection import MapLists, Wanted, page_of_things
 
     if not 0.0 <= verb.least <= 1.0:
         raise UsageError(f"--least takes a confidence from 0 to 1, not {verb.least:g}.")
+    if min(verb.page, 1 if verb.top is None else verb.top) < 1:
+        raise UsageError("--top and --page take a number from 1 on.")
     opened = AVLMap.open(verb.map) if opened is None else opened
-    held = opened.contents(verb.least, verb.name or None, verb.structure)
+    wanted = Wanted(
+        least=verb.least, name=verb.name, structure=verb.structure, room=verb.room, near=_near(verb, opened),
+        top=verb.top, page=verb.page,
+    )  # fmt: skip
+    if wanted.is_whole:
+        listed: Mapping[str, Any] = opened.contents(verb.least, verb.name or None, verb.structure).to_json(
+            str(verb.map)
+        )
+    else:
+        doubts = opened.stored.info.doubts
+        listed = {"map": str(verb.map), "frame": FRAME, **page_of_things(MapLists(opened), wanted)}
+        listed |= {"notes": list(doubts)} if doubts else {}
+    answer = answer_in(listed, FrameName(verb.frame), opened.space.level_from_recording)
     if verb.csv is not None:
-        frame = FrameName(verb.frame)
-        say(f"wrote {write_table(verb.csv, held.things, held.sounds, opened.space, frame, opened.storeys)}")
-    return answer_in(held.to_json(str(verb.map)), FrameName(verb.frame), opened.space.level_from_recording)
+        say(f"wrote {write_table(verb.csv, answer['things'], answer.get('sounds', []), answer['frame'])}")
+    return answer
 
 
-def contents_lines(answer: "ContentsAnswer") -> list[str]:
-    """Lay out what `things` reports: three tables with an empty line between them."""
+def _near(verb: Things, opened: "AVLMap") -> "str | list[float] | None":
+    """Return what things are to be near to; a place in space in the recording's frame."""
+    from avlmaps.query.selection import is_place, place_of
+
+    if verb.near is None or not is_place(verb.near):
+        return verb.near
+    place = place_of(verb.near)
+    in_space = len(place) == 3 and verb.frame == FrameName.LEVEL
+    return (opened.space.world(place) if in_space else place).tolist()
+
+
+def contents_lines(answer: "Mapping[str, Any]") -> list[str]:
+    """Lay out what `things` reports: three tables with an empty line between them, or a page of things."""
     frame = answer["frame"]
     lines = [f"note: {note}" for note in answer.get("notes", [])] + thing_lines(answer["things"], frame)
+    if "total" in answer:
+        page, pages, total = (answer[key] for key in ("page", "pages", "total"))
+        return [*lines, f"page {page} of {pages}, {total} things in all"] if pages > 1 else lines
     lines += ["", *sound_lines(answer["sounds"], frame)] if answer["sounds"] else []
     return [*lines, "", *room_lines(answer["rooms"], frame)] if answer["rooms"] else lines
 
 
-def thing_lines(things: "list[ThingAnswer]", frame: str = FrameName.RECORDING) -> list[str]:
-    """Lay out things as a table."""
+def thing_lines(things: "Sequence[ListedThing]", frame: str = FrameName.RECORDING) -> list[str]:
+    """Lay out things as a table; with their rooms and distances where those are known."""
     if not things:
         return ["no things with this confidence; lower --least to list less certain ones"]
     rows = [
@@ -84,6 +125,11 @@ def thing_lines(things: "list[ThingAnswer]", frame: str = FrameName.RECORDING) -
         for t in things
     ]
     head = ("thing", "confidence", f"position ({frame} frame)", "size in m (level axes)")
+    if "room" in things[0]:
+        head, rows = (*head, "room"), [(*row, t.get("room") or "") for row, t in zip(rows, things, strict=True)]
+    if "distance_m" in things[0]:
+        head = (*head, "distance")
+        rows = [(*row, f"{t.get('distance_m', 0.0):.2f} m") for row, t in zip(rows, things, strict=True)]
     return _with_storeys(head, rows, [t.get("storey") for t in things])
 
 
@@ -106,7 +152,7 @@ def room_lines(rooms: "list[RoomAnswer]", frame: str = FrameName.RECORDING) -> l
         return ["no rooms"]
     rows = [
         (
-            r["name"],
+            r["room"],
             f"{r['probability']:.2f}",
             "" if r["area_m2"] is None else f"{r['area_m2']:.1f} m²",
             place(r["position"]),

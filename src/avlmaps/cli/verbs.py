@@ -13,6 +13,7 @@ from avlmaps.cli.info import Info
 from avlmaps.cli.locate import Locate
 from avlmaps.cli.profiles import Profiles
 from avlmaps.cli.query import Query
+from avlmaps.cli.rooms import Rooms
 from avlmaps.cli.serve import Serve
 from avlmaps.cli.shell import Shell
 from avlmaps.cli.teach_sound import TeachSound
@@ -37,6 +38,7 @@ _OWN: dict[str, type[Verb]] = {
     "info": Info,
     "query": Query,
     "things": Things,
+    "rooms": Rooms,
     "shell": Shell,
     "view": View,
     "export": Export,
@@ -48,8 +50,8 @@ _OWN: dict[str, type[Verb]] = {
 }
 # As help lists them: in the order in which a person comes to use them; other packages' own verbs follow.
 _ORDER = (
-    "demo", "record", "add-sounds", "build", "import-map", "info", "query", "things", "shell", "view", "export",
-    "locate", "go", "serve", "teach-sound", "profiles", "bench",
+    "demo", "record", "add-sounds", "build", "import-map", "info", "query", "things", "rooms", "shell", "view",
+    "export", "locate", "go", "serve", "teach-sound", "profiles", "bench",
 )  # fmt: skip
 
 

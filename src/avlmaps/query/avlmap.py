@@ -205,14 +205,10 @@ class AVLMap:
         Raises:
             QueryError: ``least_confidence`` lies outside [0, 1], or the pixel encoder does not know a name.
         """
-        from avlmaps.query.contents import Contents
-        from avlmaps.query.unknown_names import unknown_note
+        from avlmaps.query.contents import Contents, require_known
 
         models = self.stored.info.models
-        for name in (names or ()) if "pixels" in models else ():
-            if not self.knows(name):
-                note = unknown_note(name)
-                raise QueryError(note if note.endswith("?") else f"{note}; name a thing that it knows.")
+        require_known(self.knows, (names or ()) if "pixels" in models else ())
         things = self.things(names, least_confidence, structure) if "pixels" in models else []
         rooms = self.rooms() if "views" in models else []
         return Contents(things, self.sounds(), rooms, self.stored.info.doubts, self.storeys)

@@ -5,10 +5,11 @@ claim the same voxels ("desk", "dining table"); the most confident claim stands,
 is certainly a chair, and perhaps an armchair, is listed as a chair.
 """
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from avlmaps.query.rooms import RoomField
     from avlmaps.query.schema import ContentsAnswer, RoomAnswer, SoundAnswer, ThingAnswer
 
+Row = TypeVar("Row", "ThingAnswer", "SoundAnswer", "RoomAnswer")
 Watch = Callable[[str, int, int], object]
 """Is given a stage of work, the number of steps done, and of all."""
 
@@ -139,10 +141,11 @@ class Room:
     area_m2: float | None = None
     outline: Float[np.ndarray, "c 3"] = field(repr=False, default_factory=lambda: np.zeros((0, 3)))
 
-    def to_json(self) -> "RoomAnswer":
-        """Return the room as ``avlmaps things --json`` prints it."""
+    def to_json(self, own_name: str) -> "RoomAnswer":
+        """Return the room as ``avlmaps rooms --json`` prints it, with a name that no other room of the map has."""
         return {
             "name": self.name,
+            "room": own_name,
             "confidence": self.confidence,
             "position": list(self.position),
             "views": self.views,
@@ -182,14 +185,55 @@ class Contents:
             "frame": FRAME,
             "things": [thing.to_json() for thing in self.things],
             "sounds": [sound.to_json() for sound in self.sounds],
-            "rooms": [room.to_json() for room in self.rooms],
+            "rooms": listed_rooms(self.rooms, self.storeys),
         }
-        if self.storeys is not None:
-            for row in (*answer["things"], *answer["sounds"], *answer["rooms"]):
-                row["storey"] = int(self.storeys.of_places(np.array(row["position"]))[0])
+        put_storeys(answer["things"], self.storeys)
+        put_storeys(answer["sounds"], self.storeys)
         if self.doubts:
             answer["notes"] = list(self.doubts)
         return answer
+
+
+def put_storeys(rows: list[Row], storeys: "Storeys | None") -> list[Row]:
+    """Return rows of an answer, each with the number of its storey in a map of several."""
+    if storeys is not None:
+        for row in rows:
+            row["storey"] = int(storeys.of_places(np.array(row["position"]))[0])
+    return rows
+
+
+def listed_rooms(rooms: Sequence[Room], storeys: "Storeys | None") -> "list[RoomAnswer]":
+    """Return all rooms of a map as an answer lists them."""
+    names = numbered([room.name for room in rooms])
+    return put_storeys([room.to_json(name) for room, name in zip(rooms, names, strict=True)], storeys)
+
+
+def numbered(names: Sequence[str]) -> tuple[str, ...]:
+    """Return names that are all different: those that occur several times get a number each, from 1."""
+    often, given = Counter(names), Counter[str]()
+    out: list[str] = []
+    for name in names:
+        given[name] += 1
+        out.append(f"{name} {given[name]}" if often[name] > 1 else name)
+    return tuple(out)
+
+
+def require_known(knows: Callable[[str], bool], names: Sequence[str]) -> None:
+    """Raise an error where the pixel encoder does not know one of some names.
+
+    Args:
+        knows: whether it does (``AVLMap.knows``).
+        names: of things.
+
+    Raises:
+        QueryError: it does not; the sentence says what was probably meant.
+    """
+    from avlmaps.query.unknown_names import unknown_note
+
+    for name in names:
+        if not knows(name):
+            note = unknown_note(name)
+            raise QueryError(note if note.endswith("?") else f"{note}; name a thing that it knows.")
 
 
 def find_things(

@@ -22,12 +22,15 @@ from avlmaps.core.frames import FrameName
 
 if TYPE_CHECKING:
     from avlmaps.maps.obstacles import Obstacles
-    from avlmaps.maps.storeys import Storeys
-    from avlmaps.query.contents import SoundEvent, Thing
+    from avlmaps.query.contents import Thing
+    from avlmaps.query.schema import ListedThing, SoundAnswer
     from avlmaps.query.voxel_space import Space
 
 # Gray values of Nav2's map_server for mode "trinary".
 _OCCUPIED, _FREE, _UNKNOWN = 0, 254, 205
+# Columns of a table of things and sounds that hold numbers of millimetres, and those that only some maps have.
+_NUMBERS = ("confidence", "x_m", "y_m", "z_m", "size_x_m", "size_y_m", "size_z_m")
+_ENDS = ("storey", "room", "distance_m")
 # The six faces of a voxel: the neighbour behind each, and its corners counter-clockwise from outside.
 _FACES = (
     ((1, 0, 0), ((1, 0, 0), (1, 1, 0), (1, 1, 1), (1, 0, 1))),
@@ -246,52 +249,43 @@ def write_occupancy(path: Path, obstacles: "Obstacles") -> tuple[Path, Path]:
 
 
 def write_table(
-    path: Path,
-    things: "Iterable[Thing]",
-    sounds: "Iterable[SoundEvent]",
-    space: "Space | None" = None,
-    frame: FrameName = FrameName.RECORDING,
-    storeys: "Storeys | None" = None,
+    path: Path, things: "Iterable[ListedThing]", sounds: "Iterable[SoundAnswer]", frame: str = FrameName.RECORDING
 ) -> Path:
-    """Write things and sounds as CSV, one row each; the column ``frame`` names that of the positions, metres.
+    """Write things and sounds as CSV, one row each, as an answer lists them.
 
-    Sizes are along the axes of the level frame in either, as the column ``size_frame`` says.
+    The column ``frame`` names that of the positions, metres. Sizes are along the axes of the level frame in either, as
+    the column ``size_frame`` says. Where rows have a storey, a room or a distance, these are columns at the end.
 
     Args:
         path: file.
         things: rows.
         sounds: rows.
-        space: of the map; needed for the level frame.
-        frame: of the positions.
-        storeys: of a map of several; the last column ``storey`` then holds the number, from 0, the lowest.
+        frame: in which their positions are given.
 
     Raises:
         QueryError: the file cannot be written.
     """
-    columns = ["kind", "name", "confidence", "x_m", "y_m", "z_m", "size_x_m", "size_y_m", "size_z_m",
-               "onset_s", "offset_s", "frame", "size_frame"]  # fmt: skip
-
-    def placed(position: tuple[float, float, float]) -> list[float]:
-        return [float(value) for value in _in_frame(np.array([position]), space, frame)[0]]
-
-    def on(position: tuple[float, float, float]) -> list[int]:
-        if storeys is None or space is None:
-            return []
-        return storeys.of(space.level(np.array([position]))[:, 2]).tolist()
-
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([*columns, *(() if storeys is None else ("storey",))])
+    rows: list[dict[str, object]] = []
     for thing in things:
-        numbers = [f"{value:.3f}" for value in (thing.confidence, *placed(thing.position), *thing.size)]
-        level = str(FrameName.LEVEL)
-        writer.writerow(["thing", thing.name, *numbers, "", "", str(frame), level, *on(thing.position)])
+        numbers = (thing["confidence"], *thing["position"], *thing["size"])
+        held = dict(zip(_NUMBERS, map(_millis, numbers), strict=True)) | {k: v for k, v in thing.items() if k in _ENDS}
+        rows.append({"kind": "thing", "name": thing["name"], **held, "size_frame": str(FrameName.LEVEL)})
     for sound in sounds:
-        name, confidence = (sound.names[0], f"{sound.confidences[0]:.3f}") if sound.names else ("", "")
-        place = [f"{value:.3f}" for value in placed(sound.position)]
-        times = [f"{sound.onset_s:.3f}", f"{sound.offset_s:.3f}"]
-        writer.writerow(["sound", name, confidence, *place, "", "", "", *times, str(frame), "", *on(sound.position)])
+        named = {"name": sound["names"][0], "confidence": _millis(sound["confidences"][0])} if sound["names"] else {}
+        place = dict(zip(_NUMBERS[1:4], map(_millis, sound["position"]), strict=True))
+        times = {"onset_s": _millis(sound["onset_s"]), "offset_s": _millis(sound["offset_s"])}
+        rows.append({"kind": "sound", **named, **place, **times, **{k: v for k, v in sound.items() if k in _ENDS}})
+    ends = [key for key in _ENDS if any(key in row for row in rows)]
+    text = io.StringIO()
+    columns = ["kind", "name", *_NUMBERS, "onset_s", "offset_s", "frame", "size_frame", *ends]
+    writer = csv.DictWriter(text, columns, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows({"frame": str(frame), **row} for row in rows)
     return _write(path, text.getvalue().encode("utf-8"))
+
+
+def _millis(value: float) -> str:
+    return f"{value:.3f}"
 
 
 def to_open3d(points: Float[np.ndarray, "n 3"], colors: UInt8[np.ndarray, "n 3"]) -> Any:

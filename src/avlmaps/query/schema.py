@@ -96,6 +96,21 @@ class ThingAnswer(TypedDict):
     storey: NotRequired[Storey]
 
 
+class ListedThing(ThingAnswer):
+    """A thing, with its room and its distance where those are queried."""
+
+    room: NotRequired[str | None]
+    distance_m: NotRequired[float]
+
+
+class NearAnswer(TypedDict):
+    """The thing that others are near to."""
+
+    name: str
+    confidence: Unit
+    position: Position
+
+
 class SoundAnswer(TypedDict):
     """One sound of a map; the position is that of the robot at the time."""
 
@@ -118,7 +133,8 @@ class RoomName(TypedDict):
 class RoomAnswer(TypedDict):
     """One room of a map: what walls and doorways bound."""
 
-    name: str
+    name: Annotated[str, Meta(description="kind of room")]
+    room: Annotated[str, Meta(description="its own name: the kind, and a number where there are several of a kind")]
     confidence: Unit
     position: Position
     views: Annotated[int, Meta(description="number of keyframes that show it")]
@@ -136,6 +152,15 @@ class ContentsAnswer(TypedDict):
     frame: Frame
     things: list[ThingAnswer]
     sounds: list[SoundAnswer]
+    rooms: list[RoomAnswer]
+    notes: NotRequired[Notes]
+
+
+class RoomsAnswer(TypedDict):
+    """Rooms of a map, those with most views first."""
+
+    map: str
+    frame: Frame
     rooms: list[RoomAnswer]
     notes: NotRequired[Notes]
 

@@ -1,7 +1,6 @@
 """The floors and rooms of a map as names, and which of them a point lies in: building, floor, room, things."""
 
-from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -49,6 +48,8 @@ class Whereabouts:
         Raises:
             MapError: the map was built with another encoder than is installed.
         """
+        from avlmaps.query.contents import numbered
+
         if "views" not in avlmap.stored.info.models:
             votes = avlmap.room_votes
             return cls((), (), avlmap, None if votes is None else votes.plan, None)
@@ -134,13 +135,3 @@ class Whereabouts:
         raise QueryError(
             f"There is no room {asked[:60]!r}; the rooms are: {', '.join(self.names[:_MOST_NAMED])}{more}."
         )
-
-
-def numbered(names: Sequence[str]) -> tuple[str, ...]:
-    """Return names that are all different: those that occur several times get a number each, from 1."""
-    often, given = Counter(names), Counter[str]()
-    out: list[str] = []
-    for name in names:
-        given[name] += 1
-        out.append(f"{name} {given[name]}" if often[name] > 1 else name)
-    return tuple(out)

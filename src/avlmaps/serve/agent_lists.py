@@ -10,13 +10,12 @@ from msgspec import Meta, Struct
 
 from avlmaps.core.poses import FRAME
 from avlmaps.query.schema import SoundAnswer
+from avlmaps.query.selection import Selected, Wanted, page_of, selected, things_with_rooms
 from avlmaps.query.unknown_names import unknown_note
 from avlmaps.query.whereabouts import Whereabouts
-from avlmaps.serve import work
 from avlmaps.serve.errors import RequestError
-from avlmaps.serve.requests import NoQuery, ThingsQuery, Words
-from avlmaps.serve.selection import Selected, page_of, selected, things_with_rooms, whereabouts
-from avlmaps.serve.work import Task
+from avlmaps.serve.requests import Words
+from avlmaps.serve.work import Task, lists_of
 
 Confidence = Annotated[float, Meta(ge=0.0, le=1.0)]
 Top = Annotated[int, Meta(ge=1, le=50)]
@@ -69,8 +68,8 @@ class MapQuery(Struct, forbid_unknown_fields=True):
 def describe_building(task: Task, query: MapQuery) -> dict[str, Any]:
     """Return the floors with their rooms, and how many things of each name there are."""
     del query
-    avlmap, where = task.map.avlmap, whereabouts(task.map)
-    things = work.list_things(task, ThingsQuery())["things"]
+    avlmap, lists = task.map.avlmap, lists_of(task)
+    where, things = lists.where, lists.things()
     floors = where.floors_of(_places([room.position for room in where.rooms]))
     thing_floors = where.floors_of(_places([thing["position"] for thing in things]))
     level = avlmap.space.level(avlmap.points) if len(avlmap.space) else np.zeros((1, 3))
@@ -88,7 +87,7 @@ def describe_building(task: Task, query: MapQuery) -> dict[str, Any]:
         ],
         "things": len(things),
         "names": _kinds(things),
-        "sounds": _kinds([{"name": _first_name(sound)} for sound in work.list_sounds(task, NoQuery())["sounds"]]),
+        "sounds": _kinds([{"name": _first_name(sound)} for sound in lists.sounds()]),
     }
 
 
@@ -98,12 +97,12 @@ def list_things(task: Task, query: ListThingsQuery) -> dict[str, Any]:
     Raises:
         QueryError: there is no such room, or no such thing to be near to.
     """
-    where = whereabouts(task.map)
-    names = _names(query.name)
+    lists = lists_of(task)
+    where, names = lists.where, _names(query.name)
     unknown = [name for name in names if not task.map.avlmap.knows(name)]
     known = [name for name in names if name not in unknown]
-    wanted = ThingsQuery(least=query.least, name=known, structure=query.structure)
-    chosen, near = selected(task, wanted, query.room, query.near) if known or not names else ([], None)
+    wanted = Wanted(least=query.least, name=known, structure=query.structure, room=query.room, near=query.near)
+    chosen, near = selected(lists, wanted) if known or not names else ([], None)
     about: dict[str, Any] = {"near": near}
     rows = [_thing_row(one, where) for one in chosen]
     if unknown:
@@ -115,8 +114,9 @@ def list_things(task: Task, query: ListThingsQuery) -> dict[str, Any]:
 
 def list_rooms(task: Task, query: ListRoomsQuery) -> dict[str, Any]:
     """Return the rooms of a floor, each with the number of things in it; a page of them."""
-    where = whereabouts(task.map)
-    count = Counter(one.room for one in things_with_rooms(task, ThingsQuery()))
+    lists = lists_of(task)
+    where = lists.where
+    count = Counter(one.room for one in things_with_rooms(lists, Wanted()))
     floors = where.floors_of(_places([room.position for room in where.rooms]))
     if query.floor is not None and not 0 <= query.floor < where.floor_count:
         raise RequestError(f"There is no floor {query.floor}; the map has {where.floor_count}, counted from 0.")
@@ -142,8 +142,8 @@ def list_rooms(task: Task, query: ListRoomsQuery) -> dict[str, Any]:
 
 def list_sounds(task: Task, query: ListSoundsQuery) -> dict[str, Any]:
     """Return the sounds with their likeliest names, times and places; a page of them."""
-    where, names = whereabouts(task.map), {name.casefold() for name in _names(query.name)}
-    sounds = work.list_sounds(task, NoQuery())["sounds"]
+    lists, names = lists_of(task), {name.casefold() for name in _names(query.name)}
+    where, sounds = lists.where, lists.sounds()
     rooms = where.rooms_of(_places([sound["position"] for sound in sounds]))
     rows = [
         {

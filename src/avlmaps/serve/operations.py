@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from avlmaps.navigate.paths import PathAnswer
 from avlmaps.query.places import PlaceAnswer
-from avlmaps.query.schema import ContentsAnswer, LocateAnswer, QueryAnswer
+from avlmaps.query.schema import ContentsAnswer, LocateAnswer, QueryAnswer, RoomsAnswer
 from avlmaps.serve import work
 from avlmaps.serve.requests import (
     AskQuery,
@@ -20,7 +20,6 @@ from avlmaps.serve.requests import (
     ThingsQuery,
     TilesQuery,
 )
-from avlmaps.serve.selection import list_selected
 from avlmaps.serve.tiles import TilesAnswer
 
 
@@ -64,12 +63,13 @@ OPERATIONS = (
     Operation("listContents", "/contents", "List things, sounds and rooms, as `avlmaps things` does.",
               ThingsQuery, ContentsAnswer, work.list_contents, "slow"),
     Operation("listThings", "/things", "List the things of a map, of a room, or near a place; a page of them.",
-              ListedThingsQuery, work.ListedThingsAnswer, list_selected, "slow"),
+              ListedThingsQuery, work.ListedThingsAnswer, work.list_things, "slow"),
     Operation("listSounds", "/sounds", "List the sounds of a map.",
               NoQuery, work.SoundsAnswer, work.list_sounds, "slow"),
     Operation("getSound", "/sounds/{sound:count}/clip", "Return the clip of a sound, counted from 0.",
               NoQuery, "audio/flac", work.sound_clip, "slow"),
-    Operation("listRooms", "/rooms", "List the rooms of a map.", RoomsQuery, work.RoomsAnswer, work.list_rooms, "slow"),
+    Operation("listRooms", "/rooms", "List the rooms of a map, as `avlmaps rooms` does.",
+              RoomsQuery, RoomsAnswer, work.list_rooms, "slow"),
     Operation("ask", "/ask", "Query a map in a sentence or part by part, as `avlmaps query` does.",
               AskQuery, QueryAnswer, work.ask, "quick", "form", ("photo", "clip")),
     Operation("locate", "/locate", "Return the camera pose of a photo, as `avlmaps locate` does.",

@@ -5,11 +5,8 @@ from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, Literal, TypeVar
 
 import msgspec
-import numpy as np
-from jaxtyping import Float
 from msgspec import Meta, Struct
 
-from avlmaps.core.errors import QueryError
 from avlmaps.core.question import MOST_CHARACTERS
 from avlmaps.serve.errors import RequestError
 
@@ -184,18 +181,3 @@ def _finite(request: T) -> T:
         if isinstance(value, float) and not math.isfinite(value):
             raise RequestError(f"{name} is not a finite number; give one.")
     return request
-
-
-def place_of(text: str) -> Float[np.ndarray, " n"]:
-    """Return the two or three numbers of a place.
-
-    Raises:
-        QueryError: they are not.
-    """
-    try:
-        numbers = [float(word) for word in text.split(",")]
-    except ValueError:
-        numbers = []
-    if len(numbers) not in (2, 3) or not all(math.isfinite(one) and abs(one) <= 1e6 for one in numbers):
-        raise QueryError(f"A place is x,y or x,y,z in metres, such as 1.5,2.0; not {text[:80]!r}.")
-    return np.array(numbers)

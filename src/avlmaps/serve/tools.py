@@ -11,6 +11,7 @@ from msgspec import Meta, Struct
 
 from avlmaps.navigate.paths import goals_near
 from avlmaps.query.places import last_seen
+from avlmaps.query.selection import place_given
 from avlmaps.serve import agent_lists, work
 from avlmaps.serve.agent_lists import (
     ListRoomsQuery,
@@ -22,7 +23,6 @@ from avlmaps.serve.agent_lists import (
 from avlmaps.serve.errors import RequestError
 from avlmaps.serve.pictures import small_picture
 from avlmaps.serve.requests import AskQuery, LocateQuery, PlaceQuery, Short, Words
-from avlmaps.serve.selection import place_given
 from avlmaps.serve.uploads import Uploads
 from avlmaps.serve.work import Task
 

@@ -1,6 +1,6 @@
 """The work of each request: from a request's values to its answer, in a thread of a lane."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NotRequired, TypedDict, TypeVar
 
 import msgspec
@@ -18,17 +18,18 @@ from avlmaps.query.schema import (
     LocateAnswer,
     Notes,
     QueryAnswer,
-    RoomAnswer,
+    RoomsAnswer,
     SoundAnswer,
-    ThingAnswer,
     locate_answer,
 )
+from avlmaps.query.selection import MapLists, ThingsPage, Wanted, page_of_things, place_of
 from avlmaps.serve.errors import RequestError, without_folders
 from avlmaps.serve.lanes import Watch
 from avlmaps.serve.requests import (
     CLIP,
     PHOTO,
     AskQuery,
+    ListedThingsQuery,
     LocateQuery,
     NoQuery,
     PathQuery,
@@ -37,7 +38,6 @@ from avlmaps.serve.requests import (
     RoomsQuery,
     ThingsQuery,
     TilesQuery,
-    place_of,
 )
 from avlmaps.serve.settings import Limits
 from avlmaps.serve.shelf import ServedMap, Shelf
@@ -99,32 +99,11 @@ class MapsAnswer(TypedDict):
     maps: list[MapEntry]
 
 
-class ThingsAnswer(TypedDict):
-    """Things of a map, most confident first."""
-
-    map: str
-    frame: Frame
-    things: list[ThingAnswer]
-    notes: NotRequired[Notes]
-
-
-class ListedThing(ThingAnswer):
-    """A thing, with its room and its distance where those are queried."""
-
-    room: NotRequired[str | None]
-    distance_m: NotRequired[float]
-
-
-class ListedThingsAnswer(TypedDict):
+class ListedThingsAnswer(ThingsPage):
     """A page of the things that are meant, most confident or nearest first."""
 
     map: str
     frame: Frame
-    things: list[ListedThing]
-    total: NotRequired[int]
-    page: NotRequired[int]
-    pages: NotRequired[int]
-    near: NotRequired[dict[str, Any]]
     notes: NotRequired[Notes]
 
 
@@ -134,15 +113,6 @@ class SoundsAnswer(TypedDict):
     map: str
     frame: Frame
     sounds: list[SoundAnswer]
-    notes: NotRequired[Notes]
-
-
-class RoomsAnswer(TypedDict):
-    """Rooms of a map, those with most views first."""
-
-    map: str
-    frame: Frame
-    rooms: list[RoomAnswer]
     notes: NotRequired[Notes]
 
 
@@ -175,19 +145,33 @@ def describe_map(task: Task, query: NoQuery) -> dict[str, Any]:
     return {**described, "path": task.map.name, "notices": notices}
 
 
+def lists_of(task: Task) -> MapLists:
+    """Return the lists of a task's map, which the server stores."""
+    return MapLists(task.map.avlmap, task.map.once, task.watch.step)
+
+
+def wanted(query: ThingsQuery) -> Wanted:
+    """Return which things a request means."""
+    named = Wanted(least=query.least, name=query.name, structure=query.structure)
+    if not isinstance(query, ListedThingsQuery):
+        return named
+    return replace(named, room=query.room, near=query.near, top=query.top, page=query.page)
+
+
 def list_contents(task: Task, query: ThingsQuery) -> ContentsAnswer:
     """Return what ``avlmaps things --json`` prints."""
+    lists = lists_of(task)
     answer: ContentsAnswer = {
         "map": task.map.name,
         "frame": FRAME,
-        "things": list_things(task, query)["things"],
-        "sounds": list_sounds(task, NoQuery())["sounds"],
-        "rooms": list_rooms(task, RoomsQuery())["rooms"],
+        "things": lists.things(query.least, query.name, query.structure),
+        "sounds": lists.sounds(),
+        "rooms": lists.rooms(),
     }
     return _noted(task, answer)
 
 
-Noted = TypeVar("Noted", ContentsAnswer, ThingsAnswer, SoundsAnswer, RoomsAnswer)
+Noted = TypeVar("Noted", ContentsAnswer, ListedThingsAnswer, SoundsAnswer, RoomsAnswer)
 
 
 def _noted(task: Task, answer: Noted) -> Noted:
@@ -197,36 +181,21 @@ def _noted(task: Task, answer: Noted) -> Noted:
     return answer
 
 
-def list_things(task: Task, query: ThingsQuery) -> ThingsAnswer:
-    """Return the things of a map."""
-    avlmap = task.map.avlmap
-
-    def found() -> list[ThingAnswer]:
-        if "pixels" not in avlmap.stored.info.models:
-            return []
-        names = tuple(query.name) or None
-        return [thing.to_json() for thing in avlmap.things(names, query.least, query.structure, watch=task.watch.step)]
-
-    key = ("things", query.least, tuple(query.name), query.structure)
-    return _noted(task, ThingsAnswer(map=task.map.name, frame=FRAME, things=task.map.once(key, found)))
+def list_things(task: Task, query: ListedThingsQuery) -> ListedThingsAnswer:
+    """Return a page of the things that are meant."""
+    page = page_of_things(lists_of(task), wanted(query))
+    return _noted(task, ListedThingsAnswer(map=task.map.name, frame=FRAME, **page))
 
 
 def list_sounds(task: Task, query: NoQuery) -> SoundsAnswer:
     """Return the sounds of a map."""
     del query
-    sounds = task.map.once("sounds", lambda: [sound.to_json() for sound in task.map.avlmap.sounds()])
-    return _noted(task, SoundsAnswer(map=task.map.name, frame=FRAME, sounds=sounds))
+    return _noted(task, SoundsAnswer(map=task.map.name, frame=FRAME, sounds=lists_of(task).sounds()))
 
 
 def list_rooms(task: Task, query: RoomsQuery) -> RoomsAnswer:
-    """Return the rooms of a map."""
-    avlmap = task.map.avlmap
-
-    def found() -> list[RoomAnswer]:
-        return [room.to_json() for room in avlmap.rooms()] if "views" in avlmap.stored.info.models else []
-
-    rooms = [room for room in task.map.once("rooms", found) if room["confidence"] >= query.least]
-    return _noted(task, RoomsAnswer(map=task.map.name, frame=FRAME, rooms=rooms))
+    """Return what ``avlmaps rooms --json`` prints."""
+    return _noted(task, RoomsAnswer(map=task.map.name, frame=FRAME, rooms=lists_of(task).rooms(query.least)))
 
 
 def sound_clip(task: Task, query: NoQuery) -> File:

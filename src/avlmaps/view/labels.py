@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Int, UInt8
 
 from avlmaps.core.errors import AvlmapsError
+from avlmaps.query.contents import listed_rooms
 from avlmaps.query.export import heat_colors, palette
 from avlmaps.query.naming import VoxelNamer
 
@@ -84,7 +85,10 @@ class Labels:
                 | {"track": level(sound.track).round(4).tolist()}
                 for sound in self.sounds
             ],
-            "rooms": [room.to_json() | {"label": self._room_label(room)} for room in self.rooms],
+            "rooms": [
+                row | {"label": self._room_label(room)}
+                for row, room in zip(listed_rooms(self.rooms, layout.avlmap.storeys), self.rooms, strict=True)
+            ],
             "names": list(self.names),
             "room_names": list(self.room_names),
             "voxel_names": list(self.voxel_names),

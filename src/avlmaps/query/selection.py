@@ -1,0 +1,260 @@
+"""The lists of a map, and which of its things are meant: those of a room, near a place or thing, of some names; a page.
+
+The command line, the server and agents select by these; the server stores what was computed once.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, NotRequired, TypedDict, TypeVar
+
+import numpy as np
+
+from avlmaps.core.arrays import Float
+from avlmaps.core.errors import QueryError
+from avlmaps.query.avlmap import AVLMap
+from avlmaps.query.contents import Watch, listed_rooms, put_storeys, require_known
+from avlmaps.query.schema import ListedThing, NearAnswer, RoomAnswer, SoundAnswer, ThingAnswer
+from avlmaps.query.unknown_names import unknown_note
+from avlmaps.query.whereabouts import Whereabouts
+
+Row = TypeVar("Row")
+T = TypeVar("T")
+
+
+def _computed(key: object, work: Callable[[], T]) -> T:
+    del key
+    return work()
+
+
+@dataclass(frozen=True, slots=True)
+class MapLists:
+    """The lists of one map.
+
+    Attributes:
+        avlmap: the map.
+        once: returns what work returns, perhaps remembered under a key; by default it is computed each time.
+        watch: is given the progress, as by ``AVLMap.things``.
+    """
+
+    avlmap: AVLMap
+    once: Callable[[object, Callable[[], Any]], Any] = field(default=_computed, repr=False)
+    watch: Watch = field(default=lambda stage, done, total: None, repr=False)
+
+    @property
+    def where(self) -> Whereabouts:
+        """The floors and rooms."""
+        return self.once("whereabouts", lambda: Whereabouts.of(self.avlmap))
+
+    def things(self, least: float = 0.5, names: Sequence[str] = (), structure: bool = False) -> list[ThingAnswer]:
+        """Return the things, most confident first; none of a map without a model of pixels.
+
+        Raises:
+            QueryError: ``least`` lies outside [0, 1], or the pixel encoder does not know a name.
+        """
+
+        def found() -> list[ThingAnswer]:
+            if "pixels" not in self.avlmap.stored.info.models:
+                return []
+            require_known(self.avlmap.knows, names)
+            things = self.avlmap.things(tuple(names) or None, least, structure, watch=self.watch)
+            return put_storeys([thing.to_json() for thing in things], self.avlmap.storeys)
+
+        return self.once(("things", least, tuple(names), structure), found)
+
+    def sounds(self) -> list[SoundAnswer]:
+        """Return the sounds in the order of their onset."""
+        avlmap = self.avlmap
+        return self.once("sounds", lambda: put_storeys([sound.to_json() for sound in avlmap.sounds()], avlmap.storeys))
+
+    def rooms(self, least: float = 0.0) -> list[RoomAnswer]:
+        """Return the rooms of at least some confidence, those with most views first; none without a model of views."""
+        avlmap = self.avlmap
+
+        def found() -> list[RoomAnswer]:
+            return listed_rooms(avlmap.rooms() if "views" in avlmap.stored.info.models else [], avlmap.storeys)
+
+        rooms: list[RoomAnswer] = self.once("rooms", found)
+        return [room for room in rooms if room["confidence"] >= least]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wanted:
+    """Which things are listed, in which order, and how many at once.
+
+    Attributes:
+        least: things of less confidence are left out, in [0, 1].
+        name: list these things only; by default the pixel encoder's vocabulary.
+        structure: list walls, floors and the like as well.
+        room: a room by its name, or all rooms of a kind.
+        near: what the things are near to: x,y,z of the recording frame, x,y of the level frame, or the name of a thing.
+            The nearest come first.
+        top: most things of a page; None for all.
+        page: which page, counted from 1.
+    """
+
+    least: float = 0.5
+    name: Sequence[str] = ()
+    structure: bool = False
+    room: str | None = None
+    near: str | Sequence[float] | None = None
+    top: int | None = None
+    page: int = 1
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether nothing but names and confidence is selected: all things, on one page."""
+        return self.room is None and self.near is None and self.top is None and self.page == 1
+
+
+class ThingsPage(TypedDict):
+    """A page of the things that are meant, most confident or nearest first."""
+
+    things: list[ListedThing]
+    total: NotRequired[int]
+    page: NotRequired[int]
+    pages: NotRequired[int]
+    near: NotRequired[NearAnswer]
+
+
+@dataclass(frozen=True, slots=True)
+class Selected:
+    """One thing that is meant.
+
+    Attributes:
+        thing: as it is listed.
+        room: number of its room; negative without one.
+        away_m: from the place that it should be near, metres; None where none is named.
+    """
+
+    thing: ThingAnswer
+    room: int
+    away_m: float | None = None
+
+
+def page_of_things(lists: MapLists, wanted: Wanted) -> ThingsPage:
+    """Return a page of the things that are meant; where nothing but names is selected, all of them, without a count.
+
+    Raises:
+        QueryError: there is no such room, name or page, or no such thing to be near to.
+    """
+    if wanted.is_whole:
+        return {"things": [_listed(thing) for thing in lists.things(wanted.least, wanted.name, wanted.structure)]}
+    about = None
+    if wanted.room is None and wanted.near is None:
+        rows = [_listed(thing) for thing in lists.things(wanted.least, wanted.name, wanted.structure)]
+    else:
+        chosen, about = selected(lists, wanted)
+        names = lists.where.names
+        rows = [_row(one, names[one.room] if one.room >= 0 else None) for one in chosen]
+    top = max(len(rows), 1) if wanted.top is None else wanted.top
+    things, pages = page_of(rows, top, wanted.page, "things")
+    answer: ThingsPage = {"things": things, "total": len(rows), "page": wanted.page, "pages": pages}
+    return answer if about is None else {**answer, "near": about}
+
+
+def things_with_rooms(lists: MapLists, wanted: Wanted) -> list[Selected]:
+    """Return the things of some names, each with its room."""
+    things = lists.things(wanted.least, wanted.name, wanted.structure)
+    key = ("rooms of things", wanted.least, tuple(wanted.name), wanted.structure)
+    places = np.array([thing["position"] for thing in things], np.float64).reshape(-1, 3)
+    rooms: list[int] = lists.once(key, lambda: lists.where.rooms_of(places).tolist())
+    return [Selected(thing, room) for thing, room in zip(things, rooms, strict=True)]
+
+
+def selected(lists: MapLists, wanted: Wanted) -> tuple[list[Selected], NearAnswer | None]:
+    """Return all things that are meant, and the thing that they are near to if one is named.
+
+    Raises:
+        QueryError: there is no such room, or no such thing to be near to.
+    """
+    found = things_with_rooms(lists, wanted)
+    if wanted.room is not None:
+        numbers = set(lists.where.numbers_of(wanted.room))
+        found = [one for one in found if one.room in numbers]
+    if wanted.near is None:
+        return found, None
+    place, about = _near(lists, wanted.near)
+    itself = None if about is None else about["position"]
+    level = lists.avlmap.space.level
+    found = [replace(one, away_m=_away(level, one.thing, place)) for one in found if one.thing["position"] != itself]
+    return sorted(found, key=lambda one: one.away_m or 0.0), about
+
+
+def page_of(rows: Sequence[Row], top: int, page: int, of: str) -> tuple[list[Row], int]:
+    """Return a page of some rows, and how many pages there are.
+
+    Raises:
+        QueryError: there is no such page, or a page of nothing is wanted.
+    """
+    if top < 1:
+        raise QueryError(f"A page cannot hold {top} {of}; it holds at least 1.")
+    pages = max(1, math.ceil(len(rows) / top))
+    if not 1 <= page <= pages:
+        raise QueryError(f"There is no page {page}; there are {pages} of {top}, for {len(rows)} {of}.")
+    return list(rows[(page - 1) * top : page * top]), pages
+
+
+def place_of(text: str) -> Float[np.ndarray, " n"]:
+    """Return the two or three numbers of a place.
+
+    Raises:
+        QueryError: they are not.
+    """
+    try:
+        numbers = [float(word) for word in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in (2, 3) or not all(math.isfinite(one) and abs(one) <= 1e6 for one in numbers):
+        raise QueryError(f"A place is x,y or x,y,z in metres, such as 1.5,2.0; not {text[:80]!r}.")
+    return np.array(numbers)
+
+
+def place_given(place: str | Sequence[float]) -> Float[np.ndarray, " n"]:
+    """Return the numbers of a place that comes as a text or as a list.
+
+    Raises:
+        QueryError: they are no two or three numbers.
+    """
+    return place_of(place if isinstance(place, str) else ",".join(str(value) for value in place))
+
+
+def is_place(near: str | Sequence[float]) -> bool:
+    """Return whether what things are near to is meant as a place rather than as the name of a thing."""
+    return not isinstance(near, str) or not any(letter.isalpha() for letter in near)
+
+
+def _listed(thing: ThingAnswer) -> ListedThing:
+    return ListedThing(**thing)
+
+
+def _row(one: Selected, room: str | None) -> ListedThing:
+    row = ListedThing(**one.thing, room=room)
+    if one.away_m is not None:
+        row["distance_m"] = round(one.away_m, 3)
+    return row
+
+
+def _near(lists: MapLists, near: str | Sequence[float]) -> tuple[Float[np.ndarray, " n"], NearAnswer | None]:
+    """Return the place that is meant, and the thing there if one is named."""
+    if is_place(near):
+        return place_given(near), None
+    name = str(near)
+    known = lists.avlmap.knows(name)
+    things = lists.things(names=[name]) if known else []
+    if not things:
+        why = "" if known else f": {unknown_note(name)}"
+        raise QueryError(f"The map shows no {name[:60]!r} to be near to{why}; give a place as x,y,z, or another name.")
+    best = things[0]
+    about: NearAnswer = {"name": best["name"], "confidence": best["confidence"], "position": best["position"]}
+    return np.array(best["position"]), about
+
+
+def _away(
+    level: Callable[[Float[np.ndarray, "m 3"]], Float[np.ndarray, "m 3"]],
+    thing: ThingAnswer,
+    place: Float[np.ndarray, " n"],
+) -> float:
+    """Return how far a thing's position lies from a place: in space, or level where the place has no height."""
+    point = np.array(thing["position"])
+    return math.dist(point, place) if len(place) == 3 else math.dist(level(point)[:2], place)
