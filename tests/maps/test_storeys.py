@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from avlmaps.maps.storeys import Storeys, find_storeys, said_storeys
+from avlmaps.maps.storeys import Storeys, find_storeys, one_storey, said_storeys
 from helpers.two_floors import EYE_M, FOOT_X, TOP_X, UPPER_M, VOXEL_M, WELL, box, two_floors
 
 HOME = two_floors()
@@ -103,3 +103,11 @@ def test_storeys_move_with_the_map(x: float, y: float, z: float) -> None:
         [one.floor_m for one in found().all], abs=0.051
     )
     assert len(moved.stairs) == 1
+
+
+def test_one_storey_has_the_floor_that_most_cameras_looked_at_else_one_below_them() -> None:
+    for floors in ([(0.0, 0.6), (1.2, 0.1), (2.8, 0.3)], [(2.8, 0.3), (0.0, 0.6)], [(0.0, 0.5), (2.8, 0.5)]):
+        assert one_storey(floors, np.full(3, 9.9)).floors_m.tolist() == [0.0]
+    assert one_storey([], np.array([1.2, 1.3, 1.4])).floors_m == pytest.approx([0.0])
+    single = one_storey([], np.zeros(0))
+    assert len(single) == 1 and (single.of(np.array([-1e9, 0.0, 1e9])) == 0).all()

@@ -4,17 +4,17 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from walled_rooms import UP, two_rooms
+from walled_rooms import UP, storeys_at, two_rooms
 
 from avlmaps.maps.grid import GridSpec
-from avlmaps.query.floor_plan import CELL_M, FloorPlan, storeys
+from avlmaps.query.floor_plan import CELL_M, FloorPlan
 from avlmaps.query.voxel_space import Space
 
 LEFT, RIGHT = np.array([[1.0, 1.5, 1.2]]), np.array([[5.0, 1.5, 1.2]])
 
 
 def plan_of(door_m: float = 0.0, wall: bool = True, floors: tuple[float, ...] = (0.0,)) -> FloorPlan:
-    plan = FloorPlan.of(two_rooms(door_m, wall), floors)
+    plan = FloorPlan.of(two_rooms(door_m, wall), storeys_at(*floors))
     assert plan is not None
     return plan
 
@@ -51,7 +51,7 @@ def test_a_wall_lets_nothing_through_and_a_doorway_little() -> None:
 
 def test_without_walls_it_spreads_as_a_gaussian() -> None:
     index = np.argwhere(np.ones((240, 240, 1), bool))
-    plan = FloorPlan.of(Space(GridSpec(0.05), index, UP), (0.0,))
+    plan = FloorPlan.of(Space(GridSpec(0.05), index, UP), storeys_at(0.0))
     assert plan is not None and not plan.wall.any()
     middle = np.array([[6.1, 6.1, 0.0]])
     spread = plan.spread(deposit(plan, middle), 0.8)[:, 0]
@@ -85,7 +85,7 @@ def test_furniture_and_a_rail_are_no_walls() -> None:
     plan = plan_of(wall=False)
     assert not plan.wall.reshape(-1)[plan.cells_of(LEFT)].any()
     low = np.argwhere(np.ones((60, 4, 18), bool))  # 0.9 m high, as a counter is
-    counter = FloorPlan.of(Space(GridSpec(0.05), low, UP), (0.0,))
+    counter = FloorPlan.of(Space(GridSpec(0.05), low, UP), storeys_at(0.0))
     assert counter is not None and not counter.wall.any()
 
 
@@ -103,7 +103,7 @@ def test_every_place_belongs_to_an_open_cell_that_no_other_is_clearly_nearer_tha
     rng = np.random.default_rng(seed)
     free = rng.random((2, 12, 17)) < share
     free[0, 5, 5] = True
-    plan = FloorPlan(two_rooms(), np.array([0.0, 2.5]), np.zeros(2), ~free, free, np.zeros(0, np.int64))
+    plan = FloorPlan(two_rooms(), storeys_at(0.0, 2.5), np.zeros(2), ~free, free, np.zeros(0, np.int64))
     i, j = np.indices(free.shape[1:]).reshape(2, -1)
     for storey, height_m in enumerate((0.5, 3.0)):
         points = np.c_[(np.c_[i, j] + 0.5) * CELL_M, np.full(len(i), height_m)]
@@ -122,7 +122,7 @@ def test_a_storey_knows_nothing_of_the_one_above() -> None:
     lower = np.argwhere(np.ones((40, 40, 1), bool))
     upper = lower + np.array([0, 0, 56])
     space = Space(GridSpec(0.05), np.concatenate([lower, upper]), UP)
-    plan = FloorPlan.of(space, (0.0, 2.8))
+    plan = FloorPlan.of(space, storeys_at(0.0, 2.8))
     assert plan is not None and plan.wall.shape[0] == 2
     mass = deposit(plan, np.array([[1.0, 1.0, 1.2]]))
     spread = plan.spread(mass, 1.0).reshape(plan.wall.shape)
@@ -138,25 +138,13 @@ def test_a_turned_world_gives_the_same_plan() -> None:
     points = space.centres @ turn.T
     grid = GridSpec(0.05)
     index = np.unique(np.floor(points / 0.05 + 1e-6).astype(np.int64), axis=0)
-    turned = FloorPlan.of(Space(grid, index, turn @ UP), (0.0,))
-    plan = FloorPlan.of(space, (0.0,))
+    turned = FloorPlan.of(Space(grid, index, turn @ UP), storeys_at(0.0))
+    plan = FloorPlan.of(space, storeys_at(0.0))
     assert plan is not None and turned is not None
     assert abs(int(turned.wall.sum()) - int(plan.wall.sum())) <= 0.25 * plan.wall.sum()
 
 
-def test_landings_and_steps_are_no_storeys() -> None:
-    cameras = np.zeros(0)
-    assert storeys([(0.0, 0.6), (1.2, 0.1), (2.8, 0.3)], cameras) == [0.0, 2.8]
-    assert storeys([(2.8, 0.3), (0.0, 0.6)], cameras) == [0.0, 2.8]
-
-
-def test_without_a_known_floor_the_cameras_say_where_it_is() -> None:
-    assert storeys([], np.array([1.2, 1.3, 1.4])) == pytest.approx([0.0])
-    assert storeys([], np.array([1.3, 1.3, 4.1, 4.1, 4.1])) == pytest.approx([0.0, 2.8])
-    assert len(storeys([], np.zeros(0))) == 1
-
-
 def test_a_map_without_voxels_or_kilometres_wide_has_no_plan() -> None:
-    assert FloorPlan.of(Space(GridSpec(0.05), np.zeros((0, 3), np.int64), UP), (0.0,)) is None
+    assert FloorPlan.of(Space(GridSpec(0.05), np.zeros((0, 3), np.int64), UP), storeys_at(0.0)) is None
     wide = np.array([[0, 0, 0], [200_000, 200_000, 0]])
-    assert FloorPlan.of(Space(GridSpec(0.05), wide, UP), (0.0,)) is None
+    assert FloorPlan.of(Space(GridSpec(0.05), wide, UP), storeys_at(0.0)) is None

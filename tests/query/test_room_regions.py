@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from query_fakes import UP
-from walled_rooms import two_rooms_index
+from walled_rooms import storeys_at, two_rooms_index
 
 from avlmaps.maps.grid import GridSpec
 from avlmaps.query.floor_plan import FloorPlan
@@ -130,7 +130,7 @@ def two_room_regions(turn_rad: float, door_m: float = 0.9) -> RoomRegions:
         index + np.array([[0.25, 0.25, 0.5], [0.75, 0.75, 0.5], [0.25, 0.75, 0.5], [0.75, 0.25, 0.5]])[:, None]
     ) * CELL
     moved = np.unique(np.floor(points.reshape(-1, 3) @ turn.T / CELL).astype(np.int64), axis=0)
-    plan = FloorPlan.of(Space(GridSpec(CELL), moved, UP), (0.0,))
+    plan = FloorPlan.of(Space(GridSpec(CELL), moved, UP), storeys_at(0.0))
     assert plan is not None
     cameras = np.tile(np.eye(4), (2, 1, 1))
     cameras[:, :3, 3] = np.array([[1.0, 1.5, 1.3], [5.0, 1.5, 1.3]]) @ turn.T

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from query_fakes import FakePixels, FakeSounds, fake_encoders, fake_map, keyframes_at, voxels_of
-from walled_rooms import two_rooms, two_rooms_index
+from walled_rooms import storeys_at, two_rooms, two_rooms_index
 
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.perception.room_contents import RoomContents, read_room_contents
@@ -35,7 +35,7 @@ def rooms_of(
     settings: RoomSettings = VIEWS_ALONE,
     named: NamedVoxels | None = None,
 ) -> Rooms:
-    plan = FloorPlan.of(two_rooms(door_m, wall), (0.0,))
+    plan = FloorPlan.of(two_rooms(door_m, wall), storeys_at(0.0))
     assert plan is not None
     return Rooms(plan, places, lambda: named, settings)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from walled_rooms import two_rooms
+from walled_rooms import storeys_at, two_rooms
 
 from avlmaps.core.arrays import Float
 from avlmaps.perception.room_contents import RoomContents, read_room_contents
@@ -22,7 +22,7 @@ SHARES = st.floats(0.0, 1.0)
 
 def kitchen_and_bedroom(sure: float = 0.95) -> RoomField:
     """Two rooms with a wall between them; the left one is a kitchen."""
-    plan = FloorPlan.of(two_rooms(0.0, True), (0.0,))
+    plan = FloorPlan.of(two_rooms(0.0, True), storeys_at(0.0))
     assert plan is not None
     middles = plan.space.centres
     left = np.zeros(len(plan), bool)

@@ -3,6 +3,7 @@
 import numpy as np
 
 from avlmaps.maps.grid import GridSpec
+from avlmaps.maps.storeys import Storey, Storeys
 from avlmaps.query.voxel_space import Space
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -24,3 +25,9 @@ def two_rooms_index(door_m: float = 0.0, wall: bool = True) -> np.ndarray:
 def two_rooms(door_m: float = 0.0, wall: bool = True) -> Space:
     """Return the space of ``two_rooms_index``."""
     return Space(GridSpec(0.05), two_rooms_index(door_m, wall), UP)
+
+
+def storeys_at(*floors_m: float) -> Storeys:
+    """Return storeys with floors at these heights, rising."""
+    ends = [-np.inf, *(floor - 0.3 for floor in floors_m[1:]), np.inf]
+    return Storeys(tuple(Storey(k, floor, None, ends[k], ends[k + 1], 10.0) for k, floor in enumerate(floors_m)))

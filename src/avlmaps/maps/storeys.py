@@ -21,6 +21,7 @@ _KNEE_M = 0.5  # what reaches higher over a step stands beside it, and is no nex
 _RISE_M = 0.26  # of a step, the voxels' edge included
 _LEAST_M2, _LEAST_SHARE = 1.0, 0.15  # of a floor; the share is that of the largest
 _CARRIED_M = (0.1, 2.3)  # heights over the floor at which a camera is carried
+_CAMERA_M = 1.3  # over a floor that nobody measured
 _ROUND_M = 0.25  # about a camera lies what it stands over
 _SAME_M = 0.12  # two heights closer than this are one
 _STOOD_SHARE = 0.02  # of the cameras: fewer do not make a storey
@@ -86,11 +87,21 @@ class Storeys:
     stairs: tuple[Stairs, ...] = ()
     up: tuple[float, float, float] = (0.0, 0.0, 1.0)
 
+    @classmethod
+    def single(cls, floor_m: float) -> "Storeys":
+        """Return one storey that everything belongs to, with its floor at a height."""
+        return cls((Storey(0, floor_m, None, -np.inf, np.inf, 0.0),))
+
     def __len__(self) -> int:
         return len(self.all)
 
     def __getitem__(self, number: int) -> Storey:
         return self.all[number]
+
+    @property
+    def floors_m(self) -> Float[np.ndarray, " s"]:
+        """Heights of the floors, rising."""
+        return np.array([storey.floor_m for storey in self.all])
 
     def of(self, level_z_m: Float[np.ndarray, " n"]) -> Int[np.ndarray, " n"]:
         """Return the number of the storey of each height; what lies below all floors belongs to the lowest."""
@@ -244,6 +255,18 @@ def find_storeys(
     storeys = _storeys(columns, surface, floors, float(level[:, 2].max()))
     stairs = [one for below in range(len(storeys) - 1) for one in _stairs(columns, surface, storeys, below)]
     return Storeys(tuple(storeys), tuple(stairs))
+
+
+def one_storey(floors_m: Sequence[tuple[float, float]], cameras_m: Float[np.ndarray, " k"]) -> Storeys:
+    """Return the storey of a map that has one: its floor is the one that most cameras looked at.
+
+    Args:
+        floors_m: height and weight of every floor, step and landing that is known; may be empty.
+        cameras_m: level z of the cameras, from which the floor is guessed where none is known.
+    """
+    if floors_m:
+        return Storeys.single(min(floors_m, key=lambda floor: (-floor[1], floor[0]))[0])
+    return Storeys.single(float(np.median(cameras_m)) - _CAMERA_M if len(cameras_m) else 0.0)
 
 
 def stayed_on_one(cameras_m: Float[np.ndarray, " k"]) -> bool:

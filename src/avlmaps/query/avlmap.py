@@ -17,7 +17,7 @@ from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder, SurveyedEncoder
 from avlmaps.perception.room_contents import read_room_contents
 from avlmaps.query.factors import FOUND_AT, HeatSettings
-from avlmaps.query.floor_plan import FloorPlan, storeys
+from avlmaps.query.floor_plan import FloorPlan
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.instances import FeatureVoxels, Instances, confident_instances
 from avlmaps.query.known_rivals import KnownRivals
@@ -348,6 +348,8 @@ class AVLMap:
 
         A map that has no floor plan (no voxels, no keyframes, kilometres of extent) has none either.
         """
+        from avlmaps.maps.storeys import one_storey
+
         settings, stored = self.settings.areas, self.stored
         if not settings.by_room or not len(stored.keyframes):
             return None
@@ -355,7 +357,7 @@ class AVLMap:
         ground = stored.info.ground
         known = [(floor.best.height_m, floor.cameras) for floor in ground.floors] if ground is not None else []
         places = area_anchors(stored.keyframes, settings)
-        plan = FloorPlan.of(self.space, storeys(known, cameras), places)
+        plan = FloorPlan.of(self.space, self.storeys or one_storey(known, cameras), places)
         return None if plan is None else Rooms(plan, places, self._voting_voxels, settings.rooms)
 
     @cached_property

@@ -4,25 +4,20 @@ Evidence spreads as a random walk does: a wall reflects it, a doorway lets littl
 seen it spreads as a Gaussian. So nothing has to decide where the rooms of an open plan end.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Float32, Int
+from avlmaps.maps.storeys import Storeys
 from avlmaps.query.voxel_space import Space
 
 CELL_M = 0.2
 # Heights over the floor between which a wall is seen: over tables and sofas, below the heads of doors.
 WALL_M = (1.0, 2.0)
 _WALL_SHARE = 0.5  # of the layers of voxels between them
-# Two floors closer than this are one storey with a step, a landing or stairs.
-_STOREY_M = 1.8
 _GAP_M = 1.2  # unseen floor up to this width lies between seen floor
-_BELOW_M = 0.3  # a voxel belongs to the storey whose floor lies at most this far above it
-# Height of a camera over a floor that nobody measured.
-_CAMERA_M = 1.3
 # Share of a cell's mass that one step of the walk moves to each neighbour; it adds 2 x 0.24 cells² of variance an axis.
 _TO_NEIGHBOUR = 0.24
 _MOST_CELLS = 4_000_000
@@ -35,7 +30,7 @@ class FloorPlan:
 
     Attributes:
         space: the map's voxels.
-        floors_m: (s,) level z of each storey's floor, rising.
+        storeys: of the map, with their floors' heights.
         origin_m: level x and y of the corner of cell (0, 0).
         wall: which cells are walls.
         open: which cells are no walls, and seen or between seen ones; evidence spreads over these.
@@ -43,26 +38,24 @@ class FloorPlan:
     """
 
     space: Space
-    floors_m: Float[np.ndarray, " s"]
+    storeys: Storeys
     origin_m: Float[np.ndarray, "2"]
     wall: Bool[np.ndarray, "s nx ny"]
     open: Bool[np.ndarray, "s nx ny"]
     voxel_cell: Int[np.ndarray, " n"]
 
     @classmethod
-    def of(
-        cls, space: Space, floors_m: Sequence[float], places: Float[np.ndarray, "k 3"] | None = None
-    ) -> "FloorPlan | None":
+    def of(cls, space: Space, storeys: Storeys, places: Float[np.ndarray, "k 3"] | None = None) -> "FloorPlan | None":
         """Find the walls of a map; None for a map without voxels, or one that is too large for a grid of it.
 
         Args:
             space: its voxels.
-            floors_m: level z of each storey's floor; see ``storeys``. At least one.
+            storeys: of the map.
             places: other points that the grid must cover, metres, world.
         """
         if not len(space):
             return None
-        floors = np.sort(np.asarray(floors_m, np.float64))
+        floors = storeys.floors_m
         low, high = _ends(space, places)
         low, size = low - 1, high - low + 3
         if len(floors) * int(size[0]) * int(size[1]) > _MOST_CELLS:
@@ -74,7 +67,7 @@ class FloorPlan:
         own = np.empty(len(space), np.int64)
         for a in range(0, len(space), _CHUNK):
             level = space.level(space.centres_of(slice(a, a + _CHUNK)))
-            storey = _storey_of(level[:, 2], floors)
+            storey = storeys.of(level[:, 2])
             cell = np.floor(level[:, :2] / CELL_M).astype(np.int64) - low
             mine = own[a : a + _CHUNK]
             mine[:] = (storey * size[0] + cell[:, 0]) * size[1] + cell[:, 1]
@@ -87,8 +80,8 @@ class FloorPlan:
         if places is not None:
             beyond = space.level(places)
             cell = np.floor(beyond[:, :2] / CELL_M).astype(np.int64) - low
-            seen[_storey_of(beyond[:, 2], floors), *cell.T] = True
-        return cls(space, floors, low * CELL_M, wall, _without_gaps(seen) & ~wall, own)
+            seen[storeys.of(beyond[:, 2]), *cell.T] = True
+        return cls(space, storeys, low * CELL_M, wall, _without_gaps(seen) & ~wall, own)
 
     def __len__(self) -> int:
         """Return the number of cells of all storeys."""
@@ -100,14 +93,14 @@ class FloorPlan:
         Where a storey has no open cell at all it is the cell that the point lies in, or the nearest one of the grid.
         """
         level = self.space.level(points_world)
-        storey = _storey_of(level[:, 2], self.floors_m)
+        storey = self.storeys.of(level[:, 2])
         cell = np.floor((level[:, :2] - self.origin_m) / CELL_M)
         i, j = (np.clip(cell, 0, np.array(self.wall.shape[1:]) - 1)).astype(np.int64).T
         return self._open[np.ravel_multi_index((storey, i, j), self.wall.shape)]
 
     def storeys_of(self, points_world: Float[np.ndarray, "m 3"]) -> Int[np.ndarray, " m"]:
         """Return the storey of each point, counted from 0, the lowest."""
-        return _storey_of(self.space.level(points_world)[:, 2], self.floors_m)
+        return self.storeys.of(self.space.level(points_world)[:, 2])
 
     @cached_property
     def voxel_cells(self) -> Int[np.ndarray, " n"]:
@@ -122,7 +115,7 @@ class FloorPlan:
             return np.full(len(self), -1, np.int64)
         far = 10.0 * CELL_M * sum(self.wall.shape)  # a storey away is farther than any place of the same one
         level = self.space.level(points_world)
-        points = np.c_[level[:, :2], far * _storey_of(level[:, 2], self.floors_m)]
+        points = np.c_[level[:, :2], far * self.storeys.of(level[:, 2])]
         storey, i, j = np.indices(self.wall.shape).reshape(3, -1)
         centres = np.c_[self.origin_m + (np.stack([i, j], axis=1) + 0.5) * CELL_M, far * storey]
         return np.asarray(KDTree(points).query(centres)[1], np.int64)
@@ -224,26 +217,3 @@ def _without_gaps(seen: Bool[np.ndarray, "s nx ny"]) -> Bool[np.ndarray, "s nx n
         if cells.any():
             out[storey] |= far(~far(~np.pad(cells, edge)))[edge:-edge, edge:-edge]
     return out
-
-
-def storeys(floors_m: Sequence[tuple[float, float]], cameras_m: Float[np.ndarray, " k"]) -> list[float]:
-    """Return the heights of the storeys' floors, rising.
-
-    Args:
-        floors_m: height and weight of every floor, step and landing that is known; may be empty.
-        cameras_m: level z of the cameras, from which floors are guessed where none is known.
-    """
-    if not floors_m:
-        rising = np.sort(np.asarray(cameras_m, np.float64))
-        groups = np.split(rising, np.flatnonzero(np.diff(rising) > _STOREY_M / 2) + 1) if len(rising) else []
-        floors_m = [(float(np.median(group)) - _CAMERA_M, float(len(group))) for group in groups] or [(0.0, 1.0)]
-    chosen: list[float] = []
-    for height_m, _ in sorted(floors_m, key=lambda floor: (-floor[1], floor[0])):
-        if all(abs(height_m - other) >= _STOREY_M for other in chosen):
-            chosen.append(height_m)
-    return sorted(chosen)
-
-
-def _storey_of(z_m: Float[np.ndarray, " m"], floors_m: Float[np.ndarray, " s"]) -> Int[np.ndarray, " m"]:
-    """Return the storey of each height; what lies below all floors belongs to the lowest."""
-    return np.maximum(np.searchsorted(floors_m - _BELOW_M, z_m, side="right") - 1, 0)

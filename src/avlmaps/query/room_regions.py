@@ -199,7 +199,7 @@ class RoomRegions:
             world_from_camera: of its keyframes.
             width_rad: angle of view of their camera, from side to side.
         """
-        space, storeys = plan.space, range(len(plan.floors_m))
+        space, storeys = plan.space, range(len(plan.storeys))
         level, poses = space.level(space.centres), np.asarray(world_from_camera, np.float64).reshape(-1, 4, 4)
         own, cameras = plan.storeys_of(space.centres), plan.storeys_of(poses[:, :3, 3])
         level_from_camera = space.level_from_recording @ poses
@@ -208,9 +208,9 @@ class RoomRegions:
         neighbours = [np.zeros(0, np.int64)]
         for storey in storeys:
             rows = own == storey
-            at = level[rows] if rows.any() else np.r_[plan.origin_m, plan.floors_m[storey]][None]
+            at = level[rows] if rows.any() else np.r_[plan.origin_m, plan.storeys[storey].floor_m][None]
             sights = Sights.of(level_from_camera[cameras == storey], width_rad)
-            grids.append(StoreyGrid.of(at, float(plan.floors_m[storey]), sights, space.grid.voxel_size_m))
+            grids.append(StoreyGrid.of(at, plan.storeys[storey].floor_m, sights, space.grid.voxel_size_m))
             found = rooms_of_storey(grids[-1])
             before = sum(len(each) for each in neighbours)
             labels.append(np.where(found.label >= 0, found.label + before, NONE))
@@ -275,4 +275,4 @@ class RoomRegions:
         ahead = np.roll(xy, -1, axis=0)
         if float(np.sum(xy[:, 0] * ahead[:, 1] - ahead[:, 0] * xy[:, 1])) < 0.0:
             xy = xy[::-1]
-        return self.plan.space.world(np.c_[xy, np.full(len(xy), self.plan.floors_m[storey])])
+        return self.plan.space.world(np.c_[xy, np.full(len(xy), self.plan.storeys[storey].floor_m)])

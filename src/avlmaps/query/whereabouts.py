@@ -60,7 +60,7 @@ class Whereabouts:
     @property
     def floor_count(self) -> int:
         """Number of storeys; 1 where they are not known."""
-        return 1 if self.plan is None else len(self.plan.floors_m)
+        return 1 if self.plan is None else len(self.plan.storeys)
 
     def floors_of(self, points: Float[np.ndarray, "m 3"]) -> Int[np.ndarray, " m"]:
         """Return the storey of each point (metres, recording frame), counted from 0, the lowest."""

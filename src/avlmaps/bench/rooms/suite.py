@@ -83,7 +83,7 @@ def rooms_by_kind(avlmap: "AVLMap", floor: Floor) -> list[Listed]:
     region = plan.regions(np.where(field.views >= _SEEN_VIEWS, field.share.argmax(axis=1), -1))
     places = np.asarray(avlmap.stored.keyframes.centre, np.float64).reshape(-1, 3)
     cells = plan.cells_of(places)
-    storey = int(np.abs(plan.floors_m - floor.floor_m).argmin())
+    storey = int(np.abs(plan.storeys.floors_m - floor.floor_m).argmin())
     of_cell = region.reshape(plan.wall.shape)[storey]
     at = np.floor((floor.middles - plan.origin_m) / PLAN_CELL_M).astype(int)
     within = ((at >= 0) & (at < of_cell.shape)).all(axis=-1)
