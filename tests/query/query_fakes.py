@@ -128,7 +128,7 @@ def fake_map(
         keyframes=keyframes if keyframes is not None else keyframes_at(np.zeros((0, 3))),
         place_state={},
         encoders=encoders or fake_encoders(),
-        info=SimpleNamespace(ground=None, doubts=()),
+        info=SimpleNamespace(ground=None, doubts=(), files={}),
         rig=Rig(camera, camera),
         require_model=lambda kind: None,
         clip_path=lambda sound: Path(f"fake.avlmap/{sound}.flac"),

@@ -35,6 +35,8 @@ from avlmaps.query.object_settings import ObjectSettings
 from avlmaps.query.queryable import Attachment, Photo
 from avlmaps.query.room_regions import RoomRegions
 from avlmaps.query.rooms import NamedVoxels, RoomField, Rooms, voting_rows
+from avlmaps.query.stored_names import read_closest, write_closest
+from avlmaps.query.stored_rooms import room_regions_of
 from avlmaps.query.things_in_rooms import ThingsInRooms
 from avlmaps.query.voxel_space import Space
 from avlmaps.query.words import EncodedWord, Rivals, Vocabulary
@@ -161,11 +163,16 @@ class AVLMap:
 
     def _rivals_of(self, encoder: PixelEncoder, vocabulary: Sequence[str] | None) -> Rivals:
         self.stored.require_model(Kind.PIXELS)
-        if vocabulary is None and self._known_rivals is not None:
-            return self._known_rivals.whole(self.stored.voxels.feature)
+        feature, known = self.stored.voxels.feature, self._known_rivals if vocabulary is None else None
+        if known is not None:
+            fresh = not known.is_whole
+            rivals = known.whole(feature)
+            if fresh:
+                write_closest(self.stored, known, (rivals.best, rivals.best_word, rivals.second, rivals.second_word))
+            return rivals
         names = tuple(encoder.vocabulary if vocabulary is None else vocabulary)
         if self._rivals is None or self._rivals[0] != names:
-            self._rivals = names, Rivals.of(self.stored.voxels.feature, encoder, names)
+            self._rivals = names, Rivals.of(feature, encoder, names)
         return self._rivals[1]
 
     @cached_property
@@ -178,7 +185,11 @@ class AVLMap:
         if not isinstance(encoder, NamedPixelEncoder) or not {*encoder.names} <= {*encoder.vocabulary, "other"}:
             return None
         self.stored.require_model(Kind.PIXELS)
-        return KnownRivals.of(Vocabulary.encoded(encoder, encoder.vocabulary), len(self.stored.voxels))
+        vocabulary = Vocabulary.encoded(encoder, encoder.vocabulary)
+        closest = read_closest(self.stored, vocabulary)
+        if closest is not None:
+            return KnownRivals.known_everywhere(vocabulary, closest)
+        return KnownRivals.of(vocabulary, len(self.stored.voxels))
 
     def things(
         self,
@@ -368,7 +379,7 @@ class AVLMap:
             return None
         camera = self.stored.rig.depth
         width_rad = 2.0 * float(np.arctan2(camera.width, 2.0 * camera.fx))
-        return RoomRegions.of(votes.plan, np.asarray(self.stored.keyframes.world_from_camera), width_rad)
+        return room_regions_of(self.stored, votes.plan, width_rad)
 
     @cached_property
     def room_field(self) -> RoomField | None:

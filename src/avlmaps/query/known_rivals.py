@@ -50,6 +50,12 @@ class KnownRivals(Vocabulary):
             np.zeros(count, np.bool_),
         )  # fmt: skip
 
+    @classmethod
+    def known_everywhere(cls, vocabulary: Vocabulary, closest: loops.Closest) -> Self:
+        """Return a vocabulary of which the two words closest to every voxel are known."""
+        told = vocabulary.words, vocabulary.word_feature, vocabulary.understood, vocabulary.has_other
+        return cls(*told, *closest, np.ones(len(closest[0]), np.bool_))
+
     def rivals_at(self, feature: Float16[np.ndarray, "n d"], rows: Int[np.ndarray, " m"]) -> Rivals:
         """Return the two words closest to some voxels, computing those that are not known."""
         missing = rows[~self.known[rows]]
@@ -60,9 +66,14 @@ class KnownRivals(Vocabulary):
             self.known[missing] = True
         return Rivals(*self._told, *(kept[rows] for kept in self._closest))
 
+    @property
+    def is_whole(self) -> bool:
+        """Whether they are known at every voxel."""
+        return bool(self.known.all())
+
     def whole(self, feature: Float16[np.ndarray, "n d"]) -> Rivals:
         """Return the two words closest to every voxel."""
-        if not self.known.all():
+        if not self.is_whole:
             for kept, found in zip(self._closest, loops.two_closest(feature, self.word_feature), strict=True):
                 kept[:] = found
             self.known[:] = True

@@ -96,27 +96,23 @@ def bridged(cells: Cells, columns: int) -> Cells:
 
 def flooded(label: Int[np.ndarray, "r c"], over: Cells) -> Int[np.ndarray, "r c"]:
     """Return labels grown side by side over cells; where two meet the higher wins."""
-    import cv2
+    from avlmaps.query.storey_kernels import flood
 
-    cross = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], np.uint8)
-    out = label.astype(np.int32)
-    missing = over & (out == 0)
-    while missing.any():
-        grown = np.asarray(cv2.dilate(out.astype(np.float32), cross), np.float32).astype(np.int32)
-        added = missing & (grown > 0)
-        if not added.any():
-            break
-        out[added] = grown[added]
-        missing &= ~added
+    out = np.array(label, np.int32)
+    flood(out, over & (out == 0))
     return out
 
 
 def contacts(label: Int[np.ndarray, "r c"]) -> dict[tuple[int, int], int]:
     """Return the pairs of labels over 0 that lie side by side, the lower first, and along how many cells."""
-    sides = [(label[1:], label[:-1]), (label[:, 1:], label[:, :-1])]
-    pairs = [np.stack([np.minimum(a, b), np.maximum(a, b)], axis=-1)[(a != b) & (a > 0) & (b > 0)] for a, b in sides]
-    found, count = np.unique(np.concatenate(pairs), axis=0, return_counts=True)
-    return {(int(a), int(b)): int(n) for (a, b), n in zip(found.tolist(), count.tolist(), strict=True)}
+    count = int(label.max(initial=0)) + 1
+    keys: list[Int[np.ndarray, " k"]] = []
+    for a, b in ((label[1:], label[:-1]), (label[:, 1:], label[:, :-1])):
+        met = (a != b) & (a > 0) & (b > 0)
+        one, other = a[met].astype(np.int64), b[met].astype(np.int64)
+        keys.append(np.minimum(one, other) * count + np.maximum(one, other))
+    found, times = np.unique(np.concatenate(keys), return_counts=True)
+    return {divmod(key, count): n for key, n in zip(found.tolist(), times.tolist(), strict=True)}
 
 
 def outline(cells: Cells, loose: float, most: int) -> Float32[np.ndarray, "k 2"]:

@@ -200,15 +200,15 @@ class RoomRegions:
             width_rad: angle of view of their camera, from side to side.
         """
         space, storeys = plan.space, range(len(plan.storeys))
-        level, poses = space.level(space.centres), np.asarray(world_from_camera, np.float64).reshape(-1, 4, 4)
-        own, cameras = plan.storeys_of(space.centres), plan.storeys_of(poses[:, :3, 3])
+        level, poses = space.level_centres(), np.asarray(world_from_camera, np.float64).reshape(-1, 4, 4)
+        cameras = plan.storeys_of(poses[:, :3, 3])
         level_from_camera = space.level_from_recording @ poses
         grids: list[StoreyGrid] = []
         labels: list[Int[np.ndarray, "nx ny"]] = []
         neighbours = [np.zeros(0, np.int64)]
         for storey in storeys:
-            rows = own == storey
-            at = level[rows] if rows.any() else np.r_[plan.origin_m, plan.storeys[storey].floor_m][None]
+            at = level if len(storeys) == 1 else level[plan.storeys.of(level[:, 2]) == storey]
+            at = at if len(at) else np.r_[plan.origin_m, plan.storeys[storey].floor_m][None]
             sights = Sights.of(level_from_camera[cameras == storey], width_rad)
             grids.append(StoreyGrid.of(at, plan.storeys[storey].floor_m, sights, space.grid.voxel_size_m))
             found = rooms_of_storey(grids[-1])

@@ -24,6 +24,7 @@ _MOST_CAMERAS = 1500
 _MOST_CELLS = 16_000_000
 _MARGIN_M = 1.0
 _MOST_COLUMNS = 40_000  # of walls whose direction is sought
+_MOST_COLUMN_CELLS = 200_000_000  # of a table of them
 _CLEARLY = 1.03
 
 
@@ -91,28 +92,32 @@ class StoreyGrid:
             voxel_size_m: side of a voxel.
             heading_rad: of its walls; found if None.
         """
-        height = level[:, 2] - floor_m
-        tall = (height >= WALL_M[0]) & (height < WALL_M[1])
-        heading = wall_heading(level[tall, :2], voxel_size_m) if heading_rad is None else heading_rad
-        places = turned(level[:, :2], -heading)
+        from avlmaps.query.storey_kernels import fill_cells, turned_ends
+
+        level = np.ascontiguousarray(level, np.float64)
+        heading = _heading(level, floor_m, voxel_size_m) if heading_rad is None else heading_rad
+        cos, sin = float(np.cos(heading)), float(np.sin(heading))
         over = turned(sights.places, -heading)
-        everywhere = np.concatenate([places, over])
-        ends = np.array([everywhere.min(axis=0), everywhere.max(axis=0)])
-        cell_m = max(CELL_M, voxel_size_m)
+        ends = np.array(turned_ends(level, cos, sin)).reshape(2, 2)
+        ends = np.array([np.minimum(ends[0], over.min(axis=0, initial=np.inf)),
+                         np.maximum(ends[1], over.max(axis=0, initial=-np.inf))])  # fmt: skip
+        cell_m = float(max(CELL_M, voxel_size_m))
         while np.prod(np.ptp(ends, axis=0) / cell_m + 1.0) > _MOST_CELLS:
             cell_m *= 2.0
         low = np.floor((ends[0] - _MARGIN_M) / cell_m)
-        shape = tuple((np.ceil((ends[1] + _MARGIN_M) / cell_m) - low).astype(np.int64).tolist())
-        cell = np.floor(places / cell_m + 1e-6).astype(np.int64) - low.astype(np.int64)
-        own = cell[:, 0] * shape[1] + cell[:, 1]
-        wall = _walls(own[tall], height[tall] - WALL_M[0], voxel_size_m, shape)
-        below = _marked(own[height < _LOW_M], shape)
+        nx, ny = (np.ceil((ends[1] + _MARGIN_M) / cell_m) - low).astype(np.int64).tolist()
+        held, below = np.zeros((nx, ny, _layers(voxel_size_m)), bool), np.zeros((nx, ny), bool)
+        fill_cells(
+            level, cos, sin, float(floor_m), np.array(WALL_M), _LOW_M, float(voxel_size_m), cell_m,
+            low.astype(np.int64), held, below,
+        )  # fmt: skip
+        wall, shape = _walls(held), below.shape
         over = over / cell_m - low
         seen = _carved(wall, over, sights.headings_rad - heading, sights.width_rad, _SIGHT_M / cell_m)
         stood = np.zeros(shape, bool)
         at = np.floor(over).astype(np.int64)
         stood[tuple(at[((at >= 0) & (at < shape)).all(axis=1)].T)] = True
-        return cls(float(heading), low * cell_m, float(cell_m), wall, (seen | below) & ~wall, stood)
+        return cls(float(heading), low * cell_m, cell_m, wall, (seen | below) & ~wall, stood)
 
     def cells_of(self, level_xy: Float[np.ndarray, "m 2"]) -> tuple[Int[np.ndarray, "m 2"], Bool[np.ndarray, " m"]]:
         """Return the cell nearest to each place, and which places lie within the grid."""
@@ -137,7 +142,10 @@ def wall_heading(xy: Float[np.ndarray, "m 2"], cell_m: float) -> float:
 
     Along it, walls fall into few rows and columns of cells.
     """
-    column = np.unique(np.floor(np.asarray(xy) / cell_m + 1e-6).astype(np.int64), axis=0)
+    return _heading_of_columns(np.unique(np.floor(np.asarray(xy) / cell_m + 1e-6).astype(np.int64), axis=0), cell_m)
+
+
+def _heading_of_columns(column: Int[np.ndarray, "c 2"], cell_m: float) -> float:
     if len(column) < 2:
         return 0.0
     some = (column[:: max(1, len(column) // _MOST_COLUMNS)] + 0.5) * cell_m
@@ -154,20 +162,33 @@ def _packed(xy: Float[np.ndarray, "m 2"], cell_m: float) -> float:
     return float(sum(np.square(count).sum() for count in counts))
 
 
-def _marked(own: Int[np.ndarray, " m"], shape: tuple[int, ...]) -> Bool[np.ndarray, "nx ny"]:
-    out = np.zeros(shape, bool)
-    out.reshape(-1)[own] = True
-    return out
+def _heading(level: Float[np.ndarray, "n 3"], floor_m: float, voxel_size_m: float) -> float:
+    """Return the heading of the walls of a storey; see ``wall_heading``."""
+    from avlmaps.query.storey_kernels import SIDE, mark_columns, turned_ends
+
+    cell_m = float(voxel_size_m)
+    ends = np.array(turned_ends(level, 1.0, 0.0)).reshape(2, 2)
+    low, high = np.floor(ends / cell_m + SIDE).astype(np.int64)
+    width, depth = (high - low + 1).tolist()
+    if width * depth > _MOST_COLUMN_CELLS:  # a few far voxels: a table would be larger than the map
+        height = level[:, 2] - floor_m
+        return wall_heading(level[(height >= WALL_M[0]) & (height < WALL_M[1]), :2], cell_m)
+    held = np.zeros((width, depth), bool)
+    mark_columns(level, floor_m + WALL_M[0], floor_m + WALL_M[1], cell_m, low, held)
+    return _heading_of_columns(np.argwhere(held) + low, cell_m)
 
 
-def _walls(
-    own: Int[np.ndarray, " m"], over_m: Float[np.ndarray, " m"], voxel_size_m: float, shape: tuple[int, ...]
-) -> Bool[np.ndarray, "nx ny"]:
+def _layers(voxel_size_m: float) -> int:
+    """Return how many layers of voxels lie between the heights at which walls are seen."""
+    return max(1, int(np.ceil((WALL_M[1] - WALL_M[0]) / voxel_size_m)))
+
+
+def _walls(held: Bool[np.ndarray, "nx ny layers"]) -> Bool[np.ndarray, "nx ny"]:
     """Return the cells where voxels fill half of the heights of walls, and fainter ones that touch these."""
-    layers = max(1, int(np.ceil((WALL_M[1] - WALL_M[0]) / voxel_size_m)))
-    held = np.zeros((int(np.prod(shape)), layers), bool)
-    held[own, np.minimum((over_m / voxel_size_m).astype(np.int64), layers - 1)] = True
-    share = held.mean(axis=1).reshape(shape)
+    from avlmaps.query.storey_kernels import held_share
+
+    share = np.empty(held.shape[:2])
+    held_share(held, 0, len(held), share)
     piece = pieces(share >= _FAINT_SHARE, diagonally=True)
     return of_pieces(piece, share >= _CORE_SHARE)[piece]
 

@@ -147,6 +147,13 @@ class Space:
         """Return the middles of some voxels, metres, world: of a mask, numbers or a slice; all are never computed."""
         return self.grid.centre_of(np.asarray(self.index)[voxels])
 
+    def level_centres(self) -> Float[np.ndarray, "n 3"]:
+        """Return the middles of all voxels, metres, level frame."""
+        out = np.empty((len(self), 3))
+        for a in range(0, len(out), _CHUNK):
+            out[a : a + _CHUNK] = self.level(self.centres_of(slice(a, a + _CHUNK)))
+        return out
+
     @cached_property
     def blocks(self) -> Blocks:
         """The voxels in blocks."""

@@ -13,6 +13,7 @@ import numpy as np
 
 from avlmaps.maps.store.array_files import FileInfo, sync_names, write_array, write_copy
 from avlmaps.maps.store.array_validation import array_fields
+from avlmaps.maps.store.derived import remove_derived
 from avlmaps.maps.store.integrity import remember_checked
 from avlmaps.maps.store.lock import LOCK
 from avlmaps.maps.store.manifest import MapInfo
@@ -96,6 +97,7 @@ def sweep(path: Path, info: MapInfo) -> None:
         with suppress(OSError):
             unfinished.unlink()
     remove_stages(path / PARTS)
+    remove_derived(path)
 
 
 def is_map_or_free(path: Path) -> bool:
