@@ -58,7 +58,7 @@ def test_a_kill_leaves_the_old_arrays_or_the_new_ones(
     calls = 0
     rename, remove = Path.replace, Path.unlink
 
-    def step(of, *words, **named):  # noqa: ANN001, ANN202
+    def step(of, *words, **named):
         nonlocal calls
         calls += 1
         if calls > when:

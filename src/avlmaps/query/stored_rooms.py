@@ -68,7 +68,7 @@ def _from_arrays(plan: FloorPlan, arrays: Mapping[str, np.ndarray]) -> RoomRegio
     grids: list[StoreyGrid] = []
     labels: list[Int[np.ndarray, "nx ny"]] = []
     for number in storeys:
-        frame: Float[np.ndarray, "4"] = arrays[f"frame_{number}"]
+        frame: Float[np.ndarray, 4] = arrays[f"frame_{number}"]
         cells, label = arrays[f"cells_{number}"], arrays[f"label_{number}"]
         if frame.shape != (4,) or cells.shape != (3, *label.shape) or not label.size:
             return None

@@ -36,8 +36,8 @@ def mark_columns(
     """Mark the columns of cells that hold a point between two heights; ``low`` is the index of column (0, 0)."""
     for i in range(len(level)):
         if low_m <= level[i, 2] < high_m:
-            x = int(math.floor(level[i, 0] / cell_m + SIDE)) - low[0]
-            y = int(math.floor(level[i, 1] / cell_m + SIDE)) - low[1]
+            x = math.floor(level[i, 0] / cell_m + SIDE) - low[0]
+            y = math.floor(level[i, 1] / cell_m + SIDE) - low[1]
             out[x, y] = True
 
 
@@ -76,8 +76,8 @@ def fill_cells(
         tall = wall_m[0] <= height < wall_m[1]
         if not tall and height >= least_m:
             continue
-        x = int(math.floor((level[i, 0] * cos + level[i, 1] * sin) / cell_m + SIDE)) - low[0]
-        y = int(math.floor((level[i, 1] * cos - level[i, 0] * sin) / cell_m + SIDE)) - low[1]
+        x = math.floor((level[i, 0] * cos + level[i, 1] * sin) / cell_m + SIDE) - low[0]
+        y = math.floor((level[i, 1] * cos - level[i, 0] * sin) / cell_m + SIDE) - low[1]
         if tall:
             held[x, y, min(int((height - wall_m[0]) / voxel_m), most)] = True
         if height < least_m:
