@@ -34,7 +34,7 @@ def test_contacts_are_counted_side_by_side(rows: int, columns: int, seed: int) -
     label = np.random.default_rng(seed).integers(0, 4, (rows, columns))
     expected: dict[tuple[int, int], int] = {}
     for (i, j), own in np.ndenumerate(label):
-        for other in [label[i + 1, j]] * (i + 1 < rows) + [label[i, j + 1]] * (j + 1 < columns):
+        for other in (*label[i + 1 : i + 2, j], *label[i, j + 1 : j + 2]):
             if own != other and own > 0 and other > 0:
                 pair = (int(min(own, other)), int(max(own, other)))
                 expected[pair] = expected.get(pair, 0) + 1
