@@ -174,7 +174,9 @@ def _is_purpose(words: Sequence[str], at: int) -> bool:
     """Return whether a verb at a place says what for: "somewhere to sit", "where can I sit"; no "did I leave it"."""
     before = words[max(0, at - 3) : at]
     if before[-1] == "to":  # what to drink is no place
-        return at < 2 or not (words[at - 2] in _WHAT and words[at] in _TAKEN and not _OF_PLACES & set(words[at + 1 :]))
+        return at < 2 or not (
+            words[at - 2] in _WHAT and words[at] in _TAKEN and not _OF_PLACES & set(words[at + 1 : at + 2])
+        )
     if before[-1] in _MODALS:
         return before[-1] not in _HABITS
     return before[-1] in _ACTORS and not {"did", "have", "had"} & set(before[:-1])

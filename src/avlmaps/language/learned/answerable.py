@@ -197,7 +197,9 @@ def _unknown_words(said: Claimed, body: Sequence[int], _: Inquiry) -> str | None
         frame |= _TAKEN
     named = {said.texts[at] for at in said.used}
     tokens = list(said.tokens)
-    for at in body:
+    relative = (at for at in body if said.texts[at] == "that" and at - 1 in said.used)
+    end = next(relative, len(tokens))  # "a rug that I might trip over": which one, not what is asked of it
+    for at in (at for at in body if at < end):
         token, after = said.tokens[at], said.texts[at + 1 : at + 2]
         if token.kind != "word" or at in said.used or token.text in named:
             continue
