@@ -181,9 +181,8 @@ def _described(said: Claimed, body: Sequence[int], inquiry: Inquiry) -> str | No
     """Return the name that is a thing and what it is like: "is the floor slippery?"."""
     for target in (each for one in inquiry.of for each in (one, *one.near)):
         *before, last = target.name.split() or [""]
-        if not before or not is_entry(" ".join(before)) or last not in said.texts[body[-1] :]:
-            continue
-        if describes(last) and not is_entry(last):
+        ends = any(said.texts[at] == last and at + 1 not in said.used for at in body)
+        if before and ends and is_entry(" ".join(before)) and describes(last) and not is_entry(last):
             return target.name
     return None
 
