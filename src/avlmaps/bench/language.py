@@ -108,7 +108,7 @@ def _judge_question(row: Row) -> Judged:
 
 
 def _asked(sentence: str, given: Given) -> dict[str, Any]:
-    """Return what a map is asked by a sentence, as JSON; `query` takes storeys, lists and numbers in the same order.
+    """Return the query of a sentence, as JSON; `query` takes storeys, lists and numbers in the same order.
 
     Raises:
         QueryError: the sentence is not understood.

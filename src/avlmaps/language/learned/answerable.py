@@ -1,7 +1,7 @@
 """What a question asks of the things that it names, and whether a map holds it: where, how many, whether there is one.
 
 A reading holds names alone: "is the oven in the kitchen on?" and "is there an oven in the kitchen?" are the same to
-it. The words between the names say what is asked of them. Those that no question to a map has lead to a refusal.
+it. The words between the names say what of them. Those that no question to a map has lead to a refusal.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,7 +17,7 @@ _AUXILIARIES = frozenset({
     "might", "should", "must",
 })  # fmt: skip
 _MAY = frozenset({"can", "could", "may", "might", "should", "must", "will", "would"})
-# Where another clause begins, whose words are no part of what is asked.
+# Where another clause begins, whose words are no part of the question.
 _CUTS = frozenset({
     "then", "and", "so", "because", "but", "as", "for", "if", "while", "before", "after", "when", "where", "which",
     "who", "whether", "or", "than", "like", "since", "until", "what", "how",
@@ -188,7 +188,7 @@ def _described(said: Claimed, body: Sequence[int], inquiry: Inquiry) -> str | No
 
 
 def _unknown_words(said: Claimed, body: Sequence[int], _: Inquiry) -> str | None:
-    """Return a word of what is asked that no question to a map has: "has the washing machine finished?"."""
+    """Return a word that no question to a map has: "has the washing machine finished?"."""
     if not _CORRECTS.isdisjoint(said.texts):
         return None
     frame = words().lists["frame"] | words().lists["persons"]
@@ -197,7 +197,7 @@ def _unknown_words(said: Claimed, body: Sequence[int], _: Inquiry) -> str | None
     named = {said.texts[at] for at in said.used}
     tokens = list(said.tokens)
     relative = (at for at in body if said.texts[at] == "that" and at - 1 in said.used)
-    end = next(relative, len(tokens))  # "a rug that I might trip over": which one, not what is asked of it
+    end = next(relative, len(tokens))  # "a rug that I might trip over": which one, and no more
     for at in (at for at in body if at < end):
         token, after = said.tokens[at], said.texts[at + 1 : at + 2]
         if token.kind != "word" or at in said.used or token.text in named:
