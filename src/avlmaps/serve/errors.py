@@ -9,7 +9,7 @@ from avlmaps.core.printable import printable
 from avlmaps.query.asking import AskError
 from avlmaps.query.schema import ErrorAnswer
 
-_STATUS = {"map": 503, "backend": 503}
+_STATUS = {"map": 503}  # of a backend that is missing none: no retry helps, and other queries are answered
 _ABSOLUTE = re.compile(r"(?<![\w.:/~<>-])(?:/[\w.@+~-]+){2,}|\b[A-Za-z]:\\[^\s]+|\\\\[^\s]+")
 _GENERAL = "The server cannot read one of its files; its log names the file."
 

@@ -1,7 +1,7 @@
 """The OpenAPI 3.1 document of the server, made of the types of requests and answers."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import msgspec
@@ -142,29 +142,28 @@ def _bodies(one: Operation, schema: dict[str, Any]) -> dict[str, Any]:
     form = {"type": "object", "properties": {**values, **files}, "additionalProperties": False}
     if one.body == "photo":
         form["required"] = ["photo"]
-    elif one.name == "ask":
-        form["anyOf"] = [{"required": [name]} for name in ("sentence", "object", "sound", "area", *one.files)]
+    else:
+        form |= _words_or_parts(one, one.files) | {"dependentRequired": {"intrinsics": ["photo"]}}
     bodies: dict[str, Any] = {"multipart/form-data": {"schema": form}}
     if one.body == "form":
         plain = {name: value for name, value in schema["properties"].items() if name not in _OF_FILES}
-        bodies["application/json"] = {"schema": {**schema, "properties": plain, **_words_or_parts(one, plain)}}
+        bodies["application/json"] = {"schema": {**schema, "properties": plain, **_words_or_parts(one)}}
     else:
         bodies |= {kind: {"schema": {}} for kind in ("image/jpeg", "image/png")}
     return bodies
 
 
-def _words_or_parts(one: Operation, properties: dict[str, Any]) -> dict[str, Any]:
-    """Return the rule of a query without files: a sentence or parts, not both; a picture needs neither."""
-    parts = [name for name in ("object", "sound", "area") if name in properties]
-    null = {"type": "null"}
-    no_parts = dict.fromkeys(parts, null)
-    ways: list[dict[str, Any]] = [
-        {"required": ["sentence"], "properties": {"sentence": {"type": "string", "pattern": "[A-Za-z]"}, **no_parts}}
-    ]
-    ways += [{"required": [name], "properties": {name: {"type": "string"}, "sentence": null}} for name in parts]
-    if one.name == "drawAnswer":
-        ways.append({"properties": {"sentence": {"type": ["null", "string"], "maxLength": 0}, **no_parts}})
-    return {"anyOf": ways}
+def _words_or_parts(one: Operation, files: Sequence[str] = ()) -> dict[str, Any]:
+    """Return the rule of a query: a sentence or parts, not both, or a file; a picture needs none of them."""
+
+    def given(name: str, pattern: str) -> dict[str, Any]:
+        return {"required": [name], "properties": {name: {"type": "string", "pattern": pattern}}}
+
+    parts = [given(name, r"\S") for name in ("object", "sound", "area")]
+    rule: dict[str, Any] = {"not": {"allOf": [given("sentence", r"\S"), {"anyOf": parts}]}}
+    if one.name == "ask":
+        rule["anyOf"] = [given("sentence", "[A-Za-z]"), *parts, *({"required": [name]} for name in files)]
+    return rule
 
 
 def _in_form(described: dict[str, Any]) -> dict[str, Any]:

@@ -24,10 +24,9 @@ _INK, _PATH = (38, 41, 46), (47, 111, 176)
 
 
 def full_picture(served: "ServedMap", answer: Answer) -> bytes:
-    """Return the PNG that ``avlmaps query --plot`` writes."""
-    del served
+    """Return the PNG that ``avlmaps query --plot`` writes; of an answer from a list the small one, with its places."""
     if answer.heat is None:
-        return b""
+        return small_picture(served, answer)
     with _drawing:
         return _png(answer.heat.plot(top=max(len(answer.goals), 1)))
 

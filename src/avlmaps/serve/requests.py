@@ -12,6 +12,9 @@ from avlmaps.serve.errors import RequestError
 
 T = TypeVar("T", bound=Struct)
 Words = Annotated[str, Meta(max_length=MOST_CHARACTERS)]
+# What has no letter says nothing; it is refused with a sentence of its own.
+Sentence = Annotated[str, Meta(max_length=MOST_CHARACTERS, extra_json_schema={"pattern": r"^\s*$|[A-Za-z]"})]
+Name = Annotated[str, Meta(max_length=MOST_CHARACTERS, extra_json_schema={"pattern": r"\S"})]
 Short = Annotated[str, Meta(max_length=200)]
 PHOTO, CLIP = "photo", "clip"
 _COORDINATE = Meta(ge=-1e6, le=1e6)
@@ -32,16 +35,16 @@ class ThingsQuery(Struct, forbid_unknown_fields=True):
     """Which things are listed."""
 
     least: Annotated[float, Meta(ge=0.0, le=1.0, description="List things with at least this confidence.")] = 0.5
-    name: Annotated[list[Words], Meta(max_length=64, description="List these things only.")] = []
+    name: Annotated[list[Name], Meta(max_length=64, description="List these things only.")] = []
     structure: Annotated[bool, Meta(description="List walls, floors and ceilings as well.")] = False
 
 
 class ListedThingsQuery(ThingsQuery, forbid_unknown_fields=True):
     """Which things are listed, in which order, and how many at once."""
 
-    room: Annotated[Words | None, Meta(description="List the things of this room, or of all rooms of a kind.")] = None
+    room: Annotated[Name | None, Meta(description="List the things of this room, or of all rooms of a kind.")] = None
     near: Annotated[
-        Words | None, Meta(description="x,y,z, level x,y, or the name of a thing: the nearest to it come first.")
+        Name | None, Meta(description="x,y,z, level x,y, or the name of a thing: the nearest to it come first.")
     ] = None
     top: Annotated[
         Annotated[int, Meta(ge=1, le=10_000)] | None, Meta(description="Most things of a page. Default: all.")
@@ -59,14 +62,14 @@ class AskQuery(Struct, forbid_unknown_fields=True):
     """A query: a sentence, or its parts. A photo and a clip come as files of a form."""
 
     sentence: Annotated[
-        Words | None,
+        Sentence | None,
         Meta(
             description="The query in words, such as 'the chair near the sound of glass breaking' or 'how many chairs'."
         ),
     ] = None
-    object: Annotated[Words | None, Meta(description="Instead of a sentence: the object.")] = None
-    sound: Annotated[Words | None, Meta(description="Instead of a sentence: the sound, in words.")] = None
-    area: Annotated[Words | None, Meta(description="Instead of a sentence: the area, such as a room.")] = None
+    object: Annotated[Name | None, Meta(description="Instead of a sentence: the object.")] = None
+    sound: Annotated[Name | None, Meta(description="Instead of a sentence: the sound, in words.")] = None
+    area: Annotated[Name | None, Meta(description="Instead of a sentence: the area, such as a room.")] = None
     primary: Annotated[
         Literal["object", "sound", "image", "area"] | None,
         Meta(description="Which part is sought; the others say where it is. Default: object, image, sound, area."),
@@ -122,7 +125,8 @@ class TilesQuery(Struct, forbid_unknown_fields=True):
     """How tiles are coloured."""
 
     heat: Annotated[
-        Words | None, Meta(description="A query in words; each voxel then has its heat as a seventh byte, 0 to 255.")
+        Annotated[str, Meta(max_length=MOST_CHARACTERS, extra_json_schema={"pattern": "[A-Za-z]"})] | None,
+        Meta(description="A query in words; each voxel then has its heat as a seventh byte, 0 to 255."),
     ] = None
 
 
@@ -164,6 +168,10 @@ def checked_texts(pairs: Iterable[tuple[str, str]], kind: type[T]) -> T:
         request = msgspec.convert(values, kind, strict=False)
     except msgspec.ValidationError as fault:
         raise _unfit(fault) from None
+    read = msgspec.structs.asdict(request)
+    for field in msgspec.structs.fields(kind):  # a text "null" is no number
+        if field.encode_name in values and read[field.name] is None:
+            raise RequestError(f"{field.encode_name!r} has no value; give one, or leave it out.")
     return _finite(request)
 
 

@@ -272,8 +272,10 @@ def picture(task: Task, query: PictureQuery) -> File:
     from avlmaps.serve.pictures import full_picture, map_picture, small_picture
 
     values = {name: getattr(query, name) for name in AskQuery.__struct_fields__}
-    asks = any(values[name] for name in ("sentence", "object", "sound", "area")) or task.uploads != Uploads()
+    named = any(values[name] is not None for name in ("object", "sound", "area"))
+    asks = named or bool((query.sentence or "").strip()) or task.uploads != Uploads()
     if not asks:
+        camera_of(query.intrinsics, None)  # they belong to a photo
         content = map_picture(task.map) if query.size == "full" else small_picture(task.map)
         return File(content, "image/png")
     answer = ask_map(task, AskQuery(**values))

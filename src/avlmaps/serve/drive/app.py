@@ -225,7 +225,9 @@ def _http_error(request: Request, error: Exception) -> Response:
     del request
     status = error.status_code if isinstance(error, HTTPException) else 500
     messages = {404: "There is no such address; GET /drive/ lists them.", 405: "This address takes another method."}
-    return error_response(DriveError(messages.get(status, "The request cannot be read."), status, "usage"))
+    answer = error_response(DriveError(messages.get(status, "The request cannot be read."), status, "usage"))
+    answer.headers.update(error.headers or {} if isinstance(error, HTTPException) else {})  # the methods that it takes
+    return answer
 
 
 def encoded(answer: Any) -> bytes:

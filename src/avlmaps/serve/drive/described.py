@@ -9,6 +9,10 @@ from avlmaps.serve.drive.requests import ConfirmRequest, PlanRequest
 
 _TEMPLATE = "#/components/schemas/{name}"
 _TEXT, _NUMBER, _OBJECT = {"type": "string"}, {"type": "number"}, {"type": "object"}
+# An order is a command or a program, and not both.
+_ONE_OF = [
+    {"required": [name], "properties": {name: {"type": "string", "pattern": r"\S"}}} for name in ("words", "program")
+]
 _OR_NULL = {"type": ["object", "null"]}
 _PLAN = {
     "order": _TEXT, "words": _TEXT, "reading": _TEXT, "program": _TEXT, "notes": {"type": "array", "items": _TEXT},
@@ -39,6 +43,8 @@ def drive_document() -> tuple[dict[str, Any], dict[str, Any]]:
     types = [PlanRequest, ConfirmRequest, ErrorAnswer]
     (plan, confirm, error), schemas = msgspec.json.schema_components(types, ref_template=_TEMPLATE)
 
+    order = {"allOf": [plan], "oneOf": _ONE_OF}
+
     def answers(status: str, about: str, fields: dict[str, Any]) -> dict[str, Any]:
         schema = {"type": "object", "properties": fields, "required": list(fields)}
         found = {code: _json(text, error) for code, text in _ERRORS.items()}
@@ -53,7 +59,7 @@ def drive_document() -> tuple[dict[str, Any], dict[str, Any]]:
         "/plan": {"post": {
             "operationId": "planDrive",
             "summary": "Plan a command or a program. Nothing moves.",
-            "requestBody": {"required": True, "content": {"application/json": {"schema": plan}}},
+            "requestBody": {"required": True, "content": {"application/json": {"schema": order}}},
             "responses": answers("200", "The plan and its token.", _PLAN),
         }},
         "/confirm": {"post": {
