@@ -17,8 +17,6 @@ from avlmaps.bench.harness.intervals import wilson
 from avlmaps.core.errors import LanguageError, QueryError
 from avlmaps.core.inflection import singulars_of, stem_of
 from avlmaps.core.lexicon import Kind, lexicon
-from avlmaps.language.list_questions import Listed, ListQuestion
-from avlmaps.language.sentence import Given
 
 OUTCOMES = ("right", "harmless", "asked back", "misread")
 _STOPS = frozenset({"refuse", "clarify"})
@@ -91,6 +89,7 @@ def judge_question(got: Mapping[str, Any], row: Row) -> str:
 def _intents_of(row: Row) -> list[Any]:
     from avlmaps.language.commands import read_command
     from avlmaps.language.intents import to_json
+    from avlmaps.language.sentence import Given
 
     try:
         read = read_command(str(row["say"]), Given(row.get("image"), row.get("clip")))
@@ -100,57 +99,16 @@ def _intents_of(row: Row) -> list[Any]:
 
 
 def _judge_question(row: Row) -> Judged:
+    from avlmaps.language.questions import read_question
+    from avlmaps.language.sentence import Given
+
     try:
-        got: Any = _asked(str(row["say"]), Given(row.get("image"), row.get("clip"), lambda _: True))
+        got: Any = read_question(
+            str(row["say"]), Given(row.get("image"), row.get("clip"), lambda _: True)
+        ).inquiry.to_json()
     except QueryError as fault:
         got = {"ask": "refuse", "said": str(fault)}
     return Judged(str(row["say"]), True, judge_question(got, row), got, row["question"])
-
-
-def _asked(sentence: str, given: Given) -> dict[str, Any]:
-    """Return the query of a sentence, as JSON; `query` takes storeys, lists and numbers in the same order.
-
-    Raises:
-        QueryError: the sentence is not understood.
-    """
-    from avlmaps.language.list_questions import read_list, said_alternatives, said_number, speaks_of_photo
-    from avlmaps.language.questions import read_question
-    from avlmaps.language.storey_words import asks_how_many_storeys, said_storeys
-
-    if asks_how_many_storeys(sentence):
-        return {"ask": "list", "counts": "storeys"}
-    storeys = said_storeys(sentence)
-    if storeys and (storeys[0].lists or not storeys[0].said):
-        return {"ask": "list", "storey": storeys[0].said or storeys[0].rest}
-    if storeys:
-        return {**_asked(storeys[0].rest, given), "storey": storeys[0].said}
-    rest = sentence
-    listed, numbered = read_list(rest), said_number(rest)
-    if listed is not None and listed.of is Listed.ROOM_OF:
-        if speaks_of_photo(listed.name) and given.image is not None:
-            return {"ask": "list", "room_of": {"image": given.image}}
-        return {"ask": "list", "room_of": read_question(listed.name, given).inquiry.of[0].to_json()}
-    if listed is not None:
-        return {"ask": "list", **_list_json(listed)}
-    if numbered is not None:
-        number, what = numbered
-        of = read_question(f"how many {what} are there", given).inquiry.to_json()["of"]
-        return {"ask": "list", "at_least": number, "of": of[0]}
-    read = [read_question(words, given).inquiry.to_json() for words in said_alternatives(rest) or (rest,)]
-    return {"ask": read[0]["ask"], "of": [target for one in read for target in one["of"]]}
-
-
-def _list_json(listed: ListQuestion) -> dict[str, Any]:
-    """Return a question to the lists as lists of questions have it."""
-    name = listed.name
-    told: dict[Listed, dict[str, Any]] = {
-        Listed.ROOM_BY_SIZE: {"rooms": "smallest" if listed.first else "biggest"},
-        Listed.SOUND_BY_TIME: {"sounds": "first" if listed.first else "last"},
-        Listed.CONTENTS: {"in": {"area": name}},
-        Listed.BESIDE: {"near": {"object": name}},
-        Listed.NAMES: {"counts" if listed.counts else "names": name},
-    }
-    return told[listed.of]
 
 
 def _answered(got: Mapping[str, Any], wanted: Any) -> str:
@@ -158,37 +116,10 @@ def _answered(got: Mapping[str, Any], wanted: Any) -> str:
         return "right" if got["ask"] in _STOPS else "misread"
     if got["ask"] in _STOPS:
         return "asked back"
-    if "either" in wanted:
-        wanted = {"ask": "where", "of": wanted["either"]}
-    if wanted["ask"] != "list" and got["ask"] == "list":
-        got = _plainly(got, wanted["ask"])
-    if got["ask"] == wanted["ask"] == "list":
-        return "right" if _listed(got) == _listed(wanted) else "misread"
     if got["ask"] != wanted["ask"]:
         return "misread"
     targets = [_target(one) for one in got["of"]]
-    sought = [_without_storey(one, got["storey"]) if "storey" in got else one for one in wanted["of"]]
-    return "right" if all(_target(one) in targets for one in sought) else "misread"
-
-
-def _plainly(got: Mapping[str, Any], ask: str) -> Mapping[str, Any]:
-    """Return an answer from the lists as what it answers too: a room says where, "2 of the 3" says how many."""
-    if "room_of" in got and ask == "where":
-        return {"ask": "where", "of": [got["room_of"]]}
-    if "at_least" in got:
-        return {"ask": ask, "of": [got["of"]]}
-    return {"ask": "how_many", "of": [{"object": got["counts"]}]} if "counts" in got else got
-
-
-def _without_storey(target: Any, said: str) -> Any:
-    """Return a target without the storey that a question names apart from it: the "upstairs bathroom" upstairs."""
-    near = [_without_storey(one, said) for one in target.get("near", ()) if one.get("area") != said]
-    plain = {key: value.replace(said, "").strip() if isinstance(value, str) else value for key, value in target.items()}
-    return {**plain, "near": near} if near else {key: value for key, value in plain.items() if key != "near"}
-
-
-def _listed(asked: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: _target(value) if isinstance(value, dict) else value for name, value in asked.items()}
+    return "right" if all(_target(one) in targets for one in wanted["of"]) else "misread"
 
 
 def _outcome(got: Sequence[Any], wanted: Sequence[Any]) -> str:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from avlmaps.core.errors import BackendError
 from avlmaps.core.extras import install_command
+from avlmaps.core.wording import option
 from avlmaps.perception.models.settings import model_settings
 from avlmaps.perception.user_folder import user_folder
 
@@ -42,7 +43,7 @@ def model_file(name: str, how_to_get: str) -> Path:
         if place.is_file():
             return place
     folder = model_settings().folder
-    looked = f"in {folder}" if folder else "in no folder: set --models DIR or AVLMAPS_MODELS"
+    looked = f"in {folder}" if folder else f"in no folder: set {option('models', 'DIR')} or AVLMAPS_MODELS"
     raise BackendError(f"The checkpoint {name} is not here (looked {looked}); get it with: {how_to_get}")
 
 
@@ -60,7 +61,7 @@ def local_model(model: str, how_to_get: str) -> Path:
         if place.exists():
             return place
     folder = model_settings().folder
-    looked = f"in {folder} and " if folder else "in no folder of models, --models DIR sets one, and "
+    looked = f"in {folder} and " if folder else f"in no folder of models, {option('models', 'DIR')} sets one, and "
     raise BackendError(f"The model {model} is not here (looked {looked}for that path); get it with: {how_to_get}")
 
 
@@ -84,7 +85,11 @@ def fetched_folder() -> Path:
 def _fetched(model: str, wanted: Sequence[str]) -> Path:
     settings = model_settings()
     get = f"hf download {model}"
-    looked = f"in {settings.folder}, " if settings.folder else "in a folder of models (--models DIR sets one), "
+    looked = (
+        f"in {settings.folder}, "
+        if settings.folder
+        else f"in a folder of models ({option('models', 'DIR')} sets one), "
+    )
     try:
         from huggingface_hub import snapshot_download
     except ImportError as fault:
