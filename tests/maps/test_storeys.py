@@ -80,7 +80,7 @@ def test_the_way_down_is_the_way_up_turned_round() -> None:
     assert found().route(1, 1) == ()
     assert found().refusal(1, 1, climbs=False) == ""
     assert found().refusal(0, 1, climbs=True) == ""
-    assert found().refusal(0, 1, climbs=False).endswith("the robot of this profile does not climb stairs")
+    assert found().refusal(0, 1, climbs=False).endswith("does not climb stairs: name a place on the ground floor")
 
 
 @given(st.lists(st.floats(-20.0, 20.0), min_size=1, max_size=30))

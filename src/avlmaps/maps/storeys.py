@@ -133,8 +133,9 @@ class Storeys:
             f"{one.name} at {one.floor_m:.2f} m"
         )
         if self.route(start, end) is None:
-            return f"{where}; the map holds no stairs between them"
-        return "" if climbs else f"{where}; the robot of this profile does not climb stairs"
+            return f"{where}; the map holds no stairs between them: map them too, or name a place on the {one.name}"
+        stays = f"{where}; the robot of this profile does not climb stairs: name a place on the {one.name}"
+        return "" if climbs else stays
 
 
 @dataclass(frozen=True, slots=True, eq=False)
