@@ -1,7 +1,6 @@
 """Driving to a place: what every driver offers, and the one that plans on a map and follows its way itself."""
 
 from dataclasses import dataclass, field
-from functools import cached_property
 from math import pi
 from typing import Literal, Protocol, runtime_checkable
 
@@ -141,18 +140,21 @@ class MapDriver:
         self.settings = settings or DriveSettings()
         self.contacts = ContactMap(obstacles, shape.radius_m)
         self.contacts.mark_free(body.pose)
+        self._planner: Planner | None = None  # of the obstacles known by now; None where one came since
 
     @property
     def pose(self) -> GroundPose:
         """Where the body is."""
         return self.body.pose
 
-    @cached_property
+    @property
     def planner(self) -> Planner:
         """Finds paths round all obstacles that are known by now."""
-        settings = self.settings
-        costmap = costmap_of(self.obstacles, self.shape.radius_m, settings.costs, self.contacts.cells)
-        return Planner(costmap, settings.planning)
+        if self._planner is None:
+            settings = self.settings
+            costmap = costmap_of(self.obstacles, self.shape.radius_m, settings.costs, self.contacts.cells)
+            self._planner = Planner(costmap, settings.planning)
+        return self._planner
 
     def go_to(self, place: Float[np.ndarray, "3"], *, face: Float[np.ndarray, "3"] | None = None) -> Arrival:
         """Drive to a place, or as near to it as the robot can stand and see it.
@@ -398,5 +400,5 @@ class MapDriver:
         trip.contacts += moved.contact
         # A turn has no direction in which it was stopped.
         if planned_m and self.contacts.mark_contact(before, planned, moved.pose):
-            self.__dict__.pop("planner", None)
+            self._planner = None
         return False
