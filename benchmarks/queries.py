@@ -13,7 +13,7 @@ import numpy as np
 
 from avlmaps.maps.grid import GridSpec
 from avlmaps.query.factors import anchor_heat, object_heat
-from avlmaps.query.kernels import feature_scores, margins, share
+from avlmaps.query.loops import feature_scores, margins
 from avlmaps.query.voxel_space import Space
 from avlmaps.query.words import Rivals
 
@@ -132,18 +132,10 @@ def text_rows(count: int, dim: int, rng: np.random.Generator) -> list[tuple[str,
     first, rivals = once_ms(lambda: Rivals.of(feature, encoder, words))  # pyright: ignore[reportArgumentType]
     rows.append(("the vocabulary of 100 words and other (once a session)", first, np.nan, 0.0))
     silent = np.arange(102) == 3
-    out, unsure = np.empty(count, np.float32), np.empty(count, np.bool_)
+    closest = rivals.best, rivals.best_word, rivals.second, rivals.second_word
 
-    def query() -> None:
-        score = feature_scores(feature, asked)
-        share(
-            lambda a, b: margins(
-                score, rivals.best, rivals.best_word, rivals.second, rivals.second_word, silent,
-                np.float32(-np.inf), out, unsure, a, b,
-            ),
-            count,
-            least=50_000,
-        )  # fmt: skip
+    def query() -> np.ndarray:
+        return margins(feature_scores(feature, asked), closest, silent, -np.inf)[0]
 
     ours = best_ms(query)
     everything = np.stack([encoder.table[k] for k in range(101)], axis=1)
@@ -151,7 +143,12 @@ def text_rows(count: int, dim: int, rng: np.random.Generator) -> list[tuple[str,
     plain *= count / len(scores)
     expected = scores[:, 3] - np.delete(scores, 3, axis=1).max(axis=1)
     rows.append(
-        ("one word against the vocabulary, every later time", ours, plain, float(np.abs(out[some] - expected).max()))
+        (
+            "one word against the vocabulary, every later time",
+            ours,
+            plain,
+            float(np.abs(query()[some] - expected).max()),
+        )
     )
     return rows
 

@@ -7,13 +7,8 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from avlmaps.cli import main
-from avlmaps.cli.plain_query import read_plain_query
-from avlmaps.cli.query import Query
-from avlmaps.cli.verbs import read_command
 from avlmaps.core.question import Modality, Part, Question
 from avlmaps.core.registry import Kind, load
 from avlmaps.language.questions import parse_sentence
@@ -21,8 +16,7 @@ from avlmaps.query.asking import Asked, thing_alone
 
 HEAVY = {
     "numba", "llvmlite", "scipy", "onnxruntime", "av", "matplotlib", "trimesh", "soundfile", "PIL",
-    "avlmaps.language", "avlmaps.sim", "tyro", "typeguard", "jaxtyping", "asyncio", "importlib.metadata",
-    "numpy.ma", "numpy.random",
+    "avlmaps.language", "avlmaps.sim", "typeguard", "jaxtyping", "asyncio", "numpy.ma", "numpy.random",
 }  # fmt: skip
 ASK = """
 import json, sys
@@ -62,52 +56,6 @@ def test_one_word_loads_no_heavy_package(room_map: Path) -> None:
     answer, loaded = (json.loads(line) for line in done.stdout.splitlines())
     assert answer["parts"][0]["query"] == "chair"
     assert HEAVY & set(loaded) == set()
-
-
-PLACES = st.sampled_from(
-    ["m.avlmap", "bed", "the chair near the table", "3", "None", "@file", "ä b", "1e2", "a=b", "query"]
-)
-OPTIONS = st.sampled_from([("--json",), ("--top", "3"), ("--top", "20")])
-OTHER = [
-    [], ["info", "m"], ["query", "m"], ["query", "m", ""], ["query", "m", " "], ["query", "m", "a", "b"],
-    ["query", "-", "a"],
-    ["query", "m", "a", "--plot"], ["query", "m", "a", "--top"], ["query", "m", "a", "--top", "0"],
-    ["query", "m", "a", "--top", "07"], ["query", "m", "a", "--top=2"], ["query", "m", "a", "--json", "--json"],
-    ["query", "m", "a", "--help"], ["query", "--", "m", "a"], ["query", "m", "--object", "a"],
-]  # fmt: skip
-
-
-@settings(max_examples=25, deadline=None)
-@given(
-    st.data(), st.lists(PLACES, min_size=2, max_size=2), st.lists(OPTIONS, max_size=2, unique_by=lambda words: words[0])
-)
-def test_a_plain_command_line_is_read_as_the_parser_reads_it(
-    data: st.DataObject, places: list[str], options: list[tuple[str, ...]]
-) -> None:
-    order = data.draw(st.permutations([*((place,) for place in places), *options]))
-    words = ["query", *(word for group in order for word in group)]
-    plain = read_plain_query(words)
-    assert plain is not None
-    assert read_command(words) == Query(map=plain.map, sentence=plain.sentence, top=plain.top, json=plain.json)
-
-
-@pytest.mark.parametrize("words", OTHER, ids=" ".join)
-def test_all_other_command_lines_are_left_to_the_parser(words: list[str]) -> None:
-    assert read_plain_query(words) is None
-
-
-@pytest.mark.parametrize(
-    "words", [["chair"], ["the chair near the table"], ["zebra"], ["stairs", "--top", "1"], ["kitchen"]]
-)
-def test_a_plain_command_line_answers_as_one_with_more_options(
-    room_map: Path, words: list[str], capsys: pytest.CaptureFixture[str]
-) -> None:
-    answers = []
-    for more in ([], ["--rules", "ours"]):
-        with pytest.raises(SystemExit) as stop:
-            main(["query", str(room_map), *words, "--json", *more])
-        answers.append((stop.value.code, json.loads(capsys.readouterr().out) | {"elapsed_ms": None}))
-    assert answers[0] == answers[1]
 
 
 def test_a_name_is_read_as_the_grammar_reads_it(encoder: object) -> None:

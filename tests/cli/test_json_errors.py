@@ -112,10 +112,10 @@ def test_a_cold_cache_is_announced_once_and_a_warm_one_not(tmp_path: Path) -> No
     code = (
         "import numpy as np\n"
         "from avlmaps.core.compiling import announce_compiling\n"
-        "from avlmaps.query.kernels import best_two, widen\n"
+        "from avlmaps.query.kernels import sorted_by_number\n"
         "with announce_compiling():\n"
-        "    for kind in (np.float32, np.float64):\n"
-        "        widen(np.zeros((2, 2), np.uint16), np.zeros((2, 2), kind))\n"
+        "    for kind in (np.int64, np.int32):\n"
+        "        sorted_by_number(np.zeros(2, kind), 2)\n"
     )
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
     told = [

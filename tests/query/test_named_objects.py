@@ -17,7 +17,6 @@ from avlmaps.query.factors import HeatSettings, NearAnchors
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.instances import FeatureVoxels
 from avlmaps.query.known_rivals import KnownRivals
-from avlmaps.query.loops import plain_loops
 from avlmaps.query.modalities.object import object_factor
 from avlmaps.query.object_settings import ObjectSettings
 from avlmaps.query.voxel_space import Space
@@ -228,20 +227,19 @@ def test_voxels_with_little_of_the_word_need_no_comparison(
     feature[::11] = 0.0  # voxels that no encoder has looked at
     none = dict.fromkeys(("least_confidence", "least_in_company", "guess_below"), 0.0) if rules_of_the_paper else {}
     chosen, part = ObjectSettings(score_in_company=share, **none), Part(Modality.OBJECT, word, Role.PRIMARY)
-    with plain_loops():
-        vocabulary = Vocabulary.encoded(ENCODER, NAMES)
-        none_known, all_known = (KnownRivals.of(vocabulary, len(INDEX)) for _ in range(2))
-        all_known.whole(feature)
-        full, *short = (
-            object_factor(FeatureVoxels(SPACE, feature, ENCODER, each, chosen), part, HeatSettings())
-            for each in (Rivals.of(feature, ENCODER, NAMES), vocabulary, none_known, all_known)
-        )
-        for lazy in short:
-            for one, other in ((full, lazy), (full.include_uncertain(), lazy.include_uncertain())):
-                np.testing.assert_array_equal(one.mask, other.mask)
-                np.testing.assert_array_equal(one.instance, other.instance)
-                np.testing.assert_allclose(one.confidence, other.confidence, atol=1e-6)
-                assert (one.found, one.note, one.understood) == (other.found, other.note, other.understood)
+    vocabulary = Vocabulary.encoded(ENCODER, NAMES)
+    none_known, all_known = (KnownRivals.of(vocabulary, len(INDEX)) for _ in range(2))
+    all_known.whole(feature)
+    full, *short = (
+        object_factor(FeatureVoxels(SPACE, feature, ENCODER, each, chosen), part, HeatSettings())
+        for each in (Rivals.of(feature, ENCODER, NAMES), vocabulary, none_known, all_known)
+    )
+    for lazy in short:
+        for one, other in ((full, lazy), (full.include_uncertain(), lazy.include_uncertain())):
+            np.testing.assert_array_equal(one.mask, other.mask)
+            np.testing.assert_array_equal(one.instance, other.instance)
+            np.testing.assert_allclose(one.confidence, other.confidence, atol=1e-6)
+            assert (one.found, one.note, one.understood) == (other.found, other.note, other.understood)
 
 
 @settings(max_examples=60, deadline=None)
@@ -261,7 +259,7 @@ def test_no_voxel_wins_that_its_closest_words_rule_out(
     known = KnownRivals.of(Vocabulary.encoded(ENCODER, NAMES), len(feature))
     encoded = EncodedWord.of_name(ENCODER, word) if alone and word in NAMES else EncodedWord.of(ENCODER, word)
     chosen = ObjectSettings()
-    with plain_loops(), pytest.MonkeyPatch.context() as patch:
+    with pytest.MonkeyPatch.context() as patch:
         patch.setattr(known_rivals, "_MOST_PICKED", 1.0)
         everything = known.whole(feature)
         silent = known.silent_for(ENCODER, encoded, chosen.same_word_cosine)
@@ -275,8 +273,7 @@ def test_no_voxel_wins_that_its_closest_words_rule_out(
 
 def test_few_voxels_are_left_for_a_name_that_others_win() -> None:
     known = KnownRivals.of(Vocabulary.encoded(ENCODER, NAMES), len(FEATURE))
-    with plain_loops():
-        known.whole(FEATURE)
+    known.whole(FEATURE)
     encoded = EncodedWord.of_name(ENCODER, NAMES[3])
     rows = known.contenders(ENCODER, encoded, known.silent_for(ENCODER, encoded, 0.95), 1.0)
     assert rows is not None
@@ -304,9 +301,8 @@ def test_what_is_found_alone_is_the_same_in_company(word: str, evenness: float, 
     probability = np.random.default_rng(seed).dirichlet(np.full(len(NAMES), evenness), len(INDEX))
     feature = features_of(probability, ENCODER.codes).astype(np.float16)
     part = Part(Modality.OBJECT, word, Role.PRIMARY)
-    with plain_loops():
-        rivals = Rivals.of(feature, ENCODER, NAMES)
-        alone = object_factor(FeatureVoxels(SPACE, feature, ENCODER, rivals, ObjectSettings()), part, HeatSettings())
+    rivals = Rivals.of(feature, ENCODER, NAMES)
+    alone = object_factor(FeatureVoxels(SPACE, feature, ENCODER, rivals, ObjectSettings()), part, HeatSettings())
     company = alone.include_uncertain()
     if not alone.found:
         return

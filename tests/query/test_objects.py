@@ -10,7 +10,6 @@ from avlmaps.maps.grid import GridSpec
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.query.factors import HeatSettings
 from avlmaps.query.instances import FeatureVoxels, margin_confidence
-from avlmaps.query.kernels import feature_scores, linked
 from avlmaps.query.modalities.object import object_factor
 from avlmaps.query.object_settings import ObjectSettings
 from avlmaps.query.voxel_space import Space
@@ -56,24 +55,6 @@ def test_the_margin_is_that_over_the_best_rival(seed, words, other, few) -> None
     best = (wide @ competing.T).max(axis=1, initial=-np.inf) if len(competing) else np.full(len(wide), -np.inf)
     expected = wide @ asked - (best if other else np.maximum(best, 0.3))
     np.testing.assert_allclose(margin, expected, atol=1e-5)
-
-
-def test_float16_features_score_as_in_float32() -> None:
-    rng = np.random.default_rng(0)
-    feature, word = unit_rows(rng, 1000, 37).astype(np.float16), unit_rows(rng, 1, 37)
-    np.testing.assert_allclose(feature_scores(feature, word), feature.astype(np.float32) @ word[0], atol=1e-6)
-
-
-@given(st.integers(0, 2**32 - 1), st.sampled_from([4, 12]), st.integers(1, 3))
-def test_voxels_within_reach_are_linked_and_no_others(seed, spread, reach) -> None:
-    index = np.unique(np.random.default_rng(seed).integers(-spread, spread, (60, 3)), axis=0)
-    near = np.abs(index[:, None] - index[None]).max(axis=-1) <= reach
-    for _ in range(6):
-        near = near @ near
-    labels = linked(index, reach)
-    np.testing.assert_array_equal(labels[:, None] == labels[None], near)
-    assert labels[0] == 0
-    assert sorted(set(labels)) == list(range(labels.max() + 1))
 
 
 def test_confidence_rises_with_margin_and_size() -> None:

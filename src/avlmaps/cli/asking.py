@@ -1,19 +1,16 @@
 """A query of the command line and its shell, answered as JSON; apart from the parser, which takes longer to load."""
 
 from collections.abc import Callable
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from avlmaps.cli.output import UsageError
 from avlmaps.core.frames import FrameName
 from avlmaps.query.asking import Asked, AskError, Files, ask, thing_alone
-from avlmaps.query.loops import plain_loops
 
 if TYPE_CHECKING:
     from avlmaps.query.avlmap import AVLMap
-
-_SMALL_MAP = 400_000  # voxels; plain NumPy takes 0.1 s for them
 
 
 def answered(
@@ -25,7 +22,6 @@ def answered(
     clip: Path | None = None,
     intrinsics: tuple[float, ...] | None = None,
     plot: Path | None = None,
-    once: bool = False,
     frame: FrameName = FrameName.RECORDING,
     **parts: Any,
 ) -> dict[str, Any]:
@@ -39,7 +35,6 @@ def answered(
         clip: what "this recording" means.
         intrinsics: fx, fy, cx, cy of the photo's camera, pixels.
         plot: a picture to write.
-        once: whether this process answers no other query.
         frame: of the positions in the answer.
         parts: object, sound, area and primary; see ``Asked``.
 
@@ -52,11 +47,11 @@ def answered(
     try:
         asked = Asked(sentence=sentence, image=photo, clip=recording, top=top, **parts)
         avlmap = open_map()
-        with _loops(asked, avlmap, once and plot is None):
+        with _announcing(asked, avlmap, plot):
             answer = ask(avlmap, asked, Files(intrinsics))
+            drawn = {} if plot is None or answer.heat is None else {"plot": str(answer.heat.plot(plot, top=top))}
     except AskError as error:
         raise UsageError(str(error)) from None
-    drawn = {} if plot is None or answer.heat is None else {"plot": str(answer.heat.plot(plot, top=top))}
     told: dict[str, Any] = {**answer.to_dict(), **drawn}
     if frame is FrameName.RECORDING:
         return told
@@ -65,10 +60,10 @@ def answered(
     return answer_in(told, frame, avlmap.space.level_from_recording)
 
 
-def _loops(asked: Asked, avlmap: "AVLMap", once: bool) -> "AbstractContextManager[None]":
-    """Return the context of a query: plain loops for one thing in a small map, whose process answers nothing else."""
-    if once and len(avlmap.stored.voxels) <= _SMALL_MAP and thing_alone(asked, avlmap) is not None:
-        return plain_loops()
+def _announcing(asked: Asked, avlmap: "AVLMap", plot: Path | None) -> AbstractContextManager[None]:
+    """Return what announces that loops are compiled; a question about one thing, which runs none, loads nothing."""
+    if plot is None and thing_alone(asked, avlmap) is not None:
+        return nullcontext()
     from avlmaps.core.compiling import announce_compiling
 
     return announce_compiling()

@@ -21,7 +21,6 @@ from avlmaps.cli.output import (
     system_sentence,
 )
 from avlmaps.cli.pipes import READER_GONE, drop, reader_gone, settle_streams
-from avlmaps.cli.plain_query import PlainQuery, read_plain_query
 from avlmaps.cli.shortened_files import end_at_shortened_files
 from avlmaps.core.errors import AvlmapsError, BackendError
 from avlmaps.core.printable import printable
@@ -76,17 +75,15 @@ def _main(words: list[str]) -> None:
     for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(variable, "1")
     os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")  # avlmaps reports a truncated picture in its own words
-    verb = read_plain_query(words)
-    if verb is None:
-        with _usage(words):
-            from avlmaps.cli.verbs import read_command
+    with _usage(words):
+        from avlmaps.cli.verbs import read_command
 
-            try:
-                verb = read_command(words)
-            except BackendError as error:
-                if _wants_json(words):
-                    _emit_error(kind_of(error), str(error))
-                sys.exit(_complain(error, 1))
+        try:
+            verb = read_command(words)
+        except BackendError as error:
+            if _wants_json(words):
+                _emit_error(kind_of(error), str(error))
+            sys.exit(_complain(error, 1))
     sys.exit(_run(verb))
 
 
@@ -120,7 +117,7 @@ def _usage(words: Sequence[str]) -> Iterator[None]:
         raise
 
 
-def _run(verb: "Verb | PlainQuery") -> int:
+def _run(verb: "Verb") -> int:
     end_at_shortened_files(as_json=verb.json)
     try:
         with models_in_force(verb), _compiling(verb):
@@ -146,7 +143,7 @@ def _run(verb: "Verb | PlainQuery") -> int:
     return 0
 
 
-def _swapped(verb: "Verb | PlainQuery") -> str | None:
+def _swapped(verb: "Verb") -> str | None:
     """Return a sentence where the words of a query or a command stand in the place of its map."""
     place, words = getattr(verb, "map", None), getattr(verb, "sentence", None)
     if place is None or not words or place.exists() or not Path(words, "map.json").is_file():
@@ -154,23 +151,22 @@ def _swapped(verb: "Verb | PlainQuery") -> str | None:
     return f"{words} is the map, and it comes first: avlmaps {_name_of(verb)} {words} {str(place)!r}"
 
 
-def _name_of(verb: "Verb | PlainQuery") -> str:
+def _name_of(verb: "Verb") -> str:
     from avlmaps.cli.verbs import VERBS
 
     return next((name for name, kind in VERBS.items() if isinstance(verb, kind)), "query")
 
 
-def _compiling(verb: "Verb | PlainQuery") -> AbstractContextManager[None]:
-    if verb.compiles or isinstance(verb, PlainQuery):
-        require_address_space()
+def _compiling(verb: "Verb") -> AbstractContextManager[None]:
     if not verb.compiles:
         return nullcontext()
+    require_address_space()
     from avlmaps.core.compiling import announce_compiling
 
     return announce_compiling()
 
 
-def _fail(verb: "Verb | PlainQuery", error: BaseException, message: str, status: int) -> int:
+def _fail(verb: "Verb", error: BaseException, message: str, status: int) -> int:
     """Print an error in one sentence on standard error, and as JSON on standard output with --json."""
     for said, option in _ATTACHED.items():
         message = message.replace(said, option)

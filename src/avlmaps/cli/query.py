@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tyro.conf import Positional, arg
 
+from avlmaps.cli.address_space import require_address_space
 from avlmaps.cli.locate import numbers_of
 from avlmaps.cli.output import emit, query_lines
-from avlmaps.cli.verb import ModelVerb
+from avlmaps.cli.verb import ModelVerb, OptionalPath, OptionalText
 from avlmaps.core.frames import FrameName
 
 if TYPE_CHECKING:
@@ -28,17 +29,17 @@ class Query(ModelVerb):
     """Map folder (NAME.avlmap)."""
     sentence: Annotated[Positional[str], arg(metavar="[SENTENCE]")] = ""
     """Query in words; leave it out to name the parts with options."""
-    object: Annotated[str | None, arg(metavar="NAME")] = None
+    object: Annotated[OptionalText, arg(metavar="NAME")] = None
     """Object, by name."""
-    sound: Annotated[str | None, arg(metavar="NAME")] = None
+    sound: Annotated[OptionalText, arg(metavar="NAME")] = None
     """Sound, by name."""
-    sound_clip: Annotated[Path | None, arg(metavar="FILE")] = None
+    sound_clip: Annotated[OptionalPath, arg(metavar="FILE")] = None
     """Sound, by a sound file of one like it."""
-    area: Annotated[str | None, arg(metavar="NAME")] = None
+    area: Annotated[OptionalText, arg(metavar="NAME")] = None
     """Area, by name: a room or a part of the building."""
-    image: Annotated[Path | None, arg(metavar="PHOTO")] = None
+    image: Annotated[OptionalPath, arg(metavar="PHOTO")] = None
     """Photo taken at the place."""
-    intrinsics: Annotated[str | None, arg(metavar="FX,FY,CX,CY")] = None
+    intrinsics: Annotated[OptionalText, arg(metavar="FX,FY,CX,CY")] = None
     """Intrinsics of the photo's camera, fx,fy,cx,cy in pixels. Default: the map's own colour camera."""
     primary: Annotated[Literal["object", "sound", "image", "area"] | None, arg(metavar="object|sound|image|area")] = (
         None
@@ -52,11 +53,12 @@ class Query(ModelVerb):
     """Number of goals to print."""
     frame: Annotated[Literal["recording", "level"], arg(metavar="recording|level")] = "recording"
     """Frame of the places: the recording's own, or the level one (z up)."""
-    plot: Annotated[Path | None, arg(metavar="FILE")] = None
+    plot: Annotated[OptionalPath, arg(metavar="FILE")] = None
     """Draw the heat of each part and of the product, with numbered goals, into this picture."""
 
     def run(self) -> None:
         """Answer the query."""
+        require_address_space()
         answer = ask(self)
         emit(answer, query_lines(answer), self.json)
 
@@ -90,5 +92,5 @@ def ask(verb: "Query", opened: "AVLMap | None" = None) -> dict[str, Any]:
     }
     return answered(
         lambda: opened or AVLMap.open(verb.map, settings), verb.sentence, verb.top, primary=primary,
-        intrinsics=numbers, plot=verb.plot, once=opened is None, frame=FrameName(verb.frame), **given,
+        intrinsics=numbers, plot=verb.plot, frame=FrameName(verb.frame), **given,
     )  # fmt: skip

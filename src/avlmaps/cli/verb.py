@@ -2,9 +2,14 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, Optional
 
 from tyro.conf import arg
+
+# The parser checks the default of a `str | None` with a package that takes longer to load than a question to answer;
+# it knows these itself.
+OptionalText = Optional[str]  # noqa: UP045
+OptionalPath = Optional[Path]  # noqa: UP045
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,9 +31,9 @@ class Verb:
 class ModelVerb(Verb):
     """Options of every verb that runs models; the small models that ship with the package ignore them."""
 
-    models: Annotated[Path | None, arg(metavar="DIR")] = None
+    models: Annotated[OptionalPath, arg(metavar="DIR")] = None
     """Folder of models, searched before the hub's cache. Default: AVLMAPS_MODELS."""
-    device: Annotated[str | None, arg(metavar="DEVICE")] = None
+    device: Annotated[OptionalText, arg(metavar="DEVICE")] = None
     """Device of large models: auto, cpu, cuda, cuda:1, mps. Default: AVLMAPS_DEVICE, or a GPU if there is one."""
     precision: Annotated[
         Literal["auto", "float32", "float16", "bfloat16"] | None, arg(metavar="auto|float32|float16|bfloat16")

@@ -13,6 +13,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Float32, Int
 from avlmaps.core.question import Part, Role
+from avlmaps.query.threads import share
 from avlmaps.query.voxel_space import Space
 
 # From this probability on a query is found (``QuerySettings.found_at``), and a part of it by itself: an instance, a
@@ -72,6 +73,8 @@ class Factor(ABC):
     flat: bool
     regional: bool = False
     is_named: bool = True
+    # The heat and the anchors of all voxels, once they were computed.
+    _of_all: tuple[Float32[np.ndarray, " n"], Int[np.ndarray, " n"]] | None = None
 
     @abstractmethod
     def heat_and_anchors(
@@ -79,22 +82,24 @@ class Factor(ABC):
     ) -> tuple[Float32[np.ndarray, " n"], Int[np.ndarray, " n"]]:
         """Return heat in [0, 1] of every voxel, or of some and 0 for others, and the anchor that each has it from."""
 
-    @cached_property
-    def _of_all(self) -> tuple[Float32[np.ndarray, " n"], Int[np.ndarray, " n"]]:
-        return self.heat_and_anchors()
+    def _all_heat_and_anchors(self) -> tuple[Float32[np.ndarray, " n"], Int[np.ndarray, " n"]]:
+        if self._of_all is None:
+            object.__setattr__(self, "_of_all", self.heat_and_anchors())  # the value is frozen; this adds nothing to it
+        assert self._of_all is not None
+        return self._of_all
 
     @property
     def values(self) -> Float32[np.ndarray, " n"]:
         """Heat in [0, 1] of every voxel, computed when it is first used."""
-        return self._of_all[0]
+        return self._all_heat_and_anchors()[0]
 
     def anchor_of(self, voxels: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
         """Return the anchor that each of these voxels has its heat from; they must have some."""
-        return self._of_all[1][voxels]
+        return self._all_heat_and_anchors()[1][voxels]
 
     def among(self, voxels: Bool[np.ndarray, " n"]) -> Float32[np.ndarray, " n"]:
         """Return the heat of some voxels, 0 for others: what a product needs where another factor leaves little."""
-        if "_of_all" in vars(self):  # computed before
+        if self._of_all is not None:
             return np.where(voxels, self.values, np.float32(0.0))
         return self.heat_and_anchors(voxels)[0]
 
@@ -296,7 +301,7 @@ def object_heat(
     Returns:
         The heat, and the number of the nearest voxel among those of the mask (−1 where there is no heat).
     """
-    from avlmaps.query.kernels import nearest_squared, share
+    from avlmaps.query.kernels import nearest_squared
 
     voxel_size_m = space.grid.voxel_size_m
     blocks = space.blocks if among is None else space.blocks.chosen(among)
@@ -340,7 +345,7 @@ def anchor_heat(
         falloff_per_m: ε.
         among: the voxels that are wanted; others have no heat. None: all.
     """
-    from avlmaps.query.kernels import cone_heat, share, undominated
+    from avlmaps.query.kernels import cone_heat, undominated
 
     order = np.argsort(-np.asarray(scores, np.float64), kind="stable")
     ground = np.ascontiguousarray(space.level(np.asarray(anchors, np.float64).reshape(-1, 3))[:, :2])[order]

@@ -1,42 +1,23 @@
-"""The loops over voxels that a query for a thing needs, compiled or in plain NumPy.
+"""What a search for a word computes of every voxel: scores, the closest words, margins; and which voxels are linked.
 
-The compiled ones (``kernels``) are faster by far, but loading numba takes longer than one question to a map of a room.
-``plain_loops`` is for a process that asks just one: ``avlmaps query`` on a small map. Both give the same answers; sums
-of floats differ in their last digits.
+All of it is NumPy, a few rows at a time: loading numba takes longer than one question to a map of a home, and compiled
+loops are hardly faster on a larger one (``benchmarks/queries.py``).
 """
 
-from collections.abc import Generator, Iterator
-from contextlib import contextmanager
-from contextvars import ContextVar
+from collections.abc import Iterator
 
 import numpy as np
 
 from avlmaps.core.arrays import Bool, Float16, Float32, Int, Int64
+from avlmaps.query.threads import share
 
-_CHUNK = 16_384
-# Rows that are compared with all words at once: their scores stay in the processor's cache.
-_SCORED = 2_048
-# Rows that are widened at once in plain NumPy: they stay in the processor's cache.
-_WIDENED = 4_096
+# Rows that are widened at once: they stay in the processor's cache.
+_WIDENED = 2_048
+# Fewer rows than this are not worth a thread.
+_LEAST_SHARED = 100_000
 # A float16's bits, moved to where a float32 has them, are the number times 2⁻¹¹²: the exponents' biases differ by that.
 _SIGN_EXPONENT_FRACTION = np.array(0x8FFFE000, np.uint32).view(np.int32)[()]
 _BIAS = np.float32(2.0**112)
-_PLAIN: ContextVar[bool] = ContextVar("plain", default=False)
-
-
-@contextmanager
-def plain_loops(wanted: bool = True) -> Generator[None]:
-    """Use plain NumPy in this context, so that numba is not loaded."""
-    before = _PLAIN.set(wanted)
-    try:
-        yield
-    finally:
-        _PLAIN.reset(before)
-
-
-def is_plain() -> bool:
-    """Return whether this context uses plain NumPy: a process that answers one question."""
-    return _PLAIN.get()
 
 
 def feature_scores(
@@ -45,36 +26,39 @@ def feature_scores(
     """Return the product of features with one word; of several words, the length of the products with them.
 
     Args:
-        feature: of a map.
+        feature: of a map; finite.
         words: one or more.
         rows: which features; None for all.
     """
-    if not _PLAIN.get():
-        from avlmaps.query.kernels import feature_scores as compiled
+    out = np.empty(len(feature) if rows is None else len(rows), np.float32)
+    columns = np.ascontiguousarray(np.asarray(words, np.float32).T) * _BIAS
 
-        return compiled(feature, words, rows)
-    feature = feature if rows is None else np.ascontiguousarray(feature[rows])
-    out = np.empty(len(feature), np.float32)
-    columns = np.asarray(words, np.float32).T * _BIAS
-    for a, rows in _widened(feature):
-        products = rows @ columns
-        out[a : a + len(rows)] = products[:, 0] if len(words) == 1 else np.sqrt(np.square(products).sum(axis=1))
+    def write(start: int, stop: int) -> None:
+        for a, wide in _widened(feature, rows, start, stop):
+            products = wide @ columns
+            one = products.shape[1] == 1
+            out[a : a + len(wide)] = products[:, 0] if one else np.sqrt(np.square(products).sum(axis=1))
+
+    share(write, len(out), _LEAST_SHARED)
     return out
 
 
-def _widened(feature: Float16[np.ndarray, "n d"]) -> Iterator[tuple[int, Float32[np.ndarray, "m d"]]]:
-    """Yield finite float16 rows as float32, times 2⁻¹¹², a few at a time; the next ones overwrite them.
+def _widened(
+    feature: Float16[np.ndarray, "n d"], rows: Int[np.ndarray, " m"] | None, start: int, stop: int
+) -> Iterator[tuple[int, Float32[np.ndarray, "r d"]]]:
+    """Yield float16 rows as float32, times 2⁻¹¹², a few at a time; the next ones overwrite them.
 
     NumPy converts one number after the other, six times slower.
     """
     bits = np.asarray(feature, np.float16).view(np.int16)
-    room = np.empty((min(_WIDENED, len(bits)), bits.shape[1]), np.int32)
-    for a in range(0, len(bits), _WIDENED):
-        rows = room[: len(bits) - a]
-        rows[:] = bits[a : a + _WIDENED]
-        np.left_shift(rows, 13, out=rows)
-        np.bitwise_and(rows, _SIGN_EXPONENT_FRACTION, out=rows)  # the sign was copied to four places
-        yield a, rows.view(np.float32)
+    room = np.empty((min(_WIDENED, stop - start), bits.shape[1]), np.int32)
+    for a in range(start, stop, _WIDENED):
+        b = min(a + _WIDENED, stop)
+        wide = room[: b - a]
+        wide[:] = bits[a:b] if rows is None else bits[rows[a:b]]
+        np.left_shift(wide, 13, out=wide)
+        np.bitwise_and(wide, _SIGN_EXPONENT_FRACTION, out=wide)  # the sign was copied to four places
+        yield a, wide.view(np.float32)
 
 
 Closest = tuple[
@@ -88,43 +72,24 @@ def word_type(words: int) -> type[np.signedinteger]:
 
 
 def two_closest(feature: Float16[np.ndarray, "n d"], words: Float32[np.ndarray, "v d"]) -> Closest:
-    """Return the two words closest to each feature; −inf and −1 where there are none."""
-    n = len(feature)
+    """Return the two words closest to each feature, of equals the first; −inf and −1 where there are none."""
+    n, kind = len(feature), word_type(len(words))
     best, second = np.full(n, -np.inf, np.float32), np.full(n, -np.inf, np.float32)
-    kind = word_type(len(words))
     best_word, second_word = np.full(n, -1, kind), np.full(n, -1, kind)
-    columns = np.ascontiguousarray(words.T)
+    columns = np.ascontiguousarray(np.asarray(words, np.float32).T) * _BIAS
 
-    def compiled(start: int, stop: int) -> None:
-        wide = np.empty((min(_SCORED, max(stop - start, 1)), feature.shape[1]), np.float32)
-        scores = np.empty((len(words), len(wide)), np.float32)
-        for a in range(start, stop, _SCORED):
-            rows = np.ascontiguousarray(feature[a : min(a + _SCORED, stop)], np.float16)
-            widen(rows.view(np.uint16), wide)
-            np.matmul(words, wide.T, out=scores)
-            best_two(scores[:, : len(rows)], best, best_word, second, second_word, a)
+    def write(start: int, stop: int) -> None:
+        for a, wide in _widened(feature, None, start, stop):
+            scores, rows, here = wide @ columns, np.arange(len(wide)), slice(a, a + len(wide))
+            first = scores.argmax(axis=1)
+            best[here], best_word[here] = scores[rows, first], first
+            if len(words) > 1:
+                scores[rows, first] = -np.inf
+                next_ = scores.argmax(axis=1)
+                second[here], second_word[here] = scores[rows, next_], next_
 
-    def plain() -> None:
-        scaled = columns * _BIAS
-        for a, wide in _widened(feature):
-            b = a + len(wide)
-            scores = wide @ scaled
-            rows = np.arange(b - a)
-            best_word[a:b] = scores.argmax(axis=1)
-            best[a:b] = scores[rows, best_word[a:b]]
-            if scores.shape[1] > 1:
-                scores[rows, best_word[a:b]] = -np.inf
-                second_word[a:b] = scores.argmax(axis=1)
-                second[a:b] = scores[rows, second_word[a:b]]
-
-    if not len(words):
-        pass
-    elif _PLAIN.get():
-        plain()
-    else:
-        from avlmaps.query.kernels import best_two, share, widen
-
-        share(compiled, n, least=_CHUNK)
+    if len(words):
+        share(write, n, _LEAST_SHARED)
     return best, best_word, second, second_word
 
 
@@ -141,62 +106,70 @@ def margins(
     """
     best, best_word, second, second_word = closest
     mute = np.append(silent, True)  # number −1 is no word
-    if _PLAIN.get():
-        first_mute, second_mute = mute[best_word], mute[second_word]
-        rival = np.where(first_mute, np.where(second_mute, np.float32(-np.inf), second), best)
-        return score - np.maximum(rival, np.float32(least)), first_mute & second_mute & (second_word >= 0)
-    from avlmaps.query.kernels import margins as compiled
-    from avlmaps.query.kernels import share
-
-    out, unsure = np.empty(len(score), np.float32), np.empty(len(score), np.bool_)
-    share(
-        lambda a, b: compiled(score, best, best_word, second, second_word, mute, np.float32(least), out, unsure, a, b),
-        len(score),
-        least=50_000,
-    )
-    return out, unsure
+    first_mute, second_mute = mute[best_word], mute[second_word]
+    rival = np.where(first_mute, np.where(second_mute, np.float32(-np.inf), second), best)
+    return score - np.maximum(rival, np.float32(least)), first_mute & second_mute & (second_word >= 0)
 
 
 def linked(index: Int[np.ndarray, "n 3"], reach: int) -> Int64[np.ndarray, " n"]:
     """Label voxels so that those within ``reach`` along every axis share a label; labels rise by their first voxel.
 
+    Voxels over one another make runs, and runs of columns within reach are joined where they overlap.
+
     Args:
         index: sorted by x, then y, then z, without repeats.
         reach: in voxels.
     """
-    voxels = np.ascontiguousarray(index, np.int64)
-    if not _PLAIN.get():
-        from avlmaps.query.kernels import linked as compiled
-
-        return compiled(voxels, reach)
-    if not len(voxels):
+    if not len(index):
         return np.zeros(0, np.int64)
-    low = voxels.min(axis=0)
-    size = voxels.max(axis=0) - low + 1 + 2 * reach
-    key = ((voxels[:, 0] - low[0]) * size[1] + voxels[:, 1] - low[1]) * size[2] + voxels[:, 2] - low[2]
-    side = np.arange(-reach, reach + 1)
-    steps = np.stack(np.meshgrid(side, side, side, indexing="ij"), axis=-1).reshape(-1, 3)
-    pairs: list[np.ndarray] = []
-    for dx, dy, dz in steps[len(steps) // 2 + 1 :]:  # the other half are the same pairs again
-        wanted: Int64[np.ndarray, " n"] = key + (dx * size[1] + dy) * size[2] + dz
-        at = np.minimum(np.searchsorted(key, wanted), len(key) - 1)
-        here = np.flatnonzero(key[at] == wanted)
-        pairs.append(np.stack([here, at[here]]))
-    a, b = np.concatenate(pairs, axis=1)
-    return connected(len(voxels), a, b)
+    voxels = np.asarray(index, np.int64)
+    voxels = voxels - voxels.min(axis=0)
+    x, y, z = voxels[:, 0], voxels[:, 1], voxels[:, 2]
+    # Columns and heights are numbered with room between, so that no neighbour is one of another row.
+    width, height = int(y.max()) + 1 + 2 * reach, int(z.max()) + 1 + 2 * reach
+    column = x * width + y
+    begins = np.append(True, column[1:] != column[:-1])
+    first = np.flatnonzero(begins | np.append(True, np.diff(z) > reach))  # voxel of each run
+    last = np.append(first[1:], len(z)) - 1
+    columns, of_run = column[begins], np.asarray(np.cumsum(begins)[first] - 1, np.int64)
+    bottom, top = of_run * height + z[first], of_run * height + z[last]
+    root = np.arange(len(first))
+    for dx, dy in ((dx, dy) for dx in range(reach + 1) for dy in range(-reach, reach + 1) if dx or dy > 0):
+        wanted = columns + dx * width + dy
+        at = np.minimum(np.asarray(np.searchsorted(columns, wanted), np.int64), len(columns) - 1)
+        run = np.flatnonzero((columns[at] == wanted)[of_run])
+        lift = (at[of_run[run]] - of_run[run]) * height  # to the other column
+        low = np.asarray(np.searchsorted(top, bottom[run] + lift - reach), np.int64)
+        count = np.asarray(np.searchsorted(bottom, top[run] + lift + reach, side="right") - low, np.int64)
+        ends = np.cumsum(count)
+        other = np.repeat(low - ends + count, count) + np.arange(ends[-1] if len(ends) else 0)
+        _join(root, np.repeat(run, count), other)
+    return np.repeat(_numbered(root), last - first + 1)
 
 
 def connected(count: int, a: Int[np.ndarray, " e"], b: Int[np.ndarray, " e"]) -> Int64[np.ndarray, " n"]:
     """Return the label of each of ``count`` nodes, equal for those that edges join; labels rise by their first node."""
     root = np.arange(count)
+    _join(root, a, b)
+    return _numbered(root)
+
+
+def _join(root: Int64[np.ndarray, " n"], a: Int[np.ndarray, " e"], b: Int[np.ndarray, " e"]) -> None:
+    """Give the nodes that edges join one root: of all that are joined, the first node."""
     while True:
         one, other = root[a], root[b]
         apart = one != other
         if not apart.any():
-            return np.unique(root, return_inverse=True)[1].reshape(-1).astype(np.int64)
-        np.minimum.at(root, np.maximum(one, other)[apart], np.minimum(one, other)[apart])
-        while (root[root] != root).any():
-            root = root[root]
+            return
+        a, b, one, other = a[apart], b[apart], one[apart], other[apart]
+        np.minimum.at(root, np.maximum(one, other), np.minimum(one, other))
+        while not np.array_equal(above := root[root], root):
+            root[:] = above
+
+
+def _numbered(root: Int64[np.ndarray, " n"]) -> Int64[np.ndarray, " n"]:
+    """Return the number of each node's root among all roots."""
+    return (np.cumsum(root == np.arange(len(root))) - 1)[root]
 
 
 def distinct(values: Int[np.ndarray, " n"]) -> Int[np.ndarray, " d"]:

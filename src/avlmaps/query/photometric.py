@@ -20,8 +20,8 @@ from jaxtyping import Bool, Float, Float32, Int32, UInt8
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.maps.types import Keyframes
-from avlmaps.query.kernels import share
 from avlmaps.query.photometric_kernels import compare_panoramas, compare_view, draw_panoramas
+from avlmaps.query.threads import share
 from avlmaps.query.voxel_space import Space
 
 _BIN_RAD = np.deg2rad(3.0)

@@ -12,7 +12,7 @@ from avlmaps.query.words import Vocabulary
 if TYPE_CHECKING:
     from avlmaps.maps.store.reader import StoredMap
 
-_MODULES = ("avlmaps.query.loops", "avlmaps.query.kernels", "avlmaps.query.stored_names")
+_MODULES = ("avlmaps.query.loops", "avlmaps.query.stored_names")
 _COLUMNS = ("best", "best_word", "second", "second_word")
 
 
@@ -24,7 +24,7 @@ def read_closest(stored: "StoredMap", vocabulary: Vocabulary) -> Closest | None:
         return None
     best, best_word, second, second_word = (arrays[name] for name in _COLUMNS)
     kinds = np.float32, word_type(len(vocabulary.words))
-    # Compiled loops take the numbers of words as they are; a file that somebody made must not lead them astray.
+    # The numbers of words are taken as they are; a file that somebody made must not lead astray.
     for score, word in ((best, best_word), (second, second_word)):
         fits = score.shape == word.shape == (len(stored.voxels),) and (score.dtype, word.dtype) == kinds
         if not fits or np.isnan(score).any():
