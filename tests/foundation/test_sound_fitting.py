@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 
 torch = pytest.importorskip("torch")
 from training.sounds.augmentation import PADDED, SMOOTHED, Augmentation, segmented  # noqa: E402
+from training.sounds.efficientat import Opinion  # noqa: E402
 from training.sounds.fit import share_of_rate  # noqa: E402
-from training.sounds.network import SoundNet  # noqa: E402
+from training.sounds.network import SoundNet, widened  # noqa: E402
 from training.sounds.upper import Lessons, Mapped, Settings, fit_upper  # noqa: E402
 
 from avlmaps.maps.audio.segmentation import segment  # noqa: E402
@@ -91,6 +92,43 @@ def test_the_lower_blocks_stay_and_the_upper_part_is_fitted() -> None:
     for name, weight in net.named_parameters():
         fitted = name.startswith((last, "head."))
         assert torch.equal(weight, dict(start.named_parameters())[name]) != fitted, name
+
+
+def test_a_folds_network_learns_nothing_from_what_the_teacher_says_of_its_clips() -> None:
+    given_lessons, rng = lessons(), np.random.default_rng(0)
+    said = Opinion(rng.normal(size=(12, 5)).astype(np.float32), rng.normal(size=(12, 7)).astype(np.float32))
+    own = (given_lessons.recorded[0].folds[:, 0] == 3)[:, None]
+    other = Opinion(np.where(own, 9.0, said.features), np.where(own, -9.0, said.logits))
+    other = Opinion(other.features.astype(np.float32), other.logits.astype(np.float32))
+
+    def fitted(fold: int, teacher: Opinion | None) -> np.ndarray:
+        return numbers(fit_upper(network(), given_lessons, WORDS, SETTINGS, fold, teacher=teacher))
+
+    np.testing.assert_allclose(fitted(3, said), fitted(3, other), atol=1e-6)
+    assert np.abs(fitted(0, said) - fitted(0, other)).max() > 1e-5
+    assert np.abs(fitted(0, said) - fitted(0, None)).max() > 1e-5
+
+
+def test_from_the_inputs_every_layer_is_fitted() -> None:
+    start, given_lessons = network(), lessons()
+    rng = np.random.default_rng(0)
+
+    def heard(part: Mapped) -> Mapped:
+        return replace(part, maps=rng.random((len(part.maps), 2, 64, 448)).astype(np.float16))
+
+    pairs = ((heard(clean), heard(drawn)) for clean, drawn in (given_lessons.recorded, given_lessons.synthetic))
+    net = fit_upper(start, Lessons(*pairs), WORDS, replace(SETTINGS, steps=1, whole=True))
+    for name, weight in net.named_parameters():
+        assert not torch.equal(weight, dict(start.named_parameters())[name]), name
+
+
+@given(width=st.integers(WIDTH, 3 * WIDTH), seed=st.integers(0, 99))
+def test_a_wider_network_answers_alike(width: int, seed: int) -> None:
+    torch.manual_seed(seed)
+    net = SoundNet(DIM, WIDTH).eval()
+    x = torch.randn(2, 2, 64, 448)
+    with torch.no_grad():
+        torch.testing.assert_close(widened(net, width)(x), net(x), atol=1e-5, rtol=1e-4)
 
 
 ALL_CUT = Augmentation(segmented=1.0)

@@ -11,11 +11,13 @@ from typing import Any
 import numpy as np
 import torch
 from training.sounds import calibrate
-from training.sounds.clips import Clip, read_corpus
-from training.sounds.crossvalidate import TESTED, Answers, Networks, example_bank, hear_held_out
+from training.sounds.clips import TESTED, Clip, read_corpus
+from training.sounds.crossvalidate import Answers, Networks, example_bank, hear_held_out
+from training.sounds.efficientat import stored_opinion
 from training.sounds.export import write_onnx
 from training.sounds.figures import all_tables
 from training.sounds.fit import EncodeWords
+from training.sounds.in_maps import ROOT, write_json
 from training.sounds.kinds import KINDS, NAMES, TEMPLATES
 from training.sounds.upper import Settings
 
@@ -23,7 +25,6 @@ from avlmaps.core.progress import say
 from avlmaps.perception.embedded.sound_calibration import evidence_for
 from avlmaps.perception.embedded.words import EmbeddedWords
 
-ROOT = Path(__file__).resolve().parents[2]
 WEIGHTS = Path("src/avlmaps/perception/embedded/weights")
 FIGURES = Path("src/avlmaps/bench/data/sounds_crossvalidation.json")
 NOTE = (
@@ -39,6 +40,7 @@ def main() -> None:
     parser.add_argument("--work", type=Path, default=ROOT / "build" / "sounds", help="folder of the networks")
     parser.add_argument("--out", type=Path, default=ROOT, help="the checkout to write weights and figures into")
     parser.add_argument("--start", type=Path, default=ROOT / WEIGHTS / "sounds.onnx", help="weights to continue from")
+    parser.add_argument("--teacher", type=Path, help="EfficientAT's checkpoint, which guides the fit; none if left out")
     parser.add_argument("--steps", type=int, default=Settings.steps, help="of each network")
     parser.add_argument("--each", type=int, default=8, help="synthetic sounds of a kind")
     arguments = parser.parse_args()
@@ -46,18 +48,22 @@ def main() -> None:
     corpus = read_corpus(arguments.sounds, arguments.work, arguments.each)
     words = EmbeddedWords()
     settings = Settings(steps=arguments.steps)
-    networks = Networks(corpus, words.encode, settings, arguments.start, arguments.work)
+    teacher = None
+    if arguments.teacher is not None:
+        files = [arguments.sounds / clip.path for clip in corpus.clips]
+        teacher = stored_opinion(arguments.work / f"teacher-{len(files)}.npz", arguments.teacher, files)
+    networks = Networks(corpus, words.encode, settings, arguments.start, arguments.work, teacher)
 
     answers = hear_held_out(corpus, networks, calibrate.prototypes(words.encode))
     constants = fitted_constants(answers, words.encode)
     learnt = Counter(NAMES[clip.kind] for clip in corpus.clips if clip.may_ship)
     tables = all_tables(answers, learnt, words.encode, constants)
-    write_edition(arguments.out / WEIGHTS, networks, 0, words, constants, arguments.each)
     write_edition(arguments.work / f"without-{TESTED}", networks, TESTED, words, constants, arguments.each)
     (arguments.out / FIGURES).parent.mkdir(parents=True, exist_ok=True)
     about = {"settings": asdict(settings), "words": words.card.checksum}
     write_json(arguments.out / FIGURES, {"about": about, "tables": tables})
     say(json.dumps(tables, indent=1))
+    write_edition(arguments.out / WEIGHTS, networks, 0, words, constants, arguments.each)
 
 
 def fitted_constants(answers: Answers, encode: EncodeWords) -> calibrate.Calibration:
@@ -70,7 +76,7 @@ def fitted_constants(answers: Answers, encode: EncodeWords) -> calibrate.Calibra
     c = calibrate.fit_known(answers.peers.every, unknown, c)  # of the same network
     c = calibrate.fit_taught(answers.lessons(3), c)
     left = [k for k in range(calibrate.RECORDED_COUNT) if k not in answers.without]
-    c = calibrate.fit_word(heard, kinds, [(unknown, left)], encode, c)
+    c = calibrate.flattened(calibrate.fit_word(heard, kinds, [(unknown, left)], encode, c))
     return calibrate.fit_pairs(heard, kinds, answers.household.every_room, c)
 
 
@@ -85,13 +91,29 @@ def write_edition(
     np.save(folder / "sounds.npy", bank.astype(np.float16))
     learnt = [clip for clip in networks.corpus.clips if clip.may_ship and clip.fold != fold]
     examples = np.bincount(kinds, minlength=len(NAMES)).tolist()
-    write_json(folder / "sounds.json", notes(learnt, words, c, each, examples))
+    about = networks.start.with_suffix(".json")
+    before = json.loads(about.read_text(encoding="utf-8"))["sources"] if about.exists() else ()
+    write_json(folder / "sounds.json", notes(learnt, before, words, c, each, examples))
 
 
 def notes(
-    learnt: Sequence[Clip], words: EmbeddedWords, c: calibrate.Calibration, each: int, examples: Sequence[int]
+    learnt: Sequence[Clip],
+    before: Sequence[int],
+    words: EmbeddedWords,
+    c: calibrate.Calibration,
+    each: int,
+    examples: Sequence[int],
 ) -> dict[str, Any]:
-    """Return the notes that ship beside a network: of the clips that it learnt from, constants, examples of a kind."""
+    """Return the notes that ship beside a network.
+
+    Args:
+        learnt: the clips that it learnt from.
+        before: numbers of the recordings that the lower blocks, of the edition before, learnt from.
+        words: the word encoder.
+        c: the constants.
+        each: synthetic sounds of a kind.
+        examples: how many of each kind ship.
+    """
     counts = Counter(NAMES[clip.kind] for clip in learnt)
     kinds = [
         {
@@ -110,14 +132,9 @@ def notes(
         "templates": list(TEMPLATES),
         "note": NOTE,
         "calibration": asdict(c),
-        "sources": sorted({clip.source for clip in learnt}),
+        "sources": sorted({clip.source for clip in learnt}.union(before)),
         "kinds": kinds,
     }
-
-
-def write_json(path: Path, content: dict[str, Any]) -> None:
-    """Write JSON that a person can read."""
-    path.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -5,22 +5,24 @@ are those of household kinds; every edition heard some of ESC-10.
 """
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from time import process_time
 from typing import Any
 
 import numpy as np
 from scipy.signal import oaconvolve
-from training.sounds.__main__ import ROOT, write_json
-from training.sounds.clips import Clip, read_index
-from training.sounds.crossvalidate import ROOM_S, TESTED
+from scipy.stats import binomtest
+from training.sounds.clips import ROOM_S, TESTED, Clip, read_index
+from training.sounds.in_maps import ROOT, as_a_map_cuts, write_json
 from training.sounds.kinds import CALLED, ESC10, RECORDED
 
 from avlmaps.bench.sound_clips import room_response
 from avlmaps.core.progress import say
 from avlmaps.perception.embedded.sounds import EmbeddedSounds
 from avlmaps.recordings.audio import AudioTrack, Sound
+
+FIRST, OWN, OTHER = f"first among {len(RECORDED)}", "own name says yes", "some other name says yes"
 
 
 def clips_for(clips: Sequence[Clip], fold: int, encoders: Sequence[EmbeddedSounds]) -> list[Clip]:
@@ -44,14 +46,27 @@ def measured(encoder: EmbeddedSounds, sounds: Sequence[Sound], kinds: np.ndarray
     scores = encoder.score_words(features, CALLED)
     fifty = scores[:, : len(RECORDED)]
     yes, own = fifty >= 0.5, kinds[:, None] == np.arange(len(RECORDED))
+    each = {FIRST: fifty.argmax(axis=1) == kinds, OWN: yes[own], OTHER: (yes & ~own).any(axis=1)}
+    highest_other = np.where(own, -1.0, fifty).max(axis=1)
+    limits = np.quantile(highest_other, (0.9, 0.8, 0.7))  # from which some other name says yes for 10, 20, 30 %
     return {
         "clips": len(sounds),
-        f"first among {len(RECORDED)}": int((fifty.argmax(axis=1) == kinds).sum()),
+        **{what: int(right.sum()) for what, right in each.items()},
         f"first among {len(CALLED)}": int((scores.argmax(axis=1) == kinds).sum()),
-        "own name says yes": int(yes[own].sum()),
-        "some other name says yes": int((yes & ~own).any(axis=1).sum()),
+        "own name, where another says yes for 10, 20, 30 %": [round(float((fifty[own] > x).mean()), 3) for x in limits],
+        "each": {what: right.tolist() for what, right in each.items()},
         "ms of one core a second of sound": round(1e3 * took_s / sum(sound.duration_s for sound in sounds), 2),
     }
+
+
+def paired(ships: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, str]:
+    """Return how many clips each edition alone has right (or says yes to), with McNemar's exact p."""
+    told = {}
+    for what, before in ships["each"].items():
+        old, after = np.array(before), np.array(new["each"][what])
+        won, lost = int((after & ~old).sum()), int((old & ~after).sum())
+        told[what] = f"+{won} -{lost}, p = {binomtest(won, max(won + lost, 1)).pvalue:.2g}"
+    return told
 
 
 def main() -> None:
@@ -59,29 +74,32 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--sounds", type=Path, default=ROOT.parent / "shared" / "data" / "sounds")
     parser.add_argument("--fold", type=int, default=TESTED)
-    parser.add_argument("--weights", type=Path, default=ROOT / "build" / "sounds" / f"without-{TESTED}")
+    parser.add_argument("--weights", type=Path, nargs="+", default=[ROOT / "build" / "sounds" / f"without-{TESTED}"])
     parser.add_argument("--out", type=Path, default=ROOT / "build" / "sounds" / "compared.json")
     arguments = parser.parse_args()
     nobody = ROOT / "build" / "sounds" / "nobody"  # a profile folder without taught sounds
     editions = {
         "ships": EmbeddedSounds(folder=nobody),
-        str(arguments.weights): EmbeddedSounds(folder=nobody, weights=arguments.weights),
+        **{str(weights): EmbeddedSounds(folder=nobody, weights=weights) for weights in arguments.weights},
     }
     clips = clips_for(read_index(arguments.sounds), arguments.fold, list(editions.values()))
     kinds = np.array([clip.kind for clip in clips])
     dry = [AudioTrack.open(arguments.sounds / clip.path).read() for clip in clips]
     echoes = {rate_hz: room_response(ROOM_S, rate_hz) for rate_hz in {sound.rate_hz for sound in dry}}
     wet = [Sound(oaconvolve(s.samples, echoes[s.rate_hz]).astype(np.float32), s.rate_hz) for s in dry]
-    figures = {
-        label: {
-            "id": encoder.card.id,
-            "dry": measured(encoder, dry, kinds),
-            f"RT60 {ROOM_S} s, 4 m": measured(encoder, wet, kinds),
-        }
-        for label, encoder in editions.items()
-    }
+    half = [(wet if number % 4 else dry)[number] for number in range(0, len(dry), 2)]
+    pieces, which = as_a_map_cuts(half, arguments.out.parent)
+    heard = {
+        "dry": (dry, kinds), f"RT60 {ROOM_S} s, 4 m": (wet, kinds), "pieces": (pieces, kinds[2 * which]),
+    }  # fmt: skip
+    figures: dict[str, dict[str, Any]] = {}
+    for label, encoder in editions.items():
+        figures[label] = {where: measured(encoder, *given) for where, given in heard.items()}
+        for where, found in figures[label].items():
+            found["against what ships"] = paired(figures["ships"][where], found)
+            shown = {what: value for what, value in found.items() if what != "each"}
+            say(f"{label}, {where}: {shown}")
     write_json(arguments.out, figures)
-    say(str(figures))
 
 
 if __name__ == "__main__":

@@ -8,7 +8,8 @@ import numpy as np
 import torch
 from training.sounds.augmentation import heard
 from training.sounds.calibrate import Evidence, Lesson, evidence_of, joined, lessons
-from training.sounds.clips import Corpus, Examples, mels_of, read_samples
+from training.sounds.clips import ROOM_S, TESTED, Corpus, Examples, mels_of, read_samples
+from training.sounds.efficientat import Opinion
 from training.sounds.export import opened_norms, read_onnx
 from training.sounds.fit import EncodeWords, encode, targets
 from training.sounds.kinds import ESC10, NAMES
@@ -24,10 +25,8 @@ LEFT_OUT = (
     "door knock", "can opening", "car horn", "toilet flush", "keyboard typing", "laughing", "siren", "vacuum cleaner",
     "alarm clock", "coughing",
 )  # fmt: skip
-TESTED = 5  # the fold whose clips test; the edition before heard none of its household clips
 HEARD = 4  # the fold of which it heard them
 BANK_EACH = 4  # synthetic examples of a kind without recordings
-ROOM_S = 0.6
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +39,7 @@ class Networks:
         settings: how they are fitted.
         start: the weights of the edition before, whose lower blocks they share.
         work: folder of the networks.
+        teacher: what a published network makes of every recorded clip; None for no teacher.
     """
 
     corpus: Corpus
@@ -47,6 +47,7 @@ class Networks:
     settings: Settings
     start: Path
     work: Path
+    teacher: Opinion | None = None
 
     def of_fold(self, fold: int) -> SoundNet:
         """Return the network that learnt nothing from the clips of a fold (0: one that learnt from all)."""
@@ -63,7 +64,8 @@ class Networks:
     def _fitted(self, name: str, fold: int, without: Sequence[int]) -> SoundNet:
         file, net = self.work / f"{name}.pt", self._opened()
         if not file.exists():
-            fitted = fit_upper(net, self.lessons(), targets(self.encode_words), self.settings, fold, without)
+            words = targets(self.encode_words)
+            fitted = fit_upper(net, self.lessons(), words, self.settings, fold, without, self.teacher)
             torch.save(fitted.state_dict(), file)
         net.load_state_dict(torch.load(file, weights_only=True))
         return net.eval()

@@ -1,7 +1,8 @@
 """Fit a network to what a published network says of mixtures, and to the words of what they hold.
 
-``python -m training.sounds.distil --without 5`` fits without one fold and prints how that fold is named. A run that was
-interrupted continues from its last ``REPORTED`` steps; its losses are in ``build/sounds/distilled-*.csv``.
+``python -m training.sounds.distil --without 5`` fits without one fold and prints how that fold is named. It begins from
+the weights that ship, made wider. A run that was interrupted continues from its last ``REPORTED`` steps; its losses are
+in ``build/sounds/distilled-*.csv``.
 """
 
 import argparse
@@ -25,11 +26,11 @@ from training.sounds.augmentation import (
     segmented,
 )
 from training.sounds.clips import mels_of, read_index, read_samples
-from training.sounds.export import write_onnx
-from training.sounds.fit import blend, encode, share_of_rate, steady_noise, targets
+from training.sounds.export import opened_norms, read_onnx, write_onnx
+from training.sounds.fit import blend, encode, half_precision_is_fast, share_of_rate, steady_noise, targets
 from training.sounds.kinds import NAMES, RECORDED
 from training.sounds.mixtures import Mixtures, Recipe, of_training, stored_mixtures
-from training.sounds.network import SoundNet
+from training.sounds.network import SoundNet, widened
 
 from avlmaps.core.progress import say
 from avlmaps.perception.embedded.sound_calibration import typical_examples
@@ -37,6 +38,7 @@ from avlmaps.perception.embedded.words import EmbeddedWords
 
 ROOT = Path(__file__).resolve().parents[2]
 SHARED = ROOT.parent / "shared"
+SHIPS = ROOT / "src/avlmaps/perception/embedded/weights/sounds.onnx"
 REPORTED = 200
 
 
@@ -77,10 +79,17 @@ class Settings:
 
 
 class Student(SoundNet):
-    """A sound network with two more heads, which serve training alone."""
+    """A sound network with two more heads, which serve training alone.
 
-    def __init__(self, dim: int, width: int, names: int, features: int) -> None:
-        super().__init__(dim, width)
+    Args:
+        start: the network to begin from.
+        names: how many the teacher has.
+        features: how many numbers the teacher's have.
+    """
+
+    def __init__(self, start: SoundNet, names: int, features: int) -> None:
+        super().__init__(start.head.out_features, start.stem.out_channels)
+        self.load_state_dict(start.state_dict())
         pooled = self.head.in_features
         self.named, self.felt = nn.Linear(pooled, names), nn.Linear(pooled, features)
 
@@ -125,17 +134,18 @@ class Heard:
         return x.to(memory_format=torch.channels_last), aim, self._probabilities[at], self._features[at]
 
 
-def fit(mixtures: Mixtures, words: Tensor, settings: Settings, check: Path | None = None) -> Student:
+def fit(start: SoundNet, mixtures: Mixtures, words: Tensor, settings: Settings, check: Path | None = None) -> Student:
     """Return the averaged student.
 
     Args:
+        start: the network to begin from.
         mixtures: what it learns from.
         words: targets (templates, kinds, dim).
         settings: how.
         check: where to store all that is needed to continue, with the losses in a CSV file beside it; nowhere if None.
     """
     torch.manual_seed(settings.seed)
-    net = Student(words.shape[2], settings.width, mixtures.logits.shape[1], mixtures.features.shape[1]).train()
+    net = Student(start, mixtures.logits.shape[1], mixtures.features.shape[1]).train()
     average = copy.deepcopy(net).eval()
     optimiser = torch.optim.AdamW(net.parameters(), lr=settings.rate, weight_decay=settings.decay)
     parts = {"net": net, "average": average, "optimiser": optimiser}
@@ -152,7 +162,8 @@ def fit(mixtures: Mixtures, words: Tensor, settings: Settings, check: Path | Non
         for group in optimiser.param_groups:
             group["lr"] = settings.rate * share_of_rate(step, settings.steps, 0.8)
         x, aim, probabilities, features = drawn.draw()
-        vectors, names, felt = net.answers(x)
+        with torch.autocast("cpu", torch.bfloat16, enabled=half_precision_is_fast()):
+            vectors, names, felt = (each.float() for each in net.answers(x))
         template = words[int(torch.randint(len(words), ()))]
         losses = torch.stack([
             functional.cross_entropy(vectors @ template.T / s.temperature, aim, label_smoothing=s.smoothing),
@@ -203,7 +214,8 @@ def main() -> None:
     parser.add_argument("--without", type=int, default=5, help="the fold that nothing is learnt from; 0 for none")
     parser.add_argument("--mixtures", type=int, default=Recipe.count)
     parser.add_argument("--steps", type=int, default=5000)
-    parser.add_argument("--width", type=int, default=32)
+    parser.add_argument("--width", type=int, default=32, help="at least that of the weights to begin from")
+    parser.add_argument("--start", type=Path, default=SHIPS, help="weights to begin from")
     arguments = parser.parse_args()
     torch.set_num_threads(1)
     clips = tuple(read_index(arguments.sounds))
@@ -214,7 +226,10 @@ def main() -> None:
     words = targets(EmbeddedWords().encode)
     name = f"distilled-{arguments.width}-{arguments.steps}-{arguments.without}"
     settings = Settings(steps=arguments.steps, width=arguments.width)
-    student = fit(mixtures, words, settings, arguments.work / f"{name}.pt")
+    torch.manual_seed(settings.seed)
+    start = widened(read_onnx(arguments.start), arguments.width)
+    opened_norms(start, heard(peak_normalised(torch.from_numpy(mixtures.mels[::32].astype(np.float32)))))
+    student = fit(start, mixtures, words, settings, arguments.work / f"{name}.pt")
     write_onnx([student], arguments.work / f"{name}.onnx")
     if not arguments.without:
         return

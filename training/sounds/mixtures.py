@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float32
 from training.sounds.clips import SHIPPABLE, Clip, mels_of
-from training.sounds.efficientat import opinion, read_efficientat
+from training.sounds.efficientat import opinion, read_audio, read_efficientat
 from training.sounds.kinds import MADE, NAMES
 
 from avlmaps.core.progress import progress
@@ -67,14 +67,6 @@ class Mixtures:
     logits: np.ndarray
     kinds: np.ndarray
     share: np.ndarray
-
-
-def read_audio(path: Path) -> Float32[np.ndarray, " n"]:
-    """Read a file as mono at the teacher's rate."""
-    import soundfile
-
-    samples, rate_hz = soundfile.read(path, dtype="float32", always_2d=True)
-    return resample(Sound(samples.mean(axis=1), rate_hz), RATE_HZ).samples
 
 
 def made_audio(each: int, seed: int = 0) -> tuple[list[np.ndarray], np.ndarray]:

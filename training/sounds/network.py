@@ -51,3 +51,25 @@ class SoundNet(nn.Module):
     def forward(self, x: Tensor) -> Tensor:
         """Return unit vectors."""
         return self.upper(self.lower(x))
+
+
+@torch.no_grad()
+def widened(net: SoundNet, width: int) -> SoundNet:
+    """Return a network of more channels that answers alike (Chen et al., Net2Net, ICLR 2016).
+
+    New channels are random; the old ones have zero weights for them, which fitting may change.
+    """
+    wide = SoundNet(net.head.out_features, width, net.dropout.p).eval()
+    old = net.state_dict()
+    for name, value in wide.state_dict().items():
+        given = old[name]
+        if name == "head.weight":  # of the means, then of the highest: the old channels come first in both
+            value.zero_()
+            for part, kept in zip(value.chunk(2, dim=1), given.chunk(2, dim=1), strict=True):
+                part[:, : kept.shape[1]] = kept
+        elif value.ndim > 1:
+            value[: given.shape[0], given.shape[1] :] = 0.0
+            value[: given.shape[0], : given.shape[1]] = given
+        elif value.ndim == 1:
+            value[: len(given)] = given
+    return wide
