@@ -5,7 +5,8 @@ COPY requirements/lock.txt requirements/lock.txt
 RUN pip install --no-cache-dir --require-hashes -r requirements/lock.txt
 COPY pyproject.toml README.md LICENSE NOTICE ./
 COPY src src
-RUN pip install --no-cache-dir --no-deps --no-build-isolation .
+COPY packages/avlmaps-sim packages/avlmaps-sim
+RUN pip install --no-cache-dir --no-deps --no-build-isolation . ./packages/avlmaps-sim
 RUN useradd --create-home robot
 USER robot
 WORKDIR /data

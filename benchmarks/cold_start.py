@@ -15,7 +15,8 @@ import sys  # noqa: E402
 import tempfile  # noqa: E402
 from pathlib import Path  # noqa: E402
 
-from avlmaps import AVLMap, RecordSettings, build_map, open_scene, record_scene  # noqa: E402
+from avlmaps import AVLMap, build_map  # noqa: E402
+from avlmaps_sim import RecordSettings, open_scene, record_scene  # noqa: E402
 
 THING, SENTENCE = "bed", "the chair near the table"
 

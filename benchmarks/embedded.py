@@ -23,9 +23,9 @@ import numpy as np  # noqa: E402
 from avlmaps.core.camera import Pinhole, Rig  # noqa: E402
 from avlmaps.perception.embedded.scene_network import SceneNetwork, load_network  # noqa: E402
 from avlmaps.recordings.types import Frame, Ground  # noqa: E402
-from avlmaps.sim.render import Renderer  # noqa: E402
-from avlmaps.sim.scenes import open_scene  # noqa: E402
-from avlmaps.sim.views import random_views  # noqa: E402
+from avlmaps_sim.render import Renderer  # noqa: E402
+from avlmaps_sim.scenes import open_scene  # noqa: E402
+from avlmaps_sim.views import random_views  # noqa: E402
 
 CAMERA = Pinhole(277.0, 277.0, 160.0, 120.0, 320, 240)
 

@@ -29,10 +29,10 @@ from avlmaps.maps.pipeline.estimate import estimate_sensor  # noqa: E402
 from avlmaps.maps.settings import BuildSettings  # noqa: E402
 from avlmaps.recordings.open import open_recording  # noqa: E402
 from avlmaps.recordings.types import Recording  # noqa: E402
-from avlmaps.sim.recorder import RecordSettings, record_scene  # noqa: E402
-from avlmaps.sim.render import Renderer  # noqa: E402
-from avlmaps.sim.scene import Scene  # noqa: E402
-from avlmaps.sim.scenes import open_scene  # noqa: E402
+from avlmaps_sim.recorder import RecordSettings, record_scene  # noqa: E402
+from avlmaps_sim.render import Renderer  # noqa: E402
+from avlmaps_sim.scene import Scene  # noqa: E402
+from avlmaps_sim.scenes import open_scene  # noqa: E402
 
 GRID = GridSpec(0.05)
 WITHIN_M, SEEN_M, FAR_OFF_M = 0.05, 4.0, 0.2

@@ -12,13 +12,13 @@ timing.use_one_thread()
 import cv2  # noqa: E402
 import numpy as np  # noqa: E402
 
-from avlmaps.bench.locate import MapOfPictures  # noqa: E402
 from avlmaps.core.camera import Pinhole, Rig  # noqa: E402
 from avlmaps.maps.keyframes.describe import SeenKeyframe, stack_keyframes  # noqa: E402
 from avlmaps.perception.embedded.matching import RATIO, match_mutual  # noqa: E402
 from avlmaps.perception.encoders import Encoders  # noqa: E402
 from avlmaps.perception.pose import estimate_pose  # noqa: E402
 from avlmaps.query.locate import alike, locate  # noqa: E402
+from avlmaps_sim.bench.locate import MapOfPictures  # noqa: E402
 
 CAMERA = Pinhole(525.0, 525.0, 320.0, 240.0, 640, 480)
 DEPTH_M = 2.0

@@ -106,7 +106,7 @@ def measure(name: str, folder: Path, asked: Namespace) -> dict[str, object]:
         encoder: Any = load(kind, name)
         import torch
 
-        from avlmaps.perception.models.device import select_device
+        from avlmaps_models.common.device import select_device
 
         device = select_device()
         on_gpu = device.type != "cpu"
@@ -155,7 +155,7 @@ def write(name: str, folder: Path) -> None:
     """Write a backend's checkpoint; runs in a process of its own, for the memory."""
     import torch
 
-    from avlmaps.perception.models import device  # noqa: F401 - before transformers, see models/operators.py
+    from avlmaps_models.common import device  # noqa: F401 - before transformers, see models/operators.py
 
     torch.manual_seed(0)
     WRITERS[name](folder)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from avlmaps.bench.harness.provenance import in_words, outdated
-from avlmaps.bench.output import table_markdown
+from avlmaps_sim.bench.harness.provenance import in_words, outdated
+from avlmaps_sim.bench.output import table_markdown
 
 ROOT = Path(__file__).resolve().parents[1]
 FIGURES, PAGE, README = ROOT / "docs" / "benchmarks.json", ROOT / "docs" / "benchmarks.md", ROOT / "README.md"

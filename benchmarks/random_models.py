@@ -1,7 +1,8 @@
 """Checkpoints of the published sizes with random weights, for timing: no hub is queried, and no answer means anything.
 
 The sizes are those of the published ``config.json`` (or of the published code, for files that bring none); the layouts
-are the tests' (``tests/foundation/tiny``). Vocabularies of the tokenizers are small, tables of tokens are not.
+are the tests' (``packages/avlmaps-models/tests/foundation/tiny``). Vocabularies of the tokenizers are small, tables of
+tokens are not.
 """
 
 import json
@@ -10,7 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "foundation"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "packages/avlmaps-models/tests/foundation"))
 
 Writer = Callable[[Path], None]
 CLIP_B16, CLIP_B32 = "openai/clip-vit-base-patch16", "openai/clip-vit-base-patch32"

@@ -18,11 +18,11 @@ import cv2  # noqa: E402
 import numpy as np  # noqa: E402
 
 from avlmaps.core.camera import Pinhole  # noqa: E402
-from avlmaps.sim.render import Renderer  # noqa: E402
-from avlmaps.sim.scene import Scene  # noqa: E402
-from avlmaps.sim.scenes import open_scene  # noqa: E402
-from avlmaps.sim.sensor import KINECT, Sensor  # noqa: E402
-from avlmaps.sim.views import random_views  # noqa: E402
+from avlmaps_sim.render import Renderer  # noqa: E402
+from avlmaps_sim.scene import Scene  # noqa: E402
+from avlmaps_sim.scenes import open_scene  # noqa: E402
+from avlmaps_sim.sensor import KINECT, Sensor  # noqa: E402
+from avlmaps_sim.views import random_views  # noqa: E402
 
 CAMERA = Pinhole(277.0, 277.0, 160.0, 120.0, 320, 240)
 

@@ -25,9 +25,9 @@ from typing import Any
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 
-from avlmaps.bench.harness.models import shipped_checksums  # noqa: E402
 from avlmaps.core.files import write_bytes_atomically  # noqa: E402
 from avlmaps.core.version import __version__  # noqa: E402
+from avlmaps_sim.bench.harness.models import shipped_checksums  # noqa: E402
 from page import (  # noqa: E402
     ENTRIES,
     FIGURES,

@@ -1,4 +1,4 @@
-"""No module of the package imports itself by way of others: neither at run time nor for types."""
+"""No module imports itself by way of others: neither at run time nor for types."""
 
 import ast
 from collections.abc import Iterator
@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-SRC = Path(__file__).parents[1] / "src"
+ROOT = Path(__file__).parents[1]
+SOURCES = (ROOT / "src", *sorted(ROOT.glob("packages/*/src")))
 
 
 class When(StrEnum):
@@ -19,11 +20,12 @@ class When(StrEnum):
     TYPED = "for the type checker"
 
 
-def modules(src: Path) -> dict[str, Path]:
+def modules(*sources: Path) -> dict[str, Path]:
     found: dict[str, Path] = {}
-    for path in sorted(src.rglob("*.py")):
-        parts = path.relative_to(src).with_suffix("").parts
-        found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    for src in sources:
+        for path in sorted(src.rglob("*.py")):
+            parts = path.relative_to(src).with_suffix("").parts
+            found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
     return found
 
 
@@ -43,9 +45,9 @@ def imports(tree: ast.AST, package: str, when: When = When.LOADED) -> Iterator[t
             yield from imports(node, package, When.CALLED if inside and when is When.LOADED else when)
 
 
-def import_graph(src: Path) -> dict[str, set[tuple[When, str]]]:
+def import_graph(*sources: Path) -> dict[str, set[tuple[When, str]]]:
     """Return for each module which others of the package it imports, and when."""
-    every = modules(src)
+    every = modules(*sources)
     graph: dict[str, set[tuple[When, str]]] = {}
     for name, path in every.items():
         package = name if path.name == "__init__.py" else name.rpartition(".")[0]
@@ -87,7 +89,7 @@ def circles(graph: dict[str, set[str]]) -> list[list[str]]:
 
 @cache
 def own_graph() -> dict[str, set[tuple[When, str]]]:
-    return import_graph(SRC)
+    return import_graph(*SOURCES)
 
 
 @pytest.mark.parametrize(
@@ -119,7 +121,8 @@ def test_a_circle_is_found_whenever_its_imports_are_carried_out(tmp_path: Path) 
     assert circles(loaded) == []
 
 
-def test_the_whole_package_is_read() -> None:
+def test_all_distributions_are_read() -> None:
     graph = own_graph()
     assert len(graph) > 300
+    assert {name.partition(".")[0] for name in graph} == {"avlmaps", "avlmaps_sim", "avlmaps_models"}
     assert (When.LOADED, "avlmaps.query.goals") in graph["avlmaps.query.heatmap"]

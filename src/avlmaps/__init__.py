@@ -16,7 +16,10 @@ Importing the package loads nothing heavy; each public name is imported when it 
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from avlmaps.core import moved
 from avlmaps.core.version import __version__
+
+moved.install()
 
 if TYPE_CHECKING:
     from avlmaps.api import build_map, open_map
@@ -52,8 +55,6 @@ if TYPE_CHECKING:
     from avlmaps.recordings.open import open_recording
     from avlmaps.recordings.types import Frame, Recording
     from avlmaps.recordings.writer import RecordingWriter
-    from avlmaps.sim.recorder import RecordSettings, record_scene
-    from avlmaps.sim.scenes import open_scene
 
 # Where each public name lives.
 _HOMES = {
@@ -84,7 +85,6 @@ _HOMES = {
     "QueryError": "avlmaps.core.errors",
     "QuerySettings": "avlmaps.query.avlmap",
     "Question": "avlmaps.core.question",
-    "RecordSettings": "avlmaps.sim.recorder",
     "Recording": "avlmaps.recordings.types",
     "RecordingError": "avlmaps.core.errors",
     "RecordingWriter": "avlmaps.recordings.writer",
@@ -100,9 +100,7 @@ _HOMES = {
     "build_map": "avlmaps.api",
     "open_map": "avlmaps.api",
     "open_recording": "avlmaps.recordings.open",
-    "open_scene": "avlmaps.sim.scenes",
     "profile": "avlmaps.perception.profiles",
-    "record_scene": "avlmaps.sim.recorder",
 }
 
 __all__ = [
@@ -133,7 +131,6 @@ __all__ = [
     "QueryError",
     "QuerySettings",
     "Question",
-    "RecordSettings",
     "Recording",
     "RecordingError",
     "RecordingWriter",
@@ -150,13 +147,13 @@ __all__ = [
     "build_map",
     "open_map",
     "open_recording",
-    "open_scene",
     "profile",
-    "record_scene",
 ]
 
 
 def __getattr__(name: str) -> Any:
+    if name in moved.NAMES:
+        return moved.moved_name(name)
     if name not in _HOMES:
         raise AttributeError(f"module 'avlmaps' has no attribute {name!r}")
     return getattr(importlib.import_module(_HOMES[name]), name)

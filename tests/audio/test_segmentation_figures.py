@@ -3,9 +3,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from avlmaps.bench.harness.intervals import poisson, wilson
-from avlmaps.bench.segmentation import COLUMNS, Tally, clips_to_test, measure
 from avlmaps.maps.audio.segmentation import Segment, SegmentationSettings
+from avlmaps_sim.bench.harness.intervals import poisson, wilson
+from avlmaps_sim.bench.segmentation import COLUMNS, Tally, clips_to_test, measure
 
 
 def test_a_segment_over_two_sounds_finds_one_of_them() -> None:

@@ -16,7 +16,7 @@ from avlmaps.query.asking import Asked, thing_alone
 
 HEAVY = {
     "numba", "llvmlite", "scipy", "onnxruntime", "av", "matplotlib", "trimesh", "soundfile", "PIL",
-    "avlmaps.language", "avlmaps.sim", "typeguard", "jaxtyping", "asyncio", "numpy.ma", "numpy.random",
+    "avlmaps.language", "avlmaps_sim", "typeguard", "jaxtyping", "asyncio", "numpy.ma", "numpy.random",
 }  # fmt: skip
 ASK = """
 import json, sys

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from avlmaps.core.extras import install_command
-from avlmaps.sim.materials import material
-from avlmaps.sim.scene import Scene, SceneBuilder
-from avlmaps.sim.shapes import slab
+from avlmaps_sim.materials import material
+from avlmaps_sim.scene import Scene, SceneBuilder
+from avlmaps_sim.shapes import slab
 from helpers.room import Room
 
 
@@ -36,7 +36,7 @@ def scene_of(room: Room) -> Scene:
 @pytest.fixture
 def in_room(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let any scene be the room that the map was made of."""
-    monkeypatch.setattr("avlmaps.sim.scenes.open_scene", lambda spec: scene_of(Room()))
+    monkeypatch.setattr("avlmaps_sim.scenes.open_scene", lambda spec: scene_of(Room()))
 
 
 def test_a_sentence_is_obeyed_and_told(answer, built: Path, tmp_path: Path, in_room: None) -> None:
@@ -107,7 +107,7 @@ def test_a_start_in_a_thing_or_outside_is_refused(run, built: Path, in_room: Non
 
 def test_a_scene_that_the_map_was_not_made_of_is_refused(run, built: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     elsewhere = Room(things=(), size=(2.0, 2.0, 2.6))
-    monkeypatch.setattr("avlmaps.sim.scenes.open_scene", lambda spec: scene_of(elsewhere))
+    monkeypatch.setattr("avlmaps_sim.scenes.open_scene", lambda spec: scene_of(elsewhere))
     status, _, err = run("go", built, "turn left", "--scene", "room")
     assert status == 1
     assert "is not the one that was mapped" in err

@@ -106,8 +106,14 @@ def test_chosen_backends_build_the_map_and_info_tells_them(walk: Path, answer, t
 
 def test_a_missing_package_is_told_with_its_command(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Backend, "missing", property(lambda self: self.needs))
-    assert state_of(Kind.PIXELS, "tipsv2") == ("package missing", install_command("foundation"))
-    assert state_of(Kind.SOUNDS, "audioclip") == ("package missing", install_command("paper"))
+    assert state_of(Kind.PIXELS, "tipsv2") == (
+        "package missing",
+        install_command("foundation", distribution="avlmaps-models"),
+    )
+    assert state_of(Kind.SOUNDS, "audioclip") == (
+        "package missing",
+        install_command("paper", distribution="avlmaps-models"),
+    )
 
 
 LAYOUTS = ("org/name", "org--name", "name")

@@ -9,19 +9,14 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 import pytest
 
 from avlmaps.api import build_map
-from avlmaps.bench.indexing import IndexingSettings
-from avlmaps.bench.navigation import NavigationSettings
-from avlmaps.cli.bench import Indexing, Navigation
 from avlmaps.cli.build import Build
 from avlmaps.cli.go import Chat
 from avlmaps.cli.reading_options import Reading
 from avlmaps.cli.verb import ModelVerb, Verb
 from avlmaps.cli.verbs import VERBS
-from avlmaps.demo.run import run_demo
 from avlmaps.language.chat.settings import ChatSettings
 from avlmaps.maps.fusion.sensor import SensorName
 from avlmaps.maps.fusion.settings import FusionSettings
-from avlmaps.maps.import_reference.convert import ImportSettings
 from avlmaps.maps.settings import BuildSettings, FrameSettings, GravitySettings
 from avlmaps.navigate.bodies import BodyShape
 from avlmaps.navigate.skills import RobotSettings
@@ -36,8 +31,13 @@ from avlmaps.recordings.consistency.verdict import Reason
 from avlmaps.recordings.open import open_recording
 from avlmaps.serve.drive.robots import RobotFile
 from avlmaps.serve.settings import ServeSettings
-from avlmaps.sim.recorder import RecordSettings, record_scene
 from avlmaps.view.server import ViewServer
+from avlmaps_models.import_reference.convert import ImportSettings
+from avlmaps_sim.bench.indexing import IndexingSettings
+from avlmaps_sim.bench.navigation import NavigationSettings
+from avlmaps_sim.demo.run import run_demo
+from avlmaps_sim.recorder import RecordSettings, record_scene
+from avlmaps_sim.verbs.bench import Indexing, Navigation
 
 EVERYWHERE = ("json", "models", "device", "precision")  # checked once, by test_the_models_options
 GROUPS = {

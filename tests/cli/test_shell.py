@@ -139,7 +139,7 @@ def test_export_writes_once(piped, built: Path, tmp_path: Path) -> None:
 
 
 def test_a_plan_is_driven_only_when_it_is_confirmed(piped, built: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("avlmaps.sim.scenes.open_scene", lambda spec: scene_of(Room()))
+    monkeypatch.setattr("avlmaps_sim.scenes.open_scene", lambda spec: scene_of(Room()))
     lines = "go turn left\nn\ngo turn left\nthe red thing\ngo turn left\ny\ngo turn right\nyes\ngo blorfle\n"
     status, out, err = piped(lines, built, "--json", "--scene", "room", "--start", "4.4,3.2,90")
     assert status == 1

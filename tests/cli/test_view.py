@@ -48,8 +48,8 @@ def test_a_scene_that_is_not_the_maps_is_refused_before_a_page_opens(
     def elsewhere(*_: object) -> None:
         raise SceneError("The scene is not the one that was mapped; give the scene that was recorded.")
 
-    monkeypatch.setattr("avlmaps.sim.scenes.open_scene", lambda spec: scene_of(Room()))
-    monkeypatch.setattr("avlmaps.demo.driving._require_same_frame", elsewhere)
+    monkeypatch.setattr("avlmaps_sim.scenes.open_scene", lambda spec: scene_of(Room()))
+    monkeypatch.setattr("avlmaps_sim.robots._require_same_frame", elsewhere)
     status, _, err = run("view", built, "--scene", "house:1", "--no-browser", "--port", "0")
     assert status == 1 and "not the one that was mapped" in err
 
@@ -61,7 +61,7 @@ def test_a_robot_drives_what_was_planned(built: Path, monkeypatch: pytest.Monkey
     from cli.test_go import scene_of
     from helpers.room import Room
 
-    monkeypatch.setattr("avlmaps.sim.scenes.open_scene", lambda spec: scene_of(Room()))
+    monkeypatch.setattr("avlmaps_sim.scenes.open_scene", lambda spec: scene_of(Room()))
     session = ViewSession([AVLMap.open(built)], _robot("room"))
     told = session.obey("go to the red thing")
     assert told["driven"]["ok"] and told["planned"]["ok"]

@@ -9,14 +9,14 @@ from pathlib import Path
 import pytest
 
 from avlmaps.core.lexicon import Kind, lexicon, squeezed
-from avlmaps.demo import questions
 from avlmaps.perception.embedded.words import EmbeddedWords
 from avlmaps.perception.models.prompts import THINGS
 from avlmaps.query.modalities.area import AREA_NAMES
-from avlmaps.sim.furniture import categories
-from avlmaps.sim.hearing import KINDS as SOUND_KINDS
-from avlmaps.sim.homes.furnish import HANGING_M
-from avlmaps.sim.homes.programme import home_programme, office_programme
+from avlmaps_sim.demo import questions
+from avlmaps_sim.furniture import categories
+from avlmaps_sim.hearing import KINDS as SOUND_KINDS
+from avlmaps_sim.homes.furnish import HANGING_M
+from avlmaps_sim.homes.programme import home_programme, office_programme
 
 KNOWN = lexicon()
 NYU40 = (
@@ -130,7 +130,7 @@ def test_aliases_of_the_word_encoder_are_known() -> None:
 
 
 def test_no_paraphrase_by_which_sounds_are_tested_was_learnt() -> None:
-    with files("avlmaps.bench.data").joinpath("sounds_paraphrases.csv").open(encoding="utf-8") as file:
+    with files("avlmaps_sim.bench.data").joinpath("sounds_paraphrases.csv").open(encoding="utf-8") as file:
         tested = {squeezed(row["phrase"]) for row in csv.DictReader(file)}
     assert {squeezed(word) for entry in KNOWN.entries(Kind.SOUND) for word in entry.learnt}.isdisjoint(tested)
 

@@ -16,13 +16,13 @@ from pathlib import Path
 import numpy as np
 from campaign import build, in_child, verdict_of
 
-from avlmaps.bench.recordings.drafts import Draft, RoomWalk
-from avlmaps.bench.recordings.formats import FOLDER, FORMATS, TUM_CAMERA, Format
-from avlmaps.bench.recordings.outcomes import Judge
-from avlmaps.bench.recordings.situations import situations
 from avlmaps.core import poses
 from avlmaps.maps.store.reader import StoredMap, open_stored
 from avlmaps.recordings.open import open_recording
+from avlmaps_sim.bench.recordings.drafts import Draft, RoomWalk
+from avlmaps_sim.bench.recordings.formats import FOLDER, FORMATS, TUM_CAMERA, Format
+from avlmaps_sim.bench.recordings.outcomes import Judge
+from avlmaps_sim.bench.recordings.situations import situations
 
 # Of twelve seconds: on a walk of half a metre the noise of a Kinect hides half the scale of the positions.
 _PACE = {"frames": 30, "rate_hz": 2.5, "turn_rad_s": 0.5}

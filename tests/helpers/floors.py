@@ -5,11 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from avlmaps.maps.obstacles import SIGHT_M, CellState, Obstacles
-from avlmaps.sim import shapes
-from avlmaps.sim.free_space import floor_cells, floor_heights
-from avlmaps.sim.grid_kernels import mark_slab
-from avlmaps.sim.mesh import Material
-from avlmaps.sim.scene import Scene, SceneBuilder
+from avlmaps_sim import shapes
+from avlmaps_sim.free_space import floor_cells, floor_heights
+from avlmaps_sim.grid_kernels import mark_slab
+from avlmaps_sim.mesh import Material
+from avlmaps_sim.scene import Scene, SceneBuilder
 
 GREY = Material((0.5, 0.5, 0.5))
 WALL_M = 0.1

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from avlmaps.sim.mesh import Material, Triple
-from avlmaps.sim.scene import Area, Light, Scene, SceneBuilder
-from avlmaps.sim.shapes import box, sheet
+from avlmaps_sim.mesh import Material, Triple
+from avlmaps_sim.scene import Area, Light, Scene, SceneBuilder
+from avlmaps_sim.shapes import box, sheet
 
 HEIGHT_M = 2.6
 _PAINT = Material((0.8, 0.8, 0.75))

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from avlmaps.sim.mesh import Material
-from avlmaps.sim.scene import Area, Scene, SceneBuilder
-from avlmaps.sim.shapes import box as box_mesh
+from avlmaps_sim.mesh import Material
+from avlmaps_sim.scene import Area, Scene, SceneBuilder
+from avlmaps_sim.shapes import box as box_mesh
 
 PLAIN = Material()
 

@@ -93,6 +93,8 @@ def files() -> Iterator[Path]:
         "training/**/*.md",
         "training/**/*.py",
         "src/avlmaps/**/*.py",
+        "packages/*/*.md",
+        "packages/*/src/**/*.py",
         "benchmarks/**/*.py",
     ):
         for path in sorted(ROOT.glob(pattern)):

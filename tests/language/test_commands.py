@@ -10,7 +10,6 @@ from development import NAMES, counted, rows
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from avlmaps.bench.language import counts, judge, read_list
 from avlmaps.core.errors import AvlmapsError, LanguageError
 from avlmaps.language.commands import read_command
 from avlmaps.language.intents import Clarify, Go, Kind, Refuse, Target
@@ -21,6 +20,7 @@ from avlmaps.language.rules import RulesTranslator, UnclearError, command_to_pro
 from avlmaps.language.sentence import Given
 from avlmaps.language.translator import Translator
 from avlmaps.language.verbalise import verbalise
+from avlmaps_sim.bench.language import counts, judge, read_list
 
 LISTS = Path(__file__).parent / "commands"
 # How many commands of each development list are right at least, and how many may be read as something else at most.

@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from avlmaps.bench.language import judge, judge_intents, judge_question, read_list
 from avlmaps.core.errors import BackendError
 from avlmaps.language import lexer
 from avlmaps.language.commands import read_command
@@ -56,6 +55,7 @@ from avlmaps.language.learned.reader import LearnedReader, learned_reader
 from avlmaps.language.rules import RulesTranslator, explanation
 from avlmaps.language.sentence import Given, Sentence
 from avlmaps.language.word_classes import load_word_classes
+from avlmaps_sim.bench.language import judge, judge_intents, judge_question, read_list
 
 HELD_OUT = Path(__file__).parent / "commands" / "learned_held_out.jsonl"
 # Of the held-out rows as many are right at least, and misread at most; both are a little wide of what was measured.

@@ -10,7 +10,7 @@ from avlmaps.language.storey_words import asks_how_many_storeys, said_storeys
 NAMED = {
     "the bed upstairs": ("the bed", None, True, False),
     "where is the sofa downstairs?": ("where is the sofa?", None, False, False),
-    "the upstairs bathroom": ("bathroom", None, True, False),
+    "the upstairs bathroom": ("the bathroom", None, True, False),
     "the chair on the first floor": ("the chair", 1, None, False),
     "the chair near the table on the ground floor": ("the chair near the table", 0, None, False),
     "the 2nd floor bedroom": ("bedroom", 2, None, False),

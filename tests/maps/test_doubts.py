@@ -6,7 +6,6 @@ from pathlib import Path
 import pytest
 from build_fakes import SETTINGS, register_fakes
 
-from avlmaps.bench.recordings.drafts import Draft, RoomWalk
 from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import RecordingError
@@ -15,6 +14,7 @@ from avlmaps.maps.pipeline.write import carving_doubts
 from avlmaps.maps.store.manifest import Removed
 from avlmaps.query.contents import Contents
 from avlmaps.recordings.open import open_recording
+from avlmaps_sim.bench.recordings.drafts import Draft, RoomWalk
 
 PROFILE = register_fakes()
 
@@ -26,7 +26,7 @@ def right() -> Draft:
 
 def test_it_is_refused_with_the_cause_and_the_name_that_lets_it_through(right: Draft, tmp_path: Path) -> None:
     walk = replace(right, poses=poses.inverse(right.poses)).write(tmp_path / "walk")
-    said = r"walk cannot be right\. .*Corrections\.poses=camera-from-world.*allow=geometry\."
+    said = r"walk cannot be right\. .*--poses camera-from-world.*--allow geometry\."
     with pytest.raises(RecordingError, match=said):
         build_map(open_recording(walk), tmp_path / "map", PROFILE, SETTINGS, progress=False)
     with pytest.raises(RecordingError, match="nothing called 'geometri' to allow"):

@@ -15,8 +15,8 @@ from avlmaps.maps.obstacles import CellState, Obstacles
 from avlmaps.navigate.bodies import BodyShape
 from avlmaps.navigate.controller import bearing
 from avlmaps.navigate.driver import Driver, DriveSettings, MapDriver
-from avlmaps.sim.body import Building, MotionNoise, SimulatedBody
-from avlmaps.sim.scenes import open_scene
+from avlmaps_sim.body import Building, MotionNoise, SimulatedBody
+from avlmaps_sim.scenes import open_scene
 from helpers.floors import hall, seen
 
 BOXES = [

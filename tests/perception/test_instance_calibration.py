@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from avlmaps.core.lexicon import Kind, lexicon
 from avlmaps.perception.embedded.pixels import EmbeddedPixels
 from avlmaps.perception.embedded.scene_network import load_network
-from avlmaps.sim.homes import furnish
+from avlmaps_sim.homes import furnish
 
 with pytest.MonkeyPatch.context() as patch:  # training is beside the package, not in it
     patch.syspath_prepend(str(Path(__file__).resolve().parents[2]))

@@ -13,9 +13,9 @@ from avlmaps.perception.embedded.multi_scale import LOOKS, see_multi_scale
 from avlmaps.perception.embedded.pixels import EmbeddedPixels
 from avlmaps.perception.embedded.scene_network import PLAIN, Look, load_network
 from avlmaps.recordings.types import Frame
-from avlmaps.sim.render import Renderer
-from avlmaps.sim.scenes import open_scene
-from avlmaps.sim.views import random_views
+from avlmaps_sim.render import Renderer
+from avlmaps_sim.scenes import open_scene
+from avlmaps_sim.views import random_views
 
 CAMERA = Pinhole(277.0, 277.0, 160.0, 120.0, 320, 240)
 GRID = Pinhole(8.0, 8.0, 6.0, 5.0, 12, 10)

@@ -6,18 +6,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from avlmaps.bench.frames import ONCE, measure
-from avlmaps.bench.labelled_folder import LabelledFolder
-from avlmaps.bench.nyu import CLASSES, class_of_kinds
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.perception.embedded.pixels import EmbeddedPixels
 from avlmaps.perception.embedded.scene_network import DEFAULT_WEIGHTS, SYNTHETIC_WEIGHTS, SceneNetwork, load_network
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Frame, Ground
-from avlmaps.sim.render import Renderer
-from avlmaps.sim.scenes import open_scene
-from avlmaps.sim.sensor import CLEAN, KINECT, Sensor, SensorSettings
-from avlmaps.sim.walk import random_views
+from avlmaps_sim.bench.frames import ONCE, measure
+from avlmaps_sim.bench.labelled_folder import LabelledFolder
+from avlmaps_sim.bench.nyu import CLASSES, class_of_kinds
+from avlmaps_sim.render import Renderer
+from avlmaps_sim.scenes import open_scene
+from avlmaps_sim.sensor import CLEAN, KINECT, Sensor, SensorSettings
+from avlmaps_sim.walk import random_views
 
 WEIGHTS = (DEFAULT_WEIGHTS, SYNTHETIC_WEIGHTS)
 CAMERA = Pinhole(260.0, 260.0, 160.0, 120.0, 320, 240)

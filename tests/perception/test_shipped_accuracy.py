@@ -10,16 +10,16 @@ from importlib.resources import files
 import numpy as np
 import pytest
 
-from avlmaps.bench.words import heldout, places
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.perception.embedded.scene_network import SceneNetwork, load_network
 from avlmaps.perception.embedded.sounds import EmbeddedSounds
 from avlmaps.perception.embedded.words import EmbeddedWords
 from avlmaps.recordings.types import Frame, Ground
-from avlmaps.sim.hearing import Synthesised
-from avlmaps.sim.render import Renderer
-from avlmaps.sim.scenes import open_scene
-from avlmaps.sim.views import random_views
+from avlmaps_sim.bench.words import heldout, places
+from avlmaps_sim.hearing import Synthesised
+from avlmaps_sim.render import Renderer
+from avlmaps_sim.scenes import open_scene
+from avlmaps_sim.views import random_views
 from helpers.onnx_weights import shuffled_weights
 
 WEIGHTS = files("avlmaps.perception.embedded") / "weights"

@@ -11,12 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import avlmaps.perception.embedded as embedded
-from avlmaps.bench import words as bench
 from avlmaps.core.errors import QueryError
 from avlmaps.core.registry import Kind, load
 from avlmaps.perception.embedded.wordpieces import WordPieces, clean_phrase, head_of, replace_aliases
 from avlmaps.perception.embedded.words import EmbeddedWords, read_aliases
 from avlmaps.perception.protocols import WordEncoder
+from avlmaps_sim.bench import words as bench
 
 WEIGHTS = Path(embedded.__file__).parent / "weights/words.npz"
 CHECKOUT = Path(__file__).parents[2]

@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from query_fakes import UP, furnished_map, keyframes_at, sounds_of
 
-from avlmaps.bench.harness.factors import VoxelHeat
 from avlmaps.core.errors import QueryError
 from avlmaps.core.question import Modality, Part, Question, Role
 from avlmaps.maps.grid import GridSpec
@@ -16,6 +15,7 @@ from avlmaps.query.goals import Goal
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.modalities.area import AreaSettings, modes
 from avlmaps.query.voxel_space import Space
+from avlmaps_sim.bench.harness.factors import VoxelHeat
 
 
 def track(x: float, y: float, z: float = 1.2, length_m: float = 1.0) -> np.ndarray:

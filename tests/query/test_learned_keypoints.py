@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from avlmaps.bench.locate import MapOfPictures, map_of
 from avlmaps.core.poses import inverse, rotation_angle_rad
 from avlmaps.maps.keyframes.describe import KeyframeSettings, describe_keyframe, stack_keyframes
 from avlmaps.maps.pipeline.keyframes import concat_keyframes
@@ -15,6 +14,7 @@ from avlmaps.perception.embedded.rootsift import RootSift
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.protocols import LocalFeatures, ModelCard
 from avlmaps.query.locate import LocateSettings, locate, locate_features
+from avlmaps_sim.bench.locate import MapOfPictures, map_of
 from helpers.picture_room import CAMERA, RoomWalk
 
 WALK = RoomWalk(frames=12)

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from training.found.fit import fitted, held_out
 from training.found.rows import balanced, read_rows
 
-from avlmaps.bench.found.suite import brier
 from avlmaps.core.question import Modality
 from avlmaps.query.evidence import Evidence, logit
 from avlmaps.query.probability import NUMBERS, probability_of, weights
+from avlmaps_sim.bench.found.suite import brier
 
 logits, logs = st.floats(-4, 4), st.floats(-4, 0)
 joined = st.builds(

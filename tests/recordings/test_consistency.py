@@ -10,14 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from avlmaps.bench.recordings.drafts import Draft, RoomWalk
-from avlmaps.bench.recordings.outcomes import Judge, Outcome
-from avlmaps.bench.recordings.situations import situations
 from avlmaps.cli.reading_options import Reading
 from avlmaps.cli.usage import CONFIG
 from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole
-from avlmaps.core.wording import Spelling, options_as
 from avlmaps.recordings.camera_axes import opencv_from_axes
 from avlmaps.recordings.consistency.check import check_recording
 from avlmaps.recordings.consistency.edges import find_edges, shift_of
@@ -25,6 +21,9 @@ from avlmaps.recordings.consistency.sample import Sample, choose_pairs, draw_sam
 from avlmaps.recordings.consistency.verdict import Grade, Reason, Verdict
 from avlmaps.recordings.corrections import Corrections
 from avlmaps.recordings.open import open_recording
+from avlmaps_sim.bench.recordings.drafts import Draft, RoomWalk
+from avlmaps_sim.bench.recordings.outcomes import Judge, Outcome
+from avlmaps_sim.bench.recordings.situations import situations
 
 CAMERA = Pinhole(48.0, 48.0, 32.0, 24.0, 64, 48)
 
@@ -85,8 +84,7 @@ WRONG = {
 @pytest.mark.parametrize("name", WRONG)
 def test_the_remedy_that_is_named_puts_the_recording_right(name: str, right: Draft, tmp_path: Path) -> None:
     wrong = WRONG[name](right)
-    with options_as(Spelling.FLAG):
-        found = verdict(wrong, tmp_path)
+    found = verdict(wrong, tmp_path)
     assert found.grade is not Grade.FINE
     geometry = next(f for f in found.findings if f.reason is Reason.GEOMETRY)
     again = verdict(wrong, tmp_path, options_in(geometry.remedy))
@@ -96,7 +94,7 @@ def test_the_remedy_that_is_named_puts_the_recording_right(name: str, right: Dra
 def test_a_wrong_option_is_found_out(right: Draft, tmp_path: Path) -> None:
     found = verdict(right, tmp_path, Corrections(camera_axes="opengl", depth_unit_m=0.001))
     assert found.grade is Grade.IMPOSSIBLE
-    assert "Corrections.camera_axes=opencv" in found.findings[0].remedy
+    assert "--camera-axes opencv" in found.findings[0].remedy
 
 
 @pytest.mark.parametrize(

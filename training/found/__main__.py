@@ -9,9 +9,9 @@ from training.found.fit import fitted, held_out
 from training.found.rows import Row, balanced, read_rows, write_rows
 
 import avlmaps.query
-from avlmaps.bench.found.answers import judged_scene
-from avlmaps.bench.found.suite import brier
-from avlmaps.bench.indexing import IndexingSettings
+from avlmaps_sim.bench.found.answers import judged_scene
+from avlmaps_sim.bench.found.suite import brier
+from avlmaps_sim.bench.indexing import IndexingSettings
 
 SCENES = tuple(f"house:{seed}:held-out" for seed in range(1_200_000, 1_200_008))
 WEIGHTS = Path(avlmaps.query.__path__[0]) / "found.json"

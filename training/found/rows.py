@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from avlmaps.bench.found.answers import Judged
 from avlmaps.core.question import Modality
 from avlmaps.query.evidence import Evidence
 from avlmaps.query.probability import NUMBERS
+from avlmaps_sim.bench.found.answers import Judged
 
 ROWS = Path(__file__).parent / "rows.csv"
 _COLUMNS = ("scene", "kind", "words", "answerable", "right", "combination", *NUMBERS)

@@ -13,7 +13,6 @@ from typing import Any
 from training.language.pool import HELD_OUT
 from training.language.rows import lists
 
-from avlmaps.bench.language import OUTCOMES, judge_intents, judge_question, read_list
 from avlmaps.core.errors import QueryError
 from avlmaps.language.commands import answered, weighed_readings
 from avlmaps.language.intents import Clarify, Intent, to_json
@@ -22,6 +21,7 @@ from avlmaps.language.learned.limits import Limits
 from avlmaps.language.learned.reader import LearnedReader, Read
 from avlmaps.language.questions import asked, by_name
 from avlmaps.language.sentence import Given, Sentence
+from avlmaps_sim.bench.language import OUTCOMES, judge_intents, judge_question, read_list
 
 FOLDS = (
     HELD_OUT,

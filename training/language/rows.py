@@ -34,7 +34,7 @@ from avlmaps.language.intents import (
 )  # fmt: skip
 
 ROOT = Path(__file__).parents[2]
-BLIND = ROOT / "src/avlmaps/bench/data/language"
+BLIND = ROOT / "packages/avlmaps-sim/src/avlmaps_sim/bench/data/language"
 LISTS = ROOT / "tests/language/commands"
 VOICES = Path(__file__).parent / "data"
 

@@ -17,16 +17,16 @@ from training.light.towers import PictureTower, PictureWords, SoundTower, SoundW
 
 from avlmaps.core.files import sha256_of_file
 from avlmaps.core.lexicon import Kind, lexicon
-from avlmaps.perception.foundation.clap import PROMPT as SOUND_PROMPT
 from avlmaps.perception.light import bundle as files
 from avlmaps.perception.light.mel import log_mel
 from avlmaps.perception.light.tokens import Tokens
 from avlmaps.perception.light.tower import interpolation, resized
 from avlmaps.perception.models.checksums import checksum_of, weights_in
 from avlmaps.perception.models.names import public_name
-from avlmaps.perception.models.pretrained import load_helper, load_pretrained, pretrained_folder
 from avlmaps.perception.models.prompts import AREA_PROMPTS, TIPS_PROMPTS, clean, mean_direction
 from avlmaps.perception.models.sound_scores import OTHERS
+from avlmaps_models.common.pretrained import load_helper, load_pretrained, pretrained_folder
+from avlmaps_models.foundation.clap import PROMPT as SOUND_PROMPT
 
 _CPU = torch.device("cpu")
 _OPSET = 17

@@ -14,11 +14,11 @@ from zlib import crc32
 
 import numpy as np
 
-from avlmaps.sim.files.gltf import read_parts
-from avlmaps.sim.furniture import catalogue
-from avlmaps.sim.furniture.catalogue import Families, Piece
-from avlmaps.sim.homes import furnish
-from avlmaps.sim.mesh import Mesh, joined
+from avlmaps_sim.files.gltf import read_parts
+from avlmaps_sim.furniture import catalogue
+from avlmaps_sim.furniture.catalogue import Families, Piece
+from avlmaps_sim.homes import furnish
+from avlmaps_sim.mesh import Mesh, joined
 
 # Of the pieces of a category with models this part is replaced.
 SHARE = 0.6

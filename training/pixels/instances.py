@@ -19,7 +19,6 @@ import tyro
 from training.pixels.borrowed import borrowed_furniture
 from training.pixels.worlds import FIRST_CALIBRATION_SEED
 
-from avlmaps.bench.objects import FEWEST_VOXELS, GROWN_M, STRUCTURE
 from avlmaps.core.errors import MapError
 from avlmaps.core.lexicon import Entry, Kind, lexicon
 from avlmaps.core.registry import Kind as Module
@@ -37,10 +36,11 @@ from avlmaps.query.object_settings import ObjectSettings
 from avlmaps.query.words import EncodedWord, Rivals
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Recording
-from avlmaps.sim.recorder import RecordSettings, record_scene
-from avlmaps.sim.scenes import open_scene
-from avlmaps.sim.sensor_settings import SensorName
-from avlmaps.sim.truth import read_truth
+from avlmaps_sim.bench.objects import FEWEST_VOXELS, GROWN_M, STRUCTURE
+from avlmaps_sim.recorder import RecordSettings, record_scene
+from avlmaps_sim.scenes import open_scene
+from avlmaps_sim.sensor_settings import SensorName
+from avlmaps_sim.truth import read_truth
 
 PRECISION = 0.8
 SLOPES = (1.0, 0.8)

@@ -7,7 +7,7 @@ from training.pixels.batches import Batch, Shards, View, draw_batch
 from training.pixels.labels import CATEGORIES, FIRST_COARSE, UNLABELLED
 from training.pixels.network import has_bfloat16
 
-from avlmaps.bench.nyu import CLASSES, SCORED, class_of_kinds
+from avlmaps_sim.bench.nyu import CLASSES, SCORED, class_of_kinds
 
 SMOOTHING = 0.03
 # Labels without a class of their own are loose ("other prop" also where nobody labelled): they count less.

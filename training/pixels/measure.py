@@ -17,7 +17,7 @@ from training.pixels.labels import CATEGORIES, FIRST_COARSE
 from training.pixels.losses import groups
 from training.pixels.whole import whole_frame
 
-from avlmaps.bench.nyu import SCORED
+from avlmaps_sim.bench.nyu import SCORED
 
 
 @torch.no_grad()

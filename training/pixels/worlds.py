@@ -20,9 +20,9 @@ from training.pixels.borrowed import borrowed_furniture
 from training.pixels.labels import CATEGORIES, ROOMS, UNLABELLED, room_of
 
 from avlmaps.core.camera import Pinhole
-from avlmaps.sim.furniture.catalogue import Families
-from avlmaps.sim.mesh import Mesh, joined
-from avlmaps.sim.scene import Scene, SceneBuilder
+from avlmaps_sim.furniture.catalogue import Families
+from avlmaps_sim.mesh import Mesh, joined
+from avlmaps_sim.scene import Scene, SceneBuilder
 
 WIDTH, HEIGHT = 320, 240
 # Seeds of homes: those of the benchmarks begin at a million, those of calibration here, those of training at 0.
@@ -52,7 +52,7 @@ class Options:
     furniture: Path | None = None
     """Folder of artists' models (``borrowed.py``), which furnish half of the homes; those of ``which`` alone."""
     lived_in: float = 0.8
-    """Share of homes with people, clothes, papers and shower curtains in them (``avlmaps.sim.homes.lived_in``)."""
+    """Share of homes with people, clothes, papers and shower curtains in them (``avlmaps_sim.homes.lived_in``)."""
     mirrors: float = 0.6
     """Share of homes whose mirrors reflect, in colour and in depth."""
     in_hands: float = 0.5
@@ -65,7 +65,7 @@ class Options:
 
 def scene_of(seed: int, options: Options, rng: np.random.Generator) -> Scene:
     """Return the home or office of a seed, with things that are nothing in particular and the traces of people."""
-    from avlmaps.sim.homes import lived_in, make_home, make_office
+    from avlmaps_sim.homes import lived_in, make_home, make_office
 
     borrows = options.furniture is not None and seed // options.step % 2 == 0
     with borrowed_furniture(options.furniture, options.which) if borrows and options.furniture else nullcontext():
@@ -91,8 +91,8 @@ def with_oddities(scene: Scene, rng: np.random.Generator) -> Scene:
 
 
 def _oddity(rng: np.random.Generator) -> Mesh:
-    from avlmaps.sim.materials import material
-    from avlmaps.sim.shapes import box, cylinder, ellipsoid, lathe
+    from avlmaps_sim.materials import material
+    from avlmaps_sim.shapes import box, cylinder, ellipsoid, lathe
 
     size, parts = rng.uniform(0.1, 0.9), []
     for _ in range(rng.integers(1, 6)):
@@ -133,8 +133,8 @@ class Shard:
 
 def add_home(shard: Shard, seed: int, options: Options) -> None:
     """Render the views of one home into the shard."""
-    from avlmaps.sim.render import Renderer
-    from avlmaps.sim.views import IN_HANDS, ON_A_ROBOT, random_views
+    from avlmaps_sim.render import Renderer
+    from avlmaps_sim.views import IN_HANDS, ON_A_ROBOT, random_views
 
     rng = np.random.default_rng([seed, 7])
     scene = scene_of(seed, options, rng)
@@ -167,7 +167,7 @@ def add_home(shard: Shard, seed: int, options: Options) -> None:
 
 
 def _sensor(rng: np.random.Generator):
-    from avlmaps.sim import sensor
+    from avlmaps_sim import sensor
 
     return sensor.Sensor((sensor.CLEAN, sensor.KINECT, sensor.KINECT, sensor.REALSENSE)[int(rng.integers(4))])
 

@@ -12,7 +12,7 @@ from training.rooms.furnished import Surfaces, mean_surfaces, rooms_of, scenes, 
 from training.rooms.named import named_surfaces, naming_counts
 
 from avlmaps.perception.room_contents import TABLE
-from avlmaps.sim.scenes import open_scene
+from avlmaps_sim.scenes import open_scene
 
 _PERCEPTION = Path(__file__).parents[2] / "src/avlmaps/perception"
 FIRST_SEED, HOMES, MAPPED = 300_000, 160, 12

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from avlmaps.core.lexicon import Kind, lexicon
-from avlmaps.sim.free_space import STRUCTURE
-from avlmaps.sim.scene import Scene
+from avlmaps_sim.free_space import STRUCTURE
+from avlmaps_sim.scene import Scene
 
 # Every eighth scene is an office, since homes hold no meeting rooms.
 _AN_OFFICE = 8

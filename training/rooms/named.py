@@ -7,11 +7,11 @@ import numpy as np
 from jaxtyping import Float
 from training.rooms.furnished import Surfaces
 
-from avlmaps.bench.harness.workplace import Workplace, scene_jobs
-from avlmaps.bench.indexing.runs import IndexingSettings
 from avlmaps.query.naming import VoxelNamer
-from avlmaps.sim.free_space import STRUCTURE
-from avlmaps.sim.scenes import open_scene
+from avlmaps_sim.bench.harness.workplace import Workplace, scene_jobs
+from avlmaps_sim.bench.indexing.runs import IndexingSettings
+from avlmaps_sim.free_space import STRUCTURE
+from avlmaps_sim.scenes import open_scene
 
 FRAMES = 240
 # From this surface in all maps the names of a thing's voxels are known; below, the thing is partly taken for itself.

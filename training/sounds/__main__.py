@@ -26,7 +26,7 @@ from avlmaps.perception.embedded.sound_calibration import evidence_for
 from avlmaps.perception.embedded.words import EmbeddedWords
 
 WEIGHTS = Path("src/avlmaps/perception/embedded/weights")
-FIGURES = Path("src/avlmaps/bench/data/sounds_crossvalidation.json")
+FIGURES = Path("packages/avlmaps-sim/src/avlmaps_sim/bench/data/sounds_crossvalidation.json")
 NOTE = (
     "A small closed-set encoder: ten kinds learnt from about 32 recordings each, forty from about 26, the others from "
     "synthetic sounds alone, which carry less well; other sounds can be taught."

@@ -14,7 +14,7 @@ from avlmaps.core.progress import progress
 from avlmaps.perception.embedded import logmel
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.resample import resample
-from avlmaps.sim.synthesis import MAKERS
+from avlmaps_sim.synthesis import MAKERS
 
 SHIPPABLE = ("CC0", "CC-BY ")  # the start of a licence with which a clip may teach weights that ship
 

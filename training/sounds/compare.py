@@ -17,10 +17,10 @@ from training.sounds.clips import ROOM_S, TESTED, Clip, read_index
 from training.sounds.in_maps import ROOT, as_a_map_cuts, write_json
 from training.sounds.kinds import CALLED, ESC10, RECORDED
 
-from avlmaps.bench.sound_clips import room_response
 from avlmaps.core.progress import say
 from avlmaps.perception.embedded.sounds import EmbeddedSounds
 from avlmaps.recordings.audio import AudioTrack, Sound
+from avlmaps_sim.bench.sound_clips import room_response
 
 FIRST, OWN, OTHER = f"first among {len(RECORDED)}", "own name says yes", "some other name says yes"
 

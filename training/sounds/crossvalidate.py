@@ -16,9 +16,9 @@ from training.sounds.kinds import ESC10, NAMES
 from training.sounds.network import SoundNet
 from training.sounds.upper import Lessons, Settings, encode_maps, fit_upper, stored_maps
 
-from avlmaps.bench.sound_clips import room_response
 from avlmaps.core.progress import progress
 from avlmaps.perception.embedded import logmel
+from avlmaps_sim.bench.sound_clips import room_response
 
 # Kinds that one network is fitted without, neither recorded nor synthetic: strangers, and what teaching is tried on.
 LEFT_OUT = (

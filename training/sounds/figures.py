@@ -10,8 +10,8 @@ from training.sounds.crossvalidate import LEFT_OUT, ROOM_S, Answers, Held
 from training.sounds.fit import EncodeWords
 from training.sounds.kinds import CALLED, KINDS, NAMES, RECORDED
 
-from avlmaps.bench.harness.intervals import wilson
 from avlmaps.perception.embedded.sound_calibration import Calibration, log_odds, sigmoid
+from avlmaps_sim.bench.harness.intervals import wilson
 
 Table = dict[str, Any]
 FIFTY = [KINDS[name][0] for name in RECORDED]

@@ -17,14 +17,6 @@ from typing import Any
 
 import numpy as np
 
-from avlmaps.bench.harness.clips import unheard_folder
-from avlmaps.bench.harness.evidence import LEAST_SEEN, Event, Evidence
-from avlmaps.bench.harness.factors import true_things
-from avlmaps.bench.harness.settings import Recorded
-from avlmaps.bench.harness.workplace import SceneJob, called
-from avlmaps.bench.indexing.rules import near_sound_tasks, sound_tasks
-from avlmaps.bench.indexing.runs import DEFAULT_SCENES
-from avlmaps.bench.indexing.tasks import Task, TaskKind
 from avlmaps.core.question import Modality, Part, Role
 from avlmaps.maps.audio.events import HearingSettings, detect_events
 from avlmaps.maps.grid import GridSpec
@@ -37,9 +29,17 @@ from avlmaps.query.modalities.sound import SoundSettings, sound_factor
 from avlmaps.query.voxel_space import Space
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
 from avlmaps.recordings.resample import resample
-from avlmaps.sim.free_space import STRUCTURE
-from avlmaps.sim.recorder import _soundings, _track, _trip  # pyright: ignore[reportPrivateUsage]
-from avlmaps.sim.scenes import open_scene
+from avlmaps_sim.bench.harness.clips import unheard_folder
+from avlmaps_sim.bench.harness.evidence import LEAST_SEEN, Event, Evidence
+from avlmaps_sim.bench.harness.factors import true_things
+from avlmaps_sim.bench.harness.settings import Recorded
+from avlmaps_sim.bench.harness.workplace import SceneJob, called
+from avlmaps_sim.bench.indexing.rules import near_sound_tasks, sound_tasks
+from avlmaps_sim.bench.indexing.runs import DEFAULT_SCENES
+from avlmaps_sim.bench.indexing.tasks import Task, TaskKind
+from avlmaps_sim.free_space import STRUCTURE
+from avlmaps_sim.recorder import _soundings, _track, _trip  # pyright: ignore[reportPrivateUsage]
+from avlmaps_sim.scenes import open_scene
 
 ROOT = Path(__file__).resolve().parents[2]
 PAUSE_S, NOISE_DB = 4.0, -20.0  # between two pieces of a track, and its noise against their loudness

@@ -1,15 +1,15 @@
 """Every kind of sound the encoder learns, and what else it is called, from the project's lexicon.
 
 The first name of a kind is the one that answers give. The others stand beside it when a question is compared with the
-known kinds; the paraphrases by which the encoder is tested (``avlmaps/bench/data/sounds_paraphrases.csv``) are none of
-them.
+known kinds; the paraphrases by which the encoder is tested (``avlmaps_sim/bench/data/sounds_paraphrases.csv``) are
+none of them.
 """
 
-from avlmaps.bench import sound_categories
-from avlmaps.bench.sound_categories import CATEGORIES, ESC50
 from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps_sim.bench import sound_categories
+from avlmaps_sim.bench.sound_categories import CATEGORIES, ESC50
 
-# Every kind that ``avlmaps.sim.synthesis`` makes; most of them have one to eight real clips as well.
+# Every kind that ``avlmaps_sim.synthesis`` makes; most of them have one to eight real clips as well.
 _MADE = (
     "door knock", "door opening or closing", "creaking door", "glass breaking", "dishes clattering", "can opening",
     "vacuum cleaner", "hair dryer", "fan or air conditioner", "washing machine", "blender", "electric drill",

@@ -19,7 +19,7 @@ from avlmaps.perception.embedded import logmel
 from avlmaps.perception.light.efficientat import RATE_HZ
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.resample import resample
-from avlmaps.sim.synthesis import MAKERS
+from avlmaps_sim.synthesis import MAKERS
 
 SECONDS = 5.2  # one window of the encoder
 SAMPLES = int(SECONDS * RATE_HZ)

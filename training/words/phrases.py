@@ -15,7 +15,7 @@ import numpy as np
 from avlmaps.perception.embedded.wordpieces import clean_phrase
 
 _DATA = Path(__file__).parents[1] / "data"
-HELDOUT = Path(__file__).parents[2] / "src/avlmaps/bench/data/words_heldout.csv"
+HELDOUT = Path(__file__).parents[2] / "packages/avlmaps-sim/src/avlmaps_sim/bench/data/words_heldout.csv"
 DEV = _DATA / "words_dev.csv"
 # Words that say nothing of what is meant: "something to sit on" and "a place where one sits" are both {sit}.
 _EMPTY = (

@@ -297,7 +297,8 @@ def failure(answer: dict[str, Any]) -> dict[str, Any] | None:
     if answer["ok"]:
         return None
     if answer["error"] is not None:
-        return error_answer(kind_named(answer["error_type"]), answer["error"])
+        message = answer["error"].replace("let the robot go to the best guess", "go to the best guess with --guess")
+        return error_answer(kind_named(answer["error_type"]), message)
     missed = [goal["name"] or place(goal["goal"]) for goal in answer["subgoals"] if not goal["reached"]]
     message = (
         f"The robot did not reach {len(missed)} of {len(answer['subgoals'])} goals: {', '.join(missed)}."

@@ -25,7 +25,6 @@ from avlmaps.cli.shortened_files import end_at_shortened_files
 from avlmaps.core.errors import AvlmapsError, BackendError
 from avlmaps.core.printable import printable
 from avlmaps.core.progress import end_bars
-from avlmaps.core.wording import Spelling, options_as
 
 if TYPE_CHECKING:
     from avlmaps.cli.verb import Verb
@@ -46,8 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     settle_streams()
     try:
         try:
-            with options_as(Spelling.FLAG):
-                _main(sys.argv[1:] if arguments is None else list(arguments))
+            _main(sys.argv[1:] if arguments is None else list(arguments))
         finally:
             sys.stdout.flush()  # here, since Python reports a reader that has gone on standard error if it flushes last
     except OSError as error:  # of what was printed last; a verb's own are a sentence already
@@ -75,15 +73,15 @@ def _main(words: list[str]) -> None:
     for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(variable, "1")
     os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")  # avlmaps reports a truncated picture in its own words
-    with _usage(words):
-        from avlmaps.cli.verbs import read_command
+    try:
+        with _usage(words):
+            from avlmaps.cli.verbs import read_command
 
-        try:
             verb = read_command(words)
-        except BackendError as error:
-            if _wants_json(words):
-                _emit_error(kind_of(error), str(error))
-            sys.exit(_complain(error, 1))
+    except BackendError as error:  # the verb is of a package that is not installed
+        if _wants_json(words):
+            _emit_error(kind_of(error), str(error))
+        sys.exit(_complain(error, 1))
     sys.exit(_run(verb))
 
 

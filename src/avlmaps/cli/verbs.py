@@ -1,7 +1,8 @@
 """The verbs of the command line, and the parser that reads their words."""
 
 from collections.abc import Sequence
-from typing import Annotated, Any, Union
+from functools import cache
+from typing import TYPE_CHECKING, Annotated, Any, Union
 
 import tyro
 
@@ -55,7 +56,12 @@ _ORDER = (
 )  # fmt: skip
 
 
-def _verbs() -> tuple[dict[str, type[Verb]], dict[str, str]]:
+if TYPE_CHECKING:
+    VERBS: dict[str, type[Verb]]
+
+
+@cache
+def installed() -> tuple[dict[str, type[Verb]], dict[str, str]]:
     """Return the verbs that are installed, and why each other one that is known cannot be had."""
     found, missing = dict(_OWN), {}
     for entry in entry_points(ENTRY_POINT_GROUP):
@@ -69,7 +75,10 @@ def _verbs() -> tuple[dict[str, type[Verb]], dict[str, str]]:
     return ordered, missing
 
 
-VERBS, NOT_INSTALLED = _verbs()
+def __getattr__(name: str) -> Any:
+    if name == "VERBS":  # those of other packages are loaded when the list is needed
+        return installed()[0]
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def read_command(words: Sequence[str]) -> Verb:
@@ -79,17 +88,20 @@ def read_command(words: Sequence[str]) -> Verb:
         BackendError: the verb is one of a package that is not installed.
         SystemExit: they cannot be read, or request help; either is printed.
     """
-    if words and words[0] in NOT_INSTALLED:
-        raise BackendError(NOT_INSTALLED[words[0]])
+    verbs = _OWN
+    if not words or words[0] not in _OWN:  # a verb of ours needs no other package
+        verbs, missing = installed()
+        if words and words[0] in missing:
+            raise BackendError(missing[words[0]])
     shortly = not words or words[0].startswith("-")
-    return tyro.cli(_any_verb(shortly), prog="avlmaps", description=_DESCRIPTION, args=words, config=CONFIG)
+    return tyro.cli(_any_verb(verbs, shortly), prog="avlmaps", description=_DESCRIPTION, args=words, config=CONFIG)
 
 
-def _any_verb(shortly: bool) -> Any:
+def _any_verb(verbs: dict[str, type[Verb]], shortly: bool) -> Any:
     """Return the union of the verbs; the list of them all shows one line of each."""
 
     def described(name: str, verb: type[Verb]) -> Any:
         first_line = (verb.__doc__ or "").partition("\n")[0]
         return Annotated[verb, tyro.conf.subcommand(name, description=first_line if shortly else None)]
 
-    return Union[tuple(described(name, verb) for name, verb in VERBS.items())]  # noqa: UP007 - made at run time
+    return Union[tuple(described(name, verb) for name, verb in verbs.items())]  # noqa: UP007 - made at run time

@@ -9,8 +9,13 @@ from functools import cache
 from importlib.resources import files
 from unicodedata import name
 
+from avlmaps.language.lexer import WORDS
+from avlmaps.language.names import class_words, is_known, sounding_words
+from avlmaps.perception.embedded.words import is_word
+
 ASK = "This seems to be {language}. Commands and questions have to be in English, such as: go to the kitchen."
 _LATIN = "LATIN"
+_SEVERAL = 3  # words; fewer may be a name that English borrowed
 
 
 def language_of(text: str) -> str | None:
@@ -27,7 +32,16 @@ def language_of(text: str) -> str | None:
         counted = surely + sum(word in also for word in found)
         if surely and counted * 2 >= len(found) and counted > hits:
             best, hits = language, counted
-    return best
+    return best or _unknown(found)
+
+
+def _unknown(found: list[str]) -> str | None:
+    """Return that a sentence is in another language, where of several words hardly one is English, and none usual."""
+    several = [word for word in found if len(word) > 1]
+    usual = any(word in class_words() | WORDS | sounding_words() or is_known(word) for word in several)
+    if len(several) < _SEVERAL or usual or 3 * sum(map(is_word, several)) > len(several):
+        return None
+    return "another language than English"
 
 
 @cache

@@ -118,6 +118,8 @@ def tokenise(sentence: str) -> list[Token]:
             tokens.append(Token(raw.strip("\"'"), raw, kind, found.start(), found.end()))
         elif kind == "model":
             tokens.append(Token(raw.lower(), raw, "word", found.start(), found.end()))
+        elif kind == "word" and raw.lower() == "till" and tokens and tokens[-1].text in _BEFORE_NOUNS:
+            tokens.append(Token("till", raw, "word", found.start(), found.end()))  # "the till" is no "until"
         elif kind == "word":
             tokens += _words(raw, found.start())
         elif raw == "-" and _is_minus(plain, found.start()):
@@ -131,6 +133,7 @@ def tokenise(sentence: str) -> list[Token]:
     return tokens
 
 
+_BEFORE_NOUNS = frozenset({"the", "a", "this", "that", "my", "our", "your", "each", "every", "which", "nearest"})
 _SIGNED = re.compile(r"\.?\d|pi\b", re.IGNORECASE)
 
 

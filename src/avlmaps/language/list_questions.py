@@ -52,46 +52,74 @@ class ListQuestion:
 
 _POLITE = re.compile(
     r"^(?:(?:please|hey|hi|hello|robot|so|and|okay|ok|can you|could you|would you|will you|tell me|show me|give me|"
-    r"let me know|i want to know|i would like to know|do you know|i wonder|say|name|list|find)\b[ ,]*)+"
+    r"let me know|i want to know|i would like to know|do you know|i wonder|say|name|(?:(?:a |the )?list of|list)|find)"
+    r"\b[ ,]*)+"
 )
+_POLITE_END = re.compile(r"(?:[ ,]+(?:please|thanks|thank you|for me|then|now|right now|at the moment|robot))+$")
 _ARTICLE = r"(?:(?:the|a|an|my|our|this|that) )?"
 _BUILDING = (
     r"(?: (?:in|of|inside) (?:the |this |my |our )?(?:house|home|flat|apartment|building|office|map|place|here))?"
 )
-_ASKS = r"(?:(?:what|which|where)(?: is|'s| was| are| were)?(?: the)? |the )?"
+_ASKS = r"(?:(?:what|which|where)(?: is|'s| was| are| were)?(?: the| that)? |(?:the|that) )?"
 _LARGE, _SMALL = r"biggest|largest|widest", r"smallest|tiniest"
 _LAST, _FIRST = r"last|latest|final|most recent", r"first|earliest"
+_BY_SIZE = rf"(?:(?P<last>{_LARGE})|(?P<first>{_SMALL}))"
+_BY_TIME = rf"(?:(?P<last>{_LAST})|(?P<first>{_FIRST}))"
 _HEARD = r"(?: (?:that )?(?:you |i |it |was |were |we )?(?:heard|recorded|played|hear))?"
 _IN = r"in|inside|within"
 _NEXT = r"next to|beside|near|nearby|close to|by|around|alongside"
 _THERE = r"(?: (?:there|standing|stands|lying|lies|located|found|to be found|to see|kept|placed))?"
 _ALL = r"everything|all(?: the)? (?:things|objects)|the (?:things|objects|contents)"
 _LISTS = r"(?P<names>rooms|sounds|noises|things|objects)"
-_KNOWN = r"(?: are| were| did| does| do)?(?: there| you hear| heard| recorded| it have| the (?:house|home|map) have)?"
-_WHAT_IS = rf"what(?: things| objects)?(?: is| are| stands){_THERE}"
+_WHOLE = r"(?:the|this|our|my) (?:house|home|flat|apartment|building|office|place|map) have"
+_KNOWN = (
+    r"(?: (?:are|were|did|does|do|have|has)(?: there| you hear| heard| recorded| it have| "
+    rf"{_WHOLE}| (?:you|we|i) (?:know|have|see|hear|heard|found|got|recorded))?"
+    r"| there| you hear| heard| recorded| it have)?"
+)
+_SEEN = r"(?:do|can|could|did|have) (?:you|we|i|one|they) (?:have|see|find|keep|know|got|seen|found)"
+_KIND = r"(?: else)?(?: (?:other )?(?:sort|sorts|kind|kinds|type|types) of)?"
+_WHAT_IS = rf"what{_KIND}(?: (?:things|objects|items|stuff|furniture|equipment))?(?: (?:is|are|stands|{_SEEN})){_THERE}"
+_NOT_ONE = r"(?!no |none |any |the (?:most|best|least|fewest)|most |more |fewer |enough |both |all |every |nobody )"
 _PATTERNS: tuple[tuple[Listed, str], ...] = (
-    (Listed.ROOM_BY_SIZE, rf"{_ASKS}(?:(?P<last>{_LARGE})|(?P<first>{_SMALL})) rooms?{_BUILDING}"),
-    (Listed.ROOM_BY_SIZE, rf"(?:which|what) (?:room )?is the (?:(?P<last>{_LARGE})|(?P<first>{_SMALL}))(?: room)?"),
-    (Listed.SOUND_BY_TIME, rf"{_ASKS}(?:(?P<last>{_LAST})|(?P<first>{_FIRST})) (?:sound|noise)s?{_HEARD}"),
-    (Listed.SOUND_BY_TIME, r"what (?:sound )?(?:did you hear|was heard) (?:(?P<last>last)|(?P<first>first))"),
+    (Listed.ROOM_BY_SIZE, rf"{_ASKS}{_BY_SIZE} rooms?{_BUILDING}"),
+    (Listed.ROOM_BY_SIZE, rf"(?:which|what) (?:room )?is (?:the )?{_BY_SIZE}(?: room)?{_BUILDING}"),
+    (Listed.SOUND_BY_TIME, rf"{_ASKS}{_BY_TIME} (?:sound|noise)s?{_HEARD}"),
+    (Listed.SOUND_BY_TIME, rf"{_ASKS}{_BY_TIME} thing (?:that )?(?:you|i|we) heard"),
+    (Listed.SOUND_BY_TIME, rf"what (?:sound )?(?:did you hear|was heard) {_BY_TIME}"),
+    (Listed.SOUND_BY_TIME, rf"(?:what|which) (?:sound|noise) (?:came|was|was heard|did you hear) {_BY_TIME}"),
+    (Listed.SOUND_BY_TIME, rf"what did you {_BY_TIME} hear"),
     (Listed.CONTENTS, rf"{_WHAT_IS} (?:{_IN}) {_ARTICLE}(?P<room>.+)"),
     (Listed.CONTENTS, rf"what (?:things |objects )?does {_ARTICLE}(?P<room>.+?) (?:contain|have|hold)(?: in it)?"),
-    (Listed.CONTENTS, rf"(?:{_ALL}) (?:{_IN}|of) {_ARTICLE}(?P<room>.+)"),
+    (Listed.CONTENTS, rf"(?:{_ALL})(?: (?:that|which) (?:is|are))? (?:{_IN}|of) {_ARTICLE}(?P<room>.+)"),
     (Listed.BESIDE, rf"{_WHAT_IS} (?:{_NEXT}) {_ARTICLE}(?P<thing>.+)"),
-    (Listed.BESIDE, rf"(?:{_ALL}) (?:{_NEXT}) {_ARTICLE}(?P<thing>.+)"),
+    (Listed.BESIDE, rf"(?:{_ALL})(?: (?:that|which) (?:is|are))? (?:{_NEXT}) {_ARTICLE}(?P<thing>.+)"),
     (
         Listed.ROOM_OF,
-        r"(?:in |from )?(?:which|what) (?:kind of )?room (?:is|was|are|were) (?P<words>.+?)"
-        r"(?: (?:in|from|of|at|taken in|taken from|taken|shot in|standing in|located in))?",
+        r"(?:in |from )?(?:which|what) (?:kind of )?room (?:is|was|are|were) (?!(?:closest|nearest|next|near|beside) )"
+        r"(?P<words>.+?)(?: (?:in|from|of|at|taken in|taken from|taken|shot in|standing in|located in))?",
     ),
     (Listed.ROOM_OF, r"(?:which|what) room (?:does|do|did) (?P<words>.+?) (?:come from|stand in|show|belong to)"),
+    (Listed.ROOM_OF, rf"(?:which|what) room (?:has|holds|contains) {_NOT_ONE}(?P<words>.+)"),
     (Listed.NAMES, rf"(?:what|which) {_LISTS}{_KNOWN}{_BUILDING}"),
     (Listed.NAMES, rf"(?:all )?(?:the |all the )?{_LISTS}{_BUILDING}{_HEARD}"),
-    (Listed.NAMES, rf"(?P<counts>how many) {_LISTS}{_KNOWN}{_BUILDING}"),
+    (Listed.NAMES, rf"(?:every|each) (?P<one>room|sound|noise|thing|object){_BUILDING}{_HEARD}"),
+    (
+        Listed.NAMES,
+        rf"(?P<counts>how many|(?:the )?number of) (?:the )?(?:different |separate )?{_LISTS}{_KNOWN}{_BUILDING}",
+    ),
 )
 _COMPILED = tuple((of, re.compile(pattern)) for of, pattern in _PATTERNS)
 _TAIL = re.compile(r"\b(?:in|near|next to|beside|by|on|at|close to|behind|under|around|between|inside|with)\b.*")
-_WHERE = re.compile(r"^(?:where(?: is| are|'s| can i find| would i find)|is there|are there|find) ")
+_WHERE = re.compile(
+    r"^(?:where(?: is| are|'s| can i find| would i find)|is there|are there|find|"
+    r"do (?:we|you) have|have (?:we|you) got) "
+)
+_PLACES = re.compile(
+    r"(?P<how>in|near|next to|beside|by|on|at|close to|behind|under) (?P<one>(?:[\w-]+ ){0,2}[\w-]+),? or "
+    r"(?:(?P=how) )?(?P<other>(?:[\w-]+ ){0,2}[\w-]+)"
+)
+_NO_NAMES = frozenset({"i", "you", "we", "have", "has", "do", "is", "are", "was", "can", "in", "on", "near", "by"})
 _PHOTO = re.compile(r"\b(?:photo|picture|image|snapshot|photograph|pic)\b")
 
 
@@ -109,7 +137,8 @@ def read_list(text: str) -> ListQuestion | None:
             continue
         if said.get("thing") and (_PHOTO.search(said["thing"]) or " or " in said["thing"]):
             continue
-        name = said.get("room") or said.get("thing") or said.get("words") or said.get("names") or ""
+        names = said.get("names") or (f"{said['one']}s" if said.get("one") else "")
+        name = said.get("room") or said.get("thing") or said.get("words") or names
         name = {"noises": "sounds", "objects": "things"}.get(name, name)
         return ListQuestion(of, name, bool(said.get("first")), bool(said.get("counts")))
     return None
@@ -118,7 +147,7 @@ def read_list(text: str) -> ListQuestion | None:
 def said_number(text: str) -> tuple[int, str] | None:
     """Return how many of what a phrase names: "two chairs in the kitchen" is 2 and "chairs in the kitchen"."""
     plain = _WHERE.sub("", _plain(text)).removeprefix("the ")
-    found = re.fullmatch(rf"({'|'.join(NUMBERS)}|[2-9]|[1-9]\d) ([a-z].*)", plain)
+    found = re.fullmatch(rf"({'|'.join(NUMBERS)}|[2-9]|[1-9]\d) ([a-z][^.?!]*)", plain)
     if found is None or lexicon().head(_TAIL.sub("", found[2]).strip(), Kind.THING) is None:
         return None
     return NUMBERS.get(found[1]) or int(found[1]), found[2]
@@ -126,14 +155,23 @@ def said_number(text: str) -> tuple[int, str] | None:
 
 def said_alternatives(text: str) -> tuple[str, ...]:
     """Return the phrases of which any answers: "sofa or armchair in the kitchen" is "sofa in the kitchen" and ..."""
-    plain = _WHERE.sub("", _plain(text))
+    whole = _plain(text)
+    if whole.startswith(("how ", "shall ", "should ", "which ", "what ")):
+        return ()
+    plain = _WHERE.sub("", whole)
+    whether = "" if whole.startswith(("where", "find")) or plain == whole else "is there a "
     tail = _TAIL.search(plain)
     head, rest = (plain, "") if tail is None else (plain[: tail.start()].strip(), f" {tail[0]}")
-    if " or " not in head or " or " in rest:
+    if " or " in head and " or " not in rest:
+        names, phrase = re.split(r",| or ", head), f"{whether}{{}}{rest}"
+    elif " or " in rest and " or " not in head and (places := _PLACES.fullmatch(rest.strip())):
+        begin = whole[: len(whole) - len(rest.strip())].strip()
+        names, phrase = [places["one"], places["other"]], f"{begin} {places['how']} the {{}}"
+    else:
         return ()
-    names = [re.sub(rf"^(?:either )?{_ARTICLE}", "", one.strip()) for one in re.split(r",| or ", head) if one.strip()]
-    known = all(lexicon().head(name) is not None for name in names)
-    return tuple(f"{name}{rest}" for name in names) if known and len(names) > 1 else ()
+    names = [re.sub(rf"^(?:either )?{_ARTICLE}", "", one.strip()) for one in names if one.strip()]
+    known = all(lexicon().head(name) is not None and _NO_NAMES.isdisjoint(name.split()) for name in names)
+    return tuple(phrase.format(name) for name in names) if known and len(names) > 1 else ()
 
 
 def speaks_of_photo(words: str) -> bool:
@@ -143,4 +181,6 @@ def speaks_of_photo(words: str) -> bool:
 
 def _plain(text: str) -> str:
     words = " ".join(re.sub(r"[^\w' ,./-]", " ", text.casefold()).split()).strip(" .,")
-    return _POLITE.sub("", words.replace("what's", "what is").replace("whats ", "what is ")).strip(" .,")
+    words = re.sub(r"^(.*\b(?:what|where|which|room|sound|noise))(?:'s|s(?= (?:the|in|next|near|beside|by|around)\b)) ",
+                   r"\1 is ", _POLITE.sub("", words))  # fmt: skip
+    return _POLITE_END.sub("", words.strip(" .,")).strip(" .,")

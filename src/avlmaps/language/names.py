@@ -183,6 +183,15 @@ def _verbs() -> frozenset[str]:
 
 
 @cache
+def describes(word: str) -> bool:
+    """Return whether a word says what a thing is like and names none: "slippery", "wobbly", "wet"."""
+    if word in _adjectives():
+        return True
+    ending = word.endswith(("y", "ful", "able", "ible", "ous", "less", "ish")) and len(word) > _SHORTEST_PART
+    return ending and not _is_known((word,)) and word not in _words_of("nouns") | _words_of("places")
+
+
+@cache
 def _adjectives() -> frozenset[str]:
     return listed("adjectives") | describing_words()
 

@@ -31,6 +31,13 @@ _ACTORS = frozenset({
     "somebody", "can", "could", "may", "might", "should",
 })  # fmt: skip
 _MODALS = frozenset({"can", "could", "may", "might", "should", "would", "does", "did", "do", "will"})
+_PLACING = frozenset({"in", "near", "next", "by", "beside", "close", "inside", "behind", "under", "around", "between"})
+_HERE = frozenset({"here", "hereabouts", "house", "home", "building", "map", "flat", "apartment", "place", "sense"})
+_PRONOUNS = frozenset({"i", "we", "you", "he", "she", "they"})
+_HABITS = frozenset({"does", "did", "do"})
+_WHAT = frozenset({"anything", "something", "nothing", "what", "stuff", "things", "thing"})
+_TAKEN = frozenset({"eat", "drink", "read", "watch", "play", "wear", "cook", "write", "wash", "do", "see", "look"})
+_OF_PLACES = frozenset({"on", "at", "with", "from", "off"})
 _OWN: Mapping[str, str] = dict.fromkeys(("his", "her", "their", "our", "your", "its"), "my")
 _LONGEST_ACTOR = 3  # words of who does it: "an old lady"
 _ARTICLES = frozenset({"the", "a", "an"})
@@ -120,7 +127,7 @@ def asked(sentence: Sentence, reads: Sequence[Read], limits: Limits) -> AskedSen
         raise QueryError(f"A map cannot answer this. It answers {SUPPORTED}; ask it like: {_EXAMPLE}.")
     use = use_in(sentence.text)
     if use is not None and (reads[0].is_purpose or _names_nothing(reads[0])):
-        return _put_right(_for_use(sentence, use), sentence)
+        return _put_right(_for_use(sentence, use, limits), sentence)
     plain = [read for read in reads if isinstance(read.meaning, Inquiry)]
     if reads[0].is_purpose:  # no purpose is said, so that this was none of the readings
         plain = [replace(read, probability=read.probability / (1.0 - reads[0].probability + 1e-6)) for read in plain]
@@ -149,11 +156,30 @@ def _likely(reads: Sequence[Read], sentence: Sentence, limits: Limits) -> Inquir
 def use_in(text: str) -> str | None:
     """Return the longest purpose that a sentence speaks of and that things are known to serve: "wash my hands"."""
     words = [_OWN.get(word, word) for word in re.findall(r"[a-z]+", text.lower())]
-    doing = [" ".join(words[at:]) + " " for at in range(1, len(words)) if words[at - 1] in _ACTORS]
-    if words[:1] == ["where"] and words[1:2] and words[1] in _MODALS:  # "where might a lady sit down?"
+    doing = [" ".join(words[at:]) + " " for at in range(1, len(words)) if _is_purpose(words, at)]
+    if (
+        words[:1] == ["where"]
+        and words[1:2]
+        and words[1] in _MODALS - {"did"}
+        and words[2:3]
+        and words[2] not in _PRONOUNS
+    ):
+        # "where might a lady sit down?"
         doing += [" ".join(words[at:]) + " " for at in range(3, min(len(words), 3 + _LONGEST_ACTOR))]
     uses = load_word_classes().lists["uses"]
     return max((use for use in uses if any(one.startswith(f"{use} ") for one in doing)), key=len, default=None)
+
+
+def _is_purpose(words: Sequence[str], at: int) -> bool:
+    """Return whether a verb at a place says what for: "somewhere to sit", "where can I sit"; no "did I leave it"."""
+    before = words[max(0, at - 3) : at]
+    if before[-1] == "to":  # what to drink is no place
+        return at < 2 or not (
+            words[at - 2] in _WHAT and words[at] in _TAKEN and not _OF_PLACES & set(words[at + 1 : at + 2])
+        )
+    if before[-1] in _MODALS:
+        return before[-1] not in _HABITS
+    return before[-1] in _ACTORS and not {"did", "have", "had"} & set(before[:-1])
 
 
 def _names_nothing(read: Read) -> bool:
@@ -163,12 +189,45 @@ def _names_nothing(read: Read) -> bool:
     return bool(named) and not any(is_known(one.name) for one in named)
 
 
-def _for_use(sentence: Sentence, use: str) -> Inquiry:
-    """Return the question for the things that serve a purpose: "where can I sit in the kitchen?"."""
+def _for_use(sentence: Sentence, use: str, limits: Limits) -> Inquiry:
+    """Return the question for the things that serve a purpose: "where can I sit near the window?".
+
+    Raises:
+        QueryError: where they should be is not understood.
+    """
+    names = [name.strip() for name in load_word_classes().lists["uses"][use].split(",")]
     rooms = [token.text for token in sentence.tokens if lexicon().find(token.text, Entries.ROOM) is not None]
     near = tuple(Target(Kind.AREA, room) for room in rooms if room not in use)
-    names = load_word_classes().lists["uses"][use].split(",")
-    return Inquiry(Ask.WHERE, tuple(Target(Kind.OBJECT, name.strip(), near) for name in names))
+    place = _place_of_use(sentence, use)
+    if place:
+        near = _near(names[0], place, sentence, limits)
+    return Inquiry(Ask.WHERE, tuple(Target(Kind.OBJECT, name, near) for name in names))
+
+
+def _place_of_use(sentence: Sentence, use: str) -> str:
+    """Return the words that say where a purpose should be served: "near the window"; "" where none do."""
+    texts = [token.text for token in sentence.tokens if token.kind != "punct"]
+    own = [_OWN.get(text, text) for text in texts]
+    size = len(use.split())
+    end = next((at + size for at in range(len(own)) if " ".join(own[at : at + size]) == use), len(own))
+    begin = next((at for at in range(end, len(texts)) if texts[at] in _PLACING and texts[at + 1 : at + 2]), len(texts))
+    place = texts[begin:]
+    return "" if not place or _HERE.intersection(place) else " ".join(place)
+
+
+def _near(name: str, place: str, sentence: Sentence, limits: Limits) -> tuple[Target, ...]:
+    """Return what a thing should be near.
+
+    Raises:
+        QueryError: it is not understood.
+    """
+    whole = Sentence(f"the {name} {place}", sentence.given)
+    for read in learned_reader().question(whole.tokens)[:1]:
+        if isinstance(read.meaning, Inquiry) and len(read.meaning.of) == 1 and read.probability >= limits.question:
+            (target,) = read.meaning.of
+            if target.name == name and target.near and unmet_by(whole.tokens, read.meaning, read.used) is None:
+                return target.near
+    raise QueryError(f"{place!r} is not understood; say it like: {_EXAMPLE}.")
 
 
 def _put_right(inquiry: Inquiry, sentence: Sentence) -> AskedSentence:

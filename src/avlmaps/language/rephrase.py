@@ -27,6 +27,10 @@ _SAME = frozenset({
     "move", "drive", "navigate", "park", "turn", "rotate", "spin", "stop", "halt", "pause", "back", "reverse", "point",
     "face",
 })  # fmt: skip
+_WANT = frozenset({"want", "need", "like"})
+_PLACED = frozenset({"by", "at", "in", "near", "beside", "behind", "next", "over", "inside"})
+_TURNED = frozenset({"turn", "rotate", "yaw", "spin", "pivot", "left", "right", "by", "clockwise", "counterclockwise"})
+_ROUNDS = frozenset({"turn", "turns", "revolution", "revolutions", "rev", "revs", "rotation", "rotations"})
 _TELL = frozenset({"tell", "ask", "order", "command", "instruct"})
 _LET = frozenset({"have", "let", "make"})
 _BEFORE = frozenset({"and", "then", "please", "now", "next", "finally", "also", "first", "ok", "just", "you", "to"})
@@ -79,9 +83,12 @@ def rephrased(tokens: Sequence[Token]) -> tuple[list[Token], list[str]]:
 
 
 def _joined(tokens: Sequence[Token]) -> list[Token]:
-    """Return tokens with "counter clockwise" as one word, and "sleep(5)" as a wait."""
+    """Return tokens with "counter clockwise" as one word, "sleep(5)" as a wait, and "right 0.5 turn" in degrees."""
     found: list[Token] = []
     for token in tokens:
+        if token.text in _ROUNDS and len(found) > 1 and "." in found[-1].text and found[-2].text in _TURNED:
+            found[-1] = _word(found[-1], f"{360 * float(found[-1].text):g}", "number")
+            token = _word(token, "degrees")
         if token.text == "wise" and found and found[-1].text == "clock":
             token = _word(found.pop(), "clockwise")
         if token.text == "clockwise" and found and found[-1].text in ("counter", "anti"):
@@ -139,24 +146,29 @@ def _third(tokens: list[Token], at: int) -> tuple[int, list[Token]]:
     follows = tokens[end].text if end < len(tokens) else ""
     if verb in _SEND and robot and follows in _AFTER_SEND:
         return end, [_word(tokens[at], "go")]
+    if verb in _WANT and robot and follows in _PLACED:
+        return end, [_word(tokens[at], word) for word in ("want", "you", "to", "go")]
     if verb == "send" and tokens[at + 1 : at + 2] and tokens[at + 1].text in _PRONOUNS:
         after = tokens[at + 2].text if at + 2 < len(tokens) else ""
         return (at + 2, [_word(tokens[at], "go")]) if after in _AFTER_SEND else (at, [])
     if verb in _SAME and robot:
         return end, [tokens[at]]
-    if verb in _TELL | _LET:
-        if not robot:
-            if at + 1 >= len(tokens) or tokens[at + 1].text not in _PRONOUNS:
-                return at, []
-            end = at + 2
-        if verb in _TELL:
-            if end >= len(tokens) or tokens[end].text != "to":
-                return at, []
-            end += 1
-        follows = tokens[end].text if end < len(tokens) else ""
-        if follows in _orders() or (robot and verb in _TELL and follows):
-            return end, []
-    return at, []
+    return _told(tokens, at, end, robot=robot) if verb in _TELL | _LET else (at, [])
+
+
+def _told(tokens: list[Token], at: int, end: int, *, robot: bool) -> tuple[int, list[Token]]:
+    """Return where "tell it to", "let the robot" ends that begins at a token; the token where no order follows."""
+    if not robot:
+        if at + 1 >= len(tokens) or tokens[at + 1].text not in _PRONOUNS:
+            return at, []
+        end = at + 2
+    tells = tokens[at].text in _TELL
+    if tells:
+        if end >= len(tokens) or tokens[end].text != "to":
+            return at, []
+        end += 1
+    follows = tokens[end].text if end < len(tokens) else ""
+    return (end, []) if follows in _orders() or (robot and tells and follows) else (at, [])
 
 
 @dataclass(frozen=True, slots=True)

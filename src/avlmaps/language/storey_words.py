@@ -24,13 +24,19 @@ _FLOOR = r"(?:floor|storey|story|level)"
 _END = r"(?![\w-]|\.\w|/| (?:lamp|light|mat|cushion|fan|heater|tile|plan|board|vase|mirror|cleaner)s?\b)"
 _LAST = r"(?=[ ?.!,]*$|,? (?:and|near|in|of|with|where|next|by|that|which)\b)"  # and no "floor two metres away"
 _IN = r"(?:(?:,? ?that (?:is|are) |,? ?which (?:is|are) )?(?:up |down )?(?:on|in|at|of|from) )?(?:the |our |my )?"
+# What may follow "upstairs" but a noun: in "the upstairs bathroom" it says which.
+_NO_NOUN = (
+    r"(?:near|in|on|by|next|at|beside|with|where|and|or|that|which|is|are|there|behind|under|was|were|has|have|of|to|"
+    r"from|please|then|close|between|now|somewhere|anywhere|too|as|for|around|did|do|does|can)\b"
+)
 _NOT = r"(?P<isnt>\b(?:not|except|but not|excluding) )?"
 _PATTERN = re.compile(
     rf"(?<![\w/.-]){_NOT}(?:"
-    rf"{_IN}(?P<ordinal>{_ORDINAL}|{'|'.join(_ENDS)}|upper) {_FLOOR}{_END}"
+    rf"(?P<which>upstairs|downstairs) (?!{_NO_NOUN})(?=[a-z])"
+    rf"|{_IN}(?P<ordinal>{_ORDINAL}|{'|'.join(_ENDS)}|upper) {_FLOOR}{_END}"
     rf"|{_IN}(?:floor|storey|level) (?:number )?(?P<number>{_NUMBER}){_LAST}"
     rf"|(?:one|a|the) {_FLOOR} (?P<beside>above|up|below|down){_END}"
-    rf"|{_IN}(?P<stairs>upstairs|downstairs){_END})",
+    rf"|{_IN}(?P<stairs>upstairs|downstairs){_END}(?! (?!{_NO_NOUN})[a-z]))",
     re.IGNORECASE,
 )
 _HOW_MANY = re.compile(r"\bhow many (?:floors|storeys|stories|levels)\b|\bnumber of (?:floors|storeys|stories)\b", re.I)
@@ -89,7 +95,7 @@ def _said(one: re.Match[str], rest: str, lists: bool) -> SaidStorey:
     said = one.group().strip().casefold().removeprefix((one["isnt"] or "").casefold())
     words = re.sub(r"^.*\b(?:the|our|my|on|in|at|of|from) (?=\S)", "", said)
     isnt = one["isnt"] is not None
-    if up := one["stairs"] or one["beside"]:
+    if up := one["which"] or one["stairs"] or one["beside"]:
         above = up.casefold() in ("upstairs", "above", "up")
         return SaidStorey("upstairs" if above else "downstairs", rest, None, above, isnt, lists)
     word = (one["ordinal"] or one["number"]).casefold()

@@ -11,7 +11,7 @@ from avlmaps.core.motion import Action, GroundPose, Moved
 
 @runtime_checkable
 class Body(Protocol):
-    """A robot on the ground: a simulated one (`avlmaps.sim.body.SimulatedBody`), or one of a user's own.
+    """A robot on the ground: a simulated one (of ``avlmaps-sim``), or one of a user's own.
 
     A movement returns when it is over. An obstacle is not an error: the body stops or slides, and reports a contact.
     """

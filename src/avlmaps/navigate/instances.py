@@ -7,7 +7,6 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core.errors import GoalNotFoundError
-from avlmaps.core.wording import option
 from avlmaps.navigate.footprint import Outline
 from avlmaps.query.factors import Factor, NearThings
 from avlmaps.query.goals import Goal
@@ -118,9 +117,7 @@ def explain_absence(heat: Heatmap, guess: bool = False) -> str:
     if best is None:
         return f"{what} {why}; say it in other words."
     place = ", ".join(f"{value:.2f}" for value in best.position)
-    advice = "say it in other words"
-    if not guess:
-        advice += f", or let the robot go to the best guess ({option('guess')})"
+    advice = "say it in other words" if guess else "say it in other words, or let the robot go to the best guess"
     return f"{what} {why}. The best guess is at ({place}) m with probability {best.probability:.2f}; {advice}."
 
 

@@ -14,12 +14,14 @@ from avlmaps.language import lexer
 from avlmaps.language.intents import (
     Clarify,
     Face,
+    Go,
     Intent,
     Kind,
     Pick,
     Reason,
     Refuse,
     Repeat,
+    StopAt,
     Target,
     Turn,
     Wait,
@@ -153,7 +155,11 @@ def _places(intents: Sequence[Intent]) -> list[Intent]:
     flat = [part for one in intents for part in (one.body * one.times if isinstance(one, Repeat) else (one,))]
     moves = any(isinstance(one, MoveIntent) for one in flat)
     kept = [one for one in flat if not isinstance(one, Wait) and (moves or not isinstance(one, Face | Turn))]
-    return [_rounded(on_targets(one, _plain)) for one in (kept or flat)]
+    plain = [_rounded(on_targets(one, _plain)) for one in (kept or flat)]
+    nearer = zip(plain, [*plain[1:], None], strict=True)  # "go to it, stop 1 m from it" ends as "stop 1 m from it"
+    return [
+        one for one, after in nearer if not (isinstance(one, Go) and isinstance(after, StopAt) and one.to == after.of)
+    ]
 
 
 def _rounded(intent: Intent) -> Intent:

@@ -61,6 +61,8 @@ def words() -> Words:
         "questions",
         "times",
         "signals",
+        "quantities",
+        "past",
     )
     phrases: dict[str, dict[str, list[tuple[str, ...]]]] = {name: {} for name in classes}
     for name in classes:
@@ -125,6 +127,11 @@ class Claimed(Said):
     def targets(self) -> tuple[Target, ...]:
         """The targets of the reading."""
         return tuple(target for intent in self.intents for target in targets_of(intent))
+
+    @cached_property
+    def heard(self) -> bool:
+        """Whether the sentence speaks of hearing."""
+        return not HEARD.isdisjoint(self.texts)
 
     @cached_property
     def named(self) -> frozenset[int]:

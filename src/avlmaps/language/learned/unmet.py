@@ -30,6 +30,7 @@ from avlmaps.language.intents import (
     VisitEach,
 )  # fmt: skip
 from avlmaps.language.learned.accounted import unaccounted
+from avlmaps.language.learned.answerable import unanswerable
 from avlmaps.language.learned.linear import amount_end
 from avlmaps.language.learned.said import BREAKS, DETERMINERS, HEARD, LOOKS, PREPOSITIONS, Claimed, Said, words
 from avlmaps.language.learned.ways import directions
@@ -423,6 +424,9 @@ def unmet_by(tokens: Sequence[Token], inquiry: Inquiry, used: frozenset[int]) ->
         return "A map finds what is near something, not what is far from it; say what it is near."
     if _outside(said) is not None:
         return "A map finds what is in or near something, not what is outside it; say what it is near."
+    beyond = unanswerable(said, inquiry)
+    if beyond is not None:
+        return beyond
     rules = (rule for rule in _ASKED if inquiry.ask is Ask.WHERE or rule is not _nameless)
     found = next((found for rule in rules if (found := rule(said)) is not None), None)
     if isinstance(found, Refuse):

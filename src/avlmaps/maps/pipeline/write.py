@@ -7,7 +7,6 @@ from time import perf_counter
 
 from avlmaps.core.errors import MapError
 from avlmaps.core.version import __version__
-from avlmaps.core.wording import option
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
 from avlmaps.maps.fusion.cleaning import clean
 from avlmaps.maps.fusion.free_space import FreeViews
@@ -73,7 +72,7 @@ def surfaces(plan: Plan, total: VoxelAccumulator, views: Sequence[FreeViews], se
     if not kept.any():
         raise MapError(
             f"Every voxel of {plan.recording.path} is seen through or a speck, so that the map would be empty; check "
-            f"its poses and its depth scale, or use every depth as it is ({option('sensor', 'none')})."
+            "its poses and its depth scale, or use every depth as it is (--sensor none)."
         )
     return Merged(total.voxels(kept=kept), sensor, Removed(**removed), perf_counter() - begin)
 

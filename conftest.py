@@ -1,0 +1,93 @@
+"""Fixtures that every room's tests share."""
+
+import json
+import os
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from helpers.plain_numbers import assert_plain
+
+# Small matrices run up to twenty times slower on several BLAS threads when the machine is shared.
+for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(variable, "1")
+
+from hypothesis import settings  # noqa: E402
+
+settings.register_profile("ci", deadline=None, max_examples=40, derandomize=True)
+settings.load_profile("ci")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with the files that hold a slow test: a long one that begins last leaves the other cores idle."""
+    slow = {item.path for item in items if item.get_closest_marker("slow") is not None}
+    items.sort(key=lambda item: item.path not in slow)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _every_message_has_plain_numbers() -> Iterator[None]:
+    """Hold every error that any test provokes, and every line of progress or of an answer, to ``assert_plain``."""
+    from avlmaps.core import errors, progress
+
+    def checked(self: Exception, *words: object) -> None:
+        Exception.__init__(self, *words)
+        assert_plain(str(self))
+
+    def say(message: str) -> None:
+        assert_plain(message)
+        original(message)
+
+    original, places = progress.say, [progress, *_importers("say", progress.say)]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(errors.AvlmapsError, "__init__", checked)
+        for place in places:
+            patch.setattr(place, "say", say)
+        yield
+
+
+def _importers(name: str, value: object) -> list[object]:
+    """Return the modules of the package that are loaded already and hold this value under this name."""
+    ours = [module for key, module in sys.modules.items() if key.startswith(("avlmaps.", "avlmaps_"))]
+    return [module for module in ours if vars(module).get(name) is value and module.__name__ != "avlmaps.core.progress"]
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """The folder of real data beside the checkout; tests that need it are skipped where it is absent."""
+    folder = Path(__file__).resolve().parents[1] / "shared"
+    if not (folder / "data").is_dir():
+        pytest.skip("needs the real recordings in ../shared/data, which are not part of this repository")
+    return folder
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
+    """Run a command line in this process; return its exit status, standard output and standard error."""
+
+    from avlmaps.cli import main
+
+    def call(*words: object) -> tuple[int, str, str]:
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as stop:
+            main([str(word) for word in words])
+        said = capsys.readouterr()
+        assert_plain(said.out + said.err)
+        return int(stop.value.code or 0), said.out, said.err
+
+    return call
+
+
+@pytest.fixture
+def answer(run: Callable[..., tuple[int, str, str]]) -> Callable[..., dict[str, Any]]:
+    """Run a command line with --json and return its one object."""
+
+    def call(*words: object) -> dict[str, Any]:
+        status, out, err = run(*words, "--json")
+        assert status == 0, err
+        assert out.count("\n") == 1, "one JSON object on standard output, and nothing else"
+        return json.loads(out)
+
+    return call

@@ -1,0 +1,145 @@
+"""Encoding the sounds of a scene of the data set again, from the walks below ``audio_video/``.
+
+The reference stores its sound map as a pickle, which nobody should read who does not know who wrote it, and which holds
+neither the time of a sound nor the sound itself. The tracks that it was made from lie beside it; they are encoded
+here as in a build. They were recorded on walks of their own, in the world of the scene's poses: their times are made to
+continue from the end of the scene's walk, one walk after the other.
+"""
+
+import glob
+import shutil
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from avlmaps.core.errors import MapError
+from avlmaps.core.registry import Kind, find, load
+from avlmaps.maps.audio.events import HearingSettings, detect_events
+from avlmaps.maps.store.array_validation import array_fields
+from avlmaps.maps.store.manifest import ModelInfo
+from avlmaps.maps.types import HeardSounds
+from avlmaps.recordings.open import open_recording
+from avlmaps.recordings.types import Recording
+from avlmaps_models.import_reference.scene import SceneFiles
+
+WALKS = "audio_video"
+HEARING = HearingSettings()
+
+
+@dataclass(frozen=True, slots=True)
+class Ears:
+    """Encodes the sounds on the walks of a scene; without walks, silence.
+
+    Attributes:
+        walks: opened with their tracks, in the order of their folders.
+        start_s: where the time of each begins in the map's.
+        backend: of the sound model, ``name`` or ``name@model``.
+        model: its entry for the map; None for silence.
+    """
+
+    walks: tuple[Recording, ...] = ()
+    start_s: Float[np.ndarray, " w"] = field(default_factory=lambda: np.zeros(0))
+    backend: str = ""
+    model: ModelInfo | None = None
+
+    @classmethod
+    def of(cls, scene: SceneFiles, track: str, backend: str, after_s: float) -> "Ears":
+        """Open the walks of a scene, and the model that is to hear them.
+
+        Args:
+            scene: where they are.
+            track: name of the track's file in each walk's folder, such as ``output_level_1.wav``; ``""`` for silence.
+            backend: which sound model.
+            after_s: end of the scene's own walk.
+
+        Raises:
+            MapError: none has such a track.
+            RecordingError: a walk cannot be used.
+            AudioError: a track cannot be read.
+            BackendError: the model is not known, or missing.
+        """
+        if not track:
+            return cls()
+        walks = _find_walks(scene.folder, track)
+        ends = [max(walk.duration_s, walk.audio.end_s if walk.audio else 0.0) for walk in walks]
+        start_s = after_s + np.concatenate([[0.0], np.cumsum(ends)[:-1]])
+        card = load(Kind.SOUNDS, backend).card
+        return cls(walks, start_s, backend, ModelInfo.of(_with_model(backend), card))
+
+    def ingredients(self) -> list[Any]:
+        """Return the values that identify these sounds."""
+        return [[walk.fingerprint for walk in self.walks], self.start_s.tolist(), self.model]
+
+    def detect_events(self, clips_folder: Path) -> HeardSounds:
+        """Find and encode the sounds of all walks.
+
+        Args:
+            clips_folder: where each sound is written as FLAC; made again if there are walks.
+
+        Returns:
+            The sounds in the order of their onset, in the map's time.
+        """
+        if not self.walks:
+            return _silence()
+        shutil.rmtree(clips_folder, ignore_errors=True)
+        heard: list[HeardSounds] = []
+        for walk, start_s in zip(self.walks, self.start_s.tolist(), strict=True):
+            here = clips_folder / walk.path.name
+            found = detect_events(walk, load(Kind.SOUNDS, self.backend), HEARING, here)
+            heard.append(_moved(found, here, clips_folder, start_s))
+        return _joined(heard)
+
+
+def _with_model(backend: str) -> str:
+    name, _, model = backend.partition("@")
+    model = model or find(Kind.SOUNDS, name).model
+    return f"{name}@{model}" if model else name
+
+
+def _find_walks(scene: Path, track: str) -> tuple[Recording, ...]:
+    folder = scene / WALKS
+    if Path(track).name != track:
+        raise MapError(f"{track} is no file's name; give that of the track in each walk, such as output_level_1.wav.")
+    found = sorted(path for path in folder.glob(f"*/{glob.escape(track)}") if path.is_file())
+    if not found:
+        there = sorted({path.name for path in folder.glob("*/*.wav")})
+        raise MapError(f"No folder below {folder} has a {track}; there are: {', '.join(there) or 'no .wav files'}.")
+    return tuple(open_recording(path.parent, format="avlmaps", audio=path) for path in found)
+
+
+def _silence() -> HeardSounds:
+    return HeardSounds(
+        onset_s=np.zeros(0),
+        offset_s=np.zeros(0),
+        track_offsets=np.zeros(1, np.int64),
+        track=np.zeros((0, 3), np.float32),
+        feature_offsets=np.zeros(1, np.int64),
+        feature=np.zeros((0, 0), np.float32),
+        clips=(),
+    )
+
+
+def _moved(found: HeardSounds, here: Path, clips_folder: Path, start_s: float) -> HeardSounds:
+    """Return the sounds in the map's time, their clips under names that no other walk has."""
+    names = tuple(f"{here.name}-{clip}" for clip in found.clips)
+    for clip, name in zip(found.clips, names, strict=True):
+        (here / clip).rename(clips_folder / name)
+    arrays = {name: getattr(found, name) for name in array_fields(HeardSounds)}
+    arrays["onset_s"], arrays["offset_s"] = found.onset_s + start_s, found.offset_s + start_s
+    return HeardSounds(**arrays, clips=names)
+
+
+def _joined(heard: Sequence[HeardSounds]) -> HeardSounds:
+    """Put the sounds of walks one after the other; the offsets of ragged arrays run on."""
+    arrays = {name: [getattr(one, name) for one in heard] for name in array_fields(HeardSounds)}
+    for name in ("track_offsets", "feature_offsets"):
+        lengths = np.concatenate([np.diff(offsets) for offsets in arrays[name]])
+        arrays[name] = [np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)]
+    return HeardSounds(
+        **{name: np.concatenate(parts) for name, parts in arrays.items()},
+        clips=tuple(clip for one in heard for clip in one.clips),
+    )

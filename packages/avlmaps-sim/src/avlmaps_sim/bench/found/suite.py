@@ -1,0 +1,153 @@
+"""The suite ``avlmaps bench found``: Brier scores, what is reported as found, and a reliability diagram."""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+from jaxtyping import Float
+
+from avlmaps.core.files import write_bytes_atomically
+from avlmaps.query.factors import FOUND_AT
+from avlmaps_sim.bench.found.answers import Judged, judged_job
+from avlmaps_sim.bench.harness.intervals import in_percent, wilson
+from avlmaps_sim.bench.harness.provenance import in_words, provenance
+from avlmaps_sim.bench.harness.workers import side_by_side
+from avlmaps_sim.bench.harness.workplace import scene_jobs
+from avlmaps_sim.bench.indexing.runs import IndexingSettings
+from avlmaps_sim.bench.indexing.tables import TITLE
+from avlmaps_sim.bench.indexing.tasks import TaskKind
+from avlmaps_sim.bench.output import Table, markdown, write_answer
+from avlmaps_sim.scene import Scene
+from avlmaps_sim.scenes import open_scene
+
+NOTE = (
+    "A first goal is right within 0.5 m of a right place, horizontally. Queries that have no right answer stand beside "
+    "those that have: another thing, room or sound in place of the one that is there. The Brier score is the mean of "
+    "(probability - right)^2; those that have an answer and those that have none count alike. Beside it stands that of "
+    "one who says for each kind of query how often it is right, and no more."
+)
+_BINS = np.linspace(0.0, 1.0, 11)
+
+
+def run_found(settings: IndexingSettings | None, out: Path, open_spec: Callable[[str], Scene] = open_scene) -> Any:
+    """Query scenes, whose maps are those of the suite ``indexing`` in the same folder; write tables and a picture."""
+    settings = settings or IndexingSettings()
+    weights = settings.checked()
+    todo = scene_jobs(settings, settings.recorded, settings.scenes, out / "work")
+    judge = partial(judged_job, most=settings.tasks_a_scene, open_spec=open_spec)
+    answers = [
+        one for scene in side_by_side(judge, todo, settings.jobs, "found", lambda one: one.spec) for one in scene
+    ]
+    answer = {
+        "suite": "found",
+        **provenance(settings, settings.recorded, settings.scenes, weights),
+        "note": NOTE,
+        "tables": {"found": kinds_table(answers), "reliability": reliability_table(answers)},
+    }
+    page = f"# Is found true?\n\n{in_words(answer)}\n\n{NOTE}\n\n{markdown(answer['tables'])}"
+    written = write_answer(answer, out, page)
+    write_bytes_atomically(out / "found_answers.json", msgspec.json.encode(answers))
+    draw_reliability(answers, out / "found.png")
+    return written
+
+
+def kinds_table(answers: Sequence[Judged]) -> Table:
+    """Return for each kind of query its Brier score and what is reported as found, by what it truly is."""
+    rows: list[list[object]] = []
+    tables = {str(kind): TITLE[kind] for kind in TaskKind}
+    for kind in [*sorted({one.kind for one in answers}), "all"]:
+        own = [one for one in answers if kind in (one.kind, "all")]
+        p, right, weight = _numbers(own)
+        base = np.average(right, weights=weight)
+        cells: list[object] = [
+            tables.get(kind, kind),
+            len(own),
+            round(brier(p, right, weight), 3),
+            round(float(base * (1 - base)), 3),
+        ]
+        groups = (
+            [one for one in own if one.right],
+            [one for one in own if one.answerable and not one.right],
+            [one for one in own if not one.answerable],
+        )
+        cells += map(_share_found, groups)
+        rows.append(cells)
+    columns = [
+        "query",
+        "queries",
+        "Brier score",
+        "of the rate alone",
+        "right: found",
+        "wrong: found",
+        "none there: found",
+    ]
+    return {"columns": columns, "rows": rows}
+
+
+def _share_found(group: Sequence[Judged]) -> str:
+    """Return how many of some queries are reported as found; nothing of none."""
+    if not group:
+        return ""
+    found = sum(one.probability >= FOUND_AT for one in group)
+    return f"{100.0 * found / len(group):.1f}% of {len(group)} ({in_percent(wilson(found, len(group)))})"
+
+
+def reliability_table(answers: Sequence[Judged]) -> Table:
+    """Return how often a goal is right, by its probability."""
+    p = np.array([one.probability for one in answers])
+    right = np.array([one.right for one in answers], float)
+    rows: list[list[object]] = []
+    for low, high in pairwise(_BINS.tolist()):
+        own = (p >= low) & ((p < high) | (high == 1.0))
+        count, hits = int(own.sum()), int(right[own].sum())
+        if count:
+            share = [round(float(p[own].mean()), 3), round(hits / count, 3), in_percent(wilson(hits, count))]
+            rows.append([f"{low:.1f} to {high:.1f}", count, *share])
+    return {"columns": ["probability", "queries", "mean of it", "right", "95 %"], "rows": rows}
+
+
+def brier(
+    probability: Float[np.ndarray, " n"], right: Float[np.ndarray, " n"], weight: Float[np.ndarray, " n"] | None = None
+) -> float:
+    """Return the Brier score: the mean of the squared difference of probability and truth."""
+    return float(np.average(np.square(probability - right), weights=weight))
+
+
+def _numbers(
+    answers: Sequence[Judged],
+) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
+    """Return probability, truth and weight; of each kind what has an answer and what has none weigh alike."""
+    key = [(one.kind, one.answerable) for one in answers]
+    return (
+        np.array([one.probability for one in answers]),
+        np.array([one.right for one in answers], float),
+        np.array([1.0 / key.count(one) for one in key]),
+    )
+
+
+def draw_reliability(answers: Sequence[Judged], path: Path) -> None:
+    """Draw the share of right goals over their probability, with 95 % intervals, and how many there are of each."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(5.2, 5.6), layout="constrained")
+    top, below = figure.subplots(2, 1, height_ratios=[4, 1], sharex=True)
+    rows = reliability_table(answers)["rows"]
+    p = np.array([one.probability for one in answers])
+    top.plot([0, 1], [0, 1], color="#9aa0a6", linewidth=1)
+    for row in rows:
+        count, mean, share = int(row[1]), float(row[2]), float(row[3])
+        top.plot([mean, mean], wilson(round(share * count), count), color="#e07b39", linewidth=1.2)
+        top.plot(mean, share, "o", color="#e07b39", markersize=6)
+    top.set_ylabel("share of first goals that are right")
+    below.hist(p, bins=_BINS.tolist(), color="#7fa6c9")
+    below.set_yscale("log")
+    below.set_ylabel("queries")
+    below.set_xlabel("probability that the first goal is right")
+    top.set_title(f"{len(answers)} queries in {len({one.scene for one in answers})} scenes", loc="left", fontsize=10)
+    for axes in (top, below):
+        axes.spines[["top", "right"]].set_visible(False)
+    figure.savefig(path, dpi=110)

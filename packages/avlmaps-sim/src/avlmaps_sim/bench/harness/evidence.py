@@ -1,0 +1,137 @@
+"""The truth of a recorded scene, and the rule that makes a goal unambiguous: one near, all others farther."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from avlmaps_sim.free_space import STRUCTURE
+from avlmaps_sim.mesh import Triple
+from avlmaps_sim.scene import Area, SceneObject
+
+NEAR_M = 2.5  # the right thing is at most this far, horizontally, from the place to the thing's box
+MARGIN_M = 1.5  # every other thing of the category is at least this much farther
+LEAST_SEEN = 50  # voxels: an eighth of a square metre of surface
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """A box along the axes of the scene's world (z up), metres."""
+
+    low: Triple
+    high: Triple
+
+    def distance_m(self, position: Triple) -> float:
+        """Return the horizontal distance of a place to the box; 0 over it, under it and in it."""
+        low, high, at = (np.asarray(v, np.float64)[:2] for v in (self.low, self.high, position))
+        return float(np.linalg.norm(np.maximum(np.maximum(low - at, at - high), 0.0)))
+
+    def centre_distance_m(self, position: Triple) -> float:
+        """Return the horizontal distance of a place to the middle of the box."""
+        low, high, at = (np.asarray(v, np.float64)[:2] for v in (self.low, self.high, position))
+        return float(np.linalg.norm((low + high) / 2 - at))
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """A sound that can be queried.
+
+    Attributes:
+        category: its name.
+        place: where it was heard (overlay) or came from (acoustic), metres, world.
+        track: the robot's places while it was heard (overlay); empty where ``place`` says it all.
+    """
+
+    category: str
+    place: Triple
+    track: tuple[Triple, ...] = ()
+
+    @property
+    def right(self) -> "tuple[Box, ...]":
+        """The right answers to a question for this sound: its places, as boxes without extent."""
+        return tuple(Box(at, at) for at in (self.track or (self.place,)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Evidence:
+    """The things and sounds that are truly in a scene and were recorded.
+
+    Attributes:
+        scene: its name.
+        objects: its things.
+        seen: for each thing how many voxels of the map it fills.
+        areas: its rooms.
+        events: its sounds.
+        storey_m: heights between which lies the storey that was recorded; things of others are neither queried nor
+            rivals, since distances are horizontal.
+    """
+
+    scene: str
+    objects: tuple[SceneObject, ...]
+    seen: Int[np.ndarray, " objects"]
+    areas: tuple[Area, ...] = ()
+    events: tuple[Event, ...] = ()
+    storey_m: tuple[float, float] = (-np.inf, np.inf)
+
+    def ambiguous(self) -> dict[str, list[int]]:
+        """Return the things of each category of which the recording shows two or more; unseen ones are among them."""
+        found: dict[str, list[int]] = {}
+        for instance, thing in enumerate(self.objects):
+            on_storey = self.storey_m[0] <= thing.centre[2] <= self.storey_m[1]
+            if thing.category not in STRUCTURE and on_storey:
+                found.setdefault(thing.category, []).append(instance)
+        return {name: own for name, own in found.items() if sum(map(self.shows, own)) >= 2}
+
+    def shows(self, instance: int) -> bool:
+        """Return whether the recording shows enough of a thing to query it."""
+        return bool(self.seen[instance] >= LEAST_SEEN)
+
+    def box(self, instance: int) -> Box:
+        """Return the box round a thing."""
+        thing = self.objects[instance]
+        return Box(thing.low, thing.high)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Photo:
+    """A picture that a query may use.
+
+    Attributes:
+        world_from_camera: where it was taken.
+        share: for each thing of the scene the part of the pixels that shows it.
+    """
+
+    world_from_camera: Float[np.ndarray, "4 4"]
+    share: Float[np.ndarray, " objects"]
+
+
+def alone_near(distance_m: Sequence[float], near_m: float = NEAR_M, margin_m: float = MARGIN_M) -> int | None:
+    """Return the one that is near while all others are clearly farther; None where there is no such one."""
+    if not len(distance_m):
+        return None
+    order = np.argsort(distance_m, kind="stable")
+    nearest = float(distance_m[order[0]])
+    if nearest > near_m or (len(order) > 1 and float(distance_m[order[1]]) - nearest < margin_m):
+        return None
+    return int(order[0])
+
+
+def heard_places(events: Sequence[Event]) -> dict[str, list[Event]]:
+    """Return the events of each category, in the order in which they were heard."""
+    heard: dict[str, list[Event]] = {}
+    for event in events:
+        heard.setdefault(event.category, []).append(event)
+    return heard
+
+
+def shown_boxes(evidence: Evidence) -> dict[str, list[Box]]:
+    """Return the boxes of each category of which the recording shows a thing, unseen things of it among them."""
+    low, high = evidence.storey_m
+    found: dict[str, list[int]] = {}
+    for instance, thing in enumerate(evidence.objects):
+        if thing.category not in STRUCTURE and low <= thing.centre[2] <= high:
+            found.setdefault(thing.category, []).append(instance)
+    return {
+        name: [evidence.box(i) for i in own] for name, own in sorted(found.items()) if any(map(evidence.shows, own))
+    }

@@ -1,0 +1,111 @@
+"""Heat that comes from truth, or that no map of ours stores: for ceilings and baselines, in memory alone."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Bool, Float, Float32, Int
+
+from avlmaps.core.question import Part
+from avlmaps.query.factors import Factor, NearAnchors, NearThings
+from avlmaps.query.voxel_space import Space
+from avlmaps_sim.scene import Area
+
+_STOREY_M = 0.5  # an area reaches this far below its floor and above its ceiling
+_WALL_M = 0.1  # and this far into its walls: a voxel of a thing at a wall may lie in it
+
+
+@dataclass(frozen=True, eq=False)
+class VoxelHeat(Factor):
+    """Heat given voxel by voxel; only ever context, since it has no instances of its own.
+
+    Attributes:
+        voxel: heat of every voxel, in [0, 1].
+        regional: whether it says in which region a voxel lies.
+    """
+
+    space: Space
+    part: Part
+    voxel: Float32[np.ndarray, " n"]
+    found: bool = True
+    falloff_per_m: float = 0.0
+    understood: str = ""
+    note: str = ""
+    flat: bool = field(default=False, init=False)
+    regional: bool = False
+
+    anchors = np.zeros((0, 3))
+    instance = np.zeros(0, np.int64)
+    confidence = np.zeros(0)
+
+    def heat_and_anchors(
+        self, among: Bool[np.ndarray, " n"] | None = None
+    ) -> tuple[Float32[np.ndarray, " n"], Int[np.ndarray, " n"]]:
+        """Return the heat; heat by voxel has no anchors."""
+        heat = self.voxel if among is None else np.where(among, self.voxel, np.float32(0.0))
+        return heat, np.full(len(heat), -1, np.int64)
+
+    def at(self, points_world: Float[np.ndarray, "m 3"]) -> Float[np.ndarray, " m"]:
+        """Return the heat of the nearest voxel to each point."""
+        from scipy.spatial import KDTree
+
+        if not len(self.space):
+            return np.zeros(len(points_world))
+        return self.voxel[KDTree(self.space.centres).query(points_world)[1]].astype(np.float64)
+
+    def anchor_of(self, voxels: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
+        """Return nothing: heat by voxel has no anchors."""
+        raise ValueError("heat given voxel by voxel has no anchors")
+
+
+def true_things(space: Space, part: Part, falloff_per_m: float, label: Int[np.ndarray, " n"], own: Sequence[int]):
+    """Return the heat of things whose voxels are truly known.
+
+    Args:
+        space: the map's voxels.
+        part: the part of the query.
+        falloff_per_m: how fast heat falls.
+        label: the thing that each voxel is.
+        own: the things that match the query.
+    """
+    mask: Bool[np.ndarray, " n"] = np.isin(label, np.array(own, np.int64))
+    instance = np.unique(label[mask], return_inverse=True)[1].reshape(-1)
+    count = int(instance.max(initial=-1)) + 1
+    return NearThings(space, part, falloff_per_m, mask, instance, np.ones(count, np.float32), count > 0)
+
+
+def true_places(space: Space, part: Part, falloff_per_m: float, places: Sequence[Float[np.ndarray, "k 3"]]):
+    """Return the heat around places that are truly known, each with score 1.
+
+    Args:
+        space: the map's voxels.
+        part: the part of the query.
+        falloff_per_m: how fast heat falls.
+        places: for each thing that was heard or seen the places along its track.
+    """
+    anchors = np.concatenate([np.zeros((0, 3)), *places])
+    which = np.repeat(np.arange(len(places)), [len(track) for track in places])
+    return NearAnchors(space, part, falloff_per_m, anchors, np.ones(len(anchors)), which, len(anchors) > 0)
+
+
+def true_regions(space: Space, part: Part, areas: Sequence[Area]) -> VoxelHeat:
+    """Return 1 in the rooms of the queried kind and 0 outside, the map of rooms being truly known."""
+    inside = np.zeros(len(space), bool)
+    for area in areas:
+        if area.kind != part.query:
+            continue
+        z = space.centres[:, 2]
+        within = (z > area.floor_m - _STOREY_M) & (z < area.ceiling_m + _STOREY_M)
+        inside |= within & near_polygon(area, space.centres[:, :2], _WALL_M)
+    return VoxelHeat(space, part, inside.astype(np.float32), bool(inside.any()), regional=True)
+
+
+def near_polygon(area: Area, xy: Float[np.ndarray, "n 2"], margin_m: float) -> Bool[np.ndarray, " n"]:
+    """Return which points lie inside a room, or no farther from its outline than the margin."""
+    near = np.asarray(area.contains(xy))
+    a, b = area.polygon, np.roll(area.polygon, -1, axis=0)
+    for start, end in zip(a, b, strict=True):
+        along = end - start
+        t = np.clip((xy - start) @ along / max(float(along @ along), 1e-12), 0.0, 1.0)
+        near |= np.linalg.norm(xy - start - t[:, None] * along, axis=1) <= margin_m
+    return near

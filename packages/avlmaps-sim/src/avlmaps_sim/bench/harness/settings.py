@@ -1,0 +1,115 @@
+"""Which scenes a suite runs on, and how they are recorded and mapped."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from avlmaps.core.errors import AvlmapsError
+from avlmaps.perception.encoders import Encoders, encoders_of
+from avlmaps.perception.profiles import choose_models
+from avlmaps.query.rules import Rules
+from avlmaps.recordings.clips import find_clips
+from avlmaps_sim.bench.harness.clips import unheard_rows
+from avlmaps_sim.bench.harness.models import checksums
+
+Clips = Literal["unheard", "all"]
+
+
+class TaskError(AvlmapsError):
+    """Tasks cannot be read, or do not fit the suite."""
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """How the scenes of a set of tasks were recorded: the same tasks need the same recordings.
+
+    Attributes:
+        hearing: ``overlay`` or ``acoustic``.
+        frames: limit of frames in a scene.
+        sources: limit of sounds in a scene.
+        ambiguous: how many kinds of sound play in two places.
+        sensor: whose faults colour and depth have.
+        sounds: name of the folder of clips; ``""`` for sounds made by rule.
+        seed: of walks, sounds and tasks.
+        clips: which clips of the folder; see ``SceneSettings``.
+    """
+
+    hearing: str
+    frames: int
+    sources: int
+    ambiguous: int
+    sensor: str
+    sounds: str
+    seed: int
+    clips: str = "all"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SceneSettings:
+    """Which scenes a benchmark runs on, and how they are recorded and mapped.
+
+    Attributes:
+        scenes: names of scenes.
+        profile: the models that map them.
+        models: other backends than the profile's, ``module=backend[@model]``.
+        rules: how they are mapped and queried: ``ours``, or the ``paper``'s (``avlmaps.query.rules``).
+        hearing: how sounds reach the microphone; a sound's place is the robot's (``overlay``) or its source's.
+        sounds: folder of clips; made by rule if None.
+        clips: ``unheard``: those of the folder that the shipped sound encoder was not trained on; ``all``.
+        sensor: whose faults colour and depth have.
+        frames: limit of frames a scene.
+        sources: limit of sounds a scene.
+        ambiguous: how many kinds of sound play in two places.
+        jobs: scenes side by side; 0 takes as many as there are cores.
+        seed: of walks, sounds and all queries.
+        load: tasks to use instead of making new ones; how the scenes were recorded comes from the file.
+        save: where to write the tasks.
+    """
+
+    scenes: tuple[str, ...]
+    profile: str = "embedded"
+    models: tuple[str, ...] = ()
+    rules: Rules = "ours"
+    hearing: Literal["overlay", "acoustic"] = "overlay"
+    sounds: Path | None = None
+    clips: Clips = "unheard"
+    sensor: Literal["clean", "kinect", "realsense"] = "clean"
+    frames: int = 600
+    sources: int = 14
+    ambiguous: int = 2
+    jobs: int = 0
+    seed: int = 0
+    load: Path | None = None
+    save: Path | None = None
+
+    @property
+    def recorded(self) -> Recorded:
+        """How the scenes are recorded."""
+        sounds = "" if self.sounds is None else self.sounds.resolve().name
+        clips = "all" if self.sounds is None else self.clips
+        return Recorded(
+            self.hearing, self.frames, self.sources, self.ambiguous, self.sensor, sounds, self.seed, clips
+        )  # fmt: skip
+
+    @property
+    def used(self) -> Encoders:
+        """The encoders of the profile, with the models that were chosen.
+
+        Raises:
+            BackendError: there is no such profile or backend.
+        """
+        return encoders_of(choose_models(self.profile, self.models))
+
+    def checked(self) -> dict[str, str]:
+        """Check everything that is given before anything is recorded; return the models' checksums by module.
+
+        Raises:
+            BackendError: a model is not known, or missing.
+            AudioError: the folder of clips cannot be used.
+        """
+        weights = checksums(self.used)
+        if self.sounds is not None:
+            find_clips(self.sounds)
+            if self.clips == "unheard":
+                unheard_rows(self.sounds)
+        return weights

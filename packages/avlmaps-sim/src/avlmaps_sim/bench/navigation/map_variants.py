@@ -1,0 +1,169 @@
+"""A map as one row of the tables perceives it: each sense ours, a baseline's, true, or none at all."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from jaxtyping import Float, Int, UInt8
+
+from avlmaps.core.camera import Pinhole
+from avlmaps.core.errors import QueryError
+from avlmaps.core.question import Modality, Part, Role
+from avlmaps.query.avlmap import AVLMap
+from avlmaps.query.heatmap import Heatmap
+from avlmaps.query.modalities.image import read_picture
+from avlmaps.query.queryable import Photo
+from avlmaps_sim.bench.harness.baselines import WeakHearing, alike_keyframe
+from avlmaps_sim.bench.harness.factors import VoxelHeat, true_places, true_regions, true_things
+from avlmaps_sim.bench.navigation.phrases import spoken
+from avlmaps_sim.truth import Truth
+
+Sense = Literal["ours", "weak", "true", "none"]
+
+
+@dataclass(frozen=True, slots=True)
+class Senses:
+    """Where each modality's heat comes from.
+
+    Attributes:
+        objects: ``ours``, ``true`` or ``none``.
+        sounds: ``ours``, ``weak`` (a plainer ear), ``true`` or ``none``.
+        images: ``ours``, ``weak`` (the most alike keyframe's place, nothing matched), ``true`` or ``none``.
+        areas: ``ours``, ``true`` or ``none``.
+    """
+
+    objects: Sense = "ours"
+    sounds: Sense = "ours"
+    images: Sense = "ours"
+    areas: Sense = "ours"
+
+
+@dataclass(frozen=True, eq=False)
+class KnownScene:
+    """The truth of a scene, beside its map.
+
+    Attributes:
+        avlmap: the map.
+        truth: things, sounds and rooms.
+        label: the true thing of each voxel, −1 for none.
+        hearing: whether a sound's true place is the robot's (``overlay``) or its source's (``acoustic``).
+        photos: where each photo was taken, ``world_from_camera`` by the name of its file.
+        weak: the plainer ear, made when it is first needed.
+    """
+
+    avlmap: AVLMap
+    truth: Truth
+    label: Int[np.ndarray, " n"]
+    hearing: str
+    photos: Mapping[str, Float[np.ndarray, "4 4"]]
+    weak: Callable[[], WeakHearing]
+    heats: dict[tuple[Any, ...], Heatmap] = field(default_factory=dict)
+
+
+class Perceived(AVLMap):
+    """The same map, queried through other encoders; a robot does not notice.
+
+    A sense that is none knows nothing of what is sought, and takes every place as equally near to a mark.
+    """
+
+    def __init__(self, scene: KnownScene, senses: Senses) -> None:
+        super().__init__(scene.avlmap.stored, scene.avlmap.settings)
+        self.space = scene.avlmap.space  # so that heat of all senses multiplies
+        self._scene, self._senses = scene, senses
+
+    def object(self, word: str, primary: bool = False, vocabulary: Sequence[str] | None = None) -> Heatmap:
+        """Return the heat of a thing."""
+        if self._senses.objects == "none":
+            return self._nothing(Modality.OBJECT, word, primary)
+        if self._senses.objects == "ours":
+            return self._once(("object", word, primary), lambda: self._scene.avlmap.object(word, primary))
+        return self._once(("true object", word, primary), lambda: self._true_object(word, primary))
+
+    def sound(self, text: str, primary: bool = False) -> Heatmap:
+        """Return the heat of where a sound was heard."""
+        sense = self._senses.sounds
+        makers: dict[str, Callable[[], Heatmap]] = {
+            "ours": lambda: self._scene.avlmap.sound(text, primary),
+            "weak": lambda: self._scene.weak().heat(self._category(text), _role(primary)),
+            "true": lambda: self._true_sound(text, primary),
+            "none": lambda: self._nothing(Modality.SOUND, text, primary),
+        }
+        return self._once((sense, "sound", text, primary), makers[sense])
+
+    def image(
+        self,
+        picture: str | Path | Photo | UInt8[np.ndarray, "h w 3"],
+        intrinsics: Pinhole | None = None,
+        primary: bool = False,
+    ) -> Heatmap:
+        """Return the heat of where a photo was taken."""
+        if isinstance(picture, np.ndarray | Photo):
+            raise ValueError("missions name photos by their files")
+        name, sense = Path(picture).name, self._senses.images
+        makers: dict[str, Callable[[], Heatmap]] = {
+            "ours": lambda: self._scene.avlmap.image(picture, intrinsics, primary),
+            "weak": lambda: alike_keyframe(self._scene.avlmap, read_picture(Path(picture)), name, _role(primary)),
+            "true": lambda: self._places(Modality.IMAGE, name, primary, [self._scene.photos[name][None, :3, 3]]),
+            "none": lambda: self._nothing(Modality.IMAGE, name, primary),
+        }
+        return self._once((sense, "image", name, primary), makers[sense])
+
+    def area(self, word: str, primary: bool = False) -> Heatmap:
+        """Return the heat of a kind of room."""
+        sense = self._senses.areas
+        makers: dict[str, Callable[[], Heatmap]] = {
+            "ours": lambda: self._scene.avlmap.area(word, primary),
+            "true": lambda: self._true_area(word, primary),
+            "none": lambda: self._nothing(Modality.AREA, word, primary),
+        }
+        return self._once((sense, "area", word, primary), makers[sense])
+
+    def _once(self, key: tuple[Any, ...], make: Callable[[], Heatmap]) -> Heatmap:
+        if key not in self._scene.heats:
+            self._scene.heats[key] = make()
+        return self._scene.heats[key]
+
+    def _true_object(self, word: str, primary: bool) -> Heatmap:
+        part = Part(Modality.OBJECT, word, _role(primary))
+        own = [i for i, thing in enumerate(self._scene.truth.objects) if thing.category == _plain(word)]
+        falloff = self.settings.heat.falloff_per_m(part.role)
+        return Heatmap.of(true_things(self.space, part, falloff, self._scene.label, own))
+
+    def _category(self, text: str) -> str:
+        """Return the kind of sound that a phrase names, if it was made here; the plain ear knows kinds by name only."""
+        named = {spoken(event.category): event.category for event in self._scene.truth.events}
+        return named.get(spoken(_plain(text)), text)
+
+    def _true_sound(self, text: str, primary: bool) -> Heatmap:
+        events = [event for event in self._scene.truth.events if spoken(event.category) == spoken(_plain(text))]
+        acoustic = self._scene.hearing == "acoustic"
+        tracks = [np.array([event.source if acoustic else event.robot]) for event in events]
+        return self._places(Modality.SOUND, text, primary, tracks)
+
+    def _true_area(self, word: str, primary: bool) -> Heatmap:
+        own = [area for area in self._scene.truth.areas if area.kind == _plain(word)]
+        if primary:  # a primary part has places; those of a room are its middle
+            middles = [np.append(area.polygon.mean(axis=0), area.floor_m)[None] for area in own]
+            return self._places(Modality.AREA, word, primary, middles)
+        return Heatmap.of(true_regions(self.space, Part(Modality.AREA, _plain(word)), own))
+
+    def _places(self, modality: Modality, query: str, primary: bool, tracks: Sequence[np.ndarray]) -> Heatmap:
+        part = Part(modality, query, _role(primary), modality is Modality.IMAGE)
+        return Heatmap.of(true_places(self.space, part, self.settings.heat.falloff_per_m(part.role), tracks))
+
+    def _nothing(self, modality: Modality, query: str, primary: bool) -> Heatmap:
+        if primary:
+            raise QueryError(f"The {modality} {query!r} means nothing to a robot without that sense; name another.")
+        part = Part(modality, query, Role.CONTEXT, modality is Modality.IMAGE)
+        return Heatmap.of(VoxelHeat(self.space, part, np.ones(len(self.space), np.float32)))
+
+
+def _role(primary: bool) -> Role:
+    return Role.PRIMARY if primary else Role.CONTEXT
+
+
+def _plain(words: str) -> str:
+    """Return a phrase as truth spells it."""
+    return " ".join(words.replace("_", " ").lower().split()).removeprefix("the ")

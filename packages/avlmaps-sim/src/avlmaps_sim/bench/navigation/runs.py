@@ -1,0 +1,218 @@
+"""Running the benchmark: first all scenes' missions are made, then robots are sent, every scene in its own process."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from avlmaps.core.version import __version__
+from avlmaps.language.translator import Translator
+from avlmaps.navigate.bodies import BASE
+from avlmaps_sim.bench.harness.own_recording import is_recording
+from avlmaps_sim.bench.harness.settings import TaskError
+from avlmaps_sim.bench.harness.workers import side_by_side
+from avlmaps_sim.bench.harness.workplace import SceneJob, scene_jobs
+from avlmaps_sim.bench.navigation.configurations import Configuration, configurations
+from avlmaps_sim.bench.navigation.episodes import Episode, Journal
+from avlmaps_sim.bench.navigation.missions import (
+    Mission,
+    MissionSet,
+    allocated,
+    asked_for,
+    load_missions,
+    save_missions,
+)
+from avlmaps_sim.bench.navigation.scene_setup import NavigationPlace
+from avlmaps_sim.bench.navigation.settings import NavigationSettings
+from avlmaps_sim.scene import Scene
+from avlmaps_sim.scenes import open_scene
+
+_MAKING = 3  # raised when missions are made in another way
+_SENDING = 4  # raised when robots are sent in another way
+OpenSpec = Callable[[str], Scene]
+
+
+@dataclass(frozen=True, slots=True)
+class SceneFacts:
+    """The properties of one scene.
+
+    Attributes:
+        scene: its name.
+        frames: how many the map was made of.
+        voxels: how many it has.
+        sounds: how many sounds were heard, and how many there were.
+        episodes: what became of its missions, by mission and then configuration.
+        clips: sound and clip of every event.
+    """
+
+    scene: str
+    frames: int
+    voxels: int
+    sounds: tuple[int, int]
+    episodes: tuple[Episode, ...]
+    clips: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """The outcome of all scenes."""
+
+    settings: NavigationSettings
+    missions: MissionSet
+    scenes: tuple[SceneFacts, ...]
+    weights: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def episodes(self) -> list[Episode]:
+        """All episodes, scene by scene."""
+        return [episode for scene in self.scenes for episode in scene.episodes]
+
+
+@dataclass(frozen=True, slots=True)
+class _Todo:
+    """The work of one process: make a scene's missions, or send robots on some."""
+
+    job: SceneJob
+    settings: NavigationSettings
+    missions: tuple[Mission, ...]
+    journal: Path
+    open_spec: OpenSpec
+
+
+def run(settings: NavigationSettings, out: Path, open_spec: OpenSpec = open_scene) -> Outcome:
+    """Record and map every scene, and send robots on missions in it.
+
+    Args:
+        settings: what.
+        out: folder for ``work`` (recordings and maps, shared with the indexing suite), ``navigation_missions.json``
+            and ``episodes``; a run that was broken off resumes from there.
+        open_spec: makes a scene of its name (tests give small ones).
+
+    Raises:
+        TaskError: the missions cannot be read, do not fit, or no scene yields any.
+        BackendError: a model is missing.
+    """
+    weights = settings.checked()
+    if recordings := [scene for scene in settings.scenes if is_recording(scene)]:
+        raise TaskError(
+            f"{recordings[0]} is a recording; robots are sent only through scenes whose geometry is known. Give "
+            "house:SEED or a scene file, or run the suite indexing or objects."
+        )
+    missions = _missions(settings, out, open_spec)
+    kept = tuple(mission for mission in missions.missions if mission.series in settings.series)
+    if not kept:
+        raise TaskError(
+            f"The {len(missions.scenes)} scenes yield no mission of {', '.join(settings.series)}; take larger ones, or "
+            f"more frames than {missions.recorded.frames}."
+        )
+    missions = replace(missions, missions=kept)
+    if settings.save is not None:
+        save_missions(missions, settings.save)
+    todo = [
+        _Todo(
+            job, settings, tuple(one for one in kept if one.scene == job.spec), _journal(settings, out, job), open_spec
+        )
+        for job in _jobs(settings, missions, out)
+    ]
+    total = sum(len(_pairs(one.missions)) for one in todo)
+    scenes = side_by_side(_sent, todo, settings.jobs, "navigation", _named, lambda: _count(todo), total)
+    return Outcome(settings, missions, tuple(scenes), weights)
+
+
+def _jobs(settings: NavigationSettings, missions: MissionSet, out: Path) -> list[SceneJob]:
+    return scene_jobs(settings, missions.recorded, missions.scenes, out / "work")
+
+
+def _named(todo: _Todo) -> str:
+    return todo.job.spec
+
+
+def _journal(settings: NavigationSettings, out: Path, job: SceneJob) -> Path:
+    """Return the file of a scene's episodes: one for each way of sending robots, so that its lines can be counted."""
+    return out / "episodes" / f"{job.folder.name}-{_key(settings)[:8]}.jsonl"
+
+
+def _pairs(missions: Sequence[Mission]) -> list[tuple[Mission, Configuration]]:
+    return [(mission, one) for mission in missions for one in configurations(mission.series)]
+
+
+def _count(todo: Sequence[_Todo]) -> int:
+    return sum(Journal(one.journal).count() for one in todo)
+
+
+def _missions(settings: NavigationSettings, out: Path, open_spec: OpenSpec) -> MissionSet:
+    """Return the missions of a file, of a run that was broken off, or made again."""
+    if settings.load is not None:
+        given = load_missions(settings.load)
+        if given.recorded.sounds != settings.recorded.sounds:
+            wanted = f"name the folder {given.recorded.sounds!r} with" if given.recorded.sounds else "leave out"
+            raise TaskError(f"The missions {settings.load} were made with other sounds; {wanted} --sounds.")
+        return given
+    asked = asked_for(
+        settings.recorded, settings.scenes, settings.series, settings.sequences, settings.profile, settings.models,
+        settings.rules, BASE, __version__, _MAKING,
+    )  # fmt: skip
+    path = out / "navigation_missions.json"
+    if path.exists():
+        before = load_missions(path)
+        if before.asked == asked:
+            return before
+    empty = MissionSet(settings.recorded, settings.scenes, BASE.radius_m, (), asked)
+    todo = [_Todo(job, settings, (), _journal(settings, out, job), open_spec) for job in _jobs(settings, empty, out)]
+    made = side_by_side(_made, todo, settings.jobs, "mapping", _named)
+    own = [mission for series in settings.series for mission in _shared_out(settings, series, made)]
+    missions = replace(empty, missions=tuple(own))
+    save_missions(missions, path)
+    return missions
+
+
+def _shared_out(settings: NavigationSettings, series: Any, made: list[list[Mission]]) -> list[Mission]:
+    own = [[mission for mission in scene if mission.series is series] for scene in made]
+    total = settings.total(series)
+    return allocated(own, sum(map(len, own)) if total is None else total)
+
+
+def _made(todo: _Todo) -> list[Mission]:
+    """Record and map a scene, and make its missions."""
+    return NavigationPlace(todo.job, todo.settings, todo.open_spec).missions()
+
+
+def _sent(todo: _Todo) -> SceneFacts:
+    """Send robots on a scene's missions, those aside that are done."""
+    settings, journal = todo.settings, Journal(todo.journal)
+    done = journal.read()
+    place = NavigationPlace(todo.job, settings, todo.open_spec)
+    pairs = [(mission, one) for mission, one in _pairs(todo.missions) if place.work.has(one.needs)]
+    built = place.work.avlmap.stored.info.build_key
+    keyed = [(_key(settings, built, mission.fingerprint, one), mission, one) for mission, one in pairs]
+    if any(key not in done for key, _, _ in keyed):
+        pilot = place.pilot(list(todo.missions), translator_named(settings.language))
+        for key, mission, one in keyed:
+            if key not in done:
+                done[key] = pilot.run(mission, one, key)
+                journal.add(done[key])
+    info = place.work.avlmap.stored.info.counts
+    sounds = (info.sounds, len(place.work.truth.events))
+    episodes = tuple(done[key] for key, _, _ in keyed)
+    clips = tuple((event.category, event.clip) for event in place.work.truth.events)
+    return SceneFacts(todo.job.spec, info.frames, info.voxels, sounds, episodes, clips)
+
+
+def _key(settings: NavigationSettings, *facts: object) -> str:
+    """Return a short name of how robots are sent and of all else that an episode depends on."""
+    how = (settings.rules, settings.language, settings.guess, BASE, settings.recorded, __version__, _SENDING)
+    return sha256("\n".join(map(repr, (*how, *facts))).encode()).hexdigest()[:24]
+
+
+def translator_named(language: str) -> Translator | None:
+    """Return the translator of sentences into programs; None for programs as they are."""
+    if language == "none":
+        return None
+    if language == "chat":
+        from avlmaps.language.chat import ChatTranslator
+
+        return ChatTranslator()
+    from avlmaps.language.rules import RulesTranslator
+
+    return RulesTranslator()

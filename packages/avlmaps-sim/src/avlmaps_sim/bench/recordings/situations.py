@@ -1,0 +1,369 @@
+"""The mistakes: what each makes of a right recording, and the words by which its cause is named."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from avlmaps.core import poses
+from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.recordings.camera_axes import opencv_from_axes
+from avlmaps_sim.bench.recordings.drafts import Draft, Picture
+
+Change = Callable[[Draft, Draft, np.random.Generator], Draft]
+
+
+@dataclass(frozen=True, slots=True)
+class Situation:
+    """One mistake.
+
+    Attributes:
+        name: of it.
+        group: what it is in: poses, scale, depth, colour, pictures, intrinsics or clock.
+        change: makes it, of a right recording, another walk and a source of randomness.
+        cause: a regular expression that a sentence matches which names the cause.
+    """
+
+    name: str
+    group: str
+    change: Change
+    cause: str
+
+
+def situations() -> tuple[Situation, ...]:
+    """Return all of them."""
+    return (*_of_poses(), *_of_scale(), *_of_depth(), *_of_colour(), *_of_pictures(), *_of_intrinsics(), *_of_clocks())
+
+
+def _on_poses(change: Callable[[np.ndarray], np.ndarray]) -> Change:
+    return lambda draft, other, rng: replace(draft, poses=change(draft.poses))
+
+
+def _of_axes(name: str) -> Change:
+    """Write the poses of a camera with other axes."""
+    turn = np.eye(4)
+    turn[:3, :3] = opencv_from_axes(name)
+    return _on_poses(lambda written: written @ turn)
+
+
+_GL = np.diag([1.0, -1.0, -1.0, 1.0])
+_Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
+
+
+def _of_poses() -> Iterator[Situation]:
+    group, geometry = "poses", r"do not agree|jump|exchanged|m/s|Hardly any|mount"
+    yield Situation("camera_from_world", group, _on_poses(poses.inverse), "camera_from_world|camera-from-world")
+    yield Situation("quaternion written w first", group, lambda d, o, g: replace(d, quaternion_roll=1), "wxyz")
+    yield Situation("OpenGL camera", group, _on_poses(lambda p: p @ _GL), "opengl|RUB")
+    yield Situation("OpenGL camera in a y-up world", group, _on_poses(lambda p: _Y_UP @ p @ _GL), "opengl|RUB")
+    yield Situation("poses of a body, x forward", group, _of_axes("ros"), "ros|FLU")
+    yield Situation(
+        "inverse poses of an OpenGL camera", group, _on_poses(lambda p: poses.inverse(p @ _GL)), "camera-from-world"
+    )
+    yield Situation("rotations transposed", group, _on_poses(_transposed), geometry)
+    yield Situation("poses of another walk", group, lambda d, o, g: replace(d, poses=o.poses[: len(d)]), geometry)
+    yield Situation("poses reversed", group, _on_poses(lambda p: p[::-1].copy()), geometry)
+    yield Situation("all poses the same", group, _on_poses(lambda p: np.repeat(p[:1], len(p), axis=0)), geometry)
+    yield Situation("poses jump by 0.5 m", group, _on_poses(lambda p: _jump(p, (0.5, 0.0, 0.0))), geometry)
+    yield Situation("poses turn by 20 degrees", group, _on_poses(lambda p: _jump(p, (0.0, 0.0, 0.0), 20.0)), geometry)
+    yield Situation(
+        "noise of 5 cm and 3 degrees", group, lambda d, o, g: replace(d, poses=_noisy(d.poses, g)), geometry
+    )
+    yield Situation("pictures of 10 frames exchanged", group, _exchanged, geometry)
+    yield Situation("camera rolled by 8 degrees in its mount", group, _on_poses(lambda p: p @ _ROLLED), geometry)
+    yield Situation("two neighbours exchanged", group, _neighbours(1, 0), "exchanged")
+    yield Situation("three neighbours exchanged", group, _neighbours(1, 2, 0), "exchanged")
+
+
+_ROLLED = np.eye(4)
+_ROLLED[:2, :2] = [[np.cos(0.14), -np.sin(0.14)], [np.sin(0.14), np.cos(0.14)]]
+
+
+def _transposed(written: np.ndarray) -> np.ndarray:
+    turned = written.copy()
+    turned[:, :3, :3] = np.swapaxes(written[:, :3, :3], 1, 2)
+    return turned
+
+
+def _jump(written: np.ndarray, by_m: tuple[float, float, float], degrees: float = 0.0) -> np.ndarray:
+    half = np.deg2rad(degrees) / 2.0
+    off = poses.from_quaternion(np.array([by_m]), np.array([[0.0, 0.0, np.sin(half), np.cos(half)]]))[0]
+    moved = written.copy()
+    moved[len(moved) // 2 :] = off @ moved[len(moved) // 2 :]
+    return moved
+
+
+def _noisy(written: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    turn = rng.normal(0.0, np.deg2rad(3.0) / 2.0, (len(written), 3))
+    quaternion = np.column_stack([turn, np.ones(len(written))])
+    return written @ poses.from_quaternion(rng.normal(0.0, 0.05, (len(written), 3)), quaternion)
+
+
+def _exchanged(draft: Draft, other: Draft, rng: np.random.Generator) -> Draft:
+    order = np.arange(len(draft))
+    chosen = rng.choice(len(draft), min(10, len(draft)), replace=False)
+    order[chosen] = np.roll(order[chosen], 1)
+    return _reordered(draft, order, colour=True, depth=True)
+
+
+def _neighbours(*order: int, colour: bool = True, depth: bool = True) -> Change:
+    """Put neighbours near the middle into another order."""
+
+    def changed(draft: Draft, other: Draft, rng: np.random.Generator) -> Draft:
+        rows, first = np.arange(len(draft)), int(rng.integers(len(draft) // 3, 2 * len(draft) // 3))
+        rows[first : first + len(order)] = first + np.array(order)
+        return _reordered(draft, rows, colour=colour, depth=depth)
+
+    return changed
+
+
+def _reordered(draft: Draft, order: np.ndarray, *, colour: bool, depth: bool) -> Draft:
+    rows: list[int] = order.tolist()
+    return replace(
+        draft,
+        rgb=tuple(draft.rgb[i] for i in rows) if colour else draft.rgb,
+        depth=tuple(draft.depth[i] for i in rows) if depth else draft.depth,
+    )
+
+
+def _of_scale() -> Iterator[Situation]:
+    for factor in (0.1, 0.3, 0.5, 2.0, 10.0, 100.0, 1000.0):
+        yield Situation(f"positions x{factor:g}", "scale", _on_poses(lambda p, f=factor: _scaled(p, f)), _SCALE)
+    for factor in (0.1, 0.2, 0.25, 0.5, 2.0, 4.0, 5.0, 10.0):
+        change: Change = lambda d, o, g, f=factor: replace(d, units_per_m=d.units_per_m / f)  # noqa: E731
+        yield Situation(f"depth x{factor:g}", "scale", change, _SCALE)
+
+
+_SCALE = r"times too|in metres|--depth-unit|too far to be reached|m/s|jumps by"
+
+
+def _scaled(written: np.ndarray, factor: float) -> np.ndarray:
+    scaled = written.copy()
+    scaled[:, :3, 3] *= factor
+    return scaled
+
+
+def _on_depth(change: Callable[[Picture], Picture]) -> Change:
+    return lambda draft, other, rng: replace(draft, depth=tuple(map(change, draft.depth)))
+
+
+def _on_colour(change: Callable[[Picture], Picture]) -> Change:
+    return lambda draft, other, rng: replace(draft, rgb=tuple(map(change, draft.rgb)))
+
+
+def _as_16_bit(values: Any) -> Picture:
+    return np.clip(values, 0, 65_535).astype(np.uint16)
+
+
+def _of_depth() -> Iterator[Situation]:
+    group, depth = "depth", "do not agree|depth"
+    yield Situation("distance along the ray", group, _along_ray, "along the ray")
+    yield Situation("depth mirrored", group, _on_depth(lambda d: d[:, ::-1]), "depth pictures look mirrored")
+    yield Situation("depth upside down", group, _on_depth(lambda d: d[::-1, ::-1]), "depth pictures look upside down")
+    yield Situation(
+        "depth shuffled", group, lambda d, o, g: _reordered(d, g.permutation(len(d)), colour=False, depth=True), depth
+    )
+    yield Situation("depth of another walk", group, lambda d, o, g: replace(d, depth=_fitted(o.depth, d.depth)), depth)
+    yield Situation("depth constant", group, _on_depth(lambda d: np.full_like(d, 3000)), "same depth")
+    yield Situation(
+        "depth of noise",
+        group,
+        lambda d, o, g: replace(d, depth=tuple(g.integers(300, 6000, x.shape).astype(np.uint16) for x in d.depth)),
+        depth,
+    )
+    yield Situation(
+        "disparity for depth",
+        group,
+        _on_depth(lambda d: np.where(d > 0, _as_16_bit(4e6 / np.maximum(d, 1)), 0).astype(np.uint16)),
+        depth,
+    )
+    yield Situation("bytes of depth swapped", group, _on_depth(lambda d: d.byteswap()), depth)
+    yield Situation("depth in steps of 256", group, _on_depth(lambda d: d // 256 * 256), depth)
+    yield Situation(
+        "depth shifted by a sixteenth", group, _on_depth(lambda d: np.roll(d, d.shape[1] // 16, axis=1)), depth
+    )
+    yield Situation(
+        "depth shifted downwards by a sixteenth",
+        group,
+        _on_depth(lambda d: np.roll(d, d.shape[1] // 16, axis=0)),
+        depth,
+    )
+    yield Situation("depth of two neighbours exchanged", group, _neighbours(1, 0, colour=False), "exchanged|depth")
+    yield Situation("no depth in half of the frames", group, _half_empty, "no depth")
+    yield Situation("depth froze", group, _frozen, depth)
+
+
+def _along_ray(draft: Draft, other: Draft, rng: np.random.Generator) -> Draft:
+    length = np.linalg.norm(draft.rig.depth.rays(), axis=2)
+    return replace(draft, depth=tuple(_as_16_bit(d * length) for d in draft.depth))
+
+
+def _fitted(pictures: tuple[Picture, ...], like: tuple[Picture, ...]) -> tuple[Picture, ...]:
+    """Return pictures of another walk in the number and size of this one's."""
+    import cv2
+
+    size = (like[0].shape[1], like[0].shape[0])
+    chosen = [pictures[i % len(pictures)] for i in range(len(like))]
+    return tuple(cv2.resize(picture, size, interpolation=cv2.INTER_NEAREST) for picture in chosen)
+
+
+def _half_empty(draft: Draft, other: Draft, rng: np.random.Generator) -> Draft:
+    return replace(draft, depth=tuple(d if rng.random() < 0.5 else np.zeros_like(d) for d in draft.depth))
+
+
+def _frozen(draft: Draft, other: Draft, rng: np.random.Generator) -> Draft:
+    half = len(draft) // 2
+    return replace(draft, depth=(*draft.depth[:half], *[draft.depth[half]] * (len(draft) - half)))
+
+
+def _of_colour() -> Iterator[Situation]:
+    group, colour = "colour", "colour"
+    yield Situation("colour mirrored", group, _on_colour(lambda c: c[:, ::-1]), "colour pictures look mirrored")
+    yield Situation(
+        "colour upside down", group, _on_colour(lambda c: c[::-1, ::-1]), "colour pictures look upside down"
+    )
+    yield Situation(
+        "colour shuffled", group, lambda d, o, g: _reordered(d, g.permutation(len(d)), colour=True, depth=False), colour
+    )
+    yield Situation(
+        "colour reversed",
+        group,
+        lambda d, o, g: _reordered(d, np.arange(len(d))[::-1], colour=True, depth=False),
+        colour,
+    )
+    yield Situation("colour of another walk", group, lambda d, o, g: replace(d, rgb=_fitted(o.rgb, d.rgb)), colour)
+    yield Situation(
+        "colour of noise",
+        group,
+        lambda d, o, g: replace(d, rgb=tuple(g.integers(0, 255, c.shape, dtype=np.uint8) for c in d.rgb)),
+        colour,
+    )
+    yield Situation("colour of one shade", group, _on_colour(lambda c: np.full_like(c, 128)), "of one colour")
+    yield Situation("half of the pictures BGR", group, _bgr(lambda i, n, g: g.random() < 0.5), "BGR")
+    yield Situation("every fifth picture BGR", group, _bgr(lambda i, n, g: i % 5 == 0), "BGR")
+    yield Situation("the second half BGR", group, _bgr(lambda i, n, g: i > n // 2), "BGR")
+    yield Situation(
+        "colour shifted by a sixteenth", group, _on_colour(lambda c: np.roll(c, c.shape[1] // 16, axis=1)), "colour"
+    )
+    yield Situation("colour of two neighbours exchanged", group, _neighbours(1, 0, depth=False), "exchanged|colour")
+    yield Situation(
+        "colour froze", group,
+        lambda d, o, g: _reordered(d, np.minimum(np.arange(len(d)), len(d) // 2), colour=True, depth=False), colour,
+    )  # fmt: skip
+    yield Situation(
+        "colour 3 frames late", group,
+        lambda d, o, g: _reordered(d, np.minimum(np.arange(len(d)) + 3, len(d) - 1), colour=True, depth=False), colour,
+    )  # fmt: skip
+    yield Situation("colour black", group, _on_colour(lambda c: np.zeros_like(c)), "black")
+    yield Situation("colour dark", group, _on_colour(lambda c: (c * 0.03).astype(np.uint8)), "dark|one colour|black")
+    yield Situation(
+        "colour 10 frames late",
+        group,
+        lambda d, o, g: _reordered(d, np.minimum(np.arange(len(d)) + 10, len(d) - 1), colour=True, depth=False),
+        colour,
+    )
+
+
+def _bgr(chosen: Callable[[int, int, np.random.Generator], bool]) -> Change:
+    """Exchange red and blue in some of the pictures."""
+
+    def changed(draft: Draft, other: Draft, rng: np.random.Generator) -> Draft:
+        count = len(draft)
+        return replace(draft, rgb=tuple(c[..., ::-1] if chosen(i, count, rng) else c for i, c in enumerate(draft.rgb)))
+
+    return changed
+
+
+def _of_pictures() -> Iterator[Situation]:
+    group = "pictures"
+    yield Situation("all mirrored", group, _both(lambda x: x[:, ::-1]), "pictures look mirrored")
+    yield Situation("all upside down", group, _both(lambda x: x[::-1, ::-1]), "LUF|upside down")
+    yield Situation("all turned by 90 degrees", group, _quarter, "URF|DLF|90 degrees")
+    yield Situation("all turned by 90 degrees and squeezed", group, _squeezed, "90 degrees")
+
+
+def _both(change: Callable[[Picture], Picture]) -> Change:
+    return lambda d, o, g: _on_depth(change)(_on_colour(change)(d, o, g), o, g)
+
+
+def _quarter(draft: Draft, other: Draft, rng: np.random.Generator) -> Draft:
+    def turned(camera: Pinhole) -> Pinhole:
+        return Pinhole(camera.fy, camera.fx, camera.cy, camera.width - camera.cx, camera.height, camera.width)
+
+    rig = Rig(turned(draft.rig.rgb), turned(draft.rig.depth), draft.rig.rgb_from_depth)
+    return replace(_both(np.rot90)(draft, other, rng), rig=rig)
+
+
+def _squeezed(draft: Draft, other: Draft, rng: np.random.Generator) -> Draft:
+    import cv2
+
+    def squeeze(picture: Picture) -> Picture:
+        size = (picture.shape[1], picture.shape[0])
+        return cv2.resize(np.ascontiguousarray(np.rot90(picture)), size, interpolation=cv2.INTER_NEAREST)
+
+    return _both(squeeze)(draft, other, rng)
+
+
+def _of_intrinsics() -> Iterator[Situation]:
+    group = "intrinsics"
+    yield Situation(
+        "intrinsics of a picture twice as large", group, _on_cameras(lambda c: _camera(c, 2.0, 2.0, 2.0)), "picture"
+    )
+    yield Situation(
+        "intrinsics of a picture half as large",
+        group,
+        _on_cameras(lambda c: _camera(c, 0.5, 0.5, 0.5)),
+        "picture|intrinsics",
+    )
+    for factor in (0.5, 0.7, 1.4, 2.0):
+        yield Situation(
+            f"focal length x{factor:g}", group, _on_cameras(lambda c, f=factor: _camera(c, f)), "focal length"
+        )
+    yield Situation(
+        "principal point at the corner", group, _on_cameras(lambda c: _camera(c, 1.0, 0.0, 0.0)), "principal point"
+    )
+    yield Situation(
+        "columns and rows exchanged",
+        group,
+        _on_cameras(lambda c: Pinhole(c.fy, c.fx, c.cy, c.cx, c.width, c.height)),
+        "exchanged|principal|picture",
+    )
+    yield Situation(
+        "focal length of colour x0.5", group, _on_cameras(lambda c: _camera(c, 0.5), depth=False), "colour|do not agree"
+    )
+    yield Situation(
+        "focal length of depth x0.5", group, _on_cameras(lambda c: _camera(c, 0.5), colour=False), "do not agree|focal"
+    )
+    yield Situation("colour camera 0.3 m beside", group, _mounted(0.3, 0.0, 0.0), "rgb_from_depth")
+    yield Situation("colour camera 0.15 m above", group, _mounted(0.0, 0.15, 0.0), "rgb_from_depth")
+    yield Situation(
+        "principal point off by a sixteenth", group, _on_cameras(lambda c: _camera(c, 1.0, 1.125)), "princip"
+    )
+
+
+def _mounted(*by_m: float) -> Change:
+    """Say that the colour camera is elsewhere."""
+    moved = np.eye(4)
+    moved[:3, 3] = by_m
+    return lambda d, o, g: replace(d, rig=Rig(d.rig.rgb, d.rig.depth, d.rig.rgb_from_depth @ moved))
+
+
+def _camera(camera: Pinhole, focal: float, x: float = 1.0, y: float = 1.0) -> Pinhole:
+    c = camera
+    return Pinhole(c.fx * focal, c.fy * focal, c.cx * x, c.cy * y, c.width, c.height)
+
+
+def _on_cameras(change: Callable[[Pinhole], Pinhole], *, colour: bool = True, depth: bool = True) -> Change:
+    def changed(draft: Draft, other: Draft, rng: np.random.Generator) -> Draft:
+        rig = draft.rig
+        rgb = change(rig.rgb) if colour else rig.rgb
+        return replace(draft, rig=Rig(rgb, change(rig.depth) if depth else rig.depth, rig.rgb_from_depth))
+
+    return changed
+
+
+def _of_clocks() -> Iterator[Situation]:
+    for delay_s in (-0.6, 0.3, 1.0):
+        change: Change = lambda d, o, g, s=delay_s: replace(d, pose_stamps_s=d.pose_stamps_s + s)  # noqa: E731
+        yield Situation(f"poses {delay_s:+g} s off", "clock", change, "late|early")

@@ -1,0 +1,200 @@
+"""The suites behind `avlmaps bench`: run one, write its tables as JSON, Markdown and a picture."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from avlmaps.core.errors import RecordingError
+from avlmaps.core.registry import Kind
+from avlmaps.perception.encoders import Encoders, encoders_of
+from avlmaps.perception.profiles import choose_models
+from avlmaps_sim.bench.harness.models import checksums, shipped_checksums
+from avlmaps_sim.bench.harness.provenance import in_words
+from avlmaps_sim.bench.output import BenchError, Table, draw, markdown, write_answer
+
+if TYPE_CHECKING:
+    from avlmaps_sim.bench.indexing import IndexingSettings
+    from avlmaps_sim.bench.navigation import NavigationSettings
+
+
+@dataclass(frozen=True, slots=True)
+class SuiteInputs:
+    """The inputs of a suite.
+
+    Attributes:
+        sounds: folder of clips with an index.csv, for the suites of sound.
+        clips: the same, for ``sounds``: clips that are queried by name, dry and in rooms.
+        scenes: recordings with poses, for ``locate`` and ``recordings``.
+        nyuv2: folder of labelled frames, for ``frames``.
+        profile: the models that are measured.
+        models: other backends than the profile's, ``module=backend[@model]``.
+        seed: of what is drawn at random.
+        indexing: what the suites on scenes other than ``navigation`` are run on; its own defaults if None.
+        navigation: what the suite ``navigation`` is run on; its own defaults if None.
+    """
+
+    sounds: Path | None = None
+    clips: Path | None = None
+    scenes: tuple[Path, ...] = ()
+    nyuv2: Path | None = None
+    profile: str = "embedded"
+    models: tuple[str, ...] = ()
+    seed: int = 0
+    indexing: "IndexingSettings | None" = None
+    navigation: "NavigationSettings | None" = None
+
+
+def run_suite(suite: str, inputs: SuiteInputs, out: Path) -> dict[str, Any]:
+    """Run a suite and write SUITE.json, SUITE.md, SUITE.png and a CSV file for each table into ``out``.
+
+    Args:
+        suite: ``words``, ``language``, ``sounds``, ``segmentation``, ``locate``, ``frames``, ``recordings``,
+            ``objects``, ``indexing``, ``found``, ``rooms`` or ``navigation``.
+        inputs: what it measures on.
+        out: folder to write into.
+
+    Raises:
+        BenchError: the folder or recording that the suite needs was not given, or the profile cannot be measured.
+    """
+    if suite == "indexing":
+        from avlmaps_sim.bench.indexing.suite import run_indexing
+
+        return run_indexing(inputs.indexing, out)
+    if suite == "found":
+        from avlmaps_sim.bench.found.suite import run_found
+
+        return run_found(inputs.indexing, out)
+    if suite == "rooms":
+        from avlmaps_sim.bench.rooms.suite import run_rooms
+
+        return run_rooms(inputs.indexing, out)
+    if suite == "navigation":
+        from avlmaps_sim.bench.navigation.suite import run_navigation
+
+        return run_navigation(inputs.navigation, out)
+    used = encoders_of(choose_models(inputs.profile, inputs.models))
+    weights = _weights(suite, used)
+    if suite == "objects":
+        from avlmaps_sim.bench.objects import run_objects
+
+        return run_objects(inputs.indexing, out)
+    if suite == "recordings":
+        from avlmaps_sim.bench.recordings.suite import run
+
+        tables = run(inputs.scenes, out, inputs.seed)
+    else:
+        tables = _SUITES[suite](inputs)
+    sources = (inputs.sounds, inputs.clips, inputs.nyuv2, *inputs.scenes)
+    answer = {
+        "suite": suite,
+        "scenes": [source.resolve().name for source in sources if source is not None],
+        "profile": inputs.profile,
+        "models": list(inputs.models),
+        "seed": inputs.seed,
+        "weights": weights,
+        "tables": tables,
+    }
+    written = write_answer(answer, out, f"{in_words(answer)}\n\n{markdown(tables)}")
+    draw(tables, out / f"{suite}.png")
+    return written
+
+
+# The modules that each suite measures; a model that is missing is named before anything else happens.
+_MEASURED = {"sounds": (Kind.SOUNDS,), "locate": (Kind.LOCAL, Kind.PLACE, Kind.MATCHER), "frames": (Kind.PIXELS,)}
+
+
+def _weights(suite: str, used: Encoders) -> dict[str, str]:
+    """Return the checksums of the models that a suite measures, by module."""
+    if suite == "words":
+        return {"words": shipped_checksums()["words"]}
+    known = checksums(used)
+    return {kind.value: known[kind.value] for kind in _MEASURED.get(suite, ()) if kind.value in known}
+
+
+def _words(inputs: SuiteInputs) -> Mapping[str, Table]:
+    from avlmaps_sim.bench import words
+
+    _embedded_only(inputs, "words")
+    return {"phrases kept out of training": words.run()}
+
+
+def _sounds(inputs: SuiteInputs) -> Mapping[str, Table]:
+    from avlmaps_sim.bench import sound_clips, sounds
+
+    _embedded_only(inputs, "sounds")
+    if inputs.clips is not None:
+        return sound_clips.run(inputs.clips)
+    return sounds.run(_clips(inputs))
+
+
+def _segmentation(inputs: SuiteInputs) -> Mapping[str, Table]:
+    from avlmaps_sim.bench import segmentation
+
+    return {"sounds found in a track": segmentation.run(_clips(inputs), inputs.seed)}
+
+
+def _locate(inputs: SuiteInputs) -> Mapping[str, Table]:
+    from avlmaps.recordings.open import open_recording
+    from avlmaps_sim.bench import locate
+
+    if not inputs.scenes:
+        raise BenchError("This suite measures on recordings with poses; name one or more with --scenes.")
+    tables: dict[str, Table] = {}
+    for path in inputs.scenes:
+        recording = open_recording(path)
+        if len(recording) < 20:
+            raise RecordingError(f"{path} has {len(recording)} frames; half as map and half as photos takes 20.")
+        tables[f"photos located in {path.resolve().name}"] = locate.run(
+            recording, inputs.seed, used=encoders_of(choose_models(inputs.profile, inputs.models))
+        )
+    return tables
+
+
+def _frames(inputs: SuiteInputs) -> Mapping[str, Table]:
+    from avlmaps.perception.embedded.pixels import EmbeddedPixels
+    from avlmaps_sim.bench.frames import run_frames
+
+    if inputs.nyuv2 is None:
+        raise BenchError("This suite measures on labelled frames (docs/guides/train-eyes.md); name their folder with "
+                         "--nyuv2.")  # fmt: skip
+    used = encoders_of(choose_models(inputs.profile, inputs.models))
+    encoder = used.pixels
+    if not isinstance(encoder, EmbeddedPixels):
+        raise BenchError(
+            f"The suite frames sums probabilities of kinds, which the pixel encoder {used.name_of(Kind.PIXELS)!r} does "
+            "not give. "
+            "Choose the profile embedded, synthetic or trained."
+        )
+    return run_frames(encoder, inputs.nyuv2)
+
+
+def _language(_: SuiteInputs) -> Mapping[str, Table]:
+    from avlmaps_sim.bench import language
+
+    return language.run()
+
+
+_SUITES: dict[str, Callable[[SuiteInputs], Mapping[str, Table]]] = {
+    "words": _words,
+    "language": _language,
+    "sounds": _sounds,
+    "segmentation": _segmentation,
+    "locate": _locate,
+    "frames": _frames,
+}
+
+
+def _clips(inputs: SuiteInputs) -> Path:
+    if inputs.sounds is None:
+        raise BenchError("This suite measures on a folder of clips with an index.csv; name it with --sounds.")
+    return inputs.sounds
+
+
+def _embedded_only(inputs: SuiteInputs, suite: str) -> None:
+    if inputs.profile != "embedded":
+        raise BenchError(f"The suite {suite} measures the embedded encoder; it has no figures for {inputs.profile!r}.")
+    if inputs.models:
+        raise BenchError(
+            f"The suite {suite} measures the embedded encoder; leave out --model {' '.join(inputs.models)}."
+        )

@@ -1,0 +1,224 @@
+"""A simulated robot in the true geometry of a scene: a disc that nothing gets into, and that stops or slides.
+
+The world's z is up here, so its level frame is the world. The part of the building at the body's heights is cut out
+of the triangles as lines, and distances to those are exact; a grid of distances only says where nothing is near.
+"""
+
+from dataclasses import dataclass
+from math import cos, hypot, sin
+from typing import Literal
+
+import cv2
+import numpy as np
+from jaxtyping import Float
+
+from avlmaps.core.errors import NavigationError
+from avlmaps.core.motion import FORWARD_M, TURN_RAD, Action, GroundPose, Moved
+from avlmaps_sim import body_kernels
+from avlmaps_sim.free_space import floor_cells, floor_heights, free_space
+from avlmaps_sim.grid_kernels import mark_slab
+from avlmaps_sim.scene import Scene
+
+_FINE_M = 0.05  # cells of the grids of room and of floor
+_COARSE_M = 0.25  # cells that lines are sorted into
+_CHORD_M = 0.02  # a curve is driven in straight pieces of at most this length
+_CHORD_RAD = 0.1  # ... and turn
+
+
+@dataclass(frozen=True, slots=True)
+class MotionNoise:
+    """How inexactly a body follows its commands; its odometry is true nevertheless. Standard deviations.
+
+    Attributes:
+        forward: of the distance, as a part of it.
+        turn: of the turn, as a part of it.
+        drift_rad_per_m: of the turn that creeps in while it drives, for one metre.
+    """
+
+    forward: float = 0.0
+    turn: float = 0.0
+    drift_rad_per_m: float = 0.0
+
+
+class Building:
+    """The obstacles of a scene for a body of some height; bodies of any radius can share one.
+
+    Attributes:
+        scene: which scene.
+        floor_m: height of the floor.
+        segments: (s, 4) outlines between the body's heights, top-down, as x y x y.
+    """
+
+    def __init__(
+        self, scene: Scene, low_m: float = 0.1, high_m: float = 1.5, floor: int | None = None, flies: bool = False
+    ) -> None:
+        """Cut a scene.
+
+        Args:
+            scene: the building.
+            low_m: lower parts over the floor are no obstacles.
+            high_m: higher parts are none either.
+            floor: which floor, counted from the lowest; the one with most to stand on where it is not said.
+            flies: whether the body needs no floor.
+        """
+        self.scene = scene
+        heights = floor_heights(scene)
+        self.floor_m = (
+            free_space(scene, 0.2, high_m).floor_m if floor is None and len(heights) > 1 else heights[floor or 0]
+        )
+        low, high = self.floor_m + low_m, self.floor_m + high_m
+        corners = scene.mesh.corners().astype(np.float64)
+        cut = body_kernels.cut_segments(corners, low, high)
+        self.segments = np.unique(np.round(cut, 7), axis=0)
+        extent = np.stack([scene.mesh.low[:2], scene.mesh.high[:2]]).astype(np.float64)
+        origin = extent[0] - 4 * _FINE_M
+        shape = tuple(int(n) for n in np.ceil((extent[1] - origin) / _FINE_M) + 4)
+        ground = np.ones(shape, np.bool_)
+        if not flies:
+            ground = floor_cells(scene, self.floor_m, origin, (shape[0], shape[1]), _FINE_M)
+        blocked = np.zeros(shape, np.bool_)
+        mark_slab(corners, low, high, origin, _FINE_M, blocked)
+        nx, ny = (int(n) for n in np.ceil((extent[1] - origin) / _COARSE_M) + 1)
+        starts, members = body_kernels.sorted_into_cells(self.segments, origin, _COARSE_M, nx, ny)
+        self._sorted = (self.segments, starts, members, origin, _COARSE_M, nx, ny)
+        self._ground = ground
+        self._room_m, self._floor_room_m = _room_m(blocked), _room_m(~np.pad(ground, 1))[1:-1, 1:-1]
+
+    def arrays(self, radius_m: float) -> tuple:
+        """Return the arrays that the compiled loops need for a body of some radius."""
+        room_m = np.minimum(self._room_m, self._floor_room_m + radius_m)
+        return (*self._sorted, room_m, self._ground, _FINE_M)
+
+    def clearance_m(self, x_m: float, y_m: float) -> float:
+        """Return the distance from a place to the nearest obstacle; by looking at everything."""
+        return float(body_kernels.nearest_point(x_m, y_m, self.segments)[0])
+
+
+def _room_m(blocked: np.ndarray) -> np.ndarray:
+    """Return the distance from anywhere in a cell to anything in a blocked one, never overstated."""
+    if not blocked.any():
+        return np.full(blocked.shape, 1e6)
+    apart = cv2.distanceTransform((~blocked).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE).astype(np.float64)
+    return np.maximum(apart - np.sqrt(2.0), 0.0) * _FINE_M
+
+
+class SimulatedBody:
+    """A round robot in a scene; offers what `avlmaps.navigate.bodies.Body` asks for.
+
+    Attributes:
+        building: what is in its way.
+        radius_m: of the body.
+        contacts: how many of its movements touched something.
+        travelled_m: how far it has moved.
+    """
+
+    def __init__(
+        self,
+        scene: Scene | Building,
+        pose: GroundPose,
+        radius_m: float = 0.2,
+        height_m: float = 1.5,
+        *,
+        on_contact: Literal["stop", "slide"] = "slide",
+        step_m: float = 0.1,
+        flies_m: float | None = None,
+        floor: int | None = None,
+        noise: MotionNoise | None = None,
+        rng: np.random.Generator | None = None,
+    ) -> None:
+        """Put a body into a scene.
+
+        Args:
+            scene: the building, or one that is cut already (then heights and floor are not used).
+            pose: where it starts; nothing may be within its radius there.
+            radius_m: of the body.
+            height_m: of its top over the floor.
+            on_contact: what it does when it touches something.
+            step_m: what is lower than this it drives over.
+            flies_m: height of its lowest part, for a body that flies.
+            floor: which floor, counted from the lowest; the one with most to stand on where it is not said.
+            noise: how inexactly it moves; exactly where it is not said.
+            rng: draws the noise.
+
+        Raises:
+            NavigationError: the start is not free, or there is no floor.
+            ValueError: noise without a generator.
+        """
+        if noise is not None and rng is None:
+            raise ValueError("noise needs a random generator")
+        low_m = step_m if flies_m is None else flies_m
+        self.building = (
+            scene if isinstance(scene, Building) else Building(scene, low_m, height_m, floor, flies_m is not None)
+        )
+        self.radius_m = radius_m
+        self.on_contact = on_contact
+        self.contacts, self.travelled_m = 0, 0.0
+        self._noise, self._rng = noise or MotionNoise(), rng
+        self._arrays = self.building.arrays(radius_m)
+        self._pose = pose
+        self.place_at(pose)
+
+    @property
+    def pose(self) -> GroundPose:
+        """Where it is."""
+        return self._pose
+
+    def fits(self, xy: Float[np.ndarray, "2"]) -> bool:
+        """Return whether the body can stand at a place, level x and y."""
+        return bool(body_kernels.fits(float(xy[0]), float(xy[1]), self.radius_m, self._arrays))
+
+    def place_at(self, pose: GroundPose) -> None:
+        """Put it somewhere else.
+
+        Raises:
+            NavigationError: the place is not free, or there is no floor.
+        """
+        if not self.fits(np.array([pose.x_m, pose.y_m])):
+            clear_m = self.building.clearance_m(pose.x_m, pose.y_m)
+            why = (
+                f"the nearest thing is {clear_m:.2f} m away, and its radius is {self.radius_m:.2f} m"
+                if clear_m < self.radius_m
+                else "there is no floor"
+            )
+            raise NavigationError(
+                f"The robot cannot stand at ({pose.x_m:.2f}, {pose.y_m:.2f}) m in {self.building.scene.name}: {why}; "
+                "give another start."
+            )
+        self._pose = pose
+
+    def act(self, action: Action) -> Moved:
+        """Take one of the paper's actions."""
+        if action is Action.FORWARD:
+            return self._moved(FORWARD_M, 0.0)
+        if action is Action.STOP:
+            return Moved(self._pose)
+        return self._moved(0.0, TURN_RAD if action is Action.LEFT else -TURN_RAD)
+
+    def drive(self, speed_m_s: float, turn_rad_s: float, duration_s: float) -> Moved:
+        """Move at a velocity for a while, along an arc; a touch ends the movement, not the turn."""
+        return self._moved(speed_m_s * duration_s, turn_rad_s * duration_s)
+
+    def _moved(self, ahead_m: float, turn_rad: float) -> Moved:
+        if self._rng is not None:
+            drift = self._noise.drift_rad_per_m * np.sqrt(abs(ahead_m))
+            errors = self._rng.standard_normal(3)
+            ahead_m *= 1.0 + self._noise.forward * errors[0]
+            turn_rad += turn_rad * self._noise.turn * errors[1] + drift * errors[2]
+        pose, touched = self._pose, False
+        x_m, y_m, heading = pose.x_m, pose.y_m, pose.heading_rad
+        pieces = 1
+        if ahead_m and turn_rad:
+            pieces = max(int(abs(ahead_m) / _CHORD_M), int(abs(turn_rad) / _CHORD_RAD)) + 1
+        slides = self.on_contact == "slide"
+        for _ in range(pieces if ahead_m else 0):
+            along = heading + 0.5 * turn_rad / pieces
+            dx, dy = cos(along) * ahead_m / pieces, sin(along) * ahead_m / pieces
+            x_m, y_m, hit = body_kernels.moved(x_m, y_m, dx, dy, self.radius_m, slides, self._arrays)
+            touched |= hit
+            heading += turn_rad / pieces
+            if hit and not slides:
+                break
+        self._pose = GroundPose(x_m, y_m, pose.heading_rad + turn_rad)
+        self.contacts += touched
+        self.travelled_m += hypot(x_m - pose.x_m, y_m - pose.y_m)
+        return Moved(self._pose, touched)

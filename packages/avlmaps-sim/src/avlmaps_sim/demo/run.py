@@ -1,0 +1,211 @@
+"""Make a home, drive through it, hear it, map it, ask it, send a robot through it.
+
+The truth measures afterwards how far each answer and each stop is off.
+"""
+
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from avlmaps.core.errors import MapError
+from avlmaps.core.progress import progress, say
+from avlmaps_sim.demo.outcome import DemoReport, Step
+from avlmaps_sim.demo.questions import CLIP, MAP, PAGE, PHOTO, Ask
+
+if TYPE_CHECKING:
+    from avlmaps.query.answer import Answer
+    from avlmaps.query.avlmap import AVLMap
+    from avlmaps.recordings.types import Recording
+    from avlmaps_sim.demo.evidence import Evidence
+    from avlmaps_sim.demo.questions import PhotoView
+    from avlmaps_sim.recorder import RecordSettings
+    from avlmaps_sim.scene import Scene
+
+MARKER = ".avlmaps-demo"
+
+
+@dataclass(frozen=True, slots=True)
+class DemoSettings:
+    """How large the demonstration is.
+
+    Attributes:
+        frames: limit of frames that are recorded.
+        size: columns and rows of the pictures.
+        sounds: number of sounds, if the walk has room for them; None places one for every twelve seconds.
+        workers: processes that draw; 0 takes as many as there are cores.
+        moments: of the walk that the report shows.
+    """
+
+    frames: int = 560
+    size: tuple[int, int] = (320, 240)
+    sounds: int | None = None
+    workers: int = 0
+    moments: int = 24
+
+
+def run_demo(
+    out: Path, seed: int = 0, scene: "Scene | None" = None, settings: DemoSettings | None = None
+) -> DemoReport:
+    """Run the whole demonstration into a folder; an earlier one there is replaced, anything else is left alone.
+
+    Args:
+        out: the folder.
+        seed: another seed takes another home, walk, sounds and questions.
+        scene: a building to walk through instead of the home that the seed stands for.
+        settings: how large it is.
+
+    Raises:
+        MapError: the folder holds something that is not a demonstration.
+    """
+    from avlmaps.maps.build import build_map, describe
+    from avlmaps.query.avlmap import AVLMap
+    from avlmaps_sim.demo.drive import drive
+    from avlmaps_sim.demo.evidence import Evidence
+    from avlmaps_sim.demo.home import choose_home
+    from avlmaps_sim.demo.report import write_report
+
+    _make_room(out)
+    settings = settings or DemoSettings()
+    seconds: dict[str, float] = {}
+    for_questions, for_photos, for_clip = np.random.default_rng(seed).spawn(3)
+    with _stage("home", seconds, "A home is built and furnished."):
+        scene = scene or choose_home(seed)
+    with _stage("record", seconds, f"A robot with a depth camera and a microphone drives through {_rooms(scene)}."):
+        recording = _record(scene, out, settings, seed)
+    with _stage("build", seconds, "The recording becomes a map."):
+        stored = build_map(recording, out / MAP)
+    with _stage("choose", seconds, "Questions are chosen by what is truly there."):
+        evidence = Evidence.of(recording)
+        asks, photo = _choose(scene, recording, evidence, out, for_questions, for_photos)
+        _write_clip(asks, out, for_clip)
+    with _stage("ask", seconds, "The map is queried."):
+        avlmap = AVLMap(stored)
+        answered = [
+            _answer(avlmap, ask, number, out) for number, ask in enumerate(progress(asks, "asking", unit="question"), 1)
+        ]
+        located = None if photo is None else _located(avlmap, photo, out)
+    steps = tuple(step for step, _ in answered)
+    with _stage("drive", seconds, "A robot drives to goals by one command."):
+        driven = drive(asks, avlmap, scene, out, say)
+    report = DemoReport(out, scene.name, steps, describe(stored), located, seconds, driven)
+    with _stage("page", seconds, "The map becomes a page to walk through."):
+        _write_page(avlmap, [step.ask for step in steps], out)
+    with _stage("report", seconds, "A page with pictures is written."):
+        write_report(
+            report, scene, recording, avlmap, evidence, photo, [answer for _, answer in answered], settings.moments
+        )
+    return report
+
+
+@contextmanager
+def _stage(name: str, seconds: dict[str, float], sentence: str) -> Iterator[None]:
+    """Print what begins, and store how long it took."""
+    say(sentence)
+    begin = perf_counter()
+    yield
+    seconds[name] = round(perf_counter() - begin, 1)
+
+
+def _make_room(out: Path) -> None:
+    if out.exists() and any(out.iterdir()) and not (out / MARKER).exists():
+        raise MapError(f"{out} holds something else than a demonstration; choose another folder with --out.")
+    out.mkdir(parents=True, exist_ok=True)
+    for entry in out.iterdir():  # one by one, since the folder may be a link
+        if entry.is_dir() and not entry.is_symlink():
+            shutil.rmtree(entry, ignore_errors=True)
+        else:
+            entry.unlink()
+    (out / MARKER).touch()
+
+
+def _rooms(scene: "Scene") -> str:
+    return f"{len(scene.areas)} rooms ({scene.name})" if scene.areas else scene.name
+
+
+def record_settings(scene: "Scene", settings: DemoSettings) -> "RecordSettings":
+    """Return how a home is recorded: a Kinect's faults, and sounds that reach the microphone through the rooms."""
+    from avlmaps_sim.demo.home import sounds_of
+    from avlmaps_sim.recorder import RecordSettings
+
+    return RecordSettings(
+        size=settings.size, sensor="kinect", hearing="acoustic", categories=sounds_of(scene), sources=settings.sounds,
+        max_frames=settings.frames, semantic=True, workers=settings.workers,
+    )  # fmt: skip
+
+
+def _record(scene: "Scene", out: Path, settings: DemoSettings, seed: int) -> "Recording":
+    from avlmaps.recordings.open import open_recording
+    from avlmaps_sim.recorder import record_scene
+
+    record_scene(scene, out / "recording", record_settings(scene, settings), seed)
+    return open_recording(out / "recording")
+
+
+def _choose(
+    scene: "Scene",
+    recording: "Recording",
+    evidence: "Evidence",
+    out: Path,
+    for_questions: np.random.Generator,
+    for_photos: np.random.Generator,
+) -> "tuple[list[Ask], PhotoView | None]":
+    """Choose the questions, and take the photo that one of them asks with."""
+    import cv2
+
+    from avlmaps_sim.demo.photos import photo_views
+    from avlmaps_sim.demo.questions import choose_questions
+    from avlmaps_sim.render import Renderer
+
+    renderer, camera = Renderer(scene), recording.rig.rgb
+    poses = np.asarray(recording.world_from_camera)
+    photos = photo_views(scene, renderer, camera, evidence, poses, for_photos)
+    asks, photo = choose_questions(evidence, photos, out, for_questions)
+    if photo is not None:
+        cv2.imwrite(str(out / PHOTO), renderer.render(camera, photo.world_from_camera).rgb[..., ::-1])
+    return asks, photo
+
+
+def _write_clip(asks: list[Ask], out: Path, rng: np.random.Generator) -> None:
+    """Make another recording of the sound that is queried by a clip."""
+    import soundfile
+
+    from avlmaps_sim.hearing import Synthesised
+
+    for ask in asks:
+        if ask.kind == "clip":
+            _, sound = Synthesised().draw(ask.about, rng)
+            soundfile.write(out / CLIP, sound.samples, sound.rate_hz)
+
+
+def _answer(avlmap: "AVLMap", ask: Ask, number: int, out: Path) -> "tuple[Step, Answer]":
+    answer = avlmap.ask(ask.question)
+    picture = f"question_{number}.png"
+    if answer.heat is not None:
+        answer.heat.plot(out / picture)
+    return Step(ask, answer.to_dict(), picture), answer
+
+
+def _write_page(avlmap: "AVLMap", asks: "list[Ask]", out: Path) -> None:
+    """Write the map as one page with the questions that are words alone."""
+    from avlmaps.view.page import write_page
+
+    words = [(ask.title, ask.question) for ask in asks if not any(part.is_file for part in ask.question.parts)]
+    write_page(out / PAGE, [avlmap], words)
+
+
+def _located(avlmap: "AVLMap", photo: "PhotoView", out: Path) -> tuple[float, float] | None:
+    """Return how far off the map takes the photo's camera to be, cm and degrees; None where it is not located."""
+    from avlmaps.core.poses import rotation_angle_rad
+    from avlmaps.query.modalities.image import read_picture
+
+    pose, truth = avlmap.locate(read_picture(out / PHOTO)).world_from_camera, photo.world_from_camera
+    if pose is None:
+        return None
+    off_cm = 100.0 * float(np.linalg.norm(pose[:3, 3] - truth[:3, 3]))
+    return off_cm, float(np.rad2deg(rotation_angle_rad(pose, truth)))

@@ -1,0 +1,203 @@
+"""Toilets."""
+
+import numpy as np
+
+from avlmaps_sim.furniture.catalogue import Piece, family
+from avlmaps_sim.furniture.fittings import (
+    china,
+    chrome,
+    outline,
+    shell,
+)  # fmt: skip
+from avlmaps_sim.furniture.recipe_helpers import chance, draw, finished, pick, pictured
+from avlmaps_sim.materials import material
+from avlmaps_sim.mesh import Material, Mesh
+from avlmaps_sim.shapes import box, cylinder, ellipsoid, rounded_box, slab, tube
+
+
+def _seat(rng: np.random.Generator, length: float, wide: float, power: float, z: float, x: float,
+          look: Material) -> list[Mesh]:  # fmt: skip
+    """Return seat and lid over a bowl whose rim begins at ``x``: lid shut, lid up, or both up."""
+    state = pick(rng, ("shut", "shut", "lid up", "both up"))
+    thick, egg = draw(rng, 0.014, 0.024), 0.12
+    middle = (length / 2, 0.0)
+
+    def plate(a: float, b: float, bulge: float = 0.0) -> Mesh:
+        levels = [
+            (outline(length, wide, power, 20, egg, middle), a),
+            (outline(length, wide, power, 20, egg, middle), b),
+        ]
+        if bulge:
+            levels.append((outline(length * 0.8, wide * 0.78, power, 20, egg, middle), b + bulge))
+        return shell(levels, look)
+
+    inner = (length * 0.66, wide * 0.6)
+    hole = (length * 0.52, 0.0)
+    rings = [(outline(length, wide, power, 20, egg, middle), 0.0),
+             (outline(length, wide, power, 20, egg, middle), thick), (outline(*inner, 2.0, 20, 0.2, hole), thick),
+             (outline(*inner, 2.0, 20, 0.2, hole), 0.0)]  # fmt: skip
+    ring = shell(rings, look, capped=False)
+    lid = plate(0.0, thick * 0.8, draw(rng, 0.0, 0.012))
+    up = -draw(rng, 1.62, 1.75)
+    if state == "shut":
+        parts = [ring.moved(z=z), lid.moved(z=z + thick + 0.003)]
+    elif state == "lid up":
+        parts = [ring.moved(z=z), lid.tilted("y", up).moved(x=0.02, z=z + thick)]
+    else:
+        parts = [ring.tilted("y", up).moved(x=0.045, z=z), lid.tilted("y", up).moved(x=0.02, z=z + 0.01)]
+    return [part.moved(x=x) for part in parts]
+
+
+def _bowl(rng: np.random.Generator, length: float, wide: float, power: float, z: tuple[float, float], x: float,
+          foot: tuple[float, float, float], look: Material) -> Mesh:  # fmt: skip
+    """Return a toilet's bowl with its hollow, from height to height.
+
+    Args:
+        rng: draws the bulge.
+        length: of the rim, metres.
+        wide: of the rim, metres.
+        power: squareness of the rim.
+        z: of the foot and of the rim.
+        x: where the rim begins.
+        foot: length, width of the foot and x of its middle.
+        look: of the china.
+    """
+    egg, middle, (low, high) = 0.12, (x + length / 2, 0.0), z
+    waist = low + (high - low) * draw(rng, 0.3, 0.5)
+    swell = draw(rng, 0.8, 1.0)
+    levels = [(outline(foot[0], foot[1], 2.6, 20, 0.05, (foot[2], 0.0)), low),
+              (outline(foot[0] * 0.96, foot[1] * 0.9, 2.6, 20, 0.05, (foot[2], 0.0)), waist),
+              (outline(length * 0.95, wide * swell, power, 20, egg, middle), high - 0.09),
+              (outline(length, wide, power, 20, egg, middle), high - 0.03),
+              (outline(length, wide, power, 20, egg, middle), high),
+              (outline(length * 0.72, wide * 0.66, 2.0, 20, 0.15, (middle[0] + 0.03, 0.0)), high),
+              (outline(length * 0.5, wide * 0.45, 2.0, 20, 0.1, (middle[0] + 0.03, 0.0)), high - 0.12),
+              (outline(length * 0.25, wide * 0.25, 2.0, 20, 0.0, (middle[0], 0.0)), high - 0.19)]  # fmt: skip
+    return shell(levels, look)
+
+
+def _button(x: float, y: float, z: float, look: Material) -> Mesh:
+    return cylinder(x, y, z, 0.022, 0.006, look, 10)
+
+
+def _flush(rng: np.random.Generator, deep: float, wide: float, top: float, metal: Material) -> list[Mesh]:
+    """Return the flush of the tank: a button on its lid, two buttons, or a lever at its front."""
+    if chance(rng, 0.3):
+        return [tube([(deep, -wide * 0.35, top - 0.07), (deep + 0.02, -wide * 0.35, top - 0.07),
+                      (deep + 0.022, -wide * 0.15, top - 0.075)], 0.006, metal, 5)]  # fmt: skip
+    return [_button(deep / 2, y, top, metal) for y in pick(rng, ((0.0,), (-0.024, 0.024)))]
+
+
+def _tank(rng: np.random.Generator, deep: float, wide: float, z: tuple[float, float], look: Material,
+          metal: Material) -> list[Mesh]:  # fmt: skip
+    soft = draw(rng, 0.01, 0.05)
+    lid = draw(rng, 0.025, 0.04)
+    return [rounded_box((0.0, -wide / 2, z[0]), (deep, wide / 2, z[1] - lid), soft, look),
+            rounded_box((-0.004, -wide / 2 - 0.008, z[1] - lid), (deep + 0.012, wide / 2 + 0.008, z[1]), 0.012, look),
+            *_flush(rng, deep, wide, z[1], metal)]  # fmt: skip
+
+
+def _sizes(rng: np.random.Generator) -> tuple[float, float, float, float]:
+    """Return length, width and height of a toilet's rim, metres, and how square it is."""
+    return draw(rng, 0.42, 0.52), draw(rng, 0.34, 0.4), draw(rng, 0.38, 0.46), pick(rng, (2.0, 2.2, 2.6, 4.0))
+
+
+@family("toilet", "close-coupled")
+def _close_coupled(rng: np.random.Generator) -> Piece:
+    (length, wide, rim_z, power), look, metal = _sizes(rng), china(rng), chrome(rng)
+    deep, across, top = draw(rng, 0.15, 0.21), draw(rng, 0.34, 0.48), rim_z + draw(rng, 0.32, 0.42)
+    foot = (draw(rng, 0.32, 0.48), draw(rng, 0.2, 0.27), deep + draw(rng, 0.16, 0.24))
+    seat = look if chance(rng, 0.7) else material(pick(rng, ("wood", "plastic", "black")), rng)
+    parts = [_bowl(rng, length, wide, power, (0.0, rim_z), deep + 0.01, foot, look),
+             slab(deep * 0.75, 0.0, rim_z - 0.09, deep * 1.4, min(across, 0.24), 0.085, look),
+             *_tank(rng, deep, across, (rim_z - 0.01, top), look, metal),
+             *_seat(rng, length, wide * 1.01, power, rim_z + 0.003, deep + 0.015, seat)]  # fmt: skip
+    return finished(parts)
+
+
+@family("toilet", "hung on a casing")
+def _on_casing(rng: np.random.Generator) -> Piece:
+    (length, wide, rim_z, power), look = _sizes(rng), china(rng)
+    case_deep, case_wide, top = draw(rng, 0.1, 0.2), draw(rng, 0.5, 1.1), draw(rng, 0.95, 1.25)
+    clad = pictured(pick(rng, ("tile", "plaster", "marble", "wood")), rng, "ceramic")
+    foot = (length * 0.8, wide * 0.75, case_deep + length * 0.42)
+    x = case_deep + 0.03
+    parts = [box((0.0, -case_wide / 2, 0.0), (case_deep, case_wide / 2, top), clad),
+             _bowl(rng, length, wide, power, (rim_z - draw(rng, 0.26, 0.34), rim_z), x, foot, look),
+             slab(case_deep + 0.06, 0.0, rim_z - 0.28, 0.12, wide * 0.8, 0.26, look),
+             box((case_deep, -0.12, 0.86), (case_deep + 0.012, 0.12, 0.94),
+                 material(pick(rng, ("white", "metal", "black")), rng)),
+             *_seat(rng, length, wide * 1.01, power, rim_z + 0.003, x + 0.005, look)]  # fmt: skip
+    return finished(parts)
+
+
+@family("toilet", "back to wall")
+def _back_to_wall(rng: np.random.Generator) -> Piece:
+    (length, wide, rim_z, power), look, metal = _sizes(rng), china(rng), chrome(rng)
+    deep, across, top = draw(rng, 0.14, 0.2), draw(rng, 0.36, 0.42), rim_z + draw(rng, 0.3, 0.4)
+    skirt = (length + deep * 0.6, wide * 0.86, deep + length * 0.42)
+    bowl = [(outline(skirt[0] * 0.93, skirt[1], 3.5, 20, 0.04, (skirt[2] * 0.92, 0.0)), 0.0),
+            (outline(skirt[0] * 0.97, skirt[1] * 1.02, 3.5, 20, 0.06, (skirt[2] * 0.95, 0.0)),
+             rim_z * 0.6)]  # fmt: skip
+    middle = (deep + length / 2, 0.0)
+    bowl += [(outline(length * 1.02, wide, power, 20, 0.12, middle), rim_z - 0.05),
+             (outline(length, wide, power, 20, 0.12, middle), rim_z),
+             (outline(length * 0.72, wide * 0.66, 2.0, 20, 0.1, middle), rim_z),
+             (outline(length * 0.4, wide * 0.35, 2.0, 20, 0.1, middle), rim_z - 0.17)]  # fmt: skip
+    parts = [shell(bowl, look), slab(deep / 2, 0.0, 0.0, deep, wide * 0.8, rim_z, look),
+             *_tank(rng, deep, across, (rim_z - 0.02, top), look, metal),
+             *_seat(rng, length, wide * 1.01, power, rim_z + 0.003, deep + 0.01, look)]  # fmt: skip
+    return finished(parts)
+
+
+@family("toilet", "one piece")
+def _one_piece(rng: np.random.Generator) -> Piece:
+    (length, wide, rim_z, power), look, metal = _sizes(rng), china(rng), chrome(rng)
+    deep, top = draw(rng, 0.18, 0.24), rim_z + draw(rng, 0.16, 0.3)
+    across = wide * draw(rng, 0.98, 1.1)
+    foot = (length * 0.95, wide * 0.72, deep + length * 0.35)
+    tank = [(outline(deep * s, across * w, 5.0, 20, 0.0, (deep * s / 2, 0.0)), z) for s, w,
+            z in ((1.5, 0.8, rim_z - 0.12), (1.25, 0.95, rim_z), (1.0, 1.0, rim_z + 0.08), (0.95, 1.0, top - 0.02),
+                  (0.85, 0.92, top))]  # fmt: skip
+    parts = [_bowl(rng, length, wide, power, (0.0, rim_z), deep, foot, look), shell(tank, look),
+             _button(deep * 0.42, 0.0, top, metal), box((0.0, -wide * 0.3, 0.0), (deep + 0.1, wide * 0.3, rim_z - 0.1),
+                                                        look), *_seat(rng, length, wide * 1.01, power, rim_z + 0.003,
+                                                                      deep + 0.01, look)]  # fmt: skip
+    return finished(parts)
+
+
+@family("toilet", "washing seat", held_out=True)
+def _washing_seat(rng: np.random.Generator) -> Piece:
+    (length, wide, rim_z, _), look = _sizes(rng), china(rng)
+    total, power = length + draw(rng, 0.12, 0.2), draw(rng, 3.0, 5.0)
+    levels = [(outline(total * a, wide * b, power, 22, 0.07, (total / 2 - total * (1 - a) / 2, 0.0)), z) for a, b,
+              z in ((0.86, 0.8, 0.0), (0.9, 0.82, 0.3 * rim_z), (1.0, 0.98, 0.8 * rim_z),
+                    (1.0, 1.0, rim_z))]  # fmt: skip
+    back = draw(rng, 0.12, 0.2)
+    parts = [shell(levels, look), rounded_box((0.0, -wide / 2, rim_z - 0.01),
+                                              (back, wide / 2, rim_z + draw(rng, 0.08, 0.14)), 0.03, look),
+             *_seat(rng, total - back - 0.01, wide, power, rim_z + 0.003, back, look)]  # fmt: skip
+    if chance(rng, 0.5):
+        parts.append(slab(back + 0.16, wide / 2 + 0.03, rim_z - 0.01, 0.22, 0.06, 0.05, look))
+    return finished(parts)
+
+
+@family("toilet", "high tank", held_out=True)
+def _high_tank(rng: np.random.Generator) -> Piece:
+    (length, wide, rim_z, _), look, metal = _sizes(rng), china(rng), chrome(rng)
+    wood = material("wood", rng)
+    low = draw(rng, 0.85, 1.75)
+    deep, across, tall = draw(rng, 0.17, 0.22), draw(rng, 0.4, 0.52), draw(rng, 0.28, 0.36)
+    tank = wood if chance(rng, 0.3) else look
+    x = draw(rng, 0.16, 0.2)
+    foot = (draw(rng, 0.36, 0.48), draw(rng, 0.22, 0.28), x + 0.2)
+    parts = [_bowl(rng, length, wide, 2.0, (0.0, rim_z), x, foot, look),
+             *_seat(rng, length, wide * 1.01, 2.0, rim_z + 0.003, x + 0.005, wood),
+             rounded_box((0.0, -across / 2, low), (deep, across / 2, low + tall), 0.02, tank),
+             slab(deep / 2, 0.0, low + tall, deep + 0.02, across + 0.02, 0.02, tank),
+             tube([(0.06, 0.0, low), (0.06, 0.0, rim_z + 0.02), (0.1, 0.0, rim_z - 0.06),
+                   (x + 0.08, 0.0, rim_z - 0.07)], 0.022, metal, 8),
+             tube([(deep / 2, across * 0.4, low), (deep / 2, across * 0.42, low - min(0.6, low * 0.4))], 0.003, metal,
+                  4), ellipsoid((deep / 2, across * 0.42, low - min(0.6, low * 0.4)), (0.015, 0.015, 0.03), wood, 7,
+                                4)]  # fmt: skip
+    return finished(parts)

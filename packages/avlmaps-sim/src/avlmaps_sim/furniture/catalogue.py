@@ -1,0 +1,131 @@
+"""The register of recipes. A recipe is a function of a random generator; a module of recipes registers its own.
+
+A piece stands on z = 0 with the middle of its footprint at x = y = 0 and its front looks along +x (heading 0), so
+its depth runs along x and its width along y. What hangs (a picture, a mirror, a range hood) touches the wall behind
+it with its lowest x; the rules of the home choose its height.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Literal
+
+import numpy as np
+
+from avlmaps_sim.mesh import Mesh, Triple
+
+Families = Literal["training", "held-out", "all"]
+
+# Modules with recipes, imported at the first question.
+_MODULES = ("seating", "seating_sofas", "seating_chairs", "seating_armchairs", "seating_office", "seating_small",
+            "tables", "tables_low", "beds", "beds_small", "storage", "storage_chests", "storage_shelves",
+            "storage_cabinets", "storage_small", "kitchen", "refrigerators", "stoves", "kitchen_machines", "countertop",
+            "bathroom", "bathtubs", "showers", "washbasins", "toiletries", "appliances", "heating", "ventilation",
+            "electronics", "computers", "devices", "clocks", "decor", "vases", "lighting", "chandeliers", "plants",
+            "drapes", "openings", "clutter", "crockery", "containers", "bags", "leisure", "nursery", "fitness",
+            "sports", "office", "people", "garments", "papers",
+            "shower_curtains")  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Support:
+    """A flat top that small things may stand on.
+
+    Attributes:
+        low: least x and y.
+        high: greatest x and y.
+        z: height.
+        clearance_m: free height over it.
+    """
+
+    low: tuple[float, float]
+    high: tuple[float, float]
+    z: float
+    clearance_m: float = 1.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Piece:
+    """One thing, ready to be put somewhere.
+
+    Attributes:
+        mesh: standing as the module says.
+        supports: where clutter may stand.
+        light: places in the piece's frame that shine (a lamp's bulb).
+        category: filled in by the register.
+        family: filled in by the register.
+    """
+
+    mesh: Mesh
+    supports: tuple[Support, ...] = ()
+    light: tuple[Triple, ...] = ()
+    category: str = ""
+    family: str = ""
+
+
+Recipe = Callable[[np.random.Generator], Piece]
+
+
+@dataclass(frozen=True, slots=True)
+class _Family:
+    name: str
+    recipe: Recipe
+    held_out: bool
+
+
+_REGISTER: dict[str, list[_Family]] = {}
+_loaded: list[str] = []
+
+
+def family(category: str, name: str, held_out: bool = False) -> Callable[[Recipe], Recipe]:
+    """Register a recipe as a family of shapes of a category; held-out families never enter training."""
+
+    def keep(recipe: Recipe) -> Recipe:
+        _REGISTER.setdefault(category, []).append(_Family(name, recipe, held_out))
+        return recipe
+
+    return keep
+
+
+def _load() -> None:
+    if not _loaded:
+        for module in _MODULES:
+            import_module(f"avlmaps_sim.furniture.{module}")
+        _loaded.extend(_MODULES)
+
+
+def categories() -> tuple[str, ...]:
+    """Return every category that has a recipe, sorted."""
+    _load()
+    return tuple(sorted(_REGISTER))
+
+
+def families(category: str, which: Families = "all") -> tuple[str, ...]:
+    """Return the names of a category's families."""
+    _load()
+    return tuple(f.name for f in _REGISTER[category] if which == "all" or f.held_out == (which == "held-out"))
+
+
+def make(category: str, rng: np.random.Generator, which: Families = "all", name: str | None = None) -> Piece:
+    """Make a piece of a category.
+
+    Args:
+        category: what.
+        rng: draws the family and every measure.
+        which: from the families that training may see, from those held out (where a category has none: from
+            all), or from all.
+        name: this family and no other.
+
+    Raises:
+        KeyError: no such category or family.
+    """
+    _load()
+    known = _REGISTER[category]
+    choice = [f for f in known if which == "all" or f.held_out == (which == "held-out")] or known
+    if name is not None:
+        choice = [f for f in known if f.name == name]
+        if not choice:
+            raise KeyError(f"{category} has no family {name!r}; it has {', '.join(f.name for f in known)}")
+    chosen = choice[int(rng.integers(len(choice)))]
+    piece = chosen.recipe(rng)
+    return Piece(piece.mesh, piece.supports, piece.light, category, chosen.name)

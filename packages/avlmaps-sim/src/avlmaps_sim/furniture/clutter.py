@@ -1,0 +1,272 @@
+"""Small things in real size: books, bottles, toys and shoes."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from avlmaps_sim.furniture.catalogue import Piece, family
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, finished, pick
+from avlmaps_sim.materials import material
+from avlmaps_sim.mesh import Material, Mesh, joined
+from avlmaps_sim.shapes import box, cylinder, ellipsoid, lathe, loft, rounded_box, sheet, slab, tube
+
+
+def _book(rng: np.random.Generator, tall: float, deep: float, thick: float) -> Mesh:
+    """Return a book lying flat with its spine at the greatest x, middle at the origin; height along y."""
+    cover, paper = material(pick(rng, ("painted", "plastic", "leather", "fabric")), rng), material("paper", rng)
+    t = min(0.0025, thick * 0.2)
+    x, y = deep / 2, tall / 2
+    parts = [box((-x, -y, 0.0), (x, y, t), cover), box((-x, -y, thick - t), (x, y, thick), cover)]
+    parts += [
+        box((x - t, -y, t), (x, y, thick - t), cover),
+        box((-x + 0.004, -y + 0.003, t), (x - t, y - 0.003, thick - t), paper),
+    ]
+    return joined(parts)
+
+
+def _book_size(rng: np.random.Generator) -> tuple[float, float, float]:
+    tall = draw(rng, 0.16, 0.32)
+    return tall, tall * draw(rng, 0.6, 0.8), draw(rng, 0.01, 0.045)
+
+
+@family("book", "lying")
+def _lying_books(rng: np.random.Generator) -> Piece:
+    parts, z = [], 0.0
+    for _ in range(count(rng, 1, 5)):
+        size = _book_size(rng)
+        parts.append(_book(rng, *size).turned(draw(rng, -0.3, 0.3) + np.pi * int(rng.integers(2))).moved(z=z))
+        z += size[2]
+    return finished(parts)
+
+
+@family("book", "row")
+def _book_row(rng: np.random.Generator) -> Piece:
+    parts, y = [], 0.0
+    tall = draw(rng, 0.18, 0.3)
+    for _ in range(count(rng, 3, 12)):
+        high, thick = tall * draw(rng, 0.8, 1.05), draw(rng, 0.012, 0.045)
+        one = _book(rng, high, high * draw(rng, 0.62, 0.78), thick).tilted("x", np.pi / 2)
+        parts.append(one.moved(-float(one.high[0]) + 0.1, y - float(one.low[1]), -float(one.low[2])))
+        y += thick + 0.001
+    if chance(rng, 0.5):  # the last one leans
+        lean = draw(rng, 0.15, 0.4)
+        one = _book(rng, tall * 0.9, tall * 0.65, 0.025).tilted("x", np.pi / 2 + lean)
+        parts.append(one.moved(-float(one.high[0]) + 0.1, y - float(one.low[1]), -float(one.low[2])))
+    return finished(parts)
+
+
+@family("book", "open", held_out=True)
+def _open_book(rng: np.random.Generator) -> Piece:
+    tall, deep, rise = draw(rng, 0.18, 0.32), draw(rng, 0.13, 0.22), draw(rng, 0.01, 0.03)
+    paper, cover = material("paper", rng), material("painted", rng)
+    parts = [slab(0.0, 0.0, 0.0, tall, 2 * deep + 0.01, 0.003, cover)]
+    for s in (-1, 1):
+        line = [(0.0, rise * 0.4), (0.15, rise), (0.6, rise * 0.8), (1.0, 0.004)]
+        for (a, h), (b, g) in pairwise(line):
+            parts.append(sheet((tall / 2, s * a * deep, h), (-tall, 0.0, 0.0), (0.0, s * (b - a) * deep, g - h), paper))
+    return finished(parts)
+
+
+@family("bottle", "turned")
+def _bottle(rng: np.random.Generator) -> Piece:
+    kind = pick(rng, ("wine", "beer", "water", "spray", "jar", "oil"))
+    tint = pick(rng, ((0.1, 0.25, 0.12), (0.3, 0.15, 0.05), (0.75, 0.85, 0.88), (0.85, 0.9, 0.92)))
+    dark = sum(tint) < 1.5  # green and brown glass lets little through
+    glass = (
+        replace(material("glass", rng, tint), opacity=0.8 if dark else 0.45)
+        if chance(rng, 0.6)
+        else material(pick(rng, ("plastic", "ceramic", "metal")), rng)
+    )
+    rows, tall, wide = {
+        "wine": ([(1.0, 0.0), (1.0, 0.58), (0.36, 0.72), (0.34, 0.98), (0.4, 1.0)], draw(rng, 0.27, 0.33), 0.038),
+        "beer": ([(1.0, 0.0), (1.0, 0.52), (0.5, 0.72), (0.42, 1.0)], draw(rng, 0.19, 0.26), 0.031),
+        "water": ([(0.9, 0.0), (1.0, 0.05), (0.93, 0.4), (1.0, 0.65), (0.45, 0.86), (0.42, 1.0)],
+                  draw(rng, 0.2, 0.34), 0.04),
+        "spray": ([(1.0, 0.0), (1.0, 0.6), (0.45, 0.74), (0.45, 0.85)], draw(rng, 0.2, 0.28), 0.04),
+        "jar": ([(0.95, 0.0), (1.0, 0.05), (1.0, 0.75), (0.8, 0.85), (0.8, 1.0)], draw(rng, 0.08, 0.18), 0.045),
+        "oil": ([(1.0, 0.0), (0.85, 0.35), (0.3, 0.6), (0.25, 0.95), (0.35, 1.0)], draw(rng, 0.2, 0.3), 0.04),
+    }[kind]  # fmt: skip
+    wide *= draw(rng, 0.85, 1.2)
+    cap, parts = material("plastic", rng), [lathe([(r * wide, h * tall) for r, h in rows], glass, sides=10)]
+    if chance(rng, 0.6):
+        parts.append(
+            lathe(
+                [(wide * 1.02, tall * 0.15), (wide * 1.02, tall * 0.45)],
+                material("paper", rng, tuple(rng.uniform(0.2, 1.0, 3).tolist())),
+                sides=10,
+            )
+        )
+    if kind == "spray":
+        parts += [
+            box((-0.02, -0.012, tall * 0.85), (0.05, 0.012, tall), cap),
+            box((0.025, -0.006, tall * 0.72), (0.035, 0.006, tall * 0.86), cap),
+        ]
+    else:
+        top = rows[-1][0] * wide * 1.1
+        parts.append(cylinder(0.0, 0.0, tall, top, 0.015, cap, 8))
+    return finished(parts)
+
+
+@family("bottle", "group")
+def _bottles(rng: np.random.Generator) -> Piece:
+    return finished(
+        [_bottle(rng).mesh.moved(draw(rng, -0.03, 0.03), i * draw(rng, 0.09, 0.12)) for i in range(count(rng, 2, 3))]
+    )
+
+
+@family("bottle", "pump", held_out=True)
+def _pump_bottle(rng: np.random.Generator) -> Piece:
+    tall, wide, look = (
+        draw(rng, 0.11, 0.2),
+        draw(rng, 0.027, 0.042),
+        material(pick(rng, ("plastic", "ceramic", "glass")), rng),
+    )
+    pump = material(pick(rng, ("metal", "white", "black")), rng)
+    if chance(rng, 0.5):
+        parts = [rounded_box((-wide * 0.8, -wide, 0.0), (wide * 0.8, wide, tall), 0.012, look)]
+    else:
+        parts = [lathe([(wide, 0.0), (wide, tall * 0.85), (wide * 0.5, tall)], look, sides=10)]
+    return finished(
+        [
+            *parts,
+            cylinder(0.0, 0.0, tall, 0.01, 0.035, pump, 6),
+            box((-0.008, -0.008, tall + 0.035), (0.045, 0.008, tall + 0.047), pump),
+        ]
+    )
+
+
+@family("toy", "building blocks")
+def _blocks(rng: np.random.Generator) -> Piece:
+    size, parts = draw(rng, 0.03, 0.06), []
+    for level in range(count(rng, 1, 4)):
+        for _ in range(max(3 - level, 1)):
+            x, y = (rng.uniform(-1, 1, 2) * size * (2.5 if level == 0 else 0.3)).tolist()
+            block = slab(0.0, 0.0, 0.0, size, size * pick(rng, (1.0, 1.0, 2.0)), size, material("plastic", rng))
+            parts.append(block.turned(draw(rng, 0.0, 1.5)).moved(x, y, level * size))
+    return finished(parts)
+
+
+@family("toy", "bear")
+def _bear(rng: np.random.Generator) -> Piece:
+    s, fur, dark = draw(rng, 0.05, 0.17), material("fabric", rng), material("black", rng)
+    parts = [
+        ellipsoid((0.0, 0.0, s * 0.9), (s * 0.6, s * 0.65, s * 0.85), fur, 7, 5),
+        ellipsoid((0.05 * s, 0.0, s * 2.0), (s * 0.55, s * 0.6, s * 0.55), fur, 7, 5),
+    ]
+    for side in (-1, 1):
+        parts.append(ellipsoid((0.0, side * s * 0.45, s * 2.5), (s * 0.12, s * 0.2, s * 0.2), fur, 5, 3))
+        parts.append(ellipsoid((s * 0.2, side * s * 0.7, s * 1.1), (s * 0.25, s * 0.25, s * 0.5), fur, 5, 3))
+        parts.append(ellipsoid((s * 0.7, side * s * 0.45, s * 0.25), (s * 0.55, s * 0.25, s * 0.25), fur, 5, 3))
+        parts.append(ellipsoid((s * 0.55, side * s * 0.2, s * 2.1), (s * 0.05, s * 0.06, s * 0.06), dark, 4, 2))
+    return finished([*parts, ellipsoid((s * 0.6, 0.0, s * 1.9), (s * 0.15, s * 0.2, s * 0.15), dark, 6, 4)])
+
+
+@family("toy", "truck")
+def _truck(rng: np.random.Generator) -> Piece:
+    long, body, black = draw(rng, 0.1, 0.4), material("plastic", rng), material("black", rng)
+    wide, wheel = long * draw(rng, 0.35, 0.5), long * draw(rng, 0.1, 0.14)
+    parts = [slab(0.0, 0.0, wheel, long, wide, long * 0.1, body)]
+    cab = long * draw(rng, 0.25, 0.4)
+    parts.append(
+        rounded_box(
+            (long / 2 - cab, -wide / 2, wheel),
+            (long / 2, wide / 2, wheel + long * 0.38),
+            long * 0.04,
+            material("plastic", rng),
+        )
+    )
+    if chance(rng, 0.7):
+        parts.append(
+            box(
+                (-long / 2, -wide / 2, wheel + long * 0.1),
+                (long / 2 - cab - 0.01, wide / 2, wheel + long * draw(rng, 0.2, 0.45)),
+                body,
+            )
+        )
+    for x in (-0.32, 0.32):
+        parts += [
+            tube([(x * long, s * wide * 0.42, wheel), (x * long, s * wide * 0.54, wheel)], wheel, black, 10)
+            for s in (-1, 1)
+        ]
+    return finished(parts)
+
+
+@family("toy", "doll's house", held_out=True)
+def _dolls_house(rng: np.random.Generator) -> Piece:
+    wide, deep, tall, floors = draw(rng, 0.4, 0.8), draw(rng, 0.22, 0.35), draw(rng, 0.4, 0.7), count(rng, 2, 3)
+    wall, roof = material(pick(rng, ("wood", "painted", "white")), rng), material("plastic", rng)
+    parts = [box((-deep, 0.0, 0.0), (-deep + 0.008, wide, tall), wall)]
+    parts += [
+        box((-deep, y, 0.0), (0.0, y + 0.01, tall), wall) for y in (0.0, wide * draw(rng, 0.35, 0.6), wide - 0.01)
+    ]
+    parts += [
+        box((-deep, 0.0, tall * i / floors), (0.0, wide, tall * i / floors + 0.01), wall) for i in range(floors + 1)
+    ]
+    peak = (-deep, wide / 2, tall + wide * 0.3)
+    for y in (-0.03, wide + 0.03):
+        parts.append(sheet((-deep, y, tall), (deep + 0.03, 0.0, 0.0), (0.0, peak[1] - y, peak[2] - tall), roof))
+    for _ in range(4):
+        x, y = -draw(rng, 0.05, deep * 0.8), draw(rng, 0.08, 0.9) * wide
+        level = tall * int(rng.integers(floors)) / floors + 0.01
+        parts.append(slab(x, y, level, 0.05, 0.06, 0.05, material("plastic", rng)))
+    return finished(parts)
+
+
+@family("toy", "stacking rings")
+def _rings(rng: np.random.Generator) -> Piece:
+    radius, rings, z = draw(rng, 0.05, 0.09), count(rng, 4, 6), 0.015
+    parts = [cylinder(0.0, 0.0, 0.0, radius * 1.05, 0.015, material("wood", rng), 12)]
+    for number in range(rings):
+        size = radius * (1 - 0.11 * number)
+        parts.append(
+            lathe([(size * 0.8, z), (size, z + 0.012), (size * 0.8, z + 0.024)], material("plastic", rng), sides=10)
+        )
+        z += 0.024
+    return finished([*parts, ellipsoid((0.0, 0.0, z + 0.02), (0.02, 0.02, 0.025), material("plastic", rng), 6, 4)])
+
+
+def _shoe(rng: np.random.Generator, long: float, kind: str, look: Material, sole: Material) -> Mesh:
+    """Return a shoe along x, its toe at the greatest x."""
+    wide = long * 0.36
+    s = np.linspace(0.0, 1.0, 8)
+    half = wide / 2 * np.interp(s, [0.0, 0.15, 0.45, 0.75, 0.92, 1.0], [0.55, 0.75, 0.7, 1.0, 0.8, 0.2])
+    x = (s - 0.5) * long
+    shaft = {"sneaker": 0.36, "boot": 0.85, "slipper": 0.1, "pump": 0.3}[kind] * long
+    heel = 0.3 * long if kind == "pump" else 0.0
+    lift = heel * np.interp(s, [0.0, 0.25, 0.7, 1.0], [1.0, 0.8, 0.0, 0.0])
+    high = np.interp(
+        s, [0.0, 0.3, 0.45, 0.65, 1.0], [shaft, shaft, max(shaft * 0.75, 0.1 * long), 0.22 * long, 0.1 * long]
+    )
+    floor = 0.012 if kind != "pump" else 0.004
+
+    def rings(grow: float, low: np.ndarray, top: np.ndarray) -> list[np.ndarray]:
+        shape = np.array([(-1, 0.0), (-1, 0.45), (-0.6, 1.0), (0.6, 1.0), (1, 0.45), (1, 0.0)])
+        return [
+            np.column_stack([np.full(6, a), shape[:, 0] * h * grow, b + shape[:, 1] * (t - b)])
+            for a, h, b, t in zip(x, half, low, top, strict=True)
+        ]
+
+    parts = [loft(rings(1.0, lift + floor, lift + high), look), loft(rings(1.06, lift, lift + floor * 2), sole)]
+    if kind == "pump":
+        parts.append(lathe([(0.005, 0.0), (0.014, heel)], sole, x=-long * 0.45, sides=6))
+    return joined(parts)
+
+
+def _register_shoes(kind: str, held_out: bool) -> None:
+    @family("shoes", kind, held_out)
+    def recipe(rng: np.random.Generator) -> Piece:
+        long = draw(rng, 0.2, 0.31)
+        look = material(pick(rng, ("leather", "fabric", "black", "white", "plastic")), rng)
+        sole = material(pick(rng, ("white", "black", "leather")), rng)
+        shoe = _shoe(rng, long, kind, look, sole)
+        return finished(
+            [
+                shoe.turned(draw(rng, -0.2, 0.2)).moved(draw(rng, -0.04, 0.04), s * long * draw(rng, 0.24, 0.36))
+                for s in (-1, 1)
+            ]
+        )
+
+
+for _kind, _held in (("sneaker", False), ("boot", False), ("slipper", False), ("pump", True)):
+    _register_shoes(_kind, _held)

@@ -1,0 +1,270 @@
+"""Doors, windows and folding doors, with their frames, to fill a hole in a wall or to stand for themselves.
+
+`door`, `window` and `folding_door` fill a hole of a given size: the middle of the hole's lower edge lies at the
+origin, the wall reaches from -wall_m / 2 to wall_m / 2 along x, the room is at +x (doors open to it).
+"""
+
+from itertools import pairwise
+
+import numpy as np
+
+from avlmaps_sim.furniture.catalogue import Families, Piece, family
+from avlmaps_sim.furniture.leaves import door_leaf, opaque
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, finished, pick, rim
+from avlmaps_sim.materials import material
+from avlmaps_sim.mesh import Material, Mesh, joined
+from avlmaps_sim.shapes import box, sheet
+
+DOOR_STYLES: dict[Families, tuple[str, ...]] = {
+    "training": ("panel", "flush", "glazed", "half-glazed", "grooved"),
+    "held-out": ("plank", "louvre"),
+}
+WINDOW_STYLES: dict[Families, tuple[str, ...]] = {
+    "training": ("casement", "sash", "pane", "french", "transom"),
+    "held-out": ("lattice", "sliding"),
+}
+FOLDING_STYLES: dict[Families, tuple[str, ...]] = {
+    "training": ("accordion", "bifold panel", "bifold glazed"),
+    "held-out": ("bifold louvre",),
+}
+
+
+def _styles(known: dict[Families, tuple[str, ...]], which: Families) -> tuple[str, ...]:
+    return known["training"] + known["held-out"] if which == "all" else known[which]
+
+
+def _casing(rng: np.random.Generator, width: float, height: float, wall: float, look: Material) -> tuple[Mesh, float]:
+    """Return lining and architraves of a door hole, and how thick the lining is."""
+    lining, trim, proud = draw(rng, 0.018, 0.04), draw(rng, 0.04, 0.1), draw(rng, 0.008, 0.022)
+    edge = width / 2
+    parts = [
+        box((-wall / 2, -edge, 0.0), (wall / 2, -edge + lining, height), look),
+        box((-wall / 2, edge - lining, 0.0), (wall / 2, edge, height), look),
+        box((-wall / 2, -edge + lining, height - lining), (wall / 2, edge - lining, height), look),
+    ]
+    for side in (-1, 1):
+        back, front = sorted((side * wall / 2, side * (wall / 2 + proud)))
+        parts += [
+            box((back, -edge - trim, 0.0), (front, -edge, height + trim), look),
+            box((back, edge, 0.0), (front, edge + trim, height + trim), look),
+            box((back, -edge, height), (front, edge, height + trim), look),
+        ]
+    return joined(parts), lining
+
+
+def door(rng: np.random.Generator, width_m: float, height_m: float, wall_m: float, open_rad: float = 0.0,
+         which: Families = "all", style: str | None = None) -> Piece:  # fmt: skip
+    """Make a door with its frame for a hole in a wall; wider than 1.2 m it has two leaves.
+
+    Args:
+        rng: draws style, materials and details.
+        width_m: of the hole.
+        height_m: of the hole.
+        wall_m: thickness of the wall.
+        open_rad: how far the leaves stand open, towards +x.
+        which: styles to draw from.
+        style: this style and no other (see ``DOOR_STYLES``).
+
+    Returns:
+        The door, the middle of the hole's lower edge at the origin.
+    """
+    style = pick(rng, _styles(DOOR_STYLES, which)) if style is None else style
+    look = opaque(rng)
+    frame, lining = _casing(rng, width_m, height_m, wall_m, look if chance(rng, 0.7) else opaque(rng))
+    gap = 0.003
+    room, tall = width_m - 2 * lining - 2 * gap, height_m - lining - gap - 0.008
+    hinge = wall_m / 2 - 0.028
+    if width_m > 1.2:
+        state = rng.bit_generator.state
+        left = door_leaf(rng, room / 2 - gap, tall, style, look, handle=True)
+        rng.bit_generator.state = state  # the same draws again: both leaves look alike
+        right = door_leaf(rng, room / 2 - gap, tall, style, look, handle=True).scaled(1.0, -1.0, 1.0)
+        leaves = [left.turned(-open_rad).moved(hinge, -room / 2, 0.008)]
+        leaves.append(right.turned(open_rad * draw(rng, 0.0, 1.0)).moved(hinge, room / 2, 0.008))
+    else:
+        leaf = door_leaf(rng, room, tall, style, look, handle=True).turned(-open_rad).moved(hinge, -room / 2, 0.008)
+        leaves = [leaf.scaled(1.0, -1.0, 1.0) if chance(rng, 0.5) else leaf]
+    return Piece(joined([frame, *leaves]), category="door", family=style)
+
+
+def _panes(rng: np.random.Generator, low: tuple[float, float], high: tuple[float, float], x: tuple[float, float],
+           columns: int, rows: int, look: Material) -> list[Mesh]:  # fmt: skip
+    """Return a sash: its frame and glazing bars, without the glass."""
+    bar, thin = draw(rng, 0.035, 0.07), draw(rng, 0.016, 0.03)
+    (a, b), (c, d) = low, high
+    parts = [rim(low, high, bar, x, look)]
+    uprights = np.linspace(a + bar, c - bar, columns + 1)[1:-1].tolist()
+    levels = np.linspace(b + bar, d - bar, rows + 1)[1:-1].tolist()
+    parts += [box((x[0], y - thin / 2, b + bar), (x[1], y + thin / 2, d - bar), look) for y in uprights]
+    return parts + [box((x[0], a + bar, z - thin / 2), (x[1], c - bar, z + thin / 2), look) for z in levels]
+
+
+def _sashes(rng: np.random.Generator, width: float, height: float, x: float, style: str, look: Material) -> list[Mesh]:
+    """Return the sashes of a window that fill a hole up to its middle lines; glass lies at ``x``."""
+    y, thin = width / 2, (x - 0.025, x + 0.025)
+    if style == "pane":
+        return _panes(rng, (-y, 0.0), (y, height), thin, 1, 1, look)
+    if style == "lattice":
+        return _panes(rng, (-y, 0.0), (y, height), thin, max(int(width / 0.25), 2), max(int(height / 0.28), 2), look)
+    if style == "sash":
+        grid = (count(rng, 1, 3), count(rng, 1, 2))
+        middle = height * draw(rng, 0.45, 0.55)
+        upper = _panes(rng, (-y, middle - 0.02), (y, height), (x - 0.035, x - 0.003), *grid, look)
+        return upper + _panes(rng, (-y, 0.0), (y, middle + 0.02), (x + 0.003, x + 0.035), *grid, look)
+    if style == "sliding":
+        near = -draw(rng, 0.1, 0.7) * y if chance(rng, 0.4) else -0.03  # slid aside where it is open
+        back = _panes(rng, (-y, 0.0), (0.03, height), (x - 0.035, x - 0.003), 1, 1, look)
+        return back + _panes(
+            rng, (near, 0.0), (near + y + 0.03 if near < -0.03 else y, height), (x, x + 0.035), 1, 1, look
+        )
+    foot = height * draw(rng, 0.15, 0.35) if style == "french" and chance(rng, 0.5) else 0.0
+    top = height * draw(rng, 0.68, 0.8) if style == "transom" else height
+    leaves = max(2 if style == "french" else 1, round(width / draw(rng, 0.5, 0.8)))
+    rows = count(rng, 2, 4) if style == "french" and chance(rng, 0.6) else count(rng, 1, 2)
+    parts, edges, metal = [], np.linspace(-y, y, leaves + 1).tolist(), material("metal", rng)
+    for a, c in pairwise(edges):
+        parts += _panes(rng, (a, foot), (c, top), thin, 1, rows, look)
+        parts.append(box((x + 0.025, c - 0.035, top * 0.45), (x + 0.045, c - 0.015, top * 0.45 + 0.12), metal))
+        if style == "transom":
+            parts += _panes(rng, (a, top), (c, height), thin, count(rng, 1, 2), 1, look)
+    if foot:
+        parts.append(box((x - 0.02, -y, 0.0), (x + 0.02, y, foot + 0.04), look))
+    return parts
+
+
+def window(rng: np.random.Generator, width_m: float, height_m: float, wall_m: float,
+           which: Families = "all", style: str | None = None) -> Piece:  # fmt: skip
+    """Make a window for a hole in a wall, its sill to the room at +x.
+
+    Args:
+        rng: draws style, materials and details.
+        width_m: of the hole.
+        height_m: of the hole.
+        wall_m: thickness of the wall.
+        which: styles to draw from.
+        style: this style and no other (see ``WINDOW_STYLES``).
+
+    Returns:
+        The window, the middle of the hole's lower edge at the origin (lift it to its sill's height).
+    """
+    tall = height_m > 1.75
+    known = tuple(s for s in _styles(WINDOW_STYLES, which) if (s != "french") or tall)
+    style = pick(rng, known) if style is None else style
+    look = material(pick(rng, ("white", "white", "wood", "painted")), rng)
+    jamb, x = draw(rng, 0.03, 0.06), draw(rng, -0.35, 0.15) * wall_m
+    y = width_m / 2
+    parts = [rim((-y, 0.0), (y, height_m), jamb, (x - 0.04, x + 0.04), look)]
+    inner_w, inner_h = width_m - 2 * jamb, height_m - 2 * jamb
+    parts += [part.moved(z=jamb) for part in _sashes(rng, inner_w, inner_h, x, style, look)]
+    pane = (0.0, inner_w, 0.0), (0.0, 0.0, inner_h)
+    # The outside is a picture behind the bars, since nothing is built there; a few panes are plain.
+    view = material("outdoors" if chance(rng, 0.88) else "glass", rng)
+    parts.append(sheet((x, -inner_w / 2, jamb), *pane, view, fill=True))
+    trim, proud = draw(rng, 0.04, 0.1), draw(rng, 0.006, 0.02)
+    front = wall_m / 2
+    if chance(rng, 0.55):
+        casing = rim((-y - trim, -trim), (y + trim, height_m + trim), trim, (front, front + proud), look)
+        parts.append(casing)
+    if style != "french":
+        deep, board = draw(rng, 0.03, 0.2), draw(rng, 0.018, 0.045)
+        wide = y + draw(rng, 0.0, 0.12)
+        sill = look if chance(rng, 0.6) else material(pick(rng, ("stone", "wood", "white")), rng)
+        parts.append(box((x + 0.04, -y, 0.0), (front, y, 0.006), sill))
+        parts.append(box((front, -wide, -board + 0.006), (front + deep, wide, 0.006), sill))
+    return Piece(joined(parts), category="window", family=style)
+
+
+def _folded(leaf: Mesh, width: float, leaves: int, bend_rad: float) -> Mesh:
+    """Return leaves hinged to each other in a zigzag that starts at y = 0, each turned out of its plane."""
+    step = width * np.cos(bend_rad)
+    parts = []
+    for number in range(leaves):
+        forth = number % 2 == 0
+        turned = leaf.turned(-bend_rad if forth else bend_rad)
+        parts.append(turned.moved(0.0 if forth else width * np.sin(bend_rad), number * step))
+    return joined(parts)
+
+
+def folding_door(rng: np.random.Generator, width_m: float, height_m: float, wall_m: float,
+                 which: Families = "all", style: str | None = None) -> Piece:  # fmt: skip
+    """Make a folding door with its frame for a hole in a wall, closed or drawn aside in part.
+
+    Args:
+        rng: draws style, openness, materials and details.
+        width_m: of the hole.
+        height_m: of the hole.
+        wall_m: thickness of the wall.
+        which: styles to draw from.
+        style: this style and no other (see ``FOLDING_STYLES``).
+
+    Returns:
+        The door, the middle of the hole's lower edge at the origin.
+    """
+    style = pick(rng, _styles(FOLDING_STYLES, which)) if style is None else style
+    look = opaque(rng)
+    frame, lining = _casing(rng, width_m, height_m, wall_m, look if chance(rng, 0.6) else opaque(rng))
+    room, tall = width_m - 2 * lining, height_m - lining - 0.03
+    if style == "accordion":
+        leaves = max(round(room / draw(rng, 0.09, 0.16)), 4)
+        bend = draw(rng, 0.35, 1.25)
+        each = room / leaves / np.cos(0.3)
+        leaf = box((-0.005, 0.0, 0.0), (0.005, each, tall), look)
+        pairs, stack = 1, _folded(leaf, each, leaves, max(bend, 0.32))
+    else:
+        pairs = 1 if room < 1.3 else count(rng, 1, 2)
+        leaves = 2 * max(round(room / pairs / 2 / draw(rng, 0.35, 0.6)), 1)
+        each = room / pairs / leaves - 0.002
+        bend = draw(rng, 0.08, 1.3)
+        kind = {"bifold panel": pick(rng, ("panel", "flush")), "bifold glazed": "glazed"}.get(style, "louvre")
+        stack = _folded(door_leaf(rng, each, tall, kind, look, handle=False), each, leaves, bend)
+    shift = draw(rng, -0.3, 0.2) * wall_m
+    hung = [stack.moved(shift, -room / 2, 0.012)]
+    if pairs == 2:
+        hung.append(hung[0].scaled(1.0, -1.0, 1.0))
+    rail = box((shift - 0.02, -room / 2, height_m - lining - 0.03), (shift + 0.02, room / 2, height_m - lining), look)
+    return Piece(joined([frame, rail, *hung]), category="folding door", family=style)
+
+
+def _wall(rng: np.random.Generator) -> float:
+    return draw(rng, 0.09, 0.3)
+
+
+def _register_door(style: str, held_out: bool) -> None:
+    @family("door", style, held_out)
+    def recipe(rng: np.random.Generator) -> Piece:
+        return finished([door(rng, draw(rng, 0.68, 1.05), draw(rng, 1.95, 2.3), _wall(rng), 0.0, style=style).mesh])
+
+
+def _register_window(style: str, held_out: bool) -> None:
+    @family("window", style, held_out)
+    def recipe(rng: np.random.Generator) -> Piece:
+        width = draw(rng, 1.0, 2.4) if style in ("sliding", "french") else draw(rng, 0.5, 2.2)
+        height = draw(rng, 1.95, 2.4) if style == "french" else draw(rng, 0.6, 1.7)
+        return finished([window(rng, width, height, _wall(rng), style=style).mesh])
+
+
+def _register_folding_door(style: str, held_out: bool) -> None:
+    @family("folding door", style, held_out)
+    def recipe(rng: np.random.Generator) -> Piece:
+        return finished([folding_door(rng, draw(rng, 0.7, 2.8), draw(rng, 1.95, 2.4), _wall(rng), style=style).mesh])
+
+
+for _known, _register in (
+    (DOOR_STYLES, _register_door), (WINDOW_STYLES, _register_window), (FOLDING_STYLES, _register_folding_door),
+):  # fmt: skip
+    for _which, _names in _known.items():
+        for _name in _names:
+            _register(_name, _which == "held-out")
+
+
+@family("door", "ajar")
+def _ajar(rng: np.random.Generator) -> Piece:
+    wide, tall = draw(rng, 0.7, 1.0), draw(rng, 1.95, 2.25)
+    return finished([door(rng, wide, tall, _wall(rng), draw(rng, 0.3, 1.9), which="training").mesh])
+
+
+@family("door", "double")
+def _double(rng: np.random.Generator) -> Piece:
+    wide, tall = draw(rng, 1.3, 2.0), draw(rng, 2.0, 2.5)
+    open_rad = draw(rng, 0.2, 1.6) if chance(rng, 0.4) else 0.0
+    return finished([door(rng, wide, tall, _wall(rng), open_rad, which="training").mesh])

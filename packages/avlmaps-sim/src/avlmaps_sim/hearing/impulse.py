@@ -1,0 +1,204 @@
+"""The impulse response from a source to a microphone in a building.
+
+What is modelled, in units of the direct sound at 1 m:
+- the direct sound, 1/r, where no wall lies between; else what bends round through the doorways (1/length of the
+  shortest path, held back as a thin screen would by Kurze and Anderson's formula, at most 24 dB) and what comes through
+  the walls (1/r, each wall by a light partition's loss);
+- early reflections in the source's own room, where the microphone is in it too: image sources of the room's polygon, by
+  pyroomacoustics, with the room's mean absorption;
+- the late field in every room: noise that decays as the coupled rooms do (``rooms``), band by band.
+Doors that stand closed stop sound as walls do. Not modelled: furniture between source and microphone, reflections
+that reach the next room, scattering, moving doors, Doppler shift, stairwells (another floor is audible through its slab
+alone), the directivity of sources and microphone.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from avlmaps_sim.hearing.filters import shaped_impulse, split
+from avlmaps_sim.hearing.rooms import BANDS_HZ, SPEED_M_S, WALL_DB, Rooms
+from avlmaps_sim.hearing.sound_paths import Air, Way
+from avlmaps_sim.scene import Area, Scene
+
+_SLAB_DB = WALL_DB + 12.0
+_NEAREST_M = 0.3
+_MOST_WALLS = 4
+_MOST_DIFFRACTION_DB = 24.0
+_LONGEST_S = 1.6
+_LATE_FROM_S, _LATE_BY_S = 0.010, 0.030  # after the direct sound the late field fades in
+_ORDER_OF_FEW_WALLS, _ORDER = 4, 3
+_STEP_S = 0.002
+
+
+@dataclass(eq=False)
+class Acoustics:
+    """A building prepared for impulse responses.
+
+    Attributes:
+        scene: the building.
+        rate_hz: samples a second.
+    """
+
+    scene: Scene
+    rate_hz: int
+    _floors: dict[float, tuple[Air, Rooms]] = field(default_factory=dict, init=False)
+
+    def floor_at(self, height_m: float) -> tuple[Air, Rooms]:
+        """Return the plan and the rooms of the floor that lies below a height."""
+        areas = _areas(self.scene)
+        levels = sorted({round(area.floor_m, 2) for area in areas}) or [float(self.scene.mesh.low[2])]
+        floor_m = max((level for level in levels if level <= height_m + 0.3), default=levels[0])
+        if floor_m not in self._floors:
+            here = tuple(area for area in areas if abs(area.floor_m - floor_m) < 0.8)
+            air = Air.of(self.scene, here, floor_m)
+            self._floors[floor_m] = (air, Rooms.of(self.scene, air))
+        return self._floors[floor_m]
+
+    def responses(
+        self, source: Float[np.ndarray, "3"], ears: Float[np.ndarray, "n 3"], rng: np.random.Generator
+    ) -> list[Float[np.ndarray, " t"]]:
+        """Return the impulse response from a source to each of several places, in the same units.
+
+        Args:
+            source: where it sounds; what lies in a wall is moved out of it.
+            ears: where the microphone is.
+            rng: draws the noise of the late field, the same for all places.
+        """
+        air, rooms = self.floor_at(float(ears[:, 2].mean()))
+        if self.floor_at(float(source[2]))[0] is not air:
+            return [self._through_slab(source, ear) for ear in ears]
+        own = air.room_at(source[:2])
+        source = np.array([*air.out_of_walls(source[:2], own), source[2]])
+        late = self._late(rooms, own, rng)
+        early = self._images(rooms, own, source, ears)
+        found = []
+        for ear, images, way in zip(ears, early, air.ways(source, ears), strict=True):
+            room = air.room_at(ear[:2])
+            found.append(self._response(way, images, late[room] if late is not None and room >= 0 else None))
+        return found
+
+    def _response(
+        self, way: Way, images: Float[np.ndarray, "i 2"] | None, late: Float[np.ndarray, " t"] | None
+    ) -> Float[np.ndarray, " t"]:
+        """Put direct sound, reflections and the late field together."""
+        rate_hz = self.rate_hz
+        length = round(_LONGEST_S * rate_hz) if late is None else len(late)
+        out = np.zeros(length)
+        arrivals = _direct(way)
+        for delay_s, gain in arrivals:
+            _add(out, delay_s * rate_hz, shaped_impulse(gain, rate_hz) if np.ptp(gain) > 0 else gain[:1])
+        first_s = min(delay_s for delay_s, _ in arrivals)
+        fade = np.clip((np.arange(length) / rate_hz - first_s - _LATE_FROM_S) / (_LATE_BY_S - _LATE_FROM_S), 0.0, 1.0)
+        if images is None:
+            fade = np.clip((np.arange(length) / rate_hz - first_s) / 0.002, 0.0, 1.0)
+        else:
+            for distance_m, gain in images:
+                at = distance_m / SPEED_M_S * rate_hz
+                left = 1.0 - fade[min(int(at), length - 1)] if late is not None else 1.0
+                _add(out, at, np.array([np.sqrt(left) * gain / distance_m]))
+        return out if late is None else out + np.sqrt(fade) * late
+
+    def _late(self, rooms: Rooms, own: int, rng: np.random.Generator) -> Float[np.ndarray, "r t"] | None:
+        """Return the late field in every room of a source in one of them."""
+        if own < 0:
+            return None
+        longest_s = min(_LONGEST_S, 1.1 * max(rooms.rt60_s(room) for room in range(len(rooms.areas))) + 0.1)
+        count = round(longest_s * self.rate_hz)
+        coarse = np.arange(0.0, longest_s + _STEP_S, _STEP_S)
+        energy = rooms.energy(own, coarse)
+        noise = split(rng.standard_normal(count), self.rate_hz)
+        times_s = np.arange(count) / self.rate_hz
+        out = np.zeros((len(rooms.areas), count))
+        for band in range(len(BANDS_HZ)):
+            for room in range(len(rooms.areas)):
+                amplitude = np.sqrt(np.interp(times_s, coarse, energy[band, room]) / self.rate_hz)
+                out[room] += amplitude * noise[band]
+        return out
+
+    def _images(
+        self, rooms: Rooms, own: int, source: Float[np.ndarray, "3"], ears: Float[np.ndarray, "n 3"]
+    ) -> list[Float[np.ndarray, "i 2"] | None]:
+        """Return distance and gain of the reflections at each place in the source's own room, elsewhere None.
+
+        The direct sound is not among them.
+        """
+        found: list[Float[np.ndarray, "i 2"] | None] = [None] * len(ears)
+        if own < 0:
+            return found
+        area = rooms.areas[own]
+        inside = _inside(area, ears)
+        if not inside.any() or not _inside(area, source[None]).all():
+            return found
+        import pyroomacoustics as pra
+
+        absorbing = pra.Material(rooms.mean_absorption(own))
+        order = _ORDER_OF_FEW_WALLS if len(area.polygon) <= 8 else _ORDER
+        box = pra.Room.from_corners(_counter_clockwise(area).T, fs=self.rate_hz, max_order=order, materials=absorbing)
+        box.extrude(area.ceiling_m - area.floor_m, materials=absorbing)
+        down = np.array([0.0, 0.0, area.floor_m])
+        box.add_source(source - down)
+        box.add_microphone_array((ears[inside] - down).T)
+        box.image_source_model()
+        made = box.sources[0]
+        places, gains, orders = made.images.T + down, made.damping[0], made.orders
+        visible = box.visibility or []
+        for index, seen in zip(np.flatnonzero(inside), visible[0], strict=True):
+            kept = np.asarray(seen, bool) & (orders > 0)
+            distance_m = np.linalg.norm(places[kept] - ears[index], axis=1)
+            found[index] = np.column_stack([np.maximum(distance_m, _NEAREST_M), gains[kept]])
+        return found
+
+    def _through_slab(self, source: Float[np.ndarray, "3"], ear: Float[np.ndarray, "3"]) -> Float[np.ndarray, " t"]:
+        """Return the sound on another floor: only what comes straight through the slab between."""
+        distance_m = max(float(np.linalg.norm(ear - source)), _NEAREST_M)
+        out = np.zeros(round(_LONGEST_S * self.rate_hz))
+        gain = 10.0 ** (-_SLAB_DB / 20.0) / distance_m
+        _add(out, distance_m / SPEED_M_S * self.rate_hz, shaped_impulse(gain, self.rate_hz))
+        return out
+
+
+def _direct(way: Way) -> list[tuple[float, Float[np.ndarray, " b"]]]:
+    """Return delay and gain by band of what arrives first: straight, or round corners and through walls."""
+    straight_m = max(way.straight_m, _NEAREST_M)
+    if way.clear:
+        return [(straight_m / SPEED_M_S, np.full(len(BANDS_HZ), 1.0 / straight_m))]
+    through = 10.0 ** (-min(way.walls, _MOST_WALLS) * WALL_DB / 20.0) / straight_m
+    found = [(straight_m / SPEED_M_S, through)]
+    if np.isfinite(way.round_m):
+        fresnel = 2.0 * (way.round_m - way.straight_m) * BANDS_HZ / SPEED_M_S
+        root = np.sqrt(2.0 * np.pi * np.maximum(fresnel, 1e-6))
+        loss_db = np.minimum(5.0 + 20.0 * np.log10(root / np.tanh(root)), _MOST_DIFFRACTION_DB)
+        round_m = max(way.round_m, _NEAREST_M)
+        found.append((round_m / SPEED_M_S, 10.0 ** (-loss_db / 20.0) / round_m))
+    return found
+
+
+def _add(out: Float[np.ndarray, " t"], at: float, piece: Float[np.ndarray, " k"]) -> None:
+    """Add a piece at a fractional sample, shared out between the two samples round it."""
+    whole = int(np.floor(at))
+    for begin, share in ((whole, 1.0 - (at - whole)), (whole + 1, at - whole)):
+        count = min(len(piece), len(out) - begin)
+        if count > 0:
+            out[begin : begin + count] += share * piece[:count]
+
+
+def _areas(scene: Scene) -> tuple[Area, ...]:
+    """Return the rooms; a building without any is one room as large as it, and what has no walls is open air."""
+    if scene.areas:
+        return scene.areas
+    if not any(thing.category == "wall" for thing in scene.objects):
+        return ()
+    (ax, ay, az), (bx, by, bz) = scene.mesh.low.tolist(), scene.mesh.high.tolist()
+    return (Area("room", np.array([[ax, ay], [bx, ay], [bx, by], [ax, by]]), az, max(bz, az + 2.0), "all"),)
+
+
+def _inside(area: Area, places: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, " n"]:
+    return area.contains(places[:, :2]) & (places[:, 2] > area.floor_m) & (places[:, 2] < area.ceiling_m)
+
+
+def _counter_clockwise(area: Area) -> Float[np.ndarray, "k 2"]:
+    here, there = area.polygon, np.roll(area.polygon, -1, axis=0)
+    signed = float((here[:, 0] * there[:, 1] - there[:, 0] * here[:, 1]).sum())
+    return np.asarray(area.polygon if signed > 0 else area.polygon[::-1], np.float64)

@@ -1,0 +1,58 @@
+"""Scenes by name: `house:12`, `office:3`, `house:12:held-out`, `house:12:lived-in`, or a file."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from avlmaps.core.errors import AvlmapsError
+from avlmaps_sim.furniture import Families
+from avlmaps_sim.homes import lived_in, make_home, make_office
+from avlmaps_sim.scene import Scene
+
+_MAKERS = {"house": make_home, "office": make_office}
+_LIVED_IN = "lived-in"
+_FAMILIES: dict[str, Families] = {"training": "training", "held-out": "held-out", "all": "all"}
+
+
+class SceneError(AvlmapsError):
+    """A scene cannot be opened: no such kind, no seed, no such file."""
+
+
+def open_scene(spec: str) -> Scene:
+    """Return a scene by its name.
+
+    Args:
+        spec: ``house:SEED`` or ``office:SEED``, with ``:training``, ``:held-out`` or ``:all`` (as when nothing is
+            said) behind it for the families of furniture, and ``:lived-in`` for people, clothes, papers, shower
+            curtains and mirrors that reflect; or the path of a file.
+
+    Returns:
+        The scene; the name of a building made by rule is the one that it was opened by.
+
+    Raises:
+        SceneError: there is no such scene.
+    """
+    kind, _, rest = spec.partition(":")
+    if kind in _MAKERS and not Path(spec).exists():
+        return _made(kind, *rest.split(":"), spec=spec)
+    if not Path(spec).exists():
+        raise SceneError(f"there is no scene {spec!r}; give house:SEED, office:SEED or a file that exists")
+    from avlmaps_sim.files import load_scene  # here, so that homes need no reader of files
+
+    return load_scene(Path(spec))
+
+
+def _made(kind: str, seed: str, *words: str, spec: str) -> Scene:
+    """Return a building made by rule, as the words behind its seed say."""
+    which = [word for word in words if word != _LIVED_IN]
+    if not seed.isdecimal() or len(which) > 1 or not set(which) <= _FAMILIES.keys() or words.count(_LIVED_IN) > 1:
+        raise SceneError(
+            f"the scene {spec!r} names no seed and families; write {kind}:12, or {kind}:12:held-out "
+            f"({', '.join(_FAMILIES)}), and :{_LIVED_IN} behind it for people, clothes and mirrors that reflect"
+        )
+    families = _FAMILIES[which[0] if which else "all"]
+    scene = replace(_MAKERS[kind](int(seed), families), name=spec)  # by which a command opens it again
+    if _LIVED_IN not in words:
+        return scene
+    return replace(lived_in(scene, np.random.default_rng([int(seed), 11]), families), mirrors=True)

@@ -1,0 +1,187 @@
+"""`avlmaps bench`: the quality figures, as JSON, Markdown and a picture."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+
+from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
+
+from avlmaps.cli.output import emit, table_lines
+from avlmaps.cli.verb import ModelVerb
+
+if TYPE_CHECKING:
+    from avlmaps_sim.bench.indexing import IndexingSettings
+    from avlmaps_sim.bench.navigation import NavigationSettings
+
+Suite = Literal[
+    "words",
+    "language",
+    "sounds",
+    "segmentation",
+    "locate",
+    "frames",
+    "recordings",
+    "objects",
+    "indexing",
+    "found",
+    "rooms",
+    "navigation",
+]
+Series = Literal["sounds-1", "sounds-2", "sounds-3", "images", "pairs", "commands", "spatial"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Indexing:
+    """Scenes of the suites indexing, objects and navigation."""
+
+    hearing: Literal["overlay", "acoustic"] = "overlay"
+    """How sounds reach the microphone: mixed in as the paper did, or through rooms and doorways."""
+    sensor: Literal["clean", "kinect", "realsense"] = "clean"
+    """Camera whose faults colour and depth have."""
+    rules: Literal["ours", "paper"] = "ours"
+    """Rules of mapping and querying: ours, or the paper's throughout (docs/paper-models.md)."""
+    sound_clips: Literal["unheard", "all"] = "unheard"
+    """Clips of --sounds: those that the embedded sound encoder was not trained on, or all."""
+    frames: Annotated[int, arg(metavar="N")] = 600
+    """Maximum number of frames per scene."""
+    tasks_a_scene: Annotated[int, arg(metavar="N")] = 20
+    """Maximum number of tasks per scene and table (indexing)."""
+    size: Literal["paper", "all"] = "paper"
+    """Tasks per table, over all scenes (indexing): as many as the paper has (100, 119, 159), or all."""
+    jobs: Annotated[int, arg(metavar="N")] = 0
+    """Number of scenes in parallel. Default: one for each core."""
+    tasks: Annotated[Path | None, arg(metavar="FILE")] = None
+    """Use the tasks (or missions) of this file instead of new ones."""
+    save_tasks: Annotated[Path | None, arg(metavar="FILE")] = None
+    """Write the tasks (or missions) and their truth into this file."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Navigation:
+    """Commands of the suite navigation."""
+
+    sequences: Annotated[int, arg(metavar="N")] = 200
+    """Sequences of four sounds (at each range), and of an image and two objects; pairs are 119 for each 200."""
+    series: tuple[Series, ...] = ()
+    """Experiments to run. Default: all."""
+    language: Literal["rules", "chat", "none"] = "rules"
+    """Translator of sentences into programs; none gives robots the programs."""
+    guess: bool = True
+    """Send robots to the best guess where the map is not confident, as in the paper."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bench(ModelVerb):
+    """Measure the accuracy of the parts, with counts and 95 % intervals.
+
+    Example: avlmaps bench indexing --scenes house:1000000:held-out --out bench_out
+
+    words: household phrases that were not trained on; needs nothing.
+    language: commands and questions that strangers wrote; needs nothing.
+    sounds, segmentation: need --sounds, a folder of clips with an index.csv.
+    locate: needs --scenes, recordings with poses; half of the frames become the map, the others are located.
+    frames: needs --nyuv2, labelled frames of NYU Depth V2 or of your own camera (docs/guides/train-eyes.md); kinds of
+    pixels, without any map.
+    recordings: mistakes of recordings (poses, units, axes, clocks, pictures) and right ones, and what is said of each;
+    takes --scenes, recordings of a real camera.
+    objects: positions of objects, in the scenes of indexing, whose maps it shares.
+    indexing: the paper's Tables III to V, in twelve held-out homes, in --scenes, or in a recording with objects.json.
+    found: is what is reported as found there? Brier scores and a reliability diagram, in the scenes of indexing.
+    rooms: the rooms of a map against the true ones (overlap, names, count, area), in the scenes of indexing.
+    navigation: the paper's Tables I, II and VI and its commands, in twelve held-out homes or in --scenes.
+    """
+
+    compiles: ClassVar[bool] = True
+
+    suite: Positional[Suite]
+    """Suite to run."""
+    sounds: Annotated[Path | None, arg(metavar="DIR")] = None
+    """Folder of sound clips with an index.csv (path, category, fold)."""
+    clips: Annotated[Path | None, arg(metavar="DIR")] = None
+    """Folder of clips with an index.csv: queries each by name, dry and in simulated rooms (sounds)."""
+    scenes: Annotated[tuple[str, ...], arg(metavar="SCENE ...")] = ()
+    """Recordings with poses (locate, recordings); names of scenes such as house:1000000:held-out (the others)."""
+    nyuv2: Annotated[Path | None, arg(metavar="DIR")] = None
+    """Folder of labelled frames (frames.csv, NAME.color.jpg, NAME.depth.png, NAME.label.png, camera.json)."""
+    profile: Annotated[str, arg(metavar="PROFILE")] = "embedded"
+    """Models to measure (see `avlmaps profiles`)."""
+    model: Annotated[tuple[tuple[str, ...], ...], arg(metavar="MODULE=NAME[@MODEL] ..."), UseAppendAction] = ()
+    """Other backends or models than the profile's: pixels=clip-patches@openai/clip-vit-large-patch14 views=clip."""
+    out: Annotated[Path, arg(metavar="DIR")] = Path("bench_out")
+    """Folder for SUITE.json, SUITE.md, SUITE.png and a CSV file for each table."""
+    seed: Annotated[int, arg(metavar="N")] = 0
+    """Seed of all random choices."""
+    indexing: Annotated[Indexing, OmitArgPrefixes] = field(default_factory=Indexing)
+    """Options of the suites indexing, objects and navigation."""
+    navigation: Annotated[Navigation, OmitArgPrefixes] = field(default_factory=Navigation)
+    """Options of the suite navigation."""
+
+    def run(self) -> None:
+        """Measure, write the tables, print them."""
+        from avlmaps_sim.bench.suites import SuiteInputs, run_suite
+
+        indexing = self.indexing_settings() if self.suite in ("indexing", "found", "rooms", "objects") else None
+        navigation = self.navigation_settings() if self.suite == "navigation" else None
+        scenes = () if indexing or navigation else tuple(map(Path, self.scenes))
+        models = self.models_chosen
+        inputs = SuiteInputs(
+            self.sounds, self.clips, scenes, self.nyuv2, self.profile, models, self.seed, indexing, navigation
+        )
+        answer = run_suite(self.suite, inputs, self.out)
+        lines: list[str] = []
+        for name, table in answer["tables"].items():
+            lines += [name, *["  " + line for line in table_lines(table["columns"], table["rows"])]]
+        emit(answer, [*lines, f"wrote {self.out}"], self.json)
+
+    @property
+    def models_chosen(self) -> tuple[str, ...]:
+        """The words of all --model."""
+        return tuple(word for words in self.model for word in words)
+
+    def indexing_settings(self) -> "IndexingSettings":
+        """Return the settings of the suites indexing and objects."""
+        from avlmaps_sim.bench.indexing import DEFAULT_SCENES, PAPER_SIZES, IndexingSettings
+
+        chosen = self.indexing
+        return IndexingSettings(
+            scenes=self.scenes or DEFAULT_SCENES,
+            profile=self.profile,
+            models=self.models_chosen,
+            rules=chosen.rules,
+            hearing=chosen.hearing,
+            sounds=self.sounds,
+            clips=chosen.sound_clips,
+            sensor=chosen.sensor,
+            frames=chosen.frames,
+            tasks_a_scene=chosen.tasks_a_scene,
+            sizes=PAPER_SIZES if chosen.size == "paper" else None,
+            jobs=chosen.jobs,
+            seed=self.seed,
+            load=chosen.tasks,
+            save=chosen.save_tasks,
+        )
+
+    def navigation_settings(self) -> "NavigationSettings":
+        """Return the settings of the suite navigation."""
+        from avlmaps_sim.bench import navigation
+
+        chosen, scenes = self.navigation, self.indexing
+        return navigation.NavigationSettings(
+            scenes=self.scenes or navigation.DEFAULT_SCENES,
+            series=tuple(map(navigation.Series, chosen.series)) or tuple(navigation.Series),
+            profile=self.profile,
+            models=self.models_chosen,
+            rules=scenes.rules,
+            hearing=scenes.hearing,
+            sounds=self.sounds,
+            clips=scenes.sound_clips,
+            sensor=scenes.sensor,
+            frames=scenes.frames,
+            sequences=chosen.sequences,
+            language=chosen.language,
+            guess=chosen.guess,
+            jobs=scenes.jobs,
+            seed=self.seed,
+            load=scenes.tasks,
+            save=scenes.save_tasks,
+        )

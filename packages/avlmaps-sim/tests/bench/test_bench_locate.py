@@ -1,0 +1,53 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from avlmaps.perception.encoders import Encoders
+from avlmaps.recordings.open import open_recording
+from avlmaps.recordings.subset import Subset
+from avlmaps_sim.bench.locate import COLUMNS, errors_of, foreign_errors, map_of, run
+from helpers.picture_room import RoomWalk
+
+
+def test_the_table_has_a_row_for_the_place_and_one_for_others() -> None:
+    table = run(RoomWalk(frames=40, turn=0.5), 0, steps=(2, 4), photos=5)
+    assert table["columns"] == list(COLUMNS)
+    assert [len(row) for row in table["rows"]] == [len(COLUMNS)] * 4
+    place, other = table["rows"][:2]
+    assert place[:4] == ["every other frame", 20, 5, "yes"]
+    assert place[4:6] == [100.0, "56.6 to 100.0"]
+    assert place[6] < 1.0
+    assert place[10] == 100.0
+    assert other[3:5] == ["no: mirrored", 0.0]
+    assert other[6:12] == [""] * 6
+
+
+def test_photos_of_other_places_can_be_given() -> None:
+    other = RoomWalk(frames=3, seed=5)
+    table = run(RoomWalk(frames=20), 0, steps=(2,), photos=2, foreign=[other.frame(i).rgb for i in range(3)])
+    assert table["rows"][1][2:5] == [3, "no", 0.0]
+
+
+@pytest.mark.slow
+@pytest.mark.shared
+def test_half_of_the_red_kitchen_locates_the_other_half(shared_data: Path) -> None:
+    """The issue's figures, in the first half of the walk; `avlmaps bench locate` asks everywhere."""
+    recording = open_recording(shared_data / "data" / "redkitchen")
+    stored = map_of(Subset(recording, np.arange(0, 250, 2)), Encoders.named("embedded"), np.random.default_rng(0))
+    asked = np.arange(1, 250, 12)
+    errors = errors_of(stored, recording, asked, 0)
+    assert np.median(errors.cm) <= 1.0
+    assert np.median(errors.deg) <= 0.4
+    assert ((errors.cm <= 5.0) & (errors.deg <= 5.0)).all()
+    mirrored = (np.ascontiguousarray(recording.frame(int(i)).rgb[:, ::-1]) for i in asked[::2])
+    assert np.isinf(foreign_errors(stored, mirrored, 0).cm).all()
+
+
+@pytest.mark.shared
+def test_the_depth_cameras_intrinsics_do_not_spoil_the_red_kitchen(shared_data: Path) -> None:
+    recording = open_recording(shared_data / "data" / "redkitchen")
+    stored = map_of(Subset(recording, np.arange(100, 200, 2)), Encoders.named("embedded"), np.random.default_rng(0))
+    errors = errors_of(stored, recording, np.arange(105, 196, 10), 0, camera=recording.rig.depth)
+    assert np.median(errors.cm) <= 1.5
+    assert (errors.cm <= 5.0).all()

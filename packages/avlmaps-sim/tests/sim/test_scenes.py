@@ -1,0 +1,12 @@
+"""Scenes by name."""
+
+import pytest
+
+from avlmaps_sim.scenes import open_scene
+
+
+@pytest.mark.parametrize("name", ["house:3", "house:3:held-out", "house:3:training"])
+def test_a_building_is_named_by_what_opens_it_again(name: str) -> None:
+    scene = open_scene(name)
+    assert scene.name == name
+    assert open_scene(scene.name).objects == scene.objects

@@ -1,1 +1,0 @@
-"""A world to record in: it reaches a map only through a recording."""

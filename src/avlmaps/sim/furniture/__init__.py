@@ -1,5 +1,0 @@
-"""Furniture and fittings by recipe: `make(category, rng)`; every category has several families of shapes."""
-
-from avlmaps.sim.furniture.catalogue import Families, Piece, Support, categories, families, family, make
-
-__all__ = ["Families", "Piece", "Support", "categories", "families", "family", "make"]

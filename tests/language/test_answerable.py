@@ -1,0 +1,94 @@
+"""What a question asks beside the names: what a map does not hold is refused, whatever the thing and the room."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from avlmaps.core.errors import QueryError
+from avlmaps.language.list_questions import said_alternatives
+from avlmaps.language.questions import read_question
+from avlmaps.language.sentence import Given
+from avlmaps_sim.bench.language import Judged, judge, read_list
+
+LISTS = Path(__file__).parent / "commands"
+ROWS = read_list(LISTS / "kinds.jsonl")
+KINDS = sorted({str(row["kind"]) for row in ROWS})
+QUICK = {"or and not", "purposes", "stop", "direction", "paths", "third person", "parts", "languages"}
+# Of each kind, at most so many are asked back or harmless, and so many misread; 0 and 0 of the others.
+SHORT = {"roboticist": (5, 1), "other voices": (0, 1), "states": (0, 1), "parts": (1, 0), "open names": (1, 0)}
+THINGS = st.sampled_from(["oven", "lamp", "washing machine", "heater", "tv", "printer"])
+ROOMS = st.sampled_from(["kitchen", "bathroom", "office", "hallway"])
+
+
+@pytest.mark.parametrize(
+    "kind", [kind if kind in QUICK else pytest.param(kind, marks=pytest.mark.slow) for kind in KINDS]
+)
+def test_each_kind_of_sentence_stays_understood(kind: str) -> None:
+    judged: list[Judged] = [judge(row) for row in ROWS if row["kind"] == kind]
+    back, misread = SHORT.get(kind, (0, 0))
+    wrong = [one for one in judged if one.outcome == "misread"]
+    assert not [one.say for one in judged if one.danger and one.outcome in ("misread", "harmless")]
+    assert len(wrong) <= misread, wrong
+    assert sum(one.outcome in ("asked back", "harmless") for one in judged) <= back
+
+
+def is_refused(question: str) -> bool:
+    try:
+        read_question(question)
+    except QueryError:
+        return True
+    return False
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    thing=THINGS,
+    room=ROOMS,
+    asks=st.sampled_from([
+        "is the {} in the {} on", "is the {} in the {} broken", "did I leave the {} in the {} on",
+        "did you switch off the {} in the {}", "is there more than one {} in the {}", "is there only one {} in the {}",
+        "does every {} in the {} work", "can the baby touch the {} in the {}", "where should I put the {} in the {}",
+    ]),
+)  # fmt: skip
+def test_what_a_map_does_not_hold_is_refused(thing: str, room: str, asks: str) -> None:
+    assert is_refused(asks.format(thing, room))
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    thing=THINGS,
+    room=ROOMS,
+    asks=st.sampled_from([
+        "is there a {} in the {}", "is the {} in the {}", "do we have a {} in the {}", "have you seen a {} in the {}",
+        "did I leave the {} in the {}",
+    ]),
+)  # fmt: skip
+def test_what_a_map_holds_is_asked_of_both_names(thing: str, room: str, asks: str) -> None:
+    (target,) = read_question(asks.format(thing, room)).inquiry.of
+    assert [target.name, *(near.name for near in target.near)] == [thing, room]
+
+
+@given(how=st.sampled_from(["near", "in", "beside", "next to"]), one=THINGS, other=THINGS)
+def test_either_of_two_places_is_asked_for(how: str, one: str, other: str) -> None:
+    found = said_alternatives(f"is there a chair {how} the {one} or the {other}")
+    assert found == (f"is there a chair {how} the {one}", f"is there a chair {how} the {other}")
+
+
+@pytest.mark.parametrize("name", ["heat gun", "label maker", "yoga mat"])
+@pytest.mark.parametrize("asks", ["do we have a {}", "where did I leave the {}", "where do we keep the {}"])
+def test_a_name_that_no_list_has_is_no_purpose(name: str, asks: str) -> None:
+    assert [target.name for target in read_question(asks.format(name)).inquiry.of] == [name]
+
+
+@pytest.mark.parametrize("place", ["near the window", "next to the radiator", "in the living room"])
+def test_a_purpose_keeps_its_place(place: str) -> None:
+    served, named = (read_question(text).inquiry.of[0] for text in (f"where can I sit {place}", f"the chair {place}"))
+    assert served.near
+    assert served.near == named.near
+
+
+def test_the_till_is_no_until() -> None:
+    (target,) = read_question("the bin near the till", Given(knows=lambda _: True)).inquiry.of
+    assert [near.name for near in target.near] == ["till"]
