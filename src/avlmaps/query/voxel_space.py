@@ -12,7 +12,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Int
 from avlmaps.core.poses import rotation_to_level
-from avlmaps.maps.grid import GridSpec
+from avlmaps.maps.grid import GridSpec, index_ends
 
 if TYPE_CHECKING:
     from avlmaps.maps.store.reader import StoredMap
@@ -63,12 +63,12 @@ class Blocks:
         if not n:
             empty = np.zeros((0, 3), np.int64)
             return cls(np.zeros(0, np.int64), np.zeros(1, np.int64), np.zeros((3, 0), np.int32), empty, empty)
-        least, most = (end.astype(np.int64) // _BLOCK for end in (index.min(axis=0), index.max(axis=0)))
+        least, most = (end // _BLOCK for end in index_ends(index))
         span: Int[np.ndarray, " xyz"] = most - least + 1
-        number = np.zeros(n, np.int64)
-        for axis in range(3):
-            number *= span[axis]
-            number += (index[:, axis] >> _SHIFT) - least[axis]
+        number = np.empty(n, np.int64)
+        for a in range(0, n, _CHUNK):
+            x, y, z = ((index[a : a + _CHUNK, axis] >> _SHIFT) - least[axis] for axis in range(3))
+            number[a : a + _CHUNK] = (x * span[1] + y) * span[2] + z
         order = _grouped(number, int(span[0]) * int(span[1]) * int(span[2]))
         number = number[order]
         first = np.flatnonzero(np.append(True, number[1:] != number[:-1]))
@@ -94,6 +94,14 @@ class Blocks:
             steps = [np.roll(held, step, axis) for step in range(-around, around + 1)]
             held = np.logical_or.reduce(steps)
         return every[held[tuple((cube - least).T)]]
+
+    def some(self, which: Int[np.ndarray, " k"]) -> "Blocks":
+        """Return some of the blocks, by their numbers."""
+        counts = np.diff(self.starts)[which]
+        starts = np.append(0, np.cumsum(counts)).astype(np.int64)
+        place = np.repeat(self.starts[which] - starts[:-1], counts) + np.arange(starts[-1])
+        index = np.ascontiguousarray(self.index[:, place])
+        return Blocks(self.order[place], starts, index, self.low[which], self.high[which])
 
     def chosen(self, mask: Bool[np.ndarray, " n"]) -> "Blocks":
         """Return the blocks of some of the voxels only, without sorting again; blocks that have none are left out.

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Int
 
+from avlmaps.maps.grid import index_ends
+
 # Edges of the blocks, in voxels and powers of two, of which one voxel each is drawn first.
 _SHIFTS = (4, 3, 2, 1)
 _SEED = 11
@@ -62,17 +64,21 @@ def _one_of_each(index: Int[np.ndarray, "n 3"], shift: int, chosen: np.ndarray) 
     """Return one row of each block of which none is chosen yet: the first of them."""
     if not len(index):
         return np.zeros(0, np.int64)
-    low, high = (end.astype(np.int64) >> shift for end in (index.min(axis=0), index.max(axis=0)))
+    from avlmaps.query.kernels import first_of_blocks
+
+    low, high = (end >> shift for end in index_ends(index))
     span = high - low + 1
-    key = np.zeros(len(index), np.int64)
+    blocks = int(span[0]) * int(span[1]) * int(span[2])
+    if blocks <= _MOST_BLOCKS * len(index):
+        first = np.full(blocks, -1, np.int32)
+        first_of_blocks(np.ascontiguousarray(index), shift, low, span, chosen, first)
+        return first[first >= 0].astype(np.int64)
+    key = np.zeros(len(index), np.int64)  # a few far voxels: a table of all blocks would be larger than the map
     for axis in range(3):
         key *= span[axis]
         key += (index[:, axis] >> shift) - low[axis]
-    blocks = int(span[0]) * int(span[1]) * int(span[2])
-    if blocks > _MOST_BLOCKS * len(index):  # a few far voxels: a table of all blocks would be larger than the map
-        _, key = np.unique(key, return_inverse=True)
-        blocks = int(key.max()) + 1
-    first = np.full(blocks, -1, np.int64)
+    _, key = np.unique(key, return_inverse=True)
+    first = np.full(int(key.max()) + 1, -1, np.int64)
     first[key[::-1]] = np.arange(len(index) - 1, -1, -1)  # the last one written stays
     first[key[chosen]] = -1
     return first[first >= 0]

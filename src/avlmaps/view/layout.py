@@ -13,6 +13,7 @@ from jaxtyping import Float, Float32, UInt8
 
 from avlmaps.core.errors import MapError
 from avlmaps.core.poses import FRAME
+from avlmaps.maps.grid import index_ends
 from avlmaps.query.topdown import camera_path
 from avlmaps.view.detail import detail_order
 
@@ -52,8 +53,7 @@ class Layout:
         self.avlmap = avlmap
         index = np.asarray(avlmap.space.index)
         self.order, self.levels = detail_order(index, most)
-        ends = (index.min(axis=0), index.max(axis=0)) if len(index) else (np.zeros(3, np.int64),) * 2
-        self.low, self._high = (end.astype(np.int64) for end in ends)
+        self.low, self._high = index_ends(index) if len(index) else (np.zeros(3, np.int64),) * 2
         if int((self._high - self.low).max()) > _MOST_CELLS:
             span_m = float((self._high - self.low).max() * avlmap.space.grid.voxel_size_m)
             raise MapError(

@@ -7,6 +7,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from avlmaps.core.errors import MapError
+from avlmaps.maps.grid import index_ends
 from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
 
 T = TypeVar("T")
@@ -113,7 +114,7 @@ def check_extent(index: np.ndarray, voxel_size_m: float, where: str) -> None:
     """Raise ``MapError`` where voxels are further apart than in any building, or further away than places can be."""
     if not len(index):
         return
-    low, high = index.min(axis=0).astype(np.float64), index.max(axis=0).astype(np.float64)
+    low, high = (end.astype(np.float64) for end in index_ends(index))
     extent_m, away_m = float((high - low).max()) * voxel_size_m, float(max(abs(low).max(), abs(high).max()))
     if extent_m > MOST_EXTENT_M or away_m * voxel_size_m > MOST_AWAY_M:
         raise MapError(

@@ -14,6 +14,7 @@ import numpy as np
 
 from avlmaps.core.files import decode_json
 from avlmaps.core.registry import Kind
+from avlmaps.maps.grid import index_ends
 from avlmaps.maps.store.manifest import MapInfo
 from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
 
@@ -120,7 +121,8 @@ def _model_faults(info: MapInfo, voxels: Voxels, keyframes: Keyframes, sounds: H
 def _voxel_faults(info: MapInfo, voxels: Voxels) -> Iterator[str]:
     index = np.asarray(voxels.index)
     if len(index):
-        box = np.stack([index.min(axis=0), index.max(axis=0).astype(np.int64) + 1]) * info.voxel_size_m
+        low, high = index_ends(index)
+        box = np.stack([low, high + 1]) * info.voxel_size_m
         said = np.array([info.bounding_box_m.low, info.bounding_box_m.high])
         if not np.abs(box - said).max() <= _BOX_M + 1e-9 * np.abs(said).max():
             yield (
