@@ -64,7 +64,7 @@ def build_map(
         overwrite=overwrite,
         progress=progress,
     )
-    return AVLMap(_asked_with(stored, encoders))
+    return AVLMap(_asked_with(stored, encoders)).prepare()
 
 
 def open_map(path: str | Path, *, encoders: "Encoders | None" = None) -> "AVLMap":

@@ -8,7 +8,8 @@ from hypothesis.extra import numpy as hnp
 
 from avlmaps.core.question import Modality, Part, Role
 from avlmaps.maps.grid import GridSpec
-from avlmaps.query.factors import HeatSettings, NearAnchors, anchor_heat, object_heat, stretch_scores
+from avlmaps.query import factors
+from avlmaps.query.factors import HeatSettings, NearAnchors, NearThings, anchor_heat, object_heat, stretch_scores
 from avlmaps.query.heatmap import Heatmap, product
 from avlmaps.query.voxel_space import Blocks, Space
 
@@ -218,3 +219,45 @@ def test_scores_that_are_no_numbers_are_refused() -> None:
     space = Space(GridSpec(SIZE_M), np.zeros((0, 3), np.int32), np.array([0.0, 0.0, 1.0]))
     with pytest.raises(ValueError, match="an anchor's score is outside"):
         factor(space, np.zeros((1, 3)), np.array([np.nan]))
+
+
+def near_anchors(index, up, anchors_and_scores, falloff) -> NearAnchors:
+    anchors, scores = anchors_and_scores
+    instance = np.arange(len(anchors)) % 3 if len(anchors) > 2 else np.arange(len(anchors))
+    part = Part(Modality.SOUND, "dog", Role.PRIMARY)
+    space = Space(GridSpec(SIZE_M), index, up)
+    return NearAnchors(space, part, falloff, anchors, scores, instance, True, certainty=0.7)
+
+
+@given(voxel_sets(), ups(), anchor_sets(), FALLOFFS)
+def test_no_voxel_is_hotter_than_the_places_of_one_sound(index, up, anchors_and_scores, falloff) -> None:
+    factor = near_anchors(index, up, anchors_and_scores, falloff)
+    peak = Heatmap.of(factor)._shares.peak
+    heat, anchor = factor.heat_and_anchors()
+    hot = np.flatnonzero(heat > 0.0)
+    assert (heat[hot] <= peak[factor.instance[anchor[hot]]] + 1e-6).all()
+    own = np.zeros(len(peak))
+    np.maximum.at(own, factor.instance, factor.scores)
+    assert (peak >= own - 1e-9).all()
+
+
+@given(voxel_sets(least=1), ups(), anchor_sets(), FALLOFFS, st.integers(0, 2**32 - 1))
+def test_heat_is_shown_alike_for_some_voxels_and_for_all(index, up, anchors_and_scores, falloff, seed) -> None:
+    some = np.random.default_rng(seed).integers(0, len(index), 20)
+    factor = near_anchors(index, up, anchors_and_scores, falloff)
+    part = Part(Modality.OBJECT, "chair", Role.PRIMARY)
+    mask = np.random.default_rng(seed).random(len(index)) < 0.1
+    thing = NearThings(factor.space, part, falloff, mask, np.zeros(mask.sum(), int), np.full(1, 0.6), True)
+    for one in (factor, thing):
+        np.testing.assert_allclose(Heatmap.of(one).shown_at(some), Heatmap.of(one).shown[some], atol=1e-6)
+    both = Heatmap(factor.space, (thing, factor))
+    np.testing.assert_allclose(both.shown_at(some), both.shown[some], atol=1e-6)
+
+
+@given(anchor_sets(), anchor_sets(), FALLOFFS)
+def test_heat_at_many_places_is_that_at_each(anchors_and_scores, places, falloff) -> None:
+    factor = near_anchors(np.zeros((1, 3), np.int32), np.array([0.0, 0.0, 1.0]), anchors_and_scores, falloff)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(factors, "_PAIRS", 0)
+        many = factor.at(places[0])
+    np.testing.assert_allclose(many, factor.at(places[0]), atol=1e-9)

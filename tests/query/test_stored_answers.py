@@ -138,6 +138,17 @@ def test_numbers_of_words_that_are_none_are_not_taken(base: Path, tmp_path: Path
     assert stored_names.read_closest(avlmap.stored, rivals) is None
 
 
+def test_a_saved_map_is_prepared(base: Path) -> None:
+    """As ``base`` was with the limit that maps have; here every map is large."""
+    assert not (base / DERIVED).exists()
+    AVLMap.open(base).prepare()
+    assert {file.name for file in (base / DERIVED).glob("*.json")} == {"names.json", "rooms.json"}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(avlmap_module.KnownRivals, "of", None)
+        patch.setattr(RoomRegions, "of", None)
+        AVLMap.open(base).prepare()
+
+
 def test_a_map_in_memory_has_nothing_stored(base: Path) -> None:
     stored = open_stored(base)
     in_memory = replace(stored, info=msgspec.structs.replace(stored.info, files={}), path=Path("nowhere"))

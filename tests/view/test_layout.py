@@ -9,7 +9,7 @@ from avlmaps.maps.storeys import Storey, Storeys
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.naming import VoxelNamer, keyframes_that_saw
 from avlmaps.view.labels import Labels, palettes
-from avlmaps.view.layout import RECORD, Layout
+from avlmaps.view.layout import RECORD, Layout, as_bytes
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +35,7 @@ def test_the_records_are_the_maps_voxels_in_the_order_of_drawing(layout: Layout,
 
 def test_heat_has_the_same_order_and_any_heat_is_seen(layout: Layout, room: AVLMap) -> None:
     heat = room.object("red", primary=True).shown
-    drawn = layout.in_order(heat)
+    drawn = np.frombuffer(as_bytes(heat[layout.order]), np.uint8)
     np.testing.assert_array_equal(drawn > 0, (heat > 0)[layout.order])
     np.testing.assert_allclose(drawn / 255, heat[layout.order], atol=1 / 255 + 1e-6)
 

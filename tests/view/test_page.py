@@ -11,7 +11,7 @@ import pytest
 
 from avlmaps.core.errors import QueryError
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.view.layout import Layout
+from avlmaps.view.layout import Layout, as_bytes
 from avlmaps.view.page import default_questions, live_page, write_page
 from avlmaps.view.session import MapOnPage
 
@@ -56,7 +56,7 @@ def test_the_file_holds_the_map_and_the_heat_of_each_question(page: str, room: A
     assert first["question"] == "the red thing"
     heat = room.ask("the red thing").heat
     assert heat is not None
-    np.testing.assert_array_equal(unpacked(first["heat"]), layout.in_order(heat.shown))
+    np.testing.assert_array_equal(unpacked(first["heat"]), np.frombuffer(as_bytes(heat.shown[layout.order]), np.uint8))
     assert base64.b64decode(told["clips"][0][0])[:4] == b"fLaC"
     assert len(told["pictures"][0]) == len(room.stored.keyframes)
 

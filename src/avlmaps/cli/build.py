@@ -98,6 +98,7 @@ def build(verb: "Build") -> dict[str, Any]:
     """Build a map and describe it."""
     from avlmaps.maps.build import build_map
     from avlmaps.maps.settings import BuildSettings, FrameSettings, FusionSettings, GravitySettings
+    from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.rules import build_settings
     from avlmaps.recordings.open import open_recording
 
@@ -138,6 +139,7 @@ def build(verb: "Build") -> dict[str, Any]:
         resume=not verb.fresh,
         overwrite=verb.overwrite,
     )
+    AVLMap(stored).prepare()
     return {**describe_map(stored), "elapsed_s": round(perf_counter() - begin, 3)}
 
 

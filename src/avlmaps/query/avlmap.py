@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -156,6 +157,21 @@ class AVLMap:
     ) -> FeatureVoxels:
         feature, settings = self.stored.voxels.feature, self.settings.objects
         return FeatureVoxels(self.space, feature, encoder, rivals, settings, rgb, _RoomsOnDemand(self))
+
+    def prepare(self) -> "AVLMap":
+        """Store beside a large map what its questions need again, as the end of a build does; return the map.
+
+        Nothing is computed for a map that is small or in memory. What is stored already is not computed again.
+        """
+        from avlmaps.maps.store.derived import is_large
+
+        if is_large(self.stored.info):
+            with suppress(BackendError, MapError):  # no features of things, or those of another encoder
+                if self._known_rivals is not None:
+                    self.rivals()
+            with suppress(MapError):
+                _ = self.room_regions
+        return self
 
     def rivals(self) -> Rivals:
         """Return the two words of the encoder's vocabulary closest to each voxel; the first query works them out."""

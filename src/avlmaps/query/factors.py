@@ -26,6 +26,7 @@ ROUNDING = 1e-6
 _FEW_PAIRS = 65_536
 # Pairs of a point and an anchor that are compared at once: some megabytes.
 _PAIRS = 1 << 18
+_SOME_POINTS = 16  # that are looked at together where there are more pairs than that
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,19 +239,35 @@ class NearAnchors(Factor):
         """Return the heat at any points."""
         heat = np.zeros(len(points_world))
         points, anchors = self.space.level(points_world)[:, :2], self.space.level(self.anchors)[:, :2]
-        scores = np.asarray(self.scores, np.float64)
         if len(points) * len(anchors) > _PAIRS:
-            from avlmaps.query.kernels import undominated
-
-            order = np.argsort(-scores, kind="stable")
-            order = order[undominated(np.ascontiguousarray(anchors[order]), scores[order], float(self.falloff_per_m))]
-            anchors, scores = anchors[order], scores[order]
+            return _highest_cones(points, anchors, np.asarray(self.scores, np.float64), self.falloff_per_m)
         several = max(1, _PAIRS // max(len(anchors), 1))
         for a in range(0, len(points) if len(anchors) else 0, several):
             away = points[a : a + several, None] - anchors[None]
-            cones = scores - self.falloff_per_m * np.hypot(away[..., 0], away[..., 1])
+            cones = self.scores - self.falloff_per_m * np.hypot(away[..., 0], away[..., 1])
             heat[a : a + several] = np.maximum(cones.max(axis=1), 0.0)
         return heat
+
+
+def _highest_cones(
+    points: Float[np.ndarray, "m 2"],
+    anchors: Float[np.ndarray, "a 2"],
+    scores: Float[np.ndarray, " a"],
+    falloff_per_m: float,
+) -> Float[np.ndarray, " m"]:
+    """Return max over anchors of s − ε·d, floored at 0, of many points and anchors, horizontal coordinates."""
+    from avlmaps.query.kernels import cone_heat, undominated
+
+    order = np.argsort(-scores, kind="stable")
+    order = order[undominated(np.ascontiguousarray(anchors[order]), scores[order], float(falloff_per_m))]
+    # Places that follow each other, as those of keyframes do, are one block.
+    starts = np.append(np.arange(0, len(points), _SOME_POINTS), len(points)).astype(np.int64)
+    heat, winner = np.zeros(len(points)), np.empty(len(points), np.int32)
+    cone_heat(
+        np.ascontiguousarray(points), starts, np.ascontiguousarray(anchors[order]), scores[order], float(falloff_per_m),
+        heat, winner, 0, len(starts) - 1,
+    )  # fmt: skip
+    return heat
 
 
 def product_of(factors: Sequence[Factor]) -> Float32[np.ndarray, " n"]:

@@ -18,7 +18,7 @@ import numpy as np
 from avlmaps.core.arrays import Float, Float32, Int
 from avlmaps.core.poses import plain_point
 from avlmaps.query.evidence import Evidence, evidence_of
-from avlmaps.query.factors import Factor, NearThings, lead_of
+from avlmaps.query.factors import Factor, NearAnchors, NearThings, lead_of
 from avlmaps.query.probability import probability_of
 
 if TYPE_CHECKING:
@@ -105,13 +105,17 @@ def share_voxels(
 
     Args:
         factors: one or more, of one map.
-        values: returns their product at every voxel; not called for one object alone, whose heat is 1 on it.
+        values: returns their product at every voxel; not called for one object alone, whose heat is 1 on it, nor for
+            the anchors of one sound, area or image.
         of_things: returns the product without regions.
     """
     lead = lead_of(factors)
     if isinstance(lead, NearThings) and len(factors) == 1:
         rows = np.flatnonzero(lead.mask)
         instance, heat = lead.instance, np.ones(len(rows))  # an object's own voxels are as hot as can be
+    elif type(lead) is NearAnchors and len(factors) == 1:
+        # The heat of cones is highest at their anchors, which are places as well: no voxel is hotter, or more central.
+        rows, instance, heat = np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)
     else:
         rows = np.flatnonzero(values() > 0.0) if len(lead.anchors) else np.zeros(0, np.int64)
         instance = lead.instance[lead.anchor_of(rows)] if len(rows) else np.zeros(0, np.int64)

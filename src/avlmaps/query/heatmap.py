@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
-from avlmaps.core.arrays import Float, Float32
+from avlmaps.core.arrays import Float, Float32, Int
 from avlmaps.query.evidence import Evidence
 from avlmaps.query.factors import FOUND_AT, Factor, lead_of, product_of, times
 from avlmaps.query.goals import Goal, Shares, share_voxels, weigh_goals
@@ -93,6 +93,18 @@ class Heatmap(Heat):
     def shown(self) -> Float32[np.ndarray, " n"]:
         """The heat that pictures show: times the confidence that the lead's instance there is what was queried."""
         return self.lead.weighted(self.values)
+
+    def shown_at(self, voxels: Int[np.ndarray, " m"]) -> Float32[np.ndarray, " m"]:
+        """Return ``shown`` of some voxels, in their order; heat that is not known yet is computed for these alone."""
+        if "values" in vars(self) or len(self.factors) > 1:
+            return self.shown[voxels]
+        among = np.zeros(len(self.space), np.bool_)
+        among[voxels] = True
+        heat, anchor = self.lead.heat_and_anchors(among)
+        heat, anchor = heat[voxels], anchor[voxels]
+        hot = heat > 0.0
+        heat[hot] *= self.lead.confidence[self.lead.instance[anchor[hot]]]
+        return heat
 
     @property
     def lead(self) -> Factor:

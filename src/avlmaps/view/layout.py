@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from jaxtyping import Float, Float32, UInt8
+from jaxtyping import Float, Float32
 
 from avlmaps.core.errors import MapError
 from avlmaps.core.poses import FRAME
@@ -97,10 +97,6 @@ class Layout:
         latest = float(np.asarray(stored.voxels.last_seen_s).max(initial=0.0))
         return max(1e-3, latest, *map(float, ends)) if ends else max(1e-3, latest)
 
-    def in_order(self, values: Float32[np.ndarray, " n"]) -> UInt8[np.ndarray, " m"]:
-        """Return heat in [0, 1] as whole bytes in the order of drawing; any heat at all is at least 1."""
-        return np.ceil(np.clip(values[self.order], 0.0, 1.0) * 255).astype(np.uint8)
-
     def describe(self) -> dict[str, Any]:
         """Return all that the page needs before it draws the first voxel."""
         stored, space = self.avlmap.stored, self.avlmap.space
@@ -180,3 +176,8 @@ def _floor_m(level: Float[np.ndarray, "n 3"], cameras: Float[np.ndarray, "k 3"])
         return float(heights.min())
     counts, edges = np.histogram(below, bins=max(1, int(np.ceil(np.ptp(below) / 0.05))))
     return float(edges[int(np.argmax(counts))])
+
+
+def as_bytes(heat: Float32[np.ndarray, " m"]) -> bytes:
+    """Return heat in [0, 1] as whole bytes; any heat at all is at least 1."""
+    return np.ceil(np.clip(heat, 0.0, 1.0) * 255).astype(np.uint8).tobytes()

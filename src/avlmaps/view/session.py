@@ -15,7 +15,7 @@ from avlmaps.query.modalities.sound import read_clip
 from avlmaps.query.naming import VoxelNamer, keyframes_that_saw
 from avlmaps.recordings.containers import self_contained_suffix
 from avlmaps.view.labels import Labels, palettes
-from avlmaps.view.layout import Layout
+from avlmaps.view.layout import Layout, as_bytes
 from avlmaps.view.route import Guide, MakeRobot
 from avlmaps.view.uploads import Upload, without_paths
 
@@ -157,7 +157,8 @@ class ViewSession:
                     raise QueryError(without_paths(str(fault), *files)) from fault
                 heat = answer.heat
                 answers.append(_cleaned(answer.to_dict(), *files))
-                heats.append(one.layout.in_order(heat.shown).tobytes() if heat is not None else bytes(len(one.layout)))
+                layout = one.layout
+                heats.append(as_bytes(heat.shown_at(layout.order)) if heat is not None else bytes(len(layout)))
         return {"question": sentence, "answers": answers}, b"".join(heats)
 
     def obey(

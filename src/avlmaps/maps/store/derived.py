@@ -4,7 +4,8 @@
 were made from, of the source text that made them, and of all else that they depend on. With any other key they are not
 read, so that a map that was built again, edited, or opened by another avlmaps never answers from old ones. Only a large
 map has any: those of a small one are computed as fast as they are read. Where the folder cannot be written, nothing is
-stored and every process computes them.
+stored and every process computes them. A build stores them at its end; of a map that came otherwise (merged, imported,
+repaired, older) the first question that needs them all does.
 """
 
 import hashlib
@@ -30,6 +31,11 @@ from avlmaps.maps.store.own_files import is_stored_file
 DERIVED = ".derived"
 LEAST_VOXELS = 250_000
 """A map of fewer voxels has no derivations."""
+
+
+def is_large(info: MapInfo) -> bool:
+    """Return whether a map has derivations: it lies on the disk and has many voxels."""
+    return bool(info.files) and info.counts.voxels >= LEAST_VOXELS
 
 
 class _Entry(msgspec.Struct, kw_only=True):
@@ -68,7 +74,7 @@ class Derivation:
             modules: full names of the modules that compute it.
             given: all else that it depends on; anything that msgspec turns into JSON.
         """
-        if not all(file in info.files for file in files) or info.counts.voxels < LEAST_VOXELS:
+        if not all(file in info.files for file in files) or not is_large(info):
             return None
         made_from = {file: info.files[file].sha256 for file in files}
         said = [name, made_from, [_source_digest(module) for module in modules], given]
