@@ -5,13 +5,14 @@ compiles in a fraction of the time of numba's own parallel mode.
 """
 
 import numpy as np
-from jaxtyping import Float64, Int, Int32, Int64
+from jaxtyping import Bool, Float64, Int, Int32, Int64
 from numba import njit
 
 from avlmaps.core.kernel_types import Real, Whole
 
 # Blocks within this of the first of them look through the same cones, metres.
 _WIDE_M = 1.6
+
 
 @njit(cache=True, nogil=True)
 def undominated(horizontal: Float64[np.ndarray, "n 2"], score: Float64[np.ndarray, " n"], falloff_per_m: Real):
