@@ -280,7 +280,8 @@ class RoomRegions:
 
     def outline(self, number: int) -> Float[np.ndarray, "k 3"]:
         """Return the corners of a room on its floor, counter-clockwise top-down, recording frame, metres."""
-        storey, low, high = (each[number] for each in self._boxes)
+        storeys, lows, highs = self._boxes
+        storey, low, high = int(storeys[number]), lows[number], highs[number]
         grid = self.grids[storey]
         part = self.labels[storey][low[0] : high[0], low[1] : high[1]] == number
         xy = grid.level_of(low + outline(part, _STRAIGHT_M / grid.cell_m, _MOST_CORNERS))
