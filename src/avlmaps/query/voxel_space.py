@@ -99,7 +99,8 @@ class Blocks:
         """Return some of the blocks, by their numbers."""
         counts = np.diff(self.starts)[which]
         starts = np.append(0, np.cumsum(counts)).astype(np.int64)
-        place: Int[np.ndarray, " m"] = np.repeat(self.starts[which] - starts[:-1], counts) + np.arange(starts[-1])
+        place = np.arange(int(starts[-1]), dtype=np.int64)
+        place += np.repeat(self.starts[which] - starts[:-1], counts)
         index = np.ascontiguousarray(self.index[:, place])
         return Blocks(self.order[place], starts, index, self.low[which], self.high[which])
 
