@@ -97,6 +97,19 @@ def test_the_leaf_of_a_door_and_a_lamp_part_nothing(leaf: float, y: float, lamp:
     assert set(np.unique(label).tolist()) == {NONE, 0}
 
 
+@settings(max_examples=12, deadline=None)
+@given(st.floats(0.7, 2.6), st.floats(0.0, 1.0), st.floats(0.15, 0.25))
+def test_a_room_ends_at_its_wall_where_a_window_is_set_into_it(window: float, at: float, deep: float) -> None:
+    x = 0.5 + at * (3.0 - window)
+    drawn = Drawn(4.0, 4.0).room(0, 0, 4.0, 3.0).room(x, 3.0, window, deep)
+    drawn.room(-0.5, 3.0 + deep + 0.15, 5.0, 0.5)  # seen outside, through the pane
+    label = rooms_of_storey(drawn.grid()).label
+    assert drawn.at(label, 2.0, 1.5) == 0 == drawn.at(label, x + window / 2, 2.9)
+    assert drawn.at(label, x + window / 2, 3.0 + deep + 0.05) == NONE
+    area_m2 = (label == 0).sum() * CELL**2
+    assert 12.0 - 0.1 <= area_m2 <= 12.0 + 0.1 * 14.0 + 0.05, "up to the faces of its walls"
+
+
 def test_two_doors_side_by_side_are_no_open_plan() -> None:
     drawn = Drawn(8.15, 4.0).room(0, 0, 4.0, 4.0).room(4.15, 0, 4.0, 4.0)
     label = rooms_of_storey(drawn.room(3.95, 0.6, 0.3, 1.1).room(3.95, 1.9, 0.3, 1.1).grid()).label

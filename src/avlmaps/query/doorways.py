@@ -9,13 +9,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from avlmaps.core.arrays import Bool, Int
+from avlmaps.core.arrays import Bool, Float, Int
 from avlmaps.query.raster import bridged, dilated, distance, extents, of_pieces, opened, pieces
 
 WIDEST_M = 2.2
 """A wider opening joins two parts of one room: an open plan."""
 _WIDTHS_M = (0.8, 1.0, 1.15, 1.3, 1.6, 1.9, WIDEST_M)
 _NARROWEST_M = 0.55
+_WIDEST_WINDOW_M, _DEEPEST_M, _CLOSED_SHARE = 3.0, 0.6, 0.2  # of an opening that ends behind the wall
 _LEAST_WALL_M = 0.3  # length of a wall that ends at a doorway
 _MOST_WALL_M = 0.4  # thickness of one; what is thicker is a cupboard
 _WIDER_M = 0.3
@@ -114,8 +115,51 @@ def closed_doorways(
     return out
 
 
+def recesses(
+    wall: Bool[np.ndarray, "nx ny"], free: Bool[np.ndarray, "nx ny"], cell_m: float
+) -> Bool[np.ndarray, "nx ny"]:
+    """Return the cells of recesses: openings between two ends of a wall that end behind it, such as those of windows.
+
+    The sill is low and the pane stands outside of the wall, or lets depth out: a room ends at its wall nevertheless.
+
+    Args:
+        wall: cells with walls, which run along the axes of the grid.
+        free: cells without, that were seen.
+        cell_m: side of a cell.
+    """
+    post = posts(wall, cell_m)
+    rows = _recesses_of_rows(_gaps(wall, post, free, cell_m, _WIDEST_WINDOW_M), free, cell_m)
+    columns = _recesses_of_rows(_gaps(wall.T, post.T, free.T, cell_m, _WIDEST_WINDOW_M), free.T, cell_m)
+    return (rows | columns.T) & ~wall
+
+
+def _recesses_of_rows(gaps: _Gaps, free: Bool[np.ndarray, "r c"], cell_m: float) -> Bool[np.ndarray, "r c"]:
+    seen, out = _sums(free), np.zeros(free.shape, bool)
+    gaps = gaps.where(gaps.between)
+    width, last = gaps.b - gaps.a, free.shape[0] - 1
+
+    def share(row: Int[np.ndarray, " g"]) -> Float[np.ndarray, " g"]:
+        """Return how much of each gap is free in another row; nothing is beyond the grid."""
+        at = np.clip(row, 0, last)
+        return np.where(at == row, (seen[at, gaps.b] - seen[at, gaps.a]) / np.maximum(width, 1), 0.0)
+
+    for side in (-1, 1):
+        before = np.all([share(gaps.row - side * round(m / cell_m)) >= _SEEN_BESIDE for m in _BESIDE_M], axis=0)
+        depth = np.full(len(width), -1)
+        for step in range(round(_DEEPEST_M / cell_m), 0, -1):
+            depth[share(gaps.row + side * step) <= _CLOSED_SHARE] = step
+        for k in np.flatnonzero(before & (depth > 0)):
+            ends = sorted((int(gaps.row[k]), int(gaps.row[k] + side * depth[k])))
+            out[max(ends[0], 0) : ends[1] + 1, gaps.a[k] : gaps.b[k]] = True
+    return out
+
+
 def _gaps(
-    wall: Bool[np.ndarray, "r c"], post: Bool[np.ndarray, "r c"], free: Bool[np.ndarray, "r c"], cell_m: float
+    wall: Bool[np.ndarray, "r c"],
+    post: Bool[np.ndarray, "r c"],
+    free: Bool[np.ndarray, "r c"],
+    cell_m: float,
+    widest_m: float = WIDEST_M,
 ) -> _Gaps:
     """Return the gaps along rows that lie between walls, one of which ends there and is as thin as a wall.
 
@@ -139,7 +183,7 @@ def _gaps(
     after &= thickness_m[row, np.minimum(b + 2, last)] <= _MOST_WALL_M
     seen = _sums(free)
     width = b - a
-    wide = (width * cell_m >= _NARROWEST_M - 1e-6) & (width * cell_m <= WIDEST_M + 1e-6)
+    wide = (width * cell_m >= _NARROWEST_M - 1e-6) & (width * cell_m <= widest_m + 1e-6)
     good = wide & (before | after) & (seen[row, b] - seen[row, a] >= _SEEN_SHARE * width)
     return _Gaps(row, a, b, before & after).where(good)
 

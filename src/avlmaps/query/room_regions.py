@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Float32, Int
-from avlmaps.query.doorways import closed_doorways, without_leaves, without_posts
+from avlmaps.query.doorways import closed_doorways, recesses, without_leaves, without_posts
 from avlmaps.query.floor_plan import CELL_M as PLAN_CELL_M
 from avlmaps.query.floor_plan import FloorPlan
 from avlmaps.query.raster import contacts, distance, flooded, nearest_label, outline, pieces
@@ -49,6 +49,8 @@ def rooms_of_storey(grid: StoreyGrid) -> StoreyRooms:
     cell_m = grid.cell_m
     wall = without_leaves(grid.wall, grid.free, cell_m)
     free = _whole(grid.free & ~wall, wall, cell_m)
+    shut = recesses(wall, free, cell_m)
+    wall, free = wall | shut, free & ~shut
     doorway = closed_doorways(wall, free, cell_m)
     wall = without_posts(wall, doorway, cell_m)
     free = _whole(free & ~wall, wall, cell_m)
