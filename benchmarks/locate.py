@@ -13,7 +13,7 @@ import cv2  # noqa: E402
 import numpy as np  # noqa: E402
 
 from avlmaps.core.camera import Pinhole, Rig  # noqa: E402
-from avlmaps.maps.keyframes.describe import SeenKeyframe, stack_keyframes  # noqa: E402
+from avlmaps.maps.keyframes.describe import DescribedKeyframe, stack_keyframes  # noqa: E402
 from avlmaps.perception.embedded.matching import RATIO, match_mutual  # noqa: E402
 from avlmaps.perception.encoders import Encoders  # noqa: E402
 from avlmaps.perception.pose import estimate_pose  # noqa: E402
@@ -55,7 +55,7 @@ def made_map(walls: list[np.ndarray], rng: np.random.Generator) -> MapOfPictures
         points = (DEPTH_M * ray + pose[:3, 3]).astype(np.float32)
         place = used.place.encode(rgb, one, state)
         none = np.zeros(0, np.float32)
-        seen.append(SeenKeyframe(float(number), pose, points.mean(axis=0), none, place, one, points, b""))
+        seen.append(DescribedKeyframe(float(number), pose, points.mean(axis=0), none, place, one, points, b""))
     return MapOfPictures(stack_keyframes(seen), state, used, Rig(CAMERA, CAMERA))
 
 

@@ -15,7 +15,7 @@ from avlmaps.maps.grid import GridSpec
 from avlmaps.query.factors import anchor_heat, object_heat
 from avlmaps.query.loops import feature_scores, margins
 from avlmaps.query.voxel_space import Space
-from avlmaps.query.words import Rivals
+from avlmaps.query.words import ClosestWords
 
 UP = np.array([0.0, 0.0, 1.0])
 VOXEL_SIZE_M = 0.05
@@ -128,8 +128,8 @@ def text_rows(count: int, dim: int, rng: np.random.Generator) -> list[tuple[str,
     fault = float(np.abs(feature_scores(feature[some], asked) - wide).max())
     rows = [(f"one word over {count:,} x {dim} float16", ours, plain * count / len(expected), fault)]
     words = [str(k) for k in range(100)]
-    Rivals.of(feature[:20_000], encoder, words)  # pyright: ignore[reportArgumentType]
-    first, rivals = once_ms(lambda: Rivals.of(feature, encoder, words))  # pyright: ignore[reportArgumentType]
+    ClosestWords.of(feature[:20_000], encoder, words)  # pyright: ignore[reportArgumentType]
+    first, rivals = once_ms(lambda: ClosestWords.of(feature, encoder, words))  # pyright: ignore[reportArgumentType]
     rows.append(("the vocabulary of 100 words and other (once a session)", first, np.nan, 0.0))
     silent = np.arange(102) == 3
     closest = rivals.best, rivals.best_word, rivals.second, rivals.second_word

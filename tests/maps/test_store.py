@@ -433,20 +433,20 @@ def test_an_opened_map_is_checked_once_and_again_when_a_file_was_written(
     read: list[Path] = []
     real = integrity.open_regular
     monkeypatch.setattr(integrity, "open_regular", lambda path, limit: (read.append(path), real(path, limit))[1])
-    assert open_stored(copied).guard.faults == () and len(read) > 10  # a copy is read once
+    assert open_stored(copied).integrity.faults == () and len(read) > 10  # a copy is read once
     read.clear()
-    assert open_stored(copied).guard.faults == () and not read
+    assert open_stored(copied).integrity.faults == () and not read
     file = file_of(copied, "voxels/weight")
     before = file.stat()
     flip(file)
     os.utime(file, ns=(before.st_atime_ns, before.st_mtime_ns))
-    assert [file.name in fault for fault in open_stored(copied).guard.faults] == [True]
+    assert [file.name in fault for fault in open_stored(copied).integrity.faults] == [True]
 
 
 def test_a_map_that_was_just_built_is_not_read_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("avlmaps.maps.store.array_files.SMALL_BYTES", 0)
     monkeypatch.setattr(integrity, "open_regular", None)
-    assert build_map(Walk(8), tmp_path / "map", PROFILE, SETTINGS, progress=False).guard.faults == ()
+    assert build_map(Walk(8), tmp_path / "map", PROFILE, SETTINGS, progress=False).integrity.faults == ()
 
 
 def test_every_flipped_bit_in_a_large_file_is_seen(copied: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,16 +11,16 @@ from avlmaps.core.question import Modality, Part, Role
 from avlmaps.maps.grid import GridSpec
 from avlmaps.perception.embedded.codes import features_of, orthonormal_codes
 from avlmaps.perception.protocols import ModelCard, NamedPixelEncoder
-from avlmaps.query import known_rivals
+from avlmaps.query import known_words
 from avlmaps.query.colour_filter import colour_in
 from avlmaps.query.factors import HeatSettings, NearAnchors
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.instances import FeatureVoxels
-from avlmaps.query.known_rivals import KnownRivals
+from avlmaps.query.known_words import KnownClosestWords
 from avlmaps.query.modalities.object import object_factor
 from avlmaps.query.object_settings import ObjectSettings
 from avlmaps.query.voxel_space import Space
-from avlmaps.query.words import EncodedWord, Rivals, Vocabulary, least_score_to_count, object_margins
+from avlmaps.query.words import ClosestWords, EncodedWord, Vocabulary, least_score_to_count, object_margins
 
 NAMES = ("chair", "dining table", "coffee table", "floor", "other")
 MEANT = {
@@ -72,7 +72,7 @@ SPACE = Space(GridSpec(0.05), INDEX, np.array([0.0, 0.0, 1.0]))
 
 
 def ask(word: str, rgb: np.ndarray | None = None, role: Role = Role.PRIMARY, least_confidence: float = 0.0):
-    rivals = Rivals.of(FEATURE, ENCODER, ENCODER.vocabulary)
+    rivals = ClosestWords.of(FEATURE, ENCODER, ENCODER.vocabulary)
     part = Part(Modality.OBJECT, word, role)
     settings = ObjectSettings(least_confidence=least_confidence)
     return object_factor(FeatureVoxels(SPACE, FEATURE, ENCODER, rivals, settings, rgb), part, HeatSettings())
@@ -195,7 +195,7 @@ def test_a_known_compound_that_holds_a_colour_word_is_no_colour() -> None:
 def test_the_best_guess_is_where_a_name_is_likeliest_of_what_it_may_be_at_all(p: float, expected: set[int]) -> None:
     probability = np.repeat([(0.0, 0.0, 1.0 - p, p, 0.0), (0, 1, 0, 0, 0), (1, 0, 0, 0, 0), (0, 1, 0, 0, 0)], 8, axis=0)
     feature = features_of(probability, ENCODER.codes).astype(np.float16)
-    rivals = Rivals.of(feature, ENCODER, ENCODER.vocabulary)
+    rivals = ClosestWords.of(feature, ENCODER, ENCODER.vocabulary)
     part = Part(Modality.OBJECT, "floor", Role.PRIMARY)
     guess = object_factor(FeatureVoxels(SPACE, feature, ENCODER, rivals, ObjectSettings()), part, HeatSettings())
     assert clumps(guess) == expected
@@ -205,7 +205,7 @@ def test_the_best_guess_is_where_a_name_is_likeliest_of_what_it_may_be_at_all(p:
 def test_a_guess_among_weaker_voxels_can_be_turned_off() -> None:
     probability = np.tile(np.array([0.0, 0.0, 0.95, 0.05, 0.0]), (32, 1))
     feature = features_of(probability, ENCODER.codes).astype(np.float16)
-    rivals = Rivals.of(feature, ENCODER, ENCODER.vocabulary)
+    rivals = ClosestWords.of(feature, ENCODER, ENCODER.vocabulary)
     part = Part(Modality.OBJECT, "floor", Role.PRIMARY)
     settings = ObjectSettings(guess_below=0.0)
     assert not object_factor(FeatureVoxels(SPACE, feature, ENCODER, rivals, settings), part, HeatSettings()).mask.any()
@@ -228,11 +228,11 @@ def test_voxels_with_little_of_the_word_need_no_comparison(
     none = dict.fromkeys(("least_confidence", "least_in_company", "guess_below"), 0.0) if rules_of_the_paper else {}
     chosen, part = ObjectSettings(score_in_company=share, **none), Part(Modality.OBJECT, word, Role.PRIMARY)
     vocabulary = Vocabulary.encoded(ENCODER, NAMES)
-    none_known, all_known = (KnownRivals.of(vocabulary, len(INDEX)) for _ in range(2))
+    none_known, all_known = (KnownClosestWords.of(vocabulary, len(INDEX)) for _ in range(2))
     all_known.whole(feature)
     full, *short = (
         object_factor(FeatureVoxels(SPACE, feature, ENCODER, each, chosen), part, HeatSettings())
-        for each in (Rivals.of(feature, ENCODER, NAMES), vocabulary, none_known, all_known)
+        for each in (ClosestWords.of(feature, ENCODER, NAMES), vocabulary, none_known, all_known)
     )
     for lazy in short:
         for one, other in ((full, lazy), (full.include_uncertain(), lazy.include_uncertain())):
@@ -256,13 +256,13 @@ def test_no_voxel_wins_that_its_closest_words_rule_out(
     probability = np.random.default_rng(seed).dirichlet(np.full(len(NAMES), evenness), 200)
     feature = features_of(probability, ENCODER.codes).astype(np.float16)
     feature[::11] = 0.0
-    known = KnownRivals.of(Vocabulary.encoded(ENCODER, NAMES), len(feature))
+    known = KnownClosestWords.of(Vocabulary.encoded(ENCODER, NAMES), len(feature))
     encoded = EncodedWord.of_name(ENCODER, word) if alone and word in NAMES else EncodedWord.of(ENCODER, word)
     chosen = ObjectSettings()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(known_rivals, "_MOST_PICKED", 1.0)
+        patch.setattr(known_words, "_MOST_PICKED", 1.0)
         everything = known.whole(feature)
-        silent = known.silent_for(ENCODER, encoded, chosen.same_word_cosine)
+        silent = known.not_competing(ENCODER, encoded, chosen.same_word_cosine)
         rows = known.contenders(ENCODER, encoded, silent, share)
         margin, score = object_margins(feature, everything, encoded.rows, silent, chosen.least_score)
         assert rows is not None
@@ -272,10 +272,10 @@ def test_no_voxel_wins_that_its_closest_words_rule_out(
 
 
 def test_few_voxels_are_left_for_a_name_that_others_win() -> None:
-    known = KnownRivals.of(Vocabulary.encoded(ENCODER, NAMES), len(FEATURE))
+    known = KnownClosestWords.of(Vocabulary.encoded(ENCODER, NAMES), len(FEATURE))
     known.whole(FEATURE)
     encoded = EncodedWord.of_name(ENCODER, NAMES[3])
-    rows = known.contenders(ENCODER, encoded, known.silent_for(ENCODER, encoded, 0.95), 1.0)
+    rows = known.contenders(ENCODER, encoded, known.not_competing(ENCODER, encoded, 0.95), 1.0)
     assert rows is not None
     assert not len(rows)
 
@@ -287,7 +287,7 @@ def test_weak_voxels_round_a_chair_leave_it_as_it_is_in_company() -> None:
     probability = np.where(is_chair[:, None], likely, np.where((INDEX[:, 0] // 20 == 0)[:, None], weak, none))
     feature = features_of(probability.astype(np.float32), ENCODER.codes).astype(np.float16)
     part = Part(Modality.OBJECT, "chair", Role.PRIMARY)
-    rivals = Rivals.of(feature, ENCODER, ENCODER.vocabulary)
+    rivals = ClosestWords.of(feature, ENCODER, ENCODER.vocabulary)
     alone = object_factor(FeatureVoxels(SPACE, feature, ENCODER, rivals, ObjectSettings()), part, HeatSettings())
     joined = Heatmap.of(alone) * near(0)
     assert alone.found and joined.found
@@ -301,7 +301,7 @@ def test_what_is_found_alone_is_the_same_in_company(word: str, evenness: float, 
     probability = np.random.default_rng(seed).dirichlet(np.full(len(NAMES), evenness), len(INDEX))
     feature = features_of(probability, ENCODER.codes).astype(np.float16)
     part = Part(Modality.OBJECT, word, Role.PRIMARY)
-    rivals = Rivals.of(feature, ENCODER, NAMES)
+    rivals = ClosestWords.of(feature, ENCODER, NAMES)
     alone = object_factor(FeatureVoxels(SPACE, feature, ENCODER, rivals, ObjectSettings()), part, HeatSettings())
     company = alone.include_uncertain()
     if not alone.found:
@@ -316,7 +316,7 @@ def test_what_is_found_alone_is_the_same_in_company(word: str, evenness: float, 
 
 def test_other_does_not_compete_with_itself() -> None:
     encoded, rivals = EncodedWord.of(ENCODER, "other"), Vocabulary.encoded(ENCODER, NAMES)
-    assert rivals.silent_for(ENCODER, encoded, 0.95).tolist() == [False] * 4 + [True]
+    assert rivals.not_competing(ENCODER, encoded, 0.95).tolist() == [False] * 4 + [True]
 
 
 @settings(max_examples=60, deadline=None)
@@ -337,7 +337,7 @@ def row_of_chairs(too_long: float):
     p = np.stack([chair, 0 * chair, 0 * chair, 0.35 * (1 - chair), 0.65 * (1 - chair)], axis=1)
     feature = features_of(p, ENCODER.codes).astype(np.float16)
     space = Space(GridSpec(0.05), index, np.array([0.0, 0.0, 1.0]))
-    rivals = Rivals.of(feature, ENCODER, ENCODER.vocabulary)
+    rivals = ClosestWords.of(feature, ENCODER, ENCODER.vocabulary)
     part = Part(Modality.OBJECT, "chair", Role.PRIMARY)
     voxels = FeatureVoxels(space, feature, ENCODER, rivals, ObjectSettings(too_long=too_long))
     found = object_factor(voxels, part, HeatSettings())

@@ -13,7 +13,7 @@ from avlmaps.query.instances import FeatureVoxels, margin_confidence
 from avlmaps.query.modalities.object import object_factor
 from avlmaps.query.object_settings import ObjectSettings
 from avlmaps.query.voxel_space import Space
-from avlmaps.query.words import Rivals, object_margins
+from avlmaps.query.words import ClosestWords, object_margins
 
 
 def unit_rows(rng: np.random.Generator, n: int, d: int) -> np.ndarray:
@@ -46,7 +46,7 @@ def test_the_margin_is_that_over_the_best_rival(seed, words, other, few) -> None
     rng = np.random.default_rng(seed)
     encoder = RandomWords(rng, words, 5, other)
     feature = unit_rows(rng, 3 if few else 200, 5).astype(np.float16)
-    rivals = Rivals.of(feature, encoder, encoder.vocabulary)
+    rivals = ClosestWords.of(feature, encoder, encoder.vocabulary)
     silent = np.append(rng.uniform(0, 1, words) < 0.5, [False] * other).astype(bool)
     asked = encoder.table["asked"]
     margin, _ = object_margins(feature, rivals, asked[None], silent, 0.3)
@@ -69,7 +69,7 @@ def test_confidence_rises_with_margin_and_size() -> None:
 def asked_of(encoder, index: np.ndarray, feature: np.ndarray, word: str, vocabulary=None):
     voxels = voxels_of(index, feature)
     space = Space(GridSpec(0.05), voxels.index, UP)
-    rivals = Rivals.of(voxels.feature, encoder, encoder.vocabulary if vocabulary is None else vocabulary)
+    rivals = ClosestWords.of(voxels.feature, encoder, encoder.vocabulary if vocabulary is None else vocabulary)
     part = Part(Modality.OBJECT, word)
     return object_factor(FeatureVoxels(space, voxels.feature, encoder, rivals, ObjectSettings()), part, HeatSettings())
 

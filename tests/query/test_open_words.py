@@ -15,7 +15,7 @@ from avlmaps.query.modalities.object import object_factor
 from avlmaps.query.object_settings import ObjectSettings
 from avlmaps.query.synonyms import is_a, is_open
 from avlmaps.query.voxel_space import Space
-from avlmaps.query.words import Rivals
+from avlmaps.query.words import ClosestWords
 
 WORDS = ("chair", "office chair", "dining table", "sofa", "bed", "lamp", "door", "floor", "other", "couch", "table")
 DIM = len(WORDS) + 8
@@ -68,7 +68,7 @@ def asked(encoder: Closed, word: str, things: dict[str, float]):
     feature = [seen(name, len(index[k]), contrast, k) for k, (name, contrast) in enumerate(things.items())]
     voxels, features = np.concatenate(index), np.concatenate(feature)
     space = Space(GridSpec(0.05), voxels, UP)
-    rivals = Rivals.of(features, encoder, encoder.vocabulary)
+    rivals = ClosestWords.of(features, encoder, encoder.vocabulary)
     part = Part(Modality.OBJECT, word)
     return object_factor(FeatureVoxels(space, features, encoder, rivals, ObjectSettings()), part, HeatSettings())
 

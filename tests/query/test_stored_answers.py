@@ -88,7 +88,7 @@ def test_answers_are_the_same_with_and_without_what_is_stored(
     first = told(AVLMap.open(path))
     assert {file.name for file in (path / DERIVED).glob("*.json")} == {"names.json", "rooms.json"}
     with pytest.MonkeyPatch.context() as patch:  # nothing is computed again
-        patch.setattr(avlmap_module.KnownRivals, "of", None)
+        patch.setattr(avlmap_module.KnownClosestWords, "of", None)
         patch.setattr(RoomRegions, "of", None)
         again = told(AVLMap.open(path))
     assert first == without
@@ -115,7 +115,7 @@ def test_names_of_another_vocabulary_are_not_taken(base: Path, tmp_path: Path) -
     path = random_map(base, tmp_path / "map.avlmap", 3)
     told(AVLMap.open(path))
     avlmap = AVLMap.open(path)
-    known = avlmap._known_rivals
+    known = avlmap._known_words
     assert known is not None and known.is_whole
     other = replace(known, words=(*known.words[::-1],))
     from avlmaps.query.stored_names import read_closest
@@ -130,7 +130,7 @@ def test_numbers_of_words_that_are_none_are_not_taken(base: Path, tmp_path: Path
 
     path = random_map(base, tmp_path / "map.avlmap", 4)
     avlmap = AVLMap.open(path)
-    rivals = avlmap.rivals()
+    rivals = avlmap.closest_words()
     closest = [rivals.best, rivals.best_word.copy(), rivals.second, rivals.second_word]
     assert stored_names.read_closest(avlmap.stored, rivals) is not None
     closest[1][0] = len(rivals.words)
@@ -144,7 +144,7 @@ def test_a_saved_map_is_prepared(base: Path) -> None:
     AVLMap.open(base).prepare()
     assert {file.name for file in (base / DERIVED).glob("*.json")} == {"names.json", "rooms.json"}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(avlmap_module.KnownRivals, "of", None)
+        patch.setattr(avlmap_module.KnownClosestWords, "of", None)
         patch.setattr(RoomRegions, "of", None)
         AVLMap.open(base).prepare()
 

@@ -33,7 +33,7 @@ from avlmaps.perception.profiles import profile
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.instances import FeatureVoxels, confident_instances
 from avlmaps.query.object_settings import ObjectSettings
-from avlmaps.query.words import EncodedWord, Rivals
+from avlmaps.query.words import ClosestWords, EncodedWord
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Recording
 from avlmaps_sim.bench.objects import FEWEST_VOXELS, GROWN_M, STRUCTURE
@@ -99,7 +99,7 @@ def pieces_of(options: Options, number: int) -> Iterator[Pieces]:
     encoder = asked.stored.encoders.pixels
     assert isinstance(encoder, EmbeddedPixels)
     things, feature, space = read_truth(recording).objects, asked.stored.voxels.feature, asked.space
-    rivals = Rivals.of(feature, encoder, encoder.vocabulary)
+    rivals = ClosestWords.of(feature, encoder, encoder.vocabulary)
     voxels = FeatureVoxels(space, feature, encoder, rivals, ObjectSettings(least_confidence=0.0))
     for name in encoder.vocabulary:
         if name in STRUCTURE:

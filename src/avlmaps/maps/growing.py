@@ -22,16 +22,16 @@ from avlmaps.core.registry import Kind
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
 from avlmaps.maps.fusion.free_space import FreeViewCollector
 from avlmaps.maps.grid import GridSpec
-from avlmaps.maps.keyframes.growing import GrowingKeyframes, SeenOnce
+from avlmaps.maps.keyframes.growing import GrowingKeyframes, PicturedKeyframe
 from avlmaps.maps.perceived import as_grid, encode_pixels, require_unit
 from avlmaps.maps.pipeline.estimate import estimate_ground, estimate_sensor, estimate_up
 from avlmaps.maps.pipeline.keyframes import RANDOMNESS
-from avlmaps.maps.pipeline.plan import BUILD_VERSION, Plan
+from avlmaps.maps.pipeline.plan import BUILD_VERSION, BuildPlan
 from avlmaps.maps.pipeline.sounds import silence
 from avlmaps.maps.pipeline.write import manifest_of, surfaces
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.checkpoints import key_of
-from avlmaps.maps.store.integrity import Guard
+from avlmaps.maps.store.integrity import IntegrityCheck
 from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.manifest import BadFrame, GroundInfo, MapInfo, ModelInfo, SensorInfo, Timings, UpInfo
 from avlmaps.maps.store.manifest_file import MANIFEST
@@ -56,21 +56,21 @@ class GrowingMap:
 
     Attributes:
         settings: of a build.
-        used: the encoders; that of sounds is not called, as frames have none.
+        encoders: the encoders; that of sounds is not called, as frames have none.
     """
 
     def __init__(
-        self, settings: BuildSettings, used: Encoders, up_in_world: Float[np.ndarray, "3"] | None = None
+        self, settings: BuildSettings, encoders: Encoders, up_in_world: Float[np.ndarray, "3"] | None = None
     ) -> None:
         """Begin without frames.
 
         Args:
             settings: of a build; ``frames`` does not count.
-            used: the encoders.
+            encoders: the encoders.
             up_in_world: unit vector; None finds it in the frames.
         """
-        self.settings = settings.for_profile(used.weight_variance_m2)
-        self.used = used
+        self.settings = settings.for_profile(encoders.weight_variance_m2)
+        self.encoders = encoders
         self._given_up = up_in_world
         self._walk = _Walk(up_in_world)
         self._waiting: list[_Waiting] = []
@@ -79,7 +79,7 @@ class GrowingMap:
         self._ground: Ground | None = None
         self._total: VoxelAccumulator | None = None
         self._free: FreeViewCollector | None = None
-        self._keyframes = GrowingKeyframes(used, self.settings.keyframes)
+        self._keyframes = GrowingKeyframes(encoders, self.settings.keyframes)
         self._dim: int | None = None
         self._rehearsed: dict[int, tuple[Ground, np.ndarray]] | None = None
         self._rehearsal = _Rehearsal()
@@ -146,7 +146,7 @@ class GrowingMap:
             content, info = self._content(plan, up, ground, final)
         rig, grid = self._walk.rig, GridSpec(self.settings.voxel_size_m)
         arrays = MapArrays(content.voxels, content.keyframes, content.place_state, content.sounds)
-        return StoredMap(_HERE, info, grid, up.vector(), arrays, self.used, rig, Guard(_HERE, {}))
+        return StoredMap(_HERE, info, grid, up.vector(), arrays, self.encoders, rig, IntegrityCheck(_HERE, {}))
 
     def save(self, path: Path, *, overwrite: bool = False) -> StoredMap:
         """Write the map and open it.
@@ -163,7 +163,7 @@ class GrowingMap:
         content = MapContent(made.voxels, made.keyframes, made.place_state, made.sounds, path)
         with lock_folder(path):
             write_map(path, content, made.info)
-        return replace(open_stored(path), encoders=self.used)
+        return replace(open_stored(path), encoders=self.encoders)
 
     def _accepted(self, frame: Frame) -> Frame:
         last_s = self.last_stamp_s
@@ -183,16 +183,16 @@ class GrowingMap:
 
     def _encodes_at_once(self) -> bool:
         """Return whether a frame is encoded when it comes, and not when its floor or its fate is known."""
-        if Kind.PIXELS not in self.used or self.used.keyframes_only:
+        if Kind.PIXELS not in self.encoders or self.encoders.keyframes_only:
             return False
-        encoder = self.used.pixels
+        encoder = self.encoders.pixels
         return self._ground is not None or not (isinstance(encoder, GroundReader) and encoder.reads_ground)
 
     def _rehearse(self) -> "GrowingMap":
         """Return a map of the frames that wait, as if no other came; what encoders made of them is used again."""
-        other = GrowingMap(self.settings, self.used, self._given_up)
+        other = GrowingMap(self.settings, self.encoders, self._given_up)
         other._rehearsed, other._dim = self._rehearsal.features, self._dim
-        other._keyframes.share(self._rehearsal.looks)
+        other._keyframes.share(self._rehearsal.described)
         other._left_out = list(self._left_out)
         other._waiting = list(self._waiting)
         for frame, _ in self._waiting:
@@ -201,7 +201,7 @@ class GrowingMap:
         return other
 
     def _encoded(self, frame: Frame) -> np.ndarray:
-        encoder, ground = self.used.pixels, self._ground
+        encoder, ground = self.encoders.pixels, self._ground
         if self._rehearsed is not None and ground is not None and frame.index in self._rehearsed:
             then, known = self._rehearsed[frame.index]
             if _alike(then, ground, frame):
@@ -214,7 +214,7 @@ class GrowingMap:
 
     def _checked(self, features: object, who: str, frame: Frame) -> np.ndarray:
         if self._dim is None:
-            self._dim = self.used.card(Kind.PIXELS).dim if Kind.PIXELS in self.used else None
+            self._dim = self.encoders.card(Kind.PIXELS).dim if Kind.PIXELS in self.encoders else None
         grid = as_grid(features, self._dim, who, frame)
         require_unit(grid, who, frame)
         if self._total is not None and self._total.dim != grid.shape[2]:
@@ -247,13 +247,13 @@ class GrowingMap:
     def _fuse(self, frame: Frame, features: np.ndarray | None) -> None:
         sensor = self._sensor
         assert sensor is not None
-        by_encoder = features is None and Kind.PIXELS in self.used
-        if by_encoder and not self.used.keyframes_only:
+        by_encoder = features is None and Kind.PIXELS in self.encoders
+        if by_encoder and not self.encoders.keyframes_only:
             features = self._encoded(frame)
         if self._total is None or self._free is None:
             self._total = self._empty(sensor)
             self._free = FreeViewCollector(frame.rig.depth, sensor.model)
-        if not (by_encoder and self.used.keyframes_only):
+        if not (by_encoder and self.encoders.keyframes_only):
             self._total.add(frame, features)
             self._free.add(frame)
             self._walk.append(frame)
@@ -274,8 +274,8 @@ class GrowingMap:
             total.add(frame, self._encoded(frame) if frame.index in encoded else None)
 
     def _empty(self, sensor: SensorInfo) -> VoxelAccumulator:
-        if self._dim is None and Kind.PIXELS in self.used:
-            self._dim = self.used.card(Kind.PIXELS).dim
+        if self._dim is None and Kind.PIXELS in self.encoders:
+            self._dim = self.encoders.card(Kind.PIXELS).dim
         return VoxelAccumulator(
             GridSpec(self.settings.voxel_size_m), self._dim or 0, self.settings.fusion, sensor.model
         )
@@ -288,22 +288,22 @@ class GrowingMap:
         ground, info = estimate_ground(held, self.settings, up)
         return up, info, ground
 
-    def _plan(self) -> Plan:
-        cards = self.used.cards()
-        models = {kind.value: ModelInfo.of(self.used.sources[kind].chosen, card) for kind, card in cards.items()}
+    def _plan(self) -> BuildPlan:
+        cards = self.encoders.cards()
+        models = {kind.value: ModelInfo.of(self.encoders.sources[kind].chosen, card) for kind, card in cards.items()}
         if self._dim is not None and Kind.PIXELS.value not in models:
             models[Kind.PIXELS.value] = ModelInfo(
                 backend=GIVEN_FEATURES, id="features", dim=self._dim, licence="unknown", checksum="", prompts=()
             )
-        key = key_of("growing", BUILD_VERSION, self._walk.fingerprint, self.used.name, models, self.settings)
-        return Plan(self._walk, _HERE, self.used, self.settings, models, key, "")
+        key = key_of("growing", BUILD_VERSION, self._walk.fingerprint, self.encoders.name, models, self.settings)
+        return BuildPlan(self._walk, _HERE, self.encoders, self.settings, models, key, "")
 
-    def _content(self, plan: Plan, up: UpInfo, ground: GroundInfo, final: bool) -> tuple[MapContent, MapInfo]:
+    def _content(self, plan: BuildPlan, up: UpInfo, ground: GroundInfo, final: bool) -> tuple[MapContent, MapInfo]:
         total, free, sensor = self._total, self._free, self._sensor
         if total is None or free is None or sensor is None:
             raise MapError("Every frame of the map was left out; add one whose features are right.")
         begin, views = perf_counter(), [free.views()]
-        if self.used.keyframes_only and (undecided := self._keyframes.undecided):
+        if self.encoders.keyframes_only and (undecided := self._keyframes.undecided):
             decided, total = total, self._empty(sensor)
             total.merge(decided.sums())
             self._add_to(total, undecided, {frame.index for frame in self._keyframes.last()})
@@ -326,7 +326,7 @@ class _Rehearsal:
 
     def __init__(self) -> None:
         self.features: dict[int, tuple[Ground, np.ndarray]] = {}
-        self.looks: dict[int, SeenOnce] = {}
+        self.described: dict[int, PicturedKeyframe] = {}
 
 
 def _alike(one: Ground, other: Ground, frame: Frame) -> bool:

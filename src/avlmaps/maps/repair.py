@@ -9,7 +9,7 @@ from avlmaps.core.progress import say
 from avlmaps.maps.build import build_map
 from avlmaps.maps.pipeline.plan import make_plan
 from avlmaps.maps.store.array_files import FileInfo, explain_write_errors, refuse_links, sync_names, verify_file
-from avlmaps.maps.store.integrity import Guard, remember_checked
+from avlmaps.maps.store.integrity import IntegrityCheck, remember_checked
 from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.manifest import MapInfo
 from avlmaps.maps.store.manifest_file import MANIFEST, parse_manifest, read_manifest, write_manifest
@@ -45,7 +45,7 @@ def damaged_files(path: Path) -> dict[str, str]:
     for name, file in sorted(info.files.items()):
         try:
             verify_file(path, file, verify=True)
-            Guard(path, {name: file}, trusting=False).require_whole()
+            IntegrityCheck(path, {name: file}, trusting=False).require_whole()
         except MapError as fault:
             found[name] = str(fault)
     return found

@@ -21,7 +21,7 @@ from avlmaps.query.factors import FOUND_AT, HeatSettings
 from avlmaps.query.floor_plan import FloorPlan
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.instances import FeatureVoxels, Instances, confident_instances
-from avlmaps.query.known_rivals import KnownRivals
+from avlmaps.query.known_words import KnownClosestWords
 from avlmaps.query.modalities.area import AreaSettings, area_anchors, area_factor, area_names, name_shares
 from avlmaps.query.modalities.image import image_factor, read_picture, require_fitting
 from avlmaps.query.modalities.object import object_factor
@@ -40,7 +40,7 @@ from avlmaps.query.stored_names import read_closest, write_closest
 from avlmaps.query.stored_rooms import room_regions_of
 from avlmaps.query.things_in_rooms import ThingsInRooms
 from avlmaps.query.voxel_space import Space
-from avlmaps.query.words import EncodedWord, Rivals, Vocabulary
+from avlmaps.query.words import ClosestWords, EncodedWord, Vocabulary
 from avlmaps.recordings.audio import Sound
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ class AVLMap:
     def __init__(self, stored: "StoredMap", settings: QuerySettings | None = None) -> None:
         self.stored = stored
         self.settings = settings or QuerySettings()
-        self._rivals: tuple[tuple[str, ...], Rivals] | None = None
+        self._rivals: tuple[tuple[str, ...], ClosestWords] | None = None
 
     @classmethod
     def open(cls, path: str | Path, settings: QuerySettings | None = None) -> "AVLMap":
@@ -125,7 +125,7 @@ class AVLMap:
         part = Part(Modality.OBJECT, word, _role(primary))
         encoder = self.stored.encoders.pixels
         # Of names, most voxels have too little of the word to be compared with all others.
-        known = self._known_rivals if vocabulary is None else None
+        known = self._known_words if vocabulary is None else None
         rivals = self._rivals_of(encoder, vocabulary) if known is None else known
         voxels = self._feature_voxels(encoder, rivals, self.stored.voxels.rgb)
         return Heatmap.of(object_factor(voxels, part, self.settings.heat), self.settings.found_at)
@@ -140,7 +140,7 @@ class AVLMap:
         """
         encoder = self.stored.encoders.pixels
         everywhere = self._rivals_of(encoder, None)
-        rivals = everywhere if self._known_rivals is None else self._known_rivals  # which knows all of them now
+        rivals = everywhere if self._known_words is None else self._known_words  # which knows all of them now
         if alone and isinstance(encoder, NamedPixelEncoder) and word in encoder.names:
             encoded = EncodedWord.of_name(encoder, word)
         else:
@@ -167,19 +167,24 @@ class AVLMap:
 
         if is_large(self.stored.info):
             with suppress(BackendError, MapError):  # no features of things, or those of another encoder
-                if self._known_rivals is not None:
-                    self.rivals()
+                if self._known_words is not None:
+                    self.closest_words()
             with suppress(MapError):
                 _ = self.room_regions
         return self
 
-    def rivals(self) -> Rivals:
+    def rivals(self) -> ClosestWords:
+        """Return ``closest_words``, by the name that they had before."""
+        warnings.warn("AVLMap.rivals goes in the next release; use .closest_words.", DeprecationWarning, stacklevel=2)
+        return self.closest_words()
+
+    def closest_words(self) -> ClosestWords:
         """Return the two words of the encoder's vocabulary closest to each voxel; the first query works them out."""
         return self._rivals_of(self.stored.encoders.pixels, None)
 
-    def _rivals_of(self, encoder: PixelEncoder, vocabulary: Sequence[str] | None) -> Rivals:
+    def _rivals_of(self, encoder: PixelEncoder, vocabulary: Sequence[str] | None) -> ClosestWords:
         self.stored.require_model(Kind.PIXELS)
-        feature, known = self.stored.voxels.feature, self._known_rivals if vocabulary is None else None
+        feature, known = self.stored.voxels.feature, self._known_words if vocabulary is None else None
         if known is not None:
             fresh = not known.is_whole
             rivals = known.whole(feature)
@@ -188,11 +193,11 @@ class AVLMap:
             return rivals
         names = tuple(encoder.vocabulary if vocabulary is None else vocabulary)
         if self._rivals is None or self._rivals[0] != names:
-            self._rivals = names, Rivals.of(feature, encoder, names)
+            self._rivals = names, ClosestWords.of(feature, encoder, names)
         return self._rivals[1]
 
     @cached_property
-    def _known_rivals(self) -> KnownRivals | None:
+    def _known_words(self) -> KnownClosestWords | None:
         """The names of an encoder that has a list of them, and those closest to the voxels that queries needed.
 
         None for an encoder of any words, and where names of an encoder do not compete.
@@ -204,8 +209,8 @@ class AVLMap:
         vocabulary = Vocabulary.encoded(encoder, encoder.vocabulary)
         closest = read_closest(self.stored, vocabulary)
         if closest is not None:
-            return KnownRivals.known_everywhere(vocabulary, closest)
-        return KnownRivals.of(vocabulary, len(self.stored.voxels))
+            return KnownClosestWords.known_everywhere(vocabulary, closest)
+        return KnownClosestWords.of(vocabulary, len(self.stored.voxels))
 
     def things(
         self,

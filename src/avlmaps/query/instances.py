@@ -16,7 +16,7 @@ from avlmaps.query.object_settings import ObjectSettings
 from avlmaps.query.synonyms import is_open
 from avlmaps.query.things_in_rooms import NO_ROOMS, RoomEvidence, with_rooms
 from avlmaps.query.voxel_space import Space
-from avlmaps.query.words import EncodedWord, Scored, Vocabulary, scored_once
+from avlmaps.query.words import EncodedWord, Scored, Vocabulary, scorer_of
 
 _SPECK_M2 = 0.0199  # a guess shows at least as much surface as a mug
 
@@ -121,7 +121,7 @@ class Segmentation:
 
 def confident_instances(voxels: FeatureVoxels, word: EncodedWord) -> Instances:
     """Return the instances of a word that are confident by themselves."""
-    scored = scored_once(voxels.feature, voxels.encoder, voxels.rivals, word, voxels.settings)
+    scored = scorer_of(voxels.feature, voxels.encoder, voxels.rivals, word, voxels.settings)
     return segment(voxels, word, scored(1.0)).instances
 
 
@@ -207,7 +207,7 @@ def score(
         length_m = lengths_m(space, found) if length_m is None else length_m
         confidence = oversize.less_likely(confidence, length_m, longest_m)
     if settings.room_weight > 0.0 and len(confidence):
-        nats = voxels.rooms.nats(word.meant(encoder), found.rows, found.instance, len(confidence))
+        nats = voxels.rooms.nats(word.clear_names(encoder), found.rows, found.instance, len(confidence))
         if nats is not None:
             confidence = with_rooms(confidence, settings.room_weight * nats, settings.room_cost).astype(np.float32)
     return replace(found, confidence=confidence)
@@ -299,7 +299,7 @@ def named_confidence(
     A phrase that means several names has the confidence that the most meant name would have with all their probability.
     """
     mean, area_m2 = found.mean_probability, found.voxel_count * voxel_size_m**2
-    sure = [encoder.instance_probability(name, mean, area_m2) for name in word.meant(encoder)]
+    sure = [encoder.instance_probability(name, mean, area_m2) for name in word.clear_names(encoder)]
     nothing = np.zeros(len(found))  # of a word that names none of the encoder's names
     return np.max([nothing, *sure], axis=0).astype(np.float32)
 

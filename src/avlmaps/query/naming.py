@@ -12,7 +12,7 @@ from avlmaps.perception.protocols import NamedPixelEncoder, ScaledEncoder
 if TYPE_CHECKING:
     from avlmaps.maps.store.reader import StoredMap
     from avlmaps.query.voxel_space import Space
-    from avlmaps.query.words import Rivals
+    from avlmaps.query.words import ClosestWords
 
 _CHUNK = 1 << 14
 _NEAR_M, _FAR_M = 0.1, 8.0  # from how far a keyframe counts as having seen a voxel
@@ -73,7 +73,7 @@ class VoxelNamer:
         return [(self.names[k], float(confidence[k])) for k in best if confidence[k] > 0.0]
 
     def best(
-        self, rows: Int[np.ndarray, " m"] | None = None, rivals: "Rivals | None" = None
+        self, rows: Int[np.ndarray, " m"] | None = None, rivals: "ClosestWords | None" = None
     ) -> tuple[Int[np.ndarray, " m"], Float32[np.ndarray, " m"]]:
         """Return for each of some voxels the number of its likeliest name (-1 for none) and its confidence.
 

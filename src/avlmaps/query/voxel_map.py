@@ -172,8 +172,8 @@ class VoxelMap:
         return len(self._growing)
 
     def __repr__(self) -> str:
-        used = self._growing.used
-        return f"VoxelMap({len(self)} frames, voxels of {self._growing.settings.voxel_size_m:g} m, {used!r})"
+        encoders = self._growing.encoders
+        return f"VoxelMap({len(self)} frames, voxels of {self._growing.settings.voxel_size_m:g} m, {encoders!r})"
 
 
 def _direction(up_in_world: Any) -> Float[np.ndarray, "3"] | None:

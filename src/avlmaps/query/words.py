@@ -58,7 +58,7 @@ class EncodedWord:
         code = np.ascontiguousarray(encoder.codes[weights > 0.0])
         return cls(code, code, name, weights)
 
-    def meant(self, encoder: NamedPixelEncoder) -> tuple[str, ...]:
+    def clear_names(self, encoder: NamedPixelEncoder) -> tuple[str, ...]:
         """Return the names of the encoder that the word clearly means."""
         return tuple(encoder.names[index] for index in np.flatnonzero(self.name_weights >= CLEARLY_MEANT))
 
@@ -89,7 +89,7 @@ class Vocabulary:
         understood = tuple(encoder.understood(word) for word in words)
         return Vocabulary(words, encoded[known], understood, bool(known[-1]))
 
-    def silent_for(self, encoder: PixelEncoder, encoded: "EncodedWord", cosine: float) -> Bool[np.ndarray, " v"]:
+    def not_competing(self, encoder: PixelEncoder, encoded: "EncodedWord", cosine: float) -> Bool[np.ndarray, " v"]:
         """Return which words do not compete because they name the queried thing: of ``other`` that one word."""
         close = np.linalg.norm(self.word_feature @ encoded.span.T, axis=1) >= cosine
         same = [bool(encoded.understood) and understood == encoded.understood for understood in self.understood]
@@ -100,9 +100,9 @@ class Vocabulary:
             silent[-1] = same[-1]
         return silent
 
-    def rivals_at(self, feature: Float16[np.ndarray, "n d"], rows: Int[np.ndarray, " m"]) -> "Rivals":
+    def rivals_at(self, feature: Float16[np.ndarray, "n d"], rows: Int[np.ndarray, " m"]) -> "ClosestWords":
         """Return the two words closest to some voxels of a map."""
-        return Rivals.among(np.ascontiguousarray(feature[rows]), self)
+        return ClosestWords.among(np.ascontiguousarray(feature[rows]), self)
 
     def scores_at(
         self, feature: Float16[np.ndarray, "n d"], encoded: "EncodedWord", rows: Int[np.ndarray, " m"]
@@ -118,7 +118,7 @@ class Vocabulary:
 
 
 @dataclass(frozen=True, slots=True)
-class Rivals(Vocabulary):
+class ClosestWords(Vocabulary):
     """A vocabulary, and its two words closest to each voxel, computed once a map and vocabulary.
 
     With the best two stored, a query is one pass over the features even if the queried word is in the vocabulary.
@@ -136,20 +136,22 @@ class Rivals(Vocabulary):
     second_word: Int[np.ndarray, " n"]
 
     @classmethod
-    def of(cls, feature: Float16[np.ndarray, "n d"], encoder: PixelEncoder, vocabulary: Sequence[str]) -> "Rivals":
+    def of(
+        cls, feature: Float16[np.ndarray, "n d"], encoder: PixelEncoder, vocabulary: Sequence[str]
+    ) -> "ClosestWords":
         """Score every voxel against a vocabulary; words of which the encoder understands nothing are left out."""
         return cls.among(feature, Vocabulary.encoded(encoder, vocabulary))
 
     @classmethod
-    def among(cls, feature: Float16[np.ndarray, "n d"], rivals: Vocabulary) -> "Rivals":
+    def among(cls, feature: Float16[np.ndarray, "n d"], rivals: Vocabulary) -> "ClosestWords":
         """Score voxels against an encoded vocabulary."""
         closest = loops.two_closest(feature, rivals.word_feature)
         return cls(rivals.words, rivals.word_feature, rivals.understood, rivals.has_other, *closest)
 
-    def taken(self, rows: Int[np.ndarray, " m"]) -> "Rivals":
+    def taken(self, rows: Int[np.ndarray, " m"]) -> "ClosestWords":
         """Return the same for some of the voxels."""
         closest = self.best[rows], self.best_word[rows], self.second[rows], self.second_word[rows]
-        return Rivals(self.words, self.word_feature, self.understood, self.has_other, *closest)
+        return ClosestWords(self.words, self.word_feature, self.understood, self.has_other, *closest)
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,7 +175,7 @@ class Scored:
 
 def object_margins(
     feature: Float16[np.ndarray, "n d"],
-    rivals: Rivals,
+    rivals: ClosestWords,
     word_rows: Float32[np.ndarray, "m d"],
     silent: Bool[np.ndarray, " v"],
     least_score: float,
@@ -197,7 +199,7 @@ def _beaten(
     score: Float32[np.ndarray, " m"],
     feature: Float16[np.ndarray, "n d"],
     rows: Int[np.ndarray, " m"],
-    rivals: Rivals,
+    rivals: ClosestWords,
     silent: Bool[np.ndarray, " v"],
     least_score: float,
 ) -> Float32[np.ndarray, " m"]:
@@ -224,7 +226,7 @@ def _beaten(
     return out
 
 
-def scored_once(
+def scorer_of(
     feature: Float16[np.ndarray, "n d"],
     encoder: PixelEncoder,
     rivals: Vocabulary,
@@ -233,12 +235,12 @@ def scored_once(
 ) -> Callable[[float], Scored]:
     """Return what gives the voxels where a word scores at least a share of its best rival, and maybe others.
 
-    With all ``Rivals`` known they are all voxels. Else the encoder is one of names: voxels with little of the word are
-    not compared with its rivals, and where the closest words are known before (``KnownRivals``), they say of most
-    voxels that the word cannot win.
+    Where the ``ClosestWords`` of all voxels are known, they are all voxels. Else the encoder is one of names: voxels
+    with little of the word are not compared with its rivals, and where the closest words are known before
+    (``KnownClosestWords``), they say of most voxels that the word cannot win.
     """
-    silent = rivals.silent_for(encoder, encoded, settings.same_word_cosine)
-    if isinstance(rivals, Rivals):
+    silent = rivals.not_competing(encoder, encoded, settings.same_word_cosine)
+    if isinstance(rivals, ClosestWords):
         every = np.arange(len(feature))
         everywhere = Scored(every, *object_margins(feature, rivals, encoded.rows, silent, settings.least_score))
         return lambda share: everywhere

@@ -174,7 +174,7 @@ def _name_labels(
     n = len(rows)
     try:
         namer = VoxelNamer(avlmap.stored)
-        number, confidence = namer.best(rows, avlmap.rivals())
+        number, confidence = namer.best(rows, avlmap.closest_words())
     except AvlmapsError as fault:
         notes.append(str(fault))
         return (), np.zeros(n, np.uint8), np.zeros(n, np.uint8)

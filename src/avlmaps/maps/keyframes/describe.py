@@ -132,7 +132,7 @@ def _apparent_motion(
 def perceive_keyframes(
     recording: Recording,
     indices: Sequence[int] | Int[np.ndarray, " k"],
-    used: Encoders,
+    encoders: Encoders,
     rng: "np.random.Generator",
     progress: Callable[..., Iterable[int]] = progress,
     settings: KeyframeSettings = KeyframeSettings(),
@@ -142,7 +142,7 @@ def perceive_keyframes(
     Args:
         recording: where the frames are; read one at a time.
         indices: which frames, rising.
-        used: the encoders.
+        encoders: the encoders.
         rng: for what the place encoder learns.
         progress: shows how far it is; called as ``avlmaps.core.progress.progress`` is.
         settings: how far keypoints get a 3D point, size of thumbnails.
@@ -150,9 +150,9 @@ def perceive_keyframes(
     Returns:
         The keyframes, and the arrays that the place encoder learned; the map must keep them.
     """
-    place_state, known = learn_places(recording, indices, used, rng)
+    place_state, known = learn_places(recording, indices, encoders, rng)
     seen = [
-        describe_keyframe(recording.frame(int(index)), used, place_state, settings, known.get(int(index)))
+        describe_keyframe(recording.frame(int(index)), encoders, place_state, settings, known.get(int(index)))
         for index in progress(indices, "seeing", total=len(indices), unit="keyframe")
     ]
     return stack_keyframes(seen), place_state
@@ -161,7 +161,7 @@ def perceive_keyframes(
 def learn_places(
     recording: Recording,
     indices: Sequence[int] | Int[np.ndarray, " k"],
-    used: Encoders,
+    encoders: Encoders,
     rng: "np.random.Generator",
 ) -> tuple[dict[str, np.ndarray], dict[int, LocalFeatures]]:
     """Let the place encoder learn from keyframes spread over the walk.
@@ -169,12 +169,12 @@ def learn_places(
     Returns:
         What it learned, and the local features of those frames by their number, to save doing them twice.
     """
-    if Kind.LOCAL not in used or Kind.PLACE not in used:
+    if Kind.LOCAL not in encoders or Kind.PLACE not in encoders:
         return {}, {}
-    encoder = used.local
+    encoder = encoders.local
     chosen = [int(indices[int(i)]) for i in learn_from(len(indices))]
     local = {i: encoder.encode(recording.frame(i).rgb) for i in chosen}
-    return used.place.fit(list(local.values()), rng), local
+    return encoders.place.fit(list(local.values()), rng), local
 
 
 def learn_from(keyframes: int) -> Int[np.ndarray, " k"]:
@@ -183,7 +183,7 @@ def learn_from(keyframes: int) -> Int[np.ndarray, " k"]:
 
 
 @dataclass(frozen=True, slots=True)
-class SeenKeyframe:
+class DescribedKeyframe:
     """All that the map stores of one keyframe.
 
     Attributes:
@@ -209,30 +209,30 @@ class SeenKeyframe:
 
 def describe_keyframe(
     frame: Frame,
-    used: Encoders,
+    encoders: Encoders,
     place_state: dict[str, np.ndarray],
     settings: KeyframeSettings = KeyframeSettings(),
     local: LocalFeatures | None = None,
-) -> SeenKeyframe:
+) -> DescribedKeyframe:
     """Run encoders on one frame.
 
     Args:
         frame: the frame.
-        used: the encoders; a module without one gives empty features.
+        encoders: the encoders; a module without one gives empty features.
         place_state: what the place encoder learned.
         settings: how far keypoints get a 3D point, size of thumbnails.
         local: the frame's keypoints where they are known already.
     """
     if local is None:
-        local = used.local.encode(frame.rgb) if Kind.LOCAL in used else _no_features()
+        local = encoders.local.encode(frame.rgb) if Kind.LOCAL in encoders else _no_features()
     place = np.zeros(0, np.float32)
-    if Kind.LOCAL in used and Kind.PLACE in used:
-        place = used.place.encode(frame.rgb, local, place_state)
-    return SeenKeyframe(
+    if Kind.LOCAL in encoders and Kind.PLACE in encoders:
+        place = encoders.place.encode(frame.rgb, local, place_state)
+    return DescribedKeyframe(
         stamp_s=frame.stamp_s,
         world_from_camera=frame.world_from_camera,
         centre=middle_of_view(frame),
-        view=used.views.encode([frame])[0] if Kind.VIEWS in used else np.zeros(0, np.float32),
+        view=encoders.views.encode([frame])[0] if Kind.VIEWS in encoders else np.zeros(0, np.float32),
         place=place,
         local=local,
         points_world=lift_keypoints(local.xy, frame, settings.max_depth_m),
@@ -240,7 +240,7 @@ def describe_keyframe(
     )
 
 
-def stack_keyframes(seen: Sequence[SeenKeyframe]) -> Keyframes:
+def stack_keyframes(seen: Sequence[DescribedKeyframe]) -> Keyframes:
     """Put keyframes, in the order of time, into the map's arrays."""
     return Keyframes(
         stamp_s=np.array([one.stamp_s for one in seen], np.float64),

@@ -9,8 +9,8 @@ import numpy as np
 from avlmaps.core.arrays import Float32, UInt8
 from avlmaps.core.registry import Kind
 from avlmaps.maps.keyframes.describe import (
+    DescribedKeyframe,
     KeyframeSettings,
-    SeenKeyframe,
     describe_keyframe,
     keyframes_by_motion,
     learn_from,
@@ -27,36 +27,36 @@ _GROWN = 1.25
 
 
 @dataclass(frozen=True, slots=True)
-class SeenOnce:
+class PicturedKeyframe:
     """A keyframe without its place, and its picture (PNG) for that."""
 
     index: int
-    keyframe: SeenKeyframe
+    keyframe: DescribedKeyframe
     picture: bytes
 
 
 class GrowingKeyframes:
     """Takes frames in the order of time and stores what a map holds of the keyframes among them."""
 
-    def __init__(self, used: Encoders, settings: KeyframeSettings) -> None:
+    def __init__(self, encoders: Encoders, settings: KeyframeSettings) -> None:
         """Begin without frames.
 
         Args:
-            used: the encoders; that of pixels is not called.
+            encoders: the encoders; that of pixels is not called.
             settings: when a frame becomes a keyframe.
         """
-        self._used, self._settings = used, settings
-        self._decided: list[SeenOnce] = []
-        self._maybe: dict[int, SeenOnce] = {}
+        self._encoders, self._settings = encoders, settings
+        self._decided: list[PicturedKeyframe] = []
+        self._maybe: dict[int, PicturedKeyframe] = {}
         self._recent: list[Frame] = []
-        self._looks: dict[int, SeenOnce] | None = None
+        self._described: dict[int, PicturedKeyframe] | None = None
         self._state: dict[str, np.ndarray] = {}
         self._learnt_from: list[int] = []
         self._places: dict[int, Float32[np.ndarray, " d"]] = {}
 
-    def share(self, looks: "dict[int, SeenOnce]") -> None:
+    def share(self, described: "dict[int, PicturedKeyframe]") -> None:
         """Take keyframes that were looked at before, by their number, and add those that are looked at."""
-        self._looks = looks
+        self._described = described
 
     @property
     def undecided(self) -> list[Frame]:
@@ -71,13 +71,13 @@ class GrowingKeyframes:
         """
         self._recent.append(frame)
         if len(self._recent) == 1 and not self._decided:
-            self._decided.append(self._look(frame))
+            self._decided.append(self._describe(frame))
             yield frame
         while (index := self._next()) is not None:
             decided, self._recent = self._recent[index], self._recent[index:]
             known = self._maybe.pop(decided.index, None)
             self._maybe.clear()
-            self._decided.append(known or self._look(decided))
+            self._decided.append(known or self._describe(decided))
             yield decided
 
     def _next(self) -> int | None:
@@ -103,17 +103,19 @@ class GrowingKeyframes:
         """
         for frame in self.last():
             if frame.index not in self._maybe:
-                self._maybe[frame.index] = self._look(frame)
+                self._maybe[frame.index] = self._describe(frame)
         seen = [*self._decided, *(self._maybe[frame.index] for frame in self.last())]
-        places = self._placed(seen, rng, final) if Kind.PLACE in self._used and Kind.LOCAL in self._used else None
         whole = [one.keyframe for one in seen]
-        if places is not None:
+        if Kind.PLACE in self._encoders and Kind.LOCAL in self._encoders:
+            places = self._placed(seen, rng, final)
             whole = [replace(one, place=place) for one, place in zip(whole, places, strict=True)]
         return stack_keyframes(whole), self._state
 
-    def _placed(self, seen: list[SeenOnce], rng: np.random.Generator, final: bool) -> list[Float32[np.ndarray, " d"]]:
+    def _placed(
+        self, seen: list[PicturedKeyframe], rng: np.random.Generator, final: bool
+    ) -> list[Float32[np.ndarray, " d"]]:
         """Return the descriptor of each keyframe's place; learnt again, all are encoded again."""
-        encoder, numbers = self._used.place, [one.index for one in seen]
+        encoder, numbers = self._encoders.place, [one.index for one in seen]
         few = not self._learnt_from or len(seen) >= _GROWN * len(self._learnt_from)
         if few or (final and numbers != self._learnt_from):
             with perceiving(f"The place encoder {encoder.card.id}", "the keyframes"):
@@ -128,23 +130,23 @@ class GrowingKeyframes:
                 self._places[one.index] = np.asarray(found, np.float32)
         return [self._places[one.index] for one in seen]
 
-    def _look(self, frame: Frame) -> SeenOnce:
-        if self._looks is None:
-            return self._looked(frame)
-        if frame.index not in self._looks:
-            self._looks[frame.index] = self._looked(frame)
-        return self._looks[frame.index]
+    def _describe(self, frame: Frame) -> PicturedKeyframe:
+        if self._described is None:
+            return self._described_now(frame)
+        if frame.index not in self._described:
+            self._described[frame.index] = self._described_now(frame)
+        return self._described[frame.index]
 
-    def _looked(self, frame: Frame) -> SeenOnce:
+    def _described_now(self, frame: Frame) -> PicturedKeyframe:
         with perceiving("An encoder of keyframes", frame.name):
-            seen = describe_keyframe(frame, self._used.without(Kind.PLACE), {}, self._settings)
-        if Kind.VIEWS in self._used:
-            card = self._used.card(Kind.VIEWS)
+            seen = describe_keyframe(frame, self._encoders.without(Kind.PLACE), {}, self._settings)
+        if Kind.VIEWS in self._encoders:
+            card = self._encoders.card(Kind.VIEWS)
             seen = replace(seen, view=as_row(seen.view, card.dim, f"The view encoder {card.id}", frame))
-        if Kind.PLACE not in self._used:
-            return SeenOnce(frame.index, seen, b"")
+        if Kind.PLACE not in self._encoders:
+            return PicturedKeyframe(frame.index, seen, b"")
         _, picture = cv2.imencode(".png", frame.rgb, [cv2.IMWRITE_PNG_COMPRESSION, 1])
-        return SeenOnce(frame.index, seen, picture.tobytes())
+        return PicturedKeyframe(frame.index, seen, picture.tobytes())
 
 
 def _path(frames: list[Frame]) -> tuple[np.ndarray, np.ndarray]:

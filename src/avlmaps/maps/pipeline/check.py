@@ -9,7 +9,7 @@ import numpy as np
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.progress import say
 from avlmaps.maps.gravity.given_up import some_frames, up_doubts
-from avlmaps.maps.pipeline.plan import BUILD_VERSION, Plan
+from avlmaps.maps.pipeline.plan import BUILD_VERSION, BuildPlan
 from avlmaps.maps.store.checkpoints import Computed, key_of, load_or_compute
 from avlmaps.recordings.consistency.check import check_recording
 from avlmaps.recordings.consistency.verdict import Reason, Verdict
@@ -21,7 +21,7 @@ class _Doubts(msgspec.Struct):
     whole: bool
 
 
-def checked(plan: Plan, allowed: Sequence[str]) -> Plan:
+def checked(plan: BuildPlan, allowed: Sequence[str]) -> BuildPlan:
     """Return the plan with what is doubtful about its recording, each of which is said.
 
     Args:

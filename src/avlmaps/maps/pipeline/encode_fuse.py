@@ -22,7 +22,7 @@ from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.perceived import encode_pixels
 from avlmaps.maps.pipeline.parts import MapPart, PartInfo, check_disjoint, find_part, load_part, save_part
 from avlmaps.maps.pipeline.plan import (
-    Plan,
+    BuildPlan,
     Span,
     encoded_frames,
     fusion_key,
@@ -42,7 +42,7 @@ _MOST_HELD = 4  # frames in memory for each that is encoded
 EncodedFrame = tuple[Frame | BadFrame, Float32[np.ndarray, "hf wf d"] | None]
 
 
-def encode_and_fuse(plan: Plan, given: Sequence[Path | str], sensor: SensorInfo) -> list[MapPart]:
+def encode_and_fuse(plan: BuildPlan, given: Sequence[Path | str], sensor: SensorInfo) -> list[MapPart]:
     """Encode and fuse all frames that no part covers yet; return the parts that make up the map, in a fixed order."""
     brought = [load_part(Path(folder), plan.fusion_key) for folder in given]
     covered = [span for part in brought for span in part.info.spans]
@@ -55,7 +55,7 @@ def encode_and_fuse(plan: Plan, given: Sequence[Path | str], sensor: SensorInfo)
     had = [*brought, *(part for part in finished.values() if part is not None)]
     bad = [frame for part in had for frame in part.info.bad_frames]
     done = sum(part.info.fused + len(part.info.bad_frames) for part in had)
-    fuse_spans(plan.recording, jobs, plan.used, plan.settings, sensor.model, bad, done)
+    fuse_spans(plan.recording, jobs, plan.encoders, plan.settings, sensor.model, bad, done)
     own = [part or load_part(folder, plan.fusion_key, verify=False) for folder, part in finished.items()]
     parts = sorted([*brought, *own], key=lambda part: part.info.spans)
     check_disjoint(parts)
@@ -65,7 +65,7 @@ def encode_and_fuse(plan: Plan, given: Sequence[Path | str], sensor: SensorInfo)
 def fuse_spans(
     recording: Recording,
     jobs: Sequence[tuple[Span, Path]],
-    used: Encoders,
+    encoders: Encoders,
     settings: BuildSettings,
     sensor: SensorModel,
     known_bad: Sequence[BadFrame] = (),
@@ -76,7 +76,7 @@ def fuse_spans(
     Args:
         recording: where the frames are.
         jobs: each stretch, and the folder of its part.
-        used: the encoders, of which that of pixels perceives.
+        encoders: the encoders, of which that of pixels perceives.
         settings: of the build.
         sensor: error of the depths.
         known_bad: frames of other parts that could not be read.
@@ -88,13 +88,13 @@ def fuse_spans(
     """
     if not jobs:
         return
-    key, encoder = fusion_key(recording, settings, used), pixel_encoder_of(used)
+    key, encoder = fusion_key(recording, settings, encoders), pixel_encoder_of(encoders)
     tolerance = Tolerance(recording, settings, known_bad)
     stretches = [range(*span) for span, _ in jobs]
     total_frames = done + sum(map(len, stretches))
-    chosen = encoded_frames(recording, settings, used)
+    chosen = encoded_frames(recording, settings, encoders)
     with closing(encode_frames(recording, stretches, encoder, chosen)) as ahead:
-        seen = progress(ahead, "fusing", total=total_frames, done=done, note=lambda: cache_note(used, Kind.PIXELS))
+        seen = progress(ahead, "fusing", total=total_frames, done=done, note=lambda: cache_note(encoders, Kind.PIXELS))
         for span, folder in jobs:
             begin = perf_counter()
             dim = encoder.card.dim if encoder else 0

@@ -14,7 +14,7 @@ from avlmaps.maps.fusion.depth_noise import FRAMES, measure_noise, nearest_model
 from avlmaps.maps.fusion.sensor import MODELS, SensorModel
 from avlmaps.maps.gravity.floor import FoundFloor, GroundedRecording, find_ground
 from avlmaps.maps.gravity.floor_choice import Evidence, Expected
-from avlmaps.maps.pipeline.plan import BUILD_VERSION, Plan
+from avlmaps.maps.pipeline.plan import BUILD_VERSION, BuildPlan
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.checkpoints import Computed, key_of, load_or_compute
 from avlmaps.maps.store.manifest import FloorGuess, FloorInfo, GroundInfo, SensorInfo, UpInfo
@@ -45,7 +45,7 @@ class _EstimatedSensor(msgspec.Struct, frozen=True):
     sensor: SensorInfo
 
 
-def find_up(plan: Plan) -> EstimatedUp:
+def find_up(plan: BuildPlan) -> EstimatedUp:
     """Return the up direction, from the recording or from the planes in view."""
     if plan.recording.up_in_world is not None:
         return EstimatedUp(UpInfo.of(plan.recording.up_in_world, "recording", 1.0), 0.0)
@@ -58,7 +58,7 @@ def find_up(plan: Plan) -> EstimatedUp:
     return load_or_compute(plan.folder("up", key), key, EstimatedUp, compute).facts
 
 
-def find_floor(plan: Plan, up: UpInfo) -> tuple[Plan, EstimatedFloor]:
+def find_floor(plan: BuildPlan, up: UpInfo) -> tuple[BuildPlan, EstimatedFloor]:
     """Return the plan with up and the floor in the recording's frames, and the floors."""
     recording = plan.recording
     key = key_of("ground", BUILD_VERSION, recording.fingerprint, recording.base_height, plan.settings.gravity, up)
@@ -75,7 +75,7 @@ def find_floor(plan: Plan, up: UpInfo) -> tuple[Plan, EstimatedFloor]:
     return replace(plan, recording=GroundedRecording(recording, Ground(**found.arrays))), found.facts
 
 
-def find_sensor(plan: Plan) -> SensorInfo:
+def find_sensor(plan: BuildPlan) -> SensorInfo:
     """Return the depth camera, as the settings name it or as the frames show it."""
     if plan.settings.fusion.sensor != "auto":
         return estimate_sensor(plan.recording, plan.settings)

@@ -15,7 +15,7 @@ from avlmaps.core.progress import progress
 from avlmaps.core.registry import Kind
 from avlmaps.maps.keyframes.describe import describe_keyframe, learn_places, select_keyframes, stack_keyframes
 from avlmaps.maps.pipeline.parts import MapPart
-from avlmaps.maps.pipeline.plan import BUILD_VERSION, Plan
+from avlmaps.maps.pipeline.plan import BUILD_VERSION, BuildPlan
 from avlmaps.maps.pipeline.prefetch import run_ahead
 from avlmaps.maps.store.array_validation import RAGGED, ROWS_OR_NONE, array_fields, validate_arrays
 from avlmaps.maps.store.checkpoints import (
@@ -50,7 +50,7 @@ class KeyframeResult:
     elapsed_s: float
 
 
-def describe_keyframes(plan: Plan, parts: Sequence[MapPart]) -> KeyframeResult:
+def describe_keyframes(plan: BuildPlan, parts: Sequence[MapPart]) -> KeyframeResult:
     """Choose keyframes among the frames that were fused, and look at them."""
     fused = fused_frames(parts)
     good = Subset(plan.recording, fused)
@@ -70,14 +70,14 @@ def describe_keyframes(plan: Plan, parts: Sequence[MapPart]) -> KeyframeResult:
 
 
 def _learn(
-    plan: Plan, good: Recording, chosen: Int[np.ndarray, " k"], key: str
+    plan: BuildPlan, good: Recording, chosen: Int[np.ndarray, " k"], key: str
 ) -> tuple[dict[str, np.ndarray], dict[int, LocalFeatures], float]:
     """Return the state of the place encoder, the keypoints that it learned from (if it did now), and the seconds."""
     local: dict[int, LocalFeatures] = {}
 
     def compute() -> Computed[_Facts]:
         begin = perf_counter()
-        state, keypoints = learn_places(good, chosen, plan.used, plan.rng(RANDOMNESS))
+        state, keypoints = learn_places(good, chosen, plan.encoders, plan.rng(RANDOMNESS))
         local.update(keypoints)
         return Computed(_Facts(perf_counter() - begin), state)
 
@@ -86,7 +86,7 @@ def _learn(
 
 
 def _look(
-    plan: Plan,
+    plan: BuildPlan,
     good: Recording,
     lots: dict[Path, Int[np.ndarray, " k"]],
     total: int,
@@ -96,7 +96,7 @@ def _look(
 ) -> None:
     """Encode lots of keyframes and store each lot in its folder."""
     left = sum(map(len, lots.values()))
-    blind = plan.used.without(Kind.VIEWS)  # the views are encoded ahead, in batches
+    blind = plan.encoders.without(Kind.VIEWS)  # the views are encoded ahead, in batches
     with closing(_viewed(plan, good, list(lots.values()))) as viewed:
         ahead = progress(
             viewed, "seeing", total=total, done=total - left, unit="keyframe", note=lambda: _from_store(plan)
@@ -116,10 +116,10 @@ def _look(
             pass
 
 
-def _viewed(plan: Plan, good: Recording, lots: Sequence[Int[np.ndarray, " k"]]) -> Generator[_Viewed]:
+def _viewed(plan: BuildPlan, good: Recording, lots: Sequence[Int[np.ndarray, " k"]]) -> Generator[_Viewed]:
     """Yield keyframes with their view features; decoding and encoding each run ahead in a thread."""
-    encoder = plan.used.views if Kind.VIEWS in plan.used else None
-    size = _VIEWS_ON_TORCH if encoder and plan.used.sources[Kind.VIEWS].on_torch else 1
+    encoder = plan.encoders.views if Kind.VIEWS in plan.encoders else None
+    size = _VIEWS_ON_TORCH if encoder and plan.encoders.sources[Kind.VIEWS].on_torch else 1
     frames = ((int(index), good.frame(int(index))) for lot in lots for index in lot)
     with closing(run_ahead(frames, max(2, size))) as decoded:
         yield from run_ahead(_encoded(decoded, list(map(len, lots)), encoder, size), max(2, size))
@@ -136,10 +136,10 @@ def _encoded(
             yield from ((index, frame, view) for (index, frame), view in zip(group, views, strict=True))
 
 
-def _from_store(plan: Plan) -> str:
+def _from_store(plan: BuildPlan) -> str:
     """Return how many keyframes the store holds whole: the lowest count of their kinds of features."""
     kinds = (Kind.VIEWS, Kind.LOCAL, Kind.PLACE)
-    notes = [cache_note(plan.used, kind) for kind in kinds]
+    notes = [cache_note(plan.encoders, kind) for kind in kinds]
     return min((words for words in notes if words), key=lambda words: int(words.split()[0]), default="")
 
 

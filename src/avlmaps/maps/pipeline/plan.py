@@ -29,13 +29,13 @@ Span = tuple[int, int, int]  # (first, last + 1, step) of frames
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class BuildPlan:
     """A build's ingredients.
 
     Attributes:
         recording: what to map.
         path: the map's folder.
-        used: which models perceive.
+        encoders: which models perceive.
         settings: all that can be chosen.
         models: the models' cards, by module.
         key: hash of all ingredients; two builds with one key make one map.
@@ -45,7 +45,7 @@ class Plan:
 
     recording: Recording
     path: Path
-    used: Encoders
+    encoders: Encoders
     settings: BuildSettings
     models: dict[str, ModelInfo]
     key: str
@@ -61,7 +61,7 @@ class Plan:
         return np.random.default_rng([self.settings.seed, stage])
 
 
-def make_plan(recording: Recording, path: Path, used: Encoders, settings: BuildSettings) -> Plan:
+def make_plan(recording: Recording, path: Path, encoders: Encoders, settings: BuildSettings) -> BuildPlan:
     """Gather the ingredients and refuse what cannot be built.
 
     Raises:
@@ -72,34 +72,34 @@ def make_plan(recording: Recording, path: Path, used: Encoders, settings: BuildS
         raise MapError(f"{recording.path} has no frames with a pose; there is nothing to build a map from.")
     if not is_map_or_free(path):
         raise MapError(f"{path} is there already and is not a map; give another --out, nothing in it was touched.")
-    settings = settings.for_profile(used.weight_variance_m2)
-    models = {kind.value: ModelInfo.of(used.sources[kind].chosen, card) for kind, card in used.cards().items()}
-    key = key_of("map", BUILD_VERSION, recording.fingerprint, audio_key(recording), used.name, models, settings)
-    return Plan(recording, path, used, settings, models, key, fusion_key(recording, settings, used))
+    settings = settings.for_profile(encoders.weight_variance_m2)
+    models = {kind.value: ModelInfo.of(encoders.sources[kind].chosen, card) for kind, card in encoders.cards().items()}
+    key = key_of("map", BUILD_VERSION, recording.fingerprint, audio_key(recording), encoders.name, models, settings)
+    return BuildPlan(recording, path, encoders, settings, models, key, fusion_key(recording, settings, encoders))
 
 
-def pixel_encoder_of(used: Encoders) -> PixelEncoder | None:
+def pixel_encoder_of(encoders: Encoders) -> PixelEncoder | None:
     """Return the pixel encoder, None where there is none (the map is then one of surfaces and colours)."""
-    return used.pixels if Kind.PIXELS in used else None
+    return encoders.pixels if Kind.PIXELS in encoders else None
 
 
-def fusion_key(recording: Recording, settings: BuildSettings, used: Encoders) -> str:
+def fusion_key(recording: Recording, settings: BuildSettings, encoders: Encoders) -> str:
     """Return the hash of all that the sums of a frame depend on; parts are only ever added to parts of the same key."""
-    encoder = pixel_encoder_of(used)
+    encoder = pixel_encoder_of(encoders)
     card = None if encoder is None else encoder.card
     ground = (settings.gravity, settings.seed, recording.base_height) if encoder is not None else None
     basis = recording.fingerprint, settings.voxel_size_m, settings.fusion, card, ground
-    chosen = (settings.keyframes, settings.frames.step) if used.keyframes_only else ()
+    chosen = (settings.keyframes, settings.frames.step) if encoders.keyframes_only else ()
     return key_of("fusion", BUILD_VERSION, *basis, *chosen)
 
 
-def encoded_frames(recording: Recording, settings: BuildSettings, used: Encoders) -> frozenset[int] | None:
+def encoded_frames(recording: Recording, settings: BuildSettings, encoders: Encoders) -> frozenset[int] | None:
     """Return the numbers of the frames whose pixels are encoded, None for all.
 
     For a pixel encoder that is given keyframes alone they are those of every ``frames.step``-th frame of the whole
     recording, by motion: the same on every machine that fuses a part of it, and known before a picture is read.
     """
-    if not used.keyframes_only:
+    if not encoders.keyframes_only:
         return None
     numbers = np.arange(0, len(recording), settings.frames.step)
     stamps, poses = recording.stamps_s[numbers], recording.world_from_camera[numbers]
@@ -138,7 +138,7 @@ def audio_key(recording: Recording) -> list[str | float] | None:
     return [track.path.name, content, track.rate_hz, track.duration_s, track.start_s]
 
 
-def claim(plan: Plan, resume: bool, overwrite: bool) -> MapInfo | None:
+def claim(plan: BuildPlan, resume: bool, overwrite: bool) -> MapInfo | None:
     """Check that the folder may be built into; return the map that is there if it is this very one.
 
     Args:
@@ -165,7 +165,7 @@ def claim(plan: Plan, resume: bool, overwrite: bool) -> MapInfo | None:
     return None
 
 
-def require_unchanged(plan: Plan, stamp: str) -> None:
+def require_unchanged(plan: BuildPlan, stamp: str) -> None:
     """Refuse to continue with a recording whose files were written since the build began.
 
     What was made of it is removed, since nobody knows which frames are old and which are new.
@@ -186,11 +186,11 @@ def require_unchanged(plan: Plan, stamp: str) -> None:
     )
 
 
-def _difference(plan: Plan, there: MapInfo) -> str:
+def _difference(plan: BuildPlan, there: MapInfo) -> str:
     """Return in words how the finished map's ingredients differ from this build's."""
     if there.recording.fingerprint != plan.recording.fingerprint:
         return "(another recording, or it has changed)"
-    if there.profile != plan.used.name:
+    if there.profile != plan.encoders.name:
         return f"with the profile {there.profile}"
     if there.settings != plan.settings:
         return "with other settings"

@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 
 from avlmaps.core.registry import Kind
-from avlmaps.maps.pipeline.plan import BUILD_VERSION, Plan, audio_key
+from avlmaps.maps.pipeline.plan import BUILD_VERSION, BuildPlan, audio_key
 from avlmaps.maps.store.array_validation import array_fields, validate_arrays
 from avlmaps.maps.store.checkpoints import Computed, key_of, load_or_compute
 from avlmaps.maps.types import HeardSounds
@@ -28,9 +28,9 @@ class SoundResult:
     elapsed_s: float
 
 
-def detect_sounds(plan: Plan) -> SoundResult:
+def detect_sounds(plan: BuildPlan) -> SoundResult:
     """Find the sounds in the track; none where there is no track, or no model for them."""
-    if plan.recording.audio is None or Kind.SOUNDS not in plan.used:
+    if plan.recording.audio is None or Kind.SOUNDS not in plan.encoders:
         return SoundResult(silence(plan), plan.path, 0.0)
     settings, model = plan.settings.hearing, plan.models[Kind.SOUNDS.value]
     key = key_of("sounds", BUILD_VERSION, plan.recording.fingerprint, audio_key(plan.recording), settings, model)
@@ -44,7 +44,7 @@ def detect_sounds(plan: Plan) -> SoundResult:
         begin = perf_counter()
         shutil.rmtree(scratch, ignore_errors=True)
         scratch.mkdir(parents=True)
-        heard = detect_events(plan.recording, plan.used.sounds, settings, scratch)
+        heard = detect_events(plan.recording, plan.encoders.sounds, settings, scratch)
         arrays = {name: getattr(heard, name) for name in array_fields(HeardSounds)}
         clips = {f"clips/{number:06d}": scratch / Path(clip).name for number, clip in enumerate(heard.clips)}
         return Computed(_Facts(perf_counter() - begin), arrays, clips)
@@ -56,7 +56,7 @@ def detect_sounds(plan: Plan) -> SoundResult:
     return SoundResult(sounds, found.folder / "clips", found.facts.elapsed_s)
 
 
-def silence(plan: Plan) -> HeardSounds:
+def silence(plan: BuildPlan) -> HeardSounds:
     """Return no sounds, with features as long as the model's."""
     model = plan.models.get(Kind.SOUNDS.value)
     return HeardSounds(

@@ -14,7 +14,7 @@ from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.pipeline.estimate import EstimatedFloor, EstimatedUp, ground_notices
 from avlmaps.maps.pipeline.keyframes import KeyframeResult
 from avlmaps.maps.pipeline.parts import MapPart, sum_parts
-from avlmaps.maps.pipeline.plan import Plan, strip_folder
+from avlmaps.maps.pipeline.plan import BuildPlan, strip_folder
 from avlmaps.maps.pipeline.sounds import SoundResult
 from avlmaps.maps.store.manifest import (
     BadFrame,
@@ -49,13 +49,13 @@ class Merged:
     elapsed_s: float
 
 
-def merge(plan: Plan, parts: Sequence[MapPart], sensor: SensorInfo) -> Merged:
+def merge(plan: BuildPlan, parts: Sequence[MapPart], sensor: SensorInfo) -> Merged:
     """Add the parts up to the voxels of the map, and remove those that are no surface."""
     total = sum_parts(parts, GridSpec(plan.settings.voxel_size_m))
     return surfaces(plan, total, [part.views() for part in parts], sensor)
 
 
-def surfaces(plan: Plan, total: VoxelAccumulator, views: Sequence[FreeViews], sensor: SensorInfo) -> Merged:
+def surfaces(plan: BuildPlan, total: VoxelAccumulator, views: Sequence[FreeViews], sensor: SensorInfo) -> Merged:
     """Return the voxels of the sums that are a surface.
 
     Raises:
@@ -78,7 +78,7 @@ def surfaces(plan: Plan, total: VoxelAccumulator, views: Sequence[FreeViews], se
 
 
 def write(
-    plan: Plan,
+    plan: BuildPlan,
     up: EstimatedUp,
     floor: EstimatedFloor,
     parts: Sequence[MapPart],
@@ -104,7 +104,7 @@ def write(
 
 
 def manifest_of(
-    plan: Plan,
+    plan: BuildPlan,
     up: UpInfo,
     ground: GroundInfo,
     content: MapContent,
@@ -122,7 +122,7 @@ def manifest_of(
         up=up,
         ground=ground,
         rig=RigInfo.of(plan.recording.rig),
-        profile=plan.used.name,
+        profile=plan.encoders.name,
         models=plan.models,
         settings=plan.settings,
         sensor=merged.sensor,
@@ -154,7 +154,7 @@ def _recording_info(recording: Recording) -> RecordingInfo:
     )
 
 
-def _notices(plan: Plan, up: UpInfo, ground: GroundInfo, bad: int) -> Iterator[str]:
+def _notices(plan: BuildPlan, up: UpInfo, ground: GroundInfo, bad: int) -> Iterator[str]:
     if up.known_from == "camera":
         yield "The up direction is a guess from how the camera was held: too little smooth surface is in view."
     elif up.support < _GUESS:

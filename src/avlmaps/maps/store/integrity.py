@@ -63,7 +63,7 @@ def _remembered(folder: Path) -> dict[str, Stamp]:
         return {}
 
 
-class Guard:
+class IntegrityCheck:
     """Watches over the large files of an opened map."""
 
     def __init__(self, folder: Path, files: Mapping[str, FileInfo], *, trusting: bool = True) -> None:

@@ -19,7 +19,7 @@ from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.store.array_files import MEND, FileInfo, read_array, verify_file
 from avlmaps.maps.store.array_validation import array_fields, check_extent, check_order, content_fault, validate_arrays
 from avlmaps.maps.store.consistency import arrays_fault
-from avlmaps.maps.store.integrity import Guard
+from avlmaps.maps.store.integrity import IntegrityCheck
 from avlmaps.maps.store.lock import is_locked
 from avlmaps.maps.store.manifest import GroundInfo, MapInfo
 from avlmaps.maps.store.manifest_file import MANIFEST, RESTORE, parse_manifest, read_manifest
@@ -65,7 +65,7 @@ class StoredMap:
         arrays: of the files as they are; ``voxels`` and the like are those that are known to be whole.
         encoders: which models perceived.
         rig: the recording's cameras.
-        guard: watches over the large files.
+        integrity: watches over the large files.
     """
 
     path: Path
@@ -75,7 +75,7 @@ class StoredMap:
     arrays: MapArrays
     encoders: Encoders
     rig: Rig
-    guard: Guard
+    integrity: IntegrityCheck
 
     @property
     def voxels(self) -> Voxels:
@@ -99,7 +99,7 @@ class StoredMap:
 
     @property
     def _whole(self) -> MapArrays:
-        self.guard.require_whole()
+        self.integrity.require_whole()
         return self.arrays
 
     def __repr__(self) -> str:
@@ -229,17 +229,17 @@ def _opened(path: Path, info: MapInfo, verify: bool) -> StoredMap:
         counts.sounds,
     ):
         raise MapError(f"{path / MANIFEST} is damaged: its counts are not those of the arrays; restore it from a copy.")
-    guard = Guard(path, names, trusting=not verify)
+    integrity = IntegrityCheck(path, names, trusting=not verify)
     check_extent(np.asarray(voxels.index), grid.voxel_size_m, f"{path}/voxels")
     if fault := arrays_fault(info, voxels, keyframes, sounds):
-        guard.require_whole()  # a file that is not what was written is the better reason
+        integrity.require_whole()  # a file that is not what was written is the better reason
         raise MapError(f"{path} is damaged: {fault}; {RESTORE}.")
     if verify:
-        guard.require_whole()
+        integrity.require_whole()
         check_order(voxels, f"{path}/voxels")
     state = {name.removeprefix(STATE): array for name, array in arrays.items() if name.startswith(STATE)}
     whole = MapArrays(voxels, keyframes, state, sounds)
-    return StoredMap(path, info, grid, info.up.vector(), whole, encoders_of_map(info), rig, guard)
+    return StoredMap(path, info, grid, info.up.vector(), whole, encoders_of_map(info), rig, integrity)
 
 
 def _of(arrays: Mapping[str, np.ndarray], kind: type, prefix: str) -> dict[str, Any]:

@@ -25,7 +25,7 @@ from avlmaps.query.instances import (
 )
 from avlmaps.query.object_settings import ObjectSettings
 from avlmaps.query.unknown_names import unknown_note
-from avlmaps.query.words import EncodedWord, Scored, scored_once
+from avlmaps.query.words import EncodedWord, Scored, scorer_of
 
 
 def object_factor(voxels: FeatureVoxels, part: Part, heat: HeatSettings) -> NearThings:
@@ -101,7 +101,7 @@ class _Search:
     @cached_property
     def _scored(self) -> Callable[[float], Scored]:
         voxels = self.voxels
-        return scored_once(voxels.feature, voxels.encoder, voxels.rivals, self.word, voxels.settings)
+        return scorer_of(voxels.feature, voxels.encoder, voxels.rivals, self.word, voxels.settings)
 
     @cached_property
     def _confident(self) -> Segmentation:

@@ -12,7 +12,7 @@ import numpy as np
 from avlmaps.core.arrays import Bool, Float16, Float32, Int
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder
 from avlmaps.query import loops
-from avlmaps.query.words import EncodedWord, Rivals, Vocabulary
+from avlmaps.query.words import ClosestWords, EncodedWord, Vocabulary
 
 # Features are rounded to float16, so that their squares add up to 1 within this.
 _HALF = 0.01
@@ -23,7 +23,7 @@ _MOST_PICKED = 0.5
 
 
 @dataclass(frozen=True)
-class KnownRivals(Vocabulary):
+class KnownClosestWords(Vocabulary):
     """A vocabulary of all names of an encoder, and its two words closest to the voxels where they are known.
 
     Attributes:
@@ -56,7 +56,7 @@ class KnownRivals(Vocabulary):
         told = vocabulary.words, vocabulary.word_feature, vocabulary.understood, vocabulary.has_other
         return cls(*told, *closest, np.ones(len(closest[0]), np.bool_))
 
-    def rivals_at(self, feature: Float16[np.ndarray, "n d"], rows: Int[np.ndarray, " m"]) -> Rivals:
+    def rivals_at(self, feature: Float16[np.ndarray, "n d"], rows: Int[np.ndarray, " m"]) -> ClosestWords:
         """Return the two words closest to some voxels, computing those that are not known."""
         missing = rows[~self.known[rows]]
         if len(missing):
@@ -64,20 +64,20 @@ class KnownRivals(Vocabulary):
             for kept, found in zip(self._closest, closest, strict=True):
                 kept[missing] = found
             self.known[missing] = True
-        return Rivals(*self._told, *(kept[rows] for kept in self._closest))
+        return ClosestWords(*self._told, *(kept[rows] for kept in self._closest))
 
     @property
     def is_whole(self) -> bool:
         """Whether they are known at every voxel."""
         return bool(self.known.all())
 
-    def whole(self, feature: Float16[np.ndarray, "n d"]) -> Rivals:
+    def whole(self, feature: Float16[np.ndarray, "n d"]) -> ClosestWords:
         """Return the two words closest to every voxel."""
         if not self.is_whole:
             for kept, found in zip(self._closest, loops.two_closest(feature, self.word_feature), strict=True):
                 kept[:] = found
             self.known[:] = True
-        return Rivals(*self._told, *self._closest)
+        return ClosestWords(*self._told, *self._closest)
 
     def scores_at(
         self, feature: Float16[np.ndarray, "n d"], encoded: EncodedWord, rows: Int[np.ndarray, " m"]
