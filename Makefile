@@ -30,6 +30,9 @@ FAST := tests/core tests/test_imports.py tests/test_conventions.py tests/query/t
   tests/query/test_pieces.py tests/maps/test_grid.py tests/navigate/test_planner.py tests/perception/test_codes.py \
   tests/perception/test_matching.py tests/language/test_program_run.py tests/cli/test_help.py
 
+# The further Pythons that `make dist-test` tries; each needs the locked dependencies once, from the network.
+PYTHONS ?=
+
 .PHONY: help demo test test-most test-fast dist-test test-kernels bounds test-foundation test-ros1 faults-ros1 types-foundation test-ros2 faults-ros2 python312 lint format pictures docs fuzz bench train lock clean
 
 help:  ## Show what can be made.
@@ -56,7 +59,7 @@ test-fast: $(READY)  ## Run the quick tests: core, imports, laws of the query, p
 	$(RUN)/python -m pytest -q -n 2 --dist loadfile -m "not slow and not shared" $(FAST)
 
 dist-test: $(READY)  ## Build wheels and sdists of all three, and try them in empty environments (build/dist-test, offline).
-	$(RUN)/python tests/helpers/dist_smoke.py build/dist-test
+	$(RUN)/python tests/helpers/dist_smoke.py build/dist-test $(PYTHONS)
 
 bounds: $(READY)  ## Run 100,000 random programs; print the worst processor time and the memory (20 minutes).
 	$(RUN)/python tests/helpers/program_bounds.py 100000 1

@@ -3,7 +3,7 @@
 python benchmarks/light.py [--models DIR] [--threads 2] [--repeats 5] [--json]
 
 Without --models the files are exported into a temporary folder from checkpoints of the published sizes with random
-weights (speed is the same): that takes some minutes and needs avlmaps[foundation,training].
+weights (speed is the same): that takes some minutes and needs avlmaps[training] and avlmaps-models[foundation].
 """
 
 import timing

@@ -29,6 +29,7 @@ ERRORS = (
     (("go", "nowhere.avlmap", "go to the chair", "--scene", "house:7"), 1, "map"),
     (("go", "MAP", "gabble gabble the", "--scene", "house:7"), 1, "unclear"),
     (("things", "nowhere.avlmap"), 1, "map"),
+    (("rooms", "nowhere.avlmap"), 1, "map"),
     (("shell", "nowhere.avlmap"), 1, "map"),
     (("serve", "nowhere.avlmap"), 1, "map"),
     (("view", "nowhere.avlmap"), 1, "map"),
@@ -126,7 +127,7 @@ def test_a_cold_cache_is_announced_once_and_a_warm_one_not(tmp_path: Path) -> No
 
 def test_verbs_that_run_compiled_loops_say_so(run, monkeypatch: pytest.MonkeyPatch) -> None:
     compile_something = {
-        "demo", "record", "build", "locate", "go", "bench", "things", "export", "shell", "serve", "view"
+        "demo", "record", "build", "locate", "go", "bench", "things", "rooms", "export", "shell", "serve", "view"
     }  # fmt: skip
     assert {name for name, verb in VERBS.items() if verb.compiles} == compile_something
     assert not Verb.compiles
