@@ -39,7 +39,8 @@ def start(room: Path) -> Iterator[Start]:
 
     def go(*words: object) -> tuple[subprocess.Popen[str], dict[str, Any]]:
         command = [sys.executable, "-m", "avlmaps", "serve", str(room), "--json", *map(str, words)]
-        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        as_a_user = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+        process = subprocess.Popen(command, env=as_a_user, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         running.append(process)
         assert process.stdout is not None
         line = process.stdout.readline()

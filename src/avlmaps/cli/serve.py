@@ -1,6 +1,7 @@
 """`avlmaps serve`: answer programs by HTTP and agents by MCP."""
 
 import logging
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar
@@ -118,6 +119,7 @@ def serve(verb: "Serve") -> None:
                 lines.append(f"driving {driving.robot} at {url}/drive (agents: {url}/drive/mcp, log: {driving.log})")
                 answer |= {"drive": f"{url}/drive", "robot": driving.robot, "log": str(driving.log)}
             emit(answer, lines, verb.json)
+            sys.stdout.flush()  # a program that started the server reads its address from a pipe
 
         try:
             if driving is None:
