@@ -397,3 +397,11 @@ def test_the_focal_length_of_an_uploaded_photo_is_that_of_its_exif(client: TestC
     given = {"intrinsics": "160,160,120,90"}
     sure = client.post("/maps/room/locate", files={"photo": stream.getvalue()}, data=given).json()
     assert noted["focal_from"] in ("exif", "photo") and sure["focal_from"] == "given"
+
+
+def test_a_query_takes_a_photo_with_the_intrinsics_of_its_camera(client: TestClient, photo: bytes) -> None:
+    sent = {"sentence": "the red thing near this photo"}
+    plain = client.post("/maps/room/ask", files={"photo": photo}, data=sent)
+    given = client.post("/maps/room/ask", files={"photo": photo}, data={**sent, "intrinsics": "160,160,120,90"})
+    assert plain.status_code == given.status_code == 200, given.text
+    assert given.json()["goals"] == plain.json()["goals"], "they are the map's own"

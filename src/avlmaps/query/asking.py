@@ -125,11 +125,15 @@ class Files:
 
     def _shape(self, picture: str) -> tuple[int, int]:
         from avlmaps.query.modalities.image import read_picture
+        from avlmaps.query.queryable import Photo
 
-        attached = None if self.attachments is None else self.attachments.get(picture)
-        if self.attachments is not None and not isinstance(attached, np.ndarray):
+        if self.attachments is None:
+            return read_picture(Path(picture).expanduser()).shape[:2]
+        attached = self.attachments.get(picture)
+        rgb = attached.rgb if isinstance(attached, Photo) else attached
+        if not isinstance(rgb, np.ndarray):
             raise AskError("Intrinsics belong to a photo; there is none.")
-        return (read_picture(Path(picture).expanduser()) if attached is None else np.asarray(attached)).shape[:2]
+        return rgb.shape[:2]
 
 
 def ask(avlmap: "Queryable", asked: Asked, files: Files | None = None) -> Answer:
