@@ -13,7 +13,7 @@ import numpy as np
 
 from avlmaps.maps.grid import GridSpec
 from avlmaps.query.factors import anchor_heat, object_heat
-from avlmaps.query.loops import feature_scores, margins
+from avlmaps.query.scores import feature_scores, margins
 from avlmaps.query.voxel_space import Space
 from avlmaps.query.words import ClosestWords
 

@@ -154,7 +154,7 @@ class FloorPlan:
 
         Every cell of a wall is a region by itself.
         """
-        from avlmaps.query.loops import connected
+        from avlmaps.query.components import connected
 
         a, b = self._neighbours
         same = label[a] == label[b]

@@ -11,7 +11,8 @@ import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Float16, Float32, Int, UInt8
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder, ScaledEncoder
-from avlmaps.query import loops, oversize
+from avlmaps.query import oversize
+from avlmaps.query.components import connected, distinct, linked
 from avlmaps.query.object_settings import ObjectSettings
 from avlmaps.query.synonyms import is_open
 from avlmaps.query.things_in_rooms import NO_ROOMS, RoomEvidence, with_rooms
@@ -178,8 +179,8 @@ def threshold_in_company(voxels: FeatureVoxels, scored: Scored, taken: Int[np.nd
 
 
 def link(space: Space, counting: Scored, link_m: float) -> Instances:
-    """Return the connected components of voxels: those no farther apart than ``link_m`` along every axis."""
-    instance = loops.linked(np.asarray(space.index)[counting.rows], _reach(space, link_m))
+    """Return the connected components of voxels, not scored: no farther apart than ``link_m`` along every axis."""
+    instance = linked(np.asarray(space.index)[counting.rows], _reach(space, link_m))
     unscored = np.zeros(int(instance.max(initial=-1)) + 1, np.float32)
     return Instances(counting.rows, instance, counting.margin, counting.score, unscored)
 
@@ -214,7 +215,7 @@ def score(
 
 
 def join(space: Space, found: Instances, link_m: float, join_m: float) -> Instances:
-    """Return instances of which those over one another are one, not scored; the same object where none are."""
+    """Join instances that lie over one another; return them unscored, or the same object where none do."""
     which = joined_columns(_points(space, found), found.instance, link_m, join_m)
     return found if len(found) == which.max(initial=-1) + 1 else found.relabelled(which[found.instance])
 
@@ -222,11 +223,11 @@ def join(space: Space, found: Instances, link_m: float, join_m: float) -> Instan
 def cut(
     space: Space, found: Instances, longest_m: float, link_m: float
 ) -> tuple[Instances, Float[np.ndarray, " i"] | None]:
-    """Return instances of which those that are too long are cut where they score least, not scored.
+    """Cut instances that are too long for a thing of their name, where their voxels score least.
 
     Returns:
-        The instances, the same object where none is cut; and how long each counts as: a piece is as doubtful as what
-        it was cut from.
+        The instances, unscored, or the same object where none is cut; and how long each counts as: a piece is as
+        doubtful as what it was cut from.
     """
     if not (math.isfinite(longest_m) and len(found)):
         return found, None
@@ -264,17 +265,17 @@ def joined_columns(
     column -= column.min(axis=0, initial=0)
     cell = column[:, 0] * (column[:, 1].max(initial=0) + 1) + column[:, 1]
     cells = int(cell.max(initial=0)) + 1
-    columns = np.bincount(loops.distinct(instance * cells + cell) // cells, minlength=count)
+    columns = np.bincount(distinct(instance * cells + cell) // cells, minlength=count)
     order = np.lexsort((points_level[:, 2], cell))
     below, above = order[:-1], order[1:]
     near = (cell[below] == cell[above]) & (points_level[above, 2] - points_level[below, 2] <= join_m)
     meeting = near & (instance[below] != instance[above])
     a, b = np.sort(np.stack([instance[below], instance[above]])[:, meeting], axis=0)
     pairs, pair = np.unique(a * count + b, return_inverse=True)
-    times = np.bincount(loops.distinct(pair * cells + cell[below][meeting]) // cells, minlength=len(pairs))
+    times = np.bincount(distinct(pair * cells + cell[below][meeting]) // cells, minlength=len(pairs))
     a, b = np.divmod(pairs, max(count, 1))
     same = 2 * times >= np.minimum(columns[a], columns[b])
-    return loops.connected(count, a[same], b[same])
+    return connected(count, a[same], b[same])
 
 
 def margin_confidence(
@@ -305,7 +306,7 @@ def named_confidence(
 
 
 def longest_of(voxels: FeatureVoxels, word: EncodedWord) -> float:
-    """Return the length from which an instance is too long for what is most meant, metres; infinity where unknown."""
+    """Return the length from which an instance is too long for the word's likeliest names, metres; or infinity."""
     encoder, settings = voxels.encoder, voxels.settings
     if not isinstance(encoder, NamedPixelEncoder) or settings.too_long <= 0.0 or not word.name_weights.any():
         return math.inf

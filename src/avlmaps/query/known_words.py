@@ -11,7 +11,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Bool, Float16, Float32, Int
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder
-from avlmaps.query import loops
+from avlmaps.query import scores
 from avlmaps.query.words import ClosestWords, EncodedWord, Vocabulary
 
 # Features are rounded to float16, so that their squares add up to 1 within this.
@@ -43,7 +43,7 @@ class KnownClosestWords(Vocabulary):
     @classmethod
     def of(cls, vocabulary: Vocabulary, count: int) -> Self:
         """Return a vocabulary of which nothing is known yet, for a map of ``count`` voxels."""
-        word = loops.word_type(len(vocabulary.words))
+        word = scores.word_type(len(vocabulary.words))
         return cls(
             vocabulary.words, vocabulary.word_feature, vocabulary.understood, vocabulary.has_other,
             np.empty(count, np.float32), np.empty(count, word), np.empty(count, np.float32), np.empty(count, word),
@@ -51,7 +51,7 @@ class KnownClosestWords(Vocabulary):
         )  # fmt: skip
 
     @classmethod
-    def known_everywhere(cls, vocabulary: Vocabulary, closest: loops.Closest) -> Self:
+    def known_everywhere(cls, vocabulary: Vocabulary, closest: scores.Closest) -> Self:
         """Return a vocabulary of which the two words closest to every voxel are known."""
         told = vocabulary.words, vocabulary.word_feature, vocabulary.understood, vocabulary.has_other
         return cls(*told, *closest, np.ones(len(closest[0]), np.bool_))
@@ -60,7 +60,7 @@ class KnownClosestWords(Vocabulary):
         """Return the two words closest to some voxels, computing those that are not known."""
         missing = rows[~self.known[rows]]
         if len(missing):
-            closest = loops.two_closest(np.ascontiguousarray(feature[missing]), self.word_feature)
+            closest = scores.two_closest(np.ascontiguousarray(feature[missing]), self.word_feature)
             for kept, found in zip(self._closest, closest, strict=True):
                 kept[missing] = found
             self.known[missing] = True
@@ -74,7 +74,7 @@ class KnownClosestWords(Vocabulary):
     def whole(self, feature: Float16[np.ndarray, "n d"]) -> ClosestWords:
         """Return the two words closest to every voxel."""
         if not self.is_whole:
-            for kept, found in zip(self._closest, loops.two_closest(feature, self.word_feature), strict=True):
+            for kept, found in zip(self._closest, scores.two_closest(feature, self.word_feature), strict=True):
                 kept[:] = found
             self.known[:] = True
         return ClosestWords(*self._told, *self._closest)
@@ -85,12 +85,12 @@ class KnownClosestWords(Vocabulary):
         """Return the score of a word at some voxels; that of a name which is one of the two closest is known."""
         own: Int[np.ndarray, " o"] = np.flatnonzero((self.word_feature @ encoded.rows.T > 1.0 - 1e-6).any(axis=1))
         if len(encoded.rows) != 1 or len(own) != 1:
-            return loops.feature_scores(feature, encoded.rows, rows)
+            return scores.feature_scores(feature, encoded.rows, rows)
         first: Bool[np.ndarray, " m"] = self.best_word[rows] == own[0]
         second: Bool[np.ndarray, " m"] = self.second_word[rows] == own[0]
         score = np.where(first, self.best[rows], self.second[rows])
         others = np.flatnonzero(~(first | second) | ~self.known[rows])
-        score[others] = loops.feature_scores(feature, encoded.rows, rows[others])
+        score[others] = scores.feature_scores(feature, encoded.rows, rows[others])
         return score
 
     def contenders(

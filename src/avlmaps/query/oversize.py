@@ -10,7 +10,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Float, Float32, Int
 from avlmaps.core.lexicon import Kind, lexicon
-from avlmaps.query import loops
+from avlmaps.query.components import linked
 
 # The log-odds fall by this times ln of how many times too long an instance is: twice what they rise by with its area.
 _COST = 1.6
@@ -118,7 +118,7 @@ def _pieces(
 
 
 def _connected(index: Int[np.ndarray, "a 3"], rows: Int[np.ndarray, " m"], reach: int) -> list[Int[np.ndarray, " p"]]:
-    label = loops.linked(index[rows], reach)
+    label = linked(index[rows], reach)
     parts = np.split(rows[np.argsort(label, kind="stable")], np.cumsum(np.bincount(label))[:-1])
     return [part for part in parts if len(part) >= _FEWEST_VOXELS]
 

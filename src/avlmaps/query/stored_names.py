@@ -6,18 +6,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from avlmaps.maps.store.derived import Derivation
-from avlmaps.query.loops import Closest, word_type
+from avlmaps.query.scores import Closest, word_type
 from avlmaps.query.words import Vocabulary
 
 if TYPE_CHECKING:
     from avlmaps.maps.store.reader import StoredMap
 
-_MODULES = ("avlmaps.query.loops", "avlmaps.query.stored_names")
+_MODULES = ("avlmaps.query.scores", "avlmaps.query.stored_names")
 _COLUMNS = ("best", "best_word", "second", "second_word")
 
 
 def read_closest(stored: "StoredMap", vocabulary: Vocabulary) -> Closest | None:
-    """Return what ``loops.two_closest`` gives for all voxels, where it is stored."""
+    """Return what ``scores.two_closest`` gives for all voxels, where it is stored."""
     place = _place(stored, vocabulary)
     arrays = None if place is None else place.read()
     if arrays is None or set(arrays) != set(_COLUMNS):

@@ -13,7 +13,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Bool, Float16, Float32, Int
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder
-from avlmaps.query import loops
+from avlmaps.query import scores
 from avlmaps.query.object_settings import ObjectSettings
 from avlmaps.query.synonyms import is_a, is_open
 
@@ -108,7 +108,7 @@ class Vocabulary:
         self, feature: Float16[np.ndarray, "n d"], encoded: "EncodedWord", rows: Int[np.ndarray, " m"]
     ) -> Float32[np.ndarray, " m"]:
         """Return the score of a word at some voxels of a map."""
-        return loops.feature_scores(feature, encoded.rows, rows)
+        return scores.feature_scores(feature, encoded.rows, rows)
 
     def contenders(
         self, encoder: PixelEncoder, encoded: "EncodedWord", silent: Bool[np.ndarray, " v"], share: float
@@ -145,7 +145,7 @@ class ClosestWords(Vocabulary):
     @classmethod
     def among(cls, feature: Float16[np.ndarray, "n d"], rivals: Vocabulary) -> "ClosestWords":
         """Score voxels against an encoded vocabulary."""
-        closest = loops.two_closest(feature, rivals.word_feature)
+        closest = scores.two_closest(feature, rivals.word_feature)
         return cls(rivals.words, rivals.word_feature, rivals.understood, rivals.has_other, *closest)
 
     def taken(self, rows: Int[np.ndarray, " m"]) -> "ClosestWords":
@@ -191,7 +191,7 @@ def object_margins(
         silent: which of the rivals' words do not compete.
         least_score: what the word must beat besides where ``other`` has no feature.
     """
-    score = loops.feature_scores(feature, word_rows)
+    score = scores.feature_scores(feature, word_rows)
     return _beaten(score, feature, np.arange(len(score)), rivals, silent, least_score), score
 
 
@@ -215,7 +215,7 @@ def _beaten(
     """
     floor = float(np.float32(-np.inf if rivals.has_other else least_score))
     closest = rivals.best, rivals.best_word, rivals.second, rivals.second_word
-    out, unsure = loops.margins(score, closest, silent, floor)
+    out, unsure = scores.margins(score, closest, silent, floor)
     thirds = np.flatnonzero(unsure)
     if len(thirds) and not silent.all():
         others = rivals.word_feature[~silent].T
@@ -233,7 +233,7 @@ def scorer_of(
     encoded: EncodedWord,
     settings: ObjectSettings,
 ) -> Callable[[float], Scored]:
-    """Return what gives the voxels where a word scores at least a share of its best rival, and maybe others.
+    """Return a function that gives the voxels where a word scores at least a share of its best rival, maybe others.
 
     Where the ``ClosestWords`` of all voxels are known, they are all voxels. Else the encoder is one of names: voxels
     with little of the word are not compared with its rivals, and where the closest words are known before
@@ -246,15 +246,15 @@ def scorer_of(
         return lambda share: everywhere
 
     @cache
-    def scores() -> Float32[np.ndarray, " n"]:
-        return loops.feature_scores(feature, encoded.rows)
+    def score_of_all() -> Float32[np.ndarray, " n"]:
+        return scores.feature_scores(feature, encoded.rows)
 
     @cache
     def at_least(share: float) -> Scored:
         rows = rivals.contenders(encoder, encoded, silent, share)
         if rows is None:
-            rows = np.flatnonzero(scores() > least_score_to_count(len(rivals.words), share))
-            score = scores()[rows]
+            rows = np.flatnonzero(score_of_all() > least_score_to_count(len(rivals.words), share))
+            score = score_of_all()[rows]
         else:
             score = rivals.scores_at(feature, encoded, rows)
         near = rivals.rivals_at(feature, rows)

@@ -56,7 +56,7 @@ def _through(
 
 
 def seen_through(through: Int32[np.ndarray, " n"], views: Int32[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
-    """Return which voxels are none, because too many frames see through them, beside those that hit them."""
+    """Return which voxels are no surface: too many frames see through them, compared with those that hit them."""
     return (through >= FEWEST_THROUGH) & (through > THROUGH_SHARE * views)
 
 

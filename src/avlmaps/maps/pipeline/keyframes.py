@@ -51,7 +51,7 @@ class KeyframeResult:
 
 
 def describe_keyframes(plan: BuildPlan, parts: Sequence[MapPart]) -> KeyframeResult:
-    """Choose keyframes among the frames that were fused, and look at them."""
+    """Choose keyframes among the fused frames, and describe them: keypoints, place and view."""
     fused = fused_frames(parts)
     good = Subset(plan.recording, fused)
     chosen = select_keyframes(good, plan.settings.keyframes)
@@ -60,10 +60,10 @@ def describe_keyframes(plan: BuildPlan, parts: Sequence[MapPart]) -> KeyframeRes
     key = key_of("keyframes", BUILD_VERSION, plan.recording.fingerprint, settings, seed, cards, fused[chosen].tolist())
     home = plan.folder("keyframes", key)
     place_state, local, learning_s = _learn(plan, good, chosen, key)
-    size = max(1, plan.settings.frames.per_part // 4)  # looking takes longer than fusing
+    size = max(1, plan.settings.frames.per_part // 4)  # describing takes longer than fusing
     lots = {home / f"{start:08d}": chosen[start : start + size] for start in range(0, len(chosen), size)}
     missing = {folder: lot for folder, lot in lots.items() if find_checkpoint(folder, _Facts, key) is None}
-    _look(plan, good, missing, len(chosen), place_state, local, key)
+    _describe_lots(plan, good, missing, len(chosen), place_state, local, key)
     kept = [load_checkpoint(folder, _Facts, key) for folder in lots]
     pieces = [validate_arrays(Keyframes, lot.arrays, str(lot.folder)) for lot in kept]
     return KeyframeResult(concat_keyframes(pieces), place_state, learning_s + sum(lot.facts.elapsed_s for lot in kept))
@@ -85,7 +85,7 @@ def _learn(
     return found.arrays, local, found.facts.elapsed_s
 
 
-def _look(
+def _describe_lots(
     plan: BuildPlan,
     good: Recording,
     lots: dict[Path, Int[np.ndarray, " k"]],

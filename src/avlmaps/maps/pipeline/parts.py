@@ -95,7 +95,7 @@ def merge_parts(folders: Sequence[Path | str], out: Path | str) -> MapPart:
 
 
 def sum_parts(parts: Sequence[MapPart], grid: GridSpec) -> VoxelAccumulator:
-    """Add the sums of parts, in the order given; in memory is only the total."""
+    """Add the sums of parts, in the order given; only the total is in memory."""
     total = VoxelAccumulator(grid, parts[0].sums().feature_sum.shape[1])
     for part in parts:
         total.merge(part.sums())

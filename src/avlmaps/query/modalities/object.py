@@ -117,7 +117,7 @@ class _Search:
         return self._factor(self._uncertain(self.voxels.settings))
 
     def _coloured(self, found: Segmentation) -> Segmentation:
-        """Return instances that are as much less likely as they lack the colour that was named."""
+        """Return instances with a confidence that falls as their voxels lack the colour that was named."""
         if self.colour is None or self.voxels.rgb is None:
             return found
         one = found.instances

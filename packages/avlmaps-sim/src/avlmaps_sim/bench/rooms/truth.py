@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from avlmaps.query.components import connected
 from avlmaps.query.doorways import WIDEST_M
-from avlmaps.query.loops import connected
 from avlmaps.query.raster import dilated
 from avlmaps_sim.scene import Area
 

@@ -6,8 +6,9 @@ from hypothesis import strategies as st
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from avlmaps.query import loops
-from avlmaps.query.loops import connected, feature_scores, linked, margins, two_closest
+from avlmaps.query import scores as of_voxels
+from avlmaps.query.components import connected, linked
+from avlmaps.query.scores import feature_scores, margins, two_closest
 
 
 @settings(max_examples=40, deadline=None)
@@ -26,7 +27,7 @@ def test_the_two_closest_words_are_those_of_a_stable_sort(voxels: int, words: in
             np.testing.assert_array_equal(score, np.take_along_axis(scores, order, axis=1)[:, place])
         else:
             assert set(number) <= {-1} and set(score) <= {-np.inf}
-        assert number.dtype == loops.word_type(words)
+        assert number.dtype == of_voxels.word_type(words)
 
 
 @settings(max_examples=40, deadline=None)
@@ -45,11 +46,20 @@ def test_many_rows_are_scored_as_few(monkeypatch) -> None:
     rng = np.random.default_rng(0)
     feature, words = rng.normal(size=(700, 9)).astype(np.float16), rng.normal(size=(5, 9)).astype(np.float32)
     whole, closest = feature_scores(feature, words[:1]), two_closest(feature, words)
-    monkeypatch.setattr(loops, "_WIDENED", 13)
-    monkeypatch.setattr(loops, "_LEAST_SHARED", 100)
+    monkeypatch.setattr(of_voxels, "_WIDENED", 13)
+    monkeypatch.setattr(of_voxels, "_LEAST_SHARED", 100)
     np.testing.assert_allclose(feature_scores(feature, words[:1]), whole, atol=1e-6)
     for one, other in zip(two_closest(feature, words), closest, strict=True):
         np.testing.assert_allclose(one, other, atol=1e-6)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(1, 5000), st.integers(1, 4), st.integers(0, 2**32 - 1))
+def test_equal_features_score_the_same_wherever_they_stand(count: int, words: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    feature = np.repeat(rng.normal(size=(1, 128)).astype(np.float16), count, axis=0)
+    word = rng.normal(size=(words, 128)).astype(np.float32)
+    assert len(np.unique(feature_scores(feature, word))) == 1
 
 
 def test_every_half_is_widened_exactly() -> None:
