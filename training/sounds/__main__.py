@@ -41,7 +41,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=ROOT, help="the checkout to write weights and figures into")
     parser.add_argument("--start", type=Path, default=ROOT / WEIGHTS / "sounds.onnx", help="weights to continue from")
     parser.add_argument("--teacher", type=Path, help="EfficientAT's checkpoint, which guides the fit; none if left out")
-    parser.add_argument("--steps", type=int, default=Settings.steps, help="of each network")
+    parser.add_argument("--steps", type=int, default=Settings().steps, help="of each network")
     parser.add_argument("--each", type=int, default=8, help="synthetic sounds of a kind")
     arguments = parser.parse_args()
     torch.set_num_threads(1)

@@ -24,8 +24,8 @@ START = Calibration(0.07, (0.0, 0.0, 0.0), 0.05, (0.0, 0.0), (0.0, 1.0), (0.0, 0
 
 UNKNOWN_SHARE = 0.2
 RECORDED_COUNT = len(RECORDED)
-ABROAD = 0.5  # of the log-odds, where clips are of another collection: chosen in five homes (README)
-PRESENT = 3.0  # a question names a sound that is there this much more often than a draw among all kinds would
+ABROAD = 0.8  # of the log-odds, where clips are of another collection: chosen in maps (README)
+PRESENT = 2.5  # a question names a sound that is there this much more often than a draw among all kinds would
 
 # Phrases that name no sound; with the kinds' other names they fit what counts as naming one. Not used for testing.
 NO_SOUNDS = (
