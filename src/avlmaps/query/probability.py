@@ -28,11 +28,17 @@ def probability_of(evidence: Evidence, given: Weights | None = None) -> float:
     """Return the probability that a goal with this evidence is right, by the weights that ship or those given."""
     if not evidence.context:
         return round(evidence.alone, 3)  # more digits would be noise
-    own, likely = given or weights(), 1.0
-    for factor in factors_of(evidence):
-        odds = own[f"{factor}_bias"] + sum(own[name] * getattr(evidence, name) for name in FACTORS[factor])
-        likely /= 1.0 + math.exp(-odds)
-    return round(likely, 3)
+    return round(math.prod(factor_values(evidence, given).values()), 3)
+
+
+def factor_values(evidence: Evidence, given: Weights | None = None) -> dict[str, float]:
+    """Return each factor of the probability of a goal of several parts, by its name."""
+    own = given or weights()
+    odds = {
+        factor: own[f"{factor}_bias"] + sum(own[name] * getattr(evidence, name) for name in FACTORS[factor])
+        for factor in factors_of(evidence)
+    }
+    return {factor: 1.0 / (1.0 + math.exp(-value)) for factor, value in odds.items()}
 
 
 def factors_of(evidence: Evidence) -> tuple[str, ...]:

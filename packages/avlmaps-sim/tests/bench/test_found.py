@@ -9,9 +9,11 @@ from hypothesis import strategies as st
 
 from avlmaps.core.lexicon import Kind, lexicon
 from avlmaps.core.question import Modality, Role
+from avlmaps.query.evidence import Evidence as QueryEvidence
+from avlmaps.query.probability import FACTORS, probability_of
 from avlmaps_sim.bench.found.answers import Judged
 from avlmaps_sim.bench.found.queries import FAR_M, NEAR_M, labelled_queries
-from avlmaps_sim.bench.found.suite import brier, draw_reliability, kinds_table, reliability_table
+from avlmaps_sim.bench.found.suite import brier, draw_reliability, factors_table, kinds_table, reliability_table
 from avlmaps_sim.bench.harness.evidence import Event, Evidence
 from avlmaps_sim.bench.indexing.rules import area_tasks, between_m, near_sound_tasks, sound_tasks
 from avlmaps_sim.scene import SceneObject
@@ -102,3 +104,17 @@ def test_the_table_counts_right_wrong_and_absent_apart(tmp_path: Path) -> None:
     ]
     draw_reliability(said, tmp_path / "found.png")
     assert (tmp_path / "found.png").stat().st_size > 5_000
+
+
+@given(st.floats(-4, 4), st.floats(-4, 0), st.floats(0, 2))
+def test_factors_are_means_of_goals_whose_product_is_their_probability(
+    thing: float, room: float, choice: float
+) -> None:
+    of = QueryEvidence(Modality.OBJECT, (Modality.AREA,), 0.5, thing, 0.0, room)
+    p = probability_of(of)
+    rows = factors_table([Judged("home", "area-object", "bed + bedroom", True, True, p, of)] * 3)["rows"]
+    (row,) = [row for row in rows if row[2]]
+    assert row[1] == ("right, found" if p >= 0.5 else "right, not found") and row[2] == 3
+    values = dict(zip(FACTORS, row[3:], strict=True))
+    assert values["near"] == values["marks"] == ""
+    assert float(np.prod([values[name] for name in ("thing", "room")])) == pytest.approx(p, abs=0.02)

@@ -12,6 +12,7 @@ from jaxtyping import Float
 
 from avlmaps.core.files import write_bytes_atomically
 from avlmaps.query.factors import FOUND_AT
+from avlmaps.query.probability import FACTORS, factor_values
 from avlmaps_sim.bench.found.answers import Judged, judged_job
 from avlmaps_sim.bench.harness.intervals import in_percent, wilson
 from avlmaps_sim.bench.harness.provenance import in_words, provenance
@@ -46,7 +47,11 @@ def run_found(settings: IndexingSettings | None, out: Path, open_spec: Callable[
         "suite": "found",
         **provenance(settings, settings.recorded, settings.scenes, weights),
         "note": NOTE,
-        "tables": {"found": kinds_table(answers), "reliability": reliability_table(answers)},
+        "tables": {
+            "found": kinds_table(answers),
+            "factors": factors_table(answers),
+            "reliability": reliability_table(answers),
+        },
     }
     page = f"# Is found true?\n\n{in_words(answer)}\n\n{NOTE}\n\n{markdown(answer['tables'])}"
     written = write_answer(answer, out, page)
@@ -86,6 +91,22 @@ def kinds_table(answers: Sequence[Judged]) -> Table:
         "none there: found",
     ]
     return {"columns": columns, "rows": rows}
+
+
+def factors_table(answers: Sequence[Judged]) -> Table:
+    """Return the mean of each factor of the probability, by kind of query and by what was reported and is true."""
+    rows: list[list[object]] = []
+    for kind in sorted({one.kind for one in answers if one.evidence is not None and one.evidence.context}):
+        groups = {
+            "right, found": [one for one in answers if one.right and one.probability >= FOUND_AT],
+            "right, not found": [one for one in answers if one.right and one.probability < FOUND_AT],
+            "wrong, found": [one for one in answers if not one.right and one.probability >= FOUND_AT],
+        }
+        for name, group in groups.items():
+            own = [factor_values(one.evidence) for one in group if one.kind == kind and one.evidence is not None]
+            means = [[values[factor] for values in own if factor in values] for factor in FACTORS]
+            rows.append([kind, name, len(own), *(round(float(np.mean(each)), 2) if each else "" for each in means)])
+    return {"columns": ["query", "goals", "queries", *FACTORS], "rows": rows}
 
 
 def _share_found(group: Sequence[Judged]) -> str:
