@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from build_fakes import SETTINGS, Corners, Pixels, Places, Walk
+from build_fakes import SETTINGS, Corners, Ears, Pixels, Places, Walk, write_beeps
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -23,6 +23,16 @@ class Words(Pixels):
 
     def encode_words(self, words: list[str]) -> np.ndarray:
         return np.tile(np.float32([0.5, 0.5, 0.5, 0.5]), (len(words), 1))
+
+
+class Hears(Ears):
+    """The fake ears, which can be asked."""
+
+    def score_words(self, sounds: list[np.ndarray], words: list[str]) -> np.ndarray:
+        return np.ones((len(sounds), len(words)), np.float32)
+
+    def score_sounds(self, sounds: list[np.ndarray], asked: np.ndarray) -> np.ndarray:
+        return np.ones(len(sounds), np.float32)
 
 
 class Few(Words):
@@ -67,6 +77,37 @@ def test_it_ends_as_a_build_does_whatever_is_queried_on_the_way(tmp_path: Path, 
     require_same(saved, built)
     require_same(open_stored(tmp_path / "saved", verify=True), built)
     assert saved.info.counts == built.info.counts and saved.info.models == built.info.models
+
+
+def test_sounds_end_as_in_a_build_and_are_there_before(tmp_path: Path) -> None:
+    walk = Walk(22, audio=write_beeps(tmp_path / "track.flac"))
+    used = Encoders("fake", pixels=Words(), local=Corners(), place=Places(), sounds=Hears())
+    built = build_map(walk, tmp_path / "built", used, SETTINGS, progress=False)
+    growing, listed = GrowingMap(SETTINGS, used, walk.up_in_world), []
+    for frame in walk.frames():
+        growing.add(frame)
+        growing.add_audio(walk.audio.read(frame.stamp_s, frame.stamp_s + 0.1), frame.stamp_s)
+        listed.append(len(growing.stored().sounds) if frame.index % 5 == 1 else 0)
+    growing.add_audio(walk.audio.read(2.2, 4.0), 2.2)
+    assert listed[5] == 0 and listed[-1] == 1  # it ends after 0.7 s
+    saved = growing.save(tmp_path / "saved")
+    require_same(saved, built)
+    assert len(saved.sounds) == 2
+    for field in fields(saved.sounds):
+        if field.name != "clips":
+            np.testing.assert_allclose(getattr(saved.sounds, field.name), getattr(built.sounds, field.name), atol=1e-6)
+    clips = [sorted((path / "sounds").glob("*.flac")) for path in (tmp_path / "saved", tmp_path / "built")]
+    assert [file.read_bytes() for file in clips[0]] == [file.read_bytes() for file in clips[1]]
+
+
+@pytest.mark.parametrize("frames", [22, 9])
+def test_the_voxels_of_many_parts_are_those_of_a_build_bit_by_bit(tmp_path: Path, frames: int) -> None:
+    walk, used = Walk(frames), encoders(Words())
+    built = build_map(walk, tmp_path / "built", used, SETTINGS, progress=False)
+    asked = grown(walk, used, frozenset(range(2, frames, 3)), frames=3)
+    made = asked.stored(final=True).voxels
+    for field in fields(made):
+        np.testing.assert_array_equal(getattr(made, field.name), getattr(built.voxels, field.name), err_msg=field.name)
 
 
 @given(

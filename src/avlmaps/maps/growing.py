@@ -4,9 +4,7 @@ Up, the floor and the depth camera are found in the first frames, which wait for
 is that of a build. Of a longer one they are found again each time it has doubled; what was encoded by then stays.
 """
 
-import hashlib
-from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from time import perf_counter
@@ -15,14 +13,16 @@ from typing import Any
 import numpy as np
 
 from avlmaps.core.arrays import Float
-from avlmaps.core.camera import Rig
 from avlmaps.core.errors import BackendError, MapError, RecordingError
 from avlmaps.core.progress import silence_progress
 from avlmaps.core.registry import Kind
+from avlmaps.maps.audio.growing import GrowingSounds
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
-from avlmaps.maps.fusion.free_space import FreeViewCollector
+from avlmaps.maps.fusion.free_space import FreeViewCollector, ThroughCounts, stack_views
+from avlmaps.maps.fusion.voxel_sums import VoxelSums
 from avlmaps.maps.grid import GridSpec
-from avlmaps.maps.keyframes.growing import GrowingKeyframes, PicturedKeyframe
+from avlmaps.maps.growing_walk import HERE, Walk
+from avlmaps.maps.keyframes.growing import FrozenKeyframes, GrowingKeyframes, PicturedKeyframe
 from avlmaps.maps.perceived import as_grid, encode_pixels, require_unit
 from avlmaps.maps.pipeline.estimate import estimate_ground, estimate_sensor, estimate_up
 from avlmaps.maps.pipeline.keyframes import RANDOMNESS
@@ -39,12 +39,12 @@ from avlmaps.maps.store.reader import GIVEN_FEATURES, MapArrays, StoredMap, open
 from avlmaps.maps.store.writer import MapContent, is_map_or_free, write_map
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.protocols import GroundReader
-from avlmaps.recordings.memory import MemoryRecording, frame_digest, same_rig
+from avlmaps.recordings.growing_track import GrowingTrack
+from avlmaps.recordings.memory import same_rig
 from avlmaps.recordings.types import Frame, Ground, Recording
 
 # Features of waiting frames take no more memory than this.
 _MOST_WAITING_BYTES = 5e8
-_HERE = Path("memory")
 # Findings of the floor and up within these are one.
 _SAME_FLOOR_M = 0.05
 _SAME_UP = 0.9994  # cosine of 2 degrees
@@ -60,26 +60,42 @@ class GrowingMap:
     """
 
     def __init__(
-        self, settings: BuildSettings, encoders: Encoders, up_in_world: Float[np.ndarray, "3"] | None = None
+        self,
+        settings: BuildSettings,
+        encoders: Encoders,
+        up_in_world: Float[np.ndarray, "3"] | None = None,
+        *,
+        wait: int | None = None,
+        looks_later: bool = False,
     ) -> None:
         """Begin without frames.
 
         Args:
-            settings: of a build; ``frames`` does not count.
+            settings: of a build; of ``frames`` only ``per_part`` counts.
             encoders: the encoders.
             up_in_world: unit vector; None finds it in the frames.
+            wait: frames in which up, the floor and the sensor are found first; ``gravity.frames`` if None.
+            looks_later: keyframes are looked at by ``finish``, and not when they are added.
         """
         self.settings = settings.for_profile(encoders.weight_variance_m2)
         self.encoders = encoders
         self._given_up = up_in_world
-        self._walk = _Walk(up_in_world)
+        self._walk = Walk(up_in_world)
+        self._wait = min(wait or self.settings.gravity.frames, self.settings.gravity.frames)
         self._waiting: list[_Waiting] = []
         self._left_out: list[BadFrame] = []
         self._sensor: SensorInfo | None = None
         self._ground: Ground | None = None
+        self._upright: tuple[UpInfo, GroundInfo] | None = None
+        # The sums of whole parts, which may be read elsewhere, and of the part that is not: a build adds up likewise.
         self._total: VoxelAccumulator | None = None
+        self._total_is_read = False
+        self._part: VoxelAccumulator | None = None
+        self._part_number = 0
         self._free: FreeViewCollector | None = None
-        self._keyframes = GrowingKeyframes(encoders, self.settings.keyframes)
+        self._through: ThroughCounts | None = None
+        self._keyframes = GrowingKeyframes(encoders, self.settings.keyframes, looks_later=looks_later)
+        self._sounds: GrowingSounds | None = None
         self._dim: int | None = None
         self._rehearsed: dict[int, tuple[Ground, np.ndarray]] | None = None
         self._rehearsal = _Rehearsal()
@@ -120,16 +136,42 @@ class GrowingMap:
             features = self._encoded(frame)
         self._waiting.append((frame, features))
         self._walk.spread(frame, self.settings.gravity.frames)
+        self._walk.pass_by(frame.stamp_s, frame.world_from_camera)
         waiting_bytes = sum(grid.nbytes for _, grid in self._waiting if grid is not None)
-        enough = len(self._waiting) >= self.settings.gravity.frames or waiting_bytes > _MOST_WAITING_BYTES
+        enough = len(self._waiting) >= self._wait or waiting_bytes > _MOST_WAITING_BYTES
         if self._sensor is not None or enough:
             self._settle()
+
+    def add_audio(self, chunk: Any, stamp_s: Any = None) -> None:
+        """Add a piece of sound; see ``GrowingTrack.add``. Another thread may do it.
+
+        Raises:
+            AudioError: it is no sound, of another rate, repeats what came, or is of another clock.
+        """
+        if self._sounds is None:
+            encoder = self.encoders.sounds if Kind.SOUNDS in self.encoders else None
+            self._sounds = GrowingSounds(encoder, self.settings.hearing)
+        self._sounds.add(chunk, stamp_s)
+
+    def pass_by(self, stamp_s: float, world_from_camera: Float[np.ndarray, "4 4"]) -> None:
+        """Take note of where the robot was in a frame that is not added: sounds are placed by it."""
+        self._walk.pass_by(stamp_s, world_from_camera)
+
+    @property
+    def sums(self) -> tuple[VoxelAccumulator, ...]:
+        """The sums until now, of parts that add up to the map; they change with the next frame."""
+        return tuple(part for part in (self._total, self._part) if part is not None)
+
+    @property
+    def sound_track(self) -> GrowingTrack | None:
+        """The track until now, None without one."""
+        return None if self._sounds is None else self._sounds.growing
 
     def stored(self, *, final: bool = False) -> StoredMap:
         """Return the map of the frames that came, in memory.
 
         Args:
-            final: learn places again, as a build does.
+            final: find up, the floor, places and sounds again, as a build does.
 
         Raises:
             MapError: no frame came, or none has a depth within the limits.
@@ -140,13 +182,50 @@ class GrowingMap:
         if self._sensor is None:  # the frames wait on, so that a question changes nothing
             return self._rehearse().stored(final=final)
         self._settle()
-        plan = self._plan()
+        return self.finish(self.freeze(), final=final)
+
+    def freeze(self) -> "FrozenSums":
+        """Return what came until now, which frames to come do not change. It takes the time of a frame.
+
+        Raises:
+            MapError: no frame was added up yet.
+        """
+        if self._part is None or self._free is None or self._sensor is None:
+            if len(self._left_out):
+                raise MapError("Every frame of the map was left out; add one whose features are right.")
+            raise MapError("The map has no frame yet; add one.")
+        self._total_is_read = True
+        clear, pose = self._free.collected()
+        undecided = self._keyframes.undecided if self.encoders.keyframes_only else []
+        encoded = {frame.index for frame in self._keyframes.last()} if undecided else set[int]()
+        return FrozenSums(
+            self._walk.frozen(), list(self._left_out), self._total, self._part.sums(), clear, pose,
+            self._keyframes.freeze(), undecided, encoded,
+        )  # fmt: skip
+
+    def finish(self, came: "FrozenSums", *, final: bool = False, looks_s: float = np.inf) -> StoredMap:
+        """Return the map of what came; another thread may add frames meanwhile, and only one may finish.
+
+        Args:
+            came: from ``freeze``, later than the last time.
+            final: as of ``stored``.
+            looks_s: seconds for keyframes that were not looked at yet; the rest is left for the next time.
+
+        Raises:
+            MapError: none of the frames has a depth within the limits.
+            BackendError: an encoder broke its protocol; the frame is left out.
+        """
+        plan = self._plan(came.walk)
         with silence_progress(True):
-            up, ground = self._upright()
-            content, info = self._content(plan, up, ground, final)
-        rig, grid = self._walk.rig, GridSpec(self.settings.voxel_size_m)
+            if final or self._upright is None:
+                self._upright = self._upright_of(came.walk.held())[:2]
+            content, info = self._content(plan, came, *self._upright, final, looks_s)
+        rig, grid = came.walk.rig, GridSpec(self.settings.voxel_size_m)
         arrays = MapArrays(content.voxels, content.keyframes, content.place_state, content.sounds)
-        return StoredMap(_HERE, info, grid, up.vector(), arrays, self.encoders, rig, IntegrityCheck(_HERE, {}))
+        up = self._upright[0].vector()
+        return StoredMap(
+            content.clips_folder, info, grid, up, arrays, self.encoders, rig, IntegrityCheck(content.clips_folder, {})
+        )
 
     def save(self, path: Path, *, overwrite: bool = False) -> StoredMap:
         """Write the map and open it.
@@ -155,14 +234,10 @@ class GrowingMap:
             MapError: there is nothing to write, the folder is something else, holds a map already (``overwrite``
                 replaces it), or cannot be written.
         """
-        if not is_map_or_free(path):
-            raise MapError(f"{path} is there already and is not a map; give another path, nothing in it was touched.")
-        if (path / MANIFEST).is_file() and not overwrite:
-            raise MapError(f"{path} is a finished map already; give another path, or replace it with overwrite=True.")
+        require_place(path, overwrite)
         made = self.stored(final=True)
-        content = MapContent(made.voxels, made.keyframes, made.place_state, made.sounds, path)
         with lock_folder(path):
-            write_map(path, content, made.info)
+            write_stored(path, made)
         return replace(open_stored(path), encoders=self.encoders)
 
     def _accepted(self, frame: Frame) -> Frame:
@@ -197,6 +272,8 @@ class GrowingMap:
         other._waiting = list(self._waiting)
         for frame, _ in self._waiting:
             other._walk.spread(frame, self.settings.gravity.frames)
+            other._walk.pass_by(frame.stamp_s, frame.world_from_camera)
+        other._sounds = self._sounds
         other._settle()
         return other
 
@@ -217,7 +294,7 @@ class GrowingMap:
             self._dim = self.encoders.card(Kind.PIXELS).dim if Kind.PIXELS in self.encoders else None
         grid = as_grid(features, self._dim, who, frame)
         require_unit(grid, who, frame)
-        if self._total is not None and self._total.dim != grid.shape[2]:
+        if self._part is not None and self._part.dim != grid.shape[2]:
             raise BackendError(f"{frame.name} has features, and the frames before had none; give them with all frames.")
         self._dim = grid.shape[2]
         return np.array(grid)
@@ -229,10 +306,10 @@ class GrowingMap:
         with silence_progress(True):
             if self._sensor is None:
                 held = self._walk.held()
-                self._sensor, self._ground = estimate_sensor(held, self.settings), self._upright_of(held)[2]
+                self._sensor, self._ground = estimate_sensor(held, self.settings), self._find_upright(held)
                 self._rehearsal = _Rehearsal()
             elif self._walk.has_doubled:
-                self._ground = self._upright_of(self._walk.held())[2]
+                self._ground = self._find_upright(self._walk.held())
             faults: list[BackendError] = []
             waiting, self._waiting = self._waiting, []
             for frame, features in waiting:
@@ -250,12 +327,11 @@ class GrowingMap:
         by_encoder = features is None and Kind.PIXELS in self.encoders
         if by_encoder and not self.encoders.keyframes_only:
             features = self._encoded(frame)
-        if self._total is None or self._free is None:
-            self._total = self._empty(sensor)
+        if self._free is None:
             self._free = FreeViewCollector(frame.rig.depth, sensor.model)
+            self._through = ThroughCounts(GridSpec(self.settings.voxel_size_m), frame.rig.depth)
         if not (by_encoder and self.encoders.keyframes_only):
-            self._total.add(frame, features)
-            self._free.add(frame)
+            self._sum(frame, features)
             self._walk.append(frame)
             for _ in self._keyframes.add(frame):
                 pass
@@ -263,15 +339,30 @@ class GrowingMap:
         self._walk.append(frame)
         undecided = self._keyframes.undecided
         for keyframe in self._keyframes.add(frame):
-            decided = [one for one in (*undecided, frame) if one.index <= keyframe.index]
+            for one in (*undecided, frame):
+                if one.index <= keyframe.index:
+                    self._sum(one, self._encoded(one) if one.index == keyframe.index else None)
             undecided = [one for one in (*undecided, frame) if one.index > keyframe.index]
-            self._add_to(self._total, decided, {keyframe.index})
-            for one in decided:
-                self._free.add(one)
 
-    def _add_to(self, total: VoxelAccumulator, frames: Sequence[Frame], encoded: set[int]) -> None:
-        for frame in frames:
-            total.add(frame, self._encoded(frame) if frame.index in encoded else None)
+    def _sum(self, frame: Frame, features: np.ndarray | None) -> None:
+        """Add a frame to its part; the part before it is added to the total, as the parts of a build are."""
+        assert self._sensor is not None and self._free is not None
+        number = frame.index // self.settings.frames.per_part
+        if self._part is None or number != self._part_number:
+            self._end_part()
+            self._part, self._part_number = self._empty(self._sensor), number
+        self._part.add(frame, features)
+        self._free.add(frame)
+
+    def _end_part(self) -> None:
+        if self._part is None:
+            return
+        if self._total is None:
+            self._total = VoxelAccumulator(self._part.grid, self._part.dim)
+        elif self._total_is_read:
+            self._total = self._total.copy()
+        self._total_is_read = False
+        self._total.merge(self._part.sums())
 
     def _empty(self, sensor: SensorInfo) -> VoxelAccumulator:
         if self._dim is None and Kind.PIXELS in self.encoders:
@@ -280,45 +371,99 @@ class GrowingMap:
             GridSpec(self.settings.voxel_size_m), self._dim or 0, self.settings.fusion, sensor.model
         )
 
-    def _upright(self) -> tuple[UpInfo, GroundInfo]:
-        return self._upright_of(self._walk.held())[:2]
+    def _find_upright(self, held: Recording) -> Ground:
+        up, floor, ground = self._upright_of(held)
+        self._upright = up, floor
+        return ground
 
     def _upright_of(self, held: Recording) -> tuple[UpInfo, GroundInfo, Ground]:
         up = estimate_up(held, self.settings)
         ground, info = estimate_ground(held, self.settings, up)
         return up, info, ground
 
-    def _plan(self) -> BuildPlan:
+    def _plan(self, walk: Walk) -> BuildPlan:
         cards = self.encoders.cards()
         models = {kind.value: ModelInfo.of(self.encoders.sources[kind].chosen, card) for kind, card in cards.items()}
         if self._dim is not None and Kind.PIXELS.value not in models:
             models[Kind.PIXELS.value] = ModelInfo(
                 backend=GIVEN_FEATURES, id="features", dim=self._dim, licence="unknown", checksum="", prompts=()
             )
-        key = key_of("growing", BUILD_VERSION, self._walk.fingerprint, self.encoders.name, models, self.settings)
-        return BuildPlan(self._walk, _HERE, self.encoders, self.settings, models, key, "")
+        if self._sounds is not None:
+            walk.audio = self._sounds.track
+        key = key_of("growing", BUILD_VERSION, walk.fingerprint, self.encoders.name, models, self.settings)
+        return BuildPlan(walk, HERE, self.encoders, self.settings, models, key, "")
 
-    def _content(self, plan: BuildPlan, up: UpInfo, ground: GroundInfo, final: bool) -> tuple[MapContent, MapInfo]:
-        total, free, sensor = self._total, self._free, self._sensor
-        if total is None or free is None or sensor is None:
-            raise MapError("Every frame of the map was left out; add one whose features are right.")
-        begin, views = perf_counter(), [free.views()]
-        if self.encoders.keyframes_only and (undecided := self._keyframes.undecided):
-            decided, total = total, self._empty(sensor)
-            total.merge(decided.sums())
-            self._add_to(total, undecided, {frame.index for frame in self._keyframes.last()})
-            more = FreeViewCollector(self._walk.rig.depth, sensor.model)
-            for frame in undecided:
+    def _content(
+        self, plan: BuildPlan, came: "FrozenSums", up: UpInfo, ground: GroundInfo, final: bool, looks_s: float
+    ) -> tuple[MapContent, MapInfo]:
+        sensor, rig = self._sensor, came.walk.rig
+        assert sensor is not None and self._free is not None
+        begin = perf_counter()
+        total = VoxelAccumulator(GridSpec(self.settings.voxel_size_m), came.part.feature_sum.shape[1])
+        total = total if came.total is None else came.total.copy()
+        total.merge(came.part)
+        clear, pose = came.clear, came.pose
+        if came.undecided:
+            others = self._empty(sensor)
+            more = FreeViewCollector(rig.depth, sensor.model)
+            for frame in came.undecided:
+                others.add(frame, self._encoded(frame) if frame.index in came.encoded else None)
                 more.add(frame)
-            views.append(more.views())
-        merged = surfaces(plan, total, views, sensor)
-        keyframes, state = self._keyframes.keyframes(plan.rng(RANDOMNESS), final=final)
-        content = MapContent(merged.voxels, keyframes, state, silence(plan), _HERE)
+            total.merge(others.sums())
+            clear, pose = (one + other for one, other in zip((clear, pose), more.collected(), strict=True))
+        merged = surfaces(plan, total, [stack_views(clear, pose, self._free.shape)], sensor, self._through)
+        keyframes, state = self._keyframes.keyframes(
+            plan.rng(RANDOMNESS), came.keyframes, final=final, within_s=looks_s
+        )
+        clips, sounds = HERE, silence(plan)
+        if self._sounds is not None and Kind.SOUNDS in self.encoders:
+            clips, sounds = self._sounds.clips_folder, self._sounds.heard(came.walk.motion(), final=final)
+        content = MapContent(merged.voxels, keyframes, state, sounds, clips)
         finished = datetime.now(UTC).isoformat(timespec="seconds")
         stages_s = {"growing": begin - self._begin_s, "merging": perf_counter() - begin}
         timings = Timings(finished=finished, elapsed_s=sum(stages_s.values()), stages_s=stages_s)
-        left_out = sorted(self._left_out, key=lambda frame: frame.index)
-        return content, manifest_of(plan, up, ground, content, merged, timings, len(self._walk), left_out)
+        left_out = sorted(came.left_out, key=lambda frame: frame.index)
+        return content, manifest_of(plan, up, ground, content, merged, timings, len(came.walk), left_out)
+
+
+def require_place(path: Path, overwrite: bool) -> None:
+    """Raise ``MapError`` where no map can go: on something else, or on a map that is not to be replaced."""
+    if not is_map_or_free(path):
+        raise MapError(f"{path} is there already and is not a map; give another path, nothing in it was touched.")
+    if (path / MANIFEST).is_file() and not overwrite:
+        raise MapError(f"{path} is a finished map already; give another path, or replace it with overwrite=True.")
+
+
+def write_stored(path: Path, made: StoredMap) -> MapInfo:
+    """Write a map of ``GrowingMap`` into its folder, whose lock the caller holds; see ``write_map``."""
+    return write_map(path, MapContent(made.voxels, made.keyframes, made.place_state, made.sounds, made.path), made.info)
+
+
+@dataclass(frozen=True, slots=True)
+class FrozenSums:
+    """What came to a growing map up to a moment.
+
+    Attributes:
+        walk: stamps and poses.
+        left_out: frames whose features were wrong.
+        total: sums of whole parts; not written to any more.
+        part: sums of the part that is not whole.
+        clear: up to which depth each frame saw freely; see ``FreeViews``.
+        pose: of each of these.
+        keyframes: those that were chosen, and the frames that would be if no other came.
+        undecided: frames that may become keyframes, where only these are encoded.
+        encoded: numbers of those that would.
+    """
+
+    walk: Walk
+    left_out: list[BadFrame]
+    total: VoxelAccumulator | None
+    part: VoxelSums
+    clear: list[np.ndarray]
+    pose: list[np.ndarray]
+    keyframes: FrozenKeyframes
+    undecided: list[Frame]
+    encoded: set[int]
 
 
 class _Rehearsal:
@@ -334,62 +479,3 @@ def _alike(one: Ground, other: Ground, frame: Frame) -> bool:
     pose = frame.world_from_camera
     apart_m = abs(one.camera_height_m(pose) - other.camera_height_m(pose))
     return apart_m <= _SAME_FLOOR_M and float(one.up_in_world @ other.up_in_world) >= _SAME_UP
-
-
-class _Walk(Recording):
-    """The frames of a growing map as a recording: all stamps and poses, and some frames spread over them."""
-
-    def __init__(self, up_in_world: Float[np.ndarray, "3"] | None) -> None:
-        self.path, self.format, self.audio, self.notices = _HERE, "memory", None, ()
-        self.up_in_world = up_in_world
-        self.stamps: list[float] = []
-        self.poses: list[np.ndarray] = []
-        self._held: list[Frame] = []
-        self._stride, self._came, self.has_doubled = 1, 0, False
-        self._digest = hashlib.sha256()
-
-    def rig_or(self, other: Rig) -> Rig:
-        """Return the cameras of the first frame, or of the one that is to be it."""
-        return self.rig if self._held else other
-
-    def spread(self, frame: Frame, most: int) -> None:
-        """Hold a frame if it is one of those spread over the walk, fewer than ``most`` of them."""
-        self.has_doubled, self.rig = False, self.rig_or(frame.rig)
-        if self._came % self._stride == 0:
-            if len(self._held) >= most:
-                self._stride, self._held, self.has_doubled = 2 * self._stride, self._held[::2], True
-            if self._came % self._stride == 0:
-                self._held.append(frame)
-        self._came += 1
-
-    def held(self) -> Recording:
-        """Return the frames that are held."""
-        return MemoryRecording(self._held, self.up_in_world)
-
-    def append(self, frame: Frame) -> None:
-        """Take note of a frame that was fused."""
-        self.stamps.append(frame.stamp_s)
-        self.poses.append(np.asarray(frame.world_from_camera, np.float64))
-        self._digest.update(frame_digest(frame))
-
-    @property
-    def stamps_s(self) -> Float[np.ndarray, " n"]:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """When."""
-        return np.array(self.stamps, np.float64)
-
-    @property
-    def world_from_camera(self) -> Float[np.ndarray, "n 4 4"]:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """From where."""
-        return np.stack(self.poses)
-
-    def frame(self, index: int) -> Frame:
-        """Refuse: frames are not stored."""
-        raise RecordingError(f"Frame {index} is not stored by a growing map.")
-
-    @property
-    def fingerprint(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """A hash of all frames."""
-        return self._digest.hexdigest()
-
-    def __len__(self) -> int:
-        return len(self.stamps)

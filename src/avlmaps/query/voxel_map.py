@@ -33,7 +33,8 @@ class VoxelMap:
     Up, the floor and the depth camera's error are found in the first 60 frames, which are fused then; of a longer walk,
     up and the floor again each time it has doubled. A map of more frames than that can hence differ a little from a
     build's. A question before changes nothing of that, but fuses those frames again. A question after new frames
-    computes the voxels again. The map holds no sounds. Threads may add and ask.
+    computes the voxels again. Sounds are found while they happen, and in ``save`` as a build finds them. Threads may
+    add and ask.
     """
 
     def __init__(
@@ -62,7 +63,7 @@ class VoxelMap:
             raise MapError(f"voxel_size_m must be a number of metres, not {voxel_size_m!r}.")
         chosen = replace(settings or BuildSettings(), voxel_size_m=float(voxel_size_m))
         used = encoders_of("embedded" if encoders is None else encoders)
-        self._growing = GrowingMap(chosen, used, _direction(up_in_world))
+        self._growing = GrowingMap(chosen, used, direction(up_in_world))
         self._query = query
         self._map: AVLMap | None = None
         self._lock = RLock()
@@ -98,6 +99,24 @@ class VoxelMap:
                 stamp_s = 0.0 if last_s is None else last_s + _STEP_S
             frame = given_frame(index, rgb, depth_m, camera, world_from_camera, stamp_s)
             self._growing.add(frame, features)
+            self._map = None
+
+    def add_audio(self, chunk: Any, stamp_s: Any = None) -> None:
+        """Add a piece of the microphone's sound. What is refused leaves the map as it was.
+
+        A question knows the sounds that have been over for a quarter of a second. Which they are can change as the
+        background becomes known; a saved map has those that a build finds in the whole track.
+
+        Args:
+            chunk: a ``Sound``: float32 mono samples in [-1, 1] and their rate, the same for all pieces.
+            stamp_s: when its first sample sounds, on the clock of the frames; None where the piece before ended, at
+                first 0. A gap of 0.1 s and more is filled with silence, and an overlap of that is left out.
+
+        Raises:
+            AudioError: it is no sound, is of another rate, repeats what came, or is of another clock.
+        """
+        with self._lock:
+            self._growing.add_audio(chunk, stamp_s)
             self._map = None
 
     @property
@@ -176,7 +195,12 @@ class VoxelMap:
         return f"VoxelMap({len(self)} frames, voxels of {self._growing.settings.voxel_size_m:g} m, {encoders!r})"
 
 
-def _direction(up_in_world: Any) -> Float[np.ndarray, "3"] | None:
+def direction(up_in_world: Any) -> Float[np.ndarray, "3"] | None:
+    """Return the unit vector of a direction that a program gave; None for None.
+
+    Raises:
+        MapError: it is none.
+    """
     if up_in_world is None:
         return None
     up = np.asarray(up_in_world)

@@ -16,6 +16,8 @@ _FARTHEST_MIDDLE_M = 200.0
 # One that has no depth beyond this was given in kilometres, or divided twice.
 _NEAREST_FARTHEST_M = 0.02
 
+_EXACT = 1e-12
+
 
 def given_frame(
     index: int,
@@ -42,7 +44,10 @@ def given_frame(
     name = f"frame {index}"
     colours, depths = _colours(name, rgb), _depths(name, depth_m)
     rig = _rig(name, camera, colours, depths)
-    pose = orthonormalize(_numbers(name, "world_from_camera", world_from_camera).astype(np.float64), name)
+    given = _numbers(name, "world_from_camera", world_from_camera).astype(np.float64)
+    pose = orthonormalize(given, name)
+    if np.abs(pose - given).max() < _EXACT:  # that of a recording's frame stays bit by bit what it was
+        pose = given
     if not _is_finite(stamp_s):
         raise RecordingError(f"stamp_s of {name} must be a finite number of seconds, not {stamp_s!r}.")
     return Frame(index, name, float(stamp_s), colours, depths, pose, rig)

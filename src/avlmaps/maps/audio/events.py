@@ -4,11 +4,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Protocol, cast
 
 import numpy as np
 
-from avlmaps.core.arrays import Float32
+from avlmaps.core.arrays import Float, Float32
 from avlmaps.core.errors import AudioError, BackendError
 from avlmaps.core.progress import progress, say
 from avlmaps.maps.audio.change_points import ChangeSettings, frames_of_track, split_at_changes
@@ -69,39 +69,66 @@ def detect_events(
             ``changes``.
     """
     if recording.audio is None:
-        return _collected([], encoder.card.dim)
+        return collect([], encoder.card.dim)
     clips_folder.mkdir(parents=True, exist_ok=True)
-    if isinstance(encoder, FrameSoundEncoder) and settings.cut != "energy":
-        pieces = _by_changes(recording.audio, encoder, settings.changes)
-    elif settings.cut == "changes":
+    if cuts_by_changes(encoder, settings):
+        pieces = by_changes(recording.audio, cast(FrameSoundEncoder, encoder), settings.changes)
+    else:
+        pieces = _by_energy(recording.audio, encoder, settings)
+    heard: list[Heard] = []
+    for found, sound, feature in pieces:
+        clip = f"{found.onset_s:010.3f}.flac"
+        write_flac(clips_folder / clip, sound)
+        heard.append(Heard(found, track_of(recording, found), feature, clip))
+    _tell_outside(recording, [one.segment for one in heard])
+    return collect(heard, encoder.card.dim)
+
+
+def cuts_by_changes(encoder: SoundEncoder, settings: HearingSettings) -> bool:
+    """Return whether the track is divided at its change points, and not by its energy.
+
+    Raises:
+        BackendError: the settings want change points, and the encoder has no feature for each step.
+    """
+    if isinstance(encoder, FrameSoundEncoder):
+        return settings.cut != "energy"
+    if settings.cut == "changes":
         raise BackendError(
             f"The sound model {encoder.card.id} gives no feature for each step of time to cut a track by; choose "
             "hearing.cut auto or energy, or another model."
         )
-    else:
-        pieces = _by_energy(recording.audio, encoder, settings)
-    heard: list[_Heard] = []
-    for found, sound, feature in pieces:
-        clip = f"{found.onset_s:010.3f}.flac"
-        write_flac(clips_folder / clip, sound)
-        heard.append(_Heard(found, track_of(recording, found), feature, clip))
-    _tell_outside(recording, [one.segment for one in heard])
-    return _collected(heard, encoder.card.dim)
+    return False
 
 
-_Piece = tuple[Segment, Sound, Float32[np.ndarray, "windows d"]]
+Piece = tuple[Segment, Sound, Float32[np.ndarray, "windows d"]]
 
 
-def _by_energy(track: AudioTrack, encoder: SoundEncoder, settings: HearingSettings) -> Iterator[_Piece]:
+def _by_energy(track: AudioTrack, encoder: SoundEncoder, settings: HearingSettings) -> Iterator[Piece]:
     """Yield each sound that stands out from the background, as recorded, and its features without the background."""
     found = segment(track, settings.segmentation)
     each = range(len(found))
     for i in progress(each, "hearing", unit="sound") if found else each:
         sound = track.read(found[i].onset_s, found[i].offset_s)
-        yield found[i], sound, _encoded(encoder, _cleaned(sound, track, found, i, settings))
+        yield found[i], sound, feature_of(sound, track, found, i, encoder, settings)
 
 
-def _by_changes(track: AudioTrack, encoder: FrameSoundEncoder, settings: ChangeSettings) -> Iterator[_Piece]:
+def feature_of(
+    sound: Sound,
+    track: AudioTrack,
+    found: Sequence[Segment],
+    index: int,
+    encoder: SoundEncoder,
+    settings: HearingSettings,
+) -> Float32[np.ndarray, "windows d"]:
+    """Return the features of one of the sounds that were found in a track, without the background.
+
+    Raises:
+        BackendError: they are not what the encoder's card says.
+    """
+    return _encoded(encoder, _cleaned(sound, track, found, index, settings))
+
+
+def by_changes(track: AudioTrack, encoder: FrameSoundEncoder, settings: ChangeSettings) -> Iterator[Piece]:
     """Yield the stretches of the track between changes, and the features of their steps."""
     features = frames_of_track(track, encoder)
     edges = split_at_changes(features, encoder.hop_s, settings)
@@ -113,23 +140,39 @@ def _by_changes(track: AudioTrack, encoder: FrameSoundEncoder, settings: ChangeS
             yield stretch, sound, features[begin:end]
 
 
-def track_of(recording: Recording, heard: Segment) -> Float32[np.ndarray, "places 3"]:
+class Motion(Protocol):
+    """Where a robot was, and when: a recording, or the frames that came until then."""
+
+    @property
+    def stamps_s(self) -> Float[np.ndarray, " n"]:
+        """Rising seconds."""
+        ...
+
+    @property
+    def world_from_camera(self) -> Float[np.ndarray, "n 4 4"]:
+        """Poses then."""
+        ...
+
+
+def track_of(walk: Motion, heard: Segment) -> Float32[np.ndarray, "places 3"]:
     """Return where the robot was from a sound's onset to its offset: at both, and at every frame between.
 
     Positions between frames are interpolated; before the first frame and after the last the nearest one's place
     counts. There is at least one place, however short the sound; a robot that stood still has just one.
     """
-    stamps_s = recording.stamps_s
+    stamps_s = walk.stamps_s
     between = stamps_s[(stamps_s > heard.onset_s) & (stamps_s < heard.offset_s)]
     at_s = np.concatenate([[heard.onset_s], between, [heard.offset_s]])
-    camera = recording.world_from_camera[:, :3, 3]
+    camera = walk.world_from_camera[:, :3, 3]
     positions = np.stack([np.interp(at_s, stamps_s, camera[:, axis]) for axis in range(3)], axis=1)
     moved = np.linalg.norm(np.diff(positions, axis=0), axis=1) > _NEAR_M
     return positions[np.append(True, moved)].astype(np.float32)
 
 
 @dataclass(frozen=True, slots=True)
-class _Heard:
+class Heard:
+    """A sound as the map stores it: when, where the robot was, its features, and the name of its clip's file."""
+
     segment: Segment
     track: Float32[np.ndarray, "places 3"]
     feature: Float32[np.ndarray, "windows d"]
@@ -145,14 +188,21 @@ def _cleaned(sound: Sound, track: AudioTrack, found: Sequence[Segment], index: i
 
 
 def _quiet_around(track: AudioTrack, found: Sequence[Segment], index: int, quiet_s: float) -> Iterator[Sound]:
+    for begin_s, end_s in quiet_bounds(track, found, index, quiet_s):
+        if end_s > begin_s:
+            yield track.read(begin_s, end_s)
+
+
+def quiet_bounds(
+    track: AudioTrack, found: Sequence[Segment], index: int, quiet_s: float
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return from when to when it is quiet before a sound and after it, seconds; nowhere if the end is not later."""
     here = found[index]
     earliest = found[index - 1].offset_s + _EDGE_S if index else track.start_s
     latest = found[index + 1].onset_s - _EDGE_S if index + 1 < len(found) else track.end_s
     before = (max(earliest, here.onset_s - _EDGE_S - quiet_s), here.onset_s - _EDGE_S)
     after = (here.offset_s + _EDGE_S, min(latest, here.offset_s + _EDGE_S + quiet_s))
-    for begin_s, end_s in (before, after):
-        if end_s > begin_s:
-            yield track.read(begin_s, end_s)
+    return before, after
 
 
 def _encoded(encoder: SoundEncoder, sound: Sound) -> Float32[np.ndarray, "windows d"]:
@@ -165,7 +215,9 @@ def _encoded(encoder: SoundEncoder, sound: Sound) -> Float32[np.ndarray, "window
     return feature
 
 
-def _collected(heard: Sequence[_Heard], dim: int) -> HeardSounds:
+def collect(heard: Sequence[Heard], dim: int) -> HeardSounds:
+    """Put sounds, in the order of time, into the map's arrays; ``dim`` is the length of a feature."""
+
     def offsets(parts: Sequence[np.ndarray]) -> np.ndarray:
         return np.cumsum([0, *(len(part) for part in parts)], dtype=np.int64)
 

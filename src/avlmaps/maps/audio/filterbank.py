@@ -38,20 +38,43 @@ def band_powers(blocks: Iterable[Sound]) -> Iterator[Float32[np.ndarray, "frames
     Args:
         blocks: the track in pieces of one rate.
     """
-    waiting, rate_hz, hop, size = np.zeros(0, np.float32), 0, 1, 1
+    stream = PowerStream()
     for block in blocks:
-        if rate_hz == 0:
-            rate_hz, hop, size = block.rate_hz, hop_samples(block.rate_hz), _window_samples(block.rate_hz)
-            waiting = np.zeros((size - hop) // 2, np.float32)
-        waiting = np.concatenate([waiting, block.samples])
-        count = (len(waiting) - size) // hop + 1
-        if count > 0:
-            yield _spectra(waiting, count, rate_hz)
-            waiting = waiting[count * hop :]
-    left = len(waiting) - (size - hop) // 2
-    if rate_hz and left > 0:
-        count = -(-left // hop)
-        yield _spectra(np.pad(waiting, (0, max(0, (count - 1) * hop + size - len(waiting)))), count, rate_hz)
+        if len(powers := stream.add(block)):
+            yield powers
+    if len(powers := stream.end()):
+        yield powers
+
+
+class PowerStream:
+    """The band powers of a track that comes piece by piece; see ``band_powers``."""
+
+    def __init__(self) -> None:
+        self._waiting, self._rate_hz = np.zeros(0, np.float32), 0
+
+    def add(self, block: Sound) -> Float32[np.ndarray, "frames bands"]:
+        """Take the next piece, and return the powers that are known with it."""
+        hop, size = hop_samples(block.rate_hz), _window_samples(block.rate_hz)
+        if self._rate_hz == 0:
+            self._rate_hz, self._waiting = block.rate_hz, np.zeros((size - hop) // 2, np.float32)
+        self._waiting = np.concatenate([self._waiting, block.samples])
+        count = (len(self._waiting) - size) // hop + 1
+        if count <= 0:
+            return np.zeros((0, band_count(block.rate_hz)), np.float32)
+        powers = _spectra(self._waiting, count, self._rate_hz)
+        self._waiting = self._waiting[count * hop :]
+        return powers
+
+    def end(self) -> Float32[np.ndarray, "frames bands"]:
+        """Return the last powers, as if silence followed; more pieces may come nevertheless."""
+        if self._rate_hz == 0:
+            return np.zeros((0, 1), np.float32)
+        hop, size = hop_samples(self._rate_hz), _window_samples(self._rate_hz)
+        count = -(-(len(self._waiting) - (size - hop) // 2) // hop)
+        if count <= 0:
+            return np.zeros((0, band_count(self._rate_hz)), np.float32)
+        lacking = max(0, (count - 1) * hop + size - len(self._waiting))
+        return _spectra(np.pad(self._waiting, (0, lacking)), count, self._rate_hz)
 
 
 def _window_samples(rate_hz: int) -> int:

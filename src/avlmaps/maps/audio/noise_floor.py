@@ -48,7 +48,11 @@ class NoiseFloor:
 
 
 def find_noise_floor(
-    powers: Iterable[Float32[np.ndarray, "frames bands"]], rate_hz: int, window_s: float, range_db: float
+    powers: Iterable[Float32[np.ndarray, "frames bands"]],
+    rate_hz: int,
+    window_s: float,
+    range_db: float,
+    loudest: float = 0.0,
 ) -> NoiseFloor:
     """Go through a track's band powers once and find its background.
 
@@ -58,10 +62,11 @@ def find_noise_floor(
         window_s: how many seconds around a moment determine its background.
         range_db: the background is never put lower than this below the track's loudest frame, so that in digital
             silence not every whisper is a sound.
+        loudest: the loudest frame is at least this.
     """
     medians: list[np.ndarray] = []
     waiting = np.zeros((0, 0), np.float32)
-    loudest, frames = 0.0, 0
+    frames = 0
     for power in powers:
         frames += len(power)
         loudest = max(loudest, float(power.mean(axis=1).max(initial=0.0)))

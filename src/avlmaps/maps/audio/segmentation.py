@@ -7,7 +7,7 @@ divides (barks of one dog) are one sound. The paper's own rule, a fixed threshol
 ``method="silence"``.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -105,25 +105,38 @@ def segment(track: AudioTrack, settings: SegmentationSettings = SegmentationSett
         AudioError: the track cannot be read.
     """
     if settings.method == "silence":
-        step_s = 1.0 / track.rate_hz
-        runs = _loud_runs(track, settings)
-    else:
-        step_s = hop_samples(track.rate_hz) / track.rate_hz
-        floor = find_noise_floor(
-            band_powers(track.blocks(_BLOCK_S)), track.rate_hz, settings.background_window_s, settings.range_db
-        )
-        if floor.loudest <= 0.0:
-            return []
-        runs = _merged(_runs(_excess(track, floor), settings, step_s), settings, step_s)
-    return _padded(
-        [run for run in runs if (run.end - run.begin) * step_s >= settings.min_length_s], settings, step_s, track
-    )
+        return _padded(list(_loud_runs(track, settings)), settings, 1.0 / track.rate_hz, track)
+    return segment_powers(lambda: band_powers(track.blocks(_BLOCK_S)), track, settings)
 
 
-def _excess(track: AudioTrack, floor: NoiseFloor) -> Iterator[Float32[np.ndarray, " frames"]]:
+def segment_powers(
+    powers: Callable[[], Iterable[Float32[np.ndarray, "frames bands"]]],
+    track: AudioTrack,
+    settings: SegmentationSettings,
+    loudest: float = 0.0,
+) -> list[Segment]:
+    """Find the sounds in a track whose band powers are known.
+
+    Args:
+        powers: gives the band powers of the whole track, block by block; called twice.
+        track: says when it begins and ends.
+        settings: how; the method is ``adaptive``.
+        loudest: mean power over the bands of the loudest frame of a longer track that this one is the end of.
+    """
+    step_s = hop_samples(track.rate_hz) / track.rate_hz
+    floor = find_noise_floor(powers(), track.rate_hz, settings.background_window_s, settings.range_db, loudest)
+    if floor.loudest <= 0.0:
+        return []
+    runs = _merged(_runs(_excess(powers(), floor), settings, step_s), settings, step_s)
+    return _padded(list(runs), settings, step_s, track)
+
+
+def _excess(
+    powers: Iterable[Float32[np.ndarray, "frames bands"]], floor: NoiseFloor
+) -> Iterator[Float32[np.ndarray, " frames"]]:
     """Yield every frame's mean over the bands of power over background (a ratio; about 1 where nothing sounds)."""
     begin = 0
-    for power in band_powers(track.blocks(_BLOCK_S)):
+    for power in powers:
         yield (power / floor.at(begin, len(power))).mean(axis=1)
         begin += len(power)
 
@@ -221,7 +234,8 @@ def _loud_runs(track: AudioTrack, settings: SegmentationSettings) -> Iterator[_R
 
 
 def _padded(runs: list[_Run], settings: SegmentationSettings, step_s: float, track: AudioTrack) -> list[Segment]:
-    """Widen the runs, at most to the middle of the pause between two and to the track's ends."""
+    """Widen the runs that are long enough, at most to the middle of the pause between two and to the track's ends."""
+    runs = [run for run in runs if (run.end - run.begin) * step_s >= settings.min_length_s]
     segments: list[Segment] = []
     for i, run in enumerate(runs):
         earliest = (runs[i - 1].end + run.begin) / 2.0 * step_s if i else 0.0

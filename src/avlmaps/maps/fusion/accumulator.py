@@ -7,7 +7,7 @@ parts of a recording add up to the map of the whole.
 """
 
 import numpy as np
-from jaxtyping import Bool, Float, Float16, Float32
+from jaxtyping import Bool, Float, Float16, Float32, Int32
 
 from avlmaps.core.camera import Rig
 from avlmaps.core.errors import BackendError, MapError, RecordingError
@@ -17,6 +17,7 @@ from avlmaps.maps.fusion.pixel_lookup import PixelLookup, look_up
 from avlmaps.maps.fusion.sensor import NONE, SensorModel
 from avlmaps.maps.fusion.sensor_kernels import drop_flying
 from avlmaps.maps.fusion.settings import FusionSettings
+from avlmaps.maps.fusion.voxel_kernels import look_up_views
 from avlmaps.maps.fusion.voxel_sums import Evidence, VoxelSums, VoxelTable
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.types import Voxels
@@ -115,6 +116,18 @@ class VoxelAccumulator:
             MapError: its features have another length.
         """
         self._table.add(part)
+
+    def views_at(self, index: Int32[np.ndarray, "n 3"]) -> Int32[np.ndarray, " n"]:
+        """Return how many frames have a pixel in each of some voxels."""
+        found, table = np.zeros(len(index), np.int32), self._table
+        look_up_views(np.ascontiguousarray(index), table.slots, table.index, table.views, found)
+        return found
+
+    def copy(self) -> "VoxelAccumulator":
+        """Return an accumulator of the same sums, which grows by itself."""
+        other = VoxelAccumulator(self.grid, self.dim, self.settings, self.sensor)
+        other._table = self._table.copy()
+        return other
 
     def sums(self, feature_out: Float32[np.ndarray, "n d"] | None = None) -> VoxelSums:
         """Return a copy of the sums, sorted by index.

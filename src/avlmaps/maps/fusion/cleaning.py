@@ -4,7 +4,7 @@ All that it decides on are whole numbers that add up over frames, so that the pa
 the same map.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from jaxtyping import Bool, Float64, Int32
@@ -18,6 +18,8 @@ from avlmaps.maps.fusion.voxel_kernels import rehash
 from avlmaps.maps.fusion.voxel_sums import Evidence
 from avlmaps.maps.grid import GridSpec
 
+_Count = Callable[[Int32[np.ndarray, "n 3"]], Int32[np.ndarray, " n"]]
+
 FEWEST_THROUGH = 2  # frames: one may have a wrong pose
 THROUGH_SHARE = 0.5  # a voxel goes when more frames see through it than this share of those that hit it
 SPECK_VIEWS = 2  # a group of which a voxel is hit by more frames is not a speck
@@ -25,7 +27,12 @@ MOST_REACH = 4.0  # voxels: a smear is looked for no farther
 
 
 def clean(
-    evidence: Evidence, views: Sequence[FreeViews], camera: Pinhole, grid: GridSpec, sensor: SensorModel
+    evidence: Evidence,
+    views: Sequence[FreeViews],
+    camera: Pinhole,
+    grid: GridSpec,
+    sensor: SensorModel,
+    count: _Count | None = None,
 ) -> tuple[Bool[np.ndarray, " n"], dict[str, int]]:
     """Return which voxels are a surface, and how many are not: ``seen_through``, ``smeared``, ``specks``.
 
@@ -35,24 +42,23 @@ def clean(
         camera: of the frames, for depth.
         grid: the voxels' size.
         sensor: the camera's error.
+        count: returns how many frames see through each voxel, where that is known already; the views do not count then.
     """
+    count = count or (lambda index: count_through(index, grid, camera, views))
     kept = np.ones(len(evidence), bool)
     removed: dict[str, int] = {}
     for name, rule in (("seen_through", _through), ("smeared", _smeared), ("specks", _specks)):
         there = np.flatnonzero(kept)
-        gone = rule(evidence.only(kept), views, camera, grid, sensor)
+        gone = rule(evidence.only(kept), count, sensor)
         kept[there[gone]] = False
         removed[name] = int(gone.sum())
     return kept, removed
 
 
-def _through(
-    evidence: Evidence, views: Sequence[FreeViews], camera: Pinhole, grid: GridSpec, sensor: SensorModel
-) -> Bool[np.ndarray, " n"]:
+def _through(evidence: Evidence, count: _Count, sensor: SensorModel) -> Bool[np.ndarray, " n"]:
     if not sensor.carve:
         return np.zeros(len(evidence), bool)
-    through = count_through(evidence.index, grid, camera, views)
-    return seen_through(through, evidence.views)
+    return seen_through(count(evidence.index), evidence.views)
 
 
 def seen_through(through: Int32[np.ndarray, " n"], views: Int32[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
@@ -67,9 +73,7 @@ def smear_reach(evidence: Evidence, sensor: SensorModel) -> Float64[np.ndarray, 
     return np.minimum(sensor.smear_sigmas * 0.5 * np.sqrt(1.0 / exact - 1.0), MOST_REACH)
 
 
-def _smeared(
-    evidence: Evidence, views: Sequence[FreeViews], camera: Pinhole, grid: GridSpec, sensor: SensorModel
-) -> Bool[np.ndarray, " n"]:
+def _smeared(evidence: Evidence, count: _Count, sensor: SensorModel) -> Bool[np.ndarray, " n"]:
     smeared = np.zeros(len(evidence), bool)
     if sensor.smear_sigmas > 0.0:
         carving_kernels.mark_smeared(
@@ -78,9 +82,7 @@ def _smeared(
     return smeared
 
 
-def _specks(
-    evidence: Evidence, views: Sequence[FreeViews], camera: Pinhole, grid: GridSpec, sensor: SensorModel
-) -> Bool[np.ndarray, " n"]:
+def _specks(evidence: Evidence, count: _Count, sensor: SensorModel) -> Bool[np.ndarray, " n"]:
     if sensor.speck_voxels == 0 or len(evidence) == 0:
         return np.zeros(len(evidence), bool)
     of = np.empty(len(evidence), np.int64)

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float64, Int32, UInt16
+from jaxtyping import Float64, Int32, Int64, UInt16
 
 from avlmaps.core.camera import Pinhole
-from avlmaps.core.progress import progress
+from avlmaps.core.progress import progress, silence_progress
 from avlmaps.maps.fusion import carving_kernels
 from avlmaps.maps.fusion.sensor import SensorModel
 from avlmaps.maps.fusion.sensor_kernels import clear_blocks
@@ -70,8 +70,65 @@ class FreeViewCollector:
 
     def views(self) -> FreeViews:
         """Return the collected evidence."""
-        clear = np.stack(self._clear) if self._clear else np.zeros((0, *self._shape), np.uint16)
-        return FreeViews(clear, np.stack(self._pose) if self._pose else np.zeros((0, 4, 4)))
+        return stack_views(*self.collected(), self._shape)
+
+    def collected(self) -> tuple[list[np.ndarray], list[np.ndarray]]:
+        """Return the clear pictures and the poses, one each a frame, in lists that frames to come do not change."""
+        return list(self._clear), list(self._pose)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of blocks."""
+        return self._shape
+
+
+class ThroughCounts:
+    """Counts frames that see through voxels of a map that grows: each frame and each voxel meet once."""
+
+    def __init__(self, grid: GridSpec, camera: Pinhole) -> None:
+        """Begin without frames; see ``count_through``."""
+        self._grid, self._camera = grid, camera
+        self._index, self._counts, self._frames = np.zeros((0, 3), np.int32), np.zeros(0, np.int32), 0
+
+    def count(self, index: Int32[np.ndarray, "n 3"], views: FreeViews) -> Int32[np.ndarray, " n"]:
+        """Return how many frames see through each voxel.
+
+        Args:
+            index: voxels, sorted; all those of the last call are among them.
+            views: of all frames, those of the last call first.
+        """
+        row = _rows_in(index, self._index)
+        if row is None:
+            return count_through(index, self._grid, self._camera, [views])
+        counts = np.zeros(len(index), np.int32)
+        counts[row] = self._counts
+        later = FreeViews(views.clear_mm[self._frames :], views.clear_pose[self._frames :])
+        known = np.zeros(len(index), bool)
+        known[row] = True
+        with silence_progress(True):
+            counts[known] += count_through(index[known], self._grid, self._camera, [later])
+            counts[~known] = count_through(index[~known], self._grid, self._camera, [views])
+        self._index, self._counts, self._frames = index, counts, len(views)
+        return counts.copy()
+
+
+def _rows_in(index: Int32[np.ndarray, "n 3"], some: Int32[np.ndarray, "m 3"]) -> Int64[np.ndarray, " m"] | None:
+    """Return where some of the voxels are, both sorted; None where they lie too far apart for a number each."""
+    if not len(some):
+        return np.zeros(0, np.int64)
+    low = index.min(axis=0).astype(np.int64)
+    span = [int(size) for size in index.max(axis=0) - low + 1]
+    if span[0] * span[1] * span[2] >= 1 << 62:
+        return None
+    step = np.array([span[1] * span[2], span[2], 1], np.int64)
+    keys: np.ndarray = (index - low) @ step
+    return keys.searchsorted((some - low) @ step)
+
+
+def stack_views(clear: Sequence[np.ndarray], pose: Sequence[np.ndarray], shape: tuple[int, int]) -> FreeViews:
+    """Return the views of frames, one each; ``shape`` is the rows and columns of blocks."""
+    stacked = np.stack(clear) if len(clear) else np.zeros((0, *shape), np.uint16)
+    return FreeViews(stacked, np.stack(pose) if len(pose) else np.zeros((0, 4, 4)))
 
 
 def concat_views(parts: Sequence[FreeViews]) -> FreeViews:

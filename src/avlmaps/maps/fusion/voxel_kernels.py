@@ -54,6 +54,20 @@ def find_row(i: Whole, j: Whole, k: Whole, table: Int32[np.ndarray, " slots"], i
 
 
 @njit(**OPTIONS)
+def look_up_views(
+    wanted: Int32[np.ndarray, "n 3"],
+    table: Int32[np.ndarray, " slots"],
+    index: Int32[np.ndarray, "rows 3"],
+    views: Int32[np.ndarray, " rows"],
+    found: Int32[np.ndarray, " n"],
+):
+    """Write how many frames have a pixel in each of some voxels; 0 where one is not in the table."""
+    for at in range(wanted.shape[0]):
+        row = find_row(wanted[at, 0], wanted[at, 1], wanted[at, 2], table, index)
+        found[at] = views[row] if row >= 0 else 0
+
+
+@njit(**OPTIONS)
 def rehash(table: Int32[np.ndarray, " slots"], index: Int32[np.ndarray, "rows 3"], count: Whole):
     """Enter the first ``count`` voxels into an empty (all -1) table."""
     mask = table.shape[0] - 1

@@ -1,6 +1,6 @@
 """Sums over voxels: the sums of fusion, in a table that grows in place, and in a sorted form that can be stored."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32, Int64
@@ -110,6 +110,15 @@ class VoxelTable:
     def geometry(self) -> kernels.Geometry:
         """All sums but the features', as the kernels take them."""
         return self.index, self.rgb_sum, self.rgb_weight, self.hits, self.views, self.sharp, self.last_seen_s
+
+    def copy(self) -> "VoxelTable":
+        """Return a table of the same sums."""
+        other = VoxelTable(self.dim)
+        other.count, other.slots = self.count, self.slots.copy()
+        rows = max(self.count, SMALLEST_ROOM)
+        for field in fields(VoxelSums):
+            setattr(other, field.name, getattr(self, field.name)[:rows].copy())
+        return other
 
     def reserve(self, extra: int) -> None:
         """Make room for this many new voxels."""

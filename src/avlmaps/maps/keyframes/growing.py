@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from time import perf_counter
 
 import cv2
 import numpy as np
@@ -24,6 +25,8 @@ from avlmaps.recordings.types import Frame
 
 # What places are learnt from grows by this much before they are learnt again for a question.
 _GROWN = 1.25
+# Keyframes that are left to be looked at later; each holds its frame.
+_MOST_LEFT = 40
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,18 +38,28 @@ class PicturedKeyframe:
     picture: bytes
 
 
+@dataclass(frozen=True, slots=True)
+class FrozenKeyframes:
+    """The keyframes at a moment: how many are decided, and the frames that would be more of them if no other came."""
+
+    decided: int
+    last: list[Frame]
+
+
 class GrowingKeyframes:
     """Takes frames in the order of time and stores what a map holds of the keyframes among them."""
 
-    def __init__(self, encoders: Encoders, settings: KeyframeSettings) -> None:
+    def __init__(self, encoders: Encoders, settings: KeyframeSettings, *, looks_later: bool = False) -> None:
         """Begin without frames.
 
         Args:
             encoders: the encoders; that of pixels is not called.
             settings: when a frame becomes a keyframe.
+            looks_later: frames are looked at by ``keyframes``, which another thread may call, and not by ``add``.
         """
+        self._looks_later = looks_later
         self._encoders, self._settings = encoders, settings
-        self._decided: list[PicturedKeyframe] = []
+        self._decided: list[PicturedKeyframe | Frame | None] = []  # to be looked at; None was left out
         self._maybe: dict[int, PicturedKeyframe] = {}
         self._recent: list[Frame] = []
         self._described: dict[int, PicturedKeyframe] | None = None
@@ -71,13 +84,13 @@ class GrowingKeyframes:
         """
         self._recent.append(frame)
         if len(self._recent) == 1 and not self._decided:
-            self._decided.append(self._describe(frame))
+            self._decided.append(frame if self._looks_later else self._describe(frame))
             yield frame
         while (index := self._next()) is not None:
             decided, self._recent = self._recent[index], self._recent[index:]
             known = self._maybe.pop(decided.index, None)
             self._maybe.clear()
-            self._decided.append(known or self._describe(decided))
+            self._decided.append(known or (decided if self._looks_later else self._describe(decided)))
             yield decided
 
     def _next(self) -> int | None:
@@ -91,23 +104,45 @@ class GrowingKeyframes:
             return []
         return [self._recent[index] for index in keyframes_by_motion(*_path(self._recent), self._settings)[1:]]
 
-    def keyframes(self, rng: np.random.Generator, *, final: bool) -> tuple[Keyframes, dict[str, np.ndarray]]:
+    def freeze(self) -> FrozenKeyframes:
+        """Return the keyframes until now, which frames to come do not change."""
+        return FrozenKeyframes(len(self._decided), self.last())
+
+    @property
+    def not_looked_at(self) -> int:
+        """How many decided keyframes nobody looked at yet."""
+        return sum(isinstance(one, Frame) for one in self._decided)
+
+    def keyframes(
+        self, rng: np.random.Generator, came: FrozenKeyframes, *, final: bool, within_s: float = np.inf
+    ) -> tuple[Keyframes, dict[str, np.ndarray]]:
         """Return the keyframes as if no other frame came, and what places are known by.
 
         Args:
             rng: for what the place encoder learns.
-            final: learn places again, as a build does; else only where a quarter has come since.
+            came: from ``freeze``.
+            final: learn places again, as a build does; else only where enough has come since.
+            within_s: seconds for keyframes that were not looked at; the rest is left for the next time, unless more than
+                40 of them would wait, each with its frame.
 
         Raises:
-            BackendError: an encoder gives something else than its protocol says.
+            BackendError: an encoder gives something else than its protocol says; that keyframe is left out.
         """
-        for frame in self.last():
-            if frame.index not in self._maybe:
-                self._maybe[frame.index] = self._describe(frame)
-        seen = [*self._decided, *(self._maybe[frame.index] for frame in self.last())]
+        end_s = perf_counter() + within_s
+        for at in range(came.decided):
+            one = self._decided[at]
+            if isinstance(one, Frame) and (perf_counter() < end_s or came.decided - at > _MOST_LEFT):
+                self._decided[at] = None
+                self._decided[at] = self._maybe.pop(one.index, None) or self._describe(one)
+        last = came.last if perf_counter() < end_s else []
+        maybe = {frame.index: self._maybe.get(frame.index) or self._describe(frame) for frame in last}
+        self._maybe.update(maybe)
+        seen = [one for one in (*self._decided[: came.decided], *maybe.values()) if isinstance(one, PicturedKeyframe)]
+        places = (
+            self._placed(seen, rng, final) if Kind.PLACE in self._encoders and Kind.LOCAL in self._encoders else None
+        )
         whole = [one.keyframe for one in seen]
-        if Kind.PLACE in self._encoders and Kind.LOCAL in self._encoders:
-            places = self._placed(seen, rng, final)
+        if places is not None:
             whole = [replace(one, place=place) for one, place in zip(whole, places, strict=True)]
         return stack_keyframes(whole), self._state
 

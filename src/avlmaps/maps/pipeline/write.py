@@ -3,13 +3,14 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import partial
 from time import perf_counter
 
 from avlmaps.core.errors import MapError
 from avlmaps.core.version import __version__
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
 from avlmaps.maps.fusion.cleaning import clean
-from avlmaps.maps.fusion.free_space import FreeViews
+from avlmaps.maps.fusion.free_space import FreeViews, ThroughCounts
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.pipeline.estimate import EstimatedFloor, EstimatedUp, ground_notices
 from avlmaps.maps.pipeline.keyframes import KeyframeResult
@@ -55,8 +56,21 @@ def merge(plan: BuildPlan, parts: Sequence[MapPart], sensor: SensorInfo) -> Merg
     return surfaces(plan, total, [part.views() for part in parts], sensor)
 
 
-def surfaces(plan: BuildPlan, total: VoxelAccumulator, views: Sequence[FreeViews], sensor: SensorInfo) -> Merged:
+def surfaces(
+    plan: BuildPlan,
+    total: VoxelAccumulator,
+    views: Sequence[FreeViews],
+    sensor: SensorInfo,
+    counts: ThroughCounts | None = None,
+) -> Merged:
     """Return the voxels of the sums that are a surface.
+
+    Args:
+        plan: of the build.
+        total: the sums.
+        views: where the frames saw freely.
+        sensor: the depth camera.
+        counts: what is known of these views from before; they then are of one part.
 
     Raises:
         MapError: there is none.
@@ -68,7 +82,8 @@ def surfaces(plan: BuildPlan, total: VoxelAccumulator, views: Sequence[FreeViews
             f"No pixel of {plan.recording.path} has a depth between {plan.settings.fusion.min_depth_m} and "
             f"{farthest:.4g} m, so that the map would be empty; check the recording's depth scale."
         )
-    kept, removed = clean(total.evidence(), views, plan.recording.rig.depth, grid, sensor.model)
+    count = None if counts is None else partial(counts.count, views=views[0])
+    kept, removed = clean(total.evidence(), views, plan.recording.rig.depth, grid, sensor.model, count)
     if not kept.any():
         raise MapError(
             f"Every voxel of {plan.recording.path} is seen through or a speck, so that the map would be empty; check "

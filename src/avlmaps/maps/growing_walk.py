@@ -1,0 +1,105 @@
+"""The frames of a growing map as a recording: all stamps and poses, and some frames that are spread over the walk."""
+
+import hashlib
+from copy import copy
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from avlmaps.core.arrays import Float
+from avlmaps.core.camera import Rig
+from avlmaps.core.errors import RecordingError
+from avlmaps.recordings.memory import MemoryRecording, frame_digest
+from avlmaps.recordings.types import Frame, Recording
+
+HERE = Path("memory")
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """Where the robot was, also in frames that were not fused.
+
+    Attributes:
+        stamps_s: rising seconds.
+        world_from_camera: poses then.
+    """
+
+    stamps_s: Float[np.ndarray, " n"]
+    world_from_camera: Float[np.ndarray, "n 4 4"]
+
+
+class Walk(Recording):
+    """The frames of a growing map as a recording: all stamps and poses, and some frames spread over them."""
+
+    def __init__(self, up_in_world: Float[np.ndarray, "3"] | None) -> None:
+        self.path, self.format, self.audio, self.notices = HERE, "memory", None, ()
+        self.up_in_world = up_in_world
+        self.stamps: list[float] = []
+        self.poses: list[np.ndarray] = []
+        self._held: list[Frame] = []
+        self._stride, self._came, self.has_doubled = 1, 0, False
+        self._digest = hashlib.sha256()
+        self._passed: tuple[list[float], list[np.ndarray]] = ([], [])
+
+    def rig_or(self, other: Rig) -> Rig:
+        """Return the cameras of the first frame, or of the one that is to be it."""
+        return self.rig if self._held else other
+
+    def spread(self, frame: Frame, most: int) -> None:
+        """Hold a frame if it is one of those spread over the walk, fewer than ``most`` of them."""
+        self.has_doubled, self.rig = False, self.rig_or(frame.rig)
+        if self._came % self._stride == 0:
+            if len(self._held) >= most:
+                self._stride, self._held, self.has_doubled = 2 * self._stride, self._held[::2], True
+            if self._came % self._stride == 0:
+                self._held.append(frame)
+        self._came += 1
+
+    def held(self) -> Recording:
+        """Return the frames that are held."""
+        return MemoryRecording(self._held, self.up_in_world)
+
+    def pass_by(self, stamp_s: float, world_from_camera: Float[np.ndarray, "4 4"]) -> None:
+        """Take note of where the robot was."""
+        self._passed[0].append(stamp_s)
+        self._passed[1].append(np.asarray(world_from_camera, np.float64))
+
+    def motion(self) -> Motion:
+        """Return where the robot was until now."""
+        return Motion(np.array(self._passed[0], np.float64), np.stack(self._passed[1]))
+
+    def frozen(self) -> "Walk":
+        """Return the walk until now, which frames to come do not change."""
+        other = copy(self)
+        other.stamps, other.poses, other._held = list(self.stamps), list(self.poses), list(self._held)
+        other._passed, other._digest = (list(self._passed[0]), list(self._passed[1])), self._digest.copy()
+        return other
+
+    def append(self, frame: Frame) -> None:
+        """Take note of a frame that was fused."""
+        self.stamps.append(frame.stamp_s)
+        self.poses.append(np.asarray(frame.world_from_camera, np.float64))
+        self._digest.update(frame_digest(frame))
+
+    @property
+    def stamps_s(self) -> Float[np.ndarray, " n"]:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """When."""
+        return np.array(self.stamps, np.float64)
+
+    @property
+    def world_from_camera(self) -> Float[np.ndarray, "n 4 4"]:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """From where."""
+        return np.stack(self.poses)
+
+    def frame(self, index: int) -> Frame:
+        """Refuse: frames are not stored."""
+        raise RecordingError(f"Frame {index} is not stored by a growing map.")
+
+    @property
+    def fingerprint(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """A hash of all frames."""
+        return self._digest.hexdigest()
+
+    def __len__(self) -> int:
+        return len(self.stamps)

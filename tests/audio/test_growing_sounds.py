@@ -1,0 +1,173 @@
+"""Sounds that come piece by piece are, at the end, those of the whole track; before, they are listed soon."""
+
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+from audio_fakes import RATE_HZ, FakeEncoder, FakeWalk, straight_walk, track_of
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from avlmaps.core.errors import AudioError
+from avlmaps.maps.audio import growing as growing_module
+from avlmaps.maps.audio.events import HearingSettings, detect_events
+from avlmaps.maps.audio.filterbank import PowerStream, band_powers
+from avlmaps.maps.audio.growing import ENDED_S, GrowingSounds
+from avlmaps.maps.audio.segmentation import segment
+from avlmaps.maps.types import HeardSounds
+from avlmaps.recordings.audio import AudioTrack, Sound
+from avlmaps.recordings.growing_track import GAP_S, GrowingTrack
+
+PLAIN = HearingSettings()
+
+
+def noisy(seconds: float, events: list[tuple[float, float, float]], seed: int = 0) -> np.ndarray:
+    """Return faint noise with tones (begin and length in seconds, level), as 16-bit samples hold them."""
+    samples = np.random.default_rng(seed).normal(scale=3e-3, size=round(seconds * RATE_HZ))
+    for begin_s, length_s, level in events:
+        at = round(begin_s * RATE_HZ)
+        tone = level * np.sin(2.0 * np.pi * 700.0 * np.arange(round(length_s * RATE_HZ)) / RATE_HZ)
+        samples[at : at + len(tone)] += tone[: len(samples) - at]
+    return (np.rint(np.clip(samples, -1.0, 1.0) * 32767) / 32768).astype(np.float32)
+
+
+SAMPLES = noisy(30.0, [(3.0, 0.5, 0.3), (8.0, 2.0, 0.1), (10.6, 0.4, 0.2), (20.0, 1.0, 0.4), (29.5, 0.5, 0.2)])
+
+
+def require_same(one: HeardSounds, other: HeardSounds) -> None:
+    for field in fields(HeardSounds):
+        if field.name != "clips":
+            np.testing.assert_allclose(getattr(one, field.name), getattr(other, field.name), atol=1e-5)
+    assert len(one.clips) == len(other.clips)
+
+
+def grown(cuts: list[int], samples: np.ndarray = SAMPLES) -> GrowingSounds:
+    sounds = GrowingSounds(FakeEncoder(), PLAIN)
+    for piece in np.split(samples, sorted(cuts)):
+        sounds.add(Sound(piece, RATE_HZ))
+    return sounds
+
+
+@pytest.fixture(scope="module")
+def track(tmp_path_factory: pytest.TempPathFactory) -> AudioTrack:
+    return track_of(tmp_path_factory.mktemp("track") / "a.flac", SAMPLES)
+
+
+@given(cuts=st.lists(st.integers(0, len(SAMPLES)), max_size=30), asked=st.integers(0, 30))
+@settings(max_examples=15, deadline=None)
+def test_however_the_track_is_cut_the_sounds_are_those_of_the_whole_track(
+    track: AudioTrack, tmp_path_factory: pytest.TempPathFactory, cuts: list[int], asked: int
+) -> None:
+    walk = straight_walk(30.0, 0.3, track)
+    whole = detect_events(walk, FakeEncoder(), PLAIN, tmp_path_factory.mktemp("clips"))
+    sounds = GrowingSounds(FakeEncoder(), PLAIN)
+    for number, piece in enumerate(np.split(SAMPLES, sorted(cuts))):
+        sounds.add(Sound(piece, RATE_HZ))
+        if number == asked:
+            sounds.heard(walk, final=False)  # a question changes nothing
+    require_same(sounds.heard(walk, final=True), whole)
+    assert sounds.track is not None
+    assert segment(sounds.track) == segment(track) and len(whole) == 4
+
+
+@given(cuts=st.lists(st.integers(0, len(SAMPLES)), max_size=20))
+@settings(max_examples=15, deadline=None)
+def test_powers_do_not_depend_on_the_pieces(cuts: list[int]) -> None:
+    stream = PowerStream()
+    known = [stream.add(Sound(piece, RATE_HZ)) for piece in np.split(SAMPLES, sorted(cuts))]
+    streamed = np.concatenate([*known, stream.end()])
+    np.testing.assert_allclose(streamed, np.concatenate(list(band_powers([Sound(SAMPLES, RATE_HZ)]))), rtol=1e-4)
+
+
+def test_a_sound_is_listed_within_a_second_of_its_end() -> None:
+    walk, sounds, step = straight_walk(30.0, 0.3), GrowingSounds(FakeEncoder(), PLAIN), RATE_HZ // 2
+    listed: dict[int, float] = {}
+    for at in range(0, len(SAMPLES), step):
+        sounds.add(Sound(SAMPLES[at : at + step], RATE_HZ))
+        heard = sounds.heard(walk, final=False)
+        for number, end_s in enumerate((3.5, 10.0, 21.0)):
+            if np.any(np.abs(heard.offset_s - end_s) < 0.1):
+                listed.setdefault(number, (at + step) / RATE_HZ - end_s)
+    assert sorted(listed) == [0, 1, 2]  # the second, before the third tone made it longer
+    assert all(ENDED_S <= late_s <= 1.0 for late_s in listed.values())
+    assert sounds.heard(walk, final=False).offset_s[1] == pytest.approx(11.0, abs=0.1)
+
+
+def test_the_window_of_a_long_track_moves_on_and_keeps_what_was_heard(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(growing_module, "_WINDOW_S", 45.0)
+    samples = noisy(240.0, [(float(at), 0.5, 0.3) for at in range(5, 240, 10)])
+    walk, sounds, encoder = straight_walk(240.0, 0.1), GrowingSounds(FakeEncoder(), PLAIN), FakeEncoder()
+    for at in range(0, len(samples), 5 * RATE_HZ):
+        sounds.add(Sound(samples[at : at + 5 * RATE_HZ], RATE_HZ))
+        live = sounds.heard(walk, final=False)
+    held_s = 0.01 * sum(map(len, sounds._powers))
+    assert held_s < 100.0 and len(live) == 24
+    whole = detect_events(
+        straight_walk(240.0, 0.1, track_of(tmp_path / "a.flac", samples)), encoder, PLAIN, tmp_path / "clips"
+    )
+    np.testing.assert_allclose(live.onset_s, whole.onset_s, atol=0.03)
+    require_same(sounds.heard(walk, final=True), whole)
+
+
+# The clock of a microphone
+
+
+@given(late_s=st.floats(-1.0, 3.0), jitter_s=st.floats(-0.05, 0.05))
+@settings(max_examples=40, deadline=None)
+def test_gaps_become_silence_overlaps_are_left_out_and_jitter_changes_nothing(
+    tmp_path_factory: pytest.TempPathFactory, late_s: float, jitter_s: float
+) -> None:
+    track = GrowingTrack(tmp_path_factory.mktemp("growing") / "track.f32")
+    piece = np.full(2 * RATE_HZ, 0.5, np.float32)
+    track.add(Sound(piece, RATE_HZ), 10.0)
+    track.add(Sound(piece, RATE_HZ), 12.0 + jitter_s)
+    assert track.end_s == 14.0 and (track.gaps, track.overlaps) == (0, 0)
+    track.add(Sound(piece, RATE_HZ), 14.0 + late_s)
+    moved_s = late_s if abs(late_s) >= GAP_S else 0.0
+    assert track.end_s == pytest.approx(16.0 + moved_s, abs=1e-3)
+    assert (track.gaps, track.overlaps) == (int(late_s >= GAP_S), int(late_s <= -GAP_S))
+    assert track.track is not None
+    samples = track.track.read(10.0, track.end_s).samples
+    assert (samples == 0.5).sum() + round(max(moved_s, 0.0) * RATE_HZ) == len(samples)
+
+
+def test_a_clock_that_drifts_stays_within_the_gap(tmp_path: Path) -> None:
+    track = GrowingTrack(tmp_path / "track.f32")
+    for number in range(600):  # 60 s of pieces whose microphone is 1 % slow
+        track.add(Sound(np.zeros(RATE_HZ // 10, np.float32), RATE_HZ), 0.101 * number)
+    assert track.end_s == pytest.approx(60.6, abs=GAP_S + 0.01) and track.gaps > 0
+
+
+@pytest.mark.parametrize(
+    ("chunk", "stamp_s", "said"),
+    [
+        (np.zeros(5), None, r"must be an avlmaps.Sound\(samples, rate_hz\), not ndarray"),
+        (Sound(np.zeros(5, np.float32), 8000), None, "has 8000 samples a second, those before 16000"),
+        (Sound(np.zeros(5, np.float32), 500), None, "has 500 samples a second; 1000 are needed"),
+        (Sound(np.full(5, np.nan, np.float32), RATE_HZ), None, "not finite numbers"),
+        (Sound(np.full(5, 900.0, np.float32), RATE_HZ), None, r"as large as 900; they must lie in \[-1, 1\]"),
+        (Sound(np.zeros(5, np.float32), RATE_HZ), "now", "must be a finite number of seconds, not 'now'"),
+        (Sound(np.zeros(1600, np.float32), RATE_HZ), 0.2, r"lies before the end of the sound that came \(1.000 s\)"),
+        (Sound(np.zeros(5, np.float32), RATE_HZ), 1.7e9, "after the sound before it ended"),
+    ],
+)
+def test_what_is_no_piece_of_the_track_is_refused_and_costs_nothing(
+    tmp_path: Path, chunk: object, stamp_s: object, said: str
+) -> None:
+    track = GrowingTrack(tmp_path / "track.f32")
+    track.add(Sound(np.zeros(RATE_HZ, np.float32), RATE_HZ))
+    with pytest.raises(AudioError, match=said):
+        track.add(chunk, stamp_s)
+    assert track.end_s == 1.0
+    track.add(Sound(np.zeros(RATE_HZ, np.float32), RATE_HZ))
+    assert track.end_s == 2.0
+
+
+def test_a_track_alone_on_a_walk_without_sounds_has_none(tmp_path: Path) -> None:
+    walk = FakeWalk(np.array([0.0, 1.0]), np.zeros((2, 3)))
+    assert len(GrowingSounds(FakeEncoder(), PLAIN).heard(walk, final=True)) == 0
+    silent = grown([], np.zeros(RATE_HZ, np.float32))
+    assert len(silent.heard(walk, final=False)) == len(silent.heard(walk, final=True)) == 0
