@@ -10,6 +10,9 @@
         live.add(frame.rgb, frame.depth_m, frame.camera, frame.world_from_camera, frame.stamp_s)
     live.ask("the chair"), live.save("home.avlmap")
 
+    with avlmaps.LiveMap("home.avlmap") as live:     # while a robot drives: add_frame, add_audio, ask, status
+        live.add_frame(rgb, depth_m, camera, world_from_camera, stamp_s)
+
 Importing the package loads nothing heavy; each public name is imported when it is first used.
 """
 
@@ -35,6 +38,8 @@ if TYPE_CHECKING:
         RecordingError,
     )
     from avlmaps.core.question import Modality, Part, Question, Role
+    from avlmaps.live.live_map import LiveMap
+    from avlmaps.live.settings import LiveSettings
     from avlmaps.maps.settings import BuildSettings, FrameSettings, FusionSettings
     from avlmaps.navigate.bodies import BodyShape
     from avlmaps.navigate.skills import Robot
@@ -74,6 +79,8 @@ _HOMES = {
     "HeatSettings": "avlmaps.query.factors",
     "Heatmap": "avlmaps.query.heatmap",
     "LanguageError": "avlmaps.core.errors",
+    "LiveMap": "avlmaps.live.live_map",
+    "LiveSettings": "avlmaps.live.settings",
     "Located": "avlmaps.query.locate",
     "MapError": "avlmaps.core.errors",
     "Modality": "avlmaps.core.question",
@@ -120,6 +127,8 @@ __all__ = [
     "HeatSettings",
     "Heatmap",
     "LanguageError",
+    "LiveMap",
+    "LiveSettings",
     "Located",
     "MapError",
     "Modality",

@@ -15,6 +15,7 @@ from avlmaps.cli.reading_options import Reading
 from avlmaps.cli.verb import ModelVerb, Verb
 from avlmaps.cli.verbs import VERBS
 from avlmaps.language.chat.settings import ChatSettings
+from avlmaps.live.replay import replay
 from avlmaps.maps.fusion.sensor import SensorName
 from avlmaps.maps.fusion.settings import FusionSettings
 from avlmaps.maps.settings import BuildSettings, FrameSettings, GravitySettings
@@ -42,7 +43,7 @@ from avlmaps_sim.verbs.bench import Indexing, Navigation
 EVERYWHERE = ("json", "models", "device", "precision")  # checked once, by test_the_models_options
 GROUPS = {
     "bench.indexing": Indexing, "bench.navigation": Navigation, "go.chat": Chat,
-    "build.reading": Reading, "info.reading": Reading, "add-sounds.reading": Reading,
+    "build.reading": Reading, "live.reading": Reading, "info.reading": Reading, "add-sounds.reading": Reading,
 }  # fmt: skip
 OPTIONS: dict[str, type] = {**VERBS, **GROUPS}
 
@@ -86,6 +87,10 @@ SAME: dict[str, Callable[[], Any]] = {
     "build.feature_cache_gb": of(CacheSettings, "limit_gb"),
     "build.format": of(open_recording, "format"),
     "build.audio": of(open_recording, "audio"),
+    "live.profile": of(build_map, "profile"),
+    "live.voxel_size_m": of(BuildSettings, "voxel_size_m"),
+    "live.format": of(open_recording, "format"),
+    "live.rate": of(replay, "rate"),
     "info.format": of(open_recording, "format"),
     "info.audio": of(open_recording, "audio"),
     "add-sounds.format": of(open_recording, "format"),

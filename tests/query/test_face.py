@@ -138,7 +138,7 @@ def test_help_names_what_a_newcomer_needs() -> None:
     import pydoc
 
     text = pydoc.plain(pydoc.render_doc(avlmaps))
-    for word in ("open_map", "VoxelMap", "Encoders", "m.ask(", "build_map"):
+    for word in ("open_map", "VoxelMap", "LiveMap", "Encoders", "m.ask(", "build_map"):
         assert word in text
 
 
@@ -292,7 +292,7 @@ def test_what_is_no_map_size_up_or_profile_is_refused() -> None:
 WORDS = {
     "01": ["home.avlmap", "where can I sit?"], "02": ["rec", "new.avlmap"], "03": ["rec"], "04": ["rec", "live.avlmap"],
     "05": ["rec", "mine.avlmap"], "06": ["rec"], "07": ["home.avlmap"], "08": ["home.avlmap"],
-    "09": ["home.avlmap", "photo.png"], "10": ["home.avlmap", "heat.png"],
+    "09": ["home.avlmap", "photo.png"], "10": ["home.avlmap", "heat.png"], "11": ["rec", "driven.avlmap"],
 }  # fmt: skip
 
 
@@ -306,7 +306,7 @@ def test_the_examples_run(
     assert capsys.readouterr().out.strip()
 
 
-def test_there_are_ten_short_examples() -> None:
+def test_the_examples_are_short() -> None:
     assert [path.name[:2] for path in EXAMPLES] == sorted(WORDS)
     assert all(len(path.read_text().splitlines()) <= 40 for path in EXAMPLES)
     for number in ("04", "05", "06"):  # a stranger's loop, encoder and features

@@ -110,7 +110,7 @@ def build(verb: "Build") -> dict[str, Any]:
             f"The paper's rules use every depth as it is; leave out --sensor {verb.sensor} or --rules paper."
         )
     used, cache = (
-        _choose_models(verb.profile, [word for words in verb.model for word in words]),
+        choose_models(verb.profile, [word for words in verb.model for word in words]),
         _cache(verb.feature_cache, verb.feature_cache_gb),
     )
     recording = open_recording(
@@ -143,7 +143,8 @@ def build(verb: "Build") -> dict[str, Any]:
     return {**describe_map(stored), "elapsed_s": round(perf_counter() - begin, 3)}
 
 
-def _choose_models(name: str, words: "Sequence[str]") -> "Encoders":
+def choose_models(name: str, words: "Sequence[str]") -> "Encoders":
+    """Return the encoders of a profile, with those of ``--model`` instead of some; ``UsageError`` for wrong words."""
     from avlmaps.perception.encoders import encoders_of
     from avlmaps.perception.profiles import profile, read_choices
 

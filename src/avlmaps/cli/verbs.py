@@ -11,6 +11,7 @@ from avlmaps.cli.build import Build
 from avlmaps.cli.export import Export
 from avlmaps.cli.go import Go
 from avlmaps.cli.info import Info
+from avlmaps.cli.live import Live
 from avlmaps.cli.locate import Locate
 from avlmaps.cli.profiles import Profiles
 from avlmaps.cli.query import Query
@@ -36,6 +37,7 @@ ENTRY_POINT_GROUP = "avlmaps.verbs"
 _OWN: dict[str, type[Verb]] = {
     "add-sounds": AddSounds,
     "build": Build,
+    "live": Live,
     "info": Info,
     "query": Query,
     "things": Things,
@@ -51,7 +53,7 @@ _OWN: dict[str, type[Verb]] = {
 }
 # As help lists them: in the order in which a person comes to use them; other packages' own verbs follow.
 _ORDER = (
-    "demo", "record", "add-sounds", "build", "import-map", "info", "query", "things", "rooms", "shell", "view",
+    "demo", "record", "add-sounds", "build", "live", "import-map", "info", "query", "things", "rooms", "shell", "view",
     "export", "locate", "go", "serve", "teach-sound", "profiles", "bench",
 )  # fmt: skip
 

@@ -121,8 +121,8 @@ def _rows_in(index: Int32[np.ndarray, "n 3"], some: Int32[np.ndarray, "m 3"]) ->
     if span[0] * span[1] * span[2] >= 1 << 62:
         return None
     step = np.array([span[1] * span[2], span[2], 1], np.int64)
-    keys: np.ndarray = (index - low) @ step
-    return keys.searchsorted((some - low) @ step)
+    keys, wanted = (np.asarray(np.dot(one - low, step), np.int64) for one in (index, some))
+    return np.searchsorted(keys, wanted)
 
 
 def stack_views(clear: Sequence[np.ndarray], pose: Sequence[np.ndarray], shape: tuple[int, int]) -> FreeViews:

@@ -122,8 +122,8 @@ class GrowingKeyframes:
             rng: for what the place encoder learns.
             came: from ``freeze``.
             final: learn places again, as a build does; else only where enough has come since.
-            within_s: seconds for keyframes that were not looked at; the rest is left for the next time, unless more than
-                40 of them would wait, each with its frame.
+            within_s: seconds for keyframes that were not looked at; the rest is left for the next time, unless that is
+                more than 40 of them, each with its frame.
 
         Raises:
             BackendError: an encoder gives something else than its protocol says; that keyframe is left out.

@@ -1,0 +1,86 @@
+"""`avlmaps live`: a map that grows while a recording is played, as it would on a robot."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from time import perf_counter
+from typing import Annotated, Any, ClassVar
+
+from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
+
+from avlmaps.cli.info import describe_map, info_lines
+from avlmaps.cli.output import UsageError, emit
+from avlmaps.cli.reading_options import Reading
+from avlmaps.cli.verb import ModelVerb
+from avlmaps.core.progress import say
+
+
+@dataclass(frozen=True, kw_only=True)
+class Live(ModelVerb):
+    """Map a recording while it is played, as on a robot: late frames are dropped, and the map is saved all along.
+
+    Example:
+    avlmaps live REC --out home.avlmap --rate 1
+    """
+
+    compiles: ClassVar[bool] = True
+
+    recording: Annotated[Positional[Path], arg(metavar="REC")]
+    """Recording, of any format that build reads."""
+    out: Annotated[Path, arg(metavar="MAP")]
+    """Map folder to write, by custom NAME.avlmap."""
+    rate: Annotated[float, arg(metavar="FACTOR")] = 1.0
+    """Speed of the replay: 1 as it was recorded, 2 twice as fast."""
+    as_fast_as_possible: bool = False
+    """Wait for the map instead of the clock; no frame is late."""
+    every_frame: bool = False
+    """Fuse every frame that is not late, also where nothing moved and nothing new is in view; the end is bit by bit
+    that of a build."""
+    profile: Annotated[str, arg(metavar="PROFILE")] = "embedded"
+    """Set of models (see `avlmaps profiles`)."""
+    model: Annotated[tuple[tuple[str, ...], ...], arg(metavar="MODULE=NAME[@MODEL] ..."), UseAppendAction] = ()
+    """Other backends or models than the profile's: pixels=clip-patches@openai/clip-vit-large-patch14 views=clip."""
+    voxel_size_m: Annotated[float, arg(metavar="METRES")] = 0.05
+    """Edge of a voxel, metres."""
+    format: Annotated[str, arg(metavar="FORMAT")] = "auto"
+    """Format of the recording, if its files do not show it."""
+    reading: Annotated[Reading, OmitArgPrefixes] = field(default_factory=Reading)
+    """What you know better than the recording's files."""
+    overwrite: bool = False
+    """Replace a map at --out."""
+
+    def run(self) -> None:
+        """Play it."""
+        answer = _live(self)
+        emit(answer, [*info_lines(answer, verbose=False), f"live: {answer['live']['summary']}"], self.json)
+
+
+def _live(verb: Live) -> dict[str, Any]:
+    from avlmaps.cli.build import choose_models
+    from avlmaps.live.live_map import LiveMap
+    from avlmaps.live.replay import replay
+    from avlmaps.live.settings import LiveSettings
+    from avlmaps.maps.settings import BuildSettings
+    from avlmaps.recordings.open import open_recording
+
+    begin_s = perf_counter()
+    if not verb.rate > 0.0:
+        raise UsageError(f"--rate is {verb.rate:g}; choose a positive number, or --as-fast-as-possible.")
+    used = choose_models(verb.profile, [word for words in verb.model for word in words])
+    recording = open_recording(verb.recording, format=verb.format, corrections=verb.reading.corrections())
+    for notice in recording.notices:
+        say(f"note: {notice}")
+    with LiveMap(
+        verb.out,
+        used,
+        up_in_world=recording.up_in_world,
+        settings=BuildSettings(voxel_size_m=verb.voxel_size_m),
+        live=LiveSettings(gates=not verb.every_frame),
+        overwrite=verb.overwrite,
+    ) as live:
+        replay(recording, live, None if verb.as_fast_as_possible else verb.rate)
+    status = live.status()
+    return {
+        **describe_map(live.map.stored),
+        "live": {**status.to_dict(), "summary": str(status)},
+        "elapsed_s": round(perf_counter() - begin_s, 3),
+    }

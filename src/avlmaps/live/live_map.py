@@ -1,0 +1,397 @@
+"""A map that grows while a robot drives: frames in, questions at any moment, saved all along.
+
+Three threads work. The caller's puts frames into a short queue. One fuses them, and nobody else touches the growing
+map; on request it freezes what came, which takes no longer than a frame. One works behind: it makes a map of
+what was frozen (keyframes, places and sounds are described there), puts it in the place of the last snapshot, and
+writes it into the folder. A question uses the snapshot that there is; nothing that comes later changes it.
+"""
+
+import contextlib
+import time
+from collections import deque
+from dataclasses import replace
+from pathlib import Path
+from threading import Condition, Event, Lock, Thread
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+from avlmaps.core.errors import AudioError, AvlmapsError, BackendError, MapError, RecordingError
+from avlmaps.live.gates import Gates
+from avlmaps.live.pose_check import PoseCheck
+from avlmaps.live.settings import LiveSettings
+from avlmaps.live.status import LiveStatus, Tally, memory_mb
+from avlmaps.maps.growing import FrozenSums, GrowingMap, require_place, write_stored
+from avlmaps.maps.settings import BuildSettings
+from avlmaps.maps.store.lock import lock_folder
+from avlmaps.maps.store.reader import open_stored
+from avlmaps.perception.encoders import Encoders, encoders_of
+from avlmaps.perception.profiles import Profile
+from avlmaps.query.avlmap import AVLMap, QuerySettings
+from avlmaps.recordings.given_frame import given_frame
+from avlmaps.recordings.memory import same_rig
+from avlmaps.recordings.types import Frame
+
+if TYPE_CHECKING:
+    from avlmaps.query.answer import Answer
+
+_STEP_S = 0.1
+_IDLE_S = 0.05
+_MOST_DOUBTS = 100
+_LOOKS_S = 1.0  # for keyframes, in each snapshot
+_SHARE = 4.0  # a snapshot takes at most one part in this many of the time
+
+
+class LiveMap:
+    """A map that is made while a robot drives.
+
+    Example:
+        with avlmaps.LiveMap("home.avlmap") as live:
+            live.add_frame(rgb, depth_m, camera, world_from_camera, stamp_s)
+            live.add_audio(avlmaps.Sound(samples, 16_000), stamp_s)
+            live.ask("the chair near the sound of a dog").text
+
+    The folder is a whole map at any moment from the first save on, also when the process is killed; another process
+    may open it. What came after the last save is lost then, a few seconds (``status().saved_age_s``). At the end, it is
+    the map that a build makes of the frames that were fused.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        encoders: "Encoders | Profile | str | None" = None,
+        *,
+        up_in_world: Any = None,
+        settings: BuildSettings | None = None,
+        live: LiveSettings | None = None,
+        query: QuerySettings | None = None,
+        overwrite: bool = False,
+    ) -> None:
+        """Begin an empty map, and hold its folder.
+
+        Args:
+            path: folder of the map, by custom ``NAME.avlmap``.
+            encoders: the models that perceive; those of the profile ``embedded`` if None.
+            up_in_world: the direction that is up in the world of the poses; None finds it in the frames.
+            settings: of the build.
+            live: which frames are fused, and how often it is saved.
+            query: how to query.
+            overwrite: replace a map that is there.
+
+        Raises:
+            MapError: the folder is something else or a map, or another process writes it.
+            BackendError: there is no such profile.
+        """
+        self.path, self.settings, self._query = Path(path), live or LiveSettings(), query
+        used = encoders_of("embedded" if encoders is None else encoders)
+        require_place(self.path, overwrite)
+        self._held = contextlib.ExitStack()
+        self._held.enter_context(lock_folder(self.path))
+        chosen, wait = settings or BuildSettings(), self.settings.first_frames if self.settings.gates else None
+        self._growing = GrowingMap(chosen, used, _up(up_in_world), wait=wait, looks_later=True)
+        self._gates = Gates(self.settings, chosen.fusion.max_depth_m)
+        self._check, self._tally = PoseCheck(), Tally()
+        self._queue: deque[tuple[Frame, float]] = deque()
+        self._door, self._ears = Condition(), Lock()
+        self._last: Frame | None = None
+        self._fault: BaseException | None = None
+        self._doubts: list[str] = []
+        self._frozen: tuple[FrozenSums, float] | None = None
+        self._freeze_wanted, self._freeze_done = False, Event()
+        self._snapshot: tuple[AVLMap, float] | None = None
+        self._saved_s, self._generation = float("nan"), 0
+        self._closing, self._closed = False, False
+        self._fuser = Thread(target=self._fuse_all, name="avlmaps-fuse", daemon=True)
+        self._stop_behind = Event()
+        self._behind = Thread(target=self._work_behind, name="avlmaps-behind", daemon=True)
+        self._fuser.start()
+        self._behind.start()
+
+    def add_frame(
+        self,
+        rgb: Any,
+        depth_m: Any,
+        camera: Any,
+        world_from_camera: Any,
+        stamp_s: Any = None,
+        *,
+        wait: bool = False,
+    ) -> None:
+        """Add a frame; see ``VoxelMap.add``. It returns at once, unless it is to wait.
+
+        Args:
+            rgb: colour picture, (h, w, 3) uint8.
+            depth_m: z-depth in metres, (hd, wd) floats; 0, NaN or infinity where there is none.
+            camera: a ``Pinhole`` of the colour picture, whose view the depth shares; or a ``Rig`` of both cameras.
+            world_from_camera: 4x4 pose of the depth camera (OpenCV axes), metres.
+            stamp_s: seconds, rising from frame to frame; by default 0.1 s after the one before.
+            wait: until there is room in the queue; else the frame that waits the longest is dropped for it.
+
+        Raises:
+            RecordingError: it is no frame, comes out of order or again, or is of another camera; the map is as it was.
+            BackendError: an encoder failed on frames before; they are left out.
+            MapError: the map is closed.
+        """
+        arrived_s = time.perf_counter()
+        with self._door:
+            self._require_open()
+            if stamp_s is None:
+                stamp_s = 0.0 if self._last is None else self._last.stamp_s + _STEP_S
+            try:
+                frame = self._in_order(
+                    given_frame(self._tally.of("came"), rgb, depth_m, camera, world_from_camera, stamp_s)
+                )
+            except RecordingError:
+                self._tally.note("refused")
+                raise
+            self._tally.note("came")
+            self._last = frame
+            while wait and len(self._queue) >= self.settings.most_waiting and self._fault is None:
+                self._door.wait(_IDLE_S)
+            if len(self._queue) >= self.settings.most_waiting:
+                self._queue.popleft()
+                self._tally.drop("late")
+            self._queue.append((frame, arrived_s))
+            self._door.notify_all()
+
+    def add_audio(self, chunk: Any, stamp_s: Any = None) -> None:
+        """Add a piece of the microphone's sound; see ``VoxelMap.add_audio``.
+
+        Raises:
+            AudioError: it is no sound, is of another rate, repeats what came, or is of another clock.
+            MapError: the map is closed.
+        """
+        self._require_open()
+        with self._ears:
+            try:
+                self._growing.add_audio(chunk, stamp_s)
+            except AudioError:
+                self._tally.note("refused")
+                raise
+
+    @property
+    def map(self) -> AVLMap:
+        """The last snapshot, to be queried in every way; it does not change.
+
+        Raises:
+            MapError: there is none yet.
+        """
+        snapshot = self._snapshot
+        if snapshot is None:
+            raise MapError(
+                f"The live map has no surface yet ({self._tally.of('came')} frames came); ask again in a moment."
+            )
+        return snapshot[0]
+
+    @property
+    def generation(self) -> int:
+        """How many snapshots there were; it rises when ``map`` becomes another."""
+        return self._generation
+
+    def ask(self, question: Any = "", *args: Any, **parts: Any) -> "Answer":
+        """Answer a query on the last snapshot, from any thread; see ``AVLMap.ask``."""
+        return self.map.ask(question, *args, **parts)
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """One sentence for each thing that is not as it should be: poses that do not fit, saves that failed."""
+        return tuple(self._doubts)
+
+    def status(self) -> LiveStatus:
+        """Return how the map fares."""
+        snapshot, track, now_s = self._snapshot, self._growing.sound_track, time.perf_counter()
+        counts = snapshot[0].stored.info.counts if snapshot is not None else None
+        p50_ms, p95_ms = self._tally.quantiles_ms()
+        return LiveStatus(
+            frames_in=self._tally.of("came"),
+            fused=self._tally.of("fused"),
+            dropped=self._tally.dropped(),
+            refused=self._tally.of("refused"),
+            waiting=len(self._queue),
+            frame_ms_p50=p50_ms,
+            frame_ms_p95=p95_ms,
+            voxels=counts.voxels if counts else 0,
+            keyframes=counts.keyframes if counts else 0,
+            sounds=counts.sounds if counts else 0,
+            snapshot_age_s=now_s - snapshot[1] if snapshot is not None else float("nan"),
+            saved_age_s=now_s - self._saved_s,
+            memory_mb=memory_mb(),
+            sound_gaps=0 if track is None else track.gaps,
+            doubts=self.doubts,
+        )
+
+    def close(self) -> AVLMap:
+        """Fuse what waits, find up, the floor, places and sounds as a build does, write the map and open it.
+
+        Raises:
+            MapError: no frame came, or the map cannot be written: the last save is still there, and closing may be
+                tried again.
+            BackendError: an encoder is missing, or broke its protocol.
+        """
+        with self._door:
+            self._closing = True
+            self._door.notify_all()
+        self._fuser.join()
+        self._stop_behind.set()
+        self._freeze_done.set()
+        self._behind.join()
+        if not self._closed:
+            try:
+                if len(self._growing):
+                    made = self._growing.stored(final=True)
+                    write_stored(self.path, made)
+            except BaseException:
+                if not len(self._growing) or not self.path.is_dir():
+                    self._held.close()
+                raise
+            self._closed = True
+            self._held.close()
+        if not len(self._growing):
+            raise MapError(f"No frame came, so that there is no map in {self.path}; add frames before it is closed.")
+        stored = replace(open_stored(self.path), encoders=self._growing.encoders)
+        self._snapshot = AVLMap(stored, self._query), time.perf_counter()
+        self._generation += 1
+        return self._snapshot[0]
+
+    def __enter__(self) -> "LiveMap":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            self.close()
+        except AvlmapsError:
+            if error is None:
+                raise
+        finally:
+            self._held.close()
+
+    def __len__(self) -> int:
+        """Return how many frames are in the map."""
+        return self._tally.of("fused")
+
+    def __repr__(self) -> str:
+        return f"LiveMap({self.path.name!r}: {self.status()})"
+
+    # The caller's thread
+
+    def _require_open(self) -> None:
+        if self._closing:
+            raise MapError(f"The live map {self.path} is closed; begin another.")
+        fault, self._fault = self._fault, None
+        if fault is not None:
+            raise fault
+
+    def _in_order(self, frame: Frame) -> Frame:
+        last = self._last
+        if last is None:
+            return frame
+        if not frame.stamp_s > last.stamp_s:
+            what = "repeats the last frame" if frame.stamp_s == last.stamp_s else "is out of order"
+            raise RecordingError(
+                f"A frame at {frame.stamp_s:g} s {what} ({last.stamp_s:g} s), and was left out; add frames in the "
+                "order of time."
+            )
+        if not same_rig(frame.rig, last.rig):
+            raise RecordingError(
+                f"A frame at {frame.stamp_s:g} s has another camera ({frame.rig.rgb.width}x{frame.rig.rgb.height}, "
+                f"before {last.rig.rgb.width}x{last.rig.rgb.height}), and was left out; a map has one."
+            )
+        return replace(frame, rig=last.rig)
+
+    # The thread that fuses
+
+    def _fuse_all(self) -> None:
+        while True:
+            with self._door:
+                while not self._queue and not self._closing and not self._freeze_wanted:
+                    self._door.wait(_IDLE_S)
+                frame, arrived_s = self._queue.popleft() if self._queue else (None, 0.0)
+                self._door.notify_all()
+            if frame is not None:
+                self._fuse(frame, arrived_s)
+            if self._freeze_wanted:
+                self._freeze()
+            if frame is None and self._closing and not self._queue:
+                return
+
+    def _fuse(self, frame: Frame, arrived_s: float) -> None:
+        growing = self._growing
+        try:
+            if (doubt := self._check.add(frame)) is not None:
+                self._doubt(doubt)
+            reason = self._gates.reason_against(frame, growing.sums) if self.settings.gates else None
+            if reason is not None:
+                growing.pass_by(frame.stamp_s, frame.world_from_camera)
+                self._tally.drop(reason)
+            else:
+                growing.add(replace(frame, index=growing.next_index, name=f"{growing.next_index:06d}"))
+                self._tally.note("fused")
+        except BackendError as fault:
+            self._tally.drop("wrong")
+            self._fault = fault
+        except AvlmapsError as fault:
+            self._tally.drop("wrong")
+            self._doubt(str(fault))
+        self._tally.took(time.perf_counter() - arrived_s)
+
+    def _freeze(self) -> None:
+        self._freeze_wanted = False
+        try:
+            self._frozen = self._growing.freeze(), time.perf_counter()
+        except MapError:  # up and the floor are not found yet
+            self._frozen = None
+        self._freeze_done.set()
+
+    def _doubt(self, sentence: str) -> None:
+        if len(self._doubts) < _MOST_DOUBTS and sentence not in self._doubts:
+            self._doubts.append(sentence)
+
+    # The thread behind
+
+    def _work_behind(self) -> None:
+        pause_s, known = 0.0, 0
+        while not self._stop_behind.wait(pause_s or _IDLE_S):
+            pause_s = 0.0
+            if self._tally.of("fused") == known and self._growing.sound_track is None:
+                continue
+            self._freeze_done.clear()
+            with self._door:
+                self._freeze_wanted = True
+                self._door.notify_all()
+            self._freeze_done.wait()
+            if self._frozen is None or self._closing:
+                continue
+            begin_s = time.perf_counter()
+            known = self._tally.of("fused")
+            try:
+                self._publish(*self._frozen)
+            except AvlmapsError as fault:
+                self._doubt(str(fault))
+            self._frozen = None
+            took_s = time.perf_counter() - begin_s
+            pause_s = max(self.settings.snapshot_s - took_s, (_SHARE - 1.0) * min(took_s, 1.0) / _SHARE, _IDLE_S)
+
+    def _publish(self, came: FrozenSums, came_s: float) -> None:
+        stored = self._growing.finish(came, looks_s=_LOOKS_S)
+        if not time.perf_counter() - self._saved_s < self.settings.save_s:  # also where it is NaN
+            write_stored(self.path, stored)
+            self._saved_s = came_s
+        made = AVLMap(stored, self._query)
+        _warm(made)
+        self._snapshot = made, came_s
+        self._generation += 1
+
+
+def _warm(made: AVLMap) -> None:
+    """Compute what every question needs, so that the first one does not wait for it."""
+    with contextlib.suppress(AvlmapsError):  # a profile without names, or a map too small for rooms
+        made.things()
+    with contextlib.suppress(AvlmapsError):
+        made.ask("the chair in the kitchen")
+
+
+def _up(given: Any) -> Any:
+    from avlmaps.query.voxel_map import direction
+
+    return direction(given)

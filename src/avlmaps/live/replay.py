@@ -1,0 +1,60 @@
+"""A recording that is played into a live map, at its own pace or as fast as the map takes it."""
+
+import time
+from collections.abc import Callable
+
+from avlmaps.core.errors import RecordingError
+from avlmaps.core.progress import progress, say
+from avlmaps.live.live_map import LiveMap
+from avlmaps.recordings.types import Recording
+
+
+def replay(
+    recording: Recording,
+    live: LiveMap,
+    rate: float | None = 1.0,
+    tell: Callable[[str], None] = say,
+) -> None:
+    """Give a live map the frames and the sound of a recording. Frames that cannot be read are left out.
+
+    Args:
+        recording: what to play.
+        live: the map.
+        rate: how many times faster than it was recorded; None waits for the map, so that no frame is late.
+        tell: called with each doubt, as soon as it is known.
+    """
+    begin_s, told, heard_s = time.perf_counter(), 0, None if recording.audio is None else recording.audio.start_s
+    shown = progress(range(len(recording)), "mapping", total=len(recording), note=lambda: _note(live))
+    for index in shown:
+        since_s = float(recording.stamps_s[index] - recording.stamps_s[0])
+        if rate is not None:
+            time.sleep(max(0.0, begin_s + since_s / rate - time.perf_counter()))
+        try:
+            frame = recording.frame(index)
+            live.add_frame(
+                frame.rgb, frame.depth_m, frame.camera, frame.world_from_camera, frame.stamp_s, wait=rate is None
+            )
+        except RecordingError as fault:
+            tell(f"note: {fault}")
+            continue
+        heard_s = _play(recording, live, heard_s, frame.stamp_s)
+        for doubt in live.doubts[told:]:
+            tell(f"note: {doubt}")
+        told = len(live.doubts)
+    _play(recording, live, heard_s, float("inf"))
+
+
+def _play(recording: Recording, live: LiveMap, heard_s: float | None, until_s: float) -> float | None:
+    """Give the sound up to a moment, and return up to when it came."""
+    track = recording.audio
+    if track is None or heard_s is None:
+        return None
+    end_s = min(until_s, track.end_s)
+    if end_s > heard_s:
+        live.add_audio(track.read(heard_s, end_s), heard_s)
+    return max(heard_s, end_s)
+
+
+def _note(live: LiveMap) -> str:
+    status = live.status()
+    return f"{status.fused} fused, {status.dropped.get('late', 0)} late, {status.voxels} voxels"

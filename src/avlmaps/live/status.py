@@ -1,0 +1,115 @@
+"""How a live map fares: what came, what was dropped and why, how long it took."""
+
+from collections import Counter, deque
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from threading import Lock
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True, slots=True)
+class LiveStatus:
+    """How a live map fares at a moment.
+
+    Attributes:
+        frames_in: frames that came, refused ones left out.
+        fused: frames that are in the map's sums.
+        dropped: frames that are not, by reason: ``late`` (others were waiting), ``still`` (the camera did not move),
+            ``known`` (no new surface), ``wrong`` (an encoder failed on it).
+        refused: frames and pieces of sound that were no such thing, or out of order.
+        waiting: frames that wait.
+        frame_ms_p50: milliseconds from a frame's arrival until it is in the sums or dropped by a gate, median.
+        frame_ms_p95: 95 % are quicker.
+        voxels: of the last snapshot.
+        keyframes: of the last snapshot.
+        sounds: of the last snapshot.
+        snapshot_age_s: since what the last snapshot holds came; NaN without one.
+        saved_age_s: since what the last save holds came; NaN without one.
+        memory_mb: resident memory of the process; 0 where the system does not say.
+        sound_gaps: gaps in the sound, which are silent.
+        doubts: one sentence for each thing that is not as it should be.
+    """
+
+    frames_in: int
+    fused: int
+    dropped: dict[str, int]
+    refused: int
+    waiting: int
+    frame_ms_p50: float
+    frame_ms_p95: float
+    voxels: int
+    keyframes: int
+    sounds: int
+    snapshot_age_s: float
+    saved_age_s: float
+    memory_mb: float
+    sound_gaps: int
+    doubts: tuple[str, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as JSON has it; what is not known is None."""
+        return {
+            key: None if isinstance(value, float) and np.isnan(value) else value for key, value in asdict(self).items()
+        }
+
+    def __str__(self) -> str:
+        dropped = ", ".join(f"{count} {reason}" for reason, count in sorted(self.dropped.items()))
+        return (
+            f"{self.frames_in} frames came, {self.fused} fused ({dropped or 'none'} dropped), p95 "
+            f"{self.frame_ms_p95:.0f} ms; {self.voxels} voxels, {self.keyframes} keyframes, {self.sounds} sounds; "
+            f"{self.memory_mb:.0f} MB"
+        )
+
+
+class Tally:
+    """Counts of a live map; several threads write them."""
+
+    def __init__(self) -> None:
+        """Begin with nothing."""
+        self._lock = Lock()
+        self._counts: Counter[str] = Counter()
+        self._dropped: Counter[str] = Counter()
+        self._took_ms: deque[float] = deque(maxlen=5000)
+
+    def note(self, what: str) -> None:
+        """Count one of ``came``, ``fused`` or ``refused``."""
+        with self._lock:
+            self._counts[what] += 1
+
+    def drop(self, reason: str) -> None:
+        """Count a frame that was dropped."""
+        with self._lock:
+            self._dropped[reason] += 1
+
+    def took(self, seconds: float) -> None:
+        """Note how long a frame took from its arrival."""
+        with self._lock:
+            self._took_ms.append(1e3 * seconds)
+
+    def of(self, what: str) -> int:
+        """Return a count."""
+        return self._counts[what]
+
+    def dropped(self) -> dict[str, int]:
+        """Return how many frames were dropped, by reason."""
+        with self._lock:
+            return dict(self._dropped)
+
+    def quantiles_ms(self) -> tuple[float, float]:
+        """Return the median and the 95 % quantile of a frame's time; NaN without frames."""
+        with self._lock:
+            took = list(self._took_ms)
+        return (float("nan"), float("nan")) if not took else tuple(np.percentile(took, [50, 95]).tolist())
+
+
+def memory_mb() -> float:
+    """Return the resident memory of the process, MB; 0 where the system does not say."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    except (OSError, ValueError, IndexError):
+        return 0.0
+    import os
+
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6

@@ -1,0 +1,259 @@
+"""A live map ends as a build does, answers meanwhile, and refuses what is no frame without losing anything."""
+
+import subprocess
+import sys
+import threading
+import time
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import avlmaps
+from avlmaps.core.errors import AudioError, MapError, RecordingError
+from avlmaps.live.gates import Gates
+from avlmaps.live.live_map import LiveMap
+from avlmaps.live.pose_check import PoseCheck
+from avlmaps.live.settings import LiveSettings
+from avlmaps.maps.build import build_map
+from avlmaps.maps.fusion.accumulator import VoxelAccumulator
+from avlmaps.maps.grid import GridSpec
+from avlmaps.maps.settings import BuildSettings, FrameSettings
+from avlmaps.maps.store.reader import open_stored
+
+ENCODERS = avlmaps.Encoders.named("colours")
+CAMERA = avlmaps.Pinhole(80.0, 80.0, 40.0, 30.0, 80, 60)
+UP = (0.0, 0.0, 1.0)
+EVERY = LiveSettings(gates=False)
+
+
+def frame(number: int, *, step_m: float = 0.05, seen_m: float | None = None) -> avlmaps.Frame:
+    """Return what a camera sees that goes along a wavy, coloured wall 2 m away.
+
+    Args:
+        number: of the frame, ten a second.
+        step_m: from frame to frame, as its pose says.
+        seen_m: where it really is; by default where its pose says.
+    """
+    pose = np.eye(4)
+    pose[:3, :3] = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
+    pose[0, 3] = number * step_m
+    x_m = pose[0, 3] if seen_m is None else seen_m
+    along = x_m + (np.arange(80) + 0.5 - 40.0) / 80.0 * 2.0
+    depth = np.tile(2.0 + 0.5 * np.sin(4.0 * along), (60, 1)).astype(np.float32)
+    shade = (127.0 + 120.0 * np.sin(9.0 * along)).astype(np.uint8)
+    rgb = np.stack([np.tile(shade, (60, 1)), np.full((60, 80), 60, np.uint8), np.tile(255 - shade, (60, 1))], axis=-1)
+    rig = avlmaps.Rig(CAMERA, CAMERA)
+    return avlmaps.Frame(number, f"{number:06d}", 0.1 * number, rgb, depth, pose, rig)
+
+
+def add(live: LiveMap, one: avlmaps.Frame, **parts: object) -> None:
+    live.add_frame(one.rgb, one.depth_m, one.camera, one.world_from_camera, one.stamp_s, wait=True, **parts)
+
+
+def recorded(folder: Path, frames: int) -> avlmaps.Recording:
+    with avlmaps.RecordingWriter(folder, frame(0).rig, np.array(UP)) as writer:
+        for number in range(frames):
+            writer.add(frame(number))
+    return avlmaps.open_recording(folder)
+
+
+def wait_for(condition, seconds: float = 60.0) -> None:
+    end_s = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end_s, "it did not happen"
+        time.sleep(0.01)
+
+
+def test_without_gates_the_end_is_the_build_of_the_same_frames_bit_by_bit(tmp_path: Path) -> None:
+    recording = recorded(tmp_path / "rec", 25)
+    settings = BuildSettings(frames=FrameSettings(per_part=10))
+    built = build_map(recording, tmp_path / "built", ENCODERS, settings, progress=False, allow=["geometry", "colour"])
+    with LiveMap(tmp_path / "live", ENCODERS, up_in_world=UP, settings=settings, live=EVERY) as live:
+        for one in recording:
+            add(live, one)
+    made = open_stored(tmp_path / "live", verify=True)
+    for field in fields(made.voxels):
+        np.testing.assert_array_equal(getattr(made.voxels, field.name), getattr(built.voxels, field.name))
+    np.testing.assert_array_equal(made.keyframes.stamp_s, built.keyframes.stamp_s)
+    assert live.status().dropped == {} and len(live) == 25
+
+
+def test_it_answers_from_other_threads_on_snapshots_that_do_not_change(tmp_path: Path) -> None:
+    chosen = LiveSettings(first_frames=2, snapshot_s=0.0, new_share=0.0)
+    faults: list[BaseException] = []
+    done = threading.Event()
+
+    def query() -> None:
+        try:
+            while not done.is_set():
+                snapshot = live.map
+                voxels = len(snapshot.points)
+                live.ask("something red")
+                assert len(snapshot.points) == voxels
+        except BaseException as fault:  # noqa: BLE001 - shown below
+            faults.append(fault)
+
+    with LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP, live=chosen) as live:
+        with pytest.raises(MapError, match="no surface yet"):
+            live.ask("something red")
+        for number in range(4):
+            add(live, frame(number))
+        wait_for(lambda: live.generation >= 1)
+        first = live.map
+        threads = [threading.Thread(target=query) for _ in range(2)]
+        for thread in threads:
+            thread.start()
+        before = live.generation
+        for number in range(4, 30):
+            add(live, frame(number))
+        wait_for(lambda: live.generation > before)
+        done.set()
+        for thread in threads:
+            thread.join()
+    assert not faults
+    assert len(first.points) < len(live.map.points)
+
+
+def test_frames_that_bring_nothing_are_dropped_by_reason(tmp_path: Path) -> None:
+    with LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP, live=LiveSettings(known_views=3)) as live:
+        for number in range(12):
+            add(live, replace(frame(0), stamp_s=0.1 * number))
+        for number in range(12, 30):  # to the right, and back again
+            add(live, replace(frame(number - 12), stamp_s=0.1 * number))
+        for number in range(30, 48):
+            add(live, replace(frame(47 - number), stamp_s=0.1 * number))
+    dropped = live.status().dropped
+    assert dropped["still"] >= 5 and dropped["known"] >= 5
+    assert len(live) + sum(dropped.values()) == live.status().frames_in == 48
+
+
+def test_late_frames_are_dropped_and_counted(tmp_path: Path) -> None:
+    with LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP, live=EVERY) as live:
+        for number in range(40):
+            one = frame(number)
+            live.add_frame(one.rgb, one.depth_m, one.camera, one.world_from_camera, one.stamp_s)
+    status = live.status()
+    assert status.fused + status.dropped.get("late", 0) == status.frames_in == 40
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        (dict(stamp_s=0.5), r"at 0.5 s is out of order \(1.1 s\)"),
+        (dict(stamp_s=1.1), "repeats the last frame"),
+        (dict(rgb=np.zeros((30, 40, 3), np.uint8)), "has 40x30 pixels, its camera 80x60"),
+        (dict(camera=replace(CAMERA, fx=90.0)), "another camera"),
+        (dict(depth_m=None), "must be an array of numbers, not NoneType"),
+        (dict(world_from_camera=None), "must be an array of numbers, not NoneType"),
+    ],
+    ids=lambda one: next(iter(one)) if isinstance(one, dict) else "",
+)
+def test_what_is_no_next_frame_is_refused_and_costs_nothing(tmp_path: Path, wrong: dict, said: str) -> None:
+    with LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP, live=EVERY) as live:
+        for number in range(12):
+            add(live, frame(number))
+        good = frame(12)
+        parts = dict(
+            rgb=good.rgb,
+            depth_m=good.depth_m,
+            camera=good.camera,
+            world_from_camera=good.world_from_camera,
+            stamp_s=1.2,
+        )
+        with pytest.raises(RecordingError, match=said):
+            live.add_frame(**{**parts, **wrong})
+        with pytest.raises(AudioError, match=r"must be an avlmaps\.Sound"):
+            live.add_audio(np.zeros(3))
+        live.add_frame(**parts, wait=True)
+    assert len(live) == 13 and live.status().refused == 2
+
+
+def test_a_second_writer_a_finished_map_and_an_empty_one_get_a_sentence(tmp_path: Path) -> None:
+    with LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP) as live:
+        with pytest.raises(MapError, match="is being built by another process"):
+            LiveMap(tmp_path / "map", ENCODERS)
+        add(live, frame(0))
+    with pytest.raises(MapError, match="is a finished map already"):
+        LiveMap(tmp_path / "map", ENCODERS)
+    with pytest.raises(MapError, match="is closed"):
+        add(live, frame(1))
+    with pytest.raises(MapError, match="No frame came"), LiveMap(tmp_path / "none", ENCODERS):
+        pass
+    with LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP, overwrite=True) as again:
+        add(again, frame(0))
+
+
+def test_sounds_are_in_the_map_with_the_frames(tmp_path: Path) -> None:
+    ears = avlmaps.Encoders.named("colours", sounds="embedded")
+    samples = np.random.default_rng(0).normal(scale=1e-3, size=64_000).astype(np.float32)
+    samples[16_000:24_000] += 0.3 * np.sin(np.arange(8_000) / 4.0).astype(np.float32)
+    with LiveMap(tmp_path / "map", ears, up_in_world=UP, live=EVERY) as live:
+        for number in range(40):
+            add(live, frame(number))
+            live.add_audio(avlmaps.Sound(samples[1600 * number : 1600 * (number + 1)], 16_000), 0.1 * number)
+    (heard,) = live.map.stored.sounds.onset_s
+    assert heard == pytest.approx(1.0, abs=0.1)
+
+
+KILLED = """
+import sys, time
+sys.path[:0] = {path!r}
+from test_live_map import ENCODERS, UP, add, frame
+from avlmaps.live.live_map import LiveMap
+from avlmaps.live.settings import LiveSettings
+chosen = LiveSettings(first_frames=2, snapshot_s=0.0, save_s=0.0, new_share=0.0)
+live = LiveMap(sys.argv[1], ENCODERS, up_in_world=UP, live=chosen)
+for number in range(100_000):
+    add(live, frame(number))
+    if live.status().saved_age_s >= 0.0:
+        print(number, flush=True)
+"""
+
+
+def test_what_a_kill_leaves_is_a_whole_map(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    for trial in range(2):
+        folder = tmp_path / f"map{trial}"
+        program = KILLED.format(path=[str(Path(__file__).parent)])
+        process = subprocess.Popen([sys.executable, "-c", program, str(folder)], stdout=subprocess.PIPE)
+        assert process.stdout is not None and process.stdout.readline()
+        time.sleep(float(rng.uniform(0.0, 0.8)))
+        process.kill()
+        process.wait()
+        process.stdout.close()
+        left = open_stored(folder, verify=True)
+        assert len(left.voxels) > 0 and avlmaps.open_map(folder).object("red").peak >= 0.0
+        with LiveMap(folder, ENCODERS, up_in_world=UP, overwrite=True) as again:  # the lock went with the process
+            add(again, frame(0))
+
+
+# Gates and poses
+
+
+def test_a_gate_opens_for_new_surface_alone() -> None:
+    gates, total = Gates(LiveSettings(known_views=2), 10.0), VoxelAccumulator(GridSpec(0.05), 0)
+    assert gates.reason_against(frame(0), [total]) is None  # the first
+    for _ in range(2):
+        total.add(frame(0))
+    assert gates.reason_against(frame(0), [total]) == "still"
+    assert gates.reason_against(frame(20), [total]) is None
+    for _ in range(2):
+        total.add(frame(20))
+    assert gates.reason_against(frame(0), [total]) == "known"
+
+
+def test_poses_that_stop_fitting_the_pictures_are_in_doubt_within_three_seconds() -> None:
+    check = PoseCheck()
+    assert all(check.add(frame(number)) is None for number in range(40))
+    slipping = [check.add(frame(number, seen_m=2.0 + 0.1 * (number - 40))) for number in range(40, 80)]
+    said = [(number, sentence) for number, sentence in enumerate(slipping) if sentence]
+    assert len(said) == 1 and 0.1 * said[0][0] <= 3.0
+    assert "The poses do not fit the pictures from" in said[0][1]
+
+
+def test_a_pose_that_jumps_is_said_at_once() -> None:
+    check = PoseCheck()
+    assert all(check.add(frame(number)) is None for number in range(10))
+    assert "The pose jumps at 1.00 s: 4" in str(check.add(replace(frame(90), stamp_s=1.0)))
