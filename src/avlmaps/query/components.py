@@ -4,6 +4,9 @@ import numpy as np
 
 from avlmaps.core.arrays import Int, Int64
 
+# Pairs of a run and a neighbouring column that are compared at once: few voxels take one step, many little memory.
+_MOST_AT_ONCE = 1 << 17
+
 
 def linked(index: Int[np.ndarray, "n 3"], reach: int) -> Int64[np.ndarray, " n"]:
     """Label voxels so that those within ``reach`` along every axis share a label; labels rise by their first voxel.
@@ -28,11 +31,14 @@ def linked(index: Int[np.ndarray, "n 3"], reach: int) -> Int64[np.ndarray, " n"]
     columns, of_run = column[begins], np.asarray(np.cumsum(begins)[first] - 1, np.int64)
     bottom, top = of_run * height + z[first], of_run * height + z[last]
     root = np.arange(len(first))
-    for dx, dy in ((dx, dy) for dx in range(reach + 1) for dy in range(-reach, reach + 1) if dx or dy > 0):
-        wanted = columns + dx * width + dy
+    ways = [(dx, dy) for dx in range(reach + 1) for dy in range(-reach, reach + 1) if dx or dy > 0]
+    steps = np.array([dx * width + dy for dx, dy in ways])
+    at_once = max(1, _MOST_AT_ONCE // len(first))
+    for start in range(0, len(steps), at_once):
+        wanted = columns + steps[start : start + at_once, None]
         at = np.minimum(np.asarray(np.searchsorted(columns, wanted), np.int64), len(columns) - 1)
-        run = np.flatnonzero((columns[at] == wanted)[of_run])
-        lift = (at[of_run[run]] - of_run[run]) * height  # to the other column
+        way, run = np.nonzero((columns[at] == wanted)[:, of_run])
+        lift = (at[way, of_run[run]] - of_run[run]) * height  # to the other column
         low = np.asarray(np.searchsorted(top, bottom[run] + lift - reach), np.int64)
         count = np.asarray(np.searchsorted(bottom, top[run] + lift + reach, side="right") - low, np.int64)
         ends = np.cumsum(count)

@@ -36,7 +36,7 @@ def feature_scores(
     def write(start: int, stop: int) -> None:
         for a, wide in _widened(feature, rows, start, stop):
             # Row by row: a matrix product sums rows at its edges in another order, and equal ones must stay equal.
-            products = [np.einsum("ij,j->i", wide, word) for word in scaled]
+            products = [np.vecdot(wide, word) for word in scaled]
             out[a : a + len(wide)] = products[0] if len(products) == 1 else np.sqrt(np.square(products).sum(axis=0))
 
     share(write, len(out), _LEAST_SHARED)
