@@ -144,11 +144,11 @@ def together(python: Path, cwd: Path) -> None:
     """Try all three."""
     listed = {one["name"] for one in answer(python, cwd, "profiles")["profiles"]}
     assert listed >= {"embedded", "foundation", "paper"}
-    answer(python, cwd, "record", "--scene", "house:1", "--out", "rec", "--size", "160x120", "--max-frames", "12")
+    answer(python, cwd, "record", "--scene", "house:7", "--out", "rec", "--size", "160x120", "--max-frames", "160")
     answer(python, cwd, "build", "rec", "--out", "home.avlmap", "--voxel-size-m", "0.1")
     found = answer(python, cwd, "query", "home.avlmap", "a chair near the sound of a dog")
     assert {part["modality"] for part in found["parts"]} == {"object", "sound"}
-    drive = ("go", "home.avlmap", "turn left", "--scene", "house:1")
+    drive = ("go", "home.avlmap", "turn left", "--scene", "house:7")
     assert answer(python, cwd, *drive)["ok"]
     assert answer(python, cwd, "import-map", "nowhere", "--out", "m", status=1)["error"]["kind"] == "map"
     old = "import avlmaps.sim.mesh, avlmaps_sim.mesh; assert avlmaps.sim.mesh is avlmaps_sim.mesh"
