@@ -73,22 +73,6 @@ def write_siglip2(folder: Path) -> None:
     (place / "preprocessor_config.json").write_text(json.dumps(prepared), encoding="utf-8")
 
 
-def write_open_clip(folder: Path) -> None:
-    """PE-Core B/16 by open_clip's own configuration."""
-    import open_clip
-    from safetensors.torch import save_file
-
-    place = folder / "timm/PE-Core-B-16"
-    place.mkdir(parents=True)
-    config = open_clip.get_model_config("PE-Core-B-16")
-    halves = {"mean": [0.5] * 3, "std": [0.5] * 3, "interpolation": "bilinear", "resize_mode": "squash"}
-    whole = {"model_cfg": config, "preprocess_cfg": halves}
-    (place / "open_clip_config.json").write_text(json.dumps(whole), encoding="utf-8")
-    made = open_clip.CustomTextCLIP(**{key: value for key, value in config.items() if key != "custom_text"})
-    rows = {name: row.contiguous() for name, row in made.state_dict().items()}
-    save_file(rows, place / "open_clip_model.safetensors", metadata={"format": "pt"})
-
-
 def write_clap(folder: Path) -> None:
     """CLAP with the larger of the two networks that hear (HTSAT-base), as in larger_clap_general."""
     from tiny.clap import write_roberta_tokenizer
@@ -126,14 +110,6 @@ def write_pe_a_frame(folder: Path) -> None:
     PeAudioProcessor(PeAudioFeatureExtractor(), letters()).save_pretrained(place)
 
 
-def write_dinov2(folder: Path) -> None:
-    """DINOv2 S/14."""
-    from transformers import Dinov2Config, Dinov2Model
-
-    config = Dinov2Config(hidden_size=384, num_hidden_layers=12, num_attention_heads=6, patch_size=14, image_size=518)
-    Dinov2Model(config).save_pretrained(folder / "facebook/dinov2-small")
-
-
 def _tower(width: int, layers: int, heads: int) -> dict[str, Any]:
     """Return the sizes of a transformer whose MLP is four times as wide."""
     names = ("hidden_size", "intermediate_size", "num_hidden_layers", "num_attention_heads")
@@ -151,11 +127,6 @@ def _tests_writer(module: str, function: str, **sizes: Any) -> Writer:
     return write
 
 
-def _wav2clip(folder: Path) -> None:
-    write_clip(folder, CLIP_B32)
-    _tests_writer("wav2clip", "write_wav2clip", tiny=False)(folder)
-
-
 def _lseg(folder: Path) -> None:
     from tiny.lseg import PUBLISHED, write_lseg
 
@@ -167,20 +138,16 @@ WRITERS: dict[str, Writer] = {
     "clip-patches": lambda folder: write_clip(folder, CLIP_B16),
     "siglip2": write_siglip2,
     "clip": write_clip,
-    "open-clip": write_open_clip,
     "clap": write_clap,
     "pe-a-frame": write_pe_a_frame,
     "disk": _tests_writer("disk", "write_disk"),
     "aliked": _tests_writer("aliked", "write_aliked"),
     "megaloc": _tests_writer("megaloc", "write_megaloc", tiny=False),
-    "eigenplaces": _tests_writer("eigenplaces", "write_eigenplaces", tiny=False),
-    "dinov2": write_dinov2,
     "lightglue-disk": _tests_writer("lightglue", "write_lightglue", random=True),
     "lightglue-aliked": _tests_writer("lightglue", "write_lightglue", keypoints="aliked", random=True),
     "lseg": _lseg,
     "clip-paper": write_clip,
     "audioclip": _tests_writer("audioclip", "write_audioclip", tiny=False),
-    "wav2clip": _wav2clip,
     "superpoint": _tests_writer("superpoint", "write_superpoint"),
     "netvlad": _tests_writer("netvlad", "write_netvlad", tiny=False),
     "superglue": _tests_writer("superglue", "write_superglue", random=True, layers=18),

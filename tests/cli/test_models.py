@@ -121,22 +121,22 @@ LAYOUTS = ("org/name", "org--name", "name")
 
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_weights_in_the_folder_of_models_are_seen(empty: Path, every_package: None, layout: str) -> None:
-    assert state_of(Kind.PLACE, "dinov2", empty)[0] == "weights missing"
-    (empty / layout.replace("org", "facebook").replace("name", "dinov2-small")).mkdir(parents=True)
-    assert state_of(Kind.PLACE, "dinov2", empty)[0] == "ready"
-    assert state_of(Kind.PLACE, "dinov2")[0] == "weights missing", "another folder"
+    assert state_of(Kind.PIXELS, "clip-patches", empty)[0] == "weights missing"
+    (empty / layout.replace("org", "openai").replace("name", "clip-vit-base-patch16")).mkdir(parents=True)
+    assert state_of(Kind.PIXELS, "clip-patches", empty)[0] == "ready"
+    assert state_of(Kind.PIXELS, "clip-patches")[0] == "weights missing", "another folder"
 
 
 def test_weights_in_the_hubs_cache_are_seen_without_its_library(tmp_path: Path, every_package: None) -> None:
-    state, how = state_of(Kind.PLACE, "dinov2")
+    state, how = state_of(Kind.PIXELS, "clip-patches")
     assert state == "weights missing"
-    assert how.startswith("hf download facebook/dinov2-small")
-    snapshot = tmp_path / "hf" / "hub" / "models--facebook--dinov2-small" / "snapshots" / "abc"
+    assert how.startswith("hf download openai/clip-vit-base-patch16")
+    snapshot = tmp_path / "hf" / "hub" / "models--openai--clip-vit-base-patch16" / "snapshots" / "abc"
     snapshot.mkdir(parents=True)
     (snapshot / "config.json").write_text("{}")
-    assert state_of(Kind.PLACE, "dinov2")[0] == "weights missing", "a configuration alone is not a model"
+    assert state_of(Kind.PIXELS, "clip-patches")[0] == "weights missing", "a configuration alone is not a model"
     (snapshot / "model.safetensors").write_bytes(b"")
-    assert state_of(Kind.PLACE, "dinov2")[0] == "ready"
+    assert state_of(Kind.PIXELS, "clip-patches")[0] == "ready"
 
 
 @pytest.mark.parametrize("model", [name for name, known in KNOWN.items() if known.files and not known.package])

@@ -35,10 +35,10 @@ MODELS = Distribution(
     profiles=("foundation", "paper"),
     backends=(
         "pixels:tipsv2", "pixels:clip-patches", "pixels:regions", "pixels:lseg",
-        "views:siglip2", "views:clip", "views:open-clip", "views:clip-paper",
-        "sounds:clap", "sounds:pe-a-frame", "sounds:audioclip", "sounds:wav2clip",
+        "views:siglip2", "views:clip", "views:clip-paper",
+        "sounds:clap", "sounds:pe-a-frame", "sounds:audioclip",
         "local:disk", "local:aliked", "local:superpoint",
-        "place:megaloc", "place:eigenplaces", "place:dinov2", "place:netvlad",
+        "place:megaloc", "place:netvlad",
         "matcher:lightglue-disk", "matcher:lightglue-aliked", "matcher:superglue",
     ),
 )  # fmt: skip

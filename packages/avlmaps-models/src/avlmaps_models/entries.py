@@ -14,8 +14,6 @@ def _keypoints(repository: str, file: str, size_mb: float, *cached: str) -> Publ
 
 
 _AUDIOCLIP = "https://github.com/AndreyGuzhov/AudioCLIP/releases/download/v0.1"
-_EIGENPLACES = "https://github.com/gmberton/EigenPlaces/releases/download/v1.0"
-_WAV2CLIP = "https://github.com/descriptinc/lyrebird-wav2clip/releases/download/v0.1.0-alpha"
 _NETVLAD = "https://cvg-data.inf.ethz.ch/hloc/netvlad"
 _BYTE_PAIRS = "bpe_simple_vocab_16e6.txt.gz"
 _WORDS = "openai/clip-vit-base-patch32"
@@ -24,7 +22,6 @@ _LIGHTGLUE = "kornia/lightglue"
 
 PUBLISHED: dict[str, Published] = {
     "google/tipsv2-b14": Published(size_mb=750),
-    "timm/PE-Core-B-16": Published(size_mb=1800),
     "google/siglip2-base-patch16-224": Published(size_mb=1500),
     "openai/clip-vit-base-patch16": Published(size_mb=600),
     "openai/clip-vit-large-patch14": Published(size_mb=1710),
@@ -33,16 +30,12 @@ PUBLISHED: dict[str, Published] = {
     "facebook/pe-a-frame-base": Published(size_mb=2240),
     _REGIONS: Published(size_mb=156),
     "gberton/MegaLoc": Published(size_mb=915),
-    "facebook/dinov2-small": Published(size_mb=88),
     "magic-leap-community/superpoint": Published(size_mb=5),
     "magic-leap-community/superglue_indoor": Published(size_mb=48),
     "disk-depth": _keypoints("kornia/disk", "depth-save.pth", 0),
     "aliked-n16": _keypoints("kornia/aliked", "aliked-n16.pth", 3),
     "disk": _keypoints(_LIGHTGLUE, "disk_lightglue.pth", 48, "disk_lightglue_v0-1_arxiv.pth"),
     "aliked": _keypoints(_LIGHTGLUE, "aliked_lightglue.pth", 48, "aliked_lightglue_v0-1_arxiv.pth"),
-    "ResNet50_2048_eigenplaces.pth": Published(
-        ("ResNet50_2048_eigenplaces.pth",), get=f"curl -LO {_EIGENPLACES}/ResNet50_2048_eigenplaces.pth", size_mb=110
-    ),
     "demo_e200.ckpt": Published(
         ("demo_e200.ckpt",), get="gdown 1ayk6NXURI_vIPlym16f_RG3ffxBWHxvb -O demo_e200.ckpt", size_mb=2000
     ),
@@ -58,7 +51,6 @@ PUBLISHED: dict[str, Published] = {
         get=f"curl -LO {_AUDIOCLIP}/{_BYTE_PAIRS}",
         size_mb=1.4,
     ),
-    "Wav2CLIP.pt": Published(("Wav2CLIP.pt",), get=f"curl -LO {_WAV2CLIP}/Wav2CLIP.pt", size_mb=47),
     "VGG16-NetVLAD-Pitts30K.mat": Published(
         ("VGG16-NetVLAD-Pitts30K.mat", "VGG16-NetVLAD-Pitts30K.safetensors"),
         get=f"curl -L -o VGG16-NetVLAD-Pitts30K.mat {_NETVLAD}/Pitts30K_struct.mat",
@@ -95,9 +87,6 @@ BACKENDS = (
         Kind.VIEWS, "siglip2", "siglip2:SiglipViews", "google/siglip2-base-patch16-224", "Apache-2.0", "transformers"
     ),
     _foundation(Kind.VIEWS, "clip", "clip:ClipViews", "openai/clip-vit-large-patch14", "MIT", "transformers"),
-    _foundation(
-        Kind.VIEWS, "open-clip", "open_clip_views:OpenClipViews", "timm/PE-Core-B-16", "Apache-2.0", "open_clip"
-    ),
     _foundation(Kind.SOUNDS, "clap", "clap:ClapSounds", "laion/larger_clap_general", "Apache-2.0", "transformers"),
     _foundation(
         Kind.SOUNDS, "pe-a-frame", "pe_a_frame:FrameSounds", "facebook/pe-a-frame-base", "Apache-2.0", "transformers"
@@ -115,10 +104,6 @@ BACKENDS = (
         matcher="lightglue-aliked",
     ),
     _foundation(Kind.PLACE, "megaloc", "megaloc:MegaLoc", "gberton/MegaLoc", "MIT", "transformers"),
-    _foundation(
-        Kind.PLACE, "eigenplaces", "eigenplaces:EigenPlaces", "ResNet50_2048_eigenplaces.pth", "MIT", "torchvision"
-    ),
-    _foundation(Kind.PLACE, "dinov2", "dinov2:DinoPlaces", "facebook/dinov2-small", "Apache-2.0", "transformers"),
     _foundation(Kind.MATCHER, "lightglue-disk", "lightglue:LightGlue", "disk", "Apache-2.0", "kornia"),
     _foundation(Kind.MATCHER, "lightglue-aliked", "lightglue:LightGlue", "aliked", "Apache-2.0", "kornia"),
     _paper(Kind.PIXELS, "lseg", "lseg:LSegPixels", "demo_e200.ckpt", "MIT", "transformers", also=(_BYTE_PAIRS,)),
@@ -134,7 +119,6 @@ BACKENDS = (
         "tokenizers",
         also=(_BYTE_PAIRS,),
     ),
-    _paper(Kind.SOUNDS, "wav2clip", "wav2clip:Wav2ClipSounds", "Wav2CLIP.pt", "MIT", "transformers", also=(_WORDS,)),
     _paper(
         Kind.LOCAL,
         "superpoint",
