@@ -55,3 +55,11 @@ def test_the_architecture_page_names_files_that_are_there() -> None:
     for file in files:
         rooms = (ROOT / "src/avlmaps", *ROOT.glob("packages/*/src"))
         assert any((room / file).exists() for room in rooms), file
+
+
+def test_the_makefile_names_tests_that_are_there() -> None:
+    """Pytest runs nothing where one of its files is missing."""
+    named = re.findall(r"(?<![\w/])tests/[\w/]+(?:\.py)?", (ROOT / "Makefile").read_text(encoding="utf-8"))
+    assert len(named) > 20
+    for one in named:
+        assert (ROOT / one).exists(), one
