@@ -15,7 +15,7 @@ from avlmaps.cli.reading_options import Reading
 from avlmaps.cli.verb import ModelVerb, Verb
 from avlmaps.cli.verbs import VERBS
 from avlmaps.language.chat.settings import ChatSettings
-from avlmaps.live.replay import replay
+from avlmaps.live.replay import follow, replay
 from avlmaps.maps.fusion.sensor import SensorName
 from avlmaps.maps.fusion.settings import FusionSettings
 from avlmaps.maps.settings import BuildSettings, FrameSettings, GravitySettings
@@ -91,6 +91,7 @@ SAME: dict[str, Callable[[], Any]] = {
     "live.voxel_size_m": of(BuildSettings, "voxel_size_m"),
     "live.format": of(open_recording, "format"),
     "live.rate": of(replay, "rate"),
+    "live.give_up_s": of(follow, "give_up_s"),
     "info.format": of(open_recording, "format"),
     "info.audio": of(open_recording, "audio"),
     "add-sounds.format": of(open_recording, "format"),

@@ -1,6 +1,6 @@
 """`avlmaps live`: a map that grows while a recording is played, as it would on a robot."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any, ClassVar
@@ -25,11 +25,14 @@ class Live(ModelVerb):
     compiles: ClassVar[bool] = True
 
     recording: Annotated[Positional[Path], arg(metavar="REC")]
-    """Recording, of any format that build reads."""
+    """Recording, of any format that build reads (a bag, a folder); or one of ours that is being written: it is followed
+    until it is finished."""
     out: Annotated[Path, arg(metavar="MAP")]
     """Map folder to write, by custom NAME.avlmap."""
     rate: Annotated[float, arg(metavar="FACTOR")] = 1.0
     """Speed of the replay: 1 as it was recorded, 2 twice as fast."""
+    give_up_s: Annotated[float, arg(metavar="SECONDS")] = 60.0
+    """Of a recording that is being written: end when nothing came for this long, seconds."""
     as_fast_as_possible: bool = False
     """Wait for the map instead of the clock; no frame is late."""
     every_frame: bool = False
@@ -56,28 +59,38 @@ class Live(ModelVerb):
 
 def _live(verb: Live) -> dict[str, Any]:
     from avlmaps.cli.build import choose_models
-    from avlmaps.live.live_map import LiveMap
-    from avlmaps.live.replay import replay
+    from avlmaps.live.growing_folder import is_being_written
+    from avlmaps.live.live_map import SPARSE, LiveMap
+    from avlmaps.live.replay import follow, replay
     from avlmaps.live.settings import LiveSettings
     from avlmaps.maps.settings import BuildSettings
+    from avlmaps.recordings.layout import UNFINISHED, decode_description
     from avlmaps.recordings.open import open_recording
 
     begin_s = perf_counter()
     if not verb.rate > 0.0:
         raise UsageError(f"--rate is {verb.rate:g}; choose a positive number, or --as-fast-as-possible.")
     used = choose_models(verb.profile, [word for words in verb.model for word in words])
-    recording = open_recording(verb.recording, format=verb.format, corrections=verb.reading.corrections())
-    for notice in recording.notices:
-        say(f"note: {notice}")
+    recording = None
+    if is_being_written(verb.recording):
+        up_in_world = decode_description(verb.recording / UNFINISHED).up_in_world
+    else:
+        recording = open_recording(verb.recording, format=verb.format, corrections=verb.reading.corrections())
+        up_in_world = recording.up_in_world
+        for notice in recording.notices:
+            say(f"note: {notice}")
     with LiveMap(
         verb.out,
         used,
-        up_in_world=recording.up_in_world,
-        settings=BuildSettings(voxel_size_m=verb.voxel_size_m),
+        up_in_world=up_in_world,
+        settings=replace(BuildSettings() if verb.every_frame else SPARSE, voxel_size_m=verb.voxel_size_m),
         live=LiveSettings(gates=not verb.every_frame),
         overwrite=verb.overwrite,
     ) as live:
-        replay(recording, live, None if verb.as_fast_as_possible else verb.rate)
+        if recording is None:
+            follow(verb.recording, live, verb.give_up_s)
+        else:
+            replay(recording, live, None if verb.as_fast_as_possible else verb.rate)
     status = live.status()
     return {
         **describe_map(live.map.stored),

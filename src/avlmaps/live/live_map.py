@@ -21,6 +21,7 @@ from avlmaps.live.pose_check import PoseCheck
 from avlmaps.live.settings import LiveSettings
 from avlmaps.live.status import LiveStatus, Tally, memory_mb
 from avlmaps.maps.growing import FrozenSums, GrowingMap, require_place, write_stored
+from avlmaps.maps.keyframes.describe import KeyframeSettings
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.reader import open_stored
@@ -34,10 +35,12 @@ from avlmaps.recordings.types import Frame
 if TYPE_CHECKING:
     from avlmaps.query.answer import Answer
 
+# A keyframe takes as long as three frames; with gates there are half as many as in a build.
+SPARSE = BuildSettings(keyframes=KeyframeSettings(translation_m=0.2, rotation_deg=14.0))
 _STEP_S = 0.1
 _IDLE_S = 0.05
 _MOST_DOUBTS = 100
-_LOOKS_S = 1.0  # for keyframes, in each snapshot
+_LOOKS_S = 0.5  # for keyframes, in each snapshot
 _SHARE = 4.0  # a snapshot takes at most one part in this many of the time
 
 
@@ -72,7 +75,7 @@ class LiveMap:
             path: folder of the map, by custom ``NAME.avlmap``.
             encoders: the models that perceive; those of the profile ``embedded`` if None.
             up_in_world: the direction that is up in the world of the poses; None finds it in the frames.
-            settings: of the build.
+            settings: of the build; by default those of a build, with gates half as many keyframes.
             live: which frames are fused, and how often it is saved.
             query: how to query.
             overwrite: replace a map that is there.
@@ -86,7 +89,8 @@ class LiveMap:
         require_place(self.path, overwrite)
         self._held = contextlib.ExitStack()
         self._held.enter_context(lock_folder(self.path))
-        chosen, wait = settings or BuildSettings(), self.settings.first_frames if self.settings.gates else None
+        chosen = settings or (SPARSE if self.settings.gates else BuildSettings())
+        wait = self.settings.first_frames if self.settings.gates else None
         self._growing = GrowingMap(chosen, used, _up(up_in_world), wait=wait, looks_later=True)
         self._gates = Gates(self.settings, chosen.fusion.max_depth_m)
         self._check, self._tally = PoseCheck(), Tally()

@@ -2,10 +2,13 @@
 
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.progress import progress, say
+from avlmaps.live.growing_folder import growing_frames, is_being_written
 from avlmaps.live.live_map import LiveMap
+from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Recording
 
 
@@ -42,6 +45,29 @@ def replay(
             tell(f"note: {doubt}")
         told = len(live.doubts)
     _play(recording, live, heard_s, float("inf"))
+
+
+def follow(path: Path, live: LiveMap, give_up_s: float = 60.0, tell: Callable[[str], None] = say) -> None:
+    """Give a live map the frames of a recording while it is written; its sound comes when it is finished.
+
+    Args:
+        path: folder of our own format.
+        live: the map.
+        give_up_s: end when nothing came for this long.
+        tell: called with each doubt and what else is worth knowing.
+    """
+    told = 0
+    for frame in progress(growing_frames(path, give_up_s, tell), "mapping", note=lambda: _note(live)):
+        try:
+            live.add_frame(frame.rgb, frame.depth_m, frame.camera, frame.world_from_camera, frame.stamp_s)
+        except RecordingError as fault:
+            tell(f"note: {fault}")
+        for doubt in live.doubts[told:]:
+            tell(f"note: {doubt}")
+        told = len(live.doubts)
+    if not is_being_written(path):
+        recording = open_recording(path)
+        _play(recording, live, None if recording.audio is None else recording.audio.start_s, float("inf"))
 
 
 def _play(recording: Recording, live: LiveMap, heard_s: float | None, until_s: float) -> float | None:

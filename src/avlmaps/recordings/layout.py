@@ -142,7 +142,7 @@ def read_description(folder: Path, report: Report) -> Description:
     """
     path = folder / DESCRIPTION
     try:
-        description = _decode(path)
+        description = decode_description(path)
         fault = _impossible(description)
         if fault:
             raise RecordingError(f"{path}: {fault}; fix the file.")
@@ -152,7 +152,12 @@ def read_description(folder: Path, report: Report) -> Description:
     return description
 
 
-def _decode(path: Path) -> Description:
+def decode_description(path: Path) -> Description:
+    """Read a description, also that of a recording which is being written.
+
+    Raises:
+        RecordingError: it is missing, cannot be read, or is none.
+    """
     try:
         content = read_regular(path, DESCRIPTION_BYTES).removeprefix(b"\xef\xbb\xbf")
         content.decode("utf-8")

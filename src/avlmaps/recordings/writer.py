@@ -59,7 +59,8 @@ class RecordingWriter:
 
     def __enter__(self) -> "RecordingWriter":
         _make_empty(self.path)
-        (self.path / layout.UNFINISHED).write_text("A recording is being written here.\n", encoding="utf-8")
+        # Who reads a recording that is being written finds its cameras here.
+        write_bytes_atomically(self.path / layout.UNFINISHED, self._description())
         for folder in ("rgb", "depth"):
             (self.path / folder).mkdir(exist_ok=True)
         self._poses = (self.path / layout.POSES).open("w", encoding="utf-8", newline="\n")
@@ -164,7 +165,9 @@ class RecordingWriter:
         quaternion = poses.to_quaternion(world_from_camera[None])[0]
         numbers = [stamp_s, *world_from_camera[:3, 3].tolist(), *quaternion.tolist()]
         self._poses.write(",".join(repr(float(number)) for number in numbers) + "\n")
+        self._poses.flush()
         self._frames.write(f"{name},{float(stamp_s)!r}\n")
+        self._frames.flush()  # last: a frame that is listed is whole
         self._names.add(name)
         self._stamps_s.append(float(stamp_s))
 
@@ -172,6 +175,13 @@ class RecordingWriter:
         """Write the description, which makes the folder a recording, and take the marker away."""
         if not self._stamps_s:
             raise RecordingError(f"{self.path} got no frame, so there is no recording to finish.")
+        for folder in (self.path / "rgb", self.path / "depth", self.path):
+            sync_folder(folder)
+        write_bytes_atomically(self.path / layout.DESCRIPTION, self._description())
+        (self.path / layout.UNFINISHED).unlink()
+
+    def _description(self) -> bytes:
+        """Return the content of the description of the frames until now."""
         interval_s = float(np.median(np.diff(self._stamps_s))) if len(self._stamps_s) > 1 else 0.0
         rate_hz = round(1.0 / interval_s, 6) if interval_s > 0.0 else None
         rig = self.rig
@@ -190,11 +200,7 @@ class RecordingWriter:
             frames=len(self._stamps_s),
             origin=self.origin,
         )
-        for folder in (self.path / "rgb", self.path / "depth", self.path):
-            sync_folder(folder)
-        content = msgspec.json.format(msgspec.json.encode(description), indent=2)
-        write_bytes_atomically(self.path / layout.DESCRIPTION, content + b"\n")
-        (self.path / layout.UNFINISHED).unlink()
+        return msgspec.json.format(msgspec.json.encode(description), indent=2) + b"\n"
 
 
 def _make_empty(path: Path) -> None:

@@ -26,7 +26,7 @@ from avlmaps.recordings.types import Frame
 # What places are learnt from grows by this much before they are learnt again for a question.
 _GROWN = 1.25
 # Keyframes that are left to be looked at later; each holds its frame.
-_MOST_LEFT = 40
+_MOST_LEFT = 100
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +123,7 @@ class GrowingKeyframes:
             came: from ``freeze``.
             final: learn places again, as a build does; else only where enough has come since.
             within_s: seconds for keyframes that were not looked at; the rest is left for the next time, unless that is
-                more than 40 of them, each with its frame.
+                more than 100 of them, each with its frame.
 
         Raises:
             BackendError: an encoder gives something else than its protocol says; that keyframe is left out.

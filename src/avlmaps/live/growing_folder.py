@@ -1,0 +1,141 @@
+"""A recording in our own format that is read while it is written.
+
+The writer puts the cameras into its marker ``UNFINISHED`` at the beginning, and lists a frame in ``frames.csv`` when
+its pictures and its pose are whole. So the list is read on, line by line, until ``recording.json`` is there.
+"""
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+from avlmaps.core import poses
+from avlmaps.core.errors import RecordingError
+from avlmaps.core.progress import say
+from avlmaps.recordings import images, layout
+from avlmaps.recordings.types import Frame
+
+_LOOK_S = 0.05
+STALLED_S = 5.0
+
+
+def is_being_written(path: Path) -> bool:
+    """Return whether a folder is a recording of ours that is not finished."""
+    return (path / layout.UNFINISHED).exists() and not (path / layout.DESCRIPTION).exists()
+
+
+def growing_frames(path: Path, give_up_s: float = 60.0, tell: Callable[[str], None] = say) -> Iterator[Frame]:
+    """Yield the frames of a recording as they are written, until it is finished.
+
+    A frame that cannot be read, or that has no pose of its stamp, is left out with a sentence. So is said when nothing
+    comes for five seconds, and when it continues.
+
+    Args:
+        path: the folder.
+        give_up_s: end when nothing came for this long: the writer stopped.
+        tell: called with each sentence.
+
+    Raises:
+        RecordingError: it says no cameras; it was written by an older version, or is damaged.
+    """
+    written = _Written(path, tell)
+    patience = _Patience(path, give_up_s, tell)
+    while True:
+        finished = (path / layout.DESCRIPTION).exists()  # looked up first: what is listed by then is all there is
+        rows = written.rows()
+        for name, stamp in rows:
+            if (frame := written.frame(name, stamp)) is not None:
+                yield frame
+        if patience.is_over(len(rows)) or (finished and not rows):
+            return
+        if not rows:
+            time.sleep(_LOOK_S)
+
+
+class _Written:
+    """The frames of the folder."""
+
+    def __init__(self, path: Path, tell: Callable[[str], None]) -> None:
+        marker = path / layout.UNFINISHED
+        description = layout.decode_description(marker if marker.exists() else path / layout.DESCRIPTION)
+        try:
+            self._rig = description.rig()
+        except ValueError as fault:
+            raise RecordingError(f"{path} has cameras that cannot be ({fault}); fix its description.") from None
+        self._path, self._tell, self._units_per_m = path, tell, description.depth_units_per_m
+        self._listed, self._posed = _Lines(path / layout.FRAMES), _Lines(path / layout.POSES)
+        self._pose_of: dict[float, np.ndarray] = {}
+        self._index = 0
+
+    def rows(self) -> list[list[str]]:
+        """Return the names and stamps of the frames that came."""
+        rows = self._listed.new()  # before the poses: that of a frame which is listed is there already
+        for row in self._posed.new():
+            numbers = [float(word) for word in row]
+            self._pose_of[numbers[0]] = poses.from_quaternion(np.array(numbers[1:4]), np.array(numbers[4:8]))
+        return rows
+
+    def frame(self, name: str, stamp: str) -> Frame | None:
+        """Read a frame; None, with a sentence, where it cannot be."""
+        path, rig = self._path, self._rig
+        pose = self._pose_of.pop(float(stamp), None)
+        self._index += 1
+        try:
+            if pose is None:
+                raise RecordingError(f"Frame {name} of {path} has no pose at its stamp {stamp} s, and is left out.")
+            colour = next((path / "rgb").glob(f"{name}.*"), path / "rgb" / f"{name}.png")
+            depth_m = images.read_depth(path / "depth" / f"{name}.png", rig.depth, self._units_per_m)
+            return Frame(self._index - 1, name, float(stamp), images.read_colour(colour, rig.rgb), depth_m, pose, rig)
+        except RecordingError as fault:
+            self._tell(f"note: {fault}")
+            return None
+
+
+class _Patience:
+    """How long nothing came, and what is said of it."""
+
+    def __init__(self, path: Path, give_up_s: float, tell: Callable[[str], None]) -> None:
+        self._path, self._give_up_s, self._tell = path, give_up_s, tell
+        self._last_s, self._stalled = time.monotonic(), False
+
+    def is_over(self, came: int) -> bool:
+        """Take note of how many frames came, and return whether it is time to end."""
+        since_s = time.monotonic() - self._last_s
+        if came:
+            if self._stalled:
+                self._tell(f"note: {self._path} continues after {since_s:.0f} s.")
+            self._last_s, self._stalled = time.monotonic(), False
+        elif since_s > self._give_up_s:
+            self._tell(
+                f"note: Nothing came into {self._path} for {self._give_up_s:.0f} s; its writer seems to have stopped."
+            )
+            return True
+        elif since_s > STALLED_S and not self._stalled:
+            self._tell(
+                f"note: Nothing came into {self._path} for {STALLED_S:.0f} s; waiting up to {self._give_up_s:.0f} s."
+            )
+            self._stalled = True
+        return False
+
+
+class _Lines:
+    """The rows of a table that grows; a line counts when its end is written."""
+
+    def __init__(self, path: Path) -> None:
+        self._path, self._at, self._head = path, 0, True
+
+    def new(self) -> list[list[str]]:
+        """Return the rows since the last call."""
+        try:
+            with self._path.open("rb") as stream:
+                stream.seek(self._at)
+                content = stream.read()
+        except FileNotFoundError:
+            return []
+        whole = content[: content.rfind(b"\n") + 1]
+        self._at += len(whole)
+        rows = [line.split(",") for line in whole.decode("utf-8").splitlines() if line]
+        if self._head and rows:
+            self._head, rows = False, rows[1:]
+        return rows
