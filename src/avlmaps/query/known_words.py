@@ -101,7 +101,7 @@ class KnownClosestWords(Vocabulary):
         The word means names W with weights w, and scores √(Σ w·s²) over their scores s. Where the closest word is
         neither in W nor silent, it is the best rival, with score b. No name of W scores more than the second closest
         word, c, and the squares of all scores add up to 1. So the word reaches a share of b only where
-        min(c²·Σw, (1 − b²)·max w) reaches the square of that.
+        min(c²·Σw, (1 − b²)·max w) reaches the square of that; (1 − b² − c²)·max w where the second is neither.
         """
         if not isinstance(encoder, NamedPixelEncoder) or not self.known.all():
             return None
@@ -116,9 +116,9 @@ class KnownClosestWords(Vocabulary):
         told = [order[starts[word] : starts[word + 1]] for word in np.flatnonzero(first)]
         others = self._closer_than(least / max(float(weights.sum()), 1e-9))
         square = np.square(self.best[others])
-        possible = ((1.0 + _HALF - square) * weights.max(initial=0.0) >= least * square) & ~first[
-            self.best_word[others]
-        ]
+        left = 1.0 + _HALF - square
+        left -= np.where(first[self.second_word[others]], 0.0, np.square(self.second[others]))
+        possible = (left * weights.max(initial=0.0) >= least * square) & ~first[self.best_word[others]]
         rows = np.concatenate([*told, others[possible]])
         return np.sort(rows) if len(rows) <= _MOST_PICKED * len(self.known) else None
 
