@@ -54,6 +54,13 @@ ENTRIES = (
     ),
     Entry("queries", "Queries", "python benchmarks/queries.py"),
     Entry("cold-start", "A query from the shell", "python benchmarks/cold_start.py"),
+    Entry(
+        "scale", "Large maps",
+        "python benchmarks/scale.py --folder OUT --voxels 1000000 5000000 10000000 --against decabd78", 0.5,
+        "The home `house:7` again and again, side by side. \"first\": nothing is stored beside the map yet, as of an "
+        "older or copied one; \"CPU s\": as a build leaves it. \"before\" is avlmaps at the commit that the command "
+        "names. One core.",
+    ),
     Entry("locating", "Time to locate a photo", "python benchmarks/locate.py"),
     Entry("store", "Writing and opening a map", "python benchmarks/store.py"),
     Entry("render", "Rendering views", "python benchmarks/render.py"),

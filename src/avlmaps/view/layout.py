@@ -26,7 +26,7 @@ RECORD = np.dtype([("cell", "<u2", (3,)), ("seen", "<u2"), ("rgb", "u1", (3,)), 
 _MOST_CELLS = 65535
 _NEAR_SHARE = 0.25  # of the map's extent: voxels up to this far out of the bulk of it count as the whole map
 _UNDER_CEILING_M = 0.1  # a storey is shown from below its floor to this far under its ceiling
-_MEASURED = 2_000_000  # voxels from which the page's first view is computed
+_MEASURED = 300_000  # voxels from which the first view of a page is computed: an even picture of the map
 _HEADROOM_M = 0.3  # the page opens with what is higher over the highest camera cut away
 
 
