@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from avlmaps.core.errors import AvlmapsError, LanguageError
 from avlmaps.language.commands import read_command
-from avlmaps.language.intents import Clarify, Go, Kind, Refuse, Target
+from avlmaps.language.intents import Clarify, Go, Refuse, Target, TargetKind
 from avlmaps.language.program import parse_program
 from avlmaps.language.program.writing import write_program
 from avlmaps.language.questions import read_question
@@ -102,7 +102,7 @@ def test_a_mended_word_is_said() -> None:
 
 def test_an_open_vocabulary_takes_any_noun() -> None:
     read = read_command("go to the frobnicator", Given(knows=lambda _: True))
-    assert read.intents == (Go(Target(Kind.OBJECT, "frobnicator")),)
+    assert read.intents == (Go(Target(TargetKind.OBJECT, "frobnicator")),)
 
 
 def test_what_has_no_effect_is_reported() -> None:

@@ -1,6 +1,6 @@
 """The learned reader: what it may never do, what is decided of its readings, how well it reads what is new to it."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,6 @@ from avlmaps.language.intents import (
     Go,
     Inquiry,
     Intent,
-    Kind,
     Move,
     Reason,
     Refuse,
@@ -31,6 +30,7 @@ from avlmaps.language.intents import (
     Side,
     StopAt,
     Target,
+    TargetKind,
     Turn,
     VisitEach,
     Wait,
@@ -39,17 +39,17 @@ from avlmaps.language.intents import (
 )  # fmt: skip
 from avlmaps.language.learned.decision import DANGERS, Weighed, decided, is_doubtful, is_same
 from avlmaps.language.learned.features import columns, features
+from avlmaps.language.learned.grammar import SYMBOLS
 from avlmaps.language.learned.guard import Guard, weighed
 from avlmaps.language.learned.limits import Limits
 from avlmaps.language.learned.linear import (
-    SYMBOLS,
     MalformedError,
     Pointable,
     State,
+    Symbol,
     amount,
     inquiry_of,
     intents_of,
-    is_written_well,
 )  # fmt: skip
 from avlmaps.language.learned.reader import LearnedReader, learned_reader
 from avlmaps.language.rules import RulesTranslator, explanation
@@ -85,6 +85,17 @@ def targets_of(meaning: Any) -> Iterator[Target]:
     for target in found:
         yield target
         yield from targets_of(Inquiry(None, target.near))  # pyright: ignore[reportArgumentType]
+
+
+def is_written_well(line: Sequence[Symbol], can: Pointable, *, is_question: bool) -> bool:
+    """Return whether each symbol of a line may follow those before it, and the line has ended."""
+    state = State(can, is_question)
+    for symbol in line:
+        may = state.open()
+        if symbol not in (may.tokens if isinstance(symbol, int) else may.symbols):
+            return False
+        state = state.after(symbol)
+    return state.is_over
 
 
 def flat(intents: tuple[Intent, ...]) -> list[Intent]:
@@ -143,7 +154,7 @@ def test_what_may_follow_ends_in_something_that_can_be_read(data: st.DataObject)
     tokens = lexer.tokenise("go 2 m behind the red chair in the kitchen, turn left 30 degrees, wait 5 seconds, x.png")
     is_question = data.draw(st.booleans())
     state, line = State(Pointable(tokens), is_question), []
-    while state.expect != "over":
+    while not state.is_over:
         may = state.open()
         options = sorted(may.symbols) + [str(at) for at in sorted(may.tokens)]
         assert options
@@ -179,7 +190,7 @@ def test_a_line_that_means_nothing_is_an_error(line: list[str]) -> None:
         intents_of(line, [])
 
 
-names = st.sampled_from(["chair", "table", "door"]).map(lambda name: Target(Kind.OBJECT, name))
+names = st.sampled_from(["chair", "table", "door"]).map(lambda name: Target(TargetKind.OBJECT, name))
 driving = st.one_of(
     names.map(Go), names.map(Face), names.map(Circle), names.map(VisitEach), st.just(Return()), st.just(Move(2.0)),
     st.just(Turn(90.0)), st.tuples(names, names).map(Between), names.map(lambda one: Beside(one, Side.LEFT)),
@@ -252,7 +263,7 @@ def test_the_explanation_shows_readings_and_what_decided() -> None:
 
 def test_a_file_that_came_along_is_what_this_photo_means() -> None:
     read = read_command("go to where this photo was taken", Given(image="view.png"))
-    assert read.intents == (Go(Target(Kind.IMAGE, "view.png")),)
+    assert read.intents == (Go(Target(TargetKind.IMAGE, "view.png")),)
     assert stopped(read_command("go to where this photo was taken").intents)
 
 
@@ -311,4 +322,4 @@ def test_the_network_alone_reads_most_of_them_and_random_weights_do_not(monkeypa
 
 def test_the_whole_reader_takes_the_words_of_a_map() -> None:
     read = read_command("go to the frobnicator", Given(knows=lambda _: True))
-    assert read.intents == (Go(Target(Kind.OBJECT, "frobnicator")),)
+    assert read.intents == (Go(Target(TargetKind.OBJECT, "frobnicator")),)

@@ -5,12 +5,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.language.commands import read_command
-from avlmaps.language.intents import Go, Intent, Kind, Target, Turn
+from avlmaps.language.intents import Go, Intent, Target, TargetKind, Turn
 from avlmaps.language.learned.decision import Weighed
 from avlmaps.language.learned.parts import by_parts, parts_of
 from avlmaps.language.lexer import Token, tokenise
 
-SOFA, DOOR = (Go(Target(Kind.OBJECT, name)) for name in ("sofa", "door"))
+SOFA, DOOR = (Go(Target(TargetKind.OBJECT, name)) for name in ("sofa", "door"))
 ORDERS: dict[str, Intent] = {"go to the sofa": SOFA, "go to the door": DOOR, "turn left": Turn(-90.0)}
 
 

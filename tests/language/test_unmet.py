@@ -10,13 +10,13 @@ from avlmaps.language.intents import (
     Circle,
     Clarify,
     Go,
-    Kind,
     Move,
     Pick,
     Reason,
     Refuse,
     Repeat,
     Target,
+    TargetKind,
     Turn,
     VisitEach,
     Wait,
@@ -94,8 +94,10 @@ def test_what_is_left_is_not_driven_to(verb: str) -> None:
 
 
 def test_the_farthest_is_not_the_nearest() -> None:
-    assert intents("go to the farthest chair") == (Go(Target(Kind.OBJECT, "chair", pick=Pick.FARTHEST)),)
-    assert intents("go to the chair farthest from here") == (Go(Target(Kind.OBJECT, "chair", pick=Pick.FARTHEST)),)
+    assert intents("go to the farthest chair") == (Go(Target(TargetKind.OBJECT, "chair", pick=Pick.FARTHEST)),)
+    assert intents("go to the chair farthest from here") == (
+        Go(Target(TargetKind.OBJECT, "chair", pick=Pick.FARTHEST)),
+    )
     stops("go to the second farthest chair")
 
 
@@ -159,7 +161,7 @@ def test_stop_is_stop(said: str) -> None:
 @FEW
 @given(things)
 def test_what_is_said_of_the_robot_is_said_to_it(form: str, thing: str) -> None:
-    assert intents(form.format(thing)) == (Go(Target(Kind.OBJECT, thing)),)
+    assert intents(form.format(thing)) == (Go(Target(TargetKind.OBJECT, thing)),)
 
 
 def test_a_thing_that_others_carry_is_not_the_robot() -> None:
@@ -170,12 +172,15 @@ def test_a_thing_that_others_carry_is_not_the_robot() -> None:
 @given(st.sampled_from(DELAYS), st.integers(2, 59), st.sampled_from((("seconds", 1), ("minutes", 60))))  # fmt: skip
 def test_a_delay_comes_before_its_order(form: str, count: int, unit: tuple[str, int]) -> None:
     name, seconds = unit
-    assert intents(form.format(f"{count} {name}")) == (Wait(float(count * seconds)), Go(Target(Kind.OBJECT, "door")))
+    assert intents(form.format(f"{count} {name}")) == (
+        Wait(float(count * seconds)),
+        Go(Target(TargetKind.OBJECT, "door")),
+    )
 
 
 def test_a_delay_stays_in_its_clause() -> None:
     assert intents("go to the sofa, then turn left in 10 seconds") == (
-        Go(Target(Kind.OBJECT, "sofa")), Wait(10.0), Turn(-90.0),
+        Go(Target(TargetKind.OBJECT, "sofa")), Wait(10.0), Turn(-90.0),
     )  # fmt: skip
 
 
@@ -200,7 +205,7 @@ def test_a_time_that_is_no_wait_is_asked_about(command: str) -> None:
 )
 def test_a_loop_goes_round_as_often_as_it_says(times: int, head: str) -> None:
     read = intents(head.format(times) + "go to the door")
-    assert read == (Repeat(times, (Go(Target(Kind.OBJECT, "door")),)),)
+    assert read == (Repeat(times, (Go(Target(TargetKind.OBJECT, "door")),)),)
 
 
 @pytest.mark.parametrize(
@@ -211,7 +216,7 @@ def test_a_loop_goes_round_as_often_as_it_says(times: int, head: str) -> None:
      ("", Way.ANY)],
 )  # fmt: skip
 def test_a_circle_runs_the_way_round_that_is_said(said: str, way: Way) -> None:
-    assert intents(f"go around the table {said}") == (Circle(Target(Kind.OBJECT, "table"), way=way),)
+    assert intents(f"go around the table {said}") == (Circle(Target(TargetKind.OBJECT, "table"), way=way),)
 
 
 def test_the_two_ways_round_visit_the_same_corners_in_the_other_order() -> None:
@@ -282,7 +287,7 @@ def test_a_word_that_no_step_holds_is_asked_about(command: str) -> None:
 
 def test_words_that_sound_like_numbers() -> None:
     assert intents("move forward too metres") == (Move(2.0),)
-    assert intents("in a quarter of an hour go to the door") == (Wait(900.0), Go(Target(Kind.OBJECT, "door")))
+    assert intents("in a quarter of an hour go to the door") == (Wait(900.0), Go(Target(TargetKind.OBJECT, "door")))
 
 
 @pytest.mark.parametrize(
@@ -298,7 +303,7 @@ def test_the_side_or_the_place_that_is_not_meant_is_not_taken(command: str) -> N
 
 
 def test_every_room_is_no_room_without_a_name() -> None:
-    assert intents("go to every room") == (VisitEach(Target(Kind.AREA, "room")),)
+    assert intents("go to every room") == (VisitEach(Target(TargetKind.AREA, "room")),)
 
 
 @pytest.mark.parametrize(
@@ -312,7 +317,7 @@ def test_a_condition_is_never_dropped(command: str) -> None:
 
 @pytest.mark.parametrize("command", ["go to the sofa if you can", "if it is not too much trouble, go to the sofa"])
 def test_manners_are_no_condition(command: str) -> None:
-    assert intents(command) == (Go(Target(Kind.OBJECT, "sofa")),)
+    assert intents(command) == (Go(Target(TargetKind.OBJECT, "sofa")),)
 
 
 @FEW

@@ -5,21 +5,13 @@ from dataclasses import dataclass
 from difflib import SequenceMatcher
 from itertools import pairwise
 
+from training.language.linearise import Pointers, is_written_well, line_of, line_of_question
 from training.language.rows import Example
 
 from avlmaps.core.inflection import singulars_of, stem_of
 from avlmaps.language import lexer
-from avlmaps.language.intents import Ask, Inquiry, Kind
-from avlmaps.language.learned.linear import (
-    MalformedError,
-    Pointable,
-    Pointers,
-    Symbol,
-    amount,
-    is_written_well,
-    line_of,
-    line_of_question,
-)  # fmt: skip
+from avlmaps.language.intents import Ask, Inquiry, TargetKind
+from avlmaps.language.learned.linear import MalformedError, Pointable, Symbol, amount
 from avlmaps.language.lexer import Token
 from avlmaps.language.names import sounding_forms
 from avlmaps.language.questions import use_in
@@ -93,10 +85,10 @@ class _Found(Pointers):
                  "clock": lexer.clock_at, "count": lexer.number_at}  # fmt: skip
         return max((end for end, _ in reads[of](self.tokens, at)), default=at)
 
-    def words(self, name: str, kind: Kind) -> list[int]:
-        if kind in (Kind.IMAGE, Kind.CLIP):
+    def words(self, name: str, kind: TargetKind) -> list[int]:
+        if kind in (TargetKind.IMAGE, TargetKind.CLIP):
             found = [i for i, t in enumerate(self.tokens) if t.kind == str(kind) and t.text == name]
-            given = self.example.image if kind is Kind.IMAGE else self.example.clip
+            given = self.example.image if kind is TargetKind.IMAGE else self.example.clip
             if not found and given != name:
                 raise MalformedError(f"{name} is not said")
             return found[:1]

@@ -18,7 +18,6 @@ from avlmaps.language.intents import (
     Face,
     Inquiry,
     Intent,
-    Kind,
     Pick,
     Reason,
     Refuse,
@@ -26,6 +25,7 @@ from avlmaps.language.intents import (
     Return,
     Side,
     Target,
+    TargetKind,
     Turn,
     on_targets,
 )  # fmt: skip
@@ -77,7 +77,7 @@ _FREE_ROOMS = (
 _TURNS = {"left": "right", "right": "left", "clockwise": "anticlockwise", "anticlockwise": "clockwise",
           "counterclockwise": "clockwise"}  # fmt: skip
 _ORDERED = re.compile(r"\b(first|before|finally|lastly|in that order|last of all|twice|times|same)\b", re.IGNORECASE)
-_SWAPPED = (Kind.OBJECT, Kind.AREA, Kind.SOUND)
+_SWAPPED = (TargetKind.OBJECT, TargetKind.AREA, TargetKind.SOUND)
 _COMPASS = ("north", "east", "south", "west")
 
 
@@ -88,15 +88,15 @@ class Names:
     things: tuple[str, ...]
     rooms: tuple[str, ...]
     sounds: tuple[str, ...]
-    said: Mapping[Kind, tuple[str, ...]] = field(default_factory=dict)
+    said: Mapping[TargetKind, tuple[str, ...]] = field(default_factory=dict)
 
-    def draw(self, kind: Kind, draw: random.Random) -> str:
+    def draw(self, kind: TargetKind, draw: random.Random) -> str:
         """Return a name of a kind."""
         if self.said.get(kind) and draw.random() < 0.5:
             return draw.choice(self.said[kind])
-        if kind is Kind.SOUND:
+        if kind is TargetKind.SOUND:
             return draw.choice(self.sounds)
-        if kind is Kind.AREA:
+        if kind is TargetKind.AREA:
             return draw.choice(self.rooms) if draw.random() < 0.8 else draw.choice(_FREE_ROOMS)
         chance = draw.random()
         thing = draw.choice(_FREE) if chance < 0.12 else draw.choice(self.things)
@@ -121,7 +121,7 @@ def lexicon_names() -> Names:
 
 def names_of(rows: Sequence[Example]) -> Names:
     """Return the names of the lexicon and those that the speakers of some rows use."""
-    said: dict[Kind, set[str]] = {}
+    said: dict[TargetKind, set[str]] = {}
     for row in rows:
         for target in targets_of(row.meaning):
             if target.kind in _SWAPPED and 0 < len(target.name.split()) <= 4:
@@ -184,7 +184,7 @@ def swapped(example: Example, names: Names, draw: random.Random) -> Example:
         new = names.draw(kind, draw)
         one, many = re.compile(rf"\b{re.escape(name)}\b", re.IGNORECASE), None
         say = example.say
-        if kind is not Kind.SOUND:
+        if kind is not TargetKind.SOUND:
             many = re.compile(rf"\b{re.escape(plural_of(name))}\b", re.IGNORECASE)
         if many is not None and many.search(say) and not one.search(say):
             say = many.sub(plural_of(new), say)
@@ -199,7 +199,7 @@ def swapped(example: Example, names: Names, draw: random.Random) -> Example:
     return example
 
 
-def _renamed(kind: Kind, name: str, new: str, target: Target) -> Target:
+def _renamed(kind: TargetKind, name: str, new: str, target: Target) -> Target:
     return replace(target, name=new) if (target.kind, target.name) == (kind, name) else target
 
 

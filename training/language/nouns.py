@@ -12,7 +12,7 @@ from training.language.augment import targets_of
 from training.language.pool import HELD_OUT, collected
 
 from avlmaps.core.inflection import singulars_of
-from avlmaps.language.intents import Kind
+from avlmaps.language.intents import TargetKind
 from avlmaps.language.lexer import WORDS
 from avlmaps.language.names import is_known, may_name
 from avlmaps.language.word_classes import listed
@@ -27,11 +27,11 @@ def main() -> None:
     for name in ("nouns", "places"):
         (_FOLDER / f"{name}.txt").write_text("", encoding="utf-8")
     nouns: set[str] = set()
-    said: Counter[tuple[str, Kind]] = Counter()
+    said: Counter[tuple[str, TargetKind]] = Counter()
     for row in collected():
         if row.voice in HELD_OUT:
             continue
-        targets = {target for target in targets_of(row.meaning) if target.kind in (Kind.OBJECT, Kind.AREA)}
+        targets = {target for target in targets_of(row.meaning) if target.kind in (TargetKind.OBJECT, TargetKind.AREA)}
         for head, kind in {(target.name.lower().split()[-1], target.kind) for target in targets}:
             if not head.isalpha() or len(head) < 3:
                 continue
@@ -41,8 +41,8 @@ def main() -> None:
                 nouns.add(head)
     places: set[str] = set()
     for (head, kind), count in list(said.items()):
-        mostly = count >= _OFTEN and count >= _MOSTLY * (count + said[head, Kind.OBJECT])
-        if kind is Kind.AREA and mostly and head not in WORDS and head not in listed("never"):
+        mostly = count >= _OFTEN and count >= _MOSTLY * (count + said[head, TargetKind.OBJECT])
+        if kind is TargetKind.AREA and mostly and head not in WORDS and head not in listed("never"):
             places.add(head)
     for name, words in (("nouns", nouns), ("places", places)):
         (_FOLDER / f"{name}.txt").write_text("\n".join(sorted(words)) + "\n", encoding="utf-8")

@@ -20,12 +20,12 @@ from avlmaps.language.intents import (
     Go,
     Inquiry,
     Intent,
-    Kind,
     Move,
     Return,
     Side,
     StopAt,
     Target,
+    TargetKind,
     Turn,
     VisitEach,
     Wait,
@@ -77,7 +77,7 @@ class _Maker:
     def question(self) -> Example:
         said, target = self._place()
         one = said.removeprefix("the ")
-        plural = target.kind is Kind.OBJECT
+        plural = target.kind is TargetKind.OBJECT
         many = one.replace(target.name, plural_of(target.name), 1) if plural else one
         article = "an" if one[:1] in "aeiou" else "a"
         asks: list[tuple[str, Ask]] = [
@@ -90,7 +90,7 @@ class _Maker:
                 (f"is there {article} {one}", Ask.EXISTS), (f"are there any {many}", Ask.EXISTS),
                 (f"do you see {article} {one}", Ask.EXISTS),
             ]  # fmt: skip
-        if target.kind is Kind.SOUND:
+        if target.kind is TargetKind.SOUND:
             asks += [(f"where did you hear {said}", Ask.WHERE), (f"did you hear {said}", Ask.EXISTS)]
         text, ask = self.draw.choice([one for one in asks if not one[0].startswith("which") or target.near])
         text += self.draw.choice(("", "", "?", " ?", "."))
@@ -104,9 +104,9 @@ class _Maker:
         clip = clip and self.draw.choice((clip, "bark.wav", self.draw.choice(_FILES) + ".ogg"))
         this_photo = f"{self.draw.choice(_THESE)} {self.draw.choice(('photo', 'picture', 'image'))}"
         this_clip = f"{self.draw.choice(_THESE)} {self.draw.choice(('recording', 'clip', 'sound', 'sound clip'))}"
-        said, target = self._of(Kind.OBJECT)
+        said, target = self._of(TargetKind.OBJECT)
         near = self.draw.choice(_NEAR)
-        photo, sound = Target(Kind.IMAGE, image or ""), Target(Kind.CLIP, clip or "")
+        photo, sound = Target(TargetKind.IMAGE, image or ""), Target(TargetKind.CLIP, clip or "")
         if image and clip:
             joint = self.draw.choice((f"and {near}", "and", near))
             first, second, meant = f"{near} {this_photo}", this_clip, target.with_near(photo, sound)
@@ -128,7 +128,7 @@ class _Maker:
             text = self.draw.choice(("", "where is ", "find ", "show me ")) if not place.startswith("where") else ""
             asked = None if meant is None else Inquiry(Ask.WHERE, (meant,))
             return Example(text + place + self.draw.choice(("", "?")), asked, True, VOICE, image, clip)
-        said, other = self._of(Kind.OBJECT)
+        said, other = self._of(TargetKind.OBJECT)
         between = self.draw.random() < 0.15 and not place.startswith("where")
         text = f"stop between {place} and {said}" if between else f"{self.draw.choice(_GO)} {place}"
         if meant is None:
@@ -137,7 +137,9 @@ class _Maker:
 
     def _list(self, count: int) -> Example:
         """Return goals of one kind, one behind the other."""
-        kind = self.draw.choice((Kind.OBJECT, Kind.OBJECT, Kind.SOUND, Kind.AREA, Kind.IMAGE))
+        kind = self.draw.choice(
+            (TargetKind.OBJECT, TargetKind.OBJECT, TargetKind.SOUND, TargetKind.AREA, TargetKind.IMAGE)
+        )
         parts = [self._of(kind) for _ in range(count)]
         verb, joint = self.draw.choice(_GO), self.draw.choice((*_THEN, ", "))
         repeated = self.draw.random() < 0.5
@@ -161,7 +163,7 @@ class _Maker:
         said, target = self._place()
         if self.draw.random() < 0.08:
             return self.draw.choice((("come back", Return()), ("return to the start", Return())))
-        if self.draw.random() < 0.06 and target.kind is Kind.OBJECT and not target.near:
+        if self.draw.random() < 0.06 and target.kind is TargetKind.OBJECT and not target.near:
             return f"visit each of the {plural_of(target.name)}", VisitEach(target)
         return f"{self.draw.choice(_GO)} {said}", Go(target)
 
@@ -205,7 +207,7 @@ class _Maker:
         return f"{verb} {a} and {b}", Between((one, other))
 
     def _beside(self) -> tuple[str, Intent]:
-        said, target = self._of(Kind.OBJECT)
+        said, target = self._of(TargetKind.OBJECT)
         side = self.draw.choice(list(_SIDES))
         words = self.draw.choice(_SIDES[side])
         if self.draw.random() < 0.4:
@@ -214,11 +216,11 @@ class _Maker:
         return f"{self.draw.choice(('go', 'move', 'stand', 'stop', 'drive'))} {words} {said}", Beside(target, side)
 
     def _stop(self) -> tuple[str, Intent]:
-        (said, target), (amount, metres) = self._of(Kind.OBJECT), self._metres()
+        (said, target), (amount, metres) = self._of(TargetKind.OBJECT), self._metres()
         return f"{self.draw.choice(('stop', 'stand', 'stay'))} {amount} from {said}", StopAt(target, metres)
 
     def _circle(self) -> tuple[str, Intent]:
-        said, target = self._of(Kind.OBJECT)
+        said, target = self._of(TargetKind.OBJECT)
         return f"{self.draw.choice(('circle', 'drive around', 'go around', 'go round'))} {said}", Circle(target)
 
     def _wait(self) -> tuple[str, Intent]:
@@ -227,33 +229,48 @@ class _Maker:
 
     def _place(self) -> tuple[str, Target]:
         """Return a target in words, with or without what it is near."""
-        kind = self.draw.choices((Kind.OBJECT, Kind.SOUND, Kind.AREA, Kind.IMAGE, Kind.CLIP), (8, 3, 2, 1.5, 0.5))[0]
+        kind = self.draw.choices(
+            (TargetKind.OBJECT, TargetKind.SOUND, TargetKind.AREA, TargetKind.IMAGE, TargetKind.CLIP),
+            (8, 3, 2, 1.5, 0.5),
+        )[0]
         said, target = self._of(kind)
-        if kind in (Kind.AREA, Kind.CLIP) or self.draw.random() < 0.5:
+        if kind in (TargetKind.AREA, TargetKind.CLIP) or self.draw.random() < 0.5:
             return said, target
-        if self.draw.random() < 0.06 and kind is Kind.OBJECT:
+        if self.draw.random() < 0.06 and kind is TargetKind.OBJECT:
             part = self.draw.choice(_PARTS)
-            return f"the {part} of {said}", Target(Kind.OBJECT, part, (target,))
+            return f"the {part} of {said}", Target(TargetKind.OBJECT, part, (target,))
         near: list[Target] = []
         for at in range(self.draw.choices((1, 2, 3), (7, 2, 1))[0]):
-            other = self.draw.choice((Kind.OBJECT, Kind.SOUND, Kind.AREA, Kind.IMAGE))
+            other = self.draw.choice((TargetKind.OBJECT, TargetKind.SOUND, TargetKind.AREA, TargetKind.IMAGE))
             where, each = self._of(other)
-            joint = "in" if other is Kind.AREA else self.draw.choice(("and", *_NEAR)) if at else self.draw.choice(_NEAR)
-            if other is Kind.AREA or near[-1:] == [] or near[-1].kind is not Kind.AREA:
+            joint = (
+                "in"
+                if other is TargetKind.AREA
+                else self.draw.choice(("and", *_NEAR))
+                if at
+                else self.draw.choice(_NEAR)
+            )
+            if other is TargetKind.AREA or near[-1:] == [] or near[-1].kind is not TargetKind.AREA:
                 said += f" {joint} {where}"
                 near.append(each)
         return said, target.with_near(*near)
 
-    def _of(self, kind: Kind) -> tuple[str, Target]:
-        if kind in (Kind.IMAGE, Kind.CLIP):
-            ending = self.draw.choice((".png", ".jpg", ".jpeg") if kind is Kind.IMAGE else (".wav", ".ogg", ".flac"))
+    def _of(self, kind: TargetKind) -> tuple[str, Target]:
+        if kind in (TargetKind.IMAGE, TargetKind.CLIP):
+            ending = self.draw.choice(
+                (".png", ".jpg", ".jpeg") if kind is TargetKind.IMAGE else (".wav", ".ogg", ".flac")
+            )
             name = self.draw.choice(_FILES) + ending
-            words = ("the image", "the picture", "the photo") if kind is Kind.IMAGE else ("the sound", "the recording")
+            words = (
+                ("the image", "the picture", "the photo")
+                if kind is TargetKind.IMAGE
+                else ("the sound", "the recording")
+            )
             return f"{self.draw.choice(words)} {name}", Target(kind, name)
         name = self.names.draw(kind, self.draw)
-        if kind is Kind.OBJECT and self.draw.random() < 0.05:
+        if kind is TargetKind.OBJECT and self.draw.random() < 0.05:
             name = f"{self.draw.choice(_COLOURS)} {self.draw.choice(('thing', 'object', 'box', 'one'))}"
-        if kind is Kind.SOUND:
+        if kind is TargetKind.SOUND:
             return self.draw.choice((f"the sound of {name}", f"the sound of {name}", f"the {name} sound")), Target(
                 kind, name
             )

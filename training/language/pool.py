@@ -15,7 +15,7 @@ from training.language.rows import Example, examples_of, lists
 from avlmaps.language.asking_back import strange_word
 from avlmaps.language.intents import Clarify
 from avlmaps.language.learned.features import features
-from avlmaps.language.learned.linear import INDEX, SYMBOLS
+from avlmaps.language.learned.grammar import INDEX, SYMBOLS
 from avlmaps.language.sentence import Sentence
 
 _MOST_TOKENS = 70

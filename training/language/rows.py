@@ -17,7 +17,6 @@ from avlmaps.language.intents import (
     Go,
     Inquiry,
     Intent,
-    Kind,
     Move,
     Pick,
     Reason,
@@ -27,6 +26,7 @@ from avlmaps.language.intents import (
     Side,
     StopAt,
     Target,
+    TargetKind,
     Turn,
     VisitEach,
     Wait,
@@ -68,8 +68,8 @@ def target_of(said: Any) -> Target:
     """Return a target of its JSON."""
     if isinstance(said, str):
         said = {"object": said}
-    kind = next(kind for kind in Kind if str(kind) in said)
-    name = "" if kind is Kind.HERE else str(said[str(kind)])
+    kind = next(kind for kind in TargetKind if str(kind) in said)
+    name = "" if kind is TargetKind.HERE else str(said[str(kind)])
     near = tuple(target_of(one) for one in said.get("near", ()))
     return Target(kind, name, near, Pick(said.get("pick", "")))
 
@@ -114,7 +114,8 @@ def intent_of(said: Mapping[str, Any]) -> Intent:  # noqa: C901
 def meanings(row: Mapping[str, Any]) -> "list[tuple[Intent, ...] | Inquiry | None]":
     """Return what a row means, and what else it may mean."""
     if "question" in row:
-        return [_inquiry(one) for one in (row["question"], *row.get("also", ())) if isinstance(one, dict)]
+        readings = (one for one in (row["question"], *row.get("also", ())) if isinstance(one, dict))
+        return [_inquiry(one) for one in readings if one["ask"] != "list"]  # patterns read those, not the networks
     return [tuple(intent_of(one) for one in each) for each in (row["intents"], *row.get("also", ()))]
 
 

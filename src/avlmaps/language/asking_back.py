@@ -3,15 +3,15 @@
 from collections.abc import Sequence
 from itertools import pairwise
 
-from avlmaps.language.intents import Clarify, Kind
+from avlmaps.language.intents import Clarify, TargetKind
 from avlmaps.language.lexer import Token, is_amount
 from avlmaps.language.names import class_words, is_known, may_name, near_names
 from avlmaps.language.word_classes import listed
 from avlmaps.perception.embedded.words import is_word
 
 _FILES = {
-    Kind.IMAGE: "Which picture? Attach it, or name its file in the sentence.",
-    Kind.CLIP: "Which recording? Attach it, or name its file in the sentence.",
+    TargetKind.IMAGE: "Which picture? Attach it, or name its file in the sentence.",
+    TargetKind.CLIP: "Which recording? Attach it, or name its file in the sentence.",
 }
 _PICTURES = frozenset({"photo", "picture", "image", "photograph", "snapshot", "pic"})
 _RECORDINGS = frozenset({"recording", "clip"})
@@ -30,7 +30,7 @@ def is_strange(word: str) -> bool:
     return len(word) > _SHORT and word.isalpha() and not known
 
 
-def missing_file(kind: Kind) -> Clarify:
+def missing_file(kind: TargetKind) -> Clarify:
     """Return the question for "this photo" or "this recording" where no file came along.
 
     Args:
@@ -51,7 +51,7 @@ def lacks_file(tokens: Sequence[Token]) -> Clarify | None:
     words = [token.text for token in tokens]
     for before, word in pairwise(words):
         if before in _THESE and word in _PICTURES | _RECORDINGS:
-            kind = Kind.IMAGE if word in _PICTURES else Kind.CLIP
+            kind = TargetKind.IMAGE if word in _PICTURES else TargetKind.CLIP
             return None if any(token.kind == str(kind) for token in tokens) else missing_file(kind)
     return None
 

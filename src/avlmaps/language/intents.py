@@ -10,7 +10,7 @@ from enum import StrEnum
 from typing import Any, ClassVar
 
 
-class Kind(StrEnum):
+class TargetKind(StrEnum):
     """The kind of a target; the value is its key in JSON."""
 
     OBJECT = "object"
@@ -80,7 +80,7 @@ class Target:
         pick: which one of several.
     """
 
-    kind: Kind
+    kind: TargetKind
     name: str = ""
     near: "tuple[Target, ...]" = ()
     pick: Pick = Pick.ANY
@@ -94,7 +94,7 @@ class Target:
     @property
     def is_file(self) -> bool:
         """Whether the name is the path of a file."""
-        return self.kind in (Kind.IMAGE, Kind.CLIP)
+        return self.kind in (TargetKind.IMAGE, TargetKind.CLIP)
 
     def with_near(self, *more: "Target") -> "Target":
         """Return this target, near some more."""
@@ -102,7 +102,7 @@ class Target:
 
     def to_json(self) -> dict[str, Any]:
         """Return the target as JSON has it, such as ``{"object": "chair", "near": [{"area": "kitchen"}]}``."""
-        told: dict[str, Any] = {str(self.kind): self.name if self.kind is not Kind.HERE else True}
+        told: dict[str, Any] = {str(self.kind): self.name if self.kind is not TargetKind.HERE else True}
         if self.near:
             told["near"] = [one.to_json() for one in self.near]
         if self.pick:
@@ -146,7 +146,7 @@ class Move:
 
 @dataclass(frozen=True, slots=True)
 class Between:
-    """Drive to the middle between two targets; `Kind.HERE` is where the robot stands."""
+    """Drive to the middle between two targets; `TargetKind.HERE` is where the robot stands."""
 
     do: ClassVar[str] = "between"
     of: tuple[Target, Target]
@@ -260,32 +260,27 @@ def _inner(value: Any) -> Any:
 
 def on_targets(intent: Intent, change: Callable[[Target], Target]) -> Intent:
     """Return an intent with each of its targets changed."""
-    match intent:
-        case Go(to=target) | Face(to=target):
-            return replace(intent, to=change(target))
-        case Beside(of=target) | StopAt(of=target) | Circle(of=target) | VisitEach(of=target):
-            return replace(intent, of=change(target))
-        case Between(of=(a, b)):
-            return Between((change(a), change(b)))
-        case Repeat(body=body):
-            return replace(intent, body=tuple(on_targets(one, change) for one in body))
-        case _:
-            return intent
+
+    def changed(value: Any) -> Any:
+        if isinstance(value, Target):
+            return change(value)
+        if isinstance(value, tuple):
+            return tuple(changed(one) for one in value)
+        return on_targets(value, change) if hasattr(value, "do") else value
+
+    return replace(intent, **{name: changed(getattr(intent, name)) for name in intent.__slots__})
 
 
 def targets_of(intent: Intent) -> tuple[Target, ...]:
     """Return the targets of an intent, in the order of the words; of a repeated one, those of its body."""
-    match intent:
-        case Go(to=target) | Face(to=target):
-            return (target,)
-        case Beside(of=target) | StopAt(of=target) | Circle(of=target) | VisitEach(of=target):
-            return (target,)
-        case Between(of=pair):
-            return pair
-        case Repeat(body=body):
-            return tuple(target for one in body for target in targets_of(one))
-        case _:
-            return ()
+    found: list[Target] = []
+
+    def note(target: Target) -> Target:
+        found.append(target)
+        return target
+
+    on_targets(intent, note)
+    return tuple(found)
 
 
 class Ask(StrEnum):

@@ -10,7 +10,7 @@ from avlmaps.core.lexicon import lexicon
 from avlmaps.core.question import MOST_CHARACTERS, Modality, Part, Question
 from avlmaps.language.asking_back import lacks_file
 from avlmaps.language.foreign import ASK, language_of
-from avlmaps.language.intents import Ask, Inquiry, Kind, Pick, Target
+from avlmaps.language.intents import Ask, Inquiry, Pick, Target, TargetKind
 from avlmaps.language.learned.decision import is_doubtful
 from avlmaps.language.learned.guard import Guard, kind_of
 from avlmaps.language.learned.limits import Limits
@@ -23,9 +23,12 @@ from avlmaps.language.word_classes import load_word_classes
 
 _EXAMPLE = "the chair near the sound of glass breaking, or: the table in the kitchen"
 _MODALITIES = {
-    Kind.OBJECT: Modality.OBJECT, Kind.SOUND: Modality.SOUND, Kind.CLIP: Modality.SOUND, Kind.AREA: Modality.AREA,
-    Kind.IMAGE: Modality.IMAGE,
-}  # fmt: skip
+    TargetKind.OBJECT: Modality.OBJECT,
+    TargetKind.SOUND: Modality.SOUND,
+    TargetKind.CLIP: Modality.SOUND,
+    TargetKind.AREA: Modality.AREA,
+    TargetKind.IMAGE: Modality.IMAGE,
+}
 _ACTORS = frozenset({
     "i", "we", "one", "you", "he", "she", "they", "to", "us", "someone",
     "somebody", "can", "could", "may", "might", "should",
@@ -106,7 +109,7 @@ def by_name(sentence: Sentence) -> AskedSentence | None:
     plain = all(token.kind in ("word", "punct") for token in sentence.tokens)
     if not (plain and words and is_entry(name)) or any(sounds_like(word) for word in words):
         return None
-    return AskedSentence(Inquiry(Ask.WHERE, (Target(kind_of(name, Kind.OBJECT), name),)), sentence.notes)
+    return AskedSentence(Inquiry(Ask.WHERE, (Target(kind_of(name, TargetKind.OBJECT), name),)), sentence.notes)
 
 
 def asked(sentence: Sentence, reads: Sequence[Read], limits: Limits) -> AskedSentence:
@@ -185,7 +188,7 @@ def _is_purpose(words: Sequence[str], at: int) -> bool:
 def _names_nothing(read: Read) -> bool:
     """Return whether what a reading seeks is no name that is known: "hero wash"."""
     sought = read.meaning.of if isinstance(read.meaning, Inquiry) else ()
-    named = [one for one in sought if one.kind in (Kind.OBJECT, Kind.AREA)]
+    named = [one for one in sought if one.kind in (TargetKind.OBJECT, TargetKind.AREA)]
     return bool(named) and not any(is_known(one.name) for one in named)
 
 
@@ -197,11 +200,11 @@ def _for_use(sentence: Sentence, use: str, limits: Limits) -> Inquiry:
     """
     names = [name.strip() for name in load_word_classes().lists["uses"][use].split(",")]
     rooms = [token.text for token in sentence.tokens if lexicon().find(token.text, Entries.ROOM) is not None]
-    near = tuple(Target(Kind.AREA, room) for room in rooms if room not in use)
+    near = tuple(Target(TargetKind.AREA, room) for room in rooms if room not in use)
     place = _place_of_use(sentence, use)
     if place:
         near = _near(names[0], place, sentence, limits)
-    return Inquiry(Ask.WHERE, tuple(Target(Kind.OBJECT, name, near) for name in names))
+    return Inquiry(Ask.WHERE, tuple(Target(TargetKind.OBJECT, name, near) for name in names))
 
 
 def _place_of_use(sentence: Sentence, use: str) -> str:

@@ -10,7 +10,6 @@ from avlmaps.language.intents import (
     Face,
     Go,
     Intent,
-    Kind,
     Move,
     Pick,
     Refuse,
@@ -19,6 +18,7 @@ from avlmaps.language.intents import (
     Side,
     StopAt,
     Target,
+    TargetKind,
     Turn,
     VisitEach,
     Wait,
@@ -106,17 +106,17 @@ def phrase(target: Target) -> str:
     """Return a target in words: "the chair nearest to where breathing was heard"."""
     pick = {Pick.OTHER: "other ", Pick.FARTHEST: "farthest "}.get(target.pick, "")
     match target.kind:
-        case Kind.OBJECT | Kind.AREA:
+        case TargetKind.OBJECT | TargetKind.AREA:
             own = f"the {pick}{target.name}"
-        case Kind.SOUND:
+        case TargetKind.SOUND:
             own = f"where {target.name} was heard"
-        case Kind.IMAGE:
+        case TargetKind.IMAGE:
             own = f"where the picture {target.name} was taken"
-        case Kind.CLIP:
+        case TargetKind.CLIP:
             own = f"where a sound like {target.name} was heard"
-        case Kind.HERE:
+        case TargetKind.HERE:
             return "here"
-    areas = [one for one in target.near if one.kind is Kind.AREA]
-    others = [one for one in target.near if one.kind is not Kind.AREA]
+    areas = [one for one in target.near if one.kind is TargetKind.AREA]
+    others = [one for one in target.near if one.kind is not TargetKind.AREA]
     near = f" nearest to {' and '.join(phrase(one) for one in others)}" if others else ""
     return own + near + "".join(f" in {phrase(one)}" for one in areas)

@@ -7,7 +7,7 @@ it. The words between the names say what of them. Those that no question to a ma
 from collections.abc import Callable, Sequence
 
 from avlmaps.language import lexer
-from avlmaps.language.intents import Ask, Inquiry, Kind
+from avlmaps.language.intents import Ask, Inquiry, TargetKind
 from avlmaps.language.learned.said import DETERMINERS, PREPOSITIONS, Claimed, words
 from avlmaps.language.names import describes, is_entry
 
@@ -113,7 +113,7 @@ def _not_placed(said: Claimed, _: Inquiry) -> str | None:
 
 def _past(said: Claimed, inquiry: Inquiry) -> str | None:
     """Return the words for a time before the map was made; what was heard has times, things have none."""
-    sounds = {one.kind for one in inquiry.of} & {Kind.SOUND, Kind.CLIP}
+    sounds = {one.kind for one in inquiry.of} & {TargetKind.SOUND, TargetKind.CLIP}
     spans = said.spans("past")
     asks = {"was", "were"} & set(said.texts) and not {"is", "are"} & set(said.texts)
     return " ".join(said.texts[slice(*spans[0])]) if spans and asks and not (sounds and said.heard) else None
@@ -167,7 +167,7 @@ _PETS = frozenset({"dog", "dogs", "cat", "cats", "pet", "pets", "puppy", "kitten
 def _state(said: Claimed, body: Sequence[int], inquiry: Inquiry) -> str | None:
     """Return the words for a thing that is on, off, or left running."""
     left = next((at for at in body if said.texts[at] in ("leave", "leaving")), None)
-    if left is not None and inquiry.of[0].kind is Kind.SOUND:
+    if left is not None and inquiry.of[0].kind is TargetKind.SOUND:
         return " ".join(said.texts[at] for at in body if at >= left)
     for at in body:
         after = said.tokens[at + 1 : at + 2]

@@ -16,13 +16,13 @@ from avlmaps.language.intents import (
     Face,
     Go,
     Intent,
-    Kind,
     Pick,
     Reason,
     Refuse,
     Repeat,
     StopAt,
     Target,
+    TargetKind,
     Turn,
     Wait,
     on_targets,
@@ -176,13 +176,13 @@ def _plain(target: Target) -> Target:
     """Return a target that is the same however it is written."""
     near = tuple(sorted({_plain(one) for one in _flat_near(target)}, key=str))
     words = target.name.lower().replace("-", " ").split()
-    if target.kind is Kind.SOUND:
+    if target.kind is TargetKind.SOUND:
         name = " ".join(sorted(stem_of(word) for word in words if word not in _WHO))
     elif target.is_file:
         name = target.name
     else:
         name = " ".join([*words[:-1], next(iter(singulars_of(words[-1])), words[-1])]) if words else ""
-    kind = Kind.OBJECT if target.kind is Kind.AREA else target.kind
+    kind = TargetKind.OBJECT if target.kind is TargetKind.AREA else target.kind
     return Target(kind, name, near, Pick.ANY if target.pick is Pick.NEAREST else target.pick)
 
 

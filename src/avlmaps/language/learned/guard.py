@@ -11,13 +11,13 @@ from avlmaps.language.intents import (
     Between,
     Clarify,
     Intent,
-    Kind,
     Move,
     Reason,
     Refuse,
     Repeat,
     StopAt,
     Target,
+    TargetKind,
     Turn,
     Wait,
     on_targets,
@@ -65,15 +65,15 @@ class Guard:
         """Return a target with the name that is meant; what is not known becomes a question."""
         near = tuple(self.put_right(one) for one in target.near)
         match target.kind:
-            case Kind.IMAGE | Kind.CLIP if not target.name:
+            case TargetKind.IMAGE | TargetKind.CLIP if not target.name:
                 given = self.sentence.given
-                path = given.image if target.kind is Kind.IMAGE else given.clip
+                path = given.image if target.kind is TargetKind.IMAGE else given.clip
                 if path is None:
                     self._ask(missing_file(target.kind))
                 return replace(target, name=path or "", near=near)
-            case Kind.OBJECT | Kind.AREA:
+            case TargetKind.OBJECT | TargetKind.AREA:
                 return replace(self._thing(target), near=near)
-            case Kind.SOUND:
+            case TargetKind.SOUND:
                 return replace(target, name=_sound(target.name), near=near)
             case _:
                 return replace(target, near=near)
@@ -82,7 +82,7 @@ class Guard:
         name = target.name
         if not is_known(name) and not self.sentence.knows(name):
             better = mended(name)
-            is_room = target.kind is Kind.AREA and set(name.split()) & _ROOM_WORDS
+            is_room = target.kind is TargetKind.AREA and set(name.split()) & _ROOM_WORDS
             if better is None and not is_room and not may_name(name):
                 self._ask(unknown(name))
                 return target
@@ -95,19 +95,19 @@ class Guard:
         self.problem = self.problem or question
 
 
-def kind_of(name: str, kind: Kind) -> Kind:
+def kind_of(name: str, kind: TargetKind) -> TargetKind:
     """Return whether a name is of a thing or of a room, where only one is possible; else what it was read as."""
     words = name.split()
     for start in range(len(words)):
         tail = " ".join(words[start:])
         thing, room = (lexicon().find(tail, each) is not None for each in (Entries.THING, Entries.ROOM))
         if thing and not room and not start:
-            return Kind.OBJECT
+            return TargetKind.OBJECT
         if room and not thing:
-            return Kind.AREA
+            return TargetKind.AREA
         if thing or room:
             return kind
-    return Kind.AREA if is_place(name) else kind
+    return TargetKind.AREA if is_place(name) else kind
 
 
 def _sound(name: str) -> str:

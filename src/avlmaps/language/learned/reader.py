@@ -19,11 +19,10 @@ from jaxtyping import Float32
 from avlmaps.core.errors import BackendError
 from avlmaps.language.intents import Inquiry, Intent
 from avlmaps.language.learned.features import columns, features
+from avlmaps.language.learned.grammar import INDEX, SYMBOLS
 from avlmaps.language.learned.limits import Limits
 from avlmaps.language.learned.linear import (
-    INDEX,
     MOST_SYMBOLS,
-    SYMBOLS,
     MalformedError,
     Pointable,
     State,
@@ -188,7 +187,7 @@ def _following(state: State, said: Float32[np.ndarray, " k"], texts: Sequence[st
     may = state.open()
     found: list[tuple[Symbol, float]] = [(symbol, float(said[INDEX[symbol]])) for symbol in may.symbols]
     base = len(SYMBOLS)
-    if state.expect == "name" and state.kind in _NAMED:
+    if state.kind in _NAMED:
         by_word: dict[str, list[int]] = {}
         for at in sorted(may.tokens):
             by_word.setdefault(texts[at], []).append(at)

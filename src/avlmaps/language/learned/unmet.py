@@ -19,13 +19,13 @@ from avlmaps.language.intents import (
     Go,
     Inquiry,
     Intent,
-    Kind,
     Move,
     Pick,
     Reason,
     Refuse,
     Side,
     StopAt,
+    TargetKind,
     Turn,
     VisitEach,
 )  # fmt: skip
@@ -128,7 +128,9 @@ def _outside(said: Claimed) -> Clarify | None:
         if said.texts[start] == "beyond" and beside:
             continue
         scope = said.scope(end, BREAKS | PREPOSITIONS)
-        corridor = any(one.kind is Kind.AREA and one.near for one in said.targets)  # "the hall outside the kitchen"
+        corridor = any(
+            one.kind is TargetKind.AREA and one.near for one in said.targets
+        )  # "the hall outside the kitchen"
         if not corridor and said.names_in(scope) and openings.isdisjoint(said.texts[at] for at in scope):
             return Clarify(f"'{said.said(start, scope)}': what is there? Name a place or a thing, such as its door.")
     return None
@@ -143,7 +145,7 @@ def _through(said: Claimed) -> Clarify | None:
         inside = {said.texts[i] for i in scope}
         for target in said.targets:
             head = target.name.split()[-1:]
-            if target.kind is Kind.OBJECT and set(head) <= inside - words().lists["openings"]:
+            if target.kind is TargetKind.OBJECT and set(head) <= inside - words().lists["openings"]:
                 return Clarify(
                     f"'{said.said(at, scope)}': the robot drives through rooms and doors. Say past it, or name a door."
                 )
@@ -153,11 +155,11 @@ def _through(said: Claimed) -> Clarify | None:
 def _edges(said: Claimed) -> Clarify | None:
     """Return the question for a place behind a wall or a window: the map ends there; and for the end of a room."""
     for one in said.steps:
-        if isinstance(one, Beside) and one.of.kind is Kind.AREA and ("end", "of") in pairwise(said.texts):
+        if isinstance(one, Beside) and one.of.kind is TargetKind.AREA and ("end", "of") in pairwise(said.texts):
             return Clarify(f"What is at the end of the {one.of.name}? Name it.")
         if isinstance(one, Beside) and one.side is Side.BEHIND and one.of.name.split()[-1:]:
             head = one.of.name.split()[-1]
-            if one.of.kind is Kind.OBJECT and head in words().lists["edges"]:
+            if one.of.kind is TargetKind.OBJECT and head in words().lists["edges"]:
                 return Clarify(f"What is behind the {head}? Name the room or the thing there.")
     return None
 
@@ -296,7 +298,7 @@ def _nameless(said: Claimed) -> Clarify | None:
         if (
             len(bare) == 1
             and bare[0] in lists["things"]
-            and {one.kind for one in target.near} <= {Kind.OBJECT, Kind.AREA}
+            and {one.kind for one in target.near} <= {TargetKind.OBJECT, TargetKind.AREA}
         ):
             return Clarify(f"Which {bare[0]}? Name it.")
         if bare and bare[-1] in words().lists["anyone"] and not target.near and not target.pick and _says_nothing(bare):
@@ -326,7 +328,7 @@ def _unread(said: Claimed) -> Clarify | None:
 def _unheard(said: Claimed) -> Clarify | None:
     """Return the question for a sound that no step uses: "the chair where someone coughed" is not any chair."""
     kinds = {each.kind for target in said.targets for each in (target, *target.near)}
-    if not kinds.isdisjoint({Kind.SOUND, Kind.CLIP}):
+    if not kinds.isdisjoint({TargetKind.SOUND, TargetKind.CLIP}):
         return None
     for at, text in enumerate(said.texts):
         before = said.texts[max(0, at - 4) : at]

@@ -14,7 +14,6 @@ from avlmaps.language.intents import (
     Face,
     Go,
     Intent,
-    Kind,
     Move,
     Pick,
     Repeat,
@@ -22,10 +21,12 @@ from avlmaps.language.intents import (
     Side,
     StopAt,
     Target,
+    TargetKind,
     Turn,
     VisitEach,
     Wait,
     Way,
+    targets_of,
 )  # fmt: skip
 
 _CORNERS = 8
@@ -44,23 +45,6 @@ def write_program(intents: Sequence[Intent]) -> str:
     return "\n".join([*writer.head, *writer.lines]) + "\n"
 
 
-def targets_of(intents: Sequence[Intent]) -> Iterator[Target]:
-    """Yield the targets of some intents, in their order."""
-    for intent in intents:
-        match intent:
-            case Go(to=target) | Face(to=target) | Beside(of=target) | StopAt(of=target) | Circle(of=target):
-                yield target
-            case VisitEach(of=target):
-                yield target
-            case Between(of=(a, b)):
-                yield a
-                yield b
-            case Repeat(body=body):
-                yield from targets_of(body)
-            case _:
-                pass
-
-
 @dataclass(slots=True)
 class _Writer:
     intents: Sequence[Intent]
@@ -72,10 +56,10 @@ class _Writer:
     repeats: Counter[Target] = field(default_factory=Counter)
 
     def __post_init__(self) -> None:
-        self.repeats = Counter(targets_of(self.intents))
+        self.repeats = _counted(self.intents)
         for intent in self.intents:
             if isinstance(intent, Repeat):
-                self.repeats.update(targets_of(intent.body))
+                self.repeats.update(_counted(intent.body))
         for intent in _flat(self.intents):
             twice = isinstance(intent, StopAt) or (isinstance(intent, Beside) and intent.side is Side.FRONT)
             if isinstance(intent, StopAt | Beside | Circle) and (twice or getattr(intent, "views", None)):
@@ -132,7 +116,7 @@ class _Writer:
 
     def go(self, target: Target) -> None:
         value = self.value(target)
-        plain = target.kind is Kind.OBJECT and not target.near
+        plain = target.kind is TargetKind.OBJECT and not target.near
         if not plain and target not in self.names:
             value = f"robot.get_max_pos_3d({value})"
         self.add(f"robot.move_to_object({value})" if plain else f"robot.move_to({value})")
@@ -144,8 +128,8 @@ class _Writer:
             self.add("robot.turn(180)")
 
     def between(self, a: Target, b: Target) -> None:
-        if Kind.HERE in (a.kind, b.kind):
-            other = b if a.kind is Kind.HERE else a
+        if TargetKind.HERE in (a.kind, b.kind):
+            other = b if a.kind is TargetKind.HERE else a
             self.add(f"robot.move_to((robot.current_pos() + robot.get_pos({self.value(other)})) / 2)")
             return
         self.add(f"robot.move_in_between({self.value(a)}, {self.value(b)})")
@@ -180,9 +164,9 @@ class _Writer:
             self.add(f"    robot.face({self.value(intent.of)})")
 
     def repeat(self, intent: Repeat) -> None:
-        for target in dict.fromkeys(targets_of(intent.body)):
+        for target in _counted(intent.body):
             visited = {one.of for one in _flat(intent.body) if isinstance(one, VisitEach)}
-            if target.kind is not Kind.HERE and target not in visited:
+            if target.kind is not TargetKind.HERE and target not in visited:
                 self.value(target)
         self.add(f"for {self.variable('i')} in range({intent.times}):")
         self.indent += "    "
@@ -198,30 +182,30 @@ class _Writer:
                 at = "1" if target.pick is Pick.OTHER else f"len({every}) - 1"
                 name = self.variable(target.name.split()[-1])
                 self.add(f"{name} = {every}[{at}]")
-            elif target.kind is Kind.OBJECT and not target.near:
+            elif target.kind is TargetKind.OBJECT and not target.near:
                 name = self.variable(target.name.split()[-1])
                 self.add(f"{name} = robot.get_nearest_pos({self.query(target)})")
             else:
                 heat = self.query(target)
                 name = self.variable(target.name.split()[-1] if not target.is_file else "place")
-                skill = "get_nearest_pos" if target.kind is Kind.OBJECT else "get_max_pos_3d"
+                skill = "get_nearest_pos" if target.kind is TargetKind.OBJECT else "get_max_pos_3d"
                 self.add(f"{name} = robot.{skill}({heat})")
             self.names[target] = name
         return self.names[target]
 
     def value(self, target: Target) -> str:
         """Return a skill's argument for a target: a phrase, a heatmap's best place, or its variable."""
-        if target.kind is Kind.HERE:
+        if target.kind is TargetKind.HERE:
             return "robot.current_pos()"
         if target in self.names or self.repeats[target] > 1 or target.pick in (Pick.OTHER, Pick.FARTHEST):
             return self.bound(target)
-        if target.kind is Kind.OBJECT and not target.near:
+        if target.kind is TargetKind.OBJECT and not target.near:
             return _quoted(target.name)
         return self.query(target)
 
     def query(self, target: Target) -> str:
         """Return the phrase of a thing, or the variable or expression of a heatmap."""
-        if target.kind is Kind.OBJECT and not target.near:
+        if target.kind is TargetKind.OBJECT and not target.near:
             return _quoted(target.name)
         factors = [
             f"robot.get_major_map({_argument(target)})",
@@ -244,6 +228,11 @@ _RESERVED = frozenset({
 })  # fmt: skip
 
 
+def _counted(intents: Sequence[Intent]) -> Counter[Target]:
+    """Return how often each target is said, in the order of the words."""
+    return Counter(target for intent in intents for target in targets_of(intent))
+
+
 def _flat(intents: Sequence[Intent]) -> Iterator[Intent]:
     for intent in intents:
         yield intent
@@ -258,13 +247,13 @@ def _quoted(text: str) -> str:
 
 def _argument(target: Target) -> str:
     match target.kind:
-        case Kind.OBJECT:
+        case TargetKind.OBJECT:
             return f"obj={_quoted(target.name)}"
-        case Kind.SOUND:
+        case TargetKind.SOUND:
             return f"sound={_quoted(target.name)}"
-        case Kind.AREA:
+        case TargetKind.AREA:
             return f"area={_quoted(target.name)}"
-        case Kind.IMAGE:
+        case TargetKind.IMAGE:
             return f"img=robot.load_image({_quoted(target.name)})"
         case _:
             return f"sound=robot.load_sound({_quoted(target.name)})"
