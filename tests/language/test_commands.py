@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from avlmaps.core.errors import AvlmapsError, LanguageError
 from avlmaps.language.commands import read_command
 from avlmaps.language.intents import Clarify, Go, Refuse, Target, TargetKind
+from avlmaps.language.learned_translator import LearnedTranslator, UnclearError, command_to_program
 from avlmaps.language.program import parse_program
 from avlmaps.language.program.writing import write_program
 from avlmaps.language.questions import read_question
-from avlmaps.language.rules import RulesTranslator, UnclearError, command_to_program
 from avlmaps.language.sentence import Given
 from avlmaps.language.translator import Translator
 from avlmaps.language.verbalise import verbalise
@@ -95,7 +95,7 @@ def test_a_question_has_choices_and_no_program() -> None:
 
 
 def test_a_mended_word_is_said() -> None:
-    assert RulesTranslator().program_for("go to the refridgerator").notes == (
+    assert LearnedTranslator().program_for("go to the refridgerator").notes == (
         "'refridgerator' is read as 'refrigerator'.",
     )
 
@@ -111,14 +111,25 @@ def test_what_has_no_effect_is_reported() -> None:
 
 
 def test_the_translator_is_one() -> None:
-    translator = RulesTranslator()
+    translator = LearnedTranslator()
     assert isinstance(translator, Translator)
-    assert translator.name == "rules"
+    assert translator.name == "learned"
     assert translator.repair("go to the sofa", "robot.move_to_object('sofa')", "no path") is None
 
 
+def test_the_former_name_works_with_a_warning() -> None:
+    from avlmaps.language import rules
+
+    with pytest.warns(DeprecationWarning, match="LearnedTranslator"):
+        assert rules.RulesTranslator is LearnedTranslator
+    with pytest.warns(DeprecationWarning, match="learned_translator"):
+        assert rules.command_to_program is command_to_program
+    with pytest.raises(AttributeError, match="nothing_of_this_name"):
+        _ = rules.nothing_of_this_name
+
+
 def test_the_plan_is_in_plain_words() -> None:
-    plan = RulesTranslator().program_for(
+    plan = LearnedTranslator().program_for(
         "go to the armchair nearest to where breathing was heard, then face the window"
     )
     assert plan.plan == "I will go to the armchair nearest to where breathing was heard, then face the window."

@@ -40,7 +40,6 @@ from avlmaps.language.intents import (
 from avlmaps.language.learned.decision import DANGERS, Weighed, decided, is_doubtful, is_same
 from avlmaps.language.learned.features import columns, features
 from avlmaps.language.learned.grammar import SYMBOLS
-from avlmaps.language.learned.guard import Guard, weighed
 from avlmaps.language.learned.limits import Limits
 from avlmaps.language.learned.linear import (
     MalformedError,
@@ -51,8 +50,9 @@ from avlmaps.language.learned.linear import (
     inquiry_of,
     intents_of,
 )  # fmt: skip
+from avlmaps.language.learned.name_resolver import NameResolver, weighed
 from avlmaps.language.learned.reader import LearnedReader, learned_reader
-from avlmaps.language.rules import RulesTranslator, explanation
+from avlmaps.language.learned_translator import LearnedTranslator, explanation
 from avlmaps.language.sentence import Given, Sentence
 from avlmaps.language.word_classes import load_word_classes
 from avlmaps_sim.bench.language import judge, judge_intents, judge_question, read_list
@@ -249,14 +249,16 @@ def test_words_that_turn_a_command_round_and_unread_numbers_are_doubtful() -> No
 def test_a_name_that_nothing_knows_is_a_question() -> None:
     sentence = Sentence("go to the frobnicator")
     for read in learned_reader().command(sentence.tokens):
-        checked = weighed(read, Guard(sentence))
+        checked = weighed(read, NameResolver(sentence))
         assert stopped(checked.intents) or not any(target.name for target in targets_of(checked.intents))
     known = Sentence("go to the frobnicator", Given(knows=lambda _: True))
-    assert any(not stopped(weighed(read, Guard(known)).intents) for read in learned_reader().command(known.tokens))
+    assert any(
+        not stopped(weighed(read, NameResolver(known)).intents) for read in learned_reader().command(known.tokens)
+    )
 
 
 def test_the_explanation_shows_readings_and_what_decided() -> None:
-    lines = explanation(RulesTranslator(), "go to the chair")
+    lines = explanation(LearnedTranslator(), "go to the chair")
     assert lines[0].startswith("reading  1.00: I will go to the chair")
     assert lines[-1] == "decided by: a reading that is likely enough"
 
@@ -291,7 +293,7 @@ def alone(row: Any, reader: LearnedReader) -> str:
         found = reads[0].meaning if reads else None
         return judge_question(found.to_json() if isinstance(found, Inquiry) else {"ask": "refuse"}, row)
     reads = reader.command(sentence.tokens)
-    intents = weighed(reads[0], Guard(sentence)).intents if reads else (Clarify(),)
+    intents = weighed(reads[0], NameResolver(sentence)).intents if reads else (Clarify(),)
     return judge_intents([to_json(intent) for intent in intents], row)
 
 

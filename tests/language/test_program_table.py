@@ -11,8 +11,8 @@ import pytest
 from avlmaps.core.errors import ProgramError
 from avlmaps.language.program import SKILLS, parse_program, run_program, skill_lines
 from avlmaps.language.program.calls import BUILTINS
-from avlmaps.language.program.kinds import Kind
 from avlmaps.language.program.table import skills_of
+from avlmaps.language.program.value_types import ValueType
 from avlmaps.language.program.vocabulary import Vocabulary
 from helpers.recording_robot import RecordingRobot
 
@@ -31,7 +31,7 @@ def test_every_skill_of_the_vocabulary_is_in_the_table_and_nothing_else() -> Non
 def test_a_signature_reads_as_it_is_written() -> None:
     assert SKILLS["move_north"].signature == "move_north(target: str | Place | Heat, distance_m: float = 0.5) -> None"
     assert SKILLS["get_contour"].signature == "get_contour(target: str | Place | Heat) -> list[Place]"
-    assert SKILLS["get_map"].parameters[1].kinds == {Kind.STRING, Kind.CLIP, Kind.NOTHING}
+    assert SKILLS["get_map"].parameters[1].kinds == {ValueType.STRING, ValueType.CLIP, ValueType.NOTHING}
 
 
 def test_only_alternatives_must_be_given_one_at_a_time() -> None:

@@ -22,8 +22,8 @@ from avlmaps.language.intents import (
     Wait,
     Way,
 )  # fmt: skip
+from avlmaps.language.learned_translator import command_to_program
 from avlmaps.language.questions import read_question
-from avlmaps.language.rules import command_to_program
 from avlmaps.language.sentence import Given, Sentence
 from avlmaps.language.verbalise import verbalise
 

@@ -8,8 +8,8 @@ import pytest
 
 from avlmaps.core.errors import LanguageError
 from avlmaps.core.motion import GroundPose
+from avlmaps.language.learned_translator import LearnedTranslator
 from avlmaps.language.program import Budget
-from avlmaps.language.rules import RulesTranslator
 from avlmaps.language.translator import Translation
 from avlmaps.navigate.driver import Arrival
 from avlmaps.navigate.instruct import Outcome, instruct
@@ -45,7 +45,7 @@ def told(command: str, translator=None, driver: KinematicDriver | None = None, *
     asked = AVLMap(furnished_map(sounds=sounds_of([track], [0.9])))
     lines: list[str] = []
     driver = driver or KinematicDriver(GroundPose(3.0, 2.0))
-    return instruct(command, asked, driver, translator or RulesTranslator(), tell=lines.append, **more), lines
+    return instruct(command, asked, driver, translator or LearnedTranslator(), tell=lines.append, **more), lines
 
 
 def test_a_sentence_is_obeyed_and_told_as_it_goes() -> None:

@@ -56,8 +56,8 @@ class Go(ModelVerb):
     """Command for the robot."""
     scene: Annotated[str | None, arg(metavar="SCENE")] = None
     """Scene in which the simulated body drives: house:SEED, office:SEED or a file, as for `avlmaps record`."""
-    language: Literal["rules", "chat"] = "rules"
-    """Translator of the sentence: the reader that ships, or a chat model (pip install 'avlmaps[chat]')."""
+    language: Literal["learned", "rules", "chat"] = "learned"
+    """Translator of the sentence: the reader that ships (formerly rules), or a chat model ('avlmaps[chat]')."""
     chat: Annotated[Chat, OmitArgPrefixes] = field(default_factory=Chat)
     """Chat model."""
     body: Literal["base", "drone"] = "base"
@@ -135,7 +135,7 @@ def go(verb: "Go") -> dict[str, Any]:
         raise UsageError(f"--scene and --start belong to a simulated robot; --robot {verb.robot} is where it is.")
     translator = translator_for(verb)
     if verb.explain and verb.dry_run:
-        from avlmaps.language.rules import explanation
+        from avlmaps.language.learned_translator import explanation
 
         for line in explanation(translator, verb.sentence):
             say(line)
@@ -162,7 +162,7 @@ def _driven(verb: "Go", start: "GroundPose | None") -> dict[str, Any]:
     avlmap = AVLMap.open(verb.map, QuerySettings(found_at=verb.found_at))
     translator = translator_for(verb, avlmap)
     if verb.explain:
-        from avlmaps.language.rules import explanation
+        from avlmaps.language.learned_translator import explanation
 
         for line in explanation(translator, verb.sentence):
             say(line)
@@ -236,10 +236,10 @@ def translator_for(verb: "Go", avlmap: "AVLMap | None" = None) -> "Translator":
         None if verb.image is None else str(verb.image), None if verb.sound_clip is None else str(verb.sound_clip),
         None if avlmap is None else avlmap.knows,
     )  # fmt: skip
-    if verb.language == "rules":
-        from avlmaps.language.rules import RulesTranslator
+    if verb.language != "chat":
+        from avlmaps.language.learned_translator import LearnedTranslator
 
-        return RulesTranslator(came)
+        return LearnedTranslator(came)
     from avlmaps.language.chat import ChatSettings, ChatTranslator
 
     chat = verb.chat

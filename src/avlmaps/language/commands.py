@@ -8,8 +8,8 @@ from avlmaps.language.foreign import ASK, language_of
 from avlmaps.language.intents import Beside, Clarify, Face, Intent, Refuse, Repeat, StopAt, Wait, targets_of
 from avlmaps.language.learned.decision import Decision, Weighed, decided
 from avlmaps.language.learned.forbidden import forbidden, is_stop
-from avlmaps.language.learned.guard import EXAMPLE, REFUSALS, Guard, weighed
 from avlmaps.language.learned.limits import Limits
+from avlmaps.language.learned.name_resolver import EXAMPLE, REFUSALS, NameResolver, weighed
 from avlmaps.language.learned.parts import by_parts
 from avlmaps.language.learned.reader import LearnedReader, learned_reader
 from avlmaps.language.lexer import Token, tokenise
@@ -72,7 +72,7 @@ def read_command(text: str, given: Given | None = None) -> Command:
 
 def weighed_readings(sentence: Sentence, reader: LearnedReader) -> tuple[Weighed, ...]:
     """Return the readings of a command, checked, the likeliest first; none where it has no word or too many."""
-    return tuple(weighed(read, Guard(sentence)) for read in reader.command(sentence.tokens))
+    return tuple(weighed(read, NameResolver(sentence)) for read in reader.command(sentence.tokens))
 
 
 def answered(sentence: Sentence, readings: Sequence[Weighed], reader: LearnedReader, limits: Limits) -> Decision:
@@ -82,7 +82,7 @@ def answered(sentence: Sentence, readings: Sequence[Weighed], reader: LearnedRea
         return answer
 
     def read(part: list[Token]) -> list[Weighed]:
-        return [weighed(each, Guard(sentence, part)) for each in reader.command(part)]
+        return [weighed(each, NameResolver(sentence, part)) for each in reader.command(part)]
 
     same = by_parts(sentence.tokens, readings, read)
     return answer if same is None else Decision(same.intents, "parts", same.notes)

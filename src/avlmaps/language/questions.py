@@ -12,8 +12,8 @@ from avlmaps.language.asking_back import lacks_file
 from avlmaps.language.foreign import ASK, language_of
 from avlmaps.language.intents import Ask, Inquiry, Pick, Target, TargetKind
 from avlmaps.language.learned.decision import is_doubtful
-from avlmaps.language.learned.guard import Guard, kind_of
 from avlmaps.language.learned.limits import Limits
+from avlmaps.language.learned.name_resolver import NameResolver, kind_of
 from avlmaps.language.learned.reader import Read, learned_reader
 from avlmaps.language.learned.unmet import unmet_by
 from avlmaps.language.list_questions import SUPPORTED
@@ -130,13 +130,13 @@ def asked(sentence: Sentence, reads: Sequence[Read], limits: Limits) -> AskedSen
         raise QueryError(f"A map cannot answer this. It answers {SUPPORTED}; ask it like: {_EXAMPLE}.")
     use = use_in(sentence.text)
     if use is not None and (reads[0].is_purpose or _names_nothing(reads[0])):
-        return _put_right(_for_use(sentence, use, limits), sentence)
+        return _resolved(_for_use(sentence, use, limits), sentence)
     plain = [read for read in reads if isinstance(read.meaning, Inquiry)]
     if reads[0].is_purpose:  # no purpose is said, so that this was none of the readings
         plain = [replace(read, probability=read.probability / (1.0 - reads[0].probability + 1e-6)) for read in plain]
     if not plain:
         raise QueryError(f"What serves that purpose is not known; name the thing, like: {_EXAMPLE}.")
-    return _put_right(_likely(plain, sentence, limits), sentence)
+    return _resolved(_likely(plain, sentence, limits), sentence)
 
 
 def _likely(reads: Sequence[Read], sentence: Sentence, limits: Limits) -> Inquiry:
@@ -233,18 +233,20 @@ def _near(name: str, place: str, sentence: Sentence, limits: Limits) -> tuple[Ta
     raise QueryError(f"{place!r} is not understood; say it like: {_EXAMPLE}.")
 
 
-def _put_right(inquiry: Inquiry, sentence: Sentence) -> AskedSentence:
+def _resolved(inquiry: Inquiry, sentence: Sentence) -> AskedSentence:
     """Return a question with names put right.
 
     Raises:
         QueryError: it asks for what a map cannot choose, or a name or a file is not known.
     """
-    guard = Guard(sentence)
-    targets = tuple(guard.put_right(target) for target in inquiry.of)
-    if guard.problem is not None:
-        raise QueryError(guard.problem.question)
+    resolver = NameResolver(sentence)
+    targets = tuple(resolver.resolve(target) for target in inquiry.of)
+    if resolver.problem is not None:
+        raise QueryError(resolver.problem.question)
     for one in targets:
         if one.pick in (Pick.FARTHEST, Pick.OTHER):
             raise QueryError(f"A map cannot choose '{one.pick} {one.name}'; say what it is near.")
     sides = sentence.side_notes if any(target.near for target in targets) else ()
-    return AskedSentence(Inquiry(inquiry.ask, targets), tuple(dict.fromkeys((*sentence.notes, *guard.notes, *sides))))
+    return AskedSentence(
+        Inquiry(inquiry.ask, targets), tuple(dict.fromkeys((*sentence.notes, *resolver.notes, *sides)))
+    )

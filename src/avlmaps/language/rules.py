@@ -1,90 +1,25 @@
-"""The parser as a translator: from a command to a program, or to the sentence that says why there is none."""
+"""Deprecated: `RulesTranslator` is `LearnedTranslator` of `avlmaps.language.learned_translator`."""
 
-from collections.abc import Sequence
+import warnings
+from typing import Any
 
-from avlmaps.core.errors import LanguageError
-from avlmaps.language.commands import Command, read_command
-from avlmaps.language.program.writing import write_program
-from avlmaps.language.sentence import Given
-from avlmaps.language.translator import Translation, Translator
-from avlmaps.language.verbalise import verbalise
+from avlmaps.language import learned_translator
 
-_WHY = {
-    "read": "a reading that is likely enough", "parts": "its sentences, each certain alone",
-    "danger": "a refusal for safety",
-    "stop": "the likeliest reading, which stops",
-    "words": "single words, which no reading can outweigh",
-    "unsure": "nobody: no reading is likely enough",
-}  # fmt: skip
+_RENAMED = {"RulesTranslator": "LearnedTranslator"}
 
 
-class UnclearError(LanguageError):
-    """A command is refused, or needs an answer before the robot may drive.
-
-    Attributes:
-        choices: answers that would do; empty where any words may.
-    """
-
-    def __init__(self, message: str, choices: tuple[str, ...] = ()) -> None:
-        """Take the question or the reason, and its choices."""
-        super().__init__(message)
-        self.choices = choices
-
-
-class RulesTranslator:
-    """Translates with the reader that ships: no download, no connection, the same program for the same command.
-
-    Attributes:
-        given: files and words that came along.
-    """
-
-    name = "rules"
-
-    def __init__(self, given: Given | None = None) -> None:
-        """Take the files and names that came along with the commands."""
-        self.given = given or Given()
-
-    def read(self, command: str) -> Command:
-        """Return the meaning of a command, with all readings that were weighed."""
-        return read_command(command, self.given)
-
-    def program_for(self, command: str) -> Translation:
-        """Return the program for a command; the same command always gives the same.
-
-        Raises:
-            UnclearError: the command is refused, or unclear; the sentence says why or asks back.
-            LanguageError: the command is empty or too long.
-        """
-        read = self.read(command)
-        said = verbalise(read.intents)
-        if read.stops is not None:
-            raise UnclearError(said, getattr(read.stops, "choices", ()))
-        return Translation(write_program(read.intents), read.notes, said)
-
-    def repair(self, command: str, program: str, error: str, done: Sequence[str] = ()) -> Translation | None:
-        """Return None: the reader knows no second way to say the same."""
-        return None
-
-
-def command_to_program(command: str) -> str:
-    """Return the program for a command.
-
-    Args:
-        command: what a person says, such as "go to the chair near the sound of glass breaking, then turn left".
+def __getattr__(name: str) -> Any:
+    """Return what the other module has, with a warning.
 
     Raises:
-        LanguageError: the command is refused, or unclear.
+        AttributeError: neither has it.
     """
-    return RulesTranslator().program_for(command).program
-
-
-def explanation(translator: Translator, command: str) -> list[str]:
-    """Return the readings of a command with their probabilities, a line each, and what decided.
-
-    A translator that weighs no readings has none.
-    """
-    if not isinstance(translator, RulesTranslator):
-        return ["readings: this translator weighs none"]
-    read = translator.read(command)
-    lines = [f"reading {one.probability:5.2f}: {verbalise(one.intents)}" for one in read.readings]
-    return [*lines, f"decided by: {_WHY[read.why]}"]
+    new = _RENAMED.get(name, name)
+    if name.startswith("_") or not hasattr(learned_translator, new):
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    warnings.warn(
+        f"avlmaps.language.rules.{name} is avlmaps.language.learned_translator.{new} now.",
+        DeprecationWarning,
+        stacklevel=2,
+    )
+    return getattr(learned_translator, new)

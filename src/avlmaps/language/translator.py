@@ -27,7 +27,7 @@ class Translator(Protocol):
 
     @property
     def name(self) -> str:
-        """The word by which a user chooses this translator, such as `rules` or `chat`."""
+        """The word by which a user chooses this translator, such as `learned` or `chat`."""
         ...
 
     def program_for(self, command: str) -> Translation:

@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core.motion import Action, GroundPose, Moved
+from avlmaps.language.learned_translator import LearnedTranslator
 from avlmaps.language.program import Budget
-from avlmaps.language.rules import RulesTranslator
 from avlmaps.language.translator import Translation
 from avlmaps.maps.obstacles import Obstacles
 from avlmaps.navigate.bodies import BASE, BodyShape
@@ -68,7 +68,7 @@ def rehearse(
     """
     driver = MapDriver(obstacles, FreeBody(start), shape)
     return instruct(
-        words, avlmap, driver, RulesTranslator(), budget, settings=settings, readable=readable,
+        words, avlmap, driver, LearnedTranslator(), budget, settings=settings, readable=readable,
         translation=translation, tell=tell, pause=lambda _: None,
     )  # fmt: skip
 

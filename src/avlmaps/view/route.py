@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from avlmaps.core.errors import NavigationError
 from avlmaps.core.motion import GroundPose
-from avlmaps.language.rules import RulesTranslator, explanation
+from avlmaps.language.learned_translator import LearnedTranslator, explanation
 from avlmaps.language.sentence import Given
 from avlmaps.navigate.bodies import BASE, BodyShape
 from avlmaps.navigate.costmap import costmap_of, obstacles_for
@@ -96,7 +96,7 @@ class Guide:
         if again:
             self._robot = self._pose = None
         files = [None if upload is None else str(upload.path) for upload in (photo, clip)]
-        translator = RulesTranslator(Given(files[0], files[1], self.avlmap.knows))
+        translator = LearnedTranslator(Given(files[0], files[1], self.avlmap.knows))
         readings = explanation(translator, command)[:_MOST_READINGS]
         translation = translator.program_for(command)
         readable = Readable((), tuple(path for path in files if path is not None))

@@ -10,7 +10,7 @@ import pytest
 
 from avlmaps.core.errors import LanguageError, QueryError
 from avlmaps.core.motion import Action, GroundPose
-from avlmaps.language.rules import RulesTranslator
+from avlmaps.language.learned_translator import LearnedTranslator
 from avlmaps.language.translator import Translation
 from avlmaps.maps.grid import GridSpec
 from avlmaps.navigate.driver import Arrival
@@ -115,7 +115,7 @@ def mission(*goals: Goal) -> Mission:
     return Mission("m", Series.SOUNDS_3, "made", (2.0, 1.5, 0.0), goals)
 
 
-@pytest.mark.parametrize("translator", [None, RulesTranslator()])
+@pytest.mark.parametrize("translator", [None, LearnedTranslator()])
 def test_with_true_senses_every_goal_of_one_command_is_reached(known: KnownScene, floor: Floor, translator: object):
     done = pilot(known, floor, translator).run(mission(SNORING, TABLE, FAR_CHAIR, LAUGHING), TRUE)
     assert done.reached == [True] * 4
@@ -129,7 +129,7 @@ def test_with_true_senses_every_goal_of_one_command_is_reached(known: KnownScene
 
 
 def test_a_goal_that_a_sense_lacks_is_failed_and_what_is_left_is_told_one_by_one(known: KnownScene, floor: Floor):
-    done = pilot(known, floor, RulesTranslator()).run(mission(TABLE, SNORING, TABLE, LAUGHING), DEAF)
+    done = pilot(known, floor, LearnedTranslator()).run(mission(TABLE, SNORING, TABLE, LAUGHING), DEAF)
     assert done.reached == [True, False, True, False], [leg.note for leg in done.legs]
     assert [leg.stop is None for leg in done.legs] == [False, True, False, True]
     assert done.commands[0].startswith("First go to the table, then go to the sound of snoring, then")

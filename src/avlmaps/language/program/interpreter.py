@@ -10,9 +10,11 @@ from avlmaps.language.program import syntax
 from avlmaps.language.program.budget import Budget, refused
 from avlmaps.language.program.calls import check_exactly_one, parameter_of
 from avlmaps.language.program.check import check_argument, grown, misfit
-from avlmaps.language.program.kinds import (
+from avlmaps.language.program.table import SKILLS
+from avlmaps.language.program.trace import Step, Trace, told
+from avlmaps.language.program.value_types import (
     COLLECTIONS,
-    Kind,
+    ValueType,
     check_comparison,
     check_function,
     check_indexed,
@@ -20,8 +22,6 @@ from avlmaps.language.program.kinds import (
     check_unpacked,
     check_walked,
 )
-from avlmaps.language.program.table import SKILLS
-from avlmaps.language.program.trace import Step, Trace, told
 from avlmaps.language.program.values import (
     Made,
     Sizes,
@@ -201,7 +201,7 @@ class _Run:
     def update(self, statement: syntax.Update) -> None:
         before = self.value(syntax.Name(statement.name, statement.line))
         value = self.value(statement.value)
-        if statement.operator == "+" and kind_of(before) is kind_of(value) is Kind.LIST:
+        if statement.operator == "+" and kind_of(before) is kind_of(value) is ValueType.LIST:
             raise grown(statement)
         self.names[statement.name] = self.arithmetic(statement.line, statement.operator, before, value)
 

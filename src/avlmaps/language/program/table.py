@@ -7,21 +7,21 @@ from inspect import getdoc, signature
 from types import MappingProxyType, NoneType, UnionType
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
-from avlmaps.language.program.kinds import Kind
+from avlmaps.language.program.value_types import ValueType
 from avlmaps.language.program.vocabulary import Clip, Heat, Picture, Place, Vocabulary
 
 ROBOT = "robot"
 
-_KINDS: dict[Any, tuple[Kind, str]] = {
-    NoneType: (Kind.NOTHING, "None"),
-    bool: (Kind.TRUTH, "bool"),
-    float: (Kind.NUMBER, "float"),
-    str: (Kind.STRING, "str"),
-    Place: (Kind.PLACE, "Place"),
-    Heat: (Kind.HEAT, "Heat"),
-    Picture: (Kind.PICTURE, "Picture"),
-    Clip: (Kind.CLIP, "Clip"),
-    list[Place]: (Kind.LIST, "list[Place]"),
+_KINDS: dict[Any, tuple[ValueType, str]] = {
+    NoneType: (ValueType.NOTHING, "None"),
+    bool: (ValueType.TRUTH, "bool"),
+    float: (ValueType.NUMBER, "float"),
+    str: (ValueType.STRING, "str"),
+    Place: (ValueType.PLACE, "Place"),
+    Heat: (ValueType.HEAT, "Heat"),
+    Picture: (ValueType.PICTURE, "Picture"),
+    Clip: (ValueType.CLIP, "Clip"),
+    list[Place]: (ValueType.LIST, "list[Place]"),
 }
 
 
@@ -37,7 +37,7 @@ class Parameter:
     """
 
     name: str
-    kinds: frozenset[Kind]
+    kinds: frozenset[ValueType]
     annotation: str
     default: str | None
 
@@ -61,7 +61,7 @@ class Skill:
 
     name: str
     parameters: tuple[Parameter, ...]
-    returns: Kind
+    returns: ValueType
     returns_text: str
     doc: str
 
@@ -78,7 +78,7 @@ class Skill:
     @property
     def moves(self) -> bool:
         """Whether the robot moves by it; skills that do return nothing, all others something."""
-        return self.returns is Kind.NOTHING
+        return self.returns is ValueType.NOTHING
 
     def parameter(self, name: str) -> Parameter | None:
         """Return the parameter of that name, if there is one."""
@@ -109,7 +109,7 @@ def _skill(name: str, method: Any) -> Skill:
     return Skill(name, tuple(parameters), returns, returns_text, doc)
 
 
-def _kinds_of(skill: str, hint: Any) -> tuple[frozenset[Kind], str]:
+def _kinds_of(skill: str, hint: Any) -> tuple[frozenset[ValueType], str]:
     choices = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
     try:
         known = [_KINDS[choice] for choice in choices]

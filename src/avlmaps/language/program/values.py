@@ -5,9 +5,9 @@ from types import NoneType
 from typing import Any
 
 from avlmaps.language.program.budget import refused
-from avlmaps.language.program.kinds import Kind, check_sign, kind_of_result
 from avlmaps.language.program.literals import bounded
 from avlmaps.language.program.table import Skill
+from avlmaps.language.program.value_types import ValueType, check_sign, kind_of_result
 from avlmaps.language.program.vocabulary import Clip, Heat, Picture, Place
 
 DEEPEST_VALUE = 20
@@ -31,23 +31,23 @@ class Made:
 
 Value = None | bool | int | float | str | list[Any] | tuple[Any, ...] | range | Place | Picture | Clip | Made
 
-_KINDS: dict[type, Kind] = {
-    NoneType: Kind.NOTHING,
-    bool: Kind.TRUTH,
-    int: Kind.NUMBER,
-    float: Kind.NUMBER,
-    str: Kind.STRING,
-    list: Kind.LIST,
-    tuple: Kind.TUPLE,
-    range: Kind.RANGE,
-    Place: Kind.PLACE,
-    Picture: Kind.PICTURE,
-    Clip: Kind.CLIP,
-    Made: Kind.HEAT,
+_KINDS: dict[type, ValueType] = {
+    NoneType: ValueType.NOTHING,
+    bool: ValueType.TRUTH,
+    int: ValueType.NUMBER,
+    float: ValueType.NUMBER,
+    str: ValueType.STRING,
+    list: ValueType.LIST,
+    tuple: ValueType.TUPLE,
+    range: ValueType.RANGE,
+    Place: ValueType.PLACE,
+    Picture: ValueType.PICTURE,
+    Clip: ValueType.CLIP,
+    Made: ValueType.HEAT,
 }
 
 
-def kind_of(value: Value) -> Kind:
+def kind_of(value: Value) -> ValueType:
     """Return the kind of a value; its type decides, and no subclass passes for another."""
     return _KINDS[type(value)]
 
@@ -109,9 +109,9 @@ def combined(line: int, operator: str, left: Any, right: Any, factors: int) -> V
         ProgramError: they are of no kinds that it takes, it divides by zero, or the result is too large.
     """
     kind = kind_of_result(line, operator, kind_of(left), kind_of(right))
-    if kind is Kind.HEAT:
+    if kind is ValueType.HEAT:
         return _product(line, left, right, factors)
-    if kind is Kind.PLACE:
+    if kind is ValueType.PLACE:
         left, right = handed_on(left), handed_on(right)
     try:
         made = _ARITHMETIC[operator](left, right)
@@ -120,9 +120,9 @@ def combined(line: int, operator: str, left: Any, right: Any, factors: int) -> V
     except ValueError:
         # The one value that refuses to be made is a place at infinity.
         return bounded(line, float("inf"))
-    if kind is Kind.NUMBER:
+    if kind is ValueType.NUMBER:
         return bounded(line, made)
-    if kind is Kind.PLACE:
+    if kind is ValueType.PLACE:
         for coordinate in (made.x, made.y, made.z):
             bounded(line, coordinate)
     return made
@@ -187,7 +187,7 @@ def call_function(line: int, function: str, arguments: list[Any]) -> Value:
     if not numbers:
         raise refused(line, f"`{function}` of nothing has no value; check `len` with `if` first")
     for number in numbers:
-        if kind_of(number) is not Kind.NUMBER:
+        if kind_of(number) is not ValueType.NUMBER:
             raise refused(line, f"`{function}` takes numbers, not {kind_of(number)}")
     return min(numbers) if function == "min" else max(numbers)
 
@@ -224,13 +224,13 @@ def adopted(skill: Skill, result: Any, how: str) -> Value:
         TypeError: it is not what the skill's signature promises, which is a mistake of the vocabulary's programmer.
     """
     match skill.returns:
-        case Kind.HEAT if type(result) not in _KINDS and hasattr(result, "__mul__"):
+        case ValueType.HEAT if type(result) not in _KINDS and hasattr(result, "__mul__"):
             return Made(result, how, 1)
-        case Kind.LIST if isinstance(result, (list, tuple)) and all(isinstance(each, Place) for each in result):
+        case ValueType.LIST if isinstance(result, (list, tuple)) and all(isinstance(each, Place) for each in result):
             return [_place(each) for each in result]
-        case Kind.PLACE if isinstance(result, Place):
+        case ValueType.PLACE if isinstance(result, Place):
             return _place(result)
-        case Kind.NOTHING | Kind.PICTURE | Kind.CLIP if _KINDS.get(type(result)) is skill.returns:
+        case ValueType.NOTHING | ValueType.PICTURE | ValueType.CLIP if _KINDS.get(type(result)) is skill.returns:
             return result
     raise TypeError(f"the skill {skill.name} returned {type(result).__name__}, not {skill.returns_text}")
 

@@ -20,8 +20,8 @@ from avlmaps.core.errors import AvlmapsError, NavigationError
 from avlmaps.core.motion import GroundPose, wrap_angle
 from avlmaps.core.poses import FRAME
 from avlmaps.core.printable import printable
+from avlmaps.language.learned_translator import LearnedTranslator, UnclearError
 from avlmaps.language.program import Budget, parse_program
-from avlmaps.language.rules import RulesTranslator, UnclearError
 from avlmaps.language.sentence import Given
 from avlmaps.language.translator import Translation
 from avlmaps.navigate.instruct import Outcome, instruct
@@ -168,7 +168,7 @@ class Dispatcher:
         if program.strip():
             parse_program(program)
             return Translation(program)
-        return RulesTranslator(Given(knows=now.avlmap.knows)).program_for(words)
+        return LearnedTranslator(Given(knows=now.avlmap.knows)).program_for(words)
 
     @property
     def _settings(self) -> RobotSettings:
@@ -257,7 +257,7 @@ class Dispatcher:
         error = "The order ended by a fault of avlmaps; the server's log has the details."
         try:
             outcome = instruct(
-                order.plan.words, order.now.avlmap, self._machine.driver(order.brake), RulesTranslator(),
+                order.plan.words, order.now.avlmap, self._machine.driver(order.brake), LearnedTranslator(),
                 settings=self._settings, readable=NO_FILES,
                 translation=Translation(order.plan.program, order.plan.notes, order.plan.reading),
                 tell=lambda line: self._tell(order, line), pause=order.brake.pause,

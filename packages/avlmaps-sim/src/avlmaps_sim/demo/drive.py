@@ -96,7 +96,7 @@ def drive(
         out: the demonstration's folder.
         tell: is given the program and the steps as they go.
     """
-    from avlmaps.language.rules import RulesTranslator
+    from avlmaps.language.learned_translator import LearnedTranslator
     from avlmaps.navigate.instruct import instruct
     from avlmaps.navigate.skills import RobotSettings
     from avlmaps.navigate.trace_plot import plot_path
@@ -110,7 +110,7 @@ def drive(
         robot = robot_in(avlmap, scene)
         # The goals are truly there, so the robot may go to a best guess; the report says whether that was right.
         outcome = instruct(
-            command, avlmap, robot.driver, RulesTranslator(), settings=RobotSettings(guess=True), tell=tell
+            command, avlmap, robot.driver, LearnedTranslator(), settings=RobotSettings(guess=True), tell=tell
         )
     except AvlmapsError as fault:
         return Drive(command, legs, None, None, str(fault))

@@ -64,8 +64,8 @@ class Navigation:
     """Sequences of four sounds (at each range), and of an image and two objects; pairs are 119 for each 200."""
     series: tuple[Series, ...] = ()
     """Experiments to run. Default: all."""
-    language: Literal["rules", "chat", "none"] = "rules"
-    """Translator of sentences into programs; none gives robots the programs."""
+    language: Literal["learned", "rules", "chat", "none"] = "learned"
+    """Translator of sentences into programs; rules is the former name of learned, none gives robots the programs."""
     guess: bool = True
     """Send robots to the best guess where the map is not confident, as in the paper."""
 

@@ -213,6 +213,6 @@ def translator_named(language: str) -> Translator | None:
         from avlmaps.language.chat import ChatTranslator
 
         return ChatTranslator()
-    from avlmaps.language.rules import RulesTranslator
+    from avlmaps.language.learned_translator import LearnedTranslator
 
-    return RulesTranslator()
+    return LearnedTranslator()

@@ -8,7 +8,7 @@ from avlmaps_sim.bench.harness.settings import SceneSettings, TaskError
 from avlmaps_sim.bench.navigation.missions import Series
 
 DEFAULT_SCENES = tuple(f"house:{seed}:held-out" for seed in range(1_000_001, 1_000_013))
-Language = Literal["rules", "chat", "none"]
+Language = Literal["learned", "rules", "chat", "none"]
 _PAIRS_OF_200 = 119
 
 
@@ -27,7 +27,7 @@ class NavigationSettings(SceneSettings):
     scenes: tuple[str, ...] = DEFAULT_SCENES
     series: tuple[Series, ...] = tuple(Series)
     sequences: int = 200
-    language: Language = "rules"
+    language: Language = "learned"
     guess: bool = True
 
     def __post_init__(self) -> None:

@@ -48,7 +48,7 @@ _ROOM_WORDS = frozenset({"room", "area", "zone", "hall", "corner", "wing", "bay"
 
 
 @dataclass(slots=True)
-class Guard:
+class NameResolver:
     """A sentence, the files that came along, and the tokens that are read; None: all of them."""
 
     sentence: Sentence
@@ -61,9 +61,9 @@ class Guard:
         """The tokens that are read."""
         return self.sentence.tokens if self.part is None else self.part
 
-    def put_right(self, target: Target) -> Target:
+    def resolve(self, target: Target) -> Target:
         """Return a target with the name that is meant; what is not known becomes a question."""
-        near = tuple(self.put_right(one) for one in target.near)
+        near = tuple(self.resolve(one) for one in target.near)
         match target.kind:
             case TargetKind.IMAGE | TargetKind.CLIP if not target.name:
                 given = self.sentence.given
@@ -119,36 +119,36 @@ def _sound(name: str) -> str:
     return " ".join(words)
 
 
-def weighed(read: Read, guard: Guard) -> Weighed:
+def weighed(read: Read, names: NameResolver) -> Weighed:
     """Return a reading of a command, checked.
 
     Args:
         read: the reading.
-        guard: of its sentence; a fresh one for each reading.
+        names: of its sentence; a fresh one for each reading.
     """
     assert isinstance(read.meaning, tuple)
     first = read.meaning[0]
-    if isinstance(first, Refuse) and first.reason is Reason.UNKNOWN and strange_word(guard.tokens):
-        return Weighed((unclear(guard.tokens),), read.probability)
+    if isinstance(first, Refuse) and first.reason is Reason.UNKNOWN and strange_word(names.tokens):
+        return Weighed((unclear(names.tokens),), read.probability)
     if isinstance(first, Refuse):
         return Weighed((Refuse(first.reason, REFUSALS[first.reason]),), read.probability)
     if isinstance(first, Clarify) or any(isinstance(one, Refuse | Clarify) for one in read.meaning):
-        return Weighed((unclear(guard.tokens),), read.probability)
-    intents = tuple(on_targets(intent, guard.put_right) for intent in read.meaning)
-    problem = guard.problem or _too_much(intents)
+        return Weighed((unclear(names.tokens),), read.probability)
+    intents = tuple(on_targets(intent, names.resolve) for intent in read.meaning)
+    problem = names.problem or _too_much(intents)
     if problem is not None:
         return Weighed((problem,), read.probability)
-    stop = unmet(guard.tokens, intents, read.used)
+    stop = unmet(names.tokens, intents, read.used)
     if stop is not None:
         stop = Refuse(stop.reason, REFUSALS[stop.reason]) if isinstance(stop, Refuse) else stop
         return Weighed((stop,), read.probability)
-    turned = in_direction(guard.tokens, intents)
+    turned = in_direction(names.tokens, intents)
     if isinstance(turned, Clarify):
         return Weighed((turned,), read.probability)
     intents = turned
-    doubtful = is_doubtful(guard.tokens, read.used, waits=any(isinstance(one, Wait) for one in intents))
-    doubtful = doubtful or has_strange_words(guard.tokens, read.used)
-    return Weighed(intents, read.probability, doubtful, tuple(dict.fromkeys(guard.notes)))
+    doubtful = is_doubtful(names.tokens, read.used, waits=any(isinstance(one, Wait) for one in intents))
+    doubtful = doubtful or has_strange_words(names.tokens, read.used)
+    return Weighed(intents, read.probability, doubtful, tuple(dict.fromkeys(names.notes)))
 
 
 def _too_much(intents: Sequence[Intent]) -> Clarify | None:
