@@ -26,6 +26,7 @@ ERRORS = (
     (("query", "MAP"), 2, "usage"),
     (("query", "MAP", "--object", "red", "--plot", "x.doc"), 1, "query"),
     (("locate", "MAP", "nothing.png"), 1, "query"),
+    (("live", "nowhere", "--out", "OUT"), 1, "recording"),
     (("go", "nowhere.avlmap", "go to the chair", "--scene", "house:7"), 1, "map"),
     (("go", "MAP", "gabble gabble the", "--scene", "house:7"), 1, "unclear"),
     (("things", "nowhere.avlmap"), 1, "map"),
@@ -127,7 +128,8 @@ def test_a_cold_cache_is_announced_once_and_a_warm_one_not(tmp_path: Path) -> No
 
 def test_verbs_that_run_compiled_loops_say_so(run, monkeypatch: pytest.MonkeyPatch) -> None:
     compile_something = {
-        "demo", "record", "build", "locate", "go", "bench", "things", "rooms", "export", "shell", "serve", "view"
+        "demo", "record", "build", "live", "locate", "go", "bench", "things", "rooms", "export",
+        "shell", "serve", "view"
     }  # fmt: skip
     assert {name for name, verb in VERBS.items() if verb.compiles} == compile_something
     assert not Verb.compiles

@@ -91,7 +91,7 @@ def test_a_finished_map_of_something_else_is_kept(
     with pytest.raises(MapError) as fault:
         build(walk, before.path, settings)
     assert str(fault.value) == (
-        f"{before.path} is a finished map already, {why}; give another --out, or replace it with --overwrite."
+        f"{before.path} is a finished map already, {why}; give another path, or replace it with overwrite=True."
     )
     assert content_of(before.path) == files
     after = build(walk, before.path, settings, overwrite=True)
@@ -124,7 +124,7 @@ def test_what_is_no_map_is_not_touched(tmp_path: Path, make) -> None:
     make(path)
     with pytest.raises(MapError) as fault:
         build(Walk(4), path, overwrite=True)
-    told = f"{path} is there already and is not a map; give another --out, nothing in it was touched."
+    told = f"{path} is there already and is not a map; give another path, nothing in it was touched."
     assert str(fault.value) == told
     assert not (path / ".lock").exists()
 
@@ -167,7 +167,7 @@ def test_frames_that_cannot_be_read_are_left_out_and_told(tmp_path: Path) -> Non
 def test_too_many_bad_frames_stop_the_build_and_the_count_survives_a_resume(tmp_path: Path) -> None:
     said = (
         "5 of 20 frames cannot be read, more than the 4 that may be left out; fix the recording or allow more "
-        "(--max-bad-share). The last: walk/000014.png is truncated; leave that frame out."
+        "(FrameSettings.max_bad_share). The last: walk/000014.png is truncated; leave that frame out."
     )
     for _ in range(2):
         with pytest.raises(RecordingError) as fault:

@@ -26,7 +26,7 @@ def right() -> Draft:
 
 def test_it_is_refused_with_the_cause_and_the_name_that_lets_it_through(right: Draft, tmp_path: Path) -> None:
     walk = replace(right, poses=poses.inverse(right.poses)).write(tmp_path / "walk")
-    said = r"walk cannot be right\. .*--poses camera-from-world.*--allow geometry\."
+    said = r"walk cannot be right\. .*Corrections\.poses=camera-from-world.*allow=geometry\."
     with pytest.raises(RecordingError, match=said):
         build_map(open_recording(walk), tmp_path / "map", PROFILE, SETTINGS, progress=False)
     with pytest.raises(RecordingError, match="nothing called 'geometri' to allow"):

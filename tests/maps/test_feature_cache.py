@@ -195,7 +195,7 @@ def test_too_large_features_are_told_once_and_not_kept(tmp_path: Path, capsys: p
         store.put(Kind.PIXELS, CARD, key, np.zeros(10_000, np.float16))
     said = capsys.readouterr().err
     assert said.count("note: Features of fake/pixels are not cached") == 1
-    assert "--feature-cache-gb" in said
+    assert "CacheSettings.limit_gb" in said
     assert not list(tmp_path.rglob("*.npy"))
 
 

@@ -30,7 +30,7 @@ def test_what_is_up_is_not_doubted(walk: Recording, up: tuple[float, float, floa
 @pytest.mark.parametrize("up", [(0, 1, 0), (1, 0, 0), (0, 0, -1), (0, 1, 1)])
 def test_what_is_not_up_is_said_with_what_is(walk: Recording, up: tuple[float, float, float]) -> None:
     (said,) = doubts(walk, up)
-    assert "Up is given as" in said and "Give --up 0.00,0.00,1.00" in said
+    assert "Up is given as" in said and "Give Corrections.up_in_world=0.00,0.00,1.00" in said
 
 
 def test_a_camera_on_its_side_is_believed_where_the_walk_is_level(walk: Recording) -> None:

@@ -68,7 +68,7 @@ def test_a_film_without_floor_gets_a_notice_that_says_what_to_do() -> None:
     ground, info = estimate_ground(desk_only(), DEFAULTS, UP_INFO)
     assert info.main().best.confidence < 0.7 and info.known_from == "surfaces"
     (notice,) = ground_notices(info)
-    assert "--camera-height-m" in notice
+    assert "GravitySettings.camera_height_m" in notice
     assert len(ground.camera_m) == 12
 
 

@@ -117,7 +117,7 @@ def test_links_are_found_at_any_depth_and_files_are_none(tmp_path: Path, elsewhe
 def test_a_folder_of_somebody_is_no_place_for_a_map(tmp_path: Path, name: str) -> None:
     (tmp_path / "own" / name).parent.mkdir(parents=True)
     (tmp_path / "own" / name).write_text("mine")
-    with pytest.raises(MapError, match=r"is there already and is not a map; give another --out, nothing .* touched"):
+    with pytest.raises(MapError, match=r"is there already and is not a map; give another path, nothing .* touched"):
         build_map(Walk(6), tmp_path / "own", PROFILE, SETTINGS, progress=False)
     assert content(tmp_path / "own") == {name: b"mine"}
 

@@ -171,7 +171,7 @@ def test_two_builds_into_one_folder_are_refused(tmp_path: Path) -> None:
     )
 
 
-@pytest.mark.parametrize(("version", "how"), [(2, "upgrade avlmaps"), (0, "build the map again with --overwrite")])
+@pytest.mark.parametrize(("version", "how"), [(2, "upgrade avlmaps"), (0, "build the map again in its place")])
 def test_another_schema_version(copied: Path, version: int, how: str) -> None:
     edit(copied, lambda content: content.update(schema_version=version, voxel_size_m="one day this may be a word"))
     said = f"{copied}/map.json has schema version {version}, this avlmaps reads version 1; {how}."
@@ -285,8 +285,7 @@ def open_count(path: Path) -> int:
 def test_an_array_of_another_type_than_maps_have(copied: Path) -> None:
     replace(copied, "voxels/rgb", np.zeros((3, 3), np.float32))
     assert refused(copied) == (
-        f"{copied}/voxels, rgb is float32 of (3, 3); a map has uint8 of (n, 3) there; build the map again with "
-        "--overwrite."
+        f"{copied}/voxels, rgb is float32 of (3, 3); a map has uint8 of (n, 3) there; build the map again in its place."
     )
 
 
@@ -329,7 +328,7 @@ def test_counts_that_are_not_those_of_the_arrays(copied: Path) -> None:
 
 def test_a_missing_array(copied: Path) -> None:
     edit(copied, lambda content: content["files"].pop("voxels/hits"))
-    assert refused(copied) == f"{copied}/voxels is damaged: it has no hits; build the map again with --overwrite."
+    assert refused(copied) == f"{copied}/voxels is damaged: it has no hits; build the map again in its place."
 
 
 def test_a_camera_that_is_none(copied: Path) -> None:
@@ -422,7 +421,7 @@ def test_scores_of_some_keypoints_only_are_a_damage(copied: Path) -> None:
     count = len(open_stored(copied).keyframes.xy)
     replace(copied, "keyframes/score", np.ones(count - 1, np.float16))
     assert refused(copied) == (
-        f"{copied}/keyframes, score has {count - 1} rows; xy has {count}; build the map again with --overwrite."
+        f"{copied}/keyframes, score has {count - 1} rows; xy has {count}; build the map again in its place."
     )
 
 

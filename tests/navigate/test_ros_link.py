@@ -60,7 +60,7 @@ def test_without_roslibpy_the_extra_is_named(monkeypatch):
 def test_without_rclpy_one_sentence_says_what_to_source_and_what_does_without():
     if find_spec("rclpy") is not None:
         pytest.skip("this Python has rclpy; `make test-ros2` tests it")
-    with pytest.raises(BackendError, match=r"needs ROS 2's rclpy .*setup.bash.*--ros ws://HOST:9090\.$"):
+    with pytest.raises(BackendError, match=r"needs ROS 2's rclpy .*setup.bash.*ros=ws://HOST:9090\.$"):
         open_ros_driver("nav2", "native")
     with pytest.raises(NavigationError, match="in ROS 1, over rosbridge"):
         open_ros_driver("move_base", "native")

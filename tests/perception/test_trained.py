@@ -106,7 +106,7 @@ def test_they_are_looked_for_under_another_name(eyes: Path) -> None:
 
 
 def test_without_a_folder_of_models_the_error_says_which_option_sets_one() -> None:
-    with using_models(ModelSettings()), pytest.raises(BackendError, match="--models DIR sets one"):
+    with using_models(ModelSettings()), pytest.raises(BackendError, match=r"ModelSettings\.folder=DIR sets one"):
         open_trained("no-such-eyes")
 
 

@@ -134,7 +134,7 @@ def test_a_place_that_the_points_do_not_fix_is_not_given(stored: MapOfPictures) 
     photo = WALK.room.render(PHOTO_FROM, longer)[0]
     found = locate(stored, photo, None, rng(), LocateSettings(max_place_error_m=1e-6))
     assert found.world_from_camera is None and found.score < 0.5
-    assert "is not known, and its" in found.notes[0] and "--intrinsics" in found.notes[0]
+    assert "is not known, and its" in found.notes[0] and "intrinsics=" in found.notes[0]
 
 
 @pytest.mark.parametrize(("noted", "read"), [(26, 26.0), (None, None), (0, None), (4000, None)])

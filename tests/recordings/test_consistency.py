@@ -14,6 +14,7 @@ from avlmaps.cli.reading_options import Reading
 from avlmaps.cli.usage import CONFIG
 from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole
+from avlmaps.core.wording import Spelling, options_as
 from avlmaps.recordings.camera_axes import opencv_from_axes
 from avlmaps.recordings.consistency.check import check_recording
 from avlmaps.recordings.consistency.edges import find_edges, shift_of
@@ -84,7 +85,8 @@ WRONG = {
 @pytest.mark.parametrize("name", WRONG)
 def test_the_remedy_that_is_named_puts_the_recording_right(name: str, right: Draft, tmp_path: Path) -> None:
     wrong = WRONG[name](right)
-    found = verdict(wrong, tmp_path)
+    with options_as(Spelling.FLAG):
+        found = verdict(wrong, tmp_path)
     assert found.grade is not Grade.FINE
     geometry = next(f for f in found.findings if f.reason is Reason.GEOMETRY)
     again = verdict(wrong, tmp_path, options_in(geometry.remedy))
@@ -94,7 +96,7 @@ def test_the_remedy_that_is_named_puts_the_recording_right(name: str, right: Dra
 def test_a_wrong_option_is_found_out(right: Draft, tmp_path: Path) -> None:
     found = verdict(right, tmp_path, Corrections(camera_axes="opengl", depth_unit_m=0.001))
     assert found.grade is Grade.IMPOSSIBLE
-    assert "--camera-axes opencv" in found.findings[0].remedy
+    assert "Corrections.camera_axes=opencv" in found.findings[0].remedy
 
 
 @pytest.mark.parametrize(

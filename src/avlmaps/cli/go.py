@@ -297,8 +297,7 @@ def failure(answer: dict[str, Any]) -> dict[str, Any] | None:
     if answer["ok"]:
         return None
     if answer["error"] is not None:
-        message = answer["error"].replace("let the robot go to the best guess", "go to the best guess with --guess")
-        return error_answer(kind_named(answer["error_type"]), message)
+        return error_answer(kind_named(answer["error_type"]), answer["error"])
     missed = [goal["name"] or place(goal["goal"]) for goal in answer["subgoals"] if not goal["reached"]]
     message = (
         f"The robot did not reach {len(missed)} of {len(answer['subgoals'])} goals: {', '.join(missed)}."

@@ -25,6 +25,7 @@ from avlmaps.cli.shortened_files import end_at_shortened_files
 from avlmaps.core.errors import AvlmapsError, BackendError
 from avlmaps.core.printable import printable
 from avlmaps.core.progress import end_bars
+from avlmaps.core.wording import Spelling, options_as
 
 if TYPE_CHECKING:
     from avlmaps.cli.verb import Verb
@@ -45,7 +46,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     settle_streams()
     try:
         try:
-            _main(sys.argv[1:] if arguments is None else list(arguments))
+            with options_as(Spelling.FLAG):
+                _main(sys.argv[1:] if arguments is None else list(arguments))
         finally:
             sys.stdout.flush()  # here, since Python reports a reader that has gone on standard error if it flushes last
     except OSError as error:  # of what was printed last; a verb's own are a sentence already

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from avlmaps.core.errors import MapError
 from avlmaps.core.progress import say
+from avlmaps.core.wording import option
 from avlmaps.maps.build import build_map
 from avlmaps.maps.pipeline.plan import make_plan
 from avlmaps.maps.store.array_files import FileInfo, explain_write_errors, refuse_links, sync_names, verify_file
@@ -90,7 +91,7 @@ def repair_map(path: Path | str, recording: Recording | None) -> Repaired:
     if make_plan(recording, workshop, used, info.settings).key != info.build_key:
         raise MapError(
             f"{path} was built with another sound track, with other models or by another avlmaps "
-            f"({info.avlmaps_version}); build it again with --overwrite."
+            f"({info.avlmaps_version}); build it again in its place ({option('overwrite')})."
         )
     made = build_map(recording, workshop, used, info.settings).info
     with lock_folder(path):

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core.errors import GoalNotFoundError
+from avlmaps.core.wording import option
 from avlmaps.navigate.footprint import Outline
 from avlmaps.query.factors import Factor, NearThings
 from avlmaps.query.goals import Goal
@@ -117,7 +118,9 @@ def explain_absence(heat: Heatmap, guess: bool = False) -> str:
     if best is None:
         return f"{what} {why}; say it in other words."
     place = ", ".join(f"{value:.2f}" for value in best.position)
-    advice = "say it in other words" if guess else "say it in other words, or let the robot go to the best guess"
+    advice = "say it in other words"
+    if not guess:
+        advice += f", or let the robot go to the best guess ({option('guess')})"
     return f"{what} {why}. The best guess is at ({place}) m with probability {best.probability:.2f}; {advice}."
 
 

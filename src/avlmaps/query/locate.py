@@ -9,6 +9,7 @@ from jaxtyping import Bool, Float, Float32, Int, UInt8
 
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.poses import rotation_angle_rad
+from avlmaps.core.wording import option
 from avlmaps.maps.types import Keyframes
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.pose import PoseSettings, estimate_pose
@@ -24,10 +25,6 @@ from avlmaps.query.focal import (
 )
 
 _SAME_ASPECT = 0.01
-_CENTRED = (
-    "The picture has another shape than the map's own, and its middle is taken for the axis of its camera; of a "
-    "picture that was cut out elsewhere give the intrinsics (--intrinsics fx,fy,cx,cy)."
-)
 # The score of a pose whose place the points do not fix.
 _UNSURE = 0.49
 _SAME_SIDE = 0.25  # cosine: no descriptor bears a change of view by more than 75 degrees
@@ -162,10 +159,16 @@ class Located:
         if self.world_from_camera is None:
             return (
                 f"The focal length of the photo's camera is not known, and its {self.inliers} points fix it only to "
-                f"{focal}, the place to {where}; give it (--intrinsics fx,fy,cx,cy).",
+                f"{focal}, the place to {where}; give it ({option('intrinsics', 'fx,fy,cx,cy')}).",
             )
         known = f"The focal length was found with the pose: {focal}; by it the pose is known to {where}."
-        return (known, _CENTRED) if self.centred else (known,)
+        if not self.centred:
+            return (known,)
+        return (
+            known,
+            "The picture has another shape than the map's own, and its middle is taken for the axis of its camera; of "
+            f"a picture that was cut out elsewhere give the intrinsics ({option('intrinsics', 'fx,fy,cx,cy')}).",
+        )
 
 
 def locate(

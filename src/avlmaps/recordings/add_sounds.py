@@ -15,6 +15,7 @@ from avlmaps.core.errors import AudioError, RecordingError
 from avlmaps.core.files import write_bytes_atomically
 from avlmaps.core.progress import progress as shown
 from avlmaps.core.progress import say, silence_progress
+from avlmaps.core.wording import option
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
 from avlmaps.recordings.background import background as noise_of
 from avlmaps.recordings.background import seconds_of
@@ -194,7 +195,8 @@ def _rule(walk: Walk, wanted: Spacing) -> tuple[Placer, float | None, list[str]]
     if spacing.measure != wanted.measure:
         notices.append(
             f"The walk stays within so small a place that few sounds are {wanted.distance_m:g} m apart in a straight "
-            "line; they are that far apart along the walk instead (--min-distance-m 0 allows any distance)."
+            "line; they are that far apart along the walk instead "
+            f"({option('min-distance-m', '0')} allows any distance)."
         )
     lengths_s = np.arange(_USUAL_LENGTH_S, _SHORTEST_CUT_S - 1e-9, -0.5)
     room = [capacity(walk, spacing, float(length_s), _WANTED) for length_s in lengths_s]
@@ -203,7 +205,7 @@ def _rule(walk: Walk, wanted: Spacing) -> tuple[Placer, float | None, list[str]]
     longest_s = float(lengths_s[int(np.argmax(room))])
     notices.append(
         f"Sounds of {_USUAL_LENGTH_S:g} s would leave room for {room[0]} of them, so they are cut to {longest_s:g} s, "
-        f"which leaves room for {max(room)}; a smaller --min-distance-m leaves room for more."
+        f"which leaves room for {max(room)}; a smaller {option('min-distance-m')} leaves room for more."
     )
     return Placer(walk, spacing), longest_s, notices
 

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float32
 
 from avlmaps.core.errors import AudioError, NoAudioStreamError
+from avlmaps.core.wording import option
 from avlmaps.recordings.media_files import checked_media
 
 if TYPE_CHECKING:
@@ -251,7 +252,9 @@ def _examine_video(path: Path) -> tuple[int, int]:
     try:
         with av.open(str(path)) as container:
             if not container.streams.audio:
-                raise NoAudioStreamError(f"{path} has no audio stream; give the sound as a file of its own (--audio).")
+                raise NoAudioStreamError(
+                    f"{path} has no audio stream; give the sound as a file of its own ({option('audio')})."
+                )
             audio = container.streams.audio[0]
             rate_hz = int(audio.codec_context.sample_rate)
             zero_s = (container.start_time or 0) / av.time_base

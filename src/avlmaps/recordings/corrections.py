@@ -5,7 +5,7 @@ recording of any format. Nothing is corrected that was not named.
 """
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from enum import StrEnum
 from functools import cached_property
@@ -18,6 +18,7 @@ from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.timeline import Trajectory
+from avlmaps.core.wording import flag, option
 from avlmaps.recordings.camera_axes import OPENCV, opencv_from_axes
 from avlmaps.recordings.types import Frame, Recording
 
@@ -130,21 +131,21 @@ class Corrections:
         ours = {f.name: getattr(self, f.name) for f in fields(self) if getattr(self, f.name) not in (None, ())}
         return replace(declared, **ours)
 
-    def words(self) -> str:
-        """Return them as the options of the command line that give them."""
+    def words(self, spelled: Callable[[str, str], str] = option) -> str:
+        """Return them as the options that give them, as the reader of a sentence spells options."""
         said: list[str] = []
         if self.depth_unit_m is not None:
-            said.append(f"--depth-unit {self.depth_unit_m:g}")
+            said.append(spelled("depth-unit", f"{self.depth_unit_m:g}"))
         if self.intrinsics:
-            said.append("--intrinsics " + " ".join(map(_camera_words, self.intrinsics)))
+            said.append(spelled("intrinsics", " ".join(map(_camera_words, self.intrinsics))))
         if self.poses:
-            said.append("--poses " + " ".join(self.poses))
+            said.append(spelled("poses", " ".join(self.poses)))
         if self.camera_axes is not None:
-            said.append(f"--camera-axes {self.camera_axes}")
+            said.append(spelled("camera-axes", str(self.camera_axes)))
         if self.pose_delay_s is not None:
-            said.append(f"--pose-delay {self.pose_delay_s:g}")
+            said.append(spelled("pose-delay", f"{self.pose_delay_s:g}"))
         if self.up_in_world is not None:
-            said.append("--up " + ",".join(f"{value:g}" for value in self.up_in_world))
+            said.append(spelled("up", ",".join(f"{value:g}" for value in self.up_in_world)))
         return " ".join(said)
 
 
@@ -217,7 +218,7 @@ class CorrectedRecording(Recording):
             raise RecordingError(
                 f"{whole.path}: poses that are {delay_s:g} s late leave no frame with a pose; the frames go from "
                 f"{whole.stamps_s[0]:.2f} to {whole.stamps_s[-1]:.2f} s, the poses from {known.stamps_s[0]:.2f} to "
-                f"{known.stamps_s[-1]:.2f} s. Give a smaller --pose-delay."
+                f"{known.stamps_s[-1]:.2f} s. Give a smaller {option('pose-delay')}."
             )
         lost = len(whole) - len(there)
         notice = f"{lost} frame(s) have no pose {delay_s:g} s later and are left out."
@@ -261,7 +262,7 @@ class CorrectedRecording(Recording):
     @cached_property
     def fingerprint(self) -> str:
         """Of the recording and the corrections."""
-        return hashlib.sha256(f"{self.whole.fingerprint} {self.given.words()}".encode()).hexdigest()
+        return hashlib.sha256(f"{self.whole.fingerprint} {self.given.words(flag)}".encode()).hexdigest()
 
 
 def uncorrected(recording: Recording) -> Recording:
@@ -279,8 +280,8 @@ def corrected_rig(rig: Rig, given: Sequence[GivenCamera], path: Path) -> Rig:
         return rig
     if len(given) == 1 and not rig.registered:
         raise RecordingError(
-            f"{path} has a depth camera of its own; give the intrinsics of both cameras, colour first: --intrinsics "
-            "fx,fy,cx,cy fx,fy,cx,cy."
+            f"{path} has a depth camera of its own; give the intrinsics of both cameras, colour first: "
+            f"{option('intrinsics', 'fx,fy,cx,cy fx,fy,cx,cy')}."
         )
     rgb = given[0].camera(rig.rgb.width, rig.rgb.height)
     if len(given) == 1:

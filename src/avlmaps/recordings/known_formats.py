@@ -16,6 +16,7 @@ from pathlib import Path
 
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.registry import entry_points
+from avlmaps.core.wording import option
 from avlmaps.recordings import layout
 from avlmaps.recordings.faults import Report, stop_at_first
 from avlmaps.recordings.types import Recording
@@ -101,7 +102,7 @@ def settle_sound(recording: Recording) -> None:
             raise RecordingError(
                 f"The sound track {track.path.name} of {recording.path} goes {span}, so that no sound has a place; "
                 "give the recording's time at which it begins (audio_start_s of recording.json), another track "
-                "(--audio), or none."
+                f"({option('audio')}), or none."
             )
         if shared_s < _LEAST_SHARED * (last_s - first_s):
             notices = (*notices, f"The sound track {track.path.name} goes {span}; the rest has no sound.")

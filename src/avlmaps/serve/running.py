@@ -12,6 +12,7 @@ from pathlib import Path
 from types import FrameType
 
 from avlmaps.core.files import read_regular
+from avlmaps.core.wording import Spelling, options_as
 from avlmaps.serve.guard import App
 from avlmaps.serve.service import Service
 from avlmaps.serve.settings import ServeError, ServeSettings
@@ -135,4 +136,5 @@ def run_http(
         raise ServeError(
             f"The TLS files cannot be used ({error.strerror or error}); give a PEM certificate and its key."
         ) from None
-    asyncio.run(Server(config).serve(sockets=[opened]))
+    with options_as(Spelling.FIELD):
+        asyncio.run(Server(config).serve(sockets=[opened]))

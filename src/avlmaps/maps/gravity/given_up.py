@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core.errors import RecordingError
+from avlmaps.core.wording import option
 from avlmaps.maps.gravity.up import find_up
 from avlmaps.recordings.consistency.verdict import Finding, Grade, Reason
 from avlmaps.recordings.types import Frame, Recording
@@ -50,7 +51,7 @@ def up_doubts(recording: Recording, frames: Iterator[Frame], rng: np.random.Gene
         f"Up is given as {said}, but {found.support:.0%} of the surface in view is level along {is_so}, {apart:.0f} "
         "degrees away, and so was the camera held."
     )
-    return (Finding(Reason.UP, Grade.SUSPICIOUS, sentence, f"Give --up {is_so}, or fix the poses."),)
+    return (Finding(Reason.UP, Grade.SUSPICIOUS, sentence, f"Give {option('up', is_so)}, or fix the poses."),)
 
 
 def some_frames(recording: Recording) -> Iterator[Frame]:

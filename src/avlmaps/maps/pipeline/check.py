@@ -8,6 +8,7 @@ import numpy as np
 
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.progress import say
+from avlmaps.core.wording import option
 from avlmaps.maps.gravity.given_up import some_frames, up_doubts
 from avlmaps.maps.pipeline.plan import BUILD_VERSION, BuildPlan
 from avlmaps.maps.store.checkpoints import Computed, key_of, load_or_compute
@@ -56,7 +57,8 @@ def _doubts(recording: Recording, allowed: Sequence[str]) -> _Doubts:
     refused = verdict.refused(tuple(allowed))
     if refused is not None:
         raise RecordingError(
-            f"{recording.path} cannot be right. {refused} To build it as it is: --allow {refused.reason.value}."
+            f"{recording.path} cannot be right. {refused} To build it as it is: "
+            f"{option('allow', refused.reason.value)}."
         )
     return _Doubts(verdict.sentences(), whole=not verdict.unread)
 

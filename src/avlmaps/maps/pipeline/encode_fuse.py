@@ -15,6 +15,7 @@ from jaxtyping import Float32
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.progress import progress
 from avlmaps.core.registry import Kind
+from avlmaps.core.wording import option
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
 from avlmaps.maps.fusion.free_space import FreeViewCollector
 from avlmaps.maps.fusion.sensor import SensorModel
@@ -131,7 +132,7 @@ class Tolerance:
             raise RecordingError(bad.why)
         raise RecordingError(
             f"{self._met} of {self._total} frames cannot be read, more than the {self._allowed} that may be left out; "
-            f"fix the recording or allow more (--max-bad-share). The last: {bad.why}"
+            f"fix the recording or allow more ({option('max-bad-share')}). The last: {bad.why}"
         )
 
 

@@ -10,6 +10,7 @@ import msgspec
 import numpy as np
 
 from avlmaps.core.errors import RecordingError
+from avlmaps.core.wording import option
 from avlmaps.maps.fusion.depth_noise import FRAMES, measure_noise, nearest_model
 from avlmaps.maps.fusion.sensor import MODELS, SensorModel
 from avlmaps.maps.gravity.floor import FoundFloor, GroundedRecording, find_ground
@@ -167,7 +168,7 @@ def _runner_up(floor: FoundFloor) -> FloorGuess | None:
 
 def ground_notices(ground: GroundInfo) -> Iterator[str]:
     """Yield a sentence for each floor that most of its evidence leaves open."""
-    remedy = "give the camera's height over the floor with --camera-height-m if that is wrong"
+    remedy = f"give the camera's height over the floor with {option('camera-height-m')} if that is wrong"
     for floor in ground.floors if ground.known_from == "surfaces" else ():
         best, second = floor.best, floor.runner_up
         if floor.cameras < _FEW_CAMERAS or (best.confidence >= _LEAVES_OPEN and best.in_view):
@@ -191,7 +192,7 @@ def ground_notices(ground: GroundInfo) -> Iterator[str]:
     if ground.known_from == "user" and (main := ground.main().best).below > _MUCH_BELOW:
         yield (
             f"{main.below:.0%} of what is in view lies below the floor that was given ({main.camera_height_m:.2f} m "
-            "under the camera); check --camera-height-m."
+            f"under the camera); check {option('camera-height-m')}."
         )
 
 

@@ -10,6 +10,7 @@ from avlmaps.core.errors import MapError
 from avlmaps.core.files import sampled_digest
 from avlmaps.core.progress import say
 from avlmaps.core.registry import Kind
+from avlmaps.core.wording import option
 from avlmaps.maps.keyframes.describe import keyframes_by_motion
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.checkpoints import key_of
@@ -71,7 +72,9 @@ def make_plan(recording: Recording, path: Path, encoders: Encoders, settings: Bu
     if len(recording) == 0:
         raise MapError(f"{recording.path} has no frames with a pose; there is nothing to build a map from.")
     if not is_map_or_free(path):
-        raise MapError(f"{path} is there already and is not a map; give another --out, nothing in it was touched.")
+        raise MapError(
+            f"{path} is there already and is not a map; give another {option('out')}, nothing in it was touched."
+        )
     settings = settings.for_profile(encoders.weight_variance_m2)
     models = {kind.value: ModelInfo.of(encoders.sources[kind].chosen, card) for kind, card in encoders.cards().items()}
     key = key_of("map", BUILD_VERSION, recording.fingerprint, audio_key(recording), encoders.name, models, settings)
@@ -155,7 +158,7 @@ def claim(plan: BuildPlan, resume: bool, overwrite: bool) -> MapInfo | None:
         if there.build_key != plan.key:
             raise MapError(
                 f"{plan.path} is a finished map already, of {there.recording.name} {_difference(plan, there)}; give "
-                "another --out, or replace it with --overwrite."
+                f"another {option('out')}, or replace it with {option('overwrite')}."
             )
         say(f"{plan.path} is finished already, from the same recording with the same settings; nothing to do.")
         sweep(plan.path, there)

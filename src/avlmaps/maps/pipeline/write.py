@@ -8,6 +8,7 @@ from time import perf_counter
 
 from avlmaps.core.errors import MapError
 from avlmaps.core.version import __version__
+from avlmaps.core.wording import option
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
 from avlmaps.maps.fusion.cleaning import clean
 from avlmaps.maps.fusion.free_space import FreeViews, ThroughCounts
@@ -87,7 +88,7 @@ def surfaces(
     if not kept.any():
         raise MapError(
             f"Every voxel of {plan.recording.path} is seen through or a speck, so that the map would be empty; check "
-            "its poses and its depth scale, or use every depth as it is (--sensor none)."
+            f"its poses and its depth scale, or use every depth as it is ({option('sensor', 'none')})."
         )
     return Merged(total.voxels(kept=kept), sensor, Removed(**removed), perf_counter() - begin)
 

@@ -26,7 +26,7 @@ _UNIT = 0.02
 MAY_BE_NAN = frozenset({"keyframes/points_world"})
 MOST_EXTENT_M = 10_000.0
 MOST_AWAY_M = 1e6
-_MEND = "build the map again with --overwrite"
+_MEND = "build the map again in its place"
 
 
 def array_fields(kind: type) -> list[str]:

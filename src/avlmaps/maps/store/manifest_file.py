@@ -11,7 +11,7 @@ from avlmaps.maps.store.consistency import checksum_of, manifest_fault
 from avlmaps.maps.store.manifest import SCHEMA_VERSION, MapInfo
 
 MANIFEST = "map.json"
-RESTORE = "restore it from a copy, or build the map again with --overwrite"
+RESTORE = "restore it from a copy, or build the map again in its place"
 
 
 class _Ident(msgspec.Struct):
@@ -60,7 +60,7 @@ def parse_manifest(content: bytes, path: Path) -> MapInfo:
     if ident.format != "avlmap":
         raise MapError(f"{path} belongs to no map of avlmaps; give the folder that `avlmaps build` wrote.")
     if ident.schema_version != SCHEMA_VERSION:
-        how = "upgrade avlmaps" if ident.schema_version > SCHEMA_VERSION else "build the map again with --overwrite"
+        how = "upgrade avlmaps" if ident.schema_version > SCHEMA_VERSION else "build the map again in its place"
         raise MapError(
             f"{path} has schema version {ident.schema_version}, this avlmaps reads version {SCHEMA_VERSION}; {how}."
         )

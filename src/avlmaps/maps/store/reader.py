@@ -15,6 +15,7 @@ from avlmaps.core.errors import MapError
 from avlmaps.core.poses import FRAME, rotation_to_level
 from avlmaps.core.registry import Kind
 from avlmaps.core.suggestions import near_path
+from avlmaps.core.wording import option
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.store.array_files import MEND, FileInfo, read_array, verify_file
 from avlmaps.maps.store.array_validation import array_fields, check_extent, check_order, content_fault, validate_arrays
@@ -136,7 +137,7 @@ class StoredMap:
         if (here, card.dim, card.checksum) != (made_by.id, made_by.dim, made_by.checksum or card.checksum):
             instead = f"use avlmaps {self.info.avlmaps_version}"
             if "@" in made_by.backend:
-                instead = f"name the folder that holds {made_by.id} as it was (--models DIR)"
+                instead = f"name the folder that holds {made_by.id} as it was ({option('models', 'DIR')})"
             raise MapError(
                 f"{self.path} was built with {made_by.id} (checksum {made_by.checksum[:8] or 'unknown'}), this avlmaps "
                 f"has {here} ({card.checksum[:8]}) for {kind.value}; build it again, or {instead}."

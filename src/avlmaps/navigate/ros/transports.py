@@ -4,6 +4,7 @@ from dataclasses import replace
 from typing import Literal
 
 from avlmaps.core.errors import BackendError, NavigationError
+from avlmaps.core.wording import option
 from avlmaps.navigate.ros.frames import Frames
 from avlmaps.navigate.ros.move_base import MoveBaseSession, MoveBaseTasks
 from avlmaps.navigate.ros.nav2 import Nav2Session
@@ -42,14 +43,16 @@ def native_opener(kind: RosKind, settings: RosSettings) -> Opener:
     """
     if kind != "nav2":
         raise NavigationError(
-            f"--ros native is for ROS 2; reach {kind}, in ROS 1, over rosbridge: --ros ws://HOST:9090."
+            f"{option('ros', 'native')} is for ROS 2; reach {kind}, in ROS 1, over rosbridge: "
+            f"{option('ros', 'ws://HOST:9090')}."
         )
     try:
         from avlmaps.navigate.ros.native import NativeSession
     except ImportError as fault:
         raise BackendError(
-            f"--ros native needs ROS 2's rclpy in this Python ({fault}); source /opt/ros/$ROS_DISTRO/setup.bash and "
-            "use the Python that ROS 2 was built for, or connect over rosbridge with --ros ws://HOST:9090."
+            f"{option('ros', 'native')} needs ROS 2's rclpy in this Python ({fault}); source "
+            "/opt/ros/$ROS_DISTRO/setup.bash and use the Python that ROS 2 was built for, or connect over rosbridge "
+            f"with {option('ros', 'ws://HOST:9090')}."
         ) from None
     return lambda ear, within_s: NativeSession(settings, ear)
 

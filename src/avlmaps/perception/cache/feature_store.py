@@ -22,6 +22,7 @@ import numpy as np
 from avlmaps.core.errors import BackendError
 from avlmaps.core.progress import say
 from avlmaps.core.registry import Kind
+from avlmaps.core.wording import option
 from avlmaps.perception.protocols import ModelCard
 
 _GB = 1e9
@@ -98,7 +99,7 @@ class FeatureStore:
             needed = array.nbytes / _LARGEST_SHARE / _GB
             self._tell(
                 f"Features of {card.id} are not cached: they take {array.nbytes / 1e6:.0f} MB a frame, and a hundred "
-                f"frames must find room (--feature-cache-gb {needed:.0f})."
+                f"frames must find room ({option('feature-cache-gb', f'{needed:.0f}')})."
             )
             return
         content = _packed(array)
@@ -131,7 +132,7 @@ class FeatureStore:
                 self._full = True
                 self._tell(
                     f"The feature cache is full with what this build needs itself; further frames are not stored "
-                    f"({self.limit_bytes / _GB:g} GB in {self.folder}; --feature-cache-gb)."
+                    f"({self.limit_bytes / _GB:g} GB in {self.folder}; {option('feature-cache-gb')})."
                 )
                 return False
             self._total += size

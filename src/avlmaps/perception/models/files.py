@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from avlmaps.core.errors import BackendError
+from avlmaps.core.wording import option
 from avlmaps.perception.models.settings import model_settings
 from avlmaps.perception.user_folder import user_folder
 
@@ -21,7 +22,7 @@ def local_model(model: str, how_to_get: str) -> Path:
         if place.exists():
             return place
     folder = model_settings().folder
-    looked = f"in {folder} and " if folder else "in no folder of models, --models DIR sets one, and "
+    looked = f"in {folder} and " if folder else f"in no folder of models, {option('models', 'DIR')} sets one, and "
     raise BackendError(f"The model {model} is not here (looked {looked}for that path); get it with: {how_to_get}")
 
 

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from avlmaps.core.camera import Pinhole
+from avlmaps.core.wording import option
 from avlmaps.recordings.consistency.agreement import Agreement
 from avlmaps.recordings.consistency.sample import Sample, Surfaces, steps_between_all
 from avlmaps.recordings.consistency.verdict import Finding, Grade, Reason
@@ -47,7 +48,8 @@ def of_intrinsics(sample: Sample, recording: Recording) -> Iterator[Finding]:
 def _of_camera(camera: Pinhole, where: str) -> Iterator[Finding]:
     size = f"{camera.width}x{camera.height}"
     off = (abs(camera.cx / camera.width - 0.5), abs(camera.cy / camera.height - 0.5))
-    fit = f"give those of a {size} picture with --intrinsics fx,fy,cx,cy, or of another size as fx,fy,cx,cy@WxH."
+    given = option("intrinsics", "fx,fy,cx,cy")
+    fit = f"give those of a {size} picture with {given}, or of another size as fx,fy,cx,cy@WxH."
     if max(off) > 0.5 - _CENTRE_MARGIN:
         grade = Grade.IMPOSSIBLE if max(off) > 0.5 else Grade.SUSPICIOUS
         middle = "outside" if max(off) > 0.5 else "near the edge of"
@@ -82,7 +84,7 @@ def of_depth(sample: Sample, surfaces: Surfaces, median_m: float) -> Iterator[Fi
     if empty == 1.0:
         yield Finding(
             Reason.DEPTH, Grade.SUSPICIOUS, f"None of the {len(sample)} frames that were looked at has any depth.",
-            "A map needs depth; check the depth pictures and their unit (--depth-unit).",
+            f"A map needs depth; check the depth pictures and their unit ({option('depth-unit')}).",
         )  # fmt: skip
         return
     if empty > MOST_EMPTY_FRAMES:
@@ -91,14 +93,17 @@ def of_depth(sample: Sample, surfaces: Surfaces, median_m: float) -> Iterator[Fi
     elif float(np.median(share)) < LEAST_DEPTH_SHARE:
         sentence = f"Only {np.median(share):.1%} of the pixels of a frame have a depth (the middle of {len(sample)})."
         yield Finding(
-            Reason.DEPTH, Grade.SUSPICIOUS, sentence, "Check the depth pictures and their unit (--depth-unit)."
+            Reason.DEPTH,
+            Grade.SUSPICIOUS,
+            sentence,
+            f"Check the depth pictures and their unit ({option('depth-unit')}).",
         )
     low, high = SUSPICIOUS_DEPTH_M
     if not low <= median_m <= high:
         sure = not IMPOSSIBLE_DEPTH_M[0] <= median_m <= IMPOSSIBLE_DEPTH_M[1]
         grade = Grade.IMPOSSIBLE if sure else Grade.SUSPICIOUS
         sentence = f"The depth is {median_m:.3g} m in the middle, where rooms have {low:g} to {high:g} m."
-        remedy = "Check its unit: --depth-unit METRES says what one stored unit is (0.001: millimetres)."
+        remedy = f"Check its unit: {option('depth-unit', 'METRES')} says what one stored unit is (0.001: millimetres)."
         yield Finding(Reason.DEPTH, grade, sentence, remedy)
     smooth = surfaces.smooth_share
     if smooth < LEAST_SMOOTH and sample.depth_m.shape[2] >= FEWEST_COLUMNS:

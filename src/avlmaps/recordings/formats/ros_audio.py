@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core.errors import AudioError, RecordingError
+from avlmaps.core.wording import option
 from avlmaps.recordings.audio import LOWEST_RATE_HZ, AudioTrack, Sound, write_flac
 from avlmaps.recordings.formats.ros_clock import PictureClock
 
@@ -63,7 +64,7 @@ class Pcm:
         if not (LOWEST_RATE_HZ <= rate_hz <= _HIGHEST_RATE_HZ and 1 <= channels <= _MOST_CHANNELS):
             raise RecordingError(
                 f"{what} says {rate_hz} samples a second and {channels} channel(s), which no sound has; name the right "
-                "ones (audio_pcm=16000,1), give a file (--audio), or leave the sound out (audio=none)."
+                f"ones (audio_pcm=16000,1), give a file ({option('audio')}), or leave the sound out (audio=none)."
             )
         return cls(rate_hz, channels)
 
@@ -199,7 +200,8 @@ def _sampled(
                 if other != pcm:
                     raise RecordingError(
                         f"The sound on {topic} changes from {pcm.rate_hz} to {other.rate_hz} samples a second, or from "
-                        f"{pcm.channels} to {other.channels} channel(s); give one file instead (--audio FILE)."
+                        f"{pcm.channels} to {other.channels} channel(s); give one file instead "
+                        f"({option('audio', 'FILE')})."
                     )
                 _write_silence(stream, round(silence_s[number] * pcm.rate_hz))
                 stream.write(more)
@@ -219,7 +221,7 @@ def _cannot_write(topic: str, target: Path, error: Exception) -> AudioError:
     reason = str(error).strip().rstrip(".") or "no room"
     return AudioError(
         f"The sound of {topic} cannot be written to {target.parent} ({reason}); make room there, choose another folder "
-        "for temporary files (TMPDIR), or leave the sound out (--topics audio=none)."
+        f"for temporary files (TMPDIR), or leave the sound out ({option('topics', 'audio=none')})."
     )
 
 
@@ -250,8 +252,8 @@ def _compressed(
         whole_s = float(interval_s[cuts - 1].sum())
         raise RecordingError(
             f"{len(cuts)} gap(s) in the sound of {sound.name} leave out {whole_s:.3g} s, and {suffix} cannot be cut "
-            "there, so that the rest would sound too early; give one file instead (--audio FILE), or leave it out "
-            "(--topics audio=none)."
+            f"there, so that the rest would sound too early; give one file instead ({option('audio', 'FILE')}), or "
+            f"leave it out ({option('topics', 'audio=none')})."
         )
     tracks = [AudioTrack.open(part, start_s=float(times_s[at])) for part, at in zip(parts, begins, strict=True)]
     return _joined(tracks, sound.name, folder, notices)
@@ -283,7 +285,7 @@ def _coding_of(beginning: bytes, said: str, topic: str) -> str:
         if not (said.isalnum() and len(said) < 10):
             raise RecordingError(
                 f"The AudioInfo of {topic} says that the sound is coded as {said[:20]!r}, which is no coding; give a "
-                "file (--audio FILE) or leave it out (--topics audio=none)."
+                f"file ({option('audio', 'FILE')}) or leave it out ({option('topics', 'audio=none')})."
             )
         return said
     for start, coding in _BEGINNINGS.items():
@@ -293,8 +295,8 @@ def _coding_of(beginning: bytes, said: str, topic: str) -> str:
         return "mp3"
     raise RecordingError(
         f"The sound on {topic} has no AudioInfo and is not an MP3, FLAC, OGG or WAV stream; if it is plain 16-bit "
-        "samples, say how many a second and in how many channels (--topics audio_pcm=16000,1), else give a file "
-        "(--audio FILE) or leave it out (--topics audio=none)."
+        f"samples, say how many a second and in how many channels ({option('topics', 'audio_pcm=16000,1')}), else give "
+        f"a file ({option('audio', 'FILE')}) or leave it out ({option('topics', 'audio=none')})."
     )
 
 
@@ -317,7 +319,8 @@ def _pieces(messages: Iterable[Any], topic: str) -> Iterator[tuple[Pcm, np.ndarr
         if int(info.format) not in _SAMPLES:
             raise RecordingError(
                 f"The sound on {topic} has PortAudio's format {info.format}; of samples "
-                f"{', '.join(map(str, _SAMPLES))} are read (8 is 16-bit). Give a file instead (--audio FILE)."
+                f"{', '.join(map(str, _SAMPLES))} are read (8 is 16-bit). Give a file instead "
+                f"({option('audio', 'FILE')})."
             )
         name, dtype, scale = _SAMPLES[int(info.format)]
         pcm = Pcm.check_rate(int(info.rate), int(info.channels), f"The AudioInfo of {topic}")

@@ -22,6 +22,7 @@ from avlmaps.core.camera import Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.poses import apply, inverse
 from avlmaps.core.timeline import associate, gap_notices, in_order
+from avlmaps.core.wording import option
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.content import add_files, stamp_of
 from avlmaps.recordings.formats import ros_clouds
@@ -282,8 +283,8 @@ def _other_cameras(bag: Bag, rgb_topic: str, depth_topic: str) -> tuple[str, ...
     if not others:
         return ()
     return (
-        f"Of several cameras that of {rgb_topic} and {depth_topic} is used; for another name both topics (--topics "
-        f"rgb=... depth={others[0]}).",
+        f"Of several cameras that of {rgb_topic} and {depth_topic} is used; for another name both topics "
+        f"({option('topics', f'rgb=... depth={others[0]}')}).",
     )
 
 

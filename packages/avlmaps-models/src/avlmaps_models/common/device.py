@@ -10,6 +10,7 @@ import torch
 from jaxtyping import Float32
 
 from avlmaps.core.errors import BackendError
+from avlmaps.core.wording import option
 from avlmaps.perception.models.settings import model_settings, resolve_precision
 from avlmaps_models.common.operators import declare_missing_operators
 
@@ -34,7 +35,9 @@ def select_device() -> torch.device:
         torch.zeros(1, device=device)
     except (RuntimeError, AssertionError) as fault:
         here = "cuda" if torch.cuda.is_available() else "mps" if torch.backends.mps.is_available() else "cpu"
-        raise BackendError(f"The device {wanted!r} cannot be used here ({fault}); choose --device {here}.") from fault
+        raise BackendError(
+            f"The device {wanted!r} cannot be used here ({fault}); choose {option('device', here)}."
+        ) from fault
     return device
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from avlmaps.core.distributions import MODELS
 from avlmaps.core.errors import BackendError
 from avlmaps.core.extras import install_command
+from avlmaps.core.wording import option
 from avlmaps.perception.models.files import places_of
 from avlmaps.perception.models.settings import model_settings
 
@@ -43,14 +44,15 @@ def model_file(name: str, how_to_get: str) -> Path:
         if place.is_file():
             return place
     folder = model_settings().folder
-    looked = f"in {folder}" if folder else "in no folder: set --models DIR or AVLMAPS_MODELS"
+    looked = f"in {folder}" if folder else f"in no folder: set {option('models', 'DIR')} or AVLMAPS_MODELS"
     raise BackendError(f"The checkpoint {name} is not here (looked {looked}); get it with: {how_to_get}")
 
 
 def _fetched(model: str, wanted: Sequence[str]) -> Path:
     settings = model_settings()
     get = f"hf download {model}"
-    looked = f"in {settings.folder}, " if settings.folder else "in a folder of models (--models DIR sets one), "
+    a_folder = f"in a folder of models ({option('models', 'DIR')} sets one), "
+    looked = f"in {settings.folder}, " if settings.folder else a_folder
     try:
         from huggingface_hub import snapshot_download
     except ImportError as fault:

@@ -1,0 +1,71 @@
+"""How sentences of the library name an option: a flag on the command line, an argument in Python, a field over HTTP.
+
+Most remedies of errors and notices are options, and each front spells them in its own way. A sentence writes
+``option("depth-unit", "METRES")``; a front says once, for its process, how its readers spell that.
+"""
+
+from collections.abc import Generator
+from contextlib import contextmanager
+from enum import Enum
+from typing import Final
+
+
+class Spelling(Enum):
+    """How the readers of a front spell an option."""
+
+    ARGUMENT = "argument"
+    """Python: ``overwrite=True``, ``Corrections.depth_unit_m=METRES``."""
+    FLAG = "flag"
+    """The command line: ``--overwrite``, ``--depth-unit METRES``."""
+    FIELD = "field"
+    """HTTP: ``intrinsics=fx,fy,cx,cy``."""
+
+
+# Where Python has an option elsewhere, or under another name, than the flag says.
+_ARGUMENTS: Final = {
+    "camera-axes": "Corrections.camera_axes",
+    "camera-height-m": "GravitySettings.camera_height_m",
+    "depth-unit": "Corrections.depth_unit_m",
+    "feature-cache-gb": "CacheSettings.limit_gb",
+    "max-bad-share": "FrameSettings.max_bad_share",
+    "models": "ModelSettings.folder",
+    "device": "ModelSettings.device",
+    "out": "path",
+    "pose-delay": "Corrections.pose_delay_s",
+    "poses": "Corrections.poses",
+    "sensor": "FusionSettings.sensor",
+    "up": "Corrections.up_in_world",
+}
+_SWITCHES: Final = {"guess", "overwrite", "resume", "verify"}
+_spelling = Spelling.ARGUMENT
+
+
+@contextmanager
+def options_as(spelling: Spelling) -> Generator[None]:
+    """Spell the options in this process' sentences in one way while the block runs, in all of its threads."""
+    global _spelling
+    before, _spelling = _spelling, spelling
+    try:
+        yield
+    finally:
+        _spelling = before
+
+
+def flag(name: str, value: str = "") -> str:
+    """Return an option as the command line spells it, for any reader."""
+    return f"--{name} {value}".rstrip()
+
+
+def option(name: str, value: str = "") -> str:
+    """Return how the reader of a sentence gives an option.
+
+    Args:
+        name: its name on the command line, without dashes.
+        value: what to give, such as ``METRES``; "" for a switch, or to name the option alone.
+    """
+    if _spelling is Spelling.FLAG:
+        return flag(name, value)
+    plain = name.replace("-", "_")
+    named = _ARGUMENTS.get(name, plain) if _spelling is Spelling.ARGUMENT else plain
+    given = value or ("True" if name in _SWITCHES else "")
+    return f"{named}={given}" if given else named

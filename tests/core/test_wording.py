@@ -1,0 +1,43 @@
+"""Options in sentences, as each front spells them."""
+
+import numpy as np
+import pytest
+
+from avlmaps.core.errors import NoAudioStreamError
+from avlmaps.core.wording import Spelling, flag, option, options_as
+from avlmaps.recordings.containers import examine
+
+
+@pytest.mark.parametrize(
+    ("spelling", "said"),
+    [
+        (Spelling.ARGUMENT, "overwrite=True, Corrections.depth_unit_m=METRES, Corrections.depth_unit_m"),
+        (Spelling.FLAG, "--overwrite, --depth-unit METRES, --depth-unit"),
+        (Spelling.FIELD, "overwrite=True, depth_unit=METRES, depth_unit"),
+    ],
+)
+def test_each_front_spells_options_in_its_way(spelling, said):
+    with options_as(spelling):
+        assert f"{option('overwrite')}, {option('depth-unit', 'METRES')}, {option('depth-unit')}" == said
+        assert flag("depth-unit", "METRES") == "--depth-unit METRES"
+
+
+def test_the_spelling_ends_with_its_front():
+    with pytest.raises(KeyError), options_as(Spelling.FLAG):
+        raise KeyError
+    assert option("overwrite") == "overwrite=True"
+
+
+@pytest.mark.parametrize(("spelling", "said"), [(Spelling.ARGUMENT, "(audio)"), (Spelling.FLAG, "(--audio)")])
+def test_an_error_of_the_library_names_the_option_of_its_reader(tmp_path, spelling, said):
+    av = pytest.importorskip("av")
+    path = tmp_path / "silent.mp4"
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("mpeg4", rate=5)
+        stream.width = stream.height = 32
+        stream.pix_fmt = "yuv420p"
+        container.mux(stream.encode(av.VideoFrame.from_ndarray(np.zeros((32, 32, 3), np.uint8), "rgb24")))
+        container.mux(stream.encode())
+    with options_as(spelling), pytest.raises(NoAudioStreamError) as raised:
+        examine(path)
+    assert said in str(raised.value)
