@@ -146,11 +146,13 @@ class View:
         width: columns; a multiple of ``MULTIPLE`` after padding, as the rows.
         height: rows.
         colour_kept: share of pictures with colour that keep it.
+        fineness: how many times as wide and high the colour is as the geometry.
     """
 
     width: int = 160
     height: int = 120
     colour_kept: float = 0.85
+    fineness: int = 1
 
 
 def draw_batch(sources: list[tuple[Shards, int]], view: View, rng: np.random.Generator) -> Batch:
@@ -194,10 +196,7 @@ def _sample(frames: Frames, index: int, category: int, view: View, rng: np.rando
     depth = warped(frames.depth[index], cv2.INTER_NEAREST, 0).astype(np.float32) / 1000.0
     label = warped(frames.label[index], cv2.INTER_NEAREST, UNLABELLED)
     up = np.array([cos * up[0] - sin * up[1], sin * up[0] + cos * up[1], up[2]])
-    colour = np.zeros((3, view.height, view.width), np.float32)
-    rgb_row = int(frames.rgb_row[index])
-    if rgb_row >= 0 and rng.random() < view.colour_kept:
-        colour = _other_light(warped(cv2.blur(frames.rgb[rgb_row], (2, 2)), cv2.INTER_LINEAR, 127), rng)
+    colour = _drawn_colour(frames, int(frames.rgb_row[index]), matrix, view, rng)
     if mirrored:
         depth, label, colour = depth[:, ::-1], label[:, ::-1], colour[:, :, ::-1]
         up, cx = up * (-1, 1, 1), view.width - cx
@@ -219,12 +218,34 @@ def _sample(frames: Frames, index: int, category: int, view: View, rng: np.rando
     half = [(0, p[1] // 2) for p in pad]
     return (
         np.pad(geometry, [(0, 0), *pad]),
-        np.pad(np.ascontiguousarray(colour), [(0, 0), *pad]),
+        np.pad(np.ascontiguousarray(colour), [(0, 0), *((0, view.fineness * more) for _, more in pad)]),
         np.pad(label, half, constant_values=UNLABELLED).astype(np.int64),
         np.pad(weight, half),
         np.array(frames.room[index]),
         floor,
     )
+
+
+def _drawn_colour(frames: Frames, rgb_row: int, matrix: np.ndarray, view: View, rng: np.random.Generator) -> np.ndarray:
+    """Return the colour of a view, (3, h, w) times its fineness; zeros where it has none or it is withheld.
+
+    Args:
+        frames: a shard.
+        rgb_row: which of its pictures; −1 for none.
+        matrix: (2, 3) from the picture to the view, as cv2 counts.
+        view: how the picture is drawn.
+        rng: of the light.
+    """
+    n = view.fineness
+    if rgb_row < 0 or rng.random() >= view.colour_kept:
+        return np.zeros((3, n * view.height, n * view.width), np.float32)
+    rgb = frames.rgb[rgb_row]
+    if n == 1:  # two pixels of the picture become one
+        rgb = cv2.blur(rgb, (2, 2))
+    finer = n * matrix + np.array([[0.0, 0.0, (n - 1) / 2]])  # cv2 counts from the middle of the first pixel
+    size = (n * view.width, n * view.height)
+    rgb = cv2.warpAffine(np.ascontiguousarray(rgb), finer, size, flags=cv2.INTER_LINEAR, borderValue=(127, 127, 127))
+    return _other_light(rgb, rng)
 
 
 def _other_light(rgb: np.ndarray, rng: np.random.Generator) -> np.ndarray:

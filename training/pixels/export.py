@@ -14,7 +14,8 @@ from training.pixels.network import COLOUR, GEOMETRY, RoomNetwork
 def load_network(checkpoint: Path, weights: str = "mean") -> RoomNetwork:
     """Return the network, with the running ``mean`` of its weights or the ``last`` ones."""
     state = torch.load(checkpoint, map_location="cpu", weights_only=True)
-    network = RoomNetwork(len(state["categories"]), len(state["rooms"]), tuple(state["widths"]))
+    has_tower = any(name.startswith("tower.") for name in state[weights])
+    network = RoomNetwork(len(state["categories"]), len(state["rooms"]), tuple(state["widths"]), has_tower=has_tower)
     network.load_state_dict({name: value.float() for name, value in state[weights].items()})
     return network.eval()
 
@@ -34,7 +35,8 @@ class Shipped(nn.Module):
 
 def write_onnx(network: RoomNetwork, path: Path) -> None:
     """Write the network; its pictures may have any size that is a multiple of 32."""
-    inputs = (torch.zeros(1, GEOMETRY, 64, 96), torch.zeros(1, COLOUR, 64, 96))
+    finer = 1 if network.tower is None else 2
+    inputs = (torch.zeros(1, GEOMETRY, 64, 96), torch.zeros(1, COLOUR, finer * 64, finer * 96))
     size = {2: "height", 3: "width"}
     torch.onnx.export(
         network, inputs, str(path), input_names=["geometry", "colour"], output_names=["category", "room", "floor"],

@@ -9,7 +9,7 @@ training may take several sittings (``--sitting 9`` stops after nine minutes).
 import json
 import sys
 from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from multiprocessing import get_context
 from pathlib import Path
 from time import perf_counter
@@ -26,6 +26,7 @@ from training.pixels.losses import Losses, coarse_weights, fine_weights
 from training.pixels.measure import real_figures, rendered_figures
 from training.pixels.muon import Muon
 from training.pixels.network import WIDTHS, RoomNetwork, begin_with
+from training.pixels.tower import imagenet_weights
 from training.pixels.unfold import unfolded
 
 
@@ -71,6 +72,10 @@ class Options:
     """Channels at 1/2, 1/4, 1/8, 1/16 and 1/32 of the picture's size."""
     dropout: tuple[float, float] = (0.1, 0.1)
     """Share of channels withheld at 1/16 and before the scores."""
+    tower: bool = False
+    """Let a tower that knows photographs look at colour of twice the size (``training.pixels.tower``)."""
+    tower_rate: float = 4e-4
+    """Highest learning rate of the tower."""
     decay: float = 0.05
     """Weight decay."""
     averaged: float = 300.0
@@ -100,13 +105,15 @@ class Average:
 def optimisers_of(network: nn.Module, options: Options) -> list[torch.optim.Optimizer]:
     """Return Muon for the convolutions inside the network, AdamW for its outputs, biases and norms (or for all)."""
     inside: list[Tensor] = []
+    of_adam = ("score", "colour.0", "tower")
     if options.optimiser == "muon":
-        inside = [
-            p for name, p in network.named_parameters() if p.ndim == 4 and not name.startswith(("score", "colour.0"))
-        ]
+        inside = [p for name, p in network.named_parameters() if p.ndim == 4 and not name.startswith(of_adam)]
     chosen = {id(p) for p in inside}
+    tower = [p for name, p in network.named_parameters() if name.startswith("tower.")]
+    chosen |= {id(p) for p in tower}
     rest = [p for p in network.parameters() if id(p) not in chosen]
-    adam = torch.optim.AdamW(rest, lr=options.rate, weight_decay=options.decay)
+    groups = [{"params": rest, "highest": options.rate}, {"params": tower, "highest": options.tower_rate}]
+    adam = torch.optim.AdamW([group for group in groups if group["params"]], options.rate, weight_decay=options.decay)
     return [Muon(inside, lr=options.rate, weight_decay=options.decay), adam] if inside else [adam]
 
 
@@ -116,7 +123,9 @@ _LOOKED_AT = 40
 
 def _begun(options: Options, device: torch.device, sources: list[tuple[Shards, int]]) -> RoomNetwork:
     """Return the network: new, with the weights that ship, or as the checkpoint left it."""
-    network = RoomNetwork(len(CATEGORIES), len(ROOMS), options.widths, options.dropout)
+    network = RoomNetwork(len(CATEGORIES), len(ROOMS), options.widths, options.dropout, options.tower)
+    if network.tower is not None and not options.resume:
+        network.tower.load_state_dict(imagenet_weights())
     state = None
     if options.resume:
         state = load_network(options.out, "last").state_dict()
@@ -131,7 +140,7 @@ def _begun(options: Options, device: torch.device, sources: list[tuple[Shards, i
 def _shipped(options: Options, sources: list[tuple[Shards, int]]) -> dict[str, Tensor]:
     assert options.start is not None
     rng = np.random.default_rng(options.seed)
-    drawn = (draw_batch(sources, options.view, rng) for _ in range(_LOOKED_AT))
+    drawn = (draw_batch(sources, replace(options.view, fineness=1), rng) for _ in range(_LOOKED_AT))
     looked_at = ((torch.from_numpy(batch.geometry), torch.from_numpy(batch.colour)) for batch in drawn)
     return unfolded(options.start, len(CATEGORIES), len(ROOMS), looked_at).state_dict()
 
@@ -145,6 +154,8 @@ class Run:
 
     def __init__(self, options: Options) -> None:
         """Open the frames and make the network."""
+        if options.tower:
+            options = replace(options, view=replace(options.view, fineness=2))
         torch.manual_seed(options.seed)
         torch.set_num_threads(options.threads)
         self.options, self.step = options, 0
@@ -173,9 +184,9 @@ class Run:
 
     def train_step(self, done: float) -> None:
         """Learn from one batch."""
-        rate = self.options.rate * min(1.0, (self.step + 1) / 100) * (0.5 + 0.5 * np.cos(np.pi * done)) + 1e-6
+        share = min(1.0, (self.step + 1) / 100) * (0.5 + 0.5 * np.cos(np.pi * done))
         for group in (group for optimiser in self.optimisers for group in optimiser.param_groups):
-            group["lr"] = float(rate)
+            group["lr"] = float(group.get("highest", self.options.rate) * share + 1e-6)
         batch = self.coming.pop(0).result()
         self.coming.append(self._drawn())
         loss, parts = self.losses(self.compiled, batch)
@@ -191,7 +202,7 @@ class Run:
 
     def measure(self, minutes: float) -> None:
         """Add a point to the learning curve: the mean weights on what is held out."""
-        network = RoomNetwork(len(CATEGORIES), len(ROOMS), self.options.widths)
+        network = RoomNetwork(len(CATEGORIES), len(ROOMS), self.options.widths, has_tower=self.options.tower)
         network.load_state_dict({name: value.cpu() for name, value in self.average.state.items()})
         network.eval()
         point: dict[str, object] = {

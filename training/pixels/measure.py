@@ -25,7 +25,7 @@ def real_figures(network: nn.Module, shards: Shards, flip: bool = False) -> dict
     """Return pixel accuracy, class accuracy and mean IoU of the 37 classes on every frame."""
     matrix, confusion = groups()[:SCORED], np.zeros((SCORED, SCORED), np.int64)
     for frames, index in shards.every():
-        geometry, colour, depth, _ = whole_frame(frames, index, with_colour=True)
+        geometry, colour, depth, _ = whole_frame(frames, index, with_colour=True, fineness=fineness_of(network))
         p = probabilities(network, geometry, colour, flip)[:, : depth.shape[0] // 2, : depth.shape[1] // 2]
         group = torch.einsum("gk,khw->hwg", matrix, p).numpy()
         label = frames.label[index].astype(int) - FIRST_COARSE
@@ -49,7 +49,7 @@ def rendered_figures(network: nn.Module, shards: Shards, count: int = 150) -> di
     """Return accuracy and mean IoU of the categories with 200 pixels or more, every fourth of a cell, within 4 m."""
     confusion, chosen = np.zeros((len(CATEGORIES),) * 2, np.int64), shards.every()
     for frames, index in chosen[:: max(1, len(chosen) // count)]:
-        geometry, colour, depth, label = whole_frame(frames, index, with_colour=True)
+        geometry, colour, depth, label = whole_frame(frames, index, with_colour=True, fineness=fineness_of(network))
         p = probabilities(network, geometry, colour)[:, : depth.shape[0] // 2, : depth.shape[1] // 2]
         truth, z = label[::2, ::2].astype(int), depth[::2, ::2]
         known = (truth < len(CATEGORIES)) & (z > 0) & (z < 4.0)
@@ -59,6 +59,11 @@ def rendered_figures(network: nn.Module, shards: Shards, count: int = 150) -> di
     often = truth >= 200
     union = truth + confusion.sum(axis=0) - right
     return {"accuracy": float(right.sum() / truth.sum()), "mean IoU": float((right[often] / union[often]).mean())}
+
+
+def fineness_of(network: nn.Module) -> int:
+    """Return how many times as wide as geometry the colour is that a network takes."""
+    return 2 if getattr(network, "tower", None) is not None else 1
 
 
 def probabilities(network: nn.Module, geometry: np.ndarray, colour: np.ndarray, flip: bool = False) -> torch.Tensor:

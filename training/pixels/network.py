@@ -2,6 +2,7 @@
 
 import torch
 from torch import Tensor, nn
+from training.pixels.tower import TOWER_WIDTHS, Tower
 
 GEOMETRY, COLOUR = 8, 3
 # Pictures are padded to a multiple of this.
@@ -56,10 +57,16 @@ class RoomNetwork(nn.Module):
         rooms: how many kinds of room.
         widths: see ``WIDTHS``.
         dropout: share of channels at 1/16 and before the scores that training withholds.
+        has_tower: colour has twice the size of geometry, and a tower that knows photographs looks at it.
     """
 
     def __init__(
-        self, categories: int, rooms: int, widths: tuple[int, ...] = WIDTHS, dropout: tuple[float, float] = (0.1, 0.1)
+        self,
+        categories: int,
+        rooms: int,
+        widths: tuple[int, ...] = WIDTHS,
+        dropout: tuple[float, float] = (0.1, 0.1),
+        has_tower: bool = False,
     ) -> None:
         super().__init__()
         b, c, d, e, f = widths
@@ -80,6 +87,9 @@ class RoomNetwork(nn.Module):
             step(b + c + 16, b, size=1),
         )
         self.up3, self.up2, self.up1 = Block(d), Block(c), Block(b)
+        self.tower = Tower() if has_tower else None
+        if has_tower:
+            self.from_tower = nn.ModuleList(Joint(w, t) for w, t in zip(TOWER_WIDTHS, (b, c, d, e), strict=True))
         self.score = nn.Conv2d(b, categories, 1)
         pooled = 2 * e + d
         self.room = nn.Sequential(nn.Linear(pooled, 128), nn.ReLU(inplace=True), nn.Dropout(0.3), nn.Linear(128, rooms))
@@ -89,8 +99,11 @@ class RoomNetwork(nn.Module):
         """Return scores before any softmax, (n, categories, h/2, w/2) and (n, rooms), and (n, 1) metres of floor.
 
         The last is the height of the true floor over the one that the geometry was made with. h and w are multiples
-        of ``MULTIPLE``.
+        of ``MULTIPLE``; with a tower, colour is (n, 3, 2 h, 2 w).
         """
+        towered = self._towered(colour)
+        if towered:
+            colour = nn.functional.avg_pool2d(colour, 2)
         x1 = self.stem(geometry)
         x2 = self.down2(x1)
         x3 = self.down3(x2)
@@ -99,14 +112,24 @@ class RoomNetwork(nn.Module):
         coarse = self.colour[1:](fine)
         mean, top = x4.mean(dim=(2, 3)), x4.amax(dim=(2, 3))
         colour3 = self.colour3(coarse)
-        deep = torch.relu(x4 + self.from_colour4(self.colour4(colour3)))
+        deep = x4 + self.from_colour4(self.colour4(colour3))
+        deep = torch.relu(deep + towered[3] if towered else deep)
         deep = deep + _doubled(self.from5(self.down5(deep)))
         deep = self.drop4(deep + self.whole(mean)[:, :, None, None])
-        y3 = self.up3(torch.relu(self.side3(torch.cat([x3, _doubled(deep)], 1)) + self.from_colour3(colour3)))
-        y2 = self.up2(self.side2(torch.cat([x2, _doubled(y3), coarse], 1)))
-        y1 = self.up1(self.side1(torch.cat([x1, _doubled(y2), fine], 1)))
+        y3 = self.side3(torch.cat([x3, _doubled(deep)], 1)) + self.from_colour3(colour3)
+        y3 = self.up3(torch.relu(y3 + towered[2] if towered else y3))
+        y2 = self.side2(torch.cat([x2, _doubled(y3), coarse], 1))
+        y2 = self.up2(torch.relu(y2 + towered[1]) if towered else y2)
+        y1 = self.side1(torch.cat([x1, _doubled(y2), fine], 1))
+        y1 = self.up1(torch.relu(y1 + towered[0]) if towered else y1)
         pooled = torch.cat([mean, top, y3.mean(dim=(2, 3))], 1)
         return self.score(self.drop1(y1)), self.room(pooled), self.floor(pooled)
+
+    def _towered(self, colour: Tensor) -> list[Tensor]:
+        """Return what the tower adds at 1/2, 1/4, 1/8 and 1/16 of the geometry's size; nothing without a tower."""
+        if self.tower is None:
+            return []
+        return [joint(x) for joint, x in zip(self.from_tower, self.tower(colour), strict=True)]
 
 
 def _doubled(x: Tensor) -> Tensor:

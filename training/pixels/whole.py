@@ -13,24 +13,27 @@ WIDTH, HEIGHT = 160, 120
 
 
 def whole_frame(
-    frames: Frames, index: int, with_colour: bool, mirrored: bool = False
+    frames: Frames, index: int, with_colour: bool, mirrored: bool = False, fineness: int = 1
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return geometry (1, 8, h, w) and colour (1, 3, h, w), padded, and depth and label without padding."""
+    """Return geometry (1, 8, h, w) and colour (1, 3, h, w) times its fineness, padded; depth and label as they are."""
     h, w = frames.depth[index].shape
     row = ((np.arange(HEIGHT) + 0.5) * h / HEIGHT).astype(int)
     column = ((np.arange(WIDTH) + 0.5) * w / WIDTH).astype(int)
     depth = frames.depth[index][row[:, None], column].astype(np.float32) / 1000.0
     label = np.array(frames.label[index][row[:, None], column])
     fx, fy, cx, cy, *up, height = frames.camera[index][:8]
-    colour = np.zeros((3, HEIGHT, WIDTH), np.float32)
+    wide, high = fineness * WIDTH, fineness * HEIGHT
+    colour = np.zeros((3, high, wide), np.float32)
     rgb_row = int(frames.rgb_row[index])
     if with_colour and rgb_row >= 0:
-        rgb = cv2.resize(np.ascontiguousarray(frames.rgb[rgb_row]), (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA)
+        rgb = cv2.resize(np.ascontiguousarray(frames.rgb[rgb_row]), (wide, high), interpolation=cv2.INTER_AREA)
         colour = rgb.transpose(2, 0, 1).astype(np.float32) / 127.5 - 1.0
     if mirrored:
         depth, label, colour = depth[:, ::-1], label[:, ::-1], colour[:, :, ::-1]
         cx, up = w - cx, [-up[0], up[1], up[2]]
     camera = Pinhole(fx, fy, cx, cy, w, h).resized(WIDTH, HEIGHT)
     geometry = channels(np.ascontiguousarray(depth), camera, np.array(up), height)
-    pad = ((0, 0), (0, -HEIGHT % MULTIPLE), (0, -WIDTH % MULTIPLE))
-    return np.pad(geometry, pad)[None], np.pad(colour, pad)[None], depth, label
+    more = (-HEIGHT % MULTIPLE, -WIDTH % MULTIPLE)
+    geometry = np.pad(geometry, ((0, 0), *((0, each) for each in more)))
+    colour = np.pad(colour, ((0, 0), *((0, fineness * each) for each in more)))
+    return geometry[None], colour[None], depth, label
