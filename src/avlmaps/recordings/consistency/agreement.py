@@ -1,6 +1,6 @@
 """How well the frames of a sample agree: where points of one frame lie in another, and whether they look alike."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -18,6 +18,8 @@ APART_SAME_M = 0.06
 # A pair with fewer points in view says nothing.
 FEWEST_POINTS = 25
 _LEAST_DEPTH_M = 0.02
+# Cameras further apart than this may have gone round a corner; then less than this share is seen through.
+WIDE_STEP_M, MOST_THROUGH = 0.5, 0.02
 # Brightness that varies less, of 255, is noise.
 LEAST_CONTRAST = 6.0
 
@@ -122,6 +124,27 @@ def compare(
     counts = (seen.sum(axis=1), same.sum(axis=1), through.sum(axis=1), hidden.sum(axis=1))
     measured = sample.depth_m[b[:, None], at_v, at_u] * scale
     return Agreement(*counts, _off(measured, far, seen), outside, *_likeness(sample, rig, (a, b), points, moved, same))
+
+
+def without_occluded(found: Agreement, sample: Sample, surfaces: Surfaces) -> Agreement:
+    """Return an agreement in which points that a wide step has hidden do not count.
+
+    Who goes round a corner leaves behind it what was in view: that is no contradiction, however many points it are.
+    Wrong poses, depths or cameras always let one of the two frames look through what the other sees; where neither
+    does, hidden points say nothing. Frames that are close together are judged by all of their points.
+
+    Args:
+        found: of the sample's pairs.
+        sample: the pictures.
+        surfaces: of its depth.
+    """
+    if not len(sample.pairs):
+        return found
+    place = sample.world_from_camera[:, :3, 3]
+    wide = np.linalg.norm(np.diff(place[sample.pairs], axis=1)[:, 0], axis=-1) > WIDE_STEP_M
+    back = compare(replace(sample, pairs=sample.pairs[:, ::-1]), surfaces, sample.world_from_camera)
+    looks_through = (found.through > MOST_THROUGH * found.points) | (back.through > MOST_THROUGH * back.points)
+    return replace(found, points=found.points - np.where(wide & ~looks_through, found.hidden, 0))
 
 
 def _off(measured: Float[np.ndarray, "p m"], expected: Float[np.ndarray, "p m"], seen: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ import numpy as np
 
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.timeline import Trajectory
-from avlmaps.recordings.consistency.agreement import APART_SAME_M, FEWEST_POINTS, Agreement, compare
+from avlmaps.recordings.consistency.agreement import APART_SAME_M, FEWEST_POINTS, Agreement, compare, without_occluded
 from avlmaps.recordings.consistency.blind_spots import blind_spots
 from avlmaps.recordings.consistency.causes import cause_of
 from avlmaps.recordings.consistency.edges import Edges, Shift, find_edges, shift_of
@@ -48,8 +48,11 @@ def check_recording(recording: Recording) -> Verdict:
         raise RecordingError(f"{recording.path} has no frames with a pose; there is nothing to check.")
     sample = draw_sample(recording)
     surfaces = Surfaces.of(sample.depth_m)
-    after = compare(sample.only(sample.follows), surfaces, sample.world_from_camera)
-    apart = compare(sample.only(~sample.follows), surfaces, sample.world_from_camera, floor_m=APART_SAME_M)
+    following, distant = sample.only(sample.follows), sample.only(~sample.follows)
+    after = compare(following, surfaces, sample.world_from_camera)
+    after = without_occluded(after, following, surfaces)
+    apart = compare(distant, surfaces, sample.world_from_camera, floor_m=APART_SAME_M)
+    apart = without_occluded(apart, distant, surfaces)
     found = _Found(after, apart, find_edges(sample), compare(sample.of_tint(), surfaces, sample.world_from_camera))
     known = sample.depth_m[sample.depth_m > 0.0]
     median_m = float(np.median(known)) if known.size else float("nan")
