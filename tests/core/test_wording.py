@@ -1,5 +1,8 @@
 """Options in sentences, as each front spells them."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -26,6 +29,13 @@ def test_the_spelling_ends_with_its_front():
     with pytest.raises(KeyError), options_as(Spelling.FLAG):
         raise KeyError
     assert option("overwrite") == "overwrite=True"
+
+
+def test_processes_that_a_front_starts_spell_as_it_does():
+    code = "from avlmaps.core.wording import option; print(option('overwrite'))"
+    with options_as(Spelling.FLAG):
+        said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert said.strip() == "--overwrite"
 
 
 @pytest.mark.parametrize(("spelling", "said"), [(Spelling.ARGUMENT, "(audio)"), (Spelling.FLAG, "(--audio)")])

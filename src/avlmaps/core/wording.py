@@ -1,9 +1,11 @@
 """How sentences of the library name an option: a flag on the command line, an argument in Python, a field over HTTP.
 
 Most remedies of errors and notices are options, and each front spells them in its own way. A sentence writes
-``option("depth-unit", "METRES")``; a front says once, for its process, how its readers spell that.
+``option("depth-unit", "METRES")``; a front says once, for its process and those that it starts, how its readers spell
+that.
 """
 
+import os
 from collections.abc import Generator
 from contextlib import contextmanager
 from enum import Enum
@@ -37,18 +39,24 @@ _ARGUMENTS: Final = {
     "up": "Corrections.up_in_world",
 }
 _SWITCHES: Final = {"guess", "overwrite", "resume", "verify"}
-_spelling = Spelling.ARGUMENT
+_VARIABLE: Final = "AVLMAPS_OPTIONS_AS"  # for the processes that a front starts
+_spelling = next((one for one in Spelling if one.value == os.environ.get(_VARIABLE)), Spelling.ARGUMENT)
 
 
 @contextmanager
 def options_as(spelling: Spelling) -> Generator[None]:
-    """Spell the options in this process' sentences in one way while the block runs, in all of its threads."""
+    """Spell options in one way while the block runs, in all threads and in the processes that are started meanwhile."""
     global _spelling
-    before, _spelling = _spelling, spelling
+    before, told = _spelling, os.environ.get(_VARIABLE)
+    _spelling, os.environ[_VARIABLE] = spelling, spelling.value
     try:
         yield
     finally:
         _spelling = before
+        if told is None:
+            del os.environ[_VARIABLE]
+        else:
+            os.environ[_VARIABLE] = told
 
 
 def flag(name: str, value: str = "") -> str:

@@ -135,7 +135,7 @@ def _of_scale() -> Iterator[Situation]:
         yield Situation(f"depth x{factor:g}", "scale", change, _SCALE)
 
 
-_SCALE = r"times too|in metres|--depth-unit|too far to be reached|m/s|jumps by"
+_SCALE = r"times too|in metres|depth.unit|too far to be reached|m/s|jumps by"
 
 
 def _scaled(written: np.ndarray, factor: float) -> np.ndarray:
