@@ -38,7 +38,7 @@ _ARGUMENTS: Final = {
     "sensor": "FusionSettings.sensor",
     "up": "Corrections.up_in_world",
 }
-_SWITCHES: Final = {"guess", "overwrite", "resume", "verify"}
+_SWITCHES: Final = {"guess", "overwrite"}
 _VARIABLE: Final = "AVLMAPS_OPTIONS_AS"  # for the processes that a front starts
 _spelling = next((one for one in Spelling if one.value == os.environ.get(_VARIABLE)), Spelling.ARGUMENT)
 

@@ -19,6 +19,7 @@ from avlmaps.core.files import sync_folder, write_bytes_atomically
 from avlmaps.core.progress import progress
 from avlmaps.recordings import layout
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
+from avlmaps.recordings.memory import same_rig
 from avlmaps.recordings.types import Frame, Recording
 
 _JPEG_QUALITY = 95
@@ -89,7 +90,7 @@ class RecordingWriter:
         Raises:
             RecordingError: the name was used before, the stamp is not after the last, or the disk is full.
         """
-        if not _same_rig(frame.rig, self.rig):
+        if not same_rig(frame.rig, self.rig):
             raise RecordingError(f"Frame {frame.name} was taken by another camera than the recording's first frame.")
         raw = np.rint(frame.depth_m.astype(np.float64) * self.depth_units_per_m)
         raw = np.where((raw > 0) & (raw <= _MAX_DEPTH_VALUE), raw, 0).astype(np.uint16)
@@ -218,10 +219,6 @@ def _make_empty(path: Path) -> None:
         raise RecordingError(f"{path} cannot be made a folder ({error.strerror or error}); choose another.") from None
     if taken is not None:
         raise RecordingError(f"{path} is not empty (it holds {taken.name}); choose another folder or empty it.")
-
-
-def _same_rig(a: Rig, b: Rig) -> bool:
-    return a.rgb == b.rgb and a.depth == b.depth and np.array_equal(a.rgb_from_depth, b.rgb_from_depth)
 
 
 def _triple(vector: Float[np.ndarray, "3"]) -> tuple[float, float, float]:

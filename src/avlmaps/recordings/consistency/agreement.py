@@ -138,13 +138,15 @@ def without_occluded(found: Agreement, sample: Sample, surfaces: Surfaces) -> Ag
         sample: the pictures.
         surfaces: of its depth.
     """
-    if not len(sample.pairs):
-        return found
     place = sample.world_from_camera[:, :3, 3]
-    wide = np.linalg.norm(np.diff(place[sample.pairs], axis=1)[:, 0], axis=-1) > WIDE_STEP_M
-    back = compare(replace(sample, pairs=sample.pairs[:, ::-1]), surfaces, sample.world_from_camera)
-    looks_through = (found.through > MOST_THROUGH * found.points) | (back.through > MOST_THROUGH * back.points)
-    return replace(found, points=found.points - np.where(wide & ~looks_through, found.hidden, 0))
+    step_m = np.linalg.norm(place[sample.pairs[:, 1]] - place[sample.pairs[:, 0]], axis=-1)
+    wide = np.flatnonzero((step_m > WIDE_STEP_M) & (found.through <= MOST_THROUGH * found.points))
+    apart = sample.only(wide)
+    back = compare(replace(apart, pairs=apart.pairs[:, ::-1]), surfaces, sample.world_from_camera)
+    occluded = wide[back.through <= MOST_THROUGH * back.points]
+    points = found.points.copy()
+    points[occluded] -= found.hidden[occluded]
+    return replace(found, points=points)
 
 
 def _off(measured: Float[np.ndarray, "p m"], expected: Float[np.ndarray, "p m"], seen: np.ndarray) -> np.ndarray:
