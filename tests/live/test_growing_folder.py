@@ -15,7 +15,7 @@ from avlmaps.live import growing_folder
 from avlmaps.live.growing_folder import growing_frames, is_being_written
 from avlmaps.live.live_map import LiveMap
 from avlmaps.live.replay import follow
-from avlmaps.recordings.layout import FRAMES, UNFINISHED
+from avlmaps.recordings.layout import FRAMES, POSES, UNFINISHED
 
 
 def test_what_is_followed_is_what_is_recorded(tmp_path: Path) -> None:
@@ -63,3 +63,24 @@ def test_a_writer_that_stalls_or_stops_is_said_and_what_came_is_mapped(
     with pytest.raises(RecordingError, match="is not JSON"):
         next(growing_frames(tmp_path / "rec"))
     writer.add(replace(frame(5), name="later"))
+
+
+@pytest.mark.parametrize(
+    ("table", "row"),
+    [
+        (FRAMES, b"000003"),
+        (FRAMES, b"000003,soon"),
+        (POSES, b"0.3,1,2"),
+        (POSES, b"0.3,0,0,0,0,0,0,0"),
+        (POSES, b"\xff\xfe"),
+    ],
+)
+def test_a_damaged_row_is_one_sentence(tmp_path: Path, table: str, row: bytes) -> None:
+    writer = avlmaps.RecordingWriter(tmp_path / "rec", frame(0).rig, np.array(UP))
+    writer.__enter__()
+    for number in range(3):
+        writer.add(frame(number))
+    with (tmp_path / "rec" / table).open("ab") as stream:
+        stream.write(row + b"\n")
+    with pytest.raises(RecordingError, match=r"holds a row that is none .* damaged"):
+        list(growing_frames(tmp_path / "rec", give_up_s=0.2))

@@ -185,6 +185,21 @@ def test_a_second_writer_a_finished_map_and_an_empty_one_get_a_sentence(tmp_path
         add(again, frame(0))
 
 
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_a_fault_of_ours_ends_the_waiting_and_is_raised(tmp_path: Path) -> None:
+    with LiveMap(tmp_path / "m.avlmap", ENCODERS, up_in_world=UP, live=EVERY) as live:
+        for number in range(3):
+            add(live, frame(number))
+        wait_for(lambda: len(live) == 3)
+        live._check.add = lambda frame: 1 // 0  # type: ignore[method-assign]
+        with pytest.raises(ZeroDivisionError):
+            for number in range(3, 30):
+                add(live, frame(number))
+        with pytest.raises(ZeroDivisionError):
+            add(live, frame(31))
+    assert live.map.stored.info.counts.frames == 3
+
+
 def test_sounds_are_in_the_map_with_the_frames(tmp_path: Path) -> None:
     ears = avlmaps.Encoders.named("colours", sounds="embedded")
     samples = np.random.default_rng(0).normal(scale=1e-3, size=64_000).astype(np.float32)

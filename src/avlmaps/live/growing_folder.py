@@ -37,15 +37,15 @@ def growing_frames(path: Path, give_up_s: float = 60.0, tell: Callable[[str], No
         tell: called with each sentence.
 
     Raises:
-        RecordingError: it says no cameras; it was written by an older version, or is damaged.
+        RecordingError: it says no cameras (it was written by an older version), or a table is damaged.
     """
     written = _Written(path, tell)
     patience = _Patience(path, give_up_s, tell)
     while True:
         finished = (path / layout.DESCRIPTION).exists()  # looked up first: what is listed by then is all there is
         rows = written.rows()
-        for name, stamp in rows:
-            if (frame := written.frame(name, stamp)) is not None:
+        for name, stamp_s in rows:
+            if (frame := written.frame(name, stamp_s)) is not None:
                 yield frame
         if patience.is_over(len(rows)) or (finished and not rows):
             return
@@ -68,25 +68,34 @@ class _Written:
         self._pose_of: dict[float, np.ndarray] = {}
         self._index = 0
 
-    def rows(self) -> list[list[str]]:
+    def rows(self) -> list[tuple[str, float]]:
         """Return the names and stamps of the frames that came."""
-        rows = self._listed.new()  # before the poses: that of a frame which is listed is there already
-        for row in self._posed.new():
-            numbers = [float(word) for word in row]
-            self._pose_of[numbers[0]] = poses.from_quaternion(np.array(numbers[1:4]), np.array(numbers[4:8]))
+        try:
+            # Before the poses: that of a frame which is listed is there already.
+            rows = [(name, float(stamp)) for name, stamp in self._listed.new()]
+            for row in self._posed.new():
+                stamp_s, *pose = (float(word) for word in row)
+                if len(pose) < 7:
+                    raise ValueError(f"{len(row)} columns, where a pose has 8")
+                self._pose_of[stamp_s] = poses.from_quaternion(np.array(pose[:3]), np.array(pose[3:7]))
+        except ValueError as fault:  # also of bytes that are no text
+            raise RecordingError(
+                f"A table of {self._path} holds a row that is none ({fault}); it is damaged: record again, or cut the "
+                "row out and finish the recording."
+            ) from None
         return rows
 
-    def frame(self, name: str, stamp: str) -> Frame | None:
+    def frame(self, name: str, stamp_s: float) -> Frame | None:
         """Read a frame; None, with a sentence, where it cannot be."""
         path, rig = self._path, self._rig
-        pose = self._pose_of.pop(float(stamp), None)
+        pose = self._pose_of.pop(stamp_s, None)
         self._index += 1
         try:
             if pose is None:
-                raise RecordingError(f"Frame {name} of {path} has no pose at its stamp {stamp} s, and is left out.")
+                raise RecordingError(f"Frame {name} of {path} has no pose at its stamp {stamp_s:g} s, and is left out.")
             colour = next((path / "rgb").glob(f"{name}.*"), path / "rgb" / f"{name}.png")
             depth_m = images.read_depth(path / "depth" / f"{name}.png", rig.depth, self._units_per_m)
-            return Frame(self._index - 1, name, float(stamp), images.read_colour(colour, rig.rgb), depth_m, pose, rig)
+            return Frame(self._index - 1, name, stamp_s, images.read_colour(colour, rig.rgb), depth_m, pose, rig)
         except RecordingError as fault:
             self._tell(f"note: {fault}")
             return None

@@ -9,6 +9,7 @@ writes it into the folder. A question uses the snapshot that there is; nothing t
 import contextlib
 import time
 from collections import deque
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from threading import Condition, Event, Lock, Thread
@@ -28,6 +29,7 @@ from avlmaps.maps.store.reader import open_stored
 from avlmaps.perception.encoders import Encoders, encoders_of
 from avlmaps.perception.profiles import Profile
 from avlmaps.query.avlmap import AVLMap, QuerySettings
+from avlmaps.query.voxel_map import direction
 from avlmaps.recordings.given_frame import given_frame
 from avlmaps.recordings.memory import same_rig
 from avlmaps.recordings.types import Frame
@@ -91,22 +93,23 @@ class LiveMap:
         self._held.enter_context(lock_folder(self.path))
         chosen = settings or (SPARSE if self.settings.gates else BuildSettings())
         wait = self.settings.first_frames if self.settings.gates else None
-        self._growing = GrowingMap(chosen, used, _up(up_in_world), wait=wait, looks_later=True)
+        self._growing = GrowingMap(chosen, used, direction(up_in_world), wait=wait, looks_later=True)
         self._gates = Gates(self.settings, chosen.fusion.max_depth_m)
         self._check, self._tally = PoseCheck(), Tally()
         self._queue: deque[tuple[Frame, float]] = deque()
         self._door, self._ears = Condition(), Lock()
         self._last: Frame | None = None
-        self._fault: BaseException | None = None
+        self._fault: BackendError | None = None
+        self._broken: BaseException | None = None
         self._doubts: list[str] = []
         self._frozen: tuple[FrozenSums, float] | None = None
         self._freeze_wanted, self._freeze_done = False, Event()
         self._snapshot: tuple[AVLMap, float] | None = None
         self._saved_s, self._generation = float("nan"), 0
         self._closing, self._closed = False, False
-        self._fuser = Thread(target=self._fuse_all, name="avlmaps-fuse", daemon=True)
+        self._fuser = Thread(target=self._work, args=(self._fuse_all,), name="avlmaps-fuse", daemon=True)
         self._stop_behind = Event()
-        self._behind = Thread(target=self._work_behind, name="avlmaps-behind", daemon=True)
+        self._behind = Thread(target=self._work, args=(self._work_behind,), name="avlmaps-behind", daemon=True)
         self._fuser.start()
         self._behind.start()
 
@@ -149,7 +152,7 @@ class LiveMap:
                 raise
             self._tally.note("came")
             self._last = frame
-            while wait and len(self._queue) >= self.settings.most_waiting and self._fault is None:
+            while wait and len(self._queue) >= self.settings.most_waiting and not (self._fault or self._broken):
                 self._door.wait(_IDLE_S)
             if len(self._queue) >= self.settings.most_waiting:
                 self._queue.popleft()
@@ -282,6 +285,8 @@ class LiveMap:
     def _require_open(self) -> None:
         if self._closing:
             raise MapError(f"The live map {self.path} is closed; begin another.")
+        if self._broken is not None:
+            raise self._broken
         fault, self._fault = self._fault, None
         if fault is not None:
             raise fault
@@ -302,6 +307,15 @@ class LiveMap:
                 f"before {last.rig.rgb.width}x{last.rig.rgb.height}), and was left out; a map has one."
             )
         return replace(frame, rig=last.rig)
+
+    def _work(self, work: Callable[[], None]) -> None:
+        """Do a thread's work; what ends it is raised at every frame to come, and nobody waits for it any longer."""
+        try:
+            work()
+        except BaseException as fault:
+            self._broken = fault
+            self._freeze_done.set()
+            raise
 
     # The thread that fuses
 
@@ -393,9 +407,3 @@ def _warm(made: AVLMap) -> None:
         made.things()
     with contextlib.suppress(AvlmapsError):
         made.ask("the chair in the kitchen")
-
-
-def _up(given: Any) -> Any:
-    from avlmaps.query.voxel_map import direction
-
-    return direction(given)

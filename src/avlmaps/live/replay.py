@@ -9,7 +9,7 @@ from avlmaps.core.progress import progress, say
 from avlmaps.live.growing_folder import growing_frames, is_being_written
 from avlmaps.live.live_map import LiveMap
 from avlmaps.recordings.open import open_recording
-from avlmaps.recordings.types import Recording
+from avlmaps.recordings.types import Frame, Recording
 
 
 def replay(
@@ -34,16 +34,12 @@ def replay(
             time.sleep(max(0.0, begin_s + since_s / rate - time.perf_counter()))
         try:
             frame = recording.frame(index)
-            live.add_frame(
-                frame.rgb, frame.depth_m, frame.camera, frame.world_from_camera, frame.stamp_s, wait=rate is None
-            )
+            _add(live, frame, wait=rate is None)
         except RecordingError as fault:
             tell(f"note: {fault}")
             continue
         heard_s = _play(recording, live, heard_s, frame.stamp_s)
-        for doubt in live.doubts[told:]:
-            tell(f"note: {doubt}")
-        told = len(live.doubts)
+        told = _tell_doubts(live, told, tell)
     _play(recording, live, heard_s, float("inf"))
 
 
@@ -59,15 +55,25 @@ def follow(path: Path, live: LiveMap, give_up_s: float = 60.0, tell: Callable[[s
     told = 0
     for frame in progress(growing_frames(path, give_up_s, tell), "mapping", note=lambda: _note(live)):
         try:
-            live.add_frame(frame.rgb, frame.depth_m, frame.camera, frame.world_from_camera, frame.stamp_s)
+            _add(live, frame)
         except RecordingError as fault:
             tell(f"note: {fault}")
-        for doubt in live.doubts[told:]:
-            tell(f"note: {doubt}")
-        told = len(live.doubts)
+        told = _tell_doubts(live, told, tell)
     if not is_being_written(path):
         recording = open_recording(path)
         _play(recording, live, None if recording.audio is None else recording.audio.start_s, float("inf"))
+
+
+def _add(live: LiveMap, frame: Frame, *, wait: bool = False) -> None:
+    live.add_frame(frame.rgb, frame.depth_m, frame.camera, frame.world_from_camera, frame.stamp_s, wait=wait)
+
+
+def _tell_doubts(live: LiveMap, told: int, tell: Callable[[str], None]) -> int:
+    """Report the doubts after the first ``told``, and return how many there are."""
+    doubts = live.doubts
+    for doubt in doubts[told:]:
+        tell(f"note: {doubt}")
+    return len(doubts)
 
 
 def _play(recording: Recording, live: LiveMap, heard_s: float | None, until_s: float) -> float | None:

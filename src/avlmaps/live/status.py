@@ -1,5 +1,6 @@
 """How a live map fares: what came, what was dropped and why, how long it took."""
 
+import os
 from collections import Counter, deque
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -110,6 +111,4 @@ def memory_mb() -> float:
         pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
     except (OSError, ValueError, IndexError):
         return 0.0
-    import os
-
     return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
