@@ -167,7 +167,7 @@ def test_an_encoder_that_breaks_its_protocol_in_the_middle_costs_that_frame_alon
 def test_frames_come_in_the_order_of_time_from_one_camera() -> None:
     growing = grown(Walk(4), Encoders())
     frame = Walk(4).frame(3)
-    with pytest.raises(RecordingError, match=r"is 0.3 s, not after the last frame's 0.3 s"):
+    with pytest.raises(RecordingError, match=r"at 0.3 s repeats the last frame \(0.3 s\)"):
         growing.add(frame)
     camera = replace(frame.rig.rgb, fx=30.0)
     with pytest.raises(RecordingError, match="has another camera than the frames before"):

@@ -31,7 +31,7 @@ from avlmaps.perception.profiles import Profile
 from avlmaps.query.avlmap import AVLMap, QuerySettings
 from avlmaps.query.voxel_map import direction
 from avlmaps.recordings.given_frame import given_frame
-from avlmaps.recordings.memory import same_rig
+from avlmaps.recordings.memory import next_of
 from avlmaps.recordings.types import Frame
 
 if TYPE_CHECKING:
@@ -144,9 +144,10 @@ class LiveMap:
             if stamp_s is None:
                 stamp_s = 0.0 if self._last is None else self._last.stamp_s + _STEP_S
             try:
-                frame = self._in_order(
-                    given_frame(self._tally.of("came"), rgb, depth_m, camera, world_from_camera, stamp_s)
-                )
+                last = self._last
+                frame = given_frame(self._tally.of("came"), rgb, depth_m, camera, world_from_camera, stamp_s)
+                if last is not None:
+                    frame = next_of(frame, last.stamp_s, last.rig)
             except RecordingError:
                 self._tally.note("refused")
                 raise
@@ -290,23 +291,6 @@ class LiveMap:
         fault, self._fault = self._fault, None
         if fault is not None:
             raise fault
-
-    def _in_order(self, frame: Frame) -> Frame:
-        last = self._last
-        if last is None:
-            return frame
-        if not frame.stamp_s > last.stamp_s:
-            what = "repeats the last frame" if frame.stamp_s == last.stamp_s else "is out of order"
-            raise RecordingError(
-                f"A frame at {frame.stamp_s:g} s {what} ({last.stamp_s:g} s), and was left out; add frames in the "
-                "order of time."
-            )
-        if not same_rig(frame.rig, last.rig):
-            raise RecordingError(
-                f"A frame at {frame.stamp_s:g} s has another camera ({frame.rig.rgb.width}x{frame.rig.rgb.height}, "
-                f"before {last.rig.rgb.width}x{last.rig.rgb.height}), and was left out; a map has one."
-            )
-        return replace(frame, rig=last.rig)
 
     def _work(self, work: Callable[[], None]) -> None:
         """Do a thread's work; what ends it is raised at every frame to come, and nobody waits for it any longer."""

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from avlmaps.core.arrays import Float
-from avlmaps.core.errors import BackendError, MapError, RecordingError
+from avlmaps.core.errors import BackendError, MapError
 from avlmaps.core.progress import silence_progress
 from avlmaps.core.registry import Kind
 from avlmaps.maps.audio.growing import GrowingSounds
@@ -40,7 +40,7 @@ from avlmaps.maps.store.writer import MapContent, is_map_or_free, write_map
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.protocols import GroundReader
 from avlmaps.recordings.growing_track import GrowingTrack
-from avlmaps.recordings.memory import same_rig
+from avlmaps.recordings.memory import next_of
 from avlmaps.recordings.types import Frame, Ground, Recording
 
 # Features of waiting frames take no more memory than this.
@@ -129,7 +129,7 @@ class GrowingMap:
             BackendError: the features, or the encoder's, are not what they must be. Where frames had waited, it may
                 be one of those; it is left out.
         """
-        frame = self._accepted(frame)
+        frame = next_of(frame, self.last_stamp_s, self._walk.rig_or(frame.rig))
         if features is not None:
             features = self._checked(features, "The features that were given are", frame)
         elif self._encodes_at_once():
@@ -239,22 +239,6 @@ class GrowingMap:
         with lock_folder(path):
             write_stored(path, made)
         return replace(open_stored(path), encoders=self.encoders)
-
-    def _accepted(self, frame: Frame) -> Frame:
-        last_s = self.last_stamp_s
-        if last_s is not None and not frame.stamp_s > last_s:
-            raise RecordingError(
-                f"stamp_s of {frame.name} is {frame.stamp_s:g} s, not after the last frame's {last_s:g} s; add frames "
-                "in the order of time."
-            )
-        rig = self._walk.rig_or(frame.rig)
-        if not same_rig(frame.rig, rig):
-            raise RecordingError(
-                f"{frame.name} has another camera than the frames before ({frame.rig.rgb} and depths of "
-                f"{frame.rig.depth.width}x{frame.rig.depth.height}, before {rig.rgb} and {rig.depth.width}x"
-                f"{rig.depth.height}); a map has one."
-            )
-        return replace(frame, rig=rig)
 
     def _encodes_at_once(self) -> bool:
         """Return whether a frame is encoded when it comes, and not when its floor or its fate is known."""

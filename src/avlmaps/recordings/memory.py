@@ -2,6 +2,7 @@
 
 import hashlib
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 
@@ -65,3 +66,28 @@ def same_rig(one: Rig, other: Rig) -> bool:
     """Return whether two rigs are equal."""
     cameras = one.rgb == other.rgb and one.depth == other.depth
     return one is other or (cameras and np.array_equal(one.rgb_from_depth, other.rgb_from_depth))
+
+
+def next_of(frame: Frame, last_stamp_s: float | None, rig: Rig) -> Frame:
+    """Return a frame that follows others, with their rig.
+
+    Args:
+        frame: the new one.
+        last_stamp_s: stamp of the frame before; None where it is the first.
+        rig: of the frames before.
+
+    Raises:
+        RecordingError: it repeats the last frame, comes out of order, or is of another camera.
+    """
+    if last_stamp_s is not None and not frame.stamp_s > last_stamp_s:
+        what = "repeats the last frame" if frame.stamp_s == last_stamp_s else "is out of order"
+        raise RecordingError(
+            f"A frame at {frame.stamp_s:g} s {what} ({last_stamp_s:g} s); add frames in the order of time."
+        )
+    if not same_rig(frame.rig, rig):
+        raise RecordingError(
+            f"A frame at {frame.stamp_s:g} s has another camera than the frames before ({frame.rig.rgb} and depths of "
+            f"{frame.rig.depth.width}x{frame.rig.depth.height}, before {rig.rgb} and {rig.depth.width}x"
+            f"{rig.depth.height}); a map has one."
+        )
+    return replace(frame, rig=rig)
