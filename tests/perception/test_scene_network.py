@@ -32,17 +32,18 @@ def frame_of(width: int, height: int, focal_px: float) -> Frame:
 
 @settings(max_examples=25, deadline=None)
 @given(
-    st.integers(40, 700), st.integers(40, 500), st.floats(0.4, 4.0), st.sampled_from([120, 160, 240])
+    st.integers(40, 700), st.integers(40, 500), st.floats(0.4, 4.0), st.sampled_from([120, 160, 240]), st.integers(1, 2)
 )  # fmt: skip
-@example(40, 40, 2.6964907678356185, 120)  # 44.504 columns are 45
+@example(40, 40, 2.6964907678356185, 120, 1)  # 44.504 columns are 45
 def test_a_picture_is_looked_at_no_wider_and_no_longer_than_the_network_knows(
-    width: int, height: int, focal_per_width: float, width_px: int
+    width: int, height: int, focal_per_width: float, width_px: int, fineness: int
 ) -> None:
     frame = frame_of(width, height, focal_per_width * width)
-    camera, depth_m, rgb = at_working_size(frame, width_px)
+    camera, depth_m, rgb = at_working_size(frame, width_px, fineness)
     assert camera.width <= width_px
     assert camera.fx * (camera.width - 0.5) <= width_px * camera.width + 1e-6  # up to half a column of rounding
-    assert depth_m.shape == rgb.shape[:2] == (camera.height, camera.width)
+    assert depth_m.shape == (camera.height, camera.width)
+    assert rgb.shape[:2] == (fineness * camera.height, fineness * camera.width)
     # The same rays: the field of view is kept.
     assert camera.width / camera.fx == pytest.approx(1 / focal_per_width)
 
@@ -66,6 +67,7 @@ def test_the_checksum_beside_the_weights_is_theirs(weights: str) -> None:
     assert notes.checksum == checksum_of(content, notes)
     assert checksum_of(content, msgspec.structs.replace(notes, called={}, note="said otherwise")) == notes.checksum
     assert checksum_of(content + b" ", notes) != notes.checksum
+    assert checksum_of(content, msgspec.structs.replace(notes, fineness=notes.fineness + 1)) != notes.checksum
     assert checksum_of(content, msgspec.structs.replace(notes, temperature=notes.temperature + 0.1)) != notes.checksum
 
 

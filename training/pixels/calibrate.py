@@ -8,13 +8,13 @@ import msgspec
 import numpy as np
 import torch
 import tyro
-from torch import Tensor, nn
+from torch import Tensor
 from training.pixels.batches import Shards
 from training.pixels.export import load_network, write_onnx
 from training.pixels.labels import CATEGORIES, FIRST_COARSE, ROOMS, UNLABELLED
 from training.pixels.lexicon import CALLED, KINDS
 from training.pixels.losses import groups
-from training.pixels.network import MULTIPLE
+from training.pixels.network import MULTIPLE, RoomNetwork
 from training.pixels.whole import WIDTH, whole_frame
 
 from avlmaps.perception.embedded.scene_network import DEFAULT_WEIGHTS, Notes, checksum_of
@@ -69,12 +69,12 @@ class Scores:
 
 
 @torch.no_grad()
-def scores_of(network: nn.Module, chosen: list, seed: int) -> Scores:
+def scores_of(network: RoomNetwork, chosen: list, seed: int) -> Scores:
     """Encode frames as the running system does: whole, and in colour where they have it."""
     rng = np.random.default_rng(seed)
     category, label, room, share = [], [], [], []
     for frames, index in chosen:
-        geometry, colour, depth, labels = whole_frame(frames, index, with_colour=True)
+        geometry, colour, depth, labels = whole_frame(frames, index, with_colour=True, fineness=network.fineness)
         score, rooms, _ = network(torch.from_numpy(geometry), torch.from_numpy(colour))
         score = score[:, :, : depth.shape[0] // 2, : depth.shape[1] // 2]
         truth = np.where(depth > 0, labels, UNLABELLED)[::2, ::2]
@@ -184,6 +184,7 @@ def calibrate(options: Options) -> None:
         kinds={word: names for word, names in KINDS.items() if set(names) <= known},
         width_px=WIDTH,
         multiple=MULTIPLE,
+        fineness=network.fineness,
     )
     options.out.mkdir(parents=True, exist_ok=True)
     weights = options.out / f"{options.name}.onnx"

@@ -2,13 +2,16 @@
 
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import onnx
 import onnxruntime
 import torch
 from onnx import numpy_helper
-from torch import Tensor, nn
+from torch import Tensor
 from training.pixels.network import COLOUR, GEOMETRY, RoomNetwork
+
+from avlmaps.perception.embedded.scene_network import Notes
 
 
 def load_network(checkpoint: Path, weights: str = "mean") -> RoomNetwork:
@@ -20,14 +23,18 @@ def load_network(checkpoint: Path, weights: str = "mean") -> RoomNetwork:
     return network.eval()
 
 
-class Shipped(nn.Module):
-    """A file that ``write_onnx`` wrote, queried like the network."""
+class Shipped:
+    """A file that ``write_onnx`` wrote, queried like the network.
+
+    Attributes:
+        fineness: as the network's; the notes beside the file say it.
+    """
 
     def __init__(self, path: Path) -> None:
-        super().__init__()
         self._session = onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
+        self.fineness = msgspec.json.decode(path.with_suffix(".json").read_bytes(), type=Notes).fineness
 
-    def forward(self, geometry: Tensor, colour: Tensor) -> tuple[Tensor, ...]:
+    def __call__(self, geometry: Tensor, colour: Tensor) -> tuple[Tensor, ...]:
         """Return the scores of categories and of rooms, and the floor's height."""
         outputs = self._session.run(None, {"geometry": geometry.numpy(), "colour": colour.numpy()})
         return tuple(torch.from_numpy(output) for output in outputs)
@@ -35,12 +42,12 @@ class Shipped(nn.Module):
 
 def write_onnx(network: RoomNetwork, path: Path) -> None:
     """Write the network; its pictures may have any size that is a multiple of 32."""
-    finer = 1 if network.tower is None else 2
-    inputs = (torch.zeros(1, GEOMETRY, 64, 96), torch.zeros(1, COLOUR, finer * 64, finer * 96))
-    size = {2: "height", 3: "width"}
+    n = network.fineness
+    inputs = (torch.zeros(1, GEOMETRY, 64, 96), torch.zeros(1, COLOUR, n * 64, n * 96))
+    size, finer = {2: "height", 3: "width"}, {2: f"{n}*height", 3: f"{n}*width"} if n > 1 else None
     torch.onnx.export(
         network, inputs, str(path), input_names=["geometry", "colour"], output_names=["category", "room", "floor"],
-        dynamic_axes={"geometry": size, "colour": size, "category": {2: "rows", 3: "columns"}},
+        dynamic_axes={"geometry": size, "colour": finer or size, "category": {2: "rows", 3: "columns"}},
         opset_version=17, do_constant_folding=True, dynamo=False,
     )  # fmt: skip
     _halve(path)

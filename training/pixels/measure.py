@@ -11,21 +11,22 @@ import cv2
 import numpy as np
 import torch
 import tyro
-from torch import nn
 from training.pixels.batches import Shards
+from training.pixels.export import Shipped, load_network
 from training.pixels.labels import CATEGORIES, FIRST_COARSE
 from training.pixels.losses import groups
+from training.pixels.network import RoomNetwork
 from training.pixels.whole import whole_frame
 
 from avlmaps_sim.bench.nyu import SCORED
 
 
 @torch.no_grad()
-def real_figures(network: nn.Module, shards: Shards, flip: bool = False) -> dict[str, float]:
+def real_figures(network: RoomNetwork | Shipped, shards: Shards, flip: bool = False) -> dict[str, float]:
     """Return pixel accuracy, class accuracy and mean IoU of the 37 classes on every frame."""
     matrix, confusion = groups()[:SCORED], np.zeros((SCORED, SCORED), np.int64)
     for frames, index in shards.every():
-        geometry, colour, depth, _ = whole_frame(frames, index, with_colour=True, fineness=fineness_of(network))
+        geometry, colour, depth, _ = whole_frame(frames, index, with_colour=True, fineness=network.fineness)
         p = probabilities(network, geometry, colour, flip)[:, : depth.shape[0] // 2, : depth.shape[1] // 2]
         group = torch.einsum("gk,khw->hwg", matrix, p).numpy()
         label = frames.label[index].astype(int) - FIRST_COARSE
@@ -45,11 +46,11 @@ def real_figures(network: nn.Module, shards: Shards, flip: bool = False) -> dict
 
 
 @torch.no_grad()
-def rendered_figures(network: nn.Module, shards: Shards, count: int = 150) -> dict[str, float]:
+def rendered_figures(network: RoomNetwork | Shipped, shards: Shards, count: int = 150) -> dict[str, float]:
     """Return accuracy and mean IoU of the categories with 200 pixels or more, every fourth of a cell, within 4 m."""
     confusion, chosen = np.zeros((len(CATEGORIES),) * 2, np.int64), shards.every()
     for frames, index in chosen[:: max(1, len(chosen) // count)]:
-        geometry, colour, depth, label = whole_frame(frames, index, with_colour=True, fineness=fineness_of(network))
+        geometry, colour, depth, label = whole_frame(frames, index, with_colour=True, fineness=network.fineness)
         p = probabilities(network, geometry, colour)[:, : depth.shape[0] // 2, : depth.shape[1] // 2]
         truth, z = label[::2, ::2].astype(int), depth[::2, ::2]
         known = (truth < len(CATEGORIES)) & (z > 0) & (z < 4.0)
@@ -61,12 +62,9 @@ def rendered_figures(network: nn.Module, shards: Shards, count: int = 150) -> di
     return {"accuracy": float(right.sum() / truth.sum()), "mean IoU": float((right[often] / union[often]).mean())}
 
 
-def fineness_of(network: nn.Module) -> int:
-    """Return how many times as wide as geometry the colour is that a network takes."""
-    return 2 if getattr(network, "tower", None) is not None else 1
-
-
-def probabilities(network: nn.Module, geometry: np.ndarray, colour: np.ndarray, flip: bool = False) -> torch.Tensor:
+def probabilities(
+    network: RoomNetwork | Shipped, geometry: np.ndarray, colour: np.ndarray, flip: bool = False
+) -> torch.Tensor:
     """Return (k, h, w) probabilities of a padded frame; ``flip``: the mean with those of its mirror image."""
     g, c = torch.from_numpy(geometry), torch.from_numpy(colour)
     p = network(g, c)[0].float().softmax(dim=1)[0]
@@ -95,8 +93,6 @@ class Options:
 
 def main(options: Options) -> None:
     """Print the figures."""
-    from training.pixels.export import Shipped, load_network
-
     is_shipped = options.network.suffix == ".onnx"
     network = Shipped(options.network) if is_shipped else load_network(options.network, options.weights)
     for name, figures in (

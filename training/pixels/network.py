@@ -58,6 +58,9 @@ class RoomNetwork(nn.Module):
         widths: see ``WIDTHS``.
         dropout: share of channels at 1/16 and before the scores that training withholds.
         has_tower: colour has twice the size of geometry, and a tower that knows photographs looks at it.
+
+    Attributes:
+        fineness: how many times as wide and high as geometry the colour is.
     """
 
     def __init__(
@@ -87,7 +90,7 @@ class RoomNetwork(nn.Module):
             step(b + c + 16, b, size=1),
         )
         self.up3, self.up2, self.up1 = Block(d), Block(c), Block(b)
-        self.tower = Tower() if has_tower else None
+        self.tower, self.fineness = (Tower(), 2) if has_tower else (None, 1)
         if has_tower:
             self.from_tower = nn.ModuleList(Joint(w, t) for w, t in zip(TOWER_WIDTHS, (b, c, d, e), strict=True))
         self.score = nn.Conv2d(b, categories, 1)

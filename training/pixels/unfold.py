@@ -6,7 +6,8 @@ and a scale and a shift that undo them. The network computes the same as before,
 
 Folded weights are up to ten times as small as those that were trained, and Muon's steps have one size: at the usual
 rate they would tear the network apart. So each convolution is enlarged to the size of trained weights
-(``TRAINED_RMS``), which its normalisation undoes.
+(``TRAINED_RMS``), which its normalisation undoes. A tower is left as it is folded: AdamW trains it, and its
+normalisations learn no statistics.
 """
 
 from collections.abc import Iterable
@@ -21,7 +22,11 @@ from training.pixels.network import RoomNetwork
 
 TRAINED_RMS = 0.1  # root mean square of a convolution's weights after long training with Muon
 # The convolution's name within its part of the network, and that of the normalisation behind it.
-_NORM = {"0": "1", "first": "norm_first", "second": "norm_second", "mix": "norm"}
+_NORM = {
+    "0": "1", "first": "norm_first", "second": "norm_second", "mix": "norm",
+    "_conv_stem": "_bn0", "_expand_conv": "_bn0", "_depthwise_conv": "_bn1", "_project_conv": "_bn2",
+}  # fmt: skip
+_TOWER = "tower."
 
 
 def unfolded(path: Path, categories: int, rooms: int, batches: Iterable[tuple[Tensor, Tensor]]) -> RoomNetwork:
@@ -40,7 +45,8 @@ def unfolded(path: Path, categories: int, rooms: int, batches: Iterable[tuple[Te
     widths = tuple(
         len(arrays[convolutions[name][1]]) for name in ("stem.0.0", "down2.0.0", "down3.0.0", "down4.0.0", "down5.0.0")
     )
-    network = RoomNetwork(categories, rooms, widths)
+    has_tower = any(name.startswith(_TOWER) for name in convolutions)
+    network = RoomNetwork(categories, rooms, widths, has_tower=has_tower)
     state, named = network.state_dict(), dict(network.named_modules())
     left = {name for name, module in named.items() if isinstance(module, nn.Conv2d)} - convolutions.keys()
     if left:
@@ -56,7 +62,8 @@ def unfolded(path: Path, categories: int, rooms: int, batches: Iterable[tuple[Te
         convolution, module = named[name], named[norm]
         assert isinstance(convolution, nn.Conv2d)
         assert isinstance(module, nn.BatchNorm2d)
-        normed.append((convolution, module))
+        if not name.startswith(_TOWER):
+            normed.append((convolution, module))
         state[f"{norm}.weight"].fill_(1.0)
         state[f"{norm}.bias"].copy_(shift)
         state[f"{norm}.running_mean"].zero_()

@@ -1,7 +1,7 @@
 """The network behind the embedded pixel and view encoders: what each pixel shows, and what kind of room it is.
 
-It looks at geometry in the frame of gravity, and at colour through a small late branch. It runs in onnxruntime at
-a small size (``Notes.width_px``), for every recording; ``training/pixels`` makes its weights. Two sets ship: one
+It looks at geometry in the frame of gravity, and at colour, which joins later and may be finer. It runs in onnxruntime
+at a small size (``Notes.width_px``), for every recording; ``training/pixels`` makes its weights. Two sets ship: one
 that learnt from rendered worlds and real frames, and one that saw rendered worlds alone (the profile ``synthetic``).
 """
 
@@ -86,6 +86,7 @@ class Notes(msgspec.Struct, frozen=True):
             either, since it was trained on none longer.
         instances: how instances are distinguished from noise.
         multiple: pictures are padded to a multiple of this.
+        fineness: how many times as wide and high as geometry the colour is that the network takes.
         checksum: of the weights and of what else makes the features; see ``checksum_of``.
     """
 
@@ -101,6 +102,7 @@ class Notes(msgspec.Struct, frozen=True):
     width_px: int = 240
     instances: InstanceNotes = InstanceNotes()
     multiple: int = 16
+    fineness: int = 1
     checksum: str = ""
 
 
@@ -163,15 +165,15 @@ class SceneNetwork:
         """Encode a frame; its ``ground`` gives the up direction, where it is known."""
         import cv2
 
-        camera, depth_m, rgb = at_working_size(frame, round(look.scale * self.notes.width_px))
+        multiple, fineness = self.notes.multiple, self.notes.fineness
+        camera, depth_m, rgb = at_working_size(frame, round(look.scale * self.notes.width_px), fineness)
         up, height_m = _ground_of(frame)
-        multiple = self.notes.multiple
         geometry = channels(depth_m, camera, up, height_m)
         colour = rgb.astype(np.float32).transpose(2, 0, 1) / 127.5 - 1.0
         if look.mirrored:
             geometry, colour = geometry[:, :, ::-1].copy(), colour[:, :, ::-1]
             geometry[_ACROSS] *= -1.0
-        geometry, colour = _padded(geometry, multiple), _padded(colour, multiple)
+        geometry, colour = _padded(geometry, multiple), _padded(colour, fineness * multiple)
         score, room, *floor = (
             np.asarray(output)
             for output in self._session.run(None, {"geometry": geometry[None], "colour": colour[None]})
@@ -248,20 +250,28 @@ def checksum_of(weights: bytes, notes: Notes) -> str:
     """
     said = msgspec.structs.replace(notes, called={}, kinds={}, instances=InstanceNotes(), note="")
     makes = {name: value for name, value in msgspec.structs.asdict(said).items() if name != "checksum"}
+    if notes.fineness == 1:  # weights made before there was a choice
+        del makes["fineness"]
     return sha256(weights + msgspec.json.encode(makes)).hexdigest()
 
 
 def at_working_size(
-    frame: Frame, width_px: int
-) -> tuple[Pinhole, Float32[np.ndarray, "h w"], UInt8[np.ndarray, "h w 3"]]:
-    """Return the colour camera, the depth as it sees it, and its picture, at the size that the network looks at."""
+    frame: Frame, width_px: int, fineness: int = 1
+) -> tuple[Pinhole, Float32[np.ndarray, "h w"], UInt8[np.ndarray, "hf wf 3"]]:
+    """Return the colour camera, the depth as it sees it, and its picture, at the size that the network looks at.
+
+    Args:
+        frame: the frame.
+        width_px: how wide the network's geometry is, and no longer its focal length.
+        fineness: how many times as wide and high the picture is.
+    """
     import cv2
 
     camera, depth_m = depth_in_colour(frame.depth_m, frame.rig)
     width = min(width_px, round(width_px / camera.fx * camera.width))
     height = max(1, round(width * camera.height / camera.width))
     small = camera.resized(width, height)
-    rgb = cv2.resize(frame.rgb, (width, height), interpolation=cv2.INTER_AREA)
+    rgb = cv2.resize(frame.rgb, (fineness * width, fineness * height), interpolation=cv2.INTER_AREA)
     return small, subsampled(depth_m, width, height), np.asarray(rgb, np.uint8)
 
 
