@@ -4,6 +4,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import fields, replace
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from avlmaps.live.gates import Gates
 from avlmaps.live.live_map import LiveMap
 from avlmaps.live.pose_check import PoseCheck
 from avlmaps.live.settings import LiveSettings
+from avlmaps.live.status import Tally
 from avlmaps.maps.build import build_map
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
 from avlmaps.maps.grid import GridSpec
@@ -200,6 +202,65 @@ def test_a_fault_of_ours_ends_the_waiting_and_is_raised(tmp_path: Path) -> None:
     assert live.map.stored.info.counts.frames == 3
 
 
+def within(seconds: float, work: Callable[[], object]) -> None:
+    """Do work in a thread, and fail where it does not end: a hand-over that lost its answer waits for ever."""
+    faults: list[BaseException] = []
+
+    def watched() -> None:
+        try:
+            work()
+        except BaseException as fault:  # noqa: BLE001 - raised below
+            faults.append(fault)
+
+    thread = threading.Thread(target=watched, daemon=True)
+    thread.start()
+    thread.join(seconds)
+    assert not thread.is_alive(), f"it did not end within {seconds:g} s"
+    if faults:
+        raise faults[0]
+
+
+def test_maps_that_are_closed_at_any_moment_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(0)
+
+    def of_a_slow_thread(tally: Tally, what: str) -> int:
+        if threading.current_thread().name == "avlmaps-behind":
+            time.sleep(0.01)  # between two steps of the hand-over, where a map may be closed
+        return tally._counts[what]
+
+    monkeypatch.setattr(Tally, "of", of_a_slow_thread)
+    chosen = LiveSettings(gates=False, snapshot_s=0.0, save_s=1e9)
+    settings = BuildSettings(frames=FrameSettings(per_part=10))
+    few = avlmaps.Encoders()  # neither keyframes nor pixels: the threads do little else than hand over
+
+    def live_shortly() -> None:
+        live = LiveMap(tmp_path / "map", few, up_in_world=UP, settings=settings, live=chosen, overwrite=True)
+        for number in range(int(rng.integers(1, 4))):
+            add(live, frame(number))
+        time.sleep(float(rng.uniform(0.0, 0.02)))
+        live.close()
+
+    for _ in range(25):
+        within(60.0, live_shortly)
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+@pytest.mark.parametrize("part", ["freeze", "finish"])
+def test_a_thread_that_breaks_between_two_snapshots_leaves_nobody_waiting(tmp_path: Path, part: str) -> None:
+    live = LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP, live=LiveSettings(gates=False, first_frames=1))
+    setattr(live._growing, part, lambda *args, **kwargs: 1 // 0)
+
+    def add_until_it_is_said() -> None:
+        for number in range(100_000):
+            add(live, frame(number))
+
+    with pytest.raises(ZeroDivisionError):
+        within(60.0, add_until_it_is_said)
+    delattr(live._growing, part)
+    within(60.0, live.close)
+    assert live.map.stored.info.counts.frames == len(live) > 0
+
+
 def test_sounds_are_in_the_map_with_the_frames(tmp_path: Path) -> None:
     ears = avlmaps.Encoders.named("colours", sounds="embedded")
     samples = np.random.default_rng(0).normal(scale=1e-3, size=64_000).astype(np.float32)
@@ -218,6 +279,7 @@ sys.path[:0] = {path!r}
 from test_live_map import ENCODERS, UP, add, frame
 from avlmaps.live.live_map import LiveMap
 from avlmaps.live.settings import LiveSettings
+from avlmaps.live.status import Tally
 chosen = LiveSettings(first_frames=2, snapshot_s=0.0, save_s=0.0, new_share=0.0)
 live = LiveMap(sys.argv[1], ENCODERS, up_in_world=UP, live=chosen)
 for number in range(100_000):

@@ -9,7 +9,7 @@ writes it into the folder. A question uses the snapshot that there is; nothing t
 import contextlib
 import time
 from collections import deque
-from collections.abc import Callable
+from concurrent.futures import Future
 from dataclasses import replace
 from pathlib import Path
 from threading import Condition, Event, Lock, Thread
@@ -44,6 +44,9 @@ _IDLE_S = 0.05
 _MOST_DOUBTS = 100
 _LOOKS_S = 0.5  # for keyframes, in each snapshot
 _SHARE = 4.0  # a snapshot takes at most one part in this many of the time
+
+
+_Came = tuple[FrozenSums, float]  # what was frozen, and when
 
 
 class LiveMap:
@@ -102,14 +105,14 @@ class LiveMap:
         self._fault: BackendError | None = None
         self._broken: BaseException | None = None
         self._doubts: list[str] = []
-        self._frozen: tuple[FrozenSums, float] | None = None
-        self._freeze_wanted, self._freeze_done = False, Event()
+        self._asked: Future[_Came | None] | None = None  # what the thread behind waits for; under the door
+        self._fuser_ended = False  # under the door
         self._snapshot: tuple[AVLMap, float] | None = None
         self._saved_s, self._generation = float("nan"), 0
         self._closing, self._closed = False, False
-        self._fuser = Thread(target=self._work, args=(self._fuse_all,), name="avlmaps-fuse", daemon=True)
+        self._fuser = Thread(target=self._fuse_and_answer, name="avlmaps-fuse", daemon=True)
         self._stop_behind = Event()
-        self._behind = Thread(target=self._work, args=(self._work_behind,), name="avlmaps-behind", daemon=True)
+        self._behind = Thread(target=self._work_behind, name="avlmaps-behind", daemon=True)
         self._fuser.start()
         self._behind.start()
 
@@ -141,6 +144,9 @@ class LiveMap:
         arrived_s = time.perf_counter()
         with self._door:
             self._require_open()
+            if wait:
+                self._door.wait_for(lambda: len(self._queue) < self.settings.most_waiting or self._fuser_ended)
+                self._require_open()
             if stamp_s is None:
                 stamp_s = 0.0 if self._last is None else self._last.stamp_s + _STEP_S
             try:
@@ -153,8 +159,6 @@ class LiveMap:
                 raise
             self._tally.note("came")
             self._last = frame
-            while wait and len(self._queue) >= self.settings.most_waiting and not (self._fault or self._broken):
-                self._door.wait(_IDLE_S)
             if len(self._queue) >= self.settings.most_waiting:
                 self._queue.popleft()
                 self._tally.drop("late")
@@ -240,7 +244,6 @@ class LiveMap:
             self._door.notify_all()
         self._fuser.join()
         self._stop_behind.set()
-        self._freeze_done.set()
         self._behind.join()
         if not self._closed:
             try:
@@ -292,27 +295,31 @@ class LiveMap:
         if fault is not None:
             raise fault
 
-    def _work(self, work: Callable[[], None]) -> None:
-        """Do a thread's work; what ends it is raised at every frame to come, and nobody waits for it any longer."""
+    # The thread that fuses
+
+    def _fuse_and_answer(self) -> None:
+        """Fuse until the map is closed; however that ends, who asks gets an answer."""
         try:
-            work()
+            self._fuse_all()
         except BaseException as fault:
             self._broken = fault
-            self._freeze_done.set()
             raise
-
-    # The thread that fuses
+        finally:
+            with self._door:
+                self._fuser_ended = True
+                self._answer(None)
+                self._door.notify_all()
 
     def _fuse_all(self) -> None:
         while True:
             with self._door:
-                while not self._queue and not self._closing and not self._freeze_wanted:
-                    self._door.wait(_IDLE_S)
+                while not self._queue and not self._closing and self._asked is None:
+                    self._door.wait()
                 frame, arrived_s = self._queue.popleft() if self._queue else (None, 0.0)
                 self._door.notify_all()
             if frame is not None:
                 self._fuse(frame, arrived_s)
-            if self._freeze_wanted:
+            if self._asked is not None:  # set by the thread behind alone, which waits for the answer
                 self._freeze()
             if frame is None and self._closing and not self._queue:
                 return
@@ -338,12 +345,18 @@ class LiveMap:
         self._tally.took(time.perf_counter() - arrived_s)
 
     def _freeze(self) -> None:
-        self._freeze_wanted = False
         try:
-            self._frozen = self._growing.freeze(), time.perf_counter()
+            came = self._growing.freeze(), time.perf_counter()
         except MapError:  # up and the floor are not found yet
-            self._frozen = None
-        self._freeze_done.set()
+            came = None
+        with self._door:
+            self._answer(came)
+
+    def _answer(self, came: "_Came | None") -> None:
+        """Give the thread behind what it waits for, if it does; under the door."""
+        if self._asked is not None:
+            self._asked.set_result(came)
+            self._asked = None
 
     def _doubt(self, sentence: str) -> None:
         if len(self._doubts) < _MOST_DOUBTS and sentence not in self._doubts:
@@ -352,27 +365,39 @@ class LiveMap:
     # The thread behind
 
     def _work_behind(self) -> None:
+        """Make snapshots and saves until the map is closed; what breaks this is raised at every frame to come."""
+        try:
+            self._publish_all()
+        except BaseException as fault:
+            self._broken = fault
+            raise
+
+    def _publish_all(self) -> None:
         pause_s, known = 0.0, 0
         while not self._stop_behind.wait(pause_s or _IDLE_S):
             pause_s = 0.0
             if self._tally.of("fused") == known and self._growing.sound_track is None:
                 continue
-            self._freeze_done.clear()
-            with self._door:
-                self._freeze_wanted = True
-                self._door.notify_all()
-            self._freeze_done.wait()
-            if self._frozen is None or self._closing:
+            came = self._what_came()
+            if came is None or self._closing:
                 continue
             begin_s = time.perf_counter()
             known = self._tally.of("fused")
             try:
-                self._publish(*self._frozen)
+                self._publish(*came)
             except AvlmapsError as fault:
                 self._doubt(str(fault))
-            self._frozen = None
             took_s = time.perf_counter() - begin_s
             pause_s = max(self.settings.snapshot_s - took_s, (_SHARE - 1.0) * min(took_s, 1.0) / _SHARE, _IDLE_S)
+
+    def _what_came(self) -> "_Came | None":
+        """Let the thread that fuses freeze what came; None where there is nothing, or it has ended."""
+        with self._door:
+            if self._fuser_ended:
+                return None
+            self._asked = answer = Future()
+            self._door.notify_all()
+        return answer.result()
 
     def _publish(self, came: FrozenSums, came_s: float) -> None:
         stored = self._growing.finish(came, looks_s=_LOOKS_S)
