@@ -13,12 +13,16 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import uvicorn
 from playwright.sync_api import Page, sync_playwright
 
 from avlmaps.maps.types import Voxels
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.view.server import ViewServer
-from avlmaps.view.session import ViewSession
+from avlmaps.serve.app import create_app
+from avlmaps.serve.running import listening_socket
+from avlmaps.serve.service import Service
+from avlmaps.serve.settings import Limits, ServeSettings
+from avlmaps.view.on_page import TOP
 
 ARGUMENTS = ["--headless", "--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader", "--mute-audio",
              "--disable-background-networking", "--disable-component-update",
@@ -59,25 +63,29 @@ def main() -> None:
     parser.add_argument("--queries", type=int, default=200)
     chosen = parser.parse_args()
     begin = time.perf_counter()
-    session = ViewSession([enlarged(chosen.map, chosen.voxels)])
-    _ = session.maps[0].layout.records
+    settings = ServeSettings(port=0, limits=Limits(answer_s=600.0))
+    service = Service.open({"map": chosen.map}, settings, warm=False)
+    served = service.shelf.get("map")
+    served.avlmap = enlarged(chosen.map, chosen.voxels)
+    _ = served.page.layout.records
     print(f"laid out {chosen.voxels:,} voxels in {time.perf_counter() - begin:.1f} s")
-    server = ViewServer(session, port=0)
-    threading.Thread(target=server.serve_forever, daemon=True).start()
+    opened = listening_socket(settings)
+    server = uvicorn.Server(uvicorn.Config(create_app(service, tools=()), log_config=None, ws="none"))
+    threading.Thread(target=server.run, kwargs={"sockets": [opened]}, daemon=True).start()
     words = ["the sofa", "the chair near the table", "the bed", "the window in the kitchen", "the sound of a phone"]
     for sentence in words:
-        session.ask(sentence)
+        served.page.heat_of(served.avlmap.ask(sentence, TOP))
     took = []
     for k in range(40):
         begin = time.perf_counter()
-        session.ask(words[k % len(words)])
+        served.page.heat_of(served.avlmap.ask(words[k % len(words)], TOP))
         took.append(1e3 * (time.perf_counter() - begin))
     print(f"answer and heat in process: median {np.median(took):.0f} ms, p95 {np.percentile(took, 95):.0f} ms")
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=ARGUMENTS)
         page = browser.new_page(viewport={"width": 1280, "height": 800})
         page.set_default_timeout(300_000)
-        page.goto(server.url)
+        page.goto(f"http://127.0.0.1:{opened.getsockname()[1]}/maps/map/view")
         page.wait_for_selector("html[data-drawn]", state="attached")
         print(f"first picture {page.evaluate('document.documentElement.dataset.drawn')} ms after the page began")
         page.wait_for_selector("#loading", state="hidden")
@@ -111,8 +119,8 @@ def main() -> None:
         print(f"server MB: {before[0]:.0f}, {middle[0]:.0f}, {after[0]:.0f}; page's heap MB: {before[1]:.0f}, "
               f"{middle[1]:.0f}, {after[1]:.0f} (before, half, after)")  # fmt: skip
         browser.close()
-    server.shutdown()
-    session.close()
+    server.should_exit = True
+    service.close()
 
 
 if __name__ == "__main__":

@@ -32,7 +32,6 @@ from avlmaps.recordings.consistency.verdict import Reason
 from avlmaps.recordings.open import open_recording
 from avlmaps.serve.drive.robots import RobotFile
 from avlmaps.serve.settings import ServeSettings
-from avlmaps.view.server import ViewServer
 from avlmaps_models.import_reference.convert import ImportSettings
 from avlmaps_sim.bench.indexing import IndexingSettings
 from avlmaps_sim.bench.navigation import NavigationSettings
@@ -131,8 +130,7 @@ SAME: dict[str, Callable[[], Any]] = {
     "export.least": of(AVLMap.things, "least_confidence"),
     "export.radius_m": of(BodyShape, "radius_m"),
     "export.height_m": of(BodyShape, "height_m"),
-    "view.host": of(ViewServer.__init__, "host"),
-    "view.port": of(ViewServer.__init__, "port"),
+    "view.host": of(ServeSettings, "host"),
     "serve.host": of(ServeSettings, "host"),
     "serve.port": of(ServeSettings, "port"),
     "serve.allow_host": of(ServeSettings, "allowed_hosts"),
@@ -162,7 +160,7 @@ SAME: dict[str, Callable[[], Any]] = {
 # What a person meets first: nothing behind them has such a default.
 OWN = {
     "build.rules", "query.rules", "query.sentence", "demo.out", "bench.out", "bench.indexing.size",
-    "go.language", "go.robot", "query.frame", "things.frame", "rooms.frame", "locate.frame",
+    "go.language", "go.robot", "query.frame", "things.frame", "rooms.frame", "locate.frame", "view.port",
 }  # fmt: skip
 
 

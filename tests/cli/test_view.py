@@ -20,8 +20,8 @@ def test_it_serves_until_it_is_stopped(built: Path, number: signal.Signals) -> N
         assert viewer.stdout is not None
         told = json.loads(viewer.stdout.readline())
         assert told["maps"] == [str(built)] and told["url"].startswith("http://127.0.0.1:")
-        with urllib.request.urlopen(told["url"] + "api/maps", timeout=60) as answer:
-            assert json.load(answer)["maps"][0]["name"] == "room.avlmap"
+        with urllib.request.urlopen(told["url"] + "/map", timeout=60) as answer:
+            assert json.load(answer)["map"]["name"] == "room.avlmap"
         viewer.send_signal(number)
         out, err = viewer.communicate(timeout=60)
     assert viewer.returncode == 0 and out == "" and "The viewer is stopped." in err
@@ -57,14 +57,36 @@ def test_a_scene_that_is_not_the_maps_is_refused_before_a_page_opens(
 def test_a_robot_drives_what_was_planned(built: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from avlmaps.cli.view import _robot
     from avlmaps.query.avlmap import AVLMap
-    from avlmaps.view.session import ViewSession
+    from avlmaps.view.route import Guide
     from cli.test_go import scene_of
     from helpers.room import Room
 
     monkeypatch.setattr("avlmaps_sim.scenes.open_scene", lambda spec: scene_of(Room()))
-    session = ViewSession([AVLMap.open(built)], _robot("room"))
-    told = session.obey("go to the red thing")
+    guide = Guide(AVLMap.open(built), _robot("room"))
+    told = guide.obey("go to the red thing")
     assert told["driven"]["ok"] and told["planned"]["ok"]
     assert told["driven"]["path_m"] == pytest.approx(told["planned"]["path_m"], abs=1.0)
     there = told["driven"]["places"][-1]
-    assert session.obey("turn left")["driven"]["places"][0] == pytest.approx(there, abs=0.01)
+    assert guide.obey("turn left")["driven"]["places"][0] == pytest.approx(there, abs=0.01)
+
+
+def test_names_that_no_address_holds_and_names_that_are_alike(tmp_path: Path) -> None:
+    from avlmaps.cli.view import View, _address, _named
+    from avlmaps.serve.settings import ServeSettings
+
+    first, second = tmp_path / "a" / "my/../home?.avlmap", tmp_path / "b" / "home?.avlmap"
+    named = _named(View(map=first, other=second))
+    assert list(named) == ["home-", "home--2"] and list(named.values()) == [first, second]
+    token = "a-token-of-some-length"
+    at = _address(ServeSettings(host="::", token=token), 80, list(named))
+    assert at == f"http://[::1]:80/maps/home-/view?other=home--2&token={token}"
+
+
+def test_a_port_that_is_taken_is_one_sentence(run, built: Path) -> None:
+    import socket
+
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        status, _, err = run("view", built, "--no-browser", "--port", taken.getsockname()[1])
+    assert status == 1 and "is taken by another program" in err and "--port" in err

@@ -1,14 +1,32 @@
 """A page that is served on a free port of this machine, until the test ends."""
 
 import threading
+import time
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
 import numpy as np
+import uvicorn
 
-from avlmaps.view.server import ViewServer
-from avlmaps.view.session import ViewSession
+from avlmaps.serve.app import create_app
+from avlmaps.serve.running import listening_socket
+from avlmaps.serve.service import Service
+from avlmaps.serve.settings import ServeSettings
+
+
+@dataclass(frozen=True, slots=True)
+class Served:
+    """A page.
+
+    Attributes:
+        service: its maps.
+        url: where a browser finds it.
+    """
+
+    service: Service
+    url: str
 
 
 def decoded(png: bytes | Path) -> np.ndarray:
@@ -19,14 +37,21 @@ def decoded(png: bytes | Path) -> np.ndarray:
     return shown[..., ::-1]
 
 
-def serving(session: ViewSession, host: str = "127.0.0.1") -> Iterator[ViewServer]:
-    server = ViewServer(session, host, 0)
-    thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02}, daemon=True)
-    thread.start()
-    try:
-        yield server
-    finally:
-        server.shutdown()
-        server.server_close()
-        session.close()
-        thread.join()
+def serving(*maps: Path) -> Iterator[Served]:
+    """Serve the page of a map, or of two that are compared."""
+    settings = ServeSettings(port=0)
+    service = Service.open({f"map{k}": path for k, path in enumerate(maps)}, settings, warm=False)
+    with listening_socket(settings) as opened:
+        server = uvicorn.Server(uvicorn.Config(create_app(service, tools=()), log_config=None, ws="none"))
+        thread = threading.Thread(target=server.run, kwargs={"sockets": [opened]})
+        thread.start()
+        while not server.started:
+            assert thread.is_alive()
+            time.sleep(0.01)
+        query = "?other=map1" if len(maps) > 1 else ""
+        try:
+            yield Served(service, f"http://127.0.0.1:{opened.getsockname()[1]}/maps/map0/view{query}")
+        finally:
+            server.should_exit = True
+            thread.join()
+            service.close()

@@ -10,6 +10,7 @@ from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 from starlette.testclient import TestClient
 
+from avlmaps.core.network import is_loopback
 from avlmaps.serve.errors import Privacy, without_folders
 from avlmaps.serve.guard import Guard
 from avlmaps.serve.settings import Limits, ServeError, ServeSettings
@@ -31,6 +32,15 @@ def refused(response: Response | Any, status: int, kind: str) -> str:
     assert response.status_code == status
     assert response.json()["error"]["kind"] == kind
     return response.json()["error"]["message"]
+
+
+@pytest.mark.parametrize(
+    ("host", "near"),
+    [("127.0.0.1", True), ("127.5.0.1", True), ("::1", True), ("[::1]", True), ("localhost", True), ("0.0.0.0", False),
+     ("::", False), ("192.168.1.5", False), ("localhost.example", False), ("", False)],
+)  # fmt: skip
+def test_what_is_loopback(host: str, near: bool) -> None:
+    assert is_loopback(host) is near
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1:8750", "localhost", "LOCALHOST:1", "[::1]:8750", "localhost."])
@@ -89,8 +99,24 @@ def test_no_other_text_opens(text: str) -> None:
     from avlmaps.serve.errors import RequestError
 
     with pytest.raises(RequestError) as fault:
-        Guard(behind, ServeSettings(token=TOKEN))._check_token(f"Bearer {text}")
+        Guard(behind, ServeSettings(token=TOKEN))._check_token(
+            {"authorization": f"Bearer {text}", "cookie": f"avlmaps_token={text}"}
+        )
     assert fault.value.status == 401
+
+
+def test_a_browser_brings_the_token_once_and_keeps_it() -> None:
+    odd = 'a token; of=some%20"length"'
+    client = guarded(token=odd)
+    for query in ({}, {"token": ""}, {"token": odd[:-1]}, {"token": "\xff"}):
+        refused(client.get("/maps/a/view", params=query), 401, "token")
+    refused(client.get("/", headers={"cookie": "avlmaps_token=wrong"}), 401, "token")
+    refused(client.post("/", params={"token": odd}), 401, "token")
+    entered = client.get("//evil.example/view", params={"token": odd, "other": "b"}, follow_redirects=False)
+    assert entered.status_code == 303 and entered.headers["location"] == "?other=b", "the token leaves the address"
+    cookie = entered.headers["set-cookie"]
+    assert "HttpOnly" in cookie and "SameSite=Strict" in cookie and "Secure" not in cookie
+    assert client.get("/", headers={"cookie": cookie.partition(";")[0]}).text == "0"
 
 
 def test_a_large_body_is_refused_by_its_length_and_by_its_bytes() -> None:

@@ -23,7 +23,7 @@ from avlmaps.serve.agent_answers import compact, fitting
 from avlmaps.serve.agents import agent_server
 from avlmaps.serve.app import create_app
 from avlmaps.serve.service import Service
-from avlmaps.view.session import TOP, ViewSession
+from avlmaps.view.on_page import TOP
 
 SENTENCES = [
     "chair",
@@ -117,13 +117,13 @@ def test_every_front_gives_the_answer_of_the_package(
     expected = plain({**opened.ask(given.pop("sentence", ""), TOP, **given).to_dict()})
     with TestClient(create_app(home_service), base_url="http://127.0.0.1:8750") as client:
         served = client.get("/maps/home/ask", params={**query, "top": TOP}).json()
+        seen = client.get("/maps/home/view/ask", params={**query, "top": TOP}).content
     fronts = {
         "command line": by_command_line(home, query, capsys),
         "shell": by_shell(home, query, capsys, monkeypatch),
         "server": served,
     }
-    if "sentence" in query:
-        fronts["viewer"] = ViewSession([AVLMap.open(home)]).ask(query["sentence"])[0]["answers"][0]
+    fronts["viewer"] = json.loads(seen[4 : 4 + int.from_bytes(seen[:4], "little")])["answer"]
     for front, answer in fronts.items():
         assert plain(answer) == expected, front
     assert by_agent(home_service, query) == fitting(compact(expected)), "the same, rounded and cut for an agent"

@@ -6,10 +6,8 @@ from pathlib import Path
 import pytest
 
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.view.server import ViewServer
-from avlmaps.view.session import ViewSession
 from cli.conftest import built, walk  # noqa: F401 - fixtures
-from helpers.viewing import serving
+from helpers.viewing import Served, serving
 
 
 @pytest.fixture(scope="session")
@@ -18,6 +16,6 @@ def room(built: Path) -> AVLMap:  # noqa: F811
 
 
 @pytest.fixture(scope="module")
-def served(room: AVLMap) -> Iterator[ViewServer]:
+def served(built: Path) -> Iterator[Served]:  # noqa: F811
     """A page of the map on a free port of this machine."""
-    yield from serving(ViewSession([room]))
+    yield from serving(built)

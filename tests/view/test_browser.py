@@ -10,8 +10,7 @@ import pytest
 
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.view.page import write_page
-from avlmaps.view.server import ViewServer
-from helpers.viewing import decoded, serving
+from helpers.viewing import Served, decoded, serving
 
 pytestmark = pytest.mark.browser
 _BROWSERS = ("chromium", "chromium-browser", "google-chrome")
@@ -64,7 +63,7 @@ def coloured(shown: np.ndarray) -> float:
 
 
 @pytest.fixture
-def page(browser, served: ViewServer) -> Iterator:
+def page(browser, served: Served) -> Iterator:
     one = opened(browser, served.url)
     yield one
     assert one.faults == []
@@ -165,7 +164,7 @@ def test_a_command_is_planned_and_stepped_through(page) -> None:
     assert page.inner_text("#at-text").startswith("step 3 of ")
 
 
-def test_controls_have_names_and_the_page_fits_a_phone(browser, served: ViewServer) -> None:
+def test_controls_have_names_and_the_page_fits_a_phone(browser, served: Served) -> None:
     page = opened(browser, served.url, 390, 780)
     unnamed = page.evaluate(
         """() => [...document.querySelectorAll("button, input, select, canvas")].filter((e) => e.offsetParent &&
@@ -214,7 +213,7 @@ def edges(shown: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize(("width", "height"), [(1300, 420), (390, 780)])
 def test_the_whole_map_is_in_the_picture_from_its_side_and_as_a_plan(
-    browser, served: ViewServer, width: int, height: int
+    browser, served: Served, width: int, height: int
 ) -> None:
     page = opened(browser, served.url, width, height)
     for button in ("#whole", "#above"):
@@ -278,7 +277,7 @@ def test_a_reload_brings_back_the_view_and_the_question(page) -> None:
 
 
 @pytest.mark.parametrize("hash_", ["#view=a,b,c,d,e,f,g&cut=x", "#view=0,0,-1,0,0,0,0&colour=none"])
-def test_an_address_that_means_nothing_opens_the_whole_map(browser, served: ViewServer, hash_: str) -> None:
+def test_an_address_that_means_nothing_opens_the_whole_map(browser, served: Served, hash_: str) -> None:
     page, plain = opened(browser, served.url + hash_), opened(browser, served.url)
     assert camera(page)["numbers"] == camera(plain)["numbers"]
     assert page.faults == []
@@ -326,9 +325,7 @@ def test_a_picture_is_saved(page, tmp_path: Path) -> None:
 
 
 def test_two_maps_are_seen_side_by_side_and_one_over_the_other(browser, room: AVLMap) -> None:
-    from avlmaps.view.session import ViewSession
-
-    for server in serving(ViewSession([room, AVLMap(room.stored)])):
+    for server in serving(room.stored.path, room.stored.path):
         page = opened(browser, server.url)
         shown = picture(page)
         half = shown.shape[1] // 2

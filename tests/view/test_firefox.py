@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.view.server import ViewServer
 from helpers.firefox import Firefox
+from helpers.viewing import Served
 
 pytestmark = pytest.mark.browser
 
@@ -27,7 +27,7 @@ def firefox(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Firefox]:
 
 @pytest.mark.parametrize(("width", "height"), [(1000, 720), (500, 900)])
 def test_a_question_is_answered_in_firefox(
-    firefox: Firefox, served: ViewServer, room: AVLMap, width: int, height: int
+    firefox: Firefox, served: Served, room: AVLMap, width: int, height: int
 ) -> None:
     firefox.open(served.url, width, height)
     firefox.wait_for("#canvas[data-state=whole]")

@@ -12,8 +12,8 @@ import pytest
 from avlmaps.core.errors import QueryError
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.view.layout import Layout, as_bytes
+from avlmaps.view.on_page import MapOnPage
 from avlmaps.view.page import default_questions, live_page, write_page
-from avlmaps.view.session import MapOnPage
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +36,7 @@ def test_nothing_is_loaded_from_elsewhere(page: str) -> None:
     document = re.sub(r'<script type="application/json".*?</script>', "", page, flags=re.DOTALL)
     assert not re.findall(r"(?:src|href)=[\"'](?!data:|#)", document)
     assert "://" not in document, "no address at all"
-    assert "connect-src &#x27;none&#x27;" in page and "connect-src &#x27;self&#x27;" in live_page()
+    assert "connect-src &#x27;none&#x27;" in page and b"connect-src &#x27;self&#x27;" in live_page()
 
 
 def test_the_policy_allows_the_pages_own_script_alone(page: str) -> None:

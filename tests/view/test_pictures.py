@@ -12,7 +12,6 @@ import pytest
 from test_browser import browser, opened  # noqa: F401 - a fixture
 
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.view.session import ViewSession
 from helpers.viewing import decoded, serving
 
 pytestmark = pytest.mark.browser
@@ -40,7 +39,7 @@ def test_the_guide_is_clicked_through(browser, room: AVLMap, tmp_path: Path) -> 
     avlmap = AVLMap.open(given) if given else room
     things = avlmap.things()
     wanted = next((one.name for one in things if one.name in ("sofa", "bed")), things[0].name)
-    for server in serving(ViewSession([avlmap])):
+    for server in serving(avlmap.stored.path):
         page = opened(browser, server.url, 1280, 800)
         shoot(page, folder / "view-map.png")
         ask(page, f"the {wanted}")

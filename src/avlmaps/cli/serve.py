@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from avlmaps.serve.drive.opening import Driving
     from avlmaps.serve.service import Service
 
-_PACKAGES = ("starlette", "uvicorn", "multipart", "python_multipart", "mcp", "mcp_types", "anyio")
+_PACKAGES = ("mcp", "mcp_types")
 
 
 @dataclass(frozen=True, kw_only=True)

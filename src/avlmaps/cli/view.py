@@ -1,11 +1,13 @@
 """`avlmaps view`: look at a map in the browser, ask it, drive in it; or write it all into one file."""
 
-import signal
+import contextlib
+import secrets
 import sys
 import threading
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from urllib.parse import quote, urlencode
 
 from tyro.conf import Positional, arg
 
@@ -14,19 +16,20 @@ from avlmaps.cli.verb import ModelVerb
 from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
-    from types import FrameType
-
     from avlmaps.query.avlmap import AVLMap
+    from avlmaps.serve.settings import ServeSettings
     from avlmaps.view.route import MakeRobot
+
+_ANSWER_S = 600.0  # the contents of a large map take their time, and the page waits for them
 
 
 @dataclass(frozen=True, kw_only=True)
 class View(ModelVerb):
     """Show a map in the browser: look, click, ask in words, by photo or by sound, and drive.
 
-    The viewer answers this machine alone. For another --host it makes a token, which is part of the address that it
-    prints. Stop it with Ctrl-C. With --out it writes one file instead, which opens without avlmaps and without a
-    network.
+    It is a page of `avlmaps serve`, and answers this machine alone. For another --host it makes a token, which is part
+    of the address that it prints. Stop it with Ctrl-C. With --out it writes one file instead, which opens without
+    avlmaps and without a network.
 
     Examples:
     avlmaps view home.avlmap
@@ -115,36 +118,62 @@ def _robot(scene: str) -> "MakeRobot":
 
 
 def _serve(verb: View) -> None:
-    from avlmaps.view.server import ViewServer
-    from avlmaps.view.session import ViewSession
+    from avlmaps.core.network import is_loopback
+    from avlmaps.serve.app import create_app
+    from avlmaps.serve.running import listening_socket, run_http
+    from avlmaps.serve.service import Service
+    from avlmaps.serve.settings import Limits, ServeSettings
 
-    session = ViewSession(_maps(verb), None if verb.scene is None else _robot(verb.scene))
-    server = ViewServer(session, verb.host, verb.port)
-    try:
-        # SIGINT too: a shell that starts a command in the background has it ignored.
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, _stop)
+    token = None if is_loopback(verb.host) else secrets.token_urlsafe(24)
+    limits = Limits(answer_s=_ANSWER_S)
+    settings = ServeSettings(
+        host=verb.host.strip("[]"), port=verb.port, token=token, found_at=verb.found_at, limits=limits
+    )
+    named = _named(verb)
+    with listening_socket(settings) as opened:
+        robot = None if verb.scene is None else _robot(verb.scene)
+        service = Service.open(named, settings, say, robot, warm=False)
+        first = next(iter(named))
         if verb.scene is not None:
-            session.guide.prepare()  # a scene that is not the map's is an error before a page opens
-        session.prepare()
-        answer = {"url": server.url, "maps": [str(path) for path in (verb.map, verb.other) if path is not None]}
-        emit(answer, [f"the map is at {server.url}"], verb.json)
-        sys.stdout.flush()
-        if server.token is not None:
-            say("Other machines put this machine's name in the place of 127.0.0.1; the token stays.")
-        say("Stop the viewer with Ctrl-C.")
-        if not verb.no_browser:
-            _open_browser(server.url)
-        server.serve_forever(poll_interval=0.2)
-    except KeyboardInterrupt:
+            service.shelf.get(first).guide.prepare()  # a scene that is not the map's is an error before a page opens
+        url = _address(settings, opened.getsockname()[1], list(named))
+
+        def started() -> None:
+            answer = {"url": url, "maps": [str(path) for path in named.values()]}
+            emit(answer, [f"the map is at {url}"], verb.json)
+            sys.stdout.flush()
+            if token is not None:
+                say("Other machines put this machine's name in the place of 127.0.0.1; the token stays.")
+            say("Stop the viewer with Ctrl-C.")
+            if not verb.no_browser:
+                _open_browser(url)
+
+        try:
+            with contextlib.suppress(KeyboardInterrupt):  # where signals do not reach the server's loop: Windows
+                run_http(create_app(service, tools=()), service, opened, started)
+        finally:
+            service.close()
         say("The viewer is stopped.")
-    finally:
-        server.server_close()
-        session.close()
 
 
-def _stop(number: int, frame: "FrameType | None") -> None:
-    raise KeyboardInterrupt
+def _named(verb: View) -> dict[str, Path]:
+    """Return the maps by names that an address can hold."""
+    named: dict[str, Path] = {}
+    for path in (verb.map, verb.other):
+        if path is not None:
+            letters = path.resolve().name.removesuffix(".avlmap")
+            name = "".join(c if c.isalnum() or c in "-_. " else "-" for c in letters).strip(" .") or "map"
+            named[f"{name}-2" if name in named else name] = path
+    return named
+
+
+def _address(settings: "ServeSettings", port: int, names: list[str]) -> str:
+    """Return where a browser of this machine finds the page."""
+    host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(settings.host, settings.host)
+    words = {} if len(names) < 2 else {"other": names[1]}
+    words |= {} if settings.token is None else {"token": settings.token}
+    query = f"?{urlencode(words)}" if words else ""
+    return f"http://{f'[{host}]' if ':' in host else host}:{port}/maps/{quote(names[0])}/view{query}"
 
 
 def _open_browser(url: str) -> None:

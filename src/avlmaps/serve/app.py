@@ -10,6 +10,7 @@ from starlette.applications import Starlette
 from starlette.convertors import Convertor, register_url_convertor
 from starlette.datastructures import UploadFile
 from starlette.exceptions import HTTPException
+from starlette.middleware.gzip import GZipMiddleware
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, Response, StreamingResponse
 from starlette.routing import BaseRoute, Mount, Route
@@ -107,6 +108,8 @@ def create_app(
         },
     )
     app.router.redirect_slashes = False
+    if not service.settings.is_loopback:  # packing only costs time where the browser is on this machine
+        app.add_middleware(GZipMiddleware, minimum_size=10_000, compresslevel=1)
     return Guard(app, service.settings)
 
 

@@ -1,5 +1,6 @@
 """The guard before every request: Host, Origin, token, connections, size and time of the body, security headers.
 
+Programs send the token in a header. A browser brings it in the address once, and stores it in a cookie from then on.
 It is plain ASGI and stands before the whole application, sub-applications and MCP included.
 """
 
@@ -9,9 +10,10 @@ import hmac
 import json
 import socket
 from collections.abc import Awaitable, Callable, MutableMapping
+from http.cookies import CookieError, SimpleCookie
 from ipaddress import ip_address
 from typing import Any
-from urllib.parse import urlsplit
+from urllib.parse import parse_qsl, quote, unquote, urlencode, urlsplit
 
 from avlmaps.core.network import is_loopback
 from avlmaps.serve.errors import RequestError
@@ -31,6 +33,7 @@ HEADERS = (
     (b"cross-origin-resource-policy", b"same-origin"),
 )
 _NO_STORE = (b"cache-control", b"no-store")
+_COOKIE, _IN_ADDRESS = "avlmaps_token", "token"
 _OPEN_PATHS = frozenset({"/health"})
 # Nothing in a body may stand against a stop: it is not read there, so its size does not count.
 _UNREAD_PATHS = frozenset({"/drive/stop"})
@@ -58,9 +61,12 @@ class Guard:
             await send({"type": "websocket.close", "code": 1008})
             return
         try:
-            self._check(scope)
+            entered = self._check(scope)
         except RequestError as error:
             await refuse(error, send)
+            return
+        if entered is not None:
+            await _enter(entered, send)
             return
         body = _LimitedBody(receive, self._settings.limits.body_bytes, self._settings.limits.body_s)
         started = False
@@ -82,7 +88,12 @@ class Guard:
                 raise
             await refuse(error, send)
 
-    def _check(self, scope: Scope) -> None:
+    def _check(self, scope: Scope) -> list[tuple[bytes, bytes]] | None:
+        """Return the headers of a redirection where a browser brings the token in the address, else None.
+
+        Raises:
+            RequestError: the request is refused.
+        """
         headers = _headers(scope)
         size = 0 if scope["path"] in _UNREAD_PATHS else _length(headers.get("content-length", "0"))
         if self._settings.limits.body_bytes < size:
@@ -96,8 +107,18 @@ class Guard:
                 "host",
             )
         self._check_site(headers, host)
-        if self._token is not None and scope["path"] not in _OPEN_PATHS:
-            self._check_token(headers.get("authorization", ""))
+        if self._token is None or scope["path"] in _OPEN_PATHS:
+            return None
+        pairs = parse_qsl(scope.get("query_string", b"").decode("latin-1"), keep_blank_values=True)
+        given = dict(pairs).get(_IN_ADDRESS)
+        if scope["method"] == "GET" and given is not None and self._is_token(given):
+            # The token leaves the address, so that it is in no history and in no picture of the screen.
+            left = urlencode([pair for pair in pairs if pair[0] != _IN_ADDRESS])
+            secure = "; Secure" if self._settings.scheme == "https" else ""
+            cookie = f"{_COOKIE}={quote(given, safe='')}; HttpOnly; SameSite=Strict; Path=/{secure}"
+            return [(b"location", f"?{left}".encode()), (b"set-cookie", cookie.encode())]
+        self._check_token(headers)
+        return None
 
     def _is_ours(self, host: str) -> bool:
         """Return whether a Host header names this server. An address cannot be rebound by DNS, a name can."""
@@ -119,12 +140,15 @@ class Guard:
         if not same or (site in ("cross-site", "same-site") and mode != "navigate"):
             raise RequestError("Pages of other sites may not use this server.", 403, "origin")
 
-    def _check_token(self, authorization: str) -> None:
-        scheme, _, given = authorization.partition(" ")
-        right = hmac.compare_digest(_digest(given.strip()), self._token or b"")
-        if scheme.lower() != "bearer" or not right:
+    def _is_token(self, given: str) -> bool:
+        return hmac.compare_digest(_digest(given), self._token or b"")
+
+    def _check_token(self, headers: dict[str, str]) -> None:
+        scheme, _, given = headers.get("authorization", "").partition(" ")
+        if not (scheme.lower() == "bearer" and self._is_token(given.strip())) and not self._is_token(_kept(headers)):
             raise RequestError(
-                "This server needs a token; send the header 'Authorization: Bearer TOKEN'.",
+                "This server needs a token; send the header 'Authorization: Bearer TOKEN', or add ?token=TOKEN to the "
+                "address in a browser.",
                 401,
                 "token",
                 WWW_Authenticate='Bearer realm="avlmaps"',
@@ -176,6 +200,22 @@ async def refuse(error: RequestError, send: Send) -> None:
     ]
     await send({"type": "http.response.start", "status": error.status, "headers": headers})
     await send({"type": "http.response.body", "body": body})
+
+
+async def _enter(headers: list[tuple[bytes, bytes]], send: Send) -> None:
+    """Send a browser to the address without its token."""
+    headers = [*headers, (b"content-length", b"0"), *HEADERS, _NO_STORE]
+    await send({"type": "http.response.start", "status": 303, "headers": headers})
+    await send({"type": "http.response.body", "body": b""})
+
+
+def _kept(headers: dict[str, str]) -> str:
+    """Return the token that a browser stores, "" for none."""
+    try:
+        kept = SimpleCookie(headers.get("cookie", "")).get(_COOKIE)
+    except CookieError:
+        return ""
+    return "" if kept is None else unquote(kept.value)
 
 
 def _headers(scope: Scope) -> dict[str, str]:

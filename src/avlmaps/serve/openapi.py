@@ -17,7 +17,7 @@ _TEMPLATE = "#/components/schemas/{name}"
 _ERRORS = {
     "400": "The request does not fit this document, or holds neither a sentence nor a part.",
     "401": "The token is missing or wrong.",
-    "404": "There is no such map or tile.",
+    "404": "There is no such map, tile or voxel.",
     "413": "The body, the photo or the clip is too large.",
     "415": "A file cannot be read.",
     "422": "The query cannot be answered; the sentence says why.",
@@ -132,7 +132,7 @@ def _described(one: Operation, method: str, of: dict[Any, Any], components: dict
     if one.name == "getTile":
         operation["description"] = (tiles.__doc__ or "").partition("\n\n")[2]
     if method == "POST":
-        operation["requestBody"] = {"required": one.body == "photo", "content": _bodies(one, schema)}
+        operation["requestBody"] = {"required": one.body in ("photo", "command"), "content": _bodies(one, schema)}
     return operation
 
 
@@ -142,10 +142,14 @@ def _bodies(one: Operation, schema: dict[str, Any]) -> dict[str, Any]:
     form = {"type": "object", "properties": {**values, **files}, "additionalProperties": False}
     if one.body == "photo":
         form["required"] = ["photo"]
-    else:
+    elif one.body == "form":
         form |= _words_or_parts(one, one.files) | {"dependentRequired": {"intrinsics": ["photo"]}}
+    else:
+        form["required"] = schema["required"]
     bodies: dict[str, Any] = {"multipart/form-data": {"schema": form}}
-    if one.body == "form":
+    if one.body == "command":
+        bodies["application/json"] = {"schema": schema}
+    elif one.body == "form":
         plain = {name: value for name, value in schema["properties"].items() if name not in _OF_FILES}
         bodies["application/json"] = {"schema": {**schema, "properties": plain, **_words_or_parts(one)}}
     else:
@@ -161,7 +165,7 @@ def _words_or_parts(one: Operation, files: Sequence[str] = ()) -> dict[str, Any]
 
     parts = [given(name, r"\S") for name in ("object", "sound", "area")]
     rule: dict[str, Any] = {"not": {"allOf": [given("sentence", r"\S"), {"anyOf": parts}]}}
-    if one.name == "ask":
+    if one.name != "drawAnswer":
         rule["anyOf"] = [given("sentence", "[A-Za-z]"), *parts, *({"required": [name]} for name in files)]
     return rule
 

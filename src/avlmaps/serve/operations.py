@@ -7,7 +7,7 @@ from typing import Any, Literal
 from avlmaps.navigate.paths import PathAnswer
 from avlmaps.query.places import PlaceAnswer
 from avlmaps.query.schema import ContentsAnswer, LocateAnswer, QueryAnswer, RoomsAnswer
-from avlmaps.serve import work
+from avlmaps.serve import viewing, work
 from avlmaps.serve.requests import (
     AskQuery,
     ListedThingsQuery,
@@ -16,9 +16,11 @@ from avlmaps.serve.requests import (
     PathQuery,
     PictureQuery,
     PlaceQuery,
+    RehearseQuery,
     RoomsQuery,
     ThingsQuery,
     TilesQuery,
+    ViewQuery,
 )
 from avlmaps.serve.tiles import TilesAnswer
 
@@ -36,7 +38,8 @@ class Operation:
         answer: the type of the answer's JSON, or a media type.
         work: makes the answer, in a thread.
         lane: quick for queries in words, slow for all else.
-        body: what a POST may bring: nothing (then there is only GET), JSON and forms, or forms and a photo as the body.
+        body: what a POST may bring: nothing (then there is only GET), a query as JSON or a form, a command likewise
+            (then there is only POST), or a form or a photo as the body (likewise).
         files: names of the files of a form.
     """
 
@@ -47,7 +50,7 @@ class Operation:
     answer: Any
     work: Callable[[Any, Any], Any]
     lane: Literal["quick", "slow"] = "quick"
-    body: Literal["none", "form", "photo"] = "none"
+    body: Literal["none", "form", "command", "photo"] = "none"
     files: tuple[str, ...] = ()
 
     @property
@@ -83,4 +86,22 @@ OPERATIONS = (
               NoQuery, TilesAnswer, work.tiles, "slow"),
     Operation("getTile", "/tiles/{level:count}/{i:index}/{j:index}/{k:index}", "Return one tile of voxels.",
               TilesQuery, "application/octet-stream", work.tile, "slow"),
+    Operation("getKeyframe", "/keyframes/{keyframe:count}", "Return the picture of a keyframe, counted from 0.",
+              NoQuery, "image/jpeg", viewing.keyframe),
+    Operation("view", "/view", "Show the map in a browser, as `avlmaps view` does.",
+              ViewQuery, "text/html", viewing.viewer),
+    Operation("viewMap", "/view/map", "Return what the page of `view` needs to begin.",
+              NoQuery, dict, viewing.drawn_map),
+    Operation("viewVoxels", "/view/voxels", "Return the voxels that the page draws, in the order of drawing.",
+              NoQuery, "application/octet-stream", viewing.drawn_voxels),
+    Operation("viewLabels", "/view/labels", "Return the thing, the room and the name of each voxel that is drawn.",
+              NoQuery, "application/octet-stream", viewing.drawn_labels, "slow"),
+    Operation("viewContents", "/view/contents", "Return things, sounds and rooms with the colours of the page.",
+              NoQuery, dict, viewing.drawn_contents, "slow"),
+    Operation("viewVoxel", "/view/voxels/{voxel:count}", "Return what a voxel that is drawn is taken for.",
+              NoQuery, dict, viewing.drawn_voxel),
+    Operation("askInView", "/view/ask", "Query a map, and return the answer with the heat of each voxel that is drawn.",
+              AskQuery, "application/octet-stream", viewing.ask_in_view, "quick", "form", ("photo", "clip")),
+    Operation("rehearse", "/view/rehearse", "Plan a command on the map; no real robot moves.",
+              RehearseQuery, dict, viewing.rehearse, "slow", "command", ("photo", "clip")),
 )  # fmt: skip

@@ -32,6 +32,7 @@ def html_page() -> str:
 <title>avlmaps server</title><style>{_STYLE}</style></head><body>
 <h1>avlmaps server</h1>
 <p>Version {escape(__version__)}, {len(OPERATIONS)} operations on each map. The maps: <a href="maps">maps</a>.
+In the browser, a map is at <code>/maps/NAME/view</code>.
 For programs: <a href="openapi.json">openapi.json</a> (OpenAPI 3.1). For agents: MCP by streamable HTTP at
 <code>/mcp</code>.</p>
 <pre>curl -G http://127.0.0.1:8750/maps/NAME/ask --data-urlencode "sentence=the chair near the table"

@@ -121,6 +121,24 @@ class PathQuery(Struct, forbid_unknown_fields=True, rename={"start": "from", "go
     ] = False
 
 
+class ViewQuery(Struct, forbid_unknown_fields=True):
+    """What the page shows beside the map."""
+
+    other: Annotated[Name | None, Meta(description="A second map of the same place, to compare.")] = None
+
+
+class RehearseQuery(Struct, forbid_unknown_fields=True):
+    """A command that is planned on the map. A photo and a clip that it speaks of come as files of a form."""
+
+    command: Annotated[str, Meta(max_length=1000, description="The command, such as 'go to the sofa'.")]
+    start: Annotated[
+        Annotated[str, Meta(pattern=rf"^{_NUMBER},{_NUMBER},{_NUMBER}$")] | None,
+        Meta(
+            description="x,y,heading where it begins, metres and radians, level frame. Default: near the walk's start."
+        ),
+    ] = None
+
+
 class TilesQuery(Struct, forbid_unknown_fields=True):
     """How tiles are coloured."""
 

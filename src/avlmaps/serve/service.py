@@ -3,12 +3,16 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from avlmaps.query.avlmap import QuerySettings
 from avlmaps.serve.errors import Privacy
 from avlmaps.serve.lanes import Lane
 from avlmaps.serve.settings import ServeSettings
 from avlmaps.serve.shelf import Shelf
+
+if TYPE_CHECKING:
+    from avlmaps.view.route import MakeRobot
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +39,8 @@ class Service:
         maps: Mapping[str, Path],
         settings: ServeSettings | None = None,
         note: Callable[[str], None] = lambda _: None,
+        robot: "MakeRobot | None" = None,
+        warm: bool = True,
     ) -> "Service":
         """Open the maps and start the lanes.
 
@@ -42,13 +48,15 @@ class Service:
             maps: folders by name; see ``shelf.named_maps``.
             settings: the defaults if None.
             note: is given a line for the log.
+            robot: puts a simulated robot into a map's scene, for the commands of its page.
+            warm: whether each map computes now what every query needs.
 
         Raises:
             MapError: a map cannot be opened.
         """
         settings = settings or ServeSettings()
         limits = settings.limits
-        shelf = Shelf(maps, limits, note, QuerySettings(found_at=settings.found_at))
+        shelf = Shelf(maps, limits, note, QuerySettings(found_at=settings.found_at), robot, warm)
         return cls(
             settings,
             shelf,

@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from avlmaps.navigate.paths import PathFinder
     from avlmaps.query.topdown import TopDown
     from avlmaps.serve.tiles import Pyramid
+    from avlmaps.view.on_page import MapOnPage
+    from avlmaps.view.route import Guide, MakeRobot
 
 T = TypeVar("T")
 # A query of each kind loads its model and compiles its loops.
@@ -97,8 +99,15 @@ class ServedMap:
         avlmap: the map.
     """
 
-    def __init__(self, name: str, stored: "StoredMap", settings: QuerySettings | None, cache_bytes: int) -> None:
-        self.name = name
+    def __init__(
+        self,
+        name: str,
+        stored: "StoredMap",
+        settings: QuerySettings | None,
+        cache_bytes: int,
+        robot: "MakeRobot | None" = None,
+    ) -> None:
+        self.name, self._robot = name, robot
         self.avlmap = CachedMap(stored, settings, cache_bytes)
         self._once = threading.RLock()
         self._answers: OrderedDict[object, object] = OrderedDict()
@@ -159,6 +168,20 @@ class ServedMap:
 
         return Pyramid.of(self.avlmap)
 
+    @cached_property
+    def page(self) -> "MapOnPage":
+        """The map as the page of ``view`` draws it."""
+        from avlmaps.view.on_page import MapOnPage
+
+        return MapOnPage(self.avlmap)
+
+    @cached_property
+    def guide(self) -> "Guide":
+        """Plans the commands of that page."""
+        from avlmaps.view.route import Guide
+
+        return Guide(self.avlmap, self._robot)
+
     def once(self, key: object, work: Callable[[], T], most: int = 64) -> T:
         """Return what work returns, remembered for later under a key."""
         with self._once:
@@ -175,18 +198,18 @@ class ServedMap:
 class _Slot:
     """One name, the map that answers for it now, and the one that is being opened."""
 
-    def __init__(self, name: str, path: Path, settings: QuerySettings | None, cache_bytes: int) -> None:
-        self.name, self.path = name, path
-        self._settings, self._cache_bytes = settings, cache_bytes
+    def __init__(self, name: str, path: Path, make: Callable[[str, "StoredMap"], ServedMap], warm: bool) -> None:
+        self.name, self.path, self._make = name, path, make
         self._lock = threading.Lock()
         self._opening: threading.Thread | None = None
         self.fault: AvlmapsError | OSError | None = None
-        self._stamp, self.map = self._opened()
+        self._stamp, self.map = self._opened(warm)
 
-    def _opened(self) -> tuple[object, ServedMap]:
+    def _opened(self, warm: bool = True) -> tuple[object, ServedMap]:
         before = stamp(self.path / MANIFEST)
-        opened = ServedMap(self.name, open_stored(self.path), self._settings, self._cache_bytes)
-        opened.prepare()
+        opened = self._make(self.name, open_stored(self.path))
+        if warm:
+            opened.prepare()
         return before, opened
 
     def refresh(self, note: Callable[[str], None]) -> None:
@@ -229,6 +252,8 @@ class Shelf:
         limits: Limits | None = None,
         note: Callable[[str], None] = lambda _: None,
         settings: QuerySettings | None = None,
+        robot: "MakeRobot | None" = None,
+        warm: bool = True,
     ) -> None:
         """Open maps.
 
@@ -237,13 +262,19 @@ class Shelf:
             limits: how much each map may remember.
             note: is given a line when a map was replaced.
             settings: of each map's queries.
+            robot: puts a simulated robot into a map's scene, for the commands of its page.
+            warm: whether each map computes now what every query needs.
 
         Raises:
             MapError: one of them cannot be opened.
         """
         cache_bytes = (limits or Limits()).cache_bytes
         self._note = note
-        self._slots = {name: _Slot(name, path, settings, cache_bytes) for name, path in maps.items()}
+
+        def make(name: str, stored: "StoredMap") -> ServedMap:
+            return ServedMap(name, stored, settings, cache_bytes, robot)
+
+        self._slots = {name: _Slot(name, path, make, warm) for name, path in maps.items()}
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -53,6 +53,16 @@ class Uploads:
             found[CLIP] = decode_clip(self.clip, limits)
         return found
 
+    def written(self, folder: Path) -> tuple[str | None, str | None]:
+        """Write the files, which are whole, into a folder; return their names, None for one that is not there."""
+        names: list[str | None] = []
+        for kind, content in ((PHOTO, self.photo), (CLIP, self.clip)):
+            suffix = ".png" if kind == PHOTO else self_contained_suffix(content or b"") or ""
+            names.append(None if content is None else f"{kind}{suffix}")
+            if content is not None:
+                (folder / f"{kind}{suffix}").write_bytes(content)
+        return names[0], names[1]
+
 
 def decode_photo(content: bytes, limits: Limits) -> UInt8[np.ndarray, "h w 3"]:
     """Decode a PNG or JPEG as RGB.

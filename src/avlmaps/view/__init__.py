@@ -1,1 +1,1 @@
-"""A map in the browser: `avlmaps view`. One page, served by this machine or written into one file."""
+"""A map in the browser: `avlmaps view`. One page, which `serve` serves, or written into one file."""

@@ -4,7 +4,6 @@ The page draws in the level frame (metres, z up). A voxel is three whole numbers
 `level_from_cells` turns into that frame; positions in answers stay in the recording frame, as everywhere.
 """
 
-from copy import copy
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -63,12 +62,6 @@ class Layout:
 
     def __len__(self) -> int:
         return len(self.order)
-
-    def with_map(self, avlmap: "AVLMap") -> "Layout":
-        """Return the same layout of another object of the same map."""
-        twin = copy(self)
-        twin.avlmap = avlmap
-        return twin
 
     @property
     def level_from_cells(self) -> Float[np.ndarray, "4 4"]:

@@ -6,7 +6,7 @@ import hashlib
 import json
 import re
 from collections.abc import Sequence
-from functools import partial
+from functools import cache, partial
 from html import escape
 from importlib.resources import files
 from pathlib import Path
@@ -18,12 +18,12 @@ from avlmaps.core.errors import QueryError
 from avlmaps.core.files import write_bytes_atomically
 from avlmaps.core.progress import progress
 from avlmaps.core.question import Modality, Part, Question
-from avlmaps.view.session import ViewSession
+from avlmaps.view.labels import palettes
+from avlmaps.view.on_page import TOP, MapOnPage
 
 if TYPE_CHECKING:
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.view.labels import Labels
-    from avlmaps.view.session import MapOnPage
 
 SCRIPTS = ("matrix.js", "source.js", "shaders.js", "renderer.js", "camera.js", "marks.js", "viewer.js", "address.js",
            "saving.js", "panel.js")  # fmt: skip
@@ -40,9 +40,10 @@ _POLICY = (
 )
 
 
-def live_page() -> str:
+@cache
+def live_page() -> bytes:
     """Return the page that queries its server."""
-    return _page("avlmaps view", None)
+    return _page("avlmaps view", None).encode("utf-8")
 
 
 def write_page(
@@ -62,23 +63,26 @@ def write_page(
     Raises:
         QueryError: a question is not understood, or the file cannot be written.
     """
-    session = ViewSession(maps, most=MOST_VOXELS)
-    sentences = list(questions) or default_questions(session.maps[0].labels)
+    shown = [MapOnPage(avlmap, MOST_VOXELS) for avlmap in maps]
+    sentences = list(questions) or default_questions(shown[0].labels)
     data: dict[str, Any] = {
-        **session.describe(),
+        "maps": [one.layout.describe() for one in shown],
+        "palettes": palettes(),
         "robot": False,
-        "contents": [one.describe_contents() for one in session.maps],
-        "records": [_packed(one.layout.records) for one in session.maps],
-        "labels": [_packed(one.labels.voxels.tobytes()) for one in session.maps],
-        "pictures": [_pictures(one) for one in session.maps],
-        "clips": [_clips(one) for one in session.maps],
+        "contents": [one.describe_contents() for one in shown],
+        "records": [_packed(one.layout.records) for one in shown],
+        "labels": [_packed(one.labels.voxels.tobytes()) for one in shown],
+        "pictures": [_pictures(one) for one in shown],
+        "clips": [_clips(one) for one in shown],
         "questions": [],
     }
     for one in progress(sentences, "asking", unit="question"):
         sentence, question = (one, None) if isinstance(one, str) else one
-        answer, heat = session.ask(sentence, question=question)
-        data["questions"].append(answer | {"heat": _packed(heat)})
-    names = " and ".join(one.layout.avlmap.stored.path.name.removesuffix(".avlmap") for one in session.maps)
+        answers = [on_page.avlmap.ask(question or sentence, TOP) for on_page in shown]
+        heat = b"".join(on_page.heat_of(answer) for on_page, answer in zip(shown, answers, strict=True))
+        told = [answer.to_dict() for answer in answers]
+        data["questions"].append({"question": sentence, "answers": told, "heat": _packed(heat)})
+    names = " and ".join(one.layout.avlmap.stored.path.name.removesuffix(".avlmap") for one in shown)
     content = _page(names, data).encode("utf-8")
     try:
         write_bytes_atomically(out, content)
@@ -87,8 +91,8 @@ def write_page(
     return {
         "page": str(out),
         "bytes": len(content),
-        "voxels": [len(one.layout) for one in session.maps],
-        "voxels_of_maps": [len(one.avlmap.space) for one in session.maps],
+        "voxels": [len(one.layout) for one in shown],
+        "voxels_of_maps": [len(one.avlmap.space) for one in shown],
         "questions": [{"question": one["question"], "found": one["answers"][0]["found"]} for one in data["questions"]],
     }
 
@@ -134,7 +138,7 @@ def _packed(content: bytes) -> str:
     return base64.b64encode(gzip.compress(content, _COMPRESSION, mtime=0)).decode("ascii")
 
 
-def _pictures(one: "MapOnPage") -> dict[str, str]:
+def _pictures(one: MapOnPage) -> dict[str, str]:
     """Return some keyframes' pictures, evenly over the walk, by their numbers."""
     count = len(one.avlmap.stored.keyframes)
     chosen = np.unique(np.linspace(0, count - 1, min(count, _MOST_PICTURES)).round().astype(int)) if count else ()
@@ -142,7 +146,7 @@ def _pictures(one: "MapOnPage") -> dict[str, str]:
     return {number: base64.b64encode(jpeg).decode("ascii") for number, jpeg in pictures.items() if jpeg}
 
 
-def _clips(one: "MapOnPage") -> list[str]:
+def _clips(one: MapOnPage) -> list[str]:
     stored = one.avlmap.stored
     return [
         base64.b64encode(stored.clip_path(number).read_bytes()).decode("ascii") for number in range(len(stored.sounds))

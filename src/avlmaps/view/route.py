@@ -1,7 +1,10 @@
 """A command typed into a page: its readings, its program, the path planned on the map, and a simulated drive."""
 
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,7 +26,6 @@ if TYPE_CHECKING:
     from avlmaps.maps.obstacles import Obstacles
     from avlmaps.navigate.driver import Driver
     from avlmaps.query.avlmap import AVLMap
-    from avlmaps.view.uploads import Upload
 
 MakeRobot = Callable[["AVLMap"], "Driver"]
 """Puts a robot that really moves (a simulated one) into the world that a map was made of."""
@@ -60,9 +62,8 @@ class Guide:
     def __init__(self, avlmap: "AVLMap", robot: MakeRobot | None = None, shape: BodyShape = BASE) -> None:
         self.avlmap = avlmap
         self._make_robot, self._shape = robot, shape
-        self._obstacles: Obstacles | None = None
         self._robot: Driver | None = None
-        self._pose: GroundPose | None = None
+        self._lock = threading.Lock()
 
     @property
     def has_robot(self) -> bool:
@@ -79,27 +80,34 @@ class Guide:
         self._driver()
 
     def obey(
-        self, command: str, photo: "Upload | None" = None, clip: "Upload | None" = None, *, again: bool = False
+        self,
+        command: str,
+        start: GroundPose | None = None,
+        *,
+        folder: Path | None = None,
+        photo: str | None = None,
+        clip: str | None = None,
     ) -> dict[str, Any]:
         """Read a command, plan it on the map, and drive it where there is a robot.
 
         Args:
             command: what a person says.
-            photo: what "this photo" means.
-            clip: what "this recording" means.
-            again: put the robot back to where it began, first.
+            start: where it begins without a robot, level frame; near where the walk began if None.
+            folder: whose files a program may read.
+            photo: file in the folder that "this photo" means.
+            clip: file in the folder that "this recording" means.
+
+        Returns:
+            The readings, the program, what was planned and driven, and where it ended (``pose``: x, y, heading).
 
         Raises:
             LanguageError: the command is not understood.
             NavigationError: there is no room for the robot.
         """
-        if again:
-            self._robot = self._pose = None
-        files = [None if upload is None else str(upload.path) for upload in (photo, clip)]
-        translator = LearnedTranslator(Given(files[0], files[1], self.avlmap.knows))
+        translator = LearnedTranslator(Given(photo, clip, self.avlmap.knows))
         readings = explanation(translator, command)[:_MOST_READINGS]
         translation = translator.program_for(command)
-        readable = Readable((), tuple(path for path in files if path is not None))
+        readable = Readable(() if folder is None else (folder,))
         settings = RobotSettings(waits=False)
 
         def run(driver: "Driver") -> Drive:
@@ -115,21 +123,19 @@ class Guide:
             "program": translation.program,
             "notes": list(translation.notes),
         }
-        robot = self._driver()
-        start = self._start() if robot is None else robot.pose
-        planner = MapDriver(self.obstacles, FreeBody(start), self._shape)
-        answer["planned"] = run(planner).to_json()
-        if robot is None:
-            self._pose = planner.pose
-            return answer | {"driven": None}
-        return answer | {"driven": run(robot).to_json()}
+        with self._lock:
+            robot = self._driver()
+            begin = robot.pose if robot is not None else start or self._start()
+            planner = MapDriver(self.obstacles, FreeBody(begin), self._shape)
+            planned, driven = run(planner), None if robot is None else run(robot)
+            end = planner.pose if robot is None else robot.pose
+        told = None if driven is None else driven.to_json()
+        return answer | {"planned": planned.to_json(), "driven": told, "pose": [end.x_m, end.y_m, end.heading_rad]}
 
-    @property
+    @cached_property
     def obstacles(self) -> "Obstacles":
         """The obstacles that the map knows."""
-        if self._obstacles is None:
-            self._obstacles = obstacles_for(self.avlmap, self._shape)
-        return self._obstacles
+        return obstacles_for(self.avlmap, self._shape)
 
     def _driver(self) -> "Driver | None":
         if self._robot is None and self._make_robot is not None:
@@ -137,9 +143,7 @@ class Guide:
         return self._robot
 
     def _start(self) -> GroundPose:
-        """Return where a planned command begins: where the last one ended, else near where the walk began."""
-        if self._pose is not None:
-            return self._pose
+        """Return a place near where the walk began."""
         obstacles = self.obstacles
         costmap = costmap_of(obstacles, self._shape.radius_m)
         places = costmap.middle_of(np.argwhere(costmap.passable & (costmap.room_m >= self._shape.radius_m + _MARGIN_M)))

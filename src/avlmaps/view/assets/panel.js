@@ -212,7 +212,7 @@ class Panel {
     label.firstChild.textContent = file ? file.name.slice(0, 18) : kind === "photo" ? "Photo" : "Sound";
     if (!file) return;
     try {
-      this.files[kind] = await this.source.upload(kind, file);
+      this.files[kind] = await this.source.taken(kind, file);
       this.say(`${file.name} is ready; press Ask.`, "");
     } catch (fault) {
       await this.give(kind, null);
@@ -274,7 +274,7 @@ class Panel {
       const texts = [made("p", { className: `verdict ${answer.found ? "found" : "lost"}`,
         textContent: `${of}${verdict}${count} ${answer.text}` })];
       for (const part of answer.parts) {
-        const name = `${part.modality}: ${part.query}`;
+        const name = `${part.modality}: ${this.files[part.query]?.name ?? part.query}`;
         const taken = part.understood && part.understood !== part.query ? `, understood as ${part.understood}` : "";
         const state = part.found ? "found" : "not found";
         texts.push(made("p", { className: "soft", textContent: `${name}${taken} (${part.role}), ${state}` +

@@ -9,13 +9,22 @@ async function answeredJson(response) {
 class LiveSource {
   live = true;
 
-  describe() {
-    return fetch("/api/maps").then(answeredJson);
+  /** The page is /maps/NAME/view; ?other= names a second map, to compare. */
+  constructor() {
+    const own = location.pathname.replace(/\/view$/, "");
+    const other = new URLSearchParams(location.search).get("other");
+    this.at = other === null ? [own] : [own, own.replace(/[^/]*$/, encodeURIComponent(other))];
+  }
+
+  async describe() {
+    const told = await Promise.all(this.at.map((at) => fetch(`${at}/view/map`).then(answeredJson)));
+    this.versions = told.map(({ version }) => version);
+    return { ...told[0], maps: told.map(({ map }) => map) };
   }
 
   /** Read voxels as they come; `onPart(bytes, start)` gets them piece by piece. */
   async voxels(map, onPart) {
-    const response = await fetch(`/api/maps/${map}/voxels`);
+    const response = await fetch(`${this.at[map]}/view/voxels`);
     if (!response.ok) await answeredJson(response);
     const reader = response.body.getReader();
     for (let at = 0; ; ) {
@@ -27,21 +36,21 @@ class LiveSource {
   }
 
   contents(map) {
-    return fetch(`/api/maps/${map}/contents`).then(answeredJson);
+    return fetch(`${this.at[map]}/view/contents`).then(answeredJson);
   }
 
   async labels(map) {
-    const response = await fetch(`/api/maps/${map}/labels`);
+    const response = await fetch(`${this.at[map]}/view/labels`);
     if (!response.ok) await answeredJson(response);
     return new Uint8Array(await response.arrayBuffer());
   }
 
   voxel(map, number) {
-    return fetch(`/api/maps/${map}/voxels/${number}`).then(answeredJson);
+    return fetch(`${this.at[map]}/view/voxels/${number}`).then(answeredJson);
   }
 
   keyframe(map, number) {
-    return `/api/maps/${map}/keyframes/${number}`;
+    return `${this.at[map]}/keyframes/${number}`;
   }
 
   nearestKeyframe(map, number) {
@@ -49,31 +58,57 @@ class LiveSource {
   }
 
   clip(map, number) {
-    return `/api/maps/${map}/clips/${number}`;
+    return `${this.at[map]}/sounds/${number}/clip`;
   }
 
-  async upload(kind, file) {
-    const headers = { "Content-Type": "application/octet-stream", "X-Name": encodeURIComponent(file.name) };
-    return (await fetch(`/api/uploads/${kind}`, { method: "POST", headers, body: file }).then(answeredJson)).upload;
+  /** Return a file as it is sent: the server reads PNG and JPEG, the browser more. */
+  async taken(kind, file) {
+    if (kind !== "photo") return file;
+    const picture = await createImageBitmap(file).catch(() => null);
+    if (!picture) throw new Error(`${file.name} cannot be read as an image; choose another file.`);
+    if (["image/jpeg", "image/png"].includes(file.type)) return file;
+    const sheet = made("canvas", { width: picture.width, height: picture.height });
+    sheet.getContext("2d").drawImage(picture, 0, 0);
+    const png = await new Promise((resolve) => sheet.toBlob(resolve, "image/png"));
+    return new File([png], file.name, { type: "image/png" });
   }
 
+  /** Ask each map; the heat of one comes after that of the other. */
   async ask(words) {
-    const response = await posted("/api/ask", words);
+    const told = await Promise.all(this.at.map((at, map) => this.askOne(at, map, words)));
+    const heat = new Uint8Array(told.reduce((sum, one) => sum + one.heat.length, 0));
+    let at = 0;
+    for (const one of told) {
+      heat.set(one.heat, at);
+      at += one.heat.length;
+    }
+    return { answers: told.map(({ answer }) => answer), heat };
+  }
+
+  async askOne(at, map, words) {
+    const response = await posted(`${at}/view/ask`, { ...words, top: 5 });
     if (!response.ok) await answeredJson(response);
     const bytes = new Uint8Array(await response.arrayBuffer());
     const size = new DataView(bytes.buffer).getUint32(0, true);
     const told = JSON.parse(new TextDecoder().decode(bytes.subarray(4, 4 + size)));
-    return { ...told, heat: bytes.subarray(4 + size) };
+    if (told.version !== this.versions[map]) throw new Error("The map was built again; load the page again.");
+    return { answer: told.answer, heat: bytes.subarray(4 + size) };
   }
 
-  go(words) {
-    return posted("/api/go", words).then(answeredJson);
+  /** Plan a command; without a robot of its own the server begins where the last one ended. */
+  async go(words) {
+    const start = this.pose ? { start: this.pose.map((value) => value.toFixed(6)).join(",") } : {};
+    const told = await posted(`${this.at[0]}/view/rehearse`, { ...words, ...start }).then(answeredJson);
+    this.pose = told.pose;
+    return told;
   }
 }
 
+/** Send words and files as a form. */
 function posted(path, words) {
-  const headers = { "Content-Type": "application/json" };
-  return fetch(path, { method: "POST", headers, body: JSON.stringify(words) });
+  const form = new FormData();
+  for (const [name, value] of Object.entries(words)) form.append(name, value);
+  return fetch(path, { method: "POST", body: form });
 }
 
 function fromBase64(text) {
