@@ -1,7 +1,7 @@
 """Recording a scene: a robot drives through it, its camera and its microphone run, and truth is written beside."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass, field, replace
 from multiprocessing.reduction import ForkingPickler
@@ -22,6 +22,7 @@ from avlmaps.recordings.layout import DESCRIPTION
 from avlmaps.recordings.writer import RecordingWriter
 from avlmaps_sim.coverage import FloorCoverage, coverage_of_walk, require_floor
 from avlmaps_sim.hearing import Recorded, ScheduleRule, Sounding, Synthesised, candidates, schedule
+from avlmaps_sim.rearranged import Change, to_json
 from avlmaps_sim.render import Renderer
 from avlmaps_sim.scene import Scene
 from avlmaps_sim.sensor import PRESETS, OdometryFaults, Sensor, SensorName, Shift, drifted
@@ -135,7 +136,11 @@ class _Trip:
 
 
 def record_scene(
-    scene: Scene, out: Path | str, settings: RecordSettings | None = None, seed: int = 0
+    scene: Scene,
+    out: Path | str,
+    settings: RecordSettings | None = None,
+    seed: int = 0,
+    changes: Sequence[Change] = (),
 ) -> SceneRecording:
     """Drive through a scene and write a recording in our folder format, with its truth beside it.
 
@@ -146,6 +151,7 @@ def record_scene(
         out: the folder to make; it must be empty.
         settings: the camera, its faults, and how sounds reach the microphone.
         seed: of the walk, the sounds and the faults.
+        changes: what became of the scene since it was made, for its truth.
 
     Raises:
         RecordingError: the folder is not empty, or the scene has no floor to speak of, or is none in metres.
@@ -166,7 +172,8 @@ def record_scene(
         if (track := _track(scene, settings, trip, soundings, for_track)) is not None:
             writer.set_audio(track)
         _write_frames(scene, settings, trip, writer, for_frames)
-        write_truth(out, scene, soundings, {"scene": scene.name, "seed": seed, "settings": _plain(settings)})
+        made_by = {"scene": scene.name, "seed": seed, "settings": _plain(settings)}
+        write_truth(out, scene, soundings, {**made_by, "changes": to_json(changes)} if changes else made_by)
     return SceneRecording(out, len(trip.stamps_s), trip.duration_s, tuple(soundings), floor)
 
 
