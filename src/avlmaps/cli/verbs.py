@@ -8,11 +8,13 @@ import tyro
 
 from avlmaps.cli.add_sounds import AddSounds
 from avlmaps.cli.build import Build
+from avlmaps.cli.changes import Changes
 from avlmaps.cli.export import Export
 from avlmaps.cli.go import Go
 from avlmaps.cli.info import Info
 from avlmaps.cli.live import Live
 from avlmaps.cli.locate import Locate
+from avlmaps.cli.merge import Merge
 from avlmaps.cli.profiles import Profiles
 from avlmaps.cli.query import Query
 from avlmaps.cli.rooms import Rooms
@@ -38,10 +40,12 @@ _OWN: dict[str, type[Verb]] = {
     "add-sounds": AddSounds,
     "build": Build,
     "live": Live,
+    "merge": Merge,
     "info": Info,
     "query": Query,
     "things": Things,
     "rooms": Rooms,
+    "changes": Changes,
     "shell": Shell,
     "view": View,
     "export": Export,
@@ -53,8 +57,8 @@ _OWN: dict[str, type[Verb]] = {
 }
 # As help lists them: in the order in which a person comes to use them; other packages' own verbs follow.
 _ORDER = (
-    "demo", "record", "add-sounds", "build", "live", "import-map", "info", "query", "things", "rooms", "shell", "view",
-    "export", "locate", "go", "serve", "teach-sound", "profiles", "bench",
+    "demo", "record", "add-sounds", "build", "live", "merge", "import-map", "info", "query", "things", "rooms",
+    "changes", "shell", "view", "export", "locate", "go", "serve", "teach-sound", "profiles", "bench",
 )  # fmt: skip
 
 

@@ -20,6 +20,7 @@ if TYPE_CHECKING or "jaxtyping" in sys.modules:
     from jaxtyping import Int32 as Int32
     from jaxtyping import Int64 as Int64
     from jaxtyping import UInt8 as UInt8
+    from jaxtyping import UInt16 as UInt16
 else:
 
     class Declared:
@@ -59,6 +60,7 @@ else:
 
     Bool, Complex64 = _Numbers("bool"), _Numbers("complex64")
     Float16, Float32, Float64 = _Numbers("float16"), _Numbers("float32"), _Numbers("float64")
-    Int8, Int32, Int64, UInt8 = _Numbers("int8"), _Numbers("int32"), _Numbers("int64"), _Numbers("uint8")
+    Int8, Int32, Int64 = _Numbers("int8"), _Numbers("int32"), _Numbers("int64")
+    UInt8, UInt16 = _Numbers("uint8"), _Numbers("uint16")
     Float = _Numbers("float16", "float32", "float64")
     Int = _Numbers("int8", "int16", "int32", "int64")

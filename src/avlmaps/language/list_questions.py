@@ -17,7 +17,8 @@ NUMBERS = {
 }  # fmt: skip
 SUPPORTED = (
     "where things, sounds, rooms and photos are, how many there are, what is in a room or next to a thing, which room "
-    "a thing or a photo is in, the largest or smallest room, and the first or last sound"
+    "a thing or a photo is in, the largest or smallest room, the first or last sound, and of a map of several days "
+    "what is new, gone or moved and where a thing was last seen"
 )
 """What a map answers, for the sentence that refuses another question."""
 
@@ -31,6 +32,8 @@ class Listed(StrEnum):
     BESIDE = "things beside a thing"
     ROOM_OF = "room of a thing or a photo"
     NAMES = "all rooms, sounds or things"
+    CHANGES = "what is new, gone or moved"
+    LAST_SEEN = "where a thing was last seen"
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,12 +45,16 @@ class ListQuestion:
         name: of the room or the thing; what is listed for ``NAMES``; words for ``ROOM_OF``, as a query has them.
         first: the smallest room or the first sound, instead of the largest and the last.
         counts: whether only the number is sought.
+        since: the day after which changes count, as it was said; "" for the first.
+        change: ``new``, ``gone`` or ``moved``; "" for any change.
     """
 
     of: Listed
     name: str = ""
     first: bool = False
     counts: bool = False
+    since: str = ""
+    change: str = ""
 
 
 _POLITE = re.compile(
@@ -81,7 +88,22 @@ _SEEN = r"(?:do|can|could|did|have) (?:you|we|i|one|they) (?:have|see|find|keep|
 _KIND = r"(?: else)?(?: (?:other )?(?:sort|sorts|kind|kinds|type|types) of)?"
 _WHAT_IS = rf"what{_KIND}(?: (?:things|objects|items|stuff|furniture|equipment))?(?: (?:is|are|stands|{_SEEN})){_THERE}"
 _NOT_ONE = r"(?!no |none |any |the (?:most|best|least|fewest)|most |more |fewer |enough |both |all |every |nobody )"
+_CHANGED = {
+    "new": "new|added|brought|appeared", "gone": "gone|missing|removed|taken(?: away)?|disappeared|lost",
+    "moved": "moved|somewhere else|elsewhere|in another place", "": "changed|different|other than before",
+}  # fmt: skip
+_SINCE = r"(?: since (?:visit (?P<visit>[0-9]+)|(?P<date>[0-9]{4}-[0-9]{2}-[0-9]{2})))?"
+_CHANGES = "|".join(_CHANGED.values())
+_SEEN_LAST = r"(?:last seen|seen last|last noticed|last found)"
 _PATTERNS: tuple[tuple[Listed, str], ...] = (
+    (
+        Listed.CHANGES,
+        rf"what(?: things| objects)?(?: is| are| has| have| was| were)?(?: been)? (?P<change>{_CHANGES})"
+        rf"(?:(?: here)?{_BUILDING}| (?:{_IN}|from) {_ARTICLE}(?P<place>.+?)){_SINCE}",
+    ),
+    (Listed.LAST_SEEN, rf"(?:where|when) (?:was|were|is|are) {_ARTICLE}(?P<seen>.+?) {_SEEN_LAST}"),
+    (Listed.LAST_SEEN, rf"(?:where|when) (?:did|have) (?:you|we) last (?:see|seen|notice|find) {_ARTICLE}(?P<seen>.+)"),
+    (Listed.LAST_SEEN, rf"(?:where|when) (?:did|have) (?:you|we) (?:see|seen) {_ARTICLE}(?P<seen>.+?) last"),
     (Listed.ROOM_BY_SIZE, rf"{_ASKS}{_BY_SIZE} rooms?{_BUILDING}"),
     (Listed.ROOM_BY_SIZE, rf"(?:which|what) (?:room )?is (?:the )?{_BY_SIZE}(?: room)?{_BUILDING}"),
     (Listed.SOUND_BY_TIME, rf"{_ASKS}{_BY_TIME} (?:sound|noise)s?{_HEARD}"),
@@ -131,6 +153,8 @@ def read_list(text: str) -> ListQuestion | None:
         if found is None:
             continue
         said = found.groupdict()
+        if of is Listed.CHANGES:
+            said["room"] = said.pop("place")
         if said.get("room"):
             said["room"] = mended(said["room"]) or said["room"]
         if said.get("room") and lexicon().find(said["room"], Kind.ROOM) is None:
@@ -138,9 +162,11 @@ def read_list(text: str) -> ListQuestion | None:
         if said.get("thing") and (_PHOTO.search(said["thing"]) or " or " in said["thing"]):
             continue
         names = said.get("names") or (f"{said['one']}s" if said.get("one") else "")
-        name = said.get("room") or said.get("thing") or said.get("words") or names
+        name = said.get("room") or said.get("thing") or said.get("words") or said.get("seen") or names
         name = {"noises": "sounds", "objects": "things"}.get(name, name)
-        return ListQuestion(of, name, bool(said.get("first")), bool(said.get("counts")))
+        since = f"{said.get('visit') or ''}{said.get('date') or ''}"
+        change = next((one for one, words in _CHANGED.items() if re.fullmatch(words, said.get("change") or "")), "")
+        return ListQuestion(of, name, bool(said.get("first")), bool(said.get("counts")), since, change)
     return None
 
 

@@ -28,7 +28,7 @@ from avlmaps.maps.pipeline.estimate import estimate_ground, estimate_sensor, est
 from avlmaps.maps.pipeline.keyframes import RANDOMNESS
 from avlmaps.maps.pipeline.plan import BUILD_VERSION, BuildPlan
 from avlmaps.maps.pipeline.sounds import silence
-from avlmaps.maps.pipeline.write import manifest_of, surfaces
+from avlmaps.maps.pipeline.write import manifest_of, surfaces, with_clear_views
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.checkpoints import key_of
 from avlmaps.maps.store.integrity import IntegrityCheck
@@ -402,6 +402,7 @@ class GrowingMap:
         clips, sounds = HERE, silence(plan)
         if self._sounds is not None and Kind.SOUNDS in self.encoders:
             clips, sounds = self._sounds.clips_folder, self._sounds.heard(came.walk.motion(), final=final)
+        keyframes = with_clear_views(keyframes, [stack_views(clear, pose, self._free.shape)])
         content = MapContent(merged.voxels, keyframes, state, sounds, clips)
         finished = datetime.now(UTC).isoformat(timespec="seconds")
         stages_s = {"growing": begin - self._begin_s, "merging": perf_counter() - begin}

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from avlmaps.core.arrays import Float16, Float32, Float64, Int32, Int64, UInt8
+from avlmaps.core.arrays import Float16, Float32, Float64, Int32, Int64, UInt8, UInt16
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -52,6 +52,8 @@ class Keyframes:
         thumbnails: JPEG files one after the other.
         score: the detector's confidence in each keypoint, in [0, 1]; empty where it gives none, and in maps written
             before there was such an array.
+        clear_mm: up to which depth each keyframe saw freely, block by block, as ``FreeViews``: by it a later day knows
+            what of this one it looked at. Empty where depths are used as they are, and in maps written before.
     """
 
     stamp_s: Float64[np.ndarray, " k"]
@@ -66,6 +68,7 @@ class Keyframes:
     thumbnail_offsets: Int64[np.ndarray, " k1"]
     thumbnails: UInt8[np.ndarray, " bytes"]
     score: Float16[np.ndarray, " m_or_0"] = field(default_factory=lambda: np.zeros(0, np.float16))
+    clear_mm: UInt16[np.ndarray, "k_or_0 rows columns"] = field(default_factory=lambda: np.zeros((0, 0, 0), np.uint16))
 
     def __len__(self) -> int:
         return len(self.stamp_s)

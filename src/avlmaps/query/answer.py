@@ -12,7 +12,7 @@ from avlmaps.query.heatmap import Heatmap
 
 if TYPE_CHECKING:
     from avlmaps.maps.storeys import Storeys
-    from avlmaps.query.schema import AlternativeAnswer, PartOutcome, QueryAnswer
+    from avlmaps.query.schema import AlternativeAnswer, DayAnswer, PartOutcome, QueryAnswer
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +89,7 @@ class Answer:
         alternatives: what is sought by itself, where nothing is found of it near what the query names; the other
             questions that a sentence may mean, the likeliest first.
         storeys: of a map of several.
+        when: the day of each goal, in an answer about several days: when a change was noticed, or a thing last seen.
         text: the answer in one sentence: where the first goal is, or which part failed and what the best guess is.
     """
 
@@ -103,6 +104,7 @@ class Answer:
     alternatives: tuple[Alternative, ...] = ()
     text: str = ""
     storeys: "Storeys | None" = field(default=None, repr=False, compare=False)
+    when: "tuple[DayAnswer, ...]" = ()
 
     def __repr__(self) -> str:
         counted = "" if self.count is None else f", count={self.count}"
@@ -124,6 +126,8 @@ class Answer:
         if self.storeys is not None:
             for goal in answer["goals"]:
                 goal["storey"] = int(self.storeys.of_places(np.array(goal["position"]))[0])
+        for goal, day in zip(answer["goals"], self.when, strict=False):
+            goal["when"] = day
         if self.count is not None:
             answer["count"] = self.count
         if self.notes:

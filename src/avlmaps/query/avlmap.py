@@ -50,6 +50,7 @@ if TYPE_CHECKING:
     from avlmaps.query.contents import Contents, Room, SoundEvent, Thing, Watch
     from avlmaps.query.locate import Located
     from avlmaps.query.photometric import Panoramas
+    from avlmaps.query.schema import ChangesAnswer, LastSeenAnswer
 
 # Keyframes that are matched one by one for a picture that cannot be located: more of them guess no better (measured).
 _GUESS_FROM = 20
@@ -218,11 +219,50 @@ class AVLMap:
         least_confidence: float = 0.5,
         structure: bool = False,
         watch: "Watch" = lambda stage, done, total: None,
+        *,
+        at: str | int | None = None,
     ) -> list["Thing"]:
-        """Return the things of the map, most confident first; see ``contents.find_things``."""
+        """Return the things of the map, most confident first; see ``contents.find_things``.
+
+        With ``at``, of a map of several days, those that were there on that day: a date, or the number of a visit from
+        1. What moved or went since is where it was; ``rows`` holds what is left of it.
+
+        Raises:
+            QueryError: the map was not seen on such a day, or on one day alone.
+        """
         from avlmaps.query.contents import find_things
 
+        if at is not None:
+            from avlmaps.query.changes import Days, things_at
+
+            return things_at(self.space, Days.of(self.stored), at, names, least_confidence)
         return find_things(self.stored, self.space, self.instances, names, least_confidence, structure, watch)
+
+    def changes(self, since: str | int = 1, *, first_seen: bool = False) -> "ChangesAnswer":
+        """Return what is new, moved and gone after a day: a date, or the number of a visit from 1.
+
+        Args:
+            since: the day.
+            first_seen: list also what was seen first where nobody had looked before.
+
+        Raises:
+            QueryError: the map was not seen on such a day, or on one day alone.
+        """
+        from avlmaps.query.changes import Days, changes_answer, room_namer
+
+        days = Days.of(self.stored)
+        since_visit = days.visit_of(since)
+        return changes_answer(days, self.stored.path.name, since_visit, room_namer(self), first_seen=first_seen)
+
+    def last_seen(self, name: str) -> "LastSeenAnswer":
+        """Return where things of a name were last seen, and when: those that are there still first, then the latest.
+
+        Raises:
+            QueryError: the map was seen on one day alone.
+        """
+        from avlmaps.query.changes import Days, is_meant, last_seen, room_namer
+
+        return last_seen(Days.of(self.stored), name, is_meant(name), room_namer(self))
 
     def contents(
         self, least_confidence: float = 0.5, names: Sequence[str] | None = None, structure: bool = False

@@ -12,6 +12,16 @@ from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import Kind, lexicon
 from avlmaps.language.list_questions import Listed, ListQuestion
 from avlmaps.query.answer import Answer
+from avlmaps.query.changes import (
+    ChangeKind,
+    Days,
+    changes_answer,
+    is_meant,
+    last_seen,
+    last_seen_text,
+    room_namer,
+    text_of,
+)
 from avlmaps.query.goals import Goal
 from avlmaps.query.whereabouts import NOWHERE, Whereabouts
 from avlmaps.query.wording import in_words, placed
@@ -45,6 +55,10 @@ def answer_list(avlmap: "Queryable", question: ListQuestion, top: int, ask: Call
             goals, text = _sounds_by_time(avlmap, question.first)
         case Listed.NAMES:
             return _names(avlmap, question, top)
+        case Listed.CHANGES:
+            return _changes(avlmap, question, top)
+        case Listed.LAST_SEEN:
+            return _last_seen(avlmap, question.name, top)
         case Listed.CONTENTS | Listed.BESIDE | Listed.ROOM_OF:
             return _about(avlmap, question, top, ask)
     return _answer(avlmap, goals[:top], text)
@@ -108,6 +122,43 @@ def _names(avlmap: "Queryable", question: ListQuestion, top: int) -> Answer:
         named = [goal.name for goal in goals]
     text = f"There are {len(named)} {question.name}: {counted(named)}." if named else f"There are no {question.name}."
     return _answer(avlmap, goals[:top], text, count=len(named))
+
+
+def _changes(avlmap: "Queryable", question: ListQuestion, top: int) -> Answer:
+    """Return what is new, gone or moved, in a room or anywhere, and when it was noticed."""
+    days = Days.of(avlmap.stored)
+    since = days.visit_of(question.since) if question.since else 0
+    answer = changes_answer(days, avlmap.stored.path.name, since, room_namer(avlmap))
+    every: tuple[ChangeKind, ...] = ("new", "moved", "gone")
+    kinds: list[ChangeKind] = [kind for kind in every if question.change in ("", kind)]
+    listed = [one for one in answer["changes"] if one["kind"] in kinds]
+    if question.name:
+        places = np.array([one["position"] for one in listed]).reshape(-1, 3)
+        inside = Whereabouts.of(avlmap).parts_of(lambda kind: _same_room(kind, question.name), places)
+        listed = [one for one, is_in in zip(listed, inside, strict=True) if is_in]
+    answer["changes"] = listed
+    goals = [
+        Goal(
+            tuple(one["position"]), one["confidence"], tuple(one["size"]), {}, one["confidence"], one["name"],  # pyright: ignore[reportArgumentType]
+        )
+        for one in listed
+    ]  # fmt: skip
+    whole = _answer(avlmap, goals[:top], text_of(answer, kinds, question.name), count=len(listed))
+    return replace(whole, when=tuple(one["noticed"] for one in listed[:top]))
+
+
+def _last_seen(avlmap: "Queryable", name: str, top: int) -> Answer:
+    """Return where a thing was last seen, and on which day."""
+    entry = lexicon().head(name, Kind.THING)
+    if entry is None:
+        raise QueryError(f"{name!r} is no thing that is known; name a thing, such as: where was the bag last seen?")
+    answer = last_seen(Days.of(avlmap.stored), name, is_meant(entry.name), room_namer(avlmap))
+    goals = [
+        Goal(tuple(one["position"]), one["confidence"], _NO_SIZE, {}, one["confidence"], one["name"])  # pyright: ignore[reportArgumentType]
+        for one in answer["seen"]
+    ]
+    whole = _answer(avlmap, goals[:top], last_seen_text(answer))
+    return replace(whole, when=tuple(one["last_seen"] for one in answer["seen"][:top]))
 
 
 def _about(avlmap: "Queryable", question: ListQuestion, top: int, ask: Callable[[str], Answer]) -> Answer:

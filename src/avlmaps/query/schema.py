@@ -31,6 +31,14 @@ Storey = Annotated[int, Meta(description="of a map of several: counted from 0, t
 Notes = Annotated[list[str], Meta(description="why the map may be wrong, one sentence each")]
 
 
+class DayAnswer(TypedDict):
+    """A day on which a map was seen."""
+
+    visit: Annotated[int, Meta(description="counted from 1, the first")]
+    day: Annotated[str | None, Meta(description="such as 2026-11-25; null where nobody said")]
+    stamp_s: NotRequired[Annotated[float, Meta(description="seconds, by the clock of that day's recording")]]
+
+
 class GoalAnswer(TypedDict):
     """One distinct place that answers a query."""
 
@@ -41,6 +49,9 @@ class GoalAnswer(TypedDict):
     probability: Annotated[float, Meta(ge=0.0, le=1.0, description="that it is right, all parts together")]
     name: NotRequired[Annotated[str, Meta(description="what is there, in an answer from the lists of a map")]]
     storey: NotRequired[Storey]
+    when: NotRequired[
+        Annotated[DayAnswer, Meta(description="of a map of several days: when it was last seen, or the change noticed")]
+    ]
 
 
 class PartOutcome(TypedDict):
@@ -94,6 +105,57 @@ class ThingAnswer(TypedDict):
     color: Annotated[list[int], Meta(min_length=3, max_length=3, description="mean RGB, 0 to 255")]
     voxels: int
     storey: NotRequired[Storey]
+
+
+# Functional, because one key is a word of Python.
+ChangeAnswer = TypedDict(
+    "ChangeAnswer",
+    {
+        "kind": Annotated[str, Meta(description="new, gone, moved, or first seen (nobody had looked there before)")],
+        "name": str,
+        "confidence": Unit,
+        "position": Position,
+        "from": Annotated[Position | None, Meta(description="where it was before it moved")],
+        "room": str | None,
+        "size": Size,
+        "noticed": DayAnswer,
+        "last_seen": DayAnswer,
+        "first_seen": DayAnswer,
+    },
+)
+
+
+class ChangesAnswer(TypedDict):
+    """What changed in a map since a day."""
+
+    map: str
+    frame: Frame
+    since: DayAnswer
+    days: list[DayAnswer]
+    changes: list[ChangeAnswer]
+    unknown: Annotated[int, Meta(description="things whose place nobody has looked at since they were seen")]
+    text: NotRequired[Annotated[str, Meta(description="the answer in one sentence")]]
+
+
+class LastSeenPlace(TypedDict):
+    """Where a thing was last seen, and when."""
+
+    name: str
+    position: Position
+    room: str | None
+    confidence: Unit
+    last_seen: DayAnswer
+    gone: Annotated[DayAnswer | None, Meta(description="the day on which its place was looked through")]
+    looked: Annotated[DayAnswer, Meta(description="the last day on which its place was looked at")]
+
+
+class LastSeenAnswer(TypedDict):
+    """Where things of a name were last seen: those that are there still first, then the latest."""
+
+    name: str
+    frame: Frame
+    seen: list[LastSeenPlace]
+    text: NotRequired[Annotated[str, Meta(description="the answer in one sentence")]]
 
 
 class ListedThing(ThingAnswer):

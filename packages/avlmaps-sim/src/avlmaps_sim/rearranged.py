@@ -1,7 +1,7 @@
 """A building on a later day: things were moved, taken away and brought, doors were swung. The truth says which.
 
 Day 0 is the scene as it was made. Each day follows from the one before, so that day 3 holds the changes of three days.
-A thing keeps its name over the days; one that was brought has a name that no other ever had.
+The name of a thing lasts over the days; one that was brought has a name that no other ever had.
 """
 
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float
 from avlmaps_sim.free_space import STRUCTURE, FreeSpace, free_space, reaching_part
 from avlmaps_sim.furniture import Families, make
 from avlmaps_sim.mesh import Mesh, Triple
-from avlmaps_sim.scene import Scene, SceneBuilder, SceneObject
+from avlmaps_sim.scene import Scene, SceneBuilder
 
 ChangeKind = Literal["moved", "removed", "added", "swung"]
 
@@ -277,7 +277,7 @@ def _swung(scene: Scene, number: int, rng: np.random.Generator, ways: _Ways) -> 
     own = np.flatnonzero(scene.instance == number)
     at = scene.mesh.corners()[own].astype(np.float64)
     c, s = np.cos(thing.heading_rad), np.sin(thing.heading_rad)
-    out_m = (at[..., :2] @ np.array([c, s]))  # along the way that the leaf opens to
+    out_m = at[..., :2] @ np.array([c, s])  # in the direction that the leaf opens to
     aside_m = at[..., :2] @ np.array([-s, c])
     wall = np.median(out_m)
     back, front = out_m.min(), out_m.max()

@@ -1,4 +1,4 @@
-"""Scenes by name: `house:12`, `office:3`, `house:12:held-out`, `house:12:lived-in`, `house:12:day-3`, or a file."""
+"""Scenes by name: `house:12`, `office:3`, `house:12:held-out`, `house:12:lived-in`, `house:12:day-3`, a file."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -72,7 +72,8 @@ def _day_of(spec: str) -> tuple[str, int | None]:
 
 
 def _families_of(spec: str) -> Families:
-    return next((_FAMILIES[word] for word in spec.split(":") if word in _FAMILIES), "all")
+    said: list[Families] = [_FAMILIES[word] for word in spec.split(":") if word in _FAMILIES]
+    return said[0] if said else "all"
 
 
 def _opened(spec: str) -> Scene:
@@ -92,8 +93,8 @@ def _made(kind: str, seed: str, *words: str, spec: str) -> Scene:
     if not seed.isdecimal() or len(which) > 1 or not set(which) <= _FAMILIES.keys() or words.count(_LIVED_IN) > 1:
         raise SceneError(
             f"the scene {spec!r} names no seed and families; write {kind}:12, or {kind}:12:held-out "
-            f"({', '.join(_FAMILIES)}), :{_LIVED_IN} behind it for people, clothes and mirrors that reflect, and :{_DAY}N "
-            "last for the building N days later"
+            f"({', '.join(_FAMILIES)}), :{_LIVED_IN} behind it for people, clothes and mirrors that reflect, and "
+            f":{_DAY}N last for the building N days later"
         )
     families = _FAMILIES[which[0] if which else "all"]
     scene = replace(_MAKERS[kind](int(seed), families), name=spec)  # by which a command opens it again

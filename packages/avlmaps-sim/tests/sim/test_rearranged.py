@@ -77,7 +77,9 @@ def test_triangles_lie_in_the_boxes_of_their_things_and_nothing_stands_in_anothe
     corners = after.mesh.corners()
     for number, thing in enumerate(after.objects):
         own = corners[after.instance == number].reshape(-1, 3)
-        assert np.allclose(own.min(axis=0), thing.low, atol=1e-4) and np.allclose(own.max(axis=0), thing.high, atol=1e-4)
+        assert np.allclose(own.min(axis=0), thing.low, atol=1e-4) and np.allclose(
+            own.max(axis=0), thing.high, atol=1e-4
+        )
     moved = [one for one in after.objects if one.category in ("chair", "bag", "box", "stool")]
     for number, one in enumerate(moved):
         for other in moved[number + 1 :]:

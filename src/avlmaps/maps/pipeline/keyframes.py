@@ -158,6 +158,8 @@ def concat_keyframes(pieces: Sequence[Keyframes]) -> Keyframes:
     for offsets, _ in RAGGED[Keyframes]:
         lengths = np.concatenate([np.diff(piece) for piece in arrays[offsets]])
         arrays[offsets] = [np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)]
+    if len({clear.shape[1:] for clear in arrays["clear_mm"]}) > 1:  # of other cameras, or not known of every piece
+        arrays["clear_mm"] = [arrays["clear_mm"][0][:0]]
     whole = {name: np.concatenate(values) for name, values in arrays.items()}
     for some, rows in ROWS_OR_NONE[Keyframes]:
         if len(whole[some]) != len(whole[rows]):  # not known of every piece

@@ -1,10 +1,12 @@
 """The last stages: the parts become the voxels of the map, and all of it is written."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
 from time import perf_counter
+
+import numpy as np
 
 from avlmaps.core.errors import MapError
 from avlmaps.core.version import __version__
@@ -32,7 +34,7 @@ from avlmaps.maps.store.manifest import (
     UpInfo,
 )
 from avlmaps.maps.store.writer import MapContent, write_map
-from avlmaps.maps.types import Voxels
+from avlmaps.maps.types import Keyframes, Voxels
 from avlmaps.recordings.types import Recording
 
 # Below this share of agreeing surface the direction that was found is reported as a guess.
@@ -103,7 +105,8 @@ def write(
     merged: Merged,
 ) -> MapInfo:
     """Write the map and, last of all, its manifest; then the parts go."""
-    content = MapContent(merged.voxels, pictures.keyframes, pictures.place_state, heard.sounds, heard.clips_folder)
+    keyframes = with_clear_views(pictures.keyframes, [part.views() for part in parts])
+    content = MapContent(merged.voxels, keyframes, pictures.place_state, heard.sounds, heard.clips_folder)
     stages_s = {
         "up": up.elapsed_s,
         "ground": floor.elapsed_s,
@@ -117,6 +120,20 @@ def write(
     bad = sorted((frame for part in parts for frame in part.info.bad_frames), key=lambda frame: frame.index)
     fused = sum(part.info.fused for part in parts)
     return write_map(plan.path, content, manifest_of(plan, up.up, floor.ground, content, merged, timings, fused, bad))
+
+
+def with_clear_views(keyframes: Keyframes, views: Sequence[FreeViews]) -> Keyframes:
+    """Return keyframes with what each of them saw freely, where frames were looked at for that.
+
+    Args:
+        keyframes: of the map.
+        views: of all its frames; a keyframe's is the one of its pose.
+    """
+    rows = {pose.tobytes(): (part, row) for part in views for row, pose in enumerate(np.asarray(part.clear_pose))}
+    found = [rows.get(pose.tobytes()) for pose in np.asarray(keyframes.world_from_camera, np.float64)]
+    if not found or None in found:
+        return keyframes
+    return replace(keyframes, clear_mm=np.stack([part.clear_mm[row] for part, row in filter(None, found)]))
 
 
 def manifest_of(

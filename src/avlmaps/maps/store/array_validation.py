@@ -18,7 +18,7 @@ RAGGED: dict[type, tuple[tuple[str, str], ...]] = {
     HeardSounds: (("track_offsets", "track"), ("feature_offsets", "feature")),
 }
 # Arrays that are empty where nothing is known, and the field along whose rows they go where it is.
-ROWS_OR_NONE: dict[type, tuple[tuple[str, str], ...]] = {Keyframes: (("score", "xy"),)}
+ROWS_OR_NONE: dict[type, tuple[tuple[str, str], ...]] = {Keyframes: (("score", "xy"), ("clear_mm", "stamp_s"))}
 # The keypoints' points are NaN where there was no depth.
 # Features: of unit length, or zero where there is nothing to say.
 UNIT_ROWS = frozenset({"voxels/feature", "sounds/feature", "keyframes/view", "keyframes/descriptors"})

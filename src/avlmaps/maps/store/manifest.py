@@ -105,6 +105,32 @@ class RecordingInfo(msgspec.Struct, frozen=True, kw_only=True):
     notices: tuple[str, ...] = ()
 
 
+class Visit(msgspec.Struct, frozen=True, kw_only=True):
+    """One day that a map of several days was seen on, in the order of time.
+
+    Attributes:
+        day: as ``2026-11-25``; empty where nobody said.
+        recording: what was recorded; its name only.
+        begin_s: first stamp, the map's time.
+        end_s: last stamp, likewise.
+        shift_s: the map's time less the recording's own.
+        map_from_recording: 4x4, row by row; the first day's is the identity.
+        rig: the recording's cameras.
+        frames: how many were fused.
+        checks: by what it was recognised as the same place; empty of the first day.
+    """
+
+    day: str = ""
+    recording: RecordingInfo
+    begin_s: float
+    end_s: float
+    shift_s: float
+    map_from_recording: tuple[tuple[float, float, float, float], ...]
+    rig: RigInfo
+    frames: int
+    checks: dict[str, float] = {}
+
+
 class UpInfo(msgspec.Struct, frozen=True, kw_only=True):
     """The up direction in the recording's world, and how that is known.
 
@@ -288,6 +314,7 @@ class MapInfo(msgspec.Struct, frozen=True, kw_only=True):
         bytes: size of all files.
         timings: when it was built and how long it took; the only part that differs when a build is repeated.
         checksum: hex SHA-256 of all the rest but the timings; empty in maps of older releases.
+        visits: the days of a map that was merged; none of one that was seen once.
     """
 
     format: Literal["avlmap"] = "avlmap"
@@ -314,3 +341,4 @@ class MapInfo(msgspec.Struct, frozen=True, kw_only=True):
     sensor: SensorInfo | None = None
     removed: Removed = Removed()
     checksum: str = ""
+    visits: tuple[Visit, ...] = ()

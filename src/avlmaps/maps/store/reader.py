@@ -21,6 +21,7 @@ from avlmaps.maps.store.array_files import MEND, FileInfo, read_array, verify_fi
 from avlmaps.maps.store.array_validation import array_fields, check_extent, check_order, content_fault, validate_arrays
 from avlmaps.maps.store.consistency import arrays_fault
 from avlmaps.maps.store.integrity import IntegrityCheck
+from avlmaps.maps.store.life import LIFE, Life, read_life
 from avlmaps.maps.store.lock import is_locked
 from avlmaps.maps.store.manifest import GroundInfo, MapInfo
 from avlmaps.maps.store.manifest_file import MANIFEST, RESTORE, parse_manifest, read_manifest
@@ -118,6 +119,17 @@ class StoredMap:
     def clip_path(self, sound: int) -> Path:
         """Return the FLAC file of a sound, by its number in ``sounds``."""
         return self.path / self.sounds.clips[sound]
+
+    def life(self) -> Life | None:
+        """Return what became of its things over several days; None of a map of one day.
+
+        Raises:
+            MapError: the files are damaged.
+        """
+        files = {name.removeprefix(LIFE): file for name, file in self.info.files.items() if name.startswith(LIFE)}
+        if not files:
+            return None
+        return read_life({name: read_array(self.path, file) for name, file in files.items()}, f"{self.path}/life")
 
     def require_model(self, kind: Kind) -> None:
         """Raise ``MapError`` unless this install's model is the one that made the map's features.

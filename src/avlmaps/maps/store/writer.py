@@ -15,6 +15,7 @@ from avlmaps.maps.store.array_files import FileInfo, sync_names, write_array, wr
 from avlmaps.maps.store.array_validation import array_fields
 from avlmaps.maps.store.derived import remove_derived
 from avlmaps.maps.store.integrity import remember_checked
+from avlmaps.maps.store.life import LIFE, Life, life_arrays
 from avlmaps.maps.store.lock import LOCK
 from avlmaps.maps.store.manifest import MapInfo
 from avlmaps.maps.store.manifest_file import MANIFEST, write_manifest
@@ -23,6 +24,7 @@ from avlmaps.maps.store.reader import CLIPS, PARTS, STATE
 from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
 
 SECTIONS = ("voxels", "keyframes", "sounds")
+_ALL_SECTIONS = (*SECTIONS, LIFE.rstrip("/"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +37,7 @@ class MapContent:
         place_state: what the place encoder learned from them.
         sounds: what was heard; ``clips`` are file names below ``clips_folder``.
         clips_folder: where the clips lie now.
+        life: what became of its things over several days; None of one day.
     """
 
     voxels: Voxels
@@ -42,6 +45,7 @@ class MapContent:
     place_state: dict[str, np.ndarray]
     sounds: HeardSounds
     clips_folder: Path
+    life: Life | None = None
 
 
 def write_map(path: Path, content: MapContent, info: MapInfo) -> MapInfo:
@@ -77,6 +81,9 @@ def _write_files(path: Path, content: MapContent) -> Iterator[tuple[str, FileInf
         if not name.isidentifier():
             raise ValueError(f"the place encoder calls an array {name!r}; its name must be an identifier")
         yield STATE + name, write_array(path, f"keyframes/state_{name}", array)
+    if content.life is not None:
+        for name, array in life_arrays(content.life).items():
+            yield LIFE + name, write_array(path, LIFE + name, array)
     for number, clip in enumerate(content.sounds.clips):
         source = content.clips_folder / Path(clip).name
         yield f"{CLIPS}{number:06d}", write_copy(path, f"sounds/{number:06d}", source)
@@ -88,8 +95,8 @@ def sweep(path: Path, info: MapInfo) -> None:
     Only files are removed that avlmaps has named, and one that cannot be removed is left.
     """
     kept = {path / file.path for file in info.files.values()}
-    for section in SECTIONS:
-        for old in (path / section).iterdir():
+    for section in _ALL_SECTIONS:
+        for old in (path / section).glob("*"):
             if old not in kept and is_stored_file(old):
                 with suppress(OSError):
                     old.unlink()
@@ -109,7 +116,7 @@ def is_map_or_free(path: Path) -> bool:
     names = {entry.name for entry in path.iterdir()}
     if MANIFEST in names or any(stage_folders(path / PARTS)):
         return True
-    if not names <= {LOCK, PARTS, *SECTIONS}:
+    if not names <= {LOCK, PARTS, *_ALL_SECTIONS}:
         return False
-    inside = [entry for name in names & {PARTS, *SECTIONS} for entry in (path / name).glob("*")]
+    inside = [entry for name in names & {PARTS, *_ALL_SECTIONS} for entry in (path / name).glob("*")]
     return all(is_stored_file(entry) for entry in inside)

@@ -14,6 +14,7 @@ from avlmaps_sim.bench.harness.provenance import in_words
 from avlmaps_sim.bench.output import BenchError, Table, draw, markdown, write_answer
 
 if TYPE_CHECKING:
+    from avlmaps_sim.bench.harness.settings import SceneSettings
     from avlmaps_sim.bench.indexing import IndexingSettings
     from avlmaps_sim.bench.navigation import NavigationSettings
 
@@ -32,6 +33,7 @@ class SuiteInputs:
         seed: of what is drawn at random.
         indexing: what the suites on scenes other than ``navigation`` are run on; its own defaults if None.
         navigation: what the suite ``navigation`` is run on; its own defaults if None.
+        change: what the suite ``change`` is run on, and over how many days; its own defaults if None.
     """
 
     sounds: Path | None = None
@@ -43,6 +45,7 @@ class SuiteInputs:
     seed: int = 0
     indexing: "IndexingSettings | None" = None
     navigation: "NavigationSettings | None" = None
+    change: "tuple[SceneSettings, int] | None" = None
 
 
 def run_suite(suite: str, inputs: SuiteInputs, out: Path) -> dict[str, Any]:
@@ -50,7 +53,7 @@ def run_suite(suite: str, inputs: SuiteInputs, out: Path) -> dict[str, Any]:
 
     Args:
         suite: ``words``, ``language``, ``sounds``, ``segmentation``, ``locate``, ``frames``, ``recordings``,
-            ``objects``, ``indexing``, ``found``, ``rooms`` or ``navigation``.
+            ``objects``, ``indexing``, ``found``, ``rooms``, ``change`` or ``navigation``.
         inputs: what it measures on.
         out: folder to write into.
 
@@ -69,6 +72,10 @@ def run_suite(suite: str, inputs: SuiteInputs, out: Path) -> dict[str, Any]:
         from avlmaps_sim.bench.rooms.suite import run_rooms
 
         return run_rooms(inputs.indexing, out)
+    if suite == "change":
+        from avlmaps_sim.bench.change.suite import DEFAULTS, run_change
+
+        return run_change(*(inputs.change or DEFAULTS), out)
     if suite == "navigation":
         from avlmaps_sim.bench.navigation.suite import run_navigation
 

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
-from avlmaps.cli.output import emit, table_lines
+from avlmaps.cli.output import UsageError, emit, table_lines
 from avlmaps.cli.verb import ModelVerb
 
 if TYPE_CHECKING:
+    from avlmaps_sim.bench.harness.settings import SceneSettings
     from avlmaps_sim.bench.indexing import IndexingSettings
     from avlmaps_sim.bench.navigation import NavigationSettings
 
@@ -25,6 +26,7 @@ Suite = Literal[
     "indexing",
     "found",
     "rooms",
+    "change",
     "navigation",
 ]
 Series = Literal["sounds-1", "sounds-2", "sounds-3", "images", "pairs", "commands", "spatial"]
@@ -88,6 +90,7 @@ class Bench(ModelVerb):
     indexing: the paper's Tables III to V, in twelve held-out homes, in --scenes, or in a recording with objects.json.
     found: is what is reported as found there? Brier scores and a reliability diagram, in the scenes of indexing.
     rooms: the rooms of a map against the true ones (overlap, names, count, area), in the scenes of indexing.
+    change: what is new, gone and moved over several days, in ten held-out homes or in --scenes.
     navigation: the paper's Tables I, II and VI and its commands, in twelve held-out homes or in --scenes.
     """
 
@@ -111,6 +114,8 @@ class Bench(ModelVerb):
     """Folder for SUITE.json, SUITE.md, SUITE.png and a CSV file for each table."""
     seed: Annotated[int, arg(metavar="N")] = 0
     """Seed of all random choices."""
+    days: Annotated[int | None, arg(metavar="N")] = None
+    """Number of days of each home, the first included (change). Default: 5."""
     indexing: Annotated[Indexing, OmitArgPrefixes] = field(default_factory=Indexing)
     """Options of the suites indexing, objects and navigation."""
     navigation: Annotated[Navigation, OmitArgPrefixes] = field(default_factory=Navigation)
@@ -122,11 +127,13 @@ class Bench(ModelVerb):
 
         indexing = self.indexing_settings() if self.suite in ("indexing", "found", "rooms", "objects") else None
         navigation = self.navigation_settings() if self.suite == "navigation" else None
-        scenes = () if indexing or navigation else tuple(map(Path, self.scenes))
+        change = self.change_settings() if self.suite == "change" else None
+        scenes = () if indexing or navigation or change else tuple(map(Path, self.scenes))
         models = self.models_chosen
         inputs = SuiteInputs(
-            self.sounds, self.clips, scenes, self.nyuv2, self.profile, models, self.seed, indexing, navigation
-        )
+            self.sounds, self.clips, scenes, self.nyuv2, self.profile, models, self.seed, indexing, navigation,
+            change,
+        )  # fmt: skip
         answer = run_suite(self.suite, inputs, self.out)
         lines: list[str] = []
         for name, table in answer["tables"].items():
@@ -160,6 +167,30 @@ class Bench(ModelVerb):
             load=chosen.tasks,
             save=chosen.save_tasks,
         )
+
+    def change_settings(self) -> "tuple[SceneSettings, int]":
+        """Return the settings of the suite change, and the number of days."""
+        from avlmaps_sim.bench.change.suite import DAYS, SCENES
+        from avlmaps_sim.bench.harness.settings import SceneSettings
+
+        chosen, days = self.indexing, DAYS if self.days is None else self.days
+        if days < 2:
+            raise UsageError(f"--days takes a number from 2 on, not {days}.")
+        settings = SceneSettings(
+            scenes=self.scenes or SCENES,
+            profile=self.profile,
+            models=self.models_chosen,
+            hearing=chosen.hearing,
+            sounds=self.sounds,
+            clips=chosen.sound_clips,
+            sensor=chosen.sensor,
+            frames=chosen.frames,
+            sources=3,
+            ambiguous=0,
+            jobs=chosen.jobs,
+            seed=self.seed,
+        )
+        return settings, days
 
     def navigation_settings(self) -> "NavigationSettings":
         """Return the settings of the suite navigation."""

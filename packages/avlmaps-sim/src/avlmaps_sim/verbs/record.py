@@ -30,7 +30,7 @@ class Record(Verb):
     """house:SEED, house:SEED:lived-in or office:SEED, or a .glb file, alone or with Matterport3D's _semantic.ply."""
     out: Annotated[Path, arg(metavar="REC")]
     """Recording folder to write (our format)."""
-    rearranged: Annotated[int, arg(metavar="DAYS")] = 0
+    rearranged: Annotated[int | None, arg(metavar="DAYS")] = None
     """Record the building this many days later: chairs and bags moved, things taken away and brought, doors swung."""
     sounds: Annotated[Path | None, arg(metavar="DIR")] = None
     """Folder of sound files, as `avlmaps add-sounds` reads it. Default: sounds made by rule."""
@@ -105,7 +105,7 @@ def record(verb: "Record") -> dict[str, Any]:
         colour=verb.colour,
         workers=verb.workers,
     )
-    scene, changes = open_changed(on_day(verb.scene, verb.rearranged) if verb.rearranged else verb.scene)
+    scene, changes = open_changed(on_day(verb.scene, verb.rearranged) if verb.rearranged is not None else verb.scene)
     settings = replace(settings, walk=_walk(verb.floor, scene))
     made = record_scene(scene, verb.out, settings, verb.seed, changes)
     names = [*(thing.name for thing in scene.objects), None]  # an instance of -1 is not an object

@@ -1,0 +1,294 @@
+"""The suite ``avlmaps bench change``: homes on several days, merged one after the other, against the truth."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from avlmaps.core.poses import plain_point
+from avlmaps.days.merge import NotTheSamePlaceError, ThingsOf, default_things, merge_maps
+from avlmaps.maps.store.life import Stay
+from avlmaps.query.avlmap import AVLMap
+from avlmaps.query.changes import Days
+from avlmaps.query.contents import Thing
+from avlmaps_sim.bench.change.scores import (
+    KINDS,
+    Counts,
+    Listed,
+    judged,
+    judged_list,
+    lost,
+    said_changes,
+    true_changes,
+)
+from avlmaps_sim.bench.harness.intervals import in_percent, wilson
+from avlmaps_sim.bench.harness.provenance import in_words, provenance
+from avlmaps_sim.bench.harness.settings import SceneSettings
+from avlmaps_sim.bench.harness.workers import side_by_side
+from avlmaps_sim.bench.harness.workplace import SceneJob, Workplace, scene_jobs
+from avlmaps_sim.bench.objects import FEWEST_VOXELS, STRUCTURE
+from avlmaps_sim.bench.output import Table, draw, markdown, write_answer
+from avlmaps_sim.rearranged import Change
+from avlmaps_sim.scene import NOTHING, Scene, SceneObject
+from avlmaps_sim.scenes import on_day, open_changed, open_scene
+
+NOTE = (
+    "Each home is recorded on day 0 and on the days after it, on another walk each day, rearranged in between; each "
+    "day's recording becomes a map, and the maps are merged in their order. A change is right with its kind, a fitting "
+    "name and its places within 0.5 m; true ones count where the walks saw the thing before and after. A door that "
+    "swung is neither right nor wrong to name. True perception: things are the voxels of the scene's own things, and "
+    "all else is ours. On the last day: stale is what is listed where such a thing stood on an earlier day and does so "
+    "no more; a ghost is listed where nothing stands; known are true things that some day saw. Rebuilt: the last day's "
+    "map alone; never forgets: all that was ever listed. Lost: of the first day's things that never changed, those "
+    "said to be gone."
+)
+TRUE, OURS = "true perception", "ours"
+MERGED, REBUILT, FOREVER = "merged", "rebuilt from the last day", "never forgets"
+SCENES = tuple(f"house:{1_000_000 + number}:held-out" for number in range(10))
+DAYS = 5
+DEFAULTS = (SceneSettings(scenes=SCENES, sources=3, ambiguous=0), DAYS)
+
+
+@dataclass
+class HomeResult:
+    """The results of one home with one perception.
+
+    Attributes:
+        scene: its name.
+        counts: of changes, over the days.
+        lists: how well the lists stand for the last day, by how they were made.
+        lost: static things said to be gone.
+        static: static things.
+        area_m2: of its floor.
+        off_m: by how much each day was misplaced, metres.
+        off_deg: and turned.
+        refused: days that were not recognised.
+        merge_s: seconds of each merge.
+    """
+
+    scene: str
+    counts: Counts = field(default_factory=Counts)
+    lists: dict[str, Listed] = field(default_factory=dict)
+    lost: int = 0
+    static: int = 0
+    area_m2: float = 0.0
+    off_m: list[float] = field(default_factory=list)
+    off_deg: list[float] = field(default_factory=list)
+    refused: int = 0
+    merge_s: list[float] = field(default_factory=list)
+
+
+def run_change(
+    settings: SceneSettings, days: int, out: Path, open_spec: Callable[[str], Scene] = open_scene
+) -> dict[str, Any]:
+    """Record homes on several days, merge their maps, and write tables.
+
+    Args:
+        settings: the homes, on day 0, and how they are recorded.
+        days: of each, day 0 included.
+        out: folder; its ``work`` stores recordings and maps.
+        open_spec: makes a scene of its name.
+    """
+    weights = settings.checked()
+    todo = scene_jobs(settings, settings.recorded, settings.scenes, out / "work")
+    work = partial(_home, days=days, open_spec=open_spec)
+    found = side_by_side(work, todo, settings.jobs, "change", lambda one: one.spec)
+    tables = tables_of({way: [home[way] for home in found] for way in (TRUE, OURS)})
+    answer = {
+        "suite": "change",
+        **provenance(settings, settings.recorded, settings.scenes, weights),
+        "days": days,
+        "note": NOTE,
+        "tables": tables,
+    }
+    written = write_answer(answer, out, f"# Change\n\n{in_words(answer)}\n\n{NOTE}\n\n{markdown(tables)}")
+    draw(tables, out / "change.png")
+    return written
+
+
+def _home(job: SceneJob, days: int, open_spec: Callable[[str], Scene]) -> dict[str, HomeResult]:
+    """Return the results of a home, by perception."""
+    from dataclasses import replace
+
+    places = [Workplace(replace(job, spec=on_day(job.spec, day)), open_spec) for day in range(days)]
+    changes = open_changed(on_day(job.spec, days - 1))[1] if days > 1 else ()
+    seen = [_seen_names(place) for place in places]
+    results: dict[str, HomeResult] = {}
+    for way, things_of in ((TRUE, _true_things(places)), (OURS, default_things(0.5))):
+        results[way] = _lived(job.spec, places, changes, seen, things_of, way)
+    return results
+
+
+def _seen_names(place: Workplace) -> set[str]:
+    """Return the names of the things of which the day's map has enough voxels."""
+    label = place.label
+    count = np.bincount(label[label != NOTHING], minlength=len(place.truth.objects))
+    return {thing.name for thing, voxels in zip(place.truth.objects, count, strict=True) if voxels >= FEWEST_VOXELS}
+
+
+def _true_things(places: Sequence[Workplace]) -> ThingsOf:
+    """Return what lists the true things of any of these days' maps."""
+    of = {place.avlmap.stored.path: place for place in places}
+
+    def things(avlmap: AVLMap) -> list[Thing]:
+        place = of[avlmap.stored.path]
+        label, found = place.label, list[Thing]()
+        for number, thing in enumerate(place.truth.objects):
+            rows = np.flatnonzero(label == number)
+            if thing.category in STRUCTURE or len(rows) < FEWEST_VOXELS:
+                continue
+            points = avlmap.space.centres_of(rows)
+            middle = points[np.argmin(np.linalg.norm(points - points.mean(axis=0), axis=1))]
+            size = np.ptp(points, axis=0) + avlmap.space.grid.voxel_size_m
+            r, g, b = (int(v) for v in np.asarray(avlmap.stored.voxels.rgb)[rows].mean(axis=0).round())
+            found.append(Thing(thing.category, 1.0, plain_point(middle), plain_point(size), (r, g, b), rows, points))
+        return found
+
+    return things
+
+
+def _lived(
+    scene: str,
+    places: Sequence[Workplace],
+    changes: Sequence[Change],
+    seen: Sequence[set[str]],
+    things_of: ThingsOf,
+    way: str,
+) -> HomeResult:
+    """Merge the days of a home and judge what is said on each."""
+    result = HomeResult(scene, area_m2=_floor_m2(places[0]))
+    merged = places[0].avlmap.stored
+    names_before = set(seen[0])
+    for day, place in enumerate(places[1:], 1):
+        begin_s = perf_counter()
+        folder = place.job.folder / f"merged-{'true' if way == TRUE else 'ours'}-{day}.avlmap"
+        try:
+            after = merge_maps(merged, place.avlmap.stored, folder, overwrite=True, things_of=things_of)
+        except NotTheSamePlaceError:
+            result.refused += 1
+            names_before |= seen[day]
+            continue
+        result.merge_s.append(perf_counter() - begin_s)
+        merged = after
+        off_m, off_deg = _misplaced(merged.info.visits[-1].map_from_recording, place)
+        result.off_m.append(off_m)
+        result.off_deg.append(off_deg)
+        said = said_changes(Days.of(merged), len(merged.info.visits) - 1)
+        true = true_changes(changes, day, sorted(names_before), sorted(seen[day]))
+        doors = [one.before for one in changes if one.day == day and one.kind == "swung" and one.before is not None]
+        result.counts.add(judged(said, true, doors))
+        names_before |= seen[day]
+    if merged.info.visits:
+        _judge_lists(result, Days.of(merged), places, changes, names_before, things_of)
+    return result
+
+
+def _judge_lists(
+    result: HomeResult,
+    days: Days,
+    places: Sequence[Workplace],
+    changes: Sequence[Change],
+    seen: set[str],
+    things_of: ThingsOf,
+) -> None:
+    now, last = _loose(places[-1]), days.last
+    before = [thing for place in places[:-1] for thing in _loose(place)]
+    true = [thing.name for thing in now if thing.name in seen]
+    rebuilt = [_stay(thing) for thing in things_of(places[-1].avlmap)]
+    stays = days.life.stays
+    lists = {MERGED: [stays[number] for number in days.at(last)], REBUILT: rebuilt, FOREVER: list(stays)}
+    result.lists = {name: judged_list(own, now, before, true) for name, own in lists.items()}
+    changed = {one.name for one in changes}
+    static = [thing for thing in _loose(places[0]) if thing.name not in changed]
+    result.lost, result.static = lost(days.life, static)
+
+
+def _loose(place: Workplace) -> list[SceneObject]:
+    return [thing for thing in place.truth.objects if thing.category not in STRUCTURE]
+
+
+def _stay(thing: Thing) -> Stay:
+    return Stay(
+        name=thing.name, confidence=thing.confidence, position=thing.position, size=thing.size, color=thing.color,
+        first=0, last=0, last_seen_s=0.0, looked=0,
+    )  # fmt: skip
+
+
+def _misplaced(rows: Sequence[Sequence[float]], place: Workplace) -> tuple[float, float]:
+    """Return how far a day's walk was put from where it was driven: all days share the scene's own frame."""
+    found: Float[np.ndarray, "4 4"] = np.array(rows, np.float64)
+    at = place.recording.world_from_camera[:, :3, 3]
+    off_m = np.linalg.norm(at @ found[:3, :3].T + found[:3, 3] - at, axis=1)
+    turned = np.arccos(np.clip((np.trace(found[:3, :3]) - 1.0) / 2.0, -1.0, 1.0))
+    return float(np.median(off_m)), float(np.rad2deg(turned))
+
+
+def _floor_m2(place: Workplace) -> float:
+    total = 0.0
+    for area in place.truth.areas:
+        x, y = area.polygon.T
+        total += 0.5 * abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1)))
+    return total
+
+
+def tables_of(results: dict[str, list[HomeResult]]) -> dict[str, Table]:
+    """Return the tables of all homes, by perception."""
+    rows: list[list[object]] = []
+    for way, homes in results.items():
+        counts = Counts()
+        for home in homes:
+            counts.add(home.counts)
+        for kind in KINDS:
+            right, wrong, missed = counts.right[kind], counts.wrong[kind], counts.missed[kind]
+            rows.append([
+                way, kind, right + missed, right + wrong, right, round(counts.f1(kind), 3),
+                _share(right, right + wrong), _share(right, right + missed),
+            ])  # fmt: skip
+    tables: dict[str, Table] = {
+        "changes": {
+            "columns": ["perception", "change", "true", "said", "right", "F1", "precision (95 %)", "recall (95 %)"],
+            "rows": rows,
+        }
+    }
+    rows = []
+    for way, homes in results.items():
+        area_m2 = sum(home.area_m2 for home in homes if home.lists)
+        for made in (MERGED, REBUILT, FOREVER):
+            own = [home.lists[made] for home in homes if made in home.lists]
+            listed, stale, ghosts, known, true = (
+                sum(getattr(one, name) for one in own) for name in ("listed", "stale", "ghosts", "known", "true")
+            )
+            per = round(100.0 * ghosts / max(area_m2, 1e-9), 2)
+            rows.append([way, made, listed, _share(stale, listed), per, _share(known, true)])
+    tables["the last day"] = {
+        "columns": ["perception", "map", "listed", "stale (95 %)", "ghosts per 100 m²", "things known (95 %)"],
+        "rows": rows,
+    }
+    rows = [
+        [way, _share(sum(home.lost for home in homes), sum(home.static for home in homes))]
+        for way, homes in results.items()
+    ]
+    tables["static things lost"] = {"columns": ["perception", "said to be gone (95 %)"], "rows": rows}
+    rows = []
+    for home in results.get(TRUE, []):
+        off = [f"{100 * value:.1f}" for value in home.off_m]
+        angle = [f"{value:.2f}" for value in home.off_deg]
+        f1 = [round(home.counts.f1(kind), 2) for kind in KINDS]
+        rows.append([home.scene, len(off), home.refused, " ".join(off), " ".join(angle),
+                     round(float(np.mean(home.merge_s or [0.0])), 1), *f1])  # fmt: skip
+    tables["homes, true perception"] = {
+        "columns": ["scene", "days merged", "refused", "misplaced cm", "turned degrees", "seconds a merge", *KINDS],
+        "rows": rows,
+    }
+    return tables
+
+
+def _share(part: int, whole: int) -> str:
+    if not whole:
+        return "of none"
+    return f"{100.0 * part / whole:.1f}% of {whole} ({in_percent(wilson(part, whole))})"

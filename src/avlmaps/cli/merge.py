@@ -1,0 +1,90 @@
+"""`avlmaps merge`: another day, or another robot, becomes part of a map."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+
+from tyro.conf import Positional, arg
+
+from avlmaps.cli.output import emit
+from avlmaps.cli.verb import ModelVerb
+
+if TYPE_CHECKING:
+    from avlmaps.maps.store.reader import StoredMap
+
+
+@dataclass(frozen=True, kw_only=True)
+class Merge(ModelVerb):
+    """Make one map of a map and of another day's: it is found in the first by its pictures, and updates it.
+
+    The other map needs no guess of where it is; it may be of another robot with other cameras. It is refused, with the
+    numbers, where its pictures or its surfaces do not say that it is the same place. Things of the first map are gone
+    only where the other day looked through their place; where it did not look, nothing is known of them.
+
+    Example: avlmaps merge monday.avlmap tuesday.avlmap --out home.avlmap --first-day 2026-11-23 --day 2026-11-24
+    Example: avlmaps changes home.avlmap
+    """
+
+    compiles: ClassVar[bool] = True
+
+    map: Annotated[Positional[Path], arg(metavar="MAP")]
+    """Map folder, of one day or of several."""
+    other: Annotated[Positional[Path], arg(metavar="OTHER")]
+    """Map folder of a later day, built with the same profile and voxels."""
+    out: Annotated[Path, arg(metavar="MAP")]
+    """Map folder to write; both others stay as they are."""
+    day: Annotated[str | None, arg(metavar="DAY")] = None
+    """Day of OTHER, such as 2026-11-24. Default: by its stamps, if those are of a clock."""
+    first_day: Annotated[str | None, arg(metavar="DAY")] = None
+    """Day of MAP, if it is of one day, likewise."""
+    overwrite: bool = False
+    """Replace a map at --out."""
+
+    def run(self) -> None:
+        """Merge."""
+        answer = merge(self)
+        emit(answer, merge_lines(answer), self.json)
+
+
+def merge(verb: Merge) -> dict[str, Any]:
+    """Merge two maps and return by what the place was found, and what changed."""
+    from avlmaps.days.merge import merge_maps
+    from avlmaps.maps.store.reader import open_stored
+
+    begin_s = perf_counter()
+    made = merge_maps(
+        open_stored(verb.map), open_stored(verb.other), verb.out, day=verb.day or "",
+        first_day=verb.first_day or "",
+        overwrite=verb.overwrite,
+    )  # fmt: skip
+    return {**merged_answer(made), "elapsed_s": round(perf_counter() - begin_s, 3)}
+
+
+def merged_answer(made: "StoredMap") -> dict[str, Any]:
+    """Return what is known of a merged map's last day."""
+    from avlmaps.query.changes import Days, changes_answer
+
+    days = Days.of(made)
+    visit = made.info.visits[-1]
+    return {
+        "path": str(made.path),
+        "voxels": made.info.counts.voxels,
+        "keyframes": made.info.counts.keyframes,
+        "map_from_recording": [list(row) for row in visit.map_from_recording],
+        "checks": visit.checks,
+        **{key: value for key, value in changes_answer(days, str(made.path), days.last - 1).items() if key != "map"},
+    }
+
+
+def merge_lines(answer: dict[str, Any]) -> list[str]:
+    """Lay out what `merge` reports."""
+    from avlmaps.cli.changes import change_lines
+
+    checks = answer["checks"]
+    found = (
+        f"found: {checks['agreeing']:.0f} of {checks['located']:.0f} located keyframes agree "
+        f"({checks['keyframes_tried']:.0f} tried), over {checks['spread_m']:g} m; {checks['agreement']:.1%} of "
+        f"{checks['looked']:.0f} voxels lie on the map's surface"
+    )
+    return [found, *change_lines(answer), f"wrote {answer['path']}: {answer['voxels']} voxels"]

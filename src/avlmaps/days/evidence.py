@@ -1,0 +1,206 @@
+"""What a day says of a place: there is surface again, rays pass through it, or nobody looked.
+
+For the n voxels of a thing, n₊ are those where the day has surface in the voxel or beside it, and n₋ those through
+which at least two of its views see, from where it was seen before. Voxels beside each other say the same thing twice,
+so that they count by patches of edge a: with voxels of edge s, k± = n± · s²/a². With one look that was worth nothing
+either way (a uniform prior), the probability that the thing is gone is the mean of a Beta distribution:
+
+    P(gone) = (1 + k₋) / (2 + k₋ + k₊)                                                                             (1)
+
+A thing is *gone* where P(gone) ≥ ``gone_at`` and (n₊ + n₋)/n ≥ ``least_coverage``; it is *there* where P(gone) < ½
+under the same coverage; otherwise it is *unknown*. What nobody looked at has k₊ = k₋ = 0 and P(gone) = ½: "not seen"
+never becomes "gone". Evidence of presence against evidence of free space, per thing, is the practice of
+Panoptic Multi-TSDFs (Schmid et al. 2022), POCD (Qian et al. 2022) and Khronos (Schmid et al. 2024).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from avlmaps.core.arrays import Bool, Float, Int, UInt16
+from avlmaps.core.camera import Pinhole
+from avlmaps.core.poses import apply, inverse
+from avlmaps.core.progress import silence_progress
+from avlmaps.days.settings import ChangeSettings
+from avlmaps.days.surfaces import Occupied
+from avlmaps.maps.fusion.free_space import FreeViews, block_size, count_through
+from avlmaps.maps.grid import GridSpec
+
+_MOST_SAMPLES = 48  # voxels of a thing by which it is decided which views show it
+_BEFORE_M = 0.3  # a view shows what lies up to this far behind where its blocks are free
+_LEAST_SEEN = 0.2  # of these samples
+
+
+class Verdict(StrEnum):
+    """What a day says of a thing's place."""
+
+    THERE = "there"
+    GONE = "gone"
+    UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """The evidence of a day on some voxels.
+
+    Attributes:
+        voxels: n, how many there are.
+        surface: n₊, with surface again.
+        through: n₋, seen through.
+    """
+
+    voxels: int
+    surface: int
+    through: int
+
+    def coverage(self) -> float:
+        """Return the part of the voxels that was looked at, in [0, 1]."""
+        return (self.surface + self.through) / max(self.voxels, 1)
+
+    def p_gone(self, voxel_size_m: float, settings: ChangeSettings) -> float:
+        """Return the probability that the thing is gone: equation (1)."""
+        patches = min((voxel_size_m / settings.patch_m) ** 2, 1.0)
+        return (1.0 + patches * self.through) / (2.0 + patches * (self.through + self.surface))
+
+    def verdict(self, voxel_size_m: float, settings: ChangeSettings) -> Verdict:
+        """Return what follows."""
+        if self.coverage() < settings.least_coverage:
+            return Verdict.UNKNOWN
+        p_gone = self.p_gone(voxel_size_m, settings)
+        if p_gone >= settings.gone_at:
+            return Verdict.GONE
+        return Verdict.THERE if p_gone < 0.5 else Verdict.UNKNOWN
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DayViews:
+    """How far the keyframes of one recording saw freely, in the map's world.
+
+    Attributes:
+        clear_mm: as ``FreeViews``.
+        pose: world_from_camera of each.
+        camera: that measured depth.
+    """
+
+    clear_mm: UInt16[np.ndarray, "k rows columns"]
+    pose: Float[np.ndarray, "k 4 4"]
+    camera: Pinhole
+
+    def __len__(self) -> int:
+        return len(self.pose)
+
+    def only(self, some: Bool[np.ndarray, " k"]) -> "DayViews":
+        """Return some of the views."""
+        return DayViews(self.clear_mm[some], self.pose[some], self.camera)
+
+    def moved(self, map_from_recording: Float[np.ndarray, "4 4"]) -> "DayViews":
+        """Return them in another world."""
+        return DayViews(self.clear_mm, map_from_recording @ self.pose, self.camera)
+
+    def through(self, index: Int[np.ndarray, "n 3"], grid: GridSpec) -> Int[np.ndarray, " n"]:
+        """Return how many views see through each voxel; see ``count_through``."""
+        views = FreeViews(np.asarray(self.clear_mm), np.asarray(self.pose, np.float64))
+        with silence_progress(True):
+            return count_through(np.asarray(index, np.int32), grid, self.camera, [views])
+
+    def show(self, points: Float[np.ndarray, "m 3"]) -> Bool[np.ndarray, " k"]:
+        """Return which views show a thing: its points are in the picture, and nothing is in front of them."""
+        if not (len(points) and len(self)):
+            return np.zeros(len(self), bool)
+        some = points[:: max(1, len(points) // _MOST_SAMPLES)]
+        camera, size = self.camera, block_size(self.camera)
+        own = np.einsum("kij,mj->kmi", inverse(self.pose)[:, :3, :3], some) + inverse(self.pose)[:, None, :3, 3]
+        depth = np.maximum(own[..., 2], 1e-6)
+        u = camera.fx * own[..., 0] / depth + camera.cx
+        v = camera.fy * own[..., 1] / depth + camera.cy
+        inside = (own[..., 2] > 0.05) & (u >= 0) & (v >= 0) & (u < camera.width) & (v < camera.height)
+        column, row = (np.where(inside, one, 0.0).astype(np.int64) // size for one in (u, v))
+        clear_m = self.clear_mm[np.arange(len(self))[:, None], row, column] / 1000.0
+        shown = inside & (clear_m > 0.0) & (clear_m >= own[..., 2] - _BEFORE_M)
+        return shown.mean(axis=1) >= _LEAST_SEEN
+
+    def directions(self, middle: Float[np.ndarray, "3"]) -> Float[np.ndarray, "k 3"]:
+        """Return the unit vectors from a place to the cameras."""
+        to = self.pose[:, :3, 3] - middle
+        return to / np.maximum(np.linalg.norm(to, axis=1, keepdims=True), 1e-9)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Day:
+    """What one day knows of the map's world.
+
+    Attributes:
+        views: what its keyframes looked at.
+        occupied: its surface, in the grid of its own world.
+        recording_from_map: 4x4, into that world.
+    """
+
+    views: DayViews
+    occupied: Occupied
+    recording_from_map: Float[np.ndarray, "4 4"]
+
+    def has_surface(self, points: Float[np.ndarray, "m 3"]) -> Bool[np.ndarray, " m"]:
+        """Return where the day has surface: in a place's voxel or beside it."""
+        return self.occupied.near(apply(self.recording_from_map, points))
+
+
+def seen_again(
+    index: Int[np.ndarray, "n 3"],
+    grid: GridSpec,
+    before: Sequence[DayViews],
+    day: Day,
+    settings: ChangeSettings,
+) -> Seen:
+    """Return what a day says of a thing's voxels.
+
+    Args:
+        index: its voxels.
+        grid: their size.
+        before: the views of the days on which it was there.
+        day: the day.
+        settings: how near to those a view must look from.
+    """
+    points = grid.centre_of(np.asarray(index))
+    surface = day.has_surface(points)
+    allowed = _from_where_it_was_seen(points, before, day.views, settings)
+    through = np.zeros(len(index), bool)
+    if allowed.sum() >= settings.through_views:
+        through = day.views.only(allowed).through(index, grid) >= settings.through_views
+    return Seen(len(index), int(surface.sum()), int((through & ~surface).sum()))
+
+
+def was_empty(
+    index: Int[np.ndarray, "n 3"],
+    grid: GridSpec,
+    before: Sequence[DayViews],
+    known: Occupied,
+    settings: ChangeSettings,
+) -> bool:
+    """Return whether the place of a thing was looked through before it stood there, by the rule of ``verdict``.
+
+    Args:
+        index: its voxels.
+        grid: their size.
+        before: the views of all earlier days.
+        known: the surface that the map had until then, as those who looked last left it.
+        settings: the rule.
+    """
+    surface = known.near(grid.centre_of(np.asarray(index)))
+    through = np.sum([day.through(index, grid) for day in before], axis=0) >= settings.through_views
+    seen = Seen(len(index), int(surface.sum()), int((through & ~surface).sum()))
+    return seen.verdict(grid.voxel_size_m, settings) is Verdict.GONE
+
+
+def _from_where_it_was_seen(
+    points: Float[np.ndarray, "n 3"], before: Sequence[DayViews], views: DayViews, settings: ChangeSettings
+) -> Bool[np.ndarray, " k"]:
+    """Return which views look at a thing from about where one saw it before."""
+    middle = points.mean(axis=0)
+    known = [day.directions(middle)[day.show(points)] for day in before]
+    seen_from = np.concatenate([np.zeros((0, 3)), *known])
+    if not len(seen_from):
+        return np.zeros(len(views), bool)
+    alike = (views.directions(middle) @ seen_from.T).max(axis=1)
+    return alike >= np.cos(settings.angle_rad)

@@ -1,0 +1,201 @@
+"""What became of each thing: it is the one of an earlier day, it is gone, it moved, or nobody knows.
+
+First the things of the new day are matched with those that were there; then what was not matched is judged by the
+evidence at its place (``evidence``); then the new ones are matched with those that are gone (moved).
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import msgspec
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from avlmaps.core.arrays import Float, Int
+from avlmaps.days.evidence import Day, DayViews, Verdict, seen_again, was_empty
+from avlmaps.days.settings import ChangeSettings
+from avlmaps.days.surfaces import AROUND, Occupied, packed
+from avlmaps.maps.grid import GridSpec
+from avlmaps.maps.store.life import Life, Stay
+
+SameName = Callable[[str, str], bool]
+"""Says whether two names may be of one thing."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Seen:
+    """A thing as a day's map lists it, in the grid of the map of all days.
+
+    Attributes:
+        name: the word of the vocabulary.
+        confidence: that it is one.
+        position: a point of it, metres.
+        size: along the level axes, metres.
+        color: mean RGB.
+        index: its voxels.
+        seen_s: when it was last seen, the map's time.
+    """
+
+    name: str
+    confidence: float
+    position: tuple[float, float, float]
+    size: tuple[float, float, float]
+    color: tuple[int, int, int]
+    index: Int[np.ndarray, "v 3"]
+    seen_s: float
+
+
+def begun(things: Sequence[Seen], visit: int = 0) -> Life:
+    """Return the life of things on the first day."""
+    return Life.of([_stay(thing, visit, appeared=False) for thing in things], [thing.index for thing in things])
+
+
+def lived_on(
+    life: Life,
+    things: Sequence[Seen],
+    day: Day,
+    before: Sequence[DayViews],
+    known: Occupied,
+    visit: int,
+    at_s: Sequence[float],
+    grid: GridSpec,
+    settings: ChangeSettings,
+    same: SameName = lambda one, other: one == other,
+) -> Life:
+    """Return what became of things by another day.
+
+    Args:
+        life: until then.
+        things: of the new day.
+        day: what it looked at.
+        before: the views of each earlier visit.
+        known: the surface of the map until then.
+        visit: number of the new day.
+        at_s: when each visit ended, the new one last, the map's time.
+        grid: of the voxels.
+        settings: the rule.
+        same: whether two names may be of one thing.
+    """
+    stays, voxels = list(life.stays), [life.voxels(number) for number in range(len(life))]
+    present = [number for number, stay in enumerate(stays) if stay.gone is None]
+    matched = _matched(present, stays, voxels, things, settings, same)
+    for number in present:
+        stay = stays[number]
+        if (thing := matched.get(number)) is not None:
+            seen = things[thing]
+            better = seen.confidence > stay.confidence
+            stays[number] = msgspec.structs.replace(
+                stay,
+                name=seen.name if better else stay.name,
+                confidence=max(stay.confidence, seen.confidence),
+                last=visit,
+                looked=visit,
+                last_seen_s=seen.seen_s,
+            )
+            continue
+        views = [one for one in before[stay.first : visit] if len(one)]
+        seen = seen_again(voxels[number], grid, views, day, settings)
+        match seen.verdict(grid.voxel_size_m, settings):
+            case Verdict.THERE:
+                stays[number] = msgspec.structs.replace(stay, last=visit, looked=visit, last_seen_s=at_s[visit])
+            case Verdict.GONE:
+                stays[number] = msgspec.structs.replace(stay, looked=visit, gone=visit)
+            case Verdict.UNKNOWN:
+                pass
+    for number in sorted(set(range(len(things))) - set(matched.values())):
+        thing = things[number]
+        stays.append(_stay(thing, visit, appeared=was_empty(thing.index, grid, before, known, settings)))
+        voxels.append(thing.index)
+    return Life.of(_moved(stays, len(life), visit, at_s, settings, same), voxels)
+
+
+def _stay(thing: Seen, visit: int, appeared: bool) -> Stay:
+    return Stay(
+        name=thing.name, confidence=thing.confidence, position=thing.position, size=thing.size, color=thing.color,
+        first=visit, last=visit, last_seen_s=thing.seen_s, looked=visit, appeared=appeared,
+    )  # fmt: skip
+
+
+def _matched(
+    present: Sequence[int],
+    stays: Sequence[Stay],
+    voxels: Sequence[Int[np.ndarray, "v 3"]],
+    things: Sequence[Seen],
+    settings: ChangeSettings,
+    same: SameName,
+) -> dict[int, int]:
+    """Return for stays the thing of the new day that stands where they do, each thing once.
+
+    A name that fits counts first; what lies in the same voxels under another name is the same thing named otherwise.
+    """
+    keys = [np.unique(packed((np.asarray(thing.index)[:, None] + AROUND[None]).reshape(-1, 3))) for thing in things]
+    own = [packed(voxels[number]) for number in present]
+    value = np.zeros((len(present), len(things)))
+    for row, number in enumerate(present):
+        for column, thing in enumerate(things):
+            if np.linalg.norm(np.subtract(stays[number].position, thing.position)) > _far(stays[number], thing):
+                continue
+            shared = int(np.isin(own[row], keys[column], assume_unique=False).sum())
+            smaller, larger = sorted((len(own[row]), len(thing.index)))
+            part = min(shared / max(smaller, 1), 1.0)
+            if same(stays[number].name, thing.name):
+                value[row, column] = 1.0 + part if part >= settings.overlap else 0.0
+            elif part >= settings.same_place and smaller >= settings.same_place * larger:
+                value[row, column] = part
+    rows, columns = linear_sum_assignment(-value)
+    return {
+        present[row]: int(column)
+        for row, column in zip(rows.tolist(), columns.tolist(), strict=True)
+        if value[row, column] > 0.0
+    }
+
+
+def _far(stay: Stay, thing: Seen) -> float:
+    """Return how far the middles of two that overlap can be, metres."""
+    return float(np.linalg.norm(stay.size) + np.linalg.norm(thing.size)) / 2 + 0.2
+
+
+def _moved(
+    stays: list[Stay], known: int, visit: int, at_s: Sequence[float], settings: ChangeSettings, same: SameName
+) -> list[Stay]:
+    """Join what appeared with what is gone from elsewhere: the pairs that are most alike."""
+    gone = [
+        number
+        for number, stay in enumerate(stays[:known])
+        if stay.gone is not None and stay.moved_to is None and at_s[visit] - at_s[stay.last] <= settings.within_s
+    ]
+    new = [number for number in range(known, len(stays)) if stays[number].appeared]
+    value = np.zeros((len(gone), len(new)))
+    for row, one in enumerate(gone):
+        for column, other in enumerate(new):
+            alike = likeness(stays[one], stays[other])
+            unsure = min(stays[one].confidence, stays[other].confidence) < settings.confident_at
+            named = same(stays[one].name, stays[other].name)
+            fits = alike >= (settings.least_likeness if named else settings.likeness_unnamed)
+            if (named or unsure) and fits and _apart_m(stays[one], stays[other]) <= settings.reach_m:
+                value[row, column] = alike + named
+    for row, column in zip(*linear_sum_assignment(-value), strict=True):
+        if value[row, column] > 0.0:
+            one, other = gone[row], new[column]
+            stays[one] = msgspec.structs.replace(stays[one], moved_to=other)
+            stays[other] = msgspec.structs.replace(stays[other], moved_from=one)
+    return stays
+
+
+def _apart_m(one: Stay, other: Stay) -> float:
+    return float(np.linalg.norm(np.subtract(one.position, other.position)))
+
+
+def likeness(one: Stay, other: Stay) -> float:
+    """Return how alike two things are by size and colour, in [0, 1].
+
+    exp(−½ (Δ log size / 0.5)² − ½ (Δ RGB / 60)²): the size is height, and the diagonal of the footprint, which turning
+    leaves nearly as it is.
+    """
+    sizes: list[Float[np.ndarray, 2]] = []
+    for stay in (one, other):
+        x, y, z = stay.size
+        sizes.append(np.log(np.maximum([float(np.hypot(x, y)), z], 0.05)))
+    off = float(np.square((sizes[0] - sizes[1]) / 0.5).sum())
+    tint = float(np.square(np.subtract(one.color, other.color) / 60.0).sum()) / 3.0
+    return float(np.exp(-0.5 * (off + tint)))

@@ -1,0 +1,299 @@
+"""What changed in a map of several days: what is new, gone and moved, and where a thing was last seen, with the day."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from datetime import date
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from avlmaps.core.errors import QueryError
+from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.poses import FRAME
+
+if TYPE_CHECKING:
+    from avlmaps.maps.store.life import Life, Stay
+    from avlmaps.maps.store.manifest import Visit
+    from avlmaps.maps.store.reader import StoredMap
+    from avlmaps.query.contents import Thing
+    from avlmaps.query.queryable import Queryable
+    from avlmaps.query.schema import ChangeAnswer, ChangesAnswer, DayAnswer, LastSeenAnswer
+    from avlmaps.query.voxel_space import Space
+
+ChangeKind = Literal["new", "gone", "moved", "first seen"]
+RoomOf = Callable[[tuple[float, float, float]], str | None]
+"""Returns the name of the room that holds a place."""
+
+
+@dataclass(frozen=True, slots=True)
+class Days:
+    """The days of a map and what became of its things.
+
+    Attributes:
+        visits: the days, in the order of time.
+        life: of the things.
+    """
+
+    visits: "tuple[Visit, ...]"
+    life: "Life"
+
+    @classmethod
+    def of(cls, stored: "StoredMap") -> "Days":
+        """Return those of a map.
+
+        Raises:
+            QueryError: it was seen on one day alone.
+        """
+        life = stored.life()
+        if life is None:
+            raise QueryError(
+                f"{stored.path} was seen on one day alone, so that nothing is known to have changed; add another day "
+                "with `avlmaps merge`."
+            )
+        return cls(stored.info.visits, life)
+
+    @property
+    def last(self) -> int:
+        """The number of the last visit."""
+        return len(self.visits) - 1
+
+    def name(self, visit: int) -> str:
+        """Return the name of a visit for people: its day, or its number from 1."""
+        day = self.visits[visit].day
+        return day or f"visit {visit + 1}"
+
+    def visit_of(self, said: str | int) -> int:
+        """Return the number of the visit that a day names: a number from 1, or the last one up to a date.
+
+        Raises:
+            QueryError: there is no such visit, or the days are not known.
+        """
+        text = str(said).strip()
+        if text.isdecimal():
+            if not 1 <= int(text) <= len(self.visits):
+                raise QueryError(f"There is no visit {text}; the map has {len(self.visits)}, counted from 1.")
+            return int(text) - 1
+        try:
+            wanted = date.fromisoformat(text).isoformat()
+        except ValueError:
+            raise QueryError(f"{text!r} is no day; write it as 2026-11-25, or as the number of a visit.") from None
+        dated = [number for number, visit in enumerate(self.visits) if visit.day and visit.day <= wanted]
+        if not dated:
+            first = next((visit.day for visit in self.visits if visit.day), None)
+            why = f"its first day is {first}" if first else "its days are not known, number them from 1"
+            raise QueryError(f"The map was not seen up to {wanted}; {why}.")
+        return dated[-1]
+
+    def at(self, visit: int) -> "list[int]":
+        """Return the numbers of the stays that were there on a visit."""
+        return [number for number, stay in enumerate(self.life.stays) if stay.is_there(visit)]
+
+    def changes(self, since: int = 0) -> "list[Change]":
+        """Return what changed after a visit, in the order of time.
+
+        What was seen first on a later day is ``new`` only where its place had been looked through before; else it is
+        ``first seen``.
+        """
+        found: list[Change] = []
+        stays = self.life.stays
+        for number, stay in enumerate(stays):
+            if stay.first > since and stay.moved_from is None:
+                found.append(Change("new" if stay.appeared else "first seen", stay.first, None, number))
+            if stay.gone is not None and stay.gone > since and stay.moved_to is None:
+                found.append(Change("gone", stay.gone, number, None))
+            if stay.moved_to is not None and stays[stay.moved_to].first > since:
+                found.append(Change("moved", stays[stay.moved_to].first, number, stay.moved_to))
+        return sorted(found, key=lambda one: (one.visit, _ORDER[one.kind], one.stay(stays).name))
+
+
+_ORDER = {"new": 0, "moved": 1, "gone": 2, "first seen": 3}
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """One change.
+
+    Attributes:
+        kind: what happened.
+        visit: the day on which it was noticed.
+        before: number of the stay that ended; None for what is new.
+        after: number of the stay that began; None for what is gone.
+    """
+
+    kind: ChangeKind
+    visit: int
+    before: int | None
+    after: int | None
+
+    def stay(self, stays: "Sequence[Stay]") -> "Stay":
+        """Return where it is now, or where it was."""
+        number = self.before if self.after is None else self.after
+        assert number is not None
+        return stays[number]
+
+
+def when(days: Days, visit: int, stamp_s: float | None = None) -> "DayAnswer":
+    """Return a visit as answers have it."""
+    answer: DayAnswer = {"visit": visit + 1, "day": days.visits[visit].day or None}
+    if stamp_s is not None:
+        answer["stamp_s"] = round(stamp_s - days.visits[visit].shift_s, 3)
+    return answer
+
+
+def changes_answer(
+    days: Days, name: str, since: int = 0, room_of: RoomOf = lambda place: None, *, first_seen: bool = False
+) -> "ChangesAnswer":
+    """Return what ``avlmaps changes --json`` prints.
+
+    Args:
+        days: of the map.
+        name: of the map.
+        since: visit after which changes count.
+        room_of: names the room of a place.
+        first_seen: list also what was seen first, where nobody had looked before.
+    """
+    stays = days.life.stays
+    listed: list[ChangeAnswer] = []
+    for one in days.changes(since):
+        if one.kind == "first seen" and not first_seen:
+            continue
+        stay = one.stay(stays)
+        before = None if one.before is None else stays[one.before]
+        after = None if one.after is None else stays[one.after]
+        listed.append(
+            {
+                "kind": one.kind,
+                "name": stay.name,
+                "confidence": stay.confidence,
+                "position": list(stay.position),
+                "from": None if before is None or after is None else list(before.position),
+                "room": room_of(stay.position),
+                "size": list(stay.size),
+                "noticed": when(days, one.visit),
+                "last_seen": when(days, stay.last, stay.last_seen_s),
+                "first_seen": when(days, stay.first if before is None else before.first),
+            }
+        )
+    return {
+        "map": name,
+        "frame": FRAME,
+        "since": when(days, since),
+        "days": [when(days, number) for number in range(len(days.visits))],
+        "changes": listed,
+        "unknown": sum(stay.gone is None and stay.looked < days.last for stay in stays),
+    }
+
+
+def last_seen(days: Days, name: str, same: Callable[[str], bool], room_of: RoomOf) -> "LastSeenAnswer":
+    """Return where things of a name were last seen, those that are there still first, then the latest.
+
+    Args:
+        days: of the map.
+        name: the word.
+        same: whether a thing's name is meant by it.
+        room_of: names the room of a place.
+    """
+    stays = days.life.stays
+    own = [stay for stay in stays if same(stay.name) and stay.moved_to is None]
+    own.sort(key=lambda stay: (stay.gone is not None, -stay.last_seen_s, -stay.confidence))
+    return {
+        "name": name,
+        "frame": FRAME,
+        "seen": [
+            {
+                "name": stay.name,
+                "position": list(stay.position),
+                "room": room_of(stay.position),
+                "confidence": stay.confidence,
+                "last_seen": when(days, stay.last, stay.last_seen_s),
+                "gone": None if stay.gone is None else when(days, stay.gone),
+                "looked": when(days, stay.looked),
+            }
+            for stay in own
+        ],
+    }
+
+
+def things_at(
+    space: "Space", days: Days, at: str | int, names: "Sequence[str] | None", least_confidence: float
+) -> "list[Thing]":
+    """Return the things that were there on a day, most confident first; see ``AVLMap.things``."""
+    from avlmaps.query.contents import Thing
+
+    voxels: list[list[int]] = np.asarray(space.index).tolist()
+    row_of = {(x, y, z): row for row, (x, y, z) in enumerate(voxels)}
+    found: list[Thing] = []
+    for number in days.at(days.visit_of(at)):
+        stay, index = days.life.stays[number], days.life.voxels(number)
+        if stay.confidence < least_confidence or (names is not None and stay.name not in names):
+            continue
+        own: list[list[int]] = index.tolist()
+        left = sorted(row for x, y, z in own if (row := row_of.get((x, y, z))) is not None)
+        rows = np.array(left, np.int64)
+        points = space.grid.centre_of(index)
+        found.append(Thing(stay.name, stay.confidence, stay.position, stay.size, stay.color, rows, points))
+    return sorted(found, key=lambda thing: -thing.confidence)
+
+
+def is_meant(name: str) -> Callable[[str], bool]:
+    """Return whether a thing's name is meant by a word: by itself, by another word for it, or by a wider one."""
+    entry = lexicon().find(name, Kind.THING)
+    own = name if entry is None else entry.name
+    return lambda other: other in (name, own) or lexicon().is_a(other, own, Kind.THING)
+
+
+def room_namer(avlmap: "Queryable") -> RoomOf:
+    """Return what names the room of a place in a map; nothing where it has no model of views."""
+    from avlmaps.query.whereabouts import NOWHERE, Whereabouts
+
+    known: list[Whereabouts] = []
+
+    def room_of(place: tuple[float, float, float]) -> str | None:
+        if "views" not in avlmap.stored.info.models:
+            return None
+        if not known:
+            known.append(Whereabouts.of(avlmap))
+        number = int(known[0].rooms_of(np.array([place]))[0])
+        return None if number == NOWHERE else known[0].names[number]
+
+    return room_of
+
+
+def text_of(answer: "ChangesAnswer", kinds: Iterable[ChangeKind] = ("new", "moved", "gone"), place: str = "") -> str:
+    """Return changes in one sentence."""
+    wanted = set(kinds)
+    own = [one for one in answer["changes"] if one["kind"] in wanted]
+    where = f" in the {place}" if place else ""
+    if not own:
+        names = " or ".join(kind for kind in ("new", "moved", "gone") if kind in wanted)
+        return f"Nothing is known to be {names}{where} since {said(answer['since'])}."
+    parts: list[str] = []
+    for one in own:
+        there = f" ({one['room']})" if one["room"] and not place else ""
+        verb = "is" if one["kind"] != "moved" else "has"
+        parts.append(f"{_article(one['name'])} {verb} {one['kind']}{there}, noticed on {said(one['noticed'])}")
+    return f"Since {said(answer['since'])}{where}: {'; '.join(parts)}."
+
+
+def said(day: "DayAnswer") -> str:
+    """Return a day in words."""
+    return day["day"] or f"visit {day['visit']}"
+
+
+def last_seen_text(answer: "LastSeenAnswer") -> str:
+    """Return where a thing was last seen, in one sentence."""
+    if not answer["seen"]:
+        return f"No {answer['name']} was seen on any day."
+    one = answer["seen"][0]
+    x, y, z = one["position"]
+    room = f"in the {one['room']}, " if one["room"] else ""
+    text = f"The {one['name']} was last seen on {said(one['last_seen'])}, {room}at ({x:.2f}, {y:.2f}, {z:.2f}) m."
+    if one["gone"] is not None:
+        return f"{text} On {said(one['gone'])} it was gone from there."
+    if one["looked"]["visit"] > one["last_seen"]["visit"]:
+        return text
+    return f"{text} Nothing that was seen since speaks against it."
+
+
+def _article(name: str) -> str:
+    return f"{'an' if name[:1] in 'aeiou' else 'a'} {name}"

@@ -1,0 +1,132 @@
+"""What a map of several days answers: the changes since a day, the things of a day, and where a thing was last seen."""
+
+import msgspec
+import numpy as np
+import pytest
+
+from avlmaps.core.errors import QueryError
+from avlmaps.language.list_questions import Listed, read_list
+from avlmaps.maps.store.life import Life, Stay
+from avlmaps.maps.store.manifest import CameraInfo, RecordingInfo, RigInfo, Visit
+from avlmaps.query.changes import Days, changes_answer, is_meant, last_seen, last_seen_text, text_of
+
+CAMERA = CameraInfo(fx=1.0, fy=1.0, cx=0.5, cy=0.5, width=1, height=1)
+ROWS = tuple(tuple(float(value) for value in row) for row in np.eye(4))
+DATES = ("2026-11-23", "2026-11-24", "2026-11-26")
+
+
+def visit(number: int, day: str) -> Visit:
+    recording = RecordingInfo(name="walk", format="folder", fingerprint="", frames=9, duration_s=60.0)
+    begin_s = 86_400.0 * number
+    return Visit(
+        day=day, recording=recording, begin_s=begin_s, end_s=begin_s + 60.0, shift_s=begin_s, map_from_recording=ROWS,
+        rig=RigInfo(rgb=CAMERA, depth=CAMERA, rgb_from_depth=ROWS), frames=9,
+    )  # fmt: skip
+
+
+def stay(name: str, first: int, last: int, **more: object) -> Stay:
+    known: dict[str, object] = {"confidence": 0.8, "size": (0.3, 0.3, 0.3), "color": (9, 9, 9), "looked": last}
+    known |= {"position": (float(first), 0.0, 0.3), "last_seen_s": 86_400.0 * last + 30.0, **more}
+    return Stay(name=name, first=first, last=last, **known)  # pyright: ignore[reportArgumentType]
+
+
+STAYS = [
+    stay("sofa", 0, 2),
+    stay("bag", 0, 0, gone=1, looked=1, moved_to=2),
+    stay("bag", 1, 1, appeared=True, moved_from=1, gone=2, looked=2),
+    stay("plant", 1, 2, appeared=True),
+    stay("stool", 0, 0, gone=2, looked=2),
+    stay("clock", 0, 0),  # nobody looked again
+    stay("picture", 2, 2),  # nobody had looked before
+]
+
+
+def days(dates: tuple[str, ...] = DATES) -> Days:
+    voxels = [np.full((2, 3), number, np.int32) for number in range(len(STAYS))]
+    return Days(tuple(visit(number, day) for number, day in enumerate(dates)), Life.of(STAYS, voxels))
+
+
+def kinds(since: int) -> list[tuple[str, str, int]]:
+    known = days()
+    return [(one.kind, one.stay(known.life.stays).name, one.visit) for one in known.changes(since)]
+
+
+def test_changes_come_with_their_day_and_count_since_another() -> None:
+    assert kinds(0) == [
+        ("new", "plant", 1), ("moved", "bag", 1), ("gone", "bag", 2), ("gone", "stool", 2),
+        ("first seen", "picture", 2),
+    ]  # fmt: skip
+    assert kinds(1) == [("gone", "bag", 2), ("gone", "stool", 2), ("first seen", "picture", 2)]
+    assert kinds(2) == []
+
+
+def test_a_day_holds_what_was_there_and_what_nothing_speaks_against() -> None:
+    known = days()
+    names = [[known.life.stays[number].name for number in known.at(day)] for day in range(3)]
+    assert names[0] == ["sofa", "bag", "stool", "clock"]
+    assert names[1] == ["sofa", "bag", "plant", "stool", "clock"]
+    assert names[2] == ["sofa", "plant", "clock", "picture"]
+
+
+@pytest.mark.parametrize(("said", "visit"), [("1", 0), (3, 2), ("2026-11-23", 0), ("2026-11-25", 1), ("2026-12-01", 2)])
+def test_a_day_is_a_date_or_a_number(said: str | int, visit: int) -> None:
+    assert days().visit_of(said) == visit
+
+
+@pytest.mark.parametrize(
+    ("said", "why"),
+    [("0", "no visit 0"), ("4", "has 3"), ("monday", "no day"), ("2026-11-22", "first day is 2026-11-23")],
+)
+def test_another_day_is_refused(said: str, why: str) -> None:
+    with pytest.raises(QueryError, match=why):
+        days().visit_of(said)
+    with pytest.raises(QueryError, match="number them"):
+        days(("", "", "")).visit_of("2026-11-22")
+
+
+def test_the_answer_is_json_with_the_days_and_what_is_unknown() -> None:
+    answer = changes_answer(days(), "home", 0, lambda place: "kitchen")
+    assert msgspec.json.decode(msgspec.json.encode(answer)) == answer
+    assert [one["kind"] for one in answer["changes"]] == ["new", "moved", "gone", "gone"]
+    moved = answer["changes"][1]
+    assert moved["from"] == [0.0, 0.0, 0.3] and moved["position"] == [1.0, 0.0, 0.3] and moved["room"] == "kitchen"
+    assert answer["changes"][0]["noticed"] == {"visit": 2, "day": "2026-11-24"}
+    assert answer["unknown"] == 1, "the clock"
+    assert "a bag has moved (kitchen), noticed on 2026-11-24" in text_of(answer)
+    assert text_of(answer, ("new",)) == "Since 2026-11-23: a plant is new (kitchen), noticed on 2026-11-24."
+
+
+def test_where_a_thing_was_last_seen_is_where_its_last_stay_was() -> None:
+    answer = last_seen(days(), "bag", is_meant("bag"), lambda place: None)
+    (one,) = answer["seen"]
+    assert one["position"] == [1.0, 0.0, 0.3]
+    assert one["last_seen"] == {"visit": 2, "day": "2026-11-24", "stamp_s": 30.0}
+    assert last_seen_text(answer).endswith("On 2026-11-26 it was gone from there.")
+    assert "speaks against it" in last_seen_text(last_seen(days(), "clock", is_meant("clock"), lambda place: None))
+    assert last_seen(days(), "piano", is_meant("piano"), lambda place: None)["seen"] == []
+
+
+@pytest.mark.parametrize(
+    ("sentence", "of", "name", "change", "since"),
+    [
+        ("what is new in the kitchen?", Listed.CHANGES, "kitchen", "new", ""),
+        ("What is gone?", Listed.CHANGES, "", "gone", ""),
+        ("what has moved since 2026-11-24?", Listed.CHANGES, "", "moved", "2026-11-24"),
+        ("what's missing from the bedroom", Listed.CHANGES, "bedroom", "gone", ""),
+        ("what has changed in the house since visit 2", Listed.CHANGES, "", "", "2"),
+        ("where was the suitcase last seen?", Listed.LAST_SEEN, "suitcase", "", ""),
+        ("where did you last see my bag?", Listed.LAST_SEEN, "bag", "", ""),
+    ],
+)
+def test_questions_about_days_are_read(sentence: str, of: Listed, name: str, change: str, since: str) -> None:
+    read = read_list(sentence)
+    assert read is not None
+    assert (read.of, read.name, read.change, read.since) == (of, name, change, since)
+
+
+@pytest.mark.parametrize(
+    "sentence", ["what is in the kitchen", "where is the bag", "the new chair", "what moved there"]
+)
+def test_other_questions_are_not(sentence: str) -> None:
+    read = read_list(sentence)
+    assert read is None or read.of not in (Listed.CHANGES, Listed.LAST_SEEN)

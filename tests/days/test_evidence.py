@@ -1,0 +1,105 @@
+"""What a day says of a place: the law that "not seen" never becomes "gone", and views of a plain room."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from avlmaps.core.camera import Pinhole
+from avlmaps.days.evidence import Day, DayViews, Seen, Verdict, seen_again, was_empty
+from avlmaps.days.settings import ChangeSettings
+from avlmaps.days.surfaces import Occupied
+from avlmaps.maps.grid import GridSpec
+
+GRID, SETTINGS = GridSpec(0.05), ChangeSettings()
+CAMERA = Pinhole(80.0, 80.0, 80.0, 60.0, 160, 120)
+SIZE = 2  # pixels of a block, of a picture 160 wide
+COUNT = st.integers(0, 500)
+
+
+@given(COUNT, COUNT)
+def test_what_nobody_looked_at_is_unknown(voxels: int, rest: int) -> None:
+    seen = Seen(voxels + rest, 0, 0)
+    assert seen.p_gone(0.05, SETTINGS) == 0.5 and seen.verdict(0.05, SETTINGS) is Verdict.UNKNOWN
+
+
+@given(st.integers(1, 500), COUNT, COUNT)
+def test_surface_speaks_for_a_thing_and_a_ray_against_it(voxels: int, surface: int, through: int) -> None:
+    seen = Seen(voxels + surface + through, surface, through)
+    p_gone = seen.p_gone(0.05, SETTINGS)
+    assert 0.0 < p_gone < 1.0
+    assert Seen(seen.voxels + 1, surface + 1, through).p_gone(0.05, SETTINGS) < p_gone
+    assert Seen(seen.voxels + 1, surface, through + 1).p_gone(0.05, SETTINGS) > p_gone
+    # Both sides change places: the equation favours neither.
+    assert Seen(seen.voxels, through, surface).p_gone(0.05, SETTINGS) == pytest.approx(1.0 - p_gone)
+    if seen.verdict(0.05, SETTINGS) is Verdict.GONE:
+        assert through > surface and seen.coverage() >= SETTINGS.least_coverage
+
+
+def test_the_equation_by_hand() -> None:
+    # 90 voxels of 5 cm through patches of 15 cm: ten looks.
+    assert Seen(100, 0, 90).p_gone(0.05, SETTINGS) == pytest.approx(11.0 / 12.0)
+    assert Seen(100, 90, 0).p_gone(0.05, SETTINGS) == pytest.approx(1.0 / 12.0)
+
+
+def look(at: np.ndarray, towards: np.ndarray) -> np.ndarray:
+    """Return the pose of a camera that looks from one place to another."""
+    forward = (towards - at) / np.linalg.norm(towards - at)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    pose = np.eye(4)
+    pose[:3, :3] = np.stack([right, np.cross(forward, right), forward], axis=1)
+    pose[:3, 3] = at
+    return pose
+
+
+def views(places: list[tuple[float, float, float]], towards: tuple[float, float, float], free_m: float) -> DayViews:
+    pose = np.stack([look(np.array(place), np.array(towards)) for place in places])
+    clear = np.full((len(pose), CAMERA.height // SIZE, CAMERA.width // SIZE), round(1000 * free_m), np.uint16)
+    return DayViews(clear, pose, CAMERA)
+
+
+BOX = np.stack(np.meshgrid(*[np.arange(0, 6)] * 3, indexing="ij"), axis=-1).reshape(-1, 3).astype(np.int32)
+MIDDLE = (0.15, 0.15, 0.15)
+NOTHING = np.array([[200, 200, 200]], np.int32)
+FRONT = [(2.0, 0.1, 0.3), (2.0, 0.2, 0.3), (2.1, 0.3, 0.3)]
+BACK = [(-2.0, 0.1, 0.3), (-2.0, 0.2, 0.3), (-2.1, 0.3, 0.3)]
+
+
+def day(seen: DayViews, index: np.ndarray = NOTHING) -> Day:
+    return Day(seen, Occupied.of(index, GRID), np.eye(4))
+
+
+def test_rays_through_the_place_from_where_it_was_seen_are_evidence() -> None:
+    before = [views(FRONT, MIDDLE, 1.9)]
+    seen = seen_again(BOX, GRID, before, day(views(FRONT, MIDDLE, 4.0)), SETTINGS)
+    assert seen.through == len(BOX) and seen.verdict(GRID.voxel_size_m, SETTINGS) is Verdict.GONE
+
+
+def test_rays_from_the_other_side_prove_nothing() -> None:
+    seen = seen_again(BOX, GRID, [views(FRONT, MIDDLE, 1.9)], day(views(BACK, MIDDLE, 4.0)), SETTINGS)
+    assert seen.through == 0 and seen.verdict(GRID.voxel_size_m, SETTINGS) is Verdict.UNKNOWN
+
+
+@pytest.mark.parametrize("free_m", [0.0, 1.0, 1.5])
+def test_rays_that_end_before_it_prove_nothing(free_m: float) -> None:
+    seen = seen_again(BOX, GRID, [views(FRONT, MIDDLE, 1.9)], day(views(FRONT, MIDDLE, free_m)), SETTINGS)
+    assert (seen.through, seen.surface) == (0, 0)
+
+
+def test_one_view_is_not_enough() -> None:
+    seen = seen_again(BOX, GRID, [views(FRONT, MIDDLE, 1.9)], day(views(FRONT[:1], MIDDLE, 4.0)), SETTINGS)
+    assert seen.through == 0
+
+
+def test_surface_in_its_place_keeps_it() -> None:
+    before, now = [views(FRONT, MIDDLE, 1.9)], views(FRONT, MIDDLE, 4.0)
+    seen = seen_again(BOX, GRID, before, day(now, BOX + np.array([1, 0, 0], np.int32)), SETTINGS)
+    assert seen.surface == len(BOX) and seen.verdict(GRID.voxel_size_m, SETTINGS) is Verdict.THERE
+
+
+def test_a_place_was_empty_only_where_somebody_looked() -> None:
+    none, through, short = Occupied.of(NOTHING, GRID), views(FRONT, MIDDLE, 4.0), views(FRONT, MIDDLE, 1.0)
+    assert was_empty(BOX, GRID, [through], none, SETTINGS)
+    assert not was_empty(BOX, GRID, [short], none, SETTINGS)
+    assert not was_empty(BOX, GRID, [through], Occupied.of(BOX, GRID), SETTINGS)
