@@ -13,13 +13,14 @@ import pytest
 
 import avlmaps
 from avlmaps.core.errors import AudioError, MapError, RecordingError
-from avlmaps.live.gates import Gates
+from avlmaps.live.gates import EncodingGate, Gates
 from avlmaps.live.live_map import LiveMap
 from avlmaps.live.pose_check import PoseCheck
 from avlmaps.live.settings import LiveSettings
 from avlmaps.live.status import Tally
 from avlmaps.maps.build import build_map
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
+from avlmaps.maps.fusion.settings import FusionSettings
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.settings import BuildSettings, FrameSettings
 from avlmaps.maps.store.reader import open_stored
@@ -319,6 +320,31 @@ def test_a_gate_opens_for_new_surface_alone() -> None:
     for _ in range(2):
         total.add(frame(20))
     assert gates.reason_against(frame(0), [total]) == "known"
+
+
+def test_a_frame_is_encoded_for_its_share_of_new_and_nearer_looks() -> None:
+    settings = LiveSettings(looks=2, encoded_share=0.1)
+    gate = EncodingGate(settings, FusionSettings())
+    assert [gate.opens(frame(0)) for _ in range(4)] == [True, True, False, False]
+    assert gate.opens(frame(40))  # another place
+    nearer = frame(0)
+    pose = nearer.world_from_camera.copy()
+    pose[1, 3] += 1.0  # 1 m nearer to the wall: there the weight of a look is several times that of before
+    assert gate.opens(replace(nearer, world_from_camera=pose, depth_m=nearer.depth_m - 1.0))
+    free, pressed = (EncodingGate(settings, FusionSettings()) for _ in range(2))
+    opened = [(free.opens(frame(n)), pressed.opens(frame(n), waiting=4)) for n in range(60)]
+    assert opened[0] == (True, True)
+    assert sum(one for one, _ in opened) > sum(other for _, other in opened) > 2
+
+
+def test_frames_that_are_not_encoded_add_their_surface_alone(tmp_path: Path) -> None:
+    chosen = LiveSettings(first_frames=2, known_views=100, new_share=0.0, looks=2)
+    with LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP, live=chosen) as live:
+        for number in range(12):
+            add(live, frame(number, step_m=0.005))
+    status = live.status()
+    assert status.fused == 12 and 0 < status.encoded < 12
+    assert live.map.stored.info.counts.frames == 12 and live.ask("something red").found
 
 
 def test_poses_that_stop_fitting_the_pictures_are_in_doubt_within_three_seconds() -> None:

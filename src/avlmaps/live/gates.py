@@ -1,16 +1,52 @@
-"""Which frames bring something to a map: those of a camera that moved, or with new surface in view."""
+"""Which frames bring something to a map, and which of those bring something to its features.
+
+A frame is fused where the camera moved or new surface is in view. The encoder is what costs most of a frame, and the
+frames of a slow robot show the same again and again, so that only some are encoded: a voxel's feature is a mean whose
+weights fall with distance, and a frame is worth encoding where its look at enough places weighs something beside the
+looks that were encoded before. The others add their surface and colours alone.
+"""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from avlmaps.core.arrays import Float
+from avlmaps.core.arrays import Float, Int64
 from avlmaps.core.poses import rotation_angle_rad
 from avlmaps.live.settings import LiveSettings
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
+from avlmaps.maps.fusion.settings import FusionSettings
 from avlmaps.recordings.types import Frame
 
 _ROWS, _COLUMNS = 30, 40  # points of a frame that are looked up
+_PLACE_M = 0.2  # the points of a frame are this far apart at 5 m
+_AXIS = 1 << 20  # places along each axis
+
+
+@dataclass(frozen=True, slots=True)
+class Looked:
+    """Some points that a frame sees.
+
+    Attributes:
+        world: where they are, metres.
+        distance_m: how far from the camera.
+    """
+
+    world: Float[np.ndarray, "n 3"]
+    distance_m: Float[np.ndarray, " n"]
+
+    @classmethod
+    def of(cls, frame: Frame, farthest_m: float) -> "Looked":
+        """Return points of a frame that are spread evenly over its picture, up to a depth."""
+        camera = frame.rig.depth
+        row = ((np.arange(_ROWS) + 0.5) * camera.height / _ROWS).astype(np.int64)
+        column = ((np.arange(_COLUMNS) + 0.5) * camera.width / _COLUMNS).astype(np.int64)
+        z = frame.depth_m[row[:, None], column].astype(np.float64)
+        x = (column + 0.5 - camera.cx) / camera.fx * z
+        y = (row[:, None] + 0.5 - camera.cy) / camera.fy * z
+        points = np.stack([x, y, z], axis=-1)[(z > 0.0) & (z < farthest_m)]
+        pose = np.asarray(frame.world_from_camera, np.float64)
+        return cls(points @ pose[:3, :3].T + pose[:3, 3], np.linalg.norm(points, axis=1))
 
 
 class Gates:
@@ -44,17 +80,50 @@ class Gates:
 
     def _new_share(self, frame: Frame, sums: Sequence[VoxelAccumulator]) -> float:
         """Return the share of points in voxels that too few frames hit."""
-        camera = frame.rig.depth
-        row = ((np.arange(_ROWS) + 0.5) * camera.height / _ROWS).astype(np.int64)
-        column = ((np.arange(_COLUMNS) + 0.5) * camera.width / _COLUMNS).astype(np.int64)
-        z = frame.depth_m[row[:, None], column].astype(np.float64)
-        x = (column + 0.5 - camera.cx) / camera.fx * z
-        y = (row[:, None] + 0.5 - camera.cy) / camera.fy * z
-        points = np.stack([x, y, z], axis=-1)[(z > 0.0) & (z < self._farthest_m)]
-        if not len(points):
+        world = Looked.of(frame, self._farthest_m).world
+        if not len(world):
             return 0.0
-        pose = np.asarray(frame.world_from_camera, np.float64)
-        world = points @ pose[:3, :3].T + pose[:3, 3]
         index = np.floor(world / sums[0].grid.voxel_size_m).astype(np.int32)
         views = sum((part.views_at(index) for part in sums), np.zeros(len(index), np.int32))
         return float((views < self._settings.known_views).mean())
+
+
+class EncodingGate:
+    """Says of each frame that is fused whether it is encoded; its memory is that of the surface."""
+
+    def __init__(self, settings: LiveSettings, fusion: FusionSettings) -> None:
+        """Begin with nothing encoded.
+
+        Args:
+            settings: the limits.
+            fusion: how the weight of a look falls with its distance.
+        """
+        self._settings, self._fusion = settings, fusion
+        self._weight: dict[int, float] = {}  # of the looks at a place that were encoded
+
+    def opens(self, frame: Frame, waiting: int = 0) -> bool:
+        """Return whether a frame is to be encoded; it then counts as encoded.
+
+        Args:
+            frame: the frame.
+            waiting: frames behind it; the more, the more must be new in it. All of it new always opens.
+        """
+        looked = Looked.of(frame, self._fusion.max_depth_m)
+        if not len(looked.world):
+            return False
+        weight = np.maximum(np.exp(looked.distance_m**2 * (-0.5 / self._fusion.variance_m2)), 1e-30)
+        places, at = np.unique(_keys(looked.world), return_inverse=True)
+        best = np.zeros(len(places))
+        np.maximum.at(best, at, weight)
+        known = np.array([self._weight.get(place, 0.0) for place in places.tolist()])
+        worth = float((best * self._settings.looks > known)[at].mean())
+        if worth <= min(self._settings.encoded_share * (1 + waiting), 0.5):
+            return False
+        self._weight.update(zip(places.tolist(), (known + best).tolist(), strict=True))
+        return True
+
+
+def _keys(world: Float[np.ndarray, "n 3"]) -> Int64[np.ndarray, " n"]:
+    """Return a number for the place of each point."""
+    x, y, z = np.floor(world / _PLACE_M).astype(np.int64).T % _AXIS
+    return (x * _AXIS + y) * _AXIS + z

@@ -1,31 +1,36 @@
 """A map that grows while a robot drives: frames in, questions at any moment, saved all along.
 
-Three threads work. The caller's puts frames into a short queue. One fuses them, and nobody else touches the growing
+Four threads work. The caller's puts frames into a short queue. One fuses them, and nobody else touches the growing
 map; on request it freezes what came, which takes no longer than a frame. One works behind: it makes a map of
-what was frozen (keyframes, places and sounds are described there), puts it in the place of the last snapshot, and
-writes it into the folder. A question uses the snapshot that there is; nothing that comes later changes it.
+what was frozen (keyframes, places and sounds are described there), and puts it in the place of the last snapshot. One
+writes these maps into the folder. A question uses the snapshot that there is; nothing that comes later changes it.
 """
 
 import contextlib
 import time
 from collections import deque
+from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from threading import Condition, Event, Lock, Thread
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from avlmaps.core.errors import AudioError, AvlmapsError, BackendError, MapError, RecordingError
-from avlmaps.live.gates import Gates
+from avlmaps.live.gates import EncodingGate, Gates
 from avlmaps.live.pose_check import PoseCheck
+from avlmaps.live.saver import Saver
 from avlmaps.live.settings import LiveSettings
 from avlmaps.live.status import LiveStatus, Tally, memory_mb
-from avlmaps.maps.growing import FrozenSums, GrowingMap, require_place, write_stored
+from avlmaps.maps.growing import FrozenSums, GrowingMap, require_place
 from avlmaps.maps.keyframes.describe import KeyframeSettings
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.lock import lock_folder
-from avlmaps.maps.store.reader import open_stored
+from avlmaps.maps.store.reader import StoredMap, open_stored
 from avlmaps.perception.encoders import Encoders, encoders_of
 from avlmaps.perception.profiles import Profile
 from avlmaps.query.avlmap import AVLMap, QuerySettings
@@ -42,8 +47,9 @@ SPARSE = BuildSettings(keyframes=KeyframeSettings(translation_m=0.2, rotation_de
 _STEP_S = 0.1
 _IDLE_S = 0.05
 _MOST_DOUBTS = 100
-_LOOKS_S = 0.5  # for keyframes, in each snapshot
-_SHARE = 4.0  # a snapshot takes at most one part in this many of the time
+_LOOKS_S = 0.3  # for keyframes, in each snapshot
+_LISTEN_S = 0.25  # from one look for sounds that ended to the next
+_REST_S = 1.0  # between two snapshots, at most, where one takes longer than that
 
 
 _Came = tuple[FrozenSums, float]  # what was frozen, and when
@@ -98,8 +104,10 @@ class LiveMap:
         wait = self.settings.first_frames if self.settings.gates else None
         self._growing = GrowingMap(chosen, used, direction(up_in_world), wait=wait, looks_later=True)
         self._gates = Gates(self.settings, chosen.fusion.max_depth_m)
+        self._encoding = EncodingGate(self.settings, self._growing.settings.fusion)
         self._check, self._tally = PoseCheck(), Tally()
         self._queue: deque[tuple[Frame, float]] = deque()
+        self._is_pressed = False  # whether the frames come by the clock, and are late if we are slow
         self._door, self._ears = Condition(), Lock()
         self._last: Frame | None = None
         self._fault: BackendError | None = None
@@ -108,8 +116,9 @@ class LiveMap:
         self._asked: Future[_Came | None] | None = None  # what the thread behind waits for; under the door
         self._fuser_ended = False  # under the door
         self._snapshot: tuple[AVLMap, float] | None = None
-        self._saved_s, self._generation = float("nan"), 0
+        self._generation, self._listened_s = 0, 0.0
         self._closing, self._closed = False, False
+        self._saver = Saver(self.path, self.settings.save_s, self._doubt, self._break)
         self._fuser = Thread(target=self._fuse_and_answer, name="avlmaps-fuse", daemon=True)
         self._stop_behind = Event()
         self._behind = Thread(target=self._work_behind, name="avlmaps-behind", daemon=True)
@@ -163,6 +172,7 @@ class LiveMap:
                 self._queue.popleft()
                 self._tally.drop("late")
             self._queue.append((frame, arrived_s))
+            self._is_pressed = not wait
             self._door.notify_all()
 
     def add_audio(self, chunk: Any, stamp_s: Any = None) -> None:
@@ -216,6 +226,7 @@ class LiveMap:
         return LiveStatus(
             frames_in=self._tally.of("came"),
             fused=self._tally.of("fused"),
+            encoded=self._tally.of("encoded"),
             dropped=self._tally.dropped(),
             refused=self._tally.of("refused"),
             waiting=len(self._queue),
@@ -225,7 +236,7 @@ class LiveMap:
             keyframes=counts.keyframes if counts else 0,
             sounds=counts.sounds if counts else 0,
             snapshot_age_s=now_s - snapshot[1] if snapshot is not None else float("nan"),
-            saved_age_s=now_s - self._saved_s,
+            saved_age_s=now_s - self._saver.saved_s,
             memory_mb=memory_mb(),
             sound_gaps=0 if track is None else track.gaps,
             doubts=self.doubts,
@@ -245,11 +256,11 @@ class LiveMap:
         self._fuser.join()
         self._stop_behind.set()
         self._behind.join()
+        self._saver.close()
         if not self._closed:
             try:
                 if len(self._growing):
-                    made = self._growing.stored(final=True)
-                    write_stored(self.path, made)
+                    self._saver.write(self._growing.stored(final=True))
             except BaseException:
                 if not len(self._growing) or not self.path.is_dir():
                     self._held.close()
@@ -302,7 +313,7 @@ class LiveMap:
         try:
             self._fuse_all()
         except BaseException as fault:
-            self._broken = fault
+            self._break(fault)
             raise
         finally:
             with self._door:
@@ -334,8 +345,14 @@ class LiveMap:
                 growing.pass_by(frame.stamp_s, frame.world_from_camera)
                 self._tally.drop(reason)
             else:
-                growing.add(replace(frame, index=growing.next_index, name=f"{growing.next_index:06d}"))
+                encode = not self.settings.gates or self._encoding.opens(
+                    frame, len(self._queue) if self._is_pressed else 0
+                )
+                named = replace(frame, index=growing.next_index, name=f"{growing.next_index:06d}")
+                growing.add(named, encode=encode)
                 self._tally.note("fused")
+                if encode:
+                    self._tally.note("encoded")
         except BackendError as fault:
             self._tally.drop("wrong")
             self._fault = fault
@@ -358,6 +375,10 @@ class LiveMap:
             self._asked.set_result(came)
             self._asked = None
 
+    def _break(self, fault: BaseException) -> None:
+        """Note what broke a thread; it is raised at every frame to come."""
+        self._broken = fault
+
     def _doubt(self, sentence: str) -> None:
         if len(self._doubts) < _MOST_DOUBTS and sentence not in self._doubts:
             self._doubts.append(sentence)
@@ -369,26 +390,26 @@ class LiveMap:
         try:
             self._publish_all()
         except BaseException as fault:
-            self._broken = fault
+            self._break(fault)
             raise
 
     def _publish_all(self) -> None:
-        pause_s, known = 0.0, 0
-        while not self._stop_behind.wait(pause_s or _IDLE_S):
-            pause_s = 0.0
-            if self._tally.of("fused") == known and self._growing.sound_track is None:
-                continue
-            came = self._what_came()
-            if came is None or self._closing:
-                continue
-            begin_s = time.perf_counter()
-            known = self._tally.of("fused")
-            try:
-                self._publish(*came)
-            except AvlmapsError as fault:
-                self._doubt(str(fault))
-            took_s = time.perf_counter() - begin_s
-            pause_s = max(self.settings.snapshot_s - took_s, (_SHARE - 1.0) * min(took_s, 1.0) / _SHARE, _IDLE_S)
+        from_s, known = 0.0, 0
+        while not self._stop_behind.wait(_IDLE_S):
+            begin_s, fused = time.perf_counter(), self._tally.of("fused")
+            if fused == known or begin_s < from_s:
+                self._try(self._publish_sounds)
+            elif (came := self._what_came()) is not None and not self._closing:
+                known = fused
+                self._try(partial(self._publish, *came))
+                end_s = time.perf_counter()
+                from_s = max(begin_s + self.settings.snapshot_s, end_s + min(end_s - begin_s, _REST_S))
+
+    def _try(self, work: Callable[[], None]) -> None:
+        try:
+            work()
+        except AvlmapsError as fault:
+            self._doubt(str(fault))
 
     def _what_came(self) -> "_Came | None":
         """Let the thread that fuses freeze what came; None where there is nothing, or it has ended."""
@@ -401,9 +422,23 @@ class LiveMap:
 
     def _publish(self, came: FrozenSums, came_s: float) -> None:
         stored = self._growing.finish(came, looks_s=_LOOKS_S)
-        if not time.perf_counter() - self._saved_s < self.settings.save_s:  # also where it is NaN
-            write_stored(self.path, stored)
-            self._saved_s = came_s
+        self._saver.offer(stored, came_s)
+        self._show(stored, came_s)
+
+    def _publish_sounds(self) -> None:
+        """Put sounds that ended since the last snapshot into it: a person asks for them at once."""
+        now_s, snapshot = time.perf_counter(), self._snapshot
+        if snapshot is None or now_s < self._listened_s + _LISTEN_S:
+            return
+        self._listened_s = now_s
+        stored, heard = snapshot[0].stored, self._growing.heard()
+        if heard is None or np.array_equal(heard.offset_s, stored.sounds.offset_s):
+            return
+        stored = self._growing.with_sounds(stored, heard)
+        self._saver.offer(stored, snapshot[1])
+        self._show(stored, snapshot[1])
+
+    def _show(self, stored: StoredMap, came_s: float) -> None:
         made = AVLMap(stored, self._query)
         _warm(made)
         self._snapshot = made, came_s
@@ -411,8 +446,6 @@ class LiveMap:
 
 
 def _warm(made: AVLMap) -> None:
-    """Compute what every question needs, so that the first one does not wait for it."""
+    """Compute what most questions need, so that the first one does not wait for it: the closest words, the rooms."""
     with contextlib.suppress(AvlmapsError):  # a profile without names, or a map too small for rooms
-        made.things()
-    with contextlib.suppress(AvlmapsError):
         made.ask("the chair in the kitchen")

@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 
 from avlmaps.core.poses import rotation_angle_rad
-from avlmaps.recordings.consistency.agreement import compare
+from avlmaps.recordings.consistency.agreement import compare, without_occluded
 from avlmaps.recordings.consistency.limits import LEAST_AGREEING, can_be_judged, geometry_agrees
 from avlmaps.recordings.consistency.sample import Surfaces, draw_pairs
 from avlmaps.recordings.memory import MemoryRecording
@@ -62,7 +62,8 @@ class PoseCheck:
     def _compared(self) -> str | None:
         pairs = np.array([(a, b) for a, b in combinations(range(len(self._held)), 2) if b - a <= 2])
         sample = draw_pairs(MemoryRecording(self._held), pairs, np.ones(len(pairs), bool))
-        found = compare(sample, Surfaces.of(sample.depth_m), sample.world_from_camera)
+        surfaces = Surfaces.of(sample.depth_m)
+        found = without_occluded(compare(sample, surfaces, sample.world_from_camera), sample, surfaces)
         if not can_be_judged(found):
             return None
         if geometry_agrees(found) or found.same_share >= _LEAST_AGREEING:

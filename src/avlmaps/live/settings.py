@@ -22,17 +22,22 @@ class LiveSettings:
     """A voxel that this many frames hit is known."""
     new_share: float = 0.02
     """A frame brings new surface where more than this share of its points hit voxels that are not known."""
+    looks: int = 8
+    """Encoded looks at a place, as near as a new one, beside which that is worth nothing. With gates."""
+    encoded_share: float = 0.1
+    """A fused frame is encoded where more than this share of its points is worth it; else it adds its surface and
+    colours alone. Twice that with one frame waiting behind it, and so on."""
     first_frames: int = 8
     """Frames in which up, the floor and the depth camera are found first, with gates; without them as in a build."""
     snapshot_s: float = 1.0
     """Seconds from one snapshot for questions to the next, at least; where one takes long, four times that."""
-    save_s: float = 2.5
+    save_s: float = 1.5
     """Seconds from one save to the next, at least."""
 
     def __post_init__(self) -> None:
-        for name in ("most_waiting", "known_views", "first_frames"):
+        for name in ("most_waiting", "known_views", "looks", "first_frames"):
             if not getattr(self, name) >= 1:
                 raise MapError(f"{name} of a live map is {getattr(self, name)}; choose 1 or more.")
-        for name in ("still_m", "still_deg", "new_share", "snapshot_s", "save_s"):
+        for name in ("still_m", "still_deg", "new_share", "encoded_share", "snapshot_s", "save_s"):
             if not getattr(self, name) >= 0.0:
                 raise MapError(f"{name} of a live map is {getattr(self, name)}; choose 0 or more.")

@@ -17,6 +17,7 @@ class LiveStatus:
     Attributes:
         frames_in: frames that came, refused ones left out.
         fused: frames that are in the map's sums.
+        encoded: of these, how many were given to the encoder; the others added their surface and colours.
         dropped: frames that are not, by reason: ``late`` (others were waiting), ``still`` (the camera did not move),
             ``known`` (no new surface), ``wrong`` (an encoder failed on it).
         refused: frames and pieces of sound that were no such thing, or out of order.
@@ -35,6 +36,7 @@ class LiveStatus:
 
     frames_in: int
     fused: int
+    encoded: int
     dropped: dict[str, int]
     refused: int
     waiting: int
@@ -58,9 +60,9 @@ class LiveStatus:
     def __str__(self) -> str:
         dropped = ", ".join(f"{count} {reason}" for reason, count in sorted(self.dropped.items()))
         return (
-            f"{self.frames_in} frames came, {self.fused} fused ({dropped or 'none'} dropped), p95 "
-            f"{self.frame_ms_p95:.0f} ms; {self.voxels} voxels, {self.keyframes} keyframes, {self.sounds} sounds; "
-            f"{self.memory_mb:.0f} MB"
+            f"{self.frames_in} frames came, {self.fused} fused, {self.encoded} of them encoded "
+            f"({dropped or 'none'} dropped), p95 {self.frame_ms_p95:.0f} ms; "
+            f"{self.voxels} voxels, {self.keyframes} keyframes, {self.sounds} sounds; {self.memory_mb:.0f} MB"
         )
 
 

@@ -11,6 +11,7 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
+from msgspec import structs
 
 from avlmaps.core.arrays import Float
 from avlmaps.core.errors import BackendError, MapError
@@ -36,7 +37,8 @@ from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.manifest import BadFrame, GroundInfo, MapInfo, ModelInfo, SensorInfo, Timings, UpInfo
 from avlmaps.maps.store.manifest_file import MANIFEST
 from avlmaps.maps.store.reader import GIVEN_FEATURES, MapArrays, StoredMap, open_stored
-from avlmaps.maps.store.writer import MapContent, is_map_or_free, write_map
+from avlmaps.maps.store.writer import MapContent, Written, is_map_or_free, write_map
+from avlmaps.maps.types import HeardSounds
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.protocols import GroundReader
 from avlmaps.recordings.growing_track import GrowingTrack
@@ -48,7 +50,6 @@ _MOST_WAITING_BYTES = 5e8
 # Findings of the floor and up within these are one.
 _SAME_FLOOR_M = 0.05
 _SAME_UP = 0.9994  # cosine of 2 degrees
-_Waiting = tuple[Frame, np.ndarray | None]
 
 
 class GrowingMap:
@@ -113,16 +114,18 @@ class GrowingMap:
     @property
     def last_stamp_s(self) -> float | None:
         """The stamp of the last frame, None before the first."""
-        last = self._waiting[-1][0].stamp_s if self._waiting else None
-        return last if last is not None else (self._walk.stamps[-1] if self._walk.stamps else None)
+        last = self._waiting[-1].frame.stamp_s if self._waiting else None
+        return last if last is not None else (float(self._walk.stamps_s[-1]) if len(self._walk) else None)
 
-    def add(self, frame: Frame, features: Any = None) -> None:
+    def add(self, frame: Frame, features: Any = None, *, encode: bool = True) -> None:
         """Add a frame. What is wrong with it leaves the map as it was.
 
         Args:
             frame: later than the last one, of the same cameras.
             features: of its pixels, (rows, columns, d) covering the picture evenly, each of unit length or zero;
                 instead of the encoder's.
+            encode: give it to the encoder; else it adds its surface and colours alone. Of an encoder of keyframes
+                alone, they decide.
 
         Raises:
             RecordingError: it is not later, or has other cameras.
@@ -132,12 +135,12 @@ class GrowingMap:
         frame = next_of(frame, self.last_stamp_s, self._walk.rig_or(frame.rig))
         if features is not None:
             features = self._checked(features, "The features that were given are", frame)
-        elif self._encodes_at_once():
+        elif encode and self._encodes_at_once():
             features = self._encoded(frame)
-        self._waiting.append((frame, features))
+        self._waiting.append(_Waiting(frame, features, encode))
         self._walk.spread(frame, self.settings.gravity.frames)
         self._walk.pass_by(frame.stamp_s, frame.world_from_camera)
-        waiting_bytes = sum(grid.nbytes for _, grid in self._waiting if grid is not None)
+        waiting_bytes = sum(one.features.nbytes for one in self._waiting if one.features is not None)
         enough = len(self._waiting) >= self._wait or waiting_bytes > _MOST_WAITING_BYTES
         if self._sensor is not None or enough:
             self._settle()
@@ -166,6 +169,30 @@ class GrowingMap:
     def sound_track(self) -> GrowingTrack | None:
         """The track until now, None without one."""
         return None if self._sounds is None else self._sounds.growing
+
+    def heard(self) -> HeardSounds | None:
+        """Return the sounds that are over; None without a track, an encoder of sounds or a pose. As of ``finish``.
+
+        Raises:
+            AudioError: the samples cannot be read.
+            BackendError: the encoder's features are not what its card says.
+        """
+        motion = self._walk.motion()
+        if self._sounds is None or Kind.SOUNDS not in self.encoders or not len(motion.stamps_s):
+            return None
+        return self._sounds.heard(motion, final=False)
+
+    def with_sounds(self, made: StoredMap, sounds: HeardSounds) -> StoredMap:
+        """Return a map of ``finish`` with the sounds of ``heard`` instead of its own."""
+        assert self._sounds is not None
+        folder, counts = self._sounds.clips_folder, structs.replace(made.info.counts, sounds=len(sounds))
+        return replace(
+            made,
+            path=folder,
+            info=structs.replace(made.info, counts=counts),
+            arrays=replace(made.arrays, sounds=sounds),
+            integrity=IntegrityCheck(folder, {}),
+        )
 
     def stored(self, *, final: bool = False) -> StoredMap:
         """Return the map of the frames that came, in memory.
@@ -254,9 +281,9 @@ class GrowingMap:
         other._keyframes.share(self._rehearsal.described)
         other._left_out = list(self._left_out)
         other._waiting = list(self._waiting)
-        for frame, _ in self._waiting:
-            other._walk.spread(frame, self.settings.gravity.frames)
-            other._walk.pass_by(frame.stamp_s, frame.world_from_camera)
+        for one in self._waiting:
+            other._walk.spread(one.frame, self.settings.gravity.frames)
+            other._walk.pass_by(one.frame.stamp_s, one.frame.world_from_camera)
         other._sounds = self._sounds
         other._settle()
         return other
@@ -296,20 +323,20 @@ class GrowingMap:
                 self._ground = self._find_upright(self._walk.held())
             faults: list[BackendError] = []
             waiting, self._waiting = self._waiting, []
-            for frame, features in waiting:
+            for one in waiting:
                 try:
-                    self._fuse(replace(frame, ground=self._ground), features)
+                    self._fuse(replace(one, frame=replace(one.frame, ground=self._ground)))
                 except BackendError as fault:
                     faults.append(fault)
-                    self._left_out.append(BadFrame(index=frame.index, why=str(fault)))
+                    self._left_out.append(BadFrame(index=one.frame.index, why=str(fault)))
         if faults:
             raise faults[0]
 
-    def _fuse(self, frame: Frame, features: np.ndarray | None) -> None:
-        sensor = self._sensor
+    def _fuse(self, came: "_Waiting") -> None:
+        sensor, frame, features = self._sensor, came.frame, came.features
         assert sensor is not None
         by_encoder = features is None and Kind.PIXELS in self.encoders
-        if by_encoder and not self.encoders.keyframes_only:
+        if by_encoder and came.encode and not self.encoders.keyframes_only:
             features = self._encoded(frame)
         if self._free is None:
             self._free = FreeViewCollector(frame.rig.depth, sensor.model)
@@ -419,9 +446,10 @@ def require_place(path: Path, overwrite: bool) -> None:
         raise MapError(f"{path} is a finished map already; give another path, or replace it with overwrite=True.")
 
 
-def write_stored(path: Path, made: StoredMap) -> MapInfo:
+def write_stored(path: Path, made: StoredMap, written: Written | None = None) -> MapInfo:
     """Write a map of ``GrowingMap`` into its folder, whose lock the caller holds; see ``write_map``."""
-    return write_map(path, MapContent(made.voxels, made.keyframes, made.place_state, made.sounds, made.path), made.info)
+    content = MapContent(made.voxels, made.keyframes, made.place_state, made.sounds, made.path)
+    return write_map(path, content, made.info, written)
 
 
 @dataclass(frozen=True, slots=True)
@@ -449,6 +477,15 @@ class FrozenSums:
     keyframes: FrozenKeyframes
     undecided: list[Frame]
     encoded: set[int]
+
+
+@dataclass(frozen=True, slots=True)
+class _Waiting:
+    """A frame that waits, its features if they are known, and whether they are to be made."""
+
+    frame: Frame
+    features: np.ndarray | None
+    encode: bool
 
 
 class _Rehearsal:

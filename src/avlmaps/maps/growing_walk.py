@@ -29,18 +29,37 @@ class Motion:
     world_from_camera: Float[np.ndarray, "n 4 4"]
 
 
+class _Poses:
+    """Stamps and poses that become more; a copy has those until now, and shares their memory."""
+
+    def __init__(self) -> None:
+        self._stamps_s, self._poses, self._count = np.zeros(64), np.zeros((64, 4, 4)), 0
+
+    def append(self, stamp_s: float, pose: Float[np.ndarray, "4 4"]) -> None:
+        if self._count == len(self._stamps_s):
+            self._stamps_s = np.concatenate([self._stamps_s, np.zeros(self._count)])
+            self._poses = np.concatenate([self._poses, np.zeros((self._count, 4, 4))])
+        self._stamps_s[self._count], self._poses[self._count] = stamp_s, pose
+        self._count += 1  # last of all: who reads meanwhile sees whole poses alone
+
+    def until_now(self) -> Motion:
+        count = self._count
+        return Motion(self._stamps_s[:count], self._poses[:count])
+
+    def __len__(self) -> int:
+        return self._count
+
+
 class Walk(Recording):
     """The frames of a growing map as a recording: all stamps and poses, and some frames spread over them."""
 
     def __init__(self, up_in_world: Float[np.ndarray, "3"] | None) -> None:
         self.path, self.format, self.audio, self.notices = HERE, "memory", None, ()
         self.up_in_world = up_in_world
-        self.stamps: list[float] = []
-        self.poses: list[np.ndarray] = []
+        self._fused, self._passed = _Poses(), _Poses()
         self._held: list[Frame] = []
         self._stride, self._came, self.has_doubled = 1, 0, False
         self._digest = hashlib.sha256()
-        self._passed: tuple[list[float], list[np.ndarray]] = ([], [])
 
     def rig_or(self, other: Rig) -> Rig:
         """Return the cameras of the first frame, or of the one that is to be it."""
@@ -62,35 +81,33 @@ class Walk(Recording):
 
     def pass_by(self, stamp_s: float, world_from_camera: Float[np.ndarray, "4 4"]) -> None:
         """Take note of where the robot was."""
-        self._passed[0].append(stamp_s)
-        self._passed[1].append(np.asarray(world_from_camera, np.float64))
+        self._passed.append(stamp_s, world_from_camera)
 
     def motion(self) -> Motion:
-        """Return where the robot was until now."""
-        return Motion(np.array(self._passed[0], np.float64), np.stack(self._passed[1]))
+        """Return where the robot was until now; another thread may add to it meanwhile."""
+        return self._passed.until_now()
 
     def frozen(self) -> "Walk":
         """Return the walk until now, which frames to come do not change."""
         other = copy(self)
-        other.stamps, other.poses, other._held = list(self.stamps), list(self.poses), list(self._held)
-        other._passed, other._digest = (list(self._passed[0]), list(self._passed[1])), self._digest.copy()
+        other._fused, other._passed = copy(self._fused), copy(self._passed)
+        other._held, other._digest = list(self._held), self._digest.copy()
         return other
 
     def append(self, frame: Frame) -> None:
         """Take note of a frame that was fused."""
-        self.stamps.append(frame.stamp_s)
-        self.poses.append(np.asarray(frame.world_from_camera, np.float64))
+        self._fused.append(frame.stamp_s, frame.world_from_camera)
         self._digest.update(frame_digest(frame))
 
     @property
     def stamps_s(self) -> Float[np.ndarray, " n"]:  # pyright: ignore[reportIncompatibleVariableOverride]
         """When."""
-        return np.array(self.stamps, np.float64)
+        return self._fused.until_now().stamps_s
 
     @property
     def world_from_camera(self) -> Float[np.ndarray, "n 4 4"]:  # pyright: ignore[reportIncompatibleVariableOverride]
         """From where."""
-        return np.stack(self.poses)
+        return self._fused.until_now().world_from_camera
 
     def frame(self, index: int) -> Frame:
         """Refuse: frames are not stored."""
@@ -102,4 +119,4 @@ class Walk(Recording):
         return self._digest.hexdigest()
 
     def __len__(self) -> int:
-        return len(self.stamps)
+        return len(self._fused)

@@ -1,13 +1,16 @@
 """Keyframes of a walk that is not over: chosen as in a build, each looked at once, as soon as it is decided."""
 
-from collections.abc import Iterator
+import tempfile
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
+from typing import BinaryIO
 
 import cv2
 import numpy as np
 
 from avlmaps.core.arrays import Float32, UInt8
+from avlmaps.core.errors import MapError
 from avlmaps.core.registry import Kind
 from avlmaps.maps.keyframes.describe import (
     DescribedKeyframe,
@@ -26,16 +29,16 @@ from avlmaps.recordings.types import Frame
 # What places are learnt from grows by this much before they are learnt again for a question.
 _GROWN = 1.25
 # Keyframes that are left to be looked at later; each holds its frame.
-_MOST_LEFT = 100
+_MOST_LEFT = 40
 
 
 @dataclass(frozen=True, slots=True)
 class PicturedKeyframe:
-    """A keyframe without its place, and its picture (PNG) for that."""
+    """A keyframe without its place, and where its picture (PNG) lies for that."""
 
     index: int
     keyframe: DescribedKeyframe
-    picture: bytes
+    picture: "_Picture | None"
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +69,8 @@ class GrowingKeyframes:
         self._state: dict[str, np.ndarray] = {}
         self._learnt_from: list[int] = []
         self._places: dict[int, Float32[np.ndarray, " d"]] = {}
+        self._stacked: tuple[Sequence[object], Keyframes | None] = ([], None)
+        self._pictures = _PictureFile()
 
     def share(self, described: "dict[int, PicturedKeyframe]") -> None:
         """Take keyframes that were looked at before, by their number, and add those that are looked at."""
@@ -123,7 +128,7 @@ class GrowingKeyframes:
             came: from ``freeze``.
             final: learn places again, as a build does; else only where enough has come since.
             within_s: seconds for keyframes that were not looked at; the rest is left for the next time, unless that is
-                more than 100 of them, each with its frame.
+                more than 40 of them, each with its frame. So are the frames that may become keyframes.
 
         Raises:
             BackendError: an encoder gives something else than its protocol says; that keyframe is left out.
@@ -134,17 +139,23 @@ class GrowingKeyframes:
             if isinstance(one, Frame) and (perf_counter() < end_s or came.decided - at > _MOST_LEFT):
                 self._decided[at] = None
                 self._decided[at] = self._maybe.pop(one.index, None) or self._describe(one)
-        last = came.last if perf_counter() < end_s else []
+        last = came.last if np.isinf(within_s) else []  # of frames that come on, another one will be it
         maybe = {frame.index: self._maybe.get(frame.index) or self._describe(frame) for frame in last}
         self._maybe.update(maybe)
         seen = [one for one in (*self._decided[: came.decided], *maybe.values()) if isinstance(one, PicturedKeyframe)]
         places = (
             self._placed(seen, rng, final) if Kind.PLACE in self._encoders and Kind.LOCAL in self._encoders else None
         )
-        whole = [one.keyframe for one in seen]
-        if places is not None:
-            whole = [replace(one, place=place) for one, place in zip(whole, places, strict=True)]
-        return stack_keyframes(whole), self._state
+        parts = [*seen, *(places or [])]
+        known, stacked = self._stacked
+        same = len(parts) == len(known) and all(one is other for one, other in zip(parts, known, strict=True))
+        if stacked is None or not same:  # else the arrays are those of before, which a save need not write again
+            whole = [one.keyframe for one in seen]
+            if places is not None:
+                whole = [replace(one, place=place) for one, place in zip(whole, places, strict=True)]
+            stacked = stack_keyframes(whole)
+            self._stacked = parts, stacked
+        return stacked, self._state
 
     def _placed(
         self, seen: list[PicturedKeyframe], rng: np.random.Generator, final: bool
@@ -161,7 +172,8 @@ class GrowingKeyframes:
         for one in seen:
             if one.index not in self._places:
                 with perceiving(f"The place encoder {encoder.card.id}", f"frame {one.index}"):
-                    found = encoder.encode(_picture(one.picture), one.keyframe.local, self._state)
+                    assert one.picture is not None
+                    found = encoder.encode(one.picture.read(), one.keyframe.local, self._state)
                 self._places[one.index] = np.asarray(found, np.float32)
         return [self._places[one.index] for one in seen]
 
@@ -179,17 +191,59 @@ class GrowingKeyframes:
             card = self._encoders.card(Kind.VIEWS)
             seen = replace(seen, view=as_row(seen.view, card.dim, f"The view encoder {card.id}", frame))
         if Kind.PLACE not in self._encoders:
-            return PicturedKeyframe(frame.index, seen, b"")
-        _, picture = cv2.imencode(".png", frame.rgb, [cv2.IMWRITE_PNG_COMPRESSION, 1])
-        return PicturedKeyframe(frame.index, seen, picture.tobytes())
+            return PicturedKeyframe(frame.index, seen, None)
+        return PicturedKeyframe(frame.index, seen, self._pictures.put(frame.rgb))
 
 
 def _path(frames: list[Frame]) -> tuple[np.ndarray, np.ndarray]:
     return np.array([frame.stamp_s for frame in frames]), np.stack([frame.world_from_camera for frame in frames])
 
 
-def _picture(file: bytes) -> UInt8[np.ndarray, "h w 3"]:
-    """Return the picture of a PNG file that was written of RGB as if it were BGR: the same numbers again."""
-    picture = cv2.imdecode(np.frombuffer(file, np.uint8), cv2.IMREAD_COLOR)
-    assert picture is not None
-    return picture
+class _PictureFile:
+    """Pictures on the disk, in a file without a name that goes with this object: half a megabyte each."""
+
+    def __init__(self) -> None:
+        self._file: BinaryIO | None = None
+        self._end = 0
+
+    def put(self, rgb: UInt8[np.ndarray, "h w 3"]) -> "_Picture":
+        """Store a picture, without loss.
+
+        Raises:
+            MapError: the disk is full.
+        """
+        _, png = cv2.imencode(".png", rgb, [cv2.IMWRITE_PNG_COMPRESSION, 1])
+        try:
+            if self._file is None:
+                self._file = tempfile.TemporaryFile(prefix="avlmaps-keyframes-")  # noqa: SIM115 - it goes with us
+            self._file.seek(self._end)
+            self._file.write(png.data)
+            self._file.flush()
+        except OSError as fault:
+            raise MapError(
+                f"A keyframe's picture cannot be stored in {tempfile.gettempdir()} ({fault.strerror or fault}), and is "
+                "left out; make room there, or name another folder in TMPDIR."
+            ) from fault
+        where = _Picture(self, self._end, len(png))
+        self._end += len(png)
+        return where
+
+    def read(self, at: int, size: int) -> UInt8[np.ndarray, "h w 3"]:
+        """Return a picture: written of RGB as if it were BGR, and read likewise, which are the same numbers again."""
+        assert self._file is not None
+        self._file.seek(at)
+        picture = cv2.imdecode(np.frombuffer(self._file.read(size), np.uint8), cv2.IMREAD_COLOR)
+        assert picture is not None
+        return picture
+
+
+@dataclass(frozen=True, slots=True)
+class _Picture:
+    """Where a picture lies."""
+
+    file: _PictureFile
+    at: int
+    size: int
+
+    def read(self) -> UInt8[np.ndarray, "h w 3"]:
+        return self.file.read(self.at, self.size)

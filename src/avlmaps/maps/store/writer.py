@@ -3,9 +3,10 @@
 Until ``map.json`` is replaced, in one step, the folder is the old map (or none); from then on it is the new one.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import msgspec
@@ -23,6 +24,8 @@ from avlmaps.maps.store.own_files import is_stored_file, remove_stages, stage_fo
 from avlmaps.maps.store.reader import CLIPS, PARTS, STATE
 from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
 
+# What each file of a map was written of, by its name in the manifest: an array or a file that nobody changes any more.
+Written = dict[str, tuple[np.ndarray | Path, FileInfo]]
 SECTIONS = ("voxels", "keyframes", "sounds")
 _ALL_SECTIONS = (*SECTIONS, LIFE.rstrip("/"))
 
@@ -48,13 +51,15 @@ class MapContent:
     life: Life | None = None
 
 
-def write_map(path: Path, content: MapContent, info: MapInfo) -> MapInfo:
+def write_map(path: Path, content: MapContent, info: MapInfo, written: Written | None = None) -> MapInfo:
     """Make the folder this map.
 
     Args:
         path: the map's folder; what it held as a map is replaced.
         content: the arrays.
         info: the manifest but for ``files`` and ``bytes``.
+        written: of the last call for this folder, which is the map that is there: what is the same object is not
+            written again. It becomes that of this call.
 
     Returns:
         The whole manifest, as written.
@@ -62,31 +67,41 @@ def write_map(path: Path, content: MapContent, info: MapInfo) -> MapInfo:
     Raises:
         MapError: the disk is full, or the folder cannot be written; the old map is then still there.
     """
-    files = dict(_write_files(path, content))
+    before, now = written or {}, Written()
+    for name, source, write in _writes(path, content):
+        known = before.get(name)
+        same = known is not None and (known[0] is source or (isinstance(source, Path) and known[0] == source))
+        now[name] = known if known is not None and same else (source, write())
+    files = {name: file for name, (_, file) in now.items()}
     size = sum(file.bytes for file in files.values())
     whole = msgspec.structs.replace(info, files=dict(sorted(files.items())), bytes=size)
     sync_names(path, files.values())
     write_manifest(path, whole)
     remember_checked(path, files.values())  # their checksums are those of what was written just now
     sweep(path, whole)
+    if written is not None:
+        written.clear()
+        written.update(now)
     return whole
 
 
-def _write_files(path: Path, content: MapContent) -> Iterator[tuple[str, FileInfo]]:
+def _writes(path: Path, content: MapContent) -> Iterator[tuple[str, np.ndarray | Path, Callable[[], FileInfo]]]:
+    """Yield the files of a map: their names in the manifest, what they hold, and what writes them."""
     for section, whole in zip(SECTIONS, (content.voxels, content.keyframes, content.sounds), strict=True):
         for field in array_fields(type(whole)):
             name = f"{section}/{field}"
-            yield name, write_array(path, name, getattr(whole, field))
+            array = getattr(whole, field)
+            yield name, array, partial(write_array, path, name, array)
     for name, array in content.place_state.items():
         if not name.isidentifier():
             raise ValueError(f"the place encoder calls an array {name!r}; its name must be an identifier")
-        yield STATE + name, write_array(path, f"keyframes/state_{name}", array)
+        yield STATE + name, array, partial(write_array, path, f"keyframes/state_{name}", array)
     if content.life is not None:
         for name, array in life_arrays(content.life).items():
-            yield LIFE + name, write_array(path, LIFE + name, array)
+            yield LIFE + name, array, partial(write_array, path, LIFE + name, array)
     for number, clip in enumerate(content.sounds.clips):
         source = content.clips_folder / Path(clip).name
-        yield f"{CLIPS}{number:06d}", write_copy(path, f"sounds/{number:06d}", source)
+        yield f"{CLIPS}{number:06d}", source, partial(write_copy, path, f"sounds/{number:06d}", source)
 
 
 def sweep(path: Path, info: MapInfo) -> None:

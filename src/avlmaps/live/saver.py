@@ -1,0 +1,87 @@
+"""The thread that writes a live map: the newest one that it was given, so that nothing else waits for the disk."""
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from threading import Condition, Thread
+
+from avlmaps.core.errors import MapError
+from avlmaps.maps.growing import write_stored
+from avlmaps.maps.store.reader import StoredMap
+from avlmaps.maps.store.writer import Written
+
+
+class Saver:
+    """Writes maps into a folder whose lock its maker holds.
+
+    Attributes:
+        saved_s: when what the last save holds came, by the clock of ``offer``; NaN before the first.
+    """
+
+    def __init__(
+        self, path: Path, every_s: float, tell: Callable[[str], None], broke: Callable[[BaseException], None]
+    ) -> None:
+        """Begin.
+
+        Args:
+            path: the folder.
+            every_s: seconds from the state that is saved to the next, at least; where a save takes longer, it pauses as
+                long as it took.
+            tell: called with a sentence where a save fails; the one before stays, and the next is tried as usual.
+            broke: called with what ends the thread by a fault of ours.
+        """
+        self.saved_s = float("nan")
+        self._path, self._every_s, self._tell, self._broke = path, every_s, tell, broke
+        self._door = Condition()
+        self._next: tuple[StoredMap, float] | None = None
+        self._ended, self._from_s = False, float("-inf")
+        self._written: Written = {}
+        self.thread = Thread(target=self._work, name="avlmaps-save", daemon=True)
+        self.thread.start()
+
+    def offer(self, stored: StoredMap, came_s: float) -> None:
+        """Give it the state of a moment (``time.perf_counter()``), in the place of one that it did not write yet."""
+        with self._door:
+            self._next = stored, came_s
+            self._door.notify_all()
+
+    def close(self) -> None:
+        """Wait until what is being written is written; what waits is not."""
+        with self._door:
+            self._ended = True
+            self._door.notify_all()
+        self.thread.join()
+
+    def write(self, stored: StoredMap) -> None:
+        """Write a map at once, after ``close``.
+
+        Raises:
+            MapError: it cannot be written; the one before is still there.
+        """
+        write_stored(self._path, stored, self._written)
+
+    def _work(self) -> None:
+        try:
+            while (one := self._awaited()) is not None:
+                begin_s, (stored, came_s) = time.perf_counter(), one
+                try:
+                    self.write(stored)
+                    self.saved_s = came_s
+                except MapError as fault:
+                    self._tell(str(fault))
+                end_s = time.perf_counter()
+                self._from_s = max(came_s + self._every_s, 2.0 * end_s - begin_s)
+        except BaseException as fault:
+            self._broke(fault)
+            raise
+
+    def _awaited(self) -> tuple[StoredMap, float] | None:
+        """Return what is to be written, as soon as there is something and it is time; None at the end."""
+        with self._door:
+            while not self._ended:
+                left_s = self._from_s - time.perf_counter()
+                if self._next is not None and left_s <= 0.0:
+                    one, self._next = self._next, None
+                    return one
+                self._door.wait(None if self._next is None else left_s)
+        return None
