@@ -19,13 +19,16 @@ from avlmaps.maps.store.reader import open_stored
 from avlmaps.maps.store.writer import MapContent, write_map
 from avlmaps.perception.embedded.codes import features_of
 from avlmaps.query import avlmap as avlmap_module
+from avlmaps.query import stored_instances
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.room_regions import RoomRegions
+from avlmaps.query.rooms import Rooms
 from avlmaps.query.voxel_map import VoxelMap
 from avlmaps.query.words import EncodedWord
 from avlmaps.recordings.open import open_recording
 from helpers.walked_room import write_walk
 
+PREPARED = {"names", "rooms", "instances", "kinds"}
 ASKED = ("sofa", "the chair near the table in the kitchen", "the biggest room")
 
 
@@ -86,10 +89,12 @@ def test_answers_are_the_same_with_and_without_what_is_stored(
         without = told(AVLMap.open(path))
     assert not (path / DERIVED).exists()
     first = told(AVLMap.open(path))
-    assert {file.name for file in (path / DERIVED).glob("*.json")} == {"names.json", "rooms.json"}
+    assert {file.stem for file in (path / DERIVED).glob("*.json")} == {*PREPARED, "kinds_asked"}
     with pytest.MonkeyPatch.context() as patch:  # nothing is computed again
         patch.setattr(avlmap_module.KnownClosestWords, "of", None)
         patch.setattr(RoomRegions, "of", None)
+        patch.setattr(Rooms, "_found", None)
+        patch.setattr(AVLMap, "_search", None)
         again = told(AVLMap.open(path))
     assert first == without
     assert again == without
@@ -142,7 +147,7 @@ def test_a_saved_map_is_prepared(base: Path) -> None:
     """As ``base`` was with the limit that maps have; here every map is large."""
     assert not (base / DERIVED).exists()
     AVLMap.open(base).prepare()
-    assert {file.name for file in (base / DERIVED).glob("*.json")} == {"names.json", "rooms.json"}
+    assert {file.stem for file in (base / DERIVED).glob("*.json")} == PREPARED
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(avlmap_module.KnownClosestWords, "of", None)
         patch.setattr(RoomRegions, "of", None)
@@ -154,3 +159,30 @@ def test_a_map_in_memory_has_nothing_stored(base: Path) -> None:
     in_memory = replace(stored, info=msgspec.structs.replace(stored.info, files={}), path=Path("nowhere"))
     assert told(AVLMap(in_memory)) == told(AVLMap.open(base))
     assert not Path("nowhere").exists()
+
+
+def test_instances_that_are_none_are_not_taken(base: Path, tmp_path: Path) -> None:
+    avlmap = AVLMap.open(random_map(base, tmp_path / "map.avlmap", 5)).prepare()
+    known, count = avlmap._searched(), len(avlmap.space)
+    searches = list(known)
+    arrays = stored_instances._to_arrays(list(known.values()))
+    assert stored_instances._from_arrays(arrays, len(searches), count) is not None
+    assert len(arrays["rows"])
+    for name, at, wrong in (("rows", 0, count), ("rows", 0, -1), ("instance", 0, 10**6), ("confidence", 0, 1.5)):
+        other = {**arrays, name: arrays[name].copy()}
+        other[name][at] = wrong
+        assert stored_instances._from_arrays(other, len(searches), count) is None
+    assert stored_instances._from_arrays(arrays, len(searches) + 1, count) is None
+
+
+def test_a_search_of_stored_instances_ends_where_its_watch_says_so(base: Path, tmp_path: Path) -> None:
+    path = random_map(base, tmp_path / "map.avlmap", 6)
+
+    def watch(stage: str, done: int, total: int) -> None:
+        assert (stage, total > 50) == ("things", True)
+        if done == 3:
+            raise TimeoutError
+
+    with pytest.raises(TimeoutError):
+        AVLMap.open(path).things(watch=watch)
+    assert AVLMap.open(path).things(structure=True)

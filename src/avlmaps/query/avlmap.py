@@ -1,7 +1,7 @@
 """The map as a user meets it: four modalities, each a heatmap, and whole questions."""
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -20,7 +20,7 @@ from avlmaps.perception.room_contents import read_room_contents
 from avlmaps.query.factors import FOUND_AT, HeatSettings
 from avlmaps.query.floor_plan import FloorPlan
 from avlmaps.query.heatmap import Heatmap
-from avlmaps.query.instances import FeatureVoxels, Instances, confident_instances
+from avlmaps.query.instances import FeatureVoxels, Instances, Segmentation, confident_instances
 from avlmaps.query.known_words import KnownClosestWords
 from avlmaps.query.modalities.area import AreaSettings, area_anchors, area_factor, area_names, name_shares
 from avlmaps.query.modalities.image import image_factor, read_picture, require_fitting
@@ -36,8 +36,9 @@ from avlmaps.query.object_settings import ObjectSettings
 from avlmaps.query.queryable import Attachment, Photo
 from avlmaps.query.room_regions import RoomRegions
 from avlmaps.query.rooms import NamedVoxels, RoomField, Rooms, voting_rows
+from avlmaps.query.stored_instances import Search, place_of_instances, read_instances, write_instances
 from avlmaps.query.stored_names import read_closest, write_closest
-from avlmaps.query.stored_rooms import room_regions_of
+from avlmaps.query.stored_rooms import room_field_of, room_regions_of
 from avlmaps.query.things_in_rooms import ThingsInRooms
 from avlmaps.query.voxel_space import Space
 from avlmaps.query.words import ClosestWords, EncodedWord, Vocabulary
@@ -94,6 +95,7 @@ class AVLMap:
         self.stored = stored
         self.settings = settings or QuerySettings()
         self._rivals: tuple[tuple[str, ...], ClosestWords] | None = None
+        self._known_searches: Mapping[Search, Segmentation] | None = None
 
     @classmethod
     def open(cls, path: str | Path, settings: QuerySettings | None = None) -> "AVLMap":
@@ -129,7 +131,13 @@ class AVLMap:
         known = self._known_words if vocabulary is None else None
         rivals = self._rivals_of(encoder, vocabulary) if known is None else known
         voxels = self._feature_voxels(encoder, rivals, self.stored.voxels.rgb)
-        return Heatmap.of(object_factor(voxels, part, self.settings.heat), self.settings.found_at)
+        known = None if vocabulary is not None else self._stored_search(word)
+        return Heatmap.of(object_factor(voxels, part, self.settings.heat, known), self.settings.found_at)
+
+    def _stored_search(self, word: str) -> Segmentation | None:
+        """Return what the search for a name of the encoder found, narrower names with it, where that is stored."""
+        known = self._searched(only_stored=True)
+        return known.get((word, False)) or known.get((word, True))
 
     def instances(self, word: str, alone: bool = False) -> Instances:
         """Return the instances of a word: connected voxels that it wins against the vocabulary.
@@ -139,6 +147,9 @@ class AVLMap:
             alone: take one of the encoder's names for itself, without the narrower ones that it takes in: then an
                 armchair is no "chair".
         """
+        return self._search(word, alone).instances
+
+    def _search(self, word: str, alone: bool) -> Segmentation:
         encoder = self.stored.encoders.pixels
         everywhere = self._rivals_of(encoder, None)
         rivals = everywhere if self._known_words is None else self._known_words  # which knows all of them now
@@ -170,6 +181,7 @@ class AVLMap:
             with suppress(BackendError, MapError):  # no features of things, or those of another encoder
                 if self._known_words is not None:
                     self.closest_words()
+                self._searched()
             with suppress(MapError):
                 _ = self.room_regions
         return self
@@ -236,7 +248,35 @@ class AVLMap:
             from avlmaps.query.changes import Days, things_at
 
             return things_at(self.space, Days.of(self.stored), at, names, least_confidence)
-        return find_things(self.stored, self.space, self.instances, names, least_confidence, structure, watch)
+        known: Mapping[Search, Segmentation] = {} if names is not None else self._searched(watch)
+
+        def instances_of(name: str, alone: bool) -> Instances:
+            return known[name, alone].instances if (name, alone) in known else self.instances(name, alone)
+
+        return find_things(self.stored, self.space, instances_of, names, least_confidence, structure, watch)
+
+    def _searched(
+        self, watch: "Watch" = lambda stage, done, total: None, only_stored: bool = False
+    ) -> Mapping[Search, Segmentation]:
+        """Return what all searches of a list of things found in a large map, which is stored beside it.
+
+        Args:
+            watch: see ``contents.find_things``.
+            only_stored: return nothing where it is not stored, rather than search.
+        """
+        from avlmaps.query.contents import STRUCTURE, searches_for
+
+        vocabulary = self._known_words
+        if self._known_searches or vocabulary is None or (only_stored and self._known_searches is not None):
+            return self._known_searches or {}
+        encoder, settings = self.stored.encoders.pixels, self.settings
+        searches = searches_for([name for name in encoder.vocabulary if name not in STRUCTURE], encoder)
+        place = place_of_instances(self.stored, vocabulary, searches, [settings.objects, settings.areas])
+        known = None if place is None else read_instances(place, searches, len(self.space))
+        if known is None and place is not None and not only_stored:
+            known = write_instances(place, searches, self._search, watch)
+        self._known_searches = known or {}
+        return self._known_searches
 
     def changes(self, since: str | int = 1, *, first_seen: bool = False) -> "ChangesAnswer":
         """Return what is new, moved and gone after a day: a date, or the number of a visit from 1.
@@ -430,7 +470,20 @@ class AVLMap:
         known = [(floor.best.height_m, floor.cameras) for floor in ground.floors] if ground is not None else []
         places = area_anchors(stored.keyframes, settings)
         plan = FloorPlan.of(self.space, self.storeys or one_storey(known, cameras), places)
-        return None if plan is None else Rooms(plan, places, self._voting_voxels, settings.rooms)
+        return None if plan is None else Rooms(plan, places, self._voting_voxels, settings.rooms, self._kept_field)
+
+    def _kept_field(
+        self,
+        called: str,
+        plan: FloorPlan,
+        kinds: tuple[str, ...],
+        share: Float[np.ndarray, "k n"],
+        find: Callable[[], RoomField],
+    ) -> RoomField:
+        """Return a field of rooms: of a large map that of all kinds is stored beside it."""
+        if kinds != area_names(self.stored.encoders.views):  # of a query for an area by any words
+            return find()
+        return room_field_of(self.stored, called, plan, kinds, share, self.settings.areas, find)
 
     @cached_property
     def room_regions(self) -> RoomRegions | None:

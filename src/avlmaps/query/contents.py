@@ -22,6 +22,7 @@ from avlmaps.query.factors import FOUND_AT
 from avlmaps.query.instances import Instances
 from avlmaps.query.modalities.area import AreaSettings, area_names, modes, pooled_name_shares
 from avlmaps.query.modalities.sound import sound_features
+from avlmaps.query.stored_instances import Search
 from avlmaps.query.voxel_space import Space
 
 if TYPE_CHECKING:
@@ -264,7 +265,7 @@ def find_things(
         raise QueryError(f"The least confidence is {least_confidence:g}; it must lie between 0 and 1.")
     encoder = stored.encoders.pixels
     wanted = [name for name in (encoder.vocabulary if names is None else names) if structure or name not in STRUCTURE]
-    searches = [*((name, True) for name in wanted), *((name, False) for name in wanted if _is_wide(name, encoder))]
+    searches = searches_for(wanted, encoder)
     claims: list[tuple[bool, float, int, str, Int[np.ndarray, " m"]]] = []
     for number, (name, alone) in enumerate(searches):
         watch("things", number, len(searches))
@@ -279,6 +280,11 @@ def find_things(
         owned[rows] = True
         things.append(_thing(stored, space, name, -doubt, rows))
     return sorted(things, key=lambda thing: -thing.confidence)
+
+
+def searches_for(names: Sequence[str], encoder: PixelEncoder) -> list[Search]:
+    """Return the searches that list things of some names: each for itself alone, and with the narrower names it has."""
+    return [*((name, True) for name in names), *((name, False) for name in names if _is_wide(name, encoder))]
 
 
 def _is_wide(name: str, encoder: PixelEncoder) -> bool:

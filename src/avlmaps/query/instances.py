@@ -120,10 +120,10 @@ class Segmentation:
     best: float
 
 
-def confident_instances(voxels: FeatureVoxels, word: EncodedWord) -> Instances:
+def confident_instances(voxels: FeatureVoxels, word: EncodedWord) -> Segmentation:
     """Return the instances of a word that are confident by themselves."""
     scored = scorer_of(voxels.feature, voxels.encoder, voxels.rivals, word, voxels.settings)
-    return segment(voxels, word, scored(1.0)).instances
+    return segment(voxels, word, scored(1.0))
 
 
 def segment(

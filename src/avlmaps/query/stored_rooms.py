@@ -1,7 +1,7 @@
-"""The rooms of a large map, stored beside it (``maps.store.derived``)."""
+"""The rooms of a large map and their kinds, stored beside it (``maps.store.derived``)."""
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,10 +10,13 @@ from avlmaps.core.arrays import Float, Int
 from avlmaps.maps.store.derived import Derivation
 from avlmaps.query.floor_plan import FloorPlan
 from avlmaps.query.room_regions import NONE, RoomRegions
+from avlmaps.query.rooms import RoomField
+from avlmaps.query.stored_place import place_of
 from avlmaps.query.storey_grid import StoreyGrid
 
 if TYPE_CHECKING:
     from avlmaps.maps.store.reader import StoredMap
+    from avlmaps.query.modalities.area import AreaSettings
 
 _MODULES = tuple(
     f"avlmaps.query.{name}"
@@ -39,6 +42,40 @@ def room_regions_of(stored: "StoredMap", plan: FloorPlan, width_rad: float) -> R
     if place is not None:
         place.write(_to_arrays(regions))
     return regions
+
+
+def room_field_of(
+    stored: "StoredMap",
+    called: str,
+    plan: FloorPlan,
+    kinds: tuple[str, ...],
+    share: Float[np.ndarray, "k n"],
+    settings: "AreaSettings",
+    find: Callable[[], RoomField],
+) -> RoomField:
+    """Return how likely each cell is each kind of room: as it is stored, or found now and stored.
+
+    Args:
+        stored: the map.
+        called: its name among what is stored.
+        plan: its storeys and voxels.
+        kinds: kinds of room.
+        share: how likely each keyframe's view shows each of them.
+        settings: how they are found.
+        find: finds it.
+    """
+    views = hashlib.sha256(np.ascontiguousarray(share, np.float64).tobytes()).hexdigest()
+    place = place_of(stored, called, [settings], [kinds, views, plan.origin_m.tolist(), plan.wall.shape])
+    arrays = None if place is None else place.read()
+    if arrays is not None and set(arrays) == {"share", "views"}:
+        shapes = arrays["share"].shape, arrays["views"].shape
+        types = {array.dtype for array in arrays.values()}
+        if shapes == ((len(plan), len(kinds)), (len(plan),)) and types == {np.dtype(np.float32)}:
+            return RoomField(plan, kinds, arrays["share"], arrays["views"])
+    field = find()
+    if place is not None:
+        place.write({"share": field.share, "views": np.ascontiguousarray(field.views)})
+    return field
 
 
 def _place(stored: "StoredMap", plan: FloorPlan, width_rad: float) -> Derivation | None:

@@ -29,6 +29,7 @@ from avlmaps.maps.store.manifest import MapInfo
 from avlmaps.maps.store.own_files import is_stored_file
 
 DERIVED = ".derived"
+_TEXTS = (".py", ".toml", ".json", ".csv", ".txt")  # of a package; its weights are known by the cards of their models
 LEAST_VOXELS = 250_000
 """A map of fewer voxels has no derivations."""
 
@@ -71,7 +72,7 @@ class Derivation:
             info: its manifest.
             name: of the derivation.
             files: what it reads of the map, as the manifest names it (``voxels/feature``).
-            modules: full names of the modules that compute it.
+            modules: full names of the modules, and of whole packages, that compute it.
             given: all else that it depends on; anything that msgspec turns into JSON.
         """
         if not all(file in info.files for file in files) or not is_large(info):
@@ -157,11 +158,18 @@ def _remove(files: Iterable[Path]) -> None:
 
 @cache
 def _source_digest(module: str) -> str:
-    """Return a digest of a module's source text; of the release where there is none, as in a frozen program."""
+    """Return a digest of a module's source text, of a package's with its data; of the release where there is none."""
     found = importlib.util.find_spec(module)
     if found is None or found.origin is None:
         return __version__
+    origin = Path(found.origin)
+    files = [origin]
+    if found.submodule_search_locations is not None:
+        files = sorted(file for file in origin.parent.rglob("*") if file.suffix in _TEXTS)
+    total = hashlib.sha256()
     try:
-        return hashlib.sha256(Path(found.origin).read_bytes()).hexdigest()
+        for file in files:
+            total.update(f"{file.relative_to(origin.parent)}\n".encode() + hashlib.sha256(file.read_bytes()).digest())
     except OSError:
         return __version__
+    return total.hexdigest()

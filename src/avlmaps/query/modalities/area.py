@@ -302,7 +302,7 @@ def area_factor(
         weights = np.zeros(0)
     else:
         shares = view_shares(view, encoder, part.query, settings)
-        kinds, weights = rooms.field(shares.kinds, shares.share), shares.weights
+        kinds, weights = rooms.field(shares.kinds, shares.share, "kinds_asked"), shares.weights
         posterior = scores = np.clip(kinds.at(anchors) @ weights, 0.0, 1.0).astype(np.float64)
     best = float(posterior.max(initial=0.0))
     missed = f"no view is like {part.query!r}; the best score is {best:.2f}, below {FOUND_AT:.2f}"

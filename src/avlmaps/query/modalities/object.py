@@ -28,7 +28,9 @@ from avlmaps.query.unknown_names import unknown_note
 from avlmaps.query.words import EncodedWord, Scored, scorer_of
 
 
-def object_factor(voxels: FeatureVoxels, part: Part, heat: HeatSettings) -> NearThings:
+def object_factor(
+    voxels: FeatureVoxels, part: Part, heat: HeatSettings, searched: Segmentation | None = None
+) -> NearThings:
     """Return the heat of the object that a word names; if no confidence suffices, of the best guesses, not ``found``.
 
     With the voxels' colours, an encoder that knows things but no colours is helped out with those.
@@ -37,6 +39,7 @@ def object_factor(voxels: FeatureVoxels, part: Part, heat: HeatSettings) -> Near
         voxels: of the map.
         part: of the query.
         heat: how fast it falls.
+        searched: the confident instances of the part's whole name, where they were found before.
 
     Raises:
         QueryError: the encoder understands nothing of the word.
@@ -49,7 +52,7 @@ def object_factor(voxels: FeatureVoxels, part: Part, heat: HeatSettings) -> Near
         return colour_factor(voxels, voxels.rgb, colour, part, heat)
     word = EncodedWord.of(encoder, colour.thing if colour else part.query)
     if len(word.rows):
-        return _Search(voxels, part, heat, word, colour).factor()
+        return _Search(voxels, part, heat, word, colour, searched if colour is None else None).factor()
     if isinstance(encoder, NamedPixelEncoder):
         note = unknown_note(colour.thing if colour else part.query)
         understood = f"{colour.text} {word.understood}" if colour and word.understood else word.understood
@@ -73,6 +76,7 @@ class _Search:
         heat: how fast it falls.
         word: as the encoder takes it.
         colour: what the part says of colours beside it; None for nothing.
+        searched: its confident instances, where they were found before.
     """
 
     voxels: FeatureVoxels
@@ -80,6 +84,7 @@ class _Search:
     heat: HeatSettings
     word: EncodedWord
     colour: ColourPhrase | None
+    searched: Segmentation | None = None
 
     def factor(self) -> NearThings:
         """Return the heat of the confident instances; where there are none, of the best guesses."""
@@ -105,7 +110,7 @@ class _Search:
 
     @cached_property
     def _confident(self) -> Segmentation:
-        return segment(self.voxels, self.word, self._scored(1.0))
+        return self.searched or segment(self.voxels, self.word, self._scored(1.0))
 
     def _uncertain(self, settings: ObjectSettings) -> Segmentation:
         """Return the confident instances, and those that the context of a query may select."""
