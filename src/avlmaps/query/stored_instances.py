@@ -89,7 +89,7 @@ def _to_arrays(known: Sequence[Segmentation]) -> dict[str, np.ndarray]:
 
 
 def _from_arrays(arrays: Mapping[str, np.ndarray], searches: int, voxels: int) -> list[Segmentation] | None:
-    """Return what is stored; None where the arrays are not those of so many searches of so many voxels."""
+    """Return what is stored; None where the arrays are not those of this number of searches and voxels."""
     if {name: array.dtype for name, array in arrays.items()} != {name: np.dtype(kind) for name, kind in _TYPES.items()}:
         return None
     if any(array.ndim != 1 for array in arrays.values()):
