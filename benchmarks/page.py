@@ -96,6 +96,13 @@ ENTRIES = (
         "[What a room is](concepts/rooms.md). Its limits were chosen on `house:1200000:held-out` to "
         "`house:1200005:held-out`.",
     ),
+    Entry(
+        "change", "What changed over five days",
+        f"avlmaps bench change --scenes {' '.join(f'house:{1_000_000 + n}:held-out' for n in (0, 4, 5, 6))} --days 5 "
+        "--frames 240 --out OUT", 1.5,
+        "[When a thing counts as gone, new or moved](guides/remember-days.md). Four held-out homes; their thresholds "
+        "were chosen while looking at the first three.",
+    ),
     Entry("indexing", "The paper's Tables III to V", "avlmaps bench indexing --out OUT", 1.5, _INDEXING),
     Entry(
         "indexing-clips", "The same with recorded sounds", "avlmaps bench indexing --sounds SOUNDS --out OUT", 2.5,

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.camera import Pinhole
-from avlmaps.days.evidence import Day, DayViews, Seen, Verdict, seen_again, was_empty
+from avlmaps.days.evidence import Day, DayViews, Seen, Verdict, seen_again, seen_before
 from avlmaps.days.settings import ChangeSettings
 from avlmaps.days.surfaces import Occupied
 from avlmaps.maps.grid import GridSpec
@@ -62,44 +62,58 @@ def views(places: list[tuple[float, float, float]], towards: tuple[float, float,
 BOX = np.stack(np.meshgrid(*[np.arange(0, 6)] * 3, indexing="ij"), axis=-1).reshape(-1, 3).astype(np.int32)
 MIDDLE = (0.15, 0.15, 0.15)
 NOTHING = np.array([[200, 200, 200]], np.int32)
+HERE = Occupied.of(BOX, GRID)
 FRONT = [(2.0, 0.1, 0.3), (2.0, 0.2, 0.3), (2.1, 0.3, 0.3)]
 BACK = [(-2.0, 0.1, 0.3), (-2.0, 0.2, 0.3), (-2.1, 0.3, 0.3)]
 
 
 def day(seen: DayViews, index: np.ndarray = NOTHING) -> Day:
-    return Day(seen, Occupied.of(index, GRID), np.eye(4))
+    return Day(seen, Occupied.of(index, GRID), np.eye(4), Occupied.of(index, GRID))
 
 
 def test_rays_through_the_place_from_where_it_was_seen_are_evidence() -> None:
     before = [views(FRONT, MIDDLE, 1.9)]
-    seen = seen_again(BOX, GRID, before, day(views(FRONT, MIDDLE, 4.0)), SETTINGS)
+    seen = seen_again(BOX, GRID, before, HERE, day(views(FRONT, MIDDLE, 4.0)), SETTINGS)
     assert seen.through == len(BOX) and seen.verdict(GRID.voxel_size_m, SETTINGS) is Verdict.GONE
 
 
 def test_rays_from_the_other_side_prove_nothing() -> None:
-    seen = seen_again(BOX, GRID, [views(FRONT, MIDDLE, 1.9)], day(views(BACK, MIDDLE, 4.0)), SETTINGS)
+    seen = seen_again(BOX, GRID, [views(FRONT, MIDDLE, 1.9)], HERE, day(views(BACK, MIDDLE, 4.0)), SETTINGS)
     assert seen.through == 0 and seen.verdict(GRID.voxel_size_m, SETTINGS) is Verdict.UNKNOWN
 
 
 @pytest.mark.parametrize("free_m", [0.0, 1.0, 1.5])
 def test_rays_that_end_before_it_prove_nothing(free_m: float) -> None:
-    seen = seen_again(BOX, GRID, [views(FRONT, MIDDLE, 1.9)], day(views(FRONT, MIDDLE, free_m)), SETTINGS)
+    seen = seen_again(BOX, GRID, [views(FRONT, MIDDLE, 1.9)], HERE, day(views(FRONT, MIDDLE, free_m)), SETTINGS)
     assert (seen.through, seen.surface) == (0, 0)
 
 
 def test_one_view_is_not_enough() -> None:
-    seen = seen_again(BOX, GRID, [views(FRONT, MIDDLE, 1.9)], day(views(FRONT[:1], MIDDLE, 4.0)), SETTINGS)
+    seen = seen_again(BOX, GRID, [views(FRONT, MIDDLE, 1.9)], HERE, day(views(FRONT[:1], MIDDLE, 4.0)), SETTINGS)
     assert seen.through == 0
 
 
 def test_surface_in_its_place_keeps_it() -> None:
     before, now = [views(FRONT, MIDDLE, 1.9)], views(FRONT, MIDDLE, 4.0)
-    seen = seen_again(BOX, GRID, before, day(now, BOX + np.array([1, 0, 0], np.int32)), SETTINGS)
+    seen = seen_again(BOX, GRID, before, HERE, day(now, BOX + np.array([1, 0, 0], np.int32)), SETTINGS)
     assert seen.surface == len(BOX) and seen.verdict(GRID.voxel_size_m, SETTINGS) is Verdict.THERE
 
 
-def test_a_place_was_empty_only_where_somebody_looked() -> None:
+def test_a_place_seen_before_only_where_somebody_looked() -> None:
     none, through, short = Occupied.of(NOTHING, GRID), views(FRONT, MIDDLE, 4.0), views(FRONT, MIDDLE, 1.0)
-    assert was_empty(BOX, GRID, [through], none, SETTINGS)
-    assert not was_empty(BOX, GRID, [short], none, SETTINGS)
-    assert not was_empty(BOX, GRID, [through], Occupied.of(BOX, GRID), SETTINGS)
+    now = day(through, BOX)
+    assert seen_before(BOX, GRID, [through], none, now, SETTINGS) is Verdict.GONE
+    assert seen_before(BOX, GRID, [short], none, now, SETTINGS) is Verdict.UNKNOWN
+    assert seen_before(BOX, GRID, [through], HERE, now, SETTINGS) is Verdict.THERE
+
+
+def test_the_floor_under_a_box_is_no_box() -> None:
+    """A flat box on a floor: most of its voxels lie beside the floor, which is there still."""
+    flat = BOX[BOX[:, 2] < 3]
+    floor = np.stack(np.meshgrid(np.arange(-9, 15), np.arange(-9, 15), [-1], indexing="ij"), axis=-1).reshape(-1, 3)
+    both, before = np.concatenate([flat, floor]), [views(FRONT, MIDDLE, 1.9)]
+    known = Occupied.of(both, GRID)
+    empty = seen_again(flat, GRID, before, known, day(views(FRONT, MIDDLE, 4.0), floor), SETTINGS)
+    assert empty.surface == 0 and empty.verdict(GRID.voxel_size_m, SETTINGS) is Verdict.GONE
+    still = seen_again(flat, GRID, before, known, day(views(FRONT, MIDDLE, 1.8), both), SETTINGS)
+    assert still.through == 0 and still.verdict(GRID.voxel_size_m, SETTINGS) is Verdict.THERE

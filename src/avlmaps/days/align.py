@@ -183,7 +183,10 @@ def consensus(votes: Votes, settings: AlignSettings, names: Sequence[object]) ->
             "saw more of the same rooms."
         )
     found = mean_transform(votes.map_from_other[agree], votes.camera[agree])
+    placed = (votes.map_from_other[agree] @ votes.camera[agree])[:, :3, 3]
+    off_m = float(np.median(np.linalg.norm((found @ votes.camera[agree])[:, :3, 3] - placed, axis=1)))
     return found, {
+        "votes_off_m": round(off_m, 4),
         "keyframes_tried": votes.tried,
         "located": len(votes),
         "agreeing": count,

@@ -1,9 +1,10 @@
 """What a day says of a place: there is surface again, rays pass through it, or nobody looked.
 
-For the n voxels of a thing, n₊ are those where the day has surface in the voxel or beside it, and n₋ those through
-which at least two of its views see, from where it was seen before. Voxels beside each other say the same thing twice,
-so that they count by patches of edge a: with voxels of edge s, k± = n± · s²/a². With one look that was worth nothing
-either way (a uniform prior), the probability that the thing is gone is the mean of a Beta distribution:
+For the n voxels of a thing that lie beside no other surface (the floor under a box is no box), n₊ are those where the
+day has surface in the voxel or beside it, and n₋ those through which at least two of its views see, from where it was
+seen before. Voxels beside each other say the same thing twice, so that they count by patches of edge a: with voxels of
+edge s, k± = n± · s²/a². With one look that was worth nothing either way (a uniform prior), the probability that the
+thing is gone is the mean of a Beta distribution:
 
     P(gone) = (1 + k₋) / (2 + k₋ + k₊)                                                                             (1)
 
@@ -31,6 +32,7 @@ from avlmaps.maps.grid import GridSpec
 _MOST_SAMPLES = 48  # voxels of a thing by which it is decided which views show it
 _BEFORE_M = 0.3  # a view shows what lies up to this far behind where its blocks are free
 _LEAST_SEEN = 0.2  # of these samples
+_FEWEST_OWN, _LEAST_OWN = 8, 0.15  # voxels of a thing that lie beside nothing else, and their part of it
 
 
 class Verdict(StrEnum):
@@ -135,11 +137,13 @@ class Day:
         views: what its keyframes looked at.
         occupied: its surface, in the grid of its own world.
         recording_from_map: 4x4, into that world.
+        surface: its surface, in the grid of the map.
     """
 
     views: DayViews
     occupied: Occupied
     recording_from_map: Float[np.ndarray, "4 4"]
+    surface: Occupied
 
     def has_surface(self, points: Float[np.ndarray, "m 3"]) -> Bool[np.ndarray, " m"]:
         """Return where the day has surface: in a place's voxel or beside it."""
@@ -150,6 +154,7 @@ def seen_again(
     index: Int[np.ndarray, "n 3"],
     grid: GridSpec,
     before: Sequence[DayViews],
+    known: Occupied,
     day: Day,
     settings: ChangeSettings,
 ) -> Seen:
@@ -159,38 +164,46 @@ def seen_again(
         index: its voxels.
         grid: their size.
         before: the views of the days on which it was there.
+        known: the surface of the map until then; beside what else it has, new surface says nothing of the thing.
         day: the day.
         settings: how near to those a view must look from.
     """
-    points = grid.centre_of(np.asarray(index))
-    surface = day.has_surface(points)
-    allowed = _from_where_it_was_seen(points, before, day.views, settings)
+    allowed = _from_where_it_was_seen(grid.centre_of(np.asarray(index)), before, day.views, settings)
     through = np.zeros(len(index), bool)
     if allowed.sum() >= settings.through_views:
         through = day.views.only(allowed).through(index, grid) >= settings.through_views
-    return Seen(len(index), int(surface.sum()), int((through & ~surface).sum()))
+    own = known.alone(index)
+    return _counted(through, day.has_surface(grid.centre_of(np.asarray(index))), own)
 
 
-def was_empty(
+def seen_before(
     index: Int[np.ndarray, "n 3"],
     grid: GridSpec,
     before: Sequence[DayViews],
     known: Occupied,
+    day: Day,
     settings: ChangeSettings,
-) -> bool:
-    """Return whether the place of a thing was looked through before it stood there, by the rule of ``verdict``.
+) -> Verdict:
+    """Return what earlier days say of the place of a thing: gone says that they looked through it.
 
     Args:
         index: its voxels.
         grid: their size.
         before: the views of all earlier days.
         known: the surface that the map had until then, as those who looked last left it.
+        day: on which it stands there.
         settings: the rule.
     """
-    surface = known.near(grid.centre_of(np.asarray(index)))
     through = np.sum([day.through(index, grid) for day in before], axis=0) >= settings.through_views
-    seen = Seen(len(index), int(surface.sum()), int((through & ~surface).sum()))
-    return seen.verdict(grid.voxel_size_m, settings) is Verdict.GONE
+    seen = _counted(through, known.near(grid.centre_of(np.asarray(index))), day.surface.alone(index))
+    return seen.verdict(grid.voxel_size_m, settings)
+
+
+def _counted(through: Bool[np.ndarray, " n"], surface: Bool[np.ndarray, " n"], own: Bool[np.ndarray, " n"]) -> Seen:
+    """Return the evidence of the voxels that lie beside nothing else; of all, where those are too few."""
+    if own.sum() >= max(_FEWEST_OWN, _LEAST_OWN * len(own)):
+        through, surface = through[own], surface[own]
+    return Seen(len(through), int(surface.sum()), int((through & ~surface).sum()))
 
 
 def _from_where_it_was_seen(

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from avlmaps.core.arrays import Float, Int
-from avlmaps.days.evidence import Day, DayViews, Verdict, seen_again, was_empty
+from avlmaps.days.evidence import Day, DayViews, Verdict, seen_again, seen_before
 from avlmaps.days.settings import ChangeSettings
 from avlmaps.days.surfaces import AROUND, Occupied, packed
 from avlmaps.maps.grid import GridSpec
@@ -94,7 +94,7 @@ def lived_on(
             )
             continue
         views = [one for one in before[stay.first : visit] if len(one)]
-        seen = seen_again(voxels[number], grid, views, day, settings)
+        seen = seen_again(voxels[number], grid, views, known, day, settings)
         match seen.verdict(grid.voxel_size_m, settings):
             case Verdict.THERE:
                 stays[number] = msgspec.structs.replace(stay, last=visit, looked=visit, last_seen_s=at_s[visit])
@@ -102,11 +102,15 @@ def lived_on(
                 stays[number] = msgspec.structs.replace(stay, looked=visit, gone=visit)
             case Verdict.UNKNOWN:
                 pass
+    new: list[int] = []
     for number in sorted(set(range(len(things))) - set(matched.values())):
         thing = things[number]
-        stays.append(_stay(thing, visit, appeared=was_empty(thing.index, grid, before, known, settings)))
+        then = seen_before(thing.index, grid, before, known, day, settings)
+        if then is not Verdict.THERE:
+            new.append(len(stays))
+        stays.append(_stay(thing, visit, appeared=then is Verdict.GONE))
         voxels.append(thing.index)
-    return Life.of(_moved(stays, len(life), visit, at_s, settings, same), voxels)
+    return Life.of(_moved(stays, new, visit, at_s, settings, same), voxels)
 
 
 def _stay(thing: Seen, visit: int, appeared: bool) -> Stay:
@@ -156,22 +160,25 @@ def _far(stay: Stay, thing: Seen) -> float:
 
 
 def _moved(
-    stays: list[Stay], known: int, visit: int, at_s: Sequence[float], settings: ChangeSettings, same: SameName
+    stays: list[Stay], new: Sequence[int], visit: int, at_s: Sequence[float], settings: ChangeSettings, same: SameName
 ) -> list[Stay]:
-    """Join what appeared with what is gone from elsewhere: the pairs that are most alike."""
+    """Join what appeared with what is gone from elsewhere: the pairs that are most alike.
+
+    Where nobody had looked at the place of a new thing, it must be as alike as one without a name.
+    """
     gone = [
         number
-        for number, stay in enumerate(stays[:known])
+        for number, stay in enumerate(stays)
         if stay.gone is not None and stay.moved_to is None and at_s[visit] - at_s[stay.last] <= settings.within_s
     ]
-    new = [number for number in range(known, len(stays)) if stays[number].appeared]
     value = np.zeros((len(gone), len(new)))
     for row, one in enumerate(gone):
         for column, other in enumerate(new):
             alike = likeness(stays[one], stays[other])
             unsure = min(stays[one].confidence, stays[other].confidence) < settings.confident_at
             named = same(stays[one].name, stays[other].name)
-            fits = alike >= (settings.least_likeness if named else settings.likeness_unnamed)
+            clear = named and stays[other].appeared
+            fits = alike >= (settings.least_likeness if clear else settings.likeness_unnamed)
             if (named or unsure) and fits and _apart_m(stays[one], stays[other]) <= settings.reach_m:
                 value[row, column] = alike + named
     for row, column in zip(*linear_sum_assignment(-value), strict=True):

@@ -80,8 +80,11 @@ def find_other(stored: StoredMap, other: StoredMap, settings: MergeSettings = DE
     require_upright(first, stored.up_in_world, other.up_in_world, settings.align)
     grid = stored.grid
     points, others = (grid.centre_of(np.asarray(one.voxels.index)) for one in (stored, other))
-    fine, off_m = refine(points, others, first, rng)
-    checks |= {"surface_off_m": round(off_m, 4)} | _agreement(stored, other, fine, settings)
+    fine = first
+    if checks["votes_off_m"] > settings.align.refine_from * grid.voxel_size_m:
+        fine, off_m = refine(points, others, first, rng)
+        checks["surface_off_m"] = round(off_m, 4)
+    checks |= _agreement(stored, other, fine, settings)
     return Found(fine, checks)
 
 
@@ -205,7 +208,13 @@ def merge_maps(
     listed = things_of or default_things(settings.least_confidence)
     grid = stored.grid
     before = views_of(stored)
-    now = Day(views_of(other)[0].moved(moved), Occupied.of(np.asarray(other.voxels.index), grid), inverse(moved))
+    laid, *_ = resampled(np.asarray(other.voxels.index), grid, moved)
+    now = Day(
+        views_of(other)[0].moved(moved),
+        Occupied.of(np.asarray(other.voxels.index), grid),
+        inverse(moved),
+        Occupied.of(laid, grid),
+    )
     known = Occupied.of(np.asarray(stored.voxels.index), grid)
     life = stored.life() or lives.begun([_seen(one, stored, np.eye(4), 0.0) for one in listed(AVLMap(stored))])
     things = list(listed(AVLMap(other)))

@@ -146,6 +146,16 @@ class Occupied:
             found[open_] = self.row_of(index[open_] + offset) >= 0
         return found
 
+    def alone(self, own: Int[np.ndarray, "m 3"]) -> Bool[np.ndarray, " m"]:
+        """Return which voxels of a thing lie beside no voxel but the thing's."""
+        thing = Occupied.of(own, self.grid)
+        index = np.asarray(own, np.int64)
+        found = np.ones(len(index), bool)
+        for offset in AROUND[1:]:
+            beside = index + offset
+            found &= (self.row_of(beside) < 0) | (thing.row_of(beside) >= 0)
+        return found
+
 
 AROUND = np.stack(np.meshgrid(*[[0, -1, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
 """A voxel and the 26 beside it."""

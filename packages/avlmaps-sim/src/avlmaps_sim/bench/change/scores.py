@@ -116,16 +116,25 @@ def said_changes(days: Days, visit: int) -> list[Happened]:
     return found
 
 
-def judged(said: Sequence[Happened], true: Sequence[Happened], neither: Sequence[Triple] = ()) -> Counts:
+def judged(
+    said: Sequence[Happened],
+    true: Sequence[Happened],
+    neither: Sequence[Triple] = (),
+    hidden: Sequence[Happened] = (),
+    *,
+    named: bool = True,
+) -> Counts:
     """Return how many changes are right, wrong and missed; each is matched once.
 
     Args:
         said: by the map.
         true: what happened.
         neither: places of changes that are neither right nor wrong to name (a door that swung).
+        hidden: likewise, changes that happened where nobody looked.
+        named: whether the name must fit.
     """
     counts = Counts()
-    fits = np.array([[_fits(one, other) for other in true] for one in said]).reshape(len(said), len(true))
+    fits = np.array([[_fits(one, other, named) for other in true] for one in said]).reshape(len(said), len(true))
     rows, columns = linear_sum_assignment(-fits.astype(float))
     matched = [(int(i), int(j)) for i, j in zip(rows, columns, strict=True) if fits[i, j]]
     for row, _ in matched:
@@ -135,16 +144,17 @@ def judged(said: Sequence[Happened], true: Sequence[Happened], neither: Sequence
         counts.missed[one.kind] += number not in found
     right = {row for row, _ in matched}
     for number, one in enumerate(said):
-        if number not in right and not any(_near(place, one.after or one.before) for place in neither):
+        excused = any(_near(place, one.after or one.before) for place in neither)
+        if number not in right and not excused and not any(_fits(one, other, named) for other in hidden):
             counts.wrong[one.kind] += 1
     return counts
 
 
-def _fits(said: Happened, true: Happened) -> bool:
+def _fits(said: Happened, true: Happened, named: bool = True) -> bool:
     places = ((said.before, true.before), (said.after, true.after))
     return (
         said.kind == true.kind
-        and same_thing(said.name, true.name)
+        and (not named or same_thing(said.name, true.name))
         and all(other is None or _near(one, other) for one, other in places)
     )
 

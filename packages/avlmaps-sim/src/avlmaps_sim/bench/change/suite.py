@@ -1,7 +1,8 @@
 """The suite ``avlmaps bench change``: homes on several days, merged one after the other, against the truth."""
 
+from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from time import perf_counter
@@ -10,7 +11,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.core.poses import plain_point
+from avlmaps.core.poses import apply, inverse, plain_point, rotation_angle_rad
 from avlmaps.days.merge import NotTheSamePlaceError, ThingsOf, default_things, merge_maps
 from avlmaps.maps.store.life import Stay
 from avlmaps.query.avlmap import AVLMap
@@ -19,6 +20,7 @@ from avlmaps.query.contents import Thing
 from avlmaps_sim.bench.change.scores import (
     KINDS,
     Counts,
+    Happened,
     Listed,
     judged,
     judged_list,
@@ -26,6 +28,7 @@ from avlmaps_sim.bench.change.scores import (
     said_changes,
     true_changes,
 )
+from avlmaps_sim.bench.change.turned import TurnedJob, TurnedPlace
 from avlmaps_sim.bench.harness.intervals import in_percent, wilson
 from avlmaps_sim.bench.harness.provenance import in_words, provenance
 from avlmaps_sim.bench.harness.settings import SceneSettings
@@ -33,24 +36,27 @@ from avlmaps_sim.bench.harness.workers import side_by_side
 from avlmaps_sim.bench.harness.workplace import SceneJob, Workplace, scene_jobs
 from avlmaps_sim.bench.objects import FEWEST_VOXELS, STRUCTURE
 from avlmaps_sim.bench.output import Table, draw, markdown, write_answer
+from avlmaps_sim.mesh import Triple
 from avlmaps_sim.rearranged import Change
 from avlmaps_sim.scene import NOTHING, Scene, SceneObject
 from avlmaps_sim.scenes import on_day, open_changed, open_scene
 
 NOTE = (
     "Each home is recorded on day 0 and on the days after it, on another walk each day, rearranged in between; each "
-    "day's recording becomes a map, and the maps are merged in their order. A change is right with its kind, a fitting "
-    "name and its places within 0.5 m; true ones count where the walks saw the thing before and after. A door that "
-    "swung is neither right nor wrong to name. True perception: things are the voxels of the scene's own things, and "
-    "all else is ours. On the last day: stale is what is listed where such a thing stood on an earlier day and does so "
-    "no more; a ghost is listed where nothing stands; known are true things that some day saw. Rebuilt: the last day's "
-    "map alone; never forgets: all that was ever listed. Lost: of the first day's things that never changed, those "
-    "said to be gone."
+    "later day has a world of its own, turned and shifted at random. Each day's recording becomes a map, and the maps "
+    "are merged in their order. A change is right with its kind, a fitting name and its places within 0.5 m. Happened: "
+    "to things that the walks saw before and after. Noticeable: in three frames at least, depth goes through the "
+    "middle of where the thing was, or of where it appeared before that; the others, and doors that swung, are neither "
+    "right nor wrong to name. True perception: things are the voxels of the scene's own things, and all else is ours. "
+    "On the last day: stale is what is listed where such a thing stood on an earlier day and does so no more; a ghost "
+    "is listed where nothing stands; known are true things that some day saw. Rebuilt: the last day's map alone; never "
+    "forgets: all that was ever listed. Lost: of the first day's things that never changed, those said to be gone."
 )
 TRUE, OURS = "true perception", "ours"
 MERGED, REBUILT, FOREVER = "merged", "rebuilt from the last day", "never forgets"
 SCENES = tuple(f"house:{1_000_000 + number}:held-out" for number in range(10))
 DAYS = 5
+_FEWEST_FRAMES, _BEHIND_M = 3, 0.15
 DEFAULTS = (SceneSettings(scenes=SCENES, sources=3, ambiguous=0), DAYS)
 
 
@@ -61,6 +67,8 @@ class HomeResult:
     Attributes:
         scene: its name.
         counts: of changes, over the days.
+        unnamed: the same, where names do not count.
+        happened: of each kind, how many changes of things that were seen, also where nobody looked at their place.
         lists: how well the lists stand for the last day, by how they were made.
         lost: static things said to be gone.
         static: static things.
@@ -73,6 +81,8 @@ class HomeResult:
 
     scene: str
     counts: Counts = field(default_factory=Counts)
+    unnamed: Counts = field(default_factory=Counts)
+    happened: Counter[str] = field(default_factory=Counter)
     lists: dict[str, Listed] = field(default_factory=dict)
     lost: int = 0
     static: int = 0
@@ -113,10 +123,9 @@ def run_change(
 
 def _home(job: SceneJob, days: int, open_spec: Callable[[str], Scene]) -> dict[str, HomeResult]:
     """Return the results of a home, by perception."""
-    from dataclasses import replace
-
-    places = [Workplace(replace(job, spec=on_day(job.spec, day)), open_spec) for day in range(days)]
-    changes = open_changed(on_day(job.spec, days - 1))[1] if days > 1 else ()
+    jobs = [replace(job, spec=on_day(job.spec, day)) for day in range(days)]
+    places = [Workplace(jobs[0], open_spec), *(TurnedPlace(TurnedJob.of(one), open_spec) for one in jobs[1:])]
+    changes = open_changed(jobs[-1].spec)[1]
     seen = [_seen_names(place) for place in places]
     results: dict[str, HomeResult] = {}
     for way, things_of in ((TRUE, _true_things(places)), (OURS, default_things(0.5))):
@@ -180,12 +189,51 @@ def _lived(
         result.off_deg.append(off_deg)
         said = said_changes(Days.of(merged), len(merged.info.visits) - 1)
         true = true_changes(changes, day, sorted(names_before), sorted(seen[day]))
+        result.happened.update(one.kind for one in true)
+        noticeable = _noticeable(true, places[: day + 1])
         doors = [one.before for one in changes if one.day == day and one.kind == "swung" and one.before is not None]
-        result.counts.add(judged(said, true, doors))
+        hidden = [one for one in true if one not in noticeable]
+        result.counts.add(judged(said, noticeable, doors, hidden))
+        result.unnamed.add(judged(said, noticeable, doors, hidden, named=False))
         names_before |= seen[day]
     if merged.info.visits:
         _judge_lists(result, Days.of(merged), places, changes, names_before, things_of)
     return result
+
+
+def _noticeable(true: Sequence[Happened], places: Sequence[Workplace]) -> list[Happened]:
+    """Return the changes that depth shows: it goes through where a thing was, or where one appeared before that.
+
+    Args:
+        true: changes of the last of some days.
+        places: the days up to then.
+    """
+    before = [one.before for one in true]
+    after = [one.after if one.kind == "appeared" else None for one in true]
+    empty_now = _looked_through(places[-1:], before)
+    empty_then = _looked_through(places[:-1], after)
+    return [one for one, now, then in zip(true, empty_now, empty_then, strict=True) if now and then]
+
+
+def _looked_through(places: Sequence[Workplace], points: Sequence[Triple | None]) -> list[bool]:
+    """Return through which points of a scene some frames' depth goes; True where there is no point."""
+    known = [number for number, point in enumerate(points) if point is not None]
+    often = np.zeros(len(points), int)
+    often[[number for number in range(len(points)) if number not in known]] = _FEWEST_FRAMES
+    at = np.array([points[number] for number in known], np.float64).reshape(-1, 3)
+    for place in places if known else ():
+        recording = place.recording
+        turn = place.turn if isinstance(place, TurnedPlace) else np.eye(4)
+        camera, own = recording.rig.depth, apply(turn, at)
+        for index in range(len(recording)):
+            frame = recording.frame(index)
+            x, y, z = apply(inverse(frame.world_from_camera), own).T
+            depth = np.maximum(z, 1e-6)
+            u, v = camera.fx * x / depth + camera.cx, camera.fy * y / depth + camera.cy
+            inside = (z > 0.2) & (u >= 0) & (v >= 0) & (u < camera.width) & (v < camera.height)
+            rows, columns = (np.where(inside, one, 0).astype(int) for one in (v, u))
+            often[known] += inside & (frame.depth_m[rows, columns] > z + _BEHIND_M)
+    return (often >= _FEWEST_FRAMES).tolist()
 
 
 def _judge_lists(
@@ -223,8 +271,9 @@ def _misplaced(rows: Sequence[Sequence[float]], place: Workplace) -> tuple[float
     """Return how far a day's walk was put from where it was driven: all days share the scene's own frame."""
     found: Float[np.ndarray, "4 4"] = np.array(rows, np.float64)
     at = place.recording.world_from_camera[:, :3, 3]
-    off_m = np.linalg.norm(at @ found[:3, :3].T + found[:3, 3] - at, axis=1)
-    turned = np.arccos(np.clip((np.trace(found[:3, :3]) - 1.0) / 2.0, -1.0, 1.0))
+    turn = place.turn if isinstance(place, TurnedPlace) else np.eye(4)
+    off_m = np.linalg.norm(apply(found, at) - apply(inverse(turn), at), axis=1)
+    turned = rotation_angle_rad(found, inverse(turn))
     return float(np.median(off_m)), float(np.rad2deg(turned))
 
 
@@ -239,19 +288,31 @@ def _floor_m2(place: Workplace) -> float:
 def tables_of(results: dict[str, list[HomeResult]]) -> dict[str, Table]:
     """Return the tables of all homes, by perception."""
     rows: list[list[object]] = []
-    for way, homes in results.items():
+    ways = [(way, homes, False) for way, homes in results.items()]
+    for way, homes, unnamed in (*ways, *((f"{way}, any name", results[way], True) for way in (OURS,))):
         counts = Counts()
         for home in homes:
-            counts.add(home.counts)
+            counts.add(home.unnamed if unnamed else home.counts)
         for kind in KINDS:
             right, wrong, missed = counts.right[kind], counts.wrong[kind], counts.missed[kind]
             rows.append([
-                way, kind, right + missed, right + wrong, right, round(counts.f1(kind), 3),
+                way, kind, sum(home.happened[kind] for home in homes), right + missed, right + wrong, right,
+                round(counts.f1(kind), 3),
                 _share(right, right + wrong), _share(right, right + missed),
             ])  # fmt: skip
     tables: dict[str, Table] = {
         "changes": {
-            "columns": ["perception", "change", "true", "said", "right", "F1", "precision (95 %)", "recall (95 %)"],
+            "columns": [
+                "perception",
+                "change",
+                "happened",
+                "noticeable",
+                "said",
+                "right",
+                "F1",
+                "precision (95 %)",
+                "recall (95 %)",
+            ],
             "rows": rows,
         }
     }
