@@ -1,5 +1,6 @@
 """`avlmaps live`: a map that grows while a recording is played, as it would on a robot."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from time import perf_counter
@@ -44,6 +45,13 @@ class Live(ModelVerb):
     """Other backends or models than the profile's: pixels=clip-patches@openai/clip-vit-large-patch14 views=clip."""
     voxel_size_m: Annotated[float, arg(metavar="METRES")] = 0.05
     """Edge of a voxel, metres."""
+    serve: bool = False
+    """Answer HTTP on this machine while the map grows, and afterwards until Ctrl-C, as `avlmaps serve` does; agents are
+    served by `avlmaps serve MAP` beside it, which takes each save."""
+    view: bool = False
+    """The same, and open the map's page in a browser."""
+    port: Annotated[int, arg(metavar="NUMBER")] = 8750
+    """Port of --serve and --view; 0 takes a free one."""
     format: Annotated[str, arg(metavar="FORMAT")] = "auto"
     """Format of the recording, if its files do not show it."""
     reading: Annotated[Reading, OmitArgPrefixes] = field(default_factory=Reading)
@@ -87,10 +95,19 @@ def _live(verb: Live) -> dict[str, Any]:
         live=LiveSettings(gates=not verb.every_frame),
         overwrite=verb.overwrite,
     ) as live:
-        if recording is None:
-            follow(verb.recording, live, verb.give_up_s)
+
+        def drive(over: Callable[[], bool] = lambda: False) -> None:
+            if recording is None:
+                follow(verb.recording, live, verb.give_up_s, over=over)
+            else:
+                replay(recording, live, None if verb.as_fast_as_possible else verb.rate, over=over)
+
+        if verb.serve or verb.view:
+            from avlmaps.cli.live_serving import serve_while
+
+            serve_while(live, drive, verb.port, browse=verb.view)
         else:
-            replay(recording, live, None if verb.as_fast_as_possible else verb.rate)
+            drive()
     status = live.status()
     return {
         **describe_map(live.map.stored),

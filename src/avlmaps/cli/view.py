@@ -146,7 +146,7 @@ def _serve(verb: View) -> None:
                 say("Other machines put this machine's name in the place of 127.0.0.1; the token stays.")
             say("Stop the viewer with Ctrl-C.")
             if not verb.no_browser:
-                _open_browser(url)
+                open_browser(url)
 
         try:
             with contextlib.suppress(KeyboardInterrupt):  # where signals do not reach the server's loop: Windows
@@ -176,7 +176,8 @@ def _address(settings: "ServeSettings", port: int, names: list[str]) -> str:
     return f"http://{f'[{host}]' if ':' in host else host}:{port}/maps/{quote(names[0])}/view{query}"
 
 
-def _open_browser(url: str) -> None:
+def open_browser(url: str) -> None:
+    """Open a page in the browser of this machine, without waiting for it."""
     import webbrowser
 
     threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()

@@ -17,6 +17,7 @@ def replay(
     live: LiveMap,
     rate: float | None = 1.0,
     tell: Callable[[str], None] = say,
+    over: Callable[[], bool] = lambda: False,
 ) -> None:
     """Give a live map the frames and the sound of a recording. Frames that cannot be read are left out.
 
@@ -25,10 +26,13 @@ def replay(
         live: the map.
         rate: how many times faster than it was recorded; None waits for the map, so that no frame is late.
         tell: called with each doubt, as soon as it is known.
+        over: whether to end before the recording does; queried before each frame.
     """
     begin_s, told, heard_s = time.perf_counter(), 0, None if recording.audio is None else recording.audio.start_s
     shown = progress(range(len(recording)), "mapping", total=len(recording), note=lambda: _note(live))
     for index in shown:
+        if over():
+            return
         since_s = float(recording.stamps_s[index] - recording.stamps_s[0])
         if rate is not None:
             time.sleep(max(0.0, begin_s + since_s / rate - time.perf_counter()))
@@ -43,7 +47,13 @@ def replay(
     _play(recording, live, heard_s, float("inf"))
 
 
-def follow(path: Path, live: LiveMap, give_up_s: float = 60.0, tell: Callable[[str], None] = say) -> None:
+def follow(
+    path: Path,
+    live: LiveMap,
+    give_up_s: float = 60.0,
+    tell: Callable[[str], None] = say,
+    over: Callable[[], bool] = lambda: False,
+) -> None:
     """Give a live map the frames of a recording while it is written; its sound comes when it is finished.
 
     Args:
@@ -51,9 +61,12 @@ def follow(path: Path, live: LiveMap, give_up_s: float = 60.0, tell: Callable[[s
         live: the map.
         give_up_s: end when nothing came for this long.
         tell: called with each doubt and what else is worth knowing.
+        over: whether to end before the recording does; queried at each frame.
     """
     told = 0
     for frame in progress(growing_frames(path, give_up_s, tell), "mapping", note=lambda: _note(live)):
+        if over():
+            return
         try:
             _add(live, frame)
         except RecordingError as fault:

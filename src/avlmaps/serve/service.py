@@ -9,7 +9,7 @@ from avlmaps.query.avlmap import QuerySettings
 from avlmaps.serve.errors import Privacy
 from avlmaps.serve.lanes import Lane
 from avlmaps.serve.settings import ServeSettings
-from avlmaps.serve.shelf import Shelf
+from avlmaps.serve.shelf import MapSource, Shelf
 
 if TYPE_CHECKING:
     from avlmaps.view.route import MakeRobot
@@ -36,7 +36,7 @@ class Service:
     @classmethod
     def open(
         cls,
-        maps: Mapping[str, Path],
+        maps: Mapping[str, Path | MapSource],
         settings: ServeSettings | None = None,
         note: Callable[[str], None] = lambda _: None,
         robot: "MakeRobot | None" = None,
@@ -45,7 +45,7 @@ class Service:
         """Open the maps and start the lanes.
 
         Args:
-            maps: folders by name; see ``shelf.named_maps``.
+            maps: folders, or other places of maps, by name; see ``shelf.named_maps``.
             settings: the defaults if None.
             note: is given a line for the log.
             robot: puts a simulated robot into a map's scene, for the commands of its page.
@@ -62,7 +62,7 @@ class Service:
             shelf,
             Lane("quick", limits.quick_workers, limits.waiting, limits.answer_s),
             Lane("slow", limits.slow_workers, limits.waiting, limits.answer_s),
-            Privacy((path, name) for name, path in maps.items()),
+            Privacy((path, name) for name, path in shelf.paths.items()),
         )
 
     def close(self) -> None:

@@ -1,7 +1,8 @@
-"""The maps of a server: opened once, queried by many, opened again when they are replaced on disk.
+"""The maps of a server: opened once, queried by many, opened again when they are replaced.
 
-A map is replaced when its ``map.json`` is. The new one is opened and prepared beside the old one, which answers until
-then; a query sees one of them from its beginning to its end. Where the new one cannot be opened, the old one stays.
+A map in a folder is replaced when its ``map.json`` is, a live one when it has another snapshot. The new one is opened
+and prepared beside the old one, which answers until then; a query sees one of them from its beginning to its end.
+Where the new one cannot be opened, the old one stays.
 """
 
 import threading
@@ -11,7 +12,7 @@ from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, TypeVar, cast
+from typing import TYPE_CHECKING, Protocol, TypeVar, cast
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import AvlmapsError, BackendError, QueryError
@@ -116,7 +117,7 @@ class ServedMap:
     def version(self) -> str:
         """A word that is another one for another content; clients may use it as an ETag."""
         info = self.avlmap.stored.info
-        return f"{info.build_key[:16]}-{info.timings.finished}".replace('"', "")
+        return f"{info.build_key[:16]}-{info.timings.finished}-{info.counts.sounds}".replace('"', "")
 
     def prepare(self) -> None:
         """Compute what every query needs, so that the first one is as quick as the others.
@@ -195,26 +196,65 @@ class ServedMap:
             return made
 
 
+class MapSource(Protocol):
+    """Where a map comes from that may be replaced.
+
+    Attributes:
+        path: its folder.
+        tells: whether a replacement is worth a line in the log.
+    """
+
+    path: Path
+    tells: bool
+
+    def stamp(self) -> object | None:
+        """Return what is another value for another map; None where there is none at the moment."""
+        ...
+
+    def open(self) -> "StoredMap":
+        """Return the map as it is now.
+
+        Raises:
+            MapError: it cannot be opened.
+        """
+        ...
+
+
+class _Folder:
+    """A map on the disk."""
+
+    tells = True
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def stamp(self) -> object | None:
+        return stamp(self.path / MANIFEST)
+
+    def open(self) -> "StoredMap":
+        return open_stored(self.path)
+
+
 class _Slot:
     """One name, the map that answers for it now, and the one that is being opened."""
 
-    def __init__(self, name: str, path: Path, make: Callable[[str, "StoredMap"], ServedMap], warm: bool) -> None:
-        self.name, self.path, self._make = name, path, make
+    def __init__(self, name: str, source: MapSource, make: Callable[[str, "StoredMap"], ServedMap], warm: bool) -> None:
+        self.name, self.path, self._source, self._make = name, source.path, source, make
         self._lock = threading.Lock()
         self._opening: threading.Thread | None = None
         self.fault: AvlmapsError | OSError | None = None
         self._stamp, self.map = self._opened(warm)
 
     def _opened(self, warm: bool = True) -> tuple[object, ServedMap]:
-        before = stamp(self.path / MANIFEST)
-        opened = self._make(self.name, open_stored(self.path))
+        before = self._source.stamp()
+        opened = self._make(self.name, self._source.open())
         if warm:
             opened.prepare()
         return before, opened
 
     def refresh(self, note: Callable[[str], None]) -> None:
         """Begin to open the map that has replaced this one, if there is one."""
-        now = stamp(self.path / MANIFEST)
+        now = self._source.stamp()
         if now is None or now == self._stamp:
             return
         with self._lock:
@@ -227,7 +267,7 @@ class _Slot:
 
     def _reopen(self, note: Callable[[str], None]) -> None:
         begin = perf_counter()
-        tried = stamp(self.path / MANIFEST)
+        tried = self._source.stamp()
         try:
             before, opened = self._opened()
         except (AvlmapsError, OSError) as error:
@@ -235,7 +275,8 @@ class _Slot:
             note(f"{self.name}: the map was replaced, and the new one cannot be opened ({error}); the old one answers.")
             return
         self._stamp, self.map, self.fault = before, opened, None
-        note(f"{self.name}: the map was replaced; the new one was opened in {perf_counter() - begin:.1f} s.")
+        if self._source.tells:
+            note(f"{self.name}: the map was replaced; the new one was opened in {perf_counter() - begin:.1f} s.")
 
     def wait(self, timeout_s: float) -> None:
         thread = self._opening
@@ -248,7 +289,7 @@ class Shelf:
 
     def __init__(
         self,
-        maps: Mapping[str, Path],
+        maps: Mapping[str, Path | MapSource],
         limits: Limits | None = None,
         note: Callable[[str], None] = lambda _: None,
         settings: QuerySettings | None = None,
@@ -258,7 +299,7 @@ class Shelf:
         """Open maps.
 
         Args:
-            maps: folders by name; see ``named_maps``.
+            maps: folders, or other places of maps, by name; see ``named_maps``.
             limits: how much each map may remember.
             note: is given a line when a map was replaced.
             settings: of each map's queries.
@@ -274,7 +315,8 @@ class Shelf:
         def make(name: str, stored: "StoredMap") -> ServedMap:
             return ServedMap(name, stored, settings, cache_bytes, robot)
 
-        self._slots = {name: _Slot(name, path, make, warm) for name, path in maps.items()}
+        sources = {name: _Folder(one) if isinstance(one, Path) else one for name, one in maps.items()}
+        self._slots = {name: _Slot(name, source, make, warm) for name, source in sources.items()}
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -1,0 +1,117 @@
+"""`avlmaps live --serve` and `--view`: the server's page of a map while it grows, and afterwards."""
+
+import contextlib
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from urllib.parse import quote
+
+from avlmaps.cli.output import UsageError
+from avlmaps.cli.view import open_browser
+from avlmaps.core.progress import say
+from avlmaps.live.live_map import LiveMap
+from avlmaps.maps.store.reader import StoredMap
+from avlmaps.serve.app import create_app
+from avlmaps.serve.running import listening_socket, run_http, url_of
+from avlmaps.serve.service import Service
+from avlmaps.serve.settings import ServeSettings
+
+_NAME = "live"
+_LOOK_S = 0.1
+
+
+class LiveSource:
+    """A live map as the server takes it: its last snapshot."""
+
+    tells = False
+
+    def __init__(self, live: LiveMap) -> None:
+        self.path: Path = live.path
+        self._live = live
+
+    def stamp(self) -> object | None:
+        """Return the number of the snapshot; None before the first."""
+        return self._live.generation or None
+
+    def open(self) -> StoredMap:
+        """Return the map of the snapshot."""
+        return self._live.map.stored
+
+
+class Drive:
+    """Frames that come into a live map in a thread of their own, to the end of which the map is closed."""
+
+    def __init__(self, live: LiveMap, drive: Callable[[Callable[[], bool]], None]) -> None:
+        """Begin.
+
+        Args:
+            live: the map.
+            drive: gives it frames until it says that it is over, or they end.
+        """
+        self._live, self._drive = live, drive
+        self._over = threading.Event()
+        self._fault: BaseException | None = None
+        self._thread = threading.Thread(target=self._run, name="avlmaps-drive", daemon=True)
+        self._thread.start()
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether no frame comes any more."""
+        return not self._thread.is_alive()
+
+    def end(self) -> None:
+        """Let it end after the frame that it has, wait until the map is closed, and raise what went wrong."""
+        self._over.set()
+        self._thread.join()
+        if self._fault is not None:
+            raise self._fault
+
+    def _run(self) -> None:
+        try:
+            self._drive(self._over.is_set)
+            self._live.close()
+            say("The drive is over; its map is answered on until Ctrl-C.")
+        except BaseException as fault:  # noqa: BLE001 - raised where it is waited for
+            self._fault = fault
+
+
+def serve_while(live: LiveMap, drive: Callable[[Callable[[], bool]], None], port: int, *, browse: bool) -> None:
+    """Serve a live map on this machine until Ctrl-C, while a drive gives it frames, and close it.
+
+    Args:
+        live: the map.
+        drive: gives it frames until it says that it is over, or they end.
+        port: to listen on; 0 takes a free one.
+        browse: open the page in a browser.
+
+    Raises:
+        ServeError: the port is taken.
+    """
+    if not 0 <= port <= 65535:
+        raise UsageError(f"--port is {port}; it must lie between 0 and 65535.")
+    settings = ServeSettings(host="127.0.0.1", port=port)
+    with listening_socket(settings) as opened:
+        running = Drive(live, drive)
+        try:
+            while not live.generation and not running.has_ended:
+                time.sleep(_LOOK_S)
+            if not live.generation:  # it ended without a map, or by a fault
+                return
+            service = Service.open({_NAME: LiveSource(live)}, settings, say)
+            url = f"{url_of(settings, opened)}/maps/{quote(_NAME)}/view"
+
+            def told() -> None:
+                say(f"The map is at {url}; load the page again to see how it has grown. Stop with Ctrl-C.")
+                sys.stderr.flush()
+                if browse:
+                    open_browser(url)
+
+            try:
+                with contextlib.suppress(KeyboardInterrupt):  # where signals do not reach the server's loop: Windows
+                    run_http(create_app(service, tools=()), service, opened, told)
+            finally:
+                service.close()
+        finally:
+            running.end()
