@@ -160,8 +160,8 @@ def test_every_answer_forbids_guessing_framing_and_storing() -> None:
 @pytest.mark.parametrize(
     ("settings", "says"),
     [
-        ({"host": "0.0.0.0"}, "--token-file"),
-        ({"host": "192.168.1.7"}, "--token-file"),
+        ({"host": "0.0.0.0"}, "ServeSettings.token"),
+        ({"host": "192.168.1.7"}, "ServeSettings.token"),
         ({"token": "short"}, "5 characters"),
         ({"port": 70000}, "65535"),
         ({"tls_key": "a.pem"}, "both"),

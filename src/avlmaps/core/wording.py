@@ -29,13 +29,19 @@ _ARGUMENTS: Final = {
     "camera-height-m": "GravitySettings.camera_height_m",
     "depth-unit": "Corrections.depth_unit_m",
     "feature-cache-gb": "CacheSettings.limit_gb",
+    "from": "place",
+    "host": "ServeSettings.host",
     "max-bad-share": "FrameSettings.max_bad_share",
     "models": "ModelSettings.folder",
     "device": "ModelSettings.device",
     "out": "path",
+    "port": "ServeSettings.port",
     "pose-delay": "Corrections.pose_delay_s",
     "poses": "Corrections.poses",
     "sensor": "FusionSettings.sensor",
+    "tls-cert": "ServeSettings.tls_certificate",
+    "tls-key": "ServeSettings.tls_key",
+    "token-file": "ServeSettings.token",
     "up": "Corrections.up_in_world",
 }
 _SWITCHES: Final = {"guess", "overwrite"}
@@ -64,16 +70,17 @@ def flag(name: str, value: str = "") -> str:
     return f"--{name} {value}".rstrip()
 
 
-def option(name: str, value: str = "") -> str:
+def option(name: str, value: str = "", argument: str = "") -> str:
     """Return how the reader of a sentence gives an option.
 
     Args:
         name: its name on the command line, without dashes.
         value: what to give, such as ``METRES``; "" for a switch, or to name the option alone.
+        argument: its name in Python, where that is another one here than elsewhere.
     """
     if _spelling is Spelling.FLAG:
         return flag(name, value)
     plain = name.replace("-", "_")
-    named = _ARGUMENTS.get(name, plain) if _spelling is Spelling.ARGUMENT else plain
+    named = argument or _ARGUMENTS.get(name, plain) if _spelling is Spelling.ARGUMENT else plain
     given = value or ("True" if name in _SWITCHES else "")
     return f"{named}={given}" if given else named

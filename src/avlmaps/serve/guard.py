@@ -16,6 +16,7 @@ from typing import Any
 from urllib.parse import parse_qsl, quote, unquote, urlencode, urlsplit
 
 from avlmaps.core.network import is_loopback
+from avlmaps.core.wording import flag
 from avlmaps.serve.errors import RequestError
 from avlmaps.serve.settings import ServeSettings
 
@@ -102,7 +103,7 @@ class Guard:
         if not self._is_ours(host):
             raise RequestError(
                 "The Host header names no host of this server; connect by its own name or address, or start it with "
-                "--allow-host NAME.",
+                f"{flag('allow-host', 'NAME')}.",
                 421,
                 "host",
             )

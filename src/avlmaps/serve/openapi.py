@@ -26,7 +26,7 @@ _ERRORS = {
 }
 
 
-_ABOUT = """Answers are the JSON that the command line prints under --json. Positions are metres in the frame that
+_ABOUT = """Answers are the JSON that the command line prints under `--json`. Positions are metres in the frame that
 `frame` names. Work that takes long sends its progress as server-sent events (`progress`, then `answer` or `error`) to
 clients that accept text/event-stream."""
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from types import FrameType
 
 from avlmaps.core.files import read_regular
-from avlmaps.core.wording import Spelling, options_as
+from avlmaps.core.wording import Spelling, option, options_as
 from avlmaps.serve.guard import App
 from avlmaps.serve.service import Service
 from avlmaps.serve.settings import ServeError, ServeSettings
@@ -50,7 +50,9 @@ def listening_socket(settings: ServeSettings) -> socket.socket:
         family, kind, protocol, _, address = found[0]
         opened = socket.socket(family, kind, protocol)
     except OSError as error:
-        raise ServeError(f"The server cannot listen on {settings.host} ({error.strerror}); check --host.") from None
+        raise ServeError(
+            f"The server cannot listen on {settings.host} ({error.strerror}); check {option('host')}."
+        ) from None
     try:
         opened.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         opened.bind(address)
@@ -58,8 +60,8 @@ def listening_socket(settings: ServeSettings) -> socket.socket:
         opened.close()
         if error.errno == errno.EADDRINUSE:
             raise ServeError(
-                f"Port {settings.port} of {settings.host} is taken by another program; choose one with --port N, or "
-                "--port 0 for any free one."
+                f"Port {settings.port} of {settings.host} is taken by another program; choose one with "
+                f"{option('port', 'N')}, or {option('port', '0')} for any free one."
             ) from None
         what = "needs more rights" if error.errno == errno.EACCES else error.strerror
         raise ServeError(f"The server cannot listen on {settings.host}:{settings.port} ({what}).") from None

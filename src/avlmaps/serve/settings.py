@@ -5,6 +5,7 @@ from pathlib import Path
 
 from avlmaps.core.errors import AvlmapsError
 from avlmaps.core.network import is_loopback
+from avlmaps.core.wording import option
 from avlmaps.query.factors import FOUND_AT
 
 DEFAULT_PORT = 8750
@@ -80,8 +81,8 @@ class ServeSettings:
             raise ServeError(f"The port is {self.port}; it must lie between 0 (any free one) and 65535.")
         if not self.is_loopback and self.token is None:
             raise ServeError(
-                f"A server on {self.host} can be reached by other machines, so it needs a token; give --token-file "
-                "FILE or set AVLMAPS_TOKEN."
+                f"A server on {self.host} can be reached by other machines, so it needs a token; give "
+                f"{option('token-file', 'FILE')} or set AVLMAPS_TOKEN."
             )
         if self.token is not None and (len(self.token) < SHORTEST_TOKEN or not self.token.isascii()):
             raise ServeError(
@@ -89,7 +90,7 @@ class ServeSettings:
                 "python -c 'import secrets; print(secrets.token_urlsafe())'"
             )
         if (self.tls_certificate is None) != (self.tls_key is None):
-            raise ServeError("TLS needs two files; give both --tls-cert and --tls-key.")
+            raise ServeError(f"TLS needs two files; give both {option('tls-cert')} and {option('tls-key')}.")
 
     @property
     def is_loopback(self) -> bool:

@@ -24,6 +24,7 @@ from avlmaps.core.files import DESCRIPTION_BYTES, sync_folder
 from avlmaps.core.network import is_loopback
 from avlmaps.core.progress import progress
 from avlmaps.core.version import __version__
+from avlmaps.core.wording import option
 from avlmaps.perception.light.bundle import MANIFEST, MODEL, FileNote, Manifest, parse_manifest
 from avlmaps.perception.models.checksums import remembered_sha256
 from avlmaps.perception.models.files import fetched_folder
@@ -66,7 +67,7 @@ def fetch_light(place: str = "") -> Fetched:
     if not place:
         raise BackendError(
             "No files of the profile light are published yet; make them with python -m training.light (docs/guides/"
-            f"light.md), then fetch them with --from URL|DIR or {PLACE_VARIABLE}."
+            f"light.md), then fetch them with {option('from', 'URL|DIR')} or {PLACE_VARIABLE}."
         )
     source = _page(place) if "://" in place else _Folder(Path(place).expanduser())
     content = source.small(MANIFEST)
@@ -89,7 +90,7 @@ def fetch_light(place: str = "") -> Fetched:
     except OSError as fault:
         raise BackendError(
             f"The files cannot be written to {target} ({fault.strerror or fault}); make room or choose another folder "
-            "(--models DIR)."
+            f"({option('models', 'DIR')})."
         ) from fault
     return Fetched(target, manifest, received)
 
@@ -121,7 +122,7 @@ class _Folder:
         except OSError as fault:
             raise BackendError(
                 f"{self._folder / name} cannot be read ({fault.strerror or fault}); name the folder that python -m "
-                "training.light wrote (--from DIR)."
+                f"training.light wrote ({option('from', 'DIR')})."
             ) from fault
 
 
@@ -174,13 +175,13 @@ class _Page:
         except HTTPError as fault:
             raise BackendError(
                 f"{self.said(name)} cannot be fetched: the server answers {fault.code} {fault.reason}; look at the "
-                "address (--from URL)."
+                f"address ({option('from', 'URL')})."
             ) from fault
         except (URLError, OSError, HTTPException, ValueError) as fault:
             why = getattr(fault, "reason", fault)
             raise BackendError(
                 f"{self.said(name)} cannot be reached ({why}): no network, or no such host; bring the folder from a "
-                "machine with a network and name it with --from DIR."
+                f"machine with a network and name it with {option('from', 'DIR')}."
             ) from fault
 
 
@@ -201,7 +202,9 @@ def _require_safe(url: str) -> None:
     parts = urlsplit(url)
     if parts.scheme == "https" or (parts.scheme == "http" and is_loopback(parts.hostname or "")):
         return
-    raise BackendError(f"{url} is not fetched: only https is, or http on this machine; give another --from URL.")
+    raise BackendError(
+        f"{url} is not fetched: only https is, or http on this machine; give another {option('from', 'URL')}."
+    )
 
 
 def _same(target: Path, content: bytes, manifest: Manifest) -> bool:
@@ -221,7 +224,7 @@ def _require_room(partial: Path, manifest: Manifest) -> None:
     if needed > free:
         raise BackendError(
             f"The files need {needed / 1e6:.0f} MB in {partial.parent}, and {free / 1e6:.0f} MB are free; make room, "
-            "or choose another folder (--models DIR)."
+            f"or choose another folder ({option('models', 'DIR')})."
         )
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from avlmaps.core.wording import option
 from avlmaps.serve.drive.agents import drive_agent_app
 from avlmaps.serve.drive.app import DriveService, drive_app
 from avlmaps.serve.drive.order_log import OrderLog, default_log
@@ -57,7 +58,7 @@ def open_driving(robot_file: Path, service: Service, log: Path | None = None) ->
     machine = open_machine(robot_file)
     if machine.is_real and service.settings.token is None:
         raise ServeError(
-            f"Driving a {machine.name} needs a token, also on this machine; give --token-file FILE or set "
+            f"Driving a {machine.name} needs a token, also on this machine; give {option('token-file', 'FILE')} or set "
             "AVLMAPS_TOKEN."
         )
 

@@ -17,6 +17,7 @@ from avlmaps.core.errors import MapError
 from avlmaps.core.progress import progress as shown
 from avlmaps.core.progress import say, silence_progress
 from avlmaps.core.version import __version__
+from avlmaps.core.wording import option
 from avlmaps.maps.fusion.measure_kernels import SHARP_UNITS
 from avlmaps.maps.fusion.voxel_sums import VoxelSums, VoxelTable
 from avlmaps.maps.grid import GridSpec
@@ -98,7 +99,9 @@ def import_reference_map(
     """
     begin, path = perf_counter(), Path(path)
     if not is_map_or_free(path):
-        raise MapError(f"{path} is there already and is not a map; give another --out, nothing in it was touched.")
+        raise MapError(
+            f"{path} is there already and is not a map; give another {option('out')}, nothing in it was touched."
+        )
     scene = find_scene(Path(source), areas, poses)
     with silence_progress(not progress), open_hdf5(scene.voxels) as file:
         voxels = ReferenceVoxels(file)
@@ -128,8 +131,8 @@ def _finished(path: Path, key: str, overwrite: bool) -> bool:
     there = parse_manifest(read_manifest(manifest), manifest)
     if there.build_key != key:
         raise MapError(
-            f"{path} is a finished map already, of {there.recording.name}; give another --out, or replace it with "
-            "--overwrite."
+            f"{path} is a finished map already, of {there.recording.name}; give another {option('out')}, or replace it "
+            f"with {option('overwrite')}."
         )
     say(f"{path} is finished already, from the same files; nothing to do.")
     return True
@@ -183,7 +186,8 @@ def _converted(source: ReferenceVoxels, walk: Walk, settings: ImportSettings, gr
         raise MapError(
             f"{source.path}: {left_out} of {len(source)} voxels hold NaN, infinity or a colour or weight that is none "
             f"(the first is {first_bad}), more than {settings.max_bad_share:.0%}; let the reference code write the "
-            "file again, or leave them out with a larger --max-bad-share."
+            "file again, or leave them out with a larger "
+            f"{option('max-bad-share', argument='ImportSettings.max_bad_share')}."
         )
     return table.voxels(), left_out
 

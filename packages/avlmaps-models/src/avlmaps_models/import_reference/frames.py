@@ -11,6 +11,7 @@ from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import MapError, RecordingError
 from avlmaps.core.progress import progress
+from avlmaps.core.wording import option
 from avlmaps.maps.types import Keyframes
 from avlmaps.recordings.formats.avlmaps_layout import CameraFile, camera_poses, read_camera_file, read_habitat_poses
 from avlmaps.recordings.formats.file_recording import list_names
@@ -98,14 +99,15 @@ def read_walk(scene: SceneFiles, needs_first_pose: bool) -> Walk:
     if areas is not None and len(listed) and not np.allclose(areas.habitat_from_body[:1], listed[:1], atol=1e-4):
         raise MapError(
             f"{scene.areas} begins with another pose than {scene.poses}: they are of different walks; give those that "
-            "belong together (--areas, --poses)."
+            f"belong together ({option('areas')}, {option('poses', argument='poses')})."
         )
     body = areas.habitat_from_body if areas is not None else listed
     first = listed if len(listed) else body
     if needs_first_pose and not len(first):
         raise MapError(
             f"{scene.voxels} does not say where its grid lies in the world: that is the first pose of the scene's "
-            f"poses.txt, and neither that nor {AREAS} is in {scene.folder}; give it with --poses FILE."
+            f"poses.txt, and neither that nor {AREAS} is in {scene.folder}; give it with "
+            f"{option('poses', 'FILE', argument='poses')}."
         )
     world_from_camera, notice = camera_poses(body, given)
     view = areas.view if areas is not None else np.zeros((len(body), 0), np.float32)

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from avlmaps.core.registry import Kind, find
+from avlmaps.core.wording import option
 from avlmaps.maps.store.manifest import ModelInfo, RecordingInfo
 from avlmaps.perception.encoders import Encoders
 from avlmaps_models.import_reference import areas_h5, voxels_h5
@@ -81,7 +82,8 @@ class Source:
         elif self.scene.has_sound_map:
             yield (
                 "The sound map (audio_data*.pkl) was not imported: a pickle can run any code when it is read, and this "
-                "one holds neither the time of a sound nor the sound itself; encode the tracks again with --sounds."
+                "one holds neither the time of a sound nor the sound itself; encode the tracks again with "
+                f"{option('sounds')}."
             )
         if self.scene.has_visual_map:
             yield (

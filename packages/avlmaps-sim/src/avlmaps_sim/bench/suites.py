@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.registry import Kind
+from avlmaps.core.wording import option
 from avlmaps.perception.encoders import Encoders, encoders_of
 from avlmaps.perception.profiles import choose_models
 from avlmaps_sim.bench.harness.models import checksums, shipped_checksums
@@ -146,7 +147,7 @@ def _locate(inputs: SuiteInputs) -> Mapping[str, Table]:
     from avlmaps_sim.bench import locate
 
     if not inputs.scenes:
-        raise BenchError("This suite measures on recordings with poses; name one or more with --scenes.")
+        raise BenchError(f"This suite measures on recordings with poses; name one or more with {option('scenes')}.")
     tables: dict[str, Table] = {}
     for path in inputs.scenes:
         recording = open_recording(path)
@@ -164,7 +165,7 @@ def _frames(inputs: SuiteInputs) -> Mapping[str, Table]:
 
     if inputs.nyuv2 is None:
         raise BenchError("This suite measures on labelled frames (docs/guides/train-eyes.md); name their folder with "
-                         "--nyuv2.")  # fmt: skip
+                         f"{option('nyuv2')}.")  # fmt: skip
     used = encoders_of(choose_models(inputs.profile, inputs.models))
     encoder = used.pixels
     if not isinstance(encoder, EmbeddedPixels):
@@ -194,7 +195,9 @@ _SUITES: dict[str, Callable[[SuiteInputs], Mapping[str, Table]]] = {
 
 def _clips(inputs: SuiteInputs) -> Path:
     if inputs.sounds is None:
-        raise BenchError("This suite measures on a folder of clips with an index.csv; name it with --sounds.")
+        raise BenchError(
+            f"This suite measures on a folder of clips with an index.csv; name it with {option('sounds')}."
+        )
     return inputs.sounds
 
 
@@ -203,5 +206,5 @@ def _embedded_only(inputs: SuiteInputs, suite: str) -> None:
         raise BenchError(f"The suite {suite} measures the embedded encoder; it has no figures for {inputs.profile!r}.")
     if inputs.models:
         raise BenchError(
-            f"The suite {suite} measures the embedded encoder; leave out --model {' '.join(inputs.models)}."
+            f"The suite {suite} measures the embedded encoder; leave out {option('model')} {' '.join(inputs.models)}."
         )

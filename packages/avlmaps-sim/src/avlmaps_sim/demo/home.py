@@ -4,6 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core.errors import AvlmapsError
+from avlmaps.core.wording import option
 from avlmaps_sim.demo.evidence import Box, Evidence
 from avlmaps_sim.demo.questions import FURNITURE, in_a_room, spoken
 from avlmaps_sim.hearing import KINDS, Synthesised
@@ -30,7 +31,9 @@ def choose_home(seed: int) -> Scene:
         scene = open_scene(f"house:{FIRST_SEED + SEEDS_APART * seed + number}:held-out")
         if fits(scene):
             return scene
-    raise AvlmapsError(f"None of {_TRIES} homes from seed {seed} on fits the demonstration; try another --seed.")
+    raise AvlmapsError(
+        f"None of {_TRIES} homes from seed {seed} on fits the demonstration; try another {option('seed')}."
+    )
 
 
 def fits(scene: Scene) -> bool:

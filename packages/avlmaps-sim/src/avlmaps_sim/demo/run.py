@@ -15,6 +15,7 @@ import numpy as np
 
 from avlmaps.core.errors import MapError
 from avlmaps.core.progress import progress, say
+from avlmaps.core.wording import option
 from avlmaps_sim.demo.outcome import DemoReport, Step
 from avlmaps_sim.demo.questions import CLIP, MAP, PAGE, PHOTO, Ask
 
@@ -114,7 +115,7 @@ def _stage(name: str, seconds: dict[str, float], sentence: str) -> Iterator[None
 
 def _make_room(out: Path) -> None:
     if out.exists() and any(out.iterdir()) and not (out / MARKER).exists():
-        raise MapError(f"{out} holds something else than a demonstration; choose another folder with --out.")
+        raise MapError(f"{out} holds something else than a demonstration; choose another folder with {option('out')}.")
     out.mkdir(parents=True, exist_ok=True)
     for entry in out.iterdir():  # one by one, since the folder may be a link
         if entry.is_dir() and not entry.is_symlink():

@@ -16,6 +16,7 @@ from pathlib import Path
 
 from avlmaps.core.errors import AudioError
 from avlmaps.core.files import write_bytes_atomically
+from avlmaps.core.wording import option
 
 INDEX = "index.csv"
 _SOURCE = re.compile(r"\d-(\d+)-[A-Z]")
@@ -38,7 +39,8 @@ def unheard_rows(folder: Path) -> list[dict[str, str]]:
     if not index.is_file():
         raise AudioError(
             f"There is no {index}, so it is not known which clips the sound encoder was trained on; add an index.csv "
-            "with the columns path, category and fold (empty for a clip of no training), or choose --sound-clips all."
+            "with the columns path, category and fold (empty for a clip of no training), or choose "
+            f"{option('sound-clips', 'all')}."
         )
     with index.open(newline="", encoding="utf-8-sig") as stream:
         rows = [row for row in csv.DictReader(stream) if row.get("path") and not _trained(row)]

@@ -6,6 +6,7 @@ from typing import TypeVar
 import msgspec
 
 from avlmaps.core.files import write_bytes_atomically
+from avlmaps.core.wording import option
 from avlmaps_sim.bench.harness.settings import TaskError
 
 T = TypeVar("T")
@@ -32,5 +33,7 @@ def load_versioned(path: Path, kind: type[T], schema_version: int) -> T:
         if version == schema_version:
             return msgspec.json.decode(content, type=kind)
     except (msgspec.DecodeError, msgspec.ValidationError, AttributeError) as fault:
-        raise TaskError(f"The tasks {path} are damaged ({fault}); save them again with --save-tasks.") from fault
+        raise TaskError(
+            f"The tasks {path} are damaged ({fault}); save them again with {option('save-tasks')}."
+        ) from fault
     raise TaskError(f"The tasks {path} are of schema {version}, this avlmaps reads {schema_version}; save them again.")

@@ -10,6 +10,7 @@ import msgspec
 
 from avlmaps.core.files import write_bytes_atomically
 from avlmaps.core.version import __version__
+from avlmaps.core.wording import option
 from avlmaps_sim.bench.harness.settings import SceneSettings, TaskError
 from avlmaps_sim.bench.harness.workers import side_by_side
 from avlmaps_sim.bench.harness.workplace import SceneJob, Workplace, scene_jobs
@@ -152,8 +153,8 @@ def _tasks(settings: IndexingSettings, work: Path, open_spec: Callable[[str], Sc
     if settings.load is not None:
         given = load_tasks(settings.load)
         if given.recorded.sounds != settings.recorded.sounds:
-            wanted = f"name the folder {given.recorded.sounds!r} with --sounds" if given.recorded.sounds else ""
-            raise TaskError(f"The tasks {settings.load} were made with other sounds; {wanted or 'leave --sounds out'}.")
+            wanted = f"name the folder {given.recorded.sounds!r} with" if given.recorded.sounds else "leave out"
+            raise TaskError(f"The tasks {settings.load} were made with other sounds; {wanted} {option('sounds')}.")
         return given
     jobs = scene_jobs(settings, settings.recorded, settings.scenes, work)
     todo = [_Todo(job, open_spec, settings.tasks_a_scene) for job in jobs]

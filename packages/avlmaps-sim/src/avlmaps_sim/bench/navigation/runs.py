@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from avlmaps.core.version import __version__
+from avlmaps.core.wording import option
 from avlmaps.language.translator import Translator
 from avlmaps.navigate.bodies import BASE
 from avlmaps_sim.bench.harness.own_recording import is_recording
@@ -147,7 +148,7 @@ def _missions(settings: NavigationSettings, out: Path, open_spec: OpenSpec) -> M
         given = load_missions(settings.load)
         if given.recorded.sounds != settings.recorded.sounds:
             wanted = f"name the folder {given.recorded.sounds!r} with" if given.recorded.sounds else "leave out"
-            raise TaskError(f"The missions {settings.load} were made with other sounds; {wanted} --sounds.")
+            raise TaskError(f"The missions {settings.load} were made with other sounds; {wanted} {option('sounds')}.")
         return given
     asked = asked_for(
         settings.recorded, settings.scenes, settings.series, settings.sequences, settings.profile, settings.models,
