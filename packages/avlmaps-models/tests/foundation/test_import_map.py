@@ -437,7 +437,7 @@ def test_links_to_other_files_are_not_followed(arrays: dict[str, np.ndarray], sc
 
 def test_without_any_pose_the_sentence_says_what_to_give(scene: Path, tmp_path: Path) -> None:
     source = _copy(scene / "vlmap/vlmaps.h5df", tmp_path / "vlmaps.h5df")
-    with pytest.raises(MapError, match=r"does not say where its grid lies .* give it with --poses FILE"):
+    with pytest.raises(MapError, match=r"does not say where its grid lies .* give it with poses=FILE"):
         import_reference_map(source, tmp_path / "m.avlmap", SETTINGS, progress=False)
 
 

@@ -70,7 +70,7 @@ def test_clips_of_recordings_that_the_weights_name_are_left_out(tmp_path: Path, 
 
 def test_a_folder_that_does_not_say_what_was_trained_on_is_refused(tmp_path: Path):
     (tmp_path / "bare").mkdir()
-    with pytest.raises(AudioError, match="--sound-clips all"):
+    with pytest.raises(AudioError, match="sound_clips=all"):
         unheard_rows(tmp_path / "bare")
     with pytest.raises(AudioError, match="not trained on"):
         unheard_rows(clips(tmp_path / "c", [("a/1.flac", "rain", "2")]))
