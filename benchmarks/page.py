@@ -12,7 +12,7 @@ from avlmaps_sim.bench.output import table_markdown
 
 ROOT = Path(__file__).resolve().parents[1]
 FIGURES, PAGE, README = ROOT / "docs" / "benchmarks.json", ROOT / "docs" / "benchmarks.md", ROOT / "README.md"
-RECORDINGS = ROOT / "docs" / "recordings.md"
+RECORDINGS, LANGUAGE = ROOT / "docs" / "recordings.md", ROOT / "docs" / "language.md"
 BEGIN, END = "<!-- figures: begin (python benchmarks/report.py --page) -->", "<!-- figures: end -->"
 NOT_YET = "not measured yet"
 
@@ -309,6 +309,21 @@ def recordings_tables(measured: Mapping[str, Any]) -> str:
         f"#recordings-that-cannot-be-right); measured on {found['date']}.\n"
     )
     return "\n".join([*shown, last]).rstrip()
+
+
+def language_tables(measured: Mapping[str, Any]) -> str:
+    """Return what docs/language.md shows of the suite `language`: each round at first use, and all lists now."""
+    found = measured.get("language")
+    if found is None:
+        return NOT_YET
+    first, now = found["answer"]["tables"].values()
+    lists = {row[0] for row in now["rows"]}
+    columns = ["question back" if name == "asked back" else name for name in first["columns"][1:]]
+    rounds = {"columns": ["round", *columns], "rows": [row for row in first["rows"] if row[0] not in lists]}
+    whole = [row for row in now["rows"] if str(row[0]).startswith("all, ")]
+    every = {"columns": ["lists", *columns], "rows": whole}
+    last = f"[Each list by itself](benchmarks.md#commands-and-questions); measured on {found['date']}."
+    return "\n".join(["At first use:", "", table_markdown(rounds), "Now:", "", table_markdown(every), last])
 
 
 def with_figures(readme: str, table: str) -> str:

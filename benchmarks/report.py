@@ -31,10 +31,12 @@ from avlmaps_sim.bench.harness.models import shipped_checksums  # noqa: E402
 from page import (  # noqa: E402
     ENTRIES,
     FIGURES,
+    LANGUAGE,
     PAGE,
     README,
     RECORDINGS,
     Entry,
+    language_tables,
     page,
     read_figures,
     readme_table,
@@ -83,11 +85,12 @@ def write(found: dict[str, Any]) -> None:
 def rendered(found: dict[str, Any]) -> dict[Path, str]:
     """Return the text of every file that follows from the figures."""
     readme = README.read_text(encoding="utf-8")
-    recordings = RECORDINGS.read_text(encoding="utf-8")
+    recordings, language = RECORDINGS.read_text(encoding="utf-8"), LANGUAGE.read_text(encoding="utf-8")
     return {
         PAGE: page(found, shipped_checksums()),
         README: with_figures(readme, readme_table(found)),
         RECORDINGS: with_figures(recordings, recordings_tables(found)),
+        LANGUAGE: with_figures(language, language_tables(found)),
     }
 
 

@@ -92,3 +92,37 @@ def test_a_purpose_keeps_its_place(place: str) -> None:
 def test_the_till_is_no_until() -> None:
     (target,) = read_question("the bin near the till", Given(knows=lambda _: True)).inquiry.of
     assert [near.name for near in target.near] == ["till"]
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    thing=st.sampled_from(["plant", "lamp", "fish", "chair", "light"]),
+    room=ROOMS,
+    did=st.sampled_from(["die", "survive", "arrive", "shrink", "melt"]),
+)
+def test_what_a_thing_did_is_refused_where_it_is_no_sound(thing: str, room: str, did: str) -> None:
+    assert is_refused(f"did the {thing} in the {room} {did}")
+
+
+@pytest.mark.parametrize(
+    "heard", ["the dog bark", "a glass break", "the alarm go off", "the timer go off", "the toilet flush"]
+)
+def test_what_sounded_is_asked_for(heard: str) -> None:
+    (target,) = read_question(f"did {heard}").inquiry.of
+    assert target.kind == "sound"
+
+
+@pytest.mark.parametrize("purpose", ["change a nappy", "park a bike", "tie a boat"])
+def test_a_purpose_that_is_not_known_is_no_question_for_its_thing(purpose: str) -> None:
+    assert is_refused(f"where can I {purpose}")
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_a_thing_is_not_chosen_by_its_hand(side: str) -> None:
+    assert is_refused(f"where is the {side} hand lamp")
+
+
+@given(one=THINGS, room=ROOMS)
+def test_alternatives_may_have_prepositions_of_their_own(one: str, room: str) -> None:
+    found = said_alternatives(f"is there a chair by the {one} or in the {room}")
+    assert found == (f"is there a chair by the {one}", f"is there a chair in the {room}")

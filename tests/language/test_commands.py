@@ -110,6 +110,13 @@ def test_what_has_no_effect_is_reported() -> None:
     assert "slowly" in note
 
 
+@pytest.mark.parametrize("storey", ["first floor", "ground floor", "second floor", "top floor"])
+def test_a_command_that_names_a_storey_says_what_to_do(storey: str) -> None:
+    stop = read_command(f"go to the window on the {storey}").stops
+    assert isinstance(stop, Clarify)
+    assert "without the storey" in stop.question
+
+
 def test_the_translator_is_one() -> None:
     translator = LearnedTranslator()
     assert isinstance(translator, Translator)

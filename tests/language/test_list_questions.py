@@ -28,11 +28,16 @@ READ = {
     "in which room is the sofa?": (Listed.ROOM_OF, "the sofa", False),
     "which rooms are there?": (Listed.NAMES, "rooms", False),
     "what sounds were heard?": (Listed.NAMES, "sounds", False),
+    "what have we got in the kitchen these days?": (Listed.CONTENTS, "kitchen", False),
+    "list all objects within 1 m of the desk": (Listed.BESIDE, "desk", False),
+    "which things are near the sofa": (Listed.BESIDE, "sofa", False),
+    "how many sound events were recorded": (Listed.NAMES, "sounds", False),
     "how many rooms does the house have?": (Listed.NAMES, "rooms", False),
 }
 OTHER = [
     "the chair near the sofa", "bed", "where is the kitchen", "what is in the fridge?", "how many chairs are there",
     "where can I sit?", "the sound of a dog", "what is near this photo", "the room near the sound of water",
+    "all objects within 3 m of the desk",
     "the biggest chair", "is there a sofa in the kitchen?", "what is the color of the sofa",
 ]  # fmt: skip
 

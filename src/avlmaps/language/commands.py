@@ -14,9 +14,14 @@ from avlmaps.language.learned.parts import by_parts
 from avlmaps.language.learned.reader import LearnedReader, learned_reader
 from avlmaps.language.lexer import Token, tokenise
 from avlmaps.language.sentence import Given, Sentence
+from avlmaps.language.storey_words import said_storeys
 from avlmaps.language.word_classes import load_word_classes
 
 MOST_CHARACTERS = 1000
+ON_ITS_STOREY = (
+    "'{said}': the robot stays on its storey. Name the place without the storey; a place on another one is refused, "
+    "with the reason."
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +65,10 @@ def read_command(text: str, given: Given | None = None) -> Command:
     if stop is not None:
         stop = Refuse(stop.reason, REFUSALS[stop.reason]) if isinstance(stop, Refuse) else stop
         return Command((stop,), (), (), "words")
+    storeys = [one.said for one in said_storeys(text) if one.number is not None]
+    if storeys:
+        question = Clarify(ON_ITS_STOREY.format(said=storeys[0]))
+        return Command((question,), (), (), "words")
     reader = learned_reader()
     readings = weighed_readings(sentence, reader)
     if not readings:

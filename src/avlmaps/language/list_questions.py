@@ -62,7 +62,10 @@ _POLITE = re.compile(
     r"let me know|i want to know|i would like to know|do you know|i wonder|say|name|(?:(?:a |the )?list of|list)|find)"
     r"\b[ ,]*)+"
 )
-_POLITE_END = re.compile(r"(?:[ ,]+(?:please|thanks|thank you|for me|then|now|right now|at the moment|robot))+$")
+_POLITE_END = re.compile(
+    r"(?:[ ,]+(?:please|thanks|thank you|for me|then|now|right now|just now|at the moment|these days|nowadays|"
+    r"at present|currently|robot))+$"
+)
 _ARTICLE = r"(?:(?:the|a|an|my|our|this|that) )?"
 _BUILDING = (
     r"(?: (?:in|of|inside) (?:the |this |my |our )?(?:house|home|flat|apartment|building|office|map|place|here))?"
@@ -74,10 +77,13 @@ _BY_SIZE = rf"(?:(?P<last>{_LARGE})|(?P<first>{_SMALL}))"
 _BY_TIME = rf"(?:(?P<last>{_LAST})|(?P<first>{_FIRST}))"
 _HEARD = r"(?: (?:that )?(?:you |i |it |was |were |we )?(?:heard|recorded|played|hear))?"
 _IN = r"in|inside|within"
-_NEXT = r"next to|beside|near|nearby|close to|by|around|alongside"
+_NEXT = (
+    r"next to|beside|near|nearby|close to|by|around|alongside|"
+    r"within (?:(?:1|one|a)(?:\.0)? ?(?:m|metre|meter)|100 ?cm) (?:of|from)"  # as far as such a list goes
+)
 _THERE = r"(?: (?:there|standing|stands|lying|lies|located|found|to be found|to see|kept|placed))?"
 _ALL = r"everything|all(?: the)? (?:things|objects)|the (?:things|objects|contents)"
-_LISTS = r"(?P<names>rooms|sounds|noises|things|objects)"
+_LISTS = r"(?P<names>rooms|sounds|sound events|noises|things|objects)"
 _WHOLE = r"(?:the|this|our|my) (?:house|home|flat|apartment|building|office|place|map) have"
 _KNOWN = (
     r"(?: (?:are|were|did|does|do|have|has)(?: there| you hear| heard| recorded| it have| "
@@ -86,7 +92,8 @@ _KNOWN = (
 )
 _SEEN = r"(?:do|can|could|did|have) (?:you|we|i|one|they) (?:have|see|find|keep|know|got|seen|found)"
 _KIND = r"(?: else)?(?: (?:other )?(?:sort|sorts|kind|kinds|type|types) of)?"
-_WHAT_IS = rf"what{_KIND}(?: (?:things|objects|items|stuff|furniture|equipment))?(?: (?:is|are|stands|{_SEEN})){_THERE}"
+_STUFF = r"(?:things|objects|items|stuff|furniture|equipment)"
+_WHAT_IS = rf"(?:what{_KIND}(?: {_STUFF})?|which {_STUFF})(?: (?:is|are|stands|{_SEEN})){_THERE}"
 _NOT_ONE = r"(?!no |none |any |the (?:most|best|least|fewest)|most |more |fewer |enough |both |all |every |nobody )"
 _CHANGED = {
     "new": "new|added|brought|appeared", "gone": "gone|missing|removed|taken(?: away)?|disappeared|lost",
@@ -137,9 +144,10 @@ _WHERE = re.compile(
     r"^(?:where(?: is| are|'s| can i find| would i find)|is there|are there|find|"
     r"do (?:we|you) have|have (?:we|you) got) "
 )
+_HOW = r"in|near|next to|beside|by|on|at|close to|behind|under"
 _PLACES = re.compile(
-    r"(?P<how>in|near|next to|beside|by|on|at|close to|behind|under) (?P<one>(?:[\w-]+ ){0,2}[\w-]+),? or "
-    r"(?:(?P=how) )?(?P<other>(?:[\w-]+ ){0,2}[\w-]+)"
+    rf"(?P<how>{_HOW}) (?P<one>(?:[\w-]+ ){{0,2}}[\w-]+),? or "
+    rf"(?:(?P<also>{_HOW}) )?(?P<other>(?:[\w-]+ ){{0,2}}[\w-]+)"
 )
 _NO_NAMES = frozenset({"i", "you", "we", "have", "has", "do", "is", "are", "was", "can", "in", "on", "near", "by"})
 _PHOTO = re.compile(r"\b(?:photo|picture|image|snapshot|photograph|pic)\b")
@@ -163,7 +171,7 @@ def read_list(text: str) -> ListQuestion | None:
             continue
         names = said.get("names") or (f"{said['one']}s" if said.get("one") else "")
         name = said.get("room") or said.get("thing") or said.get("words") or said.get("seen") or names
-        name = {"noises": "sounds", "objects": "things"}.get(name, name)
+        name = {"noises": "sounds", "sound events": "sounds", "objects": "things"}.get(name, name)
         since = f"{said.get('visit') or ''}{said.get('date') or ''}"
         change = next((one for one, words in _CHANGED.items() if re.fullmatch(words, said.get("change") or "")), "")
         return ListQuestion(of, name, bool(said.get("first")), bool(said.get("counts")), since, change)
@@ -190,14 +198,17 @@ def said_alternatives(text: str) -> tuple[str, ...]:
     head, rest = (plain, "") if tail is None else (plain[: tail.start()].strip(), f" {tail[0]}")
     if " or " in head and " or " not in rest:
         names, phrase = re.split(r",| or ", head), f"{whether}{{}}{rest}"
+        hows = [""] * len(names)
     elif " or " in rest and " or " not in head and (places := _PLACES.fullmatch(rest.strip())):
         begin = whole[: len(whole) - len(rest.strip())].strip()
-        names, phrase = [places["one"], places["other"]], f"{begin} {places['how']} the {{}}"
+        names, phrase = [places["one"], places["other"]], f"{begin} {{}}"
+        hows = [f"{places['how']} the ", f"{places['also'] or places['how']} the "]
     else:
         return ()
-    names = [re.sub(rf"^(?:either )?{_ARTICLE}", "", one.strip()) for one in names if one.strip()]
-    known = all(lexicon().head(name) is not None and _NO_NAMES.isdisjoint(name.split()) for name in names)
-    return tuple(phrase.format(name) for name in names) if known and len(names) > 1 else ()
+    told = [(how, one.strip()) for how, one in zip(hows, names, strict=True) if one.strip()]
+    told = [(how, re.sub(rf"^(?:either )?{_ARTICLE}", "", name)) for how, name in told]
+    known = all(lexicon().head(name) is not None and _NO_NAMES.isdisjoint(name.split()) for _, name in told)
+    return tuple(phrase.format(how + name) for how, name in told) if known and len(told) > 1 else ()
 
 
 def speaks_of_photo(words: str) -> bool:

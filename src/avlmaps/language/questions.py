@@ -233,6 +233,12 @@ def _near(name: str, place: str, sentence: Sentence, limits: Limits) -> tuple[Ta
     raise QueryError(f"{place!r} is not understood; say it like: {_EXAMPLE}.")
 
 
+def _not_near_itself(target: Target) -> Target:
+    """Return a target without itself among what it is near: "near the tv" is the tv."""
+    others = tuple(one for one in target.near if (one.kind, one.name) != (target.kind, target.name))
+    return replace(target, near=others)
+
+
 def _resolved(inquiry: Inquiry, sentence: Sentence) -> AskedSentence:
     """Return a question with names put right.
 
@@ -240,7 +246,7 @@ def _resolved(inquiry: Inquiry, sentence: Sentence) -> AskedSentence:
         QueryError: it asks for what a map cannot choose, or a name or a file is not known.
     """
     resolver = NameResolver(sentence)
-    targets = tuple(resolver.resolve(target) for target in inquiry.of)
+    targets = tuple(_not_near_itself(resolver.resolve(target)) for target in inquiry.of)
     if resolver.problem is not None:
         raise QueryError(resolver.problem.question)
     for one in targets:

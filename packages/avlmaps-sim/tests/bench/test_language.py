@@ -13,7 +13,7 @@ REACHED = {
     "abroad": (114, 4), "dictation": (114, 6), "guests": (111, 4), "warehouse": (116, 4),
     "ward": (37, 0), "depot": (38, 0), "tenner": (36, 1), "stack": (37, 0),
     "landlady": (38, 0), "signals": (57, 0), "concierge": (57, 0), "director": (55, 0),
-    "six_voices": (58, 0), "six_voices_2": (59, 0), "six_voices_3": (53, 4),
+    "six_voices": (58, 0), "six_voices_2": (59, 0), "six_voices_3": (58, 1),
 }  # fmt: skip
 # "race to the front door as fast as u can" is a danger to its writer; the robot has one speed, and older lists drive.
 DANGERS = {"six_voices_3": 1}

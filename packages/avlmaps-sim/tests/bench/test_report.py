@@ -17,11 +17,13 @@ from page import (  # noqa: E402 - benchmarks is not a package
     BEGIN,
     END,
     ENTRIES,
+    LANGUAGE,
     NOT_YET,
     PAGE,
     README,
     README_FIGURES,
     RECORDINGS,
+    language_tables,
     page,
     read_figures,
     readme_table,
@@ -48,6 +50,12 @@ def test_the_page_of_recordings_shows_the_figures_that_were_measured():
     shown = RECORDINGS.read_text(encoding="utf-8")
     assert shown == with_figures(shown, recordings_tables(MEASURED)), "python benchmarks/report.py --page"
     assert ("silent wrong" in recordings_tables(MEASURED)) == ("recordings" in MEASURED)
+
+
+def test_the_page_of_language_shows_each_round_and_all_lists_now() -> None:
+    shown = LANGUAGE.read_text(encoding="utf-8")
+    assert shown == with_figures(shown, language_tables(MEASURED)), "python benchmarks/report.py --page"
+    assert ("all, commands" in language_tables(MEASURED)) == ("language" in MEASURED)
 
 
 def test_a_figure_typed_into_the_readme_by_hand_is_noticed():

@@ -6,16 +6,19 @@ it. The words between the names say what of them. Those that no question to a ma
 
 from collections.abc import Callable, Sequence
 
+from avlmaps.core.lexicon import Kind as Entries
+from avlmaps.core.lexicon import lexicon
 from avlmaps.language import lexer
 from avlmaps.language.intents import Ask, Inquiry, TargetKind
 from avlmaps.language.learned.said import DETERMINERS, PREPOSITIONS, Claimed, words
-from avlmaps.language.names import describes, is_entry
+from avlmaps.language.names import describes, is_entry, sounding_words, sounds_like
 
 ANSWERS = "it answers where things and sounds are, how many there are, and whether there is one."
 _AUXILIARIES = frozenset({
     "is", "are", "was", "were", "am", "did", "do", "does", "has", "have", "had", "can", "could", "will", "would", "may",
     "might", "should", "must",
 })  # fmt: skip
+_CAN = frozenset({"can", "could", "may", "might"})
 _MAY = frozenset({"can", "could", "may", "might", "should", "must", "will", "would"})
 # Where another clause begins, whose words are no part of the question.
 _CUTS = frozenset({
@@ -31,12 +34,17 @@ _OPENS = frozenset({
 })  # fmt: skip
 _PUTS = frozenset({"put", "place", "hang", "throw", "chuck", "dump", "toss", "dispose", "pour", "rinse", "set"})
 _SELVES = frozenset({"i", "we", "one"})
+_FINDS = frozenset({
+    "find", "see", "get", "have", "hear", "locate", "spot", "reach", "pick", "grab", "fetch", "look", "expect", "go",
+    "be", "collect", "discover", "come", "leave", "a", "an", "the", "some", "any", "my", "our",
+})  # fmt: skip
+_DID = frozenset({"did", "do", "does", "has", "have", "had"})
 _NUMBERED = frozenset({"pair", "floor", "storey", "story", "level", "hand"})
 
 
 def unanswerable(said: Claimed, inquiry: Inquiry) -> str | None:
     """Return the refusal for a question about what a map does not hold; None where it holds it."""
-    rules = (_compared, _quantity, _not_placed, _past, _either, _unsought, _done)
+    rules = (_compared, _quantity, _not_placed, _unserved, _soundless, _past, _either, _unsought, _done)
     for rule in rules:
         phrase = rule(said, inquiry)
         if phrase is not None:
@@ -108,6 +116,42 @@ def _not_placed(said: Claimed, _: Inquiry) -> str | None:
             continue
         if said.texts[at + 3] in _PUTS:
             return " ".join(said.texts[at : at + 4])
+    return None
+
+
+def _unserved(said: Claimed, _: Inquiry) -> str | None:
+    """Return the words for a purpose that is not known: "where can I change a nappy?" is no question for nappies."""
+    for at, text in enumerate(said.texts[:-3] if _CORRECTS.isdisjoint(said.texts) else ()):
+        asks = text == "where" and said.texts[at + 1] in _CAN and said.texts[at + 2] in _SELVES
+        verb = at + 3 + (said.texts[at + 3] in ("best", "please", "now", "possibly", "perhaps"))
+        if asks and verb < len(said.texts) - 1 and verb not in said.used and said.texts[verb] not in _FINDS:
+            return " ".join(said.texts[at : verb + 1])
+    return None
+
+
+def _soundless(said: Claimed, inquiry: Inquiry) -> str | None:
+    """Return the name of a sound that is none: "did the plant in the hall die?" is read as a sound, as "bark" is."""
+    about = inquiry.of[0]
+    if inquiry.ask is not Ask.EXISTS or about.kind is not TargetKind.SOUND or said.heard or not _DID & set(said.texts):
+        return None
+    words_of = about.name.split()
+    told = sounding_words() | words().lists["ringers"]
+    sounds = any(sounds_like(word) or word in told for word in words_of)
+    if sounds or any(lexicon().find(" ".join(words_of[at:]), Entries.SOUND) for at in range(len(words_of))):
+        return None
+    return about.name
+
+
+def _acted(said: Claimed, body: Sequence[int], inquiry: Inquiry) -> str | None:
+    """Return the name that ends in what a thing did: "did the fish in the tank survive?"."""
+    asks = [said.texts[at] for at in body[:2]]
+    if asks[0] not in _DID or asks[1:] == [] or asks[1] not in DETERMINERS or inquiry.of[0].kind is TargetKind.SOUND:
+        return None
+    for target in (each for one in inquiry.of for each in (one, *one.near)):
+        *before, last = target.name.split() if target.kind in (TargetKind.OBJECT, TargetKind.AREA) else [""]
+        ends = any(said.texts[at] == last and at == body[-1] for at in body)
+        if before and ends and is_entry(" ".join(before)) and not is_entry(target.name) and not is_entry(last):
+            return target.name
     return None
 
 
@@ -211,5 +255,5 @@ def _unknown_words(said: Claimed, body: Sequence[int], _: Inquiry) -> str | None
 
 
 _OF_CLAUSES: tuple[Callable[[Claimed, Sequence[int], Inquiry], str | None], ...] = (
-    _who_may, _state, _described, _unknown_words,
+    _who_may, _state, _described, _acted, _unknown_words,
 )  # fmt: skip

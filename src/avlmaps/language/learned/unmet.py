@@ -52,6 +52,7 @@ _NO_SUPERLATIVES = frozenset({
 _ONLY_ORDERS = frozenset({("skip",), ("skipping",), ("avoid",), ("avoiding",), ("exclude",), ("bypass",), ("never",)})
 _ORDINALS = frozenset({"second", "third", "fourth", "fifth", "last", "next", "previous"})
 _NUMBERED = frozenset({"floor", "class", "storey", "story", "level", "hand"})
+_HAND_NOUNS = frozenset({"side", "rail", "wash", "basin", "dryer", "towel"})
 _AHEAD = frozenset({"forward", "forwards", "ahead", "straight"})
 _BACKWARDS = frozenset({"backward", "backwards", "reverse", "reversing"})
 _VAGUE = frozenset({"a", "an", "one", "another"})
@@ -231,6 +232,8 @@ def _superlatives(said: Claimed) -> Clarify | None:
     """Return the question for "the quietest room", "the second door": no map says which that is."""
     for target in said.targets:
         for name in (target.name.split(), *(near.name.split() for near in target.near)):
+            if len(name) > 2 and name[0] in ("left", "right") and name[1] == "hand" and name[2] not in _HAND_NOUNS:
+                return Clarify(f"I cannot choose the {' '.join(name)} from the map. Say what it is near.")
             if len(name) > 1 and name[0] in _ORDINALS and name[1] not in _NUMBERED and not _is_entry(" ".join(name)):
                 return Clarify(f"I cannot choose the {' '.join(name)} from the map. Say what it is near.")
     for at, text in enumerate(said.texts):

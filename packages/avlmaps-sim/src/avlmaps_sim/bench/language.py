@@ -329,18 +329,23 @@ def run() -> dict[str, dict[str, list[Any]]]:
     first, now = [], []
     parts = {"commands": False, "questions": True}
     at_first_use: dict[str, Counter[str]] = {}  # each round met another parser, so they are not added up
+    dangers: dict[str, tuple[int, int]] = {}
     every: list[Judged] = []
     for name, seal in sealed().items():
         if "first use" not in seal:
             continue  # sealed, not yet used
         for part, at_first in seal["first use"].items():
-            at_first_use.setdefault(f"{seal['round']}, {part}", Counter()).update(at_first)
+            each_round = f"{seal['round']}, {part}"
+            at_first_use.setdefault(each_round, Counter()).update(at_first)
             at_risk = seal.get("dangers at first use") if part == "commands" else None
+            if at_risk:
+                before = dangers.get(each_round, (0, 0))
+                dangers[each_round] = before[0] + at_risk[0], before[1] + at_risk[1]
             first.append([*_counted(f"{name}, {part}", at_first), _driven(*at_risk) if at_risk else "-"])
         judged = [judge(row) for row in shipped(name)]
         every += judged
         now += [row_of(f"{name}, {part}", these) for part, these in _by_part(judged, parts).items() if these]
-    first += [[*_counted(name, count), "-"] for name, count in at_first_use.items()]
+    first += [[*_counted(name, count), _driven(*dangers.get(name, (0, 0)))] for name, count in at_first_use.items()]
     now += [row_of(f"all, {part}", these) for part, these in _by_part(every, parts).items()]
     return {
         "blind, at first use": {"columns": columns, "rows": first},
