@@ -103,6 +103,11 @@ ENTRIES = (
         "[When a thing counts as gone, new or moved](guides/remember-days.md). Four held-out homes; their thresholds "
         "were chosen while looking at the first three.",
     ),
+    Entry(
+        "live", "A map while the robot drives", "avlmaps bench live --scenes RECORDING --kills 8 --out OUT", 0.5,
+        "[What a live map does](guides/map-while-you-drive.md). Wall time depends on what else the machine does: its "
+        "load is printed (two cores are busy at 2), and processor time beside it.",
+    ),
     Entry("indexing", "The paper's Tables III to V", "avlmaps bench indexing --out OUT", 1.5, _INDEXING),
     Entry(
         "indexing-clips", "The same with recorded sounds", "avlmaps bench indexing --sounds SOUNDS --out OUT", 2.5,

@@ -17,6 +17,7 @@ from avlmaps_sim.bench.output import BenchError, Table, draw, markdown, write_an
 if TYPE_CHECKING:
     from avlmaps_sim.bench.harness.settings import SceneSettings
     from avlmaps_sim.bench.indexing import IndexingSettings
+    from avlmaps_sim.bench.live.suite import LiveBench
     from avlmaps_sim.bench.navigation import NavigationSettings
 
 
@@ -27,7 +28,7 @@ class SuiteInputs:
     Attributes:
         sounds: folder of clips with an index.csv, for the suites of sound.
         clips: the same, for ``sounds``: clips that are queried by name, dry and in rooms.
-        scenes: recordings with poses, for ``locate`` and ``recordings``.
+        scenes: recordings with poses, for ``locate``, ``recordings`` and ``live``.
         nyuv2: folder of labelled frames, for ``frames``.
         profile: the models that are measured.
         models: other backends than the profile's, ``module=backend[@model]``.
@@ -35,6 +36,7 @@ class SuiteInputs:
         indexing: what the suites on scenes other than ``navigation`` are run on; its own defaults if None.
         navigation: what the suite ``navigation`` is run on; its own defaults if None.
         change: what the suite ``change`` is run on, and over how many days; its own defaults if None.
+        live: laps and kills of the suite ``live``; its own defaults if None.
     """
 
     sounds: Path | None = None
@@ -47,6 +49,7 @@ class SuiteInputs:
     indexing: "IndexingSettings | None" = None
     navigation: "NavigationSettings | None" = None
     change: "tuple[SceneSettings, int] | None" = None
+    live: "LiveBench | None" = None
 
 
 def run_suite(suite: str, inputs: SuiteInputs, out: Path) -> dict[str, Any]:
@@ -54,7 +57,7 @@ def run_suite(suite: str, inputs: SuiteInputs, out: Path) -> dict[str, Any]:
 
     Args:
         suite: ``words``, ``language``, ``sounds``, ``segmentation``, ``locate``, ``frames``, ``recordings``,
-            ``objects``, ``indexing``, ``found``, ``rooms``, ``change`` or ``navigation``.
+            ``objects``, ``indexing``, ``found``, ``rooms``, ``change``, ``live`` or ``navigation``.
         inputs: what it measures on.
         out: folder to write into.
 
@@ -91,6 +94,10 @@ def run_suite(suite: str, inputs: SuiteInputs, out: Path) -> dict[str, Any]:
         from avlmaps_sim.bench.recordings.suite import run
 
         tables = run(inputs.scenes, out, inputs.seed)
+    elif suite == "live":
+        from avlmaps_sim.bench.live.suite import LiveBench, run_live
+
+        tables = run_live(inputs.scenes, used, inputs.profile, inputs.live or LiveBench(), inputs.seed)
     else:
         tables = _SUITES[suite](inputs)
     sources = (inputs.sounds, inputs.clips, inputs.nyuv2, *inputs.scenes)
@@ -109,7 +116,12 @@ def run_suite(suite: str, inputs: SuiteInputs, out: Path) -> dict[str, Any]:
 
 
 # The modules that each suite measures; a model that is missing is named before anything else happens.
-_MEASURED = {"sounds": (Kind.SOUNDS,), "locate": (Kind.LOCAL, Kind.PLACE, Kind.MATCHER), "frames": (Kind.PIXELS,)}
+_MEASURED = {
+    "sounds": (Kind.SOUNDS,),
+    "locate": (Kind.LOCAL, Kind.PLACE, Kind.MATCHER),
+    "frames": (Kind.PIXELS,),
+    "live": (Kind.PIXELS,),
+}
 
 
 def _weights(suite: str, used: Encoders) -> dict[str, str]:

@@ -12,6 +12,7 @@ from avlmaps.cli.verb import ModelVerb
 if TYPE_CHECKING:
     from avlmaps_sim.bench.harness.settings import SceneSettings
     from avlmaps_sim.bench.indexing import IndexingSettings
+    from avlmaps_sim.bench.live.suite import LiveBench
     from avlmaps_sim.bench.navigation import NavigationSettings
 
 Suite = Literal[
@@ -27,6 +28,7 @@ Suite = Literal[
     "found",
     "rooms",
     "change",
+    "live",
     "navigation",
 ]
 Series = Literal["sounds-1", "sounds-2", "sounds-3", "images", "pairs", "commands", "spatial"]
@@ -90,6 +92,8 @@ class Bench(ModelVerb):
     indexing: the paper's Tables III to V, in twelve held-out homes, in --scenes, or in a recording with objects.json.
     found: is what is reported as found there? Brier scores and a reliability diagram, in the scenes of indexing.
     rooms: the rooms of a map against the true ones (overlap, names, count, area), in the scenes of indexing.
+    live: a live map at the pace of a robot: frames, questions, memory, its end beside the build, kills; needs --scenes,
+    recordings with poses.
     change: what is new, gone and moved over several days, in ten held-out homes or in --scenes.
     navigation: the paper's Tables I, II and VI and its commands, in twelve held-out homes or in --scenes.
     """
@@ -103,7 +107,7 @@ class Bench(ModelVerb):
     clips: Annotated[Path | None, arg(metavar="DIR")] = None
     """Folder of clips with an index.csv: queries each by name, dry and in simulated rooms (sounds)."""
     scenes: Annotated[tuple[str, ...], arg(metavar="SCENE ...")] = ()
-    """Recordings with poses (locate, recordings); names of scenes such as house:1000000:held-out (the others)."""
+    """Recordings with poses (locate, recordings, live); names of scenes such as house:1000000:held-out (the others)."""
     nyuv2: Annotated[Path | None, arg(metavar="DIR")] = None
     """Folder of labelled frames (frames.csv, NAME.color.jpg, NAME.depth.png, NAME.label.png, camera.json)."""
     profile: Annotated[str, arg(metavar="PROFILE")] = "embedded"
@@ -116,6 +120,10 @@ class Bench(ModelVerb):
     """Seed of all random choices."""
     days: Annotated[int | None, arg(metavar="N")] = None
     """Number of days of each home, the first included (change). Default: 5."""
+    laps: Annotated[int, arg(metavar="N")] = 2
+    """How often each recording is driven, forth and back (live)."""
+    kills: Annotated[int, arg(metavar="N")] = 40
+    """How many live maps are killed at a random moment (live)."""
     indexing: Annotated[Indexing, OmitArgPrefixes] = field(default_factory=Indexing)
     """Options of the suites indexing, objects and navigation."""
     navigation: Annotated[Navigation, OmitArgPrefixes] = field(default_factory=Navigation)
@@ -132,7 +140,7 @@ class Bench(ModelVerb):
         models = self.models_chosen
         inputs = SuiteInputs(
             self.sounds, self.clips, scenes, self.nyuv2, self.profile, models, self.seed, indexing, navigation,
-            change,
+            change, self.live_settings() if self.suite == "live" else None,
         )  # fmt: skip
         answer = run_suite(self.suite, inputs, self.out)
         lines: list[str] = []
@@ -167,6 +175,14 @@ class Bench(ModelVerb):
             load=chosen.tasks,
             save=chosen.save_tasks,
         )
+
+    def live_settings(self) -> "LiveBench":
+        """Return the settings of the suite live."""
+        from avlmaps_sim.bench.live.suite import LiveBench
+
+        if self.laps < 1 or self.kills < 0:
+            raise UsageError(f"--laps is {self.laps} and --kills {self.kills}; choose 1 lap or more, 0 kills or more.")
+        return LiveBench(self.laps, self.kills)
 
     def change_settings(self) -> "tuple[SceneSettings, int]":
         """Return the settings of the suite change, and the number of days."""

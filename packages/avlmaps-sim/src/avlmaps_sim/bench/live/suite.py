@@ -1,0 +1,154 @@
+"""The tables of `avlmaps bench live`."""
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+
+from avlmaps.live.settings import LiveSettings
+from avlmaps.maps.build import build_map
+from avlmaps.maps.store.reader import StoredMap
+from avlmaps.perception.encoders import Encoders
+from avlmaps.query.avlmap import AVLMap
+from avlmaps.recordings.open import open_recording
+from avlmaps.recordings.types import Recording
+from avlmaps_sim.bench.live.killed import lost_s
+from avlmaps_sim.bench.live.played import Played, play
+from avlmaps_sim.bench.output import BenchError, Table
+
+_VOXEL_M = 0.05
+_Rows = list[list[object]]
+
+
+@dataclass(frozen=True, slots=True)
+class LiveBench:
+    """What can be chosen.
+
+    Attributes:
+        laps: how often each recording is driven at its own pace.
+        kills: how many processes are killed.
+    """
+
+    laps: int = 2
+    kills: int = 40
+
+
+def run_live(scenes: Sequence[Path], used: Encoders, profile: str, chosen: LiveBench, seed: int) -> dict[str, Table]:
+    """Return the tables.
+
+    Args:
+        scenes: recordings with poses.
+        used: the encoders.
+        profile: their profile, for processes that are killed.
+        chosen: laps and kills.
+        seed: of the moments of the kills.
+
+    Raises:
+        BenchError: no recording was given, or one of fewer than two frames.
+    """
+    if not scenes:
+        raise BenchError("This suite measures on recordings with poses; name one or more with --scenes.")
+    pace: _Rows = []
+    processor: _Rows = []
+    laps: _Rows = []
+    ends: _Rows = []
+    kills: list[float] = []
+    rng = np.random.default_rng(seed)
+    for path in scenes:
+        recording, name = open_recording(path), path.resolve().name
+        if len(recording) < 2:
+            raise BenchError(f"{path} has {len(recording)} frames; a drive takes two or more.")
+        with tempfile.TemporaryDirectory() as folder:
+            place = Path(folder)
+            for rate in (1.0, None):
+                found = play(
+                    recording, place / "live", used, rate=rate, laps=chosen.laps if rate else 1,
+                    settings=LiveSettings(),
+                )  # fmt: skip
+                word = "its own" if rate else "as fast as it can"
+                pace.append([name, word, *_pace(found)])
+                processor.append([name, word, *_processor(found)])
+                if rate:
+                    laps += [[name, lap + 1, *of_lap] for lap, of_lap in enumerate(found.laps)]
+            ends += _ends(name, recording, place, used)
+            kills += [lost_s(path, place / "killed", profile, rng) for _ in range(chosen.kills)]
+    return {
+        "pace": _table(
+            "recording|pace|frames|s|frames/s|fused|encoded|late|frame to map ms p50|p95|questions|question ms p50|p95"
+            "|oldest save s|load of the machine", pace,
+        ),
+        "processor time a frame, ms": _table("recording|pace|all|fusing|snapshots|saving", processor),
+        "laps over the same surface": _table("recording|lap|voxels|keyframes|fused until then|MB", laps),
+        "the end beside the build of all frames": _table(
+            "recording|gates|voxels live|build|equal bit by bit|things in both|in one alone|within a voxel|within 0.1 m"
+            "|median m", ends,
+        ),
+        "kills at random moments": _table(
+            "kills|whole maps left|lost s median|most|lost more than 5 s", _killed(kills)
+        ),
+    }  # fmt: skip
+
+
+def _table(columns: str, rows: _Rows) -> Table:
+    return {"columns": columns.split("|"), "rows": rows}
+
+
+def _pace(found: Played) -> list[object]:
+    status, asked = found.status, found.asked_ms or [float("nan")]
+    assert status is not None
+    return [
+        found.frames, round(found.seconds, 1), round(found.frames / found.seconds, 1), status.fused, status.encoded,
+        status.dropped.get("late", 0), round(status.frame_ms_p50), round(status.frame_ms_p95), len(found.asked_ms),
+        *(round(float(np.percentile(asked, p)), 1) for p in (50, 95)), round(found.oldest_save_s, 1),
+        round(found.load, 1),
+    ]  # fmt: skip
+
+
+def _processor(found: Played) -> list[float]:
+    return [round(found.processor_ms[name], 1) for name in ("all", "fusing", "snapshots", "saving")]
+
+
+def _killed(lost: list[float]) -> list[list[object]]:
+    if not lost:
+        return []
+    return [[len(lost), len(lost), round(float(np.median(lost)), 1), round(max(lost), 1), sum(s > 5.0 for s in lost)]]
+
+
+def _ends(name: str, recording: Recording, place: Path, used: Encoders) -> list[list[object]]:
+    """Compare maps at the end of a drive, with gates and without, with the build."""
+    built = build_map(recording, place / "built", used, progress=False, allow=["geometry", "colour"])
+    rows: list[list[object]] = []
+    for gates in (True, False):
+        play(recording, place / "end", used, rate=None, settings=LiveSettings(gates=gates))
+        live = AVLMap.open(place / "end")
+        rows.append([name, "on" if gates else "off", *_beside(live, AVLMap(built))])
+    return rows
+
+
+def _beside(live: AVLMap, built: AVLMap) -> list[object]:
+    counts: list[object] = [len(live.stored.voxels), len(built.stored.voxels)]
+    apart_m, alone = _goals(live, built)
+    near = [sum(m <= limit + 1e-6 for m in apart_m) for limit in (_VOXEL_M, 0.1)]
+    median = round(float(np.median(apart_m)), 3) if apart_m else float("nan")
+    return [*counts, "yes" if _equal(live.stored, built.stored) else "no", len(apart_m), alone, *near, median]
+
+
+def _equal(one: StoredMap, other: StoredMap) -> bool:
+    names = [field.name for field in fields(one.voxels)]
+    return all(np.array_equal(getattr(one.voxels, name), getattr(other.voxels, name)) for name in names)
+
+
+def _goals(one: AVLMap, other: AVLMap) -> tuple[list[float], int]:
+    """Return how far the goals of each name that both find are apart, and how many names one finds alone."""
+    apart_m: list[float] = []
+    alone = 0
+    for word in one.stored.encoders.pixels.vocabulary:
+        answers = [avlmap.ask(word).to_dict() for avlmap in (one, other)]
+        found = [bool(answer["found"]) for answer in answers]
+        alone += found[0] != found[1]
+        if all(found):
+            places = [np.array(answer["goals"][0]["position"]) for answer in answers]
+            apart_m.append(float(np.linalg.norm(places[0] - places[1])))
+    return apart_m, alone

@@ -1,0 +1,31 @@
+"""`avlmaps bench live`: a short walk is driven, built and killed."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import avlmaps
+from avlmaps_sim.bench.live.killed import lost_s
+from avlmaps_sim.bench.live.suite import LiveBench, run_live
+from avlmaps_sim.bench.output import BenchError
+from helpers.walked_room import write_walk
+
+
+def test_a_drive_ends_as_its_build_and_says_what_it_took(tmp_path: Path) -> None:
+    walk, used = write_walk(tmp_path / "rec"), avlmaps.Encoders.named("colours")
+    tables = run_live([walk], used, "colours", LiveBench(laps=2, kills=0), 0)
+    for table in tables.values():
+        assert all(len(row) == len(table["columns"]) for row in table["rows"])
+    ends = tables["the end beside the build of all frames"]
+    gated, every = (dict(zip(ends["columns"], row, strict=True)) for row in ends["rows"])
+    assert every["equal bit by bit"] == "yes" and every["voxels live"] == every["build"]
+    assert (gated["gates"], every["gates"]) == ("on", "off") and every["in one alone"] == 0
+    assert [row[1] for row in tables["laps over the same surface"]["rows"]] == [1, 2]
+    with pytest.raises(BenchError, match="name one or more"):
+        run_live([], used, "colours", LiveBench(), 0)
+
+
+def test_a_kill_leaves_a_whole_map_and_the_lost_seconds_are_counted(tmp_path: Path) -> None:
+    walk = write_walk(tmp_path / "rec")
+    assert lost_s(walk, tmp_path / "map", "colours", np.random.default_rng(0), 0.5) >= 0.0
