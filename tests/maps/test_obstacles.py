@@ -117,20 +117,6 @@ def test_cells_and_points_of_the_world_agree():
     np.testing.assert_allclose(heights, 0.02, atol=0.04)
 
 
-def test_a_body_stands_only_where_it_fits():
-    obstacles = find_obstacles(voxels_of(room()), GRID, UP)
-    fits = obstacles.standable(0.3)
-    for x, expected in ((3.0, True), (3.6, True), (3.8, False), (3.95, False)):
-        assert fits[tuple(obstacles.cell_of(np.array([x, 1.8, 0.0])))] == expected
-    assert not np.any(fits & (obstacles.states != FREE))
-    np.testing.assert_array_equal(obstacles.standable(0.0), obstacles.states == FREE)
-
-
-def test_an_empty_floor_is_all_standable():
-    obstacles = find_obstacles(voxels_of(box((0, 0, 0.01), (1, 1, 0.02))), GRID, UP)
-    assert obstacles.standable(0.5).all()
-
-
 def test_the_floor_is_the_lowest_crowded_height_and_not_the_most_crowded():
     rng = np.random.default_rng(0)
     heights = [

@@ -119,20 +119,6 @@ class Obstacles:
         states[inside] = self.states[tuple(cells[inside].T)]
         return states
 
-    def standable(self, radius_m: float) -> Bool[np.ndarray, "nx ny"]:
-        """Return the free cells on whose middle a body fits: nothing occupied within its radius.
-
-        Unknown cells within the radius are let pass, since floors are never seen without holes.
-        """
-        from scipy.ndimage import distance_transform_edt
-
-        occupied = self.states == CellState.OCCUPIED
-        free = self.states == CellState.FREE
-        if not occupied.any():
-            return free
-        distance_m = distance_transform_edt(~occupied, sampling=self.cell_size_m)
-        return free & (np.asarray(distance_m) - 0.5 * self.cell_size_m >= radius_m)
-
 
 def find_obstacles(
     voxels: Voxels,

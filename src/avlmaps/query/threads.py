@@ -1,10 +1,11 @@
 """The threads that all queries share."""
 
 import itertools
-import os
 from collections.abc import Callable
 from functools import cache
 from typing import TYPE_CHECKING, Any
+
+from avlmaps.core.cores import usable_cores
 
 if TYPE_CHECKING:
     from concurrent.futures import ThreadPoolExecutor
@@ -22,8 +23,7 @@ def _pool() -> "ThreadPoolExecutor":
 
 @cache
 def _threads() -> int:
-    allowed = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return max(1, min(_MAX_THREADS, allowed))
+    return max(1, min(_MAX_THREADS, usable_cores()))
 
 
 def share(work: Callable[[int, int], Any], count: int, least: int = 1) -> None:

@@ -107,8 +107,6 @@ class AudioTrack:
             AudioError: the file cannot be read any more, or holds samples that are not finite numbers.
             ValueError: the piece ends before it begins.
         """
-        from avlmaps.recordings import containers
-
         begin = round((onset_s - self.start_s) * self.rate_hz)
         count = round(self.duration_s * self.rate_hz)
         end = count if offset_s is None else round((offset_s - self.start_s) * self.rate_hz)
@@ -117,10 +115,16 @@ class AudioTrack:
         samples = np.zeros(max(end - begin, 0), np.float32)
         inside_begin, inside_end = max(begin, 0), min(end, count)
         if inside_begin < inside_end:
-            at = inside_begin - begin
-            piece = containers.read_piece(self.path, inside_begin, inside_end, self.rate_hz, self.channel)
-            samples[at : at + len(piece)] = _checked(piece, self.path, self.rate_hz, inside_begin)
+            piece = self._samples(inside_begin, inside_end)
+            samples[inside_begin - begin : inside_begin - begin + len(piece)] = piece
         return Sound(samples, self.rate_hz)
+
+    def _samples(self, begin: int, end: int) -> np.ndarray:
+        """Read samples of the track, all of which it says that it has; a damaged file may have fewer."""
+        from avlmaps.recordings import containers
+
+        piece = containers.read_piece(self.path, begin, end, self.rate_hz, self.channel)
+        return _checked(piece, self.path, self.rate_hz, begin)
 
     def blocks(self, seconds: float = 10.0) -> Iterator[Sound]:
         """Go through the whole track in pieces of one length (the last may be shorter), one in memory at a time.

@@ -27,19 +27,6 @@ class RawTrack(AudioTrack):
 
     first: int = 0
 
-    def read(self, onset_s: float = 0.0, offset_s: float | None = None) -> Sound:
-        """Read a piece; see ``AudioTrack.read``."""
-        begin = round((onset_s - self.start_s) * self.rate_hz)
-        count = round(self.duration_s * self.rate_hz)
-        end = count if offset_s is None else round((offset_s - self.start_s) * self.rate_hz)
-        if offset_s is not None and end < begin:
-            raise ValueError(f"the piece from {onset_s} s to {offset_s} s ends before it begins")
-        samples = np.zeros(max(end - begin, 0), np.float32)
-        inside_begin, inside_end = max(begin, 0), min(end, count)
-        if inside_begin < inside_end:
-            samples[inside_begin - begin : inside_end - begin] = self._samples(inside_begin, inside_end)
-        return Sound(samples, self.rate_hz)
-
     def blocks(self, seconds: float = 10.0) -> Iterator[Sound]:
         """Go through the track in pieces; see ``AudioTrack.blocks``."""
         size, count = max(1, round(seconds * self.rate_hz)), round(self.duration_s * self.rate_hz)

@@ -113,11 +113,6 @@ class GrowingKeyframes:
         """Return the keyframes until now, which frames to come do not change."""
         return FrozenKeyframes(len(self._decided), self.last())
 
-    @property
-    def not_looked_at(self) -> int:
-        """How many decided keyframes nobody looked at yet."""
-        return sum(isinstance(one, Frame) for one in self._decided)
-
     def keyframes(
         self, rng: np.random.Generator, came: FrozenKeyframes, *, final: bool, within_s: float = np.inf
     ) -> tuple[Keyframes, dict[str, np.ndarray]]:

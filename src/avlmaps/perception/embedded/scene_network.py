@@ -5,7 +5,6 @@ at a small size (``Notes.width_px``), for every recording; ``training/pixels`` m
 that learnt from rendered worlds and real frames, and one that saw rendered worlds alone (the profile ``synthetic``).
 """
 
-import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property
@@ -19,6 +18,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Float, Float32, UInt8
 from avlmaps.core.camera import Pinhole
+from avlmaps.core.cores import usable_cores
 from avlmaps.core.errors import BackendError
 from avlmaps.perception.embedded.geometry import channels
 from avlmaps.recordings.registration import depth_in_colour
@@ -148,7 +148,7 @@ class SceneNetwork:
         import onnxruntime
 
         options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = min(4, _cores())
+        options.intra_op_num_threads = min(4, usable_cores())
         options.inter_op_num_threads = 1
         # Threads that wait for the next frame leave the cores to decoding and fusion: a build takes 0.6 of the time.
         options.add_session_config_entry("session.intra_op.allow_spinning", "0")
@@ -287,11 +287,6 @@ def _ground_of(frame: Frame) -> tuple[Float[np.ndarray, "3"], float]:
         return np.array([0.0, -1.0, 0.0]), _USUAL_HEIGHT_M
     rotation = frame.world_from_camera[:3, :3] @ frame.rig.rgb_from_depth[:3, :3].T
     return rotation.T @ frame.ground.up_in_world, frame.ground.camera_height_m(frame.world_from_camera)
-
-
-def _cores() -> int:
-    """Return how many cores this process may use; more threads than that wait for one another."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _padded(picture: Float32[np.ndarray, "c h w"], multiple: int) -> Float32[np.ndarray, "c hp wp"]:

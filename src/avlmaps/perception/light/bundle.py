@@ -3,7 +3,6 @@
 ``python -m training.light`` makes the folder, ``avlmaps profiles --fetch light`` brings it.
 """
 
-import os
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 
 import msgspec
 
+from avlmaps.core.cores import usable_cores
 from avlmaps.core.errors import BackendError
 from avlmaps.core.files import DESCRIPTION_BYTES, decode_json, read_regular
 from avlmaps.perception.models.checksums import checksum_of, remembered_sha256
@@ -155,7 +155,7 @@ class Bundle:
 
         path = self.path(name)
         options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = min(_MOST_THREADS, _cores())
+        options.intra_op_num_threads = min(_MOST_THREADS, usable_cores())
         options.inter_op_num_threads = 1
         options.log_severity_level = 3
         options.add_session_config_entry("session.intra_op.allow_spinning", "0")  # decoding needs the cores, too
@@ -235,7 +235,3 @@ def parse_manifest(content: bytes, said: str) -> Manifest:
             "files again."
         )
     return made
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
