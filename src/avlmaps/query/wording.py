@@ -2,6 +2,8 @@
 
 from collections.abc import Sequence
 
+from avlmaps.core.inflection import singulars_of
+from avlmaps.core.lexicon import Kind, lexicon
 from avlmaps.core.question import Modality, Part, Role
 from avlmaps.query.answer import Alternative, PartAnswer
 from avlmaps.query.goals import Goal
@@ -38,11 +40,10 @@ def absent_text(parts: Sequence[PartAnswer], goals: Sequence[Goal], alone: Alter
     lead = next(part for part in parts if part.part.role is Role.PRIMARY)
     missing = [part for part in parts if not part.found]
     if missing:
-        why = " and ".join(f"no {_bare(part.part)} is found" for part in missing)
+        why = " and ".join(f"no {_bare(part.part)} {_is(part.part)} found" for part in missing)
     else:
-        why = (
-            f"no {_bare(lead.part)} is found {' '.join(_beside(one.part) for one in parts if one is not lead)}".rstrip()
-        )
+        where = " ".join(_beside(one.part) for one in parts if one is not lead)
+        why = f"no {_bare(lead.part)} {_is(lead.part)} found {where}".rstrip()
     if alone is not None and alone.goals and lead.found:
         goal, what = alone.goals[0], f"the best {_bare(lead.part)}"
     elif goals:
@@ -58,6 +59,13 @@ def _bare(part: Part) -> str:
         return (_PHOTO if part.modality is Modality.IMAGE else _CLIP).split(" ", 1)[1]
     name = part.query.removeprefix("the ").removeprefix("a ").removeprefix("an ")
     return f"sound of {name}" if part.modality is Modality.SOUND else name
+
+
+def _is(part: Part) -> str:
+    """Return the verb of a part: "no chairs are", "no chair is"."""
+    last = part.query.split()[-1:] if part.modality is Modality.OBJECT else []
+    entry = lexicon().find(last[0], Kind.THING) if last and singulars_of(last[0]) else None
+    return "is" if entry is None else "are"
 
 
 def _named(part: Part) -> str:

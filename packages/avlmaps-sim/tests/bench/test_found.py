@@ -96,12 +96,15 @@ def test_the_table_counts_right_wrong_and_absent_apart(tmp_path: Path) -> None:
     said = answers([0.9, 0.2, 0.6, 0.1], [True, True, False, False])
     said.append(Judged("home 0", "object", "bed", True, False, 0.7))
     row = next(row for row in kinds_table(said)["rows"] if row[0] == "object")
-    assert [str(cell).split(" (")[0] for cell in row[4:]] == ["50.0% of 2", "100.0% of 1", "50.0% of 2"]
-    assert next(row for row in kinds_table(said[:1])["rows"] if row[0] == "object")[4:] == [
+    assert [str(cell).split(" (")[0] for cell in row[5:]] == ["50.0% of 2", "100.0% of 1", "50.0% of 2"]
+    assert next(row for row in kinds_table(said[:1])["rows"] if row[0] == "object")[5:] == [
         "100.0% of 1 (20.7 to 100.0)",
         "",
         "",
     ]
+    low, high = map(float, row[3].split(" to "))
+    assert low <= row[2] <= high
+    assert next(row for row in kinds_table(said[:1])["rows"])[3] == ""
     draw_reliability(said, tmp_path / "found.png")
     assert (tmp_path / "found.png").stat().st_size > 5_000
 

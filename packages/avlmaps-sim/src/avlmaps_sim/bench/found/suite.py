@@ -28,9 +28,11 @@ from avlmaps_sim.scenes import open_scene
 NOTE = (
     "A first goal is right within 0.5 m of a right place, horizontally. Queries that have no right answer stand beside "
     "those that have: another thing, room or sound in place of the one that is there. The Brier score is the mean of "
-    "(probability - right)^2; those that have an answer and those that have none count alike. Beside it stands that of "
-    "one who says for each kind of query how often it is right, and no more."
+    "(probability - right)^2; those that have an answer and those that have none count alike. Its interval is "
+    "bootstrapped by whole scenes. Beside it stands that of one who says for each kind of query how often it is right, "
+    "and no more."
 )
+_DRAWS = 2000
 _BINS = np.linspace(0.0, 1.0, 11)
 
 
@@ -72,6 +74,7 @@ def kinds_table(answers: Sequence[Judged]) -> Table:
             tables.get(kind, kind),
             len(own),
             round(brier(p, right, weight), 3),
+            _brier_interval(own),
             round(float(base * (1 - base)), 3),
         ]
         groups = (
@@ -85,6 +88,7 @@ def kinds_table(answers: Sequence[Judged]) -> Table:
         "query",
         "queries",
         "Brier score",
+        "95 %",
         "of the rate alone",
         "right: found",
         "wrong: found",
@@ -136,6 +140,20 @@ def brier(
 ) -> float:
     """Return the Brier score: the mean of the squared difference of probability and truth."""
     return float(np.average(np.square(probability - right), weights=weight))
+
+
+def _brier_interval(answers: Sequence[Judged]) -> str:
+    """Return the 95 % interval of a Brier score, bootstrapped by whole scenes; nothing of one scene."""
+    scenes = sorted({one.scene for one in answers})
+    if len(scenes) < 2:
+        return ""
+    p, right, weight = _numbers(answers)
+    of_scene = np.searchsorted(scenes, [one.scene for one in answers])
+    error = np.bincount(of_scene, weight * np.square(p - right), len(scenes))
+    whole = np.bincount(of_scene, weight, len(scenes))
+    drawn = np.random.default_rng(0).integers(0, len(scenes), (_DRAWS, len(scenes)))
+    low, high = np.quantile(error[drawn].sum(axis=1) / whole[drawn].sum(axis=1), [0.025, 0.975])
+    return f"{low:.3f} to {high:.3f}"
 
 
 def _numbers(
