@@ -14,7 +14,7 @@ from helpers.walked_room import write_walk
 
 def test_a_drive_ends_as_its_build_and_says_what_it_took(tmp_path: Path) -> None:
     walk, used = write_walk(tmp_path / "rec"), avlmaps.Encoders.named("colours")
-    tables = run_live([walk], used, "colours", LiveBench(laps=2, kills=0), 0)
+    tables = run_live([walk], used, "colours", LiveBench(laps=2, kills=0, rate=20.0), 0)
     for table in tables.values():
         assert all(len(row) == len(table["columns"]) for row in table["rows"])
     ends = tables["the end beside the build of all frames"]

@@ -43,7 +43,7 @@ class Played:
     asked_ms: list[float] = field(default_factory=list)
     processor_ms: dict[str, float] = field(default_factory=dict)
     oldest_save_s: float = 0.0
-    laps: list[tuple[int, int, int, float]] = field(default_factory=list)
+    laps: list[tuple[int, int, int, int]] = field(default_factory=list)
     load: float = 0.0
 
 
@@ -77,7 +77,7 @@ def play(
             found.frames += 1
             found.oldest_save_s = max(found.oldest_save_s, float(np.nan_to_num(status.saved_age_s)))
             if ends_lap:
-                found.laps.append((status.voxels, status.keyframes, status.fused, status.memory_mb))
+                found.laps.append((status.voxels, status.keyframes, status.fused, round(status.memory_mb)))
         found.seconds, cpu_s = time.perf_counter() - begin_s, time.process_time() - begin_cpu_s
         found.status, found.load = live.status(), os.getloadavg()[0]
         found.processor_ms = {"all": 1e3 * cpu_s / found.frames}

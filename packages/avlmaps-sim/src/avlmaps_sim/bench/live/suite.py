@@ -29,10 +29,12 @@ class LiveBench:
     Attributes:
         laps: how often each recording is driven at its own pace.
         kills: how many processes are killed.
+        rate: how many times faster than it was recorded a recording is driven.
     """
 
     laps: int = 2
     kills: int = 40
+    rate: float = 1.0
 
 
 def run_live(scenes: Sequence[Path], used: Encoders, profile: str, chosen: LiveBench, seed: int) -> dict[str, Table]:
@@ -62,12 +64,12 @@ def run_live(scenes: Sequence[Path], used: Encoders, profile: str, chosen: LiveB
             raise BenchError(f"{path} has {len(recording)} frames; a drive takes two or more.")
         with tempfile.TemporaryDirectory() as folder:
             place = Path(folder)
-            for rate in (1.0, None):
+            for rate in (chosen.rate, None):
                 found = play(
                     recording, place / "live", used, rate=rate, laps=chosen.laps if rate else 1,
                     settings=LiveSettings(),
                 )  # fmt: skip
-                word = "its own" if rate else "as fast as it can"
+                word = "as fast as it can" if rate is None else "its own" if rate == 1.0 else f"{rate:g} times"
                 pace.append([name, word, *_pace(found)])
                 processor.append([name, word, *_processor(found)])
                 if rate:
