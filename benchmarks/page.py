@@ -98,8 +98,8 @@ ENTRIES = (
         "`house:1200005:held-out`.",
     ),
     Entry(
-        "change", "What changed over five days",
-        f"avlmaps bench change --scenes {' '.join(f'house:{1_000_000 + n}:held-out' for n in (0, 4, 5, 6))} --days 5 "
+        "change", "What changed over three days",
+        f"avlmaps bench change --scenes {' '.join(f'house:{1_000_000 + n}:held-out' for n in (0, 4, 5, 6))} --days 3 "
         "--frames 240 --out OUT", 1.5,
         "[When a thing counts as gone, new or moved](guides/remember-days.md). Four held-out homes; their thresholds "
         "were chosen while looking at the first three.",

@@ -102,7 +102,12 @@ def test_where_a_thing_was_last_seen_is_where_its_last_stay_was() -> None:
     assert one["position"] == [1.0, 0.0, 0.3]
     assert one["last_seen"] == {"visit": 2, "day": "2026-11-24", "stamp_s": 30.0}
     assert last_seen_text(answer).endswith("On 2026-11-26 it was gone from there.")
-    assert "speaks against it" in last_seen_text(last_seen(days(), "clock", is_meant("clock"), lambda place: None))
+    clock = last_seen(days(), "clock", is_meant("clock"), lambda place: None)
+    assert last_seen_text(clock).endswith("Nobody has looked at its place since.")
+    sofa = last_seen(days(), "sofa", is_meant("sofa"), lambda place: None)
+    assert last_seen_text(sofa).startswith("The sofa was last seen on 2026-11-26") and "since" not in last_seen_text(
+        sofa
+    )
     assert last_seen(days(), "piano", is_meant("piano"), lambda place: None)["seen"] == []
 
 

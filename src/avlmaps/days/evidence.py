@@ -1,7 +1,7 @@
 """What a day says of a place: there is surface again, rays pass through it, or nobody looked.
 
 For the n voxels of a thing that lie beside no other surface (the floor under a box is no box), n₊ are those where the
-day has surface in the voxel or beside it, and n₋ those through which at least two of its views see, from where it was
+day has surface there, and n₋ those through which at least two of its views see, from where it was
 seen before. Voxels beside each other say the same thing twice, so that they count by patches of edge a: with voxels of
 edge s, k± = n± · s²/a². With one look that was worth nothing either way (a uniform prior), the probability that the
 thing is gone is the mean of a Beta distribution:
@@ -146,7 +146,7 @@ class Day:
     surface: Occupied
 
     def has_surface(self, points: Float[np.ndarray, "m 3"]) -> Bool[np.ndarray, " m"]:
-        """Return where the day has surface: in a place's voxel or beside it."""
+        """Return where the day has surface; see ``Occupied.near``."""
         return self.occupied.near(apply(self.recording_from_map, points))
 
 

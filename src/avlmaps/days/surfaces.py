@@ -20,6 +20,8 @@ _FLAT = 0.12  # smallest over middle eigenvalue of the points round a point of a
 _ROUNDS = 24
 _REACHES_M = (0.25, 0.08)  # of the first and the last round
 _STILL = 1e-5
+SURFACE_REACH_VOXELS = 1.15
+"""Voxels of two grids that hold the same surface have middles this near to each other, nearly always."""
 _OFFSET = 1 << 20
 
 
@@ -119,15 +121,18 @@ class Occupied:
     Attributes:
         key: packed voxel index, rising.
         grid: their size.
+        tree: their middles, metres.
     """
 
     key: Int[np.ndarray, " n"]
     grid: GridSpec
+    tree: KDTree
 
     @classmethod
     def of(cls, index: Int[np.ndarray, "n 3"], grid: GridSpec) -> "Occupied":
         """Return the voxels of these indices."""
-        return cls(np.sort(packed(index)), grid)
+        key = np.sort(packed(index))
+        return cls(key, grid, KDTree(grid.centre_of(unpacked(key))))
 
     def row_of(self, index: Int[np.ndarray, "m 3"]) -> Int[np.ndarray, " m"]:
         """Return where each voxel is among them in rising order, -1 where it is not."""
@@ -137,23 +142,22 @@ class Occupied:
         row = np.minimum(np.searchsorted(self.key, key), len(self.key) - 1)
         return np.where(self.key[row] == key, row, -1)
 
-    def near(self, points: Float[np.ndarray, "m 3"]) -> Bool[np.ndarray, " m"]:
-        """Return which places lie in one of the voxels, or beside one."""
-        index = np.asarray(self.grid.index_of(points), np.int64)
-        found = np.zeros(len(index), bool)
-        for offset in AROUND:
-            open_ = np.flatnonzero(~found)
-            found[open_] = self.row_of(index[open_] + offset) >= 0
-        return found
+    def near(
+        self, points: Float[np.ndarray, "m 3"], reach_voxels: float = SURFACE_REACH_VOXELS
+    ) -> Bool[np.ndarray, " m"]:
+        """Return which places have the middle of one of the voxels within a reach."""
+        if not len(self.key):
+            return np.zeros(len(points), bool)
+        apart_m, _ = self.tree.query(points, distance_upper_bound=reach_voxels * self.grid.voxel_size_m)
+        return np.isfinite(apart_m)
 
     def alone(self, own: Int[np.ndarray, "m 3"]) -> Bool[np.ndarray, " m"]:
         """Return which voxels of a thing lie beside no voxel but the thing's."""
-        thing = Occupied.of(own, self.grid)
-        index = np.asarray(own, np.int64)
+        index, thing = np.asarray(own, np.int64), packed(own)
         found = np.ones(len(index), bool)
         for offset in AROUND[1:]:
             beside = index + offset
-            found &= (self.row_of(beside) < 0) | (thing.row_of(beside) >= 0)
+            found &= (self.row_of(beside) < 0) | np.isin(packed(beside), thing)
         return found
 
 

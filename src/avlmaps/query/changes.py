@@ -199,6 +199,7 @@ def last_seen(days: Days, name: str, same: Callable[[str], bool], room_of: RoomO
     return {
         "name": name,
         "frame": FRAME,
+        "last_day": when(days, days.last),
         "seen": [
             {
                 "name": stay.name,
@@ -290,9 +291,9 @@ def last_seen_text(answer: "LastSeenAnswer") -> str:
     text = f"The {one['name']} was last seen on {said(one['last_seen'])}, {room}at ({x:.2f}, {y:.2f}, {z:.2f}) m."
     if one["gone"] is not None:
         return f"{text} On {said(one['gone'])} it was gone from there."
-    if one["looked"]["visit"] > one["last_seen"]["visit"]:
+    if one["last_seen"]["visit"] == answer["last_day"]["visit"]:
         return text
-    return f"{text} Nothing that was seen since speaks against it."
+    return f"{text} Nobody has looked at its place since."
 
 
 def _article(name: str) -> str:

@@ -144,7 +144,8 @@ def _changes(avlmap: "Queryable", question: ListQuestion, top: int) -> Answer:
         for one in listed
     ]  # fmt: skip
     whole = _answer(avlmap, goals[:top], text_of(answer, kinds, question.name), count=len(listed))
-    return replace(whole, when=tuple(one["noticed"] for one in listed[:top]))
+    # A change is known by depth, however uncertain the name is.
+    return replace(whole, found=bool(whole.goals), when=tuple(one["noticed"] for one in listed[:top]))
 
 
 def _last_seen(avlmap: "Queryable", name: str, top: int) -> Answer:

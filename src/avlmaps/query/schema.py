@@ -154,6 +154,7 @@ class LastSeenAnswer(TypedDict):
 
     name: str
     frame: Frame
+    last_day: Annotated[DayAnswer, Meta(description="the last day on which the map was seen at all")]
     seen: list[LastSeenPlace]
     text: NotRequired[Annotated[str, Meta(description="the answer in one sentence")]]
 
