@@ -32,6 +32,7 @@ from avlmaps.maps.grid import GridSpec
 _MOST_SAMPLES = 48  # voxels of a thing by which it is decided which views show it
 _BEFORE_M = 0.3  # a view shows what lies up to this far behind where its blocks are free
 _LEAST_SEEN = 0.2  # of these samples
+_SOME = 0.1  # of a thing's voxels
 _FEWEST_OWN, _LEAST_OWN = 8, 0.15  # voxels of a thing that lie beside nothing else, and their part of it
 
 
@@ -200,10 +201,17 @@ def seen_before(
 
 
 def _counted(through: Bool[np.ndarray, " n"], surface: Bool[np.ndarray, " n"], own: Bool[np.ndarray, " n"]) -> Seen:
-    """Return the evidence of the voxels that lie beside nothing else; of all, where those are too few."""
+    """Return the evidence of the voxels that lie beside nothing else; of all, where those are too few.
+
+    Of a thing that leans on a wall all voxels lie beside it. Where rays pass through more than some of them, the
+    surface behind is the wall's, and says nothing of the thing.
+    """
+    through = through & ~surface
     if own.sum() >= max(_FEWEST_OWN, _LEAST_OWN * len(own)):
         through, surface = through[own], surface[own]
-    return Seen(len(through), int(surface.sum()), int((through & ~surface).sum()))
+    elif through.sum() > _SOME * len(own):
+        surface = surface & own
+    return Seen(len(through), int(surface.sum()), int(through.sum()))
 
 
 def _from_where_it_was_seen(
