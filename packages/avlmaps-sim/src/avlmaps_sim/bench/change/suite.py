@@ -177,7 +177,9 @@ def _lived(
         begin_s = perf_counter()
         folder = place.job.folder / f"merged-{'true' if way == TRUE else 'ours'}-{day}.avlmap"
         try:
-            after = merge_maps(merged, place.avlmap.stored, folder, overwrite=True, things_of=things_of)
+            after = merge_maps(
+                merged, place.avlmap.stored, folder, overwrite=True, things_of=things_of if way == TRUE else None
+            )
         except NotTheSamePlaceError:
             result.refused += 1
             names_before |= seen[day]
@@ -247,7 +249,8 @@ def _judge_lists(
     now, last = _loose(places[-1]), days.last
     before = [thing for place in places[:-1] for thing in _loose(place)]
     true = [thing.name for thing in now if thing.name in seen]
-    rebuilt = [_stay(thing) for thing in things_of(places[-1].avlmap)]
+    turn = places[-1].turn if isinstance(places[-1], TurnedPlace) else np.eye(4)
+    rebuilt = [_stay(thing, inverse(turn)) for thing in things_of(places[-1].avlmap)]
     stays = days.life.stays
     lists = {MERGED: [stays[number] for number in days.at(last)], REBUILT: rebuilt, FOREVER: list(stays)}
     result.lists = {name: judged_list(own, now, before, true) for name, own in lists.items()}
@@ -260,9 +263,10 @@ def _loose(place: Workplace) -> list[SceneObject]:
     return [thing for thing in place.truth.objects if thing.category not in STRUCTURE]
 
 
-def _stay(thing: Thing) -> Stay:
+def _stay(thing: Thing, scene_from_map: Float[np.ndarray, "4 4"]) -> Stay:
+    position = plain_point(apply(scene_from_map, np.array(thing.position)))
     return Stay(
-        name=thing.name, confidence=thing.confidence, position=thing.position, size=thing.size, color=thing.color,
+        name=thing.name, confidence=thing.confidence, position=position, size=thing.size, color=thing.color,
         first=0, last=0, last_seen_s=0.0, looked=0,
     )  # fmt: skip
 
