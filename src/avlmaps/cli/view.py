@@ -1,7 +1,6 @@
 """`avlmaps view`: look at a map in the browser, ask it, drive in it; or write it all into one file."""
 
 import contextlib
-import secrets
 import sys
 import threading
 from dataclasses import dataclass
@@ -118,6 +117,8 @@ def _robot(scene: str) -> "MakeRobot":
 
 
 def _serve(verb: View) -> None:
+    import secrets
+
     from avlmaps.core.network import is_loopback
     from avlmaps.serve.app import create_app
     from avlmaps.serve.running import listening_socket, run_http
