@@ -27,6 +27,8 @@ ERRORS = (
     (("query", "MAP", "--object", "red", "--plot", "x.doc"), 1, "query"),
     (("locate", "MAP", "nothing.png"), 1, "query"),
     (("live", "nowhere", "--out", "OUT"), 1, "recording"),
+    (("merge", "nowhere.avlmap", "MAP", "--out", "OUT"), 1, "map"),
+    (("changes", "nowhere.avlmap"), 1, "map"),
     (("go", "nowhere.avlmap", "go to the chair", "--scene", "house:7"), 1, "map"),
     (("go", "MAP", "gabble gabble the", "--scene", "house:7"), 1, "unclear"),
     (("things", "nowhere.avlmap"), 1, "map"),
@@ -34,7 +36,7 @@ ERRORS = (
     (("shell", "nowhere.avlmap"), 1, "map"),
     (("serve", "nowhere.avlmap"), 1, "map"),
     (("view", "nowhere.avlmap"), 1, "map"),
-    (("view", "MAP", "--host", "no.such.host.invalid", "--no-browser"), 1, "query"),
+    (("view", "MAP", "--host", "no.such.host.invalid", "--no-browser"), 1, "serve"),
     (("view", "MAP", "--questions", "the chair"), 2, "usage"),
     (("view", "MAP", "--out", "OUT.txt"), 2, "usage"),
     (("view", "MAP", "--out", "OUT.html", "--questions", "near near"), 1, "query"),
@@ -129,7 +131,7 @@ def test_a_cold_cache_is_announced_once_and_a_warm_one_not(tmp_path: Path) -> No
 def test_verbs_that_run_compiled_loops_say_so(run, monkeypatch: pytest.MonkeyPatch) -> None:
     compile_something = {
         "demo", "record", "build", "live", "locate", "go", "bench", "things", "rooms", "export",
-        "shell", "serve", "view"
+        "shell", "serve", "view", "merge", "changes",
     }  # fmt: skip
     assert {name for name, verb in VERBS.items() if verb.compiles} == compile_something
     assert not Verb.compiles

@@ -34,6 +34,7 @@ from avlmaps.serve.drive.robots import RobotFile
 from avlmaps.serve.settings import ServeSettings
 from avlmaps_models.import_reference.convert import ImportSettings
 from avlmaps_sim.bench.indexing import IndexingSettings
+from avlmaps_sim.bench.live.suite import LiveBench
 from avlmaps_sim.bench.navigation import NavigationSettings
 from avlmaps_sim.demo.run import run_demo
 from avlmaps_sim.recorder import RecordSettings, record_scene
@@ -156,11 +157,14 @@ SAME: dict[str, Callable[[], Any]] = {
     "bench.navigation.sequences": of(NavigationSettings, "sequences"),
     "bench.navigation.language": of(NavigationSettings, "language"),
     "bench.navigation.guess": of(NavigationSettings, "guess"),
+    "bench.laps": of(LiveBench, "laps"),
+    "bench.kills": of(LiveBench, "kills"),
 }
 # What a person meets first: nothing behind them has such a default.
 OWN = {
     "build.rules", "query.rules", "query.sentence", "demo.out", "bench.out", "bench.indexing.size",
     "go.language", "go.robot", "query.frame", "things.frame", "rooms.frame", "locate.frame", "view.port",
+    "live.port",
 }  # fmt: skip
 
 
