@@ -13,8 +13,8 @@ FEW = ("--size", "48x32", "--max-frames", "4", "--workers", "1", "--sources", "2
 @pytest.fixture(autouse=True)
 def a_small_flat(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let house:7 be the small flat: real homes take longer to draw."""
-    known = scenes.open_scene
-    monkeypatch.setattr(scenes, "open_scene", lambda spec: flat() if spec == "house:7" else known(spec))
+    known = scenes.open_changed
+    monkeypatch.setattr(scenes, "open_changed", lambda spec: (flat(), ()) if spec == "house:7" else known(spec))
 
 
 def test_a_recording_is_made_and_told_and_can_be_opened(answer, tmp_path: Path) -> None:

@@ -150,7 +150,9 @@ def _acted(said: Claimed, body: Sequence[int], inquiry: Inquiry) -> str | None:
     for target in (each for one in inquiry.of for each in (one, *one.near)):
         *before, last = target.name.split() if target.kind in (TargetKind.OBJECT, TargetKind.AREA) else [""]
         ends = any(said.texts[at] == last and at == body[-1] for at in body)
-        if before and ends and is_entry(" ".join(before)) and not is_entry(target.name) and not is_entry(last):
+        # Behind "did" stands what it did, also where that is a thing as well: "did the chair in the kitchen die?"
+        acts = asks[0] == "did" or not is_entry(last)
+        if before and ends and is_entry(" ".join(before)) and not is_entry(target.name) and acts:
             return target.name
     return None
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from avlmaps.core.wording import option
 from avlmaps.live.settings import LiveSettings
 from avlmaps.maps.build import build_map
 from avlmaps.maps.store.reader import StoredMap
@@ -51,7 +52,7 @@ def run_live(scenes: Sequence[Path], used: Encoders, profile: str, chosen: LiveB
         BenchError: no recording was given, or one of fewer than two frames.
     """
     if not scenes:
-        raise BenchError("This suite measures on recordings with poses; name one or more with --scenes.")
+        raise BenchError(f"This suite measures on recordings with poses; name one or more with {option('scenes')}.")
     pace: _Rows = []
     processor: _Rows = []
     laps: _Rows = []
