@@ -11,6 +11,7 @@ from avlmaps.core.printable import printable
 
 T = TypeVar("T")
 _quiet = False
+_here = threading.local()  # ``quiet``: whether this thread is silenced
 _open_bars: list[Any] = []
 _lock_owner = -1
 
@@ -23,13 +24,20 @@ def silence(quiet: bool = True) -> None:
 
 @contextmanager
 def silence_progress(quiet: bool = True) -> Generator[None]:
-    """Switch progress off for a while, and put it back as it was; with ``quiet=False`` change nothing."""
-    before = _quiet
-    silence(before or quiet)
+    """Switch this thread's progress off for a while, and put it back; with ``quiet=False`` change nothing.
+
+    Other threads are not affected: what a live map does behind must not swallow what its server says.
+    """
+    before = getattr(_here, "quiet", False)
+    _here.quiet = before or quiet
     try:
         yield
     finally:
-        silence(before)
+        _here.quiet = before
+
+
+def _is_quiet() -> bool:
+    return _quiet or getattr(_here, "quiet", False)
 
 
 def _keep_lock_to_this_process(bar: type) -> None:
@@ -73,7 +81,7 @@ def progress(
         initial=done,
         unit=f" {unit}s",
         file=sys.stderr,
-        disable=_quiet,
+        disable=_is_quiet(),
         mininterval=0.2 if on_terminal else 10.0,
         dynamic_ncols=on_terminal,
         ascii=not on_terminal,
@@ -97,5 +105,5 @@ def end_bars() -> None:
 
 def say(message: str) -> None:
     """Print one line on standard error, unless progress is silenced."""
-    if not _quiet:
+    if not _is_quiet():
         sys.stderr.write(printable(message) + "\n")
