@@ -91,6 +91,7 @@ SAME: dict[str, Callable[[], Any]] = {
     "live.voxel_size_m": of(BuildSettings, "voxel_size_m"),
     "live.format": of(open_recording, "format"),
     "live.rate": of(replay, "rate"),
+    "live.port": of(ServeSettings, "port"),
     "live.give_up_s": of(follow, "give_up_s"),
     "info.format": of(open_recording, "format"),
     "info.audio": of(open_recording, "audio"),
@@ -164,7 +165,6 @@ SAME: dict[str, Callable[[], Any]] = {
 OWN = {
     "build.rules", "query.rules", "query.sentence", "demo.out", "bench.out", "bench.indexing.size",
     "go.language", "go.robot", "query.frame", "things.frame", "rooms.frame", "locate.frame", "view.port",
-    "live.port",
 }  # fmt: skip
 
 

@@ -1,6 +1,5 @@
 """`avlmaps live --serve` and `--view`: the server's page of a map while it grows, and afterwards."""
 
-import contextlib
 import sys
 import threading
 import time
@@ -8,13 +7,11 @@ from collections.abc import Callable
 from pathlib import Path
 from urllib.parse import quote
 
-from avlmaps.cli.output import UsageError
-from avlmaps.cli.view import open_browser
+from avlmaps.cli.view import open_browser, require_port, run_page
 from avlmaps.core.progress import say
 from avlmaps.live.live_map import LiveMap
 from avlmaps.maps.store.reader import StoredMap
-from avlmaps.serve.app import create_app
-from avlmaps.serve.running import listening_socket, run_http, url_of
+from avlmaps.serve.running import listening_socket, url_of
 from avlmaps.serve.service import Service
 from avlmaps.serve.settings import ServeSettings
 
@@ -89,8 +86,7 @@ def serve_while(live: LiveMap, drive: Callable[[Callable[[], bool]], None], port
     Raises:
         ServeError: the port is taken.
     """
-    if not 0 <= port <= 65535:
-        raise UsageError(f"--port is {port}; it must lie between 0 and 65535.")
+    require_port(port)
     settings = ServeSettings(host="127.0.0.1", port=port)
     with listening_socket(settings) as opened:
         running = Drive(live, drive)
@@ -108,10 +104,6 @@ def serve_while(live: LiveMap, drive: Callable[[Callable[[], bool]], None], port
                 if browse:
                     open_browser(url)
 
-            try:
-                with contextlib.suppress(KeyboardInterrupt):  # where signals do not reach the server's loop: Windows
-                    run_http(create_app(service, tools=()), service, opened, told)
-            finally:
-                service.close()
+            run_page(service, opened, told)
         finally:
             running.end()

@@ -15,7 +15,11 @@ from avlmaps.cli.verb import ModelVerb
 from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+    from socket import socket
+
     from avlmaps.query.avlmap import AVLMap
+    from avlmaps.serve.service import Service
     from avlmaps.serve.settings import ServeSettings
     from avlmaps.view.route import MakeRobot
 
@@ -74,8 +78,7 @@ def _require_fitting(verb: View) -> None:
     if verb.out is None:
         if verb.questions or verb.overwrite:
             raise UsageError("--questions and --overwrite belong to --out FILE; in the browser, type the questions.")
-        if not 0 <= verb.port <= 65535:
-            raise UsageError(f"--port is {verb.port}; it must lie between 0 and 65535.")
+        require_port(verb.port)
         return
     if verb.scene is not None:
         raise UsageError("--scene belongs to the live page; a file drives no robot.")
@@ -120,8 +123,7 @@ def _serve(verb: View) -> None:
     import secrets
 
     from avlmaps.core.network import is_loopback
-    from avlmaps.serve.app import create_app
-    from avlmaps.serve.running import listening_socket, run_http
+    from avlmaps.serve.running import listening_socket
     from avlmaps.serve.service import Service
     from avlmaps.serve.settings import Limits, ServeSettings
 
@@ -149,12 +151,32 @@ def _serve(verb: View) -> None:
             if not verb.no_browser:
                 open_browser(url)
 
-        try:
-            with contextlib.suppress(KeyboardInterrupt):  # where signals do not reach the server's loop: Windows
-                run_http(create_app(service, tools=()), service, opened, started)
-        finally:
-            service.close()
+        run_page(service, opened, started)
         say("The viewer is stopped.")
+
+
+def require_port(port: int) -> None:
+    """Raise a usage error unless a port is one, or 0 for any free one."""
+    if not 0 <= port <= 65535:
+        raise UsageError(f"--port is {port}; it must lie between 0 and 65535.")
+
+
+def run_page(service: "Service", opened: "socket", started: "Callable[[], None]") -> None:
+    """Serve maps to browsers until Ctrl-C, and close the service.
+
+    Args:
+        service: the maps.
+        opened: a bound socket.
+        started: is called when the page answers.
+    """
+    from avlmaps.serve.app import create_app
+    from avlmaps.serve.running import run_http
+
+    try:
+        with contextlib.suppress(KeyboardInterrupt):  # where signals do not reach the server's loop: Windows
+            run_http(create_app(service, tools=()), service, opened, started)
+    finally:
+        service.close()
 
 
 def _named(verb: View) -> dict[str, Path]:

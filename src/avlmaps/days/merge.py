@@ -15,7 +15,7 @@ import numpy as np
 from avlmaps.core.arrays import Bool, Float, Int
 from avlmaps.core.errors import MapError
 from avlmaps.core.lexicon import Kind, lexicon
-from avlmaps.core.poses import apply, inverse, plain_point
+from avlmaps.core.poses import apply, inverse, plain_point, rotation_angle_rad
 from avlmaps.core.version import __version__
 from avlmaps.core.wording import option
 from avlmaps.days import life as lives
@@ -104,10 +104,8 @@ def _agreement(
     for views in views_of(stored):
         free += views.through(index, grid)
     through = (free >= settings.changes.through_views) & ~on_surface
-    looked, share = (
-        int(on_surface.sum() + through.sum()),
-        float(on_surface.sum() / max(on_surface.sum() + through.sum(), 1)),
-    )
+    looked = int(on_surface.sum() + through.sum())
+    share = float(on_surface.sum() / max(looked, 1))
     if looked < wanted.least_looked or share < wanted.least_agreement:
         raise NotTheSamePlaceError(
             f"This is not seen to be the same place: of {looked} voxels of {other.path} where {stored.path} looked, "
@@ -138,9 +136,9 @@ def visits_of(stored: StoredMap) -> tuple[Visit, ...]:
 
 def views_of(stored: StoredMap) -> list[DayViews]:
     """Return what the keyframes of each visit saw freely, in the map's world."""
-    keyframes, out = stored.keyframes, list[DayViews]()
-    number = visit_of_stamps(visits_of(stored), np.asarray(keyframes.stamp_s))
-    for visit, one in enumerate(visits_of(stored)):
+    keyframes, visits, out = stored.keyframes, visits_of(stored), list[DayViews]()
+    number = visit_of_stamps(visits, np.asarray(keyframes.stamp_s))
+    for visit, one in enumerate(visits):
         own = np.flatnonzero(number == visit)
         pose = np.asarray(keyframes.world_from_camera, np.float64)[own]
         out.append(DayViews(np.asarray(keyframes.clear_mm)[own], pose, one.rig.depth.camera()))
@@ -219,12 +217,12 @@ def merge_maps(
     life = stored.life() or lives.begun([_seen(one, stored, np.eye(4), 0.0) for one in listed(AVLMap(stored))])
     things = list(listed(AVLMap(other)))
     if things_of is None:  # a list of names misses small things, whose surface changes nevertheless
-        life = _with_vanished(life, stored, now, visits, settings)
+        life = _with_vanished(life, stored, known, now, visits, settings)
         things += _unnamed_new(other, things, before, known, moved, settings)
     new = [_seen(one, other, moved, visit.shift_s) for one in things]
     at_s = [one.end_s for one in visits]
     life = lives.lived_on(life, new, now, before, known, number, at_s, grid, settings.changes, same_thing)
-    kept = _still_there(stored, life, now, number, settings)
+    kept = _still_there(stored, known, life, now, number, settings)
     voxels = _joined_voxels(stored, kept, other, moved, visit.shift_s, life)
     keyframes = _joined_keyframes(stored, other, moved, visit.shift_s)
     with tempfile.TemporaryDirectory(prefix="avlmaps-clips-") as clips:
@@ -289,15 +287,16 @@ def same_thing(one: str, other: str) -> bool:
     return one == other or words.is_a(one, other, Kind.THING) or words.is_a(other, one, Kind.THING)
 
 
-def _with_vanished(life: Life, stored: StoredMap, now: Day, visits: Sequence[Visit], settings: MergeSettings) -> Life:
+def _with_vanished(
+    life: Life, stored: StoredMap, known: Occupied, now: Day, visits: Sequence[Visit], settings: MergeSettings
+) -> Life:
     """Return a life with the surface that the new day looks through and that no thing owns, as things of their own."""
     index, grid = np.asarray(stored.voxels.index), stored.grid
     surface = now.has_surface(grid.centre_of(index))
     free = (now.views.through(index, grid) >= settings.changes.through_views) & ~surface
-    table = Occupied.of(index, grid)
     for number, stay in enumerate(life.stays):
         if stay.gone is None:
-            rows = table.row_of(life.voxels(number))
+            rows = known.row_of(life.voxels(number))
             free[rows[rows >= 0]] = False
     things = _clusters(stored, np.flatnonzero(free), settings)
     stamps = np.array([float(np.max(np.asarray(stored.voxels.last_seen_s)[one.rows])) for one in things])
@@ -350,7 +349,7 @@ def _clusters(stored: StoredMap, rows: Int[np.ndarray, " r"], settings: MergeSet
 
 
 def _still_there(
-    stored: StoredMap, life: Life, now: Day, visit: int, settings: MergeSettings
+    stored: StoredMap, known: Occupied, life: Life, now: Day, visit: int, settings: MergeSettings
 ) -> Bool[np.ndarray, " n"]:
     """Return which voxels of the map are surface still.
 
@@ -358,12 +357,11 @@ def _still_there(
     where the new day has no surface; of what is there none goes; people's go.
     """
     index, grid = np.asarray(stored.voxels.index), stored.grid
-    table = Occupied.of(index, grid)  # the map's voxels are sorted likewise
     surface = now.has_surface(grid.centre_of(index))
     through = now.views.through(index, grid) >= settings.changes.through_views
     goes = through & ~surface
     for number, stay in enumerate(life.stays):
-        rows = table.row_of(life.voxels(number))
+        rows = known.row_of(life.voxels(number))  # the map's voxels are sorted likewise
         rows = rows[rows >= 0]
         if stay.gone == visit or stay.is_person:
             goes[rows] = ~surface[rows] | stay.is_person
@@ -446,7 +444,7 @@ def _joined_keyframes(
     kept = [
         row
         for row, rivals in enumerate(near)
-        if not any(float(_turn_rad(before[row], pose[rival])) <= _NEAR_RAD for rival in rivals)
+        if not any(rotation_angle_rad(before[row], pose[rival]) <= _NEAR_RAD for rival in rivals)
     ]
     encoder = stored.encoders.place
     place = [
@@ -461,10 +459,6 @@ def _joined_keyframes(
         points_world=apply(moved, np.asarray(new.points_world, np.float64)).astype(np.float32),
     )
     return _concatenated(_rows(old, np.array(kept, np.int64)), turned)
-
-
-def _turn_rad(one: Float[np.ndarray, "4 4"], other: Float[np.ndarray, "4 4"]) -> float:
-    return float(np.arccos(np.clip((np.trace(one[:3, :3].T @ other[:3, :3]) - 1.0) / 2.0, -1.0, 1.0)))
 
 
 def _rows(keyframes: Keyframes, rows: Int[np.ndarray, " r"]) -> Keyframes:
