@@ -21,8 +21,7 @@ import numpy as np  # noqa: E402
 from scipy.spatial import cKDTree  # noqa: E402
 
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator  # noqa: E402
-from avlmaps.maps.fusion.cleaning import clean  # noqa: E402
-from avlmaps.maps.fusion.free_space import FreeViewCollector  # noqa: E402
+from avlmaps.maps.fusion.free_space import FreeViewCollector, clean  # noqa: E402
 from avlmaps.maps.fusion.sensor import NONE, SensorModel  # noqa: E402
 from avlmaps.maps.grid import GridSpec  # noqa: E402
 from avlmaps.maps.pipeline.estimate import estimate_sensor  # noqa: E402

@@ -10,7 +10,7 @@ import numpy as np
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.poses import MAX_ROTATION_FAULT
 from avlmaps.maps.fusion.measure_kernels import GREATEST_EXPONENT
-from avlmaps.maps.fusion.settings import PAPERS_VARIANCE_M2
+from avlmaps.maps.fusion.sensor import PAPERS_VARIANCE_M2
 from avlmaps.perception.embedded.meanings import Meanings
 from avlmaps.perception.profiles import profile
 from avlmaps.query.factors import FOUND_AT, ROUNDING, HeatSettings

@@ -16,8 +16,7 @@ from avlmaps.cli.verb import ModelVerb, Verb
 from avlmaps.cli.verbs import VERBS
 from avlmaps.language.chat.settings import ChatSettings
 from avlmaps.live.replay import follow, replay
-from avlmaps.maps.fusion.sensor import SensorName
-from avlmaps.maps.fusion.settings import FusionSettings
+from avlmaps.maps.fusion.sensor import FusionSettings, SensorName
 from avlmaps.maps.settings import BuildSettings, FrameSettings, GravitySettings
 from avlmaps.navigate.bodies import BodyShape
 from avlmaps.navigate.skills import RobotSettings

@@ -2,7 +2,7 @@
 
 import json
 
-from avlmaps.maps.store.consistency import checksum_of
+from avlmaps.maps.store.manifest_file import checksum_of
 
 
 def signed(content: str) -> str:

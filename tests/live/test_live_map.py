@@ -20,7 +20,7 @@ from avlmaps.live.settings import LiveSettings
 from avlmaps.live.status import Tally
 from avlmaps.maps.build import build_map
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
-from avlmaps.maps.fusion.settings import FusionSettings
+from avlmaps.maps.fusion.sensor import FusionSettings
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.settings import BuildSettings, FrameSettings
 from avlmaps.maps.store.reader import open_stored

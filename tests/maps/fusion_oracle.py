@@ -6,8 +6,7 @@ import numpy as np
 
 from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole, Rig
-from avlmaps.maps.fusion.sensor import NONE, SensorModel
-from avlmaps.maps.fusion.settings import FusionSettings
+from avlmaps.maps.fusion.sensor import NONE, FusionSettings, SensorModel
 from avlmaps.maps.fusion.voxel_sums import VoxelSums
 from avlmaps.maps.grid import GridSpec
 from avlmaps.recordings.types import Frame

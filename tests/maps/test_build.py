@@ -17,11 +17,11 @@ from hypothesis import strategies as st
 sys.path.insert(0, str(Path(__file__).parent.parent / "recordings"))
 from recording_scenes import save_depth, shots, write_folder
 
+from avlmaps.core.ahead import run_ahead
 from avlmaps.core.errors import MapError, RecordingError
 from avlmaps.maps.build import build_map, build_part, describe, merge_parts
 from avlmaps.maps.pipeline.parts import load_part
 from avlmaps.maps.pipeline.plan import audio_key, plan_spans
-from avlmaps.maps.pipeline.prefetch import run_ahead
 from avlmaps.maps.settings import BuildSettings, FrameSettings
 from avlmaps.maps.store.array_validation import array_fields
 from avlmaps.maps.store.reader import StoredMap, open_stored, verify_stored

@@ -8,8 +8,15 @@ from hypothesis import strategies as st
 from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
-from avlmaps.maps.fusion.cleaning import clean, seen_through, smear_reach
-from avlmaps.maps.fusion.free_space import FreeViewCollector, block_size, concat_views, count_through
+from avlmaps.maps.fusion.free_space import (
+    FreeViewCollector,
+    block_size,
+    clean,
+    concat_views,
+    count_through,
+    seen_through,
+    smear_reach,
+)
 from avlmaps.maps.fusion.sensor import KINECT, NONE, PERFECT, SensorModel
 from avlmaps.maps.fusion.voxel_sums import Evidence
 from avlmaps.maps.grid import GridSpec

@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 
 from avlmaps.core.errors import MapError
 from avlmaps.maps.build import build_map
-from avlmaps.maps.store.consistency import checksum_of, manifest_fault
 from avlmaps.maps.store.manifest import MapInfo
+from avlmaps.maps.store.manifest_file import checksum_of, manifest_fault
 from avlmaps.maps.store.reader import open_stored
 
 PROFILE = register_fakes()

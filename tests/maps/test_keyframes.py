@@ -14,11 +14,12 @@ from avlmaps.maps.keyframes.describe import (
     KeyframeSettings,
     describe_keyframe,
     keyframes_by_motion,
+    lift_keypoints,
+    middle_of_view,
     perceive_keyframes,
     select_keyframes,
     stack_keyframes,
 )
-from avlmaps.maps.keyframes.keypoint_depth import lift_keypoints, middle_of_view
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.registration import depth_in_colour

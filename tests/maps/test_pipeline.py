@@ -11,11 +11,11 @@ from build_fakes import SETTINGS, Corners, Pixels, Walk, register_fakes
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from avlmaps.core.ahead import run_ahead
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Backend, Kind, register
 from avlmaps.maps.build import build_map
 from avlmaps.maps.pipeline.encode_fuse import encode_frames
-from avlmaps.maps.pipeline.prefetch import run_ahead
 from avlmaps.maps.store.manifest import BadFrame
 from avlmaps.perception.profiles import Profile, profile
 from avlmaps.recordings.types import Frame

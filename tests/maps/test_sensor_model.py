@@ -11,9 +11,17 @@ from hypothesis import strategies as st
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import MapError
 from avlmaps.maps.fusion.accumulator import FusionSettings, VoxelAccumulator
-from avlmaps.maps.fusion.depth_noise import measure_noise, nearest_model
-from avlmaps.maps.fusion.sensor import KINECT, MODELS, NONE, PERFECT, REALSENSE, SensorModel
-from avlmaps.maps.fusion.sensor_kernels import drop_flying
+from avlmaps.maps.fusion.carving_kernels import drop_flying
+from avlmaps.maps.fusion.sensor import (
+    KINECT,
+    MODELS,
+    NONE,
+    PERFECT,
+    REALSENSE,
+    SensorModel,
+    measure_noise,
+    nearest_model,
+)
 from avlmaps.maps.grid import GridSpec
 from avlmaps.recordings.types import Frame
 

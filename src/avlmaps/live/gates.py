@@ -15,7 +15,7 @@ from avlmaps.core.arrays import Float, Int64
 from avlmaps.core.poses import rotation_angle_rad
 from avlmaps.live.settings import LiveSettings
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
-from avlmaps.maps.fusion.settings import FusionSettings
+from avlmaps.maps.fusion.sensor import FusionSettings
 from avlmaps.recordings.types import Frame
 
 _ROWS, _COLUMNS = 30, 40  # points of a frame that are looked up

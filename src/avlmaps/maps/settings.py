@@ -5,7 +5,7 @@ from typing import Literal
 
 from avlmaps.core.errors import MapError
 from avlmaps.maps.audio.events import HearingSettings
-from avlmaps.maps.fusion.settings import FusionSettings
+from avlmaps.maps.fusion.sensor import FusionSettings
 from avlmaps.maps.keyframes.describe import KeyframeSettings
 
 

@@ -9,7 +9,7 @@ from typing import Literal
 
 from avlmaps.maps.audio.events import HearingSettings
 from avlmaps.maps.audio.segmentation import SegmentationSettings
-from avlmaps.maps.fusion.settings import PAPERS_VARIANCE_M2
+from avlmaps.maps.fusion.sensor import PAPERS_VARIANCE_M2
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
 from avlmaps.query.avlmap import QuerySettings
 from avlmaps.query.modalities.area import AreaSettings

@@ -15,8 +15,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Float32
 from avlmaps.core.errors import AudioError
-from avlmaps.maps.audio.filterbank import band_powers, hop_samples
-from avlmaps.maps.audio.noise_floor import NoiseFloor, find_noise_floor
+from avlmaps.maps.audio.filterbank import NoiseFloor, band_powers, find_noise_floor, hop_samples
 from avlmaps.recordings.audio import AudioTrack
 
 _BLOCK_S = 10.0

@@ -1,11 +1,101 @@
-"""The compiled loops over all voxels of a map that decide which of them are no surface."""
+"""The compiled loops behind what is no surface: flying pixels of a depth picture, voxels seen through, smears."""
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int32, Int64, Shaped, UInt16
+from jaxtyping import Bool, Float32, Float64, Int32, Int64, Shaped, UInt16
 from numba import njit
 
 from avlmaps.core.kernel_types import Real, Whole
 from avlmaps.maps.fusion.voxel_kernels import OPTIONS, find_row
+
+CLEAR_UNITS_PER_M = 1000.0
+_FARTHEST_UNITS = 65535.0
+
+
+@njit(**OPTIONS)
+def _between(z: Real, a: Real, b: Real, c: Real, d: Real, once: Real, twice: Real):
+    """Return whether z lies between a nearer and a farther depth on either side (a, b: 1 and 2 pixels off; c, d)."""
+    near_1 = (a > 0.0) & (a < z - once) | (b > 0.0) & (b < z - twice)
+    far_1 = (a > z + once) | (b > z + twice)
+    near_2 = (c > 0.0) & (c < z - once) | (d > 0.0) & (d < z - twice)
+    far_2 = (c > z + once) | (d > z + twice)
+    return (near_1 & far_2) | (near_2 & far_1)
+
+
+@njit(**OPTIONS)
+def drop_flying(
+    depth: Float32[np.ndarray, "h w"],
+    steps: tuple[float, float],
+    noise: tuple[float, float],
+    edge_sigmas: Real,
+    out: Float32[np.ndarray, "h w"],
+):
+    """Copy a depth picture without the pixels that lie between a nearer and a farther surface; those become 0.
+
+    Args:
+        depth: (h, w) float32, metres.
+        steps: by how much the depth changes from one column, and from one row, to the next on the most grazing surface
+            at 1 m, metres.
+        noise: (σ at 0 m, its growth with z²).
+        edge_sigmas: a neighbour is on another surface when it is this many σ off.
+        out: (h, w) filled in.
+
+    Returns:
+        Count of depths that were left out.
+    """
+    height, width = depth.shape
+    dropped = 0
+    for v in range(height):
+        up_1, up_2 = max(v - 1, 0), max(v - 2, 0)
+        down_1, down_2 = min(v + 1, height - 1), min(v + 2, height - 1)
+        for u in range(width):
+            z = depth[v, u]
+            out[v, u] = z
+            if not z > 0.0:
+                continue
+            sigma = edge_sigmas * (noise[0] + noise[1] * z * z)
+            wide, high = sigma + steps[0] * z, sigma + steps[1] * z
+            left_1, left_2 = max(u - 1, 0), max(u - 2, 0)
+            right_1, right_2 = min(u + 1, width - 1), min(u + 2, width - 1)
+            flies = _between(
+                z, depth[v, left_1], depth[v, left_2], depth[v, right_1], depth[v, right_2],
+                wide, 2 * wide - sigma,
+            ) or _between(
+                z, depth[up_1, u], depth[up_2, u], depth[down_1, u], depth[down_2, u],
+                high, 2 * high - sigma,
+            )  # fmt: skip
+            if flies:
+                out[v, u] = 0.0
+                dropped += 1
+    return dropped
+
+
+@njit(**OPTIONS)
+def clear_blocks(
+    depth: Float32[np.ndarray, "h w"],
+    size: Whole,
+    noise: tuple[float, float],
+    clear_sigmas: Real,
+    out: UInt16[np.ndarray, "rows columns"],
+):
+    """Write how far every ray of each block of pixels is free: 0 where a pixel of it has no depth.
+
+    Args:
+        depth: (h, w) float32, metres.
+        size: edge of a block, pixels.
+        noise: (σ at 0 m, its growth with z²).
+        clear_sigmas: how many σ before its depth a ray is free.
+        out: (ceil(h / size), ceil(w / size)) uint16, thousandths of a metre, rounded down.
+    """
+    height, width = depth.shape
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            least = _FARTHEST_UNITS
+            for v in range(i * size, min((i + 1) * size, height)):
+                for u in range(j * size, min((j + 1) * size, width)):
+                    z = np.float64(depth[v, u])
+                    free = (z - clear_sigmas * (noise[0] + noise[1] * z * z)) * CLEAR_UNITS_PER_M if z > 0.0 else 0.0
+                    least = min(least, free)
+            out[i, j] = np.uint16(max(least, 0.0))
 
 
 @njit(**OPTIONS)
@@ -23,7 +113,7 @@ def count_through(
     Args:
         index: (n, 3) int32.
         voxel_size: metres.
-        clear: (rows, columns) uint16, millimetres, as `sensor_kernels.clear_blocks` wrote it.
+        clear: (rows, columns) uint16, millimetres, as `clear_blocks` wrote it.
         size: edge of a block, pixels.
         camera: (fx, fy, cx, cy, width, height).
         pose: (4, 4) world_from_camera.

@@ -9,7 +9,7 @@ import numpy as np
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.progress import say
 from avlmaps.core.wording import option
-from avlmaps.maps.gravity.given_up import some_frames, up_doubts
+from avlmaps.maps.gravity.up import some_frames, up_doubts
 from avlmaps.maps.pipeline.plan import BUILD_VERSION, BuildPlan
 from avlmaps.maps.store.checkpoints import Computed, key_of, load_or_compute
 from avlmaps.recordings.consistency.check import check_recording

@@ -12,6 +12,7 @@ from time import perf_counter
 import numpy as np
 from jaxtyping import Float32
 
+from avlmaps.core.ahead import run_ahead
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.progress import progress
 from avlmaps.core.registry import Kind
@@ -31,7 +32,6 @@ from avlmaps.maps.pipeline.plan import (
     plan_spans,
     strip_folder,
 )
-from avlmaps.maps.pipeline.prefetch import run_ahead
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.manifest import BadFrame, SensorInfo
 from avlmaps.perception.cache.cached_encoders import cache_note

@@ -11,8 +11,7 @@ import numpy as np
 
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.wording import option
-from avlmaps.maps.fusion.depth_noise import FRAMES, measure_noise, nearest_model
-from avlmaps.maps.fusion.sensor import MODELS, SensorModel
+from avlmaps.maps.fusion.sensor import FRAMES, MODELS, SensorModel, measure_noise, nearest_model
 from avlmaps.maps.gravity.floor import FoundFloor, GroundedRecording, find_ground
 from avlmaps.maps.gravity.floor_choice import Evidence, Expected
 from avlmaps.maps.pipeline.plan import BUILD_VERSION, BuildPlan

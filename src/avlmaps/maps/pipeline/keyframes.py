@@ -11,12 +11,12 @@ import msgspec
 import numpy as np
 from jaxtyping import Float32, Int
 
+from avlmaps.core.ahead import run_ahead
 from avlmaps.core.progress import progress
 from avlmaps.core.registry import Kind
 from avlmaps.maps.keyframes.describe import describe_keyframe, learn_places, select_keyframes, stack_keyframes
 from avlmaps.maps.pipeline.parts import MapPart
 from avlmaps.maps.pipeline.plan import BUILD_VERSION, BuildPlan
-from avlmaps.maps.pipeline.prefetch import run_ahead
 from avlmaps.maps.store.array_validation import RAGGED, ROWS_OR_NONE, array_fields, validate_arrays
 from avlmaps.maps.store.checkpoints import (
     Computed,

@@ -13,10 +13,9 @@ from avlmaps.core.registry import Kind
 from avlmaps.core.wording import option
 from avlmaps.maps.keyframes.describe import keyframes_by_motion
 from avlmaps.maps.settings import BuildSettings
-from avlmaps.maps.store.checkpoints import key_of
+from avlmaps.maps.store.checkpoints import key_of, remove_stages
 from avlmaps.maps.store.manifest import MapInfo, ModelInfo
 from avlmaps.maps.store.manifest_file import MANIFEST, parse_manifest, read_manifest
-from avlmaps.maps.store.own_files import remove_stages
 from avlmaps.maps.store.reader import PARTS
 from avlmaps.maps.store.writer import is_map_or_free, sweep
 from avlmaps.perception.encoders import Encoders

@@ -12,8 +12,7 @@ from avlmaps.core.errors import MapError
 from avlmaps.core.version import __version__
 from avlmaps.core.wording import option
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
-from avlmaps.maps.fusion.cleaning import clean
-from avlmaps.maps.fusion.free_space import FreeViews, ThroughCounts
+from avlmaps.maps.fusion.free_space import FreeViews, ThroughCounts, clean
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.pipeline.estimate import EstimatedFloor, EstimatedUp, ground_notices
 from avlmaps.maps.pipeline.keyframes import KeyframeResult

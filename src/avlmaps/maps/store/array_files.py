@@ -9,6 +9,7 @@ import hashlib
 import io
 import itertools
 import os
+import re
 from collections.abc import Generator, Iterable
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
@@ -25,6 +26,9 @@ SMALL_BYTES = 1 << 20  # files up to this size are read whole and always compare
 MOST_BYTES = 1 << 42
 _QUOTED = 200  # characters of what a damaged manifest says
 _CHUNK_BYTES = 1 << 24
+# Only files that are named so are ever removed: a name, sixteen digits of its checksum, its suffix. People have folders
+# called ``sounds`` of their own, and choose the folder above them for a map.
+_STORED = re.compile(r"[A-Za-z0-9_]+-[0-9a-f]{16}(\.[^./]+)?|\..+\.\d+\.partial")
 MEND = "repair it with `avlmaps info MAP --repair --recording REC`, or restore it from a copy"
 
 
@@ -191,3 +195,8 @@ def verify_file(folder: Path, info: FileInfo, *, verify: bool = False) -> Path:
     if (verify or size <= SMALL_BYTES) and sha256_of_file(path) != info.sha256:
         raise MapError(f"{path} is damaged: its checksum is not the one that was written; {MEND}.")
     return path
+
+
+def is_stored_file(path: Path) -> bool:
+    """Return whether a file of a section has a name that avlmaps gives."""
+    return _STORED.fullmatch(path.name) is not None and path.is_file()

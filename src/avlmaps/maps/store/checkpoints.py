@@ -5,8 +5,10 @@ everything that the stage's outcome depends on; a checkpoint with another key is
 """
 
 import hashlib
+import re
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -27,6 +29,8 @@ from avlmaps.maps.store.array_files import (
 )
 
 DONE = "done.json"
+# What a build names the folder of a stage: the stage and twelve digits of its key; clips wait for their stage.
+_STAGE = re.compile(r"[a-z_]+-[0-9a-f]{12}|clips|clips\.unfinished")
 
 F = TypeVar("F", bound=msgspec.Struct)
 
@@ -161,3 +165,17 @@ def load_or_compute(
     done = compute()
     save_checkpoint(folder, key, done.facts, done.arrays, done.files)
     return load_checkpoint(folder, facts, key)
+
+
+def stage_folders(parts: Path) -> Iterator[Path]:
+    """Yield the folders of stages that a build stores below ``parts/``; none where that is a link or is not there."""
+    if parts.is_dir() and not parts.is_symlink():
+        yield from (entry for entry in parts.iterdir() if _STAGE.fullmatch(entry.name) and entry.is_dir())
+
+
+def remove_stages(parts: Path) -> None:
+    """Remove what a build stored below ``parts/``, and that folder if nothing else is in it."""
+    for folder in list(stage_folders(parts)):
+        shutil.rmtree(folder, ignore_errors=True)
+    with suppress(OSError):
+        parts.rmdir()

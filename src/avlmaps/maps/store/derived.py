@@ -23,10 +23,9 @@ import numpy as np
 from avlmaps.core.errors import MapError
 from avlmaps.core.files import DESCRIPTION_BYTES, decode_json, read_regular, write_bytes_atomically
 from avlmaps.core.version import __version__
-from avlmaps.maps.store.array_files import FileInfo, read_array, sync_names, write_array
+from avlmaps.maps.store.array_files import FileInfo, is_stored_file, read_array, sync_names, write_array
 from avlmaps.maps.store.integrity import Stamp, stamp
 from avlmaps.maps.store.manifest import MapInfo
-from avlmaps.maps.store.own_files import is_stored_file
 
 DERIVED = ".derived"
 _TEXTS = (".py", ".toml", ".json", ".csv", ".txt")  # of a package; its weights are known by the cards of their models

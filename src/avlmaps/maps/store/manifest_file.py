@@ -1,14 +1,25 @@
-"""``map.json`` on the disk: written with its own checksum, and read with suspicion."""
+"""``map.json`` on the disk: written with its own checksum, and held against itself and the arrays that it lists.
 
+A map that was edited, or put together from two, is of the right form and still wrong: positions are twice as far,
+up is down, a sound ends before it begins. Each ``..._fault`` returns the first such fault in words, or nothing.
+"""
+
+import hashlib
+from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import msgspec
+import numpy as np
 
 from avlmaps.core.errors import MapError
 from avlmaps.core.files import MANIFEST_BYTES, decode_json, read_regular, write_bytes_atomically
+from avlmaps.core.registry import Kind
+from avlmaps.maps.grid import index_ends
 from avlmaps.maps.store.array_files import explain_write_errors
-from avlmaps.maps.store.consistency import checksum_of, manifest_fault
 from avlmaps.maps.store.manifest import SCHEMA_VERSION, MapInfo
+from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
 
 MANIFEST = "map.json"
 RESTORE = "restore it from a copy, or build the map again in its place"
@@ -74,3 +85,150 @@ def parse_manifest(content: bytes, path: Path) -> MapInfo:
     if fault:
         raise MapError(f"{path} is damaged: {fault}; {RESTORE}.")
     return info
+
+
+_UNIT = 1e-3
+_ROTATION = 1e-3
+# Corners of the box are written with six digits.
+_BOX_M = 1e-4
+
+
+def checksum_of(content: bytes) -> str:
+    """Return the hex SHA-256 of all that ``map.json`` says but for its own checksum and the timings.
+
+    Layout and the order of keys make no difference; every key counts, known or not. Without the timings, two builds of
+    one recording have one checksum.
+
+    Raises:
+        msgspec.DecodeError, UnicodeDecodeError: it is not JSON.
+    """
+    said: dict[str, Any] = decode_json(content, dict[str, Any])
+    for key in ("checksum", "timings"):
+        said.pop(key, None)
+    return hashlib.sha256(msgspec.json.encode(said, order="deterministic")).hexdigest()
+
+
+def manifest_fault(info: MapInfo) -> str:
+    """Return how ``map.json`` contradicts itself."""
+    return next(chain(_number_faults(info), _floor_faults(info), _geometry_faults(info), _file_faults(info)), "")
+
+
+def _number_faults(info: MapInfo) -> Iterator[str]:
+    sizes = info.voxel_size_m, info.settings.voxel_size_m
+    if not np.isclose(*sizes, rtol=1e-9):
+        yield f"voxel_size_m is {sizes[0]:g} and its settings say {sizes[1]:g}"
+    if info.seed != info.settings.seed:
+        yield f"seed is {info.seed} and its settings say {info.settings.seed}"
+    counts = msgspec.structs.asdict(info.counts)
+    if odd := [f"{what} {count}" for what, count in counts.items() if count < 0]:
+        yield f"there cannot be {odd[0]}"
+    if not (np.isfinite(info.recording.duration_s) and info.recording.duration_s >= 0.0):
+        yield f"the recording's duration_s is {info.recording.duration_s:g}"
+    if any(bad.index < 0 for bad in info.bad_frames):
+        yield "a bad frame has a negative index"
+
+
+def _floor_faults(info: MapInfo) -> Iterator[str]:
+    for floor in info.ground.floors if info.ground else ():
+        for guess in (floor.best, *([floor.runner_up] if floor.runner_up else [])):
+            shares = np.array([guess.confidence, guess.below, floor.cameras])
+            numbers = np.array([guess.height_m, guess.camera_height_m, guess.level_m2])
+            if not (np.isfinite(numbers).all() and guess.level_m2 >= 0.0):
+                yield "a floor's heights or area are no numbers"
+            if not ((shares >= 0.0) & (shares <= 1.0 + 1e-6)).all():
+                yield f"a floor's confidence or share is {shares.min():g} or {shares.max():g}; they lie in [0, 1]"
+
+
+def _geometry_faults(info: MapInfo) -> Iterator[str]:
+    length = float(np.linalg.norm(info.up.direction))
+    if not abs(length - 1.0) <= _UNIT:
+        yield f"the up direction has length {length:g}, not 1"
+    if not 0.0 <= info.up.support <= 1.0 + 1e-6:
+        yield f"the support of the up direction is {info.up.support:g}; it lies in [0, 1]"
+    if fault := _rigid_fault(np.array(info.rig.rgb_from_depth, np.float64)[None]):
+        yield f"rgb_from_depth {fault}"
+    low, high = np.array(info.bounding_box_m.low), np.array(info.bounding_box_m.high)
+    if not (np.isfinite([low, high]).all() and (low <= high).all()):
+        yield f"the bounding box goes from {low.tolist()} to {high.tolist()}"
+
+
+def _file_faults(info: MapInfo) -> Iterator[str]:
+    size = sum(file.bytes for file in info.files.values())
+    if size != info.bytes:
+        yield f"bytes is {info.bytes}, the files have {size} together"
+    owners: dict[str, str] = {}
+    for name, file in info.files.items():
+        if (other := owners.setdefault(file.path, name)) != name:
+            yield f"{other} and {name} are one file ({file.path})"
+
+
+def arrays_fault(info: MapInfo, voxels: Voxels, keyframes: Keyframes, sounds: HeardSounds) -> str:
+    """Return how the arrays contradict ``map.json`` or what their kind is; cheap, large features are not looked at."""
+    return next(
+        chain(
+            _model_faults(info, voxels, keyframes, sounds),
+            _voxel_faults(info, voxels),
+            _keyframe_faults(keyframes),
+            _sound_faults(sounds),
+        ),
+        "",
+    )
+
+
+def _model_faults(info: MapInfo, voxels: Voxels, keyframes: Keyframes, sounds: HeardSounds) -> Iterator[str]:
+    columns = (
+        (Kind.PIXELS, "voxels", voxels.feature.shape[1]),
+        (Kind.VIEWS, "keyframes", keyframes.view.shape[1]),
+        (Kind.SOUNDS, "sounds", sounds.feature.shape[1] if len(sounds) else 0),
+    )
+    for kind, what, width in columns:
+        model = info.models.get(kind.value)
+        if model is not None and width not in (0, model.dim):
+            yield f"the features of its {what} have {width} numbers, those of {model.id} have {model.dim}"
+
+
+def _voxel_faults(info: MapInfo, voxels: Voxels) -> Iterator[str]:
+    index = np.asarray(voxels.index)
+    if len(index):
+        low, high = index_ends(index)
+        box = np.stack([low, high + 1]) * info.voxel_size_m
+        said = np.array([info.bounding_box_m.low, info.bounding_box_m.high])
+        if not np.abs(box - said).max() <= _BOX_M + 1e-9 * np.abs(said).max():
+            yield (
+                f"its bounding box goes from {_place(said[0])} to {_place(said[1])}, but its voxels of "
+                f"{info.voxel_size_m:g} m from {_place(box[0])} to {_place(box[1])}"
+            )
+        seen_s = float(np.ptp(voxels.last_seen_s))
+        if seen_s > info.recording.duration_s + 1.0:
+            yield f"its voxels were seen over {seen_s:.6g} s, and the recording has {info.recording.duration_s:.6g} s"
+    if len(index) and (np.min(voxels.weight) < 0.0 or np.min(voxels.hits) < 1):
+        yield "a voxel has a negative weight or was hit by no pixel"
+
+
+def _keyframe_faults(keyframes: Keyframes) -> Iterator[str]:
+    if (np.diff(keyframes.stamp_s) <= 0.0).any():
+        yield "its keyframes are not in the order of time"
+    if fault := _rigid_fault(np.asarray(keyframes.world_from_camera)):
+        yield f"a keyframe's pose {fault}"
+
+
+def _sound_faults(sounds: HeardSounds) -> Iterator[str]:
+    if (np.diff(sounds.onset_s) < 0.0).any():
+        yield "its sounds are not in the order of their onset"
+    if (length_s := np.asarray(sounds.offset_s) - np.asarray(sounds.onset_s)).min(initial=0.0) < 0.0:
+        worst = int(np.argmin(length_s))
+        yield f"sound {worst} ends at {sounds.offset_s[worst]:.2f} s, before it begins at {sounds.onset_s[worst]:.2f} s"
+
+
+def _rigid_fault(poses: np.ndarray) -> str:
+    rotation = poses[:, :3, :3]
+    if not np.isfinite(poses).all() or not np.allclose(poses[:, 3], (0.0, 0.0, 0.0, 1.0), atol=1e-6):
+        return "is no rigid transform"
+    off = float(np.abs(np.swapaxes(rotation, 1, 2) @ rotation - np.eye(3)).max(initial=0.0))
+    if off > _ROTATION or (np.linalg.det(rotation) < 0.0).any():
+        return f"is no rotation (off orthonormal by {off:.3g}, or mirrored)"
+    return ""
+
+
+def _place(point: np.ndarray) -> str:
+    return "(" + ", ".join(f"{value:.2f}" for value in point.tolist()) + ")"

@@ -19,12 +19,11 @@ from avlmaps.core.wording import option
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.store.array_files import MEND, FileInfo, read_array, verify_file
 from avlmaps.maps.store.array_validation import array_fields, check_extent, check_order, content_fault, validate_arrays
-from avlmaps.maps.store.consistency import arrays_fault
 from avlmaps.maps.store.integrity import IntegrityCheck
 from avlmaps.maps.store.life import LIFE, Life, read_life
 from avlmaps.maps.store.lock import is_locked
 from avlmaps.maps.store.manifest import GroundInfo, MapInfo
-from avlmaps.maps.store.manifest_file import MANIFEST, RESTORE, parse_manifest, read_manifest
+from avlmaps.maps.store.manifest_file import MANIFEST, RESTORE, arrays_fault, parse_manifest, read_manifest
 from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.models.names import public_choice, public_name

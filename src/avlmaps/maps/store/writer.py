@@ -12,15 +12,15 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from avlmaps.maps.store.array_files import FileInfo, sync_names, write_array, write_copy
+from avlmaps.maps.store.array_files import FileInfo, is_stored_file, sync_names, write_array, write_copy
 from avlmaps.maps.store.array_validation import array_fields
+from avlmaps.maps.store.checkpoints import remove_stages, stage_folders
 from avlmaps.maps.store.derived import remove_derived
 from avlmaps.maps.store.integrity import remember_checked
 from avlmaps.maps.store.life import LIFE, Life, life_arrays
 from avlmaps.maps.store.lock import LOCK
 from avlmaps.maps.store.manifest import MapInfo
 from avlmaps.maps.store.manifest_file import MANIFEST, write_manifest
-from avlmaps.maps.store.own_files import is_stored_file, remove_stages, stage_folders
 from avlmaps.maps.store.reader import CLIPS, PARTS, STATE
 from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
 
