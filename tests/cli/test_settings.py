@@ -107,6 +107,7 @@ SAME: dict[str, Callable[[], Any]] = {
     "record.sources": of(RecordSettings, "sources"),
     "record.ambiguous": of(RecordSettings, "ambiguous"),
     "record.hearing": of(RecordSettings, "hearing"),
+    "record.microphones": of(RecordSettings, "microphones"),
     "record.sensor": of(RecordSettings, "sensor"),
     "record.size": size_as_words,
     "record.fov_deg": of(RecordSettings, "fov_deg"),

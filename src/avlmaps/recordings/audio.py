@@ -10,6 +10,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Float
 from avlmaps.core.errors import AudioError
+from avlmaps.recordings.microphones import Microphones
 
 LOWEST_RATE_HZ = 1000
 
@@ -52,6 +53,9 @@ class AudioTrack:
         duration_s: length in seconds.
         start_s: the recording's time at which its first sample sounds.
         channel: the one that is read; None for the mean of all.
+        microphones: where those of the channels are, None where that is not known (``channels.read_channels`` reads
+            them all).
+        files: one for each channel, where they are not channels of one file.
     """
 
     path: Path
@@ -59,6 +63,8 @@ class AudioTrack:
     duration_s: float
     start_s: float = 0.0
     channel: int | None = None
+    microphones: Microphones | None = None
+    files: tuple[Path, ...] = ()
 
     @classmethod
     def open(cls, path: Path | str, start_s: float = 0.0) -> "AudioTrack":
@@ -84,7 +90,7 @@ class AudioTrack:
     @property
     def notices(self) -> tuple[str, ...]:
         """A sentence for each thing worth knowing of the track."""
-        if self.channel is None:
+        if self.channel is None or self.microphones is not None:
             return ()
         return (
             f"The channels of {self.path} cancel one another when they are mixed (one is wired the other way round); "

@@ -126,6 +126,23 @@ def cancelling_channel(path: Path, count: int, rate_hz: int) -> int | None:
     return int(np.argmax(power)) if mixed < _CANCELLED * power.max() else None
 
 
+def read_all_channels(path: Path, begin: int, end: int, rate_hz: int) -> Float32[np.ndarray, "n channels"]:
+    """Return the samples ``begin:end`` of every channel; fewer where the file ends before.
+
+    Raises:
+        AudioError: the file cannot be read.
+    """
+    if _is_plain(path):
+        return _channels(path, begin, end, rate_hz)
+    pieces: list[Float32[np.ndarray, "n channels"]] = []
+    for time_s, samples in _frames(path, begin / rate_hz):
+        at = round(time_s * rate_hz)
+        pieces.append(samples[max(begin - at, 0) : max(end - at, 0)])
+        if at + len(samples) >= end:
+            break
+    return np.concatenate(pieces) if pieces else np.zeros((0, 1), np.float32)
+
+
 def _channels(path: Path, begin: int, end: int, rate_hz: int) -> Float32[np.ndarray, "n channels"]:
     """Return samples of all channels from ``begin`` on; about as many as are wanted of files that FFmpeg reads."""
     if _is_plain(path):

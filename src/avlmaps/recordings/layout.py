@@ -7,7 +7,8 @@ poses.csv         stamp_s,tx,ty,tz,qx,qy,qz,qw: poses of the depth camera, at th
 frames.csv        name,stamp_s: when each picture was taken. It may be left out where poses.csv has one row for
                   each picture (in the order of the names), where rgb_rate_hz is given and names are numbers, or
                   or where a video has stamps of its own; a video's frames are the depth pictures in the order of names
-audio.flac        or .wav, .ogg: the sound track; without it that of the video
+audio.flac        or .wav, .ogg: the sound track, of one channel or of those that `microphones` places; without it that
+                  of the video
 events.csv, semantic/, objects.json   truth, which mapping never reads
 """
 
@@ -24,6 +25,7 @@ from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import DESCRIPTION_BYTES, decode_json, read_regular
 from avlmaps.recordings.corrections import Corrections, PoseKind
 from avlmaps.recordings.faults import Fault, Report
+from avlmaps.recordings.microphones import MicrophoneNumbers
 
 SCHEMA_VERSION = 1
 DESCRIPTION = "recording.json"
@@ -84,6 +86,7 @@ class Description(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
         poses: how poses.csv is to be read (``--poses``).
         camera_axes: where the axes of the poses' camera point (``--camera-axes``); OpenCV's if None.
         pose_delay_s: by how much the stamps of poses.csv are later than the pictures' (``--pose-delay``).
+        microphones: where those of the track's channels are; None where that is not known.
     """
 
     schema_version: int
@@ -99,6 +102,12 @@ class Description(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     poses: PoseKind | tuple[PoseKind, ...] = ()
     camera_axes: str | None = None
     pose_delay_s: float | None = None
+    microphones: MicrophoneNumbers | msgspec.UnsetType | None = msgspec.UNSET
+
+    @property
+    def placed(self) -> MicrophoneNumbers | None:
+        """The microphones; a recording without them does not have the key, so that older readers open it."""
+        return self.microphones or None
 
     def corrections(self) -> Corrections:
         """Return how the poses are to be read.
@@ -188,6 +197,7 @@ def decode_description(path: Path) -> Description:
 def _known_keys(where: str) -> str:
     """Return the keys of the object that a decoding error points to."""
     kind = Intrinsics if where.endswith("intrinsics`") else CameraNumbers if "intrinsics." in where else Description
+    kind = MicrophoneNumbers if "microphones" in where else kind
     return ", ".join(kind.__struct_fields__)
 
 
@@ -201,6 +211,8 @@ def _impossible(description: Description) -> str:
     try:
         description.rig()
         description.corrections()
+        if description.placed is not None:
+            description.placed.microphones()
     except ValueError as error:
         return str(error)
     except RecordingError as error:

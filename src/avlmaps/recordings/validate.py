@@ -10,6 +10,7 @@ from avlmaps.core.errors import AvlmapsError, RecordingError
 from avlmaps.core.files import PICTURE_BYTES, decode_json, read_regular
 from avlmaps.core.progress import progress
 from avlmaps.recordings import images
+from avlmaps.recordings.channels import channel_faults
 from avlmaps.recordings.corrections import uncorrected
 from avlmaps.recordings.faults import Fault, Report
 from avlmaps.recordings.formats.file_recording import FileRecording
@@ -69,6 +70,8 @@ def _check_audio(recording: Recording, report: Report) -> None:
     try:
         for _ in recording.audio.blocks(60.0):
             pass
+        for sentence in channel_faults(recording.audio) if recording.audio.microphones is not None else ():
+            report(Fault(sentence, recording.audio.path, fatal=False))
     except AvlmapsError as error:
         report(Fault(str(error), recording.audio.path, fatal=False))
 

@@ -19,12 +19,15 @@ from avlmaps.core.files import sync_folder, write_bytes_atomically
 from avlmaps.core.progress import progress
 from avlmaps.recordings import layout
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
+from avlmaps.recordings.channels import ChannelSound, write_channels
 from avlmaps.recordings.memory import same_rig
+from avlmaps.recordings.microphones import MicrophoneNumbers, Microphones
 from avlmaps.recordings.types import Frame, Recording
 
 _JPEG_QUALITY = 95
 _MAX_DEPTH_VALUE = 65534
 _COPIED_AUDIO = (".flac", ".wav", ".ogg")
+_FLAC_CHANNELS = 8
 
 
 @dataclass(eq=False)
@@ -55,6 +58,7 @@ class RecordingWriter:
     _stamps_s: list[float] = field(default_factory=list, init=False)
     _names: set[str] = field(default_factory=set, init=False)
     _audio_start_s: float = field(default=0.0, init=False)
+    _microphones: MicrophoneNumbers | None = field(default=None, init=False)
     _poses: TextIO | None = field(default=None, init=False)
     _frames: TextIO | None = field(default=None, init=False)
 
@@ -127,7 +131,12 @@ class RecordingWriter:
         _take(depth, self.path / "depth" / f"{name}.png", link)
         self._log(name, stamp_s, world_from_camera)
 
-    def set_audio(self, audio: Path | Sound | AudioTrack, start_s: float = 0.0) -> None:
+    def set_audio(
+        self,
+        audio: Path | Sound | ChannelSound | AudioTrack,
+        start_s: float = 0.0,
+        microphones: Microphones | None = None,
+    ) -> None:
         """Give the recording its sound track.
 
         A FLAC, WAV or OGG file is copied as it is; samples, and the sound of a video, are written as FLAC.
@@ -135,6 +144,7 @@ class RecordingWriter:
         Args:
             audio: the track.
             start_s: the recording's time at which it begins; a track that is open says so itself.
+            microphones: where those of its channels are; a track that is open says so itself.
 
         Raises:
             RecordingError: the file is of a kind that cannot be copied.
@@ -143,6 +153,14 @@ class RecordingWriter:
         for old in self.path.glob("audio.*"):
             old.unlink()
         self._audio_start_s = audio.start_s if isinstance(audio, AudioTrack) else start_s
+        placed = audio.microphones if isinstance(audio, AudioTrack) else microphones
+        self._microphones = None if placed is None else MicrophoneNumbers.of(placed)
+        if isinstance(audio, AudioTrack) and audio.files:
+            self._take_channels(audio.files)
+            return
+        if isinstance(audio, ChannelSound):
+            write_channels(self.path / ("audio.flac" if len(audio.samples) <= _FLAC_CHANNELS else "audio.wav"), audio)
+            return
         if isinstance(audio, AudioTrack) and audio.path.suffix.lower() in _COPIED_AUDIO:
             audio = audio.path
         if isinstance(audio, Path):
@@ -151,6 +169,14 @@ class RecordingWriter:
             _take(audio, self.path / f"audio{audio.suffix.lower()}", link=False)
         else:
             write_flac(self.path / "audio.flac", audio.blocks() if isinstance(audio, AudioTrack) else audio)
+
+    def _take_channels(self, files: tuple[Path, ...]) -> None:
+        """Copy the files of the channels, each under a name of its own."""
+        assert self._microphones is not None
+        names = [f"audio.{number + 1}{path.suffix.lower()}" for number, path in enumerate(files)]
+        for path, name in zip(files, names, strict=True):
+            _take(path, self.path / name, link=False)
+        self._microphones = msgspec.structs.replace(self._microphones, files=names)
 
     def _announce(self, name: str, stamp_s: float) -> None:
         if self._poses is None:
@@ -200,6 +226,7 @@ class RecordingWriter:
             audio_start_s=self._audio_start_s,
             frames=len(self._stamps_s),
             origin=self.origin,
+            microphones=self._microphones or msgspec.UNSET,
         )
         return msgspec.json.format(msgspec.json.encode(description), indent=2) + b"\n"
 

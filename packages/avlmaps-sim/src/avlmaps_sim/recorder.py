@@ -17,8 +17,11 @@ from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.processes import end_with_parent, fresh_processes
 from avlmaps.core.progress import progress, say
+from avlmaps.core.wording import option
 from avlmaps.recordings.audio import Sound
+from avlmaps.recordings.channels import ChannelSound
 from avlmaps.recordings.layout import DESCRIPTION
+from avlmaps.recordings.microphones import LEVEL_CAMERA_FROM_ROBOT, Microphones, microphones_named
 from avlmaps.recordings.writer import RecordingWriter
 from avlmaps_sim.coverage import FloorCoverage, coverage_of_walk, require_floor
 from avlmaps_sim.hearing import Recorded, ScheduleRule, Sounding, Synthesised, candidates, schedule
@@ -47,6 +50,8 @@ class RecordSettings:
         sensor: whose faults colour and depth have.
         hearing: ``overlay``: dry clips as the paper mixed them; ``acoustic``: loudness, walls and reverberation
             follow the geometry; ``none``: no track.
+        microphones: of acoustic hearing: ``mono``, ``stereo``, ``square4``, or a JSON file with ``positions_m``.
+        rt60_s: how long every room takes to fall by 60 dB (acoustic, several microphones); by its surfaces if None.
         sounds: folder of clips, as ``avlmaps add-sounds`` reads it; None makes them by rule.
         categories: only these kinds of sound; all that homes make if empty.
         sources: how many sounds; one for every twelve seconds of the walk if None.
@@ -67,6 +72,8 @@ class RecordSettings:
     fps: float = 10.0
     sensor: SensorName = "clean"
     hearing: Hearing = "overlay"
+    microphones: str = "mono"
+    rt60_s: float | None = None
     sounds: Path | None = None
     categories: tuple[str, ...] = ()
     sources: int | None = None
@@ -93,11 +100,17 @@ class RecordSettings:
             (8_000 <= self.rate_hz <= 96_000, f"a track of {self.rate_hz} Hz", "8000 to 96000"),
             (0.0 <= self.snr_db <= 90.0, f"a signal-to-noise ratio of {self.snr_db:g} dB", "0 to 90"),
             (0 <= self.workers <= 256, f"{self.workers} processes", "0 (every core) to 256"),
+            (self.rt60_s is None or 0.1 <= self.rt60_s <= 3.0, f"rooms that ring for {self.rt60_s} s", "0.1 to 3"),
             (self.max_frames is None or self.max_frames >= 2, f"{self.max_frames} frames at most", "2 or more"),
         )
         for right, value, choice in checks:
             if not right:
                 raise RecordingError(f"A scene cannot be recorded with {value}; choose {choice}.")
+        if self.microphones != "mono" and self.hearing != "acoustic":
+            raise RecordingError(
+                f"Hearing {self.hearing} has one microphone; several ({self.microphones}) need "
+                f"{option('hearing', 'acoustic')}."
+            )
 
     @property
     def camera(self) -> Pinhole:
@@ -162,6 +175,7 @@ def record_scene(
         raise RecordingError(f"{out} holds a recording already; choose another folder or remove it.")
     space = require_floor(scene, settings.walk)
     for_walk, for_sounds, for_track, for_frames = np.random.default_rng(seed).spawn(4)
+    _microphones(settings)
     trip = _trip(scene, settings, for_walk)
     soundings = _soundings(scene, settings, trip, for_sounds)
     floor = coverage_of_walk(scene, space, trip.world_from_camera, settings.fov_deg, settings.walk)
@@ -170,7 +184,7 @@ def record_scene(
     rig = Rig(settings.camera, settings.camera)
     with RecordingWriter(out, rig, up_in_world=_UP, colour=settings.colour, origin=origin) as writer:
         if (track := _track(scene, settings, trip, soundings, for_track)) is not None:
-            writer.set_audio(track)
+            writer.set_audio(track, microphones=_microphones(settings))
         _write_frames(scene, settings, trip, writer, for_frames)
         made_by = {"scene": scene.name, "seed": seed, "settings": _plain(settings)}
         write_truth(out, scene, soundings, {**made_by, "changes": to_json(changes)} if changes else made_by)
@@ -216,7 +230,7 @@ def _soundings(scene: Scene, settings: RecordSettings, trip: _Trip, rng: np.rand
 
 def _track(
     scene: Scene, settings: RecordSettings, trip: _Trip, soundings: list[Sounding], rng: np.random.Generator
-) -> Sound | None:
+) -> Sound | ChannelSound | None:
     if settings.hearing == "none":
         return None
     if settings.hearing == "overlay":
@@ -225,9 +239,27 @@ def _track(
         return overlay(soundings, trip.duration_s, rng, settings.rate_hz, snr_db=settings.snr_db)
     from avlmaps_sim.hearing.acoustic import AcousticSettings, acoustic
 
-    wanted = AcousticSettings(rate_hz=settings.rate_hz, snr_db=settings.snr_db)
+    wanted = AcousticSettings(rate_hz=settings.rate_hz, snr_db=settings.snr_db, rt60_s=settings.rt60_s)
+    if (array := _microphones(settings)) is not None:
+        from avlmaps_sim.hearing.array import heard_by_array
+
+        poses = trip.world_from_camera
+        return heard_by_array(scene, soundings, trip.stamps_s, poses, array, trip.duration_s, rng, wanted)
     robot = trip.world_from_camera[:, :3, 3]
     return acoustic(scene, soundings, trip.stamps_s, robot, trip.duration_s, rng, wanted)
+
+
+def _microphones(settings: RecordSettings) -> Microphones | None:
+    """Return the array on the robot, whose frame is level while the camera looks down; None for one microphone."""
+    if settings.microphones == "mono":
+        return None
+    array = microphones_named(settings.microphones)
+    if not np.array_equal(array.camera_from_robot, LEVEL_CAMERA_FROM_ROBOT):
+        return array
+    down = settings.walk.pitch_down_rad
+    tilt = np.eye(4)
+    tilt[1:3, 1:3] = [[np.cos(down), -np.sin(down)], [np.sin(down), np.cos(down)]]
+    return Microphones(array.position_m, tilt @ array.camera_from_robot)
 
 
 def _write_frames(

@@ -12,7 +12,7 @@ from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.clips import loudness_db
 from avlmaps_sim.hearing import AcousticSettings, Sounding, Source, acoustic, overlay
 from avlmaps_sim.hearing.filters import shaped_impulse, split
-from avlmaps_sim.hearing.impulse import Acoustics, _direct
+from avlmaps_sim.hearing.impulse import Acoustics, arrivals
 from avlmaps_sim.hearing.rooms import BANDS_HZ, SPEED_M_S, WALL_DB, Rooms
 from avlmaps_sim.mesh import Material
 from avlmaps_sim.scene import Scene, SceneBuilder
@@ -154,7 +154,7 @@ def test_sound_that_bends_round_a_corner_loses_its_treble() -> None:
     corner = np.array([4.05, 3.0])  # the shortest way touches the door's edge
     expected_m = sum(np.linalg.norm(corner - end) for end in ((1.0, 0.8), (7.0, 0.8)))
     assert way.round_m == pytest.approx(expected_m, abs=0.25)
-    through, bent = _direct(way)
+    through, bent = arrivals(way)
     assert bent[1][0] > 2.0 * bent[1][-1]
     assert (bent[1] < 1.0 / way.straight_m).all()
     assert (through[1] < bent[1]).all()

@@ -137,7 +137,12 @@ def audio_key(recording: Recording) -> list[str | float] | None:
     if track is None:
         return None
     content = sampled_digest(track.path, LARGEST_BUDGET_BYTES).hex()
-    return [track.path.name, content, track.rate_hz, track.duration_s, track.start_s]
+    known: list[str | float] = [track.path.name, content, track.rate_hz, track.duration_s, track.start_s]
+    if track.microphones is not None:
+        array = track.microphones
+        known += [*array.position_m.ravel().tolist(), *array.camera_from_robot.ravel().tolist()]
+        known += [sampled_digest(path, LARGEST_BUDGET_BYTES).hex() for path in track.files[1:]]
+    return known
 
 
 def claim(plan: BuildPlan, resume: bool, overwrite: bool) -> MapInfo | None:

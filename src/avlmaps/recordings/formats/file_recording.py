@@ -238,13 +238,14 @@ class FileRecording(Recording):
         geometry_digest(digest, self, f" {self.depth_units}")
         add_files(digest, self.path, self._names())
         if self.audio is not None:
-            add_files(digest, self.audio.path.parent, [self.audio.path.name])
+            files = self.audio.files or (self.audio.path,)
+            add_files(digest, self.audio.path.parent, [file.name for file in files])
             digest.update(f"{self.audio.start_s}".encode())
         return digest.hexdigest()
 
     def change_stamp(self) -> str:
         """Return a hash over every file's size and time of change; see ``Recording.change_stamp``."""
-        files = [self.audio.path] if self.audio is not None else []
+        files = [*(self.audio.files or (self.audio.path,))] if self.audio is not None else []
         return stamp_of(self.path, self._names(), files)
 
     def _names(self) -> list[str]:

@@ -13,6 +13,7 @@ from avlmaps.core import poses, timeline
 from avlmaps.core.errors import NoAudioStreamError, RecordingError
 from avlmaps.recordings import layout
 from avlmaps.recordings.audio import AudioTrack
+from avlmaps.recordings.channels import tracked
 from avlmaps.recordings.corrections import corrected
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
 from avlmaps.recordings.formats.columns import NAMED_FILE, POSE, named_order, split_header
@@ -20,6 +21,7 @@ from avlmaps.recordings.formats.file_recording import FileRecording, Shots, find
 from avlmaps.recordings.formats.tables import read_table, text_lines
 from avlmaps.recordings.images import file_turn, first_picture_size
 from avlmaps.recordings.layout import Description
+from avlmaps.recordings.microphones import MicrophoneNumbers
 from avlmaps.recordings.plausible import clock_fault, date_fault, pace_fault
 from avlmaps.recordings.turning import Turn
 from avlmaps.recordings.types import Recording
@@ -63,7 +65,7 @@ def open_folder(path: Path, report: Report = stop_at_first) -> Recording:
         shots=shots,
         depth_units=description.depth_units_per_m,
         up_in_world=None if up is None else np.array(up) / np.linalg.norm(up),
-        audio=_open_audio(path, audio_start_s, video, first_s),
+        audio=_open_audio(path, audio_start_s, video, first_s, description.placed),
         notices=(*_turned_notices(video), *notices, *more),
         video=video,
         trajectory=trajectory,
@@ -114,7 +116,9 @@ def _check_clocks(folder: Path, description: Description, found: "_Pictures", kn
         raise RecordingError(f"{folder}: {fault}")
 
 
-def _open_audio(path: Path, start_s: float, video: VideoFrames | None, first_s: float) -> AudioTrack | None:
+def _open_audio(
+    path: Path, start_s: float, video: VideoFrames | None, first_s: float, microphones: MicrophoneNumbers | None
+) -> AudioTrack | None:
     """Open the sound track: a file of its own, else the video's (most have none, which is not a fault).
 
     Args:
@@ -122,10 +126,12 @@ def _open_audio(path: Path, start_s: float, video: VideoFrames | None, first_s: 
         start_s: when the track begins, as the description says; 0 where it says nothing.
         video: the pictures, where they are a video.
         first_s: when the video's first frame was taken, on the recording's clock.
+        microphones: where those of the track's channels are, where the description says so.
     """
-    file = find_audio(path)
+    file = path / microphones.files[0] if microphones is not None and microphones.files else find_audio(path)
     if file is not None:
-        return AudioTrack.open(file, start_s=start_s)
+        track = AudioTrack.open(file, start_s=start_s)
+        return track if microphones is None else tracked(track, microphones, path)
     if video is not None:
         with suppress(NoAudioStreamError):
             return AudioTrack.open(video.path, start_s=start_s or first_s - video.start_s)

@@ -26,12 +26,14 @@ class AcousticSettings:
         loudness_db: of a sound of middling kind at 1 m in the open, RMS of its loud frames against full scale.
         snr_db: how far the room's noise lies below that.
         step_s: how often the robot's place counts again; between two the responses are cross-faded.
+        rt60_s: how long every room takes to fall by 60 dB; as its surfaces say if None.
     """
 
     rate_hz: int = 22_050
     loudness_db: float = -24.0
     snr_db: float = 30.0
     step_s: float = 0.25
+    rt60_s: float | None = None
 
 
 def acoustic(
@@ -57,7 +59,7 @@ def acoustic(
         settings: how.
     """
     settings = settings or AcousticSettings()
-    building = Acoustics(scene, settings.rate_hz)
+    building = Acoustics(scene, settings.rate_hz, settings.rt60_s)
     samples = np.zeros(round(duration_s * settings.rate_hz), np.float32)
     for sounding in soundings:
         clip = resample(sounding.source.sound, settings.rate_hz)

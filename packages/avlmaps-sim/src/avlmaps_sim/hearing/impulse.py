@@ -23,11 +23,11 @@ from avlmaps_sim.hearing.sound_paths import Air, Way
 from avlmaps_sim.scene import Area, Scene
 
 _SLAB_DB = WALL_DB + 12.0
-_NEAREST_M = 0.3
+NEAREST_M = 0.3
 _MOST_WALLS = 4
 _MOST_DIFFRACTION_DB = 24.0
 _LONGEST_S = 1.6
-_LATE_FROM_S, _LATE_BY_S = 0.010, 0.030  # after the direct sound the late field fades in
+LATE_FROM_S, LATE_BY_S = 0.010, 0.030  # after the direct sound the late field fades in
 _ORDER_OF_FEW_WALLS, _ORDER = 4, 3
 _STEP_S = 0.002
 
@@ -39,10 +39,12 @@ class Acoustics:
     Attributes:
         scene: the building.
         rate_hz: samples a second.
+        rt60_s: how long every room takes to fall by 60 dB at middling frequencies; as its surfaces say if None.
     """
 
     scene: Scene
     rate_hz: int
+    rt60_s: float | None = None
     _floors: dict[float, tuple[Air, Rooms]] = field(default_factory=dict, init=False)
 
     def floor_at(self, height_m: float) -> tuple[Air, Rooms]:
@@ -53,7 +55,8 @@ class Acoustics:
         if floor_m not in self._floors:
             here = tuple(area for area in areas if abs(area.floor_m - floor_m) < 0.8)
             air = Air.of(self.scene, here, floor_m)
-            self._floors[floor_m] = (air, Rooms.of(self.scene, air))
+            rooms = Rooms.of(self.scene, air)
+            self._floors[floor_m] = (air, rooms if self.rt60_s is None else rooms.reverberating(self.rt60_s))
         return self._floors[floor_m]
 
     def responses(
@@ -68,7 +71,7 @@ class Acoustics:
         """
         air, rooms = self.floor_at(float(ears[:, 2].mean()))
         if self.floor_at(float(source[2]))[0] is not air:
-            return [self._through_slab(source, ear) for ear in ears]
+            return [self.through_slab(source, ear) for ear in ears]
         own = air.room_at(source[:2])
         source = np.array([*air.out_of_walls(source[:2], own), source[2]])
         late = self._late(rooms, own, rng)
@@ -86,11 +89,11 @@ class Acoustics:
         rate_hz = self.rate_hz
         length = round(_LONGEST_S * rate_hz) if late is None else len(late)
         out = np.zeros(length)
-        arrivals = _direct(way)
-        for delay_s, gain in arrivals:
+        arriving = arrivals(way)
+        for delay_s, gain in arriving:
             _add(out, delay_s * rate_hz, shaped_impulse(gain, rate_hz) if np.ptp(gain) > 0 else gain[:1])
-        first_s = min(delay_s for delay_s, _ in arrivals)
-        fade = np.clip((np.arange(length) / rate_hz - first_s - _LATE_FROM_S) / (_LATE_BY_S - _LATE_FROM_S), 0.0, 1.0)
+        first_s = min(delay_s for delay_s, _ in arriving)
+        fade = np.clip((np.arange(length) / rate_hz - first_s - LATE_FROM_S) / (LATE_BY_S - LATE_FROM_S), 0.0, 1.0)
         if images is None:
             fade = np.clip((np.arange(length) / rate_hz - first_s) / 0.002, 0.0, 1.0)
         else:
@@ -102,20 +105,33 @@ class Acoustics:
 
     def _late(self, rooms: Rooms, own: int, rng: np.random.Generator) -> Float[np.ndarray, "r t"] | None:
         """Return the late field in every room of a source in one of them."""
+        envelope = self.late_envelope(rooms, own)
+        if envelope is None:
+            return None
+        noise = split(rng.standard_normal(envelope.shape[2]), self.rate_hz)
+        out = np.zeros(envelope.shape[1:])
+        for band in range(len(BANDS_HZ)):
+            for room in range(len(rooms.areas)):
+                out[room] += envelope[band, room] * noise[band]
+        return out
+
+    def late_envelope(self, rooms: Rooms, own: int) -> Float[np.ndarray, "b r t"] | None:
+        """Return by band the amplitude of the late field in every room of a source in one; None outdoors."""
         if own < 0:
             return None
         longest_s = min(_LONGEST_S, 1.1 * max(rooms.rt60_s(room) for room in range(len(rooms.areas))) + 0.1)
-        count = round(longest_s * self.rate_hz)
         coarse = np.arange(0.0, longest_s + _STEP_S, _STEP_S)
         energy = rooms.energy(own, coarse)
-        noise = split(rng.standard_normal(count), self.rate_hz)
-        times_s = np.arange(count) / self.rate_hz
-        out = np.zeros((len(rooms.areas), count))
+        times_s = np.arange(round(longest_s * self.rate_hz)) / self.rate_hz
+        out = np.zeros((*energy.shape[:2], len(times_s)))
         for band in range(len(BANDS_HZ)):
             for room in range(len(rooms.areas)):
-                amplitude = np.sqrt(np.interp(times_s, coarse, energy[band, room]) / self.rate_hz)
-                out[room] += amplitude * noise[band]
+                out[band, room] = np.sqrt(np.interp(times_s, coarse, energy[band, room]) / self.rate_hz)
         return out
+
+    def coloured(self, noise: Float[np.ndarray, "w t"], envelope: Float[np.ndarray, "b t"]) -> Float[np.ndarray, "w t"]:
+        """Return each of several noises with the envelope of each band."""
+        return np.stack([(split(one, self.rate_hz) * envelope).sum(axis=0) for one in noise])
 
     def _images(
         self, rooms: Rooms, own: int, source: Float[np.ndarray, "3"], ears: Float[np.ndarray, "n 3"]
@@ -124,13 +140,29 @@ class Acoustics:
 
         The direct sound is not among them.
         """
-        found: list[Float[np.ndarray, "i 2"] | None] = [None] * len(ears)
+        out: list[Float[np.ndarray, "i 2"] | None] = []
+        for ear, found in zip(ears, self.image_sources(rooms, own, source, ears), strict=True):
+            if found is None:
+                out.append(None)
+                continue
+            distance_m = np.linalg.norm(found[0] - ear, axis=1)
+            out.append(np.column_stack([np.maximum(distance_m, NEAREST_M), found[1]]))
+        return out
+
+    def image_sources(
+        self, rooms: Rooms, own: int, source: Float[np.ndarray, "3"], ears: Float[np.ndarray, "n 3"]
+    ) -> list[tuple[Float[np.ndarray, "i 3"], Float[np.ndarray, " i"]] | None]:
+        """Return place and gain of the image sources that each place sees in the source's own room, elsewhere None.
+
+        The source itself is not among them.
+        """
+        seen_from: list[tuple[Float[np.ndarray, "i 3"], Float[np.ndarray, " i"]] | None] = [None] * len(ears)
         if own < 0:
-            return found
+            return seen_from
         area = rooms.areas[own]
         inside = _inside(area, ears)
         if not inside.any() or not _inside(area, source[None]).all():
-            return found
+            return seen_from
         import pyroomacoustics as pra
 
         absorbing = pra.Material(rooms.mean_absorption(own))
@@ -146,22 +178,21 @@ class Acoustics:
         visible = box.visibility or []
         for index, seen in zip(np.flatnonzero(inside), visible[0], strict=True):
             kept = np.asarray(seen, bool) & (orders > 0)
-            distance_m = np.linalg.norm(places[kept] - ears[index], axis=1)
-            found[index] = np.column_stack([np.maximum(distance_m, _NEAREST_M), gains[kept]])
-        return found
+            seen_from[index] = places[kept], gains[kept]
+        return seen_from
 
-    def _through_slab(self, source: Float[np.ndarray, "3"], ear: Float[np.ndarray, "3"]) -> Float[np.ndarray, " t"]:
+    def through_slab(self, source: Float[np.ndarray, "3"], ear: Float[np.ndarray, "3"]) -> Float[np.ndarray, " t"]:
         """Return the sound on another floor: only what comes straight through the slab between."""
-        distance_m = max(float(np.linalg.norm(ear - source)), _NEAREST_M)
+        distance_m = max(float(np.linalg.norm(ear - source)), NEAREST_M)
         out = np.zeros(round(_LONGEST_S * self.rate_hz))
         gain = 10.0 ** (-_SLAB_DB / 20.0) / distance_m
         _add(out, distance_m / SPEED_M_S * self.rate_hz, shaped_impulse(gain, self.rate_hz))
         return out
 
 
-def _direct(way: Way) -> list[tuple[float, Float[np.ndarray, " b"]]]:
+def arrivals(way: Way) -> list[tuple[float, Float[np.ndarray, " b"]]]:
     """Return delay and gain by band of what arrives first: straight, or round corners and through walls."""
-    straight_m = max(way.straight_m, _NEAREST_M)
+    straight_m = max(way.straight_m, NEAREST_M)
     if way.clear:
         return [(straight_m / SPEED_M_S, np.full(len(BANDS_HZ), 1.0 / straight_m))]
     through = 10.0 ** (-min(way.walls, _MOST_WALLS) * WALL_DB / 20.0) / straight_m
@@ -170,7 +201,7 @@ def _direct(way: Way) -> list[tuple[float, Float[np.ndarray, " b"]]]:
         fresnel = 2.0 * (way.round_m - way.straight_m) * BANDS_HZ / SPEED_M_S
         root = np.sqrt(2.0 * np.pi * np.maximum(fresnel, 1e-6))
         loss_db = np.minimum(5.0 + 20.0 * np.log10(root / np.tanh(root)), _MOST_DIFFRACTION_DB)
-        round_m = max(way.round_m, _NEAREST_M)
+        round_m = max(way.round_m, NEAREST_M)
         found.append((round_m / SPEED_M_S, 10.0 ** (-loss_db / 20.0) / round_m))
     return found
 

@@ -8,7 +8,7 @@ loses energy to absorption and to its neighbours through doorways and (a thousan
 In a single room this is Sabine's decay, 0.161 V/A seconds for 60 dB.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -90,6 +90,16 @@ class Rooms:
         """Return how long sound of 500 Hz and 1 kHz takes to fall by 60 dB in a room, its doorways counted as lost."""
         lost = (self.absorbing_m2[2:4, room] + self.joint_m2[2:4, room].sum(axis=1)).mean()
         return float(24.0 * np.log(10.0) * self.volume_m3[room] / (SPEED_M_S * lost))
+
+    def reverberating(self, rt60_s: float) -> "Rooms":
+        """Return the rooms with the absorption that makes each fall by 60 dB in a given time, at 500 Hz and 1 kHz.
+
+        A room that loses more through its doorways alone falls faster; it then absorbs next to nothing.
+        """
+        lost = 24.0 * np.log(10.0) * self.volume_m3 / (SPEED_M_S * rt60_s)
+        through = self.joint_m2[2:4].sum(axis=2).mean(axis=0)
+        own = np.maximum(lost - through, 0.01 * self.surface_m2)
+        return replace(self, absorbing_m2=self.absorbing_m2 * own / self.absorbing_m2[2:4].mean(axis=0))
 
     def mean_absorption(self, room: int) -> float:
         """Return the share of the energy that a room absorbs at each bounce around 1 kHz, over all its surfaces."""

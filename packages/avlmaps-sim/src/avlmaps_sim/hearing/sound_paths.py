@@ -30,12 +30,14 @@ class Way:
         clear: whether no wall lies between.
         walls: how many do.
         round_m: length of the shortest path through the air; inf where there is none.
+        corner: the place on the plan from which that path goes straight to the microphone, None where it is straight.
     """
 
     straight_m: float
     clear: bool
     walls: int
     round_m: float
+    corner: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,12 +123,12 @@ class Air:
         for ear in ears:
             straight_m = float(np.linalg.norm(ear - source))
             walls = self._walls_between(source[:2], ear[:2])
-            round_m = straight_m
+            round_m, corner = straight_m, None
             if walls:
                 before = self._space.paths(source[None, :2])[1] if before is None else before
-                flat_m = self._length_round(before[0], source[:2], ear[:2])
+                flat_m, corner = self._length_round(before[0], source[:2], ear[:2])
                 round_m = max(float(np.hypot(flat_m, ear[2] - source[2])), straight_m)
-            ways.append(Way(straight_m, walls == 0, walls, round_m))
+            ways.append(Way(straight_m, walls == 0, walls, round_m, corner))
         return ways
 
     def _walls_between(self, a: Float[np.ndarray, "2"], b: Float[np.ndarray, "2"]) -> int:
@@ -138,14 +140,16 @@ class Air:
         thick = max(1, round(_THICKEST_M / length_m * steps)) if length_m > 0.0 else 1
         return int(len(hit) > 0) + int(np.count_nonzero(np.diff(hit) > thick))
 
-    def _length_round(self, before: np.ndarray, a: Float[np.ndarray, "2"], b: Float[np.ndarray, "2"]) -> float:
-        """Return the length of the shortest path round the walls: that of the grid, pulled tight."""
+    def _length_round(
+        self, before: np.ndarray, a: Float[np.ndarray, "2"], b: Float[np.ndarray, "2"]
+    ) -> tuple[float, tuple[float, float] | None]:
+        """Return length and last corner of the shortest path round the walls: that of the grid, pulled tight."""
         way = self._space.path(before, b)
         start, goal = (self._space.nearest(end) for end in (a, b))
         if np.linalg.norm(way[0] - start) > 2 * self.cell_m:
-            return np.inf  # the goal cannot be reached, so its way begins at itself
+            return np.inf, None  # the goal cannot be reached, so its way begins at itself
         points = np.concatenate([[a], way[1:-1], [b]]) if np.allclose(goal, b) else np.concatenate([[a], way[1:]])
-        length_m, at = 0.0, 0
+        length_m, at, corner = 0.0, 0, None
         while at < len(points) - 1:
             ahead = at + 1
             step = 1
@@ -156,8 +160,9 @@ class Air:
                 else:
                     step //= 2
             length_m += float(np.linalg.norm(points[ahead] - points[at]))
+            corner = (float(points[at][0]), float(points[at][1])) if at else None
             at = ahead
-        return length_m
+        return length_m, corner
 
     def joints_m(self) -> tuple[Float[np.ndarray, "r r"], Float[np.ndarray, "r r"]]:
         """Return how many metres each two rooms border on one another, open and by walls."""

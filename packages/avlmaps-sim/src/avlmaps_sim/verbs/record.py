@@ -42,6 +42,9 @@ class Record(Verb):
     """Number of kinds of sound that play in two places."""
     hearing: Literal["overlay", "acoustic", "none"] = "overlay"
     """overlay: dry clips, as the paper mixed them; acoustic: distance, walls and reverberation follow the building."""
+    microphones: Annotated[str, arg(metavar="NAME|FILE")] = "mono"
+    """Microphones on the robot, of acoustic hearing: mono, stereo (0.2 m apart), square4 (0.2 m), or a JSON file with
+    positions_m."""
     sensor: Literal["clean", "kinect", "realsense"] = "clean"
     """Camera whose faults colour and depth have."""
     drift: bool = False
@@ -95,6 +98,7 @@ def record(verb: "Record") -> dict[str, Any]:
         fps=verb.fps,
         sensor=verb.sensor,
         hearing=verb.hearing,
+        microphones=verb.microphones,
         sounds=verb.sounds,
         categories=verb.category,
         sources=verb.sources,
@@ -127,6 +131,7 @@ def record(verb: "Record") -> dict[str, Any]:
         "frames": made.frames,
         "duration_s": round(made.duration_s, 3),
         "hearing": verb.hearing,
+        "microphones": verb.microphones,
         "sounds": len(events),
         "events": events,
         "floor": made.floor.to_json(),

@@ -1,0 +1,198 @@
+"""Sound of several microphones at once: reading it, writing it, and what can be wrong with its channels."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from avlmaps.core.arrays import Float
+from avlmaps.core.errors import AudioError, RecordingError
+from avlmaps.recordings.audio import AudioTrack, Sound
+from avlmaps.recordings.microphones import MicrophoneNumbers, Microphones
+
+_LOOKS, _LOOK_S = 24, 0.5
+_DEAD_DB = 40.0  # a channel this much below the loudest holds nothing of use
+_FULL_SCALE, _CLIPPED = 0.999, 1e-3
+_HUM_DB, _HUM_SHARE = 25.0, 0.9
+_WAV = ".wav"
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelSound:
+    """A piece of sound of several channels.
+
+    Attributes:
+        samples: (m, n) float32 in [-1, 1].
+        rate_hz: samples a second.
+    """
+
+    samples: Float[np.ndarray, "m n"]
+    rate_hz: int
+
+    def __post_init__(self) -> None:
+        if self.samples.ndim != 2 or self.samples.dtype != np.float32:
+            raise ValueError(f"samples are {self.samples.dtype} of {self.samples.shape}; they must be float32 (m, n)")
+
+    @property
+    def duration_s(self) -> float:
+        """Length in seconds."""
+        return self.samples.shape[1] / self.rate_hz
+
+    def channel(self, number: int) -> Sound:
+        """Return one channel."""
+        return Sound(np.ascontiguousarray(self.samples[number]), self.rate_hz)
+
+
+def with_microphones(track: AudioTrack, microphones: Microphones, files: tuple[Path, ...] = ()) -> AudioTrack:
+    """Return a track that knows where its channels' microphones are; as one channel it sounds as its first.
+
+    Args:
+        track: the sound file, or the first of several.
+        microphones: one for each channel.
+        files: one for each channel, where they are not channels of one file.
+
+    Raises:
+        RecordingError: there are more or fewer channels than microphones.
+        AudioError: files of channels have another length or rate.
+    """
+    from dataclasses import replace
+
+    if files:
+        for path in files[1:]:
+            other = AudioTrack.open(path, track.start_s)
+            for name, here, there in (
+                ("samples a second", track.rate_hz, other.rate_hz),
+                ("samples", round(track.duration_s * track.rate_hz), round(other.duration_s * other.rate_hz)),
+            ):
+                if here != there:
+                    raise AudioError(
+                        f"The channels disagree: {track.path} has {here} {name}, {path} has {there}; export them "
+                        "together, from one clock."
+                    )
+    else:
+        count = _count(track.path)
+        if count != len(microphones):
+            raise RecordingError(
+                f"{track.path} has {count} channel(s), but the recording describes {len(microphones)} microphone(s); "
+                "give one position for each channel."
+            )
+    return replace(track, channel=0, microphones=microphones, files=files)
+
+
+def tracked(track: AudioTrack, given: MicrophoneNumbers, folder: Path) -> AudioTrack:
+    """Return the track of a recording's folder with the microphones that its description gives."""
+    files = tuple(folder / name for name in given.files or ())
+    return with_microphones(track, given.microphones(), files)
+
+
+def read_channels(track: AudioTrack, onset_s: float, offset_s: float) -> ChannelSound:
+    """Read a piece of every channel, with silence for what lies outside the track.
+
+    Args:
+        track: of one channel or several.
+        onset_s: where the piece begins, the recording's time.
+        offset_s: where it ends.
+
+    Raises:
+        AudioError: the file cannot be read, or holds samples that are not finite numbers.
+    """
+    from avlmaps.recordings.containers import read_all_channels
+
+    begin, end = (round((at_s - track.start_s) * track.rate_hz) for at_s in (onset_s, offset_s))
+    count = round(track.duration_s * track.rate_hz)
+    inside_begin, inside_end = min(max(begin, 0), count), min(max(end, 0), count)
+    parts = [read_all_channels(path, inside_begin, inside_end, track.rate_hz) for path in track.files or (track.path,)]
+    length = min(len(part) for part in parts)
+    piece = np.concatenate([part[:length] for part in parts], axis=1)
+    if not np.isfinite(piece).all():
+        raise AudioError(f"{track.path} holds samples that are not finite numbers; convert it again from its source.")
+    samples = np.zeros((piece.shape[1], max(end - begin, 0)), np.float32)
+    if length:
+        samples[:, inside_begin - begin : inside_begin - begin + length] = piece.T
+    return ChannelSound(samples, track.rate_hz)
+
+
+def write_channels(path: Path, sound: ChannelSound) -> None:
+    """Write sound of several channels as 16-bit FLAC (up to 8) or WAV, by the file's suffix; all or nothing.
+
+    Raises:
+        AudioError: the disk is full.
+    """
+    import soundfile
+
+    from avlmaps.core.files import replace_atomically
+
+    kind = "WAV" if path.suffix.lower() == _WAV else "FLAC"
+    with replace_atomically(path) as stream:
+        try:
+            with soundfile.SoundFile(
+                stream.name, "w", sound.rate_hz, len(sound.samples), "PCM_16", format=kind
+            ) as file:
+                for at in range(0, sound.samples.shape[1], sound.rate_hz):  # a second at a time: long writes crash
+                    file.write(np.clip(sound.samples[:, at : at + sound.rate_hz].T, -1.0, 1.0))
+        except (soundfile.SoundFileError, AssertionError) as error:
+            raise AudioError(f"{path} could not be written ({error or 'the disk may be full'}).") from error
+
+
+def channel_faults(track: AudioTrack) -> list[str]:
+    """Return a sentence for each fault of a track's channels: dead, clipped, or with a constant hum.
+
+    Looks at pieces spread over the track. Channels that are exchanged show only where they are compared with the
+    geometry (see ``avlmaps.maps.sources``).
+    """
+    length_s = min(_LOOK_S, track.duration_s)
+    begin_s = track.start_s + np.linspace(0.0, track.duration_s - length_s, _LOOKS)
+    looks = [read_channels(track, at_s, at_s + length_s).samples for at_s in begin_s.tolist()]
+    samples = np.stack(looks).astype(np.float64)  # (looks, m, n)
+    return [*_dead(samples, track), *_clipped(samples, track), *_hum(samples, track)]
+
+
+def _named(track: AudioTrack, channel: int) -> str:
+    return str(track.files[channel]) if track.files else f"Channel {channel + 1} of {track.path}"
+
+
+def _dead(samples: Float[np.ndarray, "k m n"], track: AudioTrack) -> list[str]:
+    level_db = 10.0 * np.log10((samples**2).mean(axis=(0, 2)) + 1e-20)
+    dead = np.flatnonzero(level_db < level_db.max() - _DEAD_DB)
+    return [
+        f"{_named(track, int(i))} is {level_db.max() - level_db[i]:.0f} dB below the loudest, as of a microphone that "
+        "is not connected; check it, or leave it out."
+        for i in dead
+    ]
+
+
+def _clipped(samples: Float[np.ndarray, "k m n"], track: AudioTrack) -> list[str]:
+    full = np.abs(samples) >= _FULL_SCALE
+    held = (full[..., 1:] & full[..., :-1]).mean(axis=(0, 2))
+    return [
+        f"{_named(track, int(i))} is clipped in {held[i]:.1%} of its samples; record with less gain."
+        for i in np.flatnonzero(held > _CLIPPED)
+    ]
+
+
+def _hum(samples: Float[np.ndarray, "k m n"], track: AudioTrack) -> list[str]:
+    """Name a tone that stands out from the spectrum around it in nearly all pieces."""
+    spectrum = np.abs(np.fft.rfft(samples * np.hanning(samples.shape[2]), axis=2)) ** 2 + 1e-20
+    hz = np.fft.rfftfreq(samples.shape[2], 1.0 / track.rate_hz)
+    if len(hz) < 64:
+        return []
+    from scipy.ndimage import median_filter
+
+    around = median_filter(spectrum, size=(1, 1, 41), mode="nearest")
+    over_db = 10.0 * np.log10(spectrum / (around + 1e-9 * spectrum.max()))
+    constant = ((over_db > _HUM_DB).mean(axis=0) > _HUM_SHARE) & (hz > 20.0)
+    said: list[str] = []
+    for channel in np.flatnonzero(constant.any(axis=1)).tolist():
+        mean = spectrum[:, channel].mean(axis=0)
+        tone_hz = hz[np.argmax(np.where(constant[channel], mean, 0.0))]
+        said.append(
+            f"{_named(track, channel)} has a constant hum at {tone_hz:.0f} Hz in all of the track; sounds beside it "
+            "are still heard, but look for its cause (mains, a fan)."
+        )
+    return said
+
+
+def _count(path: Path) -> int:
+    from avlmaps.recordings.containers import read_all_channels
+
+    return read_all_channels(path, 0, 1, 1).shape[1]

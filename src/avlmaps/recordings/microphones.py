@@ -1,0 +1,151 @@
+"""Where the microphones of a recording are: one, two or an array, rigid on the robot."""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from avlmaps.core import poses
+from avlmaps.core.arrays import Float
+from avlmaps.core.errors import RecordingError
+from avlmaps.core.files import DESCRIPTION_BYTES, decode_json, read_regular
+
+# Two microphones nearer than this hear the same; a robot is smaller than this.
+LEAST_APART_M, MOST_APART_M = 0.01, 5.0
+MOST_CHANNELS = 64
+# x forward, y left, z up, at the camera: how the robot's frame lies in the camera's (x right, y down, z forward).
+LEVEL_CAMERA_FROM_ROBOT = np.array([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]], np.float64)
+
+
+class MicrophoneNumbers(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_defaults=True):
+    """Microphones as JSON has them.
+
+    Attributes:
+        positions_m: one for each channel, in the robot's frame: x forward, y left, z up.
+        camera_from_robot: 4x4; by default the robot's frame has its origin at the camera, and the camera looks level.
+        files: one sound file for each channel, where they are not channels of one file.
+    """
+
+    positions_m: list[list[float]]
+    camera_from_robot: list[list[float]] | None = None
+    files: list[str] | None = None
+
+    def microphones(self) -> "Microphones":
+        """Return them as the package works with them.
+
+        Raises:
+            RecordingError: the positions or the transform cannot be.
+        """
+        if not all(len(position) == 3 for position in self.positions_m):
+            raise RecordingError("microphones.positions_m needs three numbers, x, y and z in metres, for each channel.")
+        for name in self.files or ():
+            if not name or Path(name).name != name or "\0" in name:
+                raise RecordingError(f"microphones.files names {name!r}; name files that lie beside recording.json.")
+        given = self.camera_from_robot
+        if given is not None and (len(given) != 4 or any(len(row) != 4 for row in given)):
+            raise RecordingError("microphones.camera_from_robot must be a matrix of 4x4 numbers.")
+        position_m = np.array(self.positions_m, np.float64).reshape(-1, 3)
+        if self.files is not None and len(self.files) != len(position_m):
+            raise RecordingError(
+                f"microphones.files names {len(self.files)} files for {len(position_m)} positions; give one for each."
+            )
+        return Microphones(position_m, LEVEL_CAMERA_FROM_ROBOT if given is None else np.array(given, np.float64))
+
+    @staticmethod
+    def of(microphones: "Microphones") -> "MicrophoneNumbers":
+        """Return the numbers of microphones."""
+        level = np.array_equal(microphones.camera_from_robot, LEVEL_CAMERA_FROM_ROBOT)
+        return MicrophoneNumbers(
+            microphones.position_m.tolist(), None if level else microphones.camera_from_robot.tolist()
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Microphones:
+    """The microphones, one for each channel of the track.
+
+    Attributes:
+        position_m: (m, 3) places in the robot's frame (x forward, y left, z up), metres.
+        camera_from_robot: 4x4, from the robot's frame to the depth camera's.
+    """
+
+    position_m: Float[np.ndarray, "m 3"]
+    camera_from_robot: Float[np.ndarray, "4 4"] = field(default_factory=lambda: LEVEL_CAMERA_FROM_ROBOT)
+
+    def __post_init__(self) -> None:
+        place = self.position_m
+        if place.ndim != 2 or place.shape[1] != 3 or not 1 <= len(place) <= MOST_CHANNELS:
+            raise RecordingError(
+                f"The microphones' positions have shape {place.shape}; give three numbers for each of 1 to "
+                f"{MOST_CHANNELS} channels."
+            )
+        if not np.isfinite(place).all():
+            raise RecordingError("A microphone's position is NaN or infinite; measure it in metres.")
+        poses.orthonormalize(self.camera_from_robot, "the robot's frame in the camera, microphones.camera_from_robot,")
+        for one, other in itertools.combinations(range(len(place)), 2):
+            apart_m = float(np.linalg.norm(place[one] - place[other]))
+            if apart_m < LEAST_APART_M:
+                raise RecordingError(
+                    f"The microphones of channels {one + 1} and {other + 1} are {apart_m:.3g} m apart, which shows no "
+                    f"direction; give their true places, at least {LEAST_APART_M:g} m apart."
+                )
+            if apart_m > MOST_APART_M:
+                raise RecordingError(
+                    f"The microphones of channels {one + 1} and {other + 1} are {apart_m:.3g} m apart, more than the "
+                    f"{MOST_APART_M:g} m of a robot; give positions in metres (not in cm or mm)."
+                )
+
+    def __len__(self) -> int:
+        return len(self.position_m)
+
+    @property
+    def in_camera_m(self) -> Float[np.ndarray, "m 3"]:
+        """The places in the depth camera's frame, metres."""
+        return poses.apply(self.camera_from_robot, self.position_m)
+
+    def in_world_m(self, world_from_camera: Float[np.ndarray, "n 4 4"]) -> Float[np.ndarray, "n m 3"]:
+        """Return the places in the world at each of several poses of the camera, metres."""
+        turned = np.einsum("nij,mj->nmi", world_from_camera[:, :3, :3], self.in_camera_m)
+        return turned + world_from_camera[:, None, :3, 3]
+
+    def take(self, channels: Sequence[int]) -> "Microphones":
+        """Return some of them."""
+        return Microphones(self.position_m[list(channels)], self.camera_from_robot)
+
+
+def _square(side_m: float) -> list[list[float]]:
+    half = side_m / 2
+    return [[half, half, 0.0], [half, -half, 0.0], [-half, -half, 0.0], [-half, half, 0.0]]
+
+
+PRESETS: dict[str, list[list[float]]] = {
+    "mono": [[0.0, 0.0, 0.0]],
+    "stereo": [[0.0, 0.1, 0.0], [0.0, -0.1, 0.0]],
+    "square4": _square(0.2),
+}
+"""Places of the arrays that have a name, metres: the left of two is first, the square begins in front on the left."""
+
+
+def microphones_named(words: str) -> Microphones:
+    """Return the array of a name, or of a JSON file with ``positions_m`` and perhaps ``camera_from_robot``.
+
+    Raises:
+        RecordingError: there is no such name and no such file, or what it holds cannot be.
+    """
+    if words in PRESETS:
+        return Microphones(np.array(PRESETS[words], np.float64))
+    path = Path(words)
+    try:
+        return decode_json(read_regular(path, DESCRIPTION_BYTES), MicrophoneNumbers).microphones()
+    except OSError as error:
+        raise RecordingError(
+            f"There are no microphones called {words!r} and no such file ({error.strerror or error}); choose "
+            f"{', '.join(PRESETS)}, or a JSON file with positions_m."
+        ) from None
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise RecordingError(
+            f'{path} describes no microphones ({error}); write {{"positions_m": [[x, y, z], ...]}} in metres.'
+        ) from None
