@@ -7,9 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import AudioError, BackendError
-from avlmaps.maps.audio.events import HearingSettings, detect_events
+from avlmaps.maps.audio.events import detect_events
 from avlmaps.maps.audio.events import track_of as places_of
-from avlmaps.maps.audio.segmentation import Segment, SegmentationSettings, segment
+from avlmaps.maps.audio.segmentation import Segment, segment
+from avlmaps.maps.audio.settings import HearingSettings, SegmentationSettings
 from avlmaps.recordings.audio import AudioTrack
 
 PLAIN = HearingSettings()

@@ -11,8 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import AudioError, BackendError
-from avlmaps.maps.audio.change_points import ChangeSettings, frames_of_track, split_at_changes
-from avlmaps.maps.audio.events import HearingSettings, detect_events
+from avlmaps.maps.audio.change_points import frames_of_track, split_at_changes
+from avlmaps.maps.audio.events import detect_events
+from avlmaps.maps.audio.settings import ChangeSettings, HearingSettings
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.perception.protocols import FrameSoundEncoder, ModelCard
 from avlmaps.recordings.audio import Sound

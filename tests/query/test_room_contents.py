@@ -11,12 +11,13 @@ from avlmaps.core.lexicon import Kind, lexicon
 from avlmaps.perception.embedded.pixels import EmbeddedPixels
 from avlmaps.perception.embedded.views import EmbeddedViews
 from avlmaps.perception.protocols import SurveyedEncoder
+from avlmaps.perception.room_contents import FURNISHED as FOLDER
 from avlmaps.perception.room_contents import RoomContents, read_room_contents
 from avlmaps.query.room_contents import commonness
 from avlmaps.query.room_contents import votes as votes_of
 
-FURNISHED = read_room_contents("avlmaps.perception")
-NAMED = read_room_contents("avlmaps.perception.embedded")
+FURNISHED = read_room_contents()
+NAMED = read_room_contents(FOLDER / "embedded")
 KINDS = FURNISHED.kinds
 
 
@@ -79,7 +80,7 @@ def test_a_kind_that_the_table_does_not_hold_gets_the_mean() -> None:
     assert mean < 0.0, "a bed speaks against most kinds of room"
 
 
-@pytest.mark.parametrize("table", [FURNISHED, read_room_contents("avlmaps.perception.embedded")])
+@pytest.mark.parametrize("table", [FURNISHED, read_room_contents(FOLDER / "embedded")])
 def test_nothing_speaks_against_a_room_that_the_lexicon_places_it_in(table: RoomContents) -> None:
     """The homes that are counted have no table to dine at in a kitchen; real ones do."""
     kinds = table.kinds

@@ -24,7 +24,7 @@ from avlmaps.view.layout import Layout
 KINDS = ("kitchen", "bedroom", "bathroom")
 LEFT, RIGHT = np.array([[1.0, 1.5, 1.2]]), np.array([[5.0, 1.5, 1.2]])
 KITCHEN, BEDROOM = np.array([[0.8, 0.1, 0.1]]), np.array([[0.1, 0.8, 0.1]])
-FURNISHED = read_room_contents("avlmaps.perception")
+FURNISHED = read_room_contents()
 VIEWS_ALONE = RoomSettings(thing_weight=0.0)
 
 

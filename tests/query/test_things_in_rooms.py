@@ -15,7 +15,7 @@ from avlmaps.query.rooms import RoomField
 from avlmaps.query.rules import query_settings
 from avlmaps.query.things_in_rooms import ThingsInRooms, with_rooms
 
-FURNISHED = read_room_contents("avlmaps.perception")
+FURNISHED = read_room_contents()
 KINDS = ("kitchen", "bedroom")
 SHARES = st.floats(0.0, 1.0)
 

@@ -18,7 +18,8 @@ from typing import Any
 import numpy as np
 
 from avlmaps.core.question import Modality, Part, Role
-from avlmaps.maps.audio.events import HearingSettings, detect_events
+from avlmaps.maps.audio.events import detect_events
+from avlmaps.maps.audio.settings import HearingSettings
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.types import HeardSounds
 from avlmaps.perception.embedded import logmel

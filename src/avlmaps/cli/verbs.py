@@ -2,29 +2,13 @@
 
 from collections.abc import Sequence
 from functools import cache
+from importlib import import_module
 from typing import TYPE_CHECKING, Annotated, Any, Union
 
 import tyro
 
-from avlmaps.cli.add_sounds import AddSounds
-from avlmaps.cli.build import Build
-from avlmaps.cli.changes import Changes
-from avlmaps.cli.export import Export
-from avlmaps.cli.go import Go
-from avlmaps.cli.info import Info
-from avlmaps.cli.live import Live
-from avlmaps.cli.locate import Locate
-from avlmaps.cli.merge import Merge
-from avlmaps.cli.profiles import Profiles
-from avlmaps.cli.query import Query
-from avlmaps.cli.rooms import Rooms
-from avlmaps.cli.serve import Serve
-from avlmaps.cli.shell import Shell
-from avlmaps.cli.teach_sound import TeachSound
-from avlmaps.cli.things import Things
 from avlmaps.cli.usage import CONFIG
 from avlmaps.cli.verb import Verb
-from avlmaps.cli.view import View
 from avlmaps.core.distributions import OTHERS, how_to_get
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import brought, entry_points
@@ -36,24 +20,24 @@ Exit status: 0 done, 1 a known error (one sentence says which), 2 a wrong comman
 With --json an error is {"error": {"kind": ..., "message": ...}} on standard output."""
 
 ENTRY_POINT_GROUP = "avlmaps.verbs"
-_OWN: dict[str, type[Verb]] = {
-    "add-sounds": AddSounds,
-    "build": Build,
-    "live": Live,
-    "merge": Merge,
-    "info": Info,
-    "query": Query,
-    "things": Things,
-    "rooms": Rooms,
-    "changes": Changes,
-    "shell": Shell,
-    "view": View,
-    "export": Export,
-    "locate": Locate,
-    "go": Go,
-    "serve": Serve,
-    "teach-sound": TeachSound,
-    "profiles": Profiles,
+_OWN = {
+    "add-sounds": "AddSounds",
+    "build": "Build",
+    "live": "Live",
+    "merge": "Merge",
+    "info": "Info",
+    "query": "Query",
+    "things": "Things",
+    "rooms": "Rooms",
+    "changes": "Changes",
+    "shell": "Shell",
+    "view": "View",
+    "export": "Export",
+    "locate": "Locate",
+    "go": "Go",
+    "serve": "Serve",
+    "teach-sound": "TeachSound",
+    "profiles": "Profiles",
 }
 # As help lists them: in the order in which a person comes to use them; other packages' own verbs follow.
 _ORDER = (
@@ -66,10 +50,15 @@ if TYPE_CHECKING:
     VERBS: dict[str, type[Verb]]
 
 
+def _own(name: str) -> type[Verb]:
+    """Load one of our verbs; the others stay where they are, since one command needs no other's modules."""
+    return getattr(import_module(f"avlmaps.cli.{name.replace('-', '_')}"), _OWN[name])
+
+
 @cache
 def installed() -> tuple[dict[str, type[Verb]], dict[str, str]]:
     """Return the verbs that are installed, and why each other one that is known cannot be had."""
-    found, missing = dict(_OWN), {}
+    found, missing = {name: _own(name) for name in _OWN}, dict[str, str]()
     for entry in entry_points(ENTRY_POINT_GROUP):
         try:
             found.setdefault(entry.name, brought(entry, "the verb"))
@@ -94,13 +83,16 @@ def read_command(words: Sequence[str]) -> Verb:
         BackendError: the verb is one of a package that is not installed.
         SystemExit: they cannot be read, or request help; either is printed.
     """
-    verbs = _OWN
-    if not words or words[0] not in _OWN:  # a verb of ours needs no other package
+    name = words[0] if words else ""
+    if name not in _OWN:
         verbs, missing = installed()
-        if words and words[0] in missing:
-            raise BackendError(missing[words[0]])
-    shortly = not words or words[0].startswith("-")
-    return tyro.cli(_any_verb(verbs, shortly), prog="avlmaps", description=_DESCRIPTION, args=words, config=CONFIG)
+        if name in missing:
+            raise BackendError(missing[name])
+        if name not in verbs:
+            every = _any_verb(verbs, shortly=not words or name.startswith("-"))
+            return tyro.cli(every, prog="avlmaps", description=_DESCRIPTION, args=words, config=CONFIG)
+    verb = _own(name) if name in _OWN else installed()[0][name]
+    return tyro.cli(verb, prog=f"avlmaps {name}", args=words[1:], config=CONFIG)
 
 
 def _any_verb(verbs: dict[str, type[Verb]], shortly: bool) -> Any:

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from avlmaps.core.errors import MapError
-from avlmaps.maps.audio.events import HearingSettings
+from avlmaps.maps.audio.settings import HearingSettings
 from avlmaps.maps.fusion.sensor import FusionSettings
 from avlmaps.maps.keyframes.describe import KeyframeSettings
 

@@ -3,13 +3,14 @@
 import csv
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
+from pathlib import Path
 
 import numpy as np
 
 from avlmaps.core.arrays import Float64
 
 TABLE = "room_contents.csv"
+FURNISHED = Path(__file__).parent
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,13 +29,13 @@ class RoomContents:
 
 
 @cache
-def read_room_contents(package: str) -> RoomContents:
-    """Return the table that a package holds: a row for each thing, a column for each kind of room.
+def read_room_contents(folder: Path = FURNISHED) -> RoomContents:
+    """Return the table that a folder holds: a row for each thing, a column for each kind of room.
 
     Args:
-        package: ``avlmaps.perception`` for rooms as they are furnished, else that of an encoder.
+        folder: by default that of rooms as they are furnished, else that of an encoder.
     """
-    text = files(package).joinpath(TABLE).read_text(encoding="utf-8")
+    text = (folder / TABLE).read_text(encoding="utf-8")
     head, *rows = csv.reader(text.splitlines())
     surface = np.array([[float(value) for value in row[1:]] for row in rows], np.float64)
     return RoomContents(tuple(row[0] for row in rows), tuple(head[1:]), surface)

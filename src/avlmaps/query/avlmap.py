@@ -518,7 +518,7 @@ class AVLMap:
             field = self.room_field
         except (BackendError, MapError):  # no features of views, or those of another encoder
             return None
-        return None if field is None else ThingsInRooms(field, read_room_contents("avlmaps.perception"))
+        return None if field is None else ThingsInRooms(field, read_room_contents())
 
     def _voting_voxels(self) -> NamedVoxels | None:
         """Return the voxels whose names vote on kinds of room; None where the map holds no probabilities of names."""
@@ -535,7 +535,7 @@ class AVLMap:
         area_m2 = every * self.space.grid.voxel_size_m**2
         encoder = self.stored.encoders.pixels
         surveyed = encoder.room_contents if isinstance(encoder, SurveyedEncoder) else None
-        contents = surveyed or read_room_contents("avlmaps.perception")
+        contents = surveyed or read_room_contents()
         return NamedVoxels(rows, namer.names, namer.confidences(rows), area_m2, contents)
 
     def image(

@@ -12,7 +12,7 @@ import json
 import math
 from collections.abc import Mapping
 from functools import cache
-from importlib.resources import files
+from pathlib import Path
 
 from avlmaps.core.question import Modality
 from avlmaps.query.evidence import Evidence
@@ -50,4 +50,4 @@ def factors_of(evidence: Evidence) -> tuple[str, ...]:
 @cache
 def weights() -> Weights:
     """Return the weights that ship."""
-    return json.loads(files("avlmaps.query").joinpath("found.json").read_text(encoding="utf-8"))["weights"]
+    return json.loads(Path(__file__).with_name("found.json").read_text(encoding="utf-8"))["weights"]

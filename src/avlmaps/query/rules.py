@@ -7,8 +7,7 @@
 from dataclasses import replace
 from typing import Literal
 
-from avlmaps.maps.audio.events import HearingSettings
-from avlmaps.maps.audio.segmentation import SegmentationSettings
+from avlmaps.maps.audio.settings import HearingSettings, SegmentationSettings
 from avlmaps.maps.fusion.sensor import PAPERS_VARIANCE_M2
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
 from avlmaps.query.avlmap import QuerySettings

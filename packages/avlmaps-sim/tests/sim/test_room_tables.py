@@ -55,13 +55,9 @@ def test_an_encoder_that_errs_names_what_it_takes_things_for() -> None:
     assert "wall" not in named and "stove" not in named
 
 
-def test_a_table_is_read_as_it_was_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    package = tmp_path / "written_tables"
-    package.mkdir()
-    (package / "__init__.py").touch()
-    write_table({"bed": {"bedroom": 3.0}, "stove": {"kitchen": 1.25}}, package / "room_contents.csv")
-    monkeypatch.syspath_prepend(str(tmp_path))
-    read = read_room_contents("written_tables")
+def test_a_table_is_read_as_it_was_written(tmp_path: Path) -> None:
+    write_table({"bed": {"bedroom": 3.0}, "stove": {"kitchen": 1.25}}, tmp_path / "room_contents.csv")
+    read = read_room_contents(tmp_path)
     assert set(read.things) == {"bed", "stove"} and set(read.kinds) == {"bedroom", "kitchen"}
     assert read.surface_m2[read.things.index("stove"), read.kinds.index("kitchen")] == 1.25
     assert read.surface_m2[read.things.index("bed"), read.kinds.index("kitchen")] == 0.0

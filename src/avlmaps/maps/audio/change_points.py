@@ -10,41 +10,19 @@ or on its noise. Fixed windows would be simpler, but would cut every event that 
 place half a window away.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from avlmaps.core.arrays import Float, Float32, Int
-from avlmaps.core.errors import AudioError, BackendError
+from avlmaps.core.errors import BackendError
 from avlmaps.core.progress import progress
+from avlmaps.maps.audio.settings import ChangeSettings
 from avlmaps.perception.protocols import FrameSoundEncoder
 from avlmaps.recordings.audio import AudioTrack
 
 _BLOCK_S = 26.0
 _CONTEXT_S = 2.0  # heard on either side of a block, so that its first and last frames know what is round them
 _AT_ONCE = 256
-
-
-@dataclass(frozen=True, slots=True)
-class ChangeSettings:
-    """Cutting a track where what sounds changes."""
-
-    change_s: float = 0.2
-    """A stretch this long that is wholly unlike its surroundings is one of its own; a more alike stretch must last
-    longer. No stretch is shorter."""
-    max_length_s: float = 5.0
-    """A stretch that lasts longer is cut where that costs least: the robot moves on, and its places with it."""
-
-    def __post_init__(self) -> None:
-        for name in ("change_s", "max_length_s"):
-            value = getattr(self, name)
-            if not np.isfinite(value) or value <= 0.0:
-                raise AudioError(f"hearing.changes.{name} is {value}; choose a positive number.")
-        if self.max_length_s < 2.0 * self.change_s:
-            raise AudioError(
-                f"hearing.changes.max_length_s is {self.max_length_s}; choose at least twice change_s "
-                f"({self.change_s})."
-            )
+_USUAL = ChangeSettings()
 
 
 def frames_of_track(track: AudioTrack, encoder: FrameSoundEncoder) -> Float32[np.ndarray, "frames d"]:
@@ -79,7 +57,7 @@ def _check(rows: Float32[np.ndarray, "..."], wanted: int, encoder: FrameSoundEnc
 
 
 def split_at_changes(
-    features: Float32[np.ndarray, "frames d"], hop_s: float, settings: ChangeSettings = ChangeSettings()
+    features: Float32[np.ndarray, "frames d"], hop_s: float, settings: ChangeSettings = _USUAL
 ) -> Int[np.ndarray, " edges"]:
     """Return where a sequence of unit vectors is divided: 0, the first frame of each further stretch, their number.
 

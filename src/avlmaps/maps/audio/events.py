@@ -1,19 +1,20 @@
 """Hearing: from a recording's track to sounds with features, and the places where the robot heard them."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Literal, Protocol, cast
+from typing import Protocol, cast
 
 import numpy as np
 
 from avlmaps.core.arrays import Float, Float32
-from avlmaps.core.errors import AudioError, BackendError
+from avlmaps.core.errors import BackendError
 from avlmaps.core.progress import progress, say
-from avlmaps.maps.audio.change_points import ChangeSettings, frames_of_track, split_at_changes
+from avlmaps.maps.audio.change_points import frames_of_track, split_at_changes
 from avlmaps.maps.audio.denoise import denoise, noise_profile
-from avlmaps.maps.audio.segmentation import Segment, SegmentationSettings, segment
+from avlmaps.maps.audio.segmentation import Segment, segment
+from avlmaps.maps.audio.settings import ChangeSettings, HearingSettings
 from avlmaps.maps.types import HeardSounds
 from avlmaps.perception.protocols import FrameSoundEncoder, SoundEncoder
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
@@ -21,29 +22,6 @@ from avlmaps.recordings.types import Recording
 
 _NEAR_M = 1e-4  # places nearer than this are one
 _EDGE_S = 0.05  # quiet is only what is this far from a sound
-
-
-@dataclass(frozen=True, slots=True)
-class HearingSettings:
-    """From the sound track to the sounds of a map."""
-
-    segmentation: SegmentationSettings = field(default_factory=SegmentationSettings)
-    """Finding the sounds in the track."""
-    noise_reduction_db: float = 12.0
-    """The background is made quieter by at most this, dB, before a sound is encoded; 0 leaves it as it is."""
-    quiet_s: float = 5.0
-    """Seconds before and after a sound, with no other sound in them, from which the background is learnt."""
-    cut: Literal["auto", "energy", "changes"] = "auto"
-    """energy: sounds are what stands out from the background; changes: the whole track is used, divided at its change
-    points; auto: changes where the sound model gives a feature every few hundredths of a second."""
-    changes: ChangeSettings = field(default_factory=ChangeSettings)
-    """Dividing the track where what sounds changes."""
-
-    def __post_init__(self) -> None:
-        for name in ("noise_reduction_db", "quiet_s"):
-            value = getattr(self, name)
-            if not np.isfinite(value) or value < 0.0:
-                raise AudioError(f"hearing.{name} is {value}; choose 0 or more.")
 
 
 def detect_events(

@@ -9,16 +9,16 @@ divides (barks of one dog) are one sound. The paper's own rule, a fixed threshol
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
 from avlmaps.core.arrays import Float32
-from avlmaps.core.errors import AudioError
 from avlmaps.maps.audio.filterbank import NoiseFloor, band_powers, find_noise_floor, hop_samples
+from avlmaps.maps.audio.settings import SegmentationSettings
 from avlmaps.recordings.audio import AudioTrack
 
 _BLOCK_S = 10.0
+_USUAL = SegmentationSettings()
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,49 +40,6 @@ class Segment:
 
 
 @dataclass(frozen=True, slots=True)
-class SegmentationSettings:
-    """Finding the sounds in a track."""
-
-    method: Literal["adaptive", "silence"] = "adaptive"
-    """adaptive: energy against the background as it is there and then; silence: the paper's fixed threshold."""
-    onset_db: float = 6.0
-    """A sound must somewhere be this much above the background, dB."""
-    release_db: float = 2.5
-    """It lasts as long as it is this much above the background, dB."""
-    smoothing_s: float = 0.05
-    """The excess over the background is averaged over this time before it is compared, seconds."""
-    background_window_s: float = 40.0
-    """The background is found within this time, seconds; a longer sound is background."""
-    range_db: float = 65.0
-    """A level this much below the loudest moment of the track is not a sound, however silent the background."""
-    tail_db: float = 50.0
-    """A sound ends where it has fallen this much below its own loudest moment."""
-    merge_gap_s: float = 1.0
-    """Pauses up to this long divide no sound."""
-    min_length_s: float = 0.03
-    """A shorter stretch is not a sound."""
-    max_length_s: float = 30.0
-    """A longer sound is cut where it is quietest."""
-    padding_s: float = 0.02
-    """This time is added at both ends, seconds."""
-    silence_threshold: float = 0.0
-    """Of method silence: samples beyond this, of either sign, are sound."""
-    silence_s: float = 1.0
-    """Of method silence: a pause of this length divides two sounds."""
-
-    def __post_init__(self) -> None:
-        positive = ("smoothing_s", "background_window_s", "range_db", "tail_db", "max_length_s", "silence_s")
-        for name in (*positive, "merge_gap_s", "min_length_s", "padding_s", "silence_threshold", "release_db"):
-            value = getattr(self, name)
-            if not np.isfinite(value) or value < 0.0 or (name in positive and value == 0.0):
-                raise AudioError(f"The segmentation's {name} is {value}; choose a positive number.")
-        if self.onset_db < self.release_db:
-            raise AudioError(f"onset_db is {self.onset_db}, less than release_db ({self.release_db}); choose more.")
-        if self.max_length_s <= self.min_length_s:
-            raise AudioError(f"max_length_s is {self.max_length_s}, not more than min_length_s ({self.min_length_s}).")
-
-
-@dataclass(frozen=True, slots=True)
 class _Run:
     """Frames (or samples) ``begin`` to ``end`` that are sound."""
 
@@ -90,7 +47,7 @@ class _Run:
     end: int
 
 
-def segment(track: AudioTrack, settings: SegmentationSettings = SegmentationSettings()) -> list[Segment]:
+def segment(track: AudioTrack, settings: SegmentationSettings = _USUAL) -> list[Segment]:
     """Find the sounds in a track, in constant memory.
 
     Args:

@@ -1,6 +1,7 @@
 """The embedded pixel encoder: probabilities of categories for each pixel, in the space of words (see ``codes``)."""
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -46,7 +47,7 @@ class EmbeddedPixels(NamedEncoder):
     @property
     def room_contents(self) -> RoomContents:
         """What it names in rooms of each kind: furnished homes and its mistakes together (``training/rooms``)."""
-        return read_room_contents("avlmaps.perception.embedded")
+        return read_room_contents(Path(__file__).parent)
 
     def encode(self, frame: Frame) -> Float32[np.ndarray, "hf wf d"]:
         """Return features on a grid of half the size that the network looks at; zero where there is no depth."""

@@ -9,8 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property
 from hashlib import sha256
-from importlib.resources import files
-from importlib.resources.abc import Traversable
+from pathlib import Path
 from typing import Any, Final
 
 import msgspec
@@ -201,11 +200,11 @@ def load_network(weights: str = DEFAULT_WEIGHTS) -> SceneNetwork:
     Raises:
         BackendError: its files are missing or damaged.
     """
-    folder = files("avlmaps.perception.embedded") / "weights"
+    folder = Path(__file__).with_name("weights")
     return read_network(folder, weights, "install the package again, or make them with 'python -m training.pixels'")
 
 
-def read_network(folder: Traversable, weights: str, remedy: str) -> SceneNetwork:
+def read_network(folder: Path, weights: str, remedy: str) -> SceneNetwork:
     """Return the network of two files: ``WEIGHTS.onnx``, and its ``Notes``, ``WEIGHTS.json``.
 
     Args:

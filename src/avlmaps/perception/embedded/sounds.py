@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from hashlib import sha256
-from importlib.resources import files
 from io import BytesIO
 from pathlib import Path
 from typing import Any, cast
@@ -87,7 +86,7 @@ class EmbeddedSounds:
     def __init__(
         self, words: WordEncoder | None = None, folder: Path | None = None, weights: Path | None = None
     ) -> None:
-        place = files("avlmaps.perception.embedded") / "weights" if weights is None else weights
+        place = Path(__file__).with_name("weights") if weights is None else weights
         parts = [place / f"sounds.{end}" for end in ("onnx", "json", "npy")]
         missing = [part.name for part in parts if not part.is_file()]
         if missing:

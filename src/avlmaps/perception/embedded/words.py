@@ -10,8 +10,8 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from importlib.resources import files
 from io import BytesIO
+from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
@@ -21,7 +21,6 @@ from avlmaps.core.errors import BackendError, QueryError
 from avlmaps.perception.embedded.wordpieces import WordPieces, clean_phrase, replace_aliases
 from avlmaps.perception.protocols import ModelCard
 
-_PACKAGE = "avlmaps.perception.embedded"
 _REMEMBERED = 4096
 
 
@@ -68,7 +67,7 @@ def read_aliases(text: str) -> dict[str, str]:
 
 def _shipped(name: str) -> bytes:
     try:
-        return files(_PACKAGE).joinpath(name).read_bytes()
+        return (Path(__file__).parent / name).read_bytes()
     except FileNotFoundError as error:
         raise BackendError(
             f"The embedded text encoder lacks its file {name}; install the package again, or make it with "

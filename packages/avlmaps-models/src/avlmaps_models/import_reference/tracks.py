@@ -18,7 +18,8 @@ from jaxtyping import Float
 
 from avlmaps.core.errors import MapError
 from avlmaps.core.registry import Kind, find, load
-from avlmaps.maps.audio.events import HearingSettings, detect_events
+from avlmaps.maps.audio.events import detect_events
+from avlmaps.maps.audio.settings import HearingSettings
 from avlmaps.maps.store.array_validation import array_fields
 from avlmaps.maps.store.manifest import ModelInfo
 from avlmaps.maps.types import HeardSounds

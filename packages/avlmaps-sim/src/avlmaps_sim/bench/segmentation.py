@@ -16,7 +16,8 @@ import numpy as np
 from jaxtyping import Float32
 
 from avlmaps.core.progress import progress
-from avlmaps.maps.audio.segmentation import Segment, SegmentationSettings, segment
+from avlmaps.maps.audio.segmentation import Segment, segment
+from avlmaps.maps.audio.settings import SegmentationSettings
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
 from avlmaps.recordings.background import background
 from avlmaps.recordings.clips import Clip, amplify, audible_part, find_clips, gain_for
