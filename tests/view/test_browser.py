@@ -259,6 +259,26 @@ def test_a_pressed_button_can_be_read(page) -> None:
     assert abs(ink - ground).sum() > 250
 
 
+@pytest.mark.parametrize("width", [390, 700, 1000, 1280])
+def test_nothing_at_the_foot_lies_over_anything_else(browser, served: Served, width: int) -> None:
+    page = opened(browser, served.url, width, 700)
+    page.wait_for_selector("#canvas[data-state=whole]")
+    page.click("#above")
+    page.locator("#length").evaluate("e => { e.textContent = '13.40 m; level 12.94 m, up 11.70 m'; }")
+    canvas = page.locator("#canvas").bounding_box()
+    scale = page.locator("#scale").bounding_box()
+    for box in (one.bounding_box() for one in page.locator("#tools button, #length").all()):
+        apart = (
+            box["x"] + box["width"] <= scale["x"] + 0.5
+            or box["y"] + box["height"] <= scale["y"] + 0.5
+            or scale["y"] + scale["height"] <= box["y"] + 0.5
+        )
+        assert apart
+        assert box["x"] >= 0 and box["x"] + box["width"] <= canvas["width"]
+    assert page.faults == []
+    page.close()
+
+
 def test_a_reload_brings_back_the_view_and_the_question(page) -> None:
     page.fill("#sentence", "the red thing")
     page.keyboard.press("Enter")
