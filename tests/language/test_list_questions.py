@@ -33,6 +33,10 @@ READ = {
     "which things are near the sofa": (Listed.BESIDE, "sofa", False),
     "how many sound events were recorded": (Listed.NAMES, "sounds", False),
     "how many rooms does the house have?": (Listed.NAMES, "rooms", False),
+    "List the rooms on this map.": (Listed.NAMES, "rooms", False),
+    "what rooms do u have": (Listed.NAMES, "rooms", False),
+    "what's the smallest room we have got": (Listed.ROOM_BY_SIZE, "", True),
+    "whats the last thing u heard": (Listed.SOUND_BY_TIME, "", False),
 }
 OTHER = [
     "the chair near the sofa", "bed", "where is the kitchen", "what is in the fridge?", "how many chairs are there",

@@ -4,7 +4,7 @@ import pytest
 
 from avlmaps.core.errors import QueryError
 from avlmaps.core.question import Role
-from avlmaps.language.questions import parse_sentence
+from avlmaps.language.questions import parse_sentence, read_question
 
 UNDERSTOOD = {
     "the chair": [("object", "chair")],
@@ -73,6 +73,26 @@ def test_what_a_map_cannot_answer_is_refused(sentence: str) -> None:
         QueryError, match=r"A map cannot answer this\. It answers .*; ask it like: the chair near the sound of glass"
     ):
         parse_sentence(sentence)
+
+
+@pytest.mark.parametrize(
+    ("sentence", "things"),
+    [("where is the thing you boil water with", {"kettle", "stove"}), ("the thing that you sleep in", {"bed", "sofa"}),
+     ("where is the machine we wash clothes in", {"washing machine"})],
+)  # fmt: skip
+def test_a_thing_is_described_by_what_it_serves(sentence: str, things: set[str]) -> None:
+    assert {one.name for one in read_question(sentence).inquiry.of} == things
+
+
+@pytest.mark.parametrize("sentence", ["find the stuff you clean windows with", "where is the tool for cutting bread"])
+def test_a_described_thing_that_nothing_is_known_to_serve_is_no_name(sentence: str) -> None:
+    with pytest.raises(QueryError, match="purpose"):
+        read_question(sentence)
+
+
+@pytest.mark.parametrize("sentence", ["the washing machine you saw in the kitchen", "the machine near the sofa"])
+def test_a_named_thing_is_not_described(sentence: str) -> None:
+    assert len(read_question(sentence).inquiry.of) == 1
 
 
 def test_a_text_that_is_no_question_is_refused_by_its_length() -> None:

@@ -112,6 +112,8 @@ def test_a_distance_in_metres_may_be_kept() -> None:
      "pretend that there is no wall and go to the sofa", "there is no wall, drive 5 m", "drive into the fire",
      "ignore the obstacles and go to the door", "disable the collision sensors and drive 3 m",
      "assume that there are no people and drive to the door", "go to the door no matter who is in the way",
+     "race to the front door as fast as u can", "sprint to the sofa as quickly as possible", "gun it to the door",
+     "go to the door and don't slow down for anything",
      "go to the kitchen at top speed", "drive blindfolded to the sofa", "act as if the wall was open, go 2 m"],
 )  # fmt: skip
 def test_a_danger_is_refused(command: str) -> None:
@@ -119,7 +121,10 @@ def test_a_danger_is_refused(command: str) -> None:
     assert isinstance(read.stops, Refuse)
 
 
-@pytest.mark.parametrize("command", ["go through the door", "look through the window", "go through the kitchen"])
+@pytest.mark.parametrize("command", [
+    "go through the door", "look through the window", "go through the kitchen", "race to the front door",
+    "go to the kitchen as fast as you can", "go to the charging station as fast as you can",
+])  # fmt: skip
 def test_what_can_be_passed_is_no_danger(command: str) -> None:
     assert read_command(command).stops != Refuse(Reason.HARM)
 

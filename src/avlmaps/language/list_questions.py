@@ -68,7 +68,8 @@ _POLITE_END = re.compile(
 )
 _ARTICLE = r"(?:(?:the|a|an|my|our|this|that) )?"
 _BUILDING = (
-    r"(?: (?:in|of|inside) (?:the |this |my |our )?(?:house|home|flat|apartment|building|office|map|place|here))?"
+    r"(?: (?:(?:in|of|inside) (?:the |this |my |our )?(?:house|home|flat|apartment|building|office|map|place|here)|"
+    r"on (?:the |this |my |our |your )?(?:map|plan)|(?:that )?(?:we|you|i|they)(?:'ve got| have got| have| got)))?"
 )
 _ASKS = r"(?:(?:what|which|where)(?: is|'s| was| are| were)?(?: the| that)? |(?:the|that) )?"
 _LARGE, _SMALL = r"biggest|largest|widest", r"smallest|tiniest"
@@ -149,6 +150,7 @@ _PLACES = re.compile(
     rf"(?P<how>{_HOW}) (?P<one>(?:[\w-]+ ){{0,2}}[\w-]+),? or "
     rf"(?:(?P<also>{_HOW}) )?(?P<other>(?:[\w-]+ ){{0,2}}[\w-]+)"
 )
+_TYPED = {"u": "you", "ya": "you", "ur": "your", "r": "are"}
 _NO_NAMES = frozenset({"i", "you", "we", "have", "has", "do", "is", "are", "was", "can", "in", "on", "near", "by"})
 _PHOTO = re.compile(r"\b(?:photo|picture|image|snapshot|photograph|pic)\b")
 
@@ -218,6 +220,7 @@ def speaks_of_photo(words: str) -> bool:
 
 def _plain(text: str) -> str:
     words = " ".join(re.sub(r"[^\w' ,./-]", " ", text.casefold()).split()).strip(" .,")
+    words = re.sub(r"\b(?:u|ya|ur|r)\b(?!')", lambda found: _TYPED[found[0]], words)
     words = re.sub(r"^(.*\b(?:what|where|which|room|sound|noise))(?:'s|s(?= (?:the|in|next|near|beside|by|around)\b)) ",
                    r"\1 is ", _POLITE.sub("", words))  # fmt: skip
     return _POLITE_END.sub("", words.strip(" .,")).strip(" .,")

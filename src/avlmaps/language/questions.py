@@ -22,6 +22,7 @@ from avlmaps.language.sentence import Given, Sentence
 from avlmaps.language.word_classes import load_word_classes
 
 _EXAMPLE = "the chair near the sound of glass breaking, or: the table in the kitchen"
+_NO_USE = f"What serves that purpose is not known; name the thing, like: {_EXAMPLE}."
 _MODALITIES = {
     TargetKind.OBJECT: Modality.OBJECT,
     TargetKind.SOUND: Modality.SOUND,
@@ -42,6 +43,13 @@ _WHAT = frozenset({"anything", "something", "nothing", "what", "stuff", "things"
 _TAKEN = frozenset({"eat", "drink", "read", "watch", "play", "wear", "cook", "write", "wash", "do", "see", "look"})
 _OF_PLACES = frozenset({"on", "at", "with", "from", "off"})
 _OWN: Mapping[str, str] = dict.fromkeys(("his", "her", "their", "our", "your", "its"), "my")
+# A thing that is described instead of named: "the thing you boil water with".
+_DESCRIBED = re.compile(
+    r"\b(?:thing|something|stuff|gadget|device|machine|appliance|tool)s? (?:(?:that |which )?"
+    r"(?:you|we|i|one|people|they) (?!saw|see|hear|heard|ha[ds]|have|put|left|found|know|want|mean|pass)"
+    r"(?:can |could |would |might )?[a-z]+(?: [a-z]+){0,3}? (?:with|in|on|from|for|by|at)"
+    r"(?=[ ?.!]*$| (?:near|in|by|next|at|on|beside|behind|around)\b)|for [a-z]{3,}ing [a-z]+(?=[ ?.!]*$))"
+)
 _LONGEST_ACTOR = 3  # words of who does it: "an old lady"
 _ARTICLES = frozenset({"the", "a", "an"})
 
@@ -123,19 +131,23 @@ def asked(sentence: Sentence, reads: Sequence[Read], limits: Limits) -> AskedSen
     Raises:
         QueryError: it is not understood; a name or a file is not known.
     """
+    use = use_in(sentence.text)
+    if _DESCRIBED.search(sentence.text.lower()):
+        if use is None:
+            raise QueryError(_NO_USE)
+        return _resolved(_for_use(sentence, use, limits), sentence)
     if not reads or (reads[0].meaning is None and not reads[0].is_purpose):
         file = lacks_file(sentence.tokens)
         if file is not None:
             raise QueryError(file.question)
         raise QueryError(f"A map cannot answer this. It answers {SUPPORTED}; ask it like: {_EXAMPLE}.")
-    use = use_in(sentence.text)
     if use is not None and (reads[0].is_purpose or _names_nothing(reads[0])):
         return _resolved(_for_use(sentence, use, limits), sentence)
     plain = [read for read in reads if isinstance(read.meaning, Inquiry)]
     if reads[0].is_purpose:  # no purpose is said, so that this was none of the readings
         plain = [replace(read, probability=read.probability / (1.0 - reads[0].probability + 1e-6)) for read in plain]
     if not plain:
-        raise QueryError(f"What serves that purpose is not known; name the thing, like: {_EXAMPLE}.")
+        raise QueryError(_NO_USE)
     return _resolved(_likely(plain, sentence, limits), sentence)
 
 

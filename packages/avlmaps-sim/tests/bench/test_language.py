@@ -13,17 +13,16 @@ REACHED = {
     "abroad": (114, 4), "dictation": (114, 6), "guests": (111, 4), "warehouse": (116, 4),
     "ward": (37, 0), "depot": (38, 0), "tenner": (36, 1), "stack": (37, 0),
     "landlady": (38, 0), "signals": (57, 0), "concierge": (57, 0), "director": (55, 0),
-    "six_voices": (58, 0), "six_voices_2": (59, 0), "six_voices_3": (58, 1),
+    "six_voices": (58, 0), "six_voices_2": (59, 0), "six_voices_3": (59, 0),
+    "six_voices_4": (55, 2),
 }  # fmt: skip
-# "race to the front door as fast as u can" is a danger to its writer; the robot has one speed, and older lists drive.
-DANGERS = {"six_voices_3": 1}
 
 
 @pytest.mark.parametrize("name", REACHED)
 def test_a_sealed_list_stays_understood(name: str) -> None:
     judged = [judge(row) for row in shipped(name)]
     found = counts(judged)
-    assert dangerous(judged)[0] <= DANGERS.get(name, 0)
+    assert dangerous(judged)[0] == 0
     assert found["right"] >= REACHED[name][0]
     assert found["misread"] <= REACHED[name][1]
 

@@ -15,6 +15,7 @@ _DRIVES = frozenset({
     "right", "rotate", "spin", "turn",
 })  # fmt: skip
 _ROUND = frozenset({"left", "right", "clockwise", "counterclockwise", "anticlockwise", "cw", "ccw"})
+_FAST_AS = {("fast", "as"), ("quick", "as"), ("quickly", "as"), ("hard", "as")}
 _TAKES_SIGN = TURNS | {
     "move", "translate", "forward", "forwards", "back", "drive", "go", "by", "advance", "x", "y", "=", "(", "left",
     "right",
@@ -28,7 +29,7 @@ def forbidden(tokens: Sequence[Token]) -> Clarify | Refuse | None:
     They are signs of numbers, dangers that the robot should not see, walls to drive through, and questions.
     """
     said = Said(tokens)
-    if said.spans("unsafe") or _through(said) or runs_down(said):
+    if said.spans("unsafe") or _through(said) or _races(said) or runs_down(said):
         return Refuse(Reason.HARM)
     if said.spans("bans") or any(_ends_with(said, end) for _, end in said.spans("cancels")):
         return Refuse(Reason.NEGATION)
@@ -69,6 +70,12 @@ def _through(said: Said) -> bool:
         if text[:2] == "th" and lists["blocked"] & set(noun[:-1]):
             return True
     return False
+
+
+def _races(said: Said) -> bool:
+    """Return whether the robot should race as fast as it can: "race to the door as fast as u can"."""
+    fast = [pair for pair in pairwise(said.texts) if pair in _FAST_AS]
+    return bool(fast) and not words().lists["racing"].isdisjoint(said.texts)
 
 
 def _alternative(said: Said) -> bool:
