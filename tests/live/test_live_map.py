@@ -22,7 +22,7 @@ from avlmaps.maps.build import build_map
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
 from avlmaps.maps.fusion.sensor import FusionSettings
 from avlmaps.maps.grid import GridSpec
-from avlmaps.maps.settings import BuildSettings, FrameSettings
+from avlmaps.maps.settings import BuildSettings, FrameSettings, GravitySettings
 from avlmaps.maps.store.reader import open_stored
 
 ENCODERS = avlmaps.Encoders.named("colours")
@@ -360,3 +360,45 @@ def test_a_pose_that_jumps_is_said_at_once() -> None:
     check = PoseCheck()
     assert all(check.add(frame(number)) is None for number in range(10))
     assert "The pose jumps at 1.00 s: 4" in str(check.add(replace(frame(90), stamp_s=1.0)))
+
+
+def test_corrected_poses_move_a_live_map_and_are_no_jump(tmp_path: Path) -> None:
+    chosen = BuildSettings(frames=FrameSettings(per_submap=8), gravity=GravitySettings(frames=8))
+    frames = [frame(number) for number in range(50)]
+    strayed = [np.array(one.world_from_camera) for one in frames]
+    for number, pose in enumerate(strayed[:30]):
+        pose[1, 3] += 0.02 * number
+    with LiveMap(tmp_path / "live", ENCODERS, up_in_world=UP, settings=chosen, live=EVERY) as live:
+        for one, pose in zip(frames[:30], strayed, strict=False):
+            add(live, replace(one, world_from_camera=pose))
+        wait_for(lambda: live.status().voxels > 0)
+        with pytest.raises(MapError, match="of no frame"):
+            live.correct_poses([99.0], np.eye(4)[None])
+        right = np.stack([one.world_from_camera for one in frames[:30]])
+        median_m, most_m = live.correct_poses([one.stamp_s for one in frames[:30]], right)
+        for one in frames[30:]:
+            add(live, one)
+        generation = live.generation
+        wait_for(lambda: live.generation > generation)
+        assert not [doubt for doubt in live.doubts if "jumps" in doubt]
+    assert (median_m, most_m) == (pytest.approx(0.29), pytest.approx(0.58))
+    made = open_stored(tmp_path / "live")
+    wanted = avlmaps.VoxelMap(encoders=ENCODERS, up_in_world=UP)
+    for one in frames:
+        wanted.add(one.rgb, one.depth_m, one.camera, one.world_from_camera, one.stamp_s)
+    there = {tuple(index) for index in wanted.voxel_index.tolist()}
+    found = [tuple(index) for index in np.asarray(made.voxels.index).tolist()]
+    assert np.mean([index in there for index in found]) > 0.9
+    assert np.mean([index in set(found) for index in there]) > 0.95
+    submaps = made.submaps()
+    assert submaps is not None
+    assert len(submaps.stamp_s) == 50
+
+
+def test_a_live_map_without_submaps_follows_no_correction(tmp_path: Path) -> None:
+    with LiveMap(tmp_path / "live", ENCODERS, up_in_world=UP, live=EVERY) as live:
+        add(live, frame(0))
+        with pytest.raises(MapError, match="submaps"):
+            live.correct_poses([0.0], frame(0).world_from_camera[None])
+    with pytest.raises(MapError, match="closed"):
+        live.correct_poses([0.0], np.eye(4)[None])

@@ -1,6 +1,6 @@
 """`avlmaps build`: build a map from a recording."""
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
@@ -62,6 +62,12 @@ class Build(ModelVerb):
     table of stamp tx ty tz qx qy qz qw."""
     reading: Annotated[Reading, OmitArgPrefixes] = field(default_factory=Reading)
     """What you know better than the recording's files."""
+    submaps: bool = False
+    """Store the sums of every 32 frames as well, so that the map can follow corrected poses later; it takes three to
+    five times the room."""
+    corrected_poses: Annotated[Path | None, arg(metavar="FILE")] = None
+    """Move the map, which was built with --submaps, to corrected poses of its frames: a table of stamp tx ty tz qx qy
+    qz qw of the depth camera, on the recording's clock. A map that is not there yet is built first."""
     frame_step: Annotated[int, arg(metavar="N")] = 1
     """Fuse every n-th frame."""
     max_bad_share: Annotated[float, arg(metavar="SHARE")] = 0.05
@@ -91,13 +97,19 @@ class Build(ModelVerb):
     def run(self) -> None:
         """Build the map."""
         answer = build(self)
-        emit(answer, info_lines(answer, verbose=self.verbose), self.json)
+        lines = list(info_lines(answer, verbose=self.verbose))
+        if (done := answer.get("corrected")) is not None:
+            lines.append(
+                f"corrected: frames moved by {done['median_m']:.2f} m (median), {done['most_m']:.2f} m at most; "
+                f"{done['voxels_before']} voxels before, {done['voxels']} now, in {done['elapsed_s']:.1f} s"
+            )
+        emit(answer, lines, self.json)
 
 
 def build(verb: "Build") -> dict[str, Any]:
     """Build a map and describe it."""
     from avlmaps.maps.build import build_map
-    from avlmaps.maps.settings import BuildSettings, FrameSettings, FusionSettings, GravitySettings
+    from avlmaps.maps.settings import SUBMAP_FRAMES, BuildSettings, FrameSettings, FusionSettings, GravitySettings
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.rules import build_settings
     from avlmaps.recordings.open import open_recording
@@ -124,11 +136,20 @@ def build(verb: "Build") -> dict[str, Any]:
         say(f"note: {notice}")
     settings = BuildSettings(
         voxel_size_m=verb.voxel_size_m,
-        frames=FrameSettings(step=verb.frame_step, max_bad_share=verb.max_bad_share),
+        frames=FrameSettings(
+            step=verb.frame_step,
+            max_bad_share=verb.max_bad_share,
+            per_submap=SUBMAP_FRAMES if verb.submaps or verb.corrected_poses else 0,
+        ),
         fusion=FusionSettings(max_depth_m=verb.max_depth_m, sensor=verb.sensor),
         gravity=GravitySettings(camera_height_m=verb.camera_height_m),
         seed=verb.seed,
     )
+    poses = None
+    if verb.corrected_poses is not None:
+        from avlmaps.recordings.pose_file import read_pose_file
+
+        poses = read_pose_file(verb.corrected_poses)
     stored = build_map(
         recording,
         verb.out,
@@ -139,8 +160,14 @@ def build(verb: "Build") -> dict[str, Any]:
         resume=not verb.fresh,
         overwrite=verb.overwrite,
     )
+    answer: dict[str, Any] = {}
+    if poses is not None:
+        from avlmaps.maps.corrected import correct_stored
+
+        stored, done = correct_stored(stored, *poses)
+        answer["corrected"] = asdict(done)
     AVLMap(stored).prepare()
-    return {**describe_map(stored), "elapsed_s": round(perf_counter() - begin, 3)}
+    return {**describe_map(stored), **answer, "elapsed_s": round(perf_counter() - begin, 3)}
 
 
 def choose_models(name: str, words: "Sequence[str]") -> "Encoders":

@@ -53,6 +53,7 @@ _REST_S = 1.0  # between two snapshots, at most, where one takes longer than tha
 
 
 _Came = tuple[FrozenSums, float]  # what was frozen, and when
+_Correction = tuple[Any, Any, "Future[tuple[float, float]]"]  # stamps, poses, and what it did
 
 
 class LiveMap:
@@ -115,6 +116,7 @@ class LiveMap:
         self._doubts: list[str] = []
         self._asked: Future[_Came | None] | None = None  # what the thread behind waits for; under the door
         self._fuser_ended = False  # under the door
+        self._to_correct: deque[_Correction] = deque()  # under the door
         self._snapshot: tuple[AVLMap, float] | None = None
         self._generation, self._listened_s = 0, 0.0
         self._closing, self._closed = False, False
@@ -190,6 +192,25 @@ class LiveMap:
                 self._tally.note("refused")
                 raise
 
+    def correct_poses(self, stamps_s: Any, poses: Any) -> tuple[float, float]:
+        """Move the map to corrected poses of its frames; see ``VoxelMap.correct_poses``. Any thread may call it.
+
+        It waits for the frames before it and for the snapshot that is being made, and then takes its turn among the
+        frames; those that come meanwhile may be late. Questions have the old map until the next snapshot.
+
+        Raises:
+            MapError: there are no submaps or no frames, the poses are not of its frames, or the map is closed.
+            RecordingError: a pose is no rigid motion.
+        """
+        answer: Future[tuple[float, float]] = Future()
+        with self._door:
+            self._require_open()
+            if self._fuser_ended:
+                raise MapError(f"The live map {self.path} is closed; begin another.")
+            self._to_correct.append((stamps_s, poses, answer))
+            self._door.notify_all()
+        return answer.result()
+
     @property
     def map(self) -> AVLMap:
         """The last snapshot, to be queried in every way; it does not change.
@@ -260,7 +281,7 @@ class LiveMap:
         if not self._closed:
             try:
                 if len(self._growing):
-                    self._saver.write(self._growing.stored(final=True))
+                    self._saver.write(self._growing.stored(final=True), self._growing.submaps())
             except BaseException:
                 if not len(self._growing) or not self.path.is_dir():
                     self._held.close()
@@ -319,20 +340,25 @@ class LiveMap:
             with self._door:
                 self._fuser_ended = True
                 self._answer(None)
+                for _, _, answer in self._to_correct:
+                    answer.set_exception(MapError(f"The live map {self.path} was closed before; begin another."))
+                self._to_correct.clear()
                 self._door.notify_all()
 
     def _fuse_all(self) -> None:
         while True:
             with self._door:
-                while not self._queue and not self._closing and self._asked is None:
+                while not (self._queue or self._closing or self._to_correct) and self._asked is None:
                     self._door.wait()
                 frame, arrived_s = self._queue.popleft() if self._queue else (None, 0.0)
                 self._door.notify_all()
             if frame is not None:
                 self._fuse(frame, arrived_s)
+            elif self._to_correct:
+                self._correct()
             if self._asked is not None:  # set by the thread behind alone, which waits for the answer
                 self._freeze()
-            if frame is None and self._closing and not self._queue:
+            if frame is None and self._closing and not self._queue and not self._to_correct:
                 return
 
     def _fuse(self, frame: Frame, arrived_s: float) -> None:
@@ -360,6 +386,20 @@ class LiveMap:
             self._tally.drop("wrong")
             self._doubt(str(fault))
         self._tally.took(time.perf_counter() - arrived_s)
+
+    def _correct(self) -> None:
+        with self._door:
+            stamps_s, poses, answer = self._to_correct.popleft()
+        try:
+            moved = self._growing.correct_poses(stamps_s, poses)
+        except BaseException as fault:
+            answer.set_exception(fault)
+            if not isinstance(fault, AvlmapsError):
+                raise
+            return
+        self._tally.note("corrected")
+        self._check = PoseCheck()  # the next pose is of the corrected world, which is no jump
+        answer.set_result(moved)
 
     def _freeze(self) -> None:
         try:
@@ -394,13 +434,13 @@ class LiveMap:
             raise
 
     def _publish_all(self) -> None:
-        from_s, known = 0.0, 0
+        from_s, known = 0.0, (0, 0)
         while not self._stop_behind.wait(_IDLE_S):
-            begin_s, fused = time.perf_counter(), self._tally.of("fused")
-            if fused == known or begin_s < from_s:
+            begin_s, state = time.perf_counter(), (self._tally.of("fused"), self._tally.of("corrected"))
+            if state == known or begin_s < from_s:
                 self._try(self._publish_sounds)
             elif (came := self._what_came()) is not None and not self._closing:
-                known = fused
+                known = state
                 self._try(partial(self._publish, *came))
                 end_s = time.perf_counter()
                 from_s = max(begin_s + self.settings.snapshot_s, end_s + min(end_s - begin_s, _REST_S))
@@ -421,7 +461,10 @@ class LiveMap:
         return answer.result()
 
     def _publish(self, came: FrozenSums, came_s: float) -> None:
-        stored = self._growing.finish(came, looks_s=_LOOKS_S)
+        with self._growing.finishing:
+            if not self._growing.is_current(came):  # poses were corrected since: the next one has them
+                return
+            stored = self._growing.finish(came, looks_s=_LOOKS_S)
         self._saver.offer(stored, came_s)
         self._show(stored, came_s)
 

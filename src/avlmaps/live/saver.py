@@ -9,6 +9,7 @@ from avlmaps.core.errors import MapError
 from avlmaps.maps.growing import write_stored
 from avlmaps.maps.store.reader import StoredMap
 from avlmaps.maps.store.writer import Written
+from avlmaps.maps.types import Submaps
 
 
 class Saver:
@@ -52,13 +53,17 @@ class Saver:
             self._door.notify_all()
         self.thread.join()
 
-    def write(self, stored: StoredMap) -> None:
+    def write(self, stored: StoredMap, submaps: Submaps | None = None) -> None:
         """Write a map at once, after ``close``.
+
+        Args:
+            stored: the map.
+            submaps: by which it can follow corrected poses; None writes none.
 
         Raises:
             MapError: it cannot be written; the one before is still there.
         """
-        write_stored(self._path, stored, self._written)
+        write_stored(self._path, stored, self._written, submaps)
 
     def _work(self) -> None:
         try:

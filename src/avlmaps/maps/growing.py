@@ -7,6 +7,7 @@ is that of a build. Of a longer one they are found again each time it has double
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
+from threading import RLock
 from time import perf_counter
 from typing import Any
 
@@ -20,6 +21,7 @@ from avlmaps.core.registry import Kind
 from avlmaps.maps.audio.growing import GrowingSounds
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
 from avlmaps.maps.fusion.free_space import FreeViewCollector, ThroughCounts, stack_views
+from avlmaps.maps.fusion.submaps import concat_submaps, merge_submaps, submap_of
 from avlmaps.maps.fusion.voxel_sums import VoxelSums
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.growing_walk import HERE, Walk
@@ -30,7 +32,8 @@ from avlmaps.maps.pipeline.keyframes import RANDOMNESS
 from avlmaps.maps.pipeline.plan import BUILD_VERSION, BuildPlan
 from avlmaps.maps.pipeline.sounds import silence
 from avlmaps.maps.pipeline.write import manifest_of, surfaces, with_clear_views
-from avlmaps.maps.settings import BuildSettings
+from avlmaps.maps.pose_correction import PoseCorrection, moved_frame
+from avlmaps.maps.settings import SUBMAP_FRAMES, BuildSettings
 from avlmaps.maps.store.checkpoints import key_of
 from avlmaps.maps.store.integrity import IntegrityCheck
 from avlmaps.maps.store.lock import lock_folder
@@ -38,7 +41,7 @@ from avlmaps.maps.store.manifest import BadFrame, GroundInfo, MapInfo, ModelInfo
 from avlmaps.maps.store.manifest_file import MANIFEST
 from avlmaps.maps.store.reader import GIVEN_FEATURES, MapArrays, StoredMap, open_stored
 from avlmaps.maps.store.writer import MapContent, Written, is_map_or_free, write_map
-from avlmaps.maps.types import HeardSounds
+from avlmaps.maps.types import HeardSounds, Submaps
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.protocols import GroundReader
 from avlmaps.recordings.growing_track import GrowingTrack
@@ -93,6 +96,15 @@ class GrowingMap:
         self._total_is_read = False
         self._part: VoxelAccumulator | None = None
         self._part_number = 0
+        self._part_walk: list[tuple[float, np.ndarray]] = []  # stamps and poses of its frames
+        self._submaps: list[Submaps] = []
+        self.finishing = RLock()  # held while a map is made, and while poses are corrected
+        self._corrections = 0
+        if self.settings.frames.per_submap and encoders.keyframes_only:
+            raise MapError(
+                f"The encoders {encoders.name} decide late which frames they look at, so that a growing map stores no "
+                "submaps with them; leave per_submap at 0, or build the map of a recording."
+            )
         self._free: FreeViewCollector | None = None
         self._through: ThroughCounts | None = None
         self._keyframes = GrowingKeyframes(encoders, self.settings.keyframes, looks_later=looks_later)
@@ -155,6 +167,80 @@ class GrowingMap:
             encoder = self.encoders.sounds if Kind.SOUNDS in self.encoders else None
             self._sounds = GrowingSounds(encoder, self.settings.hearing)
         self._sounds.add(chunk, stamp_s)
+
+    def correct_poses(self, stamps_s: Any, poses: Any) -> tuple[float, float]:
+        """Move what came to corrected poses of it; frames to come have poses of the corrected world.
+
+        Args:
+            stamps_s: (k,) of corrected poses, rising.
+            poses: (k, 4, 4) world_from_camera of the depth camera then. Between them frames follow smoothly.
+
+        Returns:
+            How far frames moved: the median and the most, metres.
+
+        Raises:
+            MapError: it stores no submaps, no frame came, or the poses are not of its frames.
+            RecordingError: a pose is no rigid motion.
+        """
+        if not self.settings.frames.per_submap:
+            raise MapError(
+                "The map stores no submaps, so that it cannot follow corrected poses; begin it with "
+                f"settings=BuildSettings(frames=FrameSettings(per_submap={SUBMAP_FRAMES}))."
+            )
+        if not len(self):
+            raise MapError("The map has no frame yet, whose pose could be corrected; add one.")
+        with self.finishing, silence_progress(True):
+            before = self._walk.motion()
+            step = PoseCorrection.of(stamps_s, poses, before.stamps_s, before.world_from_camera)
+            self._walk.move(step)
+            self._corrections += 1
+            self._waiting = [replace(one, frame=moved_frame(one.frame, step)) for one in self._waiting]
+            self._rehearsal = _Rehearsal()
+            self._keyframes.move(step)
+            if self._part is not None:
+                self._follow(step)
+            if self._given_up is not None:
+                self._given_up = step.turn @ self._given_up
+            if self._ground is not None:
+                self._ground = self._find_upright(self._walk.held())
+            now = self._walk.motion().world_from_camera
+        apart_m = np.linalg.norm(now[:, :3, 3] - before.world_from_camera[:, :3, 3], axis=1)
+        return float(np.median(apart_m)), float(apart_m.max())
+
+    def is_current(self, came: "FrozenSums") -> bool:
+        """Return whether what was frozen has the poses of now; who asks holds ``finishing``."""
+        return came.corrections == self._corrections
+
+    def submaps(self) -> Submaps | None:
+        """Return the submaps until now, with the part that is not a whole one; None where it stores none."""
+        if self._part is None or self._free is None or not self.settings.frames.per_submap:
+            return None
+        last = [] if not self._part_walk else [self._as_submap(self._part.sums())]
+        every = concat_submaps([*self._submaps, *last])
+        clear = self._free.views().clear_mm
+        return replace(every, pose=self._walk.pose_of(every.stamp_s), clear_mm=clear)
+
+    def _follow(self, step: PoseCorrection) -> None:
+        """Merge the submaps again; what is not a whole one becomes one."""
+        assert self._sensor is not None and self._part is not None and self._free is not None
+        if self._part_walk:
+            self._keep_submap(self._part.sums())
+        self._part, self._part_number = self._empty(self._sensor), -1
+        submaps = concat_submaps(self._submaps)
+        self._total = merge_submaps(submaps, self._walk.pose_of(submaps.stamp_s), self._part.grid)
+        self._total_is_read = False
+        self._free.place(self._walk.pose_of(submaps.stamp_s))
+        self._through = ThroughCounts(GridSpec(self.settings.voxel_size_m), self._walk.rig.depth)
+
+    def _keep_submap(self, sums: VoxelSums) -> None:
+        self._submaps.append(self._as_submap(sums))
+        self._part_walk = []
+
+    def _as_submap(self, sums: VoxelSums) -> Submaps:
+        """Return the part that is summed now as a submap."""
+        assert self._part is not None
+        stamps_s, poses = zip(*self._part_walk, strict=True)
+        return submap_of(sums, self._part.spread(), np.array(stamps_s), np.stack(poses), np.zeros((0, 1, 1), np.uint16))
 
     def pass_by(self, stamp_s: float, world_from_camera: Float[np.ndarray, "4 4"]) -> None:
         """Take note of where the robot was in a frame that is not added: sounds are placed by it."""
@@ -227,7 +313,7 @@ class GrowingMap:
         encoded = {frame.index for frame in self._keyframes.last()} if undecided else set[int]()
         return FrozenSums(
             self._walk.frozen(), list(self._left_out), self._total, self._part.sums(), clear, pose,
-            self._keyframes.freeze(), undecided, encoded,
+            self._keyframes.freeze(), undecided, encoded, self._corrections,
         )  # fmt: skip
 
     def finish(self, came: "FrozenSums", *, final: bool = False, looks_s: float = np.inf) -> StoredMap:
@@ -243,7 +329,7 @@ class GrowingMap:
             BackendError: an encoder broke its protocol; the frame is left out.
         """
         plan = self._plan(came.walk)
-        with silence_progress(True):
+        with self.finishing, silence_progress(True):
             if final or self._upright is None:
                 self._upright = self._upright_of(came.walk.held())[:2]
             content, info = self._content(plan, came, *self._upright, final, looks_s)
@@ -264,7 +350,7 @@ class GrowingMap:
         require_place(path, overwrite)
         made = self.stored(final=True)
         with lock_folder(path):
-            write_stored(path, made)
+            write_stored(path, made, submaps=self.submaps())
         return replace(open_stored(path), encoders=self.encoders)
 
     def _encodes_at_once(self) -> bool:
@@ -358,12 +444,14 @@ class GrowingMap:
     def _sum(self, frame: Frame, features: np.ndarray | None) -> None:
         """Add a frame to its part; the part before it is added to the total, as the parts of a build are."""
         assert self._sensor is not None and self._free is not None
-        number = frame.index // self.settings.frames.per_part
+        number = frame.index // self.settings.frames.summed
         if self._part is None or number != self._part_number:
             self._end_part()
             self._part, self._part_number = self._empty(self._sensor), number
         self._part.add(frame, features)
         self._free.add(frame)
+        if self.settings.frames.per_submap:
+            self._part_walk.append((frame.stamp_s, np.array(frame.world_from_camera, np.float64)))
 
     def _end_part(self) -> None:
         if self._part is None:
@@ -373,14 +461,18 @@ class GrowingMap:
         elif self._total_is_read:
             self._total = self._total.copy()
         self._total_is_read = False
-        self._total.merge(self._part.sums())
+        sums = self._part.sums()
+        self._total.merge(sums)
+        if self._part_walk:
+            self._keep_submap(sums)
 
     def _empty(self, sensor: SensorInfo) -> VoxelAccumulator:
         if self._dim is None and Kind.PIXELS in self.encoders:
             self._dim = self.encoders.card(Kind.PIXELS).dim
         return VoxelAccumulator(
-            GridSpec(self.settings.voxel_size_m), self._dim or 0, self.settings.fusion, sensor.model
-        )
+            GridSpec(self.settings.voxel_size_m), self._dim or 0, self.settings.fusion, sensor.model,
+            with_spread=self.settings.frames.per_submap > 0,
+        )  # fmt: skip
 
     def _find_upright(self, held: Recording) -> Ground:
         up, floor, ground = self._upright_of(held)
@@ -446,9 +538,11 @@ def require_place(path: Path, overwrite: bool) -> None:
         raise MapError(f"{path} is a finished map already; give another path, or replace it with overwrite=True.")
 
 
-def write_stored(path: Path, made: StoredMap, written: Written | None = None) -> MapInfo:
+def write_stored(
+    path: Path, made: StoredMap, written: Written | None = None, submaps: Submaps | None = None
+) -> MapInfo:
     """Write a map of ``GrowingMap`` into its folder, whose lock the caller holds; see ``write_map``."""
-    content = MapContent(made.voxels, made.keyframes, made.place_state, made.sounds, made.path)
+    content = MapContent(made.voxels, made.keyframes, made.place_state, made.sounds, made.path, submaps=submaps)
     return write_map(path, content, made.info, written)
 
 
@@ -466,6 +560,7 @@ class FrozenSums:
         keyframes: those that were chosen, and the frames that would be if no other came.
         undecided: frames that may become keyframes, where only these are encoded.
         encoded: numbers of those that would.
+        corrections: how often poses had been corrected.
     """
 
     walk: Walk
@@ -477,6 +572,7 @@ class FrozenSums:
     keyframes: FrozenKeyframes
     undecided: list[Frame]
     encoded: set[int]
+    corrections: int
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,7 @@ import numpy as np
 from avlmaps.core.arrays import Float
 from avlmaps.core.camera import Rig
 from avlmaps.core.errors import RecordingError
+from avlmaps.maps.pose_correction import PoseCorrection, moved_frame
 from avlmaps.recordings.memory import MemoryRecording, frame_digest
 from avlmaps.recordings.types import Frame, Recording
 
@@ -41,6 +42,14 @@ class _Poses:
             self._poses = np.concatenate([self._poses, np.zeros((self._count, 4, 4))])
         self._stamps_s[self._count], self._poses[self._count] = stamp_s, pose
         self._count += 1  # last of all: who reads meanwhile sees whole poses alone
+
+    def moved(self, step: PoseCorrection) -> "_Poses":
+        """Return the same, moved; a copy of before stays as it is."""
+        other, now = _Poses(), self.until_now()
+        other._stamps_s, other._count = self._stamps_s.copy(), self._count
+        other._poses = self._poses.copy()
+        other._poses[: self._count] = step.moved(now.stamps_s, now.world_from_camera)
+        return other
 
     def until_now(self) -> Motion:
         count = self._count
@@ -86,6 +95,18 @@ class Walk(Recording):
     def motion(self) -> Motion:
         """Return where the robot was until now; another thread may add to it meanwhile."""
         return self._passed.until_now()
+
+    def move(self, step: PoseCorrection) -> None:
+        """Move all frames by a correction of their poses."""
+        self._fused, self._passed = self._fused.moved(step), self._passed.moved(step)
+        self._held = [moved_frame(frame, step) for frame in self._held]
+        if self.up_in_world is not None:
+            self.up_in_world = step.turn @ self.up_in_world
+
+    def pose_of(self, stamps_s: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n 4 4"]:
+        """Return the poses of frames that were added, by their stamps."""
+        known = self._passed.until_now()
+        return known.world_from_camera[np.searchsorted(known.stamps_s, stamps_s)]
 
     def frozen(self) -> "Walk":
         """Return the walk until now, which frames to come do not change."""

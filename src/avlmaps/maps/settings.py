@@ -8,6 +8,9 @@ from avlmaps.maps.audio.settings import HearingSettings
 from avlmaps.maps.fusion.sensor import FusionSettings
 from avlmaps.maps.keyframes.describe import KeyframeSettings
 
+SUBMAP_FRAMES = 32
+"""Frames of a submap: fewer follow corrections more closely and take more room (docs/guides/correct-poses.md)."""
+
 
 @dataclass(frozen=True, slots=True)
 class FrameSettings:
@@ -21,10 +24,18 @@ class FrameSettings:
     """What to do with a frame that cannot be read: leave it out and note it in the map, or stop."""
     max_bad_share: float = 0.05
     """Stop nevertheless when more than this share of the frames cannot be read."""
+    per_submap: int = 0
+    """Frames of a submap: the map stores their sums and can follow corrected poses. 0 stores none."""
+
+    @property
+    def summed(self) -> int:
+        """How many frames are added up by themselves."""
+        return self.per_submap or self.per_part
 
     def __post_init__(self) -> None:
         _require(self.step >= 1, f"frames.step is {self.step}", "1 or more")
         _require(self.per_part >= 1, f"frames.per_part is {self.per_part}", "1 or more")
+        _require(self.per_submap >= 0, f"frames.per_submap is {self.per_submap}", "0 (none) or more")
         _require(0.0 <= self.max_bad_share <= 1.0, f"max_bad_share is {self.max_bad_share}", "between 0 and 1")
 
 

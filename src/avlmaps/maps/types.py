@@ -104,3 +104,53 @@ class HeardSounds:
 
     def __repr__(self) -> str:
         return f"HeardSounds({len(self)})"
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Submaps:
+    """A map's voxels before they were added up, some frames at a time, so that they can follow corrected poses.
+
+    Ragged: submap b has voxels ``row_offsets[b]:row_offsets[b + 1]`` and frames ``frame_offsets[b]:...``. Of what is
+    a sum, `maps.fusion.voxel_sums.VoxelSums` says which.
+
+    Attributes:
+        row_offsets: (b + 1,) into the voxels.
+        index: which voxel, in the world of the poses that the frames were fused with.
+        feature: mean feature.
+        weight: sum of the weights behind it.
+        rgb_sum: sum of weight times colour.
+        rgb_weight: sum of these weights.
+        hits: how many pixels fell into it.
+        views: how many frames have one in it.
+        sharp: how exact their depths are.
+        last_seen_s: when a pixel last fell into it.
+        spread: how its points lie in it: mean (3), factor of the covariance (6), voxels; mean number of the frame.
+        frame_offsets: (b + 1,) into the frames.
+        stamp_s: when each frame was taken.
+        fused_pose: world_from_camera that it was fused with.
+        pose: world_from_camera now.
+        clear_mm: how far it saw freely, as ``FreeViews``; empty where depths are used as they are.
+    """
+
+    row_offsets: Int64[np.ndarray, " b1"]
+    index: Int32[np.ndarray, "n 3"]
+    feature: Float16[np.ndarray, "n d"]
+    weight: Float32[np.ndarray, " n"]
+    rgb_sum: Float32[np.ndarray, "n 3"]
+    rgb_weight: Float32[np.ndarray, " n"]
+    hits: Int32[np.ndarray, " n"]
+    views: Int32[np.ndarray, " n"]
+    sharp: Int32[np.ndarray, " n"]
+    last_seen_s: Float64[np.ndarray, " n"]
+    spread: Float16[np.ndarray, "n 10"]
+    frame_offsets: Int64[np.ndarray, " b1"]
+    stamp_s: Float64[np.ndarray, " f"]
+    fused_pose: Float64[np.ndarray, "f 4 4"]
+    pose: Float64[np.ndarray, "f 4 4"]
+    clear_mm: UInt16[np.ndarray, "f_or_0 rows columns"]
+
+    def __len__(self) -> int:
+        return len(self.row_offsets) - 1
+
+    def __repr__(self) -> str:
+        return f"Submaps({len(self)} of {len(self.stamp_s)} frames with {len(self.index):,} voxels)"

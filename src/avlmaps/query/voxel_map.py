@@ -119,6 +119,28 @@ class VoxelMap:
             self._growing.add_audio(chunk, stamp_s)
             self._map = None
 
+    def correct_poses(self, stamps_s: Any, poses: Any) -> tuple[float, float]:
+        """Move the map to corrected poses of its frames, as a loop closure gives them.
+
+        It takes a map that was begun with submaps: ``settings=BuildSettings(frames=FrameSettings(per_submap=32))``.
+        Frames to come have poses of the corrected world.
+
+        Args:
+            stamps_s: (k,) of corrected poses, rising: each of a frame, or within half a second of one.
+            poses: (k, 4, 4) world_from_camera of the depth camera then. Frames between two of them follow smoothly.
+
+        Returns:
+            How far frames moved: the median and the most, metres.
+
+        Raises:
+            MapError: there are no submaps or no frames, or the poses are not of its frames; the map is as it was.
+            RecordingError: a pose is no rigid motion.
+        """
+        with self._lock:
+            moved = self._growing.correct_poses(stamps_s, poses)
+            self._map = None
+            return moved
+
     @property
     def map(self) -> AVLMap:
         """The map of the frames that came, to be queried in every way; later frames do not change it.

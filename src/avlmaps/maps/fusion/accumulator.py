@@ -17,8 +17,9 @@ from avlmaps.maps.fusion import add_kernels as sums
 from avlmaps.maps.fusion import measure_kernels as kernels
 from avlmaps.maps.fusion.carving_kernels import drop_flying
 from avlmaps.maps.fusion.sensor import NONE, FusionSettings, SensorModel
+from avlmaps.maps.fusion.submap_kernels import SPREAD_COLUMNS, add_spread, finish_spread
 from avlmaps.maps.fusion.voxel_kernels import look_up_views
-from avlmaps.maps.fusion.voxel_sums import Evidence, VoxelSums, VoxelTable
+from avlmaps.maps.fusion.voxel_sums import Evidence, MovedFrom, VoxelSums, VoxelTable, with_rows
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.types import Voxels
 from avlmaps.recordings.types import Frame
@@ -114,7 +115,13 @@ class VoxelAccumulator:
     """
 
     def __init__(
-        self, grid: GridSpec, dim: int, settings: FusionSettings | None = None, sensor: SensorModel = NONE
+        self,
+        grid: GridSpec,
+        dim: int,
+        settings: FusionSettings | None = None,
+        sensor: SensorModel = NONE,
+        *,
+        with_spread: bool = False,
     ) -> None:
         """Begin an empty map.
 
@@ -123,6 +130,7 @@ class VoxelAccumulator:
             dim: length of a feature; 0 where no pixel features will come.
             settings: depth limits and the weight's width.
             sensor: error of the depths; by default every depth within the limits is used as it is.
+            with_spread: note how the points lie within their voxels, for ``spread``.
         """
         if dim < 0:
             raise ValueError(f"dim is {dim}; a feature cannot have fewer than 0 numbers")
@@ -133,6 +141,9 @@ class VoxelAccumulator:
         self._table = VoxelTable(dim)
         self._lookup: tuple[Rig, int, int, PixelLookup] | None = None
         self._scratch = kernels.make_scratch(1, 1)
+        self._spread = np.zeros((0, SPREAD_COLUMNS)) if with_spread else None
+        self._frames = 0
+        self._moved = MovedFrom()
 
     def __len__(self) -> int:
         """Return how many voxels there are."""
@@ -161,11 +172,12 @@ class VoxelAccumulator:
         cells, (feature_rows, feature_columns) = self._cells(features)
         lookup = self._lookup_for(frame.rig, feature_rows, feature_columns)
         pose = self._pose_of(frame)
+        depth, limits = self._depth_of(frame), self._limits()
         traced = kernels.trace(
-            self._depth_of(frame),
+            depth,
             (lookup.x, lookup.y),
             pose,
-            self._limits(),
+            limits,
             np.require(frame.rgb, np.uint8, ["C", "W"]).reshape(-1, 3),
             lookup.tables,
             lookup.projection,
@@ -177,6 +189,11 @@ class VoxelAccumulator:
         stamp_s = float(frame.stamp_s)
         known = sums.commit(voxels, self._scratch, pose[2], stamp_s, table.slots, table.geometry, table.count)
         table.count = int(known)
+        if self._spread is not None:
+            self._spread = with_rows(self._spread, len(table.weight))
+            rays = lookup.x, lookup.y
+            add_spread(depth, rays, pose, limits[:3], float(self._frames), table.slots, table.index, self._spread)
+        self._frames += 1
         faults = sums.flush(voxels, pairs, self._scratch, cells, table.feature_sum, table.weight) if pairs else 0
         if faults:
             raise BackendError(
@@ -192,6 +209,30 @@ class VoxelAccumulator:
             MapError: its features have another length.
         """
         self._table.add(part)
+
+    def spread(self) -> Float32[np.ndarray, "n 10"]:
+        """Return how the points lie within each voxel, sorted by index; see ``Submaps.spread``."""
+        if self._spread is None:
+            raise ValueError("this map was begun without with_spread")
+        rows = self._table.sort_rows()
+        found = np.empty((len(rows), SPREAD_COLUMNS), np.float32)
+        finish_spread(self._spread[rows], self._table.hits[rows], found)
+        return found
+
+    def merge_moved(
+        self, part: VoxelSums, spread: Float32[np.ndarray, "n 10"], moved: Float64[np.ndarray, "f 4 4"]
+    ) -> None:
+        """Add the sums of a submap whose frames moved.
+
+        Args:
+            part: its sums.
+            spread: how the points lie within its voxels.
+            moved: of each of its frames, the new world from the one that it was fused in, metres.
+
+        Raises:
+            MapError: its features have another length.
+        """
+        self._table.add_moved(part, spread, moved, self.grid.voxel_size_m, self._moved)
 
     def views_at(self, index: Int32[np.ndarray, "n 3"]) -> Int32[np.ndarray, " n"]:
         """Return how many frames have a pixel in each of some voxels."""

@@ -73,6 +73,10 @@ class FreeViewCollector:
         self._clear.append(clear)
         self._pose.append(np.array(frame.world_from_camera, np.float64))
 
+    def place(self, poses: Float64[np.ndarray, "k 4 4"]) -> None:
+        """Give the frames until now other poses: those of as many, or of none where nothing is collected."""
+        self._pose = list(poses[: len(self._clear)])
+
     def views(self) -> FreeViews:
         """Return the collected evidence."""
         return stack_views(*self.collected(), self._shape)

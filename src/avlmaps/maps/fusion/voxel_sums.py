@@ -7,10 +7,12 @@ from jaxtyping import Bool, Float32, Float64, Int32, Int64
 
 from avlmaps.core.errors import MapError
 from avlmaps.maps.fusion import voxel_kernels as kernels
+from avlmaps.maps.fusion.submap_kernels import MOST_SAMPLES, move_rows
 from avlmaps.maps.types import Voxels
 
 BLOCK_BYTES = 1 << 22  # merging and finishing go through features in blocks of this size, which stay in the cache
 SMALLEST_ROOM = 4096  # rows
+FARTHEST = float((1 << 31) - (1 << 22))  # voxels; indices are int32
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,11 +139,7 @@ class VoxelTable:
         Raises:
             MapError: its features have another length.
         """
-        if part.feature_sum.shape[1] != self.dim:
-            raise MapError(
-                f"The part's features have {part.feature_sum.shape[1]} numbers and this map's {self.dim}; "
-                "merge only maps that were built with the same profile."
-            )
+        self._require_alike(part)
         for rows in blocks(len(part), self.dim):
             # Copies: of a bounded size, and never read-only (which would compile the kernel a second time).
             arrays = (part.index, part.rgb_sum, part.rgb_weight, part.hits, part.views, part.sharp)
@@ -150,6 +148,40 @@ class VoxelTable:
             self.reserve(len(block[0]))
             count = kernels.add_rows(block, self.slots, self.geometry, self.feature_sum, self.weight, self.count)
             self.count = int(count)
+
+    def add_moved(
+        self, part: VoxelSums, spread: np.ndarray, moved: np.ndarray, voxel_size_m: float, before: "MovedFrom"
+    ) -> None:
+        """Add the sums of a submap whose frames moved; see `VoxelAccumulator.merge_moved`.
+
+        Raises:
+            MapError: its features have another length, or it moved out of what voxels can number.
+        """
+        self._require_alike(part)
+        to = np.ascontiguousarray(moved[:, :3], np.float64).copy()
+        to[:, :, 3] /= voxel_size_m
+        _require_within(part.index, to)
+        for rows in blocks(len(part), self.dim):
+            arrays = (part.index, part.rgb_sum, part.rgb_weight, part.hits, part.views, part.sharp)
+            every = (*arrays, part.last_seen_s, part.feature_sum, part.weight)
+            block = tuple(np.array(array[rows], order="C") for array in every)
+            where, done = np.array(spread[rows], np.float32), 0
+            while done < len(block[0]):
+                self.reserve(len(block[0]) - done + MOST_SAMPLES + 1)
+                before.reserve(len(self.weight))
+                count, done = move_rows(
+                    block, where, to, self.slots, self.geometry, self.feature_sum, self.weight,
+                    (before.submap, before.views), before.number, self.count, done,
+                )  # fmt: skip
+                self.count = int(count)
+        before.number += 1
+
+    def _require_alike(self, part: VoxelSums) -> None:
+        if part.feature_sum.shape[1] != self.dim:
+            raise MapError(
+                f"The part's features have {part.feature_sum.shape[1]} numbers and this map's {self.dim}; "
+                "merge only maps that were built with the same profile."
+            )
 
     def sort_rows(self) -> Int64[np.ndarray, " n"]:
         """Return the rows in the order of their index (x, then y, then z)."""
@@ -206,6 +238,41 @@ class VoxelTable:
             rgb=np.rint(rgb).astype(np.uint8),
             last_seen_s=self.last_seen_s[rows],
             hits=self.hits[rows],
+        )
+
+
+class MovedFrom:
+    """Which submap last added to each row of a table, and how many views: a voxel counts the frames of one once.
+
+    Attributes:
+        submap: number of the submap, -1 before the first.
+        views: how many views it added.
+        number: of the submap that comes next.
+    """
+
+    def __init__(self) -> None:
+        self.submap, self.views, self.number = np.full(0, -1, np.int64), np.zeros(0, np.int32), 0
+
+    def reserve(self, rows: int) -> None:
+        """Make room for the rows of a table."""
+        self.submap, self.views = with_rows(self.submap, rows, -1), with_rows(self.views, rows)
+
+
+def with_rows(array: np.ndarray, rows: int, fill: int = 0) -> np.ndarray:
+    """Return an array with at least as many rows, the new ones filled with a number."""
+    if len(array) >= rows:
+        return array
+    return np.concatenate([array, np.full((rows - len(array), *array.shape[1:]), fill, array.dtype)])
+
+
+def _require_within(index: Int32[np.ndarray, "n 3"], to: Float64[np.ndarray, "f 3 4"]) -> None:
+    farthest = np.abs(to[:, :, :3]).sum(axis=2).max(initial=0.0) * np.abs(index).max(initial=0) + np.abs(
+        to[:, :, 3]
+    ).max(initial=0.0)
+    if not farthest < FARTHEST:
+        raise MapError(
+            f"The poses move a part of the map by {farthest:.3g} voxels from the world's origin, more than "
+            f"{FARTHEST:.3g}; move the world's origin nearer to the map."
         )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Float32, UInt8
 from avlmaps.core.errors import MapError
+from avlmaps.core.poses import apply
 from avlmaps.core.registry import Kind
 from avlmaps.maps.keyframes.describe import (
     DescribedKeyframe,
@@ -22,6 +23,7 @@ from avlmaps.maps.keyframes.describe import (
     stack_keyframes,
 )
 from avlmaps.maps.perceived import as_row, perceiving
+from avlmaps.maps.pose_correction import PoseCorrection, moved_frame
 from avlmaps.maps.types import Keyframes
 from avlmaps.perception.encoders import Encoders
 from avlmaps.recordings.types import Frame
@@ -75,6 +77,12 @@ class GrowingKeyframes:
     def share(self, described: "dict[int, PicturedKeyframe]") -> None:
         """Take keyframes that were looked at before, by their number, and add those that are looked at."""
         self._described = described
+
+    def move(self, step: PoseCorrection) -> None:
+        """Move the keyframes, and the frames that may become some, by a correction of their poses."""
+        self._decided = [one if one is None else _moved(one, step) for one in self._decided]
+        self._maybe = {index: _moved_keyframe(one, step) for index, one in self._maybe.items()}
+        self._recent = [moved_frame(frame, step) for frame in self._recent]
 
     @property
     def undecided(self) -> list[Frame]:
@@ -188,6 +196,22 @@ class GrowingKeyframes:
         if Kind.PLACE not in self._encoders:
             return PicturedKeyframe(frame.index, seen, None)
         return PicturedKeyframe(frame.index, seen, self._pictures.put(frame.rgb))
+
+
+def _moved(one: PicturedKeyframe | Frame, step: PoseCorrection) -> PicturedKeyframe | Frame:
+    return moved_frame(one, step) if isinstance(one, Frame) else _moved_keyframe(one, step)
+
+
+def _moved_keyframe(one: PicturedKeyframe, step: PoseCorrection) -> PicturedKeyframe:
+    seen = one.keyframe
+    motion = step.at(np.array([seen.stamp_s]))[0]
+    moved = replace(
+        seen,
+        world_from_camera=motion @ seen.world_from_camera,
+        centre=apply(motion, seen.centre.astype(np.float64)).astype(np.float32),
+        points_world=apply(motion, seen.points_world.astype(np.float64)).astype(np.float32),
+    )
+    return replace(one, keyframe=moved)
 
 
 def _path(frames: list[Frame]) -> tuple[np.ndarray, np.ndarray]:

@@ -22,7 +22,7 @@ from avlmaps.maps.fusion.free_space import FreeViewCollector
 from avlmaps.maps.fusion.sensor import SensorModel
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.perceived import encode_pixels
-from avlmaps.maps.pipeline.parts import MapPart, PartInfo, check_disjoint, find_part, load_part, save_part
+from avlmaps.maps.pipeline.parts import MapPart, PartInfo, SubmapFrames, check_disjoint, find_part, load_part, save_part
 from avlmaps.maps.pipeline.plan import (
     BuildPlan,
     Span,
@@ -99,7 +99,9 @@ def fuse_spans(
         for span, folder in jobs:
             begin = perf_counter()
             dim = encoder.card.dim if encoder else 0
-            total = VoxelAccumulator(GridSpec(settings.voxel_size_m), dim, settings.fusion, sensor)
+            as_submap = settings.frames.per_submap > 0
+            grid = GridSpec(settings.voxel_size_m)
+            total = VoxelAccumulator(grid, dim, settings.fusion, sensor, with_spread=as_submap)
             free = FreeViewCollector(recording.rig.depth, sensor)
             bad = _fuse(islice(seen, len(range(*span))), total, free, tolerance)
             info = PartInfo(
@@ -109,7 +111,9 @@ def fuse_spans(
                 bad_frames=tuple(bad),
                 elapsed_s=perf_counter() - begin,
             )
-            save_part(folder, key, info, total.sums(), free.views())
+            frames = np.setdiff1d(np.arange(*span), [frame.index for frame in bad])
+            submap = SubmapFrames.of(total, recording, frames) if as_submap else None
+            save_part(folder, key, info, total.sums(), free.views(), submap)
         for _ in seen:  # nothing is left; this completes the bar
             pass
 

@@ -12,13 +12,17 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
+from avlmaps.core.arrays import Float32, Float64, Int64
 from avlmaps.core.errors import MapError
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator, VoxelSums
 from avlmaps.maps.fusion.free_space import FreeViews, concat_views
+from avlmaps.maps.fusion.submaps import submap_of
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.pipeline.plan import Span
 from avlmaps.maps.store.checkpoints import find_checkpoint, load_checkpoint, save_checkpoint
 from avlmaps.maps.store.manifest import BadFrame
+from avlmaps.maps.types import Submaps
+from avlmaps.recordings.types import Recording
 
 
 class PartInfo(msgspec.Struct, frozen=True, kw_only=True):
@@ -61,9 +65,34 @@ class MapPart:
         """Return where its frames saw freely, memory-mapped likewise."""
         return FreeViews(**self._arrays(FreeViews))
 
-    def _arrays(self, of: type[VoxelSums] | type[FreeViews]) -> dict[str, np.ndarray]:
+    def submap(self) -> Submaps:
+        """Return the part as a submap, of a build that stores them."""
+        about = SubmapFrames(**self._arrays(SubmapFrames))
+        return submap_of(self.sums(), about.spread, about.stamps_s, about.poses, self.views().clear_mm)
+
+    def _arrays(self, of: "type[VoxelSums] | type[FreeViews] | type[SubmapFrames]") -> dict[str, np.ndarray]:
         arrays = load_checkpoint(self.folder, PartInfo, self.key).arrays
         return {field.name: arrays[field.name] for field in dataclasses.fields(of)}
+
+
+@dataclass(frozen=True, slots=True)
+class SubmapFrames:
+    """What a part stores beside its sums where it is to follow corrected poses.
+
+    Attributes:
+        spread: how the points lie within each voxel; see ``Submaps``.
+        stamps_s: of its frames.
+        poses: world_from_camera of each.
+    """
+
+    spread: Float32[np.ndarray, "n 10"]
+    stamps_s: Float64[np.ndarray, " f"]
+    poses: Float64[np.ndarray, "f 4 4"]
+
+    @classmethod
+    def of(cls, total: VoxelAccumulator, recording: Recording, frames: Int64[np.ndarray, " f"]) -> "SubmapFrames":
+        """Return that of the frames that were added up."""
+        return cls(total.spread(), recording.stamps_s[frames], recording.world_from_camera[frames])
 
 
 def merge_parts(folders: Sequence[Path | str], out: Path | str) -> MapPart:
@@ -102,9 +131,17 @@ def sum_parts(parts: Sequence[MapPart], grid: GridSpec) -> VoxelAccumulator:
     return total
 
 
-def save_part(folder: Path, key: str, info: PartInfo, sums: VoxelSums, views: FreeViews) -> None:
+def save_part(
+    folder: Path,
+    key: str,
+    info: PartInfo,
+    sums: VoxelSums,
+    views: FreeViews,
+    submap: SubmapFrames | None = None,
+) -> None:
     """Store a part; a kill at any instant leaves all of it or none."""
-    arrays = {field.name: getattr(of, field.name) for of in (sums, views) for field in dataclasses.fields(of)}
+    stored = (sums, views) if submap is None else (sums, views, submap)
+    arrays = {field.name: getattr(of, field.name) for of in stored for field in dataclasses.fields(of)}
     save_checkpoint(folder, key, info, arrays)
 
 

@@ -91,6 +91,8 @@ def fusion_key(recording: Recording, settings: BuildSettings, encoders: Encoders
     card = None if encoder is None else encoder.card
     ground = (settings.gravity, settings.seed, recording.base_height) if encoder is not None else None
     basis = recording.fingerprint, settings.voxel_size_m, settings.fusion, card, ground
+    if settings.frames.per_submap:
+        basis = *basis, settings.frames.per_submap
     chosen = (settings.keyframes, settings.frames.step) if encoders.keyframes_only else ()
     return key_of("fusion", BUILD_VERSION, *basis, *chosen)
 
@@ -109,7 +111,7 @@ def encoded_frames(recording: Recording, settings: BuildSettings, encoders: Enco
 
 
 def plan_spans(frames: int, settings: BuildSettings, covered: Sequence[Span] = ()) -> list[Span]:
-    """Return the stretches to fuse one after the other, each of ``frames.per_part`` frames or fewer.
+    """Return the stretches to fuse one after the other, each of ``frames.summed`` frames or fewer.
 
     Args:
         frames: of the recording.
@@ -121,7 +123,7 @@ def plan_spans(frames: int, settings: BuildSettings, covered: Sequence[Span] = (
     for start, stop, step in covered:
         wanted[start:stop:step] = False
     spans: list[Span] = []
-    stride = settings.frames.per_part * settings.frames.step
+    stride = settings.frames.summed * settings.frames.step
     for start in range(0, frames, stride):
         left = np.flatnonzero(wanted[start : start + stride])
         for run in np.split(left, np.flatnonzero(np.diff(left) > settings.frames.step) + 1):

@@ -13,6 +13,7 @@ from avlmaps.core.version import __version__
 from avlmaps.core.wording import option
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
 from avlmaps.maps.fusion.free_space import FreeViews, ThroughCounts, clean
+from avlmaps.maps.fusion.submaps import concat_submaps
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.pipeline.estimate import EstimatedFloor, EstimatedUp, ground_notices
 from avlmaps.maps.pipeline.keyframes import KeyframeResult
@@ -105,7 +106,10 @@ def write(
 ) -> MapInfo:
     """Write the map and, last of all, its manifest; then the parts go."""
     keyframes = with_clear_views(pictures.keyframes, [part.views() for part in parts])
-    content = MapContent(merged.voxels, keyframes, pictures.place_state, heard.sounds, heard.clips_folder)
+    submaps = concat_submaps([part.submap() for part in parts]) if plan.settings.frames.per_submap else None
+    content = MapContent(
+        merged.voxels, keyframes, pictures.place_state, heard.sounds, heard.clips_folder, submaps=submaps
+    )
     stages_s = {
         "up": up.elapsed_s,
         "ground": floor.elapsed_s,

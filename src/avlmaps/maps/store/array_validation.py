@@ -8,7 +8,7 @@ import numpy as np
 
 from avlmaps.core.errors import MapError
 from avlmaps.maps.grid import index_ends
-from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
+from avlmaps.maps.types import HeardSounds, Keyframes, Submaps, Voxels
 
 T = TypeVar("T")
 
@@ -16,9 +16,13 @@ T = TypeVar("T")
 RAGGED: dict[type, tuple[tuple[str, str], ...]] = {
     Keyframes: (("offsets", "xy"), ("thumbnail_offsets", "thumbnails")),
     HeardSounds: (("track_offsets", "track"), ("feature_offsets", "feature")),
+    Submaps: (("row_offsets", "index"), ("frame_offsets", "stamp_s")),
 }
 # Arrays that are empty where nothing is known, and the field along whose rows they go where it is.
-ROWS_OR_NONE: dict[type, tuple[tuple[str, str], ...]] = {Keyframes: (("score", "xy"), ("clear_mm", "stamp_s"))}
+ROWS_OR_NONE: dict[type, tuple[tuple[str, str], ...]] = {
+    Keyframes: (("score", "xy"), ("clear_mm", "stamp_s")),
+    Submaps: (("clear_mm", "stamp_s"),),
+}
 # The keypoints' points are NaN where there was no depth.
 # Features: of unit length, or zero where there is nothing to say.
 UNIT_ROWS = frozenset({"voxels/feature", "sounds/feature", "keyframes/view", "keyframes/descriptors"})

@@ -24,7 +24,7 @@ from avlmaps.maps.store.life import LIFE, Life, read_life
 from avlmaps.maps.store.lock import is_locked
 from avlmaps.maps.store.manifest import GroundInfo, MapInfo
 from avlmaps.maps.store.manifest_file import MANIFEST, RESTORE, arrays_fault, parse_manifest, read_manifest
-from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
+from avlmaps.maps.types import HeardSounds, Keyframes, Submaps, Voxels
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.models.names import public_choice, public_name
 
@@ -35,6 +35,7 @@ PARTS = "parts"
 GIVEN_FEATURES = "given:features"  # backend of features that came without an encoder
 STATE = "keyframes/state/"
 CLIPS = "sounds/clips/"
+SUBMAPS = "submaps/"
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,6 +130,20 @@ class StoredMap:
         if not files:
             return None
         return read_life({name: read_array(self.path, file) for name, file in files.items()}, f"{self.path}/life")
+
+    def submaps(self) -> Submaps | None:
+        """Return the submaps by which it can follow corrected poses, memory-mapped; None where it has none.
+
+        Raises:
+            MapError: the files are damaged.
+        """
+        files = {name.removeprefix(SUBMAPS): file for name, file in self.info.files.items() if name.startswith(SUBMAPS)}
+        if not files:
+            return None
+        self.integrity.require_whole()
+        return validate_arrays(
+            Submaps, {name: read_array(self.path, file) for name, file in files.items()}, f"{self.path}/submaps"
+        )
 
     def require_model(self, kind: Kind) -> None:
         """Raise ``MapError`` unless this install's model is the one that made the map's features.

@@ -21,13 +21,13 @@ from avlmaps.maps.store.life import LIFE, Life, life_arrays
 from avlmaps.maps.store.lock import LOCK
 from avlmaps.maps.store.manifest import MapInfo
 from avlmaps.maps.store.manifest_file import MANIFEST, write_manifest
-from avlmaps.maps.store.reader import CLIPS, PARTS, STATE
-from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
+from avlmaps.maps.store.reader import CLIPS, PARTS, STATE, SUBMAPS
+from avlmaps.maps.types import HeardSounds, Keyframes, Submaps, Voxels
 
 # What each file of a map was written of, by its name in the manifest: an array or a file that nobody changes any more.
 Written = dict[str, tuple[np.ndarray | Path, FileInfo]]
 SECTIONS = ("voxels", "keyframes", "sounds")
-_ALL_SECTIONS = (*SECTIONS, LIFE.rstrip("/"))
+_ALL_SECTIONS = (*SECTIONS, LIFE.rstrip("/"), SUBMAPS.rstrip("/"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +41,7 @@ class MapContent:
         sounds: what was heard; ``clips`` are file names below ``clips_folder``.
         clips_folder: where the clips lie now.
         life: what became of its things over several days; None of one day.
+        submaps: by which it can follow corrected poses; None where it cannot.
     """
 
     voxels: Voxels
@@ -49,6 +50,7 @@ class MapContent:
     sounds: HeardSounds
     clips_folder: Path
     life: Life | None = None
+    submaps: Submaps | None = None
 
 
 def write_map(path: Path, content: MapContent, info: MapInfo, written: Written | None = None) -> MapInfo:
@@ -99,6 +101,10 @@ def _writes(path: Path, content: MapContent) -> Iterator[tuple[str, np.ndarray |
     if content.life is not None:
         for name, array in life_arrays(content.life).items():
             yield LIFE + name, array, partial(write_array, path, LIFE + name, array)
+    if content.submaps is not None:
+        for field in array_fields(Submaps):
+            array = getattr(content.submaps, field)
+            yield SUBMAPS + field, array, partial(write_array, path, SUBMAPS + field, array)
     for number, clip in enumerate(content.sounds.clips):
         source = content.clips_folder / Path(clip).name
         yield f"{CLIPS}{number:06d}", source, partial(write_copy, path, f"sounds/{number:06d}", source)

@@ -1,0 +1,162 @@
+"""A finished map that follows corrected poses: its submaps are merged again, and all else moves with its frames."""
+
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from msgspec import structs
+
+from avlmaps.core.arrays import Float
+from avlmaps.core.errors import MapError
+from avlmaps.core.poses import inverse
+from avlmaps.core.progress import silence_progress
+from avlmaps.core.wording import option
+from avlmaps.maps.audio.events import track_of
+from avlmaps.maps.audio.segmentation import Segment
+from avlmaps.maps.fusion.free_space import clean
+from avlmaps.maps.fusion.sensor import NONE
+from avlmaps.maps.fusion.submaps import free_views, merge_submaps
+from avlmaps.maps.growing_walk import Motion
+from avlmaps.maps.pipeline.write import carving_doubts
+from avlmaps.maps.pose_correction import PoseCorrection
+from avlmaps.maps.store.lock import lock_folder
+from avlmaps.maps.store.manifest import Box, Removed, Timings, UpInfo
+from avlmaps.maps.store.reader import StoredMap, open_stored
+from avlmaps.maps.store.writer import MapContent, write_map
+from avlmaps.maps.types import HeardSounds, Keyframes, Submaps
+
+MOVED = "Its poses were corrected after it was built"
+
+
+@dataclass(frozen=True, slots=True)
+class Corrected:
+    """What a correction did to a map.
+
+    Attributes:
+        median_m: how far a frame moved, metres.
+        most_m: the one that moved farthest.
+        voxels_before: of the map.
+        voxels: after it.
+        elapsed_s: seconds.
+    """
+
+    median_m: float
+    most_m: float
+    voxels_before: int
+    voxels: int
+    elapsed_s: float
+
+
+def correct_stored(stored: StoredMap, stamps_s: Any, poses: Any) -> tuple[StoredMap, Corrected]:
+    """Make a map follow corrected poses, in its folder. Later corrections replace this one and do not add to it.
+
+    Args:
+        stored: a map that was built with submaps.
+        stamps_s: (k,) of the corrected poses, rising, on the recording's clock.
+        poses: (k, 4, 4) world_from_camera of the depth camera then, metres. Between them frames follow smoothly.
+
+    Returns:
+        The map as it is now, opened, and what was done.
+
+    Raises:
+        MapError: the map has no submaps, the poses are not of its frames, or it cannot be written.
+        RecordingError: a pose is no rigid motion.
+    """
+    begin_s = perf_counter()
+    submaps = stored.submaps()
+    if submaps is None:
+        raise MapError(
+            f"{stored.path} has no submaps, so that it cannot follow corrected poses; build it again with "
+            f"{option('submaps')}."
+        )
+    frames_s, before = np.asarray(submaps.stamp_s), np.asarray(submaps.pose)
+    motion = PoseCorrection.of(stamps_s, poses, frames_s, before)
+    now = motion.moved(frames_s, before)
+    with lock_folder(stored.path), silence_progress(True):
+        content, removed = _moved(stored, submaps, now)
+        apart_m = np.linalg.norm(now[:, :3, 3] - np.asarray(submaps.fused_pose)[:, :3, 3], axis=1)
+        median_m, most_m = float(np.median(apart_m)), float(apart_m.max())
+        said = f"{MOVED}: frames moved by {median_m:.2f} m (median), {most_m:.2f} m at most."
+        finished = datetime.now(UTC).isoformat(timespec="seconds")
+        elapsed_s = perf_counter() - begin_s
+        info, count = stored.info, len(content.voxels)
+        doubts = tuple(carving_doubts(removed, count))
+        others = [one for one in info.notices if not one.startswith(MOVED) and one not in info.doubts]
+        kept = [one for one in info.doubts if "seen through by other frames" not in one]
+        write_map(
+            stored.path,
+            content,
+            structs.replace(
+                info,
+                up=UpInfo.of(motion.turn @ info.up.vector(), info.up.known_from, info.up.support),
+                counts=structs.replace(info.counts, voxels=count),
+                bounding_box_m=Box.of(content.voxels.index, info.voxel_size_m),
+                removed=removed,
+                doubts=(*kept, *doubts),
+                notices=(*kept, *doubts, *others, said),
+                files={},
+                timings=Timings(finished=finished, elapsed_s=info.timings.elapsed_s + elapsed_s,
+                                stages_s={**info.timings.stages_s, "correcting": elapsed_s}),
+            ),
+        )  # fmt: skip
+    opened = replace(open_stored(stored.path), encoders=stored.encoders)
+    return opened, Corrected(median_m, most_m, info.counts.voxels, count, perf_counter() - begin_s)
+
+
+def _moved(stored: StoredMap, submaps: Submaps, now: Float[np.ndarray, "f 4 4"]) -> tuple[MapContent, Removed]:
+    """Return the content of a map whose frames have these poses, and what was no surface."""
+    total = merge_submaps(submaps, now, stored.grid)
+    sensor = NONE if stored.info.sensor is None else stored.info.sensor.model
+    views = free_views(submaps, now)
+    kept, removed = clean(total.evidence(), [views], stored.rig.depth, stored.grid, sensor)
+    if not kept.any():
+        raise MapError("With the corrected poses every voxel is seen through or a speck; check the poses.")
+    keyframes = moved_keyframes(stored.keyframes, np.asarray(submaps.stamp_s), now)
+    sounds = _replaced(stored.sounds, Motion(np.asarray(submaps.stamp_s), now))
+    content = MapContent(
+        total.voxels(kept=kept), keyframes, stored.place_state, sounds, stored.path / "sounds", stored.life(),
+        replace(submaps, pose=now),
+    )  # fmt: skip
+    return content, Removed(**removed)
+
+
+def moved_keyframes(
+    keyframes: Keyframes, stamps_s: Float[np.ndarray, " f"], now: Float[np.ndarray, "f 4 4"]
+) -> Keyframes:
+    """Return keyframes at the poses that their frames have now.
+
+    Args:
+        keyframes: each of one of the frames.
+        stamps_s: of the frames.
+        now: world_from_camera of each.
+    """
+    row = np.searchsorted(stamps_s, np.asarray(keyframes.stamp_s))
+    row = np.minimum(row, len(stamps_s) - 1)
+    pose = np.asarray(keyframes.world_from_camera, np.float64)
+    step = now[row] @ inverse(pose)
+    of_point = np.repeat(np.arange(len(keyframes)), np.diff(keyframes.offsets))
+    return replace(
+        keyframes,
+        world_from_camera=now[row],
+        centre=_apply(step, np.asarray(keyframes.centre)),
+        points_world=_apply(step[of_point], np.asarray(keyframes.points_world)),
+    )
+
+
+def _apply(step: Float[np.ndarray, "n 4 4"], points: np.ndarray) -> np.ndarray:
+    moved = np.einsum("nij,nj->ni", step[:, :3, :3], points.astype(np.float64)) + step[:, :3, 3]
+    return moved.astype(np.float32)
+
+
+def _replaced(sounds: HeardSounds, walk: Motion) -> HeardSounds:
+    """Return sounds with where the robot was now."""
+    if not len(sounds):
+        return sounds
+    tracks = [
+        track_of(walk, Segment(float(onset), float(offset)))
+        for onset, offset in zip(sounds.onset_s, sounds.offset_s, strict=True)
+    ]
+    offsets = np.cumsum([0, *map(len, tracks)]).astype(np.int64)
+    return replace(sounds, track=np.concatenate(tracks), track_offsets=offsets)

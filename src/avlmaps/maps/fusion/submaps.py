@@ -1,0 +1,120 @@
+"""Submaps: the sums of some frames at a time, and the map that they add up to when their frames have moved.
+
+A submap has its voxels in the world of the poses that its frames were fused with, and nothing changes them. Corrected
+poses give each of its frames a motion; a voxel moves with the frame in the middle of those that saw it. What is merged
+then are sums, so that a map follows any number of corrections, one after the other, and no error adds up.
+"""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from avlmaps.core.arrays import Float32, Float64, UInt16
+from avlmaps.core.poses import inverse
+from avlmaps.maps.fusion.accumulator import VoxelAccumulator
+from avlmaps.maps.fusion.free_space import FreeViews
+from avlmaps.maps.fusion.voxel_sums import VoxelSums
+from avlmaps.maps.grid import GridSpec
+from avlmaps.maps.types import Submaps
+
+_MOST = (1 << 31) - 1
+
+
+def submap_of(
+    sums: VoxelSums,
+    spread: Float32[np.ndarray, "n 10"],
+    stamps_s: Float64[np.ndarray, " f"],
+    poses: Float64[np.ndarray, "f 4 4"],
+    clear_mm: UInt16[np.ndarray, "f_or_0 rows columns"],
+) -> Submaps:
+    """Return one submap.
+
+    Args:
+        sums: of its frames.
+        spread: how the points lie within these voxels.
+        stamps_s: of its frames.
+        poses: world_from_camera of each.
+        clear_mm: how far each saw freely; none where that is not collected.
+    """
+    weight = np.asarray(sums.weight)[:, None]
+    feature = np.divide(sums.feature_sum, weight, out=np.zeros(sums.feature_sum.shape), where=weight > 0.0)
+    return Submaps(
+        row_offsets=np.array([0, len(sums)], np.int64),
+        index=np.asarray(sums.index),
+        feature=feature.astype(np.float16),
+        weight=np.asarray(sums.weight).astype(np.float32),
+        rgb_sum=np.asarray(sums.rgb_sum).astype(np.float32),
+        rgb_weight=np.asarray(sums.rgb_weight).astype(np.float32),
+        hits=np.minimum(sums.hits, _MOST).astype(np.int32),
+        views=np.asarray(sums.views),
+        sharp=np.minimum(sums.sharp, _MOST).astype(np.int32),
+        last_seen_s=np.asarray(sums.last_seen_s),
+        spread=spread.astype(np.float16),
+        frame_offsets=np.array([0, len(stamps_s)], np.int64),
+        stamp_s=np.asarray(stamps_s, np.float64),
+        fused_pose=np.asarray(poses, np.float64),
+        pose=np.asarray(poses, np.float64),
+        clear_mm=clear_mm,
+    )
+
+
+def concat_submaps(parts: Sequence[Submaps]) -> Submaps:
+    """Put submaps, at least one, one after the other."""
+    arrays: dict[str, np.ndarray] = {}
+    for name in Submaps.__dataclass_fields__:
+        every = [np.asarray(getattr(part, name)) for part in parts]
+        if name.endswith("_offsets"):
+            lengths = np.concatenate([np.diff(offsets) for offsets in every])
+            arrays[name] = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
+        else:
+            arrays[name] = np.concatenate(every)
+    return Submaps(**arrays)
+
+
+def each_submap(submaps: Submaps) -> Iterator[tuple[VoxelSums, Float32[np.ndarray, "n 10"], slice]]:
+    """Yield the sums of each submap, how the points lie in its voxels, and which frames it has; one is in memory."""
+    for number in range(len(submaps)):
+        rows = slice(*submaps.row_offsets[number : number + 2])
+        weight = np.asarray(submaps.weight[rows])
+        feature = np.asarray(submaps.feature[rows]).astype(np.float32)
+        feature *= weight[:, None]
+        sums = VoxelSums(
+            index=np.asarray(submaps.index[rows]),
+            feature_sum=feature,
+            weight=weight.astype(np.float64),
+            rgb_sum=np.asarray(submaps.rgb_sum[rows]).astype(np.float64),
+            rgb_weight=np.asarray(submaps.rgb_weight[rows]).astype(np.float64),
+            hits=np.asarray(submaps.hits[rows]).astype(np.int64),
+            views=np.asarray(submaps.views[rows]),
+            sharp=np.asarray(submaps.sharp[rows]).astype(np.int64),
+            last_seen_s=np.asarray(submaps.last_seen_s[rows]),
+        )
+        yield (
+            sums,
+            np.asarray(submaps.spread[rows]).astype(np.float32),
+            slice(*submaps.frame_offsets[number : number + 2]),
+        )
+
+
+def merge_submaps(submaps: Submaps, pose: Float64[np.ndarray, "f 4 4"], grid: GridSpec) -> VoxelAccumulator:
+    """Return the map of the submaps whose frames have these poses.
+
+    Args:
+        submaps: as they were fused.
+        pose: world_from_camera of each frame.
+        grid: the voxels' size.
+
+    Raises:
+        MapError: the poses lie too far from the world's origin for voxels.
+    """
+    total = VoxelAccumulator(grid, submaps.feature.shape[1])
+    moved = pose @ inverse(np.asarray(submaps.fused_pose))
+    for sums, spread, frames in each_submap(submaps):
+        total.merge_moved(sums, spread, moved[frames])
+    return total
+
+
+def free_views(submaps: Submaps, pose: Float64[np.ndarray, "f 4 4"]) -> FreeViews:
+    """Return where the frames saw freely, from these poses."""
+    known = len(submaps.clear_mm)
+    return FreeViews(np.asarray(submaps.clear_mm), pose[:known])

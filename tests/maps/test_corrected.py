@@ -1,0 +1,275 @@
+"""A map that was built with submaps follows corrected poses: the same change nothing, a rigid motion moves it whole."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from build_fakes import SETTINGS, Corners, Ears, Pixels, Places, Walk, write_beeps
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial import KDTree
+from scipy.spatial.transform import Rotation
+
+from avlmaps.core.errors import AvlmapsError, MapError
+from avlmaps.core.poses import apply
+from avlmaps.maps.build import build_map
+from avlmaps.maps.corrected import correct_stored
+from avlmaps.maps.fusion.accumulator import VoxelAccumulator
+from avlmaps.maps.grid import GridSpec
+from avlmaps.maps.growing import GrowingMap
+from avlmaps.maps.store.reader import StoredMap, open_stored
+from avlmaps.perception.encoders import Encoders
+
+WITH = replace(SETTINGS, frames=replace(SETTINGS.frames, per_submap=4))
+FRAMES = 22
+
+
+class Words(Pixels):
+    """The fake pixels, which know a word."""
+
+    def encode_words(self, words: list[str]) -> np.ndarray:
+        return np.tile(np.float32([0.5, 0.5, 0.5, 0.5]), (len(words), 1))
+
+
+class Hears(Ears):
+    """The fake ears, which can be asked."""
+
+    def score_words(self, sounds: list[np.ndarray], words: list[str]) -> np.ndarray:
+        return np.ones((len(sounds), len(words)), np.float32)
+
+    def score_sounds(self, sounds: list[np.ndarray], asked: np.ndarray) -> np.ndarray:
+        return np.ones(len(sounds), np.float32)
+
+
+def encoders() -> Encoders:
+    return Encoders("fake", pixels=Words(), local=Corners(), place=Places(), sounds=Hears())
+
+
+def built(folder: Path, walk: Walk | None = None) -> StoredMap:
+    return build_map(walk or Walk(audio=write_beeps(folder / "beeps.flac")), folder / "map", encoders(), WITH)
+
+
+def motion(turn_deg: float = 0.0, shift: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> np.ndarray:
+    out = np.eye(4)
+    out[:3, :3] = Rotation.from_euler("z", turn_deg, degrees=True).as_matrix()
+    out[:3, 3] = shift
+    return out
+
+
+def strayed(walk: Walk) -> np.ndarray:
+    """Return poses as odometry would have them: off by more and more."""
+    off = np.tile(np.eye(4), (len(walk), 1, 1))
+    off[:, 1, 3] = 0.02 * np.arange(len(walk))
+    return off @ walk.world_from_camera
+
+
+def require_same_voxels(one: StoredMap, other: StoredMap) -> None:
+    np.testing.assert_array_equal(one.voxels.index, other.voxels.index)
+    np.testing.assert_array_equal(one.voxels.hits, other.voxels.hits)
+    np.testing.assert_allclose(one.voxels.feature, other.voxels.feature, atol=4e-3)
+    np.testing.assert_allclose(one.voxels.rgb, other.voxels.rgb, atol=1)
+
+
+def test_the_same_poses_change_nothing(tmp_path: Path) -> None:
+    walk = Walk(audio=write_beeps(tmp_path / "beeps.flac"))
+    before = built(tmp_path, walk)
+    voxels, keyframes = replace(before.voxels), replace(before.keyframes)
+    kept = {name: np.array(getattr(voxels, name)) for name in ("index", "hits", "feature", "rgb", "last_seen_s")}
+    points, track = np.array(keyframes.points_world), np.array(before.sounds.track)
+    after, done = correct_stored(before, walk.stamps_s, walk.world_from_camera)
+    assert done.most_m == 0.0
+    np.testing.assert_array_equal(after.voxels.index, kept["index"])
+    np.testing.assert_array_equal(after.voxels.hits, kept["hits"])
+    np.testing.assert_allclose(after.voxels.feature, kept["feature"], atol=4e-3)
+    np.testing.assert_allclose(after.voxels.rgb, kept["rgb"], atol=1)
+    np.testing.assert_array_equal(after.voxels.last_seen_s, kept["last_seen_s"])
+    np.testing.assert_allclose(after.keyframes.points_world, points, atol=1e-5)
+    np.testing.assert_allclose(after.sounds.track, track, atol=1e-5)
+    open_stored(after.path, verify=True)
+
+
+def test_a_map_with_submaps_has_the_voxels_of_one_without(tmp_path: Path) -> None:
+    plain = build_map(Walk(), tmp_path / "plain", encoders(), SETTINGS)
+    stored = build_map(Walk(), tmp_path / "with", encoders(), WITH)
+    require_same_voxels(plain, stored)
+    assert plain.submaps() is None
+    submaps = stored.submaps()
+    assert submaps is not None
+    assert len(submaps) == 6
+    assert len(submaps.stamp_s) == FRAMES
+
+
+@given(st.tuples(*[st.integers(-40, 40)] * 3))
+@settings(max_examples=8, deadline=None)
+def test_a_shift_by_whole_voxels_moves_voxels(shift: tuple[int, int, int]) -> None:
+    walk = Walk()
+    growing = GrowingMap(WITH, encoders(), walk.up_in_world)
+    for frame in walk.frames():
+        growing.add(frame)
+    before = growing.stored()
+    index, hits = np.array(before.voxels.index), np.array(before.voxels.hits)
+    moved = motion(shift=tuple(0.05 * np.array(shift))) @ walk.world_from_camera
+    growing.correct_poses(walk.stamps_s, moved)
+    after = growing.stored()
+    # a hit at the very edge of its voxel may be rounded into the next
+    there = {tuple(one) for one in after.voxels.index.tolist()}
+    assert np.mean([tuple(one) in there for one in (index + shift).tolist()]) > 0.99
+    assert abs(int(after.voxels.hits.sum()) - int(hits.sum())) <= 0.01 * hits.sum()
+
+
+def test_a_rigid_motion_moves_everything(tmp_path: Path) -> None:
+    walk = Walk(audio=write_beeps(tmp_path / "beeps.flac"))
+    before = built(tmp_path, walk)
+    points = before.grid.centre_of(np.array(before.voxels.index))
+    keypoints, track = np.array(before.keyframes.points_world), np.array(before.sounds.track)
+    whole = motion(33.0, (1.3, -0.7, 0.2))
+    after, _ = correct_stored(before, walk.stamps_s, whole @ walk.world_from_camera)
+    apart, _ = KDTree(after.grid.centre_of(np.array(after.voxels.index))).query(apply(whole, points))
+    assert np.quantile(apart, 0.95) < 0.11  # half the diagonals of two voxels and a little, but for what is carved
+    np.testing.assert_allclose(after.keyframes.points_world, apply(whole, keypoints), atol=1e-5)
+    np.testing.assert_allclose(after.sounds.track, apply(whole, track), atol=1e-5)
+    np.testing.assert_allclose(after.up_in_world, [0.0, 0.0, 1.0], atol=1e-9)
+
+
+def test_up_turns_with_the_poses(tmp_path: Path) -> None:
+    walk = Walk()
+    tipped = np.eye(4)
+    tipped[:3, :3] = Rotation.from_euler("x", 90, degrees=True).as_matrix()
+    after, _ = correct_stored(built(tmp_path, walk), walk.stamps_s, tipped @ walk.world_from_camera)
+    np.testing.assert_allclose(after.up_in_world, [0.0, -1.0, 0.0], atol=1e-9)
+
+
+def test_a_second_correction_replaces_the_first(tmp_path: Path) -> None:
+    walk, stray = Walk(), strayed(Walk())
+    twice = built(tmp_path, walk)
+    twice, _ = correct_stored(twice, walk.stamps_s, stray)
+    twice, _ = correct_stored(twice, walk.stamps_s, motion(10.0) @ stray)
+    (tmp_path / "once").mkdir()
+    once, _ = correct_stored(built(tmp_path / "once", walk), walk.stamps_s, motion(10.0) @ stray)
+    require_same_voxels(once, twice)
+    back, _ = correct_stored(twice, walk.stamps_s, walk.world_from_camera)
+    plain = build_map(Walk(), tmp_path / "plain", encoders(), SETTINGS)
+    require_same_voxels(plain, back)
+
+
+def test_a_strayed_map_becomes_that_of_the_right_poses(tmp_path: Path) -> None:
+    walk = Walk()
+    right = np.array(build_map(walk, tmp_path / "right", encoders(), WITH).voxels.index)
+    wrong = Walk(name="strayed")
+    wrong.world_from_camera = strayed(walk)
+    stored = built(tmp_path, wrong)
+    before = KDTree(right).query(np.array(stored.voxels.index))[0]
+    corrected, done = correct_stored(stored, walk.stamps_s, walk.world_from_camera)
+    after = KDTree(right).query(np.array(corrected.voxels.index))[0]
+    assert done.most_m == pytest.approx(0.02 * (FRAMES - 1))
+    assert np.mean(before > 1.5) > 5 * np.mean(after > 1.5)
+    missed = KDTree(np.array(corrected.voxels.index)).query(right)[0]
+    assert np.mean(missed < 1.5) > 0.99
+
+
+def test_frames_between_two_corrected_poses_follow_smoothly(tmp_path: Path) -> None:
+    walk, stray = Walk(), strayed(Walk())
+    every, _ = correct_stored(built(tmp_path, walk), walk.stamps_s, stray)
+    (tmp_path / "some").mkdir()
+    ends = [0, FRAMES - 1]  # the strayed poses lie on a line between them
+    some, _ = correct_stored(built(tmp_path / "some", walk), walk.stamps_s[ends], stray[ends])
+    require_same_voxels(every, some)
+    said = some.info.notices
+    assert any("moved by 0.21 m (median), 0.42 m at most" in sentence for sentence in said)
+
+
+@given(st.tuples(*[st.floats(-180, 180)] * 3), st.tuples(*[st.floats(-3, 3)] * 3), st.integers(0, 1000))
+@settings(max_examples=8, deadline=None)
+def test_nothing_is_lost_on_the_way(angles: tuple, shift: tuple, seed: int) -> None:
+    walk = Walk(4, seed=seed)
+    part = VoxelAccumulator(GridSpec(0.05), 4, with_spread=True)
+    for frame in walk.frames():
+        part.add(frame, Pixels().encode(frame))
+    whole = np.tile(np.eye(4), (4, 1, 1))
+    whole[:, :3, :3] = Rotation.from_euler("xyz", angles, degrees=True).as_matrix()
+    whole[:, :3, 3] = shift
+    total = VoxelAccumulator(GridSpec(0.05), 4)
+    sums = part.sums()
+    total.merge_moved(sums, part.spread(), whole)
+    moved = total.sums()
+    for name in ("feature_sum", "weight", "rgb_sum", "rgb_weight"):
+        np.testing.assert_allclose(getattr(moved, name).sum(axis=0), getattr(sums, name).sum(axis=0), rtol=1e-4)
+    assert moved.views.max() <= 4
+    assert (moved.hits >= moved.views).all()
+
+
+CASES = {
+    "none": ([], np.zeros((0, 4, 4)), "no corrected pose"),
+    "shape": ([0.0, 0.1], np.eye(4), r"\(k, 4, 4\)"),
+    "words": (["a"], [["b"]], "no numbers"),
+    "nan stamp": ([np.nan], np.eye(4)[None], "no finite"),
+    "order": ([0.2, 0.1], np.tile(np.eye(4), (2, 1, 1)), "must rise"),
+    "twice": ([0.1, 0.1], np.tile(np.eye(4), (2, 1, 1)), "must rise"),
+    "another clock": ([1000.0], np.eye(4)[None], "of no frame"),
+    "no rotation": ([0.1], np.diag([2.0, 1.0, 1.0, 1.0])[None], "not a rigid transform"),
+    "mirrored": ([0.1], np.diag([-1.0, 1.0, 1.0, 1.0])[None], "not a rigid transform"),
+    "nan pose": ([0.1], np.full((1, 4, 4), np.nan), "NaN"),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_what_is_no_correction_is_refused_and_the_map_stays(tmp_path: Path, case: str) -> None:
+    stamps, poses, said = CASES[case]
+    stored = built(tmp_path)
+    before = (stored.path / "map.json").read_bytes()
+    with pytest.raises(AvlmapsError, match=said):
+        correct_stored(stored, stamps, poses)
+    assert (stored.path / "map.json").read_bytes() == before
+
+
+def test_poses_of_another_walk_are_refused(tmp_path: Path) -> None:
+    walk = Walk(60)
+    other = walk.world_from_camera.copy()
+    other[:, 0, 3] *= -1.0
+    with pytest.raises(MapError, match="another walk"):
+        correct_stored(built(tmp_path, walk), walk.stamps_s, other)
+
+
+def test_a_map_without_submaps_says_how_it_gets_them(tmp_path: Path) -> None:
+    stored = build_map(Walk(), tmp_path / "map", encoders(), SETTINGS)
+    with pytest.raises(MapError, match="submaps"):
+        correct_stored(stored, [0.0], np.eye(4)[None])
+
+
+def test_a_growing_map_follows_and_goes_on(tmp_path: Path) -> None:
+    walk = Walk(40, audio=None)
+    right = GrowingMap(WITH, encoders(), walk.up_in_world, wait=4)
+    growing = GrowingMap(WITH, encoders(), walk.up_in_world, wait=4)
+    stray = strayed(walk)
+    for frame in walk.frames():
+        right.add(frame)
+        pose = stray[frame.index] if frame.index < 22 else walk.world_from_camera[frame.index]
+        growing.add(replace(frame, world_from_camera=pose))
+        if frame.index == 21:
+            came = growing.freeze()
+            median_m, most_m = growing.correct_poses(walk.stamps_s[:22], walk.world_from_camera[:22])
+            assert not growing.is_current(came)
+    assert (median_m, most_m) == (pytest.approx(0.21), pytest.approx(0.42))
+    wanted, found = right.stored(final=True), growing.stored(final=True)
+    apart = KDTree(np.array(wanted.voxels.index)).query(np.array(found.voxels.index))[0]
+    assert np.mean(apart < 1.5) > 0.99
+    assert np.mean(KDTree(np.array(found.voxels.index)).query(np.array(wanted.voxels.index))[0] < 1.5) > 0.99
+    np.testing.assert_allclose(
+        np.array(found.keyframes.world_from_camera)[:, 1, 3], np.zeros(len(found.keyframes)), atol=1e-9
+    )
+    saved = growing.save(tmp_path / "map")
+    again, _ = correct_stored(saved, walk.stamps_s, walk.world_from_camera)
+    require_same_voxels(found, again)
+
+
+def test_a_growing_map_follows_while_its_first_frames_wait() -> None:
+    walk = Walk(8)
+    growing = GrowingMap(WITH, encoders(), walk.up_in_world)
+    for frame in walk.frames():
+        growing.add(frame)
+    growing.correct_poses(walk.stamps_s, motion(shift=(0.0, 0.0, 1.0)) @ walk.world_from_camera)
+    other = GrowingMap(WITH, encoders(), walk.up_in_world)
+    for frame in walk.frames():
+        other.add(replace(frame, world_from_camera=motion(shift=(0.0, 0.0, 1.0)) @ frame.world_from_camera))
+    require_same_voxels(other.stored(), growing.stored())
