@@ -5,13 +5,15 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextvars import copy_context
 from pathlib import Path
+from threading import Thread
 
 import numpy as np
 import pytest
 
 from avlmaps.core.errors import NoAudioStreamError
-from avlmaps.core.wording import Spelling, flag, option, options_as
+from avlmaps.core.wording import Spelling, asked_as, flag, option, options_as
 from avlmaps.recordings.containers import examine
 
 
@@ -33,6 +35,20 @@ def test_the_spelling_ends_with_its_front():
     with pytest.raises(KeyError), options_as(Spelling.FLAG):
         raise KeyError
     assert option("overwrite") == "overwrite=True"
+
+
+def test_who_asks_is_answered_in_their_spelling_and_the_front_in_its_own():
+    with options_as(Spelling.FLAG):
+        with asked_as(Spelling.FIELD):
+            context = copy_context()
+            assert option("camera-height-m") == "camera_height_m"
+        assert option("camera-height-m") == "--camera-height-m"
+        said: list[str] = []
+        for run in (lambda work: work(), context.run):
+            thread = Thread(target=run, args=(lambda: said.append(option("camera-height-m")),))
+            thread.start()
+            thread.join()
+    assert said == ["--camera-height-m", "camera_height_m"]
 
 
 def test_processes_that_a_front_starts_spell_as_it_does():

@@ -11,6 +11,7 @@ from starlette.responses import PlainTextResponse, Response
 from starlette.testclient import TestClient
 
 from avlmaps.core.network import is_loopback
+from avlmaps.core.wording import Spelling, option, options_as
 from avlmaps.serve.errors import Privacy, without_folders
 from avlmaps.serve.guard import Guard
 from avlmaps.serve.settings import Limits, ServeError, ServeSettings
@@ -202,3 +203,13 @@ def test_paths_of_the_machine_leave_sentences(sentence: str, cleaned: str, tmp_p
 
     told = Privacy([(Path("/data/maps/home.avlmap"), "home")]).cleaned(sentence)
     assert told == cleaned if cleaned else "/" not in told and "\\" not in told
+
+
+def test_a_request_is_answered_in_fields_while_the_process_speaks_in_flags() -> None:
+    async def says(scope: Any, receive: Any, send: Any) -> None:
+        await PlainTextResponse(option("camera-height-m"))(scope, receive, send)
+
+    with options_as(Spelling.FLAG):
+        client = TestClient(Guard(says, ServeSettings()), base_url="http://127.0.0.1:8750")
+        assert client.get("/").text == "camera_height_m"
+        assert option("camera-height-m") == "--camera-height-m"

@@ -2,12 +2,13 @@
 
 Most remedies of errors and notices are options, and each front spells them in its own way. A sentence writes
 ``option("depth-unit", "METRES")``; a front says once, for its process and those that it starts, how its readers spell
-that.
+that. A server in that process has readers of its own: what is done for them is spelled as they spell.
 """
 
 import os
 from collections.abc import Generator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from enum import Enum
 from typing import Final
 
@@ -47,6 +48,7 @@ _ARGUMENTS: Final = {
 _SWITCHES: Final = {"guess", "overwrite"}
 _VARIABLE: Final = "AVLMAPS_OPTIONS_AS"  # for the processes that a front starts
 _spelling = next((one for one in Spelling if one.value == os.environ.get(_VARIABLE)), Spelling.ARGUMENT)
+_asked_as: ContextVar[Spelling | None] = ContextVar("asked_as", default=None)
 
 
 @contextmanager
@@ -65,6 +67,19 @@ def options_as(spelling: Spelling) -> Generator[None]:
             os.environ[_VARIABLE] = told
 
 
+@contextmanager
+def asked_as(spelling: Spelling) -> Generator[None]:
+    """Spell options in one way for the reader who asks here: in this thread's context, and in tasks that it starts.
+
+    Threads begin with no context; those that answer take it along (``contextvars.copy_context``).
+    """
+    before = _asked_as.set(spelling)
+    try:
+        yield
+    finally:
+        _asked_as.reset(before)
+
+
 def flag(name: str, value: str = "") -> str:
     """Return an option as the command line spells it, for any reader."""
     return f"--{name} {value}".rstrip()
@@ -78,9 +93,10 @@ def option(name: str, value: str = "", argument: str = "") -> str:
         value: what to give, such as ``METRES``; "" for a switch, or to name the option alone.
         argument: its name in Python, where that is another one here than elsewhere.
     """
-    if _spelling is Spelling.FLAG:
+    spelling = _asked_as.get() or _spelling
+    if spelling is Spelling.FLAG:
         return flag(name, value)
     plain = name.replace("-", "_")
-    named = argument or _ARGUMENTS.get(name, plain) if _spelling is Spelling.ARGUMENT else plain
+    named = argument or _ARGUMENTS.get(name, plain) if spelling is Spelling.ARGUMENT else plain
     given = value or ("True" if name in _SWITCHES else "")
     return f"{named}={given}" if given else named

@@ -16,7 +16,7 @@ from typing import Any
 from urllib.parse import parse_qsl, quote, unquote, urlencode, urlsplit
 
 from avlmaps.core.network import is_loopback
-from avlmaps.core.wording import flag
+from avlmaps.core.wording import Spelling, asked_as, flag
 from avlmaps.serve.errors import RequestError
 from avlmaps.serve.settings import ServeSettings
 
@@ -61,6 +61,11 @@ class Guard:
         if scope["type"] != "http":  # no WebSocket is served
             await send({"type": "websocket.close", "code": 1008})
             return
+        with asked_as(Spelling.FIELD):
+            await self._answer(scope, receive, send)
+
+    async def _answer(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request, or refuse it."""
         try:
             entered = self._check(scope)
         except RequestError as error:

@@ -5,6 +5,7 @@ import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from contextvars import copy_context
 from typing import TypeVar
 
 from avlmaps.core.errors import AvlmapsError
@@ -101,7 +102,7 @@ class Lane:
                 watch.step("started")
                 return work(watch)
 
-        future = self._threads.submit(watched)
+        future = self._threads.submit(copy_context().run, watched)
         future.add_done_callback(self._freed)
         try:
             async with asyncio.timeout(self._answer_s):

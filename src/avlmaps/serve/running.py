@@ -12,7 +12,7 @@ from pathlib import Path
 from types import FrameType
 
 from avlmaps.core.files import read_regular
-from avlmaps.core.wording import Spelling, option, options_as
+from avlmaps.core.wording import option
 from avlmaps.serve.guard import App
 from avlmaps.serve.service import Service
 from avlmaps.serve.settings import ServeError, ServeSettings
@@ -138,5 +138,4 @@ def run_http(
         raise ServeError(
             f"The TLS files cannot be used ({error.strerror or error}); give a PEM certificate and its key."
         ) from None
-    with options_as(Spelling.FIELD):
-        asyncio.run(Server(config).serve(sockets=[opened]))
+    asyncio.run(Server(config).serve(sockets=[opened]))

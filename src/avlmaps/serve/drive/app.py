@@ -11,7 +11,9 @@ import os
 import signal
 from collections.abc import AsyncIterator, Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextvars import copy_context
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, TypeVar
 
 import msgspec
@@ -65,14 +67,14 @@ class DriveService:
             raise DriveError(f"{self.waiting} orders are being read; send this one again in a second.", 503, "busy")
         self.waiting += 1
         try:
-            return await asyncio.get_running_loop().run_in_executor(self.orders, work)
+            return await _in(self.orders, work)
         finally:
             self.waiting -= 1
 
     async def stop(self, who: Who) -> dict[str, Any]:
         """Stop the robot: the brake at once, here; the robot's confirmation in a thread."""
         self.dispatcher.brake_now()
-        return await asyncio.get_running_loop().run_in_executor(self.stops, self.dispatcher.stop, who)
+        return await _in(self.stops, partial(self.dispatcher.stop, who))
 
     def end(self) -> None:
         """Stop the robot at once, since the server ends; streams end as well."""
@@ -95,6 +97,12 @@ class DriveService:
             await asyncio.shield(loop.run_in_executor(self.stops, self.dispatcher.close))
             self.orders.shutdown(wait=False, cancel_futures=True)
             self.stops.shutdown(wait=False)
+
+
+async def _in(threads: ThreadPoolExecutor, work: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+    """Do work in one of some threads, with the context of who asks for it."""
+    context = copy_context()
+    return await asyncio.get_running_loop().run_in_executor(threads, lambda: context.run(work))
 
 
 def drive_app(service: DriveService, agents: Any = None) -> Starlette:

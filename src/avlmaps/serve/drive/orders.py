@@ -9,6 +9,7 @@ import secrets
 import threading
 from collections import deque
 from collections.abc import Callable
+from contextvars import copy_context
 from dataclasses import dataclass, field
 from math import degrees
 from time import monotonic
@@ -196,7 +197,8 @@ class Dispatcher:
                     self._log.write("confirmed", {"who": who.to_json(), **order.plan.to_json()})
                     if order.brake.pulled:
                         raise DriveError("The robot was stopped before the order began; plan again.", 409, "stopped")
-                    order.thread = threading.Thread(target=self._run, args=(order, who), name="avlmaps-order")
+                    run = copy_context().run  # what the order says is read over HTTP
+                    order.thread = threading.Thread(target=run, args=(self._run, order, who), name="avlmaps-order")
                     order.thread.start()
                 except BaseException:
                     with self._lock:

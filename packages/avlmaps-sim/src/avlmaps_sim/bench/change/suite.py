@@ -12,7 +12,8 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core.poses import apply, inverse, plain_point, rotation_angle_rad
-from avlmaps.days.merge import NotTheSamePlaceError, ThingsOf, default_things, merge_maps
+from avlmaps.days.align import NotTheSamePlaceError
+from avlmaps.days.merge import ThingsOf, default_things, merge_maps
 from avlmaps.maps.store.life import Stay
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.changes import Days

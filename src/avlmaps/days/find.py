@@ -1,0 +1,127 @@
+"""Where a map of another day lies in this one: found by its pictures, held against the surfaces; and a map's days."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+
+from avlmaps.core.arrays import Float, Int
+from avlmaps.core.poses import apply
+from avlmaps.days.align import (
+    NotTheSamePlaceError,
+    consensus,
+    gather_votes,
+    require_alike,
+    require_upright,
+)
+from avlmaps.days.evidence import DayViews
+from avlmaps.days.settings import MergeSettings
+from avlmaps.days.surfaces import Occupied, refine
+from avlmaps.maps.store.manifest import Visit
+from avlmaps.maps.store.reader import StoredMap
+
+DEFAULTS = MergeSettings()
+_CLOCK_S = 1e8  # later stamps count from 1970: they are a clock's
+_IDENTITY = tuple(tuple(float(value) for value in row) for row in np.eye(4))
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """Where another map lies in this one, and the numbers that say so.
+
+    Attributes:
+        map_from_other: 4x4.
+        checks: keyframes tried, located and agreeing, how far those stand apart, the surfaces' distance and agreement.
+    """
+
+    map_from_other: Float[np.ndarray, "4 4"]
+    checks: dict[str, float]
+
+
+def find_other(
+    stored: StoredMap, other: StoredMap, settings: MergeSettings = DEFAULTS, known: Occupied | None = None
+) -> Found:
+    """Return where another map lies in this one, without a guess; ``known`` are this one's voxels, where they are had.
+
+    Raises:
+        MapError: the maps have other voxels or models, or no keyframes.
+        NotTheSamePlaceError: the pictures do not agree, or the surfaces contradict each other.
+    """
+    require_alike(stored, other)
+    rng = np.random.default_rng(settings.seed)
+    votes = gather_votes(stored, other, settings.align, rng)
+    first, checks = consensus(votes, settings.align, (stored.path, other.path))
+    require_upright(first, stored.up_in_world, other.up_in_world, settings.align)
+    grid = stored.grid
+    points, others = (grid.centre_of(np.asarray(one.voxels.index)) for one in (stored, other))
+    fine = first
+    if checks["votes_off_m"] > settings.align.refine_from * grid.voxel_size_m:
+        fine, off_m = refine(points, others, first, rng)
+        checks["surface_off_m"] = round(off_m, 4)
+    known = known or Occupied.of(np.asarray(stored.voxels.index), grid)
+    checks |= _agreement(stored, other.path, apply(fine, others), known, settings)
+    return Found(fine, checks)
+
+
+def _agreement(
+    stored: StoredMap, other: Path, points: Float[np.ndarray, "n 3"], known: Occupied, settings: MergeSettings
+) -> dict[str, float]:
+    """Return how much of the other map's surface (``points``) lies on this one's, of what this one looked at.
+
+    Raises:
+        NotTheSamePlaceError: too little, or too little was looked at.
+    """
+    grid, wanted = stored.grid, settings.align
+    on_surface = known.near(points)
+    index = grid.index_of(points)
+    free = np.zeros(len(index), np.int64)
+    for views in views_of(stored):
+        free += views.through(index, grid)
+    through = (free >= settings.changes.through_views) & ~on_surface
+    looked = int(on_surface.sum() + through.sum())
+    share = float(on_surface.sum() / max(looked, 1))
+    if looked < wanted.least_looked or share < wanted.least_agreement:
+        raise NotTheSamePlaceError(
+            f"This is not seen to be the same place: of {looked} voxels of {other} where {stored.path} looked, "
+            f"{share:.0%} lie on its surface and the others where it saw through; {wanted.least_agreement:.0%} of at "
+            f"least {wanted.least_looked} must. Merge maps of one building that saw some of the same rooms."
+        )
+    return {"looked": looked, "agreement": round(share, 4)}
+
+
+def visits_of(stored: StoredMap) -> tuple[Visit, ...]:
+    """Return the days of a map: the one of its recording, where it was not merged."""
+    info = stored.info
+    if info.visits:
+        return info.visits
+    stamps = np.asarray(stored.keyframes.stamp_s)
+    begin = float(stamps.min(initial=np.inf)) if len(stamps) else 0.0
+    seen = np.asarray(stored.voxels.last_seen_s)
+    begin = min(begin, float(seen.min(initial=begin)))
+    end = max(float(stamps.max(initial=begin)), float(seen.max(initial=begin)))
+    day = datetime.fromtimestamp(begin, UTC).date().isoformat() if begin > _CLOCK_S else ""
+    return (
+        Visit(
+            day=day, recording=info.recording, begin_s=begin, end_s=end, shift_s=0.0, map_from_recording=_IDENTITY,  # pyright: ignore[reportArgumentType]
+            rig=info.rig, frames=info.counts.frames,
+        ),
+    )  # fmt: skip
+
+
+def views_of(stored: StoredMap) -> list[DayViews]:
+    """Return what the keyframes of each visit saw freely, in the map's world."""
+    keyframes, visits, out = stored.keyframes, visits_of(stored), list[DayViews]()
+    number = visit_of_stamps(visits, np.asarray(keyframes.stamp_s))
+    for visit, one in enumerate(visits):
+        own = np.flatnonzero(number == visit)
+        pose = np.asarray(keyframes.world_from_camera, np.float64)[own]
+        out.append(DayViews(np.asarray(keyframes.clear_mm)[own], pose, one.rig.depth.camera()))
+    return out
+
+
+def visit_of_stamps(visits: Sequence[Visit], stamps_s: Float[np.ndarray, " n"]) -> Int[np.ndarray, " n"]:
+    """Return the number of the visit that each stamp lies in."""
+    begins = np.array([visit.begin_s for visit in visits])
+    return np.clip(np.searchsorted(begins, stamps_s + 1e-6, side="right") - 1, 0, len(visits) - 1)
