@@ -19,6 +19,7 @@ from avlmaps.query.instances import FeatureVoxels
 from avlmaps.query.known_words import KnownClosestWords
 from avlmaps.query.modalities.object import object_factor
 from avlmaps.query.object_settings import ObjectSettings
+from avlmaps.query.probability import most_likely
 from avlmaps.query.voxel_space import Space
 from avlmaps.query.words import ClosestWords, EncodedWord, Vocabulary, least_score_to_count, object_margins
 
@@ -312,6 +313,24 @@ def test_what_is_found_alone_is_the_same_in_company(word: str, evenness: float, 
     instance[company.mask] = company.instance
     np.testing.assert_array_equal(instance[alone.mask], alone.instance)
     assert (instance[company.mask & ~alone.mask] >= len(alone.confidence)).all()
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.sampled_from(sorted(MEANT)), st.sampled_from([0.1, 0.5, 5.0]), st.integers(0, 2**32 - 1), st.sampled_from([1, 3])
+)  # fmt: skip
+def test_a_thing_near_a_mark_has_at_most_a_multiple_of_its_odds_alone(
+    word: str, evenness: float, seed: int, mark: int
+) -> None:
+    probability = np.random.default_rng(seed).dirichlet(np.full(len(NAMES), evenness), len(INDEX))
+    feature = features_of(probability, ENCODER.codes).astype(np.float16)
+    part = Part(Modality.OBJECT, word, Role.PRIMARY)
+    rivals = ClosestWords.of(feature, ENCODER, NAMES)
+    alone = Heatmap.of(
+        object_factor(FeatureVoxels(SPACE, feature, ENCODER, rivals, ObjectSettings()), part, HeatSettings())
+    )
+    for several in (alone * near(mark), alone * near(mark) * near(mark), alone.include_uncertain() * near(mark)):
+        assert all(goal.probability <= most_likely(alone.probability) + 1.5e-3 for goal in several.goals(10))
 
 
 def test_other_does_not_compete_with_itself() -> None:

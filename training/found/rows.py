@@ -14,7 +14,7 @@ from avlmaps.query.probability import NUMBERS
 from avlmaps_sim.bench.found.answers import Judged
 
 ROWS = Path(__file__).parent / "rows.csv"
-_COLUMNS = ("scene", "kind", "words", "answerable", "right", "combination", *NUMBERS)
+_COLUMNS = ("scene", "kind", "words", "answerable", "right", "combination", *NUMBERS, "first_alone")
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +29,7 @@ class Row:
         right: whether the first goal is.
         combination: of what is sought and what it is near.
         numbers: of the evidence, in the order of ``NUMBERS``.
+        first_alone: of the evidence.
     """
 
     scene: str
@@ -38,21 +39,21 @@ class Row:
     right: bool
     combination: str
     numbers: tuple[float, ...]
+    first_alone: float
 
     @classmethod
     def of(cls, judged: Judged, evidence: Evidence) -> "Row":
         """Return the row of an answer."""
         numbers = tuple(round(float(getattr(evidence, name)), 4) for name in NUMBERS)
         facts = judged.scene, judged.kind, judged.words, judged.answerable, judged.right
-        return cls(*facts, combination(evidence), numbers)
+        return cls(*facts, combination(evidence), numbers, round(evidence.first_alone, 4))
 
     @property
     def evidence(self) -> Evidence:
         """The evidence again."""
         lead, *near = self.combination.replace(" near ", " and ").split(" and ")
-        return Evidence(
-            Modality(lead), tuple(map(Modality, near)), 1.0 / (1.0 + math.exp(-self.numbers[0])), *self.numbers
-        )
+        alone = 1.0 / (1.0 + math.exp(-self.numbers[0]))
+        return Evidence(Modality(lead), tuple(map(Modality, near)), alone, *self.numbers, self.first_alone)
 
 
 def combination(evidence: Evidence) -> str:
@@ -67,9 +68,8 @@ def write_rows(rows: Iterable[Row], path: Path = ROWS) -> None:
         out = csv.writer(file, lineterminator="\n")
         out.writerow(_COLUMNS)
         for row in rows:
-            out.writerow(
-                [row.scene, row.kind, row.words, int(row.answerable), int(row.right), row.combination, *row.numbers]
-            )
+            facts = row.scene, row.kind, row.words, int(row.answerable), int(row.right), row.combination
+            out.writerow([*facts, *row.numbers, row.first_alone])
 
 
 def read_rows(path: Path = ROWS) -> list[Row]:
@@ -78,7 +78,7 @@ def read_rows(path: Path = ROWS) -> list[Row]:
         return [
             Row(
                 one["scene"], one["kind"], one["words"], one["answerable"] == "1", one["right"] == "1",
-                one["combination"], tuple(float(one[name]) for name in NUMBERS),
+                one["combination"], tuple(float(one[name]) for name in NUMBERS), float(one["first_alone"]),
             )
             for one in csv.DictReader(file)
         ]  # fmt: skip
