@@ -15,9 +15,9 @@ from avlmaps.core.progress import silence_progress
 from avlmaps.core.wording import option
 from avlmaps.maps.audio.events import track_of
 from avlmaps.maps.audio.segmentation import Segment
-from avlmaps.maps.fusion.free_space import clean
+from avlmaps.maps.fusion.accumulator import VoxelAccumulator
+from avlmaps.maps.fusion.free_space import FreeViews, clean
 from avlmaps.maps.fusion.sensor import NONE
-from avlmaps.maps.fusion.submaps import free_views, merge_submaps
 from avlmaps.maps.growing_walk import Motion
 from avlmaps.maps.pipeline.write import carving_doubts
 from avlmaps.maps.pose_correction import PoseCorrection
@@ -107,9 +107,10 @@ def correct_stored(stored: StoredMap, stamps_s: Any, poses: Any) -> tuple[Stored
 
 def _moved(stored: StoredMap, submaps: Submaps, now: Float[np.ndarray, "f 4 4"]) -> tuple[MapContent, Removed]:
     """Return the content of a map whose frames have these poses, and what was no surface."""
-    total = merge_submaps(submaps, now, stored.grid)
+    total = VoxelAccumulator.of_submaps(submaps, now, stored.grid)
     sensor = NONE if stored.info.sensor is None else stored.info.sensor.model
-    views = free_views(submaps, now)
+    clear_mm = np.asarray(submaps.clear_mm)
+    views = FreeViews(clear_mm, now[: len(clear_mm)])
     kept, removed = clean(total.evidence(), [views], stored.rig.depth, stored.grid, sensor)
     if not kept.any():
         raise MapError("With the corrected poses every voxel is seen through or a speck; check the poses.")

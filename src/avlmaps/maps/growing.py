@@ -21,7 +21,7 @@ from avlmaps.core.registry import Kind
 from avlmaps.maps.audio.growing import GrowingSounds
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
 from avlmaps.maps.fusion.free_space import FreeViewCollector, ThroughCounts, stack_views
-from avlmaps.maps.fusion.submaps import concat_submaps, merge_submaps, submap_of
+from avlmaps.maps.fusion.submaps import concat_submaps, submap_of
 from avlmaps.maps.fusion.voxel_sums import VoxelSums
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.growing_walk import HERE, Walk
@@ -227,7 +227,7 @@ class GrowingMap:
             self._keep_submap(self._part.sums())
         self._part, self._part_number = self._empty(self._sensor), -1
         submaps = concat_submaps(self._submaps)
-        self._total = merge_submaps(submaps, self._walk.pose_of(submaps.stamp_s), self._part.grid)
+        self._total = VoxelAccumulator.of_submaps(submaps, self._walk.pose_of(submaps.stamp_s), self._part.grid)
         self._total_is_read = False
         self._free.place(self._walk.pose_of(submaps.stamp_s))
         self._through = ThroughCounts(GridSpec(self.settings.voxel_size_m), self._walk.rig.depth)

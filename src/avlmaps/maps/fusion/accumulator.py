@@ -13,15 +13,17 @@ from jaxtyping import Bool, Float, Float16, Float32, Float64, Int32
 
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import BackendError, MapError, RecordingError
+from avlmaps.core.poses import inverse
 from avlmaps.maps.fusion import add_kernels as sums
 from avlmaps.maps.fusion import measure_kernels as kernels
 from avlmaps.maps.fusion.carving_kernels import drop_flying
 from avlmaps.maps.fusion.sensor import NONE, FusionSettings, SensorModel
 from avlmaps.maps.fusion.submap_kernels import SPREAD_COLUMNS, add_spread, finish_spread
+from avlmaps.maps.fusion.submaps import each_submap
 from avlmaps.maps.fusion.voxel_kernels import look_up_views
 from avlmaps.maps.fusion.voxel_sums import Evidence, MovedFrom, VoxelSums, VoxelTable, with_rows
 from avlmaps.maps.grid import GridSpec
-from avlmaps.maps.types import Voxels
+from avlmaps.maps.types import Submaps, Voxels
 from avlmaps.recordings.types import Frame
 
 FARTHEST_VOXEL = (1 << 31) - 2 * kernels.REACH_VOXELS  # indices are int32
@@ -143,7 +145,6 @@ class VoxelAccumulator:
         self._scratch = kernels.make_scratch(1, 1)
         self._spread = np.zeros((0, SPREAD_COLUMNS)) if with_spread else None
         self._frames = 0
-        self._moved = MovedFrom()
 
     def __len__(self) -> int:
         """Return how many voxels there are."""
@@ -219,20 +220,28 @@ class VoxelAccumulator:
         finish_spread(self._spread[rows], self._table.hits[rows], found)
         return found
 
-    def merge_moved(
-        self, part: VoxelSums, spread: Float32[np.ndarray, "n 10"], moved: Float64[np.ndarray, "f 4 4"]
-    ) -> None:
-        """Add the sums of a submap whose frames moved.
+    @classmethod
+    def of_submaps(cls, submaps: Submaps, pose: Float64[np.ndarray, "f 4 4"], grid: GridSpec) -> "VoxelAccumulator":
+        """Return the map of submaps whose frames have these poses.
 
         Args:
-            part: its sums.
-            spread: how the points lie within its voxels.
-            moved: of each of its frames, the new world from the one that it was fused in, metres.
+            submaps: as they were fused.
+            pose: world_from_camera of each frame.
+            grid: the voxels' size.
 
         Raises:
-            MapError: its features have another length.
+            MapError: the poses lie too far from the world's origin for voxels.
         """
-        self._table.add_moved(part, spread, moved, self.grid.voxel_size_m, self._moved)
+        total = cls(grid, submaps.feature.shape[1])
+        moved = pose @ inverse(np.asarray(submaps.fused_pose))
+        before, found = MovedFrom(), [(np.zeros(0, np.int32), np.zeros(0, np.int64), np.zeros(0, np.float32))]
+        for first, part, spread, frames in each_submap(submaps):
+            target, row, weight = total._table.add_moved(part, spread, moved[frames], grid.voxel_size_m, before)
+            found.append((target, row + np.int64(first), weight))
+        if total.dim:
+            target, row, weight = (np.concatenate(column) for column in zip(*found, strict=True))
+            total._table.add_features(target, row, weight, submaps.feature)
+        return total
 
     def views_at(self, index: Int32[np.ndarray, "n 3"]) -> Int32[np.ndarray, " n"]:
         """Return how many frames have a pixel in each of some voxels."""

@@ -7,7 +7,7 @@ voxel, so that a shift by whole voxels moves voxels, and no shift changes nothin
 """
 
 import numpy as np
-from jaxtyping import Float32, Float64, Int32, Int64
+from jaxtyping import Float32, Float64, Int32, Int64, UInt16
 from numba import njit
 
 from avlmaps.core.kernel_types import Real, Whole
@@ -24,6 +24,7 @@ LEAST_HITS = 0.5  # a voxel gets less than this part of a hit from one that move
 
 
 Stay = tuple[np.ndarray, np.ndarray]
+Pairs = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 @njit(**OPTIONS)
@@ -194,39 +195,44 @@ def move_rows(
     moved: Float64[np.ndarray, "frames 3 4"],
     table: Int32[np.ndarray, " slots"],
     sums: Geometry,
-    feature_sum: Float32[np.ndarray, "rows d"],
     weight: Float64[np.ndarray, " rows"],
     stay: Stay,
     number: Whole,
     count: Whole,
     begin: Whole,
+    pairs: Pairs,
+    pair: Whole,
 ):
-    """Add voxels of a submap to a map, each moved as its frame was, until the table has no room for another.
+    """Add voxels of a submap to a map, each moved as its frame was, until there is no room for another.
+
+    Features wait for `sum_features`: which of them go where, and how much they count, is written as pairs.
 
     Args:
-        part: (index, rgb_sum, rgb_weight, hits, views, sharp, last_seen_s, feature_sum, weight) of the submap.
+        part: (index, rgb_sum, rgb_weight, hits, views, sharp, last_seen_s, weight) of the submap.
         spread: of `finish_spread`.
         moved: (frames, 3, 4) corrected from uncorrected world of each of its frames, voxels.
         table: hash table of rows.
         sums: (index, rgb_sum, rgb_weight, hits, views, sharp, last_seen_s), added to.
-        feature_sum: (rows, d), added to.
         weight: (rows,), added to.
         stay: (submap, views): of each row the last submap that added to it, and how many views it added.
         number: of this submap.
         count: number of voxels in this map already.
         begin: row of the submap to begin with.
+        pairs: (row of the map, row of the submap, weight) of each feature that counts, written from ``pair`` on.
+        pair: how many there are.
 
     Returns:
-        Count of voxels now, and the row to resume with when there is room again.
+        Count of voxels now, count of pairs, and the row to resume with when there is room again.
     """
     index, rgb_sum, rgb_weight, hits, views, sharp, last_seen_s = sums
     part_index, part_rgb, part_rgb_weight, part_hits, part_views, part_sharp, part_last_seen = part[:7]
-    part_feature, part_weight = part[7:]
+    part_weight = part[7]
+    pair_target, pair_row, pair_weight = pairs
     key, share = np.empty((MOST_SAMPLES, 3), np.int64), np.empty(MOST_SAMPLES, np.int64)
     room = min(index.shape[0], table.shape[0] // 2) - MOST_SAMPLES
     for n in range(begin, part_index.shape[0]):
-        if count > room:
-            return count, n
+        if count > room or pair > pair_target.shape[0] - MOST_SAMPLES:
+            return count, pair, n
         frame = min(max(np.int64(spread[n, NUMBER] + 0.5), 0), moved.shape[0] - 1)
         found, samples = _targets(part_index[n], spread[n], moved[frame], key, share)
         found, samples = _without_slivers(found, samples, part_hits[n], key, share)
@@ -243,7 +249,61 @@ def move_rows(
                 rgb_sum[row, colour] += amount * part_rgb[n, colour]
             rgb_weight[row] += amount * part_rgb_weight[n]
             weight[row] += amount * part_weight[n]
-            scale = np.float32(amount)
-            for column in range(feature_sum.shape[1]):
-                feature_sum[row, column] += scale * part_feature[n, column]
-    return count, part_index.shape[0]
+            pair_target[pair], pair_row[pair] = row, n
+            pair_weight[pair] = amount * part_weight[n]
+            pair += 1
+    return count, pair, part_index.shape[0]
+
+
+@njit(**OPTIONS)
+def group_pairs(target: Int32[np.ndarray, " pairs"], start: Int64[np.ndarray, " rows1"]):
+    """Return the pairs in the order of their targets; ``start`` gets where each target's begin, and is 0 before."""
+    for pair in range(target.shape[0]):
+        start[target[pair] + 1] += 1
+    for row in range(start.shape[0] - 1):
+        start[row + 1] += start[row]
+    place = start.copy()
+    order = np.empty(target.shape[0], np.int64)
+    for pair in range(target.shape[0]):
+        order[place[target[pair]]] = pair
+        place[target[pair]] += 1
+    return order
+
+
+@njit(**OPTIONS)
+def sum_features(
+    begin: Whole,
+    end: Whole,
+    start: Int64[np.ndarray, " rows1"],
+    order: Int64[np.ndarray, " pairs"],
+    row: Int64[np.ndarray, " pairs"],
+    weight: Float32[np.ndarray, " pairs"],
+    halves: UInt16[np.ndarray, "n d"],
+    feature_sum: Float32[np.ndarray, "rows d"],
+):
+    """Add to each of some rows of a map the features of its pairs, times their weights.
+
+    Args:
+        begin: first row of the map.
+        end: one past the last.
+        start: where the pairs of each row begin in ``order``.
+        order: numbers of pairs.
+        row: of the submaps' voxels, for each pair.
+        weight: of each pair.
+        halves: bits of float16 features; Numba has no numbers of that type.
+        feature_sum: added to.
+    """
+    bits = np.empty(halves.shape[1], np.uint32)
+    numbers = bits.view(np.float32)
+    for target in range(begin, end):
+        for at in range(start[target], start[target + 1]):
+            pair = order[at]
+            feature = halves[row[pair]]
+            scale = weight[pair] * np.float32(2.0**112)  # the exponents of both types are 112 apart
+            for column in range(bits.shape[0]):
+                half = np.uint32(feature[column])
+                bits[column] = ((half & np.uint32(0x8000)) << np.uint32(16)) | (
+                    (half & np.uint32(0x7FFF)) << np.uint32(13)
+                )
+            for column in range(bits.shape[0]):
+                feature_sum[target, column] += scale * numbers[column]

@@ -10,11 +10,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from avlmaps.core.arrays import Float32, Float64, UInt16
-from avlmaps.core.poses import inverse
-from avlmaps.maps.fusion.accumulator import VoxelAccumulator
-from avlmaps.maps.fusion.free_space import FreeViews
 from avlmaps.maps.fusion.voxel_sums import VoxelSums
-from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.types import Submaps
 
 _MOST = (1 << 31) - 1
@@ -71,17 +67,15 @@ def concat_submaps(parts: Sequence[Submaps]) -> Submaps:
     return Submaps(**arrays)
 
 
-def each_submap(submaps: Submaps) -> Iterator[tuple[VoxelSums, Float32[np.ndarray, "n 10"], slice]]:
-    """Yield the sums of each submap, how the points lie in its voxels, and which frames it has; one is in memory."""
+def each_submap(submaps: Submaps) -> Iterator[tuple[int, VoxelSums, Float32[np.ndarray, "n 10"], slice]]:
+    """Yield of each submap its first row, its sums but for the features, how points lie in its voxels, its frames."""
     for number in range(len(submaps)):
         rows = slice(*submaps.row_offsets[number : number + 2])
-        weight = np.asarray(submaps.weight[rows])
-        feature = np.asarray(submaps.feature[rows]).astype(np.float32)
-        feature *= weight[:, None]
+        index = np.asarray(submaps.index[rows])
         sums = VoxelSums(
-            index=np.asarray(submaps.index[rows]),
-            feature_sum=feature,
-            weight=weight.astype(np.float64),
+            index=index,
+            feature_sum=np.zeros((len(index), 0), np.float32),
+            weight=np.asarray(submaps.weight[rows]).astype(np.float64),
             rgb_sum=np.asarray(submaps.rgb_sum[rows]).astype(np.float64),
             rgb_weight=np.asarray(submaps.rgb_weight[rows]).astype(np.float64),
             hits=np.asarray(submaps.hits[rows]).astype(np.int64),
@@ -89,32 +83,5 @@ def each_submap(submaps: Submaps) -> Iterator[tuple[VoxelSums, Float32[np.ndarra
             sharp=np.asarray(submaps.sharp[rows]).astype(np.int64),
             last_seen_s=np.asarray(submaps.last_seen_s[rows]),
         )
-        yield (
-            sums,
-            np.asarray(submaps.spread[rows]).astype(np.float32),
-            slice(*submaps.frame_offsets[number : number + 2]),
-        )
-
-
-def merge_submaps(submaps: Submaps, pose: Float64[np.ndarray, "f 4 4"], grid: GridSpec) -> VoxelAccumulator:
-    """Return the map of the submaps whose frames have these poses.
-
-    Args:
-        submaps: as they were fused.
-        pose: world_from_camera of each frame.
-        grid: the voxels' size.
-
-    Raises:
-        MapError: the poses lie too far from the world's origin for voxels.
-    """
-    total = VoxelAccumulator(grid, submaps.feature.shape[1])
-    moved = pose @ inverse(np.asarray(submaps.fused_pose))
-    for sums, spread, frames in each_submap(submaps):
-        total.merge_moved(sums, spread, moved[frames])
-    return total
-
-
-def free_views(submaps: Submaps, pose: Float64[np.ndarray, "f 4 4"]) -> FreeViews:
-    """Return where the frames saw freely, from these poses."""
-    known = len(submaps.clear_mm)
-    return FreeViews(np.asarray(submaps.clear_mm), pose[:known])
+        frames = slice(*submaps.frame_offsets[number : number + 2])
+        yield int(rows.start), sums, np.asarray(submaps.spread[rows]).astype(np.float32), frames

@@ -1,13 +1,15 @@
 """Sums over voxels: the sums of fusion, in a table that grows in place, and in a sorted form that can be stored."""
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
 
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32, Int64
 
+from avlmaps.core.cores import usable_cores
 from avlmaps.core.errors import MapError
 from avlmaps.maps.fusion import voxel_kernels as kernels
-from avlmaps.maps.fusion.submap_kernels import MOST_SAMPLES, move_rows
+from avlmaps.maps.fusion.submap_kernels import MOST_SAMPLES, Pairs, group_pairs, move_rows, sum_features
 from avlmaps.maps.types import Voxels
 
 BLOCK_BYTES = 1 << 22  # merging and finishing go through features in blocks of this size, which stay in the cache
@@ -151,30 +153,65 @@ class VoxelTable:
 
     def add_moved(
         self, part: VoxelSums, spread: np.ndarray, moved: np.ndarray, voxel_size_m: float, before: "MovedFrom"
-    ) -> None:
-        """Add the sums of a submap whose frames moved; see `VoxelAccumulator.merge_moved`.
+    ) -> Pairs:
+        """Add the sums of a submap whose frames moved, but for its features.
+
+        Args:
+            part: its sums; features do not count.
+            spread: how the points lie within its voxels.
+            moved: of each of its frames, the new world from the one that it was fused in, metres.
+            voxel_size_m: edge of a voxel.
+            before: what the submaps before this one did.
+
+        Returns:
+            For each feature that counts the row of this table, the row of the submap, and the weight.
 
         Raises:
-            MapError: its features have another length, or it moved out of what voxels can number.
+            MapError: it moved out of what voxels can number.
         """
-        self._require_alike(part)
         to = np.ascontiguousarray(moved[:, :3], np.float64).copy()
         to[:, :, 3] /= voxel_size_m
         _require_within(part.index, to)
-        for rows in blocks(len(part), self.dim):
-            arrays = (part.index, part.rgb_sum, part.rgb_weight, part.hits, part.views, part.sharp)
-            every = (*arrays, part.last_seen_s, part.feature_sum, part.weight)
-            block = tuple(np.array(array[rows], order="C") for array in every)
-            where, done = np.array(spread[rows], np.float32), 0
-            while done < len(block[0]):
-                self.reserve(len(block[0]) - done + MOST_SAMPLES + 1)
-                before.reserve(len(self.weight))
-                count, done = move_rows(
-                    block, where, to, self.slots, self.geometry, self.feature_sum, self.weight,
-                    (before.submap, before.views), before.number, self.count, done,
-                )  # fmt: skip
-                self.count = int(count)
+        arrays = (part.index, part.rgb_sum, part.rgb_weight, part.hits, part.views, part.sharp, part.last_seen_s)
+        every = tuple(np.array(array, order="C") for array in (*arrays, part.weight))
+        where, done = np.array(spread, np.float32), 0
+        found: list[Pairs] = []
+        while done < len(where):
+            self.reserve(len(where) - done + MOST_SAMPLES + 1)
+            before.reserve(len(self.weight))
+            room = 3 * (len(where) - done) + MOST_SAMPLES
+            pairs = np.empty(room, np.int32), np.empty(room, np.int32), np.empty(room, np.float32)
+            count, pair, done = move_rows(
+                every, where, to, self.slots, self.geometry, self.weight, (before.submap, before.views),
+                before.number, self.count, done, pairs, 0,
+            )  # fmt: skip
+            self.count = int(count)
+            found.append((pairs[0][:pair], pairs[1][:pair], pairs[2][:pair]))
         before.number += 1
+        target, row, weight = (np.concatenate(column) for column in zip(*found, strict=True)) if found else _no_pairs()
+        return target, row, weight
+
+    def add_features(self, target: np.ndarray, row: np.ndarray, weight: np.ndarray, feature: np.ndarray) -> None:
+        """Add features of submaps.
+
+        Args:
+            target: (p,) int32, row of this table, of each pair.
+            row: (p,) int64, row of the feature.
+            weight: (p,) float32, how much it counts.
+            feature: (n, d) float16, may be memory-mapped.
+        """
+        start = np.zeros(self.count + 1, np.int64)
+        order = group_pairs(target, start)
+        halves = np.asarray(feature).view(np.uint16)
+        halves.flags.writeable = False  # as memory-mapped ones are: the kernel is compiled once
+        step = max(1, -(-self.count // usable_cores()))
+
+        def add(begin: int) -> None:
+            end = min(begin + step, self.count)
+            sum_features(begin, end, start, order, row, weight, halves, self.feature_sum)
+
+        with ThreadPoolExecutor(usable_cores()) as pool:
+            list(pool.map(add, range(0, self.count, step)))
 
     def _require_alike(self, part: VoxelSums) -> None:
         if part.feature_sum.shape[1] != self.dim:
@@ -239,6 +276,10 @@ class VoxelTable:
             last_seen_s=self.last_seen_s[rows],
             hits=self.hits[rows],
         )
+
+
+def _no_pairs() -> Pairs:
+    return np.zeros(0, np.int32), np.zeros(0, np.int32), np.zeros(0, np.float32)
 
 
 class MovedFrom:
