@@ -15,7 +15,6 @@ from jaxtyping import Float, UInt8
 
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
-from avlmaps.core.processes import end_with_parent, fresh_processes
 from avlmaps.core.progress import progress, say
 from avlmaps.core.wording import option
 from avlmaps.recordings.audio import Sound
@@ -25,6 +24,7 @@ from avlmaps.recordings.microphones import LEVEL_CAMERA_FROM_ROBOT, Microphones,
 from avlmaps.recordings.writer import RecordingWriter
 from avlmaps_sim.coverage import FloorCoverage, coverage_of_walk, require_floor
 from avlmaps_sim.hearing import Recorded, ScheduleRule, Sounding, Synthesised, candidates, schedule
+from avlmaps_sim.processes import end_with_parent, fresh_processes
 from avlmaps_sim.rearranged import Change, to_json
 from avlmaps_sim.render import Renderer
 from avlmaps_sim.scene import Scene

@@ -5,8 +5,8 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from typing import TypeVar
 
-from avlmaps.core.processes import end_with_parent, fresh_processes
 from avlmaps.core.progress import progress, say, silence
+from avlmaps_sim.processes import end_with_parent, fresh_processes
 
 S = TypeVar("S")
 T = TypeVar("T")

@@ -12,7 +12,7 @@ import pytest
 SCRIPT = """
 import os, sys, time
 from pathlib import Path
-from avlmaps.core.processes import end_with_parent, fresh_processes
+from avlmaps_sim.processes import end_with_parent, fresh_processes
 
 def work(folder):
     (Path(folder) / str(os.getpid())).touch()
@@ -26,7 +26,7 @@ if __name__ == "__main__":
 UNGUARDED = """
 import math, os
 from pathlib import Path
-from avlmaps.core.processes import end_with_parent, fresh_processes
+from avlmaps_sim.processes import end_with_parent, fresh_processes
 
 with (Path(__file__).parent / "runs").open("a") as runs:
     runs.write("run ")
