@@ -1,10 +1,14 @@
 """Batches for training: views of rendered and real frames, turned, zoomed, mirrored and degraded as by sensors."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Generic, NamedTuple, TypeVar
 
 import cv2
 import numpy as np
+import torch
+from torch.utils.data import DataLoader, IterableDataset, get_worker_info
 from training.pixels.faults import degraded, mistaken
 from training.pixels.labels import CATEGORIES, FIRST_COARSE, UNLABELLED
 from training.pixels.network import MULTIPLE
@@ -14,12 +18,12 @@ from avlmaps.perception.embedded.geometry import channels
 
 # A frame shows a category with at least this many of its 320x240 pixels.
 FEWEST_PIXELS = 160
+# Batches after which a process looks for new shards.
+LOOK_EVERY = 30
 # How evenly categories are drawn: 0 each as often as any other, 1 as often as frames show it.
 EVENNESS = 0.45
 # Share of frames that are drawn without regard to what they show.
 ANY_FRAME = 0.3
-# Share of colour pictures whose channels are shuffled: leaves are mostly green and basins white, but not always.
-STRANGE_COLOURS = 0.1
 _PLAIN = ("wall", "floor", "ceiling")
 _STRUCTURE = {FIRST_COARSE + number for number in (0, 1, 21, 37, 38, 39)}  # of the coarse classes
 
@@ -51,25 +55,29 @@ class Frames:
         return not self.is_real or bool(self.camera[index, 8])
 
 
-@dataclass
-class Batch:
-    """Arrays for the network.
+Array = TypeVar("Array", np.ndarray, torch.Tensor)
+
+
+class Batch(NamedTuple, Generic[Array]):
+    """Arrays for the network, or tensors.
 
     Attributes:
         geometry: (n, 8, h, w).
-        colour: (n, 3, h, w) in about −1 to 1, all zero where colour is withheld.
+        rgb: (n, h, w, 3) of 8 bit, times the fineness and without the margin of the geometry.
+        kept: (n,) whether the picture has a colour and it is not withheld.
         label: (n, h/2, w/2) fine and coarse.
         weight: (n, h/2, w/2) of each pixel in the loss.
         room: (n, rooms) share of the view in each kind.
         floor: (n,) height of the true floor over the one that the geometry was made with; NaN where it is unknown.
     """
 
-    geometry: np.ndarray
-    colour: np.ndarray
-    label: np.ndarray
-    weight: np.ndarray
-    room: np.ndarray
-    floor: np.ndarray
+    geometry: Array
+    rgb: Array
+    kept: Array
+    label: Array
+    weight: Array
+    room: Array
+    floor: Array
 
 
 class Shards:
@@ -155,10 +163,52 @@ class View:
     fineness: int = 1
 
 
-def draw_batch(sources: list[tuple[Shards, int]], view: View, rng: np.random.Generator) -> Batch:
+def draw_batch(sources: Sequence[tuple[Shards, int]], view: View, rng: np.random.Generator) -> Batch[np.ndarray]:
     """Draw a batch with the given number of frames of each source."""
     items = [_sample(*shards.draw_category(rng), view, rng) for shards, size in sources for _ in range(size)]
-    return Batch(*(np.stack([item[i] for item in items]) for i in range(6)))
+    return Batch(*map(np.stack, zip(*items, strict=True)))
+
+
+class _Drawn(IterableDataset):
+    """Batches for ever; each process that draws opens the shards itself, and now and then looks for new ones."""
+
+    def __init__(self, sources: list[tuple[Path, int]], view: View, seed: int) -> None:
+        self._sources, self._view, self._seed = sources, view, seed
+
+    def __iter__(self) -> Iterator[Batch[np.ndarray]]:
+        worker = get_worker_info()
+        assert worker is not None
+        cv2.setNumThreads(1)
+        rng = np.random.default_rng([self._seed, worker.id])
+        sources = [(Shards(folder), size) for folder, size in self._sources]
+        drawn = 0
+        while True:
+            yield draw_batch(sources, self._view, rng)
+            drawn += 1
+            if drawn % LOOK_EVERY == 0:
+                for shards, _ in sources:
+                    shards.refresh()
+
+
+def batches(
+    sources: list[tuple[Shards, int]], view: View, seed: int, readers: int, device: torch.device
+) -> Iterator[Batch[torch.Tensor]]:
+    """Return batches that processes draw, in memory that they share.
+
+    Args:
+        sources: shards, and how many frames of each are in a batch.
+        view: how they are drawn.
+        seed: of the drawing.
+        readers: number of processes.
+        device: what the batches are for.
+    """
+    drawn = _Drawn([(shards.folder, size) for shards, size in sources if size], view, seed)
+    return iter(
+        DataLoader(
+            drawn, batch_size=None, num_workers=readers, prefetch_factor=3, pin_memory=device.type == "cuda",
+            multiprocessing_context="spawn",
+        )
+    )  # fmt: skip
 
 
 def _placement(frames: Frames, index: int, category: int, view: View, rng: np.random.Generator) -> tuple:
@@ -196,9 +246,9 @@ def _sample(frames: Frames, index: int, category: int, view: View, rng: np.rando
     depth = warped(frames.depth[index], cv2.INTER_NEAREST, 0).astype(np.float32) / 1000.0
     label = warped(frames.label[index], cv2.INTER_NEAREST, UNLABELLED)
     up = np.array([cos * up[0] - sin * up[1], sin * up[0] + cos * up[1], up[2]])
-    colour = _drawn_colour(frames, int(frames.rgb_row[index]), matrix, view, rng)
+    rgb, kept = _drawn_colour(frames, int(frames.rgb_row[index]), matrix, view, rng)
     if mirrored:
-        depth, label, colour = depth[:, ::-1], label[:, ::-1], colour[:, :, ::-1]
+        depth, label, rgb = depth[:, ::-1], label[:, ::-1], rgb[:, ::-1]
         up, cx = up * (-1, 1, 1), view.width - cx
     known = frames.height_is_known(index)
     depth = degraded(
@@ -218,7 +268,8 @@ def _sample(frames: Frames, index: int, category: int, view: View, rng: np.rando
     half = [(0, p[1] // 2) for p in pad]
     return (
         np.pad(geometry, [(0, 0), *pad]),
-        np.pad(np.ascontiguousarray(colour), [(0, 0), *((0, view.fineness * more) for _, more in pad)]),
+        np.ascontiguousarray(rgb),
+        np.float32(kept),
         np.pad(label, half, constant_values=UNLABELLED).astype(np.int64),
         np.pad(weight, half),
         np.array(frames.room[index]),
@@ -226,39 +277,25 @@ def _sample(frames: Frames, index: int, category: int, view: View, rng: np.rando
     )
 
 
-def _drawn_colour(frames: Frames, rgb_row: int, matrix: np.ndarray, view: View, rng: np.random.Generator) -> np.ndarray:
-    """Return the colour of a view, (3, h, w) times its fineness; zeros where it has none or it is withheld.
+def _drawn_colour(
+    frames: Frames, rgb_row: int, matrix: np.ndarray, view: View, rng: np.random.Generator
+) -> tuple[np.ndarray, bool]:
+    """Return the picture of a view, (h, w, 3) times its fineness, and whether it has one that is not withheld.
 
     Args:
         frames: a shard.
         rgb_row: which of its pictures; −1 for none.
         matrix: (2, 3) from the picture to the view, as cv2 counts.
         view: how the picture is drawn.
-        rng: of the light.
+        rng: of the withholding.
     """
     n = view.fineness
+    size = (n * view.width, n * view.height)
     if rgb_row < 0 or rng.random() >= view.colour_kept:
-        return np.zeros((3, n * view.height, n * view.width), np.float32)
+        return np.zeros((*size[::-1], 3), np.uint8), False
     rgb = frames.rgb[rgb_row]
     if n == 1:  # two pixels of the picture become one
         rgb = cv2.blur(rgb, (2, 2))
     finer = n * matrix + np.array([[0.0, 0.0, (n - 1) / 2]])  # cv2 counts from the middle of the first pixel
-    size = (n * view.width, n * view.height)
     rgb = cv2.warpAffine(np.ascontiguousarray(rgb), finer, size, flags=cv2.INTER_LINEAR, borderValue=(127, 127, 127))
-    return _other_light(rgb, rng)
-
-
-def _other_light(rgb: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Return the picture as another camera under another light might show it, (3, h, w)."""
-    x = rgb.astype(np.float32) / 255.0
-    if rng.random() < STRANGE_COLOURS:
-        x = x[..., rng.permutation(3)]
-    grey = x.mean(axis=2, keepdims=True)
-    x = grey + (x - grey) * np.float32(rng.uniform(0.0, 1.5))
-    gain = (rng.uniform(0.6, 1.4) * np.exp(rng.normal(0, 0.08, 3))).astype(np.float32)
-    x = np.clip(x, 0.0, None) ** np.float32(np.exp(rng.normal(0, 0.25))) * gain
-    if rng.random() < 0.3:
-        x = cv2.GaussianBlur(x, (0, 0), rng.uniform(0.4, 1.2))
-    if rng.random() < 0.5:
-        x = x + rng.standard_normal(x.shape, np.float32) * np.float32(rng.uniform(0.0, 0.06))
-    return np.clip(x, 0.0, 1.2).astype(np.float32).transpose(2, 0, 1) * 2.0 - 1.0
+    return rgb, True

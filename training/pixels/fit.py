@@ -8,9 +8,7 @@ training may take several sittings (``--sitting 9`` stops after nine minutes).
 
 import json
 import sys
-from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field, replace
-from multiprocessing import get_context
 from pathlib import Path
 from time import perf_counter
 from typing import Literal
@@ -19,13 +17,15 @@ import numpy as np
 import torch
 import tyro
 from torch import Tensor, nn
-from training.pixels.batches import Batch, Shards, View, draw_batch
+from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
+from training.pixels.batches import Shards, View, batches, draw_batch
 from training.pixels.export import load_network
 from training.pixels.labels import CATEGORIES, ROOMS
+from training.pixels.light import in_other_light
 from training.pixels.losses import Losses, coarse_weights, fine_weights
 from training.pixels.measure import real_figures, rendered_figures
 from training.pixels.muon import Muon
-from training.pixels.network import WIDTHS, RoomNetwork, begin_with
+from training.pixels.network import MULTIPLE, WIDTHS, RoomNetwork, begin_with
 from training.pixels.tower import imagenet_weights
 from training.pixels.unfold import unfolded
 
@@ -57,7 +57,7 @@ class Options:
     threads: int = 2
     """CPU threads."""
     readers: int = 1
-    """Number of processes that draw batches; 1 is one thread; a GPU takes a dozen."""
+    """Number of processes that draw batches; a GPU takes a dozen."""
     view: View = field(default_factory=View)
     """Size of the pictures."""
     compiled: bool = False
@@ -82,24 +82,6 @@ class Options:
     """Steps that the running mean of the weights reaches back."""
     measure_minutes: float = 10.0
     """Time between two points of the curve."""
-
-
-class Average:
-    """A running mean of the weights; it generalises better than the last ones."""
-
-    def __init__(self, network: nn.Module) -> None:
-        """Begin with the weights as they are."""
-        self.state = {name: value.detach().clone() for name, value in network.state_dict().items()}
-
-    @torch.no_grad()
-    def take(self, network: nn.Module, share: float) -> None:
-        """Move towards the network's weights."""
-        for name, value in network.state_dict().items():
-            mean = self.state[name]
-            if value.dtype.is_floating_point:
-                mean.lerp_(value, share)
-            else:
-                mean.copy_(value)
 
 
 def optimisers_of(network: nn.Module, options: Options) -> list[torch.optim.Optimizer]:
@@ -141,7 +123,10 @@ def _shipped(options: Options, sources: list[tuple[Shards, int]]) -> dict[str, T
     assert options.start is not None
     rng = np.random.default_rng(options.seed)
     drawn = (draw_batch(sources, replace(options.view, fineness=1), rng) for _ in range(_LOOKED_AT))
-    looked_at = ((torch.from_numpy(batch.geometry), torch.from_numpy(batch.colour)) for batch in drawn)
+    looked_at = (
+        (torch.from_numpy(b.geometry), in_other_light(torch.from_numpy(b.rgb), torch.from_numpy(b.kept), MULTIPLE))
+        for b in drawn
+    )
     return unfolded(options.start, len(CATEGORIES), len(ROOMS), looked_at).state_dict()
 
 
@@ -160,6 +145,8 @@ class Run:
         torch.set_num_threads(options.threads)
         self.options, self.step = options, 0
         self.device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+        torch.backends.cudnn.benchmark = True
+        torch.set_float32_matmul_precision("high")
         self.rng = np.random.default_rng(options.seed)
         rendered = Shards(options.shards)
         real = [Shards(options.real / "training")] if options.real else []
@@ -169,41 +156,34 @@ class Run:
         self.losses = Losses(fine_weights(rendered, self.rng), coarse).to(self.device)
         self.network = _begun(options, self.device, self.sources)
         self.compiled = torch.compile(self.network) if options.compiled else self.network
-        self.average = Average(self.network)
+        # A running mean of the weights generalises better than the last ones.
+        keep = get_ema_multi_avg_fn(1.0 - 1.0 / options.averaged)
+        self.average = AveragedModel(self.network, multi_avg_fn=keep, use_buffers=True)
         self.optimisers = optimisers_of(self.network, options)
-        self.running: dict[str, float] = {}
+        self.running: dict[str, Tensor] = {}
         self.spent = _spent(options) if options.resume else 0.0
-        self.pool = ThreadPoolExecutor(1) if options.readers == 1 else processes(self.sources, options)
-        self.coming = [self._drawn() for _ in range(2 * options.readers)]
-
-    def _drawn(self) -> Future[Batch]:
-        seed = int(self.rng.integers(1 << 62))
-        if self.options.readers > 1:
-            return self.pool.submit(draw_here, self.options.view, seed)
-        return self.pool.submit(draw_batch, self.sources, self.options.view, np.random.default_rng(seed))
+        self.coming = batches(self.sources, options.view, options.seed, options.readers, self.device)
 
     def train_step(self, done: float) -> None:
         """Learn from one batch."""
         share = min(1.0, (self.step + 1) / 100) * (0.5 + 0.5 * np.cos(np.pi * done))
         for group in (group for optimiser in self.optimisers for group in optimiser.param_groups):
             group["lr"] = float(group.get("highest", self.options.rate) * share + 1e-6)
-        batch = self.coming.pop(0).result()
-        self.coming.append(self._drawn())
-        loss, parts = self.losses(self.compiled, batch)
+        loss, parts = self.losses(self.compiled, next(self.coming), self.network.fineness)
         self.network.zero_grad(set_to_none=True)
         loss.backward()
         nn.utils.clip_grad_norm_(self.network.parameters(), 2.0)
         for optimiser in self.optimisers:
             optimiser.step()
         self.step += 1
-        self.average.take(self.network, max(1.0 / (self.step + 10), 1.0 / self.options.averaged))
+        self.average.update_parameters(self.network)
         for name, value in parts.items():
-            self.running[name] = self.running.get(name, value) + 0.03 * (value - self.running.get(name, value))
+            self.running[name] = self.running.get(name, value).lerp(value.float(), 0.03)
 
     def measure(self, minutes: float) -> None:
         """Add a point to the learning curve: the mean weights on what is held out."""
         network = RoomNetwork(len(CATEGORIES), len(ROOMS), self.options.widths, has_tower=self.options.tower)
-        network.load_state_dict({name: value.cpu() for name, value in self.average.state.items()})
+        network.load_state_dict(self.average.module.state_dict())
         network.eval()
         point: dict[str, object] = {
             "minutes": round(minutes, 1), "steps": self.step, "frames": self.step * self.options.batch,
@@ -221,7 +201,10 @@ class Run:
         """Write the checkpoint so that a reader never meets half of one; weights in half precision, under 20 MB."""
         self.options.out.parent.mkdir(parents=True, exist_ok=True)
         scratch = self.options.out.with_suffix(".part")
-        state: dict[str, object] = {"last": _halved(self.network.state_dict()), "mean": _halved(self.average.state)}
+        state: dict[str, object] = {
+            "last": _halved(self.network.state_dict()),
+            "mean": _halved(self.average.module.state_dict()),
+        }
         about = {key: str(value) for key, value in asdict(self.options).items()}
         state |= {"widths": list(self.options.widths), "step": self.step, "minutes": minutes, "options": about}
         torch.save({**state, "categories": list(CATEGORIES), "rooms": list(ROOMS)}, scratch)
@@ -230,29 +213,6 @@ class Run:
 
 def _spent(options: Options) -> float:
     return float(torch.load(options.out, map_location="cpu", weights_only=True).get("minutes", 0.0))
-
-
-_HERE: list[tuple[Shards, int]] = []
-_drawn_here = 0
-
-
-def processes(sources: list[tuple[Shards, int]], options: Options) -> ProcessPoolExecutor:
-    """Return processes that draw batches; each opens the shards itself."""
-    folders = [(shards.folder, size) for shards, size in sources]
-    return ProcessPoolExecutor(options.readers, get_context("spawn"), _open_here, (folders,))
-
-
-def _open_here(folders: list[tuple[Path, int]]) -> None:
-    _HERE.extend((Shards(folder), size) for folder, size in folders)
-
-
-def draw_here(view: View, seed: int) -> Batch:
-    """Draw a batch in a process of its own; every hundredth time it looks for new shards."""
-    global _drawn_here
-    _drawn_here += 1
-    if _drawn_here % 100 == 0:
-        _HERE[0][0].refresh()
-    return draw_batch(_HERE, view, np.random.default_rng(seed))
 
 
 def _halved(state: dict[str, Tensor]) -> dict[str, Tensor]:
@@ -284,7 +244,6 @@ def fit(options: Options) -> None:
         if now - measured > 60 * options.measure_minutes:
             run.measure(run.spent + here)
             measured = perf_counter()
-    run.pool.shutdown(cancel_futures=True)
     run.save(run.spent + end)
     run.measure(run.spent + end)
 

@@ -5,7 +5,8 @@ import torch
 from torch import Tensor, nn
 from training.pixels.batches import Batch, Shards, View, draw_batch
 from training.pixels.labels import CATEGORIES, FIRST_COARSE, UNLABELLED
-from training.pixels.network import has_bfloat16
+from training.pixels.light import in_other_light
+from training.pixels.network import MULTIPLE, has_bfloat16
 
 from avlmaps_sim.bench.nyu import CLASSES, SCORED, class_of_kinds
 
@@ -28,8 +29,10 @@ def groups() -> Tensor:
 
 
 def fine_weights(shards: Shards, rng: np.random.Generator) -> Tensor:
-    """Return a weight for each category: rare ones count more, by the root of how rare they are."""
+    """Return a weight for each category: rare ones count more, by the root of how rare they are; 1 without frames."""
     count = np.zeros(256)
+    if not shards.refresh():
+        return torch.ones(len(CATEGORIES))
     for _ in range(15):
         count += np.bincount(draw_batch([(shards, 16)], View(), rng).label.reshape(-1), minlength=256)
     share = count[: len(CATEGORIES)] / count[: len(CATEGORIES)].sum()
@@ -62,13 +65,11 @@ class Losses(nn.Module):
         self.register_buffer("coarse", coarse)
         self.register_buffer("groups", groups())
 
-    def forward(self, network: nn.Module, batch: Batch) -> tuple[Tensor, dict[str, float]]:
+    def forward(self, network: nn.Module, batch: Batch[Tensor], fineness: int) -> tuple[Tensor, dict[str, Tensor]]:
         """Return the loss and its parts, those of real frames by themselves."""
         device = self.groups.device
-        geometry, colour, label, near, room, floor = (
-            torch.from_numpy(a).to(device)
-            for a in (batch.geometry, batch.colour, batch.label, batch.weight, batch.room, batch.floor)
-        )
+        geometry, rgb, kept, label, near, room, floor = (x.to(device, non_blocking=True) for x in batch)
+        colour = in_other_light(rgb, kept, fineness * MULTIPLE)
         geometry, colour = (x.to(memory_format=torch.channels_last) for x in (geometry, colour))
         with torch.autocast(device.type, torch.bfloat16, enabled=has_bfloat16(device)):
             score, rooms, offset = network(geometry, colour)
@@ -76,27 +77,29 @@ class Losses(nn.Module):
         real = ((label >= FIRST_COARSE) & (label != UNLABELLED)).flatten(1).any(dim=1)
         total, parts = score.new_zeros(()), {}
         for name, rows, part in (("rendered", ~real, self._fine), ("real", real, self._coarse)):
-            if bool(rows.any()):
+            count = int(rows.sum())
+            if count:
                 loss, right = part(score[rows], label[rows], near[rows])
-                total = total + loss * rows.float().mean()
-                parts |= {name: float(loss.detach()), f"{name} right": right}
+                total = total + loss * (count / len(rows))
+                parts |= {name: loss.detach(), f"{name} right": right}
         inside = room.sum(dim=1, keepdim=True)
         share = room / inside.clamp_min(1e-3)
         views = -((share * rooms.float().log_softmax(dim=1)).sum(dim=1) * inside[:, 0].clamp_max(1.0)).mean()
         known = ~floor.isnan()
-        floors = nn.functional.smooth_l1_loss(offset.float()[known, 0], floor[known], beta=0.05)
-        parts |= {"rooms": float(views.detach()), "floor": float(floors.detach())}
+        floors = nn.functional.smooth_l1_loss(offset.float()[known, 0], floor[known], beta=0.05, reduction="sum")
+        floors = floors / known.sum().clamp_min(1)
+        parts |= {"rooms": views.detach(), "floor": floors.detach()}
         return total + ROOM_SHARE * views + FLOOR_SHARE * floors, parts
 
-    def _fine(self, score: Tensor, label: Tensor, near: Tensor) -> tuple[Tensor, float]:
+    def _fine(self, score: Tensor, label: Tensor, near: Tensor) -> tuple[Tensor, Tensor]:
         known = label < len(CATEGORIES)
         flat, truth = score[known], label[known]
         each = nn.functional.cross_entropy(flat, truth, reduction="none", label_smoothing=SMOOTHING)
         weight = near[known] * self.fine[truth]
         right = (flat.detach().argmax(dim=1) == truth).float().mean()
-        return (each * weight).sum() / weight.sum().clamp_min(1.0), float(right)
+        return (each * weight).sum() / weight.sum().clamp_min(1.0), right
 
-    def _coarse(self, score: Tensor, label: Tensor, near: Tensor) -> tuple[Tensor, float]:
+    def _coarse(self, score: Tensor, label: Tensor, near: Tensor) -> tuple[Tensor, Tensor]:
         known = label != UNLABELLED
         flat, truth = score[known], label[known] - FIRST_COARSE
         log_q = (flat.softmax(dim=1) @ self.groups.T).clamp_min(1e-7).log()
@@ -104,4 +107,4 @@ class Losses(nn.Module):
         weight = near[known] * self.coarse[truth]
         scored = truth < SCORED
         right = (log_q.detach()[:, :SCORED].argmax(dim=1) == truth)[scored].float().mean()
-        return (each * weight).sum() / weight.sum().clamp_min(1.0), float(right)
+        return (each * weight).sum() / weight.sum().clamp_min(1.0), right

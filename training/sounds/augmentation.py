@@ -1,7 +1,8 @@
 """Changes of mel power while training: other places, microphones, distances and noises, new in every step.
 
 Everything works on batches of normalised mel power (n, frames, bands), since sounds add up in power and rooms,
-microphones and pitch are simple there; it costs a few milliseconds a batch and needs no audio.
+microphones and pitch are simple there; it costs a few milliseconds a batch and needs no audio. Batches lie on torch's
+default device.
 """
 
 from dataclasses import dataclass
@@ -107,7 +108,7 @@ def coloured(power: Tensor, how: Augmentation, generator: torch.Generator) -> Te
 
 @cache
 def _draws() -> Tensor:
-    generator = torch.Generator().manual_seed(0)
+    generator = torch.Generator(torch.get_default_device()).manual_seed(0)
     return 0.5 + 0.5 * torch.empty(64, FRAMES, BANDS).exponential_(generator=generator)
 
 
@@ -188,7 +189,7 @@ def segmented(power: Tensor, background: Tensor, how: Augmentation, generator: t
 def heard(power: Tensor, coarse: bool = False) -> Tensor:
     """Do what ``logmel.heard`` does, for a batch, in torch; the background in half precision where ``coarse``."""
     bands_first = power.transpose(1, 2).contiguous()
-    matrix, rows = torch.from_numpy(logmel.smoothing_matrix()), bands_first.reshape(-1, FRAMES)
+    matrix, rows = torch.from_numpy(logmel.smoothing_matrix()).to(power.device), bands_first.reshape(-1, FRAMES)
     smooth = (rows.bfloat16() @ matrix.bfloat16()).float() if coarse else rows @ matrix
     smooth = smooth.reshape(bands_first.shape)
     pcen = logmel.pcen(bands_first, smooth)

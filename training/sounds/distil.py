@@ -1,8 +1,8 @@
 """Fit a network to what a published network says of mixtures, and to the words of what they hold.
 
-``python -m training.sounds.distil --without 5`` fits without one fold and prints how that fold is named. It begins from
-the weights that ship, made wider. A run that was interrupted continues from its last ``REPORTED`` steps; its losses are
-in ``build/sounds/distilled-*.csv``.
+``python -m training.sounds.distil --without 5`` fits without one fold and prints how that fold is named. It runs on a
+GPU where there is one. A run that was interrupted continues from its last ``REPORTED`` steps; its losses are in
+``build/sounds/*-check.csv``.
 """
 
 import argparse
@@ -10,6 +10,7 @@ import copy
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
+from time import perf_counter
 
 import numpy as np
 import torch
@@ -25,7 +26,8 @@ from training.sounds.augmentation import (
     peak_normalised,
     segmented,
 )
-from training.sounds.clips import mels_of, read_index, read_samples
+from training.sounds.clips import TESTED, mels_of, read_index, read_samples
+from training.sounds.crossvalidate import LEFT_OUT
 from training.sounds.export import opened_norms, read_onnx, write_onnx
 from training.sounds.fit import blend, encode, half_precision_is_fast, share_of_rate, steady_noise, targets
 from training.sounds.kinds import NAMES, RECORDED
@@ -38,7 +40,6 @@ from avlmaps.perception.embedded.words import EmbeddedWords
 
 ROOT = Path(__file__).resolve().parents[2]
 SHARED = ROOT.parent / "shared"
-SHIPS = ROOT / "src/avlmaps/perception/embedded/weights/sounds.onnx"
 REPORTED = 200
 
 
@@ -48,6 +49,7 @@ class Settings:
 
     Attributes:
         steps: batches.
+        minutes: how long at most; the rate falls with whichever is nearer its end.
         batch: mixtures in one.
         width: of the network.
         rate: highest learning rate.
@@ -62,6 +64,7 @@ class Settings:
     """
 
     steps: int = 5000
+    minutes: float = math.inf
     batch: int = 64
     width: int = 32
     rate: float = 3e-3
@@ -101,22 +104,25 @@ class Student(SoundNet):
 
 
 class Heard:
-    """Draws batches of mixtures, each in new circumstances."""
+    """Draws batches of mixtures, each in new circumstances, on torch's default device."""
 
     def __init__(self, mixtures: Mixtures, settings: Settings, step: int = 0) -> None:
-        self._m, self._s = mixtures, settings
-        self._rng = np.random.default_rng([settings.seed, step])
-        self._generator = torch.Generator().manual_seed(settings.seed + step)
-        scale = mixtures.features.std(axis=0) + 1e-3
-        self._features = torch.from_numpy((mixtures.features - mixtures.features.mean(axis=0)) / scale)
-        self._probabilities = torch.sigmoid(torch.from_numpy(mixtures.logits))
+        self._s, device = settings, torch.get_default_device()
+        self._generator = torch.Generator(device).manual_seed(settings.seed + step)
+        features = mixtures.features
+        features = (features - features.mean(axis=0)) / (features.std(axis=0) + 1e-3)
+        self._mels, self._features, self._kinds, self._share, logits = (
+            torch.from_numpy(each).to(device)
+            for each in (mixtures.mels, features, mixtures.kinds, mixtures.share, mixtures.logits)
+        )
+        self._probabilities = torch.sigmoid(logits)
 
     @torch.no_grad()
     def draw(self) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """Return the network's input, the shares of the kinds, the teacher's probabilities and its features."""
         s, generator = self._s, self._generator
-        rows = self._rng.integers(len(self._m.mels), size=s.batch)
-        power = peak_normalised(torch.from_numpy(self._m.mels[rows].astype(np.float32)))
+        rows = torch.randint(len(self._mels), (s.batch,), generator=generator)
+        power = peak_normalised(self._mels[rows].float())
         power = coloured(power, s.augmentation, generator)
         clean = int(s.clean * s.batch)
         rest = power[clean:]
@@ -125,13 +131,12 @@ class Heard:
         )
         rest = segmented(rest, background, s.augmentation, generator)
         x = masked(heard(peak_normalised(torch.cat([power[:clean], rest]))), s.augmentation, generator)
-        kinds, share = torch.from_numpy(self._m.kinds[rows]), torch.from_numpy(self._m.share[rows])[:, None]
+        kinds, share = self._kinds[rows], self._share[rows][:, None]
         aim = (
             functional.one_hot(kinds[:, 0], len(NAMES)) * (1.0 - share)
             + functional.one_hot(kinds[:, 1], len(NAMES)) * share
         )
-        at = torch.from_numpy(rows)
-        return x.to(memory_format=torch.channels_last), aim, self._probabilities[at], self._features[at]
+        return x.to(memory_format=torch.channels_last), aim, self._probabilities[rows], self._features[rows]
 
 
 def fit(start: SoundNet, mixtures: Mixtures, words: Tensor, settings: Settings, check: Path | None = None) -> Student:
@@ -145,26 +150,33 @@ def fit(start: SoundNet, mixtures: Mixtures, words: Tensor, settings: Settings, 
         check: where to store all that is needed to continue, with the losses in a CSV file beside it; nowhere if None.
     """
     torch.manual_seed(settings.seed)
-    net = Student(start, mixtures.logits.shape[1], mixtures.features.shape[1]).train()
+    device = torch.get_default_device()
+    net = Student(start, mixtures.logits.shape[1], mixtures.features.shape[1]).to(device).train()
+    words = words.to(device)
     average = copy.deepcopy(net).eval()
     optimiser = torch.optim.AdamW(net.parameters(), lr=settings.rate, weight_decay=settings.decay)
     parts = {"net": net, "average": average, "optimiser": optimiser}
     first = 0
     if check is not None and check.exists():
-        held = torch.load(check, weights_only=True)
+        held = torch.load(check, map_location=device, weights_only=True)
         first = int(held["step"])
         for name, part in parts.items():
             part.load_state_dict(held[name])
         torch.manual_seed(settings.seed + first)
     drawn = Heard(mixtures, settings, first)
-    s, totals, since = settings, np.zeros(3), first
+    s, totals, since = settings, torch.zeros(3), first
+    half = device.type == "cuda" or half_precision_is_fast()
+    begin = perf_counter()
     for step in range(first, settings.steps):
+        done = max(step / settings.steps, (perf_counter() - begin) / 60.0 / settings.minutes)
+        if done >= 1.0:
+            break
         for group in optimiser.param_groups:
-            group["lr"] = settings.rate * share_of_rate(step, settings.steps, 0.8)
+            group["lr"] = settings.rate * share_of_rate(done * settings.steps, settings.steps, 0.8)
         x, aim, probabilities, features = drawn.draw()
-        with torch.autocast("cpu", torch.bfloat16, enabled=half_precision_is_fast()):
+        with torch.autocast(device.type, torch.bfloat16, enabled=half):
             vectors, names, felt = (each.float() for each in net.answers(x))
-        template = words[int(torch.randint(len(words), ()))]
+        template = words[step % len(words)]
         losses = torch.stack([
             functional.cross_entropy(vectors @ template.T / s.temperature, aim, label_smoothing=s.smoothing),
             settings.names * functional.binary_cross_entropy_with_logits(names, probabilities),
@@ -175,11 +187,11 @@ def fit(start: SoundNet, mixtures: Mixtures, words: Tensor, settings: Settings, 
         optimiser.step()
         keep = min(settings.averaging, (1 + step) / (10 + step))
         blend(average, net, keep)
-        totals += losses.detach().numpy()
+        totals += losses.detach()
         if (step + 1) % REPORTED == 0 or step + 1 == s.steps:
-            mean = [f"{value:.3f}" for value in totals / (step + 1 - since)]
+            mean = [f"{value:.3f}" for value in (totals / (step + 1 - since)).tolist()]
             say(f"step {step + 1}/{settings.steps} kinds, names, features: {' '.join(mean)}")
-            totals[:], since = 0.0, step + 1
+            totals, since = torch.zeros(3), step + 1
             if check is not None:
                 torch.save({"step": step + 1, **{name: part.state_dict() for name, part in parts.items()}}, check)
                 with check.with_suffix(".csv").open("a", encoding="utf-8") as curve:
@@ -211,35 +223,55 @@ def main() -> None:
     parser.add_argument("--sounds", type=Path, default=SHARED / "data" / "sounds")
     parser.add_argument("--teacher", type=Path, default=SHARED / "teachers" / "mn04_as_mAP_432.pt")
     parser.add_argument("--work", type=Path, default=ROOT / "build" / "sounds")
-    parser.add_argument("--without", type=int, default=5, help="the fold that nothing is learnt from; 0 for none")
+    parser.add_argument("--without", type=int, default=TESTED, help="the fold that nothing is learnt from; 0 for none")
+    parser.add_argument("--strangers", action="store_true", help="learn nothing of ten kinds either")
     parser.add_argument("--mixtures", type=int, default=Recipe().count)
+    parser.add_argument("--makers", type=int, default=1, help="processes that make them")
     parser.add_argument("--steps", type=int, default=Settings().steps)
+    parser.add_argument("--minutes", type=float, default=math.inf, help="how long at most")
+    parser.add_argument("--batch", type=int, default=Settings().batch)
     parser.add_argument("--width", type=int, default=Settings().width, help="at least the start's")
-    parser.add_argument("--start", type=Path, default=SHIPS, help="weights to begin from")
+    parser.add_argument("--start", type=Path, help="weights to begin from; random ones if left out")
+    parser.add_argument("--made", action="store_true", help="stop when the mixtures are made")
     arguments = parser.parse_args()
     torch.set_num_threads(1)
-    clips = tuple(read_index(arguments.sounds))
-    learnt = of_training(clips, arguments.without)
-    recipe = Recipe(count=arguments.mixtures)
-    file = arguments.work / f"mixtures-{recipe.count}-{arguments.without}.npz"
-    mixtures = stored_mixtures(file, arguments.sounds, learnt, arguments.teacher, recipe)
-    words = targets(EmbeddedWords().encode)
-    name = f"distilled-{arguments.width}-{arguments.steps}-{arguments.without}"
-    settings = Settings(steps=arguments.steps, width=arguments.width)
-    torch.manual_seed(settings.seed)
-    start = widened(read_onnx(arguments.start), arguments.width)
-    opened_norms(start, heard(peak_normalised(torch.from_numpy(mixtures.mels[::32].astype(np.float32)))))
-    student = fit(start, mixtures, words, settings, arguments.work / f"{name}.pt")
-    write_onnx([student], arguments.work / f"{name}.onnx")
-    if not arguments.without:
+    torch.backends.cudnn.benchmark = True
+    clips = read_index(arguments.sounds)
+    made = stored_mixtures(
+        arguments.work, arguments.sounds, of_training(clips), arguments.teacher, Recipe(count=arguments.mixtures),
+        arguments.makers,
+    )  # fmt: skip
+    if arguments.made:
         return
+    without = tuple(map(NAMES.index, LEFT_OUT)) if arguments.strangers else ()
+    mixtures = made.without(arguments.without, without)
+    say(f"{len(mixtures.mels)} of {len(made.mels)} mixtures")
+    words = targets(EmbeddedWords().encode)
+    name = "stranger" if arguments.strangers else f"without-{arguments.without}" if arguments.without else "all"
+    settings = Settings(steps=arguments.steps, width=arguments.width, batch=arguments.batch, minutes=arguments.minutes)
+    torch.manual_seed(settings.seed)
+    start = SoundNet(words.shape[2], arguments.width)
+    if arguments.start is not None:
+        start = widened(read_onnx(arguments.start), arguments.width)
+        opened_norms(start, heard(peak_normalised(torch.from_numpy(mixtures.mels[::32].astype(np.float32)))))
+    if torch.cuda.is_available():
+        torch.set_default_device("cuda")
+    student = fit(start, mixtures, words, settings, arguments.work / f"{name}-check.pt")
+    torch.set_default_device("cpu")
+    net = SoundNet(words.shape[2], arguments.width)
+    net.load_state_dict({key: value.cpu() for key, value in student.state_dict().items() if key in net.state_dict()})
+    torch.save(net.state_dict(), arguments.work / f"{name}.pt")
+    write_onnx([net.eval()], arguments.work / f"{name}.onnx")
+    if not arguments.without or arguments.strangers:
+        return
+    learnt = of_training(clips, arguments.without)
 
     def mels(chosen: list) -> np.ndarray:
         return np.stack([mels_of(read_samples(arguments.sounds / clip.path)) for clip in chosen])
 
     held = [clip for clip in clips if clip.fold == arguments.without and 0 <= clip.kind < len(RECORDED)]
     taught = mels(learnt), np.array([clip.kind for clip in learnt])
-    right = named_first(student, words, taught, mels(held)) == [clip.kind for clip in held]
+    right = named_first(net, words, taught, mels(held)) == [clip.kind for clip in held]
     household = np.array([clip.path.startswith("esc50") for clip in held])
     for label, rows in (("household", household), ("ESC-10", ~household)):
         hits, share = int(right[rows].sum()), right[rows].mean()

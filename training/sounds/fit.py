@@ -33,7 +33,7 @@ def steady_noise(count: int, generator: torch.Generator) -> Tensor:
     return power * 10.0 ** (tilt_db * torch.linspace(0.0, 1.0, logmel.BANDS) / 10.0)
 
 
-def share_of_rate(step: int, steps: int, falling: float) -> float:
+def share_of_rate(step: float, steps: int, falling: float) -> float:
     """Return the share of the highest learning rate at a step: a tenth rising, some flat, half a cosine to zero."""
     rising = (step + 1) / max(0.1 * steps, 1.0)
     left = min(1.0, (steps - step) / max(falling * steps, 1.0))

@@ -7,6 +7,7 @@ import pytest
 
 torch = pytest.importorskip("torch")
 from training.pixels.batches import Frames, View, draw_batch  # noqa: E402
+from training.pixels.light import in_other_light  # noqa: E402
 from training.pixels.network import RoomNetwork  # noqa: E402
 from training.pixels.tower import TOWER_WIDTHS, Tower  # noqa: E402
 
@@ -55,15 +56,30 @@ class _OneFrame:
         return self.frames, 0, -1
 
 
-def test_the_finer_colour_shows_the_same_view(monkeypatch: pytest.MonkeyPatch) -> None:
-    from training.pixels import batches
-
-    monkeypatch.setattr(batches, "_other_light", lambda rgb, _: rgb.astype(np.float32).transpose(2, 0, 1) / 127.5 - 1.0)
+def test_the_finer_colour_shows_the_same_view() -> None:
     view = View(colour_kept=1.1)
     for seed in range(5):
-        coarse = draw_batch([(_OneFrame(), 1)], view, np.random.default_rng(seed)).colour[0]
-        fine = draw_batch([(_OneFrame(), 1)], replace(view, fineness=2), np.random.default_rng(seed)).colour[0]
-        assert fine.shape == (3, 256, 320)
-        pooled = fine.reshape(3, 128, 2, 160, 2).mean(axis=(2, 4))
+        coarse = draw_batch([(_OneFrame(), 1)], view, np.random.default_rng(seed)).rgb[0]
+        fine = draw_batch([(_OneFrame(), 1)], replace(view, fineness=2), np.random.default_rng(seed)).rgb[0]
+        assert fine.shape == (240, 320, 3)
+        pooled = fine.reshape(120, 2, 160, 2, 3).mean(axis=(1, 3))
         # Where the view leaves the frame both show grey; the seam and the blur of the coarse one differ.
-        assert np.median(np.abs(pooled - coarse)) < 0.02
+        assert np.median(np.abs(pooled - coarse)) < 2.6
+
+
+def test_withheld_colour_and_the_margin_are_zero_in_any_light() -> None:
+    rgb = torch.randint(0, 256, (6, 30, 40, 3), dtype=torch.uint8)
+    kept = torch.tensor([1.0, 0.0, 1.0, 0.0, 1.0, 1.0])
+    x = in_other_light(rgb, kept, 32, torch.Generator().manual_seed(1))
+    assert x.shape == (6, 3, 32, 64)
+    assert bool((x[kept == 0.0] == 0.0).all())
+    assert bool((x[:, :, 30:] == 0.0).all()) and bool((x[:, :, :, 40:] == 0.0).all())
+    assert float(x.abs().max()) <= 1.4 + 1e-6
+    assert all(float(x[i].std()) > 0.05 for i in (0, 2, 4, 5))
+
+
+def test_light_of_a_seed_is_the_same_light() -> None:
+    rgb = torch.randint(0, 256, (3, 16, 16, 3), dtype=torch.uint8)
+    one, other = (in_other_light(rgb, torch.ones(3), 16, torch.Generator().manual_seed(7)) for _ in range(2))
+    torch.testing.assert_close(one, other)
+    assert not torch.equal(one, in_other_light(rgb, torch.ones(3), 16, torch.Generator().manual_seed(8)))
