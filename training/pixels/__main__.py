@@ -133,7 +133,7 @@ def finish(options: Options) -> None:
     real_frames = options.work / "real" / "development" if options.nyuv2 else None
     calibrate(
         CalibrateOptions(
-            network=options.network, frames=options.work / "held-out", real=real_frames, out=options.out,
+            network=(options.network,), frames=options.work / "held-out", real=real_frames, out=options.out,
             name=options.name, id=options.id,
         )
     )  # fmt: skip

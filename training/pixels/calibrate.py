@@ -10,7 +10,7 @@ import torch
 import tyro
 from torch import Tensor
 from training.pixels.batches import Shards
-from training.pixels.export import load_network, write_onnx
+from training.pixels.export import MeanOf, load_network, write_onnx
 from training.pixels.labels import CATEGORIES, FIRST_COARSE, ROOMS, UNLABELLED
 from training.pixels.lexicon import CALLED, KINDS
 from training.pixels.losses import groups
@@ -27,10 +27,11 @@ PRIOR_SHARE = 0.25
 # What weights are called that do not ship.
 OWN = "own/pixels-1"
 NOTES = {
-    "real": "A small network for homes and offices, trained on rendered rooms and on training frames of NYU Depth "
-    "V2, which is published for research and states no licence: decide whether that suits you, or take "
-    "--profile synthetic.",
-    "synthetic": "A small network for homes and offices, trained on rendered rooms alone; it goes by shape.",
+    "real": "Networks for homes and offices that began from ImageNet and learnt from rendered rooms and from training "
+    "frames of NYU Depth V2, which is published for research and states no licence: decide whether that suits you, or "
+    "take --profile synthetic.",
+    "synthetic": "A network for homes and offices that began from ImageNet and learnt from rendered rooms alone; it "
+    "goes by shape first.",
 }
 
 
@@ -38,8 +39,8 @@ NOTES = {
 class Options:
     """Options of the calibration."""
 
-    network: Path = Path("build/pixels/network.pt")
-    """Checkpoint of the training."""
+    network: tuple[Path, ...] = (Path("build/pixels/network.pt"),)
+    """Checkpoint of the training; of several the mean of their probabilities is written, as one network."""
     frames: Path = Path("build/pixels/held-out")
     """Rendered frames of held-out homes."""
     real: Path | None = None
@@ -69,7 +70,7 @@ class Scores:
 
 
 @torch.no_grad()
-def scores_of(network: RoomNetwork, chosen: list, seed: int) -> Scores:
+def scores_of(network: RoomNetwork | MeanOf, chosen: list, seed: int) -> Scores:
     """Encode frames as the running system does: whole, and in colour where they have it."""
     rng = np.random.default_rng(seed)
     category, label, room, share = [], [], [], []
@@ -114,7 +115,7 @@ def fit_scores(parts: list[Scores]) -> tuple[np.ndarray, float]:
         return loss
 
     optimiser.step(closure)
-    return bias.detach().numpy(), float(log_t.exp())
+    return bias.detach().numpy(), float(log_t.detach().exp())
 
 
 def fit_rooms(scores: Scores) -> float:
@@ -163,11 +164,19 @@ def _replaced_id(notes: Path) -> str:
 
 def calibrate(options: Options) -> None:
     """Write NAME.onnx and NAME.json, and print the figures on what was held out."""
-    network = load_network(options.network, options.weights)
     rng, shards = np.random.default_rng(options.seed), Shards(options.frames)
-    parts = [scores_of(network, [shards.draw(rng) for _ in range(options.count)], options.seed)]
+    chosen = [[shards.draw(rng) for _ in range(options.count)]]
     if options.real is not None:
-        parts.append(scores_of(network, Shards(options.real).every(), options.seed))
+        chosen.append(Shards(options.real).every())
+
+    def parts_of(network: RoomNetwork | MeanOf) -> list[Scores]:
+        return [scores_of(network, frames, options.seed) for frames in chosen]
+
+    networks = [load_network(path, options.weights) for path in options.network]
+    network: RoomNetwork | MeanOf = networks[0]
+    if len(networks) > 1:
+        network = MeanOf(networks, [fit_scores(parts_of(each))[1] for each in networks])
+    parts = parts_of(network)
     bias, temperature = fit_scores(parts)
     bias = PRIOR_SHARE * bias
     known = set(CATEGORIES) | set(ROOMS)

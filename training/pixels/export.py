@@ -1,5 +1,6 @@
-"""Writing the network for onnxruntime, its large weights in half precision."""
+"""Writing networks for onnxruntime, their kernels in 8 bit."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import msgspec
@@ -8,7 +9,7 @@ import onnx
 import onnxruntime
 import torch
 from onnx import numpy_helper
-from torch import Tensor
+from torch import Tensor, nn
 from training.pixels.network import COLOUR, GEOMETRY, RoomNetwork
 
 from avlmaps.perception.embedded.scene_network import Notes
@@ -21,6 +22,10 @@ def load_network(checkpoint: Path, weights: str = "mean") -> RoomNetwork:
     network = RoomNetwork(len(state["categories"]), len(state["rooms"]), tuple(state["widths"]), has_tower=has_tower)
     network.load_state_dict({name: value.float() for name, value in state[weights].items()})
     return network.eval()
+
+
+# Values of an output's kernel that 8 bit are enough for; depthwise ones have 9 or 25 and vary widely.
+FEWEST = 64
 
 
 class Shipped:
@@ -40,7 +45,32 @@ class Shipped:
         return tuple(torch.from_numpy(output) for output in outputs)
 
 
-def write_onnx(network: RoomNetwork, path: Path) -> None:
+class MeanOf(nn.Module):
+    """Several networks that answer together: the mean of their probabilities, as scores.
+
+    Args:
+        networks: of one fineness.
+        temperatures: each one's scores are divided by its own first.
+    """
+
+    def __init__(self, networks: Sequence[RoomNetwork], temperatures: Sequence[float]) -> None:
+        super().__init__()
+        self.networks, self._temperatures = nn.ModuleList(networks), tuple(temperatures)
+        self.fineness = networks[0].fineness
+        self.eval()
+
+    def forward(self, geometry: Tensor, colour: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Return what a network returns; the floor is the mean."""
+        score, room, floor = zip(*(network(geometry, colour) for network in self.networks), strict=True)
+        score = [each / t for each, t in zip(score, self._temperatures, strict=True)]
+        return _log_mean(score), _log_mean(room), torch.stack(floor).mean(dim=0)
+
+
+def _log_mean(scores: Sequence[Tensor]) -> Tensor:
+    return (torch.stack([each.softmax(dim=1) for each in scores]).mean(dim=0) + 1e-9).log()
+
+
+def write_onnx(network: RoomNetwork | MeanOf, path: Path) -> None:
     """Write the network; its pictures may have any size that is a multiple of 32."""
     n = network.fineness
     inputs = (torch.zeros(1, GEOMETRY, 64, 96), torch.zeros(1, COLOUR, n * 64, n * 96))
@@ -50,21 +80,33 @@ def write_onnx(network: RoomNetwork, path: Path) -> None:
         dynamic_axes={"geometry": size, "colour": finer or size, "category": {2: "rows", 3: "columns"}},
         opset_version=17, do_constant_folding=True, dynamo=False,
     )  # fmt: skip
-    _halve(path)
+    _pack(path)
 
 
-def _halve(path: Path) -> None:
-    """Store large weights in half precision; a cast widens them when the file is loaded."""
+def _pack(path: Path) -> None:
+    """Store large kernels as whole numbers of 8 bit and a scale for each output, other large arrays in half precision.
+
+    They are widened once, when the file is loaded; what is computed stays in single precision.
+    """
     model = onnx.load(path)
-    graph, casts = model.graph, []
+    graph, nodes = model.graph, []
     for weight in list(graph.initializer):
         if weight.data_type != onnx.TensorProto.FLOAT or int(np.prod(weight.dims)) < 256:
             continue
-        values = numpy_helper.to_array(weight).astype(np.float16)
+        values, name = numpy_helper.to_array(weight), weight.name
         graph.initializer.remove(weight)
-        graph.initializer.append(numpy_helper.from_array(values, f"{weight.name}_half"))
-        casts.append(onnx.helper.make_node("Cast", [f"{weight.name}_half"], [weight.name], to=onnx.TensorProto.FLOAT))
-    for node in reversed(casts):
+        wide = onnx.TensorProto.FLOAT
+        if values.ndim < 4 or values[0].size < FEWEST:
+            graph.initializer.append(numpy_helper.from_array(values.astype(np.float16), f"{name}_half"))
+            nodes.append(onnx.helper.make_node("Cast", [f"{name}_half"], [name], to=wide))
+            continue
+        scale = np.maximum(np.abs(values).max(axis=(1, 2, 3), keepdims=True), 1e-12) / 127.0
+        whole = np.rint(values / scale).astype(np.int8)
+        graph.initializer.append(numpy_helper.from_array(whole, f"{name}_whole"))
+        graph.initializer.append(numpy_helper.from_array(scale.astype(np.float32), f"{name}_scale"))
+        nodes.append(onnx.helper.make_node("Cast", [f"{name}_whole"], [f"{name}_wide"], to=wide))
+        nodes.append(onnx.helper.make_node("Mul", [f"{name}_wide", f"{name}_scale"], [name]))
+    for node in reversed(nodes):
         graph.node.insert(0, node)
     onnx.checker.check_model(model)
     onnx.save(model, path)

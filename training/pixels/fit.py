@@ -27,7 +27,7 @@ from training.pixels.measure import real_figures, rendered_figures
 from training.pixels.muon import Muon
 from training.pixels.network import MULTIPLE, WIDTHS, RoomNetwork, begin_with
 from training.pixels.tower import imagenet_weights
-from training.pixels.unfold import unfolded
+from training.pixels.unfold import has_tower, unfolded
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class Options:
     """Channels at 1/2, 1/4, 1/8, 1/16 and 1/32 of the picture's size."""
     dropout: tuple[float, float] = (0.1, 0.1)
     """Share of channels withheld at 1/16 and before the scores."""
-    tower: bool = False
+    tower: bool = True
     """Let a tower that knows photographs look at colour of twice the size (``training.pixels.tower``)."""
     tower_rate: float = 4e-4
     """Highest learning rate of the tower."""
@@ -106,13 +106,13 @@ _LOOKED_AT = 40
 def _begun(options: Options, device: torch.device, sources: list[tuple[Shards, int]]) -> RoomNetwork:
     """Return the network: new, with the weights that ship, or as the checkpoint left it."""
     network = RoomNetwork(len(CATEGORIES), len(ROOMS), options.widths, options.dropout, options.tower)
-    if network.tower is not None and not options.resume:
-        network.tower.load_state_dict(imagenet_weights())
     state = None
     if options.resume:
         state = load_network(options.out, "last").state_dict()
     elif options.start is not None:
         state = _shipped(options, sources) if options.start.suffix == ".onnx" else _mean_of(options.start)
+    if network.tower is not None and not any(name.startswith("tower.") for name in state or ()):
+        network.tower.load_state_dict(imagenet_weights())
     if state is not None:
         new = begin_with(network, state)
         print(f"{len(new)} arrays are new", file=sys.stderr)
@@ -122,9 +122,13 @@ def _begun(options: Options, device: torch.device, sources: list[tuple[Shards, i
 def _shipped(options: Options, sources: list[tuple[Shards, int]]) -> dict[str, Tensor]:
     assert options.start is not None
     rng = np.random.default_rng(options.seed)
-    drawn = (draw_batch(sources, replace(options.view, fineness=1), rng) for _ in range(_LOOKED_AT))
+    fineness = 2 if has_tower(options.start) else 1
+    drawn = (draw_batch(sources, replace(options.view, fineness=fineness), rng) for _ in range(_LOOKED_AT))
     looked_at = (
-        (torch.from_numpy(b.geometry), in_other_light(torch.from_numpy(b.rgb), torch.from_numpy(b.kept), MULTIPLE))
+        (
+            torch.from_numpy(b.geometry),
+            in_other_light(torch.from_numpy(b.rgb), torch.from_numpy(b.kept), fineness * MULTIPLE),
+        )
         for b in drawn
     )
     return unfolded(options.start, len(CATEGORIES), len(ROOMS), looked_at).state_dict()

@@ -27,10 +27,11 @@ _NORM = {
     "_conv_stem": "_bn0", "_expand_conv": "_bn0", "_depthwise_conv": "_bn1", "_project_conv": "_bn2",
 }  # fmt: skip
 _TOWER = "tower."
+_FIRST = "/networks.0/"  # of several that answer together
 
 
 def unfolded(path: Path, categories: int, rooms: int, batches: Iterable[tuple[Tensor, Tensor]]) -> RoomNetwork:
-    """Return the network of an ONNX file that ``write_onnx`` wrote.
+    """Return the network of an ONNX file that ``write_onnx`` wrote; of several that answer together the first.
 
     Args:
         path: the file.
@@ -45,8 +46,8 @@ def unfolded(path: Path, categories: int, rooms: int, batches: Iterable[tuple[Te
     widths = tuple(
         len(arrays[convolutions[name][1]]) for name in ("stem.0.0", "down2.0.0", "down3.0.0", "down4.0.0", "down5.0.0")
     )
-    has_tower = any(name.startswith(_TOWER) for name in convolutions)
-    network = RoomNetwork(categories, rooms, widths, has_tower=has_tower)
+    towered = any(name.startswith(_TOWER) for name in convolutions)
+    network = RoomNetwork(categories, rooms, widths, has_tower=towered)
     state, named = network.state_dict(), dict(network.named_modules())
     left = {name for name, module in named.items() if isinstance(module, nn.Conv2d)} - convolutions.keys()
     if left:
@@ -76,18 +77,32 @@ def unfolded(path: Path, categories: int, rooms: int, batches: Iterable[tuple[Te
     return network
 
 
+def has_tower(path: Path) -> bool:
+    """Return whether the network of a file has a tower on colour."""
+    return any(name.startswith(_TOWER) for name in _read(path)[1])
+
+
 def _read(path: Path) -> tuple[dict[str, np.ndarray], dict[str, tuple[str, str]]]:
     """Return the arrays of a file, and for each convolution by its name those of its weight and bias."""
     graph = onnx.load(path).graph
-    arrays = {each.name: numpy_helper.to_array(each) for each in graph.initializer}
+    arrays = {each.name: np.array(numpy_helper.to_array(each), np.float32) for each in graph.initializer}
     for node in graph.node:
-        if node.op_type == "Cast" and node.input[0] in arrays:
-            arrays[node.output[0]] = arrays[node.input[0]].astype(np.float32)
-    arrays = {name: np.array(value, np.float32) for name, value in arrays.items()}
+        if node.input and all(name in arrays for name in node.input):
+            if node.op_type == "Cast":
+                arrays[node.output[0]] = arrays[node.input[0]]
+            elif node.op_type == "Mul":
+                arrays[node.output[0]] = arrays[node.input[0]] * arrays[node.input[1]]
+    nodes = [node for node in graph.node if node.op_type == "Conv"]
+    first = [node for node in nodes if node.name.startswith(_FIRST)]
     convolutions = {
-        _module_name(node.name): (node.input[1], node.input[2]) for node in graph.node if node.op_type == "Conv"
+        _module_name(node.name.removeprefix(_FIRST)): (_of_first(node.input[1]), _of_first(node.input[2]))
+        for node in first or nodes
     }
-    return arrays, convolutions
+    return {_of_first(name): value for name, value in arrays.items()}, convolutions
+
+
+def _of_first(array: str) -> str:
+    return array.removeprefix("networks.0.")
 
 
 def _module_name(node: str) -> str:
