@@ -77,7 +77,7 @@ def test_weights_of_another_description_are_refused_at_the_first_frame(
     frame, folder = frame_of(160, 120, 150.0), tmp_path / "weights"
     shutil.copytree(Path(str(files("avlmaps.perception.embedded") / "weights")), folder)
     (folder / f"{DEFAULT_WEIGHTS}.onnx").write_bytes((folder / f"{SYNTHETIC_WEIGHTS}.onnx").read_bytes())
-    monkeypatch.setattr(scene_network, "files", lambda _: tmp_path)
+    monkeypatch.setattr(scene_network, "__file__", str(tmp_path / "scene_network.py"))
     network = load_network.__wrapped__(DEFAULT_WEIGHTS)  # past the cache
     with pytest.raises(BackendError, match=r"scene_encoder\.onnx and scene_encoder\.json do not belong together"):
         network.see(frame)
