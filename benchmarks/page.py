@@ -53,6 +53,10 @@ ENTRIES = (
         "geometry", "Geometry with a sensor's faults", "python benchmarks/geometry.py --scenes house:4 house:5 HOUSE",
         0.1, "The limits of the sensor models were chosen on `house:4`.",
     ),
+    Entry(
+        "corrected", "Corrected poses", "python benchmarks/corrected.py --scenes house:7",
+        about="[How a map follows corrected poses](guides/correct-poses.md). The drive goes there and back.",
+    ),
     Entry("queries", "Queries", "python benchmarks/queries.py"),
     Entry("cold-start", "A query from the shell", "python benchmarks/cold_start.py"),
     Entry(

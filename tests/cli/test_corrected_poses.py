@@ -75,3 +75,18 @@ def test_a_map_without_submaps_is_not_replaced(run, walk: Path, built: Path, tmp
     code, _, err = run("build", walk, "--out", path, "--corrected-poses", file)
     assert code == 1
     assert "finished map already" in err
+
+
+def test_a_drive_that_does_not_come_back_closes_no_loop(run, walk: Path, copied: Path) -> None:
+    before = (copied / "map.json").read_bytes()
+    code, _, err = run("build", walk, "--out", copied, "--close-loops", *BUILT)
+    assert code == 1
+    assert "not seen to come back" in err
+    assert (copied / "map.json").read_bytes() == before
+
+
+def test_poses_of_a_file_and_closed_loops_are_two_things(run, walk: Path, copied: Path, tmp_path: Path) -> None:
+    file = moved_file(walk, tmp_path / "poses.txt", 0.2)
+    code, _, err = run("build", walk, "--out", copied, "--close-loops", "--corrected-poses", file, *BUILT)
+    assert code == 2
+    assert "choose one" in err

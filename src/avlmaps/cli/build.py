@@ -68,6 +68,9 @@ class Build(ModelVerb):
     corrected_poses: Annotated[Path | None, arg(metavar="FILE")] = None
     """Move the map, which was built with --submaps, to corrected poses of its frames: a table of stamp tx ty tz qx qy
     qz qw of the depth camera, on the recording's clock. A map that is not there yet is built first."""
+    close_loops: bool = False
+    """Find by the map's own pictures where the drive came back, and move it to the poses that this gives; implies
+    --submaps. The map stays as it is where that is not clear."""
     frame_step: Annotated[int, arg(metavar="N")] = 1
     """Fuse every n-th frame."""
     max_bad_share: Annotated[float, arg(metavar="SHARE")] = 0.05
@@ -99,6 +102,12 @@ class Build(ModelVerb):
         answer = build(self)
         lines = list(info_lines(answer, verbose=self.verbose))
         if (done := answer.get("corrected")) is not None:
+            if (found := done.get("loops")) is not None:
+                lines.append(
+                    f"loops: {found['closures']} of {found['tried']} keyframes were located in earlier ones, "
+                    f"{found['apart_before_m']:.2f} m from where the poses put them (median); {found['agreeing']} "
+                    f"agree now, within {found['apart_m']:.3f} m"
+                )
             lines.append(
                 f"corrected: frames moved by {done['median_m']:.2f} m (median), {done['most_m']:.2f} m at most; "
                 f"{done['voxels_before']} voxels before, {done['voxels']} now, in {done['elapsed_s']:.1f} s"
@@ -139,12 +148,14 @@ def build(verb: "Build") -> dict[str, Any]:
         frames=FrameSettings(
             step=verb.frame_step,
             max_bad_share=verb.max_bad_share,
-            per_submap=SUBMAP_FRAMES if verb.submaps or verb.corrected_poses else 0,
+            per_submap=SUBMAP_FRAMES if verb.submaps or verb.corrected_poses or verb.close_loops else 0,
         ),
         fusion=FusionSettings(max_depth_m=verb.max_depth_m, sensor=verb.sensor),
         gravity=GravitySettings(camera_height_m=verb.camera_height_m),
         seed=verb.seed,
     )
+    if verb.corrected_poses is not None and verb.close_loops:
+        raise UsageError("--corrected-poses and --close-loops both move the map; choose one of them.")
     poses = None
     if verb.corrected_poses is not None:
         from avlmaps.recordings.pose_file import read_pose_file
@@ -166,6 +177,11 @@ def build(verb: "Build") -> dict[str, Any]:
 
         stored, done = correct_stored(stored, *poses)
         answer["corrected"] = asdict(done)
+    if verb.close_loops:
+        from avlmaps.days.loops import close_loops
+
+        stored, done, found = close_loops(stored)
+        answer["corrected"] = {**asdict(done), "loops": found.report()}
     AVLMap(stored).prepare()
     return {**describe_map(stored), **answer, "elapsed_s": round(perf_counter() - begin, 3)}
 

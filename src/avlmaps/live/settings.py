@@ -22,9 +22,9 @@ class LiveSettings:
     """A voxel that this many frames hit is known."""
     new_share: float = 0.02
     """A frame brings new surface where more than this share of its points hit voxels that are not known."""
-    looks: int = 4
+    looks: int = 12
     """Encoded looks at a place, as near as a new one, beside which that is worth nothing. With gates."""
-    encoded_share: float = 0.1
+    encoded_share: float = 0.05
     """A fused frame is encoded where more than this share of its points is worth it; else it adds its surface and
     colours alone. Twice that with one frame waiting behind it, and so on."""
     first_frames: int = 8

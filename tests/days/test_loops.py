@@ -1,0 +1,148 @@
+"""A drive that comes back is corrected by its own pictures; where these are few or disagree, nothing is done."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.errors import MapError
+from avlmaps.core.poses import inverse
+from avlmaps.days import loops
+from avlmaps.days.loops import LoopSettings, find_loops
+from avlmaps.days.pose_graph import motions
+from avlmaps.maps.types import Keyframes
+from avlmaps.query.locate import Located
+
+CAMERA = Pinhole(80.0, 80.0, 40.0, 30.0, 80, 60)
+RIG = Rig(CAMERA, CAMERA)
+COUNT = 80
+
+
+def drive() -> np.ndarray:
+    """Return poses of two rounds on a circle of 2 m."""
+    angle = np.linspace(0.0, 4.0 * np.pi, COUNT)
+    steps = np.zeros((COUNT, 6))
+    steps[:, 5] = angle
+    out = motions(steps)
+    out[:, :3, 3] = 2.0 * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
+    return out
+
+
+def strayed(true: np.ndarray) -> np.ndarray:
+    rng, out = np.random.default_rng(0), [true[0]]
+    for row in range(1, COUNT):
+        error = np.zeros((1, 6))
+        error[0, [0, 1, 5]] = rng.normal(scale=0.008, size=3) + np.array([0.004, 0.0, 0.003])
+        out.append(out[-1] @ inverse(true[row - 1]) @ true[row] @ motions(error)[0])
+    return np.stack(out)
+
+
+def stored(poses: np.ndarray) -> SimpleNamespace:
+    """Return keyframes of these poses, whose places say where on the circle they are."""
+    angle = np.linspace(0.0, 4.0 * np.pi, COUNT)
+    place = np.stack([np.cos(angle), np.sin(angle)], axis=1).astype(np.float32)
+    offsets = np.zeros(COUNT + 1, np.int64)
+    none = np.zeros((0, 2), np.float32)
+    keyframes = Keyframes(
+        0.5 * np.arange(COUNT), poses, np.zeros((COUNT, 3), np.float32), np.zeros((COUNT, 0), np.float32), place,
+        offsets, none, np.zeros((0, 4), np.float16), np.zeros((0, 3), np.float32), offsets, np.zeros(0, np.uint8),
+    )  # fmt: skip
+    return SimpleNamespace(
+        path="home.avlmap",
+        keyframes=keyframes,
+        rig=RIG,
+        place_state={},
+        encoders=None,
+        require_model=lambda kind: None,
+        up_in_world=np.array([0.0, 0.0, 1.0]),
+    )
+
+
+@pytest.fixture
+def located(monkeypatch: pytest.MonkeyPatch):
+    """Let a keyframe be located where it truly is, off by what a function says."""
+
+    def install(map_: SimpleNamespace, true: np.ndarray, off=lambda row: np.eye(4), score: float = 0.8) -> None:
+        stamps, places = map_.keyframes.stamp_s, map_.keyframes.place
+
+        def fake(there, local, place, camera, rng, settings) -> Located:
+            other = int(np.flatnonzero(stamps == there.keyframes.stamp_s[0])[0])
+            row = int(np.flatnonzero((places == place).all(axis=1))[-1])
+            measured = inverse(true[other]) @ true[row] @ off(row)
+            if np.linalg.norm(measured[:3, 3]) > 0.5:
+                return Located(None, 0, None, 0.0, 0.0, CAMERA)
+            return Located(there.keyframes.world_from_camera[0] @ measured, 50, None, score, 0.0, CAMERA)
+
+        monkeypatch.setattr(loops, "locate_features", fake)
+
+    return install
+
+
+def test_a_drive_that_came_back_is_put_right(located) -> None:
+    true = drive()
+    map_ = stored(strayed(true))
+    located(map_, true)
+    found = find_loops(map_)
+    before, after = (
+        np.linalg.norm(of[:, :3, 3] - true[:, :3, 3], axis=1) for of in (map_.keyframes.world_from_camera, found.poses)
+    )
+    assert found.agreeing == found.closures >= 10
+    assert found.apart_before_m > 0.1 > 10 * found.apart_m / 2
+    assert np.median(after) < 0.5 * np.median(before)
+    np.testing.assert_allclose(found.poses[0], true[0], atol=1e-9)
+
+
+def test_what_is_up_stays_up(located) -> None:
+    true = drive()
+    tipped = motions(np.array([[0.0, 0.0, 0.0, 0.01, -0.004, 0.0]]))[0]
+    map_ = stored(strayed(true))
+    located(map_, true, lambda row: tipped)  # each place is seen a little tipped
+    found = find_loops(map_)
+    turned = (found.poses @ inverse(map_.keyframes.world_from_camera))[:, :3, :3].sum(axis=0)
+    left, _, right = np.linalg.svd(turned)
+    np.testing.assert_allclose((left @ right)[:, 2], [0.0, 0.0, 1.0], atol=1e-7)
+
+
+def test_where_the_poses_are_right_they_stay(located) -> None:
+    true = drive()
+    map_ = stored(true)
+    located(map_, true)
+    np.testing.assert_allclose(find_loops(map_).poses, true, atol=1e-6)
+
+
+def test_one_wrong_place_among_right_ones_is_left_out(located) -> None:
+    true = drive()
+    map_ = stored(strayed(true))
+    wrong = motions(np.array([[0.3, 0.2, 0.0, 0.0, 0.0, 0.4]]))[0]
+    located(map_, true, lambda row: wrong if row == 60 else np.eye(4))
+    found = find_loops(map_)
+    assert found.agreeing == found.closures - 1
+    assert found.apart_m < 0.02
+
+
+def test_places_that_disagree_close_nothing(located) -> None:
+    true, rng = drive(), np.random.default_rng(1)
+    map_ = stored(strayed(true))
+    located(map_, true, lambda row: motions(rng.normal(scale=0.3, size=(1, 6)))[0])
+    with pytest.raises(MapError, match=r"contradict each other.*stays as it was"):
+        find_loops(map_)
+
+
+def test_a_drive_that_came_nowhere_again_says_so(located) -> None:
+    true = drive()
+    map_ = stored(true)
+    located(map_, true, score=0.52)  # located, but not surely
+    with pytest.raises(MapError, match=r"not seen to come back: of \d+ keyframes 0 were located"):
+        find_loops(map_)
+
+
+def test_a_drive_is_not_bent_against_its_odometry(located) -> None:
+    true = drive()
+    map_ = stored(true)
+    shifted = true.copy()
+    shifted[COUNT // 2 :, 0, 3] += 0.45
+    located(map_, shifted)
+    with pytest.raises(MapError, match="contradict its odometry"):
+        find_loops(map_, replace(LoopSettings(), most_strain=0.1))
