@@ -55,20 +55,22 @@ class Edges:
 
 def optimise(poses: Float[np.ndarray, "n 4 4"], edges: Edges) -> Float[np.ndarray, "n 4 4"]:
     """Return the poses that fit the edges best; the first stays where it is."""
-    from scipy import sparse
+    from scipy.sparse import csc_matrix
     from scipy.sparse.linalg import spsolve
 
     count, found = len(poses), poses.copy()
     scale = 1.0 / np.repeat(np.stack([edges.sigma_m, edges.sigma_rad], axis=1), 3, axis=1)
     row = np.arange(6 * len(edges)).reshape(-1, 6)
     columns = [6 * ends[:, None] + np.arange(6) for ends in (edges.first, edges.second)]
+    free = np.arange(6 * count - 6)
+    damping = csc_matrix((np.full(len(free), 1e-9), (free, free)), shape=(len(free), len(free)))
     for _ in range(_STEPS):
         error = edges.errors(found) * scale
         weight = np.where(edges.is_closure, 1.0 / (1.0 + (error**2).sum(axis=1) / 6.0), 1.0)
         root = np.sqrt(weight)[:, None]
         of_first, of_second = _slopes(found, edges)
         values = [slope * (scale * root)[:, :, None] for slope in (of_first, of_second)]
-        slope = sparse.coo_matrix(
+        slope = csc_matrix(
             (
                 np.concatenate([one.ravel() for one in values]),
                 (
@@ -77,9 +79,8 @@ def optimise(poses: Float[np.ndarray, "n 4 4"], edges: Edges) -> Float[np.ndarra
                 ),
             ),
             shape=(6 * len(edges), 6 * count),
-        ).tocsc()[:, 6:]
-        square = (slope.T @ slope + 1e-9 * sparse.identity(6 * count - 6)).tocsc()
-        step = -np.asarray(spsolve(square, slope.T @ (error * root).ravel())).reshape(-1, 6)
+        )[:, 6:]
+        step = -spsolve(slope.T @ slope + damping, slope.T @ (error * root).ravel()).reshape(-1, 6)
         found[1:] = found[1:] @ motions(step)
         if np.abs(step).max(initial=0.0) < _STILL:
             break
