@@ -1,5 +1,6 @@
 """`avlmaps live`: a recording is played into a map."""
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -15,3 +16,35 @@ def test_a_recording_is_played_into_a_map(answer, walk: Path, tmp_path: Path, pa
         assert live["dropped"] == {}
     assert answer("info", path)["frames"] == live["fused"]
     assert answer("query", path, "--object", "red")["goals"] is not None
+
+
+WHOLE = ("--profile", "colours", "--as-fast-as-possible", "--every-frame")
+
+
+def test_a_drive_updates_the_map_of_the_days_before(answer, walk: Path, built: Path, tmp_path: Path) -> None:
+    home = shutil.copytree(built, tmp_path / "home.avlmap")
+    words = ("--into", home, "--voxel-size-m", "0.1", *WHOLE)
+    made = answer("live", walk, "--out", tmp_path / "today.avlmap", *words)
+    assert made["into"]["checks"]["agreeing"] >= 5
+    assert made["into"]["path"] == str(home)
+    whole = answer("info", home, "--verify")
+    assert whole["frames"] == 2 * answer("info", built)["frames"]
+
+
+def test_a_drive_that_cannot_be_joined_leaves_the_map_as_it_was(run, walk: Path, built: Path, tmp_path: Path) -> None:
+    home = shutil.copytree(built, tmp_path / "home.avlmap")
+    before = (home / "map.json").read_bytes()
+    words = ("--into", home, "--voxel-size-m", "0.2", *WHOLE)
+    code, _, err = run("live", walk, "--out", tmp_path / "today.avlmap", *words)
+    assert code == 1
+    assert "has voxels of 0.1 m" in err
+    assert (home / "map.json").read_bytes() == before
+    assert (tmp_path / "today.avlmap" / "map.json").is_file()
+
+
+@pytest.mark.parametrize("words", [("--into", "today.avlmap"), ("--day", "2026-11-24")])
+def test_what_into_needs_is_said(run, walk: Path, tmp_path: Path, words: tuple[str, ...], monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, _, err = run("live", walk, "--out", "today.avlmap", *words)
+    assert code == 2
+    assert "--into" in err

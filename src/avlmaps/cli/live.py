@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from time import perf_counter
-from typing import Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
@@ -13,6 +13,9 @@ from avlmaps.cli.output import UsageError, emit
 from avlmaps.cli.reading_options import Reading
 from avlmaps.cli.verb import ModelVerb
 from avlmaps.core.progress import say
+
+if TYPE_CHECKING:
+    from avlmaps.maps.store.reader import StoredMap
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,13 +59,23 @@ class Live(ModelVerb):
     """Format of the recording, if its files do not show it."""
     reading: Annotated[Reading, OmitArgPrefixes] = field(default_factory=Reading)
     """What you know better than the recording's files."""
+    into: Annotated[Path | None, arg(metavar="MAP")] = None
+    """Map folder that this drive updates when it is over: it finds itself there by its pictures, as `avlmaps merge`
+    does. Where it is not seen to be the same place, that map stays as it is, and --out has the drive."""
+    day: Annotated[str | None, arg(metavar="DAY")] = None
+    """Day of the drive for --into, such as 2026-11-24. Default: by its stamps, if those are of a clock."""
     overwrite: bool = False
     """Replace a map at --out."""
 
     def run(self) -> None:
         """Play it."""
         answer = _live(self)
-        emit(answer, [*info_lines(answer, verbose=False), f"live: {answer['live']['summary']}"], self.json)
+        lines = [*info_lines(answer, verbose=False), f"live: {answer['live']['summary']}"]
+        if "into" in answer:
+            from avlmaps.cli.merge import merge_lines
+
+            lines += merge_lines(answer["into"])
+        emit(answer, lines, self.json)
 
 
 def _live(verb: Live) -> dict[str, Any]:
@@ -78,6 +91,7 @@ def _live(verb: Live) -> dict[str, Any]:
     begin_s = perf_counter()
     if not verb.rate > 0.0:
         raise UsageError(f"--rate is {verb.rate:g}; choose a positive number, or --as-fast-as-possible.")
+    first = _days_before(verb)
     used = choose_models(verb.profile, [word for words in verb.model for word in words])
     recording = None
     if is_being_written(verb.recording):
@@ -112,5 +126,27 @@ def _live(verb: Live) -> dict[str, Any]:
     return {
         **describe_map(live.map.stored),
         "live": {**status.to_dict(), "summary": str(status)},
+        **({} if first is None else {"into": _joined(first, live.map.stored, verb.day)}),
         "elapsed_s": round(perf_counter() - begin_s, 3),
     }
+
+
+def _days_before(verb: Live) -> "StoredMap | None":
+    """Return the map that the drive is to update; None where it updates none."""
+    from avlmaps.maps.store.reader import open_stored
+
+    if verb.into is None:
+        if verb.day is not None:
+            raise UsageError("--day is of a drive that goes --into a map; name the map as well.")
+        return None
+    if verb.into.resolve() == verb.out.resolve():
+        raise UsageError("--into is the map of the days before, and --out that of this drive; name two folders.")
+    return open_stored(verb.into)
+
+
+def _joined(first: "StoredMap", today: "StoredMap", day: str | None) -> dict[str, Any]:
+    """Let a drive update the map of the days before, and return what changed."""
+    from avlmaps.cli.merge import merged_answer
+    from avlmaps.days.merge import merge_maps
+
+    return merged_answer(merge_maps(first, today, first.path, day=day or "", overwrite=True))
