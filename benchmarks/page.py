@@ -174,7 +174,7 @@ README_FIGURES = (
     ),
     Figure(
         "sounds by words, held out: ten kinds of ESC-10", "sounds", "cross-validation: asked by words",
-        "ESC-10, one fold | dry | right name first among 10 names", "{hits} of {of}, {%} % ({95 %})",
+        "ESC-10 | dry | right name first among 50 names", "{hits} of {of}, {%} % ({95 %})",
     ),
     Figure(
         "the same, forty household kinds", "sounds", "cross-validation: asked by words",

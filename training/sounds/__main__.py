@@ -11,15 +11,14 @@ from typing import Any
 import numpy as np
 import torch
 from training.sounds import calibrate
-from training.sounds.clips import TESTED, Clip, read_corpus
-from training.sounds.crossvalidate import Answers, Networks, example_bank, hear_held_out
-from training.sounds.efficientat import stored_opinion
+from training.sounds.clips import TESTED, Clip, Corpus, read_corpus
+from training.sounds.crossvalidate import Answers, example_bank, hear_held_out, network_of
 from training.sounds.export import write_onnx
 from training.sounds.figures import all_tables
 from training.sounds.fit import EncodeWords
 from training.sounds.in_maps import ROOT, write_json
 from training.sounds.kinds import KINDS, NAMES, TEMPLATES
-from training.sounds.upper import Settings
+from training.sounds.mixtures import MADE_EACH
 
 from avlmaps.core.progress import say
 from avlmaps.perception.embedded.sound_calibration import evidence_for
@@ -34,41 +33,29 @@ NOTE = (
 
 
 def main() -> None:
-    """Run the stages in order; networks that are in the work folder are not fitted again."""
+    """Test and calibrate the networks of the work folder, and write both editions."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--sounds", type=Path, default=ROOT.parent / "shared" / "data" / "sounds")
-    parser.add_argument("--work", type=Path, default=ROOT / "build" / "sounds", help="folder of the networks")
+    parser.add_argument("--work", type=Path, default=ROOT / "build" / "sounds", help="folder of the fitted networks")
     parser.add_argument("--out", type=Path, default=ROOT, help="the checkout to write weights and figures into")
-    parser.add_argument("--start", type=Path, default=ROOT / WEIGHTS / "sounds.onnx", help="weights to continue from")
-    parser.add_argument("--teacher", type=Path, help="EfficientAT's checkpoint, which guides the fit; none if left out")
-    parser.add_argument("--steps", type=int, default=Settings().steps, help="of each network")
-    parser.add_argument("--each", type=int, default=8, help="synthetic sounds of a kind")
     arguments = parser.parse_args()
     torch.set_num_threads(1)
-    corpus = read_corpus(arguments.sounds, arguments.work, arguments.each)
+    corpus = read_corpus(arguments.sounds, arguments.work)
     words = EmbeddedWords()
-    settings = Settings(steps=arguments.steps)
-    teacher = None
-    if arguments.teacher is not None:
-        files = [arguments.sounds / clip.path for clip in corpus.clips]
-        teacher = stored_opinion(arguments.work / f"teacher-{len(files)}.npz", arguments.teacher, files)
-    networks = Networks(corpus, words.encode, settings, arguments.start, arguments.work, teacher)
-
-    answers = hear_held_out(corpus, networks, calibrate.prototypes(words.encode))
+    answers = hear_held_out(corpus, arguments.work, calibrate.prototypes(words.encode))
     constants = fitted_constants(answers, words.encode)
-    learnt = Counter(NAMES[clip.kind] for clip in corpus.clips if clip.may_ship)
+    learnt = Counter(NAMES[clip.kind] for clip in corpus.clips if clip.may_ship and clip.fold != TESTED)
     tables = all_tables(answers, learnt, words.encode, constants)
-    write_edition(arguments.work / f"without-{TESTED}", networks, TESTED, words, constants, arguments.each)
-    (arguments.out / FIGURES).parent.mkdir(parents=True, exist_ok=True)
-    about = {"settings": asdict(settings), "words": words.card.checksum}
-    write_json(arguments.out / FIGURES, {"about": about, "tables": tables})
     say(json.dumps(tables, indent=1))
-    write_edition(arguments.out / WEIGHTS, networks, 0, words, constants, arguments.each)
+    write_edition(arguments.work / f"without-{TESTED}", corpus, arguments.work, TESTED, words, constants)
+    (arguments.out / FIGURES).parent.mkdir(parents=True, exist_ok=True)
+    write_json(arguments.out / FIGURES, {"about": {"words": words.card.checksum}, "tables": tables})
+    write_edition(arguments.out / WEIGHTS, corpus, arguments.work, 0, words, constants)
 
 
 def fitted_constants(answers: Answers, encode: EncodeWords) -> calibrate.Calibration:
     """Fit every constant in turn, on clips as they are, the same clips in a room, and pieces in rooms and noise."""
-    heard, kinds = answers.household.every, answers.household.every_kind
+    heard, kinds = answers.held.every, answers.held.every_kind
     evidence = evidence_for(heard.cosines, heard.typical)
     c = replace(calibrate.START, temperature=calibrate.fit_temperature(evidence, kinds))
     c = calibrate.fit_phrases(encode, c)
@@ -77,41 +64,32 @@ def fitted_constants(answers: Answers, encode: EncodeWords) -> calibrate.Calibra
     c = calibrate.fit_taught(answers.lessons(3), c)
     left = [k for k in range(calibrate.RECORDED_COUNT) if k not in answers.without]
     c = calibrate.flattened(calibrate.fit_word(heard, kinds, [(unknown, left)], encode, c))
-    return calibrate.fit_pairs(heard, kinds, answers.household.every_room, c)
+    return calibrate.fit_pairs(heard, kinds, answers.held.every_room, c)
 
 
 def write_edition(
-    folder: Path, networks: Networks, fold: int, words: EmbeddedWords, c: calibrate.Calibration, each: int
+    folder: Path, corpus: Corpus, work: Path, fold: int, words: EmbeddedWords, c: calibrate.Calibration
 ) -> None:
     """Write what ``EmbeddedSounds`` reads: a network that learnt nothing from a fold (0 for none), examples, notes."""
     folder.mkdir(parents=True, exist_ok=True)
-    net = networks.of_fold(fold)
-    bank, kinds = example_bank(net, networks.corpus.examples(fold))
-    write_onnx([net], folder / "sounds.onnx")
+    net = network_of(work, fold)
+    bank, kinds = example_bank(net, corpus.examples(fold))
+    write_onnx(net, folder / "sounds.onnx")
     np.save(folder / "sounds.npy", bank.astype(np.float16))
-    learnt = [clip for clip in networks.corpus.clips if clip.may_ship and clip.fold != fold]
+    learnt = [clip for clip in corpus.clips if clip.may_ship and clip.fold != fold]
     examples = np.bincount(kinds, minlength=len(NAMES)).tolist()
-    about = networks.start.with_suffix(".json")
-    before = json.loads(about.read_text(encoding="utf-8"))["sources"] if about.exists() else ()
-    write_json(folder / "sounds.json", notes(learnt, before, words, c, each, examples))
+    write_json(folder / "sounds.json", notes(learnt, words, c, examples))
 
 
 def notes(
-    learnt: Sequence[Clip],
-    before: Sequence[int],
-    words: EmbeddedWords,
-    c: calibrate.Calibration,
-    each: int,
-    examples: Sequence[int],
+    learnt: Sequence[Clip], words: EmbeddedWords, c: calibrate.Calibration, examples: Sequence[int]
 ) -> dict[str, Any]:
     """Return the notes that ship beside a network.
 
     Args:
         learnt: the clips that it learnt from.
-        before: numbers of the recordings that the lower blocks, of the edition before, learnt from.
         words: the word encoder.
         c: the constants.
-        each: synthetic sounds of a kind.
         examples: how many of each kind ship.
     """
     counts = Counter(NAMES[clip.kind] for clip in learnt)
@@ -120,19 +98,19 @@ def notes(
             "name": name,
             "called": list(called),
             "origin": "recorded" if counts[name] else "synthesised",
-            "clips": counts[name] or each,
+            "clips": counts[name] or MADE_EACH,
             "examples": examples[k],
         }
         for k, (name, called) in enumerate(KINDS.items())
     ]
     return {
-        "id": "avlmaps/sounds-4",
+        "id": "avlmaps/sounds-5",
         "dim": words.card.dim,
         "words": words.card.checksum,
         "templates": list(TEMPLATES),
         "note": NOTE,
         "calibration": asdict(c),
-        "sources": sorted({clip.source for clip in learnt}.union(before)),
+        "sources": sorted({clip.source for clip in learnt}),
         "kinds": kinds,
     }
 

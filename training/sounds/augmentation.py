@@ -24,8 +24,6 @@ class Augmentation:
     """How strongly.
 
     Attributes:
-        stretch: largest change of speed, as a power of e.
-        bands_shift: largest change of pitch, in mel bands.
         equaliser_db: standard deviation of a smooth random colour.
         reverberation: share of sounds that are put into a room.
         rt60_s: range of reverberation times, drawn evenly in the logarithm.
@@ -36,12 +34,9 @@ class Augmentation:
         segmented: share of sounds that end where they sink into that background, as a segmented track cuts them.
         trimmed: share of sounds that are cut to a loud piece.
         pieces: shortest and longest of these in frames, drawn evenly in the logarithm.
-        mixed: share of sounds to which another of the batch is added, at most as loud.
         masks: widths of the masks over bands and frames (SpecAugment; Park et al. 2019).
     """
 
-    stretch: float = 0.2
-    bands_shift: float = 2.5
     equaliser_db: float = 4.0
     reverberation: float = 0.5
     rt60_s: tuple[float, float] = (0.15, 1.3)
@@ -52,35 +47,12 @@ class Augmentation:
     segmented: float = 0.5
     trimmed: float = 0.35
     pieces: tuple[int, int] = (12, 220)
-    mixed: float = 0.4
     masks: tuple[int, int] = (8, 50)
 
 
 def peak_normalised(power: Tensor) -> Tensor:
     """Scale each to a peak of one and put the floor under it, as ``logmel.normalised`` does."""
     return power / power.amax(dim=(1, 2), keepdim=True).clamp_min(1e-12) + FLOOR
-
-
-def moved(power: Tensor, how: Augmentation, generator: torch.Generator) -> Tensor:
-    """Change speed and pitch a little and move in time, all in one resampling of the logarithm."""
-    n = len(power)
-
-    def uniform(low: float, high: float) -> Tensor:
-        return low + (high - low) * torch.rand(n, generator=generator)
-
-    speed = torch.exp(uniform(-how.stretch, how.stretch))
-    theta = torch.zeros(n, 2, 3)
-    theta[:, 0, 0] = 1.0
-    theta[:, 0, 2] = uniform(-how.bands_shift, how.bands_shift) * 2.0 / BANDS
-    theta[:, 1, 1] = speed
-    theta[:, 1, 2] = 0.0
-    grid = functional.affine_grid(theta, [n, 1, FRAMES, BANDS], align_corners=False)
-    log = functional.grid_sample(power.log()[:, None], grid, padding_mode="border", align_corners=False)[:, 0].exp()
-    inside = grid[..., 1].abs().amax(dim=2, keepdim=True) <= 1.0
-    log = torch.where(inside, log, torch.full_like(log, FLOOR))
-    shift = torch.randint(0, FRAMES, (n,), generator=generator)
-    index = (torch.arange(FRAMES)[None, :] + shift[:, None]) % FRAMES
-    return torch.gather(log, 1, index[:, :, None].expand(-1, -1, BANDS))
 
 
 def trimmed(power: Tensor, how: Augmentation, generator: torch.Generator) -> Tensor:
@@ -117,6 +89,13 @@ def fluctuations(count: int, generator: torch.Generator) -> Tensor:
     bank = _draws()
     shift = int(torch.randint(FRAMES, (1,), generator=generator))
     return bank.roll(shift, dims=1)[torch.randint(len(bank), (count,), generator=generator)]
+
+
+def steady_noise(count: int, generator: torch.Generator) -> Tensor:
+    """Return mel power of noise of random colour: from falling by 25 dB over the bands to rising by 16 (white: 12)."""
+    power = fluctuations(count, generator)
+    tilt_db = 41.0 * torch.rand(count, 1, 1, generator=generator) - 25.0
+    return power * 10.0 ** (tilt_db * torch.linspace(0.0, 1.0, BANDS) / 10.0)
 
 
 def in_rooms(power: Tensor, how: Augmentation, generator: torch.Generator) -> Tensor:
@@ -186,12 +165,17 @@ def segmented(power: Tensor, background: Tensor, how: Augmentation, generator: t
     return torch.where((whole[:, None] | (within > 0.0))[:, :, None], power, torch.zeros_like(power))
 
 
-def heard(power: Tensor, coarse: bool = False) -> Tensor:
-    """Do what ``logmel.heard`` does, for a batch, in torch; the background in half precision where ``coarse``."""
+def in_circumstances(power: Tensor, how: Augmentation, generator: torch.Generator) -> Tensor:
+    """Put some sounds into rooms and some into noise, and cut some of these as a map cuts them."""
+    power = in_rooms(power, how, generator)
+    power, background = in_noise(power, steady_noise(len(power), generator), how, generator)
+    return peak_normalised(segmented(power, background, how, generator))
+
+
+def heard(power: Tensor) -> Tensor:
+    """Do what ``logmel.heard`` does, for a batch, in torch."""
     bands_first = power.transpose(1, 2).contiguous()
-    matrix, rows = torch.from_numpy(logmel.smoothing_matrix()).to(power.device), bands_first.reshape(-1, FRAMES)
-    smooth = (rows.bfloat16() @ matrix.bfloat16()).float() if coarse else rows @ matrix
-    smooth = smooth.reshape(bands_first.shape)
+    smooth = bands_first @ torch.from_numpy(logmel.smoothing_matrix()).to(power.device)
     pcen = logmel.pcen(bands_first, smooth)
     log = torch.log10(bands_first + FLOOR)
     log = (log - log.mean(dim=(1, 2), keepdim=True)) / logmel.LOG_SCALE
@@ -208,29 +192,3 @@ def masked(features: Tensor, how: Augmentation, generator: torch.Generator) -> T
         keep = ((place < start[:, None]) | (place >= (start + width)[:, None])).float()
         features = features * keep.reshape(n, 1, *((size, 1) if axis == 2 else (1, size)))
     return features
-
-
-def mixed(power: Tensor, how: Augmentation, generator: torch.Generator) -> tuple[Tensor, Tensor, Tensor]:
-    """Add another sound of the batch to some sounds (between-class learning; Tokozume et al. 2018).
-
-    Returns:
-        the sounds, which other one each holds (its place in the batch), and that one's share (0 where there is none).
-    """
-    n = len(power)
-    other = torch.randperm(n, generator=generator)
-    chosen = torch.rand(n, generator=generator) < how.mixed
-    share = torch.where(chosen, 0.5 * torch.rand(n, generator=generator), torch.zeros(n))
-    power = peak_normalised(power)
-    gain = (share / (1.0 - share)) ** 2
-    return power + gain[:, None, None] * power[other], other, share
-
-
-def augmented(
-    power: Tensor, noise: Tensor, how: Augmentation, generator: torch.Generator, coarse: bool = False
-) -> tuple[Tensor, Tensor, Tensor]:
-    """Return the network's input for a batch, each sound in new circumstances, and what ``mixed`` added."""
-    power = trimmed(moved(power, how, generator), how, generator)
-    power, other, share = mixed(coloured(power, how, generator), how, generator)
-    power, background = in_noise(in_rooms(power, how, generator), noise, how, generator)
-    power = peak_normalised(segmented(power, background, how, generator))
-    return masked(heard(power, coarse), how, generator), other, share

@@ -19,8 +19,7 @@ from avlmaps_sim.synthesis import MAKERS
 SHIPPABLE = ("CC0", "CC-BY ")  # the start of a licence with which a clip may teach weights that ship
 
 
-FOLDS = (2, 3, 4, 5)
-TESTED = 5  # the fold whose clips test; the third edition heard none of its household clips
+TESTED = 5  # the fold whose clips test
 ROOM_S = 0.6  # reverberation time of the room that they are tested in
 
 
@@ -160,8 +159,8 @@ class Corpus:
         return Examples(*recorded, self.synthetic[made], self.synthetic_kinds[made])
 
 
-def read_corpus(folder: Path, cache: Path, each: int = 16, seed: int = 0) -> Corpus:
-    """Read the recorded clips with folds and make the synthetic ones; the cache stores both."""
+def read_corpus(folder: Path, cache: Path, each: int = 4, seed: int = 0) -> Corpus:
+    """Read the recorded clips with folds and make ``each`` synthetic ones of every kind; the cache stores both."""
     clips = tuple(clip for clip in read_index(folder) if clip.fold)
     file = cache / f"recorded-{len(clips)}.npy"
     if not file.exists():

@@ -1,7 +1,7 @@
-"""Two editions of the sound encoder on clips of one fold that neither of them learnt from, in one run.
+"""Editions of the sound encoder on clips of one fold that none of them learnt from, in one run.
 
-``python -m training.sounds.compare`` compares weights that were fitted without the fold with those that ship. The clips
-are those of household kinds; every edition heard some of ESC-10.
+``python -m training.sounds.compare --weights OLD NEW`` compares weights that were fitted without the fold. The clips
+are those of household kinds; editions before the fifth heard some of ESC-10.
 """
 
 import argparse
@@ -48,21 +48,28 @@ def measured(encoder: EmbeddedSounds, sounds: Sequence[Sound], kinds: np.ndarray
     yes, own = fifty >= 0.5, kinds[:, None] == np.arange(len(RECORDED))
     each = {FIRST: fifty.argmax(axis=1) == kinds, OWN: yes[own], OTHER: (yes & ~own).any(axis=1)}
     highest_other = np.where(own, -1.0, fifty).max(axis=1)
+    likely = np.clip(np.where(own, fifty, 1.0 - fifty), 1e-6, None)
     limits = np.quantile(highest_other, (0.9, 0.8, 0.7))  # from which some other name says yes for 10, 20, 30 %
     return {
         "clips": len(sounds),
         **{what: int(right.sum()) for what, right in each.items()},
         f"first among {len(CALLED)}": int((scores.argmax(axis=1) == kinds).sum()),
         "own name, where another says yes for 10, 20, 30 %": [round(float((fifty[own] > x).mean()), 3) for x in limits],
+        f"log loss of {len(RECORDED)} questions": round(float(-np.log(likely).sum(axis=1).mean()), 2),
+        "said and true": [
+            [int(within.sum()), round(float(fifty[within].mean()), 3), round(float(own[within].mean()), 3)]
+            for within in ((fifty >= low) & (fifty < low + 0.2) for low in (0.0, 0.2, 0.4, 0.6, 0.8))
+            if within.any()
+        ],
         "each": {what: right.tolist() for what, right in each.items()},
         "ms of one core a second of sound": round(1e3 * took_s / sum(sound.duration_s for sound in sounds), 2),
     }
 
 
-def paired(ships: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, str]:
+def paired(first: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, str]:
     """Return how many clips each edition alone has right (or says yes to), with McNemar's exact p."""
     told = {}
-    for what, before in ships["each"].items():
+    for what, before in first["each"].items():
         old, after = np.array(before), np.array(new["each"][what])
         won, lost = int((after & ~old).sum()), int((old & ~after).sum())
         told[what] = f"+{won} -{lost}, p = {binomtest(won, max(won + lost, 1)).pvalue:.2g}"
@@ -70,18 +77,15 @@ def paired(ships: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, str]:
 
 
 def main() -> None:
-    """Print the figures of both editions, dry and in a room, and write them to a file."""
+    """Print the figures of every edition, dry and in a room, and write them to a file."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--sounds", type=Path, default=ROOT.parent / "shared" / "data" / "sounds")
     parser.add_argument("--fold", type=int, default=TESTED)
-    parser.add_argument("--weights", type=Path, nargs="+", default=[ROOT / "build" / "sounds" / f"without-{TESTED}"])
+    parser.add_argument("--weights", type=Path, nargs="+", required=True, help="the others are held against the first")
     parser.add_argument("--out", type=Path, default=ROOT / "build" / "sounds" / "compared.json")
     arguments = parser.parse_args()
     nobody = ROOT / "build" / "sounds" / "nobody"  # a profile folder without taught sounds
-    editions = {
-        "ships": EmbeddedSounds(folder=nobody),
-        **{str(weights): EmbeddedSounds(folder=nobody, weights=weights) for weights in arguments.weights},
-    }
+    editions = {str(weights): EmbeddedSounds(folder=nobody, weights=weights) for weights in arguments.weights}
     clips = clips_for(read_index(arguments.sounds), arguments.fold, list(editions.values()))
     kinds = np.array([clip.kind for clip in clips])
     dry = [AudioTrack.open(arguments.sounds / clip.path).read() for clip in clips]
@@ -96,7 +100,7 @@ def main() -> None:
     for label, encoder in editions.items():
         figures[label] = {where: measured(encoder, *given) for where, given in heard.items()}
         for where, found in figures[label].items():
-            found["against what ships"] = paired(figures["ships"][where], found)
+            found["against the first"] = paired(figures[str(arguments.weights[0])][where], found)
             shown = {what: value for what, value in found.items() if what != "each"}
             say(f"{label}, {where}: {shown}")
     write_json(arguments.out, figures)

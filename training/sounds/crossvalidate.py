@@ -1,4 +1,4 @@
-"""Learn from three folds, listen to the fourth: what the encoder makes of recordings it never learnt from."""
+"""Listen to the fold that was left out: what networks make of recordings that they never learnt from."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,15 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from training.sounds.augmentation import heard
+from training.sounds.augmentation import Augmentation, coloured, in_circumstances, peak_normalised, trimmed
 from training.sounds.calibrate import Evidence, Lesson, evidence_of, joined, lessons
 from training.sounds.clips import ROOM_S, TESTED, Corpus, Examples, mels_of, read_samples
-from training.sounds.efficientat import Opinion
-from training.sounds.export import opened_norms, read_onnx
-from training.sounds.fit import EncodeWords, encode, targets
-from training.sounds.kinds import ESC10, NAMES
-from training.sounds.network import SoundNet
-from training.sounds.upper import Lessons, Settings, encode_maps, fit_upper, stored_maps
+from training.sounds.fit import encode
+from training.sounds.kinds import NAMES, RECORDED
+from training.sounds.network import SoundNet, read_network
 
 from avlmaps.core.progress import progress
 from avlmaps.perception.embedded import logmel
@@ -25,54 +22,23 @@ LEFT_OUT = (
     "door knock", "can opening", "car horn", "toilet flush", "keyboard typing", "laughing", "siren", "vacuum cleaner",
     "alarm clock", "coughing",
 )  # fmt: skip
-HEARD = 4  # the fold of which it heard them
-BANK_EACH = 4  # synthetic examples of a kind without recordings
+PIECES = Augmentation(reverberation=0.6, trimmed=0.45)  # how held-out clips are put in rooms and noise, and cut
 
 
-@dataclass(frozen=True, slots=True)
-class Networks:
-    """Fits the upper part of networks, or takes those that were fitted before from the work folder.
+def network_of(work: Path, fold: int = 0, strangers: bool = False) -> SoundNet:
+    """Return a network that ``distil`` left in the work folder.
 
-    Attributes:
-        corpus: what they learn from.
-        encode_words: the word encoder.
-        settings: how they are fitted.
-        start: the weights of the edition before, whose lower blocks they share.
-        work: folder of the networks.
-        teacher: what a published network makes of every recorded clip; None for no teacher.
+    Args:
+        work: the folder.
+        fold: the fold that it learnt nothing from; 0 for the one that learnt from all.
+        strangers: whether it learnt nothing of some kinds either.
     """
+    return read_network(work / f"{name_of(fold, strangers)}.pt")
 
-    corpus: Corpus
-    encode_words: EncodeWords
-    settings: Settings
-    start: Path
-    work: Path
-    teacher: Opinion | None = None
 
-    def of_fold(self, fold: int) -> SoundNet:
-        """Return the network that learnt nothing from the clips of a fold (0: one that learnt from all)."""
-        return self._fitted(f"without-{fold}" if fold else "all", fold, ())
-
-    def stranger(self) -> SoundNet:
-        """Return the network without the tested fold and without some kinds; its upper part starts at random."""
-        return self._fitted("stranger", TESTED, tuple(map(NAMES.index, LEFT_OUT)))
-
-    def lessons(self) -> Lessons:
-        """Return the maps of all sounds under the last block."""
-        return stored_maps(self.corpus, self._opened(), self.settings, self.work)
-
-    def _fitted(self, name: str, fold: int, without: Sequence[int]) -> SoundNet:
-        file, net = self.work / f"{name}.pt", self._opened()
-        if not file.exists():
-            words = targets(self.encode_words)
-            fitted = fit_upper(net, self.lessons(), words, self.settings, fold, without, self.teacher)
-            torch.save(fitted.state_dict(), file)
-        net.load_state_dict(torch.load(file, weights_only=True))
-        return net.eval()
-
-    def _opened(self) -> SoundNet:
-        self.work.mkdir(parents=True, exist_ok=True)
-        return opened_norms(read_onnx(self.start), heard(torch.from_numpy(self.corpus.mels[::8])))
+def name_of(fold: int, strangers: bool = False) -> str:
+    """Return what a network is called in the work folder."""
+    return "stranger" if strangers else f"without-{fold}" if fold else "all"
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,18 +48,16 @@ class Held:
     Attributes:
         dry: evidence of the clips as they are.
         wet: of the same clips 4 m away in a simulated room of RT60 ``ROOM_S``.
+        pieces: of the same clips in rooms or noise that were drawn for each, some of them cut as a map cuts them.
         kinds: the right kind of each.
         sources: the recording that each was cut from.
-        pieces: evidence of such clips as training draws them: most in rooms or noise, some cut as a map cuts them.
-        piece_kinds: the right kind of each of these.
     """
 
     dry: Evidence
     wet: Evidence
+    pieces: Evidence
     kinds: np.ndarray
     sources: np.ndarray
-    pieces: Evidence
-    piece_kinds: np.ndarray
 
     @property
     def every(self) -> Evidence:
@@ -103,12 +67,12 @@ class Held:
     @property
     def every_kind(self) -> np.ndarray:
         """The right kind of each of ``every``."""
-        return np.concatenate([self.kinds, self.kinds, self.piece_kinds])
+        return np.tile(self.kinds, 3)
 
     @property
     def every_room(self) -> np.ndarray:
         """Which of the three each of ``every`` is."""
-        return np.repeat([0, 1, 2], [len(self.dry), len(self.wet), len(self.pieces)])
+        return np.repeat(np.arange(3), len(self.kinds))
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,13 +80,13 @@ class Answers:
     """The results of the cross-validation.
 
     Attributes:
-        household: the clips of ESC-50 of the tested fold, by the network without it.
+        held: the clips of recorded kinds of the tested fold, by the network without it.
         peers: those of them whose kinds the network that knows strangers was fitted to, by that network.
-        strangers: clips of the kinds that it was fitted without, of all folds that the edition before did not hear.
+        strangers: clips of the kinds that it was fitted without, of all folds.
         without: those kinds.
     """
 
-    household: Held
+    held: Held
     peers: Held
     strangers: Held
     without: tuple[int, ...]
@@ -135,36 +99,43 @@ class Answers:
 
 
 def example_bank(net: SoundNet, examples: Examples) -> tuple[np.ndarray, np.ndarray]:
-    """Return features of the recorded examples, and of a few synthetic ones of kinds without any, sorted by kind."""
-    made = examples.synthetic_kinds
-    bare = [kind for kind in np.unique(made) if kind not in examples.recorded_kinds]
-    few = np.concatenate([np.flatnonzero(made == kind)[:BANK_EACH] for kind in bare])
-    features = np.concatenate([encode(net, examples.recorded), encode(net, examples.synthetic[few])])
-    kinds = np.concatenate([examples.recorded_kinds, made[few]])
+    """Return features of the recorded examples, and of the synthetic ones of kinds without any, sorted by kind."""
+    bare = ~np.isin(examples.synthetic_kinds, examples.recorded_kinds)
+    features = np.concatenate([encode(net, examples.recorded), encode(net, examples.synthetic[bare])])
+    kinds = np.concatenate([examples.recorded_kinds, examples.synthetic_kinds[bare]])
     order = np.argsort(kinds, kind="stable")
     return features[order], kinds[order]
 
 
-def hear_held_out(corpus: Corpus, networks: Networks, aims: np.ndarray) -> Answers:
-    """Encode the tested household clips and the strangers, by networks that learnt nothing from them."""
+def hear_held_out(corpus: Corpus, work: Path, aims: np.ndarray) -> Answers:
+    """Encode the tested clips and the strangers, by networks that learnt nothing from them."""
     without = tuple(map(NAMES.index, LEFT_OUT))
-    strange = np.isin(corpus.kinds, without) & (corpus.folds != HEARD)
-    tested = (corpus.kinds >= len(ESC10)) & (corpus.folds == TESTED)
-    wet = wet_mels(corpus, tested | strange, networks.work)
+    recorded = (corpus.kinds >= 0) & (corpus.kinds < len(RECORDED))
+    strange = np.isin(corpus.kinds, without)
+    tested = recorded & (corpus.folds == TESTED)
+    wet = wet_mels(corpus, tested | strange, work)
+    pieces = piece_mels(corpus, tested | strange)
     sources = np.array([clip.source for clip in corpus.clips])
-    drawn = networks.lessons().recorded[1]
 
     def held(chosen: np.ndarray, net: SoundNet, left: Sequence[int] = ()) -> Held:
         bank = example_bank(net, corpus.examples(TESTED, left))
-        rows = np.flatnonzero(chosen[drawn.clips].all(axis=1) & (drawn.share == 0.0))
-        rows = np.random.default_rng(0).permutation(rows)[: int(chosen.sum())]  # as many as clips
-        features = (encode(net, corpus.mels[chosen]), encode(net, wet[chosen]), encode_maps(net, drawn.maps, rows))
-        dry, echoing, pieces = (evidence_of(f, aims, *bank, left) for f in features)
-        return Held(dry, echoing, corpus.kinds[chosen], sources[chosen], pieces, drawn.kinds[rows, 0])
+        features = (encode(net, mels[chosen]) for mels in (corpus.mels, wet, pieces))
+        heard = [evidence_of(each, aims, *bank, left) for each in features]
+        return Held(*heard, corpus.kinds[chosen], sources[chosen])
 
-    net = networks.stranger()
+    net = network_of(work, TESTED, strangers=True)
     peers, strangers = (held(chosen, net, without) for chosen in (tested & ~strange, strange))
-    return Answers(held(tested, networks.of_fold(TESTED)), peers, strangers, without)
+    return Answers(held(tested, network_of(work, TESTED)), peers, strangers, without)
+
+
+def piece_mels(corpus: Corpus, rows: np.ndarray, seed: int = 0) -> np.ndarray:
+    """Return mel power of clips in rooms and noise drawn for each, some cut as a map cuts; zeros for other clips."""
+    generator = torch.Generator().manual_seed(seed)
+    pieces = np.zeros_like(corpus.mels)
+    power = peak_normalised(torch.from_numpy(corpus.mels[rows]).float())
+    power = coloured(trimmed(power, PIECES, generator), PIECES, generator)
+    pieces[rows] = in_circumstances(power, PIECES, generator).numpy()
+    return pieces
 
 
 def wet_mels(corpus: Corpus, rows: np.ndarray, cache: Path) -> np.ndarray:

@@ -20,19 +20,16 @@ from training.sounds.augmentation import (
     Augmentation,
     coloured,
     heard,
-    in_noise,
-    in_rooms,
+    in_circumstances,
     masked,
     peak_normalised,
-    segmented,
 )
 from training.sounds.clips import TESTED, mels_of, read_index, read_samples
-from training.sounds.crossvalidate import LEFT_OUT
-from training.sounds.export import opened_norms, read_onnx, write_onnx
-from training.sounds.fit import blend, encode, half_precision_is_fast, share_of_rate, steady_noise, targets
+from training.sounds.crossvalidate import LEFT_OUT, name_of
+from training.sounds.fit import blend, encode, half_precision_is_fast, share_of_rate, targets
 from training.sounds.kinds import NAMES, RECORDED
 from training.sounds.mixtures import Mixtures, Recipe, of_training, stored_mixtures
-from training.sounds.network import SoundNet, widened
+from training.sounds.network import SoundNet
 
 from avlmaps.core.progress import say
 from avlmaps.perception.embedded.sound_calibration import typical_examples
@@ -125,12 +122,8 @@ class Heard:
         power = peak_normalised(self._mels[rows].float())
         power = coloured(power, s.augmentation, generator)
         clean = int(s.clean * s.batch)
-        rest = power[clean:]
-        rest, background = in_noise(
-            in_rooms(rest, s.augmentation, generator), steady_noise(len(rest), generator), s.augmentation, generator
-        )
-        rest = segmented(rest, background, s.augmentation, generator)
-        x = masked(heard(peak_normalised(torch.cat([power[:clean], rest]))), s.augmentation, generator)
+        rest = in_circumstances(power[clean:], s.augmentation, generator)
+        x = masked(heard(torch.cat([peak_normalised(power[:clean]), rest])), s.augmentation, generator)
         kinds, share = self._kinds[rows], self._share[rows][:, None]
         aim = (
             functional.one_hot(kinds[:, 0], len(NAMES)) * (1.0 - share)
@@ -230,8 +223,7 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=Settings().steps)
     parser.add_argument("--minutes", type=float, default=math.inf, help="how long at most")
     parser.add_argument("--batch", type=int, default=Settings().batch)
-    parser.add_argument("--width", type=int, default=Settings().width, help="at least the start's")
-    parser.add_argument("--start", type=Path, help="weights to begin from; random ones if left out")
+    parser.add_argument("--width", type=int, default=Settings().width, help="of the network")
     parser.add_argument("--made", action="store_true", help="stop when the mixtures are made")
     arguments = parser.parse_args()
     torch.set_num_threads(1)
@@ -247,13 +239,10 @@ def main() -> None:
     mixtures = made.without(arguments.without, without)
     say(f"{len(mixtures.mels)} of {len(made.mels)} mixtures")
     words = targets(EmbeddedWords().encode)
-    name = "stranger" if arguments.strangers else f"without-{arguments.without}" if arguments.without else "all"
+    name = name_of(arguments.without, arguments.strangers)
     settings = Settings(steps=arguments.steps, width=arguments.width, batch=arguments.batch, minutes=arguments.minutes)
     torch.manual_seed(settings.seed)
     start = SoundNet(words.shape[2], arguments.width)
-    if arguments.start is not None:
-        start = widened(read_onnx(arguments.start), arguments.width)
-        opened_norms(start, heard(peak_normalised(torch.from_numpy(mixtures.mels[::32].astype(np.float32)))))
     if torch.cuda.is_available():
         torch.set_default_device("cuda")
     student = fit(start, mixtures, words, settings, arguments.work / f"{name}-check.pt")
@@ -261,7 +250,6 @@ def main() -> None:
     net = SoundNet(words.shape[2], arguments.width)
     net.load_state_dict({key: value.cpu() for key, value in student.state_dict().items() if key in net.state_dict()})
     torch.save(net.state_dict(), arguments.work / f"{name}.pt")
-    write_onnx([net.eval()], arguments.work / f"{name}.onnx")
     if not arguments.without or arguments.strangers:
         return
     learnt = of_training(clips, arguments.without)

@@ -15,7 +15,6 @@ import torch.nn.functional as functional
 from jaxtyping import Float32
 from torch import Tensor, nn
 
-from avlmaps.core.progress import progress
 from avlmaps.perception.light.efficientat import RATE_HZ, log_mel
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.resample import resample
@@ -156,15 +155,3 @@ def read_audio(path: Path) -> Float32[np.ndarray, " n"]:
 
     samples, rate_hz = soundfile.read(path, dtype="float32", always_2d=True)
     return resample(Sound(samples.mean(axis=1), rate_hz), RATE_HZ).samples
-
-
-def stored_opinion(file: Path, checkpoint: Path, sounds: Sequence[Path]) -> Opinion:
-    """Return what the published network makes of whole sound files, which is run where ``file`` is missing."""
-    if not file.exists():
-        net = read_efficientat(checkpoint)
-        said = [opinion(net, [read_audio(path)]) for path in progress(sounds, "the teacher hears", unit="clip")]
-        np.savez(
-            file, features=np.concatenate([s.features for s in said]), logits=np.concatenate([s.logits for s in said])
-        )
-    with np.load(file, allow_pickle=False) as held:
-        return Opinion(held["features"], held["logits"])

@@ -1,4 +1,4 @@
-"""What every fit of a network to clips and words shares: targets, noise, rate, the moving average."""
+"""What a fit of a network to words needs: targets, rate, the moving average, and features to look at."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -6,14 +6,11 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import torch
 from torch import Tensor
-from training.sounds.augmentation import fluctuations, heard
+from training.sounds.augmentation import heard
 from training.sounds.kinds import CALLED, TEMPLATES
 from training.sounds.network import SoundNet
 
-from avlmaps.perception.embedded import logmel
-
 EncodeWords = Callable[[Sequence[str]], np.ndarray]
-REPORTED = 50  # steps between two lines of progress
 
 
 def half_precision_is_fast() -> bool:
@@ -24,13 +21,6 @@ def half_precision_is_fast() -> bool:
 def targets(encode_words: EncodeWords) -> Tensor:
     """Return unit vectors (templates, kinds, dim) of what every kind is called first, in every template."""
     return torch.from_numpy(np.stack([encode_words([t.format(name) for name in CALLED]) for t in TEMPLATES])).float()
-
-
-def steady_noise(count: int, generator: torch.Generator) -> Tensor:
-    """Return mel power of noise of random colour: from falling by 25 dB over the bands to rising by 16 (white: 12)."""
-    power = fluctuations(count, generator)
-    tilt_db = 41.0 * torch.rand(count, 1, 1, generator=generator) - 25.0
-    return power * 10.0 ** (tilt_db * torch.linspace(0.0, 1.0, logmel.BANDS) / 10.0)
 
 
 def share_of_rate(step: float, steps: int, falling: float) -> float:

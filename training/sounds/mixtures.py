@@ -28,7 +28,7 @@ from avlmaps_sim.synthesis import MAKERS
 SECONDS = 5.2  # one window of the encoder
 SAMPLES = int(SECONDS * RATE_HZ)
 BLOCK = 512  # samples over which loudness is taken
-MADE_EACH = 24  # sounds of a kind that are made by rule
+MADE_EACH = 48  # sounds of a kind that are made by rule
 BATCH = 32  # mixtures that go through the teacher at once
 
 
@@ -195,7 +195,7 @@ def stored_mixtures(
     files = [work / f"mixtures-{recipe.count}-{part}-of-{makers}.npz" for part in range(makers)]
     missing = [part for part, file in enumerate(files) if not file.exists()]
     work.mkdir(parents=True, exist_ok=True)
-    each = MADE_EACH // makers + 2
+    each = -(-MADE_EACH // makers)
     with ProcessPoolExecutor(makers, get_context("spawn")) as pool:
         jobs = [
             pool.submit(

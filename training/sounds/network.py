@@ -1,5 +1,7 @@
 """The network: a small residual convolution net from spectra to the space of words."""
 
+from pathlib import Path
+
 import torch
 import torch.nn.functional as functional
 from torch import Tensor, nn
@@ -53,23 +55,11 @@ class SoundNet(nn.Module):
         return self.upper(self.lower(x))
 
 
-@torch.no_grad()
-def widened(net: SoundNet, width: int) -> SoundNet:
-    """Return a network of more channels that answers alike (Chen et al., Net2Net, ICLR 2016).
-
-    New channels are random; the old ones have zero weights for them, which fitting may change.
-    """
-    wide = SoundNet(net.head.out_features, width, net.dropout.p).eval()
-    old = net.state_dict()
-    for name, value in wide.state_dict().items():
-        given = old[name]
-        if name == "head.weight":  # of the means, then of the highest: the old channels come first in both
-            value.zero_()
-            for part, kept in zip(value.chunk(2, dim=1), given.chunk(2, dim=1), strict=True):
-                part[:, : kept.shape[1]] = kept
-        elif value.ndim > 1:
-            value[: given.shape[0], given.shape[1] :] = 0.0
-            value[: given.shape[0], : given.shape[1]] = given
-        elif value.ndim == 1:
-            value[: len(given)] = given
-    return wide
+def read_network(path: Path) -> SoundNet:
+    """Return a network from its stored weights, in whichever precision, ready to listen."""
+    if not path.is_file():
+        raise SystemExit(f"{path} is missing; python -m training.sounds.distil fits it.")
+    weights = torch.load(path, map_location="cpu", weights_only=True)
+    net = SoundNet(len(weights["head.weight"]), len(weights["stem.weight"]))
+    net.load_state_dict(weights)
+    return net.eval()

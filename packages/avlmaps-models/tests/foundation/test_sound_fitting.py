@@ -9,19 +9,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 torch = pytest.importorskip("torch")
-from training.sounds.augmentation import PADDED, SMOOTHED, Augmentation, segmented  # noqa: E402
-from training.sounds.efficientat import Opinion  # noqa: E402
+from training.sounds.augmentation import PADDED, SMOOTHED, Augmentation, in_circumstances, segmented  # noqa: E402
+from training.sounds.distil import Settings, fit  # noqa: E402
+from training.sounds.export import write_onnx  # noqa: E402
 from training.sounds.fit import share_of_rate  # noqa: E402
-from training.sounds.network import SoundNet, widened  # noqa: E402
-from training.sounds.upper import Lessons, Mapped, Settings, fit_upper  # noqa: E402
+from training.sounds.kinds import NAMES  # noqa: E402
+from training.sounds.mixtures import Mixtures  # noqa: E402
+from training.sounds.network import SoundNet, read_network  # noqa: E402
 
 from avlmaps.maps.audio.segmentation import segment  # noqa: E402
 from avlmaps.perception.embedded import logmel  # noqa: E402
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac  # noqa: E402
 
-KINDS, DIM, WIDTH = 4, 16, 4
-WORDS = torch.nn.functional.normalize(torch.randn(2, KINDS, DIM, generator=torch.Generator().manual_seed(0)), dim=2)
-SETTINGS = Settings(steps=3, made=4)
+DIM, WIDTH = 16, 4
+WORDS = torch.nn.functional.normalize(
+    torch.randn(2, len(NAMES), DIM, generator=torch.Generator().manual_seed(0)), dim=2
+)
+SETTINGS = Settings(steps=2, batch=4)
 
 
 def network() -> SoundNet:
@@ -29,23 +33,12 @@ def network() -> SoundNet:
     return SoundNet(DIM, WIDTH)
 
 
-def mapped(kinds: np.ndarray, folds: np.ndarray, seed: int = 0) -> Mapped:
-    """Return random maps of sounds, each mixed with a quarter of another of its kind and fold."""
+def mixtures(kinds: np.ndarray, folds: np.ndarray, seed: int = 0) -> Mixtures:
+    """Return random mixtures of two sounds each, of given kinds and folds (n, 2)."""
     rng, n = np.random.default_rng(seed), len(kinds)
-    maps = rng.random((n, 4 * WIDTH, 8, 28)).astype(np.float16)
-    both = np.arange(n)[:, None].repeat(2, axis=1)
-    return Mapped(maps, both, kinds[both], folds[both], np.full(n, 0.25, np.float32), np.ones(n, bool))
-
-
-def lessons() -> Lessons:
-    """Return twelve clips of three kinds in folds 2 to 5, and four synthetic ones of a fourth kind."""
-    clips = mapped(np.repeat(np.arange(3), 4), np.tile([2, 3, 4, 5], 3))
-    made = mapped(np.full(4, 3), np.zeros(4, int), seed=1)
-    return Lessons((clips, clips), (made, made))
-
-
-def numbers(net: SoundNet) -> np.ndarray:
-    return torch.cat([weight.flatten() for weight in net.parameters()]).detach().numpy()
+    mels = rng.random((n, logmel.WINDOW_FRAMES, logmel.BANDS)).astype(np.float16)
+    said = (rng.normal(size=(n, size)).astype(np.float32) for size in (5, 7))
+    return Mixtures(mels, *said, kinds, folds, np.full(n, 0.25, np.float32))
 
 
 @pytest.mark.parametrize("steps", [1, 7, 1000])
@@ -60,75 +53,65 @@ def test_the_rate_rises_stays_and_falls(steps: int, falling: float) -> None:
 
 
 @given(st.data())
-def test_no_row_holds_what_is_left_out(data: st.DataObject) -> None:
-    rows = st.lists(st.tuples(*[st.integers(0, 3)] * 2, *[st.sampled_from([0, 2, 3])] * 2, st.booleans()), min_size=1)
-    drawn = data.draw(rows)
+def test_no_mixture_holds_what_is_left_out(data: st.DataObject) -> None:
+    rows = st.lists(st.tuples(*[st.integers(0, 3)] * 2, *[st.sampled_from([0, 2, 3])] * 2), min_size=1, max_size=8)
+    drawn = np.array(data.draw(rows))
     fold, without = data.draw(st.sampled_from([0, 2, 3])), data.draw(st.lists(st.integers(0, 3), max_size=2))
-    kinds, folds = np.array([row[:2] for row in drawn]), np.array([row[2:4] for row in drawn])
-    may = np.array([row[4] for row in drawn])
-    chosen = Mapped(np.zeros((len(drawn), 1, 1, 1)), kinds, kinds, folds, np.zeros(len(drawn)), may).rows(fold, without)
-    for number, (first, second, one, other, allowed) in enumerate(drawn):
-        left_out = {first, second} & set(without) or (fold > 0 and fold in (one, other))
-        assert (number in chosen) == (allowed and not left_out)
+    given_rows = mixtures(drawn[:, :2], drawn[:, 2:])
+    left = given_rows.without(fold, without)
+    kept = [
+        not ({first, second} & set(without) or (fold > 0 and fold in (one, other)))
+        for first, second, one, other in drawn.tolist()
+    ]
+    np.testing.assert_array_equal(left.mels, given_rows.mels[kept])
+    np.testing.assert_array_equal(left.kinds, given_rows.kinds[kept])
 
 
-def test_a_folds_network_learns_nothing_from_its_clips() -> None:
-    net = network()
-    given_lessons = lessons()
-    clips = given_lessons.recorded[0]
-    maps = clips.maps.copy()
-    maps[clips.folds[:, 0] == 3] *= 4.0
-    changed = replace(given_lessons, recorded=(replace(clips, maps=maps),) * 2)
-    without, without_too = (numbers(fit_upper(net, each, WORDS, SETTINGS, fold=3)) for each in (given_lessons, changed))
-    every, every_too = (numbers(fit_upper(net, each, WORDS, SETTINGS)) for each in (given_lessons, changed))
-    np.testing.assert_allclose(without, without_too, atol=1e-6)
-    assert np.abs(every - every_too).max() > 1e-4
-
-
-def test_the_lower_blocks_stay_and_the_upper_part_is_fitted() -> None:
+@pytest.mark.parametrize("name", ["mels", "features", "logits", "kinds"])
+def test_every_layer_learns_and_from_everything(name: str) -> None:
+    rng = np.random.default_rng(1)
+    given_rows = mixtures(rng.integers(0, len(NAMES), (6, 2)), rng.integers(2, 6, (6, 2)))
     start = network()
-    net = fit_upper(start, lessons(), WORDS, SETTINGS)
-    last = f"blocks.{len(start.blocks) - 1}."
-    for name, weight in net.named_parameters():
-        fitted = name.startswith((last, "head."))
-        assert torch.equal(weight, dict(start.named_parameters())[name]) != fitted, name
+    net = fit(start, given_rows, WORDS, SETTINGS)
+    for layer, weight in start.named_parameters():
+        assert not torch.equal(net.state_dict()[layer], weight), layer
+    values = getattr(given_rows, name)
+    other = fit(start, replace(given_rows, **{name: values[::-1].copy()}), WORDS, SETTINGS)
+    assert (net.head.weight - other.head.weight).abs().max() > 1e-5
 
 
-def test_a_folds_network_learns_nothing_from_what_the_teacher_says_of_its_clips() -> None:
-    given_lessons, rng = lessons(), np.random.default_rng(0)
-    said = Opinion(rng.normal(size=(12, 5)).astype(np.float32), rng.normal(size=(12, 7)).astype(np.float32))
-    own = (given_lessons.recorded[0].folds[:, 0] == 3)[:, None]
-    other = Opinion(np.where(own, 9.0, said.features), np.where(own, -9.0, said.logits))
-    other = Opinion(other.features.astype(np.float32), other.logits.astype(np.float32))
-
-    def fitted(fold: int, teacher: Opinion | None) -> np.ndarray:
-        return numbers(fit_upper(network(), given_lessons, WORDS, SETTINGS, fold, teacher=teacher))
-
-    np.testing.assert_allclose(fitted(3, said), fitted(3, other), atol=1e-6)
-    assert np.abs(fitted(0, said) - fitted(0, other)).max() > 1e-5
-    assert np.abs(fitted(0, said) - fitted(0, None)).max() > 1e-5
+def test_a_fit_that_was_interrupted_continues(tmp_path: Path) -> None:
+    given_rows = mixtures(np.zeros((4, 2), int), np.full((4, 2), 2))
+    fit(network(), given_rows, WORDS, replace(SETTINGS, steps=1), tmp_path / "check.pt")
+    fit(network(), given_rows, WORDS, SETTINGS, tmp_path / "check.pt")
+    assert [line.split(",")[0] for line in (tmp_path / "check.csv").read_text().splitlines()] == ["1", "2"]
 
 
-def test_from_the_inputs_every_layer_is_fitted() -> None:
-    start, given_lessons = network(), lessons()
-    rng = np.random.default_rng(0)
+def test_a_network_is_read_back_and_ships_as_bytes(tmp_path: Path) -> None:
+    import onnxruntime
 
-    def heard(part: Mapped) -> Mapped:
-        return replace(part, maps=rng.random((len(part.maps), 2, 64, 448)).astype(np.float16))
-
-    pairs = ((heard(clean), heard(drawn)) for clean, drawn in (given_lessons.recorded, given_lessons.synthetic))
-    net = fit_upper(start, Lessons(*pairs), WORDS, replace(SETTINGS, steps=1, whole=True))
-    for name, weight in net.named_parameters():
-        assert not torch.equal(weight, dict(start.named_parameters())[name]), name
-
-
-@given(width=st.integers(WIDTH, 3 * WIDTH), seed=st.integers(0, 99))
-def test_a_wider_network_answers_alike(width: int, seed: int) -> None:
-    torch.manual_seed(seed)
-    net = SoundNet(DIM, WIDTH).eval()
-    x = torch.randn(2, 2, 64, 448)
+    net = network()
+    torch.save({name: value.half() for name, value in net.state_dict().items()}, tmp_path / "all.pt")
+    held = read_network(tmp_path / "all.pt")
+    write_onnx(held, tmp_path / "sounds.onnx")
+    x = torch.randn(3, 2, logmel.BANDS, logmel.WINDOW_FRAMES)
+    (found,) = onnxruntime.InferenceSession(tmp_path / "sounds.onnx").run(None, {"heard": x.numpy()})
     with torch.no_grad():
-        torch.testing.assert_close(widened(net, width)(x), net(x), atol=1e-5, rtol=1e-4)
+        said = net.eval()(x).numpy()
+    np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1.0, atol=1e-5)
+    assert (said * found).sum(axis=1).min() > 0.999
+    with pytest.raises(SystemExit, match=r"stranger\.pt is missing; python -m training\.sounds\.distil fits it\."):
+        read_network(tmp_path / "stranger.pt")
+
+
+@given(seed=st.integers(0, 99))
+def test_rooms_and_noise_keep_the_peak_and_draw_anew(seed: int) -> None:
+    power = torch.rand(2, logmel.WINDOW_FRAMES, logmel.BANDS, generator=torch.Generator().manual_seed(seed)) + 0.1
+    how = Augmentation(reverberation=1.0, noisy=1.0)
+    one, same, other = (in_circumstances(power, how, torch.Generator().manual_seed(s)) for s in (seed, seed, seed + 1))
+    torch.testing.assert_close(one.amax(dim=(1, 2)), torch.ones(2))
+    torch.testing.assert_close(one, same)
+    assert (one - other).abs().max() > 1e-3
 
 
 ALL_CUT = Augmentation(segmented=1.0)
