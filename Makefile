@@ -141,8 +141,11 @@ fuzz: $(READY)  ## Break 10,000 recordings and maps in seeded ways (a night; goe
 bench: $(READY)  ## Measure speed and accuracy; writes docs/benchmarks.md and the table of the README (two nights).
 	$(RUN)/python benchmarks/report.py
 
-train: $(VENV)-training/.ready  ## Train the embedded encoders again (CPU, a night; SOUNDS=folder of clips with an index.csv).
+train: $(VENV)-training/.ready  ## Train the embedded encoders again (CPU, days, or a GPU; SOUNDS=folder of clips with an index.csv).
 	$(VENV)-training/bin/python -m training.words
+	$(VENV)-training/bin/python -m training.sounds.distil --without 5 --sounds $(or $(SOUNDS),../shared/data/sounds)
+	$(VENV)-training/bin/python -m training.sounds.distil --without 5 --strangers --sounds $(or $(SOUNDS),../shared/data/sounds)
+	$(VENV)-training/bin/python -m training.sounds.distil --without 0 --sounds $(or $(SOUNDS),../shared/data/sounds)
 	$(VENV)-training/bin/python -m training.sounds --sounds $(or $(SOUNDS),../shared/data/sounds)
 	$(VENV)-training/bin/python -m training.pixels --minutes $(or $(MINUTES),600) --out src/avlmaps/perception/embedded/weights
 	$(VENV)-training/bin/python -m training.rooms

@@ -60,10 +60,10 @@ class Settings:
         seed: of everything.
     """
 
-    steps: int = 5000
+    steps: int = 5200
     minutes: float = math.inf
-    batch: int = 64
-    width: int = 32
+    batch: int = 128
+    width: int = 56
     rate: float = 3e-3
     decay: float = 2e-2
     averaging: float = 0.998

@@ -46,7 +46,7 @@ class Recipe:
         seed: of everything.
     """
 
-    count: int = 12_000
+    count: int = 24_000
     synthetic: float = 0.25
     speed: float = 0.15
     piece: float = 0.35
