@@ -24,6 +24,7 @@ from avlmaps.perception.cache.feature_store import CacheSettings
 from avlmaps.perception.models.settings import ModelSettings, Precision
 from avlmaps.query.asking import Asked
 from avlmaps.query.avlmap import AVLMap, QuerySettings
+from avlmaps.query.modalities.sound import SoundSettings
 from avlmaps.query.rules import Rules
 from avlmaps.query.selection import Wanted
 from avlmaps.recordings.add_sounds import add_sounds
@@ -129,6 +130,10 @@ SAME: dict[str, Callable[[], Any]] = {
     "things.least": of(AVLMap.contents, "least_confidence"),
     "things.page": of(Wanted, "page"),
     "rooms.least": of(AVLMap.rooms, "least_confidence"),
+    "sources.least": of(AVLMap.sources, "least"),
+    "sources.prior": of(SoundSettings, "prior"),
+    "query.at": of(SoundSettings, "at"),
+    "go.at": of(SoundSettings, "at"),
     "export.least": of(AVLMap.things, "least_confidence"),
     "export.radius_m": of(BodyShape, "radius_m"),
     "export.height_m": of(BodyShape, "height_m"),
@@ -164,7 +169,8 @@ SAME: dict[str, Callable[[], Any]] = {
 # What a person meets first: nothing behind them has such a default.
 OWN = {
     "build.rules", "query.rules", "query.sentence", "demo.out", "bench.out", "bench.indexing.size",
-    "go.language", "go.robot", "query.frame", "things.frame", "rooms.frame", "locate.frame", "view.port",
+    "go.language", "go.robot", "query.frame", "things.frame", "rooms.frame", "sources.frame", "locate.frame",
+    "view.port",
 }  # fmt: skip
 
 
@@ -215,6 +221,9 @@ def words(hint: Any) -> set[Any]:
         ("bench.indexing", "sensor", choices(IndexingSettings, "sensor")),
         ("bench.indexing", "rules", choices(IndexingSettings, "rules")),
         ("bench.indexing", "sound_clips", choices(IndexingSettings, "clips")),
+        ("query", "at", choices(SoundSettings, "at")),
+        ("go", "at", choices(SoundSettings, "at")),
+        ("sources", "prior", choices(SoundSettings, "prior")),
         ("go", "robot", choices(RobotFile, "robot")),
         ("go", "body", choices(RobotFile, "body")),
         ("shell", "body", choices(RobotFile, "body")),

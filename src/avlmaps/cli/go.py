@@ -70,6 +70,8 @@ class Go(ModelVerb):
     """JSON file of the robot's frames and settings: namespace, radius, speed, timeouts (docs/robots.md)."""
     start: Annotated[str | None, arg(metavar="X,Y,HEADING")] = None
     """Start of the simulated robot: metres, degrees counter-clockwise from +x. Default: the start of the recording."""
+    at: Literal["robot", "source"] = "robot"
+    """Place of a sound: where the robot was when it heard it, or where it came from (see `avlmaps sources`)."""
     found_at: Annotated[float, arg(metavar="PROBABILITY")] = 0.5
     """Drive to what is found from this probability on, 0 to 1."""
     guess: bool = False
@@ -158,8 +160,10 @@ def plan_answer(translation: "Translation") -> dict[str, Any]:
 
 def _driven(verb: "Go", start: "GroundPose | None") -> dict[str, Any]:
     from avlmaps.query.avlmap import AVLMap, QuerySettings
+    from avlmaps.query.modalities.sound import SoundSettings
 
-    avlmap = AVLMap.open(verb.map, QuerySettings(found_at=verb.found_at))
+    sounds = SoundSettings(at=verb.at)
+    avlmap = AVLMap.open(verb.map, QuerySettings(found_at=verb.found_at, sounds=sounds))
     translator = translator_for(verb, avlmap)
     if verb.explain:
         from avlmaps.language.learned_translator import explanation

@@ -1,6 +1,6 @@
 """`avlmaps query`: ask a map for places."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -35,6 +35,8 @@ class Query(ModelVerb):
     """Sound, by name."""
     sound_clip: Annotated[OptionalPath, arg(metavar="FILE")] = None
     """Sound, by a sound file of one like it."""
+    at: Literal["robot", "source"] = "robot"
+    """Place of a sound: where the robot was when it heard it, or where it came from (see `avlmaps sources`)."""
     area: Annotated[OptionalText, arg(metavar="NAME")] = None
     """Area, by name: a room or a part of the building."""
     image: Annotated[OptionalPath, arg(metavar="PHOTO")] = None
@@ -81,6 +83,8 @@ def ask(verb: "Query", opened: "AVLMap | None" = None) -> dict[str, Any]:
         from avlmaps.query.rules import query_settings
 
         settings = query_settings(verb.rules, settings)
+    if verb.at != settings.sounds.at:
+        settings = replace(settings, sounds=replace(settings.sounds, at=verb.at))
     if opened is not None and opened.settings != settings:
         opened = AVLMap(opened.stored, settings)
     given = {

@@ -29,6 +29,7 @@ _OWN = {
     "query": "Query",
     "things": "Things",
     "rooms": "Rooms",
+    "sources": "Sources",
     "changes": "Changes",
     "shell": "Shell",
     "view": "View",
@@ -42,7 +43,7 @@ _OWN = {
 # As help lists them: in the order in which a person comes to use them; other packages' own verbs follow.
 _ORDER = (
     "demo", "record", "add-sounds", "build", "live", "merge", "import-map", "info", "query", "things", "rooms",
-    "changes", "shell", "view", "export", "locate", "go", "serve", "teach-sound", "profiles", "bench",
+    "sources", "changes", "shell", "view", "export", "locate", "go", "serve", "teach-sound", "profiles", "bench",
 )  # fmt: skip
 
 

@@ -13,6 +13,7 @@ from avlmaps.maps.pipeline.keyframes import describe_keyframes
 from avlmaps.maps.pipeline.parts import MapPart, load_part, merge_parts
 from avlmaps.maps.pipeline.plan import claim, fusion_key, make_plan, require_unchanged
 from avlmaps.maps.pipeline.sounds import detect_sounds
+from avlmaps.maps.pipeline.sources import locate_sources
 from avlmaps.maps.pipeline.write import merge, write
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
 from avlmaps.maps.store.lock import lock_folder
@@ -73,8 +74,9 @@ def build_map(
             keyframes = describe_keyframes(plan, fused)  # their keypoints, places and views
             sounds = detect_sounds(plan)
             merged = merge(plan, fused, sensor)  # late, because it fills the memory
+            sources = locate_sources(plan, up.up.vector(), sounds.sounds, merged.voxels)
             require_unchanged(plan, stamp)
-            write(plan, up, floor, fused, keyframes, sounds, merged)
+            write(plan, up, floor, fused, keyframes, sounds, merged, sources)
     return open_stored(plan.path)
 
 

@@ -154,3 +154,30 @@ class Submaps:
 
     def __repr__(self) -> str:
         return f"Submaps({len(self)} of {len(self.stamp_s)} frames with {len(self.index):,} voxels)"
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class SourceEvidence:
+    """What the microphones say of where each sound began, over candidates: cells of surface, and air over the floor.
+
+    Attributes:
+        place: the candidates, metres, world.
+        prior: probability of each before anything was recorded; they sum up to 1.
+        heard: log-likelihood of each candidate by what was heard of each sound; the greatest of a sound is 0.
+        expected: log-likelihood without it: near the robot, in its sight.
+        moving: 1 where the source moved while it sounded.
+        channels: how many microphones listened, one number.
+    """
+
+    place: Float32[np.ndarray, "c 3"]
+    prior: Float32[np.ndarray, " c"]
+    heard: Float16[np.ndarray, "n c"]
+    expected: Float16[np.ndarray, "n c"]
+    moving: UInt8[np.ndarray, " n"]
+    channels: Int64[np.ndarray, " 1"]
+
+    def __len__(self) -> int:
+        return len(self.heard)
+
+    def __repr__(self) -> str:
+        return f"SourceEvidence({len(self)} sounds over {len(self.place):,} candidates)"

@@ -6,7 +6,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from avlmaps.query.locate import Located
     from avlmaps.query.photometric import Panoramas
     from avlmaps.query.schema import ChangesAnswer, LastSeenAnswer
+    from avlmaps.query.sound_sources import SoundSource, SourceMap
 
 # Keyframes that are matched one by one for a picture that cannot be located: more of them guess no better (measured).
 _GUESS_FROM = 20
@@ -389,26 +390,35 @@ class AVLMap:
         encoder = self.stored.encoders.pixels
         return is_open(encoder) or bool(encoder.understood(phrase))
 
-    def sound(self, text: str, primary: bool = False) -> Heatmap:
-        """Return the heat of where a sound of that name was heard.
+    def sound(self, text: str, primary: bool = False, *, at: Literal["robot", "source"] | None = None) -> Heatmap:
+        """Return the heat of a sound of that name: where the robot was when it heard it, or where it came from.
+
+        Args:
+            text: what it is called.
+            primary: whether that place is what is sought.
+            at: ``robot`` or ``source``; by default as ``settings.sounds.at`` says, which is ``robot``.
 
         Raises:
-            QueryError: the text is empty.
+            QueryError: the text is empty, or the map does not know where its sounds came from.
         """
         part = Part(Modality.SOUND, text, _role(primary))
-        heard = self.stored.sounds
-        scores = np.zeros(0)
-        if len(heard):
-            self.stored.require_model(Kind.SOUNDS)
-            scores = self.stored.encoders.sounds.score_words(sound_features(heard), [text])[:, 0]
-        factor = sound_factor(self.space, heard, scores, part, self.settings.sounds, self.settings.heat)
-        return Heatmap.of(factor, self.settings.found_at)
+        return self._sound_heat(part, self.sound_scores(text), at)
 
-    def sound_clip(self, clip: str | Path | Sound, primary: bool = False) -> Heatmap:
-        """Return the heat of where sounds of the same kind as a clip were heard.
+    def sound_scores(self, text: str) -> Float[np.ndarray, " sounds"]:
+        """Return for each sound of the map the probability that it is called so, in [0, 1]."""
+        heard = self.stored.sounds
+        if not len(heard):
+            return np.zeros(0)
+        self.stored.require_model(Kind.SOUNDS)
+        return self.stored.encoders.sounds.score_words(sound_features(heard), [text])[:, 0]
+
+    def sound_clip(
+        self, clip: str | Path | Sound, primary: bool = False, *, at: Literal["robot", "source"] | None = None
+    ) -> Heatmap:
+        """Return the heat of sounds of the same kind as a clip; see ``sound``.
 
         Raises:
-            QueryError: the clip is missing, unreadable or silent.
+            QueryError: the clip is missing, unreadable or silent, or the map does not know where sounds came from.
         """
         name = "a clip" if isinstance(clip, Sound) else str(clip)
         part = Part(Modality.SOUND, name, _role(primary), is_file=True)
@@ -419,8 +429,40 @@ class AVLMap:
             self.stored.require_model(Kind.SOUNDS)
             encoder = self.stored.encoders.sounds
             scores = encoder.score_sounds(sound_features(heard), encoder.encode(sound))
-        factor = sound_factor(self.space, heard, scores, part, self.settings.sounds, self.settings.heat)
+        return self._sound_heat(part, scores, at)
+
+    def _sound_heat(
+        self, part: Part, scores: Float[np.ndarray, " sounds"], at: Literal["robot", "source"] | None
+    ) -> Heatmap:
+        settings = self.settings.sounds
+        if (at or settings.at) == "source" and len(scores):
+            from avlmaps.query.modalities.sound import source_factor
+
+            factor = source_factor(self.space, self.source_map, scores, part, settings, self.settings.heat)
+        else:
+            factor = sound_factor(self.space, self.stored.sounds, scores, part, settings, self.settings.heat)
         return Heatmap.of(factor, self.settings.found_at)
+
+    @cached_property
+    def source_map(self) -> "SourceMap":
+        """The evidence of where sounds came from.
+
+        Raises:
+            QueryError: the map has none.
+        """
+        from avlmaps.query.sound_sources import SourceMap
+
+        return SourceMap.of(self)
+
+    def sources(self, names: Sequence[str] = (), *, prior: bool = True, least: float = 0.0) -> "list[SoundSource]":
+        """Return the places that sounds came from, as regions with probabilities; see ``sound_sources.list_sources``.
+
+        Raises:
+            QueryError: the map does not know where its sounds came from.
+        """
+        from avlmaps.query.sound_sources import list_sources
+
+        return list_sources(self, names, prior, least=least)
 
     def area(self, word: str, primary: bool = False) -> Heatmap:
         """Return the heat of an area, such as a kitchen.

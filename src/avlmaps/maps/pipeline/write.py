@@ -34,7 +34,7 @@ from avlmaps.maps.store.manifest import (
     UpInfo,
 )
 from avlmaps.maps.store.writer import MapContent, write_map
-from avlmaps.maps.types import Keyframes, Voxels
+from avlmaps.maps.types import Keyframes, SourceEvidence, Voxels
 from avlmaps.recordings.types import Recording
 
 # Below this share of agreeing surface the direction that was found is reported as a guess.
@@ -103,12 +103,14 @@ def write(
     pictures: KeyframeResult,
     heard: SoundResult,
     merged: Merged,
+    sources: tuple[SourceEvidence | None, float] = (None, 0.0),
 ) -> MapInfo:
     """Write the map and, last of all, its manifest; then the parts go."""
     keyframes = with_clear_views(pictures.keyframes, [part.views() for part in parts])
     submaps = concat_submaps([part.submap() for part in parts]) if plan.settings.frames.per_submap else None
+    clips, evidence = heard.clips_folder, sources[0]
     content = MapContent(
-        merged.voxels, keyframes, pictures.place_state, heard.sounds, heard.clips_folder, submaps=submaps
+        merged.voxels, keyframes, pictures.place_state, heard.sounds, clips, submaps=submaps, sources=evidence
     )
     stages_s = {
         "up": up.elapsed_s,
@@ -118,6 +120,8 @@ def write(
         "sounds": heard.elapsed_s,
         "merging": merged.elapsed_s,
     }
+    if sources[0] is not None:
+        stages_s["sources"] = sources[1]
     finished = datetime.now(UTC).isoformat(timespec="seconds")
     timings = Timings(finished=finished, elapsed_s=sum(stages_s.values()), stages_s=stages_s)
     bad = sorted((frame for part in parts for frame in part.info.bad_frames), key=lambda frame: frame.index)

@@ -24,7 +24,7 @@ from avlmaps.maps.store.life import LIFE, Life, read_life
 from avlmaps.maps.store.lock import is_locked
 from avlmaps.maps.store.manifest import GroundInfo, MapInfo
 from avlmaps.maps.store.manifest_file import MANIFEST, RESTORE, arrays_fault, parse_manifest, read_manifest
-from avlmaps.maps.types import HeardSounds, Keyframes, Submaps, Voxels
+from avlmaps.maps.types import HeardSounds, Keyframes, SourceEvidence, Submaps, Voxels
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.models.names import public_choice, public_name
 
@@ -36,6 +36,7 @@ GIVEN_FEATURES = "given:features"  # backend of features that came without an en
 STATE = "keyframes/state/"
 CLIPS = "sounds/clips/"
 SUBMAPS = "submaps/"
+SOURCES = "sources/"
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,6 +145,24 @@ class StoredMap:
         return validate_arrays(
             Submaps, {name: read_array(self.path, file) for name, file in files.items()}, f"{self.path}/submaps"
         )
+
+    def sources(self) -> SourceEvidence | None:
+        """Return what the microphones say of where each sound began; None where their places are not known.
+
+        Raises:
+            MapError: the files are damaged.
+        """
+        names = {name.removeprefix(SOURCES): file for name, file in self.info.files.items() if name.startswith(SOURCES)}
+        if not names:
+            return None
+        arrays = {name: read_array(self.path, file) for name, file in names.items()}
+        found = validate_arrays(SourceEvidence, arrays, f"{self.path}/sources")
+        if len(found) != self.info.counts.sounds:
+            raise MapError(
+                f"{self.path}/sources is damaged: it has evidence of {len(found)} sounds, the map has "
+                f"{self.info.counts.sounds}; restore the map from a copy, or build it again."
+            )
+        return found
 
     def require_model(self, kind: Kind) -> None:
         """Raise ``MapError`` unless this install's model is the one that made the map's features.

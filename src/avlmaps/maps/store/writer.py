@@ -21,13 +21,13 @@ from avlmaps.maps.store.life import LIFE, Life, life_arrays
 from avlmaps.maps.store.lock import LOCK
 from avlmaps.maps.store.manifest import MapInfo
 from avlmaps.maps.store.manifest_file import MANIFEST, write_manifest
-from avlmaps.maps.store.reader import CLIPS, PARTS, STATE, SUBMAPS
-from avlmaps.maps.types import HeardSounds, Keyframes, Submaps, Voxels
+from avlmaps.maps.store.reader import CLIPS, PARTS, SOURCES, STATE, SUBMAPS
+from avlmaps.maps.types import HeardSounds, Keyframes, SourceEvidence, Submaps, Voxels
 
 # What each file of a map was written of, by its name in the manifest: an array or a file that nobody changes any more.
 Written = dict[str, tuple[np.ndarray | Path, FileInfo]]
 SECTIONS = ("voxels", "keyframes", "sounds")
-_ALL_SECTIONS = (*SECTIONS, LIFE.rstrip("/"), SUBMAPS.rstrip("/"))
+_ALL_SECTIONS = (*SECTIONS, LIFE.rstrip("/"), SUBMAPS.rstrip("/"), SOURCES.rstrip("/"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +42,7 @@ class MapContent:
         clips_folder: where the clips lie now.
         life: what became of its things over several days; None of one day.
         submaps: by which it can follow corrected poses; None where it cannot.
+        sources: what the microphones say of where each sound began; None where their places are not known.
     """
 
     voxels: Voxels
@@ -51,6 +52,7 @@ class MapContent:
     clips_folder: Path
     life: Life | None = None
     submaps: Submaps | None = None
+    sources: SourceEvidence | None = None
 
 
 def write_map(path: Path, content: MapContent, info: MapInfo, written: Written | None = None) -> MapInfo:
@@ -105,6 +107,10 @@ def _writes(path: Path, content: MapContent) -> Iterator[tuple[str, np.ndarray |
         for field in array_fields(Submaps):
             array = getattr(content.submaps, field)
             yield SUBMAPS + field, array, partial(write_array, path, SUBMAPS + field, array)
+    if content.sources is not None:
+        for field in array_fields(SourceEvidence):
+            array = getattr(content.sources, field)
+            yield SOURCES + field, array, partial(write_array, path, SOURCES + field, array)
     for number, clip in enumerate(content.sounds.clips):
         source = content.clips_folder / Path(clip).name
         yield f"{CLIPS}{number:06d}", source, partial(write_copy, path, f"sounds/{number:06d}", source)

@@ -59,6 +59,11 @@ class Acoustics:
             self._floors[floor_m] = (air, rooms if self.rt60_s is None else rooms.reverberating(self.rt60_s))
         return self._floors[floor_m]
 
+    def sounds_from(self, source: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
+        """Return the place in the air that a source is taken to sound from: what lies in a wall is moved out of it."""
+        air, _ = self.floor_at(float(source[2]))
+        return np.array([*air.out_of_walls(source[:2], air.room_at(source[:2])), source[2]])
+
     def responses(
         self, source: Float[np.ndarray, "3"], ears: Float[np.ndarray, "n 3"], rng: np.random.Generator
     ) -> list[Float[np.ndarray, " t"]]:

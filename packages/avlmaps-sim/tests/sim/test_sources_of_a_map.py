@@ -1,0 +1,158 @@
+"""From a simulated recording with an array to the sources that a map answers with."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from avlmaps.core.errors import MapError, QueryError
+from avlmaps.core.poses import rotation_to_level
+from avlmaps.core.timeline import Trajectory
+from avlmaps.maps.build import build_map
+from avlmaps.maps.sources.find import find_sources
+from avlmaps.maps.store.reader import open_stored
+from avlmaps.query.avlmap import AVLMap
+from avlmaps.recordings.audio import AudioTrack, Sound
+from avlmaps.recordings.channels import with_microphones, write_channels
+from avlmaps.recordings.microphones import microphones_named
+from avlmaps.recordings.open import open_recording
+from avlmaps_sim.hearing import AcousticSettings, Sounding, Source
+from avlmaps_sim.hearing.array import heard_by_array
+from avlmaps_sim.recorder import RecordSettings, record_scene
+from avlmaps_sim.truth import read_truth
+from helpers.hearing_scenes import flat, shoebox
+
+SOURCE = np.array([1.5, 4.2, 0.6])
+
+
+def surface() -> np.ndarray:
+    """Return points on the floor and walls of the shoebox, metres."""
+    points = [(x, y, 0.0) for x in np.arange(0, 6, 0.1) for y in np.arange(0, 5, 0.1)]
+    points += [(x, y, z) for x in (0.0, 6.0) for y in np.arange(0, 5, 0.1) for z in np.arange(0, 2.5, 0.1)]
+    points += [(x, y, z) for y in (0.0, 5.0) for x in np.arange(0, 6, 0.1) for z in np.arange(0, 2.5, 0.1)]
+    return np.array(points)
+
+
+@pytest.fixture(scope="module")
+def heard(tmp_path_factory: pytest.TempPathFactory) -> tuple[AudioTrack, Trajectory]:
+    """Return what a robot with a square array heard that drove past a source in a room."""
+    rng = np.random.default_rng(3)
+    barks = rng.standard_normal(2 * 16_000) * (np.arange(2 * 16_000) % 8000 < 2500)
+    clip = Sound((0.1 * barks).astype(np.float32), 16_000)
+    sounding = Sounding(Source("dog bark", tuple(SOURCE.tolist()), -1, "bark", clip), 1.5, 3.5, (0.0, 0.0, 0.0))
+    stamps_s = np.arange(50) / 10.0
+    poses = np.tile(np.eye(4), (50, 1, 1))
+    poses[:, :3, :3] = np.array([[0, 0, 1], [-1, 0, 0], [0, -1, 0]])
+    poses[:, :3, 3] = np.column_stack([np.linspace(2.0, 4.0, 50), np.full(50, 2.2), np.full(50, 1.3)])
+    array = microphones_named("square4")
+    settings = AcousticSettings(16_000, snr_db=20.0)
+    sound = heard_by_array(shoebox(), [sounding], stamps_s, poses, array, 5.0, rng, settings)
+    path = tmp_path_factory.mktemp("heard") / "track.flac"
+    write_channels(path, sound)
+    return with_microphones(AudioTrack.open(path), array), Trajectory(stamps_s, poses)
+
+
+def place(evidence) -> np.ndarray:
+    total = evidence.heard[0].astype(float) + evidence.expected[0].astype(float) + np.log(evidence.prior)
+    return evidence.place[int(np.argmax(total))].astype(float)
+
+
+def test_a_source_in_a_room_is_found_from_the_walk(heard: tuple[AudioTrack, Trajectory]) -> None:
+    up = np.array([0.0, 0.0, 1.0])
+    found = find_sources(*heard, [(1.5, 3.6)], surface(), up)
+    assert found is not None and found.prior.sum() == pytest.approx(1.0, abs=1e-3)
+    assert np.linalg.norm(place(found)[:2] - SOURCE[:2]) < 0.5
+    assert not found.moving[0]
+
+
+def test_a_turned_world_has_its_sources_turned(heard: tuple[AudioTrack, Trajectory]) -> None:
+    track, walk = heard
+    up = np.array([0.6, 0.0, 0.8])
+    turn = np.eye(4)
+    turn[:3, :3] = rotation_to_level(up).T
+    turned = Trajectory(walk.stamps_s, turn @ walk.world_from_body)
+    plain = find_sources(track, walk, [(1.5, 3.6)], surface(), np.array([0.0, 0.0, 1.0]))
+    other = find_sources(track, turned, [(1.5, 3.6)], surface() @ turn[:3, :3].T, up)
+    assert plain is not None and other is not None
+    assert np.linalg.norm(place(other) @ turn[:3, :3] - place(plain)) < 0.2
+
+
+def test_exchanged_channels_lose_the_source(heard: tuple[AudioTrack, Trajectory]) -> None:
+    track, walk = heard
+    assert track.microphones is not None
+    wrong = with_microphones(track, track.microphones.take([0, 2, 1, 3]))
+    up = np.array([0.0, 0.0, 1.0])
+    right, lost = (find_sources(one, walk, [(1.5, 3.6)], surface(), up) for one in (track, wrong))
+    assert right is not None and lost is not None
+    error = [np.linalg.norm(place(one)[:2] - SOURCE[:2]) for one in (right, lost)]
+    assert error[0] < error[1]
+
+
+@pytest.fixture(scope="module")
+def mapped(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """Return a recording of a flat with an array, and its map."""
+    folder = tmp_path_factory.mktemp("flat")
+    settings = RecordSettings(
+        size=(96, 72), fps=4.0, hearing="acoustic", microphones="square4", snr_db=20.0, sources=4, workers=1,
+        max_frames=120,
+    )  # fmt: skip
+    record_scene(flat(), folder / "rec", settings, seed=1)
+    build_map(open_recording(folder / "rec"), folder / "flat.avlmap", progress=False)
+    return folder / "rec", folder / "flat.avlmap"
+
+
+def test_a_map_says_where_its_sounds_came_from(mapped: tuple[Path, Path]) -> None:
+    recording, path = mapped
+    avlmap, truth = AVLMap.open(path), read_truth(recording)
+    sources = avlmap.sources()
+    assert sources and {event for one in sources for event in one.events} == set(range(len(avlmap.stored.sounds)))
+    onsets = np.asarray(avlmap.stored.sounds.onset_s)
+    errors = []
+    for event in truth.events:
+        number = int(np.argmin(np.abs(onsets - event.onset_s)))
+        one = next(source for source in sources if number in source.events)
+        errors.append(float(np.linalg.norm(np.subtract(one.position[:2], event.source[:2]))))
+        assert one.within_50_m <= one.within_90_m and one.area_50_m2 <= one.area_90_m2
+    assert np.median(errors) < 0.6
+    assert all(one.microphones == 4 for one in sources)
+
+
+def test_heat_at_the_source_is_where_the_source_is(mapped: tuple[Path, Path]) -> None:
+    avlmap = AVLMap.open(mapped[1])
+    name = max(avlmap.sources(), key=lambda one: one.confidence).name
+    heat = avlmap.sound(name, primary=True, at="source")
+    (best, *_) = avlmap.sources([name])
+    assert heat.min() >= 0.0 and heat.max() <= 1.0
+    hottest = avlmap.points[int(np.argmax(np.asarray(heat)))]
+    assert np.linalg.norm(hottest[:2] - np.array(best.position[:2])) < 0.8
+    same = avlmap.sound(name, primary=True)
+    assert np.array_equal(np.asarray(same), np.asarray(avlmap.sound(name, primary=True, at="robot")))
+
+
+def test_priors_of_the_lexicon_can_be_left_out(mapped: tuple[Path, Path]) -> None:
+    known = AVLMap.open(mapped[1]).source_map
+    plain, with_makers = (known.joined([0], "toilet flush", prior).share for prior in (False, True))
+    assert plain.sum() == pytest.approx(1.0) and with_makers.sum() == pytest.approx(1.0)
+    prior = known.prior_of("toilet flush")
+    assert prior.sum() == pytest.approx(1.0, abs=1e-4)
+
+
+def test_a_map_of_one_microphone_says_what_it_lacks(tmp_path: Path) -> None:
+    settings = RecordSettings(size=(64, 48), fps=2.0, hearing="acoustic", sources=1, workers=1, max_frames=20)
+    record_scene(flat(), tmp_path / "rec", settings, seed=1)
+    build_map(open_recording(tmp_path / "rec"), tmp_path / "one.avlmap", progress=False)
+    avlmap = AVLMap.open(tmp_path / "one.avlmap")
+    assert avlmap.stored.sources() is None
+    with pytest.raises(QueryError, match="where the microphones are"):
+        avlmap.sources()
+
+
+def test_damaged_evidence_is_refused(mapped: tuple[Path, Path], tmp_path: Path) -> None:
+    import shutil
+
+    copy = tmp_path / "copy.avlmap"
+    shutil.copytree(mapped[1], copy)
+    file = next((copy / "sources").glob("heard*"))
+    file.write_bytes(file.read_bytes()[:-64])
+    with pytest.raises(MapError):
+        open_stored(copy)

@@ -1,0 +1,1 @@
+"""Where sounds came from: evidence of microphones along the walk, over the surfaces of a map."""

@@ -1,0 +1,87 @@
+"""Where a sound may have come from: cells of the surfaces of a map, and of the air over its floor.
+
+All places are in the level frame (z up).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from avlmaps.core.arrays import Bool, Float, Float32, Int
+
+CELL_M = 0.15
+_AIR_CELL_M = 0.3
+_AIR_HEIGHTS_M = (0.4, 0.9, 1.4)
+_AIR_SHARE = 0.25  # prior probability that a sound comes from the air over the floor: somebody who has walked on
+_FLOOR_BELOW_EAR_M = (0.3, 2.2)
+_HIGHEST_OVER_EAR_M = 1.6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidates:
+    """Places that a sound may have come from.
+
+    Attributes:
+        place_m: (c, 3) middles, level frame.
+        prior: (c,) probabilities that sum up to 1.
+        in_air: (c,) whether nothing is there.
+    """
+
+    place_m: Float32[np.ndarray, "c 3"]
+    prior: Float[np.ndarray, " c"]
+    in_air: Bool[np.ndarray, " c"]
+
+    def __len__(self) -> int:
+        return len(self.place_m)
+
+
+def candidates_of(voxel_m: Float[np.ndarray, "n 3"], ear_m: Float[np.ndarray, "k 3"]) -> Candidates:
+    """Return the candidates of a map: surfaces by cells of ``CELL_M``, and the air over the floor.
+
+    Args:
+        voxel_m: middles of the surface's voxels, level frame.
+        ear_m: where the robot listened, level frame; what is far above or below all of these is another storey's.
+    """
+    low, high = ear_m[:, 2].min() - _FLOOR_BELOW_EAR_M[1], ear_m[:, 2].max() + _HIGHEST_OVER_EAR_M
+    here = voxel_m[(voxel_m[:, 2] > low) & (voxel_m[:, 2] < high)]
+    if not len(here):
+        return Candidates(np.zeros((0, 3), np.float32), np.zeros(0), np.zeros(0, bool))
+    surface = _means(here, np.floor(here / CELL_M).astype(np.int64))
+    floor = here[here[:, 2] < ear_m[:, 2].min() - _FLOOR_BELOW_EAR_M[0]]
+    air = np.zeros((0, 3))
+    if len(floor):
+        column, lowest = _columns(floor)
+        air = np.concatenate([np.column_stack([column, lowest + height]) for height in _AIR_HEIGHTS_M])
+        taken = {tuple(cell) for cell in np.floor(here / _AIR_CELL_M).astype(np.int64).tolist()}
+        air = air[[tuple(cell) not in taken for cell in np.floor(air / _AIR_CELL_M).astype(np.int64).tolist()]]
+    share = _AIR_SHARE if len(air) else 0.0
+    own = _flattened(surface)
+    prior = np.concatenate([(1.0 - share) * own / own.sum(), np.full(len(air), share / max(len(air), 1))])
+    place = np.concatenate([surface, air]).astype(np.float32)
+    return Candidates(place, prior, np.arange(len(place)) >= len(surface))
+
+
+def _flattened(surface: Float[np.ndarray, "c 3"]) -> Float[np.ndarray, " c"]:
+    """Return weights by which a column of k cells of surface has the weight √k: walls sound less than their area."""
+    _, which, count = np.unique(
+        np.floor(surface[:, :2] / CELL_M).astype(np.int64), axis=0, return_inverse=True, return_counts=True
+    )
+    return count[which.reshape(-1)] ** -0.5
+
+
+def _means(point: Float[np.ndarray, "n 3"], cell: Int[np.ndarray, "n 3"]) -> Float[np.ndarray, "c 3"]:
+    """Return the mean of the points in each cell."""
+    _, which, count = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
+    which = which.reshape(-1)
+    return np.stack([np.bincount(which, point[:, axis]) for axis in range(3)], axis=1) / count[:, None]
+
+
+def _columns(floor: Float[np.ndarray, "n 3"]) -> tuple[Float[np.ndarray, "k 2"], Float[np.ndarray, " k"]]:
+    """Return the middle of each column of air over the floor, and how high the lowest surface in it lies."""
+    cell = np.floor(floor[:, :2] / _AIR_CELL_M).astype(np.int64)
+    column, which = np.unique(cell, axis=0, return_inverse=True)
+    lowest = np.full(len(column), np.inf)
+    np.minimum.at(lowest, which.reshape(-1), floor[:, 2])
+    level = float(np.quantile(lowest, 0.2))
+    flat = np.abs(lowest - level) < 0.25
+    return (column[flat] + 0.5) * _AIR_CELL_M, lowest[flat]

@@ -1,0 +1,81 @@
+"""From a recording whose microphones are known, and the surfaces of its map: the evidence of where each sound began."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from avlmaps.core.arrays import Float
+from avlmaps.core.poses import rotation_to_level
+from avlmaps.core.progress import progress
+from avlmaps.core.timeline import Trajectory
+from avlmaps.maps.sources.candidates import candidates_of
+from avlmaps.maps.sources.density import Density, Plan, log_same_place
+from avlmaps.maps.sources.event import EventEvidence, evidence_of
+from avlmaps.maps.sources.settings import SourceSettings
+from avlmaps.maps.sources.walls import Walls
+from avlmaps.maps.types import SourceEvidence
+from avlmaps.recordings.audio import AudioTrack
+
+_HEIGHT_STEP_M = 0.25
+_MOVING = -1.5  # logarithm of the odds below which the two halves of a sound are of two places
+_LEAST = -60.0  # of a log-likelihood: no difference below matters
+
+
+def find_sources(
+    track: AudioTrack,
+    walk: Trajectory,
+    spans_s: Sequence[tuple[float, float]],
+    voxel_m: Float[np.ndarray, "n 3"],
+    up_in_world: Float[np.ndarray, "3"],
+) -> SourceEvidence | None:
+    """Return the evidence of every sound over the candidates of a map; None where nothing can be said.
+
+    Args:
+        track: with its microphones.
+        walk: the camera's poses in the world.
+        spans_s: onset and offset of each sound, the recording's time.
+        voxel_m: middles of the map's voxels, world.
+        up_in_world: unit vector.
+
+    Raises:
+        AudioError: the track cannot be read.
+    """
+    microphones = track.microphones
+    if microphones is None or not len(spans_s) or not len(voxel_m):
+        return None
+    level = rotation_to_level(up_in_world)
+    turn = np.eye(4)
+    turn[:3, :3] = level
+    walked = Trajectory(walk.stamps_s, turn @ walk.world_from_body)
+    surface = voxel_m @ level.T
+    ear = microphones.in_world_m(walked.world_from_body).mean(axis=1)
+    candidates = candidates_of(surface, ear)
+    if not len(candidates):
+        return None
+    settings, plan = SourceSettings.of(len(microphones)), Plan.of(candidates.place_m)
+    walls: dict[int, Walls] = {}
+    heard: list[EventEvidence] = []
+    for begin_s, end_s in progress(spans_s, "sources", unit="sound"):
+        span = float(begin_s), float(end_s)
+        middle_s = min(max(sum(span) / 2, float(walk.stamps_s[0])), float(walk.stamps_s[-1]))
+        height_m = float(np.interp(middle_s, walk.stamps_s, ear[:, 2]))
+        layer = round(height_m / _HEIGHT_STEP_M)
+        if layer not in walls:
+            walls[layer] = Walls.of(surface, height_m)
+        heard.append(evidence_of(track, microphones, walked, span, candidates, walls[layer], settings))
+    return SourceEvidence(
+        place=(candidates.place_m.astype(np.float64) @ level).astype(np.float32),
+        prior=candidates.prior.astype(np.float32),
+        heard=np.maximum(np.stack([one.heard for one in heard]), _LEAST).astype(np.float16),
+        expected=np.maximum(np.stack([one.expected for one in heard]), _LEAST).astype(np.float16),
+        moving=np.array([moves(one, plan, candidates.prior, settings) for one in heard], np.uint8),
+        channels=np.array([len(microphones)], np.int64),
+    )
+
+
+def moves(one: EventEvidence, plan: Plan, prior: Float[np.ndarray, " c"], settings: SourceSettings) -> bool:
+    """Return whether the two halves of a sound come from two places."""
+    if one.halves is None:
+        return False
+    first, second = (Density.of(plan, prior, half + one.expected, one.expected, settings) for half in one.halves)
+    return log_same_place(first, second, prior) < _MOVING

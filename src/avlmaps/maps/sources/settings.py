@@ -1,0 +1,44 @@
+"""The numbers of the evidence, chosen on development homes (docs/concepts/sound-sources.md)."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class SourceSettings:
+    """From correlations to probabilities.
+
+    Attributes:
+        concentration: how much a steered sum counts, after it was divided by its greatest possible value to the power
+            ``saturation``: bins of neighbouring frames repeat one another.
+        saturation: see above.
+        smoothing: of the correlations, in steps of their delay: half a cell of the candidates.
+        level_noise_db: by how much a sound's own loudness changes while it sounds (one microphone).
+        reverberant_m: distance at which rooms return as much sound as comes straight (one microphone).
+        hidden: log-odds against a place behind a wall.
+        reach_m: distance from the robot by which a place becomes e times less likely.
+        blur_m: standard deviations of the errors of place that most and some events have.
+        wide: share of those of the second.
+        astray: share of the events whose evidence says nothing.
+    """
+
+    concentration: float = 19.6
+    saturation: float = 0.7
+    smoothing: float = 5.0
+    level_noise_db: float = 8.0
+    reverberant_m: float = 0.6
+    hidden: float = 1.5
+    reach_m: float = 2.5
+    blur_m: tuple[float, float] = (0.11, 0.5)
+    wide: float = 0.07
+    astray: float = 0.015
+
+    @classmethod
+    def of(cls, channels: int) -> "SourceSettings":
+        """Return those of a number of microphones."""
+        return _OF_CHANNELS.get(channels, cls())
+
+
+_OF_CHANNELS = {
+    1: SourceSettings(reach_m=0.8, blur_m=(0.15, 0.5), wide=0.15, astray=0.03),
+    2: SourceSettings(concentration=9.8, blur_m=(0.12, 0.5), wide=0.1, astray=0.03),
+}

@@ -1,0 +1,47 @@
+"""Evidence of an array: the correlations of all frames, steered at every candidate from where the robot was then.
+
+With phases that differ from the true ones by von Mises noise, the log-likelihood of a source is the sum over frames,
+pairs and bins of weight times cosine at the delays of its place (SRP-PHAT, DiBiase 2000), times a concentration.
+"""
+
+import numpy as np
+
+from avlmaps.core.arrays import Float, Int
+from avlmaps.maps.sources.correlation import SPEED_M_S, Correlations
+
+MOST_FRAMES = 150
+
+
+def loudest_frames(found: Correlations, most: int = MOST_FRAMES) -> Int[np.ndarray, " k"]:
+    """Return the frames that say most, in the order of time."""
+    useful = np.flatnonzero(found.weight > 0.0)
+    return np.sort(useful[np.argsort(-found.weight[useful], kind="stable")[:most]])
+
+
+def steer(
+    found: Correlations,
+    ear_m: Float[np.ndarray, "f m 3"],
+    place_m: Float[np.ndarray, "c 3"],
+) -> Float[np.ndarray, " c"]:
+    """Return the sum over frames and pairs of the correlation at the delays of each place.
+
+    Args:
+        found: the frames.
+        ear_m: where the microphones were in each frame.
+        place_m: where the sound seems to come from, the same frame of reference.
+    """
+    total = np.zeros(len(place_m), np.float32)
+    place = np.ascontiguousarray(place_m.T, np.float32)
+    scale, last = np.float32(1.0 / (SPEED_M_S * found.step_s)), found.curve.shape[2] - 2
+    first = np.float32(found.first_s / found.step_s)
+    for curve, ears in zip(found.curve, ear_m.astype(np.float32), strict=True):
+        away = np.stack([
+            np.sqrt((place[0] - x) ** 2 + (place[1] - y) ** 2 + (place[2] - z) ** 2) for x, y, z in ears
+        ]) * scale  # fmt: skip
+        for number, (one, other) in enumerate(found.pair):
+            at = away[one] - away[other] - first
+            whole = np.clip(at.astype(np.int32), 0, last)
+            part = at - whole
+            own = curve[number]
+            total += own[whole] * (1.0 - part) + own[whole + 1] * part
+    return total.astype(np.float64)

@@ -1,0 +1,341 @@
+"""Where sounds came from: the evidence of a map's microphones as regions with probabilities, rooms and things.
+
+Sounds of one kind that come from one place are one source, and sharpen it: they are joined while that is likelier than
+two places (the birth rule). What usually makes a kind of sound (the lexicon's makers) is a prior apart, which can be
+left out.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from avlmaps.core.arrays import Bool, Float
+from avlmaps.core.errors import QueryError
+from avlmaps.core.lexicon import Kind as Named
+from avlmaps.core.lexicon import lexicon
+from avlmaps.maps.sources.density import Density, Plan, log_same_place
+from avlmaps.maps.sources.settings import SourceSettings
+from avlmaps.maps.types import SourceEvidence
+from avlmaps.query.voxel_space import Space
+
+if TYPE_CHECKING:
+    from avlmaps.query.avlmap import AVLMap
+    from avlmaps.query.contents import Thing
+
+_MAKERS_SHARE = 0.5  # probability that a sound comes from a thing that usually makes it, where there is one
+_AT_THING_M = 0.4
+_MOST_NAMED, _LEAST_NAMED = 3, 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class SoundSource:
+    """A place that sounds came from.
+
+    Attributes:
+        name: what it sounds like.
+        confidence: that a sound of it is one, in [0, 1].
+        position: likeliest place: the middle of its heights there, metres, recording frame.
+        within_50_m: radius on the plan that holds it with a probability of 0.5.
+        within_90_m: of 0.9.
+        area_50_m2: area of the smallest region of the plan that holds it with a probability of 0.5.
+        area_90_m2: of 0.9.
+        rooms: names of rooms and the probability that it is in each, likeliest first.
+        things: names, places and probabilities of things that it may be, likeliest first.
+        events: numbers of its sounds in the map.
+        moving: whether it moved while it sounded.
+        microphones: how many listened.
+    """
+
+    name: str
+    confidence: float
+    position: tuple[float, float, float]
+    within_50_m: float
+    within_90_m: float
+    area_50_m2: float
+    area_90_m2: float
+    rooms: tuple[tuple[str, float], ...]
+    things: tuple[tuple[str, tuple[float, float, float], float], ...]
+    events: tuple[int, ...]
+    moving: bool
+    microphones: int
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the source as ``avlmaps sources --json`` prints it."""
+        return {
+            "name": self.name,
+            "confidence": round(self.confidence, 3),
+            "position": [round(value, 3) for value in self.position],
+            "within_50_m": round(self.within_50_m, 2),
+            "within_90_m": round(self.within_90_m, 2),
+            "area_50_m2": round(self.area_50_m2, 2),
+            "area_90_m2": round(self.area_90_m2, 2),
+            "rooms": [{"name": name, "probability": round(share, 3)} for name, share in self.rooms],
+            "things": [
+                {"name": name, "position": [round(value, 3) for value in place], "probability": round(share, 3)}
+                for name, place, share in self.things
+            ],
+            "sounds": list(self.events),
+            "moving": self.moving,
+            "microphones": self.microphones,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Joined:
+    """Sounds of one source: their evidence together.
+
+    Attributes:
+        events: numbers of the sounds.
+        density: on the plan.
+        share: (c,) probability of each candidate.
+    """
+
+    events: tuple[int, ...]
+    density: Density
+    share: Float[np.ndarray, " c"]
+
+
+@dataclass(eq=False)
+class SourceMap:
+    """The evidence of a map, ready for queries.
+
+    Attributes:
+        evidence: as the map stores it.
+        space: the map's voxels.
+        things: finds the things of names in the map.
+    """
+
+    evidence: SourceEvidence
+    space: Space
+    things: "Callable[[Sequence[str]], Sequence[Thing]]"
+    _priors: dict[tuple[str, ...], Float[np.ndarray, " c"]] = field(default_factory=dict, init=False)
+
+    @classmethod
+    def of(cls, avlmap: "AVLMap") -> "SourceMap":
+        """Return the evidence of a map.
+
+        Raises:
+            QueryError: the map has none.
+        """
+        evidence = avlmap.stored.sources()
+        if evidence is None:
+            raise QueryError(
+                f"{avlmap.stored.path} does not know where sounds came from, only where the robot was: its recording "
+                "does not say where the microphones are. Give their places (microphones in recording.json) and build "
+                "the map again."
+            )
+
+        def things(names: Sequence[str]) -> "Sequence[Thing]":
+            if "pixels" not in avlmap.stored.info.models:
+                return ()
+            known = [name for name in names if avlmap.knows(name)]
+            return avlmap.things(known, 0.3) if known else ()
+
+        return cls(evidence, avlmap.space, things)
+
+    @cached_property
+    def place(self) -> Float[np.ndarray, "c 3"]:
+        """The candidates, metres, recording frame."""
+        return np.asarray(self.evidence.place, np.float64)
+
+    @cached_property
+    def settings(self) -> SourceSettings:
+        """The numbers for the microphones that listened."""
+        return SourceSettings.of(int(self.evidence.channels[0]))
+
+    @cached_property
+    def plan(self) -> Plan:
+        """The cells of the plan."""
+        return Plan.of(self.space.level(self.place))
+
+    def prior_of(self, kind: str) -> Float[np.ndarray, " c"]:
+        """Return the prior of a kind of sound: half of it at things of the map that usually make it."""
+        entry = lexicon().find(kind, Named.SOUND) if kind else None
+        makers = () if entry is None else tuple(entry.makers)
+        if makers not in self._priors:
+            self._priors[makers] = self._with_makers(makers)
+        return self._priors[makers]
+
+    def _with_makers(self, makers: tuple[str, ...]) -> Float[np.ndarray, " c"]:
+        from scipy.spatial import KDTree
+
+        prior = np.asarray(self.evidence.prior, np.float64)
+        found = self.things(makers) if makers else ()
+        near = np.zeros(len(prior))
+        for thing in found:
+            away = KDTree(thing.points).query(self.place, distance_upper_bound=_AT_THING_M)[0]
+            own = prior * (away < _AT_THING_M)
+            near += thing.confidence * own / max(float(own.sum()), 1e-12)
+        if not near.any():
+            return prior
+        return (1.0 - _MAKERS_SHARE) * prior + _MAKERS_SHARE * near / near.sum()
+
+    def joined(self, events: Sequence[int], kind: str, prior: bool = True) -> Joined:
+        """Return what several sounds say together, as if they were of one source.
+
+        Args:
+            events: numbers of the sounds.
+            kind: what they are; chooses the things that usually make them.
+            prior: whether those count.
+        """
+        chosen = self.prior_of(kind) if prior else np.asarray(self.evidence.prior, np.float64)
+        rows = np.array(events)
+        heard = np.asarray(self.evidence.heard[rows], np.float64).sum(axis=0)
+        expected = np.asarray(self.evidence.expected[rows], np.float64).sum(axis=0)
+        density = Density.of(self.plan, chosen, heard + expected, expected, self.settings)
+        return Joined(tuple(events), density, density.of_candidates(chosen, heard + expected))
+
+    def sources(self, events: Sequence[int], kind: str, prior: bool = True) -> list[Joined]:
+        """Return the sources of sounds of one kind: each sound joins the source that it fits best, or begins its own.
+
+        Args:
+            events: numbers of the sounds, the clearest first.
+            kind: what they are.
+            prior: whether things that usually make such a sound count.
+        """
+        base = np.asarray(self.evidence.prior, np.float64)
+        found: list[Joined] = []
+        for event in events:
+            alone = self.joined([event], kind, prior)
+            fits = [log_same_place(one.density, alone.density, base) for one in found]
+            best = int(np.argmax(fits)) if fits else -1
+            if fits and fits[best] > 0.0:
+                found[best] = self.joined([*found[best].events, event], kind, prior)
+            else:
+                found.append(alone)
+        return found
+
+    def position_of(self, joined: Joined) -> Float[np.ndarray, "3"]:
+        """Return the likeliest place of a source, metres, recording frame."""
+        xy = joined.density.position_m
+        level = self.space.level(self.place)
+        near = np.linalg.norm(level[:, :2] - xy, axis=1) < 0.3
+        share = joined.share[near]
+        height = float((level[near, 2] * share).sum() / share.sum()) if share.sum() > 0 else float(level[:, 2].mean())
+        return self.space.world(np.array([*xy, height]))
+
+    def anchors(self, joined: Joined) -> tuple[Float[np.ndarray, "a 3"], Float[np.ndarray, " a"]]:
+        """Return the cells of the region that holds a source with 0.9, and how likely each is against the likeliest."""
+        inside = np.flatnonzero(joined.density.region(0.9).ravel())
+        share = joined.density.share.ravel()[inside]
+        xy = self.plan.middle_m(inside)
+        height = float(self.space.level(self.position_of(joined)[None])[0, 2])
+        level = np.column_stack([xy, np.full(len(xy), height)])
+        return self.space.world(level), share / share.max()
+
+    def inside(self, joined: Joined, probability: float) -> Bool[np.ndarray, " c"]:
+        """Return which candidates lie in the region that holds a source with a probability."""
+        return joined.density.region(probability).ravel()[self.plan.cell]
+
+
+def list_sources(
+    avlmap: "AVLMap", names: Sequence[str] = (), prior: bool = True, *, least: float = 0.0
+) -> list[SoundSource]:
+    """Return the sources of a map's sounds, or of those of some names, most confident first.
+
+    Args:
+        avlmap: the map.
+        names: kinds of sound; by default each sound has its likeliest name.
+        prior: whether things that usually make such a sound count.
+        least: sources of a lower confidence are left out, in [0, 1].
+
+    Raises:
+        QueryError: the map does not know where sounds came from.
+    """
+    known = avlmap.source_map
+    places = _Places(avlmap)
+    found: list[SoundSource] = []
+    for kind, scores in _by_kind(avlmap, names).items():
+        events = [event for event, score in sorted(scores.items(), key=lambda one: -one[1]) if score >= least]
+        found += [places.described(known, one, kind, scores) for one in known.sources(events, kind, prior)]
+    return sorted(found, key=lambda one: -one.confidence)
+
+
+def _by_kind(avlmap: "AVLMap", names: Sequence[str]) -> dict[str, dict[int, float]]:
+    """Return for each kind its sounds, with the confidence of the name."""
+    kinds: dict[str, dict[int, float]] = {}
+    if not names:
+        for number, event in enumerate(avlmap.sounds()):
+            name, score = (event.names[0], event.confidences[0]) if event.names else ("", 0.0)
+            kinds.setdefault(name, {})[number] = score
+        return kinds
+    for name in names:
+        scores = avlmap.sound_scores(name)
+        likely = np.flatnonzero(scores >= 0.5)
+        chosen = likely.tolist() or ([int(np.argmax(scores))] if len(scores) else [])
+        kinds[name] = {number: float(scores[number]) for number in chosen}
+    return kinds
+
+
+class _Places:
+    """Names the rooms and things of places in a map."""
+
+    def __init__(self, avlmap: "AVLMap") -> None:
+        self._map = avlmap
+
+    @cached_property
+    def _rooms(self):
+        from avlmaps.query.whereabouts import Whereabouts
+
+        return Whereabouts.of(self._map)
+
+    @cached_property
+    def _things(self) -> "list[Thing]":
+        return self._map.things() if "pixels" in self._map.stored.info.models else []
+
+    def described(self, known: SourceMap, joined: Joined, kind: str, scores: dict[int, float]) -> SoundSource:
+        """Return a source with its region, rooms and things."""
+        x, y, z = known.position_of(joined).tolist()
+        density = joined.density
+        return SoundSource(
+            name=kind,
+            confidence=max(scores[event] for event in joined.events),
+            position=(x, y, z),
+            within_50_m=density.within_m(0.5),
+            within_90_m=density.within_m(0.9),
+            area_50_m2=density.area_m2(0.5),
+            area_90_m2=density.area_m2(0.9),
+            rooms=self._rooms_of(known, joined),
+            things=self._things_of(known, joined),
+            events=joined.events,
+            moving=any(bool(known.evidence.moving[event]) for event in joined.events),
+            microphones=int(known.evidence.channels[0]),
+        )
+
+    def _rooms_of(self, known: SourceMap, joined: Joined) -> tuple[tuple[str, float], ...]:
+        if not self._rooms.rooms:
+            return ()
+        likely = joined.share > 1e-5
+        number = self._rooms.rooms_of(known.place[likely])
+        share = np.bincount(np.maximum(number, 0), joined.share[likely] * (number >= 0), len(self._rooms.names))
+        order: list[int] = np.argsort(-share, kind="stable")[:_MOST_NAMED].tolist()
+        return tuple((self._rooms.names[i], float(share[i])) for i in order if share[i] >= _LEAST_NAMED)
+
+    def _things_of(self, known: SourceMap, joined: Joined) -> tuple[tuple[str, tuple[float, float, float], float], ...]:
+        things = self._things
+        return tuple(
+            (things[number].name, things[number].position, share)
+            for number, share in things_that_may_be(known, joined, things)
+        )
+
+
+def things_that_may_be(known: SourceMap, joined: Joined, things: "Sequence[Thing]") -> list[tuple[int, float]]:
+    """Return the numbers of the things that a source may be, and the probability of each, likeliest first.
+
+    A candidate counts for the nearest thing within ``_AT_THING_M``.
+    """
+    from scipy.spatial import KDTree
+
+    likely = np.flatnonzero(joined.share > 1e-5)
+    if not len(things) or not len(likely):
+        return []
+    points = np.concatenate([thing.points for thing in things])
+    number = np.repeat(np.arange(len(things)), [len(thing.points) for thing in things])
+    away, row = KDTree(points).query(known.place[likely])
+    near = np.asarray(away) < _AT_THING_M
+    share = np.bincount(number[row[near]], joined.share[likely][near], len(things))
+    order: list[int] = np.argsort(-share, kind="stable")[:_MOST_NAMED].tolist()
+    return [(one, float(share[one])) for one in order if share[one] >= _LEAST_NAMED]
