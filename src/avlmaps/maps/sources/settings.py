@@ -21,7 +21,7 @@ class SourceSettings:
         astray: share of the events whose evidence says nothing.
     """
 
-    concentration: float = 19.6
+    concentration: float = 15.0
     saturation: float = 0.7
     smoothing: float = 5.0
     level_noise_db: float = 8.0
@@ -29,8 +29,8 @@ class SourceSettings:
     hidden: float = 1.5
     reach_m: float = 2.5
     blur_m: tuple[float, float] = (0.11, 0.5)
-    wide: float = 0.07
-    astray: float = 0.015
+    wide: float = 0.1
+    astray: float = 0.03
 
     @classmethod
     def of(cls, channels: int) -> "SourceSettings":

@@ -103,14 +103,10 @@ def _writes(path: Path, content: MapContent) -> Iterator[tuple[str, np.ndarray |
     if content.life is not None:
         for name, array in life_arrays(content.life).items():
             yield LIFE + name, array, partial(write_array, path, LIFE + name, array)
-    if content.submaps is not None:
-        for field in array_fields(Submaps):
-            array = getattr(content.submaps, field)
-            yield SUBMAPS + field, array, partial(write_array, path, SUBMAPS + field, array)
-    if content.sources is not None:
-        for field in array_fields(SourceEvidence):
-            array = getattr(content.sources, field)
-            yield SOURCES + field, array, partial(write_array, path, SOURCES + field, array)
+    for prefix, table in ((SUBMAPS, content.submaps), (SOURCES, content.sources)):
+        for field in () if table is None else array_fields(type(table)):
+            array = getattr(table, field)
+            yield prefix + field, array, partial(write_array, path, prefix + field, array)
     for number, clip in enumerate(content.sounds.clips):
         source = content.clips_folder / Path(clip).name
         yield f"{CLIPS}{number:06d}", source, partial(write_copy, path, f"sounds/{number:06d}", source)
