@@ -100,6 +100,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--sounds", type=Path, default=SHARED / "data" / "sounds", help="folder of clips, index.csv")
     parser.add_argument("--recording", type=Path, default=SHARED / "data" / "redkitchen", help="recording with poses")
     parser.add_argument("--nyuv2", type=Path, default=SHARED / "data" / "nyuv2", help="folder of labelled frames")
+    parser.add_argument("--rooms", type=Path, default=SHARED / "data" / "rooms", help="folder of a measured room")
     parser.add_argument("--house", type=Path, default=SHARED / "scenes" / "small_house.glb", help="scene file")
     parser.add_argument("--out", type=Path, default=Path("bench_out"), help="folder of the suites' work")
     parser.add_argument("--only", nargs="+", choices=[entry.name for entry in ENTRIES], help="only these entries")
@@ -118,6 +119,7 @@ def main() -> None:
         sys.exit(f"{', '.join(differing)}: run python benchmarks/report.py --page" if differing else 0)
     data = {"SOUNDS": asked.sounds, "RECORDING": asked.recording, "HOUSE": asked.house, "NYUV2": asked.nyuv2}
     data["OUT"] = asked.out
+    data["ROOMS"] = asked.rooms
     for entry in () if asked.page else ENTRIES:
         if asked.only and entry.name not in asked.only:
             continue

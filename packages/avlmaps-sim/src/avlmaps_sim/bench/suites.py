@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from avlmaps_sim.bench.indexing import IndexingSettings
     from avlmaps_sim.bench.live.suite import LiveBench
     from avlmaps_sim.bench.navigation import NavigationSettings
+    from avlmaps_sim.bench.sources.suite import SourcesBench
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +38,7 @@ class SuiteInputs:
         navigation: what the suite ``navigation`` is run on; its own defaults if None.
         change: what the suite ``change`` is run on, and over how many days; its own defaults if None.
         live: laps and kills of the suite ``live``; its own defaults if None.
+        sources: what the suite ``sources`` is run on; its own defaults if None.
     """
 
     sounds: Path | None = None
@@ -50,6 +52,7 @@ class SuiteInputs:
     navigation: "NavigationSettings | None" = None
     change: "tuple[SceneSettings, int] | None" = None
     live: "LiveBench | None" = None
+    sources: "SourcesBench | None" = None
 
 
 def run_suite(suite: str, inputs: SuiteInputs, out: Path) -> dict[str, Any]:
@@ -57,7 +60,7 @@ def run_suite(suite: str, inputs: SuiteInputs, out: Path) -> dict[str, Any]:
 
     Args:
         suite: ``words``, ``language``, ``sounds``, ``segmentation``, ``locate``, ``frames``, ``recordings``,
-            ``objects``, ``indexing``, ``found``, ``rooms``, ``change``, ``live`` or ``navigation``.
+            ``objects``, ``indexing``, ``found``, ``rooms``, ``change``, ``live``, ``sources`` or ``navigation``.
         inputs: what it measures on.
         out: folder to write into.
 
@@ -98,12 +101,27 @@ def run_suite(suite: str, inputs: SuiteInputs, out: Path) -> dict[str, Any]:
         from avlmaps_sim.bench.live.suite import LiveBench, run_live
 
         tables = run_live(inputs.scenes, used, inputs.profile, inputs.live or LiveBench(), inputs.seed)
+    elif suite == "sources":
+        from avlmaps_sim.bench.sources.suite import SourcesBench, run_sources
+
+        _embedded_only(inputs, "sources")
+        chosen = inputs.sources or SourcesBench()
+        tables = run_sources(chosen, out, inputs.seed)
+        return _written(suite, inputs, tables, [*chosen.homes], weights, out)
     else:
         tables = _SUITES[suite](inputs)
     sources = (inputs.sounds, inputs.clips, inputs.nyuv2, *inputs.scenes)
+    scenes = [source.resolve().name for source in sources if source is not None]
+    return _written(suite, inputs, tables, scenes, weights, out)
+
+
+def _written(
+    suite: str, inputs: SuiteInputs, tables: Mapping[str, Table], scenes: list[str], weights: dict[str, str], out: Path
+) -> dict[str, Any]:
+    """Write tables with where they come from, and return all of it."""
     answer = {
         "suite": suite,
-        "scenes": [source.resolve().name for source in sources if source is not None],
+        "scenes": scenes,
         "profile": inputs.profile,
         "models": list(inputs.models),
         "seed": inputs.seed,
@@ -121,6 +139,7 @@ _MEASURED = {
     "locate": (Kind.LOCAL, Kind.PLACE, Kind.MATCHER),
     "frames": (Kind.PIXELS,),
     "live": (Kind.PIXELS,),
+    "sources": (Kind.PIXELS, Kind.SOUNDS, Kind.VIEWS),
 }
 
 

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from avlmaps_sim.bench.indexing import IndexingSettings
     from avlmaps_sim.bench.live.suite import LiveBench
     from avlmaps_sim.bench.navigation import NavigationSettings
+    from avlmaps_sim.bench.sources.suite import SourcesBench
 
 Suite = Literal[
     "words",
@@ -29,6 +30,7 @@ Suite = Literal[
     "rooms",
     "change",
     "live",
+    "sources",
     "navigation",
 ]
 Series = Literal["sounds-1", "sounds-2", "sounds-3", "images", "pairs", "commands", "spatial"]
@@ -95,6 +97,8 @@ class Bench(ModelVerb):
     live: a live map at the pace of a robot: frames, questions, memory, its end beside the build, kills; needs --scenes,
     recordings with poses.
     change: what is new, gone and moved over several days, in ten held-out homes or in --scenes.
+    sources: where sounds came from: in ten held-out homes or in --scenes, with three arrays; in a measured room
+    (--rooms); in one room under varied conditions.
     navigation: the paper's Tables I, II and VI and its commands, in twelve held-out homes or in --scenes.
     """
 
@@ -122,6 +126,10 @@ class Bench(ModelVerb):
     """Number of days of each home, the first included (change). Default: 5."""
     laps: Annotated[int, arg(metavar="N")] = 2
     """How often each recording is driven, forth and back (live)."""
+    rooms: Annotated[Path | None, arg(metavar="DIR")] = None
+    """Folder with measured/S1R01.flac to S1R25.flac, impulse responses of a room (sources)."""
+    trials: Annotated[int, arg(metavar="N")] = 12
+    """Number of trials of each condition in the one room (sources)."""
     kills: Annotated[int, arg(metavar="N")] = 40
     """How many live maps are killed at a random moment (live)."""
     indexing: Annotated[Indexing, OmitArgPrefixes] = field(default_factory=Indexing)
@@ -136,11 +144,12 @@ class Bench(ModelVerb):
         indexing = self.indexing_settings() if self.suite in ("indexing", "found", "rooms", "objects") else None
         navigation = self.navigation_settings() if self.suite == "navigation" else None
         change = self.change_settings() if self.suite == "change" else None
-        scenes = () if indexing or navigation or change else tuple(map(Path, self.scenes))
+        scenes = () if indexing or navigation or change or self.suite == "sources" else tuple(map(Path, self.scenes))
         models = self.models_chosen
         inputs = SuiteInputs(
             self.sounds, self.clips, scenes, self.nyuv2, self.profile, models, self.seed, indexing, navigation,
             change, self.live_settings() if self.suite == "live" else None,
+            self.sources_settings() if self.suite == "sources" else None,
         )  # fmt: skip
         answer = run_suite(self.suite, inputs, self.out)
         lines: list[str] = []
@@ -183,6 +192,14 @@ class Bench(ModelVerb):
         if self.laps < 1 or self.kills < 0:
             raise UsageError(f"--laps is {self.laps} and --kills {self.kills}; choose 1 lap or more, 0 kills or more.")
         return LiveBench(self.laps, self.kills)
+
+    def sources_settings(self) -> "SourcesBench":
+        """Return the settings of the suite sources."""
+        from avlmaps_sim.bench.sources.suite import HOMES, SourcesBench
+
+        if self.trials < 0:
+            raise UsageError(f"--trials takes a number of 0 or more, not {self.trials}.")
+        return SourcesBench(self.scenes or HOMES, self.rooms, self.trials, self.indexing.jobs, self.sounds)
 
     def change_settings(self) -> "tuple[SceneSettings, int]":
         """Return the settings of the suite change, and the number of days."""

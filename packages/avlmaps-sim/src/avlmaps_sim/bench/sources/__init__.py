@@ -1,0 +1,1 @@
+"""The suite `avlmaps bench sources`: where sounds came from, against the truth of rooms."""

@@ -1,0 +1,97 @@
+"""The suite ``avlmaps bench sources``: homes with three arrays, a measured room, one room under varied conditions."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from avlmaps_sim.bench.harness.intervals import in_percent, median_interval, wilson
+from avlmaps_sim.bench.harness.workers import side_by_side
+from avlmaps_sim.bench.output import Table
+from avlmaps_sim.bench.sources import measured, sweep
+from avlmaps_sim.bench.sources.arrays import ARRAYS
+from avlmaps_sim.bench.sources.homes import HomeJob, HomeOutcome, Placed, measure_home
+from avlmaps_sim.scenes import open_scene
+
+HOMES = tuple(f"house:{seed}:held-out" for seed in range(1_000_000, 1_000_010))
+_WAYS = (
+    *(name for array in ARRAYS for name in (array, f"{array}, lexicon")),
+    "robot's place (the paper)", "nearest thing", "room's middle",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class SourcesBench:
+    """What the suite runs on.
+
+    Attributes:
+        homes: names of scenes.
+        rooms: folder of the measured room; None leaves it out.
+        trials: of each condition of the sweep; 0 leaves it out.
+        jobs: homes side by side; 0 takes as many as there are cores.
+        sounds: folder of clips; None for sounds made by rule.
+    """
+
+    homes: tuple[str, ...] = HOMES
+    rooms: Path | None = None
+    trials: int = 12
+    jobs: int = 0
+    sounds: Path | None = None
+
+
+def run_sources(settings: SourcesBench, out: Path, seed: int) -> dict[str, Table]:
+    """Measure, and return the tables.
+
+    Raises:
+        AvlmapsError: the measured room is not there.
+    """
+    room = None if settings.rooms is None else measured.table(settings.rooms, seed)
+    todo = [HomeJob(spec, out / "work", seed, settings.sounds) for spec in settings.homes]
+    homes = side_by_side(
+        partial(measure_home, open_spec=open_scene), todo, settings.jobs, "sources", lambda one: one.spec
+    )
+    tables: dict[str, Table] = {"homes": table_of_homes(homes)}
+    if room is not None:
+        tables["a measured room"] = room
+    if settings.trials:
+        tables["one room, varied"] = sweep.table(settings.trials, seed)
+    return tables
+
+
+def table_of_homes(homes: Sequence[HomeOutcome]) -> Table:
+    """Return the table of all sounds of all homes, by array and baseline."""
+    every = [placed for home in homes for placed in home.placed]
+    rows = [_row(way, [one for one in every if one.array == way]) for way in _WAYS]
+    count, heard = sum(home.sounds for home in homes), sum(home.heard for home in homes)
+    columns = [
+        "by", "sounds", "median error m", "95 %", "within 0.5 m %", "right room %", "95 %", "in 50 % region %",
+        "in 90 % region %", "95 %", "90 % region m²", "right thing of 3 %", "of", "s a sound",
+    ]  # fmt: skip
+    note = f"{heard} of {count} sounds of {len(homes)} homes were detected; the others count nowhere."
+    return {"columns": columns, "rows": [row for row in rows if row[1]], "note": note}
+
+
+def _row(way: str, own: Sequence[Placed]) -> list[object]:
+    if not own:
+        return [way, 0]
+    error = np.array([one.error_m for one in own])
+    median, low, high = median_interval(error)
+    room = [one.room for one in own if one.room is not None]
+    regions = [one for one in own if one.in_90 is not None]
+    things = [one.thing for one in own if one.thing is not None]
+    in_50, in_90 = sum(bool(one.in_50) for one in regions), sum(bool(one.in_90) for one in regions)
+
+    def percent(hits: int, count: int) -> object:
+        return round(100.0 * hits / count, 1) if count else ""
+
+    return [
+        way, len(own), round(median, 2), f"{low:.2f} to {high:.2f}", percent(int((error < 0.5).sum()), len(own)),
+        percent(sum(room), len(room)), in_percent(wilson(sum(room), len(room))),
+        percent(in_50, len(regions)), percent(in_90, len(regions)),
+        in_percent(wilson(in_90, len(regions))) if regions else "",
+        round(float(np.median([one.area_90_m2 for one in regions])), 2) if regions else "",
+        percent(sum(things), len(things)), len(things) or "",
+        round(float(np.mean([one.elapsed_s for one in regions])), 2) if regions else "",
+    ]  # fmt: skip

@@ -1,0 +1,84 @@
+"""The suite of sources: its measures by hand, and what it says of bad input."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from avlmaps.core.errors import AvlmapsError
+from avlmaps_sim.bench.sources.homes import HomeOutcome, Placed, area_of, in_room, matched, nearest_held
+from avlmaps_sim.bench.sources.measured import MeasuredRoom, direct_to_reverberant_db, table, walks_of_ratios
+from avlmaps_sim.bench.sources.suite import table_of_homes
+from avlmaps_sim.bench.sources.sweep import USUAL, _trial, surfaces
+from avlmaps_sim.truth import HeardEvent
+from helpers.hearing_scenes import area
+
+
+def event(onset_s: float, offset_s: float) -> HeardEvent:
+    return HeardEvent(onset_s, offset_s, "dog bark", "clip", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), -1)
+
+
+def test_a_sound_is_matched_with_the_detected_one_that_overlaps_it_most() -> None:
+    spans = [(0.0, 1.0), (1.1, 5.0), (9.0, 9.1)]
+    assert matched([event(0.5, 3.0), event(6.0, 7.0), event(9.0, 9.1)], spans) == [(0, 1)]
+
+
+def test_places_in_walls_belong_to_the_nearest_room() -> None:
+    rooms = [area("kitchen", (0, 0), (4, 4)), area("bath", (4.1, 0), (8, 4))]
+    assert [area_of(rooms, at) for at in ((1.0, 1.0), (5.0, 1.0), (4.08, 1.0), (20.0, 20.0))] == [0, 1, 1, -1]
+    assert in_room(rooms, np.array([1.0, 1.0, 0.0]), np.array([2.0, 2.0, 0.0]))
+    assert in_room(rooms, np.array([20.0, 20.0, 0.0]), np.array([2.0, 2.0, 0.0])) is None
+
+
+def test_a_truth_off_the_map_counts_at_the_nearest_cell() -> None:
+    held = np.zeros((4, 5), bool)
+    held[1, 1] = True
+    assert nearest_held(held, 19) == 6 and nearest_held(held, 6) == 6
+
+
+def test_the_table_counts_what_was_placed() -> None:
+    placed = [
+        Placed("square4", 0.1, True, True, True, 1.0, True, True, 0.5, 9),
+        Placed("square4", 0.7, False, False, True, 2.0, None, True, 0.5, 9),
+        Placed("room's middle", 1.0, True),
+    ]
+    made = table_of_homes([HomeOutcome("house:1", 3, 2, tuple(placed))])
+    first, last = (dict(zip(made["columns"], row, strict=True)) for row in made["rows"])
+    assert (first["sounds"], first["within 0.5 m %"], first["right room %"]) == (2, 50.0, 50.0)
+    assert (first["in 90 % region %"], first["right thing of 3 %"], first["of"]) == (100.0, 100.0, 1)
+    assert last["by"] == "room's middle" and last["in 90 % region %"] == ""
+
+
+def test_the_ratio_of_direct_sound_falls_as_the_reverberation_grows() -> None:
+    rng = np.random.default_rng(0)
+    tail = rng.standard_normal(8000) * np.exp(-np.arange(8000) / 2000.0)
+    ratios = []
+    for level in (0.01, 0.02, 0.04):
+        response = level * tail
+        response[:200] = 0.0
+        response[100] = 1.0
+        ratios.append(direct_to_reverberant_db(response.astype(np.float32), 16_000))
+    assert np.allclose(np.diff(ratios), -6.02, atol=0.3)
+
+
+def test_ratios_that_obey_the_law_find_the_source() -> None:
+    rows, columns = np.divmod(np.arange(25), 5)
+    place = np.column_stack([3.68 - 0.5 * columns, 3.0 + 0.5 * rows, np.full(25, 1.2)])
+    away = np.linalg.norm(place - np.array([3.36, 2.0, 1.5]), axis=1)
+    tail = 0.01 * np.random.default_rng(1).standard_normal(3000)
+    response = np.tile(tail, (25, 1))
+    response[:, 100] = 1.0 / away
+    room = MeasuredRoom(place, response.astype(np.float32), 16_000)
+    assert np.median(walks_of_ratios(room, np.random.default_rng(0))) < 0.15
+
+
+def test_a_room_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(AvlmapsError, match="S1R01"):
+        table(tmp_path, 0)
+
+
+def test_a_usual_trial_finds_its_source() -> None:
+    errors = [_trial(USUAL, np.random.default_rng([0, number]))[0] for number in (1, 2)]
+    assert max(errors) < 1.0
+    low, high = surfaces().min(axis=0), surfaces().max(axis=0)
+    assert np.allclose(low, 0.0) and np.allclose(high, [6.0, 5.0, 2.3], atol=0.11)
