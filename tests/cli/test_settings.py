@@ -36,6 +36,7 @@ from avlmaps_models.import_reference.convert import ImportSettings
 from avlmaps_sim.bench.indexing import IndexingSettings
 from avlmaps_sim.bench.live.suite import LiveBench
 from avlmaps_sim.bench.navigation import NavigationSettings
+from avlmaps_sim.bench.sources.suite import SourcesBench
 from avlmaps_sim.demo.run import run_demo
 from avlmaps_sim.recorder import RecordSettings, record_scene
 from avlmaps_sim.verbs.bench import Indexing, Navigation
@@ -164,6 +165,7 @@ SAME: dict[str, Callable[[], Any]] = {
     "bench.navigation.language": of(NavigationSettings, "language"),
     "bench.navigation.guess": of(NavigationSettings, "guess"),
     "bench.laps": of(LiveBench, "laps"),
+    "bench.trials": of(SourcesBench, "trials"),
     "bench.kills": of(LiveBench, "kills"),
 }
 # What a person meets first: nothing behind them has such a default.

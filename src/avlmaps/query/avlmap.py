@@ -436,7 +436,7 @@ class AVLMap:
     ) -> Heatmap:
         settings = self.settings.sounds
         if (at or settings.at) == "source" and len(scores):
-            from avlmaps.query.modalities.sound import source_factor
+            from avlmaps.query.modalities.source import source_factor
 
             factor = source_factor(self.space, self.source_map, scores, part, settings, self.settings.heat)
         else:

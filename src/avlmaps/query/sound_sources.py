@@ -8,7 +8,7 @@ left out.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -19,15 +19,32 @@ from avlmaps.core.lexicon import lexicon
 from avlmaps.maps.sources.density import Density, Plan, log_same_place
 from avlmaps.maps.sources.settings import SourceSettings
 from avlmaps.maps.types import SourceEvidence
+from avlmaps.query.queryable import Queryable
 from avlmaps.query.voxel_space import Space
 
 if TYPE_CHECKING:
-    from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.contents import Thing
 
 _MAKERS_SHARE = 0.5  # probability that a sound comes from a thing that usually makes it, where there is one
 _AT_THING_M = 0.4
 _MOST_NAMED, _LEAST_NAMED = 3, 0.05
+
+
+class Listening(Queryable, Protocol):
+    """A map that names its sounds, and may know where they came from."""
+
+    @cached_property
+    def source_map(self) -> "SourceMap":
+        """The evidence of where sounds came from."""
+        ...
+
+    def knows(self, phrase: str) -> bool:
+        """Return whether it can look for a phrase."""
+        ...
+
+    def sound_scores(self, text: str) -> Float[np.ndarray, " sounds"]:
+        """Return for each sound the probability that it is called so."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +131,7 @@ class SourceMap:
     _priors: dict[tuple[str, ...], Float[np.ndarray, " c"]] = field(default_factory=dict, init=False)
 
     @classmethod
-    def of(cls, avlmap: "AVLMap") -> "SourceMap":
+    def of(cls, avlmap: Listening) -> "SourceMap":
         """Return the evidence of a map.
 
         Raises:
@@ -232,7 +249,7 @@ class SourceMap:
 
 
 def list_sources(
-    avlmap: "AVLMap", names: Sequence[str] = (), prior: bool = True, *, least: float = 0.0
+    avlmap: Listening, names: Sequence[str] = (), prior: bool = True, *, least: float = 0.0
 ) -> list[SoundSource]:
     """Return the sources of a map's sounds, or of those of some names, most confident first.
 
@@ -254,7 +271,7 @@ def list_sources(
     return sorted(found, key=lambda one: -one.confidence)
 
 
-def _by_kind(avlmap: "AVLMap", names: Sequence[str]) -> dict[str, dict[int, float]]:
+def _by_kind(avlmap: Listening, names: Sequence[str]) -> dict[str, dict[int, float]]:
     """Return for each kind its sounds, with the confidence of the name."""
     kinds: dict[str, dict[int, float]] = {}
     if not names:
@@ -273,7 +290,7 @@ def _by_kind(avlmap: "AVLMap", names: Sequence[str]) -> dict[str, dict[int, floa
 class _Places:
     """Names the rooms and things of places in a map."""
 
-    def __init__(self, avlmap: "AVLMap") -> None:
+    def __init__(self, avlmap: Listening) -> None:
         self._map = avlmap
 
     @cached_property

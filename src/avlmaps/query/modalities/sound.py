@@ -3,7 +3,7 @@
 import itertools
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -14,9 +14,6 @@ from avlmaps.maps.types import HeardSounds
 from avlmaps.query.factors import FOUND_AT, HeatSettings, NearAnchors, stretch_scores
 from avlmaps.query.voxel_space import Space
 from avlmaps.recordings.audio import Sound
-
-if TYPE_CHECKING:
-    from avlmaps.query.sound_sources import SourceMap
 
 # A clip whose loudest sample is below this (−80 dB of full scale) holds nothing to compare.
 _SILENCE = 1e-4
@@ -77,47 +74,6 @@ def sound_factor(
     return NearAnchors(
         space, part, heat.falloff_per_m(part.role), anchors, used[which], which, best >= FOUND_AT, part.query, note
     )
-
-
-def source_factor(
-    space: Space,
-    sources: "SourceMap",
-    scores: Float[np.ndarray, " sounds"],
-    part: Part,
-    settings: SoundSettings,
-    heat: HeatSettings,
-) -> NearAnchors:
-    """Return the heat of where a sound came from: its anchors are the cells of the regions of its sources.
-
-    A cell has the source's score times how likely it is against the likeliest cell. Sounds that are one yes together;
-    those of a lower score stay by themselves.
-
-    Args:
-        space: the map's voxels.
-        sources: the evidence.
-        scores: for each detected sound, in [0, 1]: the probability that it matches the query.
-        part: the part of the query.
-        settings: the prior.
-        heat: the falloff.
-    """
-    order = np.argsort(-scores, kind="stable")
-    kind, with_prior = "" if part.is_file else part.query, settings.prior == "lexicon"
-    found = sources.sources([i for i in order.tolist() if scores[i] >= FOUND_AT], kind, with_prior)
-    found += [sources.joined([i], kind, with_prior) for i in order.tolist() if 0.05 <= scores[i] < FOUND_AT]
-    places, values, which = [np.zeros((0, 3))], [np.zeros(0)], [np.zeros(0, np.int64)]
-    for number, one in enumerate(found):
-        cells, share = sources.anchors(one)
-        places.append(cells)
-        values.append(share * max(float(np.clip(scores[i], 0.0, 1.0)) for i in one.events))
-        which.append(np.full(len(cells), number))
-    best = float(np.max(scores, initial=0.0))
-    note = ""
-    if best < FOUND_AT:
-        note = f"none of the {len(scores)} detected sounds is like {part.query!r}; the best score is {best:.2f}"
-    return NearAnchors(
-        space, part, heat.falloff_per_m(part.role), np.concatenate(places), np.concatenate(values),
-        np.concatenate(which), best >= FOUND_AT, part.query, note,
-    )  # fmt: skip
 
 
 def read_clip(path: Path) -> Sound:
