@@ -58,7 +58,7 @@ def find_sources(
     for begin_s, end_s in progress(spans_s, "sources", unit="sound"):
         span = float(begin_s), float(end_s)
         middle_s = min(max(sum(span) / 2, float(walk.stamps_s[0])), float(walk.stamps_s[-1]))
-        height_m = float(np.interp(np.array([middle_s]), walk.stamps_s, ear[:, 2])[0])
+        height_m = float(ear[int(np.argmin(np.abs(walk.stamps_s - middle_s))), 2])
         layer = round(height_m / _HEIGHT_STEP_M)
         if layer not in walls:
             walls[layer] = Walls.of(surface, height_m)

@@ -81,16 +81,16 @@ class Perceived(AVLMap):
             return self._once(("object", word, primary), lambda: self._scene.avlmap.object(word, primary))
         return self._once(("true object", word, primary), lambda: self._true_object(word, primary))
 
-    def sound(self, text: str, primary: bool = False) -> Heatmap:
+    def sound(self, text: str, primary: bool = False, *, at: Literal["robot", "source"] | None = None) -> Heatmap:
         """Return the heat of where a sound was heard."""
         sense = self._senses.sounds
         makers: dict[str, Callable[[], Heatmap]] = {
-            "ours": lambda: self._scene.avlmap.sound(text, primary),
+            "ours": lambda: self._scene.avlmap.sound(text, primary, at=at),
             "weak": lambda: self._scene.weak().heat(self._category(text), _role(primary)),
             "true": lambda: self._true_sound(text, primary),
             "none": lambda: self._nothing(Modality.SOUND, text, primary),
         }
-        return self._once((sense, "sound", text, primary), makers[sense])
+        return self._once((sense, "sound", text, primary, at), makers[sense])
 
     def image(
         self,
