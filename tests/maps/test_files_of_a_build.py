@@ -2,6 +2,7 @@
 
 import sys
 import threading
+from inspect import CO_OPTIMIZED
 from pathlib import Path
 from types import FrameType
 
@@ -25,7 +26,8 @@ class _Entered:
         code = frame.f_code
         if code.co_name == "open_stored":
             self.done = True
-        if event == "call" and not self.done and code.co_filename.startswith(f"{ROOT}/"):
+        runs = event == "call" and code.co_flags & CO_OPTIMIZED  # no body of a module or a class that is loaded now
+        if runs and not self.done and code.co_filename.startswith(f"{ROOT}/"):
             self.files.add(str(Path(code.co_filename).relative_to(ROOT)))
 
 
