@@ -137,7 +137,7 @@ ENTRIES = (
         "found", "Is found true?",
         f"avlmaps bench found --scenes {' '.join(_HOMES)} HOUSE --out OUT",
         1.5, "The twelve homes of the tables above, and an artist's house. No weight of the probability was fitted on "
-        "them ([how](experiments.md#found-as-a-probability)).", "found.png",
+        "them ([how](experiments.md#found-as-a-probability), and what the weights of 26 November change).", "found.png",
     ),
     Entry("navigation", "The paper's Tables I, II and VI", "avlmaps bench navigation --out OUT", 5.0, _NAVIGATION),
     Entry(
