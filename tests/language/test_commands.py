@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from avlmaps.core.errors import AvlmapsError, LanguageError
 from avlmaps.language.commands import read_command
-from avlmaps.language.intents import Clarify, Go, Refuse, Target, TargetKind
+from avlmaps.language.intents import Clarify, Go, Refuse, Target, TargetKind, targets_of
 from avlmaps.language.learned_translator import LearnedTranslator, UnclearError, command_to_program
 from avlmaps.language.program import parse_program
 from avlmaps.language.program.writing import write_program
@@ -111,10 +111,33 @@ def test_what_has_no_effect_is_reported() -> None:
 
 
 @pytest.mark.parametrize("storey", ["first floor", "ground floor", "second floor", "top floor"])
-def test_a_command_that_names_a_storey_says_what_to_do(storey: str) -> None:
-    stop = read_command(f"go to the window on the {storey}").stops
-    assert isinstance(stop, Clarify)
-    assert "without the storey" in stop.question
+def test_a_place_on_a_storey_is_named_with_it(storey: str) -> None:
+    read = read_command(f"go to the window on the {storey}, then turn left")
+    assert read.stops is None
+    assert [one.name for intent in read.intents for one in targets_of(intent)] == [f"window on the {storey}"]
+
+
+@pytest.mark.parametrize(
+    ("command", "name"),
+    [("go to the bed upstairs", "bed upstairs"), ("go to the upstairs bathroom and come back", "bathroom upstairs"),
+     ("go to the chair near the desk on the first floor", "chair on the first floor"),
+     ("visit all chairs downstairs", "chairs downstairs")],
+)  # fmt: skip
+def test_the_target_of_a_command_is_on_its_storey(command: str, name: str) -> None:
+    read = read_command(command)
+    assert read.stops is None
+    assert targets_of(read.intents[0])[0].name == name
+
+
+@pytest.mark.parametrize(
+    "command",
+    ["go upstairs", "go upstairs to the bed", "go downstairs and look at the sofa", "pop upstairs to the office",
+     "go to the bed not on the first floor", "climb to the second floor and go to the bed",
+     "go to the sofa on the ground floor and to the bed on the first floor",
+     "go to the bathroom downstairs, then to the sofa"],
+)  # fmt: skip
+def test_the_robot_changes_no_storey_and_guesses_none(command: str) -> None:
+    assert read_command(command).stops is not None
 
 
 def test_the_translator_is_one() -> None:

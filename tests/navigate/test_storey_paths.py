@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from avlmaps.core.errors import MapError, NavigationError
+from avlmaps.core.errors import GoalNotFoundError, MapError, NavigationError
 from avlmaps.core.motion import GroundPose
+from avlmaps.core.question import Modality, Part, Role
 from avlmaps.language.program.vocabulary import Place
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.obstacles import CellState
@@ -16,11 +17,15 @@ from avlmaps.maps.types import Voxels
 from avlmaps.navigate.bodies import BASE, WALKER
 from avlmaps.navigate.costmap import obstacles_for, storey_of_walk
 from avlmaps.navigate.driver import MapDriver
+from avlmaps.navigate.file_access import Readable
 from avlmaps.navigate.footprint import Outline
+from avlmaps.navigate.grounding import Seeker
 from avlmaps.navigate.instances import Thing
 from avlmaps.navigate.paths import PathFinder
 from avlmaps.navigate.rehearsal import FreeBody
 from avlmaps.navigate.skills import Robot
+from avlmaps.query.factors import NearThings
+from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.voxel_space import Space
 from helpers.two_floors import SIZE_M, UPPER_M, VOXEL_M, WELL, two_floors
 
@@ -140,3 +145,41 @@ def test_of_things_on_two_storeys_those_of_the_robots_own_count_where_one_is_fou
     assert robot.seeker._near_first([up, down], 0.5) == [down]
     assert robot.seeker._near_first([up, unlikely], 0.5) == [up, unlikely]
     assert robot.seeker.notes == ["1 of 2 places for bed are on other storeys; those of the ground floor count"]
+
+
+def seeker(on: tuple[float, ...] = (0.9, 0.8)) -> Seeker:
+    """Return who finds beds: the first upstairs, the second on the ground floor, with these confidences."""
+    centres, (_, high) = HOME.space.centres, HOME.storeys.all
+    rows = [int(np.argmin(np.linalg.norm(centres - place, axis=1))) for place in (UP, DOWN)][: len(on)]
+    order = np.argsort(rows)
+    mask = np.zeros(len(centres), bool)
+    mask[rows] = True
+    part = Part(Modality.OBJECT, "bed", Role.PRIMARY)
+    confidence = np.array(on, np.float32)
+    factor = NearThings(HOME.space, part, 2.0, mask, order, confidence, bool((confidence >= 0.5).any()))
+    assert high.floor_m > 1.0
+    avlmap: Any = SimpleNamespace(
+        storeys=HOME.storeys, space=HOME.space, object=lambda name, primary=False: Heatmap.of(factor)
+    )
+    return Seeker(avlmap, False, Readable(), lambda _: None)
+
+
+@pytest.mark.parametrize(
+    ("name", "upstairs"),
+    [("bed upstairs", True), ("bed on the first floor", True), ("bed downstairs", False),
+     ("bed on the ground floor", False), ("bed on the top floor", True)],
+)  # fmt: skip
+def test_a_name_with_a_storey_means_what_is_there(name: str, upstairs: bool) -> None:
+    found = seeker()
+    assert (found.best(name).place[2] > 1.0) == upstairs
+    assert {thing.place[2] > 1.0 for thing in found.every(name, np.zeros(2))} == {upstairs}
+    heat = found.heat("get_major_map", name, None, None, None, primary=True)
+    for several in (heat, heat * heat, heat.include_uncertain()):
+        assert {goal.position[2] > 1.0 for goal in several.goals(9)} == {upstairs}
+
+
+def test_what_is_on_another_storey_or_on_none_is_told() -> None:
+    with pytest.raises(GoalNotFoundError, match=r"No bed is found downstairs; one is on the first floor\."):
+        seeker((0.9,)).best("bed downstairs")
+    with pytest.raises(GoalNotFoundError, match=r"not found: the map holds 2 storeys: ground floor"):
+        seeker().best("bed on the fifth floor")

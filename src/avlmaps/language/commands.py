@@ -1,11 +1,24 @@
 """From a command to intents: what the networks read, checked against the words, or a question back."""
 
+import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from avlmaps.core.errors import LanguageError
 from avlmaps.language.foreign import ASK, language_of
-from avlmaps.language.intents import Beside, Clarify, Face, Intent, Refuse, Repeat, StopAt, Wait, targets_of
+from avlmaps.language.intents import (
+    Beside,
+    Clarify,
+    Face,
+    Intent,
+    Refuse,
+    Repeat,
+    StopAt,
+    TargetKind,
+    Wait,
+    on_targets,
+    targets_of,
+)
 from avlmaps.language.learned.decision import Decision, Weighed, decided
 from avlmaps.language.learned.forbidden import forbidden, is_stop
 from avlmaps.language.learned.limits import Limits
@@ -14,13 +27,20 @@ from avlmaps.language.learned.parts import by_parts
 from avlmaps.language.learned.reader import LearnedReader, learned_reader
 from avlmaps.language.lexer import Token, tokenise
 from avlmaps.language.sentence import Given, Sentence
-from avlmaps.language.storey_words import said_storeys
+from avlmaps.language.storey_words import SaidStorey, said_storeys
 from avlmaps.language.word_classes import load_word_classes
 
 MOST_CHARACTERS = 1000
 ON_ITS_STOREY = (
     "'{said}': the robot stays on its storey. Name the place without the storey; a place on another one is refused, "
     "with the reason."
+)
+# An order to change storeys, which is no place: "go upstairs and look at the sofa".
+_CHANGES_STOREY = re.compile(
+    r"\b(?:go|come|drive|head|move|climb|get|run|walk|race|hurry|roll|pop|nip|trot|hop|dash|step|proceed|travel) "
+    r"(?:back |straight |right )?"
+    r"(?:up|down|upstairs|downstairs|(?:up |down )?to the [a-z0-9]+ (?:floor|storey|level))\b"
+    r"|\b(?:up|down)stairs (?:to|into)\b"
 )
 
 
@@ -65,10 +85,14 @@ def read_command(text: str, given: Given | None = None) -> Command:
     if stop is not None:
         stop = Refuse(stop.reason, REFUSALS[stop.reason]) if isinstance(stop, Refuse) else stop
         return Command((stop,), (), (), "words")
-    storeys = [one.said for one in said_storeys(text) if one.number is not None]
+    storeys = said_storeys(text)
     if storeys:
-        question = Clarify(ON_ITS_STOREY.format(said=storeys[0]))
-        return Command((question,), (), (), "words")
+        named = _on_storey(text, storeys, given)
+        if named is not None:
+            return named
+        numbered = [one.said for one in storeys if one.number is not None]
+        if numbered:
+            return Command((Clarify(ON_ITS_STOREY.format(said=numbered[0])),), (), (), "words")
     reader = learned_reader()
     readings = weighed_readings(sentence, reader)
     if not readings:
@@ -77,6 +101,23 @@ def read_command(text: str, given: Given | None = None) -> Command:
     answer = answered(sentence, readings, reader, reader.limits)
     notes = (*sentence.notes, *_without_effect(sentence), *answer.notes, *_lost_sides(answer.intents, sentence))
     return Command(answer.intents, tuple(dict.fromkeys(notes)), readings, answer.why)
+
+
+def _on_storey(text: str, storeys: Sequence[SaidStorey], given: Given | None) -> Command | None:
+    """Return a command whose one target is on a storey, by the target's name: "bed upstairs"; None for any other."""
+    word = storeys[0]
+    if len(storeys) > 1 or not word.said or word.isnt or not word.rest or _CHANGES_STOREY.search(text.lower()):
+        return None
+    inner = read_command(word.rest, given)
+    targets = {target for intent in inner.intents for target in targets_of(intent)}
+    if inner.stops is not None or len(targets) != 1:
+        return None
+    (target,) = targets
+    if target.is_file or target.kind is TargetKind.HERE:
+        return None
+    at = word.said if word.above is not None and "stairs" in word.said else f"on the {word.said}"
+    there = replace(target, name=f"{target.name} {at}")
+    return replace(inner, intents=tuple(on_targets(one, lambda _: there) for one in inner.intents), readings=())
 
 
 def weighed_readings(sentence: Sentence, reader: LearnedReader) -> tuple[Weighed, ...]:

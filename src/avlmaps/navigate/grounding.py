@@ -9,12 +9,15 @@ from jaxtyping import Float
 
 from avlmaps.core.errors import GoalNotFoundError, ProgramError
 from avlmaps.language.program.vocabulary import Clip, Picture, Place, Target
+from avlmaps.language.storey_words import said_storeys
+from avlmaps.maps.storeys import said_storeys as storeys_in_words
 from avlmaps.navigate.arguments import kind_of, text_of
 from avlmaps.navigate.file_access import Readable
 from avlmaps.navigate.footprint import Outline
 from avlmaps.navigate.instances import Thing, likely, nearest, same_thing, tells_one, things_in
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.heatmap import Heatmap
+from avlmaps.query.on_storeys import at_storey, storeys_meant
 
 
 class Seeker:
@@ -68,13 +71,37 @@ class Seeker:
         elif isinstance(sound, Clip):
             heat = self.avlmap.sound_clip(self.readable.find(sound.path, "clip"), primary=primary)
         elif sound is not None:
-            heat = self.avlmap.sound(text_of(sound, skill), primary)
+            heat = self._named(text_of(sound, skill), lambda name: self.avlmap.sound(name, primary))
         elif area is not None:
-            heat = self.avlmap.area(text_of(area, skill), primary)
+            heat = self._named(text_of(area, skill), lambda name: self.avlmap.area(name, primary))
         else:
-            heat = self.avlmap.object(text_of(obj, skill), primary)
+            heat = self._named(text_of(obj, skill), lambda name: self.avlmap.object(name, primary))
         self._note(heat)
         return heat
+
+    def _named(self, name: str, heat_of: Callable[[str], Heatmap]) -> Heatmap:
+        """Return the heat of a name; where it names a storey ("bed upstairs"), with the goals on that one alone.
+
+        Raises:
+            GoalNotFoundError: the map has no such storey, or nothing of the name is found there.
+        """
+        said = said_storeys(name)
+        if len(said) != 1 or not said[0].said or not said[0].rest:
+            return heat_of(name)
+        storeys, word = self.avlmap.storeys, said[0]
+        numbers, note = storeys_meant(word, 1 if storeys is None else len(storeys))
+        self.note(note)
+        if not numbers:
+            raise GoalNotFoundError(f"{name!r} is not found: the map {storeys_in_words(storeys).removeprefix('it ')}.")
+        heat = heat_of(word.rest)
+        if storeys is None:
+            return heat
+        only = heat.only(lambda places: np.isin(storeys.of_places(places), numbers))
+        if heat.found and not only.found:
+            place = heat.goals(1)[0].position
+            name_of = storeys[int(storeys.of_places(np.array([place]))[0])].name
+            raise GoalNotFoundError(f"No {word.rest} is found {at_storey(word)}; one is on the {name_of}.")
+        return only
 
     def best(self, target: Target) -> Thing:
         """Return the best thing that a target may mean.
@@ -126,7 +153,9 @@ class Seeker:
             level = self.avlmap.space.level(np.array([target.x, target.y, target.z]))
             known = self._handed_out.get(target, Thing("", Outline.at(level[:2]), level))
             return [known if target in self._instances else replace(known, outline=Outline.at(level[:2]))], True
-        heat = self.avlmap.object(target, primary=True) if isinstance(target, str) else target
+        heat = target
+        if isinstance(target, str):
+            heat = self._named(target, lambda name: self.avlmap.object(name, primary=True))
         if not isinstance(heat, Heatmap):
             raise ProgramError(f"A skill takes a phrase, a place or a heatmap to go to, not {kind_of(target)}.")
         things = things_in(heat, self.guess)

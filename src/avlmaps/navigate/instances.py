@@ -72,7 +72,7 @@ def things_in(heat: Heatmap, guess: bool = False) -> list[Thing]:
 
 def _guesses(heat: Heatmap) -> Iterator[Heatmap]:
     """Yield the possible meanings of a heatmap, the highest confidence first."""
-    lead = Heatmap.of(heat.lead, heat.found_at)
+    lead = Heatmap.of(heat.lead, heat.found_at).only(heat.where)
     yield heat
     yield heat.include_uncertain()
     if len(heat.factors) > 1:

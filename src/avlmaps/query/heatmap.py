@@ -1,14 +1,14 @@
 """The product of the heat of everything that was queried, over the occupied voxels."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
-from avlmaps.core.arrays import Float, Float32, Int
+from avlmaps.core.arrays import Bool, Float, Float32, Int
 from avlmaps.query.evidence import Evidence
 from avlmaps.query.factors import FOUND_AT, Factor, lead_of, product_of, times
 from avlmaps.query.goals import Goal, Shares, share_voxels, weigh_goals
@@ -17,6 +17,9 @@ from avlmaps.query.voxel_space import Space
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+_MOST_GOALS = 200  # that are looked through for those that lie where they may
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -29,11 +32,13 @@ class Heatmap(Heat):
         space: the map's voxels.
         factors: the parts of the query, one factor each.
         found_at: from this probability of the first goal on the query is found.
+        where: says of places (n, 3), metres, world, which may be goals; None: all.
     """
 
     space: Space
     factors: tuple[Factor, ...]
     found_at: float = FOUND_AT
+    where: Callable[[Float[np.ndarray, "n 3"]], Bool[np.ndarray, " n"]] | None = None
 
     @classmethod
     def of(cls, factor: Factor, found_at: float = FOUND_AT) -> "Heatmap":
@@ -59,11 +64,20 @@ class Heatmap(Heat):
             return Heat.__mul__(self, other)
         self._require_same(other, "multiplied")
         one, two = self._in_company(), other._in_company()
-        return Heatmap(self.space, one.factors + two.factors, max(self.found_at, other.found_at))
+        where = self.where if other.where is None else other.only(self.where).where
+        return Heatmap(self.space, one.factors + two.factors, max(self.found_at, other.found_at), where)
+
+    def only(self, where: Callable[[Float[np.ndarray, "n 3"]], Bool[np.ndarray, " n"]] | None) -> "Heatmap":
+        """Return the heatmap whose goals lie only where a function says so; that of before counts as well."""
+        before = self.where
+        if where is None or before is None:
+            return replace(self, where=where or before)
+        return replace(self, where=lambda places: before(places) & where(places))
 
     def include_uncertain(self) -> "Heatmap":
         """Return the heatmap that includes instances of low confidence: for a caller that must guess."""
-        return product([Heatmap.of(factor.include_uncertain(), self.found_at) for factor in self.factors])
+        uncertain = [Heatmap.of(factor.include_uncertain(), self.found_at) for factor in self.factors]
+        return product(uncertain).only(self.where)
 
     def _in_company(self) -> "Heatmap":
         """Return the heatmap as it counts in a product; that of several things is one already."""
@@ -131,7 +145,11 @@ class Heatmap(Heat):
 
     def weighed(self, top: int = 3) -> list[tuple[Goal, Evidence]]:
         """Return the goals, each with the evidence that its probability rests on."""
-        return weigh_goals(self.factors, self._shares, top)
+        if self.where is None:
+            return weigh_goals(self.factors, self._shares, top)
+        every = weigh_goals(self.factors, self._shares, _MOST_GOALS)
+        fits = self.where(np.array([goal.position for goal, _ in every]).reshape(-1, 3))
+        return [one for one, fit in zip(every, fits.tolist(), strict=True) if fit][:top]
 
     @overload
     def plot(self, path: str | Path, *, top: int = 3) -> Path: ...

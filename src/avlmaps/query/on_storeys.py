@@ -47,7 +47,7 @@ def answer_on_storey(
     storeys, word = avlmap.storeys, said[0]
     if not word.said:
         return _which(ask(word.rest, top), storeys)
-    numbers, note = _numbers(word, 1 if storeys is None else len(storeys))
+    numbers, note = storeys_meant(word, 1 if storeys is None else len(storeys))
     notes = (note,) if note else ()
     if not numbers:
         return _no_such(storeys, word, notes, None if word.lists else ask(word.rest, top))
@@ -65,14 +65,14 @@ def _no_such(storeys: Storeys | None, word: SaidStorey, notes: tuple[str, ...], 
     whole = whole or Answer((), False, (), 0.0)
     holds = _sentence(said_storeys(storeys).replace("it", "the map", 1))
     guess = f"; without that the best guess is at {place_of(whole.goals[0])}" if whole.goals else ""
-    text = f"{holds}, so that nothing is known to be {_at(word)}{guess}."
+    text = f"{holds}, so that nothing is known to be {at_storey(word)}{guess}."
     count = None if whole.count is None else 0
     return replace(whole, found=False, probability=0.0, count=count, notes=(*notes, *whole.notes), text=text)
 
 
 def _list(word: SaidStorey, goals: Sequence[Goal]) -> str:
     what = counted([goal.name for goal in goals]) if goals else "no thing that the map is certain of"
-    return f"{_sentence(_at(word))}: {what}."
+    return f"{_sentence(at_storey(word))}: {what}."
 
 
 def _restricted(
@@ -88,12 +88,12 @@ def _restricted(
     if not asked:  # a list
         text = _list(word, here)
     elif found:
-        text = placed(f"{in_words(asked)} {_at(word)} is most likely", here[0])
+        text = placed(f"{in_words(asked)} {at_storey(word)} is most likely", here[0])
     else:
         text = _absent(whole, word, here, storeys)
         if whole.found:
             others = (Alternative(Question.of(asked), whole.probability, True, whole.goals[:1]), *others)
-    text = text if count is None else f"Counted {_at(word)}: {count}. {text}"
+    text = text if count is None else f"Counted {at_storey(word)}: {count}. {text}"
     notes = (*notes, *whole.notes)
     goals = tuple(here[:top])
     return replace(
@@ -104,7 +104,7 @@ def _restricted(
 def _absent(whole: Answer, word: SaidStorey, here: Sequence[Goal], storeys: Storeys | None) -> str:
     """Return that nothing is found on a storey, the best guess there, and where else something is found."""
     what = in_words([one.part for one in whole.parts]).removeprefix("the ")
-    text = f"No {what} is found {_at(word)}"
+    text = f"No {what} is found {at_storey(word)}"
     if here:
         text += f"; the best guess there is at {place_of(here[0])}, probability {here[0].probability:.2f}"
     if whole.found and storeys is not None:
@@ -120,7 +120,7 @@ def _which(whole: Answer, storeys: Storeys | None) -> Answer:
     return whole
 
 
-def _numbers(word: SaidStorey, count: int) -> tuple[list[int], str]:
+def storeys_meant(word: SaidStorey, count: int) -> tuple[list[int], str]:
     """Return the numbers of the storeys that words mean in a map with this number of them, and how they were taken."""
     every = list(range(count))
     if word.above is not None:
@@ -149,7 +149,8 @@ def _storey(storeys: Storeys, goal: Goal) -> int:
     return int(storeys.of_places(np.array([goal.position]))[0])
 
 
-def _at(word: SaidStorey) -> str:
+def at_storey(word: SaidStorey) -> str:
+    """Return the words for being on a storey: "upstairs", "on the first floor", "not on the first floor"."""
     at = word.said if word.above is not None and "stairs" in word.said else f"on the {word.said}"
     return f"not {at}" if word.isnt else at
 
