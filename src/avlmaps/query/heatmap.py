@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+_Where = Callable[[Float[np.ndarray, "n 3"]], Bool[np.ndarray, " n"]]
 _MOST_GOALS = 200  # that are looked through for those that lie where they may
 
 
@@ -38,7 +39,7 @@ class Heatmap(Heat):
     space: Space
     factors: tuple[Factor, ...]
     found_at: float = FOUND_AT
-    where: Callable[[Float[np.ndarray, "n 3"]], Bool[np.ndarray, " n"]] | None = None
+    where: "_Where | None" = None
 
     @classmethod
     def of(cls, factor: Factor, found_at: float = FOUND_AT) -> "Heatmap":
@@ -67,12 +68,16 @@ class Heatmap(Heat):
         where = self.where if other.where is None else other.only(self.where).where
         return Heatmap(self.space, one.factors + two.factors, max(self.found_at, other.found_at), where)
 
-    def only(self, where: Callable[[Float[np.ndarray, "n 3"]], Bool[np.ndarray, " n"]] | None) -> "Heatmap":
+    def only(self, where: "_Where | None") -> "Heatmap":
         """Return the heatmap whose goals lie only where a function says so; that of before counts as well."""
         before = self.where
         if where is None or before is None:
             return replace(self, where=where or before)
-        return replace(self, where=lambda places: before(places) & where(places))
+
+        def both(places: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, " n"]:
+            return before(places) & where(places)
+
+        return replace(self, where=both)
 
     def include_uncertain(self) -> "Heatmap":
         """Return the heatmap that includes instances of low confidence: for a caller that must guess."""
