@@ -47,6 +47,14 @@ def test_how_an_answer_counts(intents: list[object], outcome: str) -> None:
     assert judge({"say": "go to the sofa", "intents": intents}).outcome == outcome
 
 
+def test_a_storey_counts_alike_in_a_name_and_beside_it() -> None:
+    wanted = {"area": "kitchen", "near": [{"area": "ground floor"}]}
+    row = {"say": "go to the kitchen on the ground floor", "intents": [{"do": "go", "to": wanted}]}
+    assert judge(row).outcome == "right"
+    elsewhere = {"area": "kitchen", "near": [{"area": "first floor"}]}
+    assert judge({**row, "intents": [{"do": "go", "to": elsewhere}]}).outcome == "misread"
+
+
 def test_a_question_back_is_no_misreading() -> None:
     row = {"say": "go to the frobnicator", "intents": [{"do": "go", "to": {"object": "frobnicator"}}]}
     assert judge(row).outcome == "asked back"

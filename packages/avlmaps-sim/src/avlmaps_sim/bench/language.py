@@ -246,6 +246,7 @@ def _target(target: Any) -> Any:
     if isinstance(target, str):
         target = {"object": target}
     kind = next(name for name in ("object", "sound", "area", "image", "clip", "here") if name in target)
+    target = _storey_apart(target, kind)
     pick = target.get("pick", "")
     name = _name(kind, target[kind])
     if kind in ("object", "area") and _is_both(str(target[kind])):
@@ -254,6 +255,17 @@ def _target(target: Any) -> Any:
     near = [_target(one) for one in target.get("near", ())]
     flat = frozenset(each for one in near for each in ((*one[:2], frozenset(), one[3]), *one[2]))
     return kind, name, flat, "" if pick == "nearest" else pick
+
+
+def _storey_apart(target: Any, kind: str) -> Any:
+    """Return a target with the storey that its name carries among what it is near, as lists have it."""
+    from avlmaps.language.storey_words import said_storeys
+
+    storeys = said_storeys(str(target[kind])) if kind in ("object", "area") else ()
+    if len(storeys) != 1 or not storeys[0].said or not storeys[0].rest:
+        return target
+    near = [*target.get("near", ()), {"area": storeys[0].said}]
+    return {**target, kind: storeys[0].rest, "near": near}
 
 
 def _is_both(name: str) -> bool:
