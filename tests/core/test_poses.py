@@ -80,6 +80,15 @@ def test_the_angle_between_rotations_is_symmetric_and_at_most_half_a_turn(a: np.
     assert angle == pytest.approx(float(poses.rotation_angle_rad(b, a)), abs=1e-7)
 
 
+@given(rigid(), rigid(), st.floats(0.01, 0.5))
+def test_a_mean_rotation_turns_with_what_it_is_the_mean_of(a: np.ndarray, b: np.ndarray, angle: float):
+    turned = np.eye(4)
+    turned[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+    either_side = a @ np.stack([turned, poses.inverse(turned), np.eye(4)])
+    np.testing.assert_allclose(poses.mean_rotation(either_side), a[:3, :3], atol=1e-9)
+    np.testing.assert_allclose(poses.mean_rotation(b @ either_side), (b @ a)[:3, :3], atol=1e-9)
+
+
 @given(rigid(), arrays(float, (3, 3), elements=st.floats(-1e-3, 1e-3)))
 def test_a_rotation_with_rounding_is_made_orthonormal_and_hardly_moved(a: np.ndarray, noise: np.ndarray):
     written = a.copy()

@@ -146,3 +146,27 @@ def test_a_drive_is_not_bent_against_its_odometry(located) -> None:
     located(map_, shifted)
     with pytest.raises(MapError, match="contradict its odometry"):
         find_loops(map_, replace(LoopSettings(), most_strain=0.1))
+
+
+def test_some_keyframes_have_their_own_keypoints_and_pictures() -> None:
+    rng = np.random.default_rng(0)
+    size = np.array([3, 0, 2, 4])
+    offsets = np.concatenate([[0], np.cumsum(size)])
+    pictures = np.concatenate([[0], np.cumsum(10 * size)])
+    keyframes = replace(
+        stored(np.tile(np.eye(4), (COUNT, 1, 1))).keyframes.take(np.arange(4)),
+        offsets=offsets, xy=np.arange(18, dtype=np.float32).reshape(9, 2),
+        descriptors=rng.standard_normal((9, 4)).astype(np.float16),
+        points_world=rng.standard_normal((9, 3)).astype(np.float32),
+        thumbnail_offsets=pictures, thumbnails=np.arange(90, dtype=np.uint8),
+        score=np.linspace(0, 1, 9).astype(np.float16),
+    )  # fmt: skip
+    rows = np.array([3, 0])
+    some = keyframes.take(rows)
+    for place, row in enumerate(rows.tolist()):
+        own, whole = slice(*some.offsets[place : place + 2]), slice(*offsets[row : row + 2])
+        for name in ("xy", "descriptors", "points_world", "score"):
+            np.testing.assert_array_equal(getattr(some, name)[own], getattr(keyframes, name)[whole])
+        pixels = some.thumbnails[slice(*some.thumbnail_offsets[place : place + 2])]
+        np.testing.assert_array_equal(pixels, keyframes.thumbnails[slice(*pictures[row : row + 2])])
+    assert len(some) == 2 and not len(some.clear_mm)

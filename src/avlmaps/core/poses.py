@@ -157,6 +157,12 @@ def rotation_angle_rad(a: Float[np.ndarray, "*n 4 4"], b: Float[np.ndarray, "*n 
     return np.asarray(np.arccos(np.clip((trace - 1.0) / 2.0, -1.0, 1.0)))
 
 
+def mean_rotation(b_from_a: Float[np.ndarray, "n 4 4"]) -> Float[np.ndarray, "3 3"]:
+    """Return the rotation that lies between those of some poses: the nearest to their sum (in the Frobenius norm)."""
+    left, _, right = np.linalg.svd(b_from_a[:, :3, :3].sum(axis=0))
+    return left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
+
+
 def plain_point(vector: Float[np.ndarray, "3"]) -> tuple[float, float, float]:
     """Return a position or a size, metres, as plain numbers to a tenth of a millimetre: no 0.17500000000000002."""
     x, y, z = (round(float(value), 4) for value in vector)

@@ -12,7 +12,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Int
 from avlmaps.core.errors import MapError
-from avlmaps.core.poses import inverse, rotation_angle_rad
+from avlmaps.core.poses import inverse, mean_rotation, rotation_angle_rad
 from avlmaps.core.progress import progress
 from avlmaps.core.registry import Kind
 from avlmaps.days.settings import AlignSettings
@@ -196,8 +196,7 @@ def consensus(votes: Votes, settings: AlignSettings, names: Sequence[object]) ->
 
 def mean_transform(votes: Float[np.ndarray, "v 4 4"], camera: Float[np.ndarray, "v 4 4"]) -> Float[np.ndarray, "4 4"]:
     """Return the transform that lies between some: the mean of the rotations, and of where it places the cameras."""
-    left, _, right = np.linalg.svd(votes[:, :3, :3].sum(axis=0))
-    rotation = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
+    rotation = mean_rotation(votes)
     at = camera[:, :3, 3]
     placed = np.einsum("vij,vj->vi", votes[:, :3, :3], at) + votes[:, :3, 3]
     out = np.eye(4)

@@ -9,10 +9,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Int
 from avlmaps.core.poses import apply, rotation_angle_rad
-from avlmaps.days.align import (
-    local_features,
-    thumbnail,
-)
+from avlmaps.days.align import local_features, thumbnail
 from avlmaps.days.surfaces import Occupied, resampled
 from avlmaps.maps.fusion.voxel_sums import VoxelSums, VoxelTable
 from avlmaps.maps.store.life import PEOPLE, Life
@@ -108,36 +105,7 @@ def joined_keyframes(stored: StoredMap, other: StoredMap, moved: Float[np.ndarra
         place=np.asarray(place, np.float32).reshape(len(new), -1),
         points_world=apply(moved, np.asarray(new.points_world, np.float64)).astype(np.float32),
     )
-    return _concatenated(_rows(old, np.array(kept, np.int64)), turned)
-
-
-def _rows(keyframes: Keyframes, rows: Int[np.ndarray, " r"]) -> Keyframes:
-    """Return some of the keyframes."""
-    offsets, points = _ragged(np.asarray(keyframes.offsets), rows)
-    thumbnail_offsets, pixels = _ragged(np.asarray(keyframes.thumbnail_offsets), rows)
-    score = np.asarray(keyframes.score)
-    return Keyframes(
-        stamp_s=np.asarray(keyframes.stamp_s)[rows],
-        world_from_camera=np.asarray(keyframes.world_from_camera)[rows],
-        centre=np.asarray(keyframes.centre)[rows],
-        view=np.asarray(keyframes.view)[rows],
-        place=np.asarray(keyframes.place)[rows],
-        offsets=offsets,
-        xy=np.asarray(keyframes.xy)[points],
-        descriptors=np.asarray(keyframes.descriptors)[points],
-        points_world=np.asarray(keyframes.points_world)[points],
-        thumbnail_offsets=thumbnail_offsets,
-        thumbnails=np.asarray(keyframes.thumbnails)[pixels],
-        score=score[points] if len(score) else score,
-        clear_mm=np.asarray(keyframes.clear_mm)[rows],
-    )
-
-
-def _ragged(offsets: Int[np.ndarray, " k1"], rows: Int[np.ndarray, " r"]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the offsets of some rows of a ragged array, and the entries that they have."""
-    size = np.diff(offsets)[rows]
-    ends = np.concatenate([[0], np.cumsum(size)]).astype(np.int64)
-    return ends, np.repeat(offsets[:-1][rows] - ends[:-1], size) + np.arange(ends[-1])
+    return _concatenated(old.take(np.array(kept, np.int64)), turned)
 
 
 def _concatenated(one: Keyframes, other: Keyframes) -> Keyframes:

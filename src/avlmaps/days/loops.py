@@ -5,20 +5,19 @@ the earlier keyframe to the later one. A pose graph of odometry and closures giv
 follows. Where closures are few or contradict each other, nothing is done.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from avlmaps.core.arrays import Float, Int
 from avlmaps.core.camera import Rig
 from avlmaps.core.errors import MapError
-from avlmaps.core.poses import inverse, rotation_angle_rad, rotation_to_level
+from avlmaps.core.poses import inverse, mean_rotation, rotation_angle_rad, rotation_to_level
 from avlmaps.core.progress import progress
 from avlmaps.core.registry import Kind
-from avlmaps.core.wording import option
 from avlmaps.days.align import local_features, spread_out
 from avlmaps.days.pose_graph import Edges, optimise
-from avlmaps.maps.corrected import Corrected, correct_stored
+from avlmaps.maps.corrected import Corrected, correct_stored, require_submaps
 from avlmaps.maps.store.reader import StoredMap
 from avlmaps.maps.types import Keyframes
 from avlmaps.perception.encoders import Encoders
@@ -109,11 +108,7 @@ def close_loops(stored: StoredMap, settings: LoopSettings = LoopSettings()) -> t
         MapError: the map has no submaps, or no models to find places by; too few closures were found, or they
             contradict each other. It stays as it was.
     """
-    if stored.submaps() is None:
-        raise MapError(
-            f"{stored.path} has no submaps, so that it cannot follow corrected poses; build it again with "
-            f"{option('submaps')}."
-        )
+    require_submaps(stored)  # before the long search
     found = find_loops(stored, settings)
     moved, done = correct_stored(stored, found.stamps_s, found.poses)
     return moved, done, found
@@ -183,7 +178,7 @@ def _closures(stored: StoredMap, poses: Float[np.ndarray, "k 4 4"], settings: Lo
         alike = earlier[np.argsort(-(place[earlier] @ place[row]), kind="stable")[: settings.candidates]]
         local = local_features(stored, row)
         for other in alike.tolist():
-            there = _Earlier(_alone(keyframes, other), stored.place_state, stored.encoders, stored.rig)
+            there = _Earlier(keyframes.take(np.array([other])), stored.place_state, stored.encoders, stored.rig)
             chosen = LocateSettings(refine_focal=False)
             located = locate_features(there, local, place[row], stored.rig.rgb, rng, chosen)
             found = located.world_from_camera
@@ -213,8 +208,7 @@ def _upright(
     found: Float[np.ndarray, "k 4 4"], before: Float[np.ndarray, "k 4 4"], up: Float[np.ndarray, "3"]
 ) -> Float[np.ndarray, "k 4 4"]:
     """Return poses turned about the first one, so that up stays where it was: what was seen again says little of it."""
-    left, _, right = np.linalg.svd((found @ inverse(before))[:, :3, :3].sum(axis=0))
-    tipped = left @ right @ up
+    tipped = mean_rotation(found @ inverse(before)) @ up
     to_level = rotation_to_level(up).T @ rotation_to_level(rotation_to_level(up) @ tipped) @ rotation_to_level(up)
     whole = np.eye(4)
     whole[:3, :3] = to_level
@@ -230,24 +224,3 @@ def _agreeing(closures: Edges, poses: Float[np.ndarray, "k 4 4"], settings: Loop
     error = closures.errors(poses)
     near = np.linalg.norm(error[:, :3], axis=1) <= settings.agree_m
     return near & (np.linalg.norm(error[:, 3:], axis=1) <= settings.agree_rad)
-
-
-def _alone(keyframes: Keyframes, row: int) -> Keyframes:
-    """Return one keyframe, without its picture."""
-    points = slice(*keyframes.offsets[row : row + 2])
-    return replace(
-        keyframes,
-        stamp_s=keyframes.stamp_s[row : row + 1],
-        world_from_camera=keyframes.world_from_camera[row : row + 1],
-        centre=keyframes.centre[row : row + 1],
-        view=keyframes.view[row : row + 1],
-        place=keyframes.place[row : row + 1],
-        offsets=np.array([0, len(keyframes.xy[points])], np.int64),
-        xy=keyframes.xy[points],
-        descriptors=keyframes.descriptors[points],
-        points_world=keyframes.points_world[points],
-        thumbnail_offsets=np.zeros(2, np.int64),
-        thumbnails=np.zeros(0, np.uint8),
-        score=keyframes.score[points] if len(keyframes.score) else keyframes.score,
-        clear_mm=keyframes.clear_mm[:0],
-    )

@@ -65,12 +65,7 @@ def correct_stored(stored: StoredMap, stamps_s: Any, poses: Any) -> tuple[Stored
         RecordingError: a pose is no rigid motion.
     """
     begin_s = perf_counter()
-    submaps = stored.submaps()
-    if submaps is None:
-        raise MapError(
-            f"{stored.path} has no submaps, so that it cannot follow corrected poses; build it again with "
-            f"{option('submaps')}."
-        )
+    submaps = require_submaps(stored)
     frames_s, before = np.asarray(submaps.stamp_s), np.asarray(submaps.pose)
     motion = PoseCorrection.of(stamps_s, poses, frames_s, before)
     now = motion.moved(frames_s, before)
@@ -103,6 +98,21 @@ def correct_stored(stored: StoredMap, stamps_s: Any, poses: Any) -> tuple[Stored
         )  # fmt: skip
     opened = replace(open_stored(stored.path), encoders=stored.encoders)
     return opened, Corrected(median_m, most_m, info.counts.voxels, count, perf_counter() - begin_s)
+
+
+def require_submaps(stored: StoredMap) -> Submaps:
+    """Return the submaps of a map.
+
+    Raises:
+        MapError: it has none.
+    """
+    submaps = stored.submaps()
+    if submaps is None:
+        raise MapError(
+            f"{stored.path} has no submaps, so that it cannot follow corrected poses; build it again with "
+            f"{option('submaps')}."
+        )
+    return submaps
 
 
 def _moved(stored: StoredMap, submaps: Submaps, now: Float[np.ndarray, "f 4 4"]) -> tuple[MapContent, Removed]:

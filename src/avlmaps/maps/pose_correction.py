@@ -11,7 +11,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Float
 from avlmaps.core.errors import MapError
-from avlmaps.core.poses import inverse, orthonormalize_all, rotation_angle_rad
+from avlmaps.core.poses import inverse, mean_rotation, orthonormalize_all, rotation_angle_rad
 from avlmaps.core.timeline import Trajectory
 from avlmaps.recordings.types import Frame
 
@@ -66,8 +66,7 @@ class PoseCorrection:
     @property
     def turn(self) -> Float[np.ndarray, "3 3"]:
         """The rotation of the whole, as far as the motions have one: their mean."""
-        left, _, right = np.linalg.svd(self.motions.world_from_body[:, :3, :3].sum(axis=0))
-        return left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
+        return mean_rotation(self.motions.world_from_body)
 
     def at(self, stamps_s: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n 4 4"]:
         """Return the motion at each stamp, metres."""

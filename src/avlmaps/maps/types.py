@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from avlmaps.core.arrays import Float16, Float32, Float64, Int32, Int64, UInt8, UInt16
+from avlmaps.core.arrays import Float16, Float32, Float64, Int, Int32, Int64, UInt8, UInt16
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -75,6 +75,35 @@ class Keyframes:
 
     def __repr__(self) -> str:
         return f"Keyframes({len(self)} with {len(self.xy):,} keypoints)"
+
+    def take(self, rows: Int[np.ndarray, " r"]) -> "Keyframes":
+        """Return some of them."""
+        offsets, points = _ragged(np.asarray(self.offsets), rows)
+        thumbnail_offsets, pixels = _ragged(np.asarray(self.thumbnail_offsets), rows)
+        score, clear_mm = np.asarray(self.score), np.asarray(self.clear_mm)
+        return Keyframes(
+            stamp_s=np.asarray(self.stamp_s)[rows],
+            world_from_camera=np.asarray(self.world_from_camera)[rows],
+            centre=np.asarray(self.centre)[rows],
+            view=np.asarray(self.view)[rows],
+            place=np.asarray(self.place)[rows],
+            offsets=offsets,
+            xy=np.asarray(self.xy)[points],
+            descriptors=np.asarray(self.descriptors)[points],
+            points_world=np.asarray(self.points_world)[points],
+            thumbnail_offsets=thumbnail_offsets,
+            thumbnails=np.asarray(self.thumbnails)[pixels],
+            score=score[points] if len(score) else score,
+            clear_mm=clear_mm[rows] if len(clear_mm) else clear_mm,
+        )
+
+
+def _ragged(offsets: Int[np.ndarray, " k1"], rows: Int[np.ndarray, " r"]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the offsets of some rows of a ragged array, and the entries that they have."""
+    size: Int[np.ndarray, " r"] = np.diff(offsets)[rows]
+    ends = np.concatenate([[0], np.cumsum(size)]).astype(np.int64)
+    first: Int[np.ndarray, " m"] = np.repeat(offsets[:-1][rows] - ends[:-1], size)
+    return ends, first + np.arange(len(first))
 
 
 @dataclass(frozen=True, slots=True, repr=False)

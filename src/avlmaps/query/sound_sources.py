@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from avlmaps.core.arrays import Bool, Float
+from avlmaps.core.arrays import Float
 from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import Kind as Named
 from avlmaps.core.lexicon import lexicon
@@ -242,10 +242,6 @@ class SourceMap:
         height = float(self.space.level(self.position_of(joined)[None])[0, 2])
         level = np.column_stack([xy, np.full(len(xy), height)])
         return self.space.world(level), share / share.max()
-
-    def inside(self, joined: Joined, probability: float) -> Bool[np.ndarray, " c"]:
-        """Return which candidates lie in the region that holds a source with a probability."""
-        return joined.density.region(probability).ravel()[self.plan.cell]
 
 
 def list_sources(

@@ -33,7 +33,6 @@ class Correlations:
         first_s: delay of the first.
         step_s: between two.
         weight: (f,) sum of the bins' weights: how many bins count.
-        bins: how many there are.
     """
 
     at_s: Float[np.ndarray, " f"]
@@ -42,12 +41,11 @@ class Correlations:
     first_s: float
     step_s: float
     weight: Float[np.ndarray, " f"]
-    bins: int
 
     def take(self, frames: Int[np.ndarray, " k"]) -> "Correlations":
         """Return some of the frames."""
         return Correlations(
-            self.at_s[frames], self.pair, self.curve[frames], self.first_s, self.step_s, self.weight[frames], self.bins
+            self.at_s[frames], self.pair, self.curve[frames], self.first_s, self.step_s, self.weight[frames]
         )
 
     def smoothed(self, steps: float) -> "Correlations":
@@ -112,4 +110,4 @@ def correlate(
         curve[:, number] = np.concatenate([found[:, -reach:], found[:, : reach + 1]], axis=1)
     at_s = start_s + np.arange(len(power)) * HOP_S + FRAME_S / 2
     step_s = 1.0 / (rate_hz * _OVERSAMPLING)
-    return Correlations(at_s, pair, curve, -reach * step_s, step_s, weight.sum(axis=1), int(band.sum()))
+    return Correlations(at_s, pair, curve, -reach * step_s, step_s, weight.sum(axis=1))

@@ -62,14 +62,23 @@ def acoustic(
     building = Acoustics(scene, settings.rate_hz, settings.rt60_s)
     samples = np.zeros(round(duration_s * settings.rate_hz), np.float32)
     for sounding in soundings:
-        clip = resample(sounding.source.sound, settings.rate_hz)
-        wanted_db = settings.loudness_db + sounding.source.level_db
-        dry = clip.samples * 10.0 ** ((wanted_db - loudness_db(clip)) / 20.0)
-        heard = _moving(building, sounding, dry, (stamps_s, robot), rng, settings)
+        heard = _moving(building, sounding, dry_clip(sounding, settings), (stamps_s, robot), rng, settings)
         add_at(samples, heard.astype(np.float32), round(sounding.onset_s * settings.rate_hz))
     samples += room_noise(duration_s, settings.loudness_db - settings.snr_db, settings.rate_hz, rng)
+    return Sound(unclipped(samples), settings.rate_hz)
+
+
+def dry_clip(sounding: Sounding, settings: AcousticSettings) -> Float[np.ndarray, " n"]:
+    """Return a clip as it sounds at 1 m in the open, at the track's rate."""
+    clip = resample(sounding.source.sound, settings.rate_hz)
+    wanted_db = settings.loudness_db + sounding.source.level_db
+    return clip.samples * 10.0 ** ((wanted_db - loudness_db(clip)) / 20.0)
+
+
+def unclipped(samples: Float[np.ndarray, "*m n"]) -> Float[np.ndarray, "*m n"]:
+    """Return a track as a whole so quiet that no peak is cut off."""
     peak = float(np.abs(samples).max(initial=0.0))
-    return Sound((samples * min(1.0, _HIGHEST / max(peak, 1e-9))).astype(np.float32), settings.rate_hz)
+    return (samples * min(1.0, _HIGHEST / max(peak, 1e-9))).astype(np.float32)
 
 
 def _moving(

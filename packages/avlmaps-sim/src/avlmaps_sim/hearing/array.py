@@ -17,10 +17,8 @@ import numpy as np
 from jaxtyping import Complex, Float
 
 from avlmaps.recordings.channels import ChannelSound
-from avlmaps.recordings.clips import loudness_db
 from avlmaps.recordings.microphones import Microphones
-from avlmaps.recordings.resample import resample
-from avlmaps_sim.hearing.acoustic import AcousticSettings
+from avlmaps_sim.hearing.acoustic import AcousticSettings, dry_clip, unclipped
 from avlmaps_sim.hearing.filters import shaped_impulse
 from avlmaps_sim.hearing.impulse import LATE_BY_S, LATE_FROM_S, NEAREST_M, Acoustics, arrivals
 from avlmaps_sim.hearing.overlay import room_noise
@@ -29,7 +27,6 @@ from avlmaps_sim.hearing.schedule import Sounding
 from avlmaps_sim.hearing.sound_paths import Air, Way
 from avlmaps_sim.scene import Scene
 
-_HIGHEST = 0.89  # −1 dB
 _STEP_S = 0.05  # the early part counts again after this; a robot moves 2 cm meanwhile
 _LATE_EVERY = 4  # the late field counts again after this many of these steps
 _WAVES = 64
@@ -76,18 +73,14 @@ def heard_by_array(
     samples = np.zeros((len(microphones), round(duration_s * settings.rate_hz)), np.float32)
     walk = stamps_s, microphones.in_world_m(world_from_camera)
     for sounding in soundings:
-        clip = resample(sounding.source.sound, settings.rate_hz)
-        wanted_db = settings.loudness_db + sounding.source.level_db
-        dry = clip.samples * 10.0 ** ((wanted_db - loudness_db(clip)) / 20.0)
-        heard = _moving(building, sounding, dry, walk, rng, settings.rate_hz)
+        heard = _moving(building, sounding, dry_clip(sounding, settings), walk, rng, settings.rate_hz)
         begin = round(sounding.onset_s * settings.rate_hz)
         length = min(heard.shape[1], samples.shape[1] - begin)
         samples[:, begin : begin + length] += heard[:, :length].astype(np.float32)
     level_db = settings.loudness_db - settings.snr_db
     for channel in samples:
         channel += room_noise(duration_s, level_db, settings.rate_hz, rng)
-    peak = float(np.abs(samples).max(initial=0.0))
-    return ChannelSound((samples * min(1.0, _HIGHEST / max(peak, 1e-9))).astype(np.float32), settings.rate_hz)
+    return ChannelSound(unclipped(samples), settings.rate_hz)
 
 
 def _moving(
@@ -149,7 +142,7 @@ def responses(
     if building.floor_at(float(source[2]))[0] is not air:
         return _through_slab(building, source, ears), None
     own = air.room_at(source[:2])
-    heard = _Heard(air, rooms, own, np.array([*air.out_of_walls(source[:2], own), source[2]]))
+    heard = _Heard(air, rooms, own, building.sounds_from(source))
     coarse = slice(0, None, _LATE_EVERY)
     ways = air.ways(heard.source, middle)
     reflections = building.image_sources(rooms, own, heard.source, middle[coarse])

@@ -78,7 +78,7 @@ class Acoustics:
         if self.floor_at(float(source[2]))[0] is not air:
             return [self.through_slab(source, ear) for ear in ears]
         own = air.room_at(source[:2])
-        source = np.array([*air.out_of_walls(source[:2], own), source[2]])
+        source = self.sounds_from(source)
         late = self._late(rooms, own, rng)
         early = self._images(rooms, own, source, ears)
         found = []

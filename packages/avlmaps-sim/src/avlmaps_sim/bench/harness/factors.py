@@ -102,10 +102,14 @@ def true_regions(space: Space, part: Part, areas: Sequence[Area]) -> VoxelHeat:
 
 def near_polygon(area: Area, xy: Float[np.ndarray, "n 2"], margin_m: float) -> Bool[np.ndarray, " n"]:
     """Return which points lie inside a room, or no farther from its outline than the margin."""
-    near = np.asarray(area.contains(xy))
-    a, b = area.polygon, np.roll(area.polygon, -1, axis=0)
-    for start, end in zip(a, b, strict=True):
+    return np.asarray(area.contains(xy)) | (outline_away_m(area, xy) <= margin_m)
+
+
+def outline_away_m(area: Area, xy: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
+    """Return how far points are from a room's outline, metres."""
+    away_m = np.full(len(xy), np.inf)
+    for start, end in zip(area.polygon, np.roll(area.polygon, -1, axis=0), strict=True):
         along = end - start
         t = np.clip((xy - start) @ along / max(float(along @ along), 1e-12), 0.0, 1.0)
-        near |= np.linalg.norm(xy - start - t[:, None] * along, axis=1) <= margin_m
-    return near
+        away_m = np.minimum(away_m, np.linalg.norm(xy - start - t[:, None] * along, axis=1))
+    return away_m

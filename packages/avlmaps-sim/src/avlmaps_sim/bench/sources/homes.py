@@ -16,6 +16,7 @@ from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.contents import Thing
 from avlmaps.query.sound_sources import SourceMap, things_that_may_be
 from avlmaps.recordings.open import open_recording
+from avlmaps_sim.bench.harness.factors import outline_away_m
 from avlmaps_sim.bench.sources.arrays import ARRAYS, RECORDED, track_of
 from avlmaps_sim.hearing.impulse import Acoustics
 from avlmaps_sim.recorder import RecordSettings, record_scene
@@ -170,16 +171,8 @@ def area_of(areas: Sequence[Area], at: Sequence[float] | Float[np.ndarray, " k"]
     inside = [number for number, area in enumerate(areas) if bool(area.contains(xy))]
     if inside or not areas:
         return inside[0] if inside else -1
-    away = [_to_polygon_m(area.polygon, xy) for area in areas]
+    away = [float(outline_away_m(area, xy[None])[0]) for area in areas]
     return int(np.argmin(away)) if min(away) < 0.6 else -1
-
-
-def _to_polygon_m(polygon: np.ndarray, xy: np.ndarray) -> float:
-    """Return how far a place is from the sides of a polygon."""
-    a, b = np.asarray(polygon, np.float64), np.roll(np.asarray(polygon, np.float64), -1, axis=0)
-    along = b - a
-    share = np.clip(((xy - a) * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-12), 0.0, 1.0)
-    return float(np.linalg.norm(a + share[:, None] * along - xy, axis=1).min())
 
 
 def in_room(areas: Sequence[Area], true: np.ndarray, at: np.ndarray) -> bool | None:
