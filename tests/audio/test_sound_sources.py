@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from avlmaps.maps.sources.candidates import candidates_of
+from avlmaps.maps.sources.candidates import CELL_M, candidates_of
 from avlmaps.maps.sources.correlation import SPEED_M_S, correlate
-from avlmaps.maps.sources.density import Density, Plan, log_same_place
+from avlmaps.maps.sources.density import Density, Plan, Spread, log_same_place
 from avlmaps.maps.sources.level import levels_db, unknown_offset
 from avlmaps.maps.sources.settings import SourceSettings
 from avlmaps.maps.sources.steered import steer
@@ -152,6 +152,38 @@ def test_two_sounds_of_one_place_are_one_source_and_of_two_places_two(seed: int)
         assert log_same_place(one, other, prior) < 0.0
     flat = Density(plan, plan.sums(prior))
     assert log_same_place(one, flat, prior) == pytest.approx(0.0, abs=1e-6), "what says nothing decides nothing"
+
+
+def around(sigma_m: float, seed: int, numbers: SourceSettings) -> Density:
+    """Return the density of evidence that falls off as a Gaussian round a place well inside the room."""
+    place, rng = room(step=0.15), np.random.default_rng(seed)
+    at = rng.uniform([1.5, 1.5, 0.0], [4.5, 3.5, 0.0])
+    evidence = -((place - at)[:, :2] ** 2).sum(axis=1) / (2.0 * sigma_m**2)
+    return Density.of(Plan.of(place), uniform(place), evidence, np.zeros(len(place)), numbers)
+
+
+@given(st.floats(0.05, 1.5), st.floats(1.1, 4.0), st.integers(0, 9))
+@settings(max_examples=30, deadline=None)
+def test_what_is_known_less_well_is_never_likelier_right(sigma_m: float, wider: float, seed: int) -> None:
+    one, other = (around(sigma, seed, SourceSettings()).spread for sigma in (sigma_m, sigma_m * wider))
+    assert 0.0 <= other.right <= one.right + 0.01 <= 1.01
+    assert other.within_50_m >= one.within_50_m - CELL_M and other.within_90_m >= one.within_90_m - CELL_M
+
+
+@given(st.floats(0.11, 0.6), st.floats(1.2, 3.0), st.floats(0.0, 0.2), st.integers(0, 9))
+@settings(max_examples=20, deadline=None)
+def test_larger_errors_never_make_a_place_likelier(blur_m: float, wider: float, astray: float, seed: int) -> None:
+    small, large = (SourceSettings(blur_m=(b, 0.6), astray=astray) for b in (blur_m, blur_m * wider))
+    assert around(0.1, seed, large).spread.right <= around(0.1, seed, small).spread.right + 0.01
+
+
+@given(st.integers(0, 200))
+@settings(max_examples=20, deadline=None)
+def test_a_source_that_lies_in_one_cell_is_right_with_certainty(seed: int) -> None:
+    plan = Plan.of(room(step=0.15))
+    share = np.zeros(plan.shape)
+    share.ravel()[np.random.default_rng(seed).choice(np.flatnonzero(plan.is_held))] = 1.0
+    assert Density(plan, share).spread == Spread(1.0, 0.0, 0.0)
 
 
 def test_shares_of_candidates_add_up_to_their_cells() -> None:

@@ -4,7 +4,7 @@ import logging
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from tyro.conf import Positional, UseAppendAction, arg
 
@@ -59,6 +59,8 @@ class Serve(ModelVerb):
     """A further name of this server in the Host header, such as that of a reverse proxy; may be repeated."""
     found_at: Annotated[float, arg(metavar="PROBABILITY")] = 0.5
     """Call a query found, and drive to it, from this probability of its first goal on, 0 to 1."""
+    at: Literal["robot", "source"] = "robot"
+    """Place of a sound: where the robot was when it heard it, or where it came from (see `avlmaps sources`)."""
 
     drive: Annotated[Path | None, arg(metavar="ROBOT.json")] = None
     """Drive the robot of this file as well: plans, confirmations and stops under /drive, every order logged."""
@@ -97,6 +99,7 @@ def serve(verb: "Serve") -> None:
         tls_certificate=verb.tls_cert,
         tls_key=verb.tls_key,
         found_at=verb.found_at,
+        at=verb.at,
     )
     maps = named_maps([verb.map, *verb.more])
     if verb.stdio:

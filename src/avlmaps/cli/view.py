@@ -5,7 +5,7 @@ import sys
 import threading
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 from urllib.parse import quote, urlencode
 
 from tyro.conf import Positional, arg
@@ -57,6 +57,8 @@ class View(ModelVerb):
     """Scene in which a simulated robot drives the commands typed in the page, as for `avlmaps go`."""
     found_at: Annotated[float, arg(metavar="PROBABILITY")] = 0.5
     """Call a query found from this probability of its first goal on, 0 to 1."""
+    at: Literal["robot", "source"] = "robot"
+    """Place of a sound: where the robot was when it heard it, or where it came from (see `avlmaps sources`)."""
     out: Annotated[Path | None, arg(metavar="FILE")] = None
     """Write one HTML file, and serve nothing."""
     questions: Annotated[tuple[str, ...], arg(metavar="SENTENCE ...")] = ()
@@ -90,8 +92,9 @@ def _require_fitting(verb: View) -> None:
 
 def _maps(verb: View) -> "list[AVLMap]":
     from avlmaps.query.avlmap import AVLMap, QuerySettings
+    from avlmaps.query.modalities.sound import SoundSettings
 
-    settings = QuerySettings(found_at=verb.found_at)
+    settings = QuerySettings(found_at=verb.found_at, sounds=SoundSettings(at=verb.at))
     return [AVLMap.open(path, settings) for path in (verb.map, verb.other) if path is not None]
 
 
@@ -130,7 +133,7 @@ def _serve(verb: View) -> None:
     token = None if is_loopback(verb.host) else secrets.token_urlsafe(24)
     limits = Limits(answer_s=_ANSWER_S)
     settings = ServeSettings(
-        host=verb.host.strip("[]"), port=verb.port, token=token, found_at=verb.found_at, limits=limits
+        host=verb.host.strip("[]"), port=verb.port, token=token, found_at=verb.found_at, at=verb.at, limits=limits
     )
     named = _named(verb)
     with listening_socket(settings) as opened:

@@ -4,10 +4,14 @@ Sentences are parsed into these (``language``), and the map answers them (``quer
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
+from typing import Literal
 
 from avlmaps.core.errors import QueryError
+
+HeardAt = Literal["robot", "source"]
+"""The place of a sound: where the robot was when it heard it, or where it came from."""
 
 # Nobody calls a thing by more; a text that was pasted by mistake would be read for minutes.
 MOST_CHARACTERS = 500
@@ -38,12 +42,14 @@ class Part:
         query: a phrase, or the path of a file for an image and for a query by sound clip.
         role: primary or context.
         is_file: whether ``query`` is a path (always so for an image).
+        at: the place of a sound that is meant; None: what the settings of the map say.
     """
 
     modality: Modality
     query: str
     role: Role = Role.CONTEXT
     is_file: bool = False
+    at: HeardAt | None = None
 
     def __post_init__(self) -> None:
         if not self.query.strip():
@@ -91,4 +97,10 @@ class Question:
         if parts and chosen is None:
             raise QueryError(f"The primary part is to be a {primary}, but the query has none; add one or leave it out.")
         roles = [Role.PRIMARY if i == chosen else Role.CONTEXT for i in range(len(parts))]
-        return cls(tuple(Part(p.modality, p.query, role, p.is_file) for p, role in zip(parts, roles, strict=True)))
+        return cls(tuple(replace(part, role=role) for part, role in zip(parts, roles, strict=True)))
+
+    def heard_at(self, at: HeardAt | None) -> "Question":
+        """Return the question with its sounds at that place; None leaves it as it is."""
+        if at is None:
+            return self
+        return Question(tuple(replace(p, at=at) if p.modality is Modality.SOUND else p for p in self.parts))

@@ -4,6 +4,7 @@ import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
+from avlmaps.core.question import HeardAt
 from avlmaps.language import lexer
 from avlmaps.language.lexer import Token
 from avlmaps.language.rephrase import rephrased
@@ -27,11 +28,13 @@ class Given:
         image: the file that "this photo" means.
         clip: the file that "this recording" means.
         knows: says whether the map's encoder knows a word that the lexicon does not; None: only the lexicon counts.
+        at: the place of a sound that is meant.
     """
 
     image: str | None = None
     clip: str | None = None
     knows: Callable[[str], bool] | None = None
+    at: HeardAt = "robot"
 
     def tokens(self, words: Iterable[str], at: int) -> list[Token]:
         """Return the files that a sentence may speak of as tokens behind it, so that "this photo" can point to one."""

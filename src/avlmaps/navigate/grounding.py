@@ -228,6 +228,7 @@ class Seeker:
         place = ", ".join(f"{value:.2f}" for value in self.avlmap.space.world(thing.place))
         line = f"{thing.name}: at ({place}) m, probability {thing.probability:.2f}"
         if thing.name and not self._last_line.startswith(line):
-            self._last_line = line + (f", one of {of}" if of > 1 else "")
+            spread = "" if thing.spread is None else f", {thing.spread.around('there')}"
+            self._last_line = line + spread + (f", one of {of}" if of > 1 else "")
             self._tell(self._last_line)
         return thing

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float
@@ -12,6 +13,9 @@ from avlmaps.navigate.footprint import Outline
 from avlmaps.query.factors import Factor, NearThings
 from avlmaps.query.goals import Goal
 from avlmaps.query.heatmap import Heatmap
+
+if TYPE_CHECKING:
+    from avlmaps.maps.sources.density import Spread
 
 _MOST_GOALS = 30
 
@@ -27,6 +31,7 @@ class Thing:
         probability: that it is what was meant; 1 for a place that a program gives.
         solid: whether it is a thing with an extent, rather than a place.
         found: whether that is likely enough, by the map's settings.
+        spread: how well the place is known, where it is the source of a sound.
     """
 
     name: str
@@ -35,13 +40,18 @@ class Thing:
     probability: float = 1.0
     solid: bool = False
     found: bool = True
+    spread: "Spread | None" = None
 
 
 def describe_query(heat: Heatmap) -> str:
     """Return the query of a heatmap in words: ``'chair' near 'glass breaking'``."""
     lead = heat.lead
-    others = [f"{factor.part.query!r}" for factor in heat.factors if factor is not lead]
-    return f"{lead.part.query!r}" + (f" near {' and '.join(others)}" if others else "")
+    others = [_name(factor) for factor in heat.factors if factor is not lead]
+    return _name(lead) + (f" near {' and '.join(others)}" if others else "")
+
+
+def _name(factor: Factor) -> str:
+    return f"{'the source of ' if factor.part.at == 'source' else ''}{factor.part.query!r}"
 
 
 def tells_one(heat: Heatmap) -> bool:
@@ -101,7 +111,8 @@ def _thing(heat: Heatmap, lead: Factor, goal: Goal) -> Thing:
     instance = int(lead.instance[np.argmin(np.linalg.norm(lead.anchors - position, axis=1))])
     place, found = heat.space.level(position), goal.probability >= heat.found_at
     if not isinstance(lead, NearThings):
-        return Thing(describe_query(heat), Outline.at(place[:2]), place, goal.probability, found=found)
+        name, outline = describe_query(heat), Outline.at(place[:2])
+        return Thing(name, outline, place, goal.probability, found=found, spread=goal.spread)
     own = heat.space.level(lead.anchors[lead.instance == instance])
     outline = Outline.round(own[:, :2], heat.space.grid.voxel_size_m)
     return Thing(describe_query(heat), outline, place, goal.probability, solid=True, found=found)
@@ -112,6 +123,8 @@ def explain_absence(heat: Heatmap, guess: bool = False) -> str:
     what, missing = describe_query(heat), [factor for factor in heat.factors if not factor.found]
     if missing:
         why = f"is not found in the map: {'; '.join(_absence(factor) for factor in missing)}"
+    elif len(heat.factors) == 1:
+        why = f"is not found in the map with a probability of {heat.found_at:g}"
     else:
         why = "is not found in the map: each is there, but they do not come together anywhere"
     best = next(iter(heat.goals(1)), None)

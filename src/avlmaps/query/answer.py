@@ -37,7 +37,7 @@ class PartAnswer:
 
     def to_dict(self) -> "PartOutcome":
         """Return the part as the command line prints it."""
-        return {
+        outcome: PartOutcome = {
             "modality": str(self.part.modality),
             "query": self.part.query,
             "role": str(self.part.role),
@@ -47,6 +47,9 @@ class PartAnswer:
             "note": self.note,
             "probability": self.probability,
         }
+        if self.part.at == "source":
+            outcome["at"] = "source"
+        return outcome
 
 
 @dataclass(frozen=True, slots=True)

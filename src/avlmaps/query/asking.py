@@ -14,7 +14,7 @@ import numpy as np
 
 from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import Kind, lexicon
-from avlmaps.core.question import Modality, Part, Question, Role
+from avlmaps.core.question import HeardAt, Modality, Part, Question, Role
 from avlmaps.perception.protocols import NamedPixelEncoder
 from avlmaps.query.answer import Alternative, Answer, PartAnswer
 from avlmaps.query.factors import Factor, NearAnchors, NearThings
@@ -51,6 +51,7 @@ class Asked:
         clip: a sound clip, likewise.
         primary: the part that is sought. None: the sentence says it, or the first of object, image, sound, area.
         top: most goals.
+        at: the place of its sounds; None: as the map's settings say.
     """
 
     sentence: str = ""
@@ -61,6 +62,7 @@ class Asked:
     clip: str | None = None
     primary: Modality | None = None
     top: int = 3
+    at: HeardAt | None = None
 
     def __post_init__(self) -> None:
         named = any(part is not None for part in (self.object, self.sound, self.area))
@@ -187,7 +189,7 @@ def _ask(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
     if question is None and asked.parts and not asked.sentence.strip():
         question = Question.of(asked.parts, asked.primary)
     if question is not None:
-        return answer_question(avlmap, question, asked.top, files)
+        return answer_question(avlmap, question.heard_at(asked.at), asked.top, files)
     return _answer_sentence(avlmap, asked, files)
 
 
@@ -205,6 +207,8 @@ def answer_question(avlmap: "Queryable", question: Question, top: int = 3, files
     heats = [avlmap.heat(part, camera, files.attachments) for part in question.parts]
     heat = product(heats)
     goals, found = tuple(heat.goals(top)), heat.found
+    said = (replace(part, at=factor.part.at) for part, factor in zip(question.parts, heat.factors, strict=True))
+    question = Question(tuple(said))
     parts = tuple(_part_answer(*both, heat) for both in zip(question.parts, heat.factors, strict=True))
     alone = () if found or len(heats) == 1 else (_alone(question, heats),)
     text = found_text(question.parts, goals[0]) if found else absent_text(parts, goals, next(iter(alone), None))
@@ -277,7 +281,7 @@ def _answer_read(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
     """Answer the questions that a sentence is read as; the likeliest counts."""
     questions, notes, counted = _questions(asked)
     answers: list[tuple[Question, Answer]] = []
-    for question in questions:
+    for question in (one.heard_at(asked.at) for one in questions):
         if asked.primary is not None:
             question = Question.of(question.parts, asked.primary)
         used = {part.query for part in question.parts if part.is_file}
@@ -288,7 +292,7 @@ def _answer_read(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
             )
         answers.append((question, answer_question(avlmap, question, _MOST_COUNTED if counted else asked.top, files)))
     answers.sort(key=lambda one: (one[1].found, one[1].probability), reverse=True)
-    (question, best), others = answers[0], answers[1:]
+    best, others = answers[0][1], answers[1:]
     alternatives = tuple(Alternative(question, one.probability, one.found, one.goals[:1]) for question, one in others)
     count = sum(goal.probability >= avlmap.settings.found_at for goal in best.goals) if counted else None
     return replace(
@@ -297,7 +301,7 @@ def _answer_read(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
         count=count,
         notes=(*notes, *best.notes),
         alternatives=(*best.alternatives, *alternatives),
-        text=found_text(question.parts, best.goals[0], count) if best.found else best.text,
+        text=found_text([one.part for one in best.parts], best.goals[0], count) if best.found else best.text,
     )
 
 

@@ -6,14 +6,14 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from avlmaps.core.arrays import Float, Float16, Int, Int32, UInt8
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import BackendError, MapError, QueryError
-from avlmaps.core.question import Modality, Part, Question, Role
+from avlmaps.core.question import HeardAt, Modality, Part, Question, Role
 from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder, SurveyedEncoder
 from avlmaps.perception.room_contents import read_room_contents
@@ -390,7 +390,7 @@ class AVLMap:
         encoder = self.stored.encoders.pixels
         return is_open(encoder) or bool(encoder.understood(phrase))
 
-    def sound(self, text: str, primary: bool = False, *, at: Literal["robot", "source"] | None = None) -> Heatmap:
+    def sound(self, text: str, primary: bool = False, *, at: HeardAt | None = None) -> Heatmap:
         """Return the heat of a sound of that name: where the robot was when it heard it, or where it came from.
 
         Args:
@@ -412,9 +412,7 @@ class AVLMap:
         self.stored.require_model(Kind.SOUNDS)
         return self.stored.encoders.sounds.score_words(sound_features(heard), [text])[:, 0]
 
-    def sound_clip(
-        self, clip: str | Path | Sound, primary: bool = False, *, at: Literal["robot", "source"] | None = None
-    ) -> Heatmap:
+    def sound_clip(self, clip: str | Path | Sound, primary: bool = False, *, at: HeardAt | None = None) -> Heatmap:
         """Return the heat of sounds of the same kind as a clip; see ``sound``.
 
         Raises:
@@ -431,9 +429,7 @@ class AVLMap:
             scores = encoder.score_sounds(sound_features(heard), encoder.encode(sound))
         return self._sound_heat(part, scores, at)
 
-    def _sound_heat(
-        self, part: Part, scores: Float[np.ndarray, " sounds"], at: Literal["robot", "source"] | None
-    ) -> Heatmap:
+    def _sound_heat(self, part: Part, scores: Float[np.ndarray, " sounds"], at: HeardAt | None) -> Heatmap:
         settings = self.settings.sounds
         if (at or settings.at) == "source" and len(scores):
             from avlmaps.query.modalities.source import source_factor
@@ -672,14 +668,15 @@ class AVLMap:
             return self.area(part.query, primary)
         if part.modality is Modality.IMAGE:
             return self.image(part.query, intrinsics, primary)
-        return self.sound_clip(part.query, primary) if part.is_file else self.sound(part.query, primary)
+        sound = self.sound_clip if part.is_file else self.sound
+        return sound(part.query, primary, at=part.at)
 
     def _heat_of_attachment(
         self, part: Part, intrinsics: Pinhole | None, attachments: "Mapping[str, Attachment]"
     ) -> Heatmap:
         attached, primary = attachments.get(part.query), part.role is Role.PRIMARY
         if isinstance(attached, Sound) and part.modality is Modality.SOUND:
-            return self.sound_clip(attached, primary)
+            return self.sound_clip(attached, primary, at=part.at)
         if isinstance(attached, np.ndarray | Photo) and part.modality is Modality.IMAGE:
             return self.image(attached, intrinsics, primary)
         what = "photo" if part.modality is Modality.IMAGE else "clip"
@@ -698,6 +695,7 @@ class AVLMap:
         image: str | Path | None = None,
         clip: str | Path | None = None,
         primary: Modality | str | None = None,
+        at: HeardAt | None = None,
     ) -> "Answer":
         """Answer a query with places, as the command line, the server and the viewer do.
 
@@ -715,6 +713,8 @@ class AVLMap:
             image: a photo; with a sentence, what "this photo" in it means.
             clip: a sound clip; with a sentence, what "this recording" in it means.
             primary: which part is sought; the others say where it is.
+            at: the place of a sound: ``robot``, where it was heard, or ``source``, where it came from; by default as
+                ``settings.sounds.at`` says.
 
         Raises:
             AskError: there is nothing to ask, both a sentence and parts, or a file that the sentence does not speak of.
@@ -726,12 +726,12 @@ class AVLMap:
         if isinstance(question, Question):
             if any(part is not None for part in (object, sound, area, image, clip, primary)):
                 raise AskError("A question holds its parts already; give a sentence or parts instead.")
-            return on_storey(answer_question(self, question, top, files), self.storeys)
+            return on_storey(answer_question(self, question.heard_at(at), top, files), self.storeys)
         photo, recording = (None if file is None else str(file) for file in (image, clip))
         sought = None if primary is None else Modality(primary)
         asked = Asked(
             sentence=question, object=object, sound=sound, area=area, image=photo, clip=recording, primary=sought,
-            top=top,
+            top=top, at=at,
         )  # fmt: skip
         return ask(self, asked, files)
 

@@ -8,6 +8,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +16,9 @@ from avlmaps.core.arrays import Bool, Float, Float32, Int
 from avlmaps.core.question import Part, Role
 from avlmaps.query.threads import share
 from avlmaps.query.voxel_space import Space
+
+if TYPE_CHECKING:
+    from avlmaps.maps.sources.density import Spread
 
 # From this probability on a query is found (``QuerySettings.found_at``), and a part of it by itself: an instance, a
 # sound, a view, the place of a photo.
@@ -107,6 +111,11 @@ class Factor(ABC):
     @abstractmethod
     def at(self, points_world: Float[np.ndarray, "m 3"]) -> Float[np.ndarray, " m"]:
         """Return the heat at any points."""
+
+    def spread_of(self, instance: int) -> "Spread | None":
+        """Return how well the place of an instance is known; None where it is known as well as any."""
+        del instance
+        return None
 
     def for_product(self) -> "Factor":
         """Return this factor as it counts in a product with others."""

@@ -22,6 +22,7 @@ from avlmaps.query.factors import Factor, NearAnchors, NearThings, lead_of
 from avlmaps.query.probability import probability_of
 
 if TYPE_CHECKING:
+    from avlmaps.maps.sources.density import Spread
     from avlmaps.query.schema import GoalAnswer
 
 # Two sounds heard at one place are one place to go to.
@@ -46,6 +47,7 @@ class Goal:
         parts: heat of each modality there; a second part of a modality is called ``object_2`` and so on.
         probability: that the goal is right, all parts together.
         name: what is there, for an answer from the lists of a map; ``""`` for others.
+        spread: how well the place is known, where that is less well than usual: the source of a sound.
     """
 
     position: tuple[float, float, float]
@@ -54,6 +56,7 @@ class Goal:
     parts: dict[str, float]
     probability: float = 0.0
     name: str = ""
+    spread: "Spread | None" = None
 
     def to_json(self) -> "GoalAnswer":
         """Return the goal as the command line prints it."""
@@ -66,6 +69,9 @@ class Goal:
         }
         if self.name:
             goal["name"] = self.name
+        if self.spread is not None:
+            goal["within_50_m"] = round(self.spread.within_50_m, 2)
+            goal["within_90_m"] = round(self.spread.within_90_m, 2)
         return goal
 
 
@@ -113,7 +119,7 @@ def share_voxels(
     if isinstance(lead, NearThings) and len(factors) == 1:
         rows = np.flatnonzero(lead.mask)
         instance, heat = lead.instance, np.ones(len(rows))  # an object's own voxels are as hot as can be
-    elif type(lead) is NearAnchors and len(factors) == 1:
+    elif isinstance(lead, NearAnchors) and not lead.regional and len(factors) == 1:
         # The heat of cones is highest at their anchors, which are places as well: no voxel is hotter, or more central.
         rows, instance, heat = np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)
     else:
@@ -216,4 +222,5 @@ def _goal(
         name = str(factor.part.modality)
         again = sum(key.split("_")[0] == name for key in parts)
         parts[f"{name}_{again + 1}" if again else name] = float(factor.at(position[None])[0])
-    return Goal(plain_point(position), min(max(score, 0.0), 1.0), plain_point(size), parts, probability)
+    spread = lead.spread_of(instance)
+    return Goal(plain_point(position), min(max(score, 0.0), 1.0), plain_point(size), parts, probability, spread=spread)

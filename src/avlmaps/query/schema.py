@@ -48,6 +48,10 @@ class GoalAnswer(TypedDict):
     parts: Annotated[dict[str, float], Meta(description="heat of each part there, by modality")]
     probability: Annotated[float, Meta(ge=0.0, le=1.0, description="that it is right, all parts together")]
     name: NotRequired[Annotated[str, Meta(description="what is there, in an answer from the lists of a map")]]
+    within_50_m: NotRequired[
+        Annotated[float, Meta(description="of the source of a sound: radius that holds it with probability 0.5")]
+    ]
+    within_90_m: NotRequired[Annotated[float, Meta(description="with 0.9")]]
     storey: NotRequired[Storey]
     when: NotRequired[
         Annotated[DayAnswer, Meta(description="of a map of several days: when it was last seen, or the change noticed")]
@@ -65,6 +69,7 @@ class PartOutcome(TypedDict):
     understood: Annotated[str, Meta(description="the words that the encoder acts on")]
     note: Annotated[str, Meta(description="why it is not found, or empty")]
     probability: Annotated[float, Meta(ge=0.0, le=1.0, description="that the map holds it")]
+    at: NotRequired[Annotated[str, Meta(description="source: of a sound the place where it came from is meant")]]
 
 
 class AlternativeAnswer(TypedDict):

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 _MAKERS_SHARE = 0.5  # probability that a sound comes from a thing that usually makes it, where there is one
 _AT_THING_M = 0.4
 _MOST_NAMED, _LEAST_NAMED = 3, 0.05
+_BELOW_THE_BEST = 0.999
 
 
 class Listening(Queryable, Protocol):
@@ -54,6 +55,7 @@ class SoundSource:
     Attributes:
         name: what it sounds like.
         confidence: that a sound of it is one, in [0, 1].
+        probability: that this is so and the source lies within ``RIGHT_M`` of the position: that a goal there is right.
         position: likeliest place: the middle of its heights there, metres, recording frame.
         within_50_m: radius on the plan that holds it with a probability of 0.5.
         within_90_m: of 0.9.
@@ -68,6 +70,7 @@ class SoundSource:
 
     name: str
     confidence: float
+    probability: float
     position: tuple[float, float, float]
     within_50_m: float
     within_90_m: float
@@ -84,6 +87,7 @@ class SoundSource:
         return {
             "name": self.name,
             "confidence": round(self.confidence, 3),
+            "probability": round(self.probability, 3),
             "position": [round(value, 3) for value in self.position],
             "within_50_m": round(self.within_50_m, 2),
             "within_90_m": round(self.within_90_m, 2),
@@ -235,13 +239,16 @@ class SourceMap:
         return self.space.world(np.array([*xy, height]))
 
     def anchors(self, joined: Joined) -> tuple[Float[np.ndarray, "a 3"], Float[np.ndarray, " a"]]:
-        """Return the cells of the region that holds a source with 0.9, and how likely each is against the likeliest."""
+        """Return places of a source, with values in (0, 1]: its likeliest place, and the cells of its region of 0.9.
+
+        A cell has how likely it is against the likeliest cell, and a little less than the place, which is a mean.
+        """
         inside = np.flatnonzero(joined.density.region(0.9).ravel())
         share = joined.density.share.ravel()[inside]
-        xy = self.plan.middle_m(inside)
-        height = float(self.space.level(self.position_of(joined)[None])[0, 2])
-        level = np.column_stack([xy, np.full(len(xy), height)])
-        return self.space.world(level), share / share.max()
+        place = self.position_of(joined)
+        xy, height = self.plan.middle_m(inside), float(self.space.level(place)[2])
+        cells = self.space.world(np.column_stack([xy, np.full(len(xy), height)]))
+        return np.concatenate([place[None], cells]), np.append(1.0, _BELOW_THE_BEST * share / share.max())
 
 
 def list_sources(
@@ -302,13 +309,14 @@ class _Places:
     def described(self, known: SourceMap, joined: Joined, kind: str, scores: dict[int, float]) -> SoundSource:
         """Return a source with its region, rooms and things."""
         x, y, z = known.position_of(joined).tolist()
-        density = joined.density
+        density, confidence = joined.density, max(scores[event] for event in joined.events)
         return SoundSource(
             name=kind,
-            confidence=max(scores[event] for event in joined.events),
+            confidence=confidence,
+            probability=confidence * density.spread.right,
             position=(x, y, z),
-            within_50_m=density.within_m(0.5),
-            within_90_m=density.within_m(0.9),
+            within_50_m=density.spread.within_50_m,
+            within_90_m=density.spread.within_90_m,
             area_50_m2=density.area_m2(0.5),
             area_90_m2=density.area_m2(0.9),
             rooms=self._rooms_of(known, joined),

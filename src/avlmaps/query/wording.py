@@ -20,13 +20,13 @@ def in_words(parts: Sequence[Part]) -> str:
 def found_text(parts: Sequence[Part], goal: Goal, count: int | None = None) -> str:
     """Return where the first goal of an answer that is found is, and how many there are for a count."""
     if count is not None:
-        return f"Counted: {count}. The most likely is at {place_of(goal)}, probability {goal.probability:.2f}."
-    return _sentence(f"{in_words(parts)} is most likely at {place_of(goal)}, probability {goal.probability:.2f}")
+        return f"Counted: {count}. The most likely is at {_likely(goal)}."
+    return _sentence(f"{in_words(parts)} is most likely at {_likely(goal)}")
 
 
 def placed(text: str, goal: Goal) -> str:
     """Return a sentence about a goal, with its place and probability."""
-    return _sentence(f"{text} at {place_of(goal)}, probability {goal.probability:.2f}")
+    return _sentence(f"{text} at {_likely(goal)}")
 
 
 def absent_text(parts: Sequence[PartAnswer], goals: Sequence[Goal], alone: Alternative | None) -> str:
@@ -40,17 +40,21 @@ def absent_text(parts: Sequence[PartAnswer], goals: Sequence[Goal], alone: Alter
     lead = next(part for part in parts if part.part.role is Role.PRIMARY)
     missing = [part for part in parts if not part.found]
     if missing:
-        why = " and ".join(f"no {_bare(part.part)} {_is(part.part)} found" for part in missing)
+        why = " and ".join(_not_found(part.part) for part in missing)
     else:
         where = " ".join(_beside(one.part) for one in parts if one is not lead)
-        why = f"no {_bare(lead.part)} {_is(lead.part)} found {where}".rstrip()
+        why = f"{_not_found(lead.part)} {where}".rstrip()
     if alone is not None and alone.goals and lead.found:
-        goal, what = alone.goals[0], f"the best {_bare(lead.part)}"
+        goal, what = alone.goals[0], f"the best {_bare(lead.part)}" if lead.part.at != "source" else "the best guess"
     elif goals:
         goal, what = goals[0], "the best guess"
     else:
         return _sentence(why)
-    return _sentence(f"{why}; {what} is at {place_of(goal)}, probability {goal.probability:.2f}")
+    return _sentence(f"{why}; {what} is at {_likely(goal)}")
+
+
+def _not_found(part: Part) -> str:
+    return f"{_named(part)} is not found" if part.at == "source" else f"no {_bare(part)} {_is(part)} found"
 
 
 def _bare(part: Part) -> str:
@@ -69,6 +73,8 @@ def _is(part: Part) -> str:
 
 
 def _named(part: Part) -> str:
+    if part.at == "source":
+        return f"where {_CLIP if part.is_file else f'the {_bare(part)}'} comes from"
     if part.is_file:
         return _PHOTO if part.modality is Modality.IMAGE else _CLIP
     return f"the {_bare(part)}"
@@ -81,6 +87,14 @@ def _beside(part: Part) -> str:
 def place_of(goal: Goal) -> str:
     """Return the place of a goal in words, metres."""
     return "(" + ", ".join(f"{value:.2f}" for value in goal.position) + ") m"
+
+
+def _likely(goal: Goal) -> str:
+    """Return the place of a goal and its probability; of a source the circles that hold it as well."""
+    known = f"{place_of(goal)}, probability {goal.probability:.2f}"
+    if goal.spread is None:
+        return known
+    return f"{known}: it lies {goal.spread.around('there')}"
 
 
 def _sentence(text: str) -> str:

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, TypeVar
 import msgspec
 from msgspec import Meta, Struct
 
-from avlmaps.core.question import MOST_CHARACTERS
+from avlmaps.core.question import MOST_CHARACTERS, HeardAt
 from avlmaps.serve.errors import RequestError
 
 T = TypeVar("T", bound=Struct)
@@ -75,6 +75,10 @@ class AskQuery(Struct, forbid_unknown_fields=True):
         Meta(description="Which part is sought; the others say where it is. Default: object, image, sound, area."),
     ] = None
     top: Annotated[int, Meta(ge=1, le=100, description="Most goals.")] = 3
+    at: Annotated[
+        HeardAt | None,
+        Meta(description="Place of a sound: robot, where it was heard, or source, where it came from."),
+    ] = None
     intrinsics: Annotated[
         Intrinsics | None,
         Meta(description="fx,fy,cx,cy of the photo's camera in pixels. Default: the map's own camera."),

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from avlmaps.query.avlmap import QuerySettings
+from avlmaps.query.modalities.sound import SoundSettings
 from avlmaps.serve.errors import Privacy
 from avlmaps.serve.lanes import Lane
 from avlmaps.serve.settings import ServeSettings
@@ -56,7 +57,8 @@ class Service:
         """
         settings = settings or ServeSettings()
         limits = settings.limits
-        shelf = Shelf(maps, limits, note, QuerySettings(found_at=settings.found_at), robot, warm)
+        querying = QuerySettings(found_at=settings.found_at, sounds=SoundSettings(at=settings.at))
+        shelf = Shelf(maps, limits, note, querying, robot, warm)
         return cls(
             settings,
             shelf,

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from avlmaps.core.errors import AvlmapsError
 from avlmaps.core.network import is_loopback
+from avlmaps.core.question import HeardAt
 from avlmaps.core.wording import option
 from avlmaps.query.factors import FOUND_AT
 
@@ -64,6 +65,7 @@ class ServeSettings:
         tls_certificate: PEM file of the certificate and its chain; None for plain HTTP.
         tls_key: PEM file of its key.
         found_at: a query is found from this probability of its first goal on.
+        at: the place of a sound, where a request does not say.
         limits: limits of each request.
     """
 
@@ -74,6 +76,7 @@ class ServeSettings:
     tls_certificate: Path | None = None
     tls_key: Path | None = None
     found_at: float = FOUND_AT
+    at: HeardAt = "robot"
     limits: Limits = field(default_factory=Limits)
 
     def __post_init__(self) -> None:

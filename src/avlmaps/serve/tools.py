@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from msgspec import Meta, Struct
 
+from avlmaps.core.question import HeardAt
 from avlmaps.navigate.paths import goals_near
 from avlmaps.query.places import last_seen
 from avlmaps.query.selection import place_given
@@ -42,6 +43,7 @@ class AskToolQuery(AskQuery, forbid_unknown_fields=True):
         Literal["object", "sound", "image", "area"] | None, Meta(description="the part that is sought")
     ] = None
     top: Annotated[int, Meta(ge=1, le=100)] = 3
+    at: Annotated[HeardAt | None, Meta(description="source: where a sound came from, not where it was heard")] = None
     intrinsics: Intrinsics = None
     photo: Annotated[_Base64 | None, Meta(description="base64, for 'this photo'")] = None
     clip: Annotated[_Base64 | None, Meta(description="base64, for 'this recording'")] = None

@@ -232,6 +232,7 @@ def ask_map(task: Task, query: AskQuery) -> Answer:
         image=PHOTO if PHOTO in attachments else None,
         clip=CLIP if CLIP in attachments else None,
         primary=query.primary,
+        at=query.at,
     )
 
 

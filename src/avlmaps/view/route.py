@@ -104,7 +104,7 @@ class Guide:
             LanguageError: the command is not understood.
             NavigationError: there is no room for the robot.
         """
-        translator = LearnedTranslator(Given(photo, clip, self.avlmap.knows))
+        translator = LearnedTranslator(Given(photo, clip, self.avlmap.knows, self.avlmap.settings.sounds.at))
         readings = explanation(translator, command)[:_MOST_READINGS]
         translation = translator.program_for(command)
         readable = Readable(() if folder is None else (folder,))

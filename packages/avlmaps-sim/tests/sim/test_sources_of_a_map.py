@@ -5,13 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from avlmaps.core.errors import MapError, QueryError
+from avlmaps.core.errors import GoalNotFoundError, MapError, QueryError
 from avlmaps.core.poses import rotation_to_level
 from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.build import build_map
 from avlmaps.maps.sources.find import find_sources
 from avlmaps.maps.store.reader import open_stored
-from avlmaps.query.avlmap import AVLMap
+from avlmaps.navigate.instances import things_in
+from avlmaps.query.avlmap import AVLMap, QuerySettings
 from avlmaps.recordings.audio import AudioTrack, Sound
 from avlmaps.recordings.channels import with_microphones, write_channels
 from avlmaps.recordings.microphones import microphones_named
@@ -127,6 +128,23 @@ def test_heat_at_the_source_is_where_the_source_is(mapped: tuple[Path, Path]) ->
     assert np.linalg.norm(hottest[:2] - np.array(best.position[:2])) < 0.8
     same = avlmap.sound(name, primary=True)
     assert np.array_equal(np.asarray(same), np.asarray(avlmap.sound(name, primary=True, at="robot")))
+
+
+def test_an_answer_at_the_source_believes_no_more_than_its_region(mapped: tuple[Path, Path]) -> None:
+    avlmap = AVLMap.open(mapped[1])
+    best = max(avlmap.sources(), key=lambda one: one.probability)
+    (same, *_) = [one for one in avlmap.sources([best.name]) if set(best.events) <= set(one.events)]
+    answers = [avlmap.ask(sound=best.name, at="source"), avlmap.ask(f"the sound of {best.name}", at="source")]
+    for answer in answers:
+        near = min(answer.goals, key=lambda goal: float(np.linalg.norm(np.subtract(goal.position, same.position))))
+        assert near.position == pytest.approx(same.position, abs=1e-3)
+        assert near.probability == pytest.approx(same.probability, abs=2e-3) and near.probability < same.confidence
+        assert near.spread is not None and "comes from" in answer.text
+    assert avlmap.ask(sound=best.name).goals[0].spread is None
+    heat = AVLMap(avlmap.stored, QuerySettings(found_at=1.0)).sound(best.name, primary=True, at="source")
+    with pytest.raises(GoalNotFoundError, match="the source of"):
+        things_in(heat)
+    assert things_in(heat, guess=True)[0].spread is not None
 
 
 def test_priors_of_the_lexicon_can_be_left_out(mapped: tuple[Path, Path]) -> None:

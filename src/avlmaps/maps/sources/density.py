@@ -13,6 +13,8 @@ from avlmaps.core.arrays import Bool, Float, Int
 from avlmaps.maps.sources.candidates import CELL_M
 from avlmaps.maps.sources.settings import SourceSettings
 
+RIGHT_M = 0.5
+"""A goal so near to what it is for is right, level."""
 _MARGIN = 5
 _FAR_M = 1.0  # a place farther off than this is simply wrong
 _BEST, _MOST = 64, 1500  # cells that may be the answer, and that it is compared with
@@ -57,6 +59,25 @@ class Plan:
     def middle_m(self, flat: Int[np.ndarray, " n"]) -> Float[np.ndarray, "n 2"]:
         """Return the middles of cells."""
         return (np.stack(np.unravel_index(flat, self.shape), axis=1) + self.low + 0.5) * CELL_M
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """How well the place of a source is known.
+
+    Attributes:
+        right: probability that the source lies within ``RIGHT_M`` of its likeliest place.
+        within_50_m: radius round that place, level, which holds it with a probability of 0.5.
+        within_90_m: of 0.9.
+    """
+
+    right: float
+    within_50_m: float
+    within_90_m: float
+
+    def around(self, place: str) -> str:
+        """Return in words how near to a place the source lies."""
+        return f"within {self.within_50_m:.2f} m of {place} with 50 %, within {self.within_90_m:.2f} m with 90 %"
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,6 +151,15 @@ class Density:
         order = np.argsort(away, kind="stable")
         total = np.cumsum(self.share.ravel()[held][order])
         return float(away[order][min(int(np.searchsorted(total, probability)), len(order) - 1)])
+
+    @cached_property
+    def spread(self) -> Spread:
+        """How well the place is known; a cell that the circle of ``RIGHT_M`` cuts counts in part."""
+        held = np.flatnonzero(self.share.ravel() > 0.0)
+        away = np.linalg.norm(self.plan.middle_m(held) - self.position_m, axis=1)
+        inside = np.clip((RIGHT_M - away) / CELL_M + 0.5, 0.0, 1.0)
+        right = float((inside * self.share.ravel()[held]).sum())
+        return Spread(min(right, 1.0), self.within_m(0.5), self.within_m(0.9))
 
     def of_candidates(
         self, prior: Float[np.ndarray, " c"], evidence: Float[np.ndarray, " c"]

@@ -9,7 +9,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Float, Float32
 from avlmaps.core.errors import AudioError, QueryError
-from avlmaps.core.question import Part
+from avlmaps.core.question import HeardAt, Part
 from avlmaps.maps.types import HeardSounds
 from avlmaps.query.factors import FOUND_AT, HeatSettings, NearAnchors, stretch_scores
 from avlmaps.query.voxel_space import Space
@@ -25,7 +25,7 @@ class SoundSettings:
 
     normalise: Literal["none", "min-max"] = "none"
     """``none`` takes the encoder's calibrated scores; ``min-max`` stretches them over the heard sounds (the paper)."""
-    at: Literal["robot", "source"] = "robot"
+    at: HeardAt = "robot"
     """Where the heat of a sound is: where the robot was when it heard it (the paper), or where it came from."""
     prior: Literal["lexicon", "none"] = "lexicon"
     """Whether things that usually make a sound count as its source, besides what the microphones say."""

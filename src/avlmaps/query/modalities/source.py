@@ -1,13 +1,67 @@
 """Where a sound came from, as heat."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
 import numpy as np
 
 from avlmaps.core.arrays import Float
-from avlmaps.core.question import Part
+from avlmaps.core.question import Part, Role
+from avlmaps.maps.sources.density import RIGHT_M, Spread
 from avlmaps.query.factors import FOUND_AT, HeatSettings, NearAnchors
 from avlmaps.query.modalities.sound import SoundSettings
-from avlmaps.query.sound_sources import SourceMap
+from avlmaps.query.sound_sources import Joined, SourceMap
 from avlmaps.query.voxel_space import Space
+
+_LEAST = 0.05  # sounds of a lower score are left out
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SourceAnchors(NearAnchors):
+    """Heat of where sounds came from: the anchors of a source are the cells of its region.
+
+    What is sought is right where the sound is one and its source lies so near; as context the sound alone counts.
+
+    Attributes:
+        spreads: for each source, how well its place is known.
+        part: says that the place is the source's.
+    """
+
+    spreads: tuple[Spread, ...]
+    found: bool = field(init=False)
+    note: str = field(init=False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "found", self.first_alone >= FOUND_AT)
+        object.__setattr__(self, "note", "" if self.found else self._absence())
+
+    @cached_property
+    def confidence(self) -> Float[np.ndarray, " i"]:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """Probability that the source of each lies where its heat is highest, within ``RIGHT_M``; 1 of context."""
+        if self.part.role is Role.CONTEXT:
+            return np.ones(len(self.spreads))
+        return np.array([spread.right for spread in self.spreads])
+
+    @property
+    def first_alone(self) -> float:
+        """The best score of a source, times the probability of its place."""
+        return float((self.scores * self.confidence[self.instance]).max(initial=0.0))
+
+    def spread_of(self, instance: int) -> Spread:
+        """Return how well the place of a source is known."""
+        return self.spreads[instance]
+
+    def _absence(self) -> str:
+        best = float(self.scores.max(initial=0.0))
+        if best < FOUND_AT:
+            return f"no detected sound is like {self.part.query!r}; the best score is {best:.2f}"
+        spread = self.spreads[int(self.instance[np.argmax(self.scores * self.confidence[self.instance])])]
+        return (
+            f"it was heard, but its source is only known to lie {spread.around('the best guess')}; a goal is right "
+            f"within {RIGHT_M:g} m"
+        )
 
 
 def source_factor(
@@ -17,8 +71,8 @@ def source_factor(
     part: Part,
     settings: SoundSettings,
     heat: HeatSettings,
-) -> NearAnchors:
-    """Return the heat of where a sound came from: its anchors are the cells of the regions of its sources.
+) -> SourceAnchors:
+    """Return the heat of where a sound came from.
 
     A cell has the source's score times how likely it is against the likeliest cell. Sounds that are one yes together;
     those of a lower score stay by themselves.
@@ -34,18 +88,27 @@ def source_factor(
     order = np.argsort(-scores, kind="stable")
     kind, with_prior = "" if part.is_file else part.query, settings.prior == "lexicon"
     found = sources.sources([i for i in order.tolist() if scores[i] >= FOUND_AT], kind, with_prior)
-    found += [sources.joined([i], kind, with_prior) for i in order.tolist() if 0.05 <= scores[i] < FOUND_AT]
+    found += [sources.joined([i], kind, with_prior) for i in order.tolist() if _LEAST <= scores[i] < FOUND_AT]
+    return anchors_of(space, sources, found, scores, replace(part, at="source"), heat)
+
+
+def anchors_of(
+    space: Space,
+    sources: SourceMap,
+    found: Sequence[Joined],
+    scores: Float[np.ndarray, " sounds"],
+    part: Part,
+    heat: HeatSettings,
+) -> SourceAnchors:
+    """Return the heat of some sources; see ``source_factor``."""
     places, values, which = [np.zeros((0, 3))], [np.zeros(0)], [np.zeros(0, np.int64)]
     for number, one in enumerate(found):
         cells, share = sources.anchors(one)
         places.append(cells)
         values.append(share * max(float(np.clip(scores[i], 0.0, 1.0)) for i in one.events))
         which.append(np.full(len(cells), number))
-    best = float(np.max(scores, initial=0.0))
-    note = ""
-    if best < FOUND_AT:
-        note = f"none of the {len(scores)} detected sounds is like {part.query!r}; the best score is {best:.2f}"
-    return NearAnchors(
-        space, part, heat.falloff_per_m(part.role), np.concatenate(places), np.concatenate(values),
-        np.concatenate(which), best >= FOUND_AT, part.query, note,
+    return SourceAnchors(
+        space=space, part=part, falloff_per_m=heat.falloff_per_m(part.role), anchors=np.concatenate(places),
+        scores=np.concatenate(values), instance=np.concatenate(which), understood=part.query,
+        spreads=tuple(one.density.spread for one in found),
     )  # fmt: skip

@@ -169,7 +169,8 @@ class Dispatcher:
         if program.strip():
             parse_program(program)
             return Translation(program)
-        return LearnedTranslator(Given(knows=now.avlmap.knows)).program_for(words)
+        given = Given(knows=now.avlmap.knows, at=now.avlmap.settings.sounds.at)
+        return LearnedTranslator(given).program_for(words)
 
     @property
     def _settings(self) -> RobotSettings:

@@ -1,0 +1,84 @@
+"""The probability of a goal at the source of a sound: the name's, times that of its place."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from avlmaps.core.question import HeardAt, Modality, Part, Role
+from avlmaps.language.learned_translator import LearnedTranslator
+from avlmaps.language.sentence import Given
+from avlmaps.maps.grid import GridSpec
+from avlmaps.maps.sources.density import Spread
+from avlmaps.query.answer import PartAnswer
+from avlmaps.query.heatmap import Heatmap
+from avlmaps.query.modalities.source import SourceAnchors
+from avlmaps.query.voxel_space import Space
+from avlmaps.query.wording import absent_text, found_text
+
+SPACE = Space(GridSpec(0.1), np.array([[x, y, 0] for x in range(40) for y in range(40)], np.int32), (0.0, 0.0, 1.0))
+UNIT = st.floats(0.0, 1.0)
+AT: tuple[HeardAt, HeardAt] = ("robot", "source")
+
+
+def heat_of(scores: list[float], spreads: list[Spread], role: Role = Role.PRIMARY, found_at: float = 0.5) -> Heatmap:
+    """Return the heat of sources two metres apart."""
+    anchors = np.array([[0.5 + 2.0 * number, 2.0, 0.4] for number in range(len(scores))])
+    factor = SourceAnchors(
+        space=SPACE, part=Part(Modality.SOUND, "smoke alarm", role, at="source"), falloff_per_m=2.0, anchors=anchors,
+        scores=np.array(scores), instance=np.arange(len(scores)), understood="smoke alarm", spreads=tuple(spreads),
+    )  # fmt: skip
+    return Heatmap.of(factor, found_at)
+
+
+@given(UNIT, UNIT, UNIT)
+def test_a_goal_is_as_likely_as_its_name_and_its_place(score: float, right: float, other: float) -> None:
+    one = heat_of([score], [Spread(right, 0.3, 0.9)])
+    assert one.probability == pytest.approx(score * right, abs=2e-3) and one.probability <= score + 1e-3
+    assert heat_of([score], [Spread(1.0, 0.0, 0.0)]).probability == pytest.approx(score, abs=1e-3)
+    low, high = sorted((right, other))
+    wide, narrow = (heat_of([score], [Spread(share, 0.3, 0.9)]) for share in (low, high))
+    assert wide.probability <= narrow.probability
+
+
+@given(st.lists(st.tuples(UNIT, UNIT), min_size=2, max_size=2))
+def test_of_two_sources_the_likelier_goal_leads(two: list[tuple[float, float]]) -> None:
+    heat = heat_of([score for score, _ in two], [Spread(right, 0.3, 0.9) for _, right in two])
+    probabilities = [goal.probability for goal in heat.goals()]
+    assert probabilities == sorted(probabilities, reverse=True)
+    assert heat.lead.first_alone == pytest.approx(max(score * right for score, right in two))
+
+
+def test_as_context_a_sound_counts_by_its_name_alone() -> None:
+    heat = heat_of([0.9], [Spread(0.2, 0.8, 2.0)], Role.CONTEXT)
+    assert heat.lead.confidence.tolist() == [1.0] and heat.lead.found
+
+
+def test_a_wide_region_is_not_found_and_said() -> None:
+    heat = heat_of([0.93], [Spread(0.4, 0.66, 2.1)])
+    (goal,) = heat.goals()
+    assert not heat.found and not heat.lead.found and "0.66 m" in heat.lead.note
+    part = PartAnswer(heat.lead.part, 0.93, False, "smoke alarm", heat.lead.note)
+    said = absent_text([part], [goal], None)
+    assert said.startswith("Where the sound of smoke alarm comes from is not found")
+    assert "within 0.66 m" in said and "within 2.10 m" in said
+    assert goal.to_json()["within_50_m"] == 0.66 and goal.to_json()["within_90_m"] == 2.1  # pyright: ignore
+    assert part.to_dict()["at"] == "source"  # pyright: ignore[reportTypedDictNotRequiredAccess]
+
+
+def test_a_goal_at_a_source_says_where_the_sound_comes_from() -> None:
+    heat = heat_of([0.9], [Spread(0.9, 0.2, 0.5)])
+    said = found_text([heat.lead.part], heat.goals()[0])
+    assert said.startswith("Where the sound of smoke alarm comes from is most likely at (0.50, 2.00, 0.40) m")
+    assert "probability 0.81" in said and "within 0.20 m" in said
+    chair = Part(Modality.OBJECT, "chair", Role.PRIMARY)
+    context = Part(Modality.SOUND, "barking", at="source")
+    assert "near where the sound of barking comes from" in found_text([chair, context], heat.goals()[0])
+
+
+def test_a_plan_says_where_a_sound_comes_from_where_that_is_meant() -> None:
+    said = [LearnedTranslator(Given(at=at)).program_for("go to where the smoke alarm is heard").plan for at in AT]
+    assert said == [
+        "I will go to where smoke alarm was heard.",
+        "I will go to where the sound of smoke alarm comes from.",
+    ]
