@@ -1,7 +1,7 @@
 """The compiled loops behind what is no surface: flying pixels of a depth picture, voxels seen through, smears."""
 
 import numpy as np
-from jaxtyping import Bool, Float32, Float64, Int32, Int64, Shaped, UInt16
+from jaxtyping import Bool, Float32, Int32, Int64, Shaped, UInt16
 from numba import njit
 
 from avlmaps.core.kernel_types import Real, Whole
@@ -96,57 +96,6 @@ def clear_blocks(
                     free = (z - clear_sigmas * (noise[0] + noise[1] * z * z)) * CLEAR_UNITS_PER_M if z > 0.0 else 0.0
                     least = min(least, free)
             out[i, j] = np.uint16(max(least, 0.0))
-
-
-@njit(**OPTIONS)
-def count_through(
-    index: Int32[np.ndarray, "n 3"],
-    voxel_size: Real,
-    clear: UInt16[np.ndarray, "rows columns"],
-    size: Whole,
-    camera: tuple[float, float, float, float, float, float],
-    pose: Float64[np.ndarray, "4 4"],
-    through: Int32[np.ndarray, " n"],
-):
-    """Add 1 to each voxel that a view sees through: all rays that may meet it continue for a voxel's edge behind it.
-
-    Args:
-        index: (n, 3) int32.
-        voxel_size: metres.
-        clear: (rows, columns) uint16, millimetres, as `clear_blocks` wrote it.
-        size: edge of a block, pixels.
-        camera: (fx, fy, cx, cy, width, height).
-        pose: (4, 4) world_from_camera.
-        through: (n,) int32, added to.
-    """
-    fx, fy, cx, cy, width, height = camera
-    radius = 0.5 * np.sqrt(3.0) * voxel_size
-    behind = radius + voxel_size
-    for n in range(index.shape[0]):
-        x = (index[n, 0] + 0.5) * voxel_size - pose[0, 3]
-        y = (index[n, 1] + 0.5) * voxel_size - pose[1, 3]
-        z = (index[n, 2] + 0.5) * voxel_size - pose[2, 3]
-        depth = pose[0, 2] * x + pose[1, 2] * y + pose[2, 2] * z
-        if depth <= 2.0 * radius:
-            continue
-        right = pose[0, 0] * x + pose[1, 0] * y + pose[2, 0] * z
-        down = pose[0, 1] * x + pose[1, 1] * y + pose[2, 1] * z
-        a, b = right / depth, down / depth
-        u, v = fx * a + cx, fy * b + cy
-        # a rectangle that holds the picture of the sphere round the voxel
-        wide = fx * radius * (1.0 + abs(a)) / (depth - radius)
-        high = fy * radius * (1.0 + abs(b)) / (depth - radius)
-        if u - wide < 0.0 or v - high < 0.0 or u + wide >= width or v + high >= height:
-            continue
-        far = np.int64((depth + behind) * 1000.0) + 1
-        if clear[np.int64(v) // size, np.int64(u) // size] < far:
-            continue
-        free = True
-        for i in range(np.int64(v - high) // size, np.int64(v + high) // size + 1):
-            for j in range(np.int64(u - wide) // size, np.int64(u + wide) // size + 1):
-                free = free and clear[i, j] >= far
-        if free:
-            through[n] += 1
 
 
 @njit(**OPTIONS)

@@ -18,12 +18,14 @@ from avlmaps.maps.fusion import carving_kernels
 from avlmaps.maps.fusion.carving_kernels import clear_blocks
 from avlmaps.maps.fusion.measure_kernels import SHARP_UNITS
 from avlmaps.maps.fusion.sensor import SensorModel
+from avlmaps.maps.fusion.through_kernels import chunks_of, count_frames
 from avlmaps.maps.fusion.voxel_kernels import rehash
 from avlmaps.maps.fusion.voxel_sums import Evidence
 from avlmaps.maps.grid import GridSpec
 from avlmaps.recordings.types import Frame
 
 BLOCKS_WIDE = 80
+_BATCH_FRAMES = 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,18 +162,18 @@ def count_through(
         camera: of the frames.
         parts: the frames' free views.
     """
-    through = np.zeros(len(index), np.int32)
     intrinsics = (float(camera.fx), float(camera.fy), float(camera.cx), float(camera.cy), camera.width, camera.height)
-    index = np.ascontiguousarray(index)
-
-    def every():
-        for part in parts:
-            for clear, pose in zip(part.clear_mm, part.clear_pose, strict=True):
-                yield np.array(clear), np.array(pose)
-
-    for clear, pose in progress(every(), "carving", total=sum(map(len, parts))):
-        carving_kernels.count_through(index, grid.voxel_size_m, clear, block_size(camera), intrinsics, pose, through)
-    return through
+    chunks = chunks_of(np.ascontiguousarray(index, np.int32))
+    through = np.zeros(len(index), np.int32)  # in the order of the chunks
+    batches = [
+        (part, slice(first, first + _BATCH_FRAMES)) for part in parts for first in range(0, len(part), _BATCH_FRAMES)
+    ]
+    for part, some in progress(batches, "carving", total=len(batches)):
+        clear, pose = np.array(part.clear_mm[some]), np.array(part.clear_pose[some], np.float64)
+        count_frames(chunks, grid.voxel_size_m, clear, block_size(camera), intrinsics, pose, through)
+    counts = np.empty_like(through)
+    counts[chunks[0]] = through
+    return counts
 
 
 _Count = Callable[[Int32[np.ndarray, "n 3"]], Int32[np.ndarray, " n"]]
