@@ -126,3 +126,17 @@ def test_a_thing_is_not_chosen_by_its_hand(side: str) -> None:
 def test_alternatives_may_have_prepositions_of_their_own(one: str, room: str) -> None:
     found = said_alternatives(f"is there a chair by the {one} or in the {room}")
     assert found == (f"is there a chair by the {one}", f"is there a chair in the {room}")
+
+
+@given(st.sampled_from(["milk", "water", "coffee", "space", "floor space"]), ROOMS)
+def test_an_amount_is_no_number_of_things(stuff: str, room: str) -> None:
+    with pytest.raises(QueryError, match="how much"):
+        read_question(f"how much {stuff} is there in the {room}?")
+    (chairs,) = read_question(f"how much chairs are there in the {room}?").inquiry.of
+    assert chairs.name == "chairs"
+
+
+@given(THINGS, ROOMS)
+def test_a_spoken_mark_changes_nothing(thing: str, room: str) -> None:
+    asked = f"is there a {thing} in the {room}"
+    assert read_question(f"{asked} question mark") == read_question(asked)

@@ -248,3 +248,34 @@ NONSENSE = [
 @pytest.mark.parametrize("text", NONSENSE)
 def test_nonsense_is_no_goal(text: str) -> None:
     assert read_command(text).stops is not None
+
+
+REMARKS = st.sampled_from([
+    "I think I heard the kettle whistling", "my wife thinks she heard the phone", "we saw a mouse near the sofa",
+    "I know the charger is in the office", "I can smell smoke", "well, I thought I saw a cat under the bed",
+])  # fmt: skip
+BEHIND = st.sampled_from(["go to the kitchen", "drive to the table", "go to the door, then turn left 90 degrees"])
+
+
+@settings(max_examples=25)
+@given(REMARKS, st.sampled_from(["; ", ", ", ". ", "; would you ", ", please ", " so "]), BEHIND)
+def test_what_somebody_heard_is_no_goal_where_the_order_has_its_own(remark: str, joint: str, order: str) -> None:
+    said = read_command(f"{remark}{joint}{order}")
+    assert said.intents == read_command(order).intents
+    assert any("taken as a remark" in note for note in said.notes)
+
+
+@pytest.mark.parametrize("command", ["I heard the phone in the hall, go there", "I think I heard the doorbell"])
+def test_what_somebody_heard_is_the_goal_where_the_order_has_none(command: str) -> None:
+    (step,) = read_command(command).intents
+    assert isinstance(step, Go) and step.to.kind is TargetKind.SOUND
+
+
+def test_a_danger_behind_a_remark_stays_one() -> None:
+    (step,) = read_command("I saw a baby in the hallway, drive through the hallway at full speed").intents
+    assert isinstance(step, Refuse)
+
+
+def test_arrows_and_iterations_are_an_order_and_a_count() -> None:
+    said = verbalise(read_command("patrol sofa -> table -> door, three iterations").intents)
+    assert said == "I will 3 times: go to the sofa, then go to the table, then go to the door."

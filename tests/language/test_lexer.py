@@ -19,6 +19,10 @@ from avlmaps.language.lexer import duration_at, length_at, tokenise
         ("2 metres 3 times", 2.0),
         ("1 metre. 20 degrees", 1.0),
         ("four feet six inches", 1.3716),
+        ("six foot three", 1.905),
+        ("six feet 3 times", 1.8288),
+        ("one metre and twenty", 1.2),
+        ("one metre and twenty chairs", 1.0),
     ],
 )
 def test_a_length_is_read_whole(said: str, metres: float) -> None:

@@ -37,11 +37,19 @@ READ = {
     "what rooms do u have": (Listed.NAMES, "rooms", False),
     "what's the smallest room we have got": (Listed.ROOM_BY_SIZE, "", True),
     "whats the last thing u heard": (Listed.SOUND_BY_TIME, "", False),
+    "Identify the room in which the printer is located.": (Listed.ROOM_OF, "the printer", False),
+    "the room where the piano stands": (Listed.ROOM_OF, "the piano", False),
+    "list all acoustic events in temporal order": (Listed.NAMES, "sounds", False),
+    "list the sounds in chronological order": (Listed.NAMES, "sounds", False),
+    "enumerate region labels": (Listed.NAMES, "rooms", False),
+    "what areas are there": (Listed.NAMES, "rooms", False),
+    "what was the first sound you you heard today": (Listed.SOUND_BY_TIME, "", True),
+    "which room is the biggest question mark": (Listed.ROOM_BY_SIZE, "", False),
 }
 OTHER = [
     "the chair near the sofa", "bed", "where is the kitchen", "what is in the fridge?", "how many chairs are there",
     "where can I sit?", "the sound of a dog", "what is near this photo", "the room near the sound of water",
-    "all objects within 3 m of the desk",
+    "all objects within 3 m of the desk", "the room that has the sofa", "what is the state of the lamp",
     "the biggest chair", "is there a sofa in the kitchen?", "what is the color of the sofa",
 ]  # fmt: skip
 

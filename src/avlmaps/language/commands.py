@@ -26,6 +26,7 @@ from avlmaps.language.learned.name_resolver import EXAMPLE, REFUSALS, NameResolv
 from avlmaps.language.learned.parts import by_parts
 from avlmaps.language.learned.reader import LearnedReader, learned_reader
 from avlmaps.language.lexer import Token, tokenise
+from avlmaps.language.rephrase import behind_remark
 from avlmaps.language.sentence import Given, Sentence
 from avlmaps.language.storey_words import SaidStorey, said_storeys
 from avlmaps.language.word_classes import load_word_classes
@@ -85,6 +86,11 @@ def read_command(text: str, given: Given | None = None) -> Command:
     if stop is not None:
         stop = Refuse(stop.reason, REFUSALS[stop.reason]) if isinstance(stop, Refuse) else stop
         return Command((stop,), (), (), "words")
+    order = behind_remark(sentence.tokens)
+    if order is not None:
+        said = read_command(text[order:], given)
+        remark = f"'{text[:order].strip(' ,;.:')}' is taken as a remark: it is not where to go."
+        return replace(said, notes=(remark, *said.notes))
     storeys = said_storeys(text)
     if storeys:
         named = _on_storey(text, storeys, given)

@@ -42,6 +42,7 @@ _TOKEN = re.compile(
     """,
     re.IGNORECASE | re.VERBOSE,
 )
+_SPOKEN_END = re.compile(r"(?<=\w)[ ,]+(?:question mark|exclamation (?:mark|point))[ .?!]*$", re.IGNORECASE)
 _CLITICS = {"'m": "am", "'re": "are", "'ve": "have", "'ll": "will", "'d": "would", "'s": "'s"}
 _WHOLE = {
     "let's": "let us", "can't": "can not", "cannot": "can not", "won't": "will not", "shan't": "shall not",
@@ -77,6 +78,7 @@ LENGTHS = {
     "yd": 0.9144, "yard": 0.9144, "in": 0.0254, "inch": 0.0254, "inche": 0.0254, "step": 0.5, "pace": 0.5, "km": 1000.0,
     "kilometre": 1000.0, "kilometer": 1000.0, "mile": 1609.344, "decimetre": 0.1, "decimeter": 0.1, "tile": 0.5,
 }  # fmt: skip
+_FOOT = LENGTHS["foot"]
 _ANGLES = {"degree": 1.0, "deg": 1.0, "°": 1.0, "radian": degrees(1.0), "rad": degrees(1.0)}
 _TIMES = {"second": 1.0, "sec": 1.0, "s": 1.0, "minute": 60.0, "min": 60.0, "moment": 2.0, "hour": 3600.0}
 _SIZES = frozenset({
@@ -106,7 +108,7 @@ class Token:
 
 def tokenise(sentence: str) -> list[Token]:
     """Return the tokens of a sentence, in their order."""
-    plain = normalize("NFC", sentence).translate(_CHARACTERS)
+    plain = without_spoken_end(normalize("NFC", sentence).translate(_CHARACTERS))
     tokens: list[Token] = []
     for found in _TOKEN.finditer(plain):
         kind, raw = found.lastgroup or "punct", found[0]
@@ -131,6 +133,11 @@ def tokenise(sentence: str) -> list[Token]:
             text = {"@": "at", "->": ">", "=>": ">", "\n": "."}.get(raw, "." if raw.startswith(".") else raw.lower())
             tokens.append(Token("o'clock" if kind == "clock" else text, raw, word, found.start(), found.end()))
     return tokens
+
+
+def without_spoken_end(text: str) -> str:
+    """Return a text without the name of the mark that ends it, as dictation has it: "the sofa question mark"."""
+    return _SPOKEN_END.sub("", text)
 
 
 _BEFORE_NOUNS = frozenset({"the", "a", "this", "that", "my", "our", "your", "each", "every", "which", "nearest"})
@@ -257,13 +264,17 @@ def amounts_at(tokens: list[Token], i: int, units: dict[str, float]) -> list[tup
 def _and_smaller(
     tokens: list[Token], at: int, amount: float, unit: float, units: dict[str, float]
 ) -> list[tuple[int, float]]:
-    """Return an amount with a second one in a smaller unit: "four feet six inches", "1 min 30", "one metre twenty"."""
+    """Return an amount with a smaller one: "four feet six inches", "1 min 30", "a metre [and] twenty", "six foot 3"."""
     joined = at < len(tokens) and tokens[at].text == "and"
     at += joined
     for end, value in number_at(tokens, at):
         bare = end >= len(tokens) or not (is_unit(tokens, end) or tokens[end].text in _COUNTED)
         parts = 100 if units is LENGTHS and unit == 1.0 else 60 if units is _TIMES and unit == 60.0 else 0
-        if bare and not joined and 10 <= value < parts and value == int(value):
+        ends = end >= len(tokens) or tokens[end].kind == "punct"
+        inches = units is LENGTHS and unit == _FOOT and not joined and 1 <= value < 12
+        if bare and inches and value == int(value):
+            return [(end, round(amount + value * unit / 12, 4))]
+        if bare and (ends or not joined) and 10 <= value < parts and value == int(value):
             return [(end, round(amount + value * unit / parts, 4))]
         smaller = _unit(tokens, end, units) if end < len(tokens) else None
         if smaller is not None and smaller < unit:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.language.lexer import without_spoken_end
 from avlmaps.language.names import mended
 
 NUMBERS = {
@@ -59,12 +60,14 @@ class ListQuestion:
 
 _POLITE = re.compile(
     r"^(?:(?:please|hey|hi|hello|robot|so|and|okay|ok|can you|could you|would you|will you|tell me|show me|give me|"
-    r"let me know|i want to know|i would like to know|do you know|i wonder|say|name|(?:(?:a |the )?list of|list)|find)"
+    r"let me know|i want to know|i would like to know|do you know|i wonder|say|name|(?:(?:a |the )?list of|list)|find|"
+    r"identify|determine|enumerate|print|return|output|report|state(?! of)|get)"
     r"\b[ ,]*)+"
 )
 _POLITE_END = re.compile(
     r"(?:[ ,]+(?:please|thanks|thank you|for me|then|now|right now|just now|at the moment|these days|nowadays|"
-    r"at present|currently|robot))+$"
+    r"at present|currently|robot|today|so far|up to now|full stop|period|"
+    r"(?:in|by|sorted by|ordered by) (?:temporal |chronological |the )?(?:time|order|onset)(?: of time)?))+$"
 )
 _ARTICLE = r"(?:(?:the|a|an|my|our|this|that) )?"
 _BUILDING = (
@@ -84,7 +87,10 @@ _NEXT = (
 )
 _THERE = r"(?: (?:there|standing|stands|lying|lies|located|found|to be found|to see|kept|placed))?"
 _ALL = r"everything|all(?: the)? (?:things|objects)|the (?:things|objects|contents)"
-_LISTS = r"(?P<names>rooms|sounds|sound events|noises|things|objects)"
+_LISTS = (
+    r"(?:detected |recorded |heard |mapped |known |recognised |recognized )?(?P<names>(?:rooms|regions|areas|zones|"
+    r"(?:room|region) (?:names|labels)|sounds|(?:sound|acoustic|audio|auditory) events|noises|things|objects))"
+)
 _WHOLE = r"(?:the|this|our|my) (?:house|home|flat|apartment|building|office|place|map) have"
 _KNOWN = (
     r"(?: (?:are|were|did|does|do|have|has)(?: there| you hear| heard| recorded| it have| "
@@ -130,6 +136,11 @@ _PATTERNS: tuple[tuple[Listed, str], ...] = (
         r"(?P<words>.+?)(?: (?:in|from|of|at|taken in|taken from|taken|shot in|standing in|located in))?",
     ),
     (Listed.ROOM_OF, r"(?:which|what) room (?:does|do|did) (?P<words>.+?) (?:come from|stand in|show|belong to)"),
+    (
+        Listed.ROOM_OF,
+        r"(?:the )?room (?:in which|where|that|which) (?!(?:has|holds|contains|is|was) )(?P<words>.+?) "
+        r"(?:is|was|stands|lies|sits)(?: (?:in|located|standing|kept|placed|found|to be found))?",
+    ),
     (Listed.ROOM_OF, rf"(?:which|what) room (?:has|holds|contains) {_NOT_ONE}(?P<words>.+)"),
     (Listed.NAMES, rf"(?:what|which) {_LISTS}{_KNOWN}{_BUILDING}"),
     (Listed.NAMES, rf"(?:all )?(?:the |all the )?{_LISTS}{_BUILDING}{_HEARD}"),
@@ -139,6 +150,10 @@ _PATTERNS: tuple[tuple[Listed, str], ...] = (
         rf"(?P<counts>how many|(?:the )?number of) (?:the )?(?:different |separate )?{_LISTS}{_KNOWN}{_BUILDING}",
     ),
 )
+_SAME = {
+    "noises": "sounds", "sound": "sounds", "acoustic": "sounds", "audio": "sounds", "auditory": "sounds",
+    "objects": "things", "regions": "rooms", "areas": "rooms", "zones": "rooms", "room": "rooms", "region": "rooms",
+}  # fmt: skip
 _COMPILED = tuple((of, re.compile(pattern)) for of, pattern in _PATTERNS)
 _TAIL = re.compile(r"\b(?:in|near|next to|beside|by|on|at|close to|behind|under|around|between|inside|with)\b.*")
 _WHERE = re.compile(
@@ -173,7 +188,7 @@ def read_list(text: str) -> ListQuestion | None:
             continue
         names = said.get("names") or (f"{said['one']}s" if said.get("one") else "")
         name = said.get("room") or said.get("thing") or said.get("words") or said.get("seen") or names
-        name = {"noises": "sounds", "sound events": "sounds", "objects": "things"}.get(name, name)
+        name = _SAME.get(name.split()[0], name) if of is Listed.NAMES else name
         since = f"{said.get('visit') or ''}{said.get('date') or ''}"
         change = next((one for one, words in _CHANGED.items() if re.fullmatch(words, said.get("change") or "")), "")
         return ListQuestion(of, name, bool(said.get("first")), bool(said.get("counts")), since, change)
@@ -220,7 +235,8 @@ def speaks_of_photo(words: str) -> bool:
 
 def _plain(text: str) -> str:
     words = " ".join(re.sub(r"[^\w' ,./-]", " ", text.casefold()).split()).strip(" .,")
-    words = re.sub(r"\b(?:u|ya|ur|r)\b(?!')", lambda found: _TYPED[found[0]], words)
+    words = re.sub(r"\b(?:u|ya|ur|r)\b(?!')", lambda found: _TYPED[found[0]], without_spoken_end(words))
+    words = re.sub(r"\b(\w+)(?: \1)+\b", r"\1", words)  # a word said twice: "the the"
     words = re.sub(r"^(.*\b(?:what|where|which|room|sound|noise))(?:'s|s(?= (?:the|in|next|near|beside|by|around)\b)) ",
-                   r"\1 is ", _POLITE.sub("", words))  # fmt: skip
+                   r"\1 is ", _POLITE_END.sub("", _POLITE.sub("", words)))  # fmt: skip
     return _POLITE_END.sub("", words.strip(" .,")).strip(" .,")

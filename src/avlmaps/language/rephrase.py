@@ -14,6 +14,7 @@ from functools import cache
 
 from avlmaps.language import lexer
 from avlmaps.language.lexer import Token
+from avlmaps.language.names import is_entry
 from avlmaps.language.word_classes import load_word_classes
 
 _ROBOTS = frozenset({"robot", "bot", "machine", "rover", "droid", "vehicle", "unit", "roomba", "turtlebot", "agent"})
@@ -72,6 +73,18 @@ _GENERIC = (
     | _SOUNDS
 )
 _CUTS = frozenset({"then", "finally"})
+# Who says what they heard, saw or think, and how: "I think I heard the kettle; go to the kitchen".
+_SPEAKERS = frozenset({"i", "we", "he", "she", "they", "someone", "somebody", "everyone", "everybody"})
+_REMARKS = frozenset({
+    "think", "thought", "believe", "believed", "reckon", "guess", "suppose", "swear", "know", "knew", "remember",
+    "heard", "hear", "hearing", "saw", "see", "seen", "seeing", "smell", "smelled", "smelt", "notice", "noticed",
+    "spotted", "felt", "feel", "fear", "bet",
+})  # fmt: skip
+_FAR = 4  # words from who speaks to what they do: "my wife must have heard"
+_POINTING = frozenset({
+    "it", "there", "that", "this", "these", "those", "them", "him", "her", "one", "its", "where", "same",
+})  # fmt: skip
+_ASKED_FOR = _BEFORE | {"can", "could", "would", "will", "so", "kindly", "robot", "maybe", "perhaps", "dear", ","}
 
 
 def rephrased(tokens: Sequence[Token]) -> tuple[list[Token], list[str]]:
@@ -82,6 +95,28 @@ def rephrased(tokens: Sequence[Token]) -> tuple[list[Token], list[str]]:
     return _waiting_first(found, notes), notes
 
 
+def behind_remark(tokens: Sequence[Token]) -> int | None:
+    """Return where the order begins, in characters, behind what a person heard, saw or thinks; None without both.
+
+    What somebody heard is where to go only where the order names no place of its own: "I heard the phone, go there".
+    """
+    begin = next((at for at, token in enumerate(tokens) if token.text not in _BEFORE | {"well", ",", "robot"}), 0)
+    if begin >= len(tokens) or tokens[begin].text not in _SPEAKERS:
+        begin = begin + 1 if [token.text for token in tokens[begin : begin + 1]] == ["my"] else len(tokens)
+    told = next((at for at in range(begin, min(begin + _FAR, len(tokens))) if tokens[at].text in _REMARKS), None)
+    if told is None:
+        return None
+    for at in range(told + 1, len(tokens)):
+        if tokens[at].kind != "punct" and tokens[at].text != "so":
+            continue
+        first = next((i for i in range(at + 1, len(tokens)) if tokens[i].text not in _ASKED_FOR), len(tokens))
+        rest = [token.text for token in tokens[first:]]
+        if rest[:1] and rest[0] in _orders():
+            own = _POINTING.isdisjoint(rest) and any(map(is_entry, rest))
+            return tokens[first].start if own else None
+    return None
+
+
 def _joined(tokens: Sequence[Token]) -> list[Token]:
     """Return tokens with "counter clockwise" as one word, "sleep(5)" as a wait, and "right 0.5 turn" in degrees."""
     found: list[Token] = []
@@ -89,6 +124,8 @@ def _joined(tokens: Sequence[Token]) -> list[Token]:
         if token.text in _ROUNDS and len(found) > 1 and "." in found[-1].text and found[-2].text in _TURNED:
             found[-1] = _word(found[-1], f"{360 * float(found[-1].text):g}", "number")
             token = _word(token, "degrees")
+        if token.raw in ("->", "=>"):  # "sofa -> table": one after the other
+            token = _word(token, ",", "punct")
         if token.text == "wise" and found and found[-1].text == "clock":
             token = _word(found.pop(), "clockwise")
         if token.text == "clockwise" and found and found[-1].text in ("counter", "anti"):

@@ -5,7 +5,9 @@ it. The words between the names say what of them. Those that no question to a ma
 """
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 
+from avlmaps.core.inflection import singulars_of
 from avlmaps.core.lexicon import Kind as Entries
 from avlmaps.core.lexicon import lexicon
 from avlmaps.language import lexer
@@ -44,7 +46,7 @@ _NUMBERED = frozenset({"pair", "floor", "storey", "story", "level", "hand"})
 
 def unanswerable(said: Claimed, inquiry: Inquiry) -> str | None:
     """Return the refusal for a question about what a map does not hold; None where it holds it."""
-    rules = (_compared, _quantity, _not_placed, _unserved, _soundless, _past, _either, _unsought, _done)
+    rules = (_measured, _compared, _quantity, _not_placed, _unserved, _soundless, _past, _either, _unsought, _done)
     for rule in rules:
         phrase = rule(said, inquiry)
         if phrase is not None:
@@ -83,6 +85,15 @@ def _is_asked_for(said: Claimed, at: int) -> bool:
     """Return whether a clause belongs to a "where" or a "how many": "where, I wonder, might the pool be?"."""
     begin = next((i + 1 for i in range(at - 1, -1, -1) if said.texts[i] in _ENDS), 0)
     return not _ASKS.isdisjoint(said.texts[begin:at])
+
+
+def _measured(said: Claimed, inquiry: Inquiry) -> str | None:
+    """Return the words for an amount, which is no number of things: "how much milk", and no "how much chairs"."""
+    for at, pair in enumerate(pairwise(said.texts)):
+        noun = said.texts[at + 2] if at + 2 in said.used else ""
+        if inquiry.ask is Ask.HOW_MANY and pair == ("how", "much") and not singulars_of(noun):
+            return f"how much {noun}".strip()
+    return None
 
 
 def _compared(said: Claimed, inquiry: Inquiry) -> str | None:
@@ -193,7 +204,7 @@ def _done(said: Claimed, _: Inquiry) -> str | None:
     """Return the words for what is to be done with the thing that is sought: "anything to read"."""
     for at, text in enumerate(said.texts[:-1]):
         whatever = said.texts[max(0, at - 1) : at]
-        if text == "to" and at + 1 in said.used and set(whatever) & {"anything", "something", "nothing", "stuff"}:
+        if text == "to" and said.texts[at + 1] not in _FINDS and set(whatever) & _WHATEVER:
             return " ".join(said.texts[at - 1 : at + 2])
     return None
 
@@ -206,6 +217,7 @@ def _who_may(said: Claimed, body: Sequence[int], _: Inquiry) -> str | None:
     return None
 
 
+_WHATEVER = frozenset({"anything", "something", "nothing", "stuff"})
 _TAKEN = frozenset({"taken", "took", "shot", "captured"})
 _PETS = frozenset({"dog", "dogs", "cat", "cats", "pet", "pets", "puppy", "kitten", "horse", "rabbit"})
 
