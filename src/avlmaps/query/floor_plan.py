@@ -22,6 +22,7 @@ _GAP_M = 1.2  # unseen floor up to this width lies between seen floor
 # Share of a cell's mass that one step of the walk moves to each neighbour; it adds 2 x 0.24 cells² of variance an axis.
 _TO_NEIGHBOUR = 0.24
 _MOST_CELLS = 4_000_000
+_RINGS_CELLS = 8  # how far about a cell an open one is sought cell by cell; a tree finds those farther away
 _CHUNK = 1 << 17  # voxels, or shares of cells, that are worked on at once: they stay in the processor's cache
 
 
@@ -97,7 +98,7 @@ class FloorPlan:
         storey = self.storeys.of(level[:, 2])
         cell = np.floor((level[:, :2] - self.origin_m) / CELL_M)
         i, j = (np.clip(cell, 0, np.array(self.wall.shape[1:]) - 1)).astype(np.int64).T
-        return self._open[np.ravel_multi_index((storey, i, j), self.wall.shape)]
+        return self._nearest_open(np.ravel_multi_index((storey, i, j), self.wall.shape))
 
     def storeys_of(self, points_world: Float[np.ndarray, "m 3"]) -> Int[np.ndarray, " m"]:
         """Return the storey of each point, counted from 0, the lowest."""
@@ -106,7 +107,11 @@ class FloorPlan:
     @cached_property
     def voxel_cells(self) -> Int[np.ndarray, " n"]:
         """The open cell nearest to each voxel of the map; see ``cells_of``."""
-        return self._open[self.voxel_cell]
+        nearest = np.zeros(len(self), np.int64)
+        nearest[self.voxel_cell] = 1
+        held = np.flatnonzero(nearest)
+        nearest[held] = self._nearest_open(held)
+        return nearest[self.voxel_cell]
 
     def nearest(self, points_world: Float[np.ndarray, "m 3"]) -> Int[np.ndarray, " c"]:
         """Return for each cell the point nearest to it, those of its own storey first; −1 where there are none."""
@@ -121,22 +126,32 @@ class FloorPlan:
         centres = np.c_[self.origin_m + (np.stack([i, j], axis=1) + 0.5) * CELL_M, far * storey]
         return np.asarray(KDTree(points).query(centres)[1], np.int64)
 
-    @cached_property
-    def _open(self) -> Int[np.ndarray, " c"]:
-        """The cell itself, or the open one nearest to it on its storey (within 2 %); itself where there is none."""
-        import cv2
+    def _nearest_open(self, cells: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
+        """Return the cells themselves, or the open ones nearest to them on their storeys; themselves where there is none.
 
-        cells = np.arange(len(self)).reshape(self.wall.shape)
+        Walls are thin: most that are asked for lie beside an open cell, so rings of growing radius find them at once,
+        and a query needs no OpenCV, which takes as long to load as all of them take.
+        """
         out = cells.copy()
-        for storey, free in enumerate(self.open):
-            if free.any():
-                closed = np.ascontiguousarray(~free, np.uint8)
-                found = cv2.distanceTransformWithLabels(closed, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
-                label = np.asarray(found[1], np.int64)
-                of_label = np.zeros(int(label.max()) + 1, np.int64)
-                of_label[label[free]] = cells[storey][free]
-                out[storey] = of_label[label]
-        return out.reshape(-1)
+        left = np.flatnonzero(~self.open.reshape(-1)[cells])
+        storey, i, j = np.unravel_index(cells[left], self.wall.shape)
+        edge = _RINGS_CELLS
+        ringed = np.pad(self.open, ((0, 0), (edge, edge), (edge, edge)))
+        for di, dj in _rings(edge):
+            if not len(left):
+                return out
+            hit = ringed[storey, i + (di + edge), j + (dj + edge)]
+            out[left[hit]] = np.ravel_multi_index((storey[hit], i[hit] + di, j[hit] + dj), self.wall.shape)
+            left, storey, i, j = (one[~hit] for one in (left, storey, i, j))
+        for one, free in enumerate(self.open):
+            mine = storey == one
+            if mine.any() and free.any():
+                from scipy.spatial import KDTree
+
+                at = np.argwhere(free)
+                near = at[KDTree(at).query(np.c_[i, j][mine])[1]]
+                out[left[mine]] = np.ravel_multi_index((np.full(len(near), one), *near.T), self.wall.shape)
+        return out
 
     @cached_property
     def _neighbours(self) -> Int[np.ndarray, "2 e"]:
@@ -207,16 +222,25 @@ def _ends(space: Space, places: Float[np.ndarray, "k 3"] | None) -> tuple[Int[np
 
 def _without_gaps(seen: Bool[np.ndarray, "s nx ny"]) -> Bool[np.ndarray, "s nx ny"]:
     """Fill what was not seen between seen cells, up to ``_GAP_M`` wide: under tables, and behind what stands there."""
-    import cv2
+    reach = int(_GAP_M / 2 / CELL_M + 1e-3)
+    edge = ((0, 0), (reach, reach), (reach, reach))
+    grown = _grown(np.pad(seen, edge), reach)
+    return ~_grown(~np.pad(grown, edge), reach)[:, 2 * reach : -2 * reach, 2 * reach : -2 * reach] | seen
 
-    def far(cells: Bool[np.ndarray, "nx ny"]) -> Bool[np.ndarray, "nx ny"]:
-        """Return which cells lie farther than ``reach`` from every cell that is not held."""
-        return cv2.distanceTransform(cells.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE) > reach
 
-    reach = _GAP_M / 2 / CELL_M + 1e-3
-    edge = int(np.ceil(reach)) + 1
-    out = seen.copy()
-    for storey, cells in enumerate(seen):
-        if cells.any():
-            out[storey] |= far(~far(~np.pad(cells, edge)))[edge:-edge, edge:-edge]
+def _grown(cells: Bool[np.ndarray, "s nx ny"], reach: int) -> Bool[np.ndarray, "s nx ny"]:
+    """Return which cells lie within ``reach`` cells of a held one."""
+    out = cells.copy()
+    _, nx, ny = cells.shape
+    for di, dj in _rings(reach):
+        out[:, max(di, 0) : nx + min(di, 0), max(dj, 0) : ny + min(dj, 0)] |= cells[
+            :, max(-di, 0) : nx + min(-di, 0), max(-dj, 0) : ny + min(-dj, 0)
+        ]
     return out
+
+
+def _rings(reach: int) -> list[tuple[int, int]]:
+    """Return the steps, rows and columns, to all other cells within ``reach`` cells, nearest first."""
+    span = range(-reach, reach + 1)
+    steps = [(di, dj) for di in span for dj in span if 0 < di * di + dj * dj <= reach * reach]
+    return sorted(steps, key=lambda step: step[0] ** 2 + step[1] ** 2)
