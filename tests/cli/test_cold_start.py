@@ -17,7 +17,7 @@ from avlmaps.query.asking import Asked, thing_alone
 HEAVY = {
     "numba", "llvmlite", "scipy", "onnxruntime", "av", "matplotlib", "trimesh", "soundfile", "PIL",
     "avlmaps.language", "avlmaps_sim", "typeguard", "jaxtyping", "asyncio", "numpy.ma", "numpy.random",
-    "importlib.resources", "starlette", "uvicorn", "torch", "rosbags",
+    "importlib.resources", "starlette", "uvicorn", "torch", "rosbags", "cv2",
     "avlmaps.cli.build", "avlmaps.cli.go", "avlmaps.cli.serve", "avlmaps.cli.shell", "avlmaps.cli.view",
     "avlmaps.days", "avlmaps.live", "avlmaps.navigate", "avlmaps.serve", "avlmaps.view",
     "avlmaps.maps.audio.events", "avlmaps.maps.audio.filterbank", "avlmaps.maps.build",

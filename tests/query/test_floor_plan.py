@@ -1,5 +1,7 @@
 """The floor plan: walls are found, storeys kept apart, and what spreads over a floor stays on its side of a wall."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -148,3 +150,30 @@ def test_a_map_without_voxels_or_kilometres_wide_has_no_plan() -> None:
     assert FloorPlan.of(Space(GridSpec(0.05), np.zeros((0, 3), np.int64), UP), storeys_at(0.0)) is None
     wide = np.array([[0, 0, 0], [200_000, 200_000, 0]])
     assert FloorPlan.of(Space(GridSpec(0.05), wide, UP), storeys_at(0.0)) is None
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 999), st.sampled_from([0.0, 0.002, 0.05, 0.6]), st.integers(1, 2))
+def test_a_point_belongs_to_the_open_cell_nearest_to_it(seed: int, share: float, storeys: int) -> None:
+    rng = np.random.default_rng(seed)
+    plan = FloorPlan.of(two_rooms(), storeys_at(*(0.0, 2.6)[:storeys]))
+    assert plan is not None
+    plan = replace(plan, open=rng.random(plan.wall.shape) < share)
+    at = np.argwhere(plan.open)
+    for cell in rng.integers(0, len(plan), 20):
+        storey, i, j = np.unravel_index(cell, plan.wall.shape)
+        point = np.r_[plan.origin_m + (np.array([i, j]) + 0.5) * CELL_M, 0.5 + 2.6 * storey]
+        found = np.array(np.unravel_index(plan.cells_of(point[None])[0], plan.wall.shape))
+        mine = at[at[:, 0] == storey]
+        away = np.linalg.norm(mine[:, 1:] - [i, j], axis=1)
+        assert np.linalg.norm(found - [storey, i, j]) == pytest.approx(away.min(initial=np.inf) if len(mine) else 0.0)
+
+
+def test_gaps_up_to_a_stride_are_closed_and_wider_ones_stay() -> None:
+    for gap_m, closed in ((1.0, True), (2.0, False)):
+        index = np.argwhere(np.ones((200, 60, 1), bool))
+        index = index[(index[:, 0] < 60) | (index[:, 0] >= 60 + round(gap_m / 0.05))]
+        plan = FloorPlan.of(Space(GridSpec(0.05), index, UP), storeys_at(0.0))
+        assert plan is not None
+        middle = np.floor((np.array([3.0 + gap_m / 2, 1.5]) - plan.origin_m) / CELL_M).astype(int)
+        assert bool(plan.open[0, middle[0], middle[1]]) == closed
