@@ -14,6 +14,9 @@ from helpers.plain_numbers import assert_plain
 # Small matrices run up to twenty times slower on several BLAS threads when the machine is shared.
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(variable, "1")
+# Tests start some hundred processes; without cached bytecode each compiles the package again, half a second each time.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 from hypothesis import settings  # noqa: E402
 
