@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.camera import Pinhole
-from avlmaps.days.evidence import Day, DayViews, Seen, Verdict, seen_again, seen_before
+from avlmaps.days.evidence import Day, DayViews, Verdict, VoxelEvidence, seen_again, seen_before
 from avlmaps.days.settings import ChangeSettings
 from avlmaps.days.surfaces import Occupied
 from avlmaps.maps.grid import GridSpec
@@ -19,27 +19,27 @@ COUNT = st.integers(0, 500)
 
 @given(COUNT, COUNT)
 def test_what_nobody_looked_at_is_unknown(voxels: int, rest: int) -> None:
-    seen = Seen(voxels + rest, 0, 0)
+    seen = VoxelEvidence(voxels + rest, 0, 0)
     assert seen.p_gone(0.05, SETTINGS) == 0.5 and seen.verdict(0.05, SETTINGS) is Verdict.UNKNOWN
 
 
 @given(st.integers(1, 500), COUNT, COUNT)
 def test_surface_speaks_for_a_thing_and_a_ray_against_it(voxels: int, surface: int, through: int) -> None:
-    seen = Seen(voxels + surface + through, surface, through)
+    seen = VoxelEvidence(voxels + surface + through, surface, through)
     p_gone = seen.p_gone(0.05, SETTINGS)
     assert 0.0 < p_gone < 1.0
-    assert Seen(seen.voxels + 1, surface + 1, through).p_gone(0.05, SETTINGS) < p_gone
-    assert Seen(seen.voxels + 1, surface, through + 1).p_gone(0.05, SETTINGS) > p_gone
+    assert VoxelEvidence(seen.voxels + 1, surface + 1, through).p_gone(0.05, SETTINGS) < p_gone
+    assert VoxelEvidence(seen.voxels + 1, surface, through + 1).p_gone(0.05, SETTINGS) > p_gone
     # Both sides change places: the equation favours neither.
-    assert Seen(seen.voxels, through, surface).p_gone(0.05, SETTINGS) == pytest.approx(1.0 - p_gone)
+    assert VoxelEvidence(seen.voxels, through, surface).p_gone(0.05, SETTINGS) == pytest.approx(1.0 - p_gone)
     if seen.verdict(0.05, SETTINGS) is Verdict.GONE:
         assert through > surface and seen.coverage() >= SETTINGS.least_coverage
 
 
 def test_the_equation_by_hand() -> None:
     # 90 voxels of 5 cm through patches of 15 cm: ten looks.
-    assert Seen(100, 0, 90).p_gone(0.05, SETTINGS) == pytest.approx(11.0 / 12.0)
-    assert Seen(100, 90, 0).p_gone(0.05, SETTINGS) == pytest.approx(1.0 / 12.0)
+    assert VoxelEvidence(100, 0, 90).p_gone(0.05, SETTINGS) == pytest.approx(11.0 / 12.0)
+    assert VoxelEvidence(100, 90, 0).p_gone(0.05, SETTINGS) == pytest.approx(1.0 / 12.0)
 
 
 def look(at: np.ndarray, towards: np.ndarray) -> np.ndarray:

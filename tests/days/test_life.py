@@ -7,20 +7,20 @@ from test_evidence import BACK, BOX, FRONT, GRID, MIDDLE, NOTHING, SETTINGS, day
 
 from avlmaps.core.errors import MapError
 from avlmaps.days.evidence import DayViews
-from avlmaps.days.life import Seen, begun, likeness, lived_on
+from avlmaps.days.life import SeenThing, begun, likeness, lived_on
 from avlmaps.days.surfaces import Occupied
 from avlmaps.maps.store.life import Life, life_arrays, read_life
 
 AWAY = np.array([20, 0, 0], np.int32)  # voxels: a metre off
 
 
-def thing(index: np.ndarray = BOX, name: str = "bag", color: tuple[int, int, int] = (200, 30, 30)) -> Seen:
+def thing(index: np.ndarray = BOX, name: str = "bag", color: tuple[int, int, int] = (200, 30, 30)) -> SeenThing:
     size = tuple(((np.ptp(index, axis=0) + 1) * GRID.voxel_size_m).tolist())
     middle = tuple(GRID.centre_of(index).mean(axis=0).tolist())
-    return Seen(name, 0.9, middle, size, color, index, 5.0)
+    return SeenThing(name, 0.9, middle, size, color, index, 5.0)
 
 
-def after(life: Life, things: list[Seen], now: DayViews, known: np.ndarray = BOX, visit: int = 1) -> Life:
+def after(life: Life, things: list[SeenThing], now: DayViews, known: np.ndarray = BOX, visit: int = 1) -> Life:
     before = [views(FRONT, MIDDLE, 1.9)] * visit
     at_s = [1e5 * (number + 1) for number in range(visit + 1)]
     surface = np.concatenate([NOTHING, *(one.index for one in things)])
@@ -52,7 +52,7 @@ def test_a_perception_that_misses_a_thing_does_not_lose_it() -> None:
     assert (stay.last, stay.looked, stay.gone) == (1, 1, None)
 
 
-def moved_to(other: Seen) -> tuple:
+def moved_to(other: SeenThing) -> tuple:
     """Return what is known when the bag's place is empty and another thing stands a metre off, where it was empty."""
     wide = [*FRONT, (2.0, 1.0, 0.3)]
     before = [views(wide, (0.65, 0.15, 0.15), 6.0)]
@@ -69,7 +69,7 @@ def test_an_alike_thing_elsewhere_is_the_one_that_is_gone() -> None:
 @pytest.mark.parametrize(
     "other", [thing(BOX + AWAY, "chair"), thing(BOX + AWAY, color=(10, 10, 250)), thing((BOX * [4, 4, 5]) + AWAY)]
 )
-def test_another_one_is_not(other: Seen) -> None:
+def test_another_one_is_not(other: SeenThing) -> None:
     old, new = moved_to(other)
     assert old.gone == 1 and (old.moved_to, new.moved_from) == (None, None)
 

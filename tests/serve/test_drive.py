@@ -18,7 +18,7 @@ from starlette.testclient import TestClient
 from avlmaps.serve.agent_answers import MOST_TOKENS, token_count
 from avlmaps.serve.app import create_app
 from avlmaps.serve.drive.agents import drive_agent_server
-from avlmaps.serve.drive.plans import DriveError, Plan, PlanBook
+from avlmaps.serve.drive.plans import DriveError, OrderPlan, PlanBook
 from avlmaps.serve.service import Service
 from avlmaps.serve.settings import ServeSettings
 from helpers.agent_talk import told
@@ -330,8 +330,8 @@ def test_without_drive_there_is_no_such_address(service: Service) -> None:
             assert client.post(f"/drive/{path}", json={}).status_code == 404
 
 
-def a_plan(order: str) -> Plan:
-    return Plan(order, "", "", "", (), (), 0.0, (), START, "m", "v", "r")
+def a_plan(order: str) -> OrderPlan:
+    return OrderPlan(order, "", "", "", (), (), 0.0, (), START, "m", "v", "r")
 
 
 @settings(max_examples=60)

@@ -13,7 +13,7 @@ from starlette.testclient import TestClient
 from avlmaps.core.network import is_loopback
 from avlmaps.core.wording import Spelling, option, options_as
 from avlmaps.serve.errors import Privacy, without_folders
-from avlmaps.serve.guard import Guard
+from avlmaps.serve.guard import AccessGuard
 from avlmaps.serve.settings import Limits, ServeError, ServeSettings
 
 TOKEN = "a-token-of-some-length"
@@ -26,7 +26,7 @@ async def behind(scope: Any, receive: Any, send: Any) -> None:
 
 
 def guarded(**settings: Any) -> TestClient:
-    return TestClient(Guard(behind, ServeSettings(**settings)), base_url="http://127.0.0.1:8750")
+    return TestClient(AccessGuard(behind, ServeSettings(**settings)), base_url="http://127.0.0.1:8750")
 
 
 def refused(response: Response | Any, status: int, kind: str) -> str:
@@ -100,7 +100,7 @@ def test_no_other_text_opens(text: str) -> None:
     from avlmaps.serve.errors import RequestError
 
     with pytest.raises(RequestError) as fault:
-        Guard(behind, ServeSettings(token=TOKEN))._check_token(
+        AccessGuard(behind, ServeSettings(token=TOKEN))._check_token(
             {"authorization": f"Bearer {text}", "cookie": f"avlmaps_token={text}"}
         )
     assert fault.value.status == 401
@@ -145,7 +145,7 @@ def test_a_body_that_does_not_come_is_given_up() -> None:
             sent.append(dict(message))
 
         scope = {"type": "http", "method": "POST", "path": "/", "headers": [(b"host", b"localhost")]}
-        await Guard(behind, ServeSettings(limits=Limits(body_s=0.05)))(scope, never, send)
+        await AccessGuard(behind, ServeSettings(limits=Limits(body_s=0.05)))(scope, never, send)
 
     asyncio.run(run())
     assert sent[0]["status"] == 408
@@ -210,6 +210,6 @@ def test_a_request_is_answered_in_fields_while_the_process_speaks_in_flags() -> 
         await PlainTextResponse(option("camera-height-m"))(scope, receive, send)
 
     with options_as(Spelling.FLAG):
-        client = TestClient(Guard(says, ServeSettings()), base_url="http://127.0.0.1:8750")
+        client = TestClient(AccessGuard(says, ServeSettings()), base_url="http://127.0.0.1:8750")
         assert client.get("/").text == "camera_height_m"
         assert option("camera-height-m") == "--camera-height-m"

@@ -7,7 +7,7 @@ import pytest
 
 from avlmaps.core.wording import Spelling, asked_as, option, options_as
 from avlmaps.serve.errors import RequestError
-from avlmaps.serve.lanes import CancelledWorkError, Lane, Watch, watch_here
+from avlmaps.serve.lanes import Cancellation, CancelledWorkError, Lane, watch_here
 
 
 @pytest.fixture
@@ -18,7 +18,7 @@ def gate() -> threading.Event:
 def test_work_runs_and_reports_its_steps() -> None:
     lane, steps = Lane("t", 1, 0, 10.0), []
 
-    def work(watch: Watch) -> int:
+    def work(watch: Cancellation) -> int:
         watch.step("one", 1, 2)
         watch_here().step("two", 2, 2)
         return 7
@@ -48,7 +48,7 @@ def test_more_than_the_queue_holds_is_refused_and_the_others_are_answered(gate: 
 def test_work_that_takes_too_long_is_answered_so_and_stops_at_its_next_step(gate: threading.Event) -> None:
     lane, ended = Lane("t", 1, 0, 0.05), threading.Event()
 
-    def work(watch: Watch) -> None:
+    def work(watch: Cancellation) -> None:
         gate.wait(5)
         try:
             watch.step("next")

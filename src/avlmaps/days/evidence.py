@@ -45,7 +45,7 @@ class Verdict(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class VoxelEvidence:
     """The evidence of a day on some voxels.
 
     Attributes:
@@ -158,7 +158,7 @@ def seen_again(
     known: Occupied,
     day: Day,
     settings: ChangeSettings,
-) -> Seen:
+) -> VoxelEvidence:
     """Return what a day says of a thing's voxels.
 
     Args:
@@ -200,7 +200,9 @@ def seen_before(
     return seen.verdict(grid.voxel_size_m, settings)
 
 
-def _counted(through: Bool[np.ndarray, " n"], surface: Bool[np.ndarray, " n"], own: Bool[np.ndarray, " n"]) -> Seen:
+def _counted(
+    through: Bool[np.ndarray, " n"], surface: Bool[np.ndarray, " n"], own: Bool[np.ndarray, " n"]
+) -> VoxelEvidence:
     """Return the evidence of the voxels that lie beside nothing else; of all, where those are too few.
 
     Of a thing that leans on a wall all voxels lie beside it. Where rays pass through more than some of them, the
@@ -211,7 +213,7 @@ def _counted(through: Bool[np.ndarray, " n"], surface: Bool[np.ndarray, " n"], o
         through, surface = through[own], surface[own]
     elif through.sum() > _SOME * len(own):
         surface = surface & own
-    return Seen(len(through), int(surface.sum()), int(through.sum()))
+    return VoxelEvidence(len(through), int(surface.sum()), int(through.sum()))
 
 
 def _from_where_it_was_seen(

@@ -23,7 +23,7 @@ SameName = Callable[[str, str], bool]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Seen:
+class SeenThing:
     """A thing as a day's map lists it, in the grid of the map of all days.
 
     Attributes:
@@ -45,14 +45,14 @@ class Seen:
     seen_s: float
 
 
-def begun(things: Sequence[Seen], visit: int = 0) -> Life:
+def begun(things: Sequence[SeenThing], visit: int = 0) -> Life:
     """Return the life of things on the first day."""
     return Life.of([_stay(thing, visit, appeared=False) for thing in things], [thing.index for thing in things])
 
 
 def lived_on(
     life: Life,
-    things: Sequence[Seen],
+    things: Sequence[SeenThing],
     day: Day,
     before: Sequence[DayViews],
     known: Occupied,
@@ -113,7 +113,7 @@ def lived_on(
     return Life.of(_moved(stays, new, visit, at_s, settings, same), voxels)
 
 
-def _stay(thing: Seen, visit: int, appeared: bool) -> Stay:
+def _stay(thing: SeenThing, visit: int, appeared: bool) -> Stay:
     return Stay(
         name=thing.name, confidence=thing.confidence, position=thing.position, size=thing.size, color=thing.color,
         first=visit, last=visit, last_seen_s=thing.seen_s, looked=visit, appeared=appeared,
@@ -124,7 +124,7 @@ def _matched(
     present: Sequence[int],
     stays: Sequence[Stay],
     voxels: Sequence[Int[np.ndarray, "v 3"]],
-    things: Sequence[Seen],
+    things: Sequence[SeenThing],
     settings: ChangeSettings,
     same: SameName,
 ) -> dict[int, int]:
@@ -154,7 +154,7 @@ def _matched(
     }
 
 
-def _far(stay: Stay, thing: Seen) -> float:
+def _far(stay: Stay, thing: SeenThing) -> float:
     """Return how far the middles of two that overlap can be, metres."""
     return float(np.linalg.norm(stay.size) + np.linalg.norm(thing.size)) / 2 + 0.2
 

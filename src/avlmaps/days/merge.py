@@ -159,14 +159,14 @@ def _visit(other: StoredMap, last: Visit, found: Found, day: str) -> Visit:
     )  # fmt: skip
 
 
-def _seen(thing: Thing, stored: StoredMap, map_from_own: Float[np.ndarray, "4 4"], shift_s: float) -> lives.Seen:
+def _seen(thing: Thing, stored: StoredMap, map_from_own: Float[np.ndarray, "4 4"], shift_s: float) -> lives.SeenThing:
     """Return a thing of a map in the grid of the map of all days."""
     index = np.asarray(stored.voxels.index)[thing.rows]
     if not np.array_equal(map_from_own, np.eye(4)):
         index, *_ = resampled(index, stored.grid, map_from_own)
     seen_s = float(np.max(np.asarray(stored.voxels.last_seen_s)[thing.rows])) + shift_s
     position = plain_point(apply(map_from_own, np.array(thing.position)))
-    return lives.Seen(thing.name, thing.confidence, position, thing.size, thing.color, index, seen_s)
+    return lives.SeenThing(thing.name, thing.confidence, position, thing.size, thing.color, index, seen_s)
 
 
 def same_thing(one: str, other: str) -> bool:

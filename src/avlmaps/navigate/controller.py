@@ -67,7 +67,7 @@ class Route:
         return hypot(pose.x_m - x, pose.y_m - y)
 
 
-class Watch:
+class StallDetector:
     """Detects a body that does not follow its commands, after any number of them."""
 
     def __init__(self, route: Route) -> None:

@@ -14,9 +14,9 @@ from avlmaps.navigate.bodies import BASE, Body, BodyShape
 from avlmaps.navigate.contact_map import ContactMap
 from avlmaps.navigate.controller import (
     ActionController,
+    StallDetector,
     VelocityController,
     VelocitySettings,
-    Watch,
     bearing,
     still,
     turns_for,
@@ -286,7 +286,7 @@ class MapDriver:
         if self.settings.mode == "velocity":
             return self._follow_smoothly(points, trip)
         controller = ActionController(points, self._safe)
-        watch = Watch(controller.route)
+        watch = StallDetector(controller.route)
         while trip.movements < self.settings.most_movements:
             trip.fault = watch.fault(self.pose)
             if trip.fault:
@@ -303,7 +303,7 @@ class MapDriver:
     def _follow_smoothly(self, points: Float[np.ndarray, "n 2"], trip: _Trip) -> bool:
         settings = self.settings.velocities
         controller, idle = VelocityController(points, settings, self._safe), 0
-        watch = Watch(controller.route)
+        watch = StallDetector(controller.route)
         while trip.movements < self.settings.most_movements and idle * settings.tick_s < _PATIENCE_S:
             trip.fault = watch.fault(self.pose)
             if trip.fault:

@@ -127,7 +127,7 @@ class FloorPlan:
         return np.asarray(KDTree(points).query(centres)[1], np.int64)
 
     def _nearest_open(self, cells: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
-        """Return the cells themselves, or the open ones nearest to them on their storeys; themselves where there is none.
+        """Return the open cells nearest to cells on their storeys: themselves where they are open, or where none is.
 
         Walls are thin: most that are asked for lie beside an open cell, so rings of growing radius find them at once,
         and a query needs no OpenCV, which takes as long to load as all of them take.

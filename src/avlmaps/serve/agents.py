@@ -22,7 +22,7 @@ from avlmaps.core.version import __version__
 from avlmaps.serve.agent_answers import compact, fitting
 from avlmaps.serve.errors import RequestError
 from avlmaps.serve.guard import App, Receive, Scope, Send, refuse
-from avlmaps.serve.lanes import Lane, Report, Watch
+from avlmaps.serve.lanes import Cancellation, Lane, Report
 from avlmaps.serve.requests import NoQuery, checked
 from avlmaps.serve.responses import error_response
 from avlmaps.serve.service import Service
@@ -241,7 +241,7 @@ async def _called(
     files = any(getattr(query, field, None) is not None for field in ("photo", "clip"))
     lane: Lane = service.slow if tool.slow or files else service.quick
 
-    def job(watch: Watch) -> ToolResult:
+    def job(watch: Cancellation) -> ToolResult:
         return tool.work(Task(served, service.settings.limits, watch=watch), query)
 
     return await lane.run(job, _reporter(ctx))

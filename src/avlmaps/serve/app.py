@@ -17,8 +17,8 @@ from starlette.routing import BaseRoute, Mount, Route
 
 from avlmaps.core.version import __version__
 from avlmaps.serve.errors import RequestError
-from avlmaps.serve.guard import App, Guard
-from avlmaps.serve.lanes import Report, Watch
+from avlmaps.serve.guard import AccessGuard, App
+from avlmaps.serve.lanes import Cancellation, Report
 from avlmaps.serve.openapi import document
 from avlmaps.serve.operations import OPERATIONS, Operation
 from avlmaps.serve.page import CONTENT_POLICY, html_page
@@ -110,7 +110,7 @@ def create_app(
     app.router.redirect_slashes = False
     if not service.settings.is_loopback:  # packing only costs time where the browser is on this machine
         app.add_middleware(GZipMiddleware, minimum_size=10_000, compresslevel=1)
-    return Guard(app, service.settings)
+    return AccessGuard(app, service.settings)
 
 
 async def _look_for_replaced_maps(service: Service) -> None:
@@ -192,7 +192,7 @@ async def _answered(service: Service, operation: Operation, request: Request) ->
     numbers = {name: str(value) for name, value in request.path_params.items() if name != "map"}
     tag = f'"{served.version}"'
 
-    def job(watch: Watch) -> Any:
+    def job(watch: Cancellation) -> Any:
         made = operation.work(Task(served, service.settings.limits, uploads, watch, numbers), query)
         return made if isinstance(made, File) else encoded(made)
 
@@ -206,7 +206,7 @@ async def _answered(service: Service, operation: Operation, request: Request) ->
     return Response(await lane.run(job), media_type=JSON_TYPE)
 
 
-async def _events(service: Service, lane: Any, job: Callable[[Watch], bytes]) -> AsyncIterator[bytes]:
+async def _events(service: Service, lane: Any, job: Callable[[Cancellation], bytes]) -> AsyncIterator[bytes]:
     """Yield the progress of a piece of work, and its answer or its error as the last event."""
     loop = asyncio.get_running_loop()
     steps: asyncio.Queue[bytes | None] = asyncio.Queue()
@@ -233,7 +233,7 @@ async def _events(service: Service, lane: Any, job: Callable[[Watch], bytes]) ->
         answering.cancel()
 
 
-async def _finished(service: Service, lane: Any, job: Callable[[Watch], bytes], report: Report) -> bytes:
+async def _finished(service: Service, lane: Any, job: Callable[[Cancellation], bytes], report: Report) -> bytes:
     try:
         return _event("answer", await lane.run(job, report))
     except Exception as error:  # noqa: BLE001 - as of a plain request

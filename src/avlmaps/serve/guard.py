@@ -40,7 +40,7 @@ _OPEN_PATHS = frozenset({"/health"})
 _UNREAD_PATHS = frozenset({"/drive/stop"})
 
 
-class Guard:
+class AccessGuard:
     """ASGI middleware; see the module."""
 
     def __init__(self, app: App, settings: ServeSettings) -> None:

@@ -20,7 +20,7 @@ class CancelledWorkError(AvlmapsError):
     """Nobody waits for an answer any more."""
 
 
-class Watch:
+class Cancellation:
     """What a piece of work reports to, and learns from that nobody waits for it."""
 
     def __init__(self, report: Report | None = None) -> None:
@@ -46,13 +46,13 @@ class Watch:
 _here = threading.local()
 
 
-def watch_here() -> Watch:
+def watch_here() -> Cancellation:
     """Return the watch of the work that runs in this thread; outside of any, one that nobody looks at."""
-    return getattr(_here, "watch", None) or Watch()
+    return getattr(_here, "watch", None) or Cancellation()
 
 
 @contextmanager
-def watching(watch: Watch) -> Iterator[None]:
+def watching(watch: Cancellation) -> Iterator[None]:
     """Make a watch that of this thread's work."""
     before = getattr(_here, "watch", None)
     _here.watch = watch
@@ -85,7 +85,7 @@ class Lane:
         """Pieces of work that run or wait."""
         return self._taken
 
-    async def run(self, work: Callable[[Watch], T], report: Report | None = None) -> T:
+    async def run(self, work: Callable[[Cancellation], T], report: Report | None = None) -> T:
         """Run a piece of work in one of the threads.
 
         Raises:
@@ -95,7 +95,7 @@ class Lane:
             if self._taken >= self._most:
                 raise busy(self._waiting)
             self._taken += 1
-        watch = Watch(report)
+        watch = Cancellation(report)
 
         def watched() -> T:
             with watching(watch):

@@ -24,7 +24,7 @@ from avlmaps.query.schema import (
 )
 from avlmaps.query.selection import MapLists, ThingsPage, Wanted, page_of_things, place_of
 from avlmaps.serve.errors import RequestError, without_folders
-from avlmaps.serve.lanes import Watch
+from avlmaps.serve.lanes import Cancellation
 from avlmaps.serve.requests import (
     CLIP,
     PHOTO,
@@ -60,7 +60,7 @@ class Task:
     map: ServedMap
     limits: Limits
     uploads: Uploads = field(default_factory=Uploads)
-    watch: Watch = field(default_factory=Watch)
+    watch: Cancellation = field(default_factory=Cancellation)
     path: dict[str, str] = field(default_factory=dict)
 
 

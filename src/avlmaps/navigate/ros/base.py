@@ -22,8 +22,8 @@ from avlmaps.navigate.driver import Arrival
 from avlmaps.navigate.interrupts import Halt
 from avlmaps.navigate.ros.calling_off import AGAIN_S, call_off, ended_within
 from avlmaps.navigate.ros.contact import Contact
-from avlmaps.navigate.ros.goals import End, Goal, Plan, Task, Track, Watch
-from avlmaps.navigate.ros.guard import Guard
+from avlmaps.navigate.ros.goals import End, Goal, MovementPlan, Stopwatch, Task, Track
+from avlmaps.navigate.ros.guard import GoalGuard
 from avlmaps.navigate.ros.plans import LEAST_M, LONGEST_M, Standing, ahead_of, place_to_stand, plan_turn
 from avlmaps.navigate.ros.session import Opener
 from avlmaps.navigate.ros.tasks import Tasks
@@ -78,7 +78,7 @@ class RosDriver:
         self._ours: deque[Goal] = deque(maxlen=50)
         self._halt = _IDLE
         self._clock = clock
-        self.guard: Guard | None = None
+        self.guard: GoalGuard | None = None
         self.elsewhere: Callable[[Float[np.ndarray, 3]], str] | None = None
         self._absent: set[str] = set()
         self._mute: set[str] = set()
@@ -193,10 +193,10 @@ class RosDriver:
 
     def _plan_to(
         self, start: GroundPose, wanted: Float[np.ndarray, "2"], looked_at: Float[np.ndarray, "2"] | None
-    ) -> Plan | str:
+    ) -> MovementPlan | str:
         return place_to_stand(start, wanted, looked_at, self._standing, self.settings, self._tasks.pose)
 
-    def _move(self, planned: Callable[[GroundPose], Plan | str]) -> Arrival:
+    def _move(self, planned: Callable[[GroundPose], MovementPlan | str]) -> Arrival:
         if not self._busy.acquire(blocking=False):
             return self._arrival(False, Track(self.pose), "The robot is still at another movement")
         try:
@@ -256,7 +256,7 @@ class RosDriver:
         with session.heard:
             return session.heard.wait_for(lambda: self._others(), _NEXT_LIST_S)
 
-    def _done(self, plan: Plan, track: Track) -> Arrival:
+    def _done(self, plan: MovementPlan, track: Track) -> Arrival:
         """Do what was planned, and see whether it was done."""
         end, note = End.SUCCEEDED, ""
         for task in [task for task in plan.tasks if task.action not in self._absent] or plan.tasks[-1:]:
@@ -329,7 +329,7 @@ class RosDriver:
 
     def _watch(self, goal: Goal, track: Track) -> tuple[str, bool]:
         """Wait for a goal's end; else return why it is to be given up, and whether nobody is there to take it."""
-        watch, settings, session = Watch(), self.settings, self._contact.session
+        watch, settings, session = Stopwatch(), self.settings, self._contact.session
         sent_s = looked_s = beaten_s = asked_s = self._clock()
         while not ended_within(goal, session, _LOOK_EVERY_S):
             now_s = self._clock()

@@ -88,7 +88,7 @@ class Goal:
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class MovementPlan:
     """The message to send for a movement, and the test whether it was made.
 
     Attributes:
@@ -122,7 +122,7 @@ class Track:
         return np.array(self._places, np.float64)
 
 
-class Watch:
+class Stopwatch:
     """Measures how long something takes."""
 
     def __init__(self) -> None:

@@ -5,7 +5,7 @@ driver's beats from a pipe. When the pipe closes, or no beat comes while a goal 
 cancels that goal until the robot confirms it; goals of others continue. It runs in a session of its own: what ends the
 terminal does not end it.
 
-Run as ``python -m avlmaps.navigate.ros.guard`` by `Guard`; it reads its orders, then beats, from standard input.
+Run as ``python -m avlmaps.navigate.ros.guard`` by `GoalGuard`; it reads its orders, then beats, from standard input.
 """
 
 import os
@@ -55,7 +55,7 @@ class Beat(msgspec.Struct, omit_defaults=True):
     over: bool = False
 
 
-class Guard:
+class GoalGuard:
     """The driver's end of the pipe; no fault of the guard stops the driver."""
 
     def __init__(self, orders: Orders) -> None:

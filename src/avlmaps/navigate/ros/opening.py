@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from avlmaps.navigate.ros.base import RosDriver
 from avlmaps.navigate.ros.frames import Frames
-from avlmaps.navigate.ros.guard import Guard, Orders
+from avlmaps.navigate.ros.guard import GoalGuard, Orders
 from avlmaps.navigate.ros.own_map import on_own_map
 from avlmaps.navigate.ros.plans import Standing
 from avlmaps.navigate.ros.settings import RosSettings
@@ -113,7 +113,7 @@ def open_ros_driver(
         opened.elsewhere = obstacles.elsewhere
     if guarded:
         silence_s = settings.stall_s + settings.heartbeat_s
-        opened.guard = Guard(Orders(kind, url, token, settings, silence_s, settings.goal_timeout_s))
+        opened.guard = GoalGuard(Orders(kind, url, token, settings, silence_s, settings.goal_timeout_s))
     return opened
 
 

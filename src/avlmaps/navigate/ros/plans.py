@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core.motion import GroundPose, wrap_angle
-from avlmaps.navigate.ros.goals import Plan, Task
+from avlmaps.navigate.ros.goals import MovementPlan, Task
 from avlmaps.navigate.ros.settings import RosSettings
 
 # From where to where, level x and y: where a body stops for a place and a note, or why it cannot.
@@ -26,7 +26,7 @@ def place_to_stand(
     standing: Standing | None,
     settings: RosSettings,
     task: Callable[[GroundPose], Task],
-) -> Plan | str:
+) -> MovementPlan | str:
     """Plan to stand at a place, or return why that cannot be.
 
     Args:
@@ -58,10 +58,10 @@ def place_to_stand(
             return f"it looks {degrees(turned):.0f} degrees past where it was to look"
         return ""
 
-    return Plan((task(target),), off, note)
+    return MovementPlan((task(target),), off, note)
 
 
-def plan_turn(start: GroundPose, angle_rad: float, settings: RosSettings, tasks: Tasks) -> Plan | str:
+def plan_turn(start: GroundPose, angle_rad: float, settings: RosSettings, tasks: Tasks) -> MovementPlan | str:
     """Plan a turn on the spot, or return why that cannot be."""
     if not abs(angle_rad) < 100.0:
         return f"{angle_rad} rad is not an angle to turn by"
@@ -71,10 +71,10 @@ def plan_turn(start: GroundPose, angle_rad: float, settings: RosSettings, tasks:
         allowed = min(settings.reached_rad, max(0.05, abs(angle_rad) / 2))
         return f"it is {degrees(wrong):.0f} degrees from where it was to turn" if wrong > allowed else ""
 
-    return Plan(() if abs(angle_rad) < LEAST_RAD else tasks(start, angle_rad), off)
+    return MovementPlan(() if abs(angle_rad) < LEAST_RAD else tasks(start, angle_rad), off)
 
 
-def ahead_of(start: GroundPose, distance_m: float, settings: RosSettings, tasks: Tasks) -> Plan | str:
+def ahead_of(start: GroundPose, distance_m: float, settings: RosSettings, tasks: Tasks) -> MovementPlan | str:
     """Plan a straight drive, or return why that cannot be."""
     if not abs(distance_m) < LONGEST_M:
         return f"{distance_m} m is not a distance to drive"
@@ -85,7 +85,7 @@ def ahead_of(start: GroundPose, distance_m: float, settings: RosSettings, tasks:
         allowed = min(settings.reached_m, max(0.05, abs(distance_m) / 2))
         return f"it is {away_m:.2f} m from where it was to drive" if away_m > allowed else ""
 
-    return Plan(() if abs(distance_m) < LEAST_M else tasks(start, distance_m), off)
+    return MovementPlan(() if abs(distance_m) < LEAST_M else tasks(start, distance_m), off)
 
 
 def _bearing_rad(from_x: float, from_y: float, to_x: float, to_y: float) -> float | None:

@@ -30,7 +30,7 @@ from avlmaps.navigate.rehearsal import NO_FILES, path_in_world, rehearse
 from avlmaps.navigate.skills import Robot, RobotSettings
 from avlmaps.serve.drive.brake import Brake
 from avlmaps.serve.drive.order_log import OrderLog
-from avlmaps.serve.drive.plans import DriveError, MapNow, Plan, PlanBook, Who
+from avlmaps.serve.drive.plans import DriveError, MapNow, OrderPlan, PlanBook, Who
 from avlmaps.serve.drive.robots import Machine
 
 log = logging.getLogger("avlmaps.serve.drive")
@@ -45,7 +45,7 @@ _KINDS = {"GoalNotFoundError": "goal-not-found", "NavigationError": "navigation"
 class Order:
     """A confirmed plan that runs."""
 
-    plan: Plan
+    plan: OrderPlan
     now: MapNow
     brake: Brake = field(default_factory=Brake)
     lines: deque[str] = field(default_factory=lambda: deque(maxlen=_MOST_LINES))
@@ -133,7 +133,7 @@ class Dispatcher:
         self._changed()
         return {**plan.to_json(), "token": token, "expires_in_s": self._book.lifetime_s}
 
-    def _planned(self, words: str, program: str) -> Plan:
+    def _planned(self, words: str, program: str) -> OrderPlan:
         now = self._current()
         translation = self._read(words, program, now)
         obstacles = self._machine.prepare(now.avlmap, now.version)
@@ -148,7 +148,7 @@ class Dispatcher:
             kind = _KINDS.get(outcome.error_type or "", "refused")
             raise DriveError(f"There is no plan: {outcome.error}", 422, kind)
         path = path_in_world(outcome, now.avlmap, self._floor_m(now))
-        return Plan(
+        return OrderPlan(
             order=secrets.token_hex(8),
             words=words,
             reading=translation.plan or _reading(outcome),

@@ -62,7 +62,7 @@ class MapNow:
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class OrderPlan:
     """What an order would do.
 
     Attributes:
@@ -127,12 +127,12 @@ class PlanBook:
         """
         self.lifetime_s = lifetime_s
         self.cleared = 0
-        self._waiting: OrderedDict[bytes, tuple[Plan, float]] = OrderedDict()
+        self._waiting: OrderedDict[bytes, tuple[OrderPlan, float]] = OrderedDict()
 
     def __len__(self) -> int:
         return len(self._waiting)
 
-    def add(self, plan: Plan, now_s: float, begun: int | None = None) -> str:
+    def add(self, plan: OrderPlan, now_s: float, begun: int | None = None) -> str:
         """Keep a plan and return its token; the oldest of too many plans goes.
 
         Args:
@@ -154,7 +154,7 @@ class PlanBook:
             self._waiting.popitem(last=False)
         return token
 
-    def take(self, token: str, now_s: float) -> Plan:
+    def take(self, token: str, now_s: float) -> OrderPlan:
         """Return the plan of a token and forget both.
 
         Raises:

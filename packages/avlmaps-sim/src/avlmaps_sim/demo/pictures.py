@@ -27,7 +27,7 @@ _HEAT = np.array([(122, 4, 48), (214, 53, 34), (250, 142, 28), (255, 226, 110)],
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Plan:
+class TopView:
     """A picture seen from straight above.
 
     Attributes:
@@ -58,7 +58,7 @@ class Strip:
     legend: tuple[tuple[str, tuple[int, int, int], float], ...]
 
 
-def from_above(scene: Scene) -> Plan:
+def from_above(scene: Scene) -> TopView:
     """Draw a home without its ceilings, from so high that it is as good as a plan."""
     keep = np.array([thing.category not in _OVERHEAD for thing in scene.objects], bool)[scene.instance]
     mesh = scene.mesh
@@ -75,17 +75,17 @@ def from_above(scene: Scene) -> Plan:
     alpha = np.where(view.instance == NOTHING, 0, 255).astype(np.uint8)
     half = np.array([width, height]) / (2 * scale)
     (left, bottom), (right, top) = (low + high) / 2 - half, (low + high) / 2 + half
-    return Plan(np.dstack([view.rgb, alpha]), (float(left), float(right), float(bottom), float(top)))
+    return TopView(np.dstack([view.rgb, alpha]), (float(left), float(right), float(bottom), float(top)))
 
 
-def map_from_above(space: Space) -> Plan:
+def map_from_above(space: Space) -> TopView:
     """Return the map's own colours from above."""
     view = TopDown.of(space)
     alpha = np.where(view.seen, 255, 0).astype(np.uint8)
-    return Plan(np.dstack([view.rgb, alpha])[::-1], view.extent)
+    return TopView(np.dstack([view.rgb, alpha])[::-1], view.extent)
 
 
-def heat_from_above(space: Space, values: Float32[np.ndarray, " n"]) -> Plan:
+def heat_from_above(space: Space, values: Float32[np.ndarray, " n"]) -> TopView:
     """Return heat as a layer over a plan: the hotter the lighter, and clear where there is none."""
     view = TopDown.of(space)
     heat = view.heat(values)[::-1]
@@ -93,7 +93,7 @@ def heat_from_above(space: Space, values: Float32[np.ndarray, " n"]) -> Plan:
     place = share * (len(_HEAT) - 1)
     rgb = np.stack([np.interp(place, np.arange(len(_HEAT)), _HEAT[:, k]) for k in range(3)], axis=-1)
     alpha = np.where(heat > 0.0, 40 + 200 * (heat / max(float(heat.max(initial=0.0)), 1e-9)) ** 0.7, 0)
-    return Plan(np.dstack([rgb, alpha]).astype(np.uint8), view.extent)
+    return TopView(np.dstack([rgb, alpha]).astype(np.uint8), view.extent)
 
 
 def strip_of(

@@ -11,8 +11,8 @@ import numpy as np
 
 from avlmaps_sim.demo.drive import drive_card
 from avlmaps_sim.demo.pictures import (
-    Plan,
     Strip,
+    TopView,
     embedded,
     envelope,
     from_above,
@@ -107,7 +107,7 @@ def _opening(report: "DemoReport", evidence: "Evidence") -> str:
     )
 
 
-def _home(sheet: Sheet, home: Plan, evidence: "Evidence") -> str:
+def _home(sheet: Sheet, home: TopView, evidence: "Evidence") -> str:
     sounds = [(event.source, event.category) for event in evidence.events]
     drawing = sheet.drawing(
         [
@@ -271,7 +271,7 @@ def _panels(step: "Step", answer: "Answer", sheet: Sheet, photo: "PhotoView | No
     return f'<div class="panels{"" if small else " one"}">{large}<div class="small">{"".join(small)}</div></div>'
 
 
-def _layer(sheet: Sheet, plan: Plan) -> str:
+def _layer(sheet: Sheet, plan: TopView) -> str:
     return sheet.picture(plan)
 
 

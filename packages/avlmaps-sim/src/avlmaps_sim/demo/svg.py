@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps_sim.demo.evidence import Box
-from avlmaps_sim.demo.pictures import Extent, Plan, embedded
+from avlmaps_sim.demo.pictures import Extent, TopView, embedded
 from avlmaps_sim.scene import Area
 
 _ROOM_GRID = 24
@@ -50,7 +50,7 @@ class Sheet:
             f"{''.join(content)}</svg>"
         )
 
-    def picture(self, plan: Plan, name: str = "") -> str:
+    def picture(self, plan: TopView, name: str = "") -> str:
         """Return a picture laid where it belongs; one with a name can be used again."""
         left, right, bottom, top = plan.extent
         x, y = self.at(left, top)

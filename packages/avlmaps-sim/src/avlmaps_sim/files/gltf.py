@@ -42,7 +42,7 @@ _BROKEN = (ValueError, KeyError, IndexError, TypeError, AttributeError, OSError,
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class MeshPart:
     """One mesh of a file, placed in the file's own axes.
 
     Attributes:
@@ -84,7 +84,7 @@ def load_gltf(path: Path, up_axis: Axis = "auto") -> Scene:
     return with_areas(scene, _areas(beside, notes, scene)) if notes.get("regions") else scene
 
 
-def read_parts(path: Path) -> list[Part]:
+def read_parts(path: Path) -> list[MeshPart]:
     """Read every mesh of a glTF file as often as it is placed.
 
     Raises:
@@ -158,7 +158,7 @@ def _glb_header(path: Path) -> dict[str, Any]:
     return header if isinstance(header, dict) else {}
 
 
-def _parts(loaded: trimesh.Scene) -> Iterator[Part]:
+def _parts(loaded: trimesh.Scene) -> Iterator[MeshPart]:
     """Walk the nodes that hold triangles."""
     parents = loaded.graph.transforms.parents
     looks: dict[int, Material] = {}
@@ -169,7 +169,7 @@ def _parts(loaded: trimesh.Scene) -> Iterator[Part]:
             continue
         category, instance = _meaning(loaded, str(node), geometry, parents)
         mesh, colour = _mesh(geometry, np.asarray(matrix, np.float64), looks)
-        yield Part(category, instance, mesh, colour)
+        yield MeshPart(category, instance, mesh, colour)
 
 
 def _meaning(loaded: trimesh.Scene, node: str, geometry: trimesh.Trimesh, parents: dict) -> tuple[str, str]:
@@ -263,7 +263,7 @@ def _srgb(linear: np.ndarray) -> np.ndarray:
     return np.where(linear < 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
 
 
-def _up(wanted: Axis, notes: dict[str, Any], header: dict[str, Any], parts: Sequence[Part]) -> str:
+def _up(wanted: Axis, notes: dict[str, Any], header: dict[str, Any], parts: Sequence[MeshPart]) -> str:
     """Decide which axis of a file is up."""
     if wanted != "auto":
         return wanted

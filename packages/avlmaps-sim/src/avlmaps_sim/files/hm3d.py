@@ -12,7 +12,7 @@ from jaxtyping import Float, Int
 from scipy.spatial import ConvexHull, QhullError
 
 from avlmaps.core.errors import SceneError
-from avlmaps_sim.files.gltf import Part, header_of, read_parts, up_of
+from avlmaps_sim.files.gltf import MeshPart, header_of, read_parts, up_of
 from avlmaps_sim.files.labels import NO_LABEL, Label, labelled_scene, passed_on
 from avlmaps_sim.mesh import Mesh, joined
 from avlmaps_sim.scene import Area, Scene
@@ -93,7 +93,7 @@ def read_annotation(path: Path) -> tuple[dict[int, int], dict[int, Label], dict[
     return by_colour, meanings, region
 
 
-def _labels(part: Part, by_colour: dict[int, int]) -> Int[np.ndarray, " t"]:
+def _labels(part: MeshPart, by_colour: dict[int, int]) -> Int[np.ndarray, " t"]:
     """Return the object that each triangle is painted as: the first probe whose colour is some object's."""
     mesh = part.mesh
     count = len(mesh.triangle)
@@ -108,7 +108,7 @@ def _labels(part: Part, by_colour: dict[int, int]) -> Int[np.ndarray, " t"]:
     return label
 
 
-def _paint(part: Part, weight: Float[np.ndarray, "3"]) -> Int[np.ndarray, " t"]:
+def _paint(part: MeshPart, weight: Float[np.ndarray, "3"]) -> Int[np.ndarray, " t"]:
     """Return the colour (0xRRGGBB) at one place on every triangle."""
     mesh = part.mesh
     rgb = np.zeros((len(mesh.triangle), 3), np.int64)

@@ -6,7 +6,7 @@ import numpy as np
 
 from avlmaps_sim.furniture import Piece, Support
 from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick
-from avlmaps_sim.homes.furnish import Among, Furnisher, Stood, floor_standing, footprint
+from avlmaps_sim.homes.furnish import Among, Furnisher, PlacedPiece, floor_standing, footprint
 from avlmaps_sim.homes.polygons import corners_of, overlapping
 
 # Things found on the tops of furniture.
@@ -59,7 +59,7 @@ _LYING = (
 )
 
 
-def things_on(f: Furnisher, anchor: Stood, wanted: Sequence[str], turn_rad: float | None = None) -> int:
+def things_on(f: Furnisher, anchor: PlacedPiece, wanted: Sequence[str], turn_rad: float | None = None) -> int:
     """Stand small things on the tops of a piece, meeting nothing there; return how many found a place."""
     tops = [top for top in anchor.piece.supports if min(np.subtract(top.high, top.low)) > 0.06]
     done = 0
@@ -95,7 +95,7 @@ def _small_enough(f: Furnisher, category: str, top: Support) -> Piece | None:
 
 def _set(
     f: Furnisher,
-    anchor: Stood,
+    anchor: PlacedPiece,
     top: Support,
     piece: Piece,
     centre: np.ndarray,
@@ -124,7 +124,7 @@ def _set(
 
 def set_at(
     f: Furnisher,
-    anchor: Stood,
+    anchor: PlacedPiece,
     category: str,
     depth: float,
     across: float,

@@ -1,4 +1,4 @@
-"""The hands that furnish a room: try places for a piece until one is free, put it there, put things on it."""
+"""Furnishing a room: tries places for a piece until one is free, puts it there, and puts things on it."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -62,7 +62,7 @@ def hangs(piece: Piece) -> bool:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Stood:
+class PlacedPiece:
     """A piece that has its place.
 
     Attributes:
@@ -127,7 +127,7 @@ class Furnisher:
     has_ceiling: bool = True
     fill: float = 1.0
     mess: float = 0.3
-    stood: list[Stood] = field(default_factory=list)
+    stood: list[PlacedPiece] = field(default_factory=list)
     laid: dict[tuple[int, int], list[np.ndarray]] = field(default_factory=dict)
 
     def new(self, category: str, among: Among | None = None) -> Piece | None:
@@ -138,13 +138,13 @@ class Furnisher:
         names = names or [name for name in families(category) if among(name)]
         return make(category, self.rng, self.which, pick(self.rng, names)) if names else None
 
-    def put(self, piece: Piece, place: Place, front_m: float = 0.0, solid: bool = True) -> Stood:
+    def put(self, piece: Piece, place: Place, front_m: float = 0.0, solid: bool = True) -> PlacedPiece:
         """Add a piece to the scene at a place, and keep its place and a zone before it from others."""
         foot = footprint(piece.mesh)
-        stood = Stood(piece, place, foot, self.floor_m)
+        stood = PlacedPiece(piece, place, foot, self.floor_m)
         if solid:
             number = self.ground.take(foot, stood.centre, place.heading_rad, place.z, front_m)
-            stood = Stood(piece, place, foot, self.floor_m, number)
+            stood = PlacedPiece(piece, place, foot, self.floor_m, number)
         mesh = piece.mesh.turned(place.heading_rad).moved(place.x, place.y, place.z + self.floor_m)
         self.builder.add(piece.category, mesh, place.heading_rad, piece.family, area=self.area)
         for x, y, z in piece.light:
@@ -158,7 +158,7 @@ class Furnisher:
     def try_at(
         self, piece: Piece, centre: Float[np.ndarray, "n 2"], heading_rad: Float[np.ndarray, " n"], z: float = 0.0,
         front_m: float = 0.0, solid: bool = True, zones: bool = True, except_for: int = -1,
-    ) -> Stood | None:  # fmt: skip
+    ) -> PlacedPiece | None:  # fmt: skip
         """Put a piece at the first of several places that is free and leaves the passages free."""
         foot = footprint(piece.mesh)
         if z + foot.high_m > self.height_m - 0.02 and piece.category not in ("wall", "column"):
@@ -180,7 +180,7 @@ class Furnisher:
         self, piece: Piece, sides: Sequence[Side] | None = None, front_m: float = 0.5, gap_m: float = 0.0,
         z: float = 0.0, corner: float = 0.3, near: Float[np.ndarray, "2"] | None = None, tries: int = 14,
         at_middle: float = 0.0,
-    ) -> Stood | None:  # fmt: skip
+    ) -> PlacedPiece | None:  # fmt: skip
         """Stand a piece against a wall, looking into the room.
 
         Args:
@@ -217,7 +217,7 @@ class Furnisher:
                 return found
         return None
 
-    def beside(self, piece: Piece, anchor: Stood, gap_m: float = 0.05, back: bool = True) -> Stood | None:
+    def beside(self, piece: Piece, anchor: PlacedPiece, gap_m: float = 0.05, back: bool = True) -> PlacedPiece | None:
         """Stand a piece to the left or right of another, backs in line (or fronts), looking the same way."""
         foot = footprint(piece.mesh)
         x = anchor.foot.middle[0] + (foot.half[0] - anchor.foot.half[0]) * (1 if back else -1)
@@ -227,10 +227,10 @@ class Furnisher:
         return self.try_at(piece, anchor.to_world(local), np.full(2, anchor.place.heading_rad))
 
     def before(
-        self, piece: Piece, anchor: Stood, gap_m: float, facing: bool = True, aside_m: float = 0.0,
+        self, piece: Piece, anchor: PlacedPiece, gap_m: float, facing: bool = True, aside_m: float = 0.0,
         turn_rad: float = 0.0,
         front_m: float = 0.0, zones: bool = False, solid: bool = True,
-    ) -> Stood | None:  # fmt: skip
+    ) -> PlacedPiece | None:  # fmt: skip
         """Stand a piece before the front of another, looking at it or the same way."""
         foot = footprint(piece.mesh)
         x = anchor.foot.middle[0] + anchor.foot.half[0] + gap_m + foot.half[0]
@@ -241,7 +241,7 @@ class Furnisher:
     def somewhere(
         self, piece: Piece, front_m: float = 0.0, tries: int = 24, square: float = 0.5, z: float = 0.0,
         near: Float[np.ndarray, "2"] | None = None, solid: bool = True,
-    ) -> Stood | None:  # fmt: skip
+    ) -> PlacedPiece | None:  # fmt: skip
         """Stand a piece anywhere on the floor, turned at random or square to a wall."""
         low, high = self.ground.polygon.min(axis=0), self.ground.polygon.max(axis=0)
         centre = self.rng.uniform(low, high, (tries, 2))
@@ -253,7 +253,9 @@ class Furnisher:
             heading = base + np.pi / 2 * self.rng.integers(0, 4, tries)
         return self.try_at(piece, centre, heading, z, front_m, solid)
 
-    def in_middle(self, piece: Piece, spread: float = 0.15, front_m: float = 0.0, tries: int = 16) -> Stood | None:
+    def in_middle(
+        self, piece: Piece, spread: float = 0.15, front_m: float = 0.0, tries: int = 16
+    ) -> PlacedPiece | None:
         """Stand a piece about the middle of the room, square to its longest wall."""
         span = np.ptp(self.ground.polygon, axis=0)
         centre = middle(self.ground.polygon) + self.rng.normal(0.0, spread, (tries, 2)) * span
@@ -264,7 +266,7 @@ class Furnisher:
     def hang(
         self, piece: Piece, low_m: tuple[float, float], sides: Sequence[Side] | None = None, tries: int = 10,
         near: Float[np.ndarray, "2"] | None = None,
-    ) -> Stood | None:  # fmt: skip
+    ) -> PlacedPiece | None:  # fmt: skip
         """Hang a piece on a wall, its lowest edge between two heights."""
         top = self.height_m - 0.08 - float(piece.mesh.high[2])
         z = min(draw(self.rng, *low_m), top)
@@ -272,7 +274,7 @@ class Furnisher:
             return None
         return self.along(piece, sides, front_m=0.0, gap_m=-_TOUCH_M + 0.001, z=z, near=near, tries=tries, corner=0.0)
 
-    def from_ceiling(self, piece: Piece, centre: Float[np.ndarray, "2"]) -> Stood | None:
+    def from_ceiling(self, piece: Piece, centre: Float[np.ndarray, "2"]) -> PlacedPiece | None:
         """Hang a lamp from the ceiling over a place, where a head passes under it or a table stands below."""
         foot = footprint(piece.mesh)
         z = self.height_m - foot.high_m - 0.001
@@ -289,7 +291,7 @@ class Furnisher:
 
     def stand(self, category: str, share: float = 1.0, front_m: float = 0.45, corner: float = 0.3,
               near: Float[np.ndarray, "2"] | None = None, sides: Sequence[Side] | None = None,
-              at_middle: float = 0.0, among: Among | None = None) -> Stood | None:  # fmt: skip
+              at_middle: float = 0.0, among: Among | None = None) -> PlacedPiece | None:  # fmt: skip
         """Stand a piece of a category against a wall in a share of the cases, or hang it if it is made to hang."""
         if self.rng.random() > share * self.fill:
             return None
@@ -298,7 +300,7 @@ class Furnisher:
         return self._stand(piece, front_m, corner, near, sides, at_middle)
 
     def insist(self, category: str, front_m: float = 0.45, corner: float = 0.3, at_middle: float = 0.0,
-               tries: int = 3, among: Among | None = None) -> Stood | None:  # fmt: skip
+               tries: int = 3, among: Among | None = None) -> PlacedPiece | None:  # fmt: skip
         """Stand what a room cannot do without, trying several shapes until one finds a place."""
         for _ in range(tries if self.fill > 0.5 or self.rng.random() < 0.6 else 0):
             if (piece := self.new(category, among or _fit_to_stand(category))) is None:
@@ -308,16 +310,16 @@ class Furnisher:
         return None
 
     def _stand(self, piece: Piece, front_m: float, corner: float, near: Float[np.ndarray, "2"] | None,
-               sides: Sequence[Side] | None, at_middle: float) -> Stood | None:  # fmt: skip
+               sides: Sequence[Side] | None, at_middle: float) -> PlacedPiece | None:  # fmt: skip
         if hangs(piece):
             return self.hang(piece, HANGING_M.get(piece.category, (1.2, 1.7)), sides, near=near)
         return self.along(piece, sides, front_m, corner=corner, near=near, at_middle=at_middle)
 
     def row(self, wanted: Sequence[str], sides: Sequence[Side] | None = None, front_m: float = 0.6,
-            deepest_m: float = 1.0) -> list[Stood]:  # fmt: skip
+            deepest_m: float = 1.0) -> list[PlacedPiece]:  # fmt: skip
         """Stand pieces side by side along one wall, as in a fitted kitchen; what does not fit is left out."""
         pieces = [piece for name in wanted if (piece := self._shallow(name, deepest_m)) is not None]
-        best: list[Stood] = []
+        best: list[PlacedPiece] = []
         for side in (self.sides(1.2) if sides is None else sides)[:3]:
             reached = 0.004 if self.rng.random() < 0.7 else draw(self.rng, 0.0, side.length_m / 4)
             left = list(pieces)
@@ -342,7 +344,7 @@ class Furnisher:
                 return piece
         return None
 
-    def _next_in_row(self, left: Sequence[Piece], side: Side, reached: float, front_m: float) -> Stood | None:
+    def _next_in_row(self, left: Sequence[Piece], side: Side, reached: float, front_m: float) -> PlacedPiece | None:
         for piece in left[:3]:
             foot = footprint(piece.mesh)
             end = reached + foot.width_m

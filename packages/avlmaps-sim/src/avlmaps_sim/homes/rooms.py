@@ -6,12 +6,12 @@ from avlmaps_sim.furniture import Piece
 from avlmaps_sim.furniture.decor import CARPET_SHAPES, carpet
 from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick
 from avlmaps_sim.homes.clutter import set_at
-from avlmaps_sim.homes.furnish import Furnisher, Stood, footprint, hangs, wall_hung
+from avlmaps_sim.homes.furnish import Furnisher, PlacedPiece, footprint, hangs, wall_hung
 from avlmaps_sim.homes.polygons import middle
 from avlmaps_sim.homes.seats import seat_round
 
 
-def several(f: Furnisher, wanted: dict[str, float], front_m: float = 0.4) -> list[Stood]:
+def several(f: Furnisher, wanted: dict[str, float], front_m: float = 0.4) -> list[PlacedPiece]:
     """Stand pieces against walls, each with its own probability, in random order."""
     names = list(wanted)
     f.rng.shuffle(names)
@@ -60,7 +60,7 @@ def living_room(f: Furnisher) -> None:
         f.in_middle(table)
 
 
-def _screen(f: Furnisher) -> Stood | None:
+def _screen(f: Furnisher) -> PlacedPiece | None:
     """Stand a tv on its cabinet, or hang it."""
     if not chance(f.rng, 0.85):
         return None
@@ -87,7 +87,7 @@ def _tall_lamp(family: str) -> bool:
     return family in ("shade on pole", "tripod", "arc", "torchiere", "paper column", "many heads")
 
 
-def _facing(f: Furnisher, piece: Piece, screen: Stood) -> Stood | None:
+def _facing(f: Furnisher, piece: Piece, screen: PlacedPiece) -> PlacedPiece | None:
     """Stand a piece so that it looks at a screen from some metres."""
     foot = footprint(piece.mesh)
     ahead = np.array([np.cos(screen.place.heading_rad), np.sin(screen.place.heading_rad)])
@@ -97,7 +97,7 @@ def _facing(f: Furnisher, piece: Piece, screen: Stood) -> Stood | None:
     return f.try_at(piece, centre, np.full(len(away), screen.place.heading_rad + np.pi), front_m=0.3)
 
 
-def _sofa_corner(f: Furnisher, sofa: Stood) -> None:
+def _sofa_corner(f: Furnisher, sofa: PlacedPiece) -> None:
     rng = f.rng
     ahead = np.array([np.cos(sofa.place.heading_rad), np.sin(sofa.place.heading_rad)])
     table = None
@@ -129,7 +129,7 @@ def dining_room(f: Furnisher) -> None:
                 "piano": 0.05, "vase": 0.15, "fireplace": 0.05, "clock": 0.15})  # fmt: skip
 
 
-def dining_place(f: Furnisher, share: float, free_standing: float = 0.85) -> Stood | None:
+def dining_place(f: Furnisher, share: float, free_standing: float = 0.85) -> PlacedPiece | None:
     """Stand a dining table with chairs round it, in a share of the cases."""
     rng = f.rng
     stood = None
@@ -166,7 +166,7 @@ def bedroom(f: Furnisher) -> None:
                 "tv": 0.15, "fan": 0.06, "wardrobe": 0.15, "ironing board": 0.05, "guitar": 0.06})  # fmt: skip
 
 
-def _bedside(f: Furnisher, bed: Stood) -> None:
+def _bedside(f: Furnisher, bed: PlacedPiece) -> None:
     rng = f.rng
     first = f.new("nightstand")
     for _ in range(2):
@@ -203,7 +203,7 @@ def childrens_room(f: Furnisher) -> None:
             f.somewhere(toy, square=0.0, tries=6)
 
 
-def desk_place(f: Furnisher, computer: float = 0.75, front_m: float = 0.75) -> Stood | None:
+def desk_place(f: Furnisher, computer: float = 0.75, front_m: float = 0.75) -> PlacedPiece | None:
     """Stand a desk against a wall, with a chair before it and what one works with on it."""
     rng = f.rng
     stood = f.insist("desk", front_m, 0.35, tries=2)
@@ -215,7 +215,7 @@ def desk_place(f: Furnisher, computer: float = 0.75, front_m: float = 0.75) -> S
     return stood
 
 
-def equip(f: Furnisher, desk: Stood, computer: float = 0.75) -> None:
+def equip(f: Furnisher, desk: PlacedPiece, computer: float = 0.75) -> None:
     """Put a screen and a keyboard, or a laptop, and a lamp on a desk."""
     rng = f.rng
     if chance(rng, computer):

@@ -4,7 +4,7 @@ import numpy as np
 
 from avlmaps_sim.furniture import Piece
 from avlmaps_sim.furniture.recipe_helpers import chance, draw
-from avlmaps_sim.homes.furnish import Furnisher, Stood, footprint
+from avlmaps_sim.homes.furnish import Furnisher, PlacedPiece, footprint
 from avlmaps_sim.homes.placing import Footprint
 from avlmaps_sim.mesh import Mesh
 
@@ -19,7 +19,7 @@ def push_in_m(chair: Mesh, table: Mesh) -> float:
     return float(np.clip(chair.high[0] - reach - 0.03, 0.0, 0.45))
 
 
-def meets_legs(table: Stood, foot: Footprint, centre: np.ndarray, heading_rad: float) -> bool:
+def meets_legs(table: PlacedPiece, foot: Footprint, centre: np.ndarray, heading_rad: float) -> bool:
     """Return whether a leg of the table would stand within the box of a chair."""
     mesh = table.piece.mesh
     legs = table.to_world(mesh.vertex[mesh.vertex[:, 2] < _LEGS_BELOW_M][:, :2].astype(np.float64))
@@ -29,7 +29,7 @@ def meets_legs(table: Stood, foot: Footprint, centre: np.ndarray, heading_rad: f
     return bool(np.any((np.abs(x) < foot.half[0] + 0.01) & (np.abs(y) < foot.half[1] + 0.01)))
 
 
-def _seat_places(table: Stood, width_m: float) -> list[tuple[float, float, float]]:
+def _seat_places(table: PlacedPiece, width_m: float) -> list[tuple[float, float, float]]:
     """Return places (x, y, heading) along the four edges of a table, in its own frame."""
     half_x, half_y = table.foot.half
     out = []
@@ -47,7 +47,7 @@ def _seat_places(table: Stood, width_m: float) -> list[tuple[float, float, float
     return out
 
 
-def seat_round(f: Furnisher, table: Stood, piece: Piece, number: int, all_sides: bool = True) -> int:
+def seat_round(f: Furnisher, table: PlacedPiece, piece: Piece, number: int, all_sides: bool = True) -> int:
     """Stand chairs of one kind round a table; return how many found a place.
 
     Args:
@@ -73,8 +73,8 @@ def seat_round(f: Furnisher, table: Stood, piece: Piece, number: int, all_sides:
     return done
 
 
-def _sit(f: Furnisher, table: Stood, piece: Piece, foot: Footprint, place: tuple[float, float, float], out_m: float,
-         tidy: bool) -> bool:  # fmt: skip
+def _sit(f: Furnisher, table: PlacedPiece, piece: Piece, foot: Footprint, place: tuple[float, float, float],
+         out_m: float, tidy: bool) -> bool:  # fmt: skip
     x, y, heading = place
     turn = 0.0 if tidy and chance(f.rng, 0.7) else float(f.rng.normal(0.0, 0.05 if out_m < 0 else 0.3))
     toward = np.array([np.cos(heading), np.sin(heading)])

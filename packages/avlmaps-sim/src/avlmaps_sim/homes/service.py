@@ -5,7 +5,7 @@ import numpy as np
 from avlmaps_sim.furniture import Piece
 from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick
 from avlmaps_sim.homes.clutter import set_at
-from avlmaps_sim.homes.furnish import Furnisher, Stood, floor_standing, footprint, wall_hung
+from avlmaps_sim.homes.furnish import Furnisher, PlacedPiece, floor_standing, footprint, wall_hung
 from avlmaps_sim.homes.rooms import dining_place, several
 from avlmaps_sim.homes.seats import seat_round
 
@@ -42,7 +42,7 @@ def kitchen(f: Furnisher) -> None:
                 "clock": 0.2})  # fmt: skip
 
 
-def _above(f: Furnisher, fitted: list[Stood]) -> None:
+def _above(f: Furnisher, fitted: list[PlacedPiece]) -> None:
     """Hang the hood over the stove and cabinets over the counters."""
     for stood in [s for s in f.stood if s.piece.category == "stove"]:
         hood = f.new("range hood")
@@ -58,7 +58,7 @@ def _above(f: Furnisher, fitted: list[Stood]) -> None:
                 _over(f, cabinet, stood, low)
 
 
-def _over(f: Furnisher, piece: Piece, stood: Stood, z: float) -> Stood | None:
+def _over(f: Furnisher, piece: Piece, stood: PlacedPiece, z: float) -> PlacedPiece | None:
     foot = footprint(piece.mesh)
     if z + foot.high_m > f.height_m - 0.03:
         piece = type(piece)(piece.mesh.scaled(1, 1, max((f.height_m - 0.05 - z) / foot.high_m, 0.4)), (), (),
@@ -77,7 +77,9 @@ def _over(f: Furnisher, piece: Piece, stood: Stood, z: float) -> Stood | None:
     return f.try_at(piece, centre[on_wall], heading[on_wall], z, zones=False)
 
 
-def _clear_of_holes(f: Furnisher, centre: np.ndarray, half_m: float, low: float, high: float, stood: Stood) -> bool:
+def _clear_of_holes(
+    f: Furnisher, centre: np.ndarray, half_m: float, low: float, high: float, stood: PlacedPiece
+) -> bool:
     for side in f.ground.sides:
         if np.cos(side.heading_rad - stood.place.heading_rad) > 0.999:
             at = float((centre - side.a) @ side.along)
