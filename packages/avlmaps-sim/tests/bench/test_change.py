@@ -59,7 +59,7 @@ def test_an_empty_list_is_not_stale() -> None:
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
     out = tmp_path_factory.mktemp("change")
-    settings = SceneSettings(scenes=("house:7",), frames=90, sources=1, ambiguous=0, jobs=1)
+    settings = SceneSettings(scenes=("house:7",), profile="synthetic", frames=60, sources=1, ambiguous=0, jobs=1)
     return out, run_change(settings, 2, out)
 
 
@@ -77,8 +77,8 @@ def test_a_home_over_two_days_is_recognised_and_judged(bench: tuple[Path, dict])
 @pytest.mark.slow
 def test_a_merged_map_is_a_map_and_bad_merges_are_refused(bench: tuple[Path, dict], tmp_path: Path) -> None:
     work = bench[0] / "work"
-    (first,) = work.glob("house-7-*/embedded.avlmap")
-    (second,) = work.glob("house-7-day-1-*/turned-embedded.avlmap")
+    (first,) = work.glob("house-7-*/synthetic.avlmap")
+    (second,) = work.glob("house-7-day-1-*/turned-synthetic.avlmap")
     (merged,) = work.glob("house-7-day-1-*/merged-true-1.avlmap")
     one, other, both = (open_stored(path, verify=True) for path in (first, second, merged))
     assert len(both.info.visits) == 2 and both.life() is not None
@@ -100,9 +100,9 @@ def test_a_merged_map_is_a_map_and_bad_merges_are_refused(bench: tuple[Path, dic
 
 @pytest.mark.slow
 def test_another_home_is_refused_with_numbers(bench: tuple[Path, dict], tmp_path: Path) -> None:
-    settings = SceneSettings(scenes=("house:11",), frames=60, sources=1, ambiguous=0, jobs=1)
+    settings = SceneSettings(scenes=("house:11",), profile="synthetic", frames=24, sources=1, ambiguous=0, jobs=1)
     run_change(settings, 1, tmp_path)
-    (first,) = (bench[0] / "work").glob("house-7-*/embedded.avlmap")
-    (other,) = (tmp_path / "work").glob("house-11-*/embedded.avlmap")
+    (first,) = (bench[0] / "work").glob("house-7-*/synthetic.avlmap")
+    (other,) = (tmp_path / "work").glob("house-11-*/synthetic.avlmap")
     with pytest.raises(NotTheSamePlaceError, match=r"of \d+ keyframes .* \d+ were located"):
         merge_maps(open_stored(first), open_stored(other), tmp_path / "no.avlmap")

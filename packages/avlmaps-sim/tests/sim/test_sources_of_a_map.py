@@ -94,8 +94,8 @@ def mapped(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     """Return a recording of a flat with an array, and its map."""
     folder = tmp_path_factory.mktemp("flat")
     settings = RecordSettings(
-        size=(96, 72), fps=4.0, hearing="acoustic", microphones="square4", snr_db=20.0, sources=4, workers=1,
-        max_frames=120,
+        size=(96, 72), fps=4.0, hearing="acoustic", microphones="square4", snr_db=20.0, sources=3, workers=1,
+        max_frames=80,
     )  # fmt: skip
     record_scene(flat(), folder / "rec", settings, seed=1)
     build_map(open_recording(folder / "rec"), folder / "flat.avlmap", progress=False)
