@@ -129,8 +129,8 @@ class FloorPlan:
     def _nearest_open(self, cells: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
         """Return the open cells nearest to cells on their storeys: themselves where they are open, or where none is.
 
-        Walls are thin: most that are asked for lie beside an open cell, so rings of growing radius find them at once,
-        and a query needs no OpenCV, which takes as long to load as all of them take.
+        Walls are thin: most of their cells lie beside an open one, so rings of growing radius find it at once, and a
+        query needs no OpenCV, which takes longer to load.
         """
         out = cells.copy()
         left = np.flatnonzero(~self.open.reshape(-1)[cells])

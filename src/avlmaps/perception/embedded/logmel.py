@@ -67,7 +67,7 @@ def normalised(mels: Float32[np.ndarray, "frames bands"]) -> Float32[np.ndarray,
 
 
 def check_audible(samples: Float[np.ndarray, " n"], name: str = "the sound") -> None:
-    """Refuse samples that cannot be heard.
+    """Refuse samples in which nothing is audible.
 
     Raises:
         AudioError: no samples, samples that are not finite numbers, or silence.
