@@ -29,6 +29,11 @@ ERRORS = (
     (("live", "nowhere", "--out", "OUT"), 1, "recording"),
     (("merge", "nowhere.avlmap", "MAP", "--out", "OUT"), 1, "map"),
     (("changes", "nowhere.avlmap"), 1, "map"),
+    (("edit", "nowhere.avlmap"), 1, "map"),
+    (("edit", "MAP", "--rename", "unicorn", "--to", "horse"), 1, "query"),
+    (("edit", "MAP", "--pin", "dock"), 2, "usage"),
+    (("edit", "MAP", "--forbid", "x", "--box", "1,2,3"), 1, "query"),
+    (("edit", "MAP", "--undo", "last"), 1, "query"),
     (("sources", "nowhere.avlmap"), 1, "map"),
     (("sources", "MAP"), 1, "query"),
     (("go", "nowhere.avlmap", "go to the chair", "--scene", "house:7"), 1, "map"),
@@ -133,7 +138,7 @@ def test_a_cold_cache_is_announced_once_and_a_warm_one_not(tmp_path: Path) -> No
 def test_verbs_that_run_compiled_loops_say_so(run, monkeypatch: pytest.MonkeyPatch) -> None:
     compile_something = {
         "demo", "record", "build", "live", "locate", "go", "bench", "things", "rooms", "export",
-        "shell", "serve", "view", "merge", "changes", "sources",
+        "shell", "serve", "view", "merge", "changes", "edit", "sources",
     }  # fmt: skip
     assert {name for name, verb in VERBS.items() if verb.compiles} == compile_something
     assert not Verb.compiles

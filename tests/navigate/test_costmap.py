@@ -141,6 +141,7 @@ class _WordMap:
         )  # fmt: skip
         keyframes = SimpleNamespace(world_from_camera=np.zeros((0, 4, 4)))
         self.stored = SimpleNamespace(voxels=voxels, grid=grid, up_in_world=np.eye(3)[2], keyframes=keyframes)
+        self.edited = SimpleNamespace(forbidden=())
 
 
 @pytest.fixture

@@ -46,7 +46,8 @@ def home(stairs: bool = True) -> Any:
         voxels=voxels, grid=grid, up_in_world=Z, keyframes=SimpleNamespace(world_from_camera=poses)
     )
     storeys = find_storeys(grid.centre_of(index), VOXEL_M, drawn.cameras)
-    return SimpleNamespace(stored=stored, space=Space(grid, index, Z), storeys=storeys)
+    unedited = SimpleNamespace(forbidden=())
+    return SimpleNamespace(stored=stored, space=Space(grid, index, Z), storeys=storeys, edited=unedited)
 
 
 HOME, BARE = home(), home(stairs=False)

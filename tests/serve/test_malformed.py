@@ -7,7 +7,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from starlette.testclient import TestClient
 
-from avlmaps.query.selection import place_of
+from avlmaps.query.given_places import place_of
 from avlmaps.serve.errors import RequestError
 from avlmaps.serve.requests import AskQuery, PathQuery, PlaceQuery, ThingsQuery, checked, checked_texts
 from avlmaps.serve.settings import Limits

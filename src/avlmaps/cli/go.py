@@ -238,7 +238,7 @@ def translator_for(verb: "Go", avlmap: "AVLMap | None" = None) -> "Translator":
 
     came = Given(
         None if verb.image is None else str(verb.image), None if verb.sound_clip is None else str(verb.sound_clip),
-        None if avlmap is None else avlmap.knows, verb.at,
+        None if avlmap is None else avlmap.knows, verb.at, () if avlmap is None else avlmap.edited.own_names,
     )  # fmt: skip
     if verb.language != "chat":
         from avlmaps.language.learned_translator import LearnedTranslator

@@ -96,7 +96,7 @@ def contents(verb: Things, opened: "AVLMap | None" = None) -> dict[str, Any]:
 
 def _near(verb: Things, opened: "AVLMap") -> "str | list[float] | None":
     """Return what things are to be near to; a place in space in the recording's frame."""
-    from avlmaps.query.selection import is_place, place_of
+    from avlmaps.query.given_places import is_place, place_of
 
     if verb.near is None or not is_place(verb.near):
         return verb.near

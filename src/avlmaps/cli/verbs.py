@@ -31,6 +31,7 @@ _OWN = {
     "rooms": "Rooms",
     "sources": "Sources",
     "changes": "Changes",
+    "edit": "Edit",
     "shell": "Shell",
     "view": "View",
     "export": "Export",
@@ -43,7 +44,8 @@ _OWN = {
 # As help lists them: in the order in which a person comes to use them; other packages' own verbs follow.
 _ORDER = (
     "demo", "record", "add-sounds", "build", "live", "merge", "import-map", "info", "query", "things", "rooms",
-    "sources", "changes", "shell", "view", "export", "locate", "go", "serve", "teach-sound", "profiles", "bench",
+    "sources", "changes", "edit", "shell", "view", "export", "locate", "go", "serve", "teach-sound", "profiles",
+    "bench",
 )  # fmt: skip
 
 

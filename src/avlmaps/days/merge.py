@@ -25,11 +25,13 @@ from avlmaps.days.settings import MergeSettings
 from avlmaps.days.surfaces import Occupied, resampled
 from avlmaps.maps.growing import require_place
 from avlmaps.maps.store.checkpoints import key_of
+from avlmaps.maps.store.edits import Edit, World, carried_edits, read_edits, write_edits
 from avlmaps.maps.store.life import Life
-from avlmaps.maps.store.lock import lock_folder
+from avlmaps.maps.store.lock import EDITING, lock_folder
 from avlmaps.maps.store.manifest import Box, Counts, MapInfo, RecordingInfo, RigInfo, Timings, Visit
 from avlmaps.maps.store.reader import StoredMap, open_stored
 from avlmaps.maps.store.writer import MapContent, write_map
+from avlmaps.maps.types import Keyframes
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.components import linked
 from avlmaps.query.contents import STRUCTURE, Thing
@@ -102,8 +104,10 @@ def merge_maps(
         inverse(moved),
         Occupied.of(laid, grid),
     )
-    life = stored.life() or lives.begun([_seen(one, stored, np.eye(4), 0.0) for one in listed(AVLMap(stored))])
-    things = list(listed(AVLMap(other)))
+    life = stored.life() or lives.begun(
+        [_seen(one, stored, np.eye(4), 0.0) for one in listed(AVLMap(stored, edits=()))]
+    )
+    things = list(listed(AVLMap(other, edits=())))
     if things_of is None:  # a list of names misses small things, whose surface changes nevertheless
         life = _with_vanished(life, stored, known, now, visits, settings)
         things += _unnamed_new(other, things, before, known, moved, settings)
@@ -117,9 +121,21 @@ def merge_maps(
         sounds = joined_sounds(stored, other, moved, visit.shift_s, Path(clips))
         content = MapContent(voxels, keyframes, stored.place_state, sounds, Path(clips), life)
         info = _manifest(stored, other, content, visits, settings, perf_counter() - begin_s)
-        with lock_folder(out):
+        edits = _edits(stored, other, keyframes, moved)
+        with lock_folder(out), lock_folder(out, EDITING):
             write_map(out, content, info)
+            if edits or read_edits(out):
+                write_edits(out, edits)
     return replace(open_stored(out), encoders=stored.encoders)
+
+
+def _edits(stored: StoredMap, other: StoredMap, onto: Keyframes, moved: Float[np.ndarray, "4 4"]) -> tuple[Edit, ...]:
+    """Return what people corrected in both maps, in the world of this one, in the order of time."""
+    world = World.of(stored.info)
+    own = carried_edits(read_edits(stored.path), stored.keyframes, world, onto, np.eye(4))
+    others = carried_edits(read_edits(other.path), other.keyframes, world, onto, moved)
+    known = {edit.id for edit in own}
+    return tuple(sorted((*own, *(edit for edit in others if edit.id not in known)), key=lambda edit: edit.made))
 
 
 def _dated(visits: tuple[Visit, ...], first_day: str, stored: StoredMap) -> tuple[Visit, ...]:
@@ -217,7 +233,7 @@ def _clusters(stored: StoredMap, rows: Int[np.ndarray, " r"], settings: MergeSet
     """Return the groups of voxels that touch, each as a thing with the likeliest name of its voxels together."""
     if "pixels" not in stored.info.models or not len(rows):
         return []
-    wanted, avlmap, namer = settings.changes, AVLMap(stored), VoxelNamer(stored)
+    wanted, avlmap, namer = settings.changes, AVLMap(stored, edits=()), VoxelNamer(stored)
     named = np.array([name not in STRUCTURE for name in namer.names])
     which = linked(np.asarray(stored.voxels.index)[rows], 1)
     found: list[Thing] = []

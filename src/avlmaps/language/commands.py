@@ -26,6 +26,7 @@ from avlmaps.language.learned.name_resolver import EXAMPLE, REFUSALS, NameResolv
 from avlmaps.language.learned.parts import by_parts
 from avlmaps.language.learned.reader import LearnedReader, learned_reader
 from avlmaps.language.lexer import Token, tokenise
+from avlmaps.language.own_names import stand_ins
 from avlmaps.language.rephrase import behind_remark
 from avlmaps.language.sentence import Given, Sentence
 from avlmaps.language.storey_words import SaidStorey, said_storeys
@@ -75,6 +76,11 @@ def read_command(text: str, given: Given | None = None) -> Command:
         LanguageError: the command is empty or too long.
     """
     _check_length(text)
+    stand = stand_ins(text, () if given is None else given.own)
+    if stand.own and given is not None:
+        read = read_command(stand.text, replace(given, own=()))
+        intents = tuple(on_targets(one, stand.target) for one in read.intents)
+        return replace(read, intents=intents, notes=tuple(map(stand.back, read.notes)))
     language = language_of(text)
     tokens = tokenise(text)
     if is_stop(tokens):

@@ -5,12 +5,14 @@ knows a map.
 """
 
 import re
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from avlmaps.core.lexicon import Kind, lexicon
 from avlmaps.language.lexer import without_spoken_end
 from avlmaps.language.names import mended
+from avlmaps.language.own_names import OwnName, stand_ins
 
 NUMBERS = {
     "two": 2, "three": 3, "four": 4, "five": 5, "six": 6, "seven": 7, "eight": 8, "nine": 9, "ten": 10,
@@ -170,8 +172,17 @@ _NO_NAMES = frozenset({"i", "you", "we", "have", "has", "do", "is", "are", "was"
 _PHOTO = re.compile(r"\b(?:photo|picture|image|snapshot|photograph|pic)\b")
 
 
-def read_list(text: str) -> ListQuestion | None:
-    """Return the question to the lists that a sentence is; None where it is another one."""
+def read_list(text: str, own: Sequence[OwnName] = ()) -> ListQuestion | None:
+    """Return the question to the lists that a sentence is; None where it is another one.
+
+    Args:
+        text: the sentence.
+        own: names that people gave to things and rooms of the map.
+    """
+    stand = stand_ins(text, own)
+    if stand.own:
+        read = read_list(stand.text)
+        return None if read is None else replace(read, name=stand.back(read.name))
     plain = _plain(text)
     for of, pattern in _COMPILED:
         found = pattern.fullmatch(plain)

@@ -18,6 +18,7 @@ from avlmaps.language.learned.reader import Read, learned_reader
 from avlmaps.language.learned.unmet import unmet_by
 from avlmaps.language.list_questions import SUPPORTED
 from avlmaps.language.names import is_entry, is_known, sounds_like
+from avlmaps.language.own_names import stand_ins
 from avlmaps.language.sentence import Given, Sentence
 from avlmaps.language.word_classes import load_word_classes
 
@@ -99,6 +100,14 @@ def read_question(text: str, given: Given | None = None) -> AskedSentence:
         raise QueryError(
             f"The sentence has {len(text)} characters, more than {MOST_CHARACTERS}; say it shorter, like: {_EXAMPLE}."
         )
+    stand = stand_ins(text, () if given is None else given.own)
+    if stand.own and given is not None:
+        try:
+            read = read_question(stand.text, replace(given, own=()))
+        except QueryError as refused:
+            raise QueryError(stand.back(str(refused))) from None
+        of = tuple(map(stand.target, read.inquiry.of))
+        return AskedSentence(replace(read.inquiry, of=of), tuple(map(stand.back, read.notes)))
     language = language_of(text)
     if language is not None:
         raise QueryError(ASK.format(language=language))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from avlmaps.core.question import HeardAt
 from avlmaps.language import lexer
 from avlmaps.language.lexer import Token
+from avlmaps.language.own_names import OwnName
 from avlmaps.language.rephrase import rephrased
 from avlmaps.language.spelling import respelt
 
@@ -29,12 +30,14 @@ class Given:
         clip: the file that "this recording" means.
         knows: says whether the map's encoder knows a word that the lexicon does not; None: only the lexicon counts.
         at: the place of a sound that is meant.
+        own: names that people gave to things and rooms of the map.
     """
 
     image: str | None = None
     clip: str | None = None
     knows: Callable[[str], bool] | None = None
     at: HeardAt = "robot"
+    own: tuple[OwnName, ...] = ()
 
     def tokens(self, words: Iterable[str], at: int) -> list[Token]:
         """Return the files that a sentence may speak of as tokens behind it, so that "this photo" can point to one."""

@@ -4,7 +4,8 @@ The level frame shares the world's origin and has z up (`avlmaps.core.poses.rota
 is unknown, which is not free; and every voxel counts, the first as well as the last.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import numpy as np
@@ -63,6 +64,32 @@ class Body:
             )
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class ForbiddenArea:
+    """An area of the floor that a person forbade.
+
+    Attributes:
+        name: its own.
+        said: who forbade it and when, in words.
+        corners: (k, 2) level x and y, metres.
+        storey: the number of the one that it is on.
+    """
+
+    name: str
+    said: str
+    corners: Float64[np.ndarray, "k 2"]
+    storey: int = 0
+
+    def cells(self, shape: tuple[int, ...], origin_m: Float[np.ndarray, "2"], cell_m: float) -> Bool[np.ndarray, "r c"]:
+        """Return the cells of a grid that it touches."""
+        import cv2
+
+        mask = np.zeros(shape[::-1], np.uint8)  # OpenCV's x runs along the columns
+        corners = np.clip((self.corners - origin_m) / cell_m - 0.5, -2.0, np.array(shape) + 1.0)
+        cv2.fillPoly(mask, [np.round(corners * 16.0).astype(np.int32)], 1, shift=4)
+        return mask.T.astype(bool)
+
+
 @dataclass(frozen=True, slots=True)
 class Obstacles:
     """A top-down grid; cell (i, j) covers ``origin_m + [i, i + 1) x [j, j + 1) · cell_size_m`` of the level x and y.
@@ -77,6 +104,7 @@ class Obstacles:
             that is not known.
         storeys: those of the map; None where it has one.
         storey: the number of the one that this is the grid of.
+        forbidden: the areas that people forbade, of all storeys; on this one they are occupied.
     """
 
     level_from_world: Float64[np.ndarray, "3 3"]
@@ -87,17 +115,42 @@ class Obstacles:
     tall: Bool[np.ndarray, "nx ny"] | None = None
     storeys: Storeys | None = None
     storey: int = 0
+    forbidden: tuple[ForbiddenArea, ...] = ()
+
+    def without(self, areas: Sequence[ForbiddenArea]) -> "Obstacles":
+        """Return the grid with areas that no body enters; itself without any."""
+        states = self.states.copy() if areas else self.states
+        for area in areas:
+            if area.storey == self.storey:
+                states[area.cells(states.shape, self.origin_m, self.cell_size_m)] = CellState.OCCUPIED
+        return replace(self, states=states, forbidden=tuple(areas)) if areas else self
+
+    def forbids(self, point_world: Float[np.ndarray, "3"]) -> str:
+        """Return why no body goes to a place of this storey that a person forbade; ``""`` for other places."""
+        cell = self.cell_of(point_world)
+        if not all(0 <= one < size for one, size in zip(cell.tolist(), self.states.shape, strict=True)):
+            return ""
+        for area in self.forbidden:
+            own = area.storey == self.storey
+            if own and area.cells(self.states.shape, self.origin_m, self.cell_size_m)[tuple(cell)]:
+                return f"it lies in {area.name}, {area.said}; `avlmaps edit MAP --undo` allows it again"
+        return ""
 
     def elsewhere(self, point_world: Float[np.ndarray, "3"], climbs: bool = False) -> str:
-        """Return why a body on this storey does not come to a place of another one; ``""`` for a place of its own.
+        """Return why a body on this storey does not come to a place of another one, or to one that a person forbade.
+
+        ``""`` for a place of its own.
 
         Args:
             point_world: the place, metres.
             climbs: whether the body takes stairs.
         """
-        if self.storeys is None or not np.isfinite(point_world).all():
+        if not np.isfinite(point_world).all():
             return ""
-        return self.storeys.refusal(self.storey, int(self.storeys.of_places(point_world)[0]), climbs)
+        other = self.storey if self.storeys is None else int(self.storeys.of_places(point_world)[0])
+        if self.storeys is not None and (refusal := self.storeys.refusal(self.storey, other, climbs)):
+            return refusal
+        return self.forbids(point_world) if other == self.storey else ""
 
     def cell_of(self, points_world: Float[np.ndarray, "*n 3"]) -> Int[np.ndarray, "*n 2"]:
         """Return the cell above or below which each point of the world lies; it may be outside of the grid."""

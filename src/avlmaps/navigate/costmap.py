@@ -151,10 +151,11 @@ def obstacles_for(avlmap: "AVLMap", shape: BodyShape = BASE, storey: int | None 
     number = storey_of_walk(avlmap) if storey is None else storey
     if not 0 <= number < (1 if storeys is None else len(storeys)):
         raise MapError(f"The map has no storey {number}; {said_storeys(storeys)}.")
-    return find_obstacles(
+    found = find_obstacles(
         stored.voxels, stored.grid, stored.up_in_world, body, ignored=ignored, walked=walked, storeys=storeys,
         storey=number,
     )  # fmt: skip
+    return found.without(avlmap.edited.forbidden)
 
 
 def storey_of_walk(avlmap: "AVLMap") -> int:

@@ -150,6 +150,8 @@ class PathFinder:
 
     def _on_one(self, start: Spot, place: Spot) -> Route | None:
         obstacles, planner = self._planned(start.storey)
+        if self._forbidden(place):
+            return None
         with self._lock:  # the planner's own caches are not made for threads
             stop = planner.stop_for(start.xy, place.xy)
             way = None if stop is None else planner.way(start.xy, stop.xy)
@@ -172,6 +174,7 @@ class PathFinder:
         if found is None:
             note = "" if storeys is None else storeys.refusal(one.storey, other.storey, self.shape.climbs)
             off = [name for name, at in (("start", one), ("goal", other)) if not self._holds(at)]
+            note = note or self._forbidden(other)
             if off:
                 note = f"the {' and the '.join(off)} lies outside of the map"
             return {"found": False, "points": [], "length_m": None, "cost": None, "stop": None,
@@ -193,6 +196,11 @@ class PathFinder:
         """Return where a body stops at the end of a route."""
         at = np.append(route.stop.xy, self.obstacles(route.storeys[-1]).floor_m)
         return {"position": self._world(at), "beside_m": route.stop.beside_m, "seen": bool(route.stop.seen)}
+
+    def _forbidden(self, spot: Spot) -> str:
+        """Return why no body goes to a place that a person forbade; ``""`` for other places."""
+        obstacles = self.obstacles(spot.storey)
+        return obstacles.forbids(self.avlmap.space.world(np.append(spot.xy, obstacles.floor_m)))
 
     def _holds(self, spot: Spot) -> bool:
         return bool(self.planner(spot.storey).costmap.holds(spot.xy))

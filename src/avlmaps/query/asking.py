@@ -23,6 +23,7 @@ from avlmaps.query.wording import absent_text, found_text
 
 if TYPE_CHECKING:
     from avlmaps.core.camera import Pinhole
+    from avlmaps.language.own_names import OwnName
     from avlmaps.language.questions import AskedSentence
     from avlmaps.maps.storeys import Storeys
     from avlmaps.query.queryable import Attachment, Queryable
@@ -213,8 +214,11 @@ def answer_question(avlmap: "Queryable", question: Question, top: int = 3, files
     alone = () if found or len(heats) == 1 else (_alone(question, heats),)
     text = found_text(question.parts, goals[0]) if found else absent_text(parts, goals, next(iter(alone), None))
     elapsed_ms = 1e3 * (time.perf_counter() - begin)
-    doubts = avlmap.stored.info.doubts
-    return Answer(goals, found, parts, elapsed_ms, heat, heat.probability, text=text, alternatives=alone, notes=doubts)
+    named = {kind: [part.query for part in question.parts if part.modality is kind] for kind in Modality}
+    places = [goal.position for goal in goals] if found else []
+    said = avlmap.edited.said_of(places, named[Modality.OBJECT], named[Modality.AREA])
+    notes = (*avlmap.stored.info.doubts, *said)
+    return Answer(goals, found, parts, elapsed_ms, heat, heat.probability, text=text, alternatives=alone, notes=notes)
 
 
 def _part_answer(part: Part, factor: Factor, whole: Heatmap) -> PartAnswer:
@@ -254,7 +258,7 @@ def _answer_sentence(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
     from avlmaps.language.list_questions import read_list, said_number
     from avlmaps.query.lists import answer_list
 
-    listed, numbered = read_list(asked.sentence), said_number(asked.sentence)
+    listed, numbered = read_list(asked.sentence, avlmap.edited.own_names), said_number(asked.sentence)
     if listed is not None:
         return answer_list(avlmap, listed, asked.top, lambda words: _answer_words(avlmap, asked, words, files))
     if numbered is None:
@@ -279,7 +283,7 @@ def _answer_words(avlmap: "Queryable", asked: Asked, words: str, files: Files) -
 
 def _answer_read(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
     """Answer the questions that a sentence is read as; the likeliest counts."""
-    questions, notes, counted = _questions(asked)
+    questions, notes, counted = _questions(asked, avlmap.edited.own_names)
     answers: list[tuple[Question, Answer]] = []
     for question in (one.heard_at(asked.at) for one in questions):
         if asked.primary is not None:
@@ -305,24 +309,25 @@ def _answer_read(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
     )
 
 
-def _questions(asked: Asked) -> tuple[tuple[Question, ...], tuple[str, ...], bool]:
+def _questions(asked: Asked, own: "tuple[OwnName, ...]") -> tuple[tuple[Question, ...], tuple[str, ...], bool]:
     """Return the questions that a sentence is read as, how its words were taken, and whether it asks how many."""
     from avlmaps.language.intents import Ask
     from avlmaps.language.list_questions import said_alternatives
 
-    read = [_read(words, asked.image, asked.clip) for words in said_alternatives(asked.sentence) or (asked.sentence,)]
+    said = said_alternatives(asked.sentence) or (asked.sentence,)
+    read = [_read(words, asked.image, asked.clip, own) for words in said]
     questions = tuple(dict.fromkeys(question for one in read for question in one.questions))
     notes = tuple(dict.fromkeys(note for one in read for note in one.notes))
     return questions, notes, read[0].inquiry.ask is Ask.HOW_MANY
 
 
 @lru_cache(maxsize=512)
-def _read(sentence: str, image: str | None, clip: str | None) -> "AskedSentence":
+def _read(sentence: str, image: str | None, clip: str | None, own: "tuple[OwnName, ...]") -> "AskedSentence":
     """Return the reading of a sentence; it depends on nothing but the words, and agents repeat theirs."""
     from avlmaps.language.questions import read_question
     from avlmaps.language.sentence import Given
 
-    return read_question(sentence, Given(image, clip, knows=lambda _: True))
+    return read_question(sentence, Given(image, clip, knows=lambda _: True, own=own))
 
 
 def _probability(factor: Factor) -> float:

@@ -17,7 +17,7 @@ from avlmaps.core.question import HeardAt, Modality, Part, Question, Role
 from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder, SurveyedEncoder
 from avlmaps.perception.room_contents import read_room_contents
-from avlmaps.query.factors import FOUND_AT, HeatSettings
+from avlmaps.query.factors import FOUND_AT, HeatSettings, NearThings
 from avlmaps.query.floor_plan import FloorPlan
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.instances import FeatureVoxels, Instances, Segmentation, confident_instances
@@ -45,10 +45,13 @@ from avlmaps.query.words import ClosestWords, EncodedWord, Vocabulary
 from avlmaps.recordings.audio import Sound
 
 if TYPE_CHECKING:
+    from avlmaps.maps.store.edits import Edit
     from avlmaps.maps.store.reader import StoredMap
     from avlmaps.maps.storeys import Storeys
     from avlmaps.query.answer import Answer
     from avlmaps.query.contents import Contents, Room, SoundEvent, Thing, Watch
+    from avlmaps.query.editor import Editor
+    from avlmaps.query.edits import Edited
     from avlmaps.query.locate import Located
     from avlmaps.query.photometric import Panoramas
     from avlmaps.query.schema import ChangesAnswer, LastSeenAnswer
@@ -92,9 +95,19 @@ class AVLMap:
         settings: how to query.
     """
 
-    def __init__(self, stored: "StoredMap", settings: QuerySettings | None = None) -> None:
+    def __init__(
+        self, stored: "StoredMap", settings: QuerySettings | None = None, edits: "Sequence[Edit] | None" = None
+    ) -> None:
+        """Take a map.
+
+        Args:
+            stored: the map as it lies on the disk.
+            settings: how to query.
+            edits: what people corrected; None for those in the map's folder, none for what the encoders say alone.
+        """
         self.stored = stored
         self.settings = settings or QuerySettings()
+        self._given_edits = edits
         self._rivals: tuple[tuple[str, ...], ClosestWords] | None = None
         self._known_searches: Mapping[Search, Segmentation] | None = None
 
@@ -108,6 +121,26 @@ class AVLMap:
         from avlmaps.maps.store.reader import open_stored
 
         return cls(open_stored(Path(path)), settings)
+
+    @cached_property
+    def edited(self) -> "Edited":
+        """What people corrected, as it applies to this map."""
+        from avlmaps.maps.store.edits import read_edits
+        from avlmaps.query.edits import apply
+
+        return apply(read_edits(self.stored.path) if self._given_edits is None else self._given_edits, self)
+
+    @property
+    def edit(self) -> "Editor":
+        """Corrects the map: ``m.edit.rename("chair", "stool")``; see ``editor.Editor``."""
+        from avlmaps.query.editor import Editor
+
+        return Editor(self)
+
+    def forget_edits(self) -> None:
+        """Read what people corrected again at the next question."""
+        for name in ("edited", "room_field"):
+            self.__dict__.pop(name, None)
 
     @cached_property
     def space(self) -> Space:
@@ -127,13 +160,23 @@ class AVLMap:
             BackendError: the map's profile has no pixel encoder.
         """
         part = Part(Modality.OBJECT, word, _role(primary))
-        encoder = self.stored.encoders.pixels
+        pinned = self.edited.pinned(part, self.settings.heat)
+        if pinned is not None:
+            return Heatmap.of(pinned, self.settings.found_at)
+        if self.edited.is_room(word):
+            return self.area(word, primary)
+        factor = self.edited.object_factor(part, self.settings.heat, lambda: self._seen_object(part, vocabulary))
+        return Heatmap.of(factor, self.settings.found_at)
+
+    def _seen_object(self, part: Part, vocabulary: Sequence[str] | None) -> NearThings:
+        """Return the heat of an object as the encoder sees it."""
+        word, encoder = part.query, self.stored.encoders.pixels
         # Of names, most voxels have too little of the word to be compared with all others.
         known = self._known_words if vocabulary is None else None
         rivals = self._rivals_of(encoder, vocabulary) if known is None else known
         voxels = self._feature_voxels(encoder, rivals, self.stored.voxels.rgb)
         known = None if vocabulary is not None else self._stored_search(word)
-        return Heatmap.of(object_factor(voxels, part, self.settings.heat, known), self.settings.found_at)
+        return object_factor(voxels, part, self.settings.heat, known)
 
     def _stored_search(self, word: str) -> Segmentation | None:
         """Return what the search for a name of the encoder found, narrower names with it, where that is stored."""
@@ -148,7 +191,7 @@ class AVLMap:
             alone: take one of the encoder's names for itself, without the narrower ones that it takes in: then an
                 armchair is no "chair".
         """
-        return self._search(word, alone).instances
+        return self.edited.instances(self._search(word, alone).instances, word)
 
     def _search(self, word: str, alone: bool) -> Segmentation:
         encoder = self.stored.encoders.pixels
@@ -243,16 +286,31 @@ class AVLMap:
         Raises:
             QueryError: the map was not seen on such a day, or on one day alone.
         """
-        from avlmaps.query.contents import find_things
-
         if at is not None:
             from avlmaps.query.changes import Days, things_at
 
-            return things_at(self.space, Days.of(self.stored), at, names, least_confidence)
+            days = Days.of(self.stored, self.edited.life)
+            return things_at(self.space, days, at, names, least_confidence)
+        seen = names
+        if names is not None and self.edited:
+            seen = [name for name in names if self.sees(name)]
+        found = self.unedited_things(seen, least_confidence, structure, watch)
+        return self.edited.things(found, names, least_confidence)
+
+    def unedited_things(
+        self,
+        names: Sequence[str] | None = None,
+        least_confidence: float = 0.5,
+        structure: bool = False,
+        watch: "Watch" = lambda stage, done, total: None,
+    ) -> list["Thing"]:
+        """Return ``things`` as the encoder sees them, without what people corrected."""
+        from avlmaps.query.contents import find_things
+
         known: Mapping[Search, Segmentation] = {} if names is not None else self._searched(watch)
 
         def instances_of(name: str, alone: bool) -> Instances:
-            return known[name, alone].instances if (name, alone) in known else self.instances(name, alone)
+            return known[name, alone].instances if (name, alone) in known else self._search(name, alone).instances
 
         return find_things(self.stored, self.space, instances_of, names, least_confidence, structure, watch)
 
@@ -291,7 +349,7 @@ class AVLMap:
         """
         from avlmaps.query.changes import Days, changes_answer, room_namer
 
-        days = Days.of(self.stored)
+        days = Days.of(self.stored, self.edited.life)
         since_visit = days.visit_of(since)
         return changes_answer(days, self.stored.path.name, since_visit, room_namer(self), first_seen=first_seen)
 
@@ -303,7 +361,7 @@ class AVLMap:
         """
         from avlmaps.query.changes import Days, is_meant, last_seen, room_namer
 
-        return last_seen(Days.of(self.stored), name, is_meant(name), room_namer(self))
+        return last_seen(Days.of(self.stored, self.edited.life), name, is_meant(name), room_namer(self))
 
     def contents(
         self, least_confidence: float = 0.5, names: Sequence[str] | None = None, structure: bool = False
@@ -338,7 +396,8 @@ class AVLMap:
 
         field, regions = self.room_field, self.room_regions
         by_floor = None if field is None or regions is None else (field, regions)
-        return find_rooms(self.stored, self.space, self.settings.areas, least_confidence, by_floor)
+        rooms = find_rooms(self.stored, self.space, self.settings.areas, least_confidence, by_floor)
+        return self.edited.listed_rooms(rooms)
 
     @property
     def points(self) -> Float[np.ndarray, "n 3"]:
@@ -384,6 +443,10 @@ class AVLMap:
         )
 
     def knows(self, phrase: str) -> bool:
+        """Return whether the map can be queried for a thing: the pixel encoder sees such, or a person named one so."""
+        return self.edited.knows(phrase) or self.sees(phrase)
+
+    def sees(self, phrase: str) -> bool:
         """Return whether the pixel encoder can look for a phrase: any phrase for an open vocabulary, else its words."""
         from avlmaps.query.synonyms import is_open
 
@@ -472,8 +535,9 @@ class AVLMap:
         self.stored.require_model(Kind.VIEWS)
         settings = self.settings
         factor = area_factor(
-            self.space, self.stored.keyframes, encoder, part, settings.areas, settings.heat, self.room_votes
-        )
+            self.space, self.stored.keyframes, encoder, part, settings.areas, settings.heat, self.room_votes,
+            self.edited.room_field if self.edited else None,
+        )  # fmt: skip
         return Heatmap.of(factor, settings.found_at)
 
     @cached_property
@@ -535,12 +599,20 @@ class AVLMap:
 
     @cached_property
     def room_field(self) -> RoomField | None:
-        """How likely each place is each kind of room that the view encoder knows; None where there are no votes.
+        """How likely each place is each kind of room that the view encoder knows or a person named.
+
+        None where there are no votes.
 
         Raises:
             BackendError: the map's profile has no view encoder.
             MapError: the map was built with another encoder than is installed.
         """
+        seen = self._seen_room_field
+        return None if seen is None else self.edited.room_field(seen)
+
+    @cached_property
+    def _seen_room_field(self) -> RoomField | None:
+        """The same as the view encoder sees it."""
         votes = self.room_votes
         if votes is None:
             return None
@@ -553,7 +625,7 @@ class AVLMap:
     def things_in_rooms(self) -> ThingsInRooms | None:
         """The evidence of rooms on the things in them; None for a map whose rooms are not known."""
         try:
-            field = self.room_field
+            field = self._seen_room_field
         except (BackendError, MapError):  # no features of views, or those of another encoder
             return None
         return None if field is None else ThingsInRooms(field, read_room_contents())

@@ -38,8 +38,12 @@ class Days:
     life: "Life"
 
     @classmethod
-    def of(cls, stored: "StoredMap") -> "Days":
+    def of(cls, stored: "StoredMap", corrected: "Callable[[Life], Life] | None" = None) -> "Days":
         """Return those of a map.
+
+        Args:
+            stored: the map.
+            corrected: gives things the names that people gave them.
 
         Raises:
             QueryError: it was seen on one day alone.
@@ -50,7 +54,7 @@ class Days:
                 f"{stored.path} was seen on one day alone, so that nothing is known to have changed; add another day "
                 "with `avlmaps merge`."
             )
-        return cls(stored.info.visits, life)
+        return cls(stored.info.visits, life if corrected is None else corrected(life))
 
     @property
     def last(self) -> int:

@@ -60,6 +60,7 @@ class Thing:
         color: mean RGB of its voxels.
         rows: numbers of its voxels in the map.
         points: middles of its voxels, metres, recording frame.
+        edited: who corrected it and when, in words; empty for what nobody corrected.
     """
 
     name: str
@@ -69,10 +70,11 @@ class Thing:
     color: tuple[int, int, int]
     rows: Int[np.ndarray, " m"] = field(repr=False)
     points: Float[np.ndarray, "m 3"] = field(repr=False)
+    edited: str = ""
 
     def to_json(self) -> "ThingAnswer":
         """Return the thing as ``avlmaps things --json`` prints it."""
-        return {
+        answer: ThingAnswer = {
             "name": self.name,
             "confidence": self.confidence,
             "position": list(self.position),
@@ -80,6 +82,9 @@ class Thing:
             "color": list(self.color),
             "voxels": len(self.rows),
         }
+        if self.edited:
+            answer["edited"] = self.edited
+        return answer
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -130,6 +135,7 @@ class Room:
         region: its number in ``AVLMap.room_regions``; −1 for a room that is a group of views.
         area_m2: of its floor; None for a group of views.
         outline: corners on its floor, metres, recording frame; none for a group of views.
+        edited: who named it and when, in words; empty for what nobody corrected.
     """
 
     name: str
@@ -141,10 +147,11 @@ class Room:
     region: int = -1
     area_m2: float | None = None
     outline: Float[np.ndarray, "c 3"] = field(repr=False, default_factory=lambda: np.zeros((0, 3)))
+    edited: str = ""
 
     def to_json(self, own_name: str) -> "RoomAnswer":
         """Return the room as ``avlmaps rooms --json`` prints it, with a name that no other room of the map has."""
-        return {
+        answer: RoomAnswer = {
             "name": self.name,
             "room": own_name,
             "confidence": self.confidence,
@@ -155,6 +162,9 @@ class Room:
             "area_m2": self.area_m2,
             "outline": [[round(value, 3) for value in corner] for corner in self.outline.tolist()],
         }
+        if self.edited:
+            answer["edited"] = self.edited
+        return answer
 
     def may_be(self, kind: Callable[[str], bool]) -> bool:
         """Return whether the room is of a kind, or a part of it may be: an open plan has several names."""
@@ -278,7 +288,7 @@ def find_things(
         if owned[rows].mean() >= _SAME_SHARE:
             continue
         owned[rows] = True
-        things.append(_thing(stored, space, name, -doubt, rows))
+        things.append(thing_of(stored, space, name, -doubt, rows))
     return sorted(things, key=lambda thing: -thing.confidence)
 
 
@@ -302,7 +312,8 @@ def _confident(found: Instances, least: float) -> Iterator[tuple[float, Int[np.n
         yield float(found.confidence[number]), found.rows[order[bounds[number] : bounds[number + 1]]]
 
 
-def _thing(stored: "StoredMap", space: Space, name: str, confidence: float, rows: Int[np.ndarray, " m"]) -> Thing:
+def thing_of(stored: "StoredMap", space: Space, name: str, confidence: float, rows: Int[np.ndarray, " m"]) -> Thing:
+    """Return some voxels of a map as a thing of a name."""
     points = space.centres_of(rows)
     extent = np.ptp(space.level(points), axis=0) + space.grid.voxel_size_m
     colors: UInt8[np.ndarray, "m 3"] = np.asarray(stored.voxels.rgb)[rows]

@@ -71,7 +71,8 @@ def _answer(
     probability = goals[0].probability if goals else 0.0
     found = bool(goals) and probability >= avlmap.settings.found_at
     parts, heat = ((), None) if subject is None else (subject.parts, subject.heat)
-    return Answer(tuple(goals), found, parts, 0.0, heat, probability, count, text=text)
+    said = avlmap.edited.said_of([goal.position for goal in goals], areas={goal.name for goal in goals})
+    return Answer(tuple(goals), found, parts, 0.0, heat, probability, count, text=text, notes=said)
 
 
 def _rooms_by_size(avlmap: "Queryable", first: bool) -> tuple[list[Goal], str]:
@@ -126,7 +127,7 @@ def _names(avlmap: "Queryable", question: ListQuestion, top: int) -> Answer:
 
 def _changes(avlmap: "Queryable", question: ListQuestion, top: int) -> Answer:
     """Return what is new, gone or moved, in a room or anywhere, and when it was noticed."""
-    days = Days.of(avlmap.stored)
+    days = Days.of(avlmap.stored, avlmap.edited.life)
     since = days.visit_of(question.since) if question.since else 0
     answer = changes_answer(days, avlmap.stored.path.name, since, room_namer(avlmap))
     every: tuple[ChangeKind, ...] = ("new", "moved", "gone")
@@ -153,7 +154,7 @@ def _last_seen(avlmap: "Queryable", name: str, top: int) -> Answer:
     entry = lexicon().head(name, Kind.THING)
     if entry is None:
         raise QueryError(f"{name!r} is no thing that is known; name a thing, such as: where was the bag last seen?")
-    answer = last_seen(Days.of(avlmap.stored), name, is_meant(entry.name), room_namer(avlmap))
+    answer = last_seen(Days.of(avlmap.stored, avlmap.edited.life), name, is_meant(entry.name), room_namer(avlmap))
     goals = [
         Goal(tuple(one["position"]), one["confidence"], _NO_SIZE, {}, one["confidence"], one["name"])  # pyright: ignore[reportArgumentType]
         for one in answer["seen"]

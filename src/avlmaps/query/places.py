@@ -135,7 +135,8 @@ def _rooms(avlmap: "AVLMap", point: Float[np.ndarray, "3"]) -> list[NameScore]:
     if "views" not in stored.info.models or not len(stored.keyframes):
         return []
     encoder = stored.encoders.views
-    names, field = area_names(encoder), avlmap.room_field
+    field = avlmap.room_field
+    names = area_names(encoder) if field is None else field.kinds
     places = np.asarray(stored.keyframes.centre, np.float64).reshape(-1, 3)
     space = avlmap.space
     away = np.linalg.norm(space.level(places)[:, :2] - space.level(point)[:2], axis=1)

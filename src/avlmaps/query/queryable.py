@@ -1,6 +1,6 @@
 """What an answer needs of a map: ``AVLMap`` gives it, and asking, lists and whereabouts know no more of it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
@@ -15,6 +15,7 @@ from avlmaps.query.voxel_space import Space
 from avlmaps.recordings.audio import Sound
 
 if TYPE_CHECKING:
+    from avlmaps.maps.store.life import Life
     from avlmaps.maps.store.reader import StoredMap
     from avlmaps.maps.storeys import Storeys
     from avlmaps.query.contents import Room, SoundEvent, Thing
@@ -48,6 +49,25 @@ class FoundSettings(Protocol):
         ...
 
 
+class Corrections(Protocol):
+    """What people corrected in a map, as far as an answer needs it; ``edits.Edited`` is it."""
+
+    @property
+    def own_names(self) -> tuple[tuple[str, bool], ...]:
+        """The names that people gave, and whether each is that of a room."""
+        ...
+
+    def said_of(
+        self, places: Sequence[Sequence[float]], named: Iterable[str] = (), areas: Iterable[str] = ()
+    ) -> tuple[str, ...]:
+        """Return who corrected what an answer is about, and when, in a sentence each."""
+        ...
+
+    def life(self, life: "Life") -> "Life":
+        """Return what became of things over days, under the names that people gave them."""
+        ...
+
+
 class Queryable(Protocol):
     """A map that gives heat for parts of a question, and lists of what it holds."""
 
@@ -59,6 +79,11 @@ class Queryable(Protocol):
     @property
     def settings(self) -> FoundSettings:
         """How to query."""
+        ...
+
+    @cached_property
+    def edited(self) -> "Corrections":
+        """What people corrected, as it applies to this map."""
         ...
 
     @cached_property

@@ -4,7 +4,7 @@ from typing import cast
 
 import numpy as np
 
-from avlmaps.core.arrays import Bool, Float32, Int
+from avlmaps.core.arrays import Bool, Float, Float32, Int
 
 Cells = Bool[np.ndarray, "r c"]
 
@@ -134,3 +134,15 @@ def outline(cells: Cells, loose: float, most: int) -> Float32[np.ndarray, "k 2"]
         if len(corners) <= most:
             return ((corners + 0.5) / 3.0 - 1.0).astype(np.float32)
         loose *= 1.5
+
+
+def in_polygon(xy: Float[np.ndarray, "n 2"], corners: Float[np.ndarray, "k 2"]) -> Bool[np.ndarray, " n"]:
+    """Return which points lie in a polygon, by how often a ray from each crosses its sides."""
+    inside = np.zeros(len(xy), np.bool_)
+    for (ax, ay), (bx, by) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        if ay == by:
+            continue
+        crosses = (xy[:, 1] >= min(ay, by)) & (xy[:, 1] < max(ay, by))
+        at = ax + (xy[:, 1] - ay) * (bx - ax) / (by - ay)
+        inside ^= crosses & (xy[:, 0] < at)
+    return inside

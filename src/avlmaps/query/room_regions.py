@@ -15,7 +15,7 @@ from avlmaps.core.arrays import Bool, Float, Float32, Int
 from avlmaps.query.doorways import closed_doorways, recesses, without_leaves, without_posts
 from avlmaps.query.floor_plan import CELL_M as PLAN_CELL_M
 from avlmaps.query.floor_plan import FloorPlan
-from avlmaps.query.raster import contacts, distance, flooded, nearest_label, outline, pieces
+from avlmaps.query.raster import contacts, distance, flooded, in_polygon, nearest_label, outline, pieces
 from avlmaps.query.storey_grid import Sights, StoreyGrid
 
 NONE = -1
@@ -244,6 +244,20 @@ class RoomRegions:
         place[np.asarray(listed, np.int64)] = np.arange(len(listed))
         place[-1] = NONE  # no region: of points outside, and of rooms that are groups of views
         return place[self.at(points_world)]
+
+    def share_of(self, number: int, corners_world: Float[np.ndarray, "k 3"]) -> float:
+        """Return which share of a room and of an area on its floor together both hold, in [0, 1].
+
+        Args:
+            number: of the room.
+            corners_world: of the area, metres.
+        """
+        storey = int(self._boxes[0][number])
+        grid, own = self.grids[storey], self.labels[storey] == number
+        level = self.plan.space.level(np.asarray(corners_world, np.float64))
+        middle = grid.level_of(np.argwhere(np.ones(own.shape, bool)) + 0.5)
+        inside = in_polygon(middle, level[:, :2]).reshape(own.shape)
+        return float(np.count_nonzero(inside & own) / max(np.count_nonzero(inside | own), 1))
 
     @cached_property
     def of_plan_cells(self) -> Int[np.ndarray, " c"]:

@@ -28,6 +28,7 @@ Matrix = Annotated[
 ]
 Frame = Annotated[str, Meta(description="the frame of the positions: recording")]
 Storey = Annotated[int, Meta(description="of a map of several: counted from 0, the lowest")]
+Edited = Annotated[str, Meta(description="who corrected it and when, such as: named by a person on 2026-11-26")]
 Notes = Annotated[list[str], Meta(description="why the map may be wrong, one sentence each")]
 
 
@@ -110,6 +111,7 @@ class ThingAnswer(TypedDict):
     color: Annotated[list[int], Meta(min_length=3, max_length=3, description="mean RGB, 0 to 255")]
     voxels: int
     storey: NotRequired[Storey]
+    edited: NotRequired[Edited]
 
 
 # Functional, because one key is a word of Python.
@@ -164,6 +166,28 @@ class LastSeenAnswer(TypedDict):
     text: NotRequired[Annotated[str, Meta(description="the answer in one sentence")]]
 
 
+class EditAnswer(TypedDict):
+    """One correction by a person."""
+
+    id: Annotated[str, Meta(description="by which it is undone")]
+    does: Annotated[str, Meta(description="rename, rename room, merge, split, forbid, pin or undo")]
+    name: Annotated[str, Meta(description="the new name, or that of an area or place")]
+    of: Annotated[list[str], Meta(description="what it is about was called; of an undo, the edit that is undone")]
+    position: Annotated[Position | None, Meta(description="of what it is about, as it was then")]
+    by: Annotated[str, Meta(description="who made it; empty where nobody said")]
+    made: Annotated[str, Meta(description="when, ISO 8601, UTC")]
+    state: Annotated[str, Meta(description="applied, undone, undo, or lost: it finds nothing to apply to")]
+    why: NotRequired[Annotated[str, Meta(description="it finds nothing to apply to")]]
+
+
+class EditsAnswer(TypedDict):
+    """All corrections of a map, the oldest first."""
+
+    map: str
+    edits: list[EditAnswer]
+    text: NotRequired[Annotated[str, Meta(description="what the last edit did, in one sentence")]]
+
+
 class ListedThing(ThingAnswer):
     """A thing, with its room and its distance where those are queried."""
 
@@ -211,6 +235,7 @@ class RoomAnswer(TypedDict):
     names: Annotated[list[RoomName], Meta(description="kinds that it may be, best first; several of an open plan")]
     area_m2: Annotated[float | None, Meta(description="of its floor; null where no walls are known")]
     outline: Annotated[list[Position], Meta(description="corners on its floor, counter-clockwise from above")]
+    edited: NotRequired[Edited]
 
 
 class ContentsAnswer(TypedDict):

@@ -14,6 +14,7 @@ from avlmaps.core.arrays import Float
 from avlmaps.core.errors import QueryError
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.contents import Watch, listed_rooms, put_storeys, require_known
+from avlmaps.query.given_places import is_place, place_given
 from avlmaps.query.schema import ListedThing, NearAnswer, RoomAnswer, SoundAnswer, ThingAnswer
 from avlmaps.query.unknown_names import unknown_note
 from avlmaps.query.whereabouts import Whereabouts
@@ -193,35 +194,6 @@ def page_of(rows: Sequence[Row], top: int, page: int, of: str) -> tuple[list[Row
     if not 1 <= page <= pages:
         raise QueryError(f"There is no page {page}; there are {pages} of {top}, for {len(rows)} {of}.")
     return list(rows[(page - 1) * top : page * top]), pages
-
-
-def place_of(text: str) -> Float[np.ndarray, " n"]:
-    """Return the two or three numbers of a place.
-
-    Raises:
-        QueryError: they are not.
-    """
-    try:
-        numbers = [float(word) for word in text.split(",")]
-    except ValueError:
-        numbers = []
-    if len(numbers) not in (2, 3) or not all(math.isfinite(one) and abs(one) <= 1e6 for one in numbers):
-        raise QueryError(f"A place is x,y or x,y,z in metres, such as 1.5,2.0; not {text[:80]!r}.")
-    return np.array(numbers)
-
-
-def place_given(place: str | Sequence[float]) -> Float[np.ndarray, " n"]:
-    """Return the numbers of a place that comes as a text or as a list.
-
-    Raises:
-        QueryError: they are no two or three numbers.
-    """
-    return place_of(place if isinstance(place, str) else ",".join(str(value) for value in place))
-
-
-def is_place(near: str | Sequence[float]) -> bool:
-    """Return whether what things are near to is meant as a place rather than as the name of a thing."""
-    return not isinstance(near, str) or not any(letter.isalpha() for letter in near)
 
 
 def _listed(thing: ThingAnswer) -> ListedThing:

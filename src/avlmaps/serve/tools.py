@@ -11,8 +11,8 @@ from msgspec import Meta, Struct
 
 from avlmaps.core.question import HeardAt
 from avlmaps.navigate.paths import goals_near
+from avlmaps.query.given_places import place_given
 from avlmaps.query.places import last_seen
-from avlmaps.query.selection import place_given
 from avlmaps.serve import agent_lists, work
 from avlmaps.serve.agent_lists import (
     ListRoomsQuery,

@@ -10,6 +10,7 @@ from avlmaps.core.poses import FRAME
 from avlmaps.navigate.paths import PathAnswer
 from avlmaps.query.answer import Answer
 from avlmaps.query.description import map_answer
+from avlmaps.query.given_places import place_of
 from avlmaps.query.places import PlaceAnswer, column_point, describe_place
 from avlmaps.query.queryable import Photo
 from avlmaps.query.schema import (
@@ -22,7 +23,7 @@ from avlmaps.query.schema import (
     SoundAnswer,
     locate_answer,
 )
-from avlmaps.query.selection import MapLists, ThingsPage, Wanted, page_of_things, place_of
+from avlmaps.query.selection import MapLists, ThingsPage, Wanted, page_of_things
 from avlmaps.serve.errors import RequestError, without_folders
 from avlmaps.serve.lanes import Cancellation
 from avlmaps.serve.requests import (

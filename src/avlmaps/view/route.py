@@ -104,7 +104,9 @@ class Guide:
             LanguageError: the command is not understood.
             NavigationError: there is no room for the robot.
         """
-        translator = LearnedTranslator(Given(photo, clip, self.avlmap.knows, self.avlmap.settings.sounds.at))
+        avlmap = self.avlmap
+        given = Given(photo, clip, avlmap.knows, avlmap.settings.sounds.at, avlmap.edited.own_names)
+        translator = LearnedTranslator(given)
         readings = explanation(translator, command)[:_MOST_READINGS]
         translation = translator.program_for(command)
         readable = Readable(() if folder is None else (folder,))

@@ -11,6 +11,12 @@ from avlmaps.core.errors import MapError
 from avlmaps.maps.store.array_files import explain_write_errors, refuse_links
 
 LOCK = ".lock"
+EDITING = ".edits.lock"
+_PATIENCE_S = {LOCK: 0.06, EDITING: 5.0}  # an edit takes milliseconds, and several come at once
+_BUSY = {
+    LOCK: "is being built by another process{} at this moment; wait for it, or build into another folder.",
+    EDITING: "is being edited by another process{} at this moment; try again.",
+}
 
 if sys.platform == "win32":  # pragma: no cover - tried on Windows only
     import msvcrt
@@ -26,9 +32,9 @@ else:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
-def _grab_patiently(descriptor: int) -> None:
+def _grab_patiently(descriptor: int, patience_s: float) -> None:
     """Try a few times: `is_locked` of another process holds the lock for an instant."""
-    for _ in range(3):
+    for _ in range(round(patience_s / 0.02)):
         try:
             return _grab(descriptor)
         except OSError:
@@ -37,27 +43,28 @@ def _grab_patiently(descriptor: int) -> None:
 
 
 @contextmanager
-def lock_folder(folder: Path) -> Generator[None]:
-    """Hold the folder's lock; the folder is made if it is not there.
+def lock_folder(folder: Path, name: str = LOCK) -> Generator[None]:
+    """Hold one of the folder's locks; the folder is made if it is not there.
+
+    Args:
+        folder: the map's.
+        name: ``LOCK`` of a build, ``EDITING`` of its edits, which need not wait for a build.
 
     Raises:
-        MapError: another build holds it, the folder cannot be written, or holds a link to another folder.
+        MapError: another process holds it, the folder cannot be written, or holds a link to another folder.
     """
     refuse_links(folder)
     with explain_write_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
-        if (folder / LOCK).is_symlink():  # it would be emptied
-            (folder / LOCK).unlink()
-        descriptor = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o644)
+        if (folder / name).is_symlink():  # it would be emptied
+            (folder / name).unlink()
+        descriptor = os.open(folder / name, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o644)
     try:
         try:
-            _grab_patiently(descriptor)
+            _grab_patiently(descriptor, _PATIENCE_S[name])
         except OSError as fault:
             holder = os.pread(descriptor, 32, 0).decode("ascii", "replace").strip() if hasattr(os, "pread") else ""
-            raise MapError(
-                f"{folder} is being built by another process{f' ({holder})' if holder else ''} at this moment; wait "
-                "for it, or build into another folder."
-            ) from fault
+            raise MapError(f"{folder} {_BUSY[name].format(f' ({holder})' if holder else '')}") from fault
         with explain_write_errors(folder):
             os.ftruncate(descriptor, 0)
             os.write(descriptor, f"{os.getpid()}\n".encode())

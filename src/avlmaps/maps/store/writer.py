@@ -16,9 +16,10 @@ from avlmaps.maps.store.array_files import FileInfo, is_stored_file, sync_names,
 from avlmaps.maps.store.array_validation import array_fields
 from avlmaps.maps.store.checkpoints import remove_stages, stage_folders
 from avlmaps.maps.store.derived import remove_derived
+from avlmaps.maps.store.edits import EDITS
 from avlmaps.maps.store.integrity import remember_checked
 from avlmaps.maps.store.life import LIFE, Life, life_arrays
-from avlmaps.maps.store.lock import LOCK
+from avlmaps.maps.store.lock import EDITING, LOCK
 from avlmaps.maps.store.manifest import MapInfo
 from avlmaps.maps.store.manifest_file import MANIFEST, write_manifest
 from avlmaps.maps.store.reader import CLIPS, PARTS, SOURCES, STATE, SUBMAPS
@@ -139,7 +140,7 @@ def is_map_or_free(path: Path) -> bool:
     names = {entry.name for entry in path.iterdir()}
     if MANIFEST in names or any(stage_folders(path / PARTS)):
         return True
-    if not names <= {LOCK, PARTS, *_ALL_SECTIONS}:
+    if not names <= {LOCK, EDITING, EDITS, PARTS, *_ALL_SECTIONS}:
         return False
     inside = [entry for name in names & {PARTS, *_ALL_SECTIONS} for entry in (path / name).glob("*")]
     return all(is_stored_file(entry) for entry in inside)

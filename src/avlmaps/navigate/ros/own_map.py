@@ -180,7 +180,8 @@ def on_own_map(ours: Obstacles, grid: OwnGrid, frames: Frames) -> Obstacles:
         cells = np.where(inside[..., None], cells, 0)
         known = inside & (ours.states[cells[..., 0], cells[..., 1]] != CellState.UNKNOWN)
         tall = np.where(known, ours.tall[cells[..., 0], cells[..., 1]], occupied)
-    return replace(ours, origin_m=low, cell_size_m=grid.cell_m, states=states, tall=tall)
+    theirs = replace(ours, origin_m=low, cell_size_m=grid.cell_m, states=states, tall=tall)
+    return theirs.without(ours.forbidden)
 
 
 def _turned(xy: np.ndarray, corner: GroundPose) -> np.ndarray:

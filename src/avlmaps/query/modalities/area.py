@@ -1,6 +1,6 @@
 """Where a kind of area is: keyframes whose view is closer to its name than to those of other areas, and their rooms."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -279,6 +279,7 @@ def area_factor(
     settings: AreaSettings,
     heat: HeatSettings,
     rooms: Rooms | None = None,
+    corrected: Callable[[RoomField], RoomField] | None = None,
 ) -> NearAnchors:
     """Return the heat of an area: one anchor a keyframe.
 
@@ -293,6 +294,7 @@ def area_factor(
         settings: how views are scored.
         heat: how fast heat falls.
         rooms: of the map; without them heat falls off round every keyframe.
+        corrected: puts in the rooms that people named: kinds behind those that the encoder knows.
     """
     anchors = area_anchors(keyframes, settings)
     view = np.asarray(keyframes.view)
@@ -303,11 +305,15 @@ def area_factor(
     else:
         shares = view_shares(view, encoder, part.query, settings)
         kinds, weights = rooms.field(shares.kinds, shares.share, "kinds_asked"), shares.weights
+        if corrected is not None:
+            kinds = corrected(kinds)
+            named = [1.0 if same_place(kind, part.query) else 0.0 for kind in kinds.kinds[len(weights) :]]
+            weights = np.concatenate([weights, named])
         posterior = scores = np.clip(kinds.at(anchors) @ weights, 0.0, 1.0).astype(np.float64)
     best = float(posterior.max(initial=0.0))
     missed = f"no view is like {part.query!r}; the best score is {best:.2f}, below {FOUND_AT:.2f}"
     note = "" if best >= FOUND_AT else missed
-    if isinstance(encoder, NamedViewEncoder) and not encoder.name_weights(part.query).any():
+    if isinstance(encoder, NamedViewEncoder) and not (encoder.name_weights(part.query).any() or weights.any()):
         note = f"{unknown_note(part.query, Kind.ROOM)}; it knows: {', '.join(encoder.names)}"
     if not len(keyframes):
         note = "the map holds no keyframes"

@@ -169,7 +169,8 @@ class Dispatcher:
         if program.strip():
             parse_program(program)
             return Translation(program)
-        given = Given(knows=now.avlmap.knows, at=now.avlmap.settings.sounds.at)
+        own = now.avlmap.edited.own_names
+        given = Given(knows=now.avlmap.knows, at=now.avlmap.settings.sounds.at, own=own)
         return LearnedTranslator(given).program_for(words)
 
     @property

@@ -1,0 +1,58 @@
+"""Names that people gave to things, rooms and places of a map: "my charging dock" is in no lexicon.
+
+A sentence is read with a word that is known in the place of each, since what was learnt reads such words best; what was
+read has the own name again.
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.language.intents import Target
+
+OwnName = tuple[str, bool]
+"""A name without its article, in lower case, and whether it is that of a room."""
+_THINGS = ("lamp", "clock", "vase", "suitcase", "printer", "basket")
+_ROOMS = ("kitchen", "garage", "library", "bathroom", "gym")
+
+
+@dataclass(frozen=True, slots=True)
+class StandIns:
+    """A sentence with known words in the place of own names.
+
+    Attributes:
+        text: the sentence.
+        own: the own name of each word.
+    """
+
+    text: str
+    own: dict[str, str] = field(default_factory=dict)
+
+    def back(self, text: str) -> str:
+        """Return words with the own names."""
+        for word, name in self.own.items():
+            text = re.sub(rf"\b{word}\b", lambda _, name=name: name, text, flags=re.IGNORECASE)
+        return text
+
+    def target(self, target: Target) -> Target:
+        """Return a target with its own name."""
+        return replace(target, name=self.own.get(target.name, target.name), near=tuple(map(self.target, target.near)))
+
+
+def stand_ins(text: str, names: Sequence[OwnName]) -> StandIns:
+    """Return a sentence with a known word for each own name in it that the lexicon does not have."""
+    out, own = text, dict[str, str]()
+    for name, is_room in sorted(names, key=lambda one: -len(one[0])):
+        if lexicon().find(name, Kind.ROOM if is_room else Kind.THING) is not None:
+            continue
+        said = re.compile(rf"(?<![\w-])(?:(?:the|a|an|my|your|our) )?{re.escape(name)}(?![\w-])", re.IGNORECASE)
+        if not said.search(out):
+            continue
+        free = (one for one in (_ROOMS if is_room else _THINGS) if one not in own and one not in text.casefold())
+        word = next(free, None)
+        if word is None:
+            break
+        out = said.sub(f"the {word}", out)
+        own[word] = name
+    return StandIns(out, own)

@@ -1,0 +1,369 @@
+"""Corrects a map: each method makes one ``Edit``, checks that it finds what it is about, and appends it to the log."""
+
+import math
+from collections.abc import Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from avlmaps.core.arrays import Float
+from avlmaps.core.errors import MapError, QueryError
+from avlmaps.maps.store.edits import LONGEST_NAME, Does, Edit, Spot, World, append_edit, in_force, read_edits
+from avlmaps.query.edits import Edited, SeenMap, apply, means, said
+from avlmaps.query.given_places import is_place, place_given, place_of
+from avlmaps.query.queryable import Queryable
+
+if TYPE_CHECKING:
+    from avlmaps.query.contents import Thing
+    from avlmaps.query.schema import EditAnswer, EditsAnswer
+
+Place = Sequence[float] | str
+"""x, y, z in metres of the recording frame, or x, y of the level frame; as numbers or as text."""
+_NEAR_M = 1.0  # how far from a thing a place may lie that means it
+_MOST_NAMED = 8
+
+
+class EditableMap(SeenMap, Queryable, Protocol):
+    """A map that can be corrected: ``AVLMap`` is one."""
+
+    @cached_property
+    def edited(self) -> Edited:
+        """What people corrected."""
+        ...
+
+    def forget_edits(self) -> None:
+        """Read what people corrected again at the next question."""
+        ...
+
+
+class Editor:
+    """Corrects a map in its folder.
+
+    Edits are stored beside the map and survive another build of it. ``by`` says who made them.
+    """
+
+    def __init__(self, avlmap: EditableMap) -> None:
+        self._map = avlmap
+
+    def rename(self, thing: str | None, to: str, *, at: Place | None = None, by: str = "") -> Edit:
+        """Give a thing another name: "that is not a chair, it is a stool".
+
+        Args:
+            thing: what it is called; None for what is at the place.
+            to: its name from now on.
+            at: where it is, for one of several.
+            by: who says so.
+
+        Raises:
+            QueryError: there is no such thing, or there are several, or the name is none.
+            MapError: the map lies in memory alone, or cannot be written.
+        """
+        found = self._thing(thing, at)
+        return self._add("rename", [self._map.edited.spot_of(found.name, found.rows)], name=_name(to), by=by)
+
+    def rename_room(self, room: str, to: str, *, by: str = "") -> Edit:
+        """Give a room another name: "this room is the studio".
+
+        Args:
+            room: what ``rooms`` calls it, or a place in it.
+            to: its name from now on.
+            by: who says so.
+
+        Raises:
+            QueryError: there is no such room, or there are several.
+            MapError: see ``rename``.
+        """
+        return self._add("rename room", [self._room(room)], name=_name(to), by=by)
+
+    def merge(self, *things: Place, to: str = "", by: str = "") -> Edit:
+        """Make one thing of several that the map takes apart.
+
+        Args:
+            things: the place of each.
+            to: its name; by default that of the first.
+            by: who says so.
+
+        Raises:
+            QueryError: fewer than two different things are meant.
+            MapError: see ``rename``.
+        """
+        found = [self._thing(None, place) for place in things]
+        if len({int(one.rows[0]) for one in found}) < 2:
+            raise QueryError(f"{len(found)} places mean fewer than two things; give a place on each that is merged.")
+        spots = [self._map.edited.spot_of(one.name, one.rows) for one in found]
+        return self._add("merge", spots, name=_name(to) if to else "", by=by)
+
+    def split(
+        self,
+        thing: str | None,
+        *,
+        at: Place | None = None,
+        plane: Sequence[Place] = (),
+        box: Sequence[float] = (),
+        by: str = "",
+    ) -> Edit:
+        """Take a thing apart: by its connected pieces, by an upright plane, or by a box.
+
+        Args:
+            thing: what it is called; None for what is at the place.
+            at: where it is, for one of several.
+            plane: two places on the plane.
+            box: x and y of two opposite corners, level frame, metres.
+            by: who says so.
+
+        Raises:
+            QueryError: there is no such thing, or the cut leaves it whole.
+            MapError: see ``rename``.
+        """
+        found = self._thing(thing, at)
+        if len(plane) not in (0, 2) or (plane and box):
+            raise QueryError("A thing is split by a plane through two places, or by a box, or by neither.")
+        floor_m = float(self._map.space.level(np.array(found.position))[2])
+        cut = [self._level(place) for place in plane] if plane else _corners(box) if box else []
+        world = self._map.space.world
+        points = [_vector(world(np.array([xy[0], xy[1], floor_m]))) for xy in cut]
+        spot = self._map.edited.spot_of(found.name, found.rows)
+        edit = self._new("split", [spot], cut=points, by=by)
+        before = sum(bool(np.isin(one.rows, found.rows).any()) for one in self._after().claims)
+        after = sum(bool(np.isin(one.rows, found.rows).any()) for one in self._after(edit).claims)
+        if after <= max(before, 1):
+            how = "the cut does not meet it" if cut else "it is one connected piece; cut it by a plane or a box"
+            raise QueryError(f"The {found.name} at {_said(found.position)} stays whole: {how}.")
+        return self._append(edit)
+
+    def forbid(self, name: str, *, box: Sequence[float] = (), room: str | None = None, by: str = "") -> Edit:
+        """Forbid an area to robots: no path goes through it, and no goal in it is accepted.
+
+        Args:
+            name: of the area.
+            box: x and y of two opposite corners, level frame, metres; on the storey where the map's walk began.
+            room: instead of a box, what ``rooms`` calls a room, or a place in it.
+            by: who says so.
+
+        Raises:
+            QueryError: neither or both are given, the box is none, or there is no such room.
+            MapError: see ``rename``.
+        """
+        if bool(box) == (room is not None):
+            raise QueryError("An area is forbidden by a box x0,y0,x1,y1 or by a room; give one of them.")
+        spot = self._room(room) if room is not None else self._area(_corners(box))
+        return self._add("forbid", [spot], name=_name(name), by=by)
+
+    def pin(self, name: str, at: Place, *, by: str = "") -> Edit:
+        """Give a place a name of one's own: "my charging dock". The same name again moves it.
+
+        Args:
+            name: of the place.
+            at: where it is; of two numbers, on the floor of the storey where the map's walk began.
+            by: who says so.
+
+        Raises:
+            QueryError: the place or the name is none.
+            MapError: see ``rename``.
+        """
+        numbers = place_given(at)
+        place = numbers if len(numbers) == 3 else self._map.space.world(np.append(numbers, self._floor_m()))
+        return self._add(
+            "pin", [Spot(middle=_vector(place)).anchored(self._map.stored.keyframes)], name=_name(name), by=by
+        )
+
+    def undo(self, which: str = "", *, by: str = "") -> Edit:
+        """Undo an edit.
+
+        Args:
+            which: its id; by default the last that is in force.
+            by: who says so.
+
+        Raises:
+            QueryError: there is no such edit in force.
+            MapError: see ``rename``.
+        """
+        known = in_force(self._log())
+        wanted = [edit for edit in known if edit.id == which] if which else list(known[-1:])
+        if not wanted:
+            what = f"edit {which[:20]!r}" if which else "edit"
+            raise QueryError(f"There is no {what} in force to undo; `avlmaps edit MAP --list` lists them.")
+        return self._append(self._new("undo", of=wanted[0].id, by=by))
+
+    def history(self) -> "EditsAnswer":
+        """Return all edits, the oldest first, and which of them find nothing to apply to."""
+        log = self._log()
+        counting = {edit.id for edit in in_force(log)}
+        lost = {one.edit.id: one.why for one in self._after().lost}
+        rows = list({edit.id: edit for edit in log}.values())
+        return {"map": self._map.stored.path.name, "edits": [_row(edit, counting, lost) for edit in rows]}
+
+    def _thing(self, name: str | None, at: Place | None) -> "Thing":
+        """Return the one thing that is meant."""
+        if name is None and at is None:
+            raise QueryError("Which thing? Name it, or give its place as x,y,z.")
+        least = 0.5 if at is None else 0.2
+        things = [one for one in self._map.things(None, least) if len(one.rows)]
+        if name is not None:
+            is_meant = means(name)
+            things = [one for one in things if is_meant(one.name)]
+        what = name or "thing"
+        if at is not None:
+            place = place_given(at)
+            things = [one for one in things if self._away_m(one, place) <= _NEAR_M]
+            things.sort(key=lambda one: (round(self._away_m(one, place), 2), -one.confidence))
+            if not things:
+                raise QueryError(
+                    f"The map shows no {what} within {_NEAR_M:g} m of {_said(place)}; list them with `avlmaps things`."
+                )
+            return things[0]
+        if not things:
+            raise QueryError(f"The map shows no {what}; list what it shows with `avlmaps things`.")
+        if len(things) > 1:
+            places = ", ".join(_said(one.position) for one in things[:_MOST_NAMED])
+            raise QueryError(f"There are {len(things)} things called {what}: say which by its place, one of {places}.")
+        return things[0]
+
+    def _away_m(self, thing: "Thing", place: Float[np.ndarray, " n"]) -> float:
+        """Return how far a thing's voxels lie from a place: in space, or level where the place has no height."""
+        points = thing.points if len(place) == 3 else self._map.space.level(thing.points)[:, :2]
+        return float(np.linalg.norm(points - place, axis=1).min())
+
+    def _room(self, room: str) -> Spot:
+        """Return the room that is meant."""
+        from avlmaps.query.whereabouts import Whereabouts
+
+        where = Whereabouts.of(self._map)
+        if where.regions is None:
+            raise QueryError("The map has no floor plan, so that its rooms are not known.")
+        if is_place(room):
+            numbers: list[int] = where.rooms_of(self._in_space(place_of(room))[None]).tolist()
+        else:
+            numbers = where.numbers_of(room)
+        if len(numbers) > 1:
+            names = ", ".join(where.names[number] for number in numbers[:_MOST_NAMED])
+            raise QueryError(f"{len(numbers)} rooms are called {room}; say which: {names}.")
+        found = where.rooms[numbers[0]] if numbers[0] >= 0 else None
+        if found is None or found.region < 0:
+            raise QueryError(f"The floor of the room {room!r} is not mapped, so that it has no extent to name.")
+        spot = Spot(name=found.name, middle=found.position, corners=tuple(map(_vector, found.outline)))
+        return spot.anchored(self._map.stored.keyframes)
+
+    def _area(self, corners: Sequence[Float[np.ndarray, "2"]]) -> Spot:
+        floor_m = self._floor_m()
+        points = [self._map.space.world(np.append(corner, floor_m)) for corner in corners]
+        middle = _vector(np.mean(points, axis=0))
+        return Spot(middle=middle, corners=tuple(map(_vector, points))).anchored(self._map.stored.keyframes)
+
+    def _floor_m(self) -> float:
+        """Return the level height of the floor on which the map's walk began."""
+        space, cameras = self._map.space, np.asarray(self._map.stored.keyframes.world_from_camera)[:1, :3, 3]
+        if self._map.storeys is not None and len(cameras):
+            storey = int(self._map.storeys.of_places(cameras)[0])
+            return float(self._map.storeys[storey].floor_m)
+        from avlmaps.maps.obstacles import floor_height
+
+        return floor_height(space.level_centres()[:, 2], space.grid.voxel_size_m) if len(space) else 0.0
+
+    def _in_space(self, place: Float[np.ndarray, " n"]) -> Float[np.ndarray, "3"]:
+        return place if len(place) == 3 else self._map.space.world(np.append(place, self._floor_m()))
+
+    def _level(self, place: Place) -> Float[np.ndarray, "2"]:
+        numbers = place_given(place)
+        return numbers if len(numbers) == 2 else self._map.space.level(numbers)[:2]
+
+    def _new(
+        self,
+        does: Does,
+        at: Sequence[Spot] = (),
+        *,
+        name: str = "",
+        cut: Sequence[tuple[float, float, float]] = (),
+        of: str = "",
+        by: str = "",
+    ) -> Edit:
+        world = World.of(self._map.stored.info) if at else None
+        return Edit.new(does, at, name=name, cut=cut, of=of, by=_name(by) if by else "", world=world)
+
+    def _add(self, does: Does, at: Sequence[Spot], *, name: str, by: str) -> Edit:
+        return self._append(self._new(does, at, name=name, by=by))
+
+    def _append(self, edit: Edit) -> Edit:
+        stored = self._map.stored
+        if not stored.info.files:
+            raise MapError("The map lies in memory alone; save it, and edit what is saved.")
+        append_edit(stored.path, edit)
+        self._map.forget_edits()
+        return edit
+
+    def _log(self) -> tuple[Edit, ...]:
+        return read_edits(self._map.stored.path)
+
+    def _after(self, *more: Edit) -> Edited:
+        return apply((*self._log(), *more), self._map)
+
+
+def _row(edit: Edit, counting: set[str], lost: dict[str, str]) -> "EditAnswer":
+    state = (
+        "undo"
+        if edit.does == "undo"
+        else "undone"
+        if edit.id not in counting
+        else "lost"
+        if edit.id in lost
+        else "applied"
+    )
+    row: EditAnswer = {
+        "id": edit.id,
+        "does": edit.does,
+        "name": edit.name,
+        "of": [one.name for one in edit.at] if edit.does != "undo" else [edit.of],
+        "position": list(edit.at[0].middle) if edit.at else None,
+        "by": edit.by,
+        "made": edit.made,
+        "state": state,
+    }
+    if edit.id in lost:
+        row["why"] = lost[edit.id]
+    return row
+
+
+def edit_text(edit: Edit) -> str:
+    """Return what an edit did, in one sentence."""
+    if edit.does == "undo":
+        return f"Edit {edit.of} is undone."
+    before = " and the ".join(one.name for one in edit.at if one.name)
+    match edit.does:
+        case "rename" | "rename room":
+            what = f"The {before} is called {edit.name}"
+        case "merge":
+            what = f"The {before} are one thing" + (f", {edit.name}" if edit.name else "")
+        case "split":
+            what = f"The {before} is split"
+        case "forbid":
+            what = f"No robot enters {edit.name}"
+        case _:
+            what = f"{edit.name} is at {_said(edit.at[0].middle)}"
+    return f"{what} from now on ({said(edit)}, edit {edit.id})."
+
+
+def _name(name: str) -> str:
+    word = " ".join(name.split())
+    if not word or len(word) > LONGEST_NAME or not any(letter.isalnum() for letter in word) or not word.isprintable():
+        raise QueryError(f"{name[:40]!r} is no name; give one to {LONGEST_NAME} characters, a letter among them.")
+    return word
+
+
+def _corners(box: Sequence[float]) -> list[Float[np.ndarray, "2"]]:
+    """Return the corners of a box, level x and y."""
+    if len(box) != 4 or not all(math.isfinite(value) and abs(value) <= 1e5 for value in box):
+        raise QueryError(f"A box is x0,y0,x1,y1 in metres of the level frame, two opposite corners; not {tuple(box)}.")
+    (x0, x1), (y0, y1) = sorted((box[0], box[2])), sorted((box[1], box[3]))
+    if min(x1 - x0, y1 - y0) < 0.01:
+        raise QueryError(f"The box {tuple(box)} has no area; give two opposite corners, x0,y0,x1,y1.")
+    return [np.array(corner, np.float64) for corner in ((x0, y0), (x1, y0), (x1, y1), (x0, y1))]
+
+
+def _vector(point: Float[np.ndarray, "3"]) -> tuple[float, float, float]:
+    x, y, z = (round(float(value), 4) for value in point)
+    return x, y, z
+
+
+def _said(point: Sequence[float] | Float[np.ndarray, " n"]) -> str:
+    return "(" + ", ".join(f"{value:.2f}" for value in point) + ") m"

@@ -1,0 +1,605 @@
+"""What people corrected in a map, applied: ``apply`` is the one place, for every question, list, picture and path.
+
+A thing that was edited is a ``Claim``: voxels with a name. What the encoder sees in these voxels counts no more where
+a person named them; a name that means the claim's finds it. A room's name is put into the field of kinds of room, from
+which rooms and areas follow.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from avlmaps.core.arrays import Bool, Float, Int
+from avlmaps.core.errors import QueryError
+from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.question import Part
+from avlmaps.maps.store.edits import Edit, Spot, World, in_force
+from avlmaps.query.colour_filter import colour_in, colour_share
+from avlmaps.query.components import linked
+from avlmaps.query.factors import FOUND_AT, HeatSettings, NearAnchors, NearThings
+from avlmaps.query.instances import Instances
+from avlmaps.query.modalities.area import same_place
+from avlmaps.query.raster import in_polygon
+from avlmaps.query.rooms import RoomField
+
+if TYPE_CHECKING:
+    from avlmaps.maps.obstacles import ForbiddenArea
+    from avlmaps.maps.store.life import Life
+    from avlmaps.maps.store.reader import StoredMap
+    from avlmaps.maps.storeys import Storeys
+    from avlmaps.query.contents import Room, Thing
+    from avlmaps.query.room_regions import RoomRegions
+    from avlmaps.query.voxel_space import Space
+
+_SAME_BOX, _ALIKE_BOX = 0.5, 0.2  # shares of two boxes together that both hold: certainly one thing, and perhaps
+_HALF = 0.5  # of its voxels: then a thing is in the claim
+_LEAST_LISTED = 0.2  # a person may name what the map is not certain of
+_SPECK = 0.05  # share of a thing; smaller pieces belong to the nearest larger one
+_SAME_ROOM = 0.25
+_AT_M = 1e-3
+_POSSESSIVES = ("the ", "a ", "an ", "my ", "your ", "our ")
+_DONE = {"rename": "named", "rename room": "named", "merge": "made one thing", "split": "split", "pin": "named",
+         "forbid": "forbidden"}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Claim:
+    """Voxels that an edit made one thing.
+
+    Attributes:
+        name: of the thing.
+        rows: numbers of its voxels in the map, ascending.
+        confidence: that it has this name, in [0, 1]; 1 where a person said so.
+        is_named: whether a person said so.
+        edit: the last one that made it.
+    """
+
+    name: str
+    rows: Int[np.ndarray, " m"]
+    confidence: float
+    is_named: bool
+    edit: Edit
+
+
+@dataclass(frozen=True, slots=True)
+class LostEdit:
+    """An edit that finds nothing to apply to, and why."""
+
+    edit: Edit
+    why: str
+
+
+def said(edit: Edit) -> str:
+    """Return who did what and when, in words: ``named by a person on 2026-11-26``."""
+    return f"{_DONE[edit.does]} by {edit.by or 'a person'} on {edit.day}"
+
+
+def plain_name(name: str) -> str:
+    """Return a name in lower case without the words before it: "My charging dock" is "charging dock"."""
+    word = " ".join(name.casefold().split())
+    return next((word.removeprefix(one) for one in _POSSESSIVES if word.startswith(one)), word)
+
+
+def means(asked: str) -> Callable[[str], bool]:
+    """Return whether the name of a thing is meant by a word: it is the same, another word for it, or a narrower one."""
+    known, word = lexicon(), plain_name(asked)
+    entry = known.find(word, Kind.THING) or known.head(word, Kind.THING)
+
+    def is_meant(name: str) -> bool:
+        own = plain_name(name)
+        if own == word:
+            return True
+        of = known.find(own, Kind.THING) or known.head(own, Kind.THING)
+        return entry is not None and of is not None and known.is_a(of.name, entry.name, Kind.THING)
+
+    return is_meant
+
+
+class SeenMap(Protocol):
+    """What edits need of a map: what its encoders see."""
+
+    @property
+    def stored(self) -> "StoredMap":
+        """The map as it lies on the disk."""
+        ...
+
+    @cached_property
+    def space(self) -> "Space":
+        """The voxels' places."""
+        ...
+
+    @cached_property
+    def storeys(self) -> "Storeys | None":
+        """The storeys of the map; None for a map of one."""
+        ...
+
+    @cached_property
+    def room_regions(self) -> "RoomRegions | None":
+        """The rooms that walls and doorways bound."""
+        ...
+
+    def sees(self, phrase: str) -> bool:
+        """Return whether the pixel encoder can look for a phrase."""
+        ...
+
+    def unedited_things(self, names: Sequence[str] | None = None, least_confidence: float = 0.5) -> "list[Thing]":
+        """Return the things of the map as the encoder sees them."""
+        ...
+
+
+def apply(edits: Sequence[Edit], avlmap: SeenMap) -> "Edited":
+    """Return what edits make of a map: of no edits, everything stays the same object.
+
+    Args:
+        edits: all of a log, the oldest first; those that are undone do not count.
+        avlmap: the map.
+    """
+    return Edited(in_force(edits), avlmap)
+
+
+class Edited:
+    """A map with its edits. What is computed of them once is stored.
+
+    Attributes:
+        edits: those in force.
+    """
+
+    def __init__(self, edits: tuple[Edit, ...], avlmap: SeenMap) -> None:
+        self.edits = edits
+        self._map = avlmap
+        self._lost: dict[str, LostEdit] = {}
+
+    def __bool__(self) -> bool:
+        return bool(self.edits)
+
+    # What was edited, found in the map as it is now.
+
+    @cached_property
+    def claims(self) -> tuple[Claim, ...]:
+        """The things that were renamed, merged or split, by their first voxel."""
+        claims: list[Claim] = []
+        for edit in self._of("rename", "merge", "split"):
+            found = [self._targets(spot.now(self._map.stored.keyframes), claims) for spot in edit.at]
+            if not all(found):
+                at = edit.at[[bool(one) for one in found].index(False)]
+                self._lose(edit, f"nothing like the {at.name or 'thing'} is at {_place(at.middle)} any more")
+                continue
+            targets = list({one.rows[0]: one for each in found for one in each}.values())
+            claims = [one for one in claims if all(one is not other for other in targets)]
+            claims += self._made(edit, targets)
+        return tuple(sorted(claims, key=lambda one: int(one.rows[0])))
+
+    def _made(self, edit: Edit, targets: Sequence[Claim]) -> list[Claim]:
+        """Return what an edit makes of things."""
+        if edit.does == "rename":
+            return [replace(one, name=edit.name, confidence=1.0, is_named=True, edit=edit) for one in targets]
+        if edit.does == "split":
+            return [replace(one, rows=rows, edit=edit) for one in targets for rows in self._pieces(one.rows, edit)]
+        first = targets[0]
+        named = bool(edit.name) or first.is_named
+        sure = 1.0 if edit.name else max(one.confidence for one in targets if one.name == first.name)
+        rows = np.unique(np.concatenate([one.rows for one in targets]))
+        return [Claim(edit.name or first.name, rows, sure, named, edit)]
+
+    def _pieces(self, rows: Int[np.ndarray, " m"], edit: Edit) -> list[Int[np.ndarray, " m"]]:
+        """Return the parts of a thing that a cut makes; the thing where it makes none."""
+        space = self._map.space
+        level = space.level(space.centres_of(rows))
+        cut = self._cut_of(edit)
+        if len(cut) == 2:
+            along = cut[1] - cut[0]
+            which = ((level[:, :2] - cut[0]) @ np.array([-along[1], along[0]]) > 0.0).astype(np.int64)
+        elif len(cut):
+            which = in_polygon(level[:, :2], cut).astype(np.int64)
+        else:
+            which = linked(np.asarray(space.index)[rows], 1)
+            which = _without_specks(which, level)
+        return [rows[which == number] for number in np.unique(which)]
+
+    def _cut_of(self, edit: Edit) -> Float[np.ndarray, "k 2"]:
+        """Return the points of a cut, level x and y, in the world as it is now."""
+        if not edit.cut:
+            return np.zeros((0, 2))
+        spot = edit.at[0]
+        with_cut = Spot(middle=spot.middle, corners=edit.cut, seen_from=spot.seen_from).now(self._map.stored.keyframes)
+        return self._map.space.level(np.array(with_cut.corners, np.float64))[:, :2]
+
+    def _targets(self, spot: Spot, claims: Sequence[Claim]) -> list[Claim]:
+        """Return the claims, or the thing of the map, that a spot is about; none where there is nothing like it."""
+        own = [(self._overlap(spot, self._box(one.rows)), one) for one in claims]
+        share, best = max(own, key=lambda one: one[0], default=(0.0, None))
+        if best is not None and share >= _SAME_BOX:
+            return [best]
+        thing = self._thing_at(spot) or self._thing_at(self._carried(spot))
+        if thing is None:
+            return [best] if best is not None and share >= _ALIKE_BOX else []
+        holding = [one for one in claims if _share(thing.rows, one.rows) >= _HALF]
+        inside = [one for one in claims if _share(one.rows, thing.rows) >= _HALF]
+        if holding or inside:
+            return holding[:1] or inside
+        taken = np.concatenate([np.zeros(0, np.int64), *(one.rows for one in claims)])
+        rows = np.setdiff1d(thing.rows, taken)
+        nobody = Edit(schema=1, id="", does="rename", made="")
+        return [Claim(thing.name, rows, thing.confidence, False, nobody)] if len(rows) else []
+
+    def _thing_at(self, spot: Spot | None) -> "Thing | None":
+        """Return the thing of the map, as its encoder sees it, that fills the box of a spot best."""
+        if spot is None:
+            return None
+        for names in ((spot.name,), None):
+            best, most = None, _ALIKE_BOX
+            for thing in self._things_called(names):
+                share = self._overlap(spot, self._box(thing.rows))
+                if share >= most:
+                    best, most = thing, share
+            if best is not None:
+                return best
+        return None
+
+    @cached_property
+    def _known_things(self) -> "dict[tuple[str, ...] | None, list[Thing]]":
+        return {}
+
+    def _things_called(self, names: tuple[str, ...] | None) -> "list[Thing]":
+        if names is not None and not self._map.sees(names[0]):
+            return []
+        if names not in self._known_things:
+            self._known_things[names] = self._map.unedited_things(names, _LEAST_LISTED)
+        return self._known_things[names]
+
+    def _carried(self, spot: Spot) -> Spot | None:
+        """Return where a later day found the thing of a spot, of which an earlier day knew; None where it did not."""
+        life = self._map.stored.life() if getattr(self._map.stored.info, "visits", ()) else None
+        if life is None:
+            return None
+        number = self._stay_at(life, spot)
+        if number is None or life.stays[number].moved_to is None:
+            return None
+        while (after := life.stays[number].moved_to) is not None:
+            number = after
+        points = self._map.space.grid.centre_of(life.voxels(number))
+        low, high = self._box_of(self._map.space.level(points))
+        middle = self._map.space.world((low + high) / 2.0)
+        return Spot(name=spot.name, middle=_vector(middle), size=_vector(high - low))
+
+    def _stay_at(self, life: "Life", spot: Spot) -> int | None:
+        """Return the number of the stay that fills the box of a spot best."""
+        level = self._map.space.level
+        near = [
+            (self._overlap(spot, self._box_of(level(self._map.space.grid.centre_of(life.voxels(number))))), number)
+            for number in range(len(life))
+            if len(life.voxels(number))
+        ]
+        share, number = max(near, default=(0.0, 0))
+        return number if share >= _ALIKE_BOX else None
+
+    def _box(self, rows: Int[np.ndarray, " m"]) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
+        return self._box_of(self._map.space.level(self._map.space.centres_of(rows)))
+
+    def _box_of(self, level: Float[np.ndarray, "m 3"]) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
+        half = self._map.space.grid.voxel_size_m / 2.0
+        return level.min(axis=0) - half, level.max(axis=0) + half
+
+    def _overlap(self, spot: Spot, box: tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]) -> float:
+        """Return which share of two boxes together both hold, in [0, 1]."""
+        middle, size = self._map.space.level(np.array(spot.middle)), np.array(spot.size)
+        low, high = middle - size / 2.0, middle + size / 2.0
+        both = np.prod(np.clip(np.minimum(high, box[1]) - np.maximum(low, box[0]), 0.0, None))
+        whole = np.prod(size) + np.prod(box[1] - box[0]) - both
+        return float(both / whole) if whole > 0.0 else 0.0
+
+    def spot_of(self, name: str, rows: Int[np.ndarray, " m"]) -> Spot:
+        """Return what an edit is about: the thing of some voxels."""
+        low, high = self._box(rows)
+        middle = self._map.space.world((low + high) / 2.0)
+        spot = Spot(name=name, middle=_vector(middle), size=_vector(high - low))
+        return spot.anchored(self._map.stored.keyframes)
+
+    @cached_property
+    def rooms(self) -> Mapping[int, Edit]:
+        """The edits of rooms, by the number of the region in ``AVLMap.room_regions``."""
+        edits, regions = self._of("rename room"), None
+        if edits:
+            regions = self._map.room_regions
+        found: dict[int, Edit] = {}
+        for edit in edits:
+            spot = edit.at[0].now(self._map.stored.keyframes)
+            number = -1 if regions is None else int(regions.at(np.array([spot.middle]))[0])
+            if regions is None or number < 0 or regions.share_of(number, np.array(spot.corners)) < _SAME_ROOM:
+                self._lose(edit, f"no room like the {spot.name} is at {_place(spot.middle)} any more")
+            else:
+                found[number] = edit
+        return found
+
+    @cached_property
+    def pins(self) -> Mapping[str, tuple[Edit, Float[np.ndarray, "3"]]]:
+        """The places that were named, by plain names: the last place of each."""
+        keyframes = self._map.stored.keyframes
+        return {plain_name(edit.name): (edit, np.array(edit.at[0].now(keyframes).middle)) for edit in self._of("pin")}
+
+    @cached_property
+    def forbidden(self) -> "tuple[ForbiddenArea, ...]":
+        """The areas that no robot enters; of one name the last."""
+        from avlmaps.maps.obstacles import ForbiddenArea
+
+        areas: dict[str, ForbiddenArea] = {}
+        storeys = self._map.storeys
+        for edit in self._of("forbid"):
+            corners = np.array(edit.at[0].now(self._map.stored.keyframes).corners, np.float64)
+            storey = 0 if storeys is None else int(storeys.of_places(corners.mean(axis=0))[0])
+            level = self._map.space.level(corners)[:, :2]
+            areas[plain_name(edit.name)] = ForbiddenArea(edit.name, said(edit), level, storey)
+        return tuple(areas.values())
+
+    @property
+    def lost(self) -> tuple[LostEdit, ...]:
+        """The edits that find nothing to apply to; finding that out looks for what each is about."""
+        _ = self.claims, self.rooms, self.pins, self.forbidden
+        return tuple(self._lost[edit.id] for edit in self.edits if edit.id in self._lost)
+
+    def _of(self, *does: str) -> list[Edit]:
+        """Return the edits of some kinds whose places are in the map's world."""
+        wanted = [edit for edit in self.edits if edit.does in does]
+        own: list[Edit] = []
+        for edit in wanted:
+            if edit.world is None or edit.world.is_that_of(World.of(self._map.stored.info)):
+                own.append(edit)
+            else:
+                self._lose(edit, f"it was made in a map of another recording, {edit.world.name}")
+        return own
+
+    def _lose(self, edit: Edit, why: str) -> None:
+        self._lost[edit.id] = LostEdit(edit, why)
+
+    # What follows for questions and lists.
+
+    @property
+    def own_names(self) -> tuple[tuple[str, bool], ...]:
+        """The names that people gave, plain, and whether each is that of a room."""
+        named = [(plain_name(edit.name), edit.does == "rename room") for edit in self.edits if edit.does != "forbid"]
+        return tuple(dict.fromkeys(one for one in named if one[0]))
+
+    def knows(self, phrase: str) -> bool:
+        """Return whether a person named something so."""
+        word = plain_name(phrase)
+        return any(name == word for name, _ in self.own_names)
+
+    def is_room(self, phrase: str) -> bool:
+        """Return whether a person named a room so, and nothing else."""
+        word = plain_name(phrase)
+        kinds = {is_room for name, is_room in self.own_names if name == word}
+        return kinds == {True}
+
+    def pinned(self, part: Part, heat: HeatSettings) -> NearAnchors | None:
+        """Return the heat of a place that a person named; None where nobody named one so."""
+        known = self.pins.get(plain_name(part.query)) if self.edits else None
+        if known is None:
+            return None
+        falloff = heat.falloff_per_m(part.role)
+        return NearAnchors(
+            self._map.space, part, falloff, known[1][None], np.ones(1), np.zeros(1, np.int64), True, part.query
+        )
+
+    def object_factor(self, part: Part, heat: HeatSettings, find: Callable[[], NearThings]) -> NearThings:
+        """Return the heat of the things that a part of a question names, as people corrected them.
+
+        Args:
+            part: of the query.
+            heat: how fast it falls.
+            find: returns it as the encoder sees it; may raise where that understands nothing of it.
+        """
+        if not self.edits or not self.claims:
+            return find()
+        try:
+            raw = find()
+        except QueryError:
+            is_meant = means(part.query)
+            if not any(is_meant(one.name) for one in self.claims):
+                raise
+            nothing = np.zeros(len(self._map.space), np.bool_), np.zeros(0, np.int64), np.zeros(0, np.float32)
+            raw = NearThings(self._map.space, part, heat.falloff_per_m(part.role), *nothing, found=False)
+        return self._corrected(raw, part.query)
+
+    def _corrected(self, raw: NearThings, word: str) -> NearThings:
+        colour = colour_in(word)
+        if colour is not None and not colour.thing:
+            return raw
+        rows = np.flatnonzero(raw.mask)
+        rows, instance, confidence, given = self._claimed(rows, raw.instance, raw.confidence, word)
+        if colour is not None and lexicon().find(word, Kind.THING) is None and len(given):
+            last = np.arange(len(confidence) - len(given), len(confidence))
+            rgb = np.asarray(self._map.stored.voxels.rgb)
+            for number, claim in zip(last, given, strict=True):
+                own = np.zeros(len(claim.rows), np.int64)
+                confidence[number] *= colour_share(rgb, claim.rows, own, colour)[0]
+        mask = np.zeros(len(raw.mask), np.bool_)
+        mask[rows] = True
+        best, uncertain = float(confidence.max(initial=0.0)), raw.with_uncertain
+        is_named = raw.is_named or bool(given)
+        found = best >= FOUND_AT and is_named
+        lost = f"what looks like {word!r} was named otherwise by a person" if raw.found else raw.note
+        return replace(
+            raw, mask=mask, instance=instance, confidence=confidence, found=found, is_named=is_named,
+            understood=raw.understood or (word if given else ""), note="" if found else lost,
+            with_uncertain=None if uncertain is None else lambda: self._corrected(uncertain(), word),
+        )  # fmt: skip
+
+    def instances(self, found: Instances, word: str) -> Instances:
+        """Return the instances of a word as people corrected them; those of voxels that they added are certain."""
+        if not self.edits or not self.claims:
+            return found
+        rows, instance, confidence, _ = self._claimed(found.rows, found.instance, found.confidence, word)
+        margin, score = np.ones(len(rows), np.float32), np.ones(len(rows), np.float32)
+        at = np.minimum(np.searchsorted(found.rows, rows), max(len(found.rows) - 1, 0))
+        if len(found.rows):
+            known = found.rows[at] == rows
+            margin[known], score[known] = found.margin[at[known]], found.score[at[known]]
+        return Instances(rows, instance, margin, score, confidence.astype(np.float32))
+
+    def _claimed(
+        self,
+        rows: Int[np.ndarray, " a"],
+        instance: Int[np.ndarray, " a"],
+        confidence: Float[np.ndarray, " i"],
+        word: str,
+    ) -> tuple[Int[np.ndarray, " b"], Int[np.ndarray, " b"], Float[np.ndarray, " j"], list[Claim]]:
+        """Return instances without what people named otherwise, with the claims that the word means behind them."""
+        is_meant = means(word)
+        exact = [one for one in self.claims if plain_name(one.name) == plain_name(word)]
+        given = exact or [one for one in self.claims if is_meant(one.name)]
+        taken = self._voxels(one for one in self.claims if one.is_named or one in given)
+        count = np.bincount(instance, minlength=len(confidence))
+        left = np.bincount(instance[~taken[rows]], minlength=len(confidence))
+        stays = (left > 0) & (left >= _HALF * count)
+        own = stays[instance] & ~taken[rows]
+        number = np.cumsum(stays) - 1
+        kept = int(stays.sum())
+        new_rows = np.concatenate([rows[own], *(one.rows for one in given)])
+        new_instance = np.concatenate(
+            [number[instance[own]], *(np.full(len(one.rows), kept + k) for k, one in enumerate(given))]
+        ).astype(np.int64)
+        order = np.argsort(new_rows, kind="stable")
+        sure = np.concatenate([confidence[stays], [one.confidence for one in given]])
+        return new_rows[order], new_instance[order], sure, given
+
+    def _voxels(self, claims: Iterable[Claim]) -> Bool[np.ndarray, " n"]:
+        taken = np.zeros(len(self._map.space), np.bool_)
+        for one in claims:
+            taken[one.rows] = True
+        return taken
+
+    def things(self, found: "list[Thing]", names: Sequence[str] | None, least_confidence: float) -> "list[Thing]":
+        """Return a list of things as people corrected it, most confident first."""
+        if not self.edits or not (self.claims or self.pins):
+            return found
+        from avlmaps.query.contents import thing_of
+
+        taken = self._voxels(self.claims)
+        kept = [one for one in found if not len(one.rows) or taken[one.rows].mean() < _HALF]
+        wanted = None if names is None else [means(name) for name in names]
+
+        def is_wanted(name: str, sure: float) -> bool:
+            return sure >= least_confidence and (wanted is None or any(one(name) for one in wanted))
+
+        stored, space = self._map.stored, self._map.space
+        own = [
+            replace(thing_of(stored, space, one.name, one.confidence, one.rows), edited=said(one.edit))
+            for one in self.claims
+            if is_wanted(one.name, one.confidence)
+        ]
+        pinned = [_pinned(edit, place) for edit, place in self.pins.values() if is_wanted(edit.name, 1.0)]
+        return sorted([*kept, *own, *pinned], key=lambda one: -one.confidence)
+
+    def room_field(self, field: RoomField) -> RoomField:
+        """Return how likely each place is each kind of room, where people said so with certainty."""
+        if not self.edits or not self.rooms:
+            return field
+        regions = self._map.room_regions
+        assert regions is not None
+        kinds = list(field.kinds)
+        kinds += dict.fromkeys(edit.name for edit in self.rooms.values() if edit.name not in kinds)
+        share = np.zeros((len(field.share), len(kinds)), np.float32)
+        share[:, : len(field.kinds)] = field.share
+        for number, edit in self.rooms.items():
+            own = regions.of_plan_cells == number
+            share[own] = 0.0
+            share[own, kinds.index(edit.name)] = 1.0
+        return replace(field, kinds=tuple(kinds), share=share)
+
+    def listed_rooms(self, rooms: "list[Room]") -> "list[Room]":
+        """Return rooms that say who named them."""
+        if not self.edits or not self.rooms:
+            return rooms
+        return [
+            room if (edit := self.rooms.get(room.region)) is None else replace(room, edited=said(edit))
+            for room in rooms
+        ]
+
+    def life(self, life: "Life") -> "Life":
+        """Return what became of things over days, under the names that people gave them, wherever they moved."""
+        if not self.edits:
+            return life
+        import msgspec
+
+        stays, changed = list(life.stays), False
+        for edit in self._of("rename"):
+            number = self._stay_at(life, edit.at[0].now(self._map.stored.keyframes))
+            if number is None:
+                continue
+            while (before := stays[number].moved_from) is not None:
+                number = before
+            while number is not None:
+                stays[number] = msgspec.structs.replace(stays[number], name=edit.name)
+                number, changed = stays[number].moved_to, True
+        return replace(life, stays=tuple(stays)) if changed else life
+
+    def said_of(
+        self, places: Sequence[Sequence[float]], named: Iterable[str] = (), areas: Iterable[str] = ()
+    ) -> tuple[str, ...]:
+        """Return who corrected what an answer is about, and when, in a sentence each.
+
+        Args:
+            places: of its goals, metres, the map's world.
+            named: names that the question has for things and places.
+            areas: those that it has for rooms.
+        """
+        if not self.edits:
+            return ()
+        space, names, rooms = self._map.space, set(map(plain_name, named)), list(map(plain_name, areas))
+        points = np.asarray(places, np.float64).reshape(-1, 1, 3)
+
+        def is_at(own: Float[np.ndarray, "m 3"]) -> bool:
+            return any(float(np.linalg.norm(own - point, axis=1).min()) < _AT_M for point in points)
+
+        told = [edit for name, (edit, place) in self.pins.items() if name in names or is_at(place[None])]
+        told += [edit for edit in self.rooms.values() if any(same_place(edit.name, room) for room in rooms)]
+        said_of = [f"{_the(edit.name)} was {said(edit)}." for edit in told]
+        said_of += [
+            f"{_the(one.name)} was {said(one.edit)}."
+            for one in self.claims
+            if plain_name(one.name) in names or is_at(space.centres_of(one.rows))
+        ]
+        return tuple(dict.fromkeys(said_of))
+
+
+def _without_specks(which: Int[np.ndarray, " m"], level: Float[np.ndarray, "m 3"]) -> Int[np.ndarray, " m"]:
+    """Return pieces of which those that are specks belong to the nearest large one."""
+    from scipy.spatial import KDTree
+
+    count = np.bincount(which)
+    large = count >= max(2.0, _SPECK * len(which))
+    if large.all() or not large.any():
+        return which
+    on_large = large[which]
+    nearest = KDTree(level[on_large]).query(level[~on_large])[1]
+    out = which.copy()
+    out[~on_large] = which[on_large][nearest]
+    return out
+
+
+def _pinned(edit: Edit, place: Float[np.ndarray, "3"]) -> "Thing":
+    from avlmaps.query.contents import Thing
+
+    nothing = np.zeros(0, np.int64)
+    return Thing(edit.name, 1.0, _vector(place), (0.0, 0.0, 0.0), (0, 0, 0), nothing, np.zeros((0, 3)), said(edit))
+
+
+def _share(rows: Int[np.ndarray, " m"], others: Int[np.ndarray, " k"]) -> float:
+    """Return which share of some voxels are among others."""
+    return float(np.isin(rows, others).mean()) if len(rows) else 0.0
+
+
+def _vector(point: Float[np.ndarray, "3"]) -> tuple[float, float, float]:
+    x, y, z = (round(float(value), 4) for value in point)
+    return x, y, z
+
+
+def _place(point: Sequence[float]) -> str:
+    return "(" + ", ".join(f"{value:.2f}" for value in point) + ") m"
+
+
+def _the(name: str) -> str:
+    return f"The {plain_name(name)}"
