@@ -84,6 +84,7 @@ def _moved(keyframes: Keyframes, world: np.ndarray, number: int) -> Keyframes:
         thumbnail_offsets=np.diff(keyframes.thumbnail_offsets)[which],
         thumbnails=np.asarray(keyframes.thumbnails)[pictures],
         score=np.asarray(keyframes.score)[points] if len(keyframes.score) else keyframes.score,
+        clear_mm=np.asarray(keyframes.clear_mm)[which] if len(keyframes.clear_mm) else keyframes.clear_mm,
     )
 
 
@@ -103,6 +104,7 @@ def _joined(frames: list[Keyframes]) -> Keyframes:
         columns[lengths] = np.append(0, np.cumsum(columns[lengths][order]))
     for name in ("stamp_s", "world_from_camera", "centre", "view", "place"):
         columns[name] = columns[name][order]
+    columns["clear_mm"] = columns["clear_mm"][order] if len(columns["clear_mm"]) else columns["clear_mm"]
     return Keyframes(**columns)
 
 

@@ -68,7 +68,7 @@ def test_asking_gives_what_multiplying_gives(heard: AVLMap) -> None:
 def test_any_part_can_be_the_primary_one() -> None:
     roles = [part.role for part in Question.of([CHAIR, DOG], Modality.SOUND).parts]
     assert roles == [Role.CONTEXT, Role.PRIMARY]
-    with pytest.raises(QueryError, match=r"^The primary part is to be a image, but the query has none"):
+    with pytest.raises(QueryError, match=r"^The query has no image to be its primary part; add one"):
         Question.of([CHAIR, DOG], Modality.IMAGE)
 
 

@@ -132,6 +132,24 @@ def test_a_picture_of_an_answer_from_a_list_is_a_picture(client: TestClient) -> 
         assert drawn.status_code == 200 and drawn.content.startswith(b"\x89PNG"), size
 
 
+def test_a_body_is_required_where_none_is_refused(client: TestClient, document: dict[str, Any]) -> None:
+    bodies = {
+        (path, item["post"]["operationId"]): item["post"]["requestBody"]["required"]
+        for path, item in document["paths"].items()
+        if path.startswith("/maps/{map}/") and "post" in item
+    }
+    assert len(bodies) > 4
+    for (path, name), required in bodies.items():
+        answered = client.post(path.replace("{map}", "room"))
+        assert required == (answered.status_code >= 400), (name, answered.text[:200])
+
+
+def test_a_blank_name_of_another_map_is_refused(client: TestClient, document: dict[str, Any]) -> None:
+    (other,) = document["paths"]["/maps/{map}/view"]["get"]["parameters"][1:]
+    assert not Draft202012Validator(other["schema"]).is_valid("")
+    assert client.get("/maps/room/view", params={"other": ""}).status_code == 400
+
+
 def test_intrinsics_without_a_photo_are_refused(client: TestClient) -> None:
     for values in ({}, {"sentence": "the red thing"}):
         refused = client.post("/maps/room/picture", files={"intrinsics": (None, "525,525,320,240")}, data=values)

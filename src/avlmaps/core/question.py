@@ -95,7 +95,7 @@ class Question:
         """
         chosen = next((i for i, part in enumerate(parts) if primary in (None, part.modality)), None)
         if parts and chosen is None:
-            raise QueryError(f"The primary part is to be a {primary}, but the query has none; add one or leave it out.")
+            raise QueryError(f"The query has no {primary} to be its primary part; add one or leave it out.")
         roles = [Role.PRIMARY if i == chosen else Role.CONTEXT for i in range(len(parts))]
         return cls(tuple(replace(part, role=role) for part, role in zip(parts, roles, strict=True)))
 

@@ -13,6 +13,7 @@ from avlmaps.serve.operations import OPERATIONS, Operation
 from avlmaps.serve.work import MapsAnswer
 
 _OF_FILES = ("intrinsics",)  # values that only a form with a photo can hold
+_DRAWS_MAP = ("drawAnswer",)  # what needs no query
 _TEMPLATE = "#/components/schemas/{name}"
 _ERRORS = {
     "400": "The request does not fit this document, or holds neither a sentence nor a part.",
@@ -132,7 +133,8 @@ def _described(one: Operation, method: str, of: dict[Any, Any], components: dict
     if one.name == "getTile":
         operation["description"] = (tiles.__doc__ or "").partition("\n\n")[2]
     if method == "POST":
-        operation["requestBody"] = {"required": one.body in ("photo", "command"), "content": _bodies(one, schema)}
+        needed = one.body != "form" or one.name not in _DRAWS_MAP
+        operation["requestBody"] = {"required": needed, "content": _bodies(one, schema)}
     return operation
 
 
@@ -165,7 +167,7 @@ def _words_or_parts(one: Operation, files: Sequence[str] = ()) -> dict[str, Any]
 
     parts = [given(name, r"\S") for name in ("object", "sound", "area")]
     rule: dict[str, Any] = {"not": {"allOf": [given("sentence", r"\S"), {"anyOf": parts}]}}
-    if one.name != "drawAnswer":
+    if one.name not in _DRAWS_MAP:
         rule["anyOf"] = [given("sentence", "[A-Za-z]"), *parts, *({"required": [name]} for name in files)]
     return rule
 

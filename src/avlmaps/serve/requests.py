@@ -128,7 +128,10 @@ class PathQuery(Struct, forbid_unknown_fields=True, rename={"start": "from", "go
 class ViewQuery(Struct, forbid_unknown_fields=True):
     """What the page shows beside the map."""
 
-    other: Annotated[Name | None, Meta(description="A second map of the same place, to compare.")] = None
+    other: Annotated[
+        Annotated[str, Meta(max_length=MOST_CHARACTERS, pattern=r"\S")] | None,
+        Meta(description="A second map of the same place, to compare."),
+    ] = None
 
 
 class RehearseQuery(Struct, forbid_unknown_fields=True):
