@@ -9,11 +9,11 @@ from audio_fakes import FakeWalk, quiet, straight_walk, tone, track_of
 
 from avlmaps.core.errors import AudioError, RecordingError
 from avlmaps.maps.audio.segmentation import segment
-from avlmaps.recordings.add_sounds import add_sounds, read_events
 from avlmaps.recordings.audio import AudioTrack, Sound
-from avlmaps.recordings.clips import audible, find_clips, loudness_db
 from avlmaps.recordings.open import open_recording
-from avlmaps.recordings.spacing import Placer, Spacing, Walk, capacity, chosen_spacing
+from avlmaps_sim.mixing.add_sounds import add_sounds, read_events
+from avlmaps_sim.mixing.clips import audible, find_clips, loudness_db
+from avlmaps_sim.mixing.spacing import Placer, Spacing, Walk, capacity, chosen_spacing
 
 RATE_HZ = 16_000
 NAMES = ("bell", "dog_bark", "tap", "whistle", "door")

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from avlmaps.maps.audio.denoise import NoiseProfile, denoise, denoise_blocks, noise_profile
 from avlmaps.recordings.audio import Sound
-from avlmaps.recordings.background import background
-from avlmaps.recordings.clips import amplify, audible_part, find_clips, loudness_db
+from avlmaps_sim.mixing.background import background
+from avlmaps_sim.mixing.clips import amplify, audible_part, find_clips, loudness_db
 
 
 def noise(seconds: int, kind: str, seed: int = 0) -> np.ndarray:

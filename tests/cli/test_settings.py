@@ -27,7 +27,6 @@ from avlmaps.query.avlmap import AVLMap, QuerySettings
 from avlmaps.query.modalities.sound import SoundSettings
 from avlmaps.query.rules import Rules
 from avlmaps.query.selection import Wanted
-from avlmaps.recordings.add_sounds import add_sounds
 from avlmaps.recordings.consistency.verdict import Reason
 from avlmaps.recordings.open import open_recording
 from avlmaps.serve.drive.robots import RobotFile
@@ -38,6 +37,7 @@ from avlmaps_sim.bench.live.suite import LiveBench
 from avlmaps_sim.bench.navigation import NavigationSettings
 from avlmaps_sim.bench.sources.suite import SourcesBench
 from avlmaps_sim.demo.run import run_demo
+from avlmaps_sim.mixing.add_sounds import add_sounds
 from avlmaps_sim.recorder import RecordSettings, record_scene
 from avlmaps_sim.verbs.bench import Indexing, Navigation
 

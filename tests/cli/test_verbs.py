@@ -252,8 +252,8 @@ def test_a_known_error_is_one_sentence(words, code, sentence, built: Path, walk:
 
 
 def test_adding_sounds_without_progress_says_nothing(walk: Path, tmp_path: Path, capsys) -> None:
-    from avlmaps.recordings.add_sounds import add_sounds
     from avlmaps.recordings.open import open_recording
+    from avlmaps_sim.mixing.add_sounds import add_sounds
 
     (tmp_path / "clips" / "beep").mkdir(parents=True)
     soundfile.write(tmp_path / "clips" / "beep" / "a.wav", beeps(1.0), RATE_HZ)

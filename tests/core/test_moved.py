@@ -11,8 +11,9 @@ import avlmaps
 from avlmaps.core import moved
 from avlmaps.core.extras import install_command
 
-LIGHT = ["avlmaps.sim.mesh", "avlmaps.sim.furniture.tables", "avlmaps.bench.words", "avlmaps.demo.driving",
-         "avlmaps.maps.import_reference.scene", "avlmaps.perception.foundation.prompts"]  # fmt: skip
+LIGHT = ["avlmaps.sim.mesh", "avlmaps.recordings.clips", "avlmaps.sim.furniture.tables", "avlmaps.bench.words",
+         "avlmaps.demo.driving", "avlmaps.maps.import_reference.scene",
+         "avlmaps.perception.foundation.prompts"]  # fmt: skip
 
 WITHOUT = """
 import sys

@@ -21,7 +21,6 @@ With --json an error is {"error": {"kind": ..., "message": ...}} on standard out
 
 ENTRY_POINT_GROUP = "avlmaps.verbs"
 _OWN = {
-    "add-sounds": "AddSounds",
     "build": "Build",
     "live": "Live",
     "merge": "Merge",

@@ -28,7 +28,7 @@ class Distribution:
     backends: tuple[str, ...] = ()
 
 
-SIMULATOR = Distribution("avlmaps-sim", verbs=("demo", "record", "bench"))
+SIMULATOR = Distribution("avlmaps-sim", verbs=("demo", "record", "add-sounds", "bench"))
 MODELS = Distribution(
     "avlmaps-models",
     verbs=("import-map",),

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from types import ModuleType
 
+_MIXING = ("add_sounds", "background", "clips", "spacing")
 _SHARED = ("prompts", "picture_sizes", "sound_windows", "sound_scores")
 _ON_TORCH = (
     "device",
@@ -30,6 +31,7 @@ MODULES = {
     "avlmaps.bench": "avlmaps_sim.bench",
     "avlmaps.demo.driving": "avlmaps_sim.robots",
     "avlmaps.demo": "avlmaps_sim.demo",
+    **{f"avlmaps.recordings.{one}": f"avlmaps_sim.mixing.{one}" for one in _MIXING},
     "avlmaps.maps.import_reference": "avlmaps_models.import_reference",
     "avlmaps.perception.foundation": "avlmaps_models.foundation",
     "avlmaps.perception.paper": "avlmaps_models.paper",

@@ -15,7 +15,6 @@ from avlmaps.core.errors import AudioError, BackendError
 from avlmaps.core.registry import Kind
 from avlmaps.perception.profiles import choose_models
 from avlmaps.recordings.audio import Sound, write_flac
-from avlmaps.recordings.clips import find_clips
 from avlmaps.recordings.types import Frame
 from avlmaps.recordings.writer import RecordingWriter
 from avlmaps_sim.bench.harness.chosen import chosen_on
@@ -33,6 +32,7 @@ from avlmaps_sim.bench.indexing.voxel_views import cut_out, mixed, surface_regio
 from avlmaps_sim.bench.navigation import NavigationSettings
 from avlmaps_sim.bench.navigation.runs import run as run_navigation
 from avlmaps_sim.bench.output import as_csv, table_markdown, write_answer
+from avlmaps_sim.mixing.clips import find_clips
 from avlmaps_sim.render import Renderer
 from helpers.small_home import furnished
 

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from avlmaps.core.errors import AvlmapsError, RecordingError
-from avlmaps.recordings.add_sounds import read_events
 from avlmaps.recordings.formats.folder import open_folder
 from avlmaps.recordings.layout import UNFINISHED
 from avlmaps_sim import recorder
 from avlmaps_sim.mesh import Material
+from avlmaps_sim.mixing.add_sounds import read_events
 from avlmaps_sim.recorder import RecordSettings, record_scene
 from avlmaps_sim.render import Renderer
 from avlmaps_sim.scene import SceneBuilder

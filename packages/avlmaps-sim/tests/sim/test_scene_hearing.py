@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 from scipy.signal import butter, fftconvolve, sosfilt
 
 from avlmaps.recordings.audio import Sound
-from avlmaps.recordings.clips import loudness_db
 from avlmaps_sim.hearing import AcousticSettings, Sounding, Source, acoustic, overlay
 from avlmaps_sim.hearing.filters import shaped_impulse, split
 from avlmaps_sim.hearing.impulse import Acoustics, arrivals
 from avlmaps_sim.hearing.rooms import BANDS_HZ, SPEED_M_S, WALL_DB, Rooms
 from avlmaps_sim.mesh import Material
+from avlmaps_sim.mixing.clips import loudness_db
 from avlmaps_sim.scene import Scene, SceneBuilder
 from avlmaps_sim.shapes import sheet
 from helpers.hearing_scenes import HEIGHT_M, area, open_air, shoebox, two_rooms

@@ -7,11 +7,11 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.recordings.audio import Sound
-from avlmaps.recordings.clips import loudness_db
 from avlmaps.recordings.resample import resample
 from avlmaps_sim.hearing.impulse import Acoustics
 from avlmaps_sim.hearing.overlay import add_at, room_noise
 from avlmaps_sim.hearing.schedule import Sounding
+from avlmaps_sim.mixing.clips import loudness_db
 from avlmaps_sim.scene import Scene
 
 _HIGHEST = 0.89  # −1 dB

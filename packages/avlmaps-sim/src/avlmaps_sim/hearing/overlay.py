@@ -6,10 +6,10 @@ import numpy as np
 from jaxtyping import Float32
 
 from avlmaps.recordings.audio import Sound
-from avlmaps.recordings.background import background
-from avlmaps.recordings.clips import amplify, gain_for
 from avlmaps.recordings.resample import resample
 from avlmaps_sim.hearing.schedule import Sounding
+from avlmaps_sim.mixing.background import background
+from avlmaps_sim.mixing.clips import amplify, gain_for
 
 NEAREST_M = 1.0  # nearer than this a sound grows no louder
 

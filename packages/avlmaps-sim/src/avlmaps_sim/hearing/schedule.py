@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Bool, Float
 
-from avlmaps.recordings.spacing import Walk
 from avlmaps_sim.hearing.sources import Source
 from avlmaps_sim.mesh import Triple
+from avlmaps_sim.mixing.spacing import Walk
 from avlmaps_sim.scene import Scene
 
 _OTHER_ROOM_M = 4.0  # a source in another room counts as this much farther away

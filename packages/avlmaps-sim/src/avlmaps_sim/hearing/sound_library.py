@@ -8,8 +8,8 @@ import numpy as np
 
 from avlmaps.core.errors import AudioError
 from avlmaps.recordings.audio import Sound
-from avlmaps.recordings.clips import Clip, audible, audible_part, find_clips
 from avlmaps_sim.hearing.kinds import kind_of
+from avlmaps_sim.mixing.clips import Clip, audible, audible_part, find_clips
 
 _LONGEST_S = 5.0
 

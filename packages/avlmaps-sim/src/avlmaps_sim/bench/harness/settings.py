@@ -8,9 +8,9 @@ from avlmaps.core.errors import AvlmapsError
 from avlmaps.perception.encoders import Encoders, encoders_of
 from avlmaps.perception.profiles import choose_models
 from avlmaps.query.rules import Rules
-from avlmaps.recordings.clips import find_clips
 from avlmaps_sim.bench.harness.clips import unheard_rows
 from avlmaps_sim.bench.harness.models import checksums
+from avlmaps_sim.mixing.clips import find_clips
 
 Clips = Literal["unheard", "all"]
 

@@ -17,12 +17,12 @@ from avlmaps.core.progress import progress as shown
 from avlmaps.core.progress import say, silence_progress
 from avlmaps.core.wording import option
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
-from avlmaps.recordings.background import background as noise_of
-from avlmaps.recordings.background import seconds_of
-from avlmaps.recordings.clips import Clip, amplify, audible_part, find_clips, gain_for, loudness_db
 from avlmaps.recordings.layout import DESCRIPTION
-from avlmaps.recordings.spacing import Placer, Spacing, Walk, capacity, chosen_spacing
 from avlmaps.recordings.types import Recording
+from avlmaps_sim.mixing.background import background as noise_of
+from avlmaps_sim.mixing.background import seconds_of
+from avlmaps_sim.mixing.clips import Clip, amplify, audible_part, find_clips, gain_for, loudness_db
+from avlmaps_sim.mixing.spacing import Placer, Spacing, Walk, capacity, chosen_spacing
 
 EVENTS = "events.csv"
 EVENTS_HEADER = ("onset_s", "offset_s", "category", "clip", "x", "y", "z", "gain_db")

@@ -50,8 +50,8 @@ class AddSounds(Verb):
 
     def run(self) -> None:
         """Write the new recording."""
-        from avlmaps.recordings.add_sounds import add_sounds
         from avlmaps.recordings.open import open_recording
+        from avlmaps_sim.mixing.add_sounds import add_sounds
 
         events = add_sounds(
             open_recording(self.recording, format=self.format, corrections=self.reading.corrections()),

@@ -1,0 +1,1 @@
+"""Mixing recorded sounds into the track of a recording, with the truth of what sounds where."""
