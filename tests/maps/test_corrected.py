@@ -16,10 +16,13 @@ from avlmaps.core.poses import apply
 from avlmaps.maps.build import build_map
 from avlmaps.maps.corrected import correct_stored
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
-from avlmaps.maps.fusion.submaps import submap_of
+from avlmaps.maps.fusion.moved_submaps import MovedSubmaps
+from avlmaps.maps.fusion.submaps import concat_submaps, submap_of
+from avlmaps.maps.fusion.voxel_sums import VoxelSums
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.growing import GrowingMap
 from avlmaps.maps.store.reader import StoredMap, open_stored
+from avlmaps.maps.types import Submaps
 from avlmaps.perception.encoders import Encoders
 
 WITH = replace(SETTINGS, frames=replace(SETTINGS.frames, per_submap=4))
@@ -180,24 +183,52 @@ def test_frames_between_two_corrected_poses_follow_smoothly(tmp_path: Path) -> N
     assert any("moved by 0.21 m (median), 0.42 m at most" in sentence for sentence in said)
 
 
+def one_submap(walk: Walk) -> tuple[VoxelSums, Submaps]:
+    """Return the sums of a walk, and the same as a submap."""
+    part = VoxelAccumulator(GridSpec(0.05), 4, with_spread=True)
+    for frame in walk.frames():
+        part.add(frame, Pixels().encode(frame))
+    sums, none = part.sums(), np.zeros((0, 1, 1), np.uint16)
+    return sums, submap_of(sums, part.spread(), walk.stamps_s, walk.world_from_camera, none)
+
+
 @given(st.tuples(*[st.floats(-180, 180)] * 3), st.tuples(*[st.floats(-3, 3)] * 3), st.integers(0, 1000))
 @settings(max_examples=8, deadline=None)
 def test_nothing_is_lost_on_the_way(angles: tuple, shift: tuple, seed: int) -> None:
     walk = Walk(4, seed=seed)
-    part = VoxelAccumulator(GridSpec(0.05), 4, with_spread=True)
-    for frame in walk.frames():
-        part.add(frame, Pixels().encode(frame))
     whole = np.tile(np.eye(4), (4, 1, 1))
     whole[:, :3, :3] = Rotation.from_euler("xyz", angles, degrees=True).as_matrix()
     whole[:, :3, 3] = shift
-    sums = part.sums()
-    none = np.zeros((0, 1, 1), np.uint16)
-    submap = submap_of(sums, part.spread(), walk.stamps_s, walk.world_from_camera, none)
+    sums, submap = one_submap(walk)
     moved = VoxelAccumulator.of_submaps(submap, whole @ walk.world_from_camera, GridSpec(0.05)).sums()
     for name in ("feature_sum", "weight", "rgb_sum", "rgb_weight"):
         np.testing.assert_allclose(getattr(moved, name).sum(axis=0), getattr(sums, name).sum(axis=0), rtol=2e-3)
     assert moved.views.max() <= 4
     assert (moved.hits >= moved.views).all()
+
+
+def test_features_that_are_summed_at_the_end_are_those_of_a_table_that_goes_on() -> None:
+    walk = Walk(8)
+    _, submap = one_submap(walk)
+    poses = motion(27.0, (0.4, 0.1, 0.0)) @ walk.world_from_camera
+    moved = MovedSubmaps(concat_submaps([submap, submap]), np.concatenate([poses, poses]), GridSpec(0.05))
+    table, evidence = moved.table(), moved.evidence()
+    kept = np.arange(len(evidence)) % 3 > 0
+    one, other = moved.voxels(kept), table.voxels(kept=kept)
+    for name in ("index", "feature", "weight", "rgb", "last_seen_s", "hits"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+    np.testing.assert_array_equal(evidence.views, table.evidence().views)
+    np.testing.assert_array_equal(evidence.sharp, table.evidence().sharp)
+
+
+def test_a_map_grows_beyond_the_room_that_was_made_for_it() -> None:
+    walk = Walk(8)
+    _, submap = one_submap(walk)
+    apart = np.concatenate([motion(shift=(9.0 * n, 0.0, 0.0)) @ walk.world_from_camera for n in range(6)])
+    moved = MovedSubmaps(concat_submaps([submap] * 6), apart, GridSpec(0.05))
+    once = MovedSubmaps(submap, apart[:8], GridSpec(0.05))
+    assert len(moved.evidence()) == 6 * len(once.evidence())
+    np.testing.assert_array_equal(moved.voxels().feature, np.tile(once.voxels().feature, (6, 1)))
 
 
 CASES = {

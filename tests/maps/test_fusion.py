@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import BackendError, MapError, RecordingError
 from avlmaps.maps.fusion.accumulator import FusionSettings, VoxelAccumulator, VoxelSums
+from avlmaps.maps.fusion.voxel_kernels import unit_rows
 from avlmaps.maps.grid import GridSpec
 from avlmaps.recordings.types import Frame
 
@@ -339,3 +340,17 @@ def test_pictures_may_change_in_size_between_frames():
     sums = fuse(zip(frames, features, strict=True), 2).sums()
     pixels = [pixels_of(f, x, GRID, FusionSettings()) for f, x in zip(frames, features, strict=True)]
     assert_same_sums(sums, fused(pixels))
+
+
+@given(st.integers(0, 10_000))
+def test_features_of_length_one_are_rounded_to_halves_as_numpy_rounds(seed):
+    rng = np.random.default_rng(seed)
+    sums = (rng.normal(size=(60, 12)) * 10.0 ** rng.integers(-8, 3, (60, 12))).astype(np.float32)
+    sums[7], sums[8, 0] = 0.0, np.nan
+    found, rows = np.empty((60, 12), np.uint16), rng.permutation(60)
+    unit_rows(sums, rows, found)
+    halves, length = found.view(np.float16), np.linalg.norm(sums.astype(np.float64), axis=1, keepdims=True)
+    unit = np.divide(sums, length, out=np.zeros((60, 12)), where=length > 0.0)[rows]
+    assert np.isnan(halves[rows == 8, 0]).all()
+    # as near as halves lie: one in 2048, and 2**-24 where they are the least
+    np.testing.assert_allclose(halves[rows != 8], unit[rows != 8], rtol=2.0**-11 + 1e-6, atol=2.0**-25 + 1e-9)

@@ -15,8 +15,8 @@ from avlmaps.core.progress import silence_progress
 from avlmaps.core.wording import option
 from avlmaps.maps.audio.events import track_of
 from avlmaps.maps.audio.segmentation import Segment
-from avlmaps.maps.fusion.accumulator import VoxelAccumulator
 from avlmaps.maps.fusion.free_space import FreeViews, clean
+from avlmaps.maps.fusion.moved_submaps import MovedSubmaps
 from avlmaps.maps.fusion.sensor import NONE
 from avlmaps.maps.growing_walk import Motion
 from avlmaps.maps.pipeline.write import carving_doubts
@@ -117,7 +117,7 @@ def require_submaps(stored: StoredMap) -> Submaps:
 
 def _moved(stored: StoredMap, submaps: Submaps, now: Float[np.ndarray, "f 4 4"]) -> tuple[MapContent, Removed]:
     """Return the content of a map whose frames have these poses, and what was no surface."""
-    total = VoxelAccumulator.of_submaps(submaps, now, stored.grid)
+    total = MovedSubmaps(submaps, now, stored.grid)
     sensor = NONE if stored.info.sensor is None else stored.info.sensor.model
     clear_mm = np.asarray(submaps.clear_mm)
     views = FreeViews(clear_mm, now[: len(clear_mm)])

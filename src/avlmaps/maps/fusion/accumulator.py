@@ -13,15 +13,14 @@ from jaxtyping import Bool, Float, Float16, Float32, Float64, Int32
 
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import BackendError, MapError, RecordingError
-from avlmaps.core.poses import inverse
 from avlmaps.maps.fusion import add_kernels as sums
 from avlmaps.maps.fusion import measure_kernels as kernels
 from avlmaps.maps.fusion.carving_kernels import drop_flying
+from avlmaps.maps.fusion.moved_submaps import MovedSubmaps
 from avlmaps.maps.fusion.sensor import NONE, FusionSettings, SensorModel
 from avlmaps.maps.fusion.submap_kernels import SPREAD_COLUMNS, add_spread, finish_spread
-from avlmaps.maps.fusion.submaps import each_submap
 from avlmaps.maps.fusion.voxel_kernels import look_up_views
-from avlmaps.maps.fusion.voxel_sums import Evidence, MovedFrom, VoxelSums, VoxelTable, with_rows
+from avlmaps.maps.fusion.voxel_sums import Evidence, VoxelSums, VoxelTable, with_rows
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.types import Submaps, Voxels
 from avlmaps.recordings.types import Frame
@@ -233,14 +232,7 @@ class VoxelAccumulator:
             MapError: the poses lie too far from the world's origin for voxels.
         """
         total = cls(grid, submaps.feature.shape[1])
-        moved = pose @ inverse(np.asarray(submaps.fused_pose))
-        before, found = MovedFrom(), [(np.zeros(0, np.int32), np.zeros(0, np.int64), np.zeros(0, np.float32))]
-        for first, part, spread, frames in each_submap(submaps):
-            target, row, weight = total._table.add_moved(part, spread, moved[frames], grid.voxel_size_m, before)
-            found.append((target, row + np.int64(first), weight))
-        if total.dim:
-            target, row, weight = (np.concatenate(column) for column in zip(*found, strict=True))
-            total._table.add_features(target, row, weight, submaps.feature)
+        total._table = MovedSubmaps(submaps, pose, grid).table()
         return total
 
     def views_at(self, index: Int32[np.ndarray, "n 3"]) -> Int32[np.ndarray, " n"]:

@@ -11,7 +11,7 @@ from jaxtyping import Float32, Float64, Int32, Int64, UInt16
 from numba import njit
 
 from avlmaps.core.kernel_types import Real, Whole
-from avlmaps.maps.fusion.voxel_kernels import OPTIONS, Geometry, find_or_insert, find_row
+from avlmaps.maps.fusion.voxel_kernels import OPTIONS, find_or_insert, find_row
 
 # Columns of the sums over a voxel's points: offsets from its middle, their products, the number of the frame.
 X, Y, Z, XX, XY, XZ, YY, YZ, ZZ, NUMBER = range(10)
@@ -23,8 +23,14 @@ WITHIN = 0.4999  # voxels: samples go no farther from the middle
 LEAST_HITS = 0.5  # a voxel gets less than this part of a hit from one that moves: it has none
 
 
-Stay = tuple[np.ndarray, np.ndarray]
 Pairs = tuple[np.ndarray, np.ndarray, np.ndarray]
+# Columns of the sums over what moves into a voxel, which lie side by side: one line of the cache for each.
+RED, GREEN, BLUE, RGB_WEIGHT, WEIGHT, SHARP, HITS, LAST_SEEN = range(8)
+SUM_COLUMNS = 8
+# Columns of the counts of a voxel: frames, the last submap that added to it from 1, and how many frames that added.
+VIEWS, LAST_SUBMAP, ITS_VIEWS = range(3)
+COUNT_COLUMNS = 3
+_CELLS = 64  # a voxel that moves meets at most three along each axis; four are counted, as a power of two
 
 
 @njit(**OPTIONS)
@@ -125,67 +131,70 @@ def _within(value: Real):
 
 @njit(**OPTIONS)
 def _targets(
-    voxel: Int32[np.ndarray, "3"],
-    where: Float32[np.ndarray, " columns"],
-    to: Float64[np.ndarray, "3 4"],
-    key: Int64[np.ndarray, "samples 3"],
-    share: Int64[np.ndarray, " samples"],
+    n: Whole,
+    index: Int32[np.ndarray, "n 3"],
+    spread: Float32[np.ndarray, "n columns"],
+    frame: Whole,
+    moved: Float64[np.ndarray, "frames 3 4"],
+    cell: Int64[np.ndarray, " cells"],
+    share: Int64[np.ndarray, " cells"],
 ):
-    """Write in which voxels the samples of one that moves fall, and how many; return their count, and the samples'."""
-    lxx, lyx, lyy = np.float64(where[3]), np.float64(where[4]), np.float64(where[5])
-    lzx, lzy, lzz = np.float64(where[6]), np.float64(where[7]), np.float64(where[8])
+    """Write the cells in which the samples of a voxel that moves fall, and how many fall into each.
+
+    Returns:
+        Count of cells, count of samples, and the voxel in which the middle falls; cell 21 is that one.
+    """
+    ax, ay, az, at = moved[frame, 0, 0], moved[frame, 0, 1], moved[frame, 0, 2], moved[frame, 0, 3]
+    bx, by, bz, bt = moved[frame, 1, 0], moved[frame, 1, 1], moved[frame, 1, 2], moved[frame, 1, 3]
+    cx, cy, cz, ct = moved[frame, 2, 0], moved[frame, 2, 1], moved[frame, 2, 2], moved[frame, 2, 3]
+    mx, my, mz = np.float64(spread[n, 0]), np.float64(spread[n, 1]), np.float64(spread[n, 2])
+    lxx, lyx, lyy = np.float64(spread[n, 3]), np.float64(spread[n, 4]), np.float64(spread[n, 5])
+    lzx, lzy, lzz = np.float64(spread[n, 6]), np.float64(spread[n, 7]), np.float64(spread[n, 8])
+    x, y, z = index[n, 0] + 0.5, index[n, 1] + 0.5, index[n, 2] + 0.5
+    middle_x = ax * x + ay * y + az * z + at
+    middle_y = bx * x + by * y + bz * z + bt
+    middle_z = cx * x + cy * y + cz * z + ct
+    i, j, k = np.int64(np.floor(middle_x)), np.int64(np.floor(middle_y)), np.int64(np.floor(middle_z))
+    from_x, from_y, from_z = middle_x - i + 1.0, middle_y - j + 1.0, middle_z - k + 1.0  # of the lowest cell
     steps_a = _steps(np.sqrt(lxx * lxx + lyx * lyx + lzx * lzx))
     steps_b = _steps(np.sqrt(lyy * lyy + lzy * lzy))
     steps_c = _steps(lzz)
     found = 0
     for a in range(steps_a):
         ua = EVEN * ((a + 0.5) / steps_a - 0.5)
+        off_x = _within(mx + lxx * ua)
         for b in range(steps_b):
             ub = EVEN * ((b + 0.5) / steps_b - 0.5)
+            off_y, along_z = _within(my + lyx * ua + lyy * ub), mz + lzx * ua + lzy * ub
             for c in range(steps_c):
-                uc = EVEN * ((c + 0.5) / steps_c - 0.5)
-                x = voxel[0] + 0.5 + _within(where[0] + lxx * ua)
-                y = voxel[1] + 0.5 + _within(where[1] + lyx * ua + lyy * ub)
-                z = voxel[2] + 0.5 + _within(where[2] + lzx * ua + lzy * ub + lzz * uc)
-                i = np.int64(np.floor(to[0, 0] * x + to[0, 1] * y + to[0, 2] * z + to[0, 3]))
-                j = np.int64(np.floor(to[1, 0] * x + to[1, 1] * y + to[1, 2] * z + to[1, 3]))
-                k = np.int64(np.floor(to[2, 0] * x + to[2, 1] * y + to[2, 2] * z + to[2, 3]))
-                at = found - 1
-                while at >= 0 and (key[at, 0] != i or key[at, 1] != j or key[at, 2] != k):
-                    at -= 1
-                if at < 0:
-                    key[found, 0], key[found, 1], key[found, 2] = i, j, k
-                    share[found] = 1
+                off_z = _within(along_z + lzz * EVEN * ((c + 0.5) / steps_c - 0.5))
+                # as far from the middle as half the diagonal of a voxel: these are positive, and cut off as floored
+                p = np.int64(from_x + ax * off_x + ay * off_y + az * off_z)
+                q = np.int64(from_y + bx * off_x + by * off_y + bz * off_z)
+                r = np.int64(from_z + cx * off_x + cy * off_y + cz * off_z)
+                place = (p * 16 + q * 4 + r) & (_CELLS - 1)
+                if share[place] == 0:
+                    cell[found] = place
                     found += 1
-                else:
-                    share[at] += 1
-    return found, steps_a * steps_b * steps_c
+                share[place] += 1
+    return found, steps_a * steps_b * steps_c, i, j, k
 
 
 @njit(**OPTIONS)
 def _without_slivers(
-    found: Whole, samples: Whole, hits: Whole, key: Int64[np.ndarray, "samples 3"], share: Int64[np.ndarray, " samples"]
+    found: Whole, samples: Whole, hits: Whole, cell: Int64[np.ndarray, " cells"], share: Int64[np.ndarray, " cells"]
 ):
-    """Leave out the voxels that get hardly a part of a hit, unless all do; return count and samples of the rest."""
-    kept, total = 0, 0
+    """Leave out the cells that get hardly a part of a hit, unless all do; return the samples of the rest."""
+    kept = 0
     for at in range(found):
-        if share[at] * hits >= LEAST_HITS * samples:
-            key[kept, 0], key[kept, 1], key[kept, 2] = key[at, 0], key[at, 1], key[at, 2]
-            share[kept] = share[at]
-            total += share[at]
-            kept += 1
-    return (kept, total) if kept > 0 else (found, samples)
-
-
-@njit(**OPTIONS)
-def _add_views(row: Whole, seen: Whole, number: Whole, views: Int32[np.ndarray, " rows"], stay: Stay):
-    """Add the frames of a submap that saw a voxel, which may come several times: the most count."""
-    last_of, views_of = stay
-    if last_of[row] != number:
-        last_of[row], views_of[row] = number, 0
-    if seen > views_of[row]:
-        views[row] += seen - views_of[row]
-        views_of[row] = seen
+        if share[cell[at]] * hits >= LEAST_HITS * samples:
+            kept += share[cell[at]]
+    if kept == 0:
+        return samples
+    for at in range(found):
+        if share[cell[at]] * hits < LEAST_HITS * samples:
+            share[cell[at]] = 0
+    return kept
 
 
 @njit(**OPTIONS)
@@ -194,65 +203,72 @@ def move_rows(
     spread: Float32[np.ndarray, "n columns"],
     moved: Float64[np.ndarray, "frames 3 4"],
     table: Int32[np.ndarray, " slots"],
-    sums: Geometry,
-    weight: Float64[np.ndarray, " rows"],
-    stay: Stay,
-    number: Whole,
-    count: Whole,
-    begin: Whole,
+    index: Int32[np.ndarray, "rows 3"],
+    sums: Float64[np.ndarray, "rows columns"],
+    counts: Int32[np.ndarray, "rows few"],
+    place: tuple[int, int, int, int, int],
     pairs: Pairs,
-    pair: Whole,
 ):
     """Add voxels of a submap to a map, each moved as its frame was, until there is no room for another.
 
     Features wait for `sum_features`: which of them go where, and how much they count, is written as pairs.
 
     Args:
-        part: (index, rgb_sum, rgb_weight, hits, views, sharp, last_seen_s, weight) of the submap.
+        part: (index, weight, rgb_sum, rgb_weight, hits, views, sharp, last_seen_s) of the submap.
         spread: of `finish_spread`.
         moved: (frames, 3, 4) corrected from uncorrected world of each of its frames, voxels.
         table: hash table of rows.
-        sums: (index, rgb_sum, rgb_weight, hits, views, sharp, last_seen_s), added to.
-        weight: (rows,), added to.
-        stay: (submap, views): of each row the last submap that added to it, and how many views it added.
-        number: of this submap.
-        count: number of voxels in this map already.
-        begin: row of the submap to begin with.
-        pairs: (row of the map, row of the submap, weight) of each feature that counts, written from ``pair`` on.
-        pair: how many there are.
+        index: (rows, 3), those that are new are written.
+        sums: (rows, SUM_COLUMNS), added to.
+        counts: (rows, COUNT_COLUMNS), added to.
+        place: number of this submap from 1, its first row among those of all submaps, count of voxels in the map, row
+            of the submap to begin with, count of pairs.
+        pairs: (row of the map, row of all submaps, weight) of each feature that counts, written on.
 
     Returns:
-        Count of voxels now, count of pairs, and the row to resume with when there is room again.
+        Count of voxels now, the row to resume with when there is room again, and count of pairs.
     """
-    index, rgb_sum, rgb_weight, hits, views, sharp, last_seen_s = sums
-    part_index, part_rgb, part_rgb_weight, part_hits, part_views, part_sharp, part_last_seen = part[:7]
-    part_weight = part[7]
+    part_index, part_weight, part_rgb, part_rgb_weight, part_hits, part_views, part_sharp, part_last_seen = part
     pair_target, pair_row, pair_weight = pairs
-    key, share = np.empty((MOST_SAMPLES, 3), np.int64), np.empty(MOST_SAMPLES, np.int64)
+    number, first, count, begin, pair = place
+    cell, share = np.empty(_CELLS, np.int64), np.zeros(_CELLS, np.int64)
     room = min(index.shape[0], table.shape[0] // 2) - MOST_SAMPLES
     for n in range(begin, part_index.shape[0]):
         if count > room or pair > pair_target.shape[0] - MOST_SAMPLES:
-            return count, pair, n
+            return count, n, pair
         frame = min(max(np.int64(spread[n, NUMBER] + 0.5), 0), moved.shape[0] - 1)
-        found, samples = _targets(part_index[n], spread[n], moved[frame], key, share)
-        found, samples = _without_slivers(found, samples, part_hits[n], key, share)
+        found, samples, i, j, k = _targets(n, part_index, spread, frame, moved, cell, share)
+        samples = _without_slivers(found, samples, part_hits[n], cell, share)
         for at in range(found):
-            amount = share[at] / samples
-            row = int(find_or_insert(key[at, 0], key[at, 1], key[at, 2], table, index, count))
-            last_seen_s[row] = part_last_seen[n] if row == count else max(last_seen_s[row], part_last_seen[n])
-            count += row == count
+            shared, to = share[cell[at]], cell[at]
+            share[to] = 0
+            if shared == 0:
+                continue
+            amount = shared / samples
+            row = int(find_or_insert(i + to // 16 - 1, j + to // 4 % 4 - 1, k + to % 4 - 1, table, index, count))
+            if row == count:
+                sums[row, LAST_SEEN] = part_last_seen[n]
+                count += 1
             hit = max(np.int64(amount * part_hits[n] + 0.5), 1)
-            hits[row] += hit
-            sharp[row] += np.int64(amount * part_sharp[n] + 0.5)
-            _add_views(row, np.int32(min(part_views[n], hit)), number, views, stay)  # no more frames than hits
-            for colour in range(3):
-                rgb_sum[row, colour] += amount * part_rgb[n, colour]
-            rgb_weight[row] += amount * part_rgb_weight[n]
-            weight[row] += amount * part_weight[n]
-            pair_target[pair], pair_row[pair] = row, n
+            sums[row, RED] += amount * part_rgb[n, 0]
+            sums[row, GREEN] += amount * part_rgb[n, 1]
+            sums[row, BLUE] += amount * part_rgb[n, 2]
+            sums[row, RGB_WEIGHT] += amount * part_rgb_weight[n]
+            sums[row, WEIGHT] += amount * part_weight[n]
+            sums[row, SHARP] += np.floor(amount * part_sharp[n] + 0.5)
+            sums[row, HITS] += hit
+            sums[row, LAST_SEEN] = max(sums[row, LAST_SEEN], part_last_seen[n])
+            # The frames of a submap count once in a voxel that several of its voxels move to: the most of them.
+            seen = np.int32(min(part_views[n], hit))  # no more frames than hits
+            if counts[row, LAST_SUBMAP] != number:
+                counts[row, LAST_SUBMAP], counts[row, ITS_VIEWS] = number, 0
+            if seen > counts[row, ITS_VIEWS]:
+                counts[row, VIEWS] += seen - counts[row, ITS_VIEWS]
+                counts[row, ITS_VIEWS] = seen
+            pair_target[pair], pair_row[pair] = row, first + n
             pair_weight[pair] = amount * part_weight[n]
             pair += 1
-    return count, pair, part_index.shape[0]
+    return count, part_index.shape[0], pair
 
 
 @njit(**OPTIONS)
@@ -272,38 +288,38 @@ def group_pairs(target: Int32[np.ndarray, " pairs"], start: Int64[np.ndarray, " 
 
 @njit(**OPTIONS)
 def sum_features(
-    begin: Whole,
-    end: Whole,
+    rows: Int64[np.ndarray, " k"],
     start: Int64[np.ndarray, " rows1"],
     order: Int64[np.ndarray, " pairs"],
-    row: Int64[np.ndarray, " pairs"],
+    row: Int32[np.ndarray, " pairs"],
     weight: Float32[np.ndarray, " pairs"],
     halves: UInt16[np.ndarray, "n d"],
-    feature_sum: Float32[np.ndarray, "rows d"],
+    out: Float32[np.ndarray, "k d"],
 ):
-    """Add to each of some rows of a map the features of its pairs, times their weights.
+    """Write the sums of the features that some rows of a map have pairs of, times their weights.
 
     Args:
-        begin: first row of the map.
-        end: one past the last.
+        rows: of the map.
         start: where the pairs of each row begin in ``order``.
         order: numbers of pairs.
         row: of the submaps' voxels, for each pair.
         weight: of each pair.
         halves: bits of float16 features; Numba has no numbers of that type.
-        feature_sum: added to.
+        out: filled in.
     """
     bits = np.empty(halves.shape[1], np.uint32)
     numbers = bits.view(np.float32)
-    for target in range(begin, end):
-        for at in range(start[target], start[target + 1]):
+    for n in range(rows.shape[0]):
+        for column in range(bits.shape[0]):
+            out[n, column] = 0.0
+        for at in range(start[rows[n]], start[rows[n] + 1]):
             pair = order[at]
-            feature = halves[row[pair]]
+            source = row[pair]
             scale = weight[pair] * np.float32(2.0**112)  # the exponents of both types are 112 apart
             for column in range(bits.shape[0]):
-                half = np.uint32(feature[column])
+                half = np.uint32(halves[source, column])
                 bits[column] = ((half & np.uint32(0x8000)) << np.uint32(16)) | (
                     (half & np.uint32(0x7FFF)) << np.uint32(13)
                 )
             for column in range(bits.shape[0]):
-                feature_sum[target, column] += scale * numbers[column]
+                out[n, column] += scale * numbers[column]

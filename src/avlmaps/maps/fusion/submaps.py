@@ -5,7 +5,7 @@ poses give each of its frames a motion; a voxel moves with the frame in the midd
 then are sums, so that a map follows any number of corrections, one after the other, and no error adds up.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -65,23 +65,3 @@ def concat_submaps(parts: Sequence[Submaps]) -> Submaps:
         else:
             arrays[name] = np.concatenate(every)
     return Submaps(**arrays)
-
-
-def each_submap(submaps: Submaps) -> Iterator[tuple[int, VoxelSums, Float32[np.ndarray, "n 10"], slice]]:
-    """Yield of each submap its first row, its sums but for the features, how points lie in its voxels, its frames."""
-    for number in range(len(submaps)):
-        rows = slice(*submaps.row_offsets[number : number + 2])
-        index = np.asarray(submaps.index[rows])
-        sums = VoxelSums(
-            index=index,
-            feature_sum=np.zeros((len(index), 0), np.float32),
-            weight=np.asarray(submaps.weight[rows]).astype(np.float64),
-            rgb_sum=np.asarray(submaps.rgb_sum[rows]).astype(np.float64),
-            rgb_weight=np.asarray(submaps.rgb_weight[rows]).astype(np.float64),
-            hits=np.asarray(submaps.hits[rows]).astype(np.int64),
-            views=np.asarray(submaps.views[rows]),
-            sharp=np.asarray(submaps.sharp[rows]).astype(np.int64),
-            last_seen_s=np.asarray(submaps.last_seen_s[rows]),
-        )
-        frames = slice(*submaps.frame_offsets[number : number + 2])
-        yield int(rows.start), sums, np.asarray(submaps.spread[rows]).astype(np.float32), frames

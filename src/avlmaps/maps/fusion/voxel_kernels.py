@@ -1,7 +1,7 @@
 """The compiled loops over a table of voxels: finding rows by index, adding rows, finishing features."""
 
 import numpy as np
-from jaxtyping import Float, Float32, Float64, Int, Int32
+from jaxtyping import Float32, Float64, Int, Int32, UInt16
 from numba import njit
 
 from avlmaps.core.kernel_types import Options, Whole
@@ -121,12 +121,33 @@ def add_rows(
 
 
 @njit(**REASSOCIATING)
-def unit_rows(feature_sum: Float32[np.ndarray, "rows d"], rows: Int[np.ndarray, " n"], out: Float[np.ndarray, "n d"]):
-    """Write the rows of ``feature_sum`` scaled to length 1 (a zero row stays zero) into ``out`` (len(rows), d)."""
+def _scale_of(feature_sum: Float32[np.ndarray, "rows d"], row: Whole):
+    """Return what makes a row of length 1; 0 where it is zero."""
+    square = 0.0
+    for column in range(feature_sum.shape[1]):
+        square += np.float64(feature_sum[row, column]) ** 2
+    return 1.0 / np.sqrt(square) if square > 0.0 else 0.0
+
+
+@njit(**OPTIONS)
+def unit_rows(feature_sum: Float32[np.ndarray, "rows d"], rows: Int[np.ndarray, " n"], out: UInt16[np.ndarray, "n d"]):
+    """Write rows of ``feature_sum`` scaled to length 1 (a zero row stays zero) as the bits of float16 numbers.
+
+    They are rounded to the nearest, and to even where two are as near, as NumPy does; Numba has no numbers of that
+    type. What is NaN stays NaN.
+    """
+    unit, dim = np.empty(out.shape[1], np.float32), out.shape[1]
+    bits, shifted = unit.view(np.uint32), np.empty(dim, np.float32)
+    small = shifted.view(np.uint32)
     for n in range(rows.shape[0]):
-        square = 0.0
-        for column in range(out.shape[1]):
-            square += np.float64(feature_sum[rows[n], column]) ** 2
-        scale = 1.0 / np.sqrt(square) if square > 0.0 else 0.0
-        for column in range(out.shape[1]):
-            out[n, column] = feature_sum[rows[n], column] * scale
+        scale = _scale_of(feature_sum, rows[n])
+        for column in range(dim):
+            unit[column] = feature_sum[rows[n], column] * scale
+            shifted[column] = abs(unit[column]) + np.float32(0.5)  # what is below the least exponent ends in its bits
+        for column in range(dim):
+            size = bits[column] & np.uint32(0x7FFFFFFF)
+            odd = (size >> np.uint32(13)) & np.uint32(1)
+            half = (size - np.uint32(0x38000000) + np.uint32(0xFFF) + odd) >> np.uint32(13)
+            half = small[column] - np.uint32(0x3F000000) if size < np.uint32(0x38800000) else half
+            half = np.uint32(0x7E00) if size > np.uint32(0x477FE000) else half
+            out[n, column] = np.uint16(half | ((bits[column] >> np.uint32(16)) & np.uint32(0x8000)))

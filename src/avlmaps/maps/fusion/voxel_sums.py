@@ -1,20 +1,16 @@
 """Sums over voxels: the sums of fusion, in a table that grows in place, and in a sorted form that can be stored."""
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
 
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32, Int64
 
-from avlmaps.core.cores import usable_cores
 from avlmaps.core.errors import MapError
 from avlmaps.maps.fusion import voxel_kernels as kernels
-from avlmaps.maps.fusion.submap_kernels import MOST_SAMPLES, Pairs, group_pairs, move_rows, sum_features
 from avlmaps.maps.types import Voxels
 
 BLOCK_BYTES = 1 << 22  # merging and finishing go through features in blocks of this size, which stay in the cache
 SMALLEST_ROOM = 4096  # rows
-FARTHEST = float((1 << 31) - (1 << 22))  # voxels; indices are int32
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,68 +147,6 @@ class VoxelTable:
             count = kernels.add_rows(block, self.slots, self.geometry, self.feature_sum, self.weight, self.count)
             self.count = int(count)
 
-    def add_moved(
-        self, part: VoxelSums, spread: np.ndarray, moved: np.ndarray, voxel_size_m: float, before: "MovedFrom"
-    ) -> Pairs:
-        """Add the sums of a submap whose frames moved, but for its features.
-
-        Args:
-            part: its sums; features do not count.
-            spread: how the points lie within its voxels.
-            moved: of each of its frames, the new world from the one that it was fused in, metres.
-            voxel_size_m: edge of a voxel.
-            before: what the submaps before this one did.
-
-        Returns:
-            For each feature that counts the row of this table, the row of the submap, and the weight.
-
-        Raises:
-            MapError: it moved out of what voxels can number.
-        """
-        to = np.ascontiguousarray(moved[:, :3], np.float64).copy()
-        to[:, :, 3] /= voxel_size_m
-        _require_within(part.index, to)
-        arrays = (part.index, part.rgb_sum, part.rgb_weight, part.hits, part.views, part.sharp, part.last_seen_s)
-        every = tuple(np.array(array, order="C") for array in (*arrays, part.weight))
-        where, done = np.array(spread, np.float32), 0
-        found: list[Pairs] = []
-        while done < len(where):
-            self.reserve(len(where) - done + MOST_SAMPLES + 1)
-            before.reserve(len(self.weight))
-            room = 3 * (len(where) - done) + MOST_SAMPLES
-            pairs = np.empty(room, np.int32), np.empty(room, np.int32), np.empty(room, np.float32)
-            count, pair, done = move_rows(
-                every, where, to, self.slots, self.geometry, self.weight, (before.submap, before.views),
-                before.number, self.count, done, pairs, 0,
-            )  # fmt: skip
-            self.count = int(count)
-            found.append((pairs[0][:pair], pairs[1][:pair], pairs[2][:pair]))
-        before.number += 1
-        target, row, weight = (np.concatenate(column) for column in zip(*found, strict=True)) if found else _no_pairs()
-        return target, row, weight
-
-    def add_features(self, target: np.ndarray, row: np.ndarray, weight: np.ndarray, feature: np.ndarray) -> None:
-        """Add features of submaps.
-
-        Args:
-            target: (p,) int32, row of this table, of each pair.
-            row: (p,) int64, row of the feature.
-            weight: (p,) float32, how much it counts.
-            feature: (n, d) float16, may be memory-mapped.
-        """
-        start = np.zeros(self.count + 1, np.int64)
-        order = group_pairs(target, start)
-        halves = np.asarray(feature).view(np.uint16)
-        halves.flags.writeable = False  # as memory-mapped ones are: the kernel is compiled once
-        step = max(1, -(-self.count // usable_cores()))
-
-        def add(begin: int) -> None:
-            end = min(begin + step, self.count)
-            sum_features(begin, end, start, order, row, weight, halves, self.feature_sum)
-
-        with ThreadPoolExecutor(usable_cores()) as pool:
-            list(pool.map(add, range(0, self.count, step)))
-
     def _require_alike(self, part: VoxelSums) -> None:
         if part.feature_sum.shape[1] != self.dim:
             raise MapError(
@@ -222,15 +156,7 @@ class VoxelTable:
 
     def sort_rows(self) -> Int64[np.ndarray, " n"]:
         """Return the rows in the order of their index (x, then y, then z)."""
-        index = self.index[: self.count].astype(np.int64)
-        if not len(index):
-            return np.zeros(0, np.int64)
-        low = index.min(axis=0)
-        span = [int(size) for size in index.max(axis=0) - low + 1]
-        if span[0] * span[1] * span[2] >= 1 << 62:
-            return np.lexsort(index.T[::-1])
-        i, j, k = (index - low).T
-        return np.argsort((i * span[1] + j) * span[2] + k)
+        return sorted_rows(self.index[: self.count])
 
     def sums(self, feature_out: np.ndarray | None = None) -> VoxelSums:
         """Return the sums, sorted; see `VoxelAccumulator.sums`."""
@@ -261,11 +187,11 @@ class VoxelTable:
         rows = rows if kept is None else rows[kept]
         feature = feature_array(feature_out, (len(rows), self.dim), np.float16)
         parts = blocks(len(rows), self.dim)
-        buffer = np.empty((parts[0].stop if parts else 0, self.dim), np.float32)
+        buffer = np.empty((parts[0].stop if parts else 0, self.dim), np.uint16)
         for block in parts:
             unit = buffer[: block.stop - block.start]
             kernels.unit_rows(self.feature_sum, rows[block], unit)
-            feature[block] = unit
+            feature[block] = unit.view(np.float16)
         rgb_weight = self.rgb_weight[rows, None]
         rgb = np.divide(self.rgb_sum[rows], rgb_weight, out=np.zeros((len(rows), 3)), where=rgb_weight > 0.0)
         return Voxels(
@@ -278,25 +204,17 @@ class VoxelTable:
         )
 
 
-def _no_pairs() -> Pairs:
-    return np.zeros(0, np.int32), np.zeros(0, np.int32), np.zeros(0, np.float32)
-
-
-class MovedFrom:
-    """Which submap last added to each row of a table, and how many views: a voxel counts the frames of one once.
-
-    Attributes:
-        submap: number of the submap, -1 before the first.
-        views: how many views it added.
-        number: of the submap that comes next.
-    """
-
-    def __init__(self) -> None:
-        self.submap, self.views, self.number = np.full(0, -1, np.int64), np.zeros(0, np.int32), 0
-
-    def reserve(self, rows: int) -> None:
-        """Make room for the rows of a table."""
-        self.submap, self.views = with_rows(self.submap, rows, -1), with_rows(self.views, rows)
+def sorted_rows(index: Int32[np.ndarray, "n 3"]) -> Int64[np.ndarray, " n"]:
+    """Return the order of voxels by x, then y, then z."""
+    if not len(index):
+        return np.zeros(0, np.int64)
+    wide = index.astype(np.int64)
+    low = wide.min(axis=0)
+    span = [int(size) for size in wide.max(axis=0) - low + 1]
+    if span[0] * span[1] * span[2] >= 1 << 62:
+        return np.lexsort(wide.T[::-1])
+    i, j, k = (wide - low).T
+    return np.argsort((i * span[1] + j) * span[2] + k)
 
 
 def with_rows(array: np.ndarray, rows: int, fill: int = 0) -> np.ndarray:
@@ -304,17 +222,6 @@ def with_rows(array: np.ndarray, rows: int, fill: int = 0) -> np.ndarray:
     if len(array) >= rows:
         return array
     return np.concatenate([array, np.full((rows - len(array), *array.shape[1:]), fill, array.dtype)])
-
-
-def _require_within(index: Int32[np.ndarray, "n 3"], to: Float64[np.ndarray, "f 3 4"]) -> None:
-    farthest = np.abs(to[:, :, :3]).sum(axis=2).max(initial=0.0) * np.abs(index).max(initial=0) + np.abs(
-        to[:, :, 3]
-    ).max(initial=0.0)
-    if not farthest < FARTHEST:
-        raise MapError(
-            f"The poses move a part of the map by {farthest:.3g} voxels from the world's origin, more than "
-            f"{FARTHEST:.3g}; move the world's origin nearer to the map."
-        )
 
 
 def blocks(count: int, dim: int) -> list[slice]:

@@ -1,0 +1,191 @@
+"""The map that submaps add up to when their frames have moved: its surface first, features where they are wanted.
+
+What is a sum of a few numbers is added at once. Features are long, and are summed at the end, for the voxels that are
+a surface alone: until then a list says which of them go where, and how much they count.
+"""
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+
+from avlmaps.core.arrays import Bool, Float32, Float64, Int32, Int64
+from avlmaps.core.cores import usable_cores
+from avlmaps.core.errors import MapError
+from avlmaps.core.poses import inverse
+from avlmaps.maps.fusion import submap_kernels as kernels
+from avlmaps.maps.fusion.voxel_kernels import rehash, unit_rows
+from avlmaps.maps.fusion.voxel_sums import Evidence, VoxelTable, blocks, sorted_rows, with_rows
+from avlmaps.maps.grid import GridSpec
+from avlmaps.maps.types import Submaps, Voxels
+
+FARTHEST = float((1 << 31) - (1 << 22))  # voxels; indices are int32
+_PAIRS_PER_VOXEL = 3  # at first
+_FIELDS = ("index", "weight", "rgb_sum", "rgb_weight", "hits", "views", "sharp", "last_seen_s")
+
+_Take = Callable[[slice, np.ndarray], None]
+
+
+class MovedSubmaps:
+    """Submaps, added up at other poses of their frames."""
+
+    def __init__(self, submaps: Submaps, pose: Float64[np.ndarray, "f 4 4"], grid: GridSpec) -> None:
+        """Add up what is no feature.
+
+        Args:
+            submaps: as they were fused.
+            pose: world_from_camera of each frame.
+            grid: the voxels' size.
+
+        Raises:
+            MapError: the poses lie too far from the world's origin for voxels.
+        """
+        self._feature = submaps.feature
+        moved = np.ascontiguousarray((pose @ inverse(np.asarray(submaps.fused_pose)))[:, :3], np.float64)
+        moved[:, :, 3] /= grid.voxel_size_m
+        self._count, self._pair = 0, 0
+        self._make_room(kernels.MOST_SAMPLES + len(submaps.index) // 2)
+        self._make_pairs(kernels.MOST_SAMPLES + _PAIRS_PER_VOXEL * len(submaps.index))
+        for number, (first, part, spread, frames) in enumerate(_each(submaps), start=1):
+            _require_within(part[0], moved[frames])
+            self._add(number, first, part, spread, np.ascontiguousarray(moved[frames]))
+        self._index, self._sums = self._index[: self._count], self._sums[: self._count]
+        self._views = self._counts[: self._count, kernels.VIEWS]
+        self._order = sorted_rows(self._index)
+
+    def evidence(self) -> Evidence:
+        """Return the evidence of each voxel's surface, sorted by index, for `free_space.clean`."""
+        rows = self._order
+        hits, sharp = (self._sums[rows, column].astype(np.int64) for column in (kernels.HITS, kernels.SHARP))
+        return Evidence(self._index[rows], hits, self._views[rows], sharp)
+
+    def voxels(self, kept: Bool[np.ndarray, " n"] | None = None) -> Voxels:
+        """Return the means, sorted by index: features of unit length, colours.
+
+        Args:
+            kept: which voxels of `evidence` to return; all by default.
+        """
+        rows = self._order if kept is None else self._order[kept]
+        sums, dim = self._sums[rows], self._feature.shape[1]
+        feature = np.empty((len(rows), dim), np.float16)
+
+        def finish(block: slice, summed: Float32[np.ndarray, "k d"]) -> None:
+            unit_rows(summed, np.arange(len(summed)), feature.view(np.uint16)[block])
+
+        if dim:
+            self._features(rows, finish)
+        rgb, rgb_weight = sums[:, : kernels.RGB_WEIGHT], sums[:, kernels.RGB_WEIGHT, None]
+        colour = np.divide(rgb, rgb_weight, out=np.zeros((len(rows), 3)), where=rgb_weight > 0.0)
+        return Voxels(
+            index=self._index[rows],
+            feature=feature,
+            weight=sums[:, kernels.WEIGHT].astype(np.float32),
+            rgb=np.rint(colour).astype(np.uint8),
+            last_seen_s=sums[:, kernels.LAST_SEEN].copy(),
+            hits=sums[:, kernels.HITS].astype(np.int64),
+        )
+
+    def table(self) -> VoxelTable:
+        """Return the sums as a table, to which frames can be added."""
+        table, sums, dim = VoxelTable(self._feature.shape[1]), self._sums, self._feature.shape[1]
+        table.reserve(self._count)
+        count = table.count = self._count
+        table.index[:count] = self._index
+        table.weight[:count] = sums[:, kernels.WEIGHT]
+        table.rgb_sum[:count] = sums[:, : kernels.RGB_WEIGHT]
+        table.rgb_weight[:count] = sums[:, kernels.RGB_WEIGHT]
+        table.hits[:count] = sums[:, kernels.HITS]
+        table.views[:count] = self._views
+        table.sharp[:count] = sums[:, kernels.SHARP]
+        table.last_seen_s[:count] = sums[:, kernels.LAST_SEEN]
+        rehash(table.slots, table.index, count)
+
+        def take(block: slice, summed: Float32[np.ndarray, "k d"]) -> None:
+            table.feature_sum[block] = summed
+
+        if dim:
+            self._features(np.arange(count), take)
+        return table
+
+    def _add(
+        self,
+        number: int,
+        first: int,
+        part: tuple[np.ndarray, ...],
+        spread: Float32[np.ndarray, "n 10"],
+        moved: Float64[np.ndarray, "f 3 4"],
+    ) -> None:
+        """Add one submap."""
+        done = 0
+        while done < len(spread):
+            place = number, first, self._count, done, self._pair
+            count, done, pair = kernels.move_rows(
+                part, spread, moved, self._slots, self._index, self._sums, self._counts, place, self._pairs
+            )
+            self._count, self._pair = int(count), int(pair)
+            if done < len(spread):  # one of both is full
+                self._make_room(2 * len(self._index))
+                self._make_pairs(2 * len(self._pairs[0]))
+
+    def _make_room(self, rows: int) -> None:
+        """Make room for this many voxels; what is not touched takes no memory."""
+        if self._count:
+            self._index, self._sums = with_rows(self._index, rows), with_rows(self._sums, rows)
+            self._counts = with_rows(self._counts, rows)
+        else:
+            self._index, self._sums = np.zeros((rows, 3), np.int32), np.zeros((rows, kernels.SUM_COLUMNS))
+            self._counts = np.zeros((rows, kernels.COUNT_COLUMNS), np.int32)
+        self._slots = np.full(1 << (2 * rows).bit_length(), -1, np.int32)
+        rehash(self._slots, self._index, self._count)
+
+    def _make_pairs(self, most: int) -> None:
+        """Make room for this many pairs, whose rows are 32-bit: 2 billion voxels are half a terabyte of features."""
+        every = np.empty(most, np.int32), np.empty(most, np.int32), np.empty(most, np.float32)
+        for column, array in enumerate(every):
+            array[: self._pair] = self._pairs[column][: self._pair] if self._pair else ()
+        self._pairs: tuple[Int32[np.ndarray, " p"], Int32[np.ndarray, " p"], Float32[np.ndarray, " p"]] = every
+
+    def _features(self, rows: Int64[np.ndarray, " k"], take: _Take) -> None:
+        """Give the sums of features of some voxels, block by block, from several threads."""
+        target, row, weight = (column[: self._pair] for column in self._pairs)
+        start = np.zeros(self._count + 1, np.int64)
+        order = kernels.group_pairs(target, start)
+        halves = np.asarray(self._feature).view(np.uint16)
+        halves.flags.writeable = False  # as memory-mapped ones are: the kernel is compiled once
+
+        def work(block: slice) -> None:
+            summed = np.empty((block.stop - block.start, halves.shape[1]), np.float32)
+            kernels.sum_features(rows[block], start, order, row, weight, halves, summed)
+            take(block, summed)
+
+        with ThreadPoolExecutor(usable_cores()) as pool:
+            list(pool.map(work, blocks(len(rows), halves.shape[1])))
+
+
+def _each(
+    submaps: Submaps,
+) -> Iterator[tuple[int, tuple[np.ndarray, ...], Float32[np.ndarray, "n 10"], slice]]:
+    """Yield of each submap its first row, its sums but for the features, how points lie in its voxels, its frames."""
+    for number in range(len(submaps.row_offsets) - 1):
+        rows = slice(*(int(at) for at in submaps.row_offsets[number : number + 2]))
+        part = tuple(_read_only(np.ascontiguousarray(getattr(submaps, name)[rows])) for name in _FIELDS)
+        spread = np.asarray(submaps.spread[rows]).astype(np.float32)
+        yield rows.start, part, spread, slice(*submaps.frame_offsets[number : number + 2])
+
+
+def _read_only(array: np.ndarray) -> np.ndarray:
+    """Return an array as memory-mapped ones are, so that the kernel is compiled once."""
+    view = array.view(np.ndarray)
+    view.flags.writeable = False
+    return view
+
+
+def _require_within(index: Int32[np.ndarray, "n 3"], to: Float64[np.ndarray, "f 3 4"]) -> None:
+    farthest = np.abs(to[:, :, :3]).sum(axis=2).max(initial=0.0) * np.abs(index).max(initial=0) + np.abs(
+        to[:, :, 3]
+    ).max(initial=0.0)
+    if not farthest < FARTHEST:
+        raise MapError(
+            f"The poses move a part of the map by {farthest:.3g} voxels from the world's origin, more than "
+            f"{FARTHEST:.3g}; move the world's origin nearer to the map."
+        )
