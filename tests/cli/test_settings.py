@@ -174,7 +174,7 @@ SAME: dict[str, Callable[[], Any]] = {
 OWN = {
     "build.rules", "query.rules", "query.sentence", "demo.out", "bench.out", "bench.indexing.size",
     "go.language", "go.robot", "query.frame", "things.frame", "rooms.frame", "sources.frame", "locate.frame",
-    "view.port",
+    "view.port", "live.source",
 }  # fmt: skip
 
 

@@ -11,7 +11,7 @@ from test_live_map import ENCODERS, UP, frame
 
 import avlmaps
 from avlmaps.core.errors import RecordingError
-from avlmaps.live import growing_folder
+from avlmaps.live import patience
 from avlmaps.live.growing_folder import growing_frames, is_being_written
 from avlmaps.live.live_map import LiveMap
 from avlmaps.live.replay import follow
@@ -46,7 +46,7 @@ def test_what_is_followed_is_what_is_recorded(tmp_path: Path) -> None:
 def test_a_writer_that_stalls_or_stops_is_said_and_what_came_is_mapped(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(growing_folder, "STALLED_S", 0.1)
+    monkeypatch.setattr(patience, "STALLED_S", 0.1)
     writer = avlmaps.RecordingWriter(tmp_path / "rec", frame(0).rig, np.array(UP))
     writer.__enter__()
     for number in range(4):

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from test_rosbag import HEIGHT, START_S, WIDTH, BagMaker, world_from_body
 
 from avlmaps.recordings.formats.ros_messages import camera_of, is_rectified
-from avlmaps.recordings.formats.rosbag import _pair, open_rosbag  # pyright: ignore[reportPrivateUsage]
+from avlmaps.recordings.formats.ros_topics import pair_images
+from avlmaps.recordings.formats.rosbag import open_rosbag
 
 
 def info(p_focal: float = 40.0) -> SimpleNamespace:
@@ -65,8 +66,8 @@ PAIRS = [
 
 @pytest.mark.parametrize(("colours", "depths", "chosen"), PAIRS)
 def test_colour_and_depth_are_of_one_camera(colours: list[str], depths: list[str], chosen: tuple[str, str]) -> None:
-    assert _pair(colours, depths) == chosen
-    assert _pair(colours[::-1], depths[::-1]) == chosen
+    assert pair_images(colours, depths) == chosen
+    assert pair_images(colours[::-1], depths[::-1]) == chosen
 
 
 @given(st.integers(2, 5), st.data())
@@ -75,7 +76,7 @@ def test_cameras_of_several_namespaces_are_never_mixed(count: int, data: st.Data
     colours = data.draw(st.permutations([f"{name}/color/image_raw" for name in names]))
     depths = data.draw(st.permutations([f"{name}/{data.draw(st.sampled_from(['depth', 'aligned_depth']))}/image"
                                         for name in names]))  # fmt: skip
-    rgb, depth = _pair(colours, depths)
+    rgb, depth = pair_images(colours, depths)
     assert rgb.split("/")[2] == depth.split("/")[2]
 
 

@@ -9,7 +9,7 @@ from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
 from avlmaps.cli.info import describe_map, info_lines
 from avlmaps.cli.output import UsageError, emit
-from avlmaps.cli.reading_options import Reading
+from avlmaps.cli.reading_options import Reading, topics_of
 from avlmaps.cli.verb import ModelVerb
 from avlmaps.core.progress import say
 
@@ -138,7 +138,7 @@ def build(verb: "Build") -> dict[str, Any]:
         [verb.recording, *verb.more],
         format=verb.format,
         audio=verb.audio,
-        topics=_topics(verb.topics),
+        topics=topics_of(verb.topics),
         corrections=verb.reading.corrections(),
     )
     for notice in recording.notices:
@@ -204,10 +204,3 @@ def _cache(place: str, limit_gb: float) -> "CacheSettings":
     if place in ("auto", "off"):
         return CacheSettings(place, limit_gb)
     return CacheSettings(Path(place).expanduser(), limit_gb)
-
-
-def _topics(words: tuple[str, ...]) -> dict[str, str]:
-    for word in words:
-        if not all(word.partition("=")):
-            raise UsageError(f"--topics takes words like rgb=/camera/color/image_raw, not {word!r}.")
-    return dict(word.split("=", 1) for word in words)

@@ -4,17 +4,18 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
 from avlmaps.cli.info import describe_map, info_lines
 from avlmaps.cli.output import UsageError, emit
-from avlmaps.cli.reading_options import Reading
+from avlmaps.cli.reading_options import Reading, topics_of
 from avlmaps.cli.verb import ModelVerb
 from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
+    from avlmaps.live.live_map import LiveMap
     from avlmaps.maps.store.reader import StoredMap
 
 
@@ -28,15 +29,21 @@ class Live(ModelVerb):
 
     compiles: ClassVar[bool] = True
 
-    recording: Annotated[Positional[Path], arg(metavar="REC")]
+    recording: Annotated[Positional[Path | None], arg(metavar="REC")] = None
     """Recording, of any format that build reads (a bag, a folder); or one of ours that is being written: it is followed
-    until it is finished."""
+    until it is finished. None with --source ros2."""
+    source: Annotated[Literal["recording", "ros2"], arg(metavar="recording|ros2")] = "recording"
+    """Source of frames and sound: REC, or what a running robot publishes in ROS 2 (by rclpy, in the Python that ROS 2
+    was built for), until Ctrl-C."""
+    topics: Annotated[tuple[str, ...], arg(metavar="KIND=TOPIC ...")] = ()
+    """With --source ros2: topics that their type does not identify: rgb=, depth=, pose= or audio=TOPIC; audio=none
+    leaves the sound out, audio_pcm=16000,1 says how plain samples are coded."""
     out: Annotated[Path, arg(metavar="MAP")]
     """Map folder to write, by custom NAME.avlmap."""
     rate: Annotated[float, arg(metavar="FACTOR")] = 1.0
     """Speed of the replay: 1 as it was recorded, 2 twice as fast."""
     give_up_s: Annotated[float, arg(metavar="SECONDS")] = 60.0
-    """Of a recording that is being written: end when nothing came for this long, seconds."""
+    """Of a recording that is being written, and of ROS 2: end when nothing came for this long, seconds."""
     as_fast_as_possible: bool = False
     """Wait for the map instead of the clock; no frame is late."""
     every_frame: bool = False
@@ -80,27 +87,16 @@ class Live(ModelVerb):
 
 def _live(verb: Live) -> dict[str, Any]:
     from avlmaps.cli.build import choose_models
-    from avlmaps.live.growing_folder import is_being_written
     from avlmaps.live.live_map import SPARSE, LiveMap
-    from avlmaps.live.replay import follow, replay
     from avlmaps.live.settings import LiveSettings
     from avlmaps.maps.settings import BuildSettings
-    from avlmaps.recordings.layout import UNFINISHED, decode_description
-    from avlmaps.recordings.open import open_recording
 
     begin_s = perf_counter()
     if not verb.rate > 0.0:
         raise UsageError(f"--rate is {verb.rate:g}; choose a positive number, or --as-fast-as-possible.")
     first = _days_before(verb)
     used = choose_models(verb.profile, [word for words in verb.model for word in words])
-    recording = None
-    if is_being_written(verb.recording):
-        up_in_world = decode_description(verb.recording / UNFINISHED).up_in_world
-    else:
-        recording = open_recording(verb.recording, format=verb.format, corrections=verb.reading.corrections())
-        up_in_world = recording.up_in_world
-        for notice in recording.notices:
-            say(f"note: {notice}")
+    up_in_world, play = _robot(verb) if verb.source == "ros2" else _recording(verb)
     with LiveMap(
         verb.out,
         used,
@@ -111,10 +107,7 @@ def _live(verb: Live) -> dict[str, Any]:
     ) as live:
 
         def drive(over: Callable[[], bool] = lambda: False) -> None:
-            if recording is None:
-                follow(verb.recording, live, verb.give_up_s, over=over)
-            else:
-                replay(recording, live, None if verb.as_fast_as_possible else verb.rate, over=over)
+            play(live, over)
 
         if verb.serve or verb.view:
             from avlmaps.cli.live_serving import serve_while
@@ -129,6 +122,55 @@ def _live(verb: Live) -> dict[str, Any]:
         **({} if first is None else {"into": _joined(first, live.map.stored, verb.day)}),
         "elapsed_s": round(perf_counter() - begin_s, 3),
     }
+
+
+_Play = Callable[["LiveMap", Callable[[], bool]], None]  # gives a map frames until it says that it is over
+
+
+def _recording(verb: Live) -> tuple[Any, _Play]:
+    """Return up in the world of a recording, and what plays it."""
+    from avlmaps.live.growing_folder import is_being_written
+    from avlmaps.live.replay import follow, replay
+    from avlmaps.recordings.layout import UNFINISHED, decode_description
+    from avlmaps.recordings.open import open_recording
+
+    path = verb.recording
+    if path is None:
+        raise UsageError("live needs a recording, REC, or --source ros2.")
+    if verb.topics:
+        raise UsageError("--topics is of --source ros2; a bag whose topics must be named is mapped by build.")
+    if is_being_written(path):
+        up_in_world = decode_description(path / UNFINISHED).up_in_world
+        return up_in_world, lambda live, over: follow(path, live, verb.give_up_s, over=over)
+    recording = open_recording(path, format=verb.format, corrections=verb.reading.corrections())
+    for notice in recording.notices:
+        say(f"note: {notice}")
+    rate = None if verb.as_fast_as_possible else verb.rate
+    return recording.up_in_world, lambda live, over: replay(recording, live, rate, over=over)
+
+
+def _robot(verb: Live) -> tuple[Any, _Play]:
+    """Return up in ROS's world, by its own convention (REP 103), and what gives the frames of a running robot."""
+    from avlmaps.live.ros_source import follow_ros2, open_ros2, ros_topics
+
+    if verb.recording is not None or verb.as_fast_as_possible or verb.rate != 1.0 or verb.format != "auto":
+        raise UsageError(
+            "--source ros2 takes what a robot publishes now: leave REC, --rate, --format and the like out."
+        )
+    if verb.reading != Reading():
+        raise UsageError(
+            "--depth-unit, --intrinsics and the like are of a recording; leave them out with --source ros2."
+        )
+    topics = ros_topics(topics_of(verb.topics))
+    inbox = open_ros2(topics)  # before the map's folder is made
+
+    def play(live: "LiveMap", over: Callable[[], bool]) -> None:
+        try:
+            follow_ros2(live, topics, verb.give_up_s, over=over, join=lambda _: inbox)
+        except KeyboardInterrupt:
+            say("note: Stopped by Ctrl-C; the map is finished.")
+
+    return (0.0, 0.0, 1.0), play
 
 
 def _days_before(verb: Live) -> "StoredMap | None":

@@ -60,6 +60,18 @@ class Reading:
         )
 
 
+def topics_of(words: tuple[str, ...]) -> dict[str, str]:
+    """Return what ``--topics`` says: names by what they are for.
+
+    Raises:
+        UsageError: a word is not of its form.
+    """
+    for word in words:
+        if not all(word.partition("=")):
+            raise UsageError(f"--topics takes words like rgb=/camera/color/image_raw, not {word!r}.")
+    return dict(word.split("=", 1) for word in words)
+
+
 def _direction(words: str) -> tuple[float, float, float]:
     try:
         x, y, z = (float(word) for word in words.split(","))

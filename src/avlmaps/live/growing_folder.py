@@ -13,11 +13,11 @@ import numpy as np
 from avlmaps.core import poses
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.progress import say
+from avlmaps.live.patience import Patience
 from avlmaps.recordings import images, layout
 from avlmaps.recordings.types import Frame
 
 _LOOK_S = 0.05
-STALLED_S = 5.0
 
 
 def is_being_written(path: Path) -> bool:
@@ -40,7 +40,7 @@ def growing_frames(path: Path, give_up_s: float = 60.0, tell: Callable[[str], No
         RecordingError: it says no cameras (it was written by an older version), or a table is damaged.
     """
     written = _Written(path, tell)
-    patience = _Patience(path, give_up_s, tell)
+    patience = Patience(f"into {path}", give_up_s, tell, "its writer seems to have stopped")
     while True:
         finished = (path / layout.DESCRIPTION).exists()  # looked up first: what is listed by then is all there is
         rows = written.rows()
@@ -99,33 +99,6 @@ class _Written:
         except RecordingError as fault:
             self._tell(f"note: {fault}")
             return None
-
-
-class _Patience:
-    """How long nothing came, and what is said of it."""
-
-    def __init__(self, path: Path, give_up_s: float, tell: Callable[[str], None]) -> None:
-        self._path, self._give_up_s, self._tell = path, give_up_s, tell
-        self._last_s, self._stalled = time.monotonic(), False
-
-    def is_over(self, came: int) -> bool:
-        """Take note of how many frames came, and return whether it is time to end."""
-        since_s = time.monotonic() - self._last_s
-        if came:
-            if self._stalled:
-                self._tell(f"note: {self._path} continues after {since_s:.0f} s.")
-            self._last_s, self._stalled = time.monotonic(), False
-        elif since_s > self._give_up_s:
-            self._tell(
-                f"note: Nothing came into {self._path} for {self._give_up_s:.0f} s; its writer seems to have stopped."
-            )
-            return True
-        elif since_s > STALLED_S and not self._stalled:
-            self._tell(
-                f"note: Nothing came into {self._path} for {STALLED_S:.0f} s; waiting up to {self._give_up_s:.0f} s."
-            )
-            self._stalled = True
-        return False
 
 
 class _Lines:

@@ -26,8 +26,9 @@ from std_msgs.msg import String
 from unique_identifier_msgs.msg import UUID as GoalUuid  # noqa: N811 - a class
 
 from avlmaps.core.errors import AvlmapsError
+from avlmaps.core.ros_interfaces import interface
 from avlmaps.navigate.ros.goals import End, Goal
-from avlmaps.navigate.ros.interfaces import filled, interface
+from avlmaps.navigate.ros.interfaces import filled
 from avlmaps.navigate.ros.messages import Transform, rigid, sanitize_line
 from avlmaps.navigate.ros.nav2_tasks import MOVING, why_of
 from avlmaps.navigate.ros.own_map import OwnGrid, checked_grid

@@ -161,7 +161,7 @@ def extract_audio(
         return None, (f"The sound topic {sound.name} has no message.",)
     times_s, notices = sound.times_s()
     if getattr(first[1], "__msgtype__", "") == STAMPED:
-        return _sampled(lambda: _pieces(_messages(sound), sound.name), sound.name, folder, times_s, notices)
+        return _sampled(lambda: sampled_pieces(_messages(sound), sound.name), sound.name, folder, times_s, notices)
     coding = (getattr(info, "coding_format", "") or "").lower()
     if pcm is None and coding in _PCM:
         sample_format = getattr(info, "sample_format", "") or "S16LE"
@@ -313,7 +313,12 @@ def _plain(messages: Iterable[Any], pcm: Pcm) -> Iterator[tuple[Pcm, np.ndarray]
         rest = content[whole:]
 
 
-def _pieces(messages: Iterable[Any], topic: str) -> Iterator[tuple[Pcm, np.ndarray]]:
+def sampled_pieces(messages: Iterable[Any], topic: str) -> Iterator[tuple[Pcm, np.ndarray]]:
+    """Yield of each AudioStamped its numbers and its samples, (n, channels) in [-1, 1].
+
+    Raises:
+        RecordingError: its format is none of samples, or no sound has such numbers.
+    """
     for message in messages:
         audio, info = message.audio.audio_data, message.audio.info
         if int(info.format) not in _SAMPLES:

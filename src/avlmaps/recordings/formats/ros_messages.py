@@ -1,6 +1,6 @@
 """Reading the few ROS messages that a recording needs: images, depth, camera calibration, poses.
 
-Works on messages as `rosbags` deserialises them, of ROS 1 and ROS 2 alike.
+Works on messages as `rosbags` deserialises them, of ROS 1 and ROS 2 alike, and on those of rclpy.
 """
 
 import re
@@ -42,7 +42,7 @@ def colour_of(message: Any, name: str, camera: Pinhole | None = None) -> UInt8[n
     Raises:
         RecordingError: its encoding is not one of a colour picture, or its bytes are cut short.
     """
-    if "CompressedImage" in message.__msgtype__:
+    if _is_compressed(message):
         return _decoded(message.data, name, camera, colour=True)[..., ::-1]
     if message.encoding not in _COLOUR_ENCODINGS:
         known = ", ".join(_COLOUR_ENCODINGS)
@@ -52,13 +52,18 @@ def colour_of(message: Any, name: str, camera: Pinhole | None = None) -> UInt8[n
     return np.ascontiguousarray(pixels[..., list(order)])
 
 
+def _is_compressed(message: Any) -> bool:
+    """Return whether a picture is a CompressedImage, of a bag or of rclpy."""
+    return hasattr(message, "format") and not hasattr(message, "encoding")
+
+
 def depth_of(message: Any, name: str, camera: Pinhole | None = None) -> Float32[np.ndarray, "h w"]:
     """Return z-depth in metres, 0 where there is none, of an Image or a `compressedDepth` CompressedImage.
 
     Raises:
         RecordingError: its encoding is not one of a depth picture, or its bytes are cut short.
     """
-    if "CompressedImage" in message.__msgtype__:
+    if _is_compressed(message):
         return _decompressed_depth(message, name, camera)
     order = ">" if message.is_bigendian else "<"
     if message.encoding in ("16UC1", "mono16"):

@@ -149,7 +149,7 @@ def find_motion(bag: Bag, named: str, camera_frame: str, transforms: TransformTr
     body, assumed = "", ""
     for _, message in bag.messages(topic):
         if not body:
-            body, assumed = _body_of(message, topic, camera_frame, tree)
+            body, assumed = body_of(message, topic, camera_frame, tree)
         stamp_s = message.header.stamp.sec + message.header.stamp.nanosec * 1e-9
         own = getattr(message, "child_frame_id", "") or body
         tree.add(message.header.frame_id or "world", own, pose_of(message), stamp_s, static=False)
@@ -177,7 +177,7 @@ def _tree_of_file(file: Path, camera_frame: str) -> TransformTree:
     return tree
 
 
-def _body_of(message: Any, topic: str, camera_frame: str, mounts: TransformTree) -> tuple[str, str]:
+def body_of(message: Any, topic: str, camera_frame: str, mounts: TransformTree) -> tuple[str, str]:
     """Return whose poses a topic has, and a notice where the messages do not name it.
 
     A camera that is mounted on a robot is seldom what a robot's pose is of: unless the topic is called after a camera,

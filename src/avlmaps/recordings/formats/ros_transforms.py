@@ -2,6 +2,7 @@
 
 from collections import Counter
 from dataclasses import dataclass, field
+from itertools import takewhile
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -27,6 +28,11 @@ class _Edge:
         self.stamps_s.append(stamp_s)
         self.parent_from_child.append(parent_from_child)
         self.constant &= bool(np.abs(parent_from_child - self.parent_from_child[0]).max() <= _SAME)
+
+    def forget(self, before_s: float) -> None:
+        kept = [at for at, stamp_s in enumerate(self.stamps_s) if stamp_s >= before_s] or [len(self.stamps_s) - 1]
+        self.stamps_s = [self.stamps_s[at] for at in kept]
+        self.parent_from_child = [self.parent_from_child[at] for at in kept]
 
     def trajectory(self) -> Trajectory:
         stamps_s, poses = np.array(self.stamps_s), np.stack(self.parent_from_child)
@@ -67,6 +73,18 @@ class TransformTree:
                 if edge.constant:
                     tree.add(edge.parent, child, edge.parent_from_child[0], 0.0, static=True)
         return tree
+
+    def forget(self, before_s: float) -> None:
+        """Leave out moving transforms from before a stamp, but for the last of each: a robot drives for days."""
+        for parents in self._edges.values():
+            for edge in parents.values():
+                if not edge.static:
+                    edge.forget(before_s)
+
+    def newest_s(self, frame: str) -> float | None:
+        """Return up to when what moves a frame most often is known, None where nothing moves it."""
+        carrier = self._carrier(frame)
+        return max(self._edge(carrier).stamps_s) if carrier else None
 
     @property
     def notices(self) -> tuple[str, ...]:
@@ -136,16 +154,16 @@ class TransformTree:
         return inverse(up_a[shared[0]]) @ up_b[shared[0]] if shared else None
 
     def root_from(
-        self, frame: str, stamps_s: Float[np.ndarray, " k"]
+        self, frame: str, stamps_s: Float[np.ndarray, " k"], world: str = ""
     ) -> tuple[Float[np.ndarray, "k 4 4"], Bool[np.ndarray, " k"]]:
-        """Return the pose of a frame in its tree's root at each stamp, and where it is known.
+        """Return the pose of a frame in its tree's root, or in a frame above it, at each stamp, and where it is known.
 
         The transform that moves the frame most often has to be known there; the others, which correct it, may come
         seldom (``HOLD_S``).
         """
         pose, known = np.broadcast_to(np.eye(4), (len(stamps_s), 4, 4)).copy(), np.ones(len(stamps_s), bool)
         carrier = self._carrier(frame)
-        for name in self._chain(frame):
+        for name in takewhile(lambda name: name != world, self._chain(frame)):
             edge = self._edge(name)
             if edge.static or (name != carrier and edge.constant):
                 pose = edge.parent_from_child[0] @ pose

@@ -10,9 +10,9 @@ clouds of a LiDAR are projected into the colour camera.
 import hashlib
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from functools import cached_property
-from itertools import islice, takewhile
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +31,13 @@ from avlmaps.recordings.formats.ros_audio import STAMPED, Pcm, SoundTopic, extra
 from avlmaps.recordings.formats.ros_clock import PictureClock
 from avlmaps.recordings.formats.ros_messages import camera_of, colour_of, depth_of, is_rectified
 from avlmaps.recordings.formats.ros_motion import base_height, find_motion, is_tf, no_pose, read_tf
+from avlmaps.recordings.formats.ros_topics import (
+    PAIRING_TOLERANCE_S,
+    RosTopics,
+    info_beside,
+    pair_images,
+    shared_namespace,
+)
 from avlmaps.recordings.formats.ros_transforms import TransformTree
 from avlmaps.recordings.plausible import plausible_walk
 from avlmaps.recordings.types import Frame, Recording
@@ -39,29 +46,8 @@ _IMAGE_TYPES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 _INFO_TYPES = ("sensor_msgs/msg/CameraInfo",)
 _AUDIO_INFO_TYPES = ("audio_common_msgs/msg/AudioInfo",)
 _AUDIO_TYPES = ("audio_common_msgs/msg/AudioData", "audio_common_msgs/msg/AudioDataStamped", STAMPED)
-# A colour and a depth picture at most this far apart are taken for one moment.
-PAIRING_TOLERANCE_S = 0.05
 # A LiDAR turns ten times a second: the nearest picture is at most half a turn away.
 CLOUD_TOLERANCE_S = 0.06
-
-
-@dataclass(frozen=True, slots=True)
-class RosTopics:
-    """Topics by name; empty ones are found by type.
-
-    Attributes:
-        rgb: colour images (raw or compressed).
-        depth: depth images (raw or compressedDepth), or point clouds.
-        pose: odometry, poses of the camera or the body, transforms, or a file of poses; empty: /tf first.
-        audio: audio data; ``none`` leaves the sound out.
-        audio_pcm: no topic: ``16000,1`` says that audio data are plain 16-bit samples, 16,000 a second, in one channel.
-    """
-
-    rgb: str = ""
-    depth: str = ""
-    pose: str = ""
-    audio: str = ""
-    audio_pcm: str = ""
 
 
 def open_rosbag(path: Path, topics: Mapping[str, str] | None = None, more: Sequence[Path] = ()) -> "RosbagRecording":
@@ -233,7 +219,7 @@ def _image_topics(bag: Bag, topics: RosTopics) -> tuple[str, str]:
             raise RecordingError(f"{bag.path} has no image topic {topic!r}; its image topics are: {every}.")
     depths = [topics.depth] if topics.depth else [t for t in images if "depth" in t.lower()]
     colours = [topics.rgb] if topics.rgb else [t for t in images if t not in depths and "depth" not in t.lower()]
-    rgb, depth = _pair(colours, depths)
+    rgb, depth = pair_images(colours, depths)
     depth = depth or next(iter(clouds), "")
     if not depth or not rgb:
         missing, name = ("depth", "depth") if not depth else ("colour", "rgb")
@@ -252,34 +238,11 @@ def _other_topics(bag: Bag) -> str:
     return f" It holds messages of: {', '.join(types[:8])}{' ...' if len(types) > 8 else ''}."
 
 
-def _pair(colours: list[str], depths: list[str]) -> tuple[str, str]:
-    """Return the colour and the depth topic that belong together: of one namespace, depth registered to colour.
-
-    Raw topics go before compressed ones (the order of the lists).
-    """
-    pairs = [(colour, depth) for depth in depths for colour in colours]
-    if not pairs:
-        return next(iter(colours), ""), next(iter(depths), "")
-
-    def likeliness(pair: tuple[str, str]) -> tuple[int, bool, bool]:
-        registered = any(word in pair[1].lower() for word in ("align", "registered"))
-        coloured = any(word in pair[0].lower() for word in ("color", "rgb", "colour"))
-        return _shared_namespace(*pair), registered, coloured
-
-    return max(pairs, key=likeliness)
-
-
-def _shared_namespace(one: str, other: str) -> int:
-    """Return how many names two topics begin with alike."""
-    names = zip(one.strip("/").split("/"), other.strip("/").split("/"), strict=False)
-    return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], names))
-
-
 def _other_cameras(bag: Bag, rgb_topic: str, depth_topic: str) -> tuple[str, ...]:
     """Return a notice where a bag has depth images of other cameras than the chosen one, or nothing."""
     images = [topic for topic in bag.topics_of(_IMAGE_TYPES) if "depth" in topic.lower()]
-    own = _shared_namespace(rgb_topic, depth_topic)
-    others = [topic for topic in images if _shared_namespace(topic, depth_topic) < max(own, 1)]
+    own = shared_namespace(rgb_topic, depth_topic)
+    others = [topic for topic in images if shared_namespace(topic, depth_topic) < max(own, 1)]
     if not others:
         return ()
     return (
@@ -327,11 +290,8 @@ def _read_rig(bag: Bag, rgb_topic: str, depth_topic: str, mounts: TransformTree)
 def _info_topic(bag: Bag, image_topic: str) -> str:
     """Return the calibration published beside an image topic, or one of another name for its frame, or nothing."""
     infos = bag.topics_of(_INFO_TYPES)
-    parts = image_topic.split("/")
-    for length in range(len(parts) - 1, 0, -1):
-        for name in ("camera_info", "info/camera_info"):  # the latter as RealSense's viewer has it
-            if (beside := "/".join([*parts[:length], name])) in infos:
-                return beside
+    if beside := info_beside(image_topic, infos):
+        return beside
     image = next(iter(bag.messages(image_topic)), None)
     frame = image[1].header.frame_id if image else ""
     others = [topic for topic in infos if frame and not topic.endswith("/camera_info")]

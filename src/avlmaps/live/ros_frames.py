@@ -1,0 +1,277 @@
+"""Frames out of the messages of a running robot: colour and depth of one moment, their cameras, and where it was.
+
+It knows no ROS: it takes messages, of rclpy or of the same fields, with the time of this machine at which
+they came, and says which frames are whole. What cannot become a frame is left out, counted, and said once.
+"""
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from avlmaps.core.arrays import Float32, Float64, UInt8
+from avlmaps.core.camera import Rig
+from avlmaps.core.errors import RecordingError
+from avlmaps.recordings.formats.ros_messages import camera_of, colour_of, depth_of, is_rectified, pose_of
+from avlmaps.recordings.formats.ros_motion import body_of
+from avlmaps.recordings.formats.ros_topics import PAIRING_TOLERANCE_S
+from avlmaps.recordings.formats.ros_transforms import HOLD_S, TransformTree
+
+Kind = Literal["rgb", "depth", "rgb_info", "depth_info", "tf", "tf_static", "pose"]
+
+PARTNER_WITHIN_S = 1.0
+"""A depth picture waits this long for the colour picture of its moment."""
+POSE_WITHIN_S = 0.5
+"""A pair of pictures waits this long for the pose of its moment."""
+LATER_POSE_WITHIN_S = 0.1
+"""... and this long for a pose after it, between which and the one before it lies."""
+SETTLED_S = 2.0
+"""A calibration or a mount that has not come by then is taken to be missing."""
+_HELD = 30  # pictures and pairs that wait, at most
+_FORGET_EVERY = 500  # transforms
+
+
+@dataclass(frozen=True, slots=True)
+class RosFrame:
+    """A frame as ``LiveMap.add_frame`` takes it."""
+
+    rgb: UInt8[np.ndarray, "h w 3"]
+    depth_m: Float32[np.ndarray, "hd wd"]
+    rig: Rig
+    world_from_camera: Float64[np.ndarray, "4 4"]
+    stamp_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Picture:
+    stamp_s: float
+    message: Any
+    came_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Pair:
+    colour: _Picture
+    depth: _Picture
+    came_s: float
+
+
+class RosFrames:
+    """Puts frames together.
+
+    Attributes:
+        unpaired: depth pictures without a colour picture of their moment.
+        unplaced: pairs without a pose of their moment.
+        unread: pairs that cannot be read.
+    """
+
+    def __init__(self, rgb_topic: str, depth_topic: str, pose_topic: str, tell: Callable[[str], None]) -> None:
+        """Begin without messages.
+
+        Args:
+            rgb_topic: name, for sentences.
+            depth_topic: likewise.
+            pose_topic: likewise; empty where only transforms move the robot.
+            tell: called with a sentence for each thing that is assumed or left out, once.
+        """
+        self.unpaired = self.unplaced = self.unread = 0
+        self._topics = {"rgb": rgb_topic, "depth": depth_topic, "pose": pose_topic}
+        self._tell, self._told = tell, set[str]()
+        self._tree, self._moved, self._world = TransformTree(), 0, ""
+        self._infos: dict[str, Any] = {}
+        self._rig: Rig | None = None
+        self._pictures: dict[str, deque[_Picture]] = {"rgb": deque(maxlen=_HELD), "depth": deque(maxlen=_HELD)}
+        self._pairs: deque[_Pair] = deque(maxlen=_HELD)
+        self._first_s: float | None = None
+
+    def take(self, kind: Kind, message: Any, now_s: float) -> None:
+        """Take a message.
+
+        Args:
+            kind: what it is for.
+            message: of sensor_msgs, tf2_msgs, nav_msgs or geometry_msgs.
+            now_s: when it came, by a clock of this machine that never goes back.
+        """
+        match kind:
+            case "rgb" | "depth":
+                self._take_picture(kind, message, now_s)
+            case "rgb_info" | "depth_info":
+                self._infos[kind] = message
+            case "tf" | "tf_static":
+                for transform in message.transforms:
+                    self._move(transform.header.frame_id, transform.child_frame_id, transform, kind == "tf_static")
+            case "pose":
+                self._take_pose(message)
+
+    def ready(self, now_s: float) -> list[RosFrame]:
+        """Return the frames that are whole now, in the order of time.
+
+        Args:
+            now_s: by the clock of ``take``.
+        """
+        self._pair(now_s)
+        found: list[RosFrame] = []
+        while self._pairs:
+            pair = self._pairs[0]
+            rig, pose = self._rig_of(pair, now_s), None
+            if rig is not None:
+                pose = self._pose_of(pair, now_s)
+            if pose is None and now_s - pair.came_s <= POSE_WITHIN_S:
+                break
+            self._pairs.popleft()
+            if rig is None or pose is None:
+                self.unplaced += 1
+                self._say_once(f"note: Frames are left out: {self.missing()}.")
+            elif (frame := self._read(pair, rig, pose)) is not None:
+                found.append(frame)
+        return found
+
+    def missing(self) -> str:
+        """Return what there is too little of for a frame, as part of a sentence."""
+        for kind, what in (("rgb", "colour picture"), ("depth", "depth picture")):
+            if not self._pictures[kind] and self._first_s is None:
+                return f"no {what} has come on {self._topics[kind]}"
+        if "rgb_info" not in self._infos:
+            return f"no CameraInfo has come beside {self._topics['rgb']}"
+        if not self._pairs and not (self.unplaced or self.unread):
+            return (
+                f"no pictures of {self._topics['rgb']} and {self._topics['depth']} are of one moment (within "
+                f"{1000 * PAIRING_TOLERANCE_S:.0f} ms); check that both have stamps of one clock"
+            )
+        return self._unplaced()
+
+    def _unplaced(self) -> str:
+        frame = self._camera_frame
+        if not self._tree.moves(frame):
+            root = self._tree.root(frame)
+            chain = f"; it hangs on {root!r}, and a transform to that is missing" if root != frame.lstrip("/") else ""
+            return f"nothing moves the camera {frame!r}: no transform on /tf leads to it, and no odometry{chain}"
+        span = self._tree.span_s(frame)
+        return (
+            f"the camera {frame!r} has no pose at the pictures' stamps (the last is of {self._stamp_s:.3f} s"
+            f"{f', poses go from {span[0]:.3f} to {span[1]:.3f} s' if span else ''}); check that both have one clock"
+        )
+
+    def _take_picture(self, kind: Literal["rgb", "depth"], message: Any, now_s: float) -> None:
+        stamp_s = _stamp_s(message)
+        if stamp_s <= 0.0:
+            self._say_once(f"note: The pictures on {self._topics[kind]} have no stamps; let their driver set them.")
+            return
+        held = self._pictures[kind]
+        if held and stamp_s <= held[-1].stamp_s:  # again, or overtaken
+            if stamp_s > held[-1].stamp_s - PARTNER_WITHIN_S:
+                return
+            held.clear()  # the clock was set back, as where a simulation begins again
+        held.append(_Picture(stamp_s, message, now_s))
+        if kind == "depth":
+            self._camera_frame, self._stamp_s = message.header.frame_id, stamp_s
+
+    _camera_frame, _stamp_s = "", 0.0
+
+    def _take_pose(self, message: Any) -> None:
+        named, topic = getattr(message, "child_frame_id", ""), self._topics["pose"]
+        if not named:
+            named, assumed = body_of(message, topic, self._camera_frame, self._tree.mounts())
+            if assumed:
+                self._say_once(f"note: {assumed}")
+        self._move(message.header.frame_id or "world", named, message, static=False)
+
+    def _move(self, parent: str, child: str, message: Any, static: bool) -> None:
+        stamp_s = _stamp_s(message)
+        self._tree.add(parent, child, pose_of(message), stamp_s, static)
+        self._moved += 1
+        if self._moved % _FORGET_EVERY == 0 and not static:
+            self._tree.forget(stamp_s - 2.0 * HOLD_S)
+
+    def _pair(self, now_s: float) -> None:
+        """Put depth pictures and the colour pictures of their moments together."""
+        colours, depths = self._pictures["rgb"], self._pictures["depth"]
+        while depths:
+            depth = depths[0]
+            near = [one for one in colours if abs(one.stamp_s - depth.stamp_s) <= PAIRING_TOLERANCE_S]
+            newest_s = colours[-1].stamp_s if colours else -np.inf
+            waited = now_s - depth.came_s > PARTNER_WITHIN_S
+            if near and (newest_s >= depth.stamp_s or waited):
+                nearest = min(near, key=lambda one: abs(one.stamp_s - depth.stamp_s))
+                self._pairs.append(_Pair(nearest, depth, now_s))
+                self._first_s = now_s if self._first_s is None else self._first_s
+            elif waited or newest_s > depth.stamp_s + PAIRING_TOLERANCE_S:
+                self.unpaired += 1
+            else:
+                return
+            depths.popleft()
+
+    def _rig_of(self, pair: _Pair, now_s: float) -> Rig | None:
+        """Return the cameras, as soon as they are known."""
+        if self._rig is not None or "rgb_info" not in self._infos:
+            return self._rig
+        settled = self._first_s is not None and now_s - self._first_s > SETTLED_S
+        if "depth_info" not in self._infos and not settled:
+            return None
+        frames = [picture.message.header.frame_id for picture in (pair.colour, pair.depth)]
+        rgb_from_depth = self._tree.mounts().fixed(*frames)
+        if rgb_from_depth is None and not settled:
+            return None
+        rgb_topic, depth_topic = self._topics["rgb"], self._topics["depth"]
+        if "depth_info" not in self._infos:
+            self._say_once(
+                f"note: {depth_topic} has no CameraInfo; that of {rgb_topic} is used, as for registered depth."
+            )
+        if rgb_from_depth is None:
+            self._say_once(
+                f"note: No static transform links {frames[0]!r} and {frames[1]!r}; they are taken for one place."
+            )
+        rgb = self._camera(self._infos["rgb_info"], rgb_topic)
+        depth = self._camera(self._infos.get("depth_info", self._infos["rgb_info"]), depth_topic)
+        self._rig = Rig(rgb, depth, np.eye(4) if rgb_from_depth is None else rgb_from_depth)
+        return self._rig
+
+    def _camera(self, info: Any, topic: str) -> Any:
+        camera, distorted = camera_of(info, topic, is_rectified(topic))
+        if distorted:
+            self._say_once(f"note: {topic} has lens distortion, which a pinhole leaves out; use rectified pictures.")
+        return camera
+
+    def _pose_of(self, pair: _Pair, now_s: float) -> Float64[np.ndarray, "4 4"] | None:
+        """Return world_from_camera at the depth picture, None while it is not known."""
+        frame, stamp_s = pair.depth.message.header.frame_id, pair.depth.stamp_s
+        newest_s = self._tree.newest_s(frame)
+        if newest_s is None or self._tree.cycle(frame):
+            return None
+        if newest_s < stamp_s and now_s - pair.came_s < LATER_POSE_WITHIN_S:
+            return None
+        self._world = self._world or self._tree.root(frame)
+        if self._world not in self._tree.ancestors(frame):
+            return None
+        # A map may come above odometry later: the world stays what it was.
+        pose, known = self._tree.root_from(frame, np.array([stamp_s]), self._world)
+        return pose[0] if known[0] else None
+
+    def _read(self, pair: _Pair, rig: Rig, pose: Float64[np.ndarray, "4 4"]) -> RosFrame | None:
+        """Read the pictures of a frame, None where they cannot be."""
+        rgb_topic, depth_topic = self._topics["rgb"], self._topics["depth"]
+        try:
+            rgb = colour_of(pair.colour.message, rgb_topic, rig.rgb)
+            depth_m = depth_of(pair.depth.message, depth_topic, rig.depth)
+            for picture, camera, topic in ((rgb, rig.rgb, rgb_topic), (depth_m, rig.depth, depth_topic)):
+                if picture.shape[:2] != (camera.height, camera.width):
+                    raise RecordingError(
+                        f"The pictures on {topic} are {picture.shape[1]}x{picture.shape[0]}; their calibration says "
+                        f"{camera.width}x{camera.height}."
+                    )
+        except RecordingError as fault:
+            self.unread += 1
+            self._say_once(f"note: {fault}")
+            return None
+        return RosFrame(rgb, depth_m, rig, pose, pair.depth.stamp_s)
+
+    def _say_once(self, sentence: str) -> None:
+        if len(self._told) < 100 and sentence not in self._told:
+            self._told.add(sentence)
+            self._tell(sentence)
+
+
+def _stamp_s(message: Any) -> float:
+    return message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec

@@ -1,0 +1,277 @@
+"""Messages of a robot become frames: of one moment, with the pose of that moment; else they are left out, and why."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from test_live_map import ENCODERS, UP, frame
+
+from avlmaps.core.errors import BackendError, RecordingError
+from avlmaps.live.live_map import LiveMap
+from avlmaps.live.ros_frames import PARTNER_WITHIN_S, POSE_WITHIN_S, RosFrames
+from avlmaps.live.ros_sound import RosSound
+from avlmaps.live.ros_source import follow_ros2, open_ros2, ros_topics
+from avlmaps.live.settings import LiveSettings
+from avlmaps.recordings.formats.ros_audio import Pcm
+from avlmaps.recordings.formats.ros_topics import RosTopics
+from helpers import ros_messages as ros
+
+START_S = 1_700_000_000.0
+
+
+class Robot:
+    """Gives messages to what puts frames together."""
+
+    def __init__(self, told: Callable[[str], None] = lambda _: None, knows: bool = True) -> None:
+        self.frames, self.now_s = RosFrames("/rgb", "/depth", "", told), 100.0
+        if knows:
+            self.give("tf_static", ros.mount())
+            for kind in ("rgb_info", "depth_info"):
+                self.give(kind, ros.camera_info(frame(0).rig.rgb))
+
+    def give(self, kind, message) -> None:
+        self.frames.take(kind, message, self.now_s)
+
+    def see(self, number: int, off_s: float = 0.0, **kinds) -> None:
+        one, stamp_s = frame(number), START_S + 0.1 * number
+        self.give("rgb", kinds.get("rgb", ros.colour)(one, stamp_s + off_s))
+        self.give("depth", kinds.get("depth", ros.depth)(one, stamp_s))
+
+    def be(self, number: int, parent: str = "odom") -> None:
+        self.give("tf", ros.moved(frame(number).world_from_camera, START_S + 0.1 * number, parent))
+
+    def wait(self, seconds: float):
+        self.now_s += seconds
+        return self.frames.ready(self.now_s)
+
+
+@pytest.mark.parametrize("packed", [False, True])
+def test_pictures_and_transforms_become_frames_of_a_recording(packed: bool) -> None:
+    robot = Robot()
+    kinds = {"rgb": ros.compressed_colour, "depth": ros.compressed_depth} if packed else {}
+    for number in range(6):
+        robot.be(number)
+        robot.see(number, **kinds)
+    found = robot.wait(0.2)
+    assert len(found) == 6
+    for number, one in enumerate(found):
+        wanted = frame(number)
+        np.testing.assert_array_equal(one.rgb, wanted.rgb)
+        np.testing.assert_allclose(one.depth_m, wanted.depth_m, atol=6e-4)
+        np.testing.assert_allclose(one.world_from_camera, wanted.world_from_camera, atol=1e-6)
+        assert one.stamp_s == pytest.approx(START_S + 0.1 * number, abs=1e-6)
+        assert one.rig.depth == wanted.rig.depth
+
+
+def moved_at(one, stamp_s: float):
+    return ros.moved(one.world_from_camera, stamp_s)
+
+
+@given(st.integers(0, 10_000))
+@settings(max_examples=15, deadline=None)
+def test_frames_come_once_and_in_order_however_messages_are_mixed(seed: int) -> None:
+    rng, robot = np.random.default_rng(seed), Robot()
+    events = [(kind, number) for number in range(8) for kind in ("tf", "rgb", "depth")]
+    late = {"tf": 0.08, "rgb": 0.15, "depth": 0.15}  # of one kind the order stays
+    events.sort(key=lambda event: 0.1 * event[1] + rng.uniform(0.0, late[event[0]] / 2))
+    seen: dict[str, int] = {}
+    found = []
+    for kind, number in events:
+        if number < seen.get(kind, -1):
+            continue
+        seen[kind] = number
+        one, stamp_s = frame(number), START_S + 0.1 * number
+        made = {"tf": moved_at, "rgb": ros.colour, "depth": ros.depth}[kind]
+        robot.give(kind, made(one, stamp_s))
+        found += robot.wait(0.03)
+    found += robot.wait(PARTNER_WITHIN_S + 0.01)
+    found += robot.wait(POSE_WITHIN_S + 0.01)
+    stamps = [one.stamp_s for one in found]
+    assert stamps == sorted(set(stamps))
+    for one in found:
+        wanted = frame(round((one.stamp_s - START_S) / 0.1))
+        np.testing.assert_array_equal(one.rgb, wanted.rgb)
+        np.testing.assert_allclose(one.world_from_camera, wanted.world_from_camera, atol=1e-6)
+    assert len(found) + robot.frames.unpaired + robot.frames.unplaced == 8
+
+
+def test_a_pose_between_two_transforms_lies_between_them() -> None:
+    robot = Robot()
+    for number in (0, 2):
+        robot.be(number)
+    robot.see(1)
+    (one,) = robot.wait(0.0)
+    middle = 0.5 * (frame(0).world_from_camera[:3, 3] + frame(2).world_from_camera[:3, 3])
+    np.testing.assert_allclose(one.world_from_camera[:3, 3], middle, atol=0.02)
+
+
+def test_the_world_stays_when_a_map_comes_above_odometry() -> None:
+    robot = Robot()
+    for number in range(2):
+        robot.be(number)
+        robot.see(number)
+    before = robot.wait(0.2)
+    off = np.eye(4)
+    off[:3, 3] = 5.0, 0.0, 0.0
+    robot.give("tf", ros.tf(ros.transform("map", "odom", off, START_S + 0.2)))
+    for number in range(2, 4):
+        robot.be(number)
+        robot.see(number)
+    after = robot.wait(0.2)
+    assert (len(before), len(after)) == (2, 2)
+    np.testing.assert_allclose(after[1].world_from_camera, frame(3).world_from_camera, atol=1e-6)
+
+
+def test_a_robot_without_transforms_moves_by_odometry() -> None:
+    robot = Robot(knows=False)
+    robot.give("tf_static", ros.mount())
+    robot.give("rgb_info", ros.camera_info(frame(0).rig.rgb))
+    one = frame(3)
+    body = one.world_from_camera @ np.linalg.inv(ros.BODY_FROM_CAMERA)
+    moved = ros.transform("odom", "base_link", body, START_S + 0.3)
+    at = SimpleNamespace(position=moved.transform.translation, orientation=moved.transform.rotation)
+    robot.see(3)
+    robot.give("pose", SimpleNamespace(header=moved.header, child_frame_id="base_link", pose=SimpleNamespace(pose=at)))
+    assert robot.wait(0.1) == []  # the depth's own calibration may yet come
+    robot.now_s += 3.0
+    robot.see(4)
+    robot.give("pose", SimpleNamespace(header=ros.header(START_S + 0.4, "odom"), child_frame_id="base_link",
+                                       pose=SimpleNamespace(pose=at)))  # fmt: skip
+    assert len(robot.wait(0.0)) == 2
+
+
+LEFT_OUT = {
+    "no transform": (lambda robot: robot.see(0), "nothing moves the camera 'camera'"),
+    "another clock": (
+        lambda robot: (robot.give("tf", ros.moved(np.eye(4), 5.0)), robot.see(0)), "check that both have one clock",
+    ),
+    "an encoding": (
+        lambda robot: (robot.be(0), robot.see(0, rgb=lambda f, s: ros.colour(f, s, "yuv422"))), "has encoding 'yuv422'",
+    ),
+    "another size": (
+        lambda robot: (
+            robot.give("rgb_info", ros.camera_info(frame(0).rig.rgb.resized(64, 48))), robot.be(0), robot.see(0)
+        ),
+        "their calibration says 64x48",
+    ),
+    "no stamps": (
+        lambda robot: robot.give("rgb", ros.colour(frame(0), 0.0)), "have no stamps",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", LEFT_OUT)
+def test_what_cannot_be_a_frame_is_left_out_with_a_reason_once(case: str) -> None:
+    told: list[str] = []
+    happens, said = LEFT_OUT[case]
+    robot = Robot(told.append)
+    for _ in range(2):
+        happens(robot)
+        assert robot.wait(POSE_WITHIN_S + 0.1) == []
+    assert len(told) == 1 and said in told[0]
+
+
+def test_pictures_of_two_moments_are_no_frame() -> None:
+    robot = Robot()
+    for number in range(3):
+        robot.be(number)
+        robot.see(number, off_s=0.055)
+    assert len(robot.wait(PARTNER_WITHIN_S + 0.1)) <= 2  # the last colour picture is 45 ms before the next depth
+    assert robot.frames.unpaired >= 1
+    assert "no colour picture has come" in RosFrames("/rgb", "/depth", "", print).missing()
+
+
+def test_what_robots_say_of_sound_is_read() -> None:
+    samples = np.array([[0, 16384], [-16384, 0]], "<i2")
+    data = SimpleNamespace(data=np.frombuffer(samples.tobytes(), np.uint8))
+    sound = RosSound("/audio", Pcm(16_000, 2))
+    assert sound.take(data, None, 10.0) is None  # no picture says by which clock
+    heard, begin_s = sound.take(data, START_S, 10.0) or (None, 0.0)
+    assert heard is not None and begin_s == pytest.approx(START_S + 10.0 - 2 / 16_000)
+    np.testing.assert_allclose(heard.samples, [0.25, -0.25])
+    _, again_s = sound.take(data, START_S, 10.02) or (None, 0.0)
+    assert again_s == pytest.approx(begin_s + 2 / 16_000)  # right after the one before
+    with pytest.raises(RecordingError, match="audio_pcm=16000,1"):
+        RosSound("/audio").take(data, START_S, 10.0)
+    with pytest.raises(RecordingError, match="is coded as 'mp3'"):
+        RosSound("/audio").inform(SimpleNamespace(coding_format="mp3", sample_format="", sample_rate=0, channels=0))
+
+
+class Played:
+    """What a network gave, at once."""
+
+    def __init__(self, messages: list, chosen: dict[str, str] | None = None) -> None:
+        self.chosen = {"rgb": "/rgb", "depth": "/depth"} if chosen is None else chosen
+        self.lost, self.fault, self._messages = 0, "", messages
+
+    def __enter__(self) -> "Played":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def take(self, wait_s: float) -> list:
+        some, self._messages = self._messages[:6], self._messages[6:]
+        if some and not self._messages:
+            self.lost = 3
+        return some
+
+    def described(self) -> str:
+        return "The network has nothing"
+
+
+def messages(count: int) -> list:
+    rig = frame(0).rig
+    every = [("tf_static", ros.mount()), ("rgb_info", ros.camera_info(rig.rgb)),
+             ("depth_info", ros.camera_info(rig.depth))]  # fmt: skip
+    for number in range(count):
+        one, stamp_s = frame(number), START_S + 0.1 * number
+        every += [("tf", ros.moved(one.world_from_camera, stamp_s)), ("rgb", ros.colour(one, stamp_s)),
+                  ("depth", ros.depth(one, stamp_s))]  # fmt: skip
+    return [(kind, message, 100.0) for kind, message in every]
+
+
+def test_a_robot_is_mapped_and_what_was_lost_counts_as_late(tmp_path: Path) -> None:
+    told: list[str] = []
+    live = LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP, live=replace(LiveSettings(gates=False), most_waiting=50))
+    with live:
+        follow_ros2(live, RosTopics(), 1.0, told.append, join=lambda _: Played(messages(12)))
+    status = live.status()
+    assert status.frames_in == 15
+    assert status.dropped == {"late": 3}
+    assert status.fused == 12
+    assert any("Mapping from ROS 2: rgb /rgb, depth /depth" in said for said in told)
+    assert live.map.stored.info.counts.voxels > 100
+
+
+@pytest.mark.parametrize(
+    ("given", "chosen", "said"),
+    [
+        ([], {}, "nobody publishes pictures of colour and of depth. The network has nothing"),
+        ([], None, "no colour picture has come on /rgb"),
+        (messages(2)[3:], None, "no CameraInfo has come beside /rgb"),
+    ],
+)
+def test_a_robot_that_gives_no_frame_is_said(tmp_path: Path, given: list, chosen, said: str) -> None:
+    with (
+        pytest.raises(RecordingError, match="No frame came from ROS 2 within 1 s") as fault,
+        LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP) as live,
+    ):
+        follow_ros2(live, RosTopics(), 0.7, lambda _: None, join=lambda _: Played(given, chosen))
+    assert said in str(fault.value)
+    assert not (tmp_path / "map" / "map.json").exists()
+
+
+def test_ros_that_is_not_here_and_topics_of_no_kind_are_said() -> None:
+    with pytest.raises(RecordingError, match="no 'colour' among the topics"):
+        ros_topics({"colour": "/rgb"})
+    try:
+        import rclpy  # noqa: F401  # pyright: ignore[reportMissingImports]
+    except ImportError:
+        with pytest.raises(BackendError, match="needs ROS 2's rclpy"):
+            open_ros2(RosTopics())
