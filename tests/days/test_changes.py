@@ -1,5 +1,8 @@
 """What a map of several days answers: the changes since a day, the things of a day, and where a thing was last seen."""
 
+from pathlib import Path
+from types import SimpleNamespace
+
 import msgspec
 import numpy as np
 import pytest
@@ -9,6 +12,9 @@ from avlmaps.language.list_questions import Listed, read_list
 from avlmaps.maps.store.life import Life, Stay
 from avlmaps.maps.store.manifest import CameraInfo, RecordingInfo, RigInfo, Visit
 from avlmaps.query.changes import Days, changes_answer, is_meant, last_seen, last_seen_text, text_of
+from avlmaps.query.goals import Goal
+from avlmaps.query.lists import lies
+from avlmaps.query.usual import days_of, usual, usual_place_text, usual_text
 
 CAMERA = CameraInfo(fx=1.0, fy=1.0, cx=0.5, cy=0.5, width=1, height=1)
 ROWS = tuple(tuple(float(value) for value in row) for row in np.eye(4))
@@ -135,3 +141,100 @@ def test_questions_about_days_are_read(sentence: str, of: Listed, name: str, cha
 def test_other_questions_are_not(sentence: str) -> None:
     read = read_list(sentence)
     assert read is None or read.of not in (Listed.CHANGES, Listed.LAST_SEEN)
+
+
+# What is usual.
+
+
+def lived(name: str, there: tuple[int, ...], absent: tuple[int, ...] = (), **more: object) -> Stay:
+    known: dict[str, object] = {"there_on": there, "absent_on": absent, "position": (1.0, 1.0, 0.8), **more}
+    return stay(name, there[0], there[-1], **known)
+
+
+def usual_of(*stays: Stay) -> list[tuple[str, int, int, bool]]:
+    voxels = [np.full((2, 3), number, np.int32) for number in range(len(stays))]
+    known = Days(tuple(visit(number, day) for number, day in enumerate(DATES)), Life.of(stays, voxels))
+    return [(one.stay.name, one.there, one.looked, one.is_usual) for one in usual(known, lambda _: True)]
+
+
+def test_usual_is_what_most_of_the_days_that_looked_saw_and_more_than_one() -> None:
+    assert usual_of(lived("bag", (0, 1, 2))) == [("bag", 3, 3, True)]
+    assert usual_of(lived("bag", (0, 2))) == [("bag", 2, 2, True)], "a day that did not look counts neither way"
+    assert usual_of(lived("bag", (0,))) == [("bag", 1, 1, False)], "one day is no habit"
+    assert usual_of(lived("bag", (0,), (1, 2))) == [("bag", 1, 3, False)]
+
+
+def test_a_thing_that_comes_and_goes_is_one_by_its_place() -> None:
+    came_back = (lived("bag", (0,), (1,)), lived("bag", (2,), (1,), position=(1.4, 1.0, 0.8)))
+    assert usual_of(*came_back) == [("bag", 2, 3, True)]
+    elsewhere = (lived("bag", (0, 1), (2,)), lived("bag", (2,), position=(9.0, 1.0, 0.8)))
+    assert usual_of(*elsewhere) == [("bag", 2, 3, True), ("bag", 1, 1, False)]
+    assert usual_of(lived("person", (0, 1, 2))) == [], "people come and go"
+
+
+def test_the_order_of_stays_changes_nothing() -> None:
+    stays = [lived("bag", (0, 1), (2,)), lived("bag", (2,), position=(9.0, 1.0, 0.8)), lived("cup", (0, 1, 2))]
+    assert usual_of(*stays) == usual_of(*reversed(stays))
+
+
+def test_maps_of_before_know_the_first_and_the_last_day() -> None:
+    assert usual_of(stay("bag", 0, 2)) == [("bag", 2, 2, True)]
+    assert usual_of(stay("bag", 1, 1, appeared=True, gone=2)) == [("bag", 1, 3, False)]
+
+
+def test_what_is_usual_is_said_with_its_days() -> None:
+    voxels = [np.full((2, 3), number, np.int32) for number in range(3)]
+    stays = (lived("bag", (0, 1), (2,)), lived("cup", (1,), (0, 2)), lived("book", (0, 1, 2)))
+    known = Days(tuple(visit(number, day) for number, day in enumerate(DATES)), Life.of(stays, voxels))
+    found = usual(known, lambda _: True)
+    assert usual_text(found, "on the table") == (
+        "Usually on the table: book (3 of 3 days), bag (2 of 3 days). Seen there on 1 day only: cup."
+    )
+    bag = usual(known, lambda one: one.name == "bag")
+    assert usual_place_text(known, "bag", bag, lambda _: "hall") == (
+        "The bag is usually in the hall, at (1.00, 1.00, 0.80) m: on 2 of 3 days on which its place was looked at."
+    )
+    cup = usual(known, lambda one: one.name == "cup")
+    assert usual_place_text(known, "cup", cup, lambda _: None) == (
+        "The cup was seen on 1 day only, 2026-11-24, at (1.00, 1.00, 0.80) m; that says nothing of what is usual."
+    )
+    assert usual_place_text(known, "ski", [], lambda _: None) == "No ski was seen on any day."
+    with pytest.raises(QueryError, match="on one day alone, so that nobody knows what is usual"):
+        days_of(SimpleNamespace(info=SimpleNamespace(visits=()), path=Path("home.avlmap")), lambda life: life)  # pyright: ignore[reportArgumentType]
+
+
+@pytest.mark.parametrize(
+    ("sentence", "how", "name"),
+    [
+        ("what is usually on the table?", "on", "table"),
+        ("What usually stands next to the sofa?", "near", "sofa"),
+        ("what is in the kitchen most of the time?", "in", "kitchen"),
+        ("where is the suitcase usually?", "", "suitcase"),
+        ("where is the suitcase usually kept", "", "suitcase"),
+        ("Where do you normally find the keys?", "", "keys"),
+        ("where does the bag usually stand?", "", "bag"),
+    ],
+)
+def test_a_sentence_asks_what_is_usual(sentence: str, how: str, name: str) -> None:
+    read = read_list(sentence)
+    assert read is not None and (read.of, read.how, read.name) == (Listed.USUAL, how, name)
+
+
+@pytest.mark.parametrize("sentence", ["what is on the table?", "where is the suitcase?", "is the bag usually red?"])
+def test_other_sentences_do_not(sentence: str) -> None:
+    read = read_list(sentence)
+    assert read is None or read.of is not Listed.USUAL
+
+
+def test_on_a_thing_lies_what_stands_over_its_middle_and_not_what_hangs_or_stands_beside() -> None:
+    table = Goal((2.0, 2.0, 0.4), 0.9, (1.2, 0.8, 0.8), {}, 0.9, "table")
+    flat = SimpleNamespace(space=SimpleNamespace(level=lambda points: points))
+
+    def on(name: str, x: float, z: float, size: tuple[float, float, float] = (0.2, 0.2, 0.2), how: str = "on") -> bool:
+        return lies(flat, how, lived(name, (0, 1), position=(x, 2.0, z), size=size), table)  # pyright: ignore[reportArgumentType]
+
+    assert on("book", 2.0, 0.9) and on("book", 2.5, 0.75)
+    assert not on("book", 2.0, 0.15), "under it"
+    assert not on("book", 3.0, 0.9) and on("book", 3.0, 0.9, how="near"), "beside it"
+    assert not on("book", 2.0, 1.5) and not on("picture", 2.0, 1.0)
+    assert not on("desk", 2.0, 0.4, (1.2, 0.8, 0.8)), "itself by another name"

@@ -88,3 +88,14 @@ def test_a_life_is_stored_whole_and_a_damaged_one_is_said() -> None:
         with pytest.raises(MapError, match="damaged"):
             read_life({**arrays, name: broken}, "life")
     assert msgspec.structs.replace(life.stays[0], name="person").is_person
+
+
+def test_each_day_that_looked_is_counted_and_no_other() -> None:
+    seen, empty, blind = views(FRONT, MIDDLE, 1.9), views(FRONT, MIDDLE, 4.0), views(BACK, MIDDLE, 4.0)
+    life = after(begun([thing()]), [thing(BOX + 1)], seen, visit=1)
+    life = after(life, [], blind, visit=2)
+    life = after(life, [], empty, visit=3)
+    life = after(life, [], empty, visit=4)
+    (stay,) = life.stays
+    assert (stay.there_on, stay.absent_on, stay.gone) == ((0, 1), (3, 4), 3)
+    assert (stay.days_there, stay.days_absent) == ({0, 1}, {3, 4})

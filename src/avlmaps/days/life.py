@@ -76,7 +76,11 @@ def lived_on(
         settings: the rule.
         same: whether two names may be of one thing.
     """
-    stays, voxels = list(life.stays), [life.voxels(number) for number in range(len(life))]
+    voxels = [life.voxels(number) for number in range(len(life))]
+    stays = [
+        _still_absent(stay, own, day, before, known, visit, grid, settings)
+        for stay, own in zip(life.stays, voxels, strict=True)
+    ]
     present = [number for number, stay in enumerate(stays) if stay.gone is None]
     matched = _matched(present, stays, voxels, things, settings, same)
     for number in present:
@@ -91,15 +95,20 @@ def lived_on(
                 last=visit,
                 looked=visit,
                 last_seen_s=seen.seen_s,
+                there_on=(*stay.there_on, visit),
             )
             continue
         views = [one for one in before[stay.first : visit] if len(one)]
         seen = seen_again(voxels[number], grid, views, known, day, settings)
         match seen.verdict(grid.voxel_size_m, settings):
             case Verdict.THERE:
-                stays[number] = msgspec.structs.replace(stay, last=visit, looked=visit, last_seen_s=at_s[visit])
+                there_on = (*stay.there_on, visit)
+                stays[number] = msgspec.structs.replace(
+                    stay, last=visit, looked=visit, last_seen_s=at_s[visit], there_on=there_on
+                )
             case Verdict.GONE:
-                stays[number] = msgspec.structs.replace(stay, looked=visit, gone=visit)
+                absent_on = (*stay.absent_on, visit)
+                stays[number] = msgspec.structs.replace(stay, looked=visit, gone=visit, absent_on=absent_on)
             case Verdict.UNKNOWN:
                 pass
     new: list[int] = []
@@ -108,15 +117,41 @@ def lived_on(
         then = seen_before(thing.index, grid, before, known, day, settings)
         if then is not Verdict.THERE:
             new.append(len(stays))
-        stays.append(_stay(thing, visit, appeared=then is Verdict.GONE))
+        stay = _stay(thing, visit, appeared=then is Verdict.GONE)
+        if stay.appeared:
+            each = [seen_before(thing.index, grid, [views], known, day, settings) for views in before]
+            absent_on = tuple(one for one, verdict in enumerate(each) if verdict is Verdict.GONE)
+            stay = msgspec.structs.replace(stay, absent_on=absent_on)
+        stays.append(stay)
         voxels.append(thing.index)
     return Life.of(_moved(stays, new, visit, at_s, settings, same), voxels)
+
+
+def _still_absent(
+    stay: Stay,
+    voxels: Int[np.ndarray, "v 3"],
+    day: Day,
+    before: Sequence[DayViews],
+    known: Occupied,
+    visit: int,
+    grid: GridSpec,
+    settings: ChangeSettings,
+) -> Stay:
+    """Return a stay that is gone with the new day, where that looked through its place again; others as they are."""
+    if stay.gone is None:
+        return stay
+    views = [one for one in before[stay.first : stay.gone] if len(one)]
+    seen = seen_again(voxels, grid, views, known, day, settings)
+    if seen.verdict(grid.voxel_size_m, settings) is not Verdict.GONE:
+        return stay
+    return msgspec.structs.replace(stay, absent_on=(*stay.absent_on, visit))
 
 
 def _stay(thing: SeenThing, visit: int, appeared: bool) -> Stay:
     return Stay(
         name=thing.name, confidence=thing.confidence, position=thing.position, size=thing.size, color=thing.color,
         first=visit, last=visit, last_seen_s=thing.seen_s, looked=visit, appeared=appeared,
+        there_on=(visit,),
     )  # fmt: skip
 
 

@@ -21,7 +21,7 @@ NUMBERS = {
 SUPPORTED = (
     "where things, sounds, rooms and photos are, how many there are, what is in a room or next to a thing, which room "
     "a thing or a photo is in, the largest or smallest room, the first or last sound, and of a map of several days "
-    "what is new, gone or moved and where a thing was last seen"
+    "what is new, gone or moved, where a thing was last seen and what is usual"
 )
 """What a map answers, for the sentence that refuses another question."""
 
@@ -37,6 +37,7 @@ class Listed(StrEnum):
     NAMES = "all rooms, sounds or things"
     CHANGES = "what is new, gone or moved"
     LAST_SEEN = "where a thing was last seen"
+    USUAL = "what is usually somewhere, or where a thing usually is"
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +51,7 @@ class ListQuestion:
         counts: whether only the number is sought.
         since: the day after which changes count, as it was said; "" for the first.
         change: ``new``, ``gone`` or ``moved``; "" for any change.
+        how: of ``USUAL``, ``on``, ``in`` or ``near`` the name; "" where the thing of that name usually is.
     """
 
     of: Listed
@@ -58,6 +60,7 @@ class ListQuestion:
     counts: bool = False
     since: str = ""
     change: str = ""
+    how: str = ""
 
 
 _POLITE = re.compile(
@@ -111,7 +114,27 @@ _CHANGED = {
 _SINCE = r"(?: since (?:visit (?P<visit>[0-9]+)|(?P<date>[0-9]{4}-[0-9]{2}-[0-9]{2})))?"
 _CHANGES = "|".join(_CHANGED.values())
 _SEEN_LAST = r"(?:last seen|seen last|last noticed|last found)"
+_USUALLY = (
+    r"(?:usually|normally|typically|generally|commonly|mostly|most often|often|most of the time|on most days|most days|"
+    r"as a rule)"
+)
+_HOW_USUAL = rf"(?P<how>on top of|on|{_IN}|{_NEXT})"
+_PUT = r"(?: (?:found|kept|standing|lying|placed|put|stored|located|seen|to be found))?"
+_USUAL_THING = (
+    rf"where (?:is|are) {_ARTICLE}(?P<seen>.+?) {_USUALLY}{_PUT}",
+    rf"where (?:is|are) {_USUALLY} {_ARTICLE}(?P<seen>.+)",
+    rf"where (?:do|can|could|would) (?:you|we|i|one|people) {_USUALLY} (?:see|find|keep|put|leave) "
+    rf"{_ARTICLE}(?P<seen>.+)",
+    rf"where (?:does|do) {_ARTICLE}(?P<seen>.+?) {_USUALLY} (?:stand|lie|live|hang|go|belong|sit|stay)",
+)
 _PATTERNS: tuple[tuple[Listed, str], ...] = (
+    (Listed.USUAL, rf"what(?: {_STUFF})? (?:is|are|stands|lies) {_USUALLY}{_PUT} {_HOW_USUAL} {_ARTICLE}(?P<place>.+)"),
+    (Listed.USUAL, rf"what(?: {_STUFF})? {_USUALLY} (?:is|are|stands|lies){_PUT} {_HOW_USUAL} {_ARTICLE}(?P<place>.+)"),
+    (
+        Listed.USUAL,
+        rf"what(?: {_STUFF})? (?:is|are|stands|lies){_PUT} {_HOW_USUAL} {_ARTICLE}(?P<place>.+?) {_USUALLY}",
+    ),
+    *((Listed.USUAL, pattern) for pattern in _USUAL_THING),
     (
         Listed.CHANGES,
         rf"what(?: things| objects)?(?: is| are| has| have| was| were)?(?: been)? (?P<change>{_CHANGES})"
@@ -189,8 +212,11 @@ def read_list(text: str, own: Sequence[OwnName] = ()) -> ListQuestion | None:
         if found is None:
             continue
         said = found.groupdict()
-        if of is Listed.CHANGES:
+        how = _how_of(said.get("how") or "")
+        if of is Listed.CHANGES or how == "in":
             said["room"] = said.pop("place")
+        elif how:
+            said["thing"] = said.pop("place")
         if said.get("room"):
             said["room"] = mended(said["room"]) or said["room"]
         if said.get("room") and lexicon().find(said["room"], Kind.ROOM) is None:
@@ -202,8 +228,15 @@ def read_list(text: str, own: Sequence[OwnName] = ()) -> ListQuestion | None:
         name = _SAME.get(name.split()[0], name) if of is Listed.NAMES else name
         since = f"{said.get('visit') or ''}{said.get('date') or ''}"
         change = next((one for one, words in _CHANGED.items() if re.fullmatch(words, said.get("change") or "")), "")
-        return ListQuestion(of, name, bool(said.get("first")), bool(said.get("counts")), since, change)
+        return ListQuestion(of, name, bool(said.get("first")), bool(said.get("counts")), since, change, how)
     return None
+
+
+def _how_of(said: str) -> str:
+    """Return ``on``, ``in`` or ``near`` for the words that say how things lie to a place."""
+    if not said:
+        return ""
+    return "on" if said.startswith("on") else "in" if re.fullmatch(_IN, said) else "near"
 
 
 def said_number(text: str) -> tuple[int, str] | None:

@@ -12,7 +12,7 @@ from avlmaps.query.heatmap import Heatmap
 
 if TYPE_CHECKING:
     from avlmaps.maps.storeys import Storeys
-    from avlmaps.query.schema import AlternativeAnswer, DayAnswer, PartOutcome, QueryAnswer
+    from avlmaps.query.schema import AlternativeAnswer, DayAnswer, PartOutcome, QueryAnswer, UsualAnswer
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +93,7 @@ class Answer:
             questions that a sentence may mean, the likeliest first.
         storeys: of a map of several.
         when: the day of each goal, in an answer about several days: when a change was noticed, or a thing last seen.
+        usual: on how many days each goal was there, in an answer about what is usual.
         text: the answer in one sentence: where the first goal is, or which part failed and what the best guess is.
     """
 
@@ -108,6 +109,7 @@ class Answer:
     text: str = ""
     storeys: "Storeys | None" = field(default=None, repr=False, compare=False)
     when: "tuple[DayAnswer, ...]" = ()
+    usual: "tuple[UsualAnswer, ...]" = ()
 
     def __repr__(self) -> str:
         counted = "" if self.count is None else f", count={self.count}"
@@ -131,6 +133,8 @@ class Answer:
                 goal["storey"] = int(self.storeys.of_places(np.array(goal["position"]))[0])
         for goal, day in zip(answer["goals"], self.when, strict=False):
             goal["when"] = day
+        for goal, usual in zip(answer["goals"], self.usual, strict=False):
+            goal["usual"] = usual
         if self.count is not None:
             answer["count"] = self.count
         if self.notes:

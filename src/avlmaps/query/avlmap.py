@@ -3,10 +3,11 @@
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -141,6 +142,12 @@ class AVLMap:
         """Read what people corrected again at the next question."""
         for name in ("edited", "room_field"):
             self.__dict__.pop(name, None)
+
+    def as_edited_now(self) -> Self:
+        """Return the same map with the edits of now; what no edit changes is not computed again."""
+        other = copy(self)
+        other.forget_edits()
+        return other
 
     @cached_property
     def space(self) -> Space:

@@ -22,15 +22,20 @@ from avlmaps.query.changes import (
     room_namer,
     text_of,
 )
+from avlmaps.query.edits import means
 from avlmaps.query.goals import Goal
+from avlmaps.query.usual import days_of, usual, usual_place_text, usual_text
 from avlmaps.query.whereabouts import NOWHERE, Whereabouts
 from avlmaps.query.wording import in_words, placed
 
 if TYPE_CHECKING:
+    from avlmaps.maps.store.life import Stay
     from avlmaps.query.contents import Thing
     from avlmaps.query.queryable import Queryable
 
 BESIDE_M = 1.0  # from box to box, horizontally
+_ON_M = 0.3  # how far over a thing's box another that lies on it may be
+_HANGS = ("wall", "ceiling", "built in")  # such lies on nothing, even over a table
 _MOST_NAMED = 12
 _LEAST_M2 = 1.0  # of a room; less is a corner that views disagree about
 _NO_SIZE = (0.0, 0.0, 0.0)
@@ -59,6 +64,8 @@ def answer_list(avlmap: "Queryable", question: ListQuestion, top: int, ask: Call
             return _changes(avlmap, question, top)
         case Listed.LAST_SEEN:
             return _last_seen(avlmap, question.name, top)
+        case Listed.USUAL:
+            return _usual(avlmap, question, top, ask)
         case Listed.CONTENTS | Listed.BESIDE | Listed.ROOM_OF:
             return _about(avlmap, question, top, ask)
     return _answer(avlmap, goals[:top], text)
@@ -161,6 +168,50 @@ def _last_seen(avlmap: "Queryable", name: str, top: int) -> Answer:
     ]
     whole = _answer(avlmap, goals[:top], last_seen_text(answer))
     return replace(whole, when=tuple(one["last_seen"] for one in answer["seen"][:top]))
+
+
+def _usual(avlmap: "Queryable", question: ListQuestion, top: int, ask: Callable[[str], Answer]) -> Answer:
+    """Return what is usually somewhere, or where a thing usually is, by the days that looked."""
+    days = days_of(avlmap.stored, avlmap.edited.life)
+    name = question.name
+    if not question.how:
+        meant = means(name)
+        found = usual(days, lambda stay: meant(stay.name))
+        text = usual_place_text(days, name, found, room_namer(avlmap))
+    elif question.how == "in":
+        places = np.array([stay.position for stay in days.life.stays]).reshape(-1, 3)
+        inside = Whereabouts.of(avlmap).parts_of(lambda kind: _same_room(kind, name), places)
+        within = {id(stay) for stay, is_in in zip(days.life.stays, inside, strict=True) if is_in}
+        found = usual(days, lambda stay: id(stay) in within)
+        text = usual_text(found, f"in the {name}")
+    else:
+        subject = ask(name)
+        if not subject.found:
+            return replace(subject, goals=())
+        marks = [goal for goal in subject.goals if goal.probability >= avlmap.settings.found_at]
+        found = usual(days, lambda stay: any(lies(avlmap, question.how, stay, mark) for mark in marks))
+        text = usual_text(found, f"{question.how} the {name}")
+    goals = [Goal(one.stay.position, one.share, one.stay.size, {}, one.share, one.stay.name) for one in found]
+    whole = _answer(avlmap, goals[:top], text)
+    is_known = bool(found) and found[0].is_usual
+    return replace(whole, found=is_known, usual=tuple(one.to_json() for one in found[:top]))
+
+
+def lies(avlmap: "Queryable", how: str, stay: "Stay", mark: Goal) -> bool:
+    """Return whether a thing lies on or near another."""
+    level = avlmap.space.level
+    own, place = level(np.array([stay.position]))[0], level(np.array([mark.position]))[0]
+    size, mark_size = np.array(stay.size), np.array(mark.size)
+    if _overlap(own, size, place, mark_size):
+        return False
+    if how == "near":
+        return _gap_m(own, size, place, mark_size) <= BESIDE_M
+    entry = lexicon().find(stay.name, Kind.THING)
+    if entry is not None and entry.mount in _HANGS:
+        return False
+    over = bool((np.abs(own - place)[:2] <= mark_size[:2] / 2.0).all())
+    rises_m = (own[2] - size[2] / 2.0) - place[2]
+    return over and 0.0 <= rises_m <= mark_size[2] / 2.0 + _ON_M
 
 
 def _about(avlmap: "Queryable", question: ListQuestion, top: int, ask: Callable[[str], Answer]) -> Answer:

@@ -40,6 +40,13 @@ class DayAnswer(TypedDict):
     stamp_s: NotRequired[Annotated[float, Meta(description="seconds, by the clock of that day's recording")]]
 
 
+class UsualAnswer(TypedDict):
+    """On how many days something was at a place."""
+
+    there: Annotated[int, Meta(description="days on which it was seen there")]
+    looked: Annotated[int, Meta(description="days on which the place was looked at")]
+
+
 class GoalAnswer(TypedDict):
     """One distinct place that answers a query."""
 
@@ -57,6 +64,7 @@ class GoalAnswer(TypedDict):
     when: NotRequired[
         Annotated[DayAnswer, Meta(description="of a map of several days: when it was last seen, or the change noticed")]
     ]
+    usual: NotRequired[UsualAnswer]
 
 
 class PartOutcome(TypedDict):

@@ -6,10 +6,11 @@ from typing import Any, Literal
 
 from avlmaps.navigate.paths import PathAnswer
 from avlmaps.query.places import PlaceAnswer
-from avlmaps.query.schema import ContentsAnswer, LocateAnswer, QueryAnswer, RoomsAnswer
+from avlmaps.query.schema import ContentsAnswer, EditsAnswer, LocateAnswer, QueryAnswer, RoomsAnswer
 from avlmaps.serve import viewing, work
 from avlmaps.serve.requests import (
     AskQuery,
+    EditQuery,
     ListedThingsQuery,
     LocateQuery,
     NoQuery,
@@ -73,6 +74,10 @@ OPERATIONS = (
               NoQuery, "audio/flac", work.sound_clip, "slow"),
     Operation("listRooms", "/rooms", "List the rooms of a map, as `avlmaps rooms` does.",
               RoomsQuery, RoomsAnswer, work.list_rooms, "slow"),
+    Operation("listEdits", "/edits", "List what people corrected, as `avlmaps edit --list` does.",
+              NoQuery, EditsAnswer, work.list_edits, "slow"),
+    Operation("editMap", "/edit", "Correct the map, as `avlmaps edit` does; later queries know it.",
+              EditQuery, EditsAnswer, work.edit, "slow", "command"),
     Operation("ask", "/ask", "Query a map in a sentence or part by part, as `avlmaps query` does.",
               AskQuery, QueryAnswer, work.ask, "quick", "form", ("photo", "clip")),
     Operation("locate", "/locate", "Return the camera pose of a photo, as `avlmaps locate` does.",

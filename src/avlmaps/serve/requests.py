@@ -8,6 +8,7 @@ import msgspec
 from msgspec import Meta, Struct
 
 from avlmaps.core.question import MOST_CHARACTERS, HeardAt
+from avlmaps.maps.store.edits import LONGEST_NAME
 from avlmaps.serve.errors import RequestError
 
 T = TypeVar("T", bound=Struct)
@@ -16,6 +17,7 @@ Words = Annotated[str, Meta(max_length=MOST_CHARACTERS)]
 Sentence = Annotated[str, Meta(max_length=MOST_CHARACTERS, extra_json_schema={"pattern": r"^\s*$|[A-Za-z]"})]
 Name = Annotated[str, Meta(max_length=MOST_CHARACTERS, extra_json_schema={"pattern": r"\S"})]
 Short = Annotated[str, Meta(max_length=200)]
+EditName = Annotated[str, Meta(max_length=LONGEST_NAME, extra_json_schema={"pattern": r"\S"})]
 PHOTO, CLIP = "photo", "clip"
 _COORDINATE = Meta(ge=-1e6, le=1e6)
 # Forms for the OpenAPI document; what does not have them is refused with a sentence of its own.
@@ -123,6 +125,30 @@ class PathQuery(Struct, forbid_unknown_fields=True, rename={"start": "from", "go
     stairs: Annotated[
         bool, Meta(description="For a body that takes stairs, such as a person; a robot on wheels not.")
     ] = False
+
+
+class EditQuery(Struct, forbid_unknown_fields=True):
+    """A correction of the map, as `avlmaps edit` makes it; /maps/{map}/edits lists all."""
+
+    does: Annotated[
+        Literal["rename", "rename-room", "merge", "split", "forbid", "pin", "undo"], Meta(description="What it does.")
+    ]
+    name: Annotated[
+        EditName | None,
+        Meta(description="The thing or room that is meant; of forbid and pin, the name of the area or place."),
+    ] = None
+    to: Annotated[EditName | None, Meta(description="The new name, of rename, rename-room and merge.")] = None
+    at: Annotated[Place | None, Meta(description="Where the thing or place is, such as 1.5,2.0 or 1.5,2.0,0.3.")] = None
+    places: Annotated[
+        list[Place], Meta(max_length=16, description="Of the things that are merged; two on the plane of a split.")
+    ] = []
+    room: Annotated[EditName | None, Meta(description="The room that is forbidden.")] = None
+    box: Annotated[
+        list[Annotated[float, _COORDINATE]],
+        Meta(max_length=4, description="x0, y0, x1, y1 of what is forbidden or cut, level frame, metres."),
+    ] = []
+    edit: Annotated[Short | None, Meta(description="The edit that is undone. Default: the last.")] = None
+    by: Annotated[EditName | None, Meta(description="Who makes it.")] = None
 
 
 class ViewQuery(Struct, forbid_unknown_fields=True):

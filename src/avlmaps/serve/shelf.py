@@ -18,6 +18,7 @@ from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import AvlmapsError, BackendError, QueryError
 from avlmaps.core.question import Modality, Part, Role
 from avlmaps.language.questions import parse_sentence
+from avlmaps.maps.store.edits import EDITS
 from avlmaps.maps.store.integrity import stamp
 from avlmaps.maps.store.manifest_file import MANIFEST
 from avlmaps.maps.store.reader import open_stored
@@ -55,6 +56,11 @@ class CachedMap(AVLMap):
         self._kept: OrderedDict[Part, tuple[Heatmap, int]] = OrderedDict()
         self._kept_bytes, self._cache_bytes = 0, cache_bytes
         self._lock = threading.Lock()
+
+    def forget_edits(self) -> None:
+        """Read what people corrected again at the next question; heat of before does not count."""
+        super().forget_edits()
+        self._kept, self._kept_bytes, self._lock = OrderedDict(), 0, threading.Lock()
 
     def heat(
         self, part: Part, intrinsics: Pinhole | None = None, attachments: Mapping[str, Attachment] | None = None
@@ -100,24 +106,22 @@ class ServedMap:
         avlmap: the map.
     """
 
-    def __init__(
-        self,
-        name: str,
-        stored: "StoredMap",
-        settings: QuerySettings | None,
-        cache_bytes: int,
-        robot: "MakeRobot | None" = None,
-    ) -> None:
+    def __init__(self, name: str, avlmap: CachedMap, robot: "MakeRobot | None" = None) -> None:
         self.name, self._robot = name, robot
-        self.avlmap = CachedMap(stored, settings, cache_bytes)
+        self.avlmap = avlmap
         self._once = threading.RLock()
         self._answers: OrderedDict[object, object] = OrderedDict()
 
     @property
     def version(self) -> str:
         """A word that is another one for another content; clients may use it as an ETag."""
-        info = self.avlmap.stored.info
-        return f"{info.build_key[:16]}-{info.timings.finished}-{info.counts.sounds}".replace('"', "")
+        info, edits = self.avlmap.stored.info, self.avlmap.edited.edits
+        edited = f"-{'-'.join(edit.id for edit in edits[-1:])}-{len(edits)}" if edits else ""
+        return f"{info.build_key[:16]}-{info.timings.finished}-{info.counts.sounds}{edited}".replace('"', "")
+
+    def as_edited_now(self) -> "ServedMap":
+        """Return the same map with the edits of now."""
+        return ServedMap(self.name, self.avlmap.as_edited_now(), self._robot)
 
     def prepare(self) -> None:
         """Compute what every query needs, so that the first one is as quick as the others.
@@ -243,6 +247,7 @@ class _Slot:
         self._lock = threading.Lock()
         self._opening: threading.Thread | None = None
         self.fault: AvlmapsError | OSError | None = None
+        self._edits = stamp(self.path / EDITS)
         self._stamp, self.map = self._opened(warm)
 
     def _opened(self, warm: bool = True) -> tuple[object, ServedMap]:
@@ -253,8 +258,11 @@ class _Slot:
         return before, opened
 
     def refresh(self, note: Callable[[str], None]) -> None:
-        """Begin to open the map that has replaced this one, if there is one."""
-        now = self._source.stamp()
+        """Take the edits of now, and begin to open the map that has replaced this one, if there is one."""
+        edits, now = stamp(self.path / EDITS), self._source.stamp()
+        if edits != self._edits:
+            with self._lock:
+                self._take_edits(edits, note)
         if now is None or now == self._stamp:
             return
         with self._lock:
@@ -264,6 +272,18 @@ class _Slot:
                 return
             self._opening = threading.Thread(target=self._reopen, args=(note,), name="avlmaps-reopen", daemon=True)
             self._opening.start()
+
+    def _take_edits(self, edits: object, note: Callable[[str], None]) -> None:
+        if edits == self._edits:
+            return
+        try:
+            edited = self.map.as_edited_now()
+            _ = edited.avlmap.edited  # reads the log
+        except (AvlmapsError, OSError) as error:
+            note(f"{self.name}: its edits cannot be read ({error}); those of before count.")
+        else:
+            self.map = edited
+        self._edits = edits
 
     def _reopen(self, note: Callable[[str], None]) -> None:
         begin = perf_counter()
@@ -313,7 +333,7 @@ class Shelf:
         self._note = note
 
         def make(name: str, stored: "StoredMap") -> ServedMap:
-            return ServedMap(name, stored, settings, cache_bytes, robot)
+            return ServedMap(name, CachedMap(stored, settings, cache_bytes), robot)
 
         sources = {name: _Folder(one) if isinstance(one, Path) else one for name, one in maps.items()}
         self._slots = {name: _Slot(name, source, make, warm) for name, source in sources.items()}

@@ -10,11 +10,13 @@ from avlmaps.core.poses import FRAME
 from avlmaps.navigate.paths import PathAnswer
 from avlmaps.query.answer import Answer
 from avlmaps.query.description import map_answer
+from avlmaps.query.editor import edit_text
 from avlmaps.query.given_places import place_of
 from avlmaps.query.places import PlaceAnswer, column_point, describe_place
 from avlmaps.query.queryable import Photo
 from avlmaps.query.schema import (
     ContentsAnswer,
+    EditsAnswer,
     Frame,
     LocateAnswer,
     Notes,
@@ -30,6 +32,7 @@ from avlmaps.serve.requests import (
     CLIP,
     PHOTO,
     AskQuery,
+    EditQuery,
     ListedThingsQuery,
     LocateQuery,
     NoQuery,
@@ -197,6 +200,45 @@ def list_sounds(task: Task, query: NoQuery) -> SoundsAnswer:
 def list_rooms(task: Task, query: RoomsQuery) -> RoomsAnswer:
     """Return what ``avlmaps rooms --json`` prints."""
     return _noted(task, RoomsAnswer(map=task.map.name, frame=FRAME, rooms=lists_of(task).rooms(query.least)))
+
+
+def list_edits(task: Task, query: NoQuery) -> EditsAnswer:
+    """Return what ``avlmaps edit --list --json`` prints."""
+    del query
+    return {**task.map.avlmap.edit.history(), "map": task.map.name}
+
+
+def edit(task: Task, query: EditQuery) -> EditsAnswer:
+    """Correct the map, and return all edits; later queries know it.
+
+    Raises:
+        RequestError: a value is missing.
+        QueryError: there is no such thing, room or edit.
+    """
+    editor, by = task.map.avlmap.as_edited_now().edit, query.by or ""
+
+    def needed(name: str) -> str:
+        value = getattr(query, name)
+        if value is None:
+            raise RequestError(f"{query.does} needs the value {name!r}; /openapi.json describes it.")
+        return value
+
+    match query.does:
+        case "rename":
+            made = editor.rename(query.name, needed("to"), at=query.at, by=by)
+        case "rename-room":
+            made = editor.rename_room(needed("name"), needed("to"), by=by)
+        case "merge":
+            made = editor.merge(*query.places, to=query.to or "", by=by)
+        case "split":
+            made = editor.split(query.name, at=query.at, plane=query.places, box=query.box, by=by)
+        case "forbid":
+            made = editor.forbid(needed("name"), box=query.box, room=query.room, by=by)
+        case "pin":
+            made = editor.pin(needed("name"), needed("at"), by=by)
+        case "undo":
+            made = editor.undo(query.edit or "", by=by)
+    return {**editor.history(), "map": task.map.name, "text": edit_text(made)}
 
 
 def sound_clip(task: Task, query: NoQuery) -> File:

@@ -35,6 +35,8 @@ class Stay(msgspec.Struct, frozen=True, kw_only=True):
         appeared: its place was looked through before it was there; False says only that it was seen first then.
         moved_to: the stay that follows where it was carried to.
         moved_from: the stay before.
+        there_on: the visits that saw it, or its surface; none of a map of before.
+        absent_on: the visits that looked through its place, before it came and after it went; likewise.
     """
 
     name: str
@@ -50,6 +52,21 @@ class Stay(msgspec.Struct, frozen=True, kw_only=True):
     appeared: bool = False
     moved_to: int | None = None
     moved_from: int | None = None
+    there_on: tuple[int, ...] = ()
+    absent_on: tuple[int, ...] = ()
+
+    @property
+    def days_there(self) -> frozenset[int]:
+        """The visits that saw it there."""
+        return frozenset(self.there_on or (self.first, self.last))
+
+    @property
+    def days_absent(self) -> frozenset[int]:
+        """The visits that looked at its place and saw that it was not there."""
+        if self.there_on:
+            return frozenset(self.absent_on)
+        before = {self.first - 1} if self.appeared else set[int]()
+        return frozenset(before | ({self.gone} if self.gone is not None else set()))
 
     @property
     def is_person(self) -> bool:
