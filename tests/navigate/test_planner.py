@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.ndimage import label
 from test_costmap import CELL_M, grid_of, of_states
 
-from avlmaps.maps.obstacles import CellState, Obstacles
+from avlmaps.maps.obstacles import CellState, ForbiddenArea, Obstacles
 from avlmaps.navigate.costmap import costmap_of
 from avlmaps.navigate.planner import Planner, PlanSettings
 
@@ -303,3 +303,30 @@ def test_what_is_no_place_is_answered_without_a_warning(number):
     for ends in ((here, nowhere), (nowhere, here), (nowhere, nowhere)):
         assert planner.way(*ends) is None
         assert planner.stop_for(*ends) is None
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    low=st.tuples(st.floats(0.6, 2.0), st.floats(-0.5, 1.5)),
+    size=st.tuples(st.floats(0.05, 1.5), st.floats(0.05, 2.5)),
+)
+def test_no_way_leads_through_an_area_that_a_person_forbade(low, size):
+    """A path round it where there is one, never nearer than the body's radius, and none where it parts the floor."""
+    free = Obstacles(np.eye(3), np.zeros(2), CELL_M, 0.0, np.full((80, 50), CellState.FREE, np.uint8))
+    (x0, y0), (x1, y1) = low, np.add(low, size)
+    corners = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
+    area = ForbiddenArea("the wet floor", "forbidden by a person on 2026-11-26", corners)
+    obstacles = free.without([area])
+    assert free.without([]) is free and (free.states == CellState.FREE).all()
+    planner, radius_m = Planner(costmap_of(obstacles, 0.15)), 0.15
+    way = planner.way(np.array([0.2, 1.2]), np.array([3.8, 1.2]))
+    inside = np.array([*corners.mean(axis=0), 0.0])
+    if 0.0 <= inside[1] < 2.5:
+        assert obstacles.elsewhere(inside).startswith("it lies in the wet floor, forbidden by a person on 2026-11-26")
+    assert not obstacles.elsewhere(np.array([0.2, 1.2, 0.0]))
+    if way is None:
+        assert y0 < 2 * radius_m + 3 * CELL_M and y1 > 2.5 - 2 * radius_m - 3 * CELL_M, "there is room beside it"
+        return
+    samples = np.concatenate([a + (b - a) * np.linspace(0.0, 1.0, 60)[:, None] for a, b in pairwise(way.points)])
+    away = np.maximum(np.maximum([x0, y0] - samples, samples - [x1, y1]), 0.0)
+    assert np.hypot(*away.T).min() >= radius_m - CELL_M

@@ -264,6 +264,9 @@ class MapDriver:
         if not self.planner.costmap.holds(goal):
             return f"the place ({goal[0]:.2f}, {goal[1]:.2f}) m is off the map"
         if self.planner.entry(self._xy) is None:
+            here = np.append(self._xy, self.obstacles.floor_m) @ self.obstacles.level_from_world
+            if forbidden := self.obstacles.forbids(here):
+                return f"the robot stands where it may not be, and does not find out: {forbidden}"
             return "nothing round the robot is known to be free, so that it cannot set out"
         return "no path leads there that is wide enough for the robot"
 

@@ -493,6 +493,14 @@ class Edited:
         pinned = [_pinned(edit, place) for edit, place in self.pins.values() if is_wanted(edit.name, 1.0)]
         return sorted([*kept, *own, *pinned], key=lambda one: -one.confidence)
 
+    def named_at(self, rows: Int[np.ndarray, " m"]) -> str | None:
+        """Return what people named most of some voxels; None where they named nothing there."""
+        if not self.edits or not len(rows):
+            return None
+        named = [(_share(rows, one.rows), one.name) for one in self.claims if one.is_named]
+        share, name = max(named, default=(0.0, ""))
+        return name if share >= _HALF else None
+
     def room_field(self, field: RoomField) -> RoomField:
         """Return how likely each place is each kind of room, where people said so with certainty."""
         if not self.edits or not self.rooms:
@@ -583,8 +591,8 @@ def _without_specks(which: Int[np.ndarray, " m"], level: Float[np.ndarray, "m 3"
 def _pinned(edit: Edit, place: Float[np.ndarray, "3"]) -> "Thing":
     from avlmaps.query.contents import Thing
 
-    nothing = np.zeros(0, np.int64)
-    return Thing(edit.name, 1.0, _vector(place), (0.0, 0.0, 0.0), (0, 0, 0), nothing, np.zeros((0, 3)), said(edit))
+    no_voxels = np.zeros(0, np.int64)
+    return Thing(edit.name, 1.0, _vector(place), (0.0, 0.0, 0.0), (0, 0, 0), no_voxels, place[None], said(edit))
 
 
 def _share(rows: Int[np.ndarray, " m"], others: Int[np.ndarray, " k"]) -> float:

@@ -120,14 +120,16 @@ def _names(avlmap: "AVLMap", rows: Int[np.ndarray, " m"]) -> list[NameScore]:
     """Return the names with the highest mean confidence over some voxels."""
     if not len(rows) or "pixels" not in avlmap.stored.info.models:
         return []
-    namer = VoxelNamer(avlmap.stored)
+    namer, said = VoxelNamer(avlmap.stored), avlmap.edited.named_at(rows)
+    own: list[NameScore] = [] if said is None else [{"name": said, "confidence": 1.0}]
     confidence = namer.confidences(rows)
     some = confidence[confidence.any(axis=1)]
     if not len(some):
-        return []
+        return own
     mean = some.mean(axis=0)
     order = [i for i in np.argsort(-mean, kind="stable") if namer.names[i] != "other"][:MOST_NAMES]
-    return [{"name": namer.names[i], "confidence": round(float(mean[i]), 3)} for i in order]
+    seen: list[NameScore] = [{"name": namer.names[i], "confidence": round(float(mean[i]), 3)} for i in order]
+    return [*own, *seen][:MOST_NAMES]
 
 
 def _rooms(avlmap: "AVLMap", point: Float[np.ndarray, "3"]) -> list[NameScore]:

@@ -4,6 +4,8 @@ import threading
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from avlmaps.core.errors import AvlmapsError, QueryError
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.naming import VoxelNamer, keyframes_that_saw
@@ -65,6 +67,8 @@ class MapOnPage:
             names, calibrated = self._namer.likeliest(row), self._namer.calibrated
         except AvlmapsError as fault:
             note = str(fault)
+        if (said := avlmap.edited.named_at(np.array([row]))) is not None:
+            names = [(said, 1.0), *names]
         views = keyframes_that_saw(avlmap.stored, avlmap.space, row)
         voxels = avlmap.stored.voxels
         thing = self._thing_at(row)
