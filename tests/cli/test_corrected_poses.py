@@ -5,8 +5,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial import KDTree
 
 from avlmaps.cli import main
+from avlmaps.core.camera import Rig
+from avlmaps.maps.store.reader import open_stored
+from avlmaps.query.avlmap import AVLMap
+from avlmaps.recordings.types import Frame
+from avlmaps.recordings.writer import RecordingWriter
+from helpers.raycast import render
+from helpers.room import Room
+from helpers.walked_room import CAMERA
 
 BUILT = ("--profile", "colours", "--sensor", "none")
 
@@ -77,12 +86,55 @@ def test_a_map_without_submaps_is_not_replaced(run, walk: Path, built: Path, tmp
     assert "finished map already" in err
 
 
+@pytest.mark.parametrize("wish", ["--submaps", "--close-loops"])
+def test_a_map_that_lacks_submaps_alone_says_how_it_gets_them(run, walk: Path, built: Path, wish: str) -> None:
+    before = (built / "map.json").read_bytes()
+    code, _, err = run("build", walk, "--out", built, "--voxel-size-m", "0.1", "--profile", "colours", wish)
+    assert code == 1
+    assert "finished map without submaps" in err
+    assert "--submaps and --overwrite" in err
+    assert (built / "map.json").read_bytes() == before
+
+
 def test_a_drive_that_does_not_come_back_closes_no_loop(run, walk: Path, copied: Path) -> None:
     before = (copied / "map.json").read_bytes()
     code, _, err = run("build", walk, "--out", copied, "--close-loops", *BUILT)
     assert code == 1
     assert "not seen to come back" in err
     assert (copied / "map.json").read_bytes() == before
+
+
+def there_and_back(path: Path, stray_m: float) -> tuple[Path, np.ndarray]:
+    """Write a drive there and back whose poses stray to one side, and return it with the true poses."""
+    room, rig = Room(), Rig(CAMERA, CAMERA)
+    out = room.walk()[100:196:4]
+    true = np.concatenate([out, out[::-1]])
+    with RecordingWriter(path, rig, up_in_world=np.array([0.0, 0.0, 1.0])) as writer:
+        for index, pose in enumerate(true):
+            view, off = render(room.scene, CAMERA, pose), pose.copy()
+            off[:2, 3] += stray_m * index / (len(true) - 1) * np.array([0.8, -0.6])
+            writer.add(Frame(index, f"{index:06d}", index / 2.0, view.rgb, view.depth_m, off, rig))
+    return path, true
+
+
+def test_a_drive_that_comes_back_is_put_right_by_its_own_pictures(answer, tmp_path: Path) -> None:
+    recording, true = there_and_back(tmp_path / "rec", 0.36)
+    right, _ = there_and_back(tmp_path / "right", 0.0)
+    words = ("--profile", "colours", "--voxel-size-m", "0.1")
+    answer("build", right, "--out", tmp_path / "right.avlmap", *words)
+    answer("build", recording, "--out", tmp_path / "map", "--submaps", *words)
+    wanted = AVLMap.open(tmp_path / "right.avlmap").points
+    before = KDTree(wanted).query(AVLMap.open(tmp_path / "map").points)[0]
+    made = answer("build", recording, "--out", tmp_path / "map", "--close-loops", *words)
+    loops = made["corrected"]["loops"]
+    assert loops["agreeing"] == loops["closures"] >= 4
+    assert loops["apart_before_m"] > 0.1 > 0.03 > loops["apart_m"]
+    keyframes = open_stored(tmp_path / "map", verify=True).keyframes
+    number = np.rint(2.0 * np.asarray(keyframes.stamp_s)).astype(int)
+    apart = np.linalg.norm(np.asarray(keyframes.world_from_camera)[:, :3, 3] - true[number][:, :3, 3], axis=1)
+    assert apart[0] == pytest.approx(0.0, abs=1e-6) and apart[-1] < 0.05
+    after = KDTree(wanted).query(AVLMap.open(tmp_path / "map").points)[0]
+    assert np.mean(before > 0.15) > 3.0 * np.mean(after > 0.15)
 
 
 def test_poses_of_a_file_and_closed_loops_are_two_things(run, walk: Path, copied: Path, tmp_path: Path) -> None:

@@ -1,7 +1,7 @@
 """The plan of a build: what it is made of, which frames it fuses, and where it stores what it has finished."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -162,6 +162,11 @@ def claim(plan: BuildPlan, resume: bool, overwrite: bool) -> MapInfo | None:
     if manifest.is_file() and not overwrite:
         there = parse_manifest(read_manifest(manifest), manifest)
         if there.build_key != plan.key:
+            if _lacks_submaps_alone(plan, there):
+                raise MapError(
+                    f"{plan.path} is a finished map without submaps, and cannot follow corrected poses; build it "
+                    f"again with {option('submaps')} and {option('overwrite')}, or give another {option('out')}."
+                )
             raise MapError(
                 f"{plan.path} is a finished map already, of {there.recording.name} {_difference(plan, there)}; give "
                 f"another {option('out')}, or replace it with {option('overwrite')}."
@@ -192,6 +197,18 @@ def require_unchanged(plan: BuildPlan, stamp: str) -> None:
     raise MapError(
         f"Files of {plan.recording.path} were written while it was mapped, so that the map would be of two recordings; "
         "run the same build again when it is complete."
+    )
+
+
+def _lacks_submaps_alone(plan: BuildPlan, there: MapInfo) -> bool:
+    """Return whether the finished map is what this build makes, but for submaps."""
+    frames = plan.settings.frames
+    without = replace(plan.settings, frames=replace(frames, per_submap=0))
+    return (
+        frames.per_submap > 0
+        and there.recording.fingerprint == plan.recording.fingerprint
+        and there.profile == plan.encoders.name
+        and there.settings == without
     )
 
 
