@@ -51,7 +51,7 @@ def network_at(width_px: int) -> SceneNetwork:
 
 
 def main() -> int:
-    arguments = parser(__doc__.splitlines()[0])
+    arguments = parser((__doc__ or "").splitlines()[0])
     arguments.add_argument("--scene", default="house:3")
     arguments.add_argument("--frames", type=int, default=12)
     arguments.add_argument("--repeats", type=int, default=3)

@@ -9,6 +9,7 @@ in the cache from the frame before.
 """
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from timing import parser, seconds, show, use_one_thread
@@ -30,13 +31,21 @@ ROWS, COLUMNS, DIM = 120, 160, 512
 ALPHA_VARIANCE, SAMPLE_EVERY = 0.6, 100
 
 
+def read(path: Path, how: int) -> np.ndarray:
+    picture = cv2.imread(str(path), how)
+    assert picture is not None, path
+    return picture
+
+
 def kitchen_frames(count: int) -> list[Frame]:
     rig, frames = Rig(DEPTH, DEPTH), []
     paths = sorted(KITCHEN.glob("*.depth.png"))
     for path in paths[:: max(1, len(paths) // count)][:count]:
-        depth = cv2.imread(str(path), cv2.IMREAD_UNCHANGED).astype(np.float32) / 1000.0
+        depth = read(path, cv2.IMREAD_UNCHANGED).astype(np.float32) / 1000.0
         depth[depth > 60.0] = 0.0
-        rgb = np.ascontiguousarray(cv2.imread(str(path).replace("depth.png", "color.jpg"))[..., ::-1])
+        rgb = np.ascontiguousarray(
+            read(path.with_name(path.name.replace("depth.png", "color.jpg")), cv2.IMREAD_COLOR)[..., ::-1]
+        )
         pose = poses.orthonormalize(np.loadtxt(str(path).replace("depth.png", "pose.txt")), path.name)
         frames.append(Frame(len(frames), path.name, len(frames) / 15, rgb, depth, pose, rig))
     return frames
@@ -107,7 +116,7 @@ class PointLoop:
         self.weight[n] = weight + alpha
 
 
-def time_ours(frames: list[Frame], maps: list[np.ndarray | None], repeats: int) -> tuple[np.ndarray, int, int]:
+def time_ours(frames: list[Frame], maps: Sequence[np.ndarray | None], repeats: int) -> tuple[np.ndarray, int, int]:
     """Return the least seconds of each frame, the points of all and the voxels."""
     best, points, voxels = np.full(len(frames), np.inf), 0, 0
     for _ in range(repeats):
@@ -143,7 +152,7 @@ def line(way: str, best_s: np.ndarray, points: int, loop_rate: float) -> dict[st
 
 
 def main() -> int:
-    arguments = parser(__doc__.splitlines()[0])
+    arguments = parser((__doc__ or "").splitlines()[0])
     arguments.add_argument("--frames", type=int, default=40)
     arguments.add_argument("--repeats", type=int, default=7)
     chosen = arguments.parse_args()

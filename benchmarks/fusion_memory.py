@@ -49,7 +49,7 @@ def build(voxels: int, dim: int, rounds: int) -> tuple[VoxelAccumulator, int]:
 
 
 def main() -> int:
-    arguments = parser(__doc__.splitlines()[0])
+    arguments = parser((__doc__ or "").splitlines()[0])
     arguments.add_argument("--voxels", type=int, default=1_000_000)
     arguments.add_argument("--dim", type=int, default=512)
     arguments.add_argument("--rounds", type=int, default=1)

@@ -18,7 +18,7 @@ from timing import parser, seconds, show, use_one_thread
 use_one_thread()
 
 import numpy as np  # noqa: E402
-from scipy.spatial import cKDTree  # noqa: E402
+from scipy.spatial import KDTree  # noqa: E402
 
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator  # noqa: E402
 from avlmaps.maps.fusion.free_space import FreeViewCollector, clean  # noqa: E402
@@ -32,6 +32,7 @@ from avlmaps_sim.recorder import RecordSettings, record_scene  # noqa: E402
 from avlmaps_sim.render import Renderer  # noqa: E402
 from avlmaps_sim.scene import Scene  # noqa: E402
 from avlmaps_sim.scenes import open_scene  # noqa: E402
+from avlmaps_sim.sensor_settings import SensorName  # noqa: E402
 
 GRID = GridSpec(0.05)
 WITHIN_M, SEEN_M, FAR_OFF_M = 0.05, 4.0, 0.2
@@ -88,10 +89,10 @@ def made(recording: Recording, sensor: SensorModel) -> Made:
     return Made(evidence.index[kept], spent + took)
 
 
-def row(name: str, found: Made, surface: cKDTree, seen: np.ndarray, frames: int) -> dict[str, object]:
+def row(name: str, found: Made, surface: KDTree, seen: np.ndarray, frames: int) -> dict[str, object]:
     middles = GRID.centre_of(found.index)
     off = surface.query(middles, distance_upper_bound=1.0)[0]
-    near = np.isfinite(cKDTree(middles).query(seen, distance_upper_bound=WITHIN_M)[0])
+    near = np.isfinite(KDTree(middles).query(seen, distance_upper_bound=WITHIN_M)[0])
     return {
         "map": name,
         "voxels": len(off),
@@ -102,9 +103,9 @@ def row(name: str, found: Made, surface: cKDTree, seen: np.ndarray, frames: int)
     }
 
 
-def rows_of(spec: str, sensors: list[str], frames: int) -> list[dict[str, object]]:
+def rows_of(spec: str, sensors: list[SensorName], frames: int) -> list[dict[str, object]]:
     scene, out = open_scene(spec), []
-    surface, seen = cKDTree(surface_of(scene)), None
+    surface, seen = KDTree(surface_of(scene)), None
     with TemporaryDirectory() as scratch:
         for sensor in sensors:
             path = Path(scratch) / sensor
@@ -122,7 +123,7 @@ def rows_of(spec: str, sensors: list[str], frames: int) -> list[dict[str, object
 
 
 def main() -> int:
-    arguments = parser(__doc__.splitlines()[0])
+    arguments = parser((__doc__ or "").splitlines()[0])
     arguments.add_argument("--scenes", nargs="+", default=["house:4", "house:5"])
     arguments.add_argument("--sensors", nargs="+", default=["kinect", "realsense", "clean"])
     arguments.add_argument("--frames", type=int, default=250)

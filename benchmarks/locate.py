@@ -5,6 +5,9 @@ python benchmarks/locate.py [--keyframes 100] [--photos 10] [--json]
 The pictures are painted at random (640x480, about 1,000 keypoints); a photo is a keyframe shifted, with noise.
 """
 
+from collections.abc import Callable
+from typing import TypeVar
+
 import timing
 
 timing.use_one_thread()
@@ -20,6 +23,7 @@ from avlmaps.perception.pose import estimate_pose  # noqa: E402
 from avlmaps.query.locate import alike, locate  # noqa: E402
 from avlmaps_sim.bench.locate import MapOfPictures  # noqa: E402
 
+T = TypeVar("T")
 CAMERA = Pinhole(525.0, 525.0, 320.0, 240.0, 640, 480)
 DEPTH_M = 2.0
 
@@ -90,7 +94,7 @@ def measure(stored: MapOfPictures, photos: list[np.ndarray]) -> dict[str, float]
     """Return milliseconds of processor time a photo, the median, for each stage and each other way."""
     taken: dict[str, list[float]] = {}
 
-    def timed(name: str, work, *arguments):
+    def timed(name: str, work: Callable[..., T], *arguments: object) -> T:
         spent, result = timing.seconds(work, *arguments)
         taken.setdefault(name, []).append(1e3 * spent)
         return result

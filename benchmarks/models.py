@@ -113,7 +113,7 @@ def measure(name: str, folder: Path, asked: Namespace) -> dict[str, object]:
         batch, work = task(kind, encoder, on_gpu, asked)
         # A GPU is waited for; on a busy CPU waiting must not count, which only one thread can separate.
         clock = time.perf_counter if on_gpu or torch.get_num_threads() > 1 else time.thread_time
-        work()
+        made = work()
         times = []
         for _ in range(asked.frames):
             begin = clock()

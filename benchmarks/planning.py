@@ -68,7 +68,7 @@ def way(costmap: Costmap, places: tuple[np.ndarray, np.ndarray], settings: PlanS
 
 
 def main() -> int:
-    arguments = parser(__doc__.splitlines()[0])
+    arguments = parser((__doc__ or "").splitlines()[0])
     arguments.add_argument("--cells", type=int, default=1000)
     arguments.add_argument("--repeats", type=int, default=5)
     chosen = arguments.parse_args()
@@ -78,6 +78,7 @@ def main() -> int:
         obstacles = Obstacles(np.eye(3), np.zeros(2), CELL_M, 0.0, states)
         places = ends(costmap_of(obstacles, RADIUS_M))
         inflate_s, plan_s, exact_s = [], [], []
+        found = best = None
         for repeat in range(chosen.repeats + 1):
             one, costmap = seconds(costmap_of, obstacles, RADIUS_M)
             two, found = seconds(way, costmap, places, PlanSettings())
@@ -86,6 +87,8 @@ def main() -> int:
                 inflate_s.append(one)
                 plan_s.append(two)
                 exact_s.append(three)
+        assert found is not None
+        assert best is not None
         inflate_ms, plan_ms, exact_ms = (1e3 * float(np.median(times)) for times in (inflate_s, plan_s, exact_s))
         rows.append(
             {

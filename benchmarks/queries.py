@@ -8,6 +8,7 @@ import json
 import sys
 import time
 from collections.abc import Callable
+from typing import TypeVar
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from avlmaps.query.scores import feature_scores, margins
 from avlmaps.query.voxel_space import Space
 from avlmaps.query.words import ClosestWords
 
+T = TypeVar("T")
 UP = np.array([0.0, 0.0, 1.0])
 VOXEL_SIZE_M = 0.05
 
@@ -49,7 +51,7 @@ def best_ms(work: Callable[[], object], repeats: int = 25) -> float:
     return 1e3 * min(times)
 
 
-def once_ms(work: Callable[[], np.ndarray]) -> tuple[float, np.ndarray]:
+def once_ms(work: Callable[[], T]) -> tuple[float, T]:
     """Return the time of one call and its result."""
     begin = time.perf_counter()
     result = work()
@@ -155,7 +157,7 @@ def text_rows(count: int, dim: int, rng: np.random.Generator) -> list[tuple[str,
 
 def main() -> None:
     """Print the table, or one JSON object."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--voxels", type=int, default=300_000)
     parser.add_argument("--features", type=int, default=1_000_000)
     parser.add_argument("--dim", type=int, default=512)

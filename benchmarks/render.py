@@ -55,7 +55,7 @@ def least_s(work: Callable[[np.ndarray], object], poses: np.ndarray, repeats: in
 
 
 def main() -> int:
-    arguments = parser(__doc__.splitlines()[0])
+    arguments = parser((__doc__ or "").splitlines()[0])
     arguments.add_argument("--scene", default="house:3")
     arguments.add_argument("--views", type=int, default=60)
     arguments.add_argument("--repeats", type=int, default=5)

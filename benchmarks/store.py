@@ -173,7 +173,7 @@ def write_parts(folder: Path, voxels: int, dim: int, parts: int = 4) -> None:
 
 def main() -> None:
     """Measure and print a table, or one JSON object."""
-    parser = timing.parser(__doc__.splitlines()[0])
+    parser = timing.parser((__doc__ or "").splitlines()[0])
     parser.add_argument("--voxels", type=int, default=1_000_000)
     parser.add_argument("--dim", type=int, default=512)
     parser.add_argument("--folder", type=Path, default=None)

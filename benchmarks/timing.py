@@ -6,7 +6,7 @@ import os
 import resource
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TypeVar
 
 T = TypeVar("T")
@@ -39,7 +39,7 @@ def parser(description: str) -> argparse.ArgumentParser:
     return arguments
 
 
-def show(title: str, rows: Sequence[dict[str, object]], facts: dict[str, object], as_json: bool) -> None:
+def show(title: str, rows: Sequence[Mapping[str, object]], facts: Mapping[str, object], as_json: bool) -> None:
     """Print a table with the facts below it, or all of it as one JSON object."""
     if as_json:
         print(json.dumps({"title": title, "rows": list(rows), **facts}))

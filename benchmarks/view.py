@@ -66,7 +66,7 @@ def main() -> None:
     settings = ServeSettings(port=0, limits=Limits(answer_s=600.0))
     service = Service.open({"map": chosen.map}, settings, warm=False)
     served = service.shelf.get("map")
-    served.avlmap = enlarged(chosen.map, chosen.voxels)
+    served.avlmap = enlarged(chosen.map, chosen.voxels)  # pyright: ignore[reportAttributeAccessIssue]
     _ = served.page.layout.records
     print(f"laid out {chosen.voxels:,} voxels in {time.perf_counter() - begin:.1f} s")
     opened = listening_socket(settings)
@@ -100,7 +100,7 @@ def main() -> None:
         print(f"frames while orbiting: median {np.median(frames):.0f} ms, p95 {np.percentile(frames, 95):.0f} ms, "
               f"{budget:,} voxels each")  # fmt: skip
         waits = []
-        before = resident_mb(), heap_mb(page)
+        before = middle = resident_mb(), heap_mb(page)
         for k in range(chosen.queries):
             told = page.evaluate(
                 """async (sentence) => { const begun = performance.now(); const view = avlmapsView;

@@ -53,7 +53,9 @@ class Row:
         """The evidence again."""
         lead, *near = self.combination.replace(" near ", " and ").split(" and ")
         alone = 1.0 / (1.0 + math.exp(-self.numbers[0]))
-        return Evidence(Modality(lead), tuple(map(Modality, near)), alone, *self.numbers, self.first_alone)
+        numbers = dict(zip(NUMBERS, self.numbers, strict=True))
+        near_kinds = tuple(map(Modality, near))
+        return Evidence(Modality(lead), near_kinds, alone, **numbers, first_alone=self.first_alone)
 
 
 def combination(evidence: Evidence) -> str:

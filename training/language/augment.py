@@ -114,9 +114,11 @@ def lexicon_names() -> Names:
     things = {name for entry in book.entries(Entries.THING) for name in (entry.name, *entry.synonyms)}
     rooms = {name for entry in book.entries(Entries.ROOM) for name in (entry.name, *entry.synonyms)}
     sounds = {name for entry in book.entries(Entries.SOUND) for name in (entry.name, *entry.synonyms)}
-    return Names(
-        *(tuple(sorted(n for n in each if n.isascii() and len(n.split()) <= 3)) for each in (things, rooms, sounds))
-    )
+    return Names(_sayable(things), _sayable(rooms), _sayable(sounds))
+
+
+def _sayable(names: set[str]) -> tuple[str, ...]:
+    return tuple(sorted(name for name in names if name.isascii() and len(name.split()) <= 3))
 
 
 def names_of(rows: Sequence[Example]) -> Names:
@@ -281,17 +283,17 @@ def joined(first: Example, second: Example, draw: random.Random) -> Example:
     """Return two commands in one sentence; what is refused is refused as a whole."""
     if not (joinable(first) and joinable(second)):
         return first
-    assert isinstance(first.meaning, tuple)
-    assert isinstance(second.meaning, tuple)
-    if any(isinstance(one, Return) for one in first.meaning):
+    if any(isinstance(one, Return) for one in _flat(first.meaning)):
         first, second = second, first
-    if any(isinstance(one, Return) for one in first.meaning):
+    if any(isinstance(one, Return) for one in _flat(first.meaning)):
         return first
     a, b = first.say.rstrip(" .!?;,"), second.say.strip()
     if not b or _ORDERED.search(f"{a} {b}"):
         return first
     if draw.random() < 0.7:
         b = b[0].lower() + b[1:]
+    assert isinstance(first.meaning, tuple)
+    assert isinstance(second.meaning, tuple)
     stop = next((m for m in (first.meaning, second.meaning) if isinstance(m[0], Refuse)), None)
     both: Any = stop or (*first.meaning, *second.meaning)
     also = tuple({*first.also, *second.also, second.voice})

@@ -262,7 +262,7 @@ def _small_vectors(path: Path, tokens: Tokens, phrases: Sequence[str], prompts: 
 def _picture_input(rgb: np.ndarray, note: files.PictureNote) -> dict[str, np.ndarray]:
     from avlmaps.perception.models.picture_sizes import working_size
 
-    height, width = working_size(*rgb.shape[:2], note.short_side, note.patch)
+    height, width = working_size(rgb.shape[0], rgb.shape[1], note.short_side, note.patch)
     return {
         "pixels": resized(rgb, height, width).transpose(2, 0, 1)[None].copy(),
         "rows": interpolation(note.grid, height // note.patch),

@@ -54,7 +54,8 @@ def list_of(described: dict[str, Any]) -> TokenList:
     vocabulary = [""] * (1 + max(number.values()))
     for token, at in number.items():
         vocabulary[at] = token
-    merges = [tuple(pair.split(" ")) if isinstance(pair, str) else tuple(pair) for pair in model["merges"]]
+    pairs = (pair.split(" ") if isinstance(pair, str) else pair for pair in model["merges"])
+    merges = [(str(left), str(right)) for left, right in pairs]
     cutting, letters = (
         _parts(described["pre_tokenizer"], "pretokenizers"),
         _parts(described["normalizer"], "normalizers"),

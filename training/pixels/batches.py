@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Generic, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import cv2
 import numpy as np
@@ -228,7 +228,7 @@ def _placement(frames: Frames, index: int, category: int, view: View, rng: np.ra
     return zoom / 2.0, turn, float(x), float(y)
 
 
-def _sample(frames: Frames, index: int, category: int, view: View, rng: np.random.Generator) -> tuple[np.ndarray, ...]:
+def _sample(frames: Frames, index: int, category: int, view: View, rng: np.random.Generator) -> tuple[Any, ...]:
     scale, turn, x, y = _placement(frames, index, category, view, rng)
     fx, fy, cx, cy, *up, height = frames.camera[index][:8]
     mirrored = rng.random() < 0.5

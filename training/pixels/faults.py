@@ -35,6 +35,7 @@ def in_painted(depth_m: np.ndarray) -> np.ndarray:
     if not empty.any() or empty.all():
         return depth_m
     _, nearest = cv2.distanceTransformWithLabels(empty.astype(np.uint8), cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL)
+    nearest = np.asarray(nearest, np.intp)
     value = np.zeros(int(nearest.max()) + 1, np.float32)
     value[nearest[~empty]] = depth_m[~empty]
     return value[nearest]

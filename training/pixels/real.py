@@ -116,7 +116,7 @@ def write_pack(frames: list[Real], names: tuple[str, ...], path: Path) -> None:
     }
     arrays = {f"{name}_{key}": value for name, part in parts.items() for key, value in part.items()}
     path.parent.mkdir(parents=True, exist_ok=True)
-    np.savez(path, names=np.array(names), camera=np.stack([one.camera for one in frames]), **arrays)
+    np.savez(path, allow_pickle=False, names=np.array(names), camera=np.stack([one.camera for one in frames]), **arrays)
 
 
 def read_pack(path: Path) -> tuple[list[Real], tuple[str, ...]]:

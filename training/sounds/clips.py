@@ -66,7 +66,8 @@ def read_samples(path: Path) -> Float32[np.ndarray, " n"]:
     """Read a file as mono at the encoder's rate."""
     import soundfile
 
-    samples, rate_hz = soundfile.read(path, dtype="float32", always_2d=True)
+    with soundfile.SoundFile(path) as file:
+        samples, rate_hz = file.read(dtype="float32", always_2d=True), file.samplerate
     return resample(Sound(samples.mean(axis=1), rate_hz), logmel.RATE_HZ).samples
 
 

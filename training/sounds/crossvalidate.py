@@ -118,10 +118,11 @@ def hear_held_out(corpus: Corpus, work: Path, aims: np.ndarray) -> Answers:
     sources = np.array([clip.source for clip in corpus.clips])
 
     def held(chosen: np.ndarray, net: SoundNet, left: Sequence[int] = ()) -> Held:
-        bank = example_bank(net, corpus.examples(TESTED, left))
-        features = (encode(net, mels[chosen]) for mels in (corpus.mels, wet, pieces))
-        heard = [evidence_of(each, aims, *bank, left) for each in features]
-        return Held(*heard, corpus.kinds[chosen], sources[chosen])
+        examples, kinds = example_bank(net, corpus.examples(TESTED, left))
+        dry, in_room, cut = (
+            evidence_of(encode(net, mels[chosen]), aims, examples, kinds, left) for mels in (corpus.mels, wet, pieces)
+        )
+        return Held(dry, in_room, cut, corpus.kinds[chosen], sources[chosen])
 
     net = network_of(work, TESTED, strangers=True)
     peers, strangers = (held(chosen, net, without) for chosen in (tested & ~strange, strange))

@@ -153,5 +153,6 @@ def read_audio(path: Path) -> Float32[np.ndarray, " n"]:
     """Read a file as mono at the teacher's rate."""
     import soundfile
 
-    samples, rate_hz = soundfile.read(path, dtype="float32", always_2d=True)
+    with soundfile.SoundFile(path) as file:
+        samples, rate_hz = file.read(dtype="float32", always_2d=True), file.samplerate
     return resample(Sound(samples.mean(axis=1), rate_hz), RATE_HZ).samples

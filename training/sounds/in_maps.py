@@ -130,7 +130,7 @@ def walk_of(spec: str, recorded: Recorded, clips: Path | None, work: Path) -> Wa
     trip = _trip(scene, settings, for_walk)
     soundings = _soundings(scene, settings, trip, for_sounds)
     track = _track(scene, settings, trip, soundings, for_track)
-    assert track is not None
+    assert isinstance(track, Sound)
     file = work / f"{job.folder.name}.flac"
     write_flac(file, track)
     walked = SimpleNamespace(
