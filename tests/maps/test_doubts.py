@@ -1,20 +1,29 @@
 """A recording that contradicts itself is refused, or let through by the reason's name; doubts stay with the map."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from build_fakes import SETTINGS, register_fakes
 
 from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import RecordingError
+from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.build import build_map
+from avlmaps.maps.pipeline.check import judge
 from avlmaps.maps.pipeline.write import carving_doubts
 from avlmaps.maps.store.manifest import Removed
 from avlmaps.query.contents import Contents
+from avlmaps.recordings.channels import ChannelSound, write_channels
+from avlmaps.recordings.consistency.verdict import Grade, Reason
+from avlmaps.recordings.layout import DESCRIPTION
+from avlmaps.recordings.microphones import microphones_named
 from avlmaps.recordings.open import open_recording
 from avlmaps_sim.bench.recordings.drafts import Draft, RoomWalk
+from helpers.heard_in_the_open import heard_in_the_open
 
 PROFILE = register_fakes()
 
@@ -44,6 +53,39 @@ def test_a_right_one_has_no_doubts(right: Draft, tmp_path: Path) -> None:
     )
     assert stored.info.doubts == ()
     assert "notes" not in Contents([], [], [], stored.info.doubts).to_json("map")
+
+
+def with_array(draft: Draft, folder: Path, order: tuple[int, ...] = (0, 1, 2, 3), dead: int | None = None) -> Path:
+    """Write a slow walk that an array listened on, its channels in an order, one of them perhaps dead."""
+    stamps_s = 12.0 * draft.stamps_s
+    path = replace(draft, stamps_s=stamps_s, pose_stamps_s=stamps_s).write(folder)
+    array, walk = microphones_named("square4"), Trajectory(stamps_s, draft.poses)
+    middle = draft.poses[:, :3, 3].mean(axis=0)
+    sounds = [(middle + 2.0 * np.array([np.cos(k), np.sin(k), 0.1]), 5.0 * k + 1.0, 5.0 * k + 4.0) for k in range(5)]
+    sound = heard_in_the_open(array, walk, sounds, np.random.default_rng(4))
+    samples = sound.samples[list(order)]
+    samples[[] if dead is None else [dead]] = 0.0
+    write_channels(path / "audio.flac", ChannelSound(samples, sound.rate_hz))
+    described = json.loads((path / DESCRIPTION).read_text())
+    described["microphones"] = {"positions_m": array.position_m.tolist()}
+    (path / DESCRIPTION).write_text(json.dumps(described))
+    return path
+
+
+def test_exchanged_channels_are_a_finding_with_the_order_that_fits(right: Draft, tmp_path: Path) -> None:
+    whole = judge(open_recording(with_array(right, tmp_path / "whole")))
+    assert not whole.findings
+    found = judge(open_recording(with_array(right, tmp_path / "wrong", order=(0, 2, 1, 3)))).findings
+    assert [one.reason for one in found] == [Reason.MICROPHONES] and found[0].grade is Grade.SUSPICIOUS
+    assert "Channels 2 and 3" in found[0].sentence and "in the order 1, 3, 2, 4" in found[0].sentence
+    assert "positions_m" in found[0].remedy
+
+
+def test_a_dead_channel_stays_with_the_map(right: Draft, tmp_path: Path) -> None:
+    path = with_array(right, tmp_path / "dead", dead=1)
+    stored = build_map(open_recording(path), tmp_path / "map", PROFILE, SETTINGS, progress=False)
+    (doubt,) = stored.info.doubts
+    assert "Channel 2 of dead/audio.flac" in doubt and "not connected" in doubt
 
 
 def test_much_that_is_seen_through_is_doubtful() -> None:

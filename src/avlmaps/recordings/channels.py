@@ -1,5 +1,6 @@
 """Sound of several microphones at once: reading it, writing it, and what can be wrong with its channels."""
 
+import itertools
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -135,16 +136,28 @@ def write_channels(path: Path, sound: ChannelSound) -> None:
 
 
 def channel_faults(track: AudioTrack) -> list[str]:
-    """Return a sentence for each fault of a track's channels: dead, clipped, or with a constant hum.
+    """Return a sentence for each fault of a track's channels: dead, copied, clipped, or with a constant hum.
 
     Looks at pieces spread over the track. Channels that are exchanged show only where they are compared with the
-    geometry (see ``avlmaps.maps.sources``).
+    geometry along the drive (``avlmaps.maps.sources.wiring``).
     """
+    samples = _looked_at(track)
+    return [
+        *_dead(samples, track), *_copied(samples, track), *_clipped(samples, track), *_hum(samples, track),
+    ]  # fmt: skip
+
+
+def useless_channels(track: AudioTrack) -> list[str]:
+    """Return those of the faults with which an array shows no direction: a channel that is dead, or another's copy."""
+    samples = _looked_at(track)
+    return [*_dead(samples, track), *_copied(samples, track)]
+
+
+def _looked_at(track: AudioTrack) -> Float[np.ndarray, "k m n"]:
     length_s = min(_LOOK_S, track.duration_s)
     begin_s = track.start_s + np.linspace(0.0, track.duration_s - length_s, _LOOKS)
     looks = [read_channels(track, at_s, at_s + length_s).samples for at_s in begin_s.tolist()]
-    samples = np.stack(looks).astype(np.float64)  # (looks, m, n)
-    return [*_dead(samples, track), *_clipped(samples, track), *_hum(samples, track)]
+    return np.stack(looks).astype(np.float64)
 
 
 def _named(track: AudioTrack, channel: int) -> str:
@@ -159,6 +172,21 @@ def _dead(samples: Float[np.ndarray, "k m n"], track: AudioTrack) -> list[str]:
         "is not connected; check it, or leave it out."
         for i in dead
     ]
+
+
+def _copied(samples: Float[np.ndarray, "k m n"], track: AudioTrack) -> list[str]:
+    """Name a channel that holds another's sound: two microphones never hear quite the same."""
+    power = (samples**2).mean(axis=(0, 2))
+    said: list[str] = []
+    for one, other in itertools.combinations(range(len(power)), 2):
+        scale = float((samples[:, one] * samples[:, other]).mean()) / max(float(power[one]), 1e-20)
+        rest = float(((samples[:, other] - scale * samples[:, one]) ** 2).mean())
+        if power[one] > 0.0 and 10.0 * np.log10((rest + 1e-20) / (float(power[other]) + 1e-20)) < -_DEAD_DB:
+            said.append(
+                f"{_named(track, other)} holds the same sound as channel {one + 1}, as of one microphone that was "
+                "copied, so that both together show no direction; record each microphone's own channel."
+            )
+    return said
 
 
 def _clipped(samples: Float[np.ndarray, "k m n"], track: AudioTrack) -> list[str]:

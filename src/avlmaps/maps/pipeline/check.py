@@ -6,14 +6,20 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 
-from avlmaps.core.errors import RecordingError
+from avlmaps.core.errors import AudioError, RecordingError
 from avlmaps.core.progress import say
+from avlmaps.core.timeline import Trajectory
 from avlmaps.core.wording import option
+from avlmaps.maps.audio.segmentation import segment
 from avlmaps.maps.gravity.up import some_frames, up_doubts
-from avlmaps.maps.pipeline.plan import BUILD_VERSION, BuildPlan
+from avlmaps.maps.pipeline.plan import BUILD_VERSION, BuildPlan, audio_key, strip_folder
+from avlmaps.maps.sources.wiring import check_wiring
 from avlmaps.maps.store.checkpoints import Computed, key_of, load_or_compute
+from avlmaps.recordings.audio import AudioTrack
+from avlmaps.recordings.channels import useless_channels
 from avlmaps.recordings.consistency.check import check_recording
-from avlmaps.recordings.consistency.verdict import Reason, Verdict
+from avlmaps.recordings.consistency.verdict import Finding, Grade, Reason, Verdict
+from avlmaps.recordings.layout import DESCRIPTION
 from avlmaps.recordings.types import Recording
 
 
@@ -36,7 +42,8 @@ def checked(plan: BuildPlan, allowed: Sequence[str]) -> BuildPlan:
     for name in allowed:
         if name not in known:
             raise RecordingError(f"There is nothing called {name!r} to allow; known are: {', '.join(known)}.")
-    key = key_of("doubts", BUILD_VERSION, plan.recording.fingerprint, sorted(allowed))
+    of_array = audio_key(plan.recording) if _array_of(plan.recording) is not None else None
+    key = key_of("doubts", BUILD_VERSION, plan.recording.fingerprint, sorted(allowed), of_array)
 
     def compute() -> Computed[_Doubts]:
         return Computed(_doubts(plan.recording, allowed))
@@ -60,11 +67,14 @@ def _doubts(recording: Recording, allowed: Sequence[str]) -> _Doubts:
             f"{recording.path} cannot be right. {refused} To build it as it is: "
             f"{option('allow', refused.reason.value)}."
         )
-    return _Doubts(verdict.sentences(), whole=not verdict.unread)
+    array = _array_of(recording)
+    useless = useless_channels(array) if array is not None else []
+    sentences = (*verdict.sentences(), *useless)
+    return _Doubts(tuple(strip_folder(one, recording) for one in sentences), whole=not verdict.unread)
 
 
 def judge(recording: Recording) -> Verdict:
-    """Check a recording against itself, and the up direction that was given against what it shows.
+    """Check a recording against itself, the up direction that was given against what it shows, and its microphones.
 
     Raises:
         RecordingError: it has no frame that can be read.
@@ -73,4 +83,58 @@ def judge(recording: Recording) -> Verdict:
     if verdict.refused(()) is not None:  # with such poses nothing is level
         return verdict
     tilted = up_doubts(recording, some_frames(recording), np.random.default_rng(0))
-    return replace(verdict, findings=(*verdict.findings, *tilted))
+    wired, unsure = _of_microphones(recording)
+    findings = (*verdict.findings, *tilted, *wired)
+    return replace(verdict, findings=findings, unchecked=(*verdict.unchecked, *unsure) if not findings else ())
+
+
+def _array_of(recording: Recording) -> AudioTrack | None:
+    """Return the track of several microphones whose places are known, None where there is none."""
+    track = recording.audio
+    return track if track is not None and track.microphones is not None and len(track.microphones) > 1 else None
+
+
+def _of_microphones(recording: Recording) -> tuple[list[Finding], list[str]]:
+    """Return what is wrong with the order of the channels, and what about it does not show."""
+    track = _array_of(recording)
+    try:
+        if track is None or useless_channels(track):
+            return [], []
+        walk = recording.trajectory or Trajectory(recording.stamps_s, recording.world_from_camera)
+        spans_s = [(heard.onset_s, heard.offset_s) for heard in segment(track)]
+        found = check_wiring(track, walk, spans_s)
+    except AudioError:  # the track is validated and read elsewhere, with a sentence for that
+        return [], []
+    if found is None:
+        return [], [
+            "The order of the channels cannot be checked here: the track has fewer than three sounds during the drive."
+        ]
+    fits = (
+        f"over {found.sounds} sounds along the drive they reach {found.fit:.2f} of the greatest correlation as "
+        f"described, and {found.best_fit:.2f}"
+    )
+    if found.reversed_channel is not None:
+        number = found.reversed_channel + 1
+        sentence = f"Channel {number} of the microphones is wired the other way round: {fits} with its sign turned."
+        return [_doubtful(sentence, f"Exchange the two wires of microphone {number}, or turn that channel's sign.")], []
+    if not found.is_right:
+        moved = [str(channel + 1) for channel, microphone in enumerate(found.order) if channel != microphone]
+        order = ", ".join(str(microphone + 1) for microphone in found.order)
+        sentence = (
+            f"Channels {' and '.join([', '.join(moved[:-1]), moved[-1]])} of the microphones look exchanged: their "
+            f"delays do not fit the places; {fits} with the places in the order {order}."
+        )
+        turned = " (or that order turned or mirrored, which fits as well)" if found.unsure else ""
+        remedy = f"Put the wires right, or write positions_m of {DESCRIPTION} in that order{turned}, and build again."
+        return [_doubtful(sentence, remedy)], []
+    if not found.unsure:
+        return [], []
+    others = " or ".join(" ".join(str(microphone + 1) for microphone in order) for order in found.unsure[:2])
+    return [], [
+        f"Channels in the order {others} would not show here, because the robot hardly turned or moved while it heard "
+        "sounds; check the places of the microphones by hand, or drive in curves past something that sounds."
+    ]
+
+
+def _doubtful(sentence: str, remedy: str) -> Finding:
+    return Finding(Reason.MICROPHONES, Grade.SUSPICIOUS, sentence, remedy)

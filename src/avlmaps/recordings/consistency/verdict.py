@@ -24,6 +24,7 @@ class Reason(StrEnum):
     INTRINSICS = "intrinsics"
     MOTION = "motion"
     UP = "up"
+    MICROPHONES = "microphones"
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,222 @@
+"""Whether the channels of an array are those of the microphones that the geometry says: exchanged, or wired in reverse.
+
+Every order of the channels is tried on what was heard along the drive. For each sound and each order, the place is
+sought whose delays, from where the robot was in each frame, fit best (``steered``). Only the right order fits all
+sounds well. Orders that turn or mirror the array fit a single moment as well; the drive, which turns, does not.
+"""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from avlmaps.core.arrays import Float, Int
+from avlmaps.core.poses import apply, rotation_to_level
+from avlmaps.core.timeline import Trajectory
+from avlmaps.maps.sources.correlation import SPEED_M_S, Correlations, correlate
+from avlmaps.maps.sources.steered import loudest_frames
+from avlmaps.recordings.audio import AudioTrack
+from avlmaps.recordings.channels import read_channels
+from avlmaps.recordings.microphones import Microphones
+
+_MOST_SOUNDS, _MOST_FRAMES, _LONGEST_S, _BEFORE_S = 30, 80, 10.0, 1.0
+_LEAST_FRAMES = 6
+_MOST_ORDERED = 4  # microphones of which every order is tried; of more, exchanges one after the other
+MOST_MICROPHONES = 8
+_AZIMUTHS, _AWAY_M, _OVER_EAR_M = 48, (0.5, 1.0, 2.0, 4.0), (-0.9, -0.3, 0.3)
+_SMOOTHING = 5.0
+# An order fits better when the sounds' fits grow by a factor, and by some standard errors of its logarithm: by much,
+# or by little where Student's t makes that improbable for every order that is tried.
+_MUCH, _LITTLE, _STANDARD_ERRORS, _IMPROBABLE, _FEWEST_SOUNDS = 1.25, 1.03, 3.0, 1e-3, 3
+_LEAST, _POOR = 0.01, 0.12  # a right array in a room that rings for a second fits by more
+
+Order = tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Wiring:
+    """What was found about the order of the channels.
+
+    Attributes:
+        order: the microphone (its position's number, from 0) of each channel that fits best.
+        reversed_channel: the channel whose sign is turned, None where none is.
+        fit: share of the greatest possible correlation that the order of the recording reaches, mean over the sounds.
+        best_fit: that of ``order``.
+        sounds: how many were heard well enough.
+        unsure: other orders that fit about as well as ``order``, which moves fewest channels of them.
+    """
+
+    order: Order
+    reversed_channel: int | None
+    fit: float
+    best_fit: float
+    sounds: int
+    unsure: tuple[Order, ...] = ()
+
+    @property
+    def is_right(self) -> bool:
+        """Whether nothing else fits better than what the recording says."""
+        return not _moved(self.order) and self.reversed_channel is None
+
+
+def check_wiring(track: AudioTrack, walk: Trajectory, spans_s: Sequence[tuple[float, float]]) -> Wiring | None:
+    """Compare delays between channels, sound by sound along a drive, with the geometry; None for too few sounds.
+
+    Args:
+        track: with its microphones.
+        walk: the camera's poses.
+        spans_s: onset and offset of the sounds, the recording's time.
+
+    Raises:
+        AudioError: the track cannot be read.
+    """
+    array = track.microphones
+    if array is None or not 2 <= len(array) <= MOST_MICROPHONES:
+        return None
+    inside = [span for span in spans_s if span[1] > walk.stamps_s[0] and span[0] < walk.stamps_s[-1]]
+    heard = [one for span in _spread(inside) if (one := _Heard.of(track, array, walk, span)) is not None]
+    if len(heard) < _FEWEST_SOUNDS:
+        return None
+    own = tuple(range(len(array)))
+    orders = _orders_of(len(array), heard)
+    fits = {order: np.array([one.fit(order) for one in heard]) for order in orders}
+    flipped = [np.array([one.fit(own, channel) for one in heard]) for channel in own] if len(own) > 2 else []
+    best = max(orders, key=lambda order: float(fits[order].sum()))
+    turned = max(range(len(flipped)), key=lambda number: float(flipped[number].sum())) if flipped else None
+    if turned is not None and flipped[turned].sum() > fits[best].sum() and _is_better(flipped[turned], fits[own]):
+        return Wiring(own, turned, _mean(fits[own]), _mean(flipped[turned]), len(heard))
+    if not _is_better(fits[best], fits[own]):
+        unsure = tuple(order for order in orders if order != own and not _is_better(fits[own], fits[order]))
+        return Wiring(own, None, _mean(fits[own]), _mean(fits[own]), len(heard), unsure)
+    alike = [order for order in orders if order == best or not _is_better(fits[best], fits[order])]
+    fewest = min(_moved(order) for order in alike)
+    best = max((order for order in alike if _moved(order) == fewest), key=lambda order: _mean(fits[order]))
+    others = tuple(order for order in alike if order != best)
+    return Wiring(best, None, _mean(fits[own]), _mean(fits[best]), len(heard), others)
+
+
+def _moved(order: Order) -> int:
+    """Return how many channels are another microphone's."""
+    return sum(channel != microphone for channel, microphone in enumerate(order))
+
+
+def _mean(fits: Float[np.ndarray, " s"]) -> float:
+    return float(fits.mean())
+
+
+def _is_better(one: Float[np.ndarray, " s"], other: Float[np.ndarray, " s"], tried: int = 24) -> bool:
+    """Return whether a fit is better than another, over all sounds and clearly."""
+    from scipy.special import stdtrit
+
+    more = np.log(np.maximum(one, _LEAST)) - np.log(np.maximum(other, _LEAST))
+    errors = float(more.mean() / (more.std(ddof=1) / np.sqrt(len(more)) + 1e-3))
+    growth = float(one.mean() / max(other.mean(), _LEAST))
+    if one.mean() < _POOR or errors < _STANDARD_ERRORS:
+        return False
+    return growth > _MUCH or (growth > _LITTLE and errors > float(stdtrit(len(more) - 1, 1.0 - _IMPROBABLE / tried)))
+
+
+def _spread(spans_s: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Return at most as many sounds as are looked at, evenly spread."""
+    at = np.unique(np.linspace(0, len(spans_s) - 1, min(len(spans_s), _MOST_SOUNDS)).round().astype(int))
+    return [spans_s[number] for number in at.tolist()] if len(spans_s) else []
+
+
+def _orders_of(count: int, heard: Sequence["_Heard"]) -> list[Order]:
+    """Return the orders to compare: all of a few microphones, of more what exchanges lead to from the best turns."""
+    own = tuple(range(count))
+    if count <= _MOST_ORDERED:
+        return list(itertools.permutations(own))
+    known: dict[Order, float] = {}
+
+    def fit(order: Order) -> float:
+        if order not in known:
+            known[order] = sum(one.fit(order) for one in heard)
+        return known[order]
+
+    rings = [own[turn:] + own[:turn] for turn in own]
+    best = max([*rings, *(ring[::-1] for ring in rings)], key=fit)
+    for start in {own, best}:
+        order, before = start, -np.inf
+        while fit(order) > before:
+            before = fit(order)
+            order = max((order, *(_exchanged(order, a, b) for a, b in itertools.combinations(own, 2))), key=fit)
+    return list(known)
+
+
+def _exchanged(order: Order, one: int, other: int) -> Order:
+    changed = list(order)
+    changed[one], changed[other] = order[other], order[one]
+    return tuple(changed)
+
+
+@dataclass(frozen=True, eq=False)
+class _Heard:
+    """One sound: how well each pair of channels fits each pair of microphones, over places round the robot.
+
+    Attributes:
+        pair: (p, 2) channels.
+        fits: (p, m, m, c) sums over the frames of the correlation of a pair of channels, at the delays of a pair of
+            microphones and a place; as a share of the greatest possible.
+    """
+
+    pair: Int[np.ndarray, "p 2"]
+    fits: Float[np.ndarray, "p m m c"]
+
+    @classmethod
+    def of(
+        cls, track: AudioTrack, array: Microphones, walk: Trajectory, span_s: tuple[float, float]
+    ) -> "_Heard | None":
+        """Return what was heard of a sound; None where hardly a frame stands out."""
+        onset_s, offset_s = span_s[0], min(span_s[1], span_s[0] + _LONGEST_S)
+        begin_s = max(onset_s - _BEFORE_S, track.start_s)
+        sound = read_channels(track, begin_s, offset_s)
+        apart = array.position_m[:, None] - array.position_m[None]
+        longest_m = float(np.linalg.norm(apart, axis=2).max())
+        found = correlate(sound.samples, sound.rate_hz, begin_s, onset_s - begin_s, longest_m)
+        known = np.flatnonzero((found.at_s >= walk.stamps_s[0]) & (found.at_s <= walk.stamps_s[-1]))
+        found = found.take(known)
+        found = found.take(loudest_frames(found, _MOST_FRAMES)).smoothed(_SMOOTHING)
+        if len(found.at_s) < _LEAST_FRAMES:
+            return None
+        poses = walk.at(found.at_s)
+        ear = array.in_world_m(poses)
+        place = _places(ear, poses @ array.camera_from_robot)
+        return cls(found.pair, _pair_fits(found, ear, place))
+
+    def fit(self, order: Order, reversed_channel: int | None = None) -> float:
+        """Return how well the best place fits where the channels are those of microphones in an order."""
+        one, other = np.array(order)[self.pair].T
+        chosen = self.fits[np.arange(len(self.pair)), one, other]
+        if reversed_channel is not None:
+            chosen = chosen * np.where((self.pair == reversed_channel).any(axis=1), -1.0, 1.0)[:, None]
+        return float(chosen.sum(axis=0).max())
+
+
+def _places(ear: Float[np.ndarray, "f m 3"], world_from_robot: Float[np.ndarray, "f 4 4"]) -> Float[np.ndarray, "c 3"]:
+    """Return places all round the middle of the drive, near and far."""
+    up = world_from_robot[:, :3, 2].mean(axis=0)
+    azimuth = 2.0 * np.pi * np.arange(_AZIMUTHS) / _AZIMUTHS
+    flat = np.stack([np.cos(azimuth), np.sin(azimuth)], axis=1)
+    rings = [np.column_stack([flat * away, np.full(_AZIMUTHS, over)]) for away in _AWAY_M for over in _OVER_EAR_M]
+    back = np.eye(4)
+    back[:3, :3] = rotation_to_level(up / np.linalg.norm(up)).T
+    back[:3, 3] = ear.mean(axis=(0, 1))
+    return apply(back, np.concatenate(rings))
+
+
+def _pair_fits(
+    found: Correlations, ear: Float[np.ndarray, "f m 3"], place: Float[np.ndarray, "c 3"]
+) -> Float[np.ndarray, "p m m c"]:
+    count = ear.shape[1]
+    total = np.zeros((len(found.pair), count, count, len(place)), np.float32)
+    last = found.curve.shape[2] - 2
+    for curve, ears in zip(found.curve, ear, strict=True):
+        away = np.linalg.norm(place[None] - ears[:, None], axis=2) / (SPEED_M_S * found.step_s)
+        for one, other in itertools.permutations(range(count), 2):
+            at = away[one] - away[other] - found.first_s / found.step_s
+            whole = np.clip(at.astype(np.int64), 0, last)
+            part = (at - whole).astype(np.float32)
+            total[:, one, other] += curve[:, whole] * (1.0 - part) + curve[:, whole + 1] * part
+    return total / max(float(found.weight.sum()) * len(found.pair), 1e-9)
