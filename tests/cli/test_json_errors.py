@@ -17,6 +17,7 @@ ERRORS = (
     (("record", "--scene", "house:seven", "--out", "OUT"), 1, "scene"),
     (("record", "--scene", "house:7", "--out", "OUT", "--size", "x"), 2, "usage"),
     (("add-sounds", "REC", "--clips", "nowhere", "--out", "OUT"), 1, "audio"),
+    (("calibrate", "REC", "--out", "OUT"), 1, "recording"),
     (("build", "nowhere", "--out", "OUT"), 1, "recording"),
     (("build", "REC", "--out", "OUT", "--profile", "magic"), 1, "backend"),
     (("import-map", "nowhere", "--out", "OUT"), 1, "map"),

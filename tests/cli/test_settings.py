@@ -45,6 +45,7 @@ EVERYWHERE = ("json", "models", "device", "precision")  # checked once, by test_
 GROUPS = {
     "bench.indexing": Indexing, "bench.navigation": Navigation, "go.chat": Chat,
     "build.reading": Reading, "live.reading": Reading, "info.reading": Reading, "add-sounds.reading": Reading,
+    "calibrate.reading": Reading,
 }  # fmt: skip
 OPTIONS: dict[str, type] = {**VERBS, **GROUPS}
 
@@ -97,6 +98,7 @@ SAME: dict[str, Callable[[], Any]] = {
     "info.format": of(open_recording, "format"),
     "info.audio": of(open_recording, "audio"),
     "add-sounds.format": of(open_recording, "format"),
+    "calibrate.format": of(open_recording, "format"),
     "add-sounds.seed": of(add_sounds, "seed"),
     "add-sounds.interval_s": of(add_sounds, "interval_s"),
     "add-sounds.min_distance_m": of(add_sounds, "min_distance_m"),

@@ -57,6 +57,8 @@ class Build(ModelVerb):
     """Format of the recording, if its files do not show it."""
     audio: Annotated[Path | None, arg(metavar="FILE")] = None
     """Sound file to use instead of the recording's own track."""
+    microphones: Annotated[Path | None, arg(metavar="FILE")] = None
+    """Places of the microphones instead of the recording's own: a JSON file, as `avlmaps calibrate` writes it."""
     topics: Annotated[tuple[str, ...], arg(metavar="KIND=TOPIC ...")] = ()
     """Topics of a ROS bag that their type does not identify: rgb=, depth=, pose= or audio=TOPIC; or pose=FILE, a
     table of stamp tx ty tz qx qy qz qw."""
@@ -141,6 +143,7 @@ def build(verb: "Build") -> dict[str, Any]:
         audio=verb.audio,
         topics=topics_of(verb.topics),
         corrections=verb.reading.corrections(),
+        microphones=verb.microphones,
     )
     for notice in recording.notices:
         say(f"note: {notice}")

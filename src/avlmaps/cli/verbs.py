@@ -21,6 +21,7 @@ With --json an error is {"error": {"kind": ..., "message": ...}} on standard out
 
 ENTRY_POINT_GROUP = "avlmaps.verbs"
 _OWN = {
+    "calibrate": "Calibrate",
     "build": "Build",
     "live": "Live",
     "merge": "Merge",
@@ -42,9 +43,9 @@ _OWN = {
 }
 # As help lists them: in the order in which a person comes to use them; other packages' own verbs follow.
 _ORDER = (
-    "demo", "record", "add-sounds", "build", "live", "merge", "import-map", "info", "query", "things", "rooms",
-    "sources", "changes", "edit", "shell", "view", "export", "locate", "go", "serve", "teach-sound", "profiles",
-    "bench",
+    "demo", "record", "add-sounds", "calibrate", "build", "live", "merge", "import-map", "info", "query", "things",
+    "rooms", "sources", "changes", "edit", "shell", "view", "export", "locate", "go", "serve", "teach-sound",
+    "profiles", "bench",
 )  # fmt: skip
 
 

@@ -58,6 +58,11 @@ def with_microphones(track: AudioTrack, microphones: Microphones, files: tuple[P
     """
     from dataclasses import replace
 
+    if files and len(files) != len(microphones):
+        raise RecordingError(
+            f"The recording has {len(files)} files of channels, but {len(microphones)} microphone(s) are described; "
+            "give one position for each."
+        )
     if files:
         for path in files[1:]:
             other = AudioTrack.open(path, track.start_s)

@@ -11,11 +11,13 @@ import numpy as np
 from avlmaps.core import poses
 from avlmaps.core.arrays import Float
 from avlmaps.core.errors import RecordingError
-from avlmaps.core.files import DESCRIPTION_BYTES, decode_json, read_regular
+from avlmaps.core.files import DESCRIPTION_BYTES, decode_json, read_regular, write_bytes_atomically
 
 # Two microphones nearer than this hear the same; a robot is smaller than this.
 LEAST_APART_M, MOST_APART_M = 0.01, 5.0
 MOST_CHANNELS = 64
+# A channel that is later than this against the others is not of their clock.
+MOST_DELAY_S = 0.01
 # x forward, y left, z up, at the camera: how the robot's frame lies in the camera's (x right, y down, z forward).
 LEVEL_CAMERA_FROM_ROBOT = np.array([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]], np.float64)
 
@@ -27,11 +29,13 @@ class MicrophoneNumbers(msgspec.Struct, forbid_unknown_fields=True, frozen=True,
         positions_m: one for each channel, in the robot's frame: x forward, y left, z up.
         camera_from_robot: 4x4; by default the robot's frame has its origin at the camera, and the camera looks level.
         files: one sound file for each channel, where they are not channels of one file.
+        delays_s: by how much each channel is late, seconds; none is if None.
     """
 
     positions_m: list[list[float]]
     camera_from_robot: list[list[float]] | None = None
     files: list[str] | None = None
+    delays_s: list[float] | None = None
 
     def microphones(self) -> "Microphones":
         """Return them as the package works with them.
@@ -52,14 +56,17 @@ class MicrophoneNumbers(msgspec.Struct, forbid_unknown_fields=True, frozen=True,
             raise RecordingError(
                 f"microphones.files names {len(self.files)} files for {len(position_m)} positions; give one for each."
             )
-        return Microphones(position_m, LEVEL_CAMERA_FROM_ROBOT if given is None else np.array(given, np.float64))
+        turn = LEVEL_CAMERA_FROM_ROBOT if given is None else np.array(given, np.float64)
+        return Microphones(position_m, turn, None if self.delays_s is None else np.array(self.delays_s, np.float64))
 
     @staticmethod
     def of(microphones: "Microphones") -> "MicrophoneNumbers":
         """Return the numbers of microphones."""
         level = np.array_equal(microphones.camera_from_robot, LEVEL_CAMERA_FROM_ROBOT)
         return MicrophoneNumbers(
-            microphones.position_m.tolist(), None if level else microphones.camera_from_robot.tolist()
+            microphones.position_m.tolist(),
+            None if level else microphones.camera_from_robot.tolist(),
+            delays_s=None if microphones.delay_s is None else microphones.delay_s.tolist(),
         )
 
 
@@ -70,10 +77,12 @@ class Microphones:
     Attributes:
         position_m: (m, 3) places in the robot's frame (x forward, y left, z up), metres.
         camera_from_robot: 4x4, from the robot's frame to the depth camera's.
+        delay_s: (m,) by how much each channel is late, seconds; None where none is.
     """
 
     position_m: Float[np.ndarray, "m 3"]
     camera_from_robot: Float[np.ndarray, "4 4"] = field(default_factory=lambda: LEVEL_CAMERA_FROM_ROBOT)
+    delay_s: Float[np.ndarray, " c"] | None = None
 
     def __post_init__(self) -> None:
         place = self.position_m
@@ -84,6 +93,16 @@ class Microphones:
             )
         if not np.isfinite(place).all():
             raise RecordingError("A microphone's position is NaN or infinite; measure it in metres.")
+        if self.delay_s is not None and self.delay_s.shape != (len(place),):
+            raise RecordingError(
+                f"There are delays of {self.delay_s.size} channels for {len(place)} microphones; give one for each."
+            )
+        late = np.zeros(0) if self.delay_s is None else self.delay_s
+        if not (np.abs(late) <= MOST_DELAY_S).all():  # NaN is not
+            raise RecordingError(
+                f"A channel's delay is {late[~(np.abs(late) <= MOST_DELAY_S)][0]:g} s; it is in seconds and at most "
+                f"{MOST_DELAY_S:g} either way, so align the files of the channels first."
+            )
         poses.orthonormalize(self.camera_from_robot, "the robot's frame in the camera, microphones.camera_from_robot,")
         for one, other in itertools.combinations(range(len(place)), 2):
             apart_m = float(np.linalg.norm(place[one] - place[other]))
@@ -113,7 +132,8 @@ class Microphones:
 
     def take(self, channels: Sequence[int]) -> "Microphones":
         """Return some of them."""
-        return Microphones(self.position_m[list(channels)], self.camera_from_robot)
+        late_s = None if self.delay_s is None else self.delay_s[list(channels)]
+        return Microphones(self.position_m[list(channels)], self.camera_from_robot, late_s)
 
 
 def _square(side_m: float) -> list[list[float]]:
@@ -130,7 +150,7 @@ PRESETS: dict[str, list[list[float]]] = {
 
 
 def microphones_named(words: str) -> Microphones:
-    """Return the array of a name, or of a JSON file with ``positions_m`` and perhaps ``camera_from_robot``.
+    """Return the array of a name, or of a JSON file with ``positions_m``, perhaps more of ``MicrophoneNumbers``.
 
     Raises:
         RecordingError: there is no such name and no such file, or what it holds cannot be.
@@ -149,3 +169,16 @@ def microphones_named(words: str) -> Microphones:
         raise RecordingError(
             f'{path} describes no microphones ({error}); write {{"positions_m": [[x, y, z], ...]}} in metres.'
         ) from None
+
+
+def write_microphones(path: Path, microphones: Microphones) -> None:
+    """Write an array as a JSON file that ``microphones_named`` reads; all or nothing.
+
+    Raises:
+        RecordingError: it cannot be written there.
+    """
+    content = msgspec.json.format(msgspec.json.encode(MicrophoneNumbers.of(microphones)), indent=2) + b"\n"
+    try:
+        write_bytes_atomically(path, content)
+    except OSError as error:
+        raise RecordingError(f"{path} cannot be written ({error.strerror or error}); choose another file.") from None

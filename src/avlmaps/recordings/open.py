@@ -9,8 +9,10 @@ from avlmaps.core.errors import RecordingError
 from avlmaps.core.suggestions import did_you_mean, near_path
 from avlmaps.recordings import layout
 from avlmaps.recordings.audio import AudioTrack
+from avlmaps.recordings.channels import with_microphones
 from avlmaps.recordings.corrections import Corrections, corrected
 from avlmaps.recordings.known_formats import FORMATS, LOOKED_AT, Format, formats, settle_sound
+from avlmaps.recordings.microphones import microphones_named
 from avlmaps.recordings.types import Recording
 from avlmaps.recordings.unreadable import why_unreadable
 
@@ -24,6 +26,7 @@ def open_recording(
     audio: Path | str | None = None,
     topics: Mapping[str, str] | None = None,
     corrections: Corrections | None = None,
+    microphones: Path | str | None = None,
 ) -> Recording:
     """Open a recording in place: nothing is copied, and no picture is read before it is needed.
 
@@ -33,6 +36,8 @@ def open_recording(
         audio: another sound track, beginning with the recording; it takes the place of the recording's own.
         topics: of a ROS bag, by what they are for (``rgb``, ``depth``, ``pose``, ``audio``); the others are found.
         corrections: what someone knows better than the files; a notice repeats it.
+        microphones: where those of the track's channels are, instead of the recording's own: a JSON file, or a name
+            (``microphones.PRESETS``); a notice repeats it.
 
     Raises:
         RecordingError: there is nothing there, it is of no known format, or it cannot be used.
@@ -46,6 +51,12 @@ def open_recording(
     if audio is not None:
         recording.audio = AudioTrack.open(Path(audio))
         settle_sound(recording)
+    if microphones is not None:
+        if recording.audio is None:
+            raise RecordingError(f"{path} has no sound track, so that it has no place for {microphones}.")
+        array = microphones_named(str(microphones))
+        recording.audio = with_microphones(recording.audio, array, recording.audio.files)
+        recording.notices = (*recording.notices, f"The microphones are those of {Path(microphones).name}, as given.")
     if corrections:
         recording = corrected(recording, corrections)
         recording.notices = (*recording.notices, f"Read as given: {corrections.words()}.")

@@ -77,7 +77,13 @@ def direct_weight(power: Float[np.ndarray, "f b"], noise: Float[np.ndarray, " b"
 
 
 def correlate(
-    samples: Float[np.ndarray, "m n"], rate_hz: int, start_s: float, quiet_s: float, longest_m: float
+    samples: Float[np.ndarray, "m n"],
+    rate_hz: int,
+    start_s: float,
+    quiet_s: float,
+    longest_m: float,
+    delay_s: Float[np.ndarray, " m"] | None = None,
+    high_hz: float = _HIGH_HZ,
 ) -> Correlations:
     """Correlate every pair of channels in short frames.
 
@@ -87,11 +93,13 @@ def correlate(
         start_s: the recording's time of the first sample.
         quiet_s: how much of it, from its beginning, is before the sound: its noise.
         longest_m: distance of the farthest two microphones.
+        delay_s: by how much each channel is late, which is taken back; None where none is.
+        high_hz: highest frequency that counts.
     """
     spectrum = spectra(samples, rate_hz)
     size = round(FRAME_S * rate_hz)
     hz = np.fft.rfftfreq(size, 1.0 / rate_hz)
-    band = (hz >= _LOW_HZ) & (hz <= min(_HIGH_HZ, 0.45 * rate_hz))
+    band = (hz >= _LOW_HZ) & (hz <= min(high_hz, 0.45 * rate_hz))
     power = (np.abs(spectrum[..., band]) ** 2).mean(axis=0).astype(np.float64)
     before = max(int((quiet_s - FRAME_S) / HOP_S), 0)
     noise = np.quantile(power[: max(before, 1)], 0.5, axis=0) if before else np.quantile(power, 0.05, axis=0) * 0.5
@@ -102,7 +110,9 @@ def correlate(
     reach = int(np.ceil((longest_m / SPEED_M_S * rate_hz + 1.0) * _OVERSAMPLING))
     curve = np.zeros((len(power), len(pair), 2 * reach + 1), np.float32)
     unit = np.zeros((len(samples), len(power), padded // 2 + 1), np.complex64)
-    unit[..., : len(hz)][..., band] = np.exp(1j * np.angle(spectrum[..., band]))
+    late = np.zeros(len(samples)) if delay_s is None else delay_s
+    early = 2.0 * np.pi * late[:, None, None] * hz[band]
+    unit[..., : len(hz)][..., band] = np.exp(1j * (np.angle(spectrum[..., band]) + early))
     full = np.zeros((len(power), padded // 2 + 1), np.float32)
     full[:, : len(hz)][:, band] = weight
     for number, (one, other) in enumerate(pair):

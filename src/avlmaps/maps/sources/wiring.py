@@ -174,7 +174,7 @@ class _Heard:
         sound = read_channels(track, begin_s, offset_s)
         apart = array.position_m[:, None] - array.position_m[None]
         longest_m = float(np.linalg.norm(apart, axis=2).max())
-        found = correlate(sound.samples, sound.rate_hz, begin_s, onset_s - begin_s, longest_m)
+        found = correlate(sound.samples, sound.rate_hz, begin_s, onset_s - begin_s, longest_m, array.delay_s)
         known = np.flatnonzero((found.at_s >= walk.stamps_s[0]) & (found.at_s <= walk.stamps_s[-1]))
         found = found.take(known)
         found = found.take(loudest_frames(found, _MOST_FRAMES)).smoothed(_SMOOTHING)

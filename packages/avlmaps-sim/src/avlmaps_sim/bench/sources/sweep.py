@@ -95,7 +95,7 @@ def _trial(condition: Condition, rng: np.random.Generator) -> tuple[float, bool]
     sounding = [_bursts(place, rng) for place in places]
     array = microphones_named("square4")
     settings = AcousticSettings(_RATE_HZ, snr_db=condition.snr_db, rt60_s=condition.rt60_s)
-    heard = heard_by_array(_room(), sounding, stamps_s, poses, array, count / 10.0, rng, settings)
+    heard = heard_by_array(bare_room(), sounding, stamps_s, poses, array, count / 10.0, rng, settings)
     turn = Rotation.from_matrix(_about_z(np.deg2rad(condition.pose_deg) * rng.standard_normal()))
     believed = poses.copy()
     believed[:, :3, :3] = turn.as_matrix() @ poses[:, :3, :3]
@@ -129,7 +129,8 @@ def _about_z(angle: float) -> Float[np.ndarray, "3 3"]:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-def _room() -> Scene:
+def bare_room() -> Scene:
+    """Return a room of 6 x 5 x 2.6 m with nothing in it."""
     corners = np.array([[0.0, 0.0], [_X_M, 0.0], [_X_M, _Y_M], [0.0, _Y_M]])
     builder = SceneBuilder("bare room", areas=[Area("bedroom", corners, 0.0, _HEIGHT_M, "bedroom#1")])
     builder.add("floor", sheet((0.0, 0.0, 0.0), (_X_M, 0.0, 0.0), (0.0, _Y_M, 0.0), _PAINT))

@@ -1,0 +1,328 @@
+"""Calibration of an array in place: where its microphones are and how late its channels, from one still source.
+
+The robot drives past something that sounds and stays where it is. Each frame with an onset gives the delay of each pair
+of channels (the peak of GCC-PHAT near the predicted one). Nonlinear least squares find the places, the delays of the
+channels and the place of the source that explain them all along the odometry. The middle of the array and the mean
+delay stay as given: no delay between channels shows them well, and no steering needs them.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from avlmaps.core.arrays import Bool, Float
+from avlmaps.core.errors import RecordingError
+from avlmaps.core.poses import apply, inverse, rotation_to_level
+from avlmaps.core.timeline import Trajectory
+from avlmaps.core.wording import option
+from avlmaps.maps.sources.correlation import SPEED_M_S, Correlations, correlate
+from avlmaps.maps.sources.steered import loudest_frames, steer
+from avlmaps.recordings.audio import AudioTrack
+from avlmaps.recordings.channels import read_channels
+from avlmaps.recordings.microphones import Microphones
+
+_BLOCK_S, _FRAMES_A_BLOCK, _MOST_FRAMES = 10.0, 60, 600
+_HIGH_HZ = 7000.0  # sharper peaks than steering bears: they are sought near the predicted delay alone
+_SLACK_M = 0.2  # how much farther apart than given the channels may seem
+_GRID_M, _ROUND_M, _HEIGHTS_M = 0.3, 4.0, (-1.0, -0.5, 0.0, 0.5)
+_SMOOTHING = 5.0
+_WINDOWS_S = (250e-6, 150e-6, 80e-6, 60e-6, 60e-6)  # round the predicted delay, one solution after the other
+_LEAST_PEAK = 0.3  # of the greatest possible correlation
+_SPREAD_S = 15e-6  # usual error of a peak
+_FEWEST = 60  # frames with measured delays
+# What the walk must leave of doubt at most, one standard deviation, and how badly the result may fit.
+WORST_PLACE_M, WORST_DELAY_S, WORST_RESIDUAL_S = 0.01, 30e-6, 45e-6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Calibration:
+    """A refined array.
+
+    Attributes:
+        microphones: the array.
+        source_m: (3,) where the source is, world.
+        before_s: residual of the delays with the given array, 1.48 times the median of its size.
+        after_s: with the refined one.
+        place_sd_m: (m,) standard deviation of each place along the axis that is known least; held axes are left out.
+        delay_sd_s: (m,) of each channel's delay.
+        moved_m: (m,) how far each microphone is from where it was given.
+        frames: how many had a measured delay.
+        held_heights: whether the walk does not show heights, so that z stays as given.
+    """
+
+    microphones: Microphones
+    source_m: Float[np.ndarray, "3"]
+    before_s: float
+    after_s: float
+    place_sd_m: Float[np.ndarray, " m"]
+    delay_sd_s: Float[np.ndarray, " m"]
+    moved_m: Float[np.ndarray, " m"]
+    frames: int
+    held_heights: bool
+
+
+def calibrate(track: AudioTrack, walk: Trajectory, between_s: tuple[float, float] | None = None) -> Calibration:
+    """Refine the places of the microphones and the delays of the channels.
+
+    Args:
+        track: with its microphones as they were measured, off by centimetres.
+        walk: the camera's poses.
+        between_s: when the one source sounds, the recording's time; None for all of the track.
+
+    Raises:
+        RecordingError: there is no array, the sound is too little or of no still source, or the walk does not determine
+            the array; with the numbers.
+        AudioError: the track cannot be read.
+    """
+    array = track.microphones
+    if array is None or len(array) < 2:
+        raise RecordingError(
+            "There is no array to calibrate: the recording gives no places of two or more microphones "
+            f"(microphones of recording.json, or {option('microphones', 'FILE')})."
+        )
+    begin_s, end_s = _span(track, walk, between_s)
+    found = _frames(track, array, begin_s, end_s)
+    if len(found.at_s) < _FEWEST:
+        raise RecordingError(_too_little(len(found.at_s), begin_s, end_s))
+    fit = _Fit.of(found, array, walk)
+    start = np.concatenate([np.zeros(fit.basis.shape[1] * 4), fit.seek(np.zeros(len(array)))])
+    solution, measured = fit.solve(start, hold_heights=False)
+    covered = fit.covariance(solution, measured, hold_heights=False)
+    held = bool(covered[0][:, 2].max() > WORST_PLACE_M)
+    if held:
+        solution, measured = fit.solve(start, hold_heights=True)
+        covered = fit.covariance(solution, measured, hold_heights=True)
+    place_sd, delay_sd = covered
+    frames = int(measured.used.any(axis=1).sum())
+    if frames < _FEWEST:
+        raise RecordingError(_too_little(frames, begin_s, end_s))
+    worst = int(place_sd.max(axis=1).argmax())
+    if place_sd.max() > WORST_PLACE_M or delay_sd.max() > WORST_DELAY_S:
+        raise RecordingError(
+            f"The walk does not determine the array: the place of microphone {worst + 1} would be known to "
+            f"{100 * place_sd[worst].max():.1f} cm and a channel's delay to {1e6 * delay_sd.max():.0f} µs (one "
+            f"standard deviation), where {100 * WORST_PLACE_M:g} cm and {1e6 * WORST_DELAY_S:g} µs are needed. Let the "
+            "robot turn on the spot and drive past the source on both sides, at 1 to 3 m from it."
+        )
+    after_s = _scale(fit.residual_s(solution, measured))
+    if after_s > WORST_RESIDUAL_S:
+        raise RecordingError(
+            f"No array explains the delays: they differ by {1e6 * after_s:.0f} µs (at most "
+            f"{1e6 * WORST_RESIDUAL_S:g}) from those of one still source. Give the time when a single source sounds "
+            f"({option('between', 'BEGIN END')}), in a room with few echoes; are poses and clocks right?"
+        )
+    refined = fit.array_of(solution)
+    return Calibration(
+        refined, fit.source_of(solution), _scale(fit.residual_s(fit.only_source(solution, measured), measured)),
+        after_s, place_sd.max(axis=1), delay_sd, np.linalg.norm(refined.position_m - array.position_m, axis=1),
+        frames, held,
+    )  # fmt: skip
+
+
+def _span(track: AudioTrack, walk: Trajectory, between_s: tuple[float, float] | None) -> tuple[float, float]:
+    first_s, last_s = max(track.start_s, float(walk.stamps_s[0])), min(track.end_s, float(walk.stamps_s[-1]))
+    begin_s, end_s = between_s or (first_s, last_s)
+    if not first_s - 1e-6 <= begin_s < end_s <= last_s + 1e-6:
+        raise RecordingError(
+            f"There is no sound with poses from {begin_s:g} to {end_s:g} s; both are there from {first_s:.2f} to "
+            f"{last_s:.2f} s."
+        )
+    return begin_s, end_s
+
+
+def _too_little(frames: int, begin_s: float, end_s: float) -> str:
+    return (
+        f"Too little sounds from {begin_s:.1f} to {end_s:.1f} s to calibrate by: {frames} frames have a clear onset, "
+        f"{_FEWEST} are needed. Let something tick or click (a metronome, keys) while the robot drives."
+    )
+
+
+def _frames(track: AudioTrack, array: Microphones, begin_s: float, end_s: float) -> Correlations:
+    """Return the frames with most onset, of every stretch of the time some."""
+    apart = array.position_m[:, None] - array.position_m[None]
+    longest_m = float(np.linalg.norm(apart, axis=2).max()) + _SLACK_M
+    pieces: list[Correlations] = []
+    count = max(int(np.ceil((end_s - begin_s) / _BLOCK_S)), 1)
+    each = min(_FRAMES_A_BLOCK, max(_MOST_FRAMES // count, 4))
+    for at_s in np.linspace(begin_s, end_s, count + 1)[:-1].tolist():
+        sound = read_channels(track, at_s, min(at_s + _BLOCK_S, end_s))
+        found = correlate(sound.samples, sound.rate_hz, at_s, 0.0, longest_m, delay_s=array.delay_s, high_hz=_HIGH_HZ)
+        pieces.append(found.take(loudest_frames(found, each)))
+    first = pieces[0]
+    found = Correlations(
+        np.concatenate([piece.at_s for piece in pieces]), first.pair,
+        np.concatenate([piece.curve for piece in pieces]), first.first_s, first.step_s,
+        np.concatenate([piece.weight for piece in pieces]),
+    )  # fmt: skip
+    return found.take(np.flatnonzero((found.at_s >= begin_s) & (found.at_s <= end_s)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Measured:
+    """Delays that were measured.
+
+    Attributes:
+        delay_s: (f, p) of each frame and pair.
+        used: (f, p) where there is one.
+    """
+
+    delay_s: Float[np.ndarray, "f p"]
+    used: Bool[np.ndarray, "f p"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Fit:
+    """The unknowns are, in this order: places (m - 1, 3) and delays (m - 1) over ``basis``, and the source (3).
+
+    Attributes:
+        found: the frames.
+        array: as given.
+        world_from_robot: (f, 4, 4) of each frame.
+        basis: (m, m - 1) orthonormal changes that leave the mean as it is.
+    """
+
+    found: Correlations
+    array: Microphones
+    world_from_robot: Float[np.ndarray, "f 4 4"]
+    basis: Float[np.ndarray, "m n"]
+
+    @classmethod
+    def of(cls, found: Correlations, array: Microphones, walk: Trajectory) -> "_Fit":
+        count = len(array)
+        basis = np.linalg.svd(np.eye(count) - 1.0 / count)[0][:, : count - 1]
+        return cls(found, array, walk.at(found.at_s) @ array.camera_from_robot, basis)
+
+    def seek(self, late_s: Float[np.ndarray, " m"]) -> Float[np.ndarray, "3"]:
+        """Return the place round the walk that the given array points to, on a coarse grid."""
+        up = self.world_from_robot[:, :3, 2].mean(axis=0)
+        level = np.eye(4)
+        level[:3, :3] = rotation_to_level(up / np.linalg.norm(up))
+        ears = self._ears(self.array.position_m)
+        middle = apply(level, ears.mean(axis=1))
+        low, high = middle.min(axis=0) - _ROUND_M, middle.max(axis=0) + _ROUND_M
+        axes = [np.arange(low[0], high[0], _GRID_M), np.arange(low[1], high[1], _GRID_M),
+                float(np.median(middle[:, 2])) + np.array(_HEIGHTS_M)]  # fmt: skip
+        place = apply(inverse(level), np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3))
+        some = np.unique(np.linspace(0, len(ears) - 1, min(len(ears), 200)).astype(int))
+        return place[int(np.argmax(steer(self.found.take(some).smoothed(_SMOOTHING), ears[some], place)))]
+
+    def solve(self, start: Float[np.ndarray, " n"], hold_heights: bool) -> tuple[Float[np.ndarray, " n"], _Measured]:
+        """Return the unknowns and the delays that they were found by: measured near the prediction, again and again."""
+        free = self._free(hold_heights)
+        solution = start.copy()
+        solution[: len(free)][~free] = 0.0
+        measured = self._measure(solution, _WINDOWS_S[0])
+        for number, window_s in enumerate(_WINDOWS_S):
+            measured = self._measure(solution, window_s)
+            # The source alone at first: the array is nearly right, its place is a cell of the grid.
+            chosen = free if number else np.arange(len(free)) >= len(free) - 3
+            solution = self._least_squares(solution, chosen, measured)
+        return solution, measured
+
+    def only_source(self, solution: Float[np.ndarray, " n"], measured: _Measured) -> Float[np.ndarray, " n"]:
+        """Return the unknowns with the array as given, and the place of the source that then fits best."""
+        given = np.concatenate([np.zeros(len(solution) - 3), solution[-3:]])
+        return self._least_squares(given, np.arange(len(given)) >= len(given) - 3, measured)
+
+    def _least_squares(
+        self, solution: Float[np.ndarray, " n"], chosen: Bool[np.ndarray, " n"], measured: _Measured
+    ) -> Float[np.ndarray, " n"]:
+        """Return the unknowns with those that are chosen fitted; wild delays count little."""
+        from scipy.optimize import least_squares
+
+        whole = solution.copy()
+
+        def residual(values: Float[np.ndarray, " k"]) -> np.ndarray:
+            whole[chosen] = values
+            return self.residual_s(whole, measured) / _SPREAD_S
+
+        whole[chosen] = least_squares(residual, solution[chosen], loss="cauchy", x_scale="jac").x
+        return whole
+
+    def covariance(
+        self, solution: Float[np.ndarray, " n"], measured: _Measured, hold_heights: bool
+    ) -> tuple[Float[np.ndarray, "m 3"], Float[np.ndarray, " m"]]:
+        """Return standard deviations of the places, along each axis, and of the delays."""
+        from scipy.optimize import approx_fprime
+
+        free = np.flatnonzero(self._free(hold_heights))
+        if measured.used.sum() <= len(free):
+            return np.full((len(self.array), 3), np.inf), np.full(len(self.array), np.inf)
+
+        def residual(values: Float[np.ndarray, " k"]) -> np.ndarray:
+            whole = solution.copy()
+            whole[free] = values
+            return self.residual_s(whole, measured)
+
+        slope = approx_fprime(solution[free], residual, 1e-6)
+        # Pairs repeat one another (m - 1 of m (m - 1) / 2 are independent), and so do frames that overlap by half.
+        spread_s = _scale(self.residual_s(solution, measured)) * np.sqrt(len(self.array))
+        inner = np.linalg.pinv(slope.T @ slope, rcond=1e-12) * spread_s**2
+        blind = np.linalg.svd(slope, compute_uv=False)
+        if blind[-1] < 1e-9 * blind[0]:
+            return np.full((len(self.array), 3), np.inf), np.full(len(self.array), np.inf)
+        whole = np.zeros((len(solution), len(solution)))
+        whole[np.ix_(free, free)] = inner
+        count = self.basis.shape[1]
+        of_place = whole[: 3 * count, : 3 * count].reshape(count, 3, count, 3)
+        place = np.einsum("ma,aibi,mb->mi", self.basis, of_place, self.basis)
+        delay = np.einsum("ma,ab,mb->m", self.basis, whole[3 * count : -3, 3 * count : -3], self.basis)
+        return np.sqrt(np.maximum(place, 0.0)), np.sqrt(np.maximum(delay, 0.0)) * 1e-3
+
+    def array_of(self, solution: Float[np.ndarray, " n"]) -> Microphones:
+        """Return the array of the unknowns."""
+        (place, late_s), given = self._split(solution), self.array.delay_s
+        return replace(self.array, position_m=place, delay_s=late_s if given is None else given + late_s)
+
+    @staticmethod
+    def source_of(solution: Float[np.ndarray, " n"]) -> Float[np.ndarray, "3"]:
+        """Return the source's place of the unknowns."""
+        return solution[-3:]
+
+    def residual_s(self, solution: Float[np.ndarray, " n"], measured: _Measured) -> Float[np.ndarray, " k"]:
+        """Return by how much each measured delay is longer than the unknowns say."""
+        return (measured.delay_s - self._predicted_s(solution))[measured.used]
+
+    def _free(self, hold_heights: bool) -> Bool[np.ndarray, " n"]:
+        count = self.basis.shape[1]
+        free = np.ones(4 * count + 3, bool)
+        free[2 : 3 * count : 3] = not hold_heights
+        return free
+
+    def _split(self, solution: Float[np.ndarray, " n"]) -> tuple[Float[np.ndarray, "m 3"], Float[np.ndarray, " m"]]:
+        """Return places, and delays in seconds (the unknowns have them in milliseconds, of the size of metres)."""
+        count = self.basis.shape[1]
+        place = self.array.position_m + self.basis @ solution[: 3 * count].reshape(count, 3)
+        return place, 1e-3 * self.basis @ solution[3 * count : 4 * count]
+
+    def _ears(self, place: Float[np.ndarray, "m 3"]) -> Float[np.ndarray, "f m 3"]:
+        turned = np.einsum("fij,mj->fmi", self.world_from_robot[:, :3, :3], place)
+        return turned + self.world_from_robot[:, None, :3, 3]
+
+    def _predicted_s(self, solution: Float[np.ndarray, " n"]) -> Float[np.ndarray, "f p"]:
+        place, late_s = self._split(solution)
+        arrival_s = np.linalg.norm(self._ears(place) - solution[-3:], axis=2) / SPEED_M_S + late_s
+        one, other = self.found.pair.T
+        return arrival_s[:, one] - arrival_s[:, other]
+
+    def _measure(self, solution: Float[np.ndarray, " n"], window_s: float) -> _Measured:
+        """Return the peaks of the correlations near the predicted delays."""
+        curve, step_s = self.found.curve, self.found.step_s
+        reach = max(int(np.ceil(window_s / step_s)), 2)
+        middle = np.rint((self._predicted_s(solution) - self.found.first_s) / step_s).astype(np.int64)
+        inside = (middle > reach) & (middle < curve.shape[2] - reach - 1)
+        middle = np.clip(middle, reach + 1, curve.shape[2] - reach - 2)
+        near = np.take_along_axis(curve, middle[..., None] + np.arange(-reach - 1, reach + 2), axis=2)
+        best = 1 + near[..., 1:-1].argmax(axis=2)
+        left, top, right = (np.take_along_axis(near, (best + by)[..., None], axis=2)[..., 0] for by in (-1, 0, 1))
+        is_peak = (top >= left) & (top >= right)
+        bend = left - 2.0 * top + right
+        part = np.where(bend < 0.0, 0.5 * (left - right) / np.where(bend < 0.0, bend, 1.0), 0.0)
+        delay_s = self.found.first_s + (middle - reach - 1 + best + part) * step_s
+        used = inside & is_peak & (top > _LEAST_PEAK * self.found.weight[:, None])
+        return _Measured(delay_s.astype(np.float64), used)
+
+
+def _scale(residual: Float[np.ndarray, " k"]) -> float:
+    """Return the spread of residuals of which some are wild."""
+    return float(1.4826 * np.median(np.abs(residual))) if len(residual) else np.inf
