@@ -127,6 +127,9 @@ def thing_lines(things: "Sequence[ListedThing]", frame: str = FrameName.RECORDIN
     head = ("thing", "confidence", f"position ({frame} frame)", "size in m (level axes)")
     if "room" in things[0]:
         head, rows = (*head, "room"), [(*row, t.get("room") or "") for row, t in zip(rows, things, strict=True)]
+    if any("heard" in thing for thing in things):
+        said = [", ".join(f"{h['sound']} {h['probability']:.2f}" for h in t.get("heard", ())) for t in things]
+        head, rows = (*head, "heard from it"), [(*row, one) for row, one in zip(rows, said, strict=True)]
     if "distance_m" in things[0]:
         head = (*head, "distance")
         rows = [(*row, f"{t.get('distance_m', 0.0):.2f} m") for row, t in zip(rows, things, strict=True)]

@@ -384,11 +384,13 @@ class AVLMap:
             QueryError: ``least_confidence`` lies outside [0, 1], or the pixel encoder does not know a name.
         """
         from avlmaps.query.contents import Contents, require_known
+        from avlmaps.query.heard_from import with_heard
 
         models = self.stored.info.models
         require_known(self.knows, (names or ()) if "pixels" in models else ())
         things = self.things(names, least_confidence, structure) if "pixels" in models else []
         rooms = self.rooms() if "views" in models else []
+        things = with_heard(self, things, are_all=not names)
         return Contents(things, self.sounds(), rooms, self.stored.info.doubts, self.storeys)
 
     def sounds(self, most_names: int = 3) -> list["SoundEvent"]:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from avlmaps.maps.storeys import Storeys
     from avlmaps.query.room_regions import RoomRegions
     from avlmaps.query.rooms import RoomField
-    from avlmaps.query.schema import ContentsAnswer, RoomAnswer, SoundAnswer, ThingAnswer
+    from avlmaps.query.schema import ContentsAnswer, HeardFromAnswer, RoomAnswer, SoundAnswer, ThingAnswer
 
 Row = TypeVar("Row", "ThingAnswer", "SoundAnswer", "RoomAnswer")
 Watch = Callable[[str, int, int], object]
@@ -61,6 +61,7 @@ class Thing:
         rows: numbers of its voxels in the map.
         points: middles of its voxels, metres, recording frame.
         edited: who corrected it and when, in words; empty for what nobody corrected.
+        heard: sounds that may have come from it, where a list was asked for that.
     """
 
     name: str
@@ -71,6 +72,7 @@ class Thing:
     rows: Int[np.ndarray, " m"] = field(repr=False)
     points: Float[np.ndarray, "m 3"] = field(repr=False)
     edited: str = ""
+    heard: "tuple[HeardFromAnswer, ...]" = ()
 
     def to_json(self) -> "ThingAnswer":
         """Return the thing as ``avlmaps things --json`` prints it."""
@@ -84,6 +86,8 @@ class Thing:
         }
         if self.edited:
             answer["edited"] = self.edited
+        if self.heard:
+            answer["heard"] = list(self.heard)
         return answer
 
 

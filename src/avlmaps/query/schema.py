@@ -109,6 +109,15 @@ class QueryAnswer(TypedDict):
     plot: NotRequired[str]
 
 
+class HeardFromAnswer(TypedDict):
+    """A sound that may have come from a thing."""
+
+    sound: str
+    probability: Annotated[float, Meta(ge=0.0, le=1.0, description="of the name, times that the thing is its source")]
+    onset_s: Annotated[float, Meta(description="seconds from the start of the recording; the last of several")]
+    when: NotRequired[Annotated[DayAnswer, Meta(description="of a map of several days")]]
+
+
 class ThingAnswer(TypedDict):
     """One thing of a map."""
 
@@ -120,6 +129,9 @@ class ThingAnswer(TypedDict):
     voxels: int
     storey: NotRequired[Storey]
     edited: NotRequired[Edited]
+    heard: NotRequired[
+        Annotated[list[HeardFromAnswer], Meta(description="sounds that may have come from it, likeliest first")]
+    ]
 
 
 # Functional, because one key is a word of Python.

@@ -15,6 +15,7 @@ from avlmaps.core.errors import QueryError
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.contents import Watch, listed_rooms, put_storeys, require_known
 from avlmaps.query.given_places import is_place, place_given
+from avlmaps.query.heard_from import with_heard
 from avlmaps.query.schema import ListedThing, NearAnswer, RoomAnswer, SoundAnswer, ThingAnswer
 from avlmaps.query.unknown_names import unknown_note
 from avlmaps.query.whereabouts import Whereabouts
@@ -59,7 +60,8 @@ class MapLists:
                 return []
             require_known(self.avlmap.knows, names)
             things = self.avlmap.things(tuple(names) or None, least, structure, watch=self.watch)
-            return put_storeys([thing.to_json() for thing in things], self.avlmap.storeys)
+            heard = with_heard(self.avlmap, things, are_all=not names)
+            return put_storeys([thing.to_json() for thing in heard], self.avlmap.storeys)
 
         return self.once(("things", least, tuple(names), structure), found)
 

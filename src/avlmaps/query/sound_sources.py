@@ -5,7 +5,7 @@ two places (the birth rule). What usually makes a kind of sound (the lexicon's m
 left out.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol
@@ -265,13 +265,21 @@ def list_sources(
     Raises:
         QueryError: the map does not know where sounds came from.
     """
-    known = avlmap.source_map
     places = _Places(avlmap)
-    found: list[SoundSource] = []
+    listed = list_joined(avlmap, names, prior, least=least)
+    found = [places.described(avlmap.source_map, one, kind, confidence) for kind, confidence, one in listed]
+    return sorted(found, key=lambda one: -one.confidence)
+
+
+def list_joined(
+    avlmap: Listening, names: Sequence[str] = (), prior: bool = True, *, least: float = 0.0
+) -> Iterator[tuple[str, float, Joined]]:
+    """Yield the sources of a map's sounds, each with its name and the confidence of it; see ``list_sources``."""
+    known = avlmap.source_map
     for kind, scores in _by_kind(avlmap, names).items():
         events = [event for event, score in sorted(scores.items(), key=lambda one: -one[1]) if score >= least]
-        found += [places.described(known, one, kind, scores) for one in known.sources(events, kind, prior)]
-    return sorted(found, key=lambda one: -one.confidence)
+        for one in known.sources(events, kind, prior):
+            yield kind, max(scores[event] for event in one.events), one
 
 
 def _by_kind(avlmap: Listening, names: Sequence[str]) -> dict[str, dict[int, float]]:
@@ -306,10 +314,10 @@ class _Places:
     def _things(self) -> "list[Thing]":
         return self._map.things() if "pixels" in self._map.stored.info.models else []
 
-    def described(self, known: SourceMap, joined: Joined, kind: str, scores: dict[int, float]) -> SoundSource:
+    def described(self, known: SourceMap, joined: Joined, kind: str, confidence: float) -> SoundSource:
         """Return a source with its region, rooms and things."""
         x, y, z = known.position_of(joined).tolist()
-        density, confidence = joined.density, max(scores[event] for event in joined.events)
+        density = joined.density
         return SoundSource(
             name=kind,
             confidence=confidence,

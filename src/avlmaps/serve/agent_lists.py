@@ -24,6 +24,7 @@ Place = Annotated[str | list[float], Meta(description="x,y,z")]
 PlaceOrName = Annotated[str | list[float] | None, Meta(description="x,y,z or a thing's name: nearest first")]
 Names = str | list[Words]
 _MOST_KINDS = 12
+_MOST_HEARD = 2
 
 
 class ListThingsQuery(Struct, forbid_unknown_fields=True):
@@ -168,6 +169,7 @@ def _thing_row(one: Selected, where: Whereabouts) -> dict[str, Any]:
         "size": one.thing["size"],
         "room": where.names[one.room] if one.room >= 0 else None,
         "distance_m": one.away_m,
+        "heard": one.thing.get("heard", [])[:_MOST_HEARD] or None,
     }
 
 

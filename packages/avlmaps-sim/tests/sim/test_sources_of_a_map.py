@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from avlmaps.cli.things import thing_lines
 from avlmaps.core.errors import GoalNotFoundError, MapError, QueryError
 from avlmaps.core.poses import rotation_to_level
 from avlmaps.core.timeline import Trajectory
@@ -145,6 +146,33 @@ def test_an_answer_at_the_source_believes_no_more_than_its_region(mapped: tuple[
     with pytest.raises(GoalNotFoundError, match="the source of"):
         things_in(heat)
     assert things_in(heat, guess=True)[0].spread is not None
+
+
+def test_things_list_what_was_heard_from_them(mapped: tuple[Path, Path]) -> None:
+    avlmap = AVLMap.open(mapped[1])
+    listed = avlmap.contents().to_json("flat")["things"]
+    heard = {(row["sound"], tuple(thing["position"])): row for thing in listed for row in thing.get("heard", [])}
+    likely = {
+        (source.name, place): source.confidence * share
+        for source in avlmap.sources()
+        for _, place, share in source.things
+        if source.confidence * share >= 0.1
+    }
+    assert likely and {key: row["probability"] for key, row in heard.items()} == pytest.approx(likely, abs=1e-3)
+    ends = np.asarray(avlmap.stored.sounds.onset_s)
+    assert all(np.abs(ends - row["onset_s"]).min() < 1e-6 and "when" not in row for row in heard.values())
+    assert "heard from it" in thing_lines(listed)[0]
+    assert "heard" not in avlmap.things()[0].to_json()
+
+
+def test_a_thing_alone_in_a_list_is_no_likelier_the_source(mapped: tuple[Path, Path]) -> None:
+    avlmap = AVLMap.open(mapped[1])
+    whole = {thing.position: thing.heard for thing in avlmap.contents().things}
+    names = sorted({thing.name for thing in avlmap.things()})
+    for name in names[:3]:
+        for thing in avlmap.contents(names=[name]).things:
+            before = sum(row["probability"] for row in whole.get(thing.position, ()))
+            assert thing.position not in whole or sum(row["probability"] for row in thing.heard) <= before + 0.15
 
 
 def test_priors_of_the_lexicon_can_be_left_out(mapped: tuple[Path, Path]) -> None:
