@@ -6,12 +6,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from avlmaps.maps.sources.candidates import CELL_M, candidates_of
+from avlmaps.maps.sources.carried import carry_evidence
 from avlmaps.maps.sources.correlation import SPEED_M_S, correlate
 from avlmaps.maps.sources.density import Density, Plan, Spread, log_same_place
 from avlmaps.maps.sources.level import levels_db, unknown_offset
 from avlmaps.maps.sources.settings import SourceSettings
 from avlmaps.maps.sources.steered import steer
 from avlmaps.maps.sources.walls import Walls
+from avlmaps.maps.types import SourceEvidence
 
 RATE_HZ = 16_000
 SQUARE = np.array([[0.1, 0.1, 0.0], [0.1, -0.1, 0.0], [-0.1, -0.1, 0.0], [-0.1, 0.1, 0.0]])
@@ -184,6 +186,56 @@ def test_a_source_that_lies_in_one_cell_is_right_with_certainty(seed: int) -> No
     share = np.zeros(plan.shape)
     share.ravel()[np.random.default_rng(seed).choice(np.flatnonzero(plan.is_held))] = 1.0
     assert Density(plan, share).spread == Spread(1.0, 0.0, 0.0)
+
+
+# --- evidence of several maps
+
+
+def evidence_of(seed: int, sounds: int = 2) -> SourceEvidence:
+    """Return evidence of sounds in the room, each round a place."""
+    rng = np.random.default_rng(seed)
+    found = candidates_of(room(), np.array([[3.0, 2.5, 1.3]]))
+    at = found.place_m[rng.choice(len(found), sounds)]
+    heard = -((found.place_m[None] - at[:, None]) ** 2).sum(axis=2) / 0.5
+    return SourceEvidence(
+        place=found.place_m, prior=found.prior.astype(np.float32),
+        heard=(heard - heard.max(axis=1, keepdims=True)).astype(np.float16),
+        expected=np.full(heard.shape, -0.5, np.float16), moving=np.zeros(sounds, np.uint8),
+        channels=np.array([4], np.int64),
+    )  # fmt: skip
+
+
+@given(st.integers(0, 9), st.floats(0.0, 6.0), st.floats(-3.0, 3.0))
+@settings(max_examples=15, deadline=None)
+def test_evidence_that_is_carried_names_the_moved_places(seed: int, angle: float, x: float) -> None:
+    own, turn = evidence_of(seed), np.eye(4)
+    turn[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+    turn[:3, 3] = [x, 1.0, 0.0]
+    moved, up = room() @ turn[:3, :3].T + turn[:3, 3], np.array([0.0, 0.0, 1.0])
+    robot = (turn[:3, :3] @ [3.0, 2.5, 1.3] + turn[:3, 3])[None]
+    found = carry_evidence([(own, turn)], moved, robot, up)
+    assert found is not None and len(found) == len(own) and found.prior.sum() == pytest.approx(1.0, abs=1e-3)
+    for number in range(len(own)):
+        before = own.place[np.argmax(own.heard[number])] @ turn[:3, :3].T + turn[:3, 3]
+        assert np.linalg.norm(found.place[np.argmax(found.heard[number])] - before) < 0.35
+
+
+def test_evidence_on_the_same_surface_stays_as_it_was() -> None:
+    own, robot = evidence_of(3), np.array([[3.0, 2.5, 1.3]])
+    both = carry_evidence([(own, np.eye(4)), (own, np.eye(4))], room(), robot, np.array([0.0, 0.0, 1.0]))
+    assert both is not None and len(both) == 2 * len(own)
+    assert np.allclose(both.place, own.place) and np.allclose(both.prior, own.prior)
+    assert np.allclose(both.heard, np.concatenate([own.heard, own.heard]), atol=0.02)
+    assert np.allclose(both.expected, -0.5, atol=0.01)
+
+
+def test_what_a_day_did_not_see_is_less_likely_by_its_distance() -> None:
+    own, up = evidence_of(1, 1), np.array([0.0, 0.0, 1.0])
+    wide = carry_evidence([(own, np.eye(4))], room(9.0), np.array([[3.0, 2.5, 1.3]]), up)
+    assert wide is not None
+    beyond = wide.place[:, 0] > 7.0
+    assert wide.expected[0][beyond].max() < wide.expected[0][~beyond].max() - 0.2
+    assert carry_evidence([(own, np.eye(4))], np.zeros((0, 3)), np.array([[3.0, 2.5, 1.3]]), up) is None
 
 
 def test_shares_of_candidates_add_up_to_their_cells() -> None:

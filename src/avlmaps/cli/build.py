@@ -179,12 +179,12 @@ def build(verb: "Build") -> dict[str, Any]:
     if poses is not None:
         from avlmaps.maps.corrected import correct_stored
 
-        stored, done = correct_stored(stored, *poses)
+        stored, done = correct_stored(stored, *poses, recording)
         answer["corrected"] = asdict(done)
     if verb.close_loops:
         from avlmaps.days.loops import close_loops
 
-        stored, done, found = close_loops(stored)
+        stored, done, found = close_loops(stored, recording=recording)
         answer["corrected"] = {**asdict(done), "loops": found.report()}
     AVLMap(stored).prepare()
     return {**describe_map(stored), **answer, "elapsed_s": round(perf_counter() - begin, 3)}

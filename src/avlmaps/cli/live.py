@@ -115,11 +115,11 @@ def _live(verb: Live) -> dict[str, Any]:
             serve_while(live, drive, verb.port, browse=verb.view)
         else:
             drive()
-    status = live.status()
+    status, stored = live.status(), _with_sources(verb, live.map.stored)
     return {
-        **describe_map(live.map.stored),
+        **describe_map(stored),
         "live": {**status.to_dict(), "summary": str(status)},
-        **({} if first is None else {"into": _joined(first, live.map.stored, verb.day)}),
+        **({} if first is None else {"into": _joined(first, stored, verb.day)}),
         "elapsed_s": round(perf_counter() - begin_s, 3),
     }
 
@@ -171,6 +171,21 @@ def _robot(verb: Live) -> tuple[Any, _Play]:
             say("note: Stopped by Ctrl-C; the map is finished.")
 
     return (0.0, 0.0, 1.0), play
+
+
+def _with_sources(verb: Live, stored: "StoredMap") -> "StoredMap":
+    """Return the map of a drive that is over, with where its sounds came from, if the microphones are known."""
+    from avlmaps.live.growing_folder import is_being_written
+    from avlmaps.maps.pipeline.sources import add_sources
+    from avlmaps.recordings.open import open_recording
+
+    if not len(stored.sounds):
+        return stored
+    if verb.recording is None or is_being_written(verb.recording):
+        say("note: Where sounds came from is not known while a robot drives; build the map of its finished recording.")
+        return stored
+    recording = open_recording(verb.recording, format=verb.format, corrections=verb.reading.corrections())
+    return add_sources(stored, recording)
 
 
 def _days_before(verb: Live) -> "StoredMap | None":

@@ -63,11 +63,14 @@ def merge(verb: Merge) -> dict[str, Any]:
 
 def merged_answer(made: "StoredMap") -> dict[str, Any]:
     """Return what is known of a merged map's last day."""
+    from avlmaps.days.join import NO_SOURCES
     from avlmaps.query.changes import Days, changes_answer
 
     days = Days.of(made)
     visit = made.info.visits[-1]
+    notes = [notice for notice in made.info.notices if notice.startswith(NO_SOURCES)]
     return {
+        **({"notes": notes} if notes else {}),
         "path": str(made.path),
         "voxels": made.info.counts.voxels,
         "keyframes": made.info.counts.keyframes,
@@ -87,4 +90,5 @@ def merge_lines(answer: dict[str, Any]) -> list[str]:
         f"({checks['keyframes_tried']:.0f} tried), over {checks['spread_m']:g} m; {checks['agreement']:.1%} of "
         f"{checks['looked']:.0f} voxels lie on the map's surface"
     )
-    return [found, *change_lines(answer), f"wrote {answer['path']}: {answer['voxels']} voxels"]
+    notes = [f"note: {note}" for note in answer.get("notes", ())]
+    return [found, *notes, *change_lines(answer), f"wrote {answer['path']}: {answer['voxels']} voxels"]

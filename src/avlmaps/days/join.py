@@ -12,10 +12,12 @@ from avlmaps.core.poses import apply, rotation_angle_rad
 from avlmaps.days.align import local_features, thumbnail
 from avlmaps.days.surfaces import Occupied, resampled
 from avlmaps.maps.fusion.voxel_sums import VoxelSums, VoxelTable
+from avlmaps.maps.sources.carried import carry_evidence
 from avlmaps.maps.store.life import PEOPLE, Life
 from avlmaps.maps.store.reader import StoredMap
-from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
+from avlmaps.maps.types import HeardSounds, Keyframes, SourceEvidence, Voxels
 
+NO_SOURCES = "The map of all days does not know where sounds came from"
 _NEAR_M, _NEAR_RAD = 0.15, math.radians(10.0)  # a keyframe of the new day takes the place of one so near
 
 
@@ -125,6 +127,39 @@ def _padded(clear_mm: np.ndarray, rows: int, columns: int) -> np.ndarray:
     out = np.zeros((len(clear_mm), rows, columns), np.uint16)
     out[:, : clear_mm.shape[1], : clear_mm.shape[2]] = clear_mm
     return out
+
+
+def joined_sources(
+    stored: StoredMap, other: StoredMap, moved: Float[np.ndarray, "4 4"], voxels: Voxels, keyframes: Keyframes
+) -> tuple[SourceEvidence | None, str]:
+    """Return the evidence of where the sounds of all days came from; or why there is none, in a sentence.
+
+    Args:
+        stored: the map.
+        other: the new day's.
+        moved: map_from_other.
+        voxels: of both.
+        keyframes: of both; they tell where the robots were.
+    """
+    parts = [(of.sources(), where) for of, where in ((stored, np.eye(4)), (other, moved)) if len(of.sounds)]
+    known = [(evidence, where) for evidence, where in parts if evidence is not None]
+    if not known:
+        return None, ""
+    if len(known) < len(parts):
+        of = next(of for of in (stored, other) if len(of.sounds) and of.sources() is None)
+        return None, (
+            f"{NO_SOURCES}: {of.path.name} was built without the places of its microphones; give them (microphones in "
+            "recording.json), build it again and merge again."
+        )
+    counts = [int(evidence.channels[0]) for evidence, _ in known]
+    if len(set(counts)) > 1:
+        return None, (
+            f"{NO_SOURCES}: {stored.path.name} was heard with {counts[0]} microphones and {other.path.name} with "
+            f"{counts[1]}; query where sounds came from in each day's own map, or record with the same array."
+        )
+    voxel_m = stored.grid.centre_of(np.asarray(voxels.index))
+    robot_m = np.asarray(keyframes.world_from_camera, np.float64)[:, :3, 3]
+    return carry_evidence(known, voxel_m, robot_m, stored.up_in_world), ""
 
 
 def joined_sounds(

@@ -22,6 +22,7 @@ from avlmaps.maps.store.reader import StoredMap
 from avlmaps.maps.types import Keyframes
 from avlmaps.perception.encoders import Encoders
 from avlmaps.query.locate import LocateSettings, locate_features
+from avlmaps.recordings.types import Recording
 
 _NEEDED = (Kind.LOCAL, Kind.PLACE, Kind.MATCHER)
 
@@ -101,8 +102,15 @@ class _Earlier:
     rig: Rig
 
 
-def close_loops(stored: StoredMap, settings: LoopSettings = LoopSettings()) -> tuple[StoredMap, Corrected, Loops]:
+def close_loops(
+    stored: StoredMap, settings: LoopSettings = LoopSettings(), recording: Recording | None = None
+) -> tuple[StoredMap, Corrected, Loops]:
     """Find where the drive came back, correct the poses by it, and make the map follow them, in its folder.
+
+    Args:
+        stored: a map that was built with submaps.
+        settings: of the search.
+        recording: as ``correct_stored`` takes it.
 
     Raises:
         MapError: the map has no submaps, or no models to find places by; too few closures were found, or they
@@ -110,7 +118,7 @@ def close_loops(stored: StoredMap, settings: LoopSettings = LoopSettings()) -> t
     """
     require_submaps(stored)  # before the long search
     found = find_loops(stored, settings)
-    moved, done = correct_stored(stored, found.stamps_s, found.poses)
+    moved, done = correct_stored(stored, found.stamps_s, found.poses, recording)
     return moved, done, found
 
 

@@ -20,7 +20,7 @@ from avlmaps.core.wording import option
 from avlmaps.days import life as lives
 from avlmaps.days.evidence import Day, DayViews
 from avlmaps.days.find import DEFAULTS, Found, find_other, views_of, visit_of_stamps, visits_of
-from avlmaps.days.join import joined_keyframes, joined_sounds, joined_voxels
+from avlmaps.days.join import NO_SOURCES, joined_keyframes, joined_sounds, joined_sources, joined_voxels
 from avlmaps.days.settings import MergeSettings
 from avlmaps.days.surfaces import Occupied, resampled
 from avlmaps.maps.growing import require_place
@@ -119,8 +119,9 @@ def merge_maps(
     keyframes = joined_keyframes(stored, other, moved, visit.shift_s)
     with tempfile.TemporaryDirectory(prefix="avlmaps-clips-") as clips:
         sounds = joined_sounds(stored, other, moved, visit.shift_s, Path(clips))
-        content = MapContent(voxels, keyframes, stored.place_state, sounds, Path(clips), life)
-        info = _manifest(stored, other, content, visits, settings, perf_counter() - begin_s)
+        sources, why_not = joined_sources(stored, other, moved, voxels, keyframes)
+        content = MapContent(voxels, keyframes, stored.place_state, sounds, Path(clips), life, sources=sources)
+        info = _manifest(stored, other, content, visits, settings, perf_counter() - begin_s, why_not)
         edits = _edits(stored, other, keyframes, moved)
         with lock_folder(out), lock_folder(out, EDITING):
             write_map(out, content, info)
@@ -281,6 +282,7 @@ def _manifest(
     visits: tuple[Visit, ...],
     settings: MergeSettings,
     elapsed_s: float,
+    notice: str,
 ) -> MapInfo:
     info, grid = stored.info, stored.grid
     finished = datetime.now(UTC).isoformat(timespec="seconds")
@@ -306,7 +308,10 @@ def _manifest(
         counts=counts,
         rig=RigInfo.of(stored.rig),
         bounding_box_m=Box.of(content.voxels.index, grid.voxel_size_m),
-        notices=tuple(dict.fromkeys((*info.notices, *other.info.notices))),
+        notices=(
+            *dict.fromkeys(one for one in (*info.notices, *other.info.notices) if not one.startswith(NO_SOURCES)),
+            *([notice] if notice else ()),
+        ),
         doubts=tuple(dict.fromkeys((*info.doubts, *other.info.doubts))),
         visits=visits,
         files={},

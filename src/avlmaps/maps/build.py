@@ -6,6 +6,7 @@ from pathlib import Path
 from avlmaps.core.errors import MapError
 from avlmaps.core.progress import silence_progress
 from avlmaps.core.registry import Kind
+from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.pipeline.check import checked
 from avlmaps.maps.pipeline.encode_fuse import encode_and_fuse, fuse_spans
 from avlmaps.maps.pipeline.estimate import attach_estimated_ground, estimate_sensor, find_floor, find_sensor, find_up
@@ -74,7 +75,8 @@ def build_map(
             keyframes = describe_keyframes(plan, fused)  # their keypoints, places and views
             sounds = detect_sounds(plan)
             merged = merge(plan, fused, sensor)  # late, because it fills the memory
-            sources = locate_sources(plan, up.up.vector(), sounds.sounds, merged.voxels)
+            grid = GridSpec(plan.settings.voxel_size_m)
+            sources = locate_sources(plan.recording, up.up.vector(), sounds.sounds, merged.voxels, grid)
             require_unchanged(plan, stamp)
             write(plan, up, floor, fused, keyframes, sounds, merged, sources)
     return open_stored(plan.path)

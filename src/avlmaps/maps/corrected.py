@@ -12,6 +12,7 @@ from avlmaps.core.arrays import Float
 from avlmaps.core.errors import MapError
 from avlmaps.core.poses import inverse
 from avlmaps.core.progress import silence_progress
+from avlmaps.core.timeline import Trajectory
 from avlmaps.core.wording import option
 from avlmaps.maps.audio.events import track_of
 from avlmaps.maps.audio.segmentation import Segment
@@ -19,13 +20,15 @@ from avlmaps.maps.fusion.free_space import FreeViews, clean
 from avlmaps.maps.fusion.moved_submaps import MovedSubmaps
 from avlmaps.maps.fusion.sensor import NONE
 from avlmaps.maps.growing_walk import Motion
+from avlmaps.maps.pipeline.sources import locate_sources
 from avlmaps.maps.pipeline.write import carving_doubts
 from avlmaps.maps.pose_correction import PoseCorrection
 from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.manifest import Box, Removed, Timings, UpInfo
 from avlmaps.maps.store.reader import StoredMap, open_stored
 from avlmaps.maps.store.writer import MapContent, write_map
-from avlmaps.maps.types import HeardSounds, Keyframes, Submaps
+from avlmaps.maps.types import HeardSounds, Keyframes, SourceEvidence, Submaps
+from avlmaps.recordings.types import Recording
 
 MOVED = "Its poses were corrected after it was built"
 
@@ -49,13 +52,16 @@ class Corrected:
     elapsed_s: float
 
 
-def correct_stored(stored: StoredMap, stamps_s: Any, poses: Any) -> tuple[StoredMap, Corrected]:
+def correct_stored(
+    stored: StoredMap, stamps_s: Any, poses: Any, recording: Recording | None = None
+) -> tuple[StoredMap, Corrected]:
     """Make a map follow corrected poses, in its folder. Later corrections replace this one and do not add to it.
 
     Args:
         stored: a map that was built with submaps.
         stamps_s: (k,) of the corrected poses, rising, on the recording's clock.
         poses: (k, 4, 4) world_from_camera of the depth camera then, metres. Between them frames follow smoothly.
+        recording: that the map is of: by it, where sounds came from is found again; without it that is not known.
 
     Returns:
         The map as it is now, opened, and what was done.
@@ -71,6 +77,8 @@ def correct_stored(stored: StoredMap, stamps_s: Any, poses: Any) -> tuple[Stored
     now = motion.moved(frames_s, before)
     with lock_folder(stored.path), silence_progress(True):
         content, removed = _moved(stored, submaps, now)
+        sources, sources_s = _sources(stored, content, Trajectory(frames_s, now), motion.turn, recording)
+        content = replace(content, sources=sources)
         apart_m = np.linalg.norm(now[:, :3, 3] - np.asarray(submaps.fused_pose)[:, :3, 3], axis=1)
         median_m, most_m = float(np.median(apart_m)), float(apart_m.max())
         said = f"{MOVED}: frames moved by {median_m:.2f} m (median), {most_m:.2f} m at most."
@@ -93,11 +101,27 @@ def correct_stored(stored: StoredMap, stamps_s: Any, poses: Any) -> tuple[Stored
                 notices=(*kept, *doubts, *others, said),
                 files={},
                 timings=Timings(finished=finished, elapsed_s=info.timings.elapsed_s + elapsed_s,
-                                stages_s={**info.timings.stages_s, "correcting": elapsed_s}),
+                                stages_s={**info.timings.stages_s, "correcting": elapsed_s, **sources_s}),
             ),
         )  # fmt: skip
     opened = replace(open_stored(stored.path), encoders=stored.encoders)
     return opened, Corrected(median_m, most_m, info.counts.voxels, count, perf_counter() - begin_s)
+
+
+def _sources(
+    stored: StoredMap,
+    content: MapContent,
+    walk: Trajectory,
+    turn: Float[np.ndarray, "3 3"],
+    recording: Recording | None,
+) -> tuple[SourceEvidence | None, dict[str, float]]:
+    """Return the evidence of where sounds came from, and the seconds that took, where the recording tells it."""
+    if recording is None:
+        return None, {}
+    found, elapsed_s = locate_sources(
+        recording, turn @ stored.up_in_world, content.sounds, content.voxels, stored.grid, walk
+    )
+    return found, {} if found is None else {"sources": elapsed_s}
 
 
 def require_submaps(stored: StoredMap) -> Submaps:

@@ -23,6 +23,7 @@ from avlmaps.query.queryable import Queryable
 from avlmaps.query.voxel_space import Space
 
 if TYPE_CHECKING:
+    from avlmaps.maps.store.reader import StoredMap
     from avlmaps.query.contents import Thing
 
 _MAKERS_SHARE = 0.5  # probability that a sound comes from a thing that usually makes it, where there is one
@@ -46,6 +47,21 @@ class Listening(Queryable, Protocol):
     def sound_scores(self, text: str) -> Float[np.ndarray, " sounds"]:
         """Return for each sound the probability that it is called so."""
         ...
+
+
+def _unknown(stored: "StoredMap") -> str:
+    """Return why a map does not know where sounds came from, and what to do."""
+    what = f"{stored.path} does not know where sounds came from, only where the robot was"
+    if stored.info.visits:
+        return (
+            f"{what}: it is of several days, and not all of them say where the microphones are, or they have other "
+            "microphones. Build each day's map from a recording that says it (microphones in recording.json) and merge "
+            "them again."
+        )
+    return (
+        f"{what}: its recording does not say where the microphones are, or it was made without its recording. Give "
+        "their places (microphones in recording.json) and build the map of the recording again."
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,11 +159,7 @@ class SourceMap:
         """
         evidence = avlmap.stored.sources()
         if evidence is None:
-            raise QueryError(
-                f"{avlmap.stored.path} does not know where sounds came from, only where the robot was: its recording "
-                "does not say where the microphones are. Give their places (microphones in recording.json) and build "
-                "the map again."
-            )
+            raise QueryError(_unknown(avlmap.stored))
 
         def things(names: Sequence[str]) -> "Sequence[Thing]":
             if "pixels" not in avlmap.stored.info.models:

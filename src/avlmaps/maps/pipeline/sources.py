@@ -1,26 +1,76 @@
 """The stage of the sources: where each sound began, of a recording whose microphones are known."""
 
+from dataclasses import replace
+from datetime import UTC, datetime
 from time import perf_counter
 
 import numpy as np
+from msgspec import structs
 
+from avlmaps.core.arrays import Float
 from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.grid import GridSpec
-from avlmaps.maps.pipeline.plan import BuildPlan
+from avlmaps.maps.store.lock import lock_folder
+from avlmaps.maps.store.reader import StoredMap, open_stored
+from avlmaps.maps.store.writer import MapContent, write_map
 from avlmaps.maps.types import HeardSounds, SourceEvidence, Voxels
+from avlmaps.recordings.types import Recording
 
 
 def locate_sources(
-    plan: BuildPlan, up_in_world: np.ndarray, heard: HeardSounds, voxels: Voxels
+    recording: Recording,
+    up_in_world: Float[np.ndarray, "3"],
+    heard: HeardSounds,
+    voxels: Voxels,
+    grid: GridSpec,
+    walk: Trajectory | None = None,
 ) -> tuple[SourceEvidence | None, float]:
-    """Return the evidence of each sound over the surfaces of the map, and the seconds that took; None without any."""
-    begin, recording = perf_counter(), plan.recording
+    """Return the evidence of each sound over the surfaces of a map, and the seconds that took; None without any.
+
+    Args:
+        recording: of the sounds.
+        up_in_world: unit vector.
+        heard: the sounds.
+        voxels: of the map.
+        grid: of the map.
+        walk: the camera's poses in the map's world; the recording's own by default.
+    """
+    begin = perf_counter()
     if recording.audio is None or recording.audio.microphones is None or not len(heard):
         return None, 0.0
     from avlmaps.maps.sources.find import find_sources
 
-    walk = recording.trajectory or Trajectory(recording.stamps_s, recording.world_from_camera)
+    known = walk or recording.trajectory or Trajectory(recording.stamps_s, recording.world_from_camera)
     spans_s = list(zip(heard.onset_s.tolist(), heard.offset_s.tolist(), strict=True))
-    voxel_m = GridSpec(plan.settings.voxel_size_m).centre_of(np.asarray(voxels.index))
-    found = find_sources(recording.audio, walk, spans_s, voxel_m, up_in_world)
+    voxel_m = grid.centre_of(np.asarray(voxels.index))
+    found = find_sources(recording.audio, known, spans_s, voxel_m, up_in_world)
     return found, perf_counter() - begin
+
+
+def add_sources(stored: StoredMap, recording: Recording) -> StoredMap:
+    """Find where the sounds of a finished map came from, by its recording, and write that into its folder.
+
+    The map of a live drive needs this: its microphones come as one. Where the recording does not say where its
+    microphones are, the map stays as it is.
+
+    Raises:
+        MapError: the folder is in use or cannot be written.
+        AudioError: the recording's sound cannot be read.
+    """
+    found, elapsed_s = locate_sources(recording, stored.up_in_world, stored.sounds, stored.voxels, stored.grid)
+    if found is None:
+        return stored
+    info, folder = stored.info, stored.path / "sounds"
+    content = MapContent(
+        stored.voxels, stored.keyframes, stored.place_state, stored.sounds, folder, stored.life(), stored.submaps(),
+        found,
+    )  # fmt: skip
+    timings = structs.replace(
+        info.timings,
+        finished=datetime.now(UTC).isoformat(timespec="seconds"),
+        elapsed_s=info.timings.elapsed_s + elapsed_s,
+        stages_s={**info.timings.stages_s, "sources": elapsed_s},
+    )
+    with lock_folder(stored.path):
+        write_map(stored.path, content, structs.replace(info, files={}, timings=timings))
+    return replace(open_stored(stored.path), encoders=stored.encoders)

@@ -1,0 +1,133 @@
+"""Maps that were merged, moved to corrected poses or made live know where their sounds came from as well."""
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from avlmaps.core.errors import QueryError
+from avlmaps.core.poses import apply
+from avlmaps.days.join import joined_sources
+from avlmaps.days.merge import merge_maps
+from avlmaps.maps.build import build_map
+from avlmaps.maps.corrected import correct_stored
+from avlmaps.maps.pipeline.sources import add_sources
+from avlmaps.maps.settings import BuildSettings, FrameSettings
+from avlmaps.maps.sources.density import Density, Plan
+from avlmaps.maps.sources.settings import SourceSettings
+from avlmaps.maps.store.reader import StoredMap, open_stored
+from avlmaps.maps.store.writer import MapContent, write_map
+from avlmaps.maps.types import SourceEvidence
+from avlmaps.query.avlmap import AVLMap
+from avlmaps.recordings.open import open_recording
+from avlmaps_sim.recorder import RecordSettings, record_scene
+from helpers.hearing_scenes import flat
+
+
+@pytest.fixture(scope="module")
+def heard(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """Return a recording of a flat with an array, and its map with submaps."""
+    folder = tmp_path_factory.mktemp("flat")
+    settings = RecordSettings(
+        size=(160, 120), fps=4.0, hearing="acoustic", microphones="square4", snr_db=20.0, sources=4, workers=1,
+        max_frames=100,
+    )  # fmt: skip
+    record_scene(flat(), folder / "rec", settings, seed=1)
+    built = BuildSettings(frames=FrameSettings(per_submap=32))
+    build_map(open_recording(folder / "rec"), folder / "flat.avlmap", settings=built, progress=False)
+    return folder / "rec", folder / "flat.avlmap"
+
+
+@pytest.fixture
+def copy(heard: tuple[Path, Path], tmp_path: Path) -> StoredMap:
+    """Return the map in a folder of its own."""
+    shutil.copytree(heard[1], tmp_path / "copy.avlmap")
+    return open_stored(tmp_path / "copy.avlmap")
+
+
+def places(sources: SourceEvidence | None) -> np.ndarray:
+    """Return the likeliest place on the plan of each sound alone."""
+    assert sources is not None
+    plan, prior = Plan.of(sources.place), sources.prior.astype(np.float64)
+    settings = SourceSettings.of(int(sources.channels[0]))
+    found = [
+        Density.of(plan, prior, heard.astype(np.float64) + expected, expected.astype(np.float64), settings).position_m
+        for heard, expected in zip(sources.heard, sources.expected, strict=True)
+    ]
+    return np.array(found).reshape(-1, 2)
+
+
+def without_sources(stored: StoredMap) -> StoredMap:
+    content = MapContent(
+        stored.voxels, stored.keyframes, stored.place_state, stored.sounds, stored.path / "sounds",
+        submaps=stored.submaps(),
+    )  # fmt: skip
+    write_map(stored.path, content, replace_files(stored))
+    return open_stored(stored.path)
+
+
+def replace_files(stored: StoredMap):
+    from msgspec import structs
+
+    return structs.replace(stored.info, files={})
+
+
+def test_a_map_that_grew_gets_its_sources_from_its_recording(heard: tuple[Path, Path], copy: StoredMap) -> None:
+    before = copy.sources()
+    bare = without_sources(copy)
+    assert bare.sources() is None
+    with pytest.raises(QueryError, match="build the map of the recording"):
+        AVLMap(bare).sources()
+    after = add_sources(bare, open_recording(heard[0]))
+    assert np.allclose(places(after.sources()), places(before), atol=0.05)
+    assert after.info.counts == copy.info.counts and open_stored(after.path).submaps() is not None
+    assert all(after.clip_path(number).is_file() for number in range(len(after.sounds)))
+
+
+def test_sources_move_with_corrected_poses(heard: tuple[Path, Path], copy: StoredMap) -> None:
+    recording, before = open_recording(heard[0]), places(copy.sources())
+    turn = np.eye(4)
+    turn[:2, :2], turn[:2, 3] = [[0.0, -1.0], [1.0, 0.0]], [3.0, 1.0]
+    poses = turn @ np.asarray(recording.world_from_camera)
+    moved, _ = correct_stored(copy, recording.stamps_s, poses, recording)
+    wanted = apply(turn, np.column_stack([before, np.zeros(len(before))]))[:, :2]
+    apart = np.linalg.norm(places(moved.sources()) - wanted, axis=1)
+    assert np.median(apart) < 0.2
+    lost, _ = correct_stored(moved, recording.stamps_s, poses)
+    assert lost.sources() is None, "old evidence does not fit new poses"
+
+
+def test_a_merged_map_has_the_sources_of_both_days(heard: tuple[Path, Path], copy: StoredMap, tmp_path: Path) -> None:
+    first = open_stored(heard[1])
+    merged = merge_maps(first, copy, tmp_path / "both.avlmap", day="2026-11-24", first_day="2026-11-23")
+    both, one = merged.sources(), places(first.sources())
+    assert both is not None and len(both) == 2 * len(one) == len(merged.sounds)
+    apart = np.linalg.norm(places(both) - np.concatenate([one, one]), axis=1)
+    assert np.median(apart) < 0.2
+    rows = [row for thing in AVLMap(merged).contents().things for row in thing.heard]
+    assert all(row.get("when", {}).get("day") in ("2026-11-23", "2026-11-24") for row in rows)
+
+
+def test_a_merge_says_why_it_does_not_know(heard: tuple[Path, Path], copy: StoredMap, tmp_path: Path) -> None:
+    first = open_stored(heard[1])
+    bare = without_sources(copy)
+    found, why = joined_sources(first, bare, np.eye(4), first.voxels, first.keyframes)
+    assert found is None and "copy.avlmap" in why and "microphones in recording.json" in why
+    own = first.sources()
+    assert own is not None
+    stereo = replace(own, channels=np.array([2], np.int64))
+    write_map(
+        copy.path,
+        MapContent(
+            bare.voxels, bare.keyframes, bare.place_state, bare.sounds, bare.path / "sounds", sources=stereo
+        ),
+        replace_files(bare),
+    )  # fmt: skip
+    found, why = joined_sources(first, open_stored(copy.path), np.eye(4), first.voxels, first.keyframes)
+    assert found is None and "4 microphones" in why and "2" in why
+    merged = merge_maps(first, open_stored(copy.path), tmp_path / "both.avlmap")
+    assert why in merged.info.notices
+    with pytest.raises(QueryError, match="merge them again"):
+        AVLMap(merged).sources()
