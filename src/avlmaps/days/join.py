@@ -139,7 +139,7 @@ def joined_sources(
         other: the new day's.
         moved: map_from_other.
         voxels: of both.
-        keyframes: of both; they tell where the robots were.
+        keyframes: of both; where the robots were.
     """
     parts = [(of.sources(), where) for of, where in ((stored, np.eye(4)), (other, moved)) if len(of.sounds)]
     known = [(evidence, where) for evidence, where in parts if evidence is not None]

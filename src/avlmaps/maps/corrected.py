@@ -115,7 +115,7 @@ def _sources(
     turn: Float[np.ndarray, "3 3"],
     recording: Recording | None,
 ) -> tuple[SourceEvidence | None, dict[str, float]]:
-    """Return the evidence of where sounds came from, and the seconds that took, where the recording tells it."""
+    """Return the evidence of where sounds came from, and the seconds that took, where the microphones are known."""
     if recording is None:
         return None, {}
     found, elapsed_s = locate_sources(

@@ -11,7 +11,7 @@ from avlmaps.maps.sources.settings import SourceSettings
 from avlmaps.maps.types import SourceEvidence
 
 _NEIGHBOURS = 4
-_KNOWN_M = 0.3  # from the nearest candidate of its own map a place is known so far
+_KNOWN_M = 0.3  # from the nearest candidate of its own map a place counts as known up to this distance
 _TINY_M2 = 1e-8
 
 
