@@ -14,6 +14,7 @@ from avlmaps.maps.sources.find import find_sources
 from avlmaps.maps.store.reader import open_stored
 from avlmaps.navigate.instances import things_in
 from avlmaps.query.avlmap import AVLMap, QuerySettings
+from avlmaps.query.schema import ListedThing
 from avlmaps.recordings.audio import AudioTrack, Sound
 from avlmaps.recordings.channels import with_microphones, write_channels
 from avlmaps.recordings.microphones import microphones_named
@@ -161,7 +162,7 @@ def test_things_list_what_was_heard_from_them(mapped: tuple[Path, Path]) -> None
     assert likely and {key: row["probability"] for key, row in heard.items()} == pytest.approx(likely, abs=1e-3)
     ends = np.asarray(avlmap.stored.sounds.onset_s)
     assert all(np.abs(ends - row["onset_s"]).min() < 1e-6 and "when" not in row for row in heard.values())
-    assert "heard from it" in thing_lines(listed)[0]
+    assert "heard from it" in thing_lines([ListedThing(**row) for row in listed])[0]
     assert "heard" not in avlmap.things()[0].to_json()
 
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from avlmaps.core.arrays import Float
+from avlmaps.core.arrays import Float, Float16, Int
 from avlmaps.core.poses import apply, rotation_to_level
 from avlmaps.maps.sources.candidates import candidates_of
 from avlmaps.maps.sources.settings import SourceSettings
@@ -57,12 +57,20 @@ def _laid(
 
     own = apply(moved, np.asarray(evidence.place, np.float64))
     count = min(_NEIGHBOURS, len(own))
-    away, row = (np.asarray(one).reshape(len(place), count) for one in KDTree(own).query(place, k=count))
-    weight = 1.0 / (away**2 + _TINY_M2)
+    near = KDTree(own).query(place, k=count)
+    away_m = np.asarray(near[0], np.float64).reshape(len(place), count)
+    row = np.asarray(near[1], np.int64).reshape(len(place), count)
+    weight = 1.0 / (away_m**2 + _TINY_M2)
     weight /= weight.sum(axis=1, keepdims=True)
-    heard, expected = (
-        (np.asarray(values, np.float64)[:, row] * weight).sum(axis=2) for values in (evidence.heard, evidence.expected)
-    )
+    heard = _means(evidence.heard, row, weight)
+    expected = _means(evidence.expected, row, weight)
     reach_m = SourceSettings.of(int(evidence.channels[0])).reach_m
-    expected -= np.maximum(away[:, 0] - _KNOWN_M, 0.0) / reach_m
+    expected -= np.maximum(away_m[:, 0] - _KNOWN_M, 0.0) / reach_m
     return heard - heard.max(axis=1, keepdims=True), expected
+
+
+def _means(
+    values: Float16[np.ndarray, "n own"], row: Int[np.ndarray, "c k"], weight: Float[np.ndarray, "c k"]
+) -> Float[np.ndarray, "n c"]:
+    """Return the weighted means of some columns."""
+    return (np.asarray(values, np.float64)[:, row] * weight).sum(axis=2)
