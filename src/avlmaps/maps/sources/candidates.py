@@ -52,8 +52,8 @@ def candidates_of(voxel_m: Float[np.ndarray, "n 3"], ear_m: Float[np.ndarray, "k
     if len(floor):
         column, lowest = _columns(floor)
         air = np.concatenate([np.column_stack([column, lowest + height]) for height in _AIR_HEIGHTS_M])
-        taken = {tuple(cell) for cell in np.floor(here / _AIR_CELL_M).astype(np.int64).tolist()}
-        air = air[[tuple(cell) not in taken for cell in np.floor(air / _AIR_CELL_M).astype(np.int64).tolist()]]
+        key = _keys(np.floor(np.concatenate([here, air]) / _AIR_CELL_M).astype(np.int64))
+        air = air[~np.isin(key[len(here) :], key[: len(here)])]
     share = _AIR_SHARE if len(air) else 0.0
     own = _flattened(surface)
     prior = np.concatenate([(1.0 - share) * own / own.sum(), np.full(len(air), share / max(len(air), 1))])
@@ -63,25 +63,29 @@ def candidates_of(voxel_m: Float[np.ndarray, "n 3"], ear_m: Float[np.ndarray, "k
 
 def _flattened(surface: Float[np.ndarray, "c 3"]) -> Float[np.ndarray, " c"]:
     """Return weights by which a column of k cells of surface has the weight √k: walls sound less than their area."""
-    _, which, count = np.unique(
-        np.floor(surface[:, :2] / CELL_M).astype(np.int64), axis=0, return_inverse=True, return_counts=True
-    )
-    return count[which.reshape(-1)] ** -0.5
+    column = _keys(np.floor(surface[:, :2] / CELL_M).astype(np.int64))
+    _, which, count = np.unique(column, return_inverse=True, return_counts=True)
+    return count[which] ** -0.5
+
+
+def _keys(cell: Int[np.ndarray, "n k"]) -> Int[np.ndarray, " n"]:
+    """Return a number for each cell, the same for the same cell, in the order of the cells' rows."""
+    low = cell.min(axis=0)
+    return np.ravel_multi_index(tuple((cell - low).T), tuple(cell.max(axis=0) - low + 1))
 
 
 def _means(point: Float[np.ndarray, "n 3"], cell: Int[np.ndarray, "n 3"]) -> Float[np.ndarray, "c 3"]:
     """Return the mean of the points in each cell."""
-    _, which, count = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
-    which = which.reshape(-1)
+    _, which, count = np.unique(_keys(cell), return_inverse=True, return_counts=True)
     return np.stack([np.bincount(which, point[:, axis]) for axis in range(3)], axis=1) / count[:, None]
 
 
 def _columns(floor: Float[np.ndarray, "n 3"]) -> tuple[Float[np.ndarray, "k 2"], Float[np.ndarray, " k"]]:
     """Return the middle of each column of air over the floor, and how high the lowest surface in it lies."""
     cell = np.floor(floor[:, :2] / _AIR_CELL_M).astype(np.int64)
-    column, which = np.unique(cell, axis=0, return_inverse=True)
-    lowest = np.full(len(column), np.inf)
-    np.minimum.at(lowest, which.reshape(-1), floor[:, 2])
+    _, first, which = np.unique(_keys(cell), return_index=True, return_inverse=True)
+    column, lowest = cell[first], np.full(len(first), np.inf)
+    np.minimum.at(lowest, which, floor[:, 2])
     level = float(np.quantile(lowest, 0.2))
     flat = np.abs(lowest - level) < 0.25
     return (column[flat] + 0.5) * _AIR_CELL_M, lowest[flat]
