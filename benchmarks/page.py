@@ -70,7 +70,7 @@ ENTRIES = (
     Entry("locating", "Time to locate a photo", "python benchmarks/locate.py"),
     Entry(
         "source-speed", "Time to find where a sound came from", "python benchmarks/sources.py",
-        about="[How](concepts/sound-sources.md). Two seconds on 300,000 voxels were asked for.",
+        about="[How](concepts/sound-sources.md). The goal is two seconds on 300,000 voxels.",
     ),
     Entry("store", "Writing and opening a map", "python benchmarks/store.py"),
     Entry("render", "Rendering views", "python benchmarks/render.py"),

@@ -36,7 +36,7 @@ def building() -> np.ndarray:
     x, y = (np.arange(0.0, side, STEP_M) + STEP_M / 2 for side in size)
     up = np.arange(STEP_M, HIGH_M, STEP_M) + STEP_M / 2
     floor = np.stack(np.meshgrid(x, y, [0.0], indexing="ij"), axis=-1).reshape(-1, 3)
-    parts = [floor, floor + [0.0, 0.0, HIGH_M]]
+    parts = [floor, floor + np.array([0.0, 0.0, HIGH_M])]
     for number in range(ROOMS + 1):
         for along, axis in ((y, 0), (x, 1)):
             free = along[np.abs(along % SIDE_M[1 - axis] - 2.5) > 0.45]
@@ -58,7 +58,7 @@ def drive() -> Trajectory:
 
 
 def recorded(walk: Trajectory, array: Microphones, folder: Path) -> AudioTrack:
-    """Return what the array hears of bursts of noise without reflections, written into a folder."""
+    """Return the track of the array in bursts of noise without reflections, written into a folder."""
     rng, hop = np.random.default_rng(0), RATE_HZ // 10
     count = round(walk.stamps_s[-1] * RATE_HZ)
     noise = rng.standard_normal(count) * (np.arange(count) % 4000 < 2500)

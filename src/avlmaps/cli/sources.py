@@ -63,7 +63,7 @@ def source_lines(answer: "Mapping[str, Any]") -> list[str]:
         return ["no sounds"]
     rows = [
         (
-            one["name"] or "unnamed", f"{one['confidence']:.2f}", place(one["position"]),
+            one["name"] or "unnamed", f"{one['confidence']:.2f}", f"{one['probability']:.2f}", place(one["position"]),
             f"{one['within_50_m']:.2f} m", f"{one['within_90_m']:.2f} m",
             ", ".join(f"{room['name']} {room['probability']:.2f}" for room in one["rooms"][:2]),
             ", ".join(f"{thing['name']} {thing['probability']:.2f}" for thing in one["things"]),
@@ -71,6 +71,6 @@ def source_lines(answer: "Mapping[str, Any]") -> list[str]:
         )
         for one in answer["sources"]
     ]  # fmt: skip
-    head = ("sound", "confidence", f"position ({answer['frame']} frame)", "50 % within", "90 % within", "room", "thing",
-            "sounds")  # fmt: skip
+    head = ("sound", "confidence", "probability", f"position ({answer['frame']} frame)", "50 % within", "90 % within",
+            "room", "thing", "sounds")  # fmt: skip
     return table_lines(head, rows)

@@ -38,13 +38,14 @@ def test_a_truth_off_the_map_counts_at_the_nearest_cell() -> None:
 
 def test_the_table_counts_what_was_placed() -> None:
     placed = [
-        Placed("square4", 0.1, True, True, True, 1.0, True, True, 0.5, 9),
-        Placed("square4", 0.7, False, False, True, 2.0, None, True, 0.5, 9),
+        Placed("square4", 0.1, True, True, True, 1.0, True, True, 0.5, 9, 0.9),
+        Placed("square4", 0.7, False, False, True, 2.0, None, True, 0.5, 9, 0.2),
         Placed("room's middle", 1.0, True),
     ]
     made = table_of_homes([HomeOutcome("house:1", 3, 2, tuple(placed))])
     first, last = (dict(zip(made["columns"], row, strict=True)) for row in made["rows"])
     assert (first["sounds"], first["within 0.5 m %"], first["right room %"]) == (2, 50.0, 50.0)
+    assert first["said %"] == 55.0 and last["said %"] == ""
     assert (first["in 90 % region %"], first["right thing of 3 %"], first["of"]) == (100.0, 100.0, 1)
     assert last["by"] == "room's middle" and last["in 90 % region %"] == ""
 

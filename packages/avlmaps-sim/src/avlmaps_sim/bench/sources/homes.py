@@ -57,6 +57,7 @@ class Placed:
         in_50: whether the region of 50 % holds the truth; None of a baseline.
         in_90: of 90 %.
         area_90_m2: of that region.
+        right: probability that it gives to the truth within 0.5 m of the place.
         thing: whether the right thing is among the first three; None where no thing made it.
         same_room: whether the robot was in the source's room.
         elapsed_s: seconds that its evidence took.
@@ -73,6 +74,7 @@ class Placed:
     same_room: bool = True
     elapsed_s: float = float("nan")
     voxels: int = 0
+    right: float = float("nan")
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,6 +141,7 @@ def measure_home(job: HomeJob, open_spec: Callable[[str], Scene]) -> HomeOutcome
                     same_room(truth.areas, event.source, event.robot),
                     each_s,
                     len(avlmap.space),
+                    one.density.spread.right,
                 ))  # fmt: skip
     for index, number in pairs:
         placed += baselines(truth.events[index], true[index], truth.areas, things, avlmap, number)
