@@ -71,7 +71,9 @@ def _flattened(surface: Float[np.ndarray, "c 3"]) -> Float[np.ndarray, " c"]:
 def _keys(cell: Int[np.ndarray, "n k"]) -> Int[np.ndarray, " n"]:
     """Return a number for each cell, the same for the same cell, in the order of the cells' rows."""
     low = cell.min(axis=0)
-    return np.ravel_multi_index(tuple((cell - low).T), tuple(cell.max(axis=0) - low + 1))
+    size = cell.max(axis=0) - low + 1
+    step = np.append(np.cumprod(size[:0:-1])[::-1], 1)
+    return ((cell - low) * step).sum(axis=1)
 
 
 def _means(point: Float[np.ndarray, "n 3"], cell: Int[np.ndarray, "n 3"]) -> Float[np.ndarray, "c 3"]:
