@@ -10,6 +10,7 @@ from avlmaps.core.errors import AvlmapsError
 from avlmaps.query.contents import listed_rooms
 from avlmaps.query.export import heat_colors, palette
 from avlmaps.query.naming import VoxelNamer
+from avlmaps.view.sounded import drawn_sources
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -32,6 +33,7 @@ class Labels:
         things: most confident first.
         sounds: in the order of their onset.
         rooms: those with most views first.
+        sources: where sounds came from, as the page draws it; none where the map does not know.
         names: of things, in the order of their colours; a voxel's first label counts into it from 1.
         room_names: likewise, for the second label.
         voxel_names: likewise, for the third label.
@@ -42,6 +44,7 @@ class Labels:
     things: "tuple[Thing, ...]"
     sounds: "tuple[SoundEvent, ...]"
     rooms: "tuple[Room, ...]"
+    sources: "tuple[dict[str, Any], ...]"
     names: tuple[str, ...]
     room_names: tuple[str, ...]
     voxel_names: tuple[str, ...]
@@ -55,12 +58,13 @@ class Labels:
         things = _or_note(avlmap.things, notes)
         sounds = _or_note(avlmap.sounds, notes)
         rooms = _or_note(avlmap.rooms, notes)
+        sources = _or_note(lambda: drawn_sources(avlmap), notes)
         names, thing = _thing_labels(len(avlmap.space), things)
         room_names, room = _room_labels(avlmap, rooms, layout.order)
         voxel_names, best, confidence = _name_labels(avlmap, notes, layout.order)
         voxels = np.stack([thing[layout.order], room, best, confidence], axis=1)
         return cls(
-            tuple(things), tuple(sounds), tuple(rooms), names, room_names, voxel_names, voxels,
+            tuple(things), tuple(sounds), tuple(rooms), tuple(sources), names, room_names, voxel_names, voxels,
             tuple(dict.fromkeys(notes)),
         )  # fmt: skip
 
@@ -85,6 +89,7 @@ class Labels:
                 | {"track": level(sound.track).round(4).tolist()}
                 for sound in self.sounds
             ],
+            "sources": list(self.sources),
             "rooms": [
                 row | {"label": self._room_label(room)}
                 for row, room in zip(listed_rooms(self.rooms, layout.avlmap.storeys), self.rooms, strict=True)

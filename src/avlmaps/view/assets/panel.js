@@ -7,6 +7,14 @@ const clock = (seconds) => `${Math.floor(seconds / 60)}:${String(Math.floor(seco
 const percent = (share) => `${Math.round(100 * share)} %`;
 const areaText = (room) => (room.area_m2 === null ? "" : ` · ${room.area_m2.toFixed(1)} m²`);
 
+const RAYS = 8; // of each sound of a source
+
+/** How well the place of a source is known, and what it may be. */
+function sourceText(source) {
+  const likely = [source.things[0], source.rooms[0]].filter(Boolean).map((one) => `${one.name} ${percent(one.probability)}`);
+  return [`within ${metres(source.within_50_m)} with 50 %, ${metres(source.within_90_m)} with 90 %`, ...likely].join(" · ");
+}
+
 function made(tag, properties = {}, ...children) {
   const element = document.createElement(tag);
   Object.assign(element, properties);
@@ -332,9 +340,10 @@ class Panel {
     this.cut();
     this.bindStoreys();
     $("colour").addEventListener("change", () => this.colourBy($("colour").value));
-    for (const kind of ["things", "boxes", "sounds", "rooms", "path"]) {
+    for (const kind of ["things", "boxes", "sounds", "sources", "rooms", "path"]) {
       $(`show-${kind}`).addEventListener("change", () => {
         this.marks();
+        this.legend();
         this.drawPath();
       });
     }
@@ -417,6 +426,12 @@ class Panel {
         list.append(made("li", {}, tint, text));
       });
     }
+    if (!$("show-sources").checked || !this.contents.some((one) => one?.sources.length)) return;
+    for (const [share, tint] of Object.entries(SOURCE_TINTS)) {
+      const edge = made("i");
+      edge.style.background = `rgb(${tint.map((value) => Math.round(255 * value)).join(",")})`;
+      list.append(made("li", {}, edge, `a sound's source, with ${percent(Number(share))}`));
+    }
   }
 
   /** All names and numbers over the picture. */
@@ -436,6 +451,7 @@ class Panel {
         place: this.toLevel(k, sound.position), text: `♪ ${sound.names[0] ?? `sound ${i + 1}`}`,
         title: `play what was heard at ${clock(sound.onset_s)}`, onClick: (event) => this.play(k, i, event.target),
       })) : []);
+      this.markSources(k, shown("sources") ? contents.sources : []);
       marks.set("room", 3, shown("rooms") ? contents.rooms.map((room) => {
         const place = this.toLevel(k, room.position);
         const floor = room.outline.length ? this.toLevel(k, room.outline[0])[2] : this.floorUnder(map, place[2]);
@@ -470,8 +486,44 @@ class Panel {
     this.viewer.changed();
   }
 
+  /** The regions that hold the sources of sounds, and from where the robot heard the chosen one. */
+  markSources(k, sources) {
+    const { marks, map } = this.viewer.fields[k];
+    marks.set("source", 1.5, sources.map((source, i) => ({
+      place: this.toLevel(k, source.position), text: `◉ ${source.name || `source ${i + 1}`}`,
+      title: `${sourceText(source)}; play it, and show from where it was heard`,
+      onClick: (event) => {
+        this.showRays(k, source);
+        this.play(k, source.sounds[0], event.target);
+      },
+    })));
+    this.viewer.setLines(k, "sources", sources.flatMap(({ regions, position }) => {
+      const floor = this.floorUnder(map, this.toLevel(k, position)[2]) + 0.04;
+      return regions.flatMap(({ probability, outlines }) => outlines.map((corners) => ({
+        kind: "band", tint: SOURCE_TINTS[probability],
+        places: band([...corners, corners[0]].map(([x, y]) => [x, y, floor]), probability > 0.5 ? 0.04 : 0.08),
+      })));
+    }));
+    if (this.heard?.k === k && !sources.includes(this.heard.source)) this.viewer.setLines(k, "rays", null);
+  }
+
+  /** Lines from the places where the robot heard a source to the source. */
+  showRays(k, source) {
+    this.heard = { k, source };
+    const end = this.toLevel(k, source.position);
+    const places = source.sounds.flatMap((number) => {
+      const { track } = this.contents[k].sounds[number];
+      const step = Math.max(1, Math.ceil(track.length / RAYS));
+      return track.filter((_, i) => i % step === 0);
+    });
+    this.viewer.fields.forEach((_, other) => this.viewer.setLines(other, "rays", other === k ? [
+      { kind: "line", tint: SOURCE_TINTS[0.5], through: true,
+        places: new Float32Array(places.flatMap((place) => [...place, ...end])) },
+    ] : null));
+  }
+
   list() {
-    const { things, sounds, rooms } = this.contents[0];
+    const { things, sounds, sources, rooms } = this.contents[0];
     const { palettes } = this.contents[0];
     const row = (text, more, place, distance, [kind, label] = []) => {
       const swatch = kind ? [made("i", { className: "swatch" })] : [];
@@ -492,10 +544,18 @@ class Panel {
         ariaLabel: `clip of ${sound.names[0] ?? "the sound"}` }));
       return item;
     }));
+    $("sources").replaceChildren(...sources.map((source, i) => {
+      const item = row(source.name || `source ${i + 1}`, sourceText(source), source.position, 5);
+      item.firstChild.addEventListener("click", () => this.showRays(0, source));
+      item.append(made("audio", { controls: true, preload: "none", src: this.source.clip(0, source.sounds[0]),
+        ariaLabel: `clip of ${source.name || "the source"}` }));
+      return item;
+    }));
+    $("sources-section").hidden = $("sources-field").hidden = !this.contents.some((one) => one?.sources.length);
     $("rooms").replaceChildren(...rooms.map((room) =>
       row(room.name, `${percent(room.probability)}${areaText(room)} · ${room.views} views`, room.position, 7,
         ["room", room.label])));
-    for (const [id, list] of [["things", things], ["sounds", sounds], ["rooms", rooms]]) {
+    for (const [id, list] of [["things", things], ["sounds", sounds], ["sources", sources], ["rooms", rooms]]) {
       $(`${id}-count`).textContent = `(${list.length})`;
     }
     if (!this.source.live) return;

@@ -3,6 +3,7 @@
 const REST_MS = 140;
 const PATH_TINT = [0.12, 0.44, 0.75];
 const INK_TINT = [0.09, 0.1, 0.11];
+const SOURCE_TINTS = { 0.5: [0.7, 0.26, 0.06], 0.9: [0.95, 0.6, 0.32] };
 
 /** A band over the floor along a path. */
 function band(places, width) {

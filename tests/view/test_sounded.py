@@ -1,0 +1,87 @@
+"""Where sounds came from, on the page: regions at their source, rays from where the robot heard it, and the clip."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_browser import browser, opened  # noqa: F401 - a fixture
+
+from avlmaps.maps.store.reader import open_stored
+from avlmaps.maps.store.writer import MapContent, write_map
+from avlmaps.maps.types import SourceEvidence
+from avlmaps.query.avlmap import AVLMap
+from avlmaps.view.sounded import SHARES, drawn_sources
+from helpers.viewing import Served, serving
+
+
+@pytest.fixture(scope="session")
+def sounded(room: AVLMap, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The small map, with evidence that its sounds came from near one voxel."""
+    stored = open_stored(room.stored.path)
+    place = np.asarray(room.points, np.float32)[::3]
+    away = np.linalg.norm(place[:, :2] - place[len(place) // 2, :2], axis=1)
+    heard = np.tile(-((away / 0.4) ** 2), (len(stored.sounds), 1)).astype(np.float16)
+    evidence = SourceEvidence(
+        place, np.full(len(place), 1.0 / len(place), np.float32), heard, np.zeros_like(heard),
+        np.zeros(len(heard), np.uint8), np.array([4], np.int64),
+    )  # fmt: skip
+    content = MapContent(
+        stored.voxels, stored.keyframes, stored.place_state, stored.sounds, stored.path / "sounds", sources=evidence
+    )
+    path = tmp_path_factory.mktemp("sounded") / "room.avlmap"
+    write_map(path, content, stored.info)
+    return path
+
+
+def _holds(corners: np.ndarray, x: float, y: float) -> bool:
+    a, b = corners, np.roll(corners, -1, axis=0)
+    crosses = (a[:, 1] > y) != (b[:, 1] > y)
+    at = a[:, 0] + (y - a[:, 1]) / np.where(crosses, b[:, 1] - a[:, 1], 1.0) * (b[:, 0] - a[:, 0])
+    return bool(np.count_nonzero(crosses & (at > x)) % 2)
+
+
+def test_the_regions_hold_the_source_and_the_likelier_is_smaller(sounded: Path) -> None:
+    avlmap = AVLMap.open(sounded)
+    drawn = drawn_sources(avlmap)
+    assert len(drawn) == len(avlmap.sources()) > 0
+    for one in drawn:
+        x, y, _ = avlmap.space.level(np.array(one["position"]))
+        assert [region["probability"] for region in one["regions"]] == list(SHARES)
+        spans = []
+        for region in one["regions"]:
+            outlines = [np.array(corners) for corners in region["outlines"]]
+            assert any(_holds(corners[:, :2], x, y) for corners in outlines)
+            spans.append(np.ptp(np.concatenate(outlines)[:, :2], axis=0).max())
+        assert spans[0] <= spans[1]
+
+
+def test_a_map_that_does_not_know_has_none_and_no_note(room: AVLMap) -> None:
+    from avlmaps.view.on_page import MapOnPage
+
+    told = MapOnPage(room).describe_contents()
+    assert told["sources"] == [] and not any("microphone" in note for note in told["notes"])
+
+
+@pytest.fixture
+def served_sounds(sounded: Path) -> Iterator[Served]:
+    yield from serving(sounded)
+
+
+@pytest.mark.browser
+def test_a_click_on_a_source_shows_rays_and_plays_its_clip(browser, served_sounds: Served) -> None:  # noqa: F811
+    page = opened(browser, served_sounds.url)
+    lines = "avlmapsView.viewer.fields[0].lines"
+    drawn = len(drawn_sources(served_sounds.service.shelf.get("map0").avlmap))
+    assert page.locator(".mark.source").count() == drawn
+    assert page.evaluate(f"{lines}.get('sources').length") >= 2 * drawn
+    assert page.evaluate(f"{lines}.has('rays')") is False
+    page.locator(".mark.source").first.dispatch_event("click")
+    assert page.evaluate(f"{lines}.get('rays')[0].places.length") >= 6
+    assert page.locator(".mark.source.playing").count() == 1
+    assert "50 %" in page.inner_text("#legend") and page.locator("#sources audio").count() == drawn
+    page.uncheck("#show-sources")
+    assert page.locator(".mark.source").count() == 0 and page.inner_text("#legend") == ""
+    assert page.evaluate(f"{lines}.has('rays')") is False
+    assert page.faults == []
+    page.close()
