@@ -9,6 +9,7 @@ PROJECTS := pyproject.toml $(SIM)/pyproject.toml $(MODELS)/pyproject.toml
 EDITABLE := install --quiet --no-deps --no-build-isolation -e . -e $(SIM) -e $(MODELS)
 TORCH := .venv-foundation
 ROS2 := .venv-ros2
+CLUSTER := .venv-cluster
 # The wheels of ROS 2 are for CPython 3.12 alone.
 PYTHON312 ?= $(firstword $(foreach one,python3.12 $(PYTHON) $(wildcard $(HOME)/.pyenv/versions/3.12*/bin/python3.12) \
   $(shell uv python find 3.12 2>/dev/null),  $(shell $(one) -c 'import sys; sys.version_info[:2] == (3, 12) and print(sys.executable)' 2>/dev/null)))
@@ -33,7 +34,7 @@ FAST := tests/core tests/test_imports.py tests/test_conventions.py tests/query/t
 # The further Pythons that `make dist-test` tries; each needs the locked dependencies once, from the network.
 PYTHONS ?=
 
-.PHONY: help demo test test-most test-fast dist-test test-kernels bounds test-foundation test-ros1 faults-ros1 types-foundation test-ros2 faults-ros2 python312 lint format pictures docs fuzz bench train lock clean
+.PHONY: help demo test test-most test-fast dist-test test-kernels bounds test-foundation test-ros1 faults-ros1 types-foundation test-ros2 faults-ros2 test-cluster python312 lint format pictures docs fuzz bench train lock clean
 
 help:  ## Show what can be made.
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -103,6 +104,16 @@ python312:  ## Say which Python 3.12 `make test-ros2` takes; fail where there is
 # These robots move in real time: what fails beside other processes is run once more, alone.
 test-ros2: $(ROS2)/.ready  ## Run the tests against real ROS 2 (rclpy from wheels, in a virtual environment of its own, 1 GB).
 	$(ROS2)/bin/python -m pytest -n 2 --dist loadgroup tests/ros2 || $(ROS2)/bin/python -m pytest --last-failed -n 0 tests/ros2
+
+test-cluster: $(CLUSTER)/.ready  ## Build on a Ray cluster of two workers and kill them (in a virtual environment of its own, 1 GB).
+	$(CLUSTER)/bin/python -m pytest -rs tests/maps/test_cluster.py tests/maps/test_ray.py
+
+$(CLUSTER)/.ready: requirements/lock.txt requirements/cluster.txt $(PROJECTS)
+	$(PYTHON) -m venv $(CLUSTER)
+	$(CLUSTER)/bin/python -m pip install --quiet --require-hashes -r requirements/lock.txt
+	$(CLUSTER)/bin/python -m pip install --quiet -r requirements/cluster.txt
+	$(CLUSTER)/bin/python -m pip $(EDITABLE)
+	touch $@
 
 faults-ros2: $(ROS2)/.ready  ## Break a native drive on ROS 2 in 200 random ways (an hour): ros2_faults.jsonl.
 	$(ROS2)/bin/python tests/ros2/faults.py --cases $(or $(CASES),200) --seed $(or $(SEED),1)

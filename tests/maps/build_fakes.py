@@ -1,6 +1,8 @@
 """A small walk past a coloured wall, and models that cost nothing, for tests of the store and the build."""
 
 import hashlib
+import json
+import time
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -34,6 +36,7 @@ class Walk(Recording):
         bad: tuple[int, ...] = (),
         name: str = "walk",
         audio: Path | None = None,
+        slow_s: float = 0.0,
     ) -> None:
         self.path = Path("/nowhere/of/mine") / name
         self.format = "fake"
@@ -45,11 +48,12 @@ class Walk(Recording):
         self.up_in_world = np.array([0.0, 0.0, 1.0])
         self.audio = AudioTrack.open(audio) if audio else None
         self.notices = (f"{self.path} is made up.",)
-        self.seed, self.bad = seed, bad
+        self.seed, self.bad, self.slow_s = seed, bad, slow_s
 
     def frame(self, index: int) -> Frame:
         if index in self.bad:
             raise RecordingError(f"{self.path}/{index:06d}.png is truncated; leave that frame out.")
+        time.sleep(self.slow_s)
         rng = np.random.default_rng([self.seed, index])
         rgb = np.kron(rng.integers(0, 256, (6, 8, 3)), np.ones((4, 4, 1))).astype(np.uint8)
         depth = (2.0 + rng.uniform(0.0, 0.5, (24, 32))).astype(np.float32)
@@ -61,6 +65,24 @@ class Walk(Recording):
     @cached_property
     def fingerprint(self) -> str:
         return hashlib.sha256(f"{self.path.name} {len(self)} {self.seed}".encode()).hexdigest()
+
+
+def open_walk(audio: Path | None = None, *, seed: int = 0, bad: tuple[int, ...] = (5,), slow_s: float = 0.0) -> Walk:
+    """Open the walk as each worker of a cluster does; its models are known from then on."""
+    register_fakes()
+    return Walk(seed=seed, bad=bad, audio=audio, slow_s=slow_s)
+
+
+def content_of(path: Path) -> dict[str, bytes]:
+    """Return every file of a map, and map.json without its timings."""
+    files = {
+        str(file.relative_to(path)): file.read_bytes()
+        for file in path.rglob("*")
+        if file.is_file() and file.name not in (".lock", ".checked.json")
+    }
+    manifest = json.loads(files.pop("map.json"))
+    manifest.pop("timings")
+    return {**files, "map.json": json.dumps(manifest, sort_keys=True).encode()}
 
 
 def write_beeps(path: Path, onsets_s: tuple[float, ...] = (0.3, 2.0)) -> Path:

@@ -1,6 +1,8 @@
 """`avlmaps build`: build a map from a recording."""
 
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
@@ -14,10 +16,12 @@ from avlmaps.cli.verb import ModelVerb
 from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Generator, Sequence
 
+    from avlmaps.maps.pipeline.workers import Workers
     from avlmaps.perception.cache.feature_store import CacheSettings
     from avlmaps.perception.encoders import Encoders
+    from avlmaps.recordings.types import Recording
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,6 +93,10 @@ class Build(ModelVerb):
     """Build a map although the recording contradicts itself, for these reasons; the error names its reason."""
     sensor: Literal["auto", "kinect", "realsense", "perfect", "none"] = "auto"
     """Depth camera; its error decides which depths are used. auto measures it; none uses all, as the paper does."""
+    ray: Annotated[tuple[str, ...] | None, arg(metavar="[HOST:PORT]")] = None
+    """Let the workers of a Ray cluster encode, fuse and describe, by jobs of 200 frames: the cluster at HOST:PORT, to
+    which this machine belongs, or without an address one of this machine's cores. The recording and MAP must lie on
+    storage that all machines share; the map is the same (docs/guides/cluster.md)."""
     resume: bool = False
     """Resume a stopped build. This is the default; the flag lets scripts say so."""
     fresh: bool = False
@@ -124,7 +132,6 @@ def build(verb: "Build") -> dict[str, Any]:
     from avlmaps.maps.settings import SUBMAP_FRAMES, BuildSettings, FrameSettings, FusionSettings, GravitySettings
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.rules import build_settings
-    from avlmaps.recordings.open import open_recording
 
     begin = perf_counter()
     if verb.resume and verb.fresh:
@@ -137,14 +144,7 @@ def build(verb: "Build") -> dict[str, Any]:
         choose_models(verb.profile, [word for words in verb.model for word in words]),
         _cache(verb.feature_cache, verb.feature_cache_gb),
     )
-    recording = open_recording(
-        [verb.recording, *verb.more],
-        format=verb.format,
-        audio=verb.audio,
-        topics=topics_of(verb.topics),
-        corrections=verb.reading.corrections(),
-        microphones=verb.microphones,
-    )
+    recording = _opening(verb)()
     for notice in recording.notices:
         say(f"note: {notice}")
     settings = BuildSettings(
@@ -165,16 +165,18 @@ def build(verb: "Build") -> dict[str, Any]:
         from avlmaps.recordings.pose_file import read_pose_file
 
         poses = read_pose_file(verb.corrected_poses)
-    stored = build_map(
-        recording,
-        verb.out,
-        used,
-        build_settings(verb.rules, settings),
-        cache=cache,
-        allow=verb.allow,
-        resume=not verb.fresh,
-        overwrite=verb.overwrite,
-    )
+    with _workers(verb, cache) as workers:
+        stored = build_map(
+            recording,
+            verb.out,
+            used,
+            build_settings(verb.rules, settings),
+            cache=cache,
+            workers=workers,
+            allow=verb.allow,
+            resume=not verb.fresh,
+            overwrite=verb.overwrite,
+        )
     answer: dict[str, Any] = {}
     if poses is not None:
         from avlmaps.maps.corrected import correct_stored
@@ -188,6 +190,44 @@ def build(verb: "Build") -> dict[str, Any]:
         answer["corrected"] = {**asdict(done), "loops": found.report()}
     AVLMap(stored).prepare()
     return {**describe_map(stored), **answer, "elapsed_s": round(perf_counter() - begin, 3)}
+
+
+def _opening(verb: "Build") -> "Callable[[], Recording]":
+    """Return what opens the recording, here and on any machine that sees it at the same place."""
+    from avlmaps.recordings.open import open_recording
+
+    topics = topics_of(verb.topics)
+    if Path(topics.get("pose", "")).is_file():
+        topics["pose"] = str(Path(topics["pose"]).absolute())
+    return partial(
+        open_recording,
+        [path.absolute() for path in (verb.recording, *verb.more)]
+        if verb.ray is not None
+        else [verb.recording, *verb.more],
+        format=verb.format,
+        audio=verb.audio and verb.audio.absolute(),
+        topics=topics,
+        corrections=verb.reading.corrections(),
+        microphones=verb.microphones and verb.microphones.absolute(),
+    )
+
+
+@contextmanager
+def _workers(verb: "Build", cache: "CacheSettings") -> "Generator[Workers]":
+    """Give those who do the jobs of a build: this process, or a Ray cluster."""
+    from avlmaps.maps.pipeline.workers import ALONE
+
+    if verb.ray is None:
+        yield ALONE
+        return
+    if len(verb.ray) > 1:
+        raise UsageError(f"--ray takes one address and got {' '.join(verb.ray)}; give recordings before it.")
+    from avlmaps.maps.pipeline.cluster import Spread
+    from avlmaps.maps.pipeline.ray_pool import RayPool
+
+    with RayPool(*verb.ray) as pool:
+        say(f"note: the cluster has {pool.cores} cores (machines: {pool.machines}).")
+        yield Spread(pool, _opening(verb), cache)
 
 
 def choose_models(name: str, words: "Sequence[str]") -> "Encoders":

@@ -15,6 +15,7 @@ from avlmaps.maps.pipeline.parts import MapPart, load_part, merge_parts
 from avlmaps.maps.pipeline.plan import claim, fusion_key, make_plan, require_unchanged
 from avlmaps.maps.pipeline.sounds import detect_sounds
 from avlmaps.maps.pipeline.sources import locate_sources
+from avlmaps.maps.pipeline.workers import ALONE, Workers
 from avlmaps.maps.pipeline.write import merge, write
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
 from avlmaps.maps.store.lock import lock_folder
@@ -36,6 +37,7 @@ def build_map(
     *,
     cache: CacheSettings = DEFAULT_CACHE,
     parts: Sequence[Path | str] = (),
+    workers: Workers = ALONE,
     allow: Sequence[str] = (),
     resume: bool = True,
     overwrite: bool = False,
@@ -53,6 +55,7 @@ def build_map(
         settings: all that can be chosen.
         cache: whether features are stored, so that another build of the same frames encodes nothing again.
         parts: folders of ``build_part`` from other machines; their frames are not fused again.
+        workers: who fuses frames, describes keyframes and adds parts up: this process, or a cluster.
         allow: names of reasons for which the recording is not refused (``recordings.consistency.verdict.Reason``).
         resume: continue with what a stopped build had finished; otherwise begin again.
         overwrite: replace a finished map there that came from another recording, or with other settings.
@@ -71,10 +74,10 @@ def build_map(
             up = find_up(plan)
             plan, floor = find_floor(plan, up.up)
             sensor = find_sensor(plan)
-            fused = encode_and_fuse(plan, parts, sensor)
-            keyframes = describe_keyframes(plan, fused)  # their keypoints, places and views
+            fused = encode_and_fuse(plan, parts, sensor, workers.fuse)
+            keyframes = describe_keyframes(plan, fused, workers.describe)  # their keypoints, places and views
             sounds = detect_sounds(plan)
-            merged = merge(plan, fused, sensor)  # late, because it fills the memory
+            merged = merge(plan, fused, sensor, workers.add_up)  # late, because it fills the memory
             grid = GridSpec(plan.settings.voxel_size_m)
             sources = locate_sources(plan.recording, up.up.vector(), sounds.sounds, merged.voxels, grid)
             require_unchanged(plan, stamp)

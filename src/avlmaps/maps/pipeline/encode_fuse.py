@@ -41,10 +41,18 @@ from avlmaps.recordings.types import Frame, Recording
 
 _MOST_HELD = 4  # frames in memory for each that is encoded
 EncodedFrame = tuple[Frame | BadFrame, Float32[np.ndarray, "hf wf d"] | None]
+Fuse = Callable[[BuildPlan, Sequence[tuple[Span, Path]], SensorModel, Sequence[BadFrame], int], None]
 
 
-def encode_and_fuse(plan: BuildPlan, given: Sequence[Path | str], sensor: SensorInfo) -> list[MapPart]:
-    """Encode and fuse all frames that no part covers yet; return the parts that make up the map, in a fixed order."""
+def encode_and_fuse(plan: BuildPlan, given: Sequence[Path | str], sensor: SensorInfo, fuse: Fuse) -> list[MapPart]:
+    """Encode and fuse all frames that no part covers yet; return the parts that make up the map, in a fixed order.
+
+    Args:
+        plan: of the build.
+        given: folders of parts from other machines.
+        sensor: the depth camera.
+        fuse: fuses stretches of frames, each into its folder.
+    """
     brought = [load_part(Path(folder), plan.fusion_key) for folder in given]
     covered = [span for part in brought for span in part.info.spans]
     home = plan.folder("fusion", plan.fusion_key)
@@ -56,7 +64,7 @@ def encode_and_fuse(plan: BuildPlan, given: Sequence[Path | str], sensor: Sensor
     had = [*brought, *(part for part in finished.values() if part is not None)]
     bad = [frame for part in had for frame in part.info.bad_frames]
     done = sum(part.info.fused + len(part.info.bad_frames) for part in had)
-    fuse_spans(plan.recording, jobs, plan.encoders, plan.settings, sensor.model, bad, done)
+    fuse(plan, jobs, sensor.model, bad, done)
     own = [part or load_part(folder, plan.fusion_key, verify=False) for folder, part in finished.items()]
     parts = sorted([*brought, *own], key=lambda part: part.info.spans)
     check_disjoint(parts)

@@ -1,6 +1,6 @@
 """The build's keyframe stage: some keyframes at a time; each lot is stored when it is done."""
 
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from itertools import islice
@@ -50,8 +50,31 @@ class KeyframeResult:
     elapsed_s: float
 
 
-def describe_keyframes(plan: BuildPlan, parts: Sequence[MapPart]) -> KeyframeResult:
-    """Choose keyframes among the fused frames, and describe them: keypoints, place and view."""
+@dataclass(frozen=True, slots=True)
+class KeyframeLots:
+    """Keyframes that are to be described, some at a time.
+
+    Attributes:
+        frames: the recording's frames among which they are.
+        lots: numbers of keyframes in ``frames``, by the folder that they are to be stored in.
+        total: how many keyframes the map has, for the progress bar.
+        places: the folder of what the place encoder learned.
+        local: keypoints that are known already, by number in ``frames``.
+        key: of the stage.
+    """
+
+    frames: Recording
+    lots: dict[Path, Int[np.ndarray, " k"]]
+    total: int
+    places: Path
+    local: dict[int, LocalFeatures]
+    key: str
+
+
+def describe_keyframes(
+    plan: BuildPlan, parts: Sequence[MapPart], describe: Callable[[BuildPlan, KeyframeLots], None]
+) -> KeyframeResult:
+    """Choose keyframes among the fused frames, and let them be described: keypoints, place and view."""
     fused = fused_frames(parts)
     good = Subset(plan.recording, fused)
     chosen = select_keyframes(good, plan.settings.keyframes)
@@ -63,7 +86,7 @@ def describe_keyframes(plan: BuildPlan, parts: Sequence[MapPart]) -> KeyframeRes
     size = max(1, plan.settings.frames.per_part // 4)  # describing takes longer than fusing
     lots = {home / f"{start:08d}": chosen[start : start + size] for start in range(0, len(chosen), size)}
     missing = {folder: lot for folder, lot in lots.items() if find_checkpoint(folder, _Facts, key) is None}
-    _describe_lots(plan, good, missing, len(chosen), place_state, local, key)
+    describe(plan, KeyframeLots(good, missing, len(chosen), _places(plan, key), local, key))
     kept = [load_checkpoint(folder, _Facts, key) for folder in lots]
     pieces = [validate_arrays(Keyframes, lot.arrays, str(lot.folder)) for lot in kept]
     return KeyframeResult(concat_keyframes(pieces), place_state, learning_s + sum(lot.facts.elapsed_s for lot in kept))
@@ -81,37 +104,36 @@ def _learn(
         local.update(keypoints)
         return Computed(_Facts(perf_counter() - begin), state)
 
-    found = load_or_compute(plan.folder("keyframes", key) / "places", key, _Facts, compute)
+    found = load_or_compute(_places(plan, key), key, _Facts, compute)
     return found.arrays, local, found.facts.elapsed_s
 
 
-def _describe_lots(
-    plan: BuildPlan,
-    good: Recording,
-    lots: dict[Path, Int[np.ndarray, " k"]],
-    total: int,
-    place_state: dict[str, np.ndarray],
-    local: dict[int, LocalFeatures],
-    key: str,
-) -> None:
+def _places(plan: BuildPlan, key: str) -> Path:
+    """Return the folder of what the place encoder learned."""
+    return plan.folder("keyframes", key) / "places"
+
+
+def describe_lots(plan: BuildPlan, work: KeyframeLots) -> None:
     """Encode lots of keyframes and store each lot in its folder."""
-    left = sum(map(len, lots.values()))
+    left = sum(map(len, work.lots.values()))
+    place_state = load_checkpoint(work.places, _Facts, work.key).arrays
     blind = plan.encoders.without(Kind.VIEWS)  # the views are encoded ahead, in batches
-    with closing(_viewed(plan, good, list(lots.values()))) as viewed:
+    with closing(_viewed(plan, work.frames, list(work.lots.values()))) as viewed:
         ahead = progress(
-            viewed, "seeing", total=total, done=total - left, unit="keyframe", note=lambda: _from_store(plan)
+            viewed, "seeing", total=work.total, done=work.total - left, unit="keyframe", note=lambda: _from_store(plan)
         )
-        for folder, lot in lots.items():
+        for folder, lot in work.lots.items():
             begin = perf_counter()
             seen = [
                 replace(
-                    describe_keyframe(frame, blind, place_state, plan.settings.keyframes, local.get(index)), view=view
+                    describe_keyframe(frame, blind, place_state, plan.settings.keyframes, work.local.get(index)),
+                    view=view,
                 )
                 for index, frame, view in islice(ahead, len(lot))
             ]
             pieces = stack_keyframes(seen)
             arrays = {name: getattr(pieces, name) for name in array_fields(Keyframes)}
-            save_checkpoint(folder, key, _Facts(perf_counter() - begin), arrays)
+            save_checkpoint(folder, work.key, _Facts(perf_counter() - begin), arrays)
         for _ in ahead:  # nothing is left; this completes the bar
             pass
 

@@ -1,6 +1,6 @@
 """The last stages: the parts become the voxels of the map, and all of it is written."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
@@ -14,10 +14,9 @@ from avlmaps.core.wording import option
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
 from avlmaps.maps.fusion.free_space import FreeViews, ThroughCounts, clean
 from avlmaps.maps.fusion.submaps import concat_submaps
-from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.pipeline.estimate import EstimatedFloor, EstimatedUp, ground_notices
 from avlmaps.maps.pipeline.keyframes import KeyframeResult
-from avlmaps.maps.pipeline.parts import MapPart, sum_parts
+from avlmaps.maps.pipeline.parts import MapPart
 from avlmaps.maps.pipeline.plan import BuildPlan, strip_folder
 from avlmaps.maps.pipeline.sounds import SoundResult
 from avlmaps.maps.store.manifest import (
@@ -53,10 +52,14 @@ class Merged:
     elapsed_s: float
 
 
-def merge(plan: BuildPlan, parts: Sequence[MapPart], sensor: SensorInfo) -> Merged:
+def merge(
+    plan: BuildPlan,
+    parts: Sequence[MapPart],
+    sensor: SensorInfo,
+    add_up: Callable[[BuildPlan, Sequence[MapPart]], VoxelAccumulator],
+) -> Merged:
     """Add the parts up to the voxels of the map, and remove those that are no surface."""
-    total = sum_parts(parts, GridSpec(plan.settings.voxel_size_m))
-    return surfaces(plan, total, [part.views() for part in parts], sensor)
+    return surfaces(plan, add_up(plan, parts), [part.views() for part in parts], sensor)
 
 
 def surfaces(

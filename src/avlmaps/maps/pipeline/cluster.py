@@ -1,0 +1,207 @@
+"""A build's jobs on a pool of workers: processes or machines that see the recording and the map at the same places."""
+
+import dataclasses
+import secrets
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import closing
+from itertools import pairwise
+from pathlib import Path
+from typing import Protocol, TypeVar
+
+import numpy as np
+
+from avlmaps.core.arrays import Int64
+from avlmaps.core.errors import BackendError
+from avlmaps.core.progress import progress
+from avlmaps.maps.fusion.accumulator import VoxelAccumulator, VoxelSums
+from avlmaps.maps.fusion.sensor import SensorModel
+from avlmaps.maps.gravity.floor import GroundedRecording
+from avlmaps.maps.grid import GridSpec
+from avlmaps.maps.pipeline.cluster_jobs import (
+    AddJob,
+    DescribeJob,
+    FuseJob,
+    NoFacts,
+    Reopen,
+    Request,
+    add_job,
+    describe_job,
+    fuse_job,
+    software,
+    token_file,
+)
+from avlmaps.maps.pipeline.encode_fuse import Tolerance
+from avlmaps.maps.pipeline.keyframes import KeyframeLots
+from avlmaps.maps.pipeline.parts import MapPart, load_part, sum_parts
+from avlmaps.maps.pipeline.plan import BuildPlan, Span
+from avlmaps.maps.store.array_files import explain_write_errors
+from avlmaps.maps.store.checkpoints import find_checkpoint, key_of, load_checkpoint
+from avlmaps.maps.store.manifest import BadFrame
+from avlmaps.perception.cache.feature_store import DEFAULT_CACHE, CacheSettings
+from avlmaps.perception.models.settings import model_settings
+from avlmaps.perception.profiles import GIVEN
+from avlmaps.recordings.subset import Subset
+from avlmaps.recordings.types import Recording
+
+J = TypeVar("J")
+A = TypeVar("A")
+# Sums of parts are added up by the workers in slabs of about this size, and by one process where there is less.
+SLAB_BYTES = 1 << 28
+
+
+class Pool(Protocol):
+    """Processes that do jobs: Ray's, or any others that can be given a function and a value."""
+
+    @property
+    def cores(self) -> int:
+        """How many jobs it does at once."""
+        ...
+
+    def run(self, function: Callable[[J], A], jobs: Sequence[J]) -> Generator[tuple[int, A]]:
+        """Do each job once, or again where its worker died; yield number and result of each as it is done."""
+        ...
+
+
+class Spread:
+    """Gives a build's jobs to a pool of workers."""
+
+    def __init__(
+        self, pool: Pool, reopen: Reopen, cache: CacheSettings = DEFAULT_CACHE, slab_bytes: int = SLAB_BYTES
+    ) -> None:
+        """Use a pool.
+
+        Args:
+            pool: that does the jobs.
+            reopen: opens the recording on a worker, as it was opened here.
+            cache: of features.
+            slab_bytes: how much of the sums a worker adds up in one job.
+        """
+        self._pool, self._reopen, self._cache, self._slab_bytes = pool, reopen, cache, slab_bytes
+
+    def fuse(
+        self,
+        plan: BuildPlan,
+        jobs: Sequence[tuple[Span, Path]],
+        sensor: SensorModel,
+        known_bad: Sequence[BadFrame],
+        done: int,
+    ) -> None:
+        """Let each part be fused by a worker.
+
+        Raises:
+            RecordingError: too many frames cannot be read.
+            MapError: a worker sees another recording or map, runs another avlmaps, or dies again and again.
+            BackendError: it has other weights, or lacks a model.
+        """
+        if not jobs:
+            return
+        request, tolerance = self._request(plan), Tolerance(plan.recording, plan.settings, known_bad)
+        orders = [FuseJob(request, span, folder, sensor) for span, folder in jobs]
+
+        def frames() -> Iterator[None]:
+            with closing(self._pool.run(fuse_job, orders)) as results:
+                for number, result in results:
+                    result.require()
+                    order = orders[number]
+                    for bad in load_part(order.folder, plan.fusion_key, verify=False).info.bad_frames:
+                        tolerance.meet(bad)
+                    yield from (None for _ in range(*order.span))
+
+        total = done + sum(len(range(*span)) for span, _ in jobs)
+        for _ in progress(frames(), "fusing", total=total, done=done):
+            pass
+
+    def describe(self, plan: BuildPlan, work: KeyframeLots) -> None:
+        """Let each lot of keyframes be described by a worker; raises as ``fuse``."""
+        if not work.lots:
+            return
+        request, numbers = self._request(plan), _numbers(work.frames)
+        orders = [
+            DescribeJob(request, numbers[lot], folder, work.places, work.key) for folder, lot in work.lots.items()
+        ]
+
+        def keyframes() -> Iterator[None]:
+            with closing(self._pool.run(describe_job, orders)) as results:
+                for number, result in results:
+                    result.require()
+                    yield from (None for _ in orders[number].frames)
+
+        known = work.total - sum(map(len, work.lots.values()))
+        for _ in progress(keyframes(), "seeing", total=work.total, done=known, unit="keyframe"):
+            pass
+
+    def add_up(self, plan: BuildPlan, parts: Sequence[MapPart]) -> VoxelAccumulator:
+        """Let workers add the parts up, each a slab of the building, and put the slabs together.
+
+        The sums are floating-point numbers, whose last bits depend on the order in which they are added: the parts of
+        a voxel are therefore added in the order of their frames, on each worker, and what is cut is the building.
+        """
+        grid, sums = GridSpec(plan.settings.voxel_size_m), [part.sums() for part in parts]
+        size = sum(len(one) * _row_bytes(one) for one in sums)
+        slabs = min(self._pool.cores, size // self._slab_bytes)
+        if slabs < 2:
+            return sum_parts(parts, grid)
+        request, folders = self._request(plan), tuple(part.folder for part in parts)
+        orders: list[AddJob] = []
+        for low, high in _slabs(sums, int(slabs)):
+            key = key_of("slab", plan.fusion_key, [part.info.spans for part in parts], low, high)
+            orders.append(AddJob(request, folders, low, high, plan.folder("slab", key), key))
+        missing = [order for order in orders if find_checkpoint(order.folder, NoFacts, order.key) is None]
+        with closing(self._pool.run(add_job, missing)) as results:
+            for _, result in results:
+                result.require()
+        total = VoxelAccumulator(grid, sums[0].feature_sum.shape[1])
+        for order in orders:
+            total.merge(VoxelSums(**load_checkpoint(order.folder, NoFacts, order.key).arrays))
+        return total
+
+    def _request(self, plan: BuildPlan) -> Request:
+        encoders, recording = plan.encoders, plan.recording
+        own = [kind for kind in encoders if encoders.name_of(kind).startswith(GIVEN)]
+        if own:
+            raise BackendError(
+                f"The encoder of {own[0]} is an object of this process, and other machines have none; register it as a "
+                "backend that they can import, and give its name."
+            )
+        # A path that is relative means another place on another machine.
+        path, token = plan.path.absolute(), secrets.token_hex(8)
+        file = token_file(path, plan.key, token)
+        with explain_write_errors(file.parent):
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.touch()
+        return Request(
+            reopen=self._reopen,
+            path=path,
+            profile=encoders.name,
+            encoders={kind: encoders.name_of(kind) for kind in encoders},
+            weight_variance_m2=encoders.weight_variance_m2,
+            cache=self._cache,
+            models=model_settings(),
+            settings=plan.settings,
+            ground=recording.ground if isinstance(recording, GroundedRecording) else None,
+            key=plan.key,
+            fingerprint=recording.fingerprint,
+            checksums={module: card.checksum for module, card in plan.models.items()},
+            software=software(),
+            token=token,
+        )
+
+
+def _numbers(frames: Recording) -> Int64[np.ndarray, " n"]:
+    """Return the numbers that the frames of a recording's subset have in the recording."""
+    return frames.indices if isinstance(frames, Subset) else np.arange(len(frames))
+
+
+def _row_bytes(sums: VoxelSums) -> int:
+    return sum(
+        array.itemsize * (array.shape[1] if array.ndim == 2 else 1)
+        for array in (getattr(sums, field.name) for field in dataclasses.fields(sums))
+    )
+
+
+def _slabs(parts: Sequence[VoxelSums], count: int) -> list[tuple[int, int]]:
+    """Return ranges of x that cover all voxels, each with about as many rows of the parts."""
+    some = np.sort(np.concatenate([np.asarray(one.index[:: max(1, len(one) // 1000), 0]) for one in parts if len(one)]))
+    inner = np.unique(some[np.linspace(0, len(some), count, endpoint=False, dtype=np.int64)[1:]])
+    edges = [-(1 << 31), *(int(edge) for edge in inner), 1 << 31]
+    return list(pairwise(edges))

@@ -1,0 +1,307 @@
+"""What a worker of a cluster does: one job of a build, described by a small value, done into a folder of the map.
+
+Pictures and sums stay on the storage that all machines share. A worker makes the build's plan itself, of the recording
+that it sees, its own code and its own weights, and refuses to work where that plan is another one. What it makes is a
+checkpoint of the build, written beside and renamed when it is whole: a worker that dies leaves nothing that counts, and
+two that do the same job leave one result.
+"""
+
+import dataclasses
+import hashlib
+import secrets
+import shutil
+import socket
+import sys
+from bisect import bisect_left
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from avlmaps.core.arrays import Int64
+from avlmaps.core.errors import AvlmapsError, BackendError, MapError, RecordingError
+from avlmaps.core.progress import silence_progress
+from avlmaps.core.registry import Kind
+from avlmaps.core.version import __version__
+from avlmaps.maps.fusion.accumulator import VoxelAccumulator, VoxelSums
+from avlmaps.maps.fusion.sensor import SensorModel
+from avlmaps.maps.gravity.floor import GroundedRecording
+from avlmaps.maps.grid import GridSpec
+from avlmaps.maps.pipeline.encode_fuse import fuse_spans
+from avlmaps.maps.pipeline.keyframes import KeyframeLots, describe_lots
+from avlmaps.maps.pipeline.parts import load_part
+from avlmaps.maps.pipeline.plan import BuildPlan, Span, make_plan
+from avlmaps.maps.settings import BuildSettings
+from avlmaps.maps.store.array_files import explain_write_errors
+from avlmaps.maps.store.checkpoints import DONE, save_checkpoint
+from avlmaps.maps.store.reader import PARTS
+from avlmaps.perception.cache.cached_encoders import with_cache
+from avlmaps.perception.cache.feature_store import CacheSettings
+from avlmaps.perception.encoders import Encoders
+from avlmaps.perception.models.settings import ModelSettings, model_settings, use_models
+from avlmaps.recordings.subset import Subset
+from avlmaps.recordings.types import Ground, Recording
+
+Reopen = Callable[[], Recording]
+"""Opens the recording on a machine: ``functools.partial(open_recording, "/shared/REC")``."""
+_COMPUTING = ("numpy", "numba", "onnxruntime", "opencv-python-headless", "scipy")
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """From what a worker makes the plan of a build, and by what it knows that it is the same.
+
+    Attributes:
+        reopen: opens the recording.
+        path: the map's folder.
+        profile: name of the profile.
+        encoders: name of each module's encoder.
+        weight_variance_m2: of the profile.
+        cache: of features.
+        models: where models are and how they run.
+        settings: of the build.
+        ground: that was found in the recording.
+        key: of the build's plan.
+        fingerprint: of the recording.
+        checksums: of each module's weights.
+        software: see ``software``.
+        token: name of a file in the map's folder, new in each request.
+    """
+
+    reopen: Reopen
+    path: Path
+    profile: str
+    encoders: dict[Kind, str]
+    weight_variance_m2: float
+    cache: CacheSettings
+    models: ModelSettings
+    settings: BuildSettings
+    ground: Ground | None
+    key: str
+    fingerprint: str
+    checksums: dict[str, str]
+    software: dict[str, str]
+    token: str
+
+
+@dataclass(frozen=True, slots=True)
+class FuseJob:
+    """A stretch of frames that is to become the part in a folder."""
+
+    request: Request
+    span: Span
+    folder: Path
+    sensor: SensorModel
+
+
+@dataclass(frozen=True, slots=True)
+class DescribeJob:
+    """A lot of keyframes, numbers of the recording's frames, that is to be stored in a folder."""
+
+    request: Request
+    frames: Int64[np.ndarray, " k"]
+    folder: Path
+    places: Path
+    key: str
+
+
+@dataclass(frozen=True, slots=True)
+class AddJob:
+    """A slab of voxels, those with ``low`` <= x < ``high``, whose sums over parts are to be stored in a folder."""
+
+    request: Request
+    parts: tuple[Path, ...]
+    low: int
+    high: int
+    folder: Path
+    key: str
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """What became of a job.
+
+    Attributes:
+        host: of the worker.
+        error: the class of the error that a user can fix, ``""`` for none.
+        why: its sentence.
+    """
+
+    host: str
+    error: str = ""
+    why: str = ""
+
+    def require(self) -> None:
+        """Raise the error again on this side."""
+        if self.error:
+            raise _ERRORS.get(self.error, MapError)(self.why)
+
+
+_ERRORS: dict[str, type[AvlmapsError]] = {
+    of.__name__: of for of in (BackendError, MapError, RecordingError)
+}  # the others are errors of a map to those who build one
+
+
+class NoFacts(msgspec.Struct):
+    """A slab's arrays are all of it."""
+
+
+def fuse_job(job: FuseJob) -> Done:
+    """Fuse a stretch of frames on a worker."""
+
+    def work(plan: BuildPlan, folder: Path) -> None:
+        fuse_spans(plan.recording, [(job.span, folder)], plan.encoders, plan.settings, job.sensor)
+
+    return _do(job.request, job.folder, work)
+
+
+def describe_job(job: DescribeJob) -> Done:
+    """Describe a lot of keyframes on a worker."""
+
+    def work(plan: BuildPlan, folder: Path) -> None:
+        count = len(job.frames)
+        lots = {folder: np.arange(count)}
+        describe_lots(plan, KeyframeLots(Subset(plan.recording, job.frames), lots, count, job.places, {}, job.key))
+
+    return _do(job.request, job.folder, work)
+
+
+def add_job(job: AddJob) -> Done:
+    """Add the parts of a slab up on a worker."""
+
+    def work(plan: BuildPlan, folder: Path) -> None:
+        total: VoxelAccumulator | None = None
+        for part in job.parts:
+            sums = _within(load_part(part, plan.fusion_key, verify=False).sums(), job.low, job.high)
+            total = total or VoxelAccumulator(GridSpec(plan.settings.voxel_size_m), sums.feature_sum.shape[1])
+            total.merge(sums)
+        if total is not None:
+            added = total.sums()
+            arrays = {field.name: getattr(added, field.name) for field in dataclasses.fields(added)}
+            save_checkpoint(folder, job.key, NoFacts(), arrays)
+
+    return _do(job.request, job.folder, work)
+
+
+@cache
+def software() -> dict[str, str]:
+    """Return what computes here: the Python, a hash of this avlmaps' code, and the versions of what it computes by."""
+    package, code = Path(__file__).parents[2], hashlib.sha256()
+    for path in sorted(package.rglob("*.py")):
+        code.update(path.relative_to(package).as_posix().encode() + b"\0" + path.read_bytes())
+    found = {"Python": f"{sys.version_info[0]}.{sys.version_info[1]}"}
+    found["avlmaps"] = f"{__version__} ({code.hexdigest()[:12]})"
+    return found | {name: metadata.version(name) for name in _COMPUTING}
+
+
+def _do(request: Request, folder: Path, work: Callable[[BuildPlan, Path], None]) -> Done:
+    """Let a worker do a job into a folder that is renamed when it is whole; a user's errors become values."""
+    host = socket.gethostname()
+    try:
+        with silence_progress(), _whole(folder) as attempt:
+            work(_plan(request, host), attempt)
+    except AvlmapsError as fault:
+        return Done(host, type(fault).__name__, str(fault))
+    return Done(host)
+
+
+@contextmanager
+def _whole(folder: Path) -> Generator[Path]:
+    """Give a folder beside a job's to write into; it takes its name when the block is done."""
+    attempt = folder.with_name(f"{folder.name}.{secrets.token_hex(4)}")
+    try:
+        yield attempt
+        with explain_write_errors(folder):
+            try:
+                attempt.rename(folder)
+            except OSError:
+                if not (folder / DONE).is_file():  # else another worker was taken for dead, and has done it
+                    raise
+    finally:
+        shutil.rmtree(attempt, ignore_errors=True)
+
+
+_known: list[tuple[str, BuildPlan]] = []  # the last plan that this worker made, by its token
+
+
+def _plan(request: Request, host: str) -> BuildPlan:
+    """Return the plan of the build, made from what this worker sees.
+
+    Raises:
+        MapError: it sees another map or recording, or computes by other software.
+        BackendError: it lacks a model, or has other weights.
+    """
+    if _known and _known[0][0] == request.token:
+        return _known[0][1]
+    _require_same_software(request, host)
+    _require_same_folder(request, host)
+    try:
+        recording = request.reopen()
+    except AvlmapsError as fault:
+        raise MapError(
+            f"The worker on {host} cannot open the recording: {str(fault).rstrip('.')}. A recording must lie on "
+            "storage that all machines of the cluster see at the same path."
+        ) from fault
+    if recording.fingerprint != request.fingerprint:
+        raise MapError(
+            f"The worker on {host} sees another recording at {recording.path}; a recording must lie on storage that "
+            "all machines of the cluster share."
+        )
+    if request.models != model_settings():
+        use_models(request.models)
+    encoders = Encoders.of(
+        request.profile,
+        Encoders.remembered(request.profile, {kind.value: name for kind, name in request.encoders.items()}).sources,
+        request.weight_variance_m2,
+    )
+    plan = make_plan(recording, request.path, with_cache(encoders, request.cache), request.settings)
+    for module, checksum in request.checksums.items():
+        own = plan.models[module].checksum if module in plan.models else "none"
+        if own != checksum:
+            raise BackendError(
+                f"The worker on {host} has other weights for {module} ({own[:12]}) than this machine "
+                f"({checksum[:12]}); bring the same models to all machines."
+            )
+    if plan.key != request.key:
+        raise MapError(
+            f"The worker on {host} would build another map, for a reason that it cannot name; check that its sound "
+            "track and its settings are those of this machine."
+        )
+    if request.ground is not None:
+        plan = replace(plan, recording=GroundedRecording(recording, request.ground))
+    _known[:] = [(request.token, plan)]
+    return plan
+
+
+def _require_same_software(request: Request, host: str) -> None:
+    own = software()
+    for name, version in request.software.items():
+        if own.get(name) != version:
+            raise MapError(
+                f"The worker on {host} runs {name} {own.get(name, 'none')} and this machine {version}; install the "
+                "same on all machines of the cluster."
+            )
+
+
+def _require_same_folder(request: Request, host: str) -> None:
+    if not token_file(request.path, request.key, request.token).is_file():
+        raise MapError(
+            f"The worker on {host} does not see {request.path} as this machine does; the map must lie on storage that "
+            "all machines of the cluster share, at the same path."
+        )
+
+
+def token_file(path: Path, key: str, token: str) -> Path:
+    """Return the file by which a worker knows that it sees the map's folder itself, not another at the same path."""
+    return path / PARTS / f"cluster-{key[:12]}" / token
+
+
+def _within(sums: VoxelSums, low: int, high: int) -> VoxelSums:
+    """Return the rows of sorted sums with low <= x < high, memory-mapped still."""
+    first, last = (bisect_left(range(len(sums)), edge, key=lambda row: int(sums.index[row, 0])) for edge in (low, high))
+    return VoxelSums(**{field.name: getattr(sums, field.name)[first:last] for field in dataclasses.fields(sums)})
