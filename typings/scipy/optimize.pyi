@@ -20,3 +20,14 @@ def approx_fprime(
 def linear_sum_assignment(
     cost_matrix: ArrayLike, maximize: bool = False
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]: ...
+def minimize(
+    fun: Callable[[NDArray[np.float64]], Any],
+    x0: ArrayLike,
+    *,
+    jac: bool = False,
+    method: Literal["L-BFGS-B"] = ...,
+    bounds: list[tuple[float, float]] | None = None,
+) -> OptimizeResult: ...
+def minimize_scalar(
+    fun: Callable[[float], float], *, bounds: tuple[float, float], method: Literal["bounded"]
+) -> OptimizeResult: ...
