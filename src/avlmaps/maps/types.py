@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from avlmaps.core.arrays import Float16, Float32, Float64, Int, Int32, Int64, UInt8, UInt16
+from avlmaps.core.arrays import Float16, Float32, Float64, Int, Int8, Int32, Int64, UInt8, UInt16
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -145,7 +145,8 @@ class Submaps:
     Attributes:
         row_offsets: (b + 1,) into the voxels.
         index: which voxel, in the world of the poses that the frames were fused with.
-        feature: mean feature.
+        feature: mean feature, in units of ``feature_scale``: a quarter of the room of the sums it came from.
+        feature_scale: of each voxel; 0 where no pixel with a feature fell.
         weight: sum of the weights behind it.
         rgb_sum: sum of weight times colour.
         rgb_weight: sum of these weights.
@@ -163,7 +164,8 @@ class Submaps:
 
     row_offsets: Int64[np.ndarray, " b1"]
     index: Int32[np.ndarray, "n 3"]
-    feature: Float16[np.ndarray, "n d"]
+    feature: Int8[np.ndarray, "n d"]
+    feature_scale: Float32[np.ndarray, " n"]
     weight: Float32[np.ndarray, " n"]
     rgb_sum: Float32[np.ndarray, "n 3"]
     rgb_weight: Float32[np.ndarray, " n"]

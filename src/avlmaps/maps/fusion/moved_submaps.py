@@ -40,7 +40,7 @@ class MovedSubmaps:
         Raises:
             MapError: the poses lie too far from the world's origin for voxels.
         """
-        self._feature = submaps.feature
+        self._feature, self._scale = submaps.feature, submaps.feature_scale
         moved = np.ascontiguousarray((pose @ inverse(np.asarray(submaps.fused_pose)))[:, :3], np.float64)
         moved[:, :, 3] /= grid.voxel_size_m
         self._count, self._pair = 0, 0
@@ -150,16 +150,15 @@ class MovedSubmaps:
         target, row, weight = (column[: self._pair] for column in self._pairs)
         start = np.zeros(self._count + 1, np.int64)
         order = kernels.group_pairs(target, start)
-        halves = np.asarray(self._feature).view(np.uint16)
-        halves.flags.writeable = False  # as memory-mapped ones are: the kernel is compiled once
+        feature, scale = _read_only(np.asarray(self._feature)), _read_only(np.asarray(self._scale))
 
         def work(block: slice) -> None:
-            summed = np.empty((block.stop - block.start, halves.shape[1]), np.float32)
-            kernels.sum_features(rows[block], start, order, row, weight, halves, summed)
+            summed = np.empty((block.stop - block.start, feature.shape[1]), np.float32)
+            kernels.sum_features(rows[block], start, order, row, weight, feature, scale, summed)
             take(block, summed)
 
         with ThreadPoolExecutor(usable_cores()) as pool:
-            list(pool.map(work, blocks(len(rows), halves.shape[1])))
+            list(pool.map(work, blocks(len(rows), feature.shape[1])))
 
 
 def _each(

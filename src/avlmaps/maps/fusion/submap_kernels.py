@@ -7,7 +7,7 @@ voxel, so that a shift by whole voxels moves voxels, and no shift changes nothin
 """
 
 import numpy as np
-from jaxtyping import Float32, Float64, Int32, Int64, UInt16
+from jaxtyping import Float32, Float64, Int8, Int32, Int64
 from numba import njit
 
 from avlmaps.core.kernel_types import Real, Whole
@@ -287,13 +287,33 @@ def group_pairs(target: Int32[np.ndarray, " pairs"], start: Int64[np.ndarray, " 
 
 
 @njit(**OPTIONS)
+def round_to_steps(
+    feature_sum: Float32[np.ndarray, "n d"],
+    weight: Float64[np.ndarray, " n"],
+    out: Int8[np.ndarray, "n d"],
+    scale: Float32[np.ndarray, " n"],
+):
+    """Write sums over weights as whole numbers up to 127 times a scale."""
+    for n in range(feature_sum.shape[0]):
+        most = np.float32(0.0)
+        for column in range(out.shape[1]):
+            most = max(most, abs(feature_sum[n, column]))
+        known = most > 0.0 and weight[n] > 0.0
+        factor = np.float32(127.0) / most if known else np.float32(0.0)
+        scale[n] = most / (127.0 * weight[n]) if known else 0.0
+        for column in range(out.shape[1]):
+            out[n, column] = np.int8(np.rint(feature_sum[n, column] * factor))
+
+
+@njit(**OPTIONS)
 def sum_features(
     rows: Int64[np.ndarray, " k"],
     start: Int64[np.ndarray, " rows1"],
     order: Int64[np.ndarray, " pairs"],
     row: Int32[np.ndarray, " pairs"],
     weight: Float32[np.ndarray, " pairs"],
-    halves: UInt16[np.ndarray, "n d"],
+    feature: Int8[np.ndarray, "n d"],
+    scale: Float32[np.ndarray, " n"],
     out: Float32[np.ndarray, "k d"],
 ):
     """Write the sums of the features that some rows of a map have pairs of, times their weights.
@@ -304,22 +324,16 @@ def sum_features(
         order: numbers of pairs.
         row: of the submaps' voxels, for each pair.
         weight: of each pair.
-        halves: bits of float16 features; Numba has no numbers of that type.
+        feature: of the submaps' voxels, in steps.
+        scale: how large a step is.
         out: filled in.
     """
-    bits = np.empty(halves.shape[1], np.uint32)
-    numbers = bits.view(np.float32)
     for n in range(rows.shape[0]):
-        for column in range(bits.shape[0]):
+        for column in range(out.shape[1]):
             out[n, column] = 0.0
         for at in range(start[rows[n]], start[rows[n] + 1]):
             pair = order[at]
             source = row[pair]
-            scale = weight[pair] * np.float32(2.0**112)  # the exponents of both types are 112 apart
-            for column in range(bits.shape[0]):
-                half = np.uint32(halves[source, column])
-                bits[column] = ((half & np.uint32(0x8000)) << np.uint32(16)) | (
-                    (half & np.uint32(0x7FFF)) << np.uint32(13)
-                )
-            for column in range(bits.shape[0]):
-                out[n, column] += scale * numbers[column]
+            factor = weight[pair] * scale[source]
+            for column in range(out.shape[1]):
+                out[n, column] += factor * np.float32(feature[source, column])

@@ -9,7 +9,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from avlmaps.core.arrays import Float32, Float64, UInt16
+from avlmaps.core.arrays import Float, Float32, Float64, Int8, UInt16
+from avlmaps.maps.fusion.submap_kernels import round_to_steps
 from avlmaps.maps.fusion.voxel_sums import VoxelSums
 from avlmaps.maps.types import Submaps
 
@@ -32,12 +33,12 @@ def submap_of(
         poses: world_from_camera of each.
         clear_mm: how far each saw freely; none where that is not collected.
     """
-    weight = np.asarray(sums.weight)[:, None]
-    feature = np.divide(sums.feature_sum, weight, out=np.zeros(sums.feature_sum.shape), where=weight > 0.0)
+    feature, scale = in_steps(np.asarray(sums.feature_sum), np.asarray(sums.weight))
     return Submaps(
         row_offsets=np.array([0, len(sums)], np.int64),
         index=np.asarray(sums.index),
-        feature=feature.astype(np.float16),
+        feature=feature,
+        feature_scale=scale,
         weight=np.asarray(sums.weight).astype(np.float32),
         rgb_sum=np.asarray(sums.rgb_sum).astype(np.float32),
         rgb_weight=np.asarray(sums.rgb_weight).astype(np.float32),
@@ -52,6 +53,22 @@ def submap_of(
         pose=np.asarray(poses, np.float64),
         clear_mm=clear_mm,
     )
+
+
+def in_steps(
+    feature_sum: Float[np.ndarray, "n d"], weight: Float64[np.ndarray, " n"]
+) -> tuple[Int8[np.ndarray, "n d"], Float32[np.ndarray, " n"]]:
+    """Return mean features in 254 steps from their least to their greatest number, and how large a step of each is.
+
+    What is rounded is at most half a step, 1/254 of the largest number, and differs from submap to submap.
+
+    Args:
+        feature_sum: sums of weight times feature.
+        weight: of each; a voxel without one has no feature.
+    """
+    steps, scale = np.empty(feature_sum.shape, np.int8), np.empty(len(feature_sum), np.float32)
+    round_to_steps(np.array(feature_sum, np.float32, order="C"), np.array(weight, np.float64), steps, scale)
+    return steps, scale
 
 
 def concat_submaps(parts: Sequence[Submaps]) -> Submaps:

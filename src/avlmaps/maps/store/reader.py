@@ -142,9 +142,13 @@ class StoredMap:
         if not files:
             return None
         self.integrity.require_whole()
-        return validate_arrays(
-            Submaps, {name: read_array(self.path, file) for name, file in files.items()}, f"{self.path}/submaps"
-        )
+        arrays = {name: read_array(self.path, file) for name, file in files.items()}
+        if "feature_scale" not in arrays and "feature" in arrays:  # written while features were halves
+            from avlmaps.maps.fusion.submaps import in_steps  # its kernels take long to import
+
+            feature = arrays["feature"]
+            arrays["feature"], arrays["feature_scale"] = in_steps(feature, np.ones(len(feature)))
+        return validate_arrays(Submaps, arrays, f"{self.path}/submaps")
 
     def sources(self) -> SourceEvidence | None:
         """Return what the microphones say of where each sound began; None where their places are not known.
