@@ -21,6 +21,7 @@ from avlmaps.maps.types import Submaps, Voxels
 
 FARTHEST = float((1 << 31) - (1 << 22))  # voxels; indices are int32
 _PAIRS_PER_VOXEL = 3  # at first
+_BRICKS = 1024
 _FIELDS = ("index", "weight", "rgb_sum", "rgb_weight", "hits", "views", "sharp", "last_seen_s")
 
 _Take = Callable[[slice, np.ndarray], None]
@@ -43,7 +44,8 @@ class MovedSubmaps:
         self._feature, self._scale = submaps.feature, submaps.feature_scale
         moved = np.ascontiguousarray((pose @ inverse(np.asarray(submaps.fused_pose)))[:, :3], np.float64)
         moved[:, :, 3] /= grid.voxel_size_m
-        self._count, self._pair = 0, 0
+        self._count, self._pair, self._brick = 0, 0, 0
+        self._make_bricks(_BRICKS)
         self._make_room(kernels.MOST_SAMPLES + len(submaps.index) // 2)
         self._make_pairs(kernels.MOST_SAMPLES + _PAIRS_PER_VOXEL * len(submaps.index))
         for number, (first, part, spread, frames) in enumerate(_each(submaps), start=1):
@@ -118,14 +120,15 @@ class MovedSubmaps:
         """Add one submap."""
         done = 0
         while done < len(spread):
-            place = number, first, self._count, done, self._pair
-            count, done, pair = kernels.move_rows(
-                part, spread, moved, self._slots, self._index, self._sums, self._counts, place, self._pairs
+            place = number, first, self._count, done, self._pair, self._brick
+            count, done, pair, brick = kernels.move_rows(
+                part, spread, moved, self._bricks, self._index, self._sums, self._counts, place, self._pairs
             )
-            self._count, self._pair = int(count), int(pair)
-            if done < len(spread):  # one of both is full
+            self._count, self._pair, self._brick = int(count), int(pair), int(brick)
+            if done < len(spread):  # one of them is full
                 self._make_room(2 * len(self._index))
                 self._make_pairs(2 * len(self._pairs[0]))
+                self._make_bricks(2 * len(self._bricks[2]))
 
     def _make_room(self, rows: int) -> None:
         """Make room for this many voxels; what is not touched takes no memory."""
@@ -135,8 +138,16 @@ class MovedSubmaps:
         else:
             self._index, self._sums = np.zeros((rows, 3), np.int32), np.zeros((rows, kernels.SUM_COLUMNS))
             self._counts = np.zeros((rows, kernels.COUNT_COLUMNS), np.int32)
-        self._slots = np.full(1 << (2 * rows).bit_length(), -1, np.int32)
-        rehash(self._slots, self._index, self._count)
+
+    def _make_bricks(self, most: int) -> None:
+        """Make room for this many bricks."""
+        rows = np.full((most, kernels.BRICK_VOXELS), -1, np.int32)
+        index, slots = np.zeros((most, 3), np.int32), np.full(1 << (2 * most).bit_length(), -1, np.int32)
+        if self._brick:
+            _, known, held = self._bricks
+            index[: self._brick], rows[: self._brick] = known[: self._brick], held[: self._brick]
+        rehash(slots, index, self._brick)
+        self._bricks: kernels.Bricks = slots, index, rows
 
     def _make_pairs(self, most: int) -> None:
         """Make room for this many pairs, whose rows are 32-bit: 2 billion voxels are half a terabyte of features."""

@@ -24,12 +24,16 @@ LEAST_HITS = 0.5  # a voxel gets less than this part of a hit from one that move
 
 
 Pairs = tuple[np.ndarray, np.ndarray, np.ndarray]
+Bricks = tuple[np.ndarray, np.ndarray, np.ndarray]
 # Columns of the sums over what moves into a voxel, which lie side by side: one line of the cache for each.
 RED, GREEN, BLUE, RGB_WEIGHT, WEIGHT, SHARP, HITS, LAST_SEEN = range(8)
 SUM_COLUMNS = 8
 # Columns of the counts of a voxel: frames, the last submap that added to it from 1, and how many frames that added.
 VIEWS, LAST_SUBMAP, ITS_VIEWS = range(3)
 COUNT_COLUMNS = 3
+BRICK_SHIFT = 3  # the rows of the voxels of a cube of 2 to the power of this lie side by side
+BRICK_VOXELS = 512
+_MOST_BRICKS = 8  # that a voxel moves to
 _CELLS = 64  # a voxel that moves meets at most three along each axis; four are counted, as a power of two
 
 
@@ -202,11 +206,11 @@ def move_rows(
     part: tuple[np.ndarray, ...],
     spread: Float32[np.ndarray, "n columns"],
     moved: Float64[np.ndarray, "frames 3 4"],
-    table: Int32[np.ndarray, " slots"],
+    bricks: Bricks,
     index: Int32[np.ndarray, "rows 3"],
     sums: Float64[np.ndarray, "rows columns"],
     counts: Int32[np.ndarray, "rows few"],
-    place: tuple[int, int, int, int, int],
+    place: tuple[int, int, int, int, int, int],
     pairs: Pairs,
 ):
     """Add voxels of a submap to a map, each moved as its frame was, until there is no room for another.
@@ -217,25 +221,28 @@ def move_rows(
         part: (index, weight, rgb_sum, rgb_weight, hits, views, sharp, last_seen_s) of the submap.
         spread: of `finish_spread`.
         moved: (frames, 3, 4) corrected from uncorrected world of each of its frames, voxels.
-        table: hash table of rows.
+        bricks: hash table of bricks, (b, 3) which each is, (b, BRICK_VOXELS) rows of its voxels or -1.
         index: (rows, 3), those that are new are written.
         sums: (rows, SUM_COLUMNS), added to.
         counts: (rows, COUNT_COLUMNS), added to.
         place: number of this submap from 1, its first row among those of all submaps, count of voxels in the map, row
-            of the submap to begin with, count of pairs.
+            of the submap to begin with, count of pairs, count of bricks.
         pairs: (row of the map, row of all submaps, weight) of each feature that counts, written on.
 
     Returns:
-        Count of voxels now, the row to resume with when there is room again, and count of pairs.
+        Count of voxels now, the row to resume with when there is room again, count of pairs, and of bricks.
     """
     part_index, part_weight, part_rgb, part_rgb_weight, part_hits, part_views, part_sharp, part_last_seen = part
     pair_target, pair_row, pair_weight = pairs
-    number, first, count, begin, pair = place
+    table, brick_index, rows = bricks
+    number, first, count, begin, pair, brick_count = place
     cell, share = np.empty(_CELLS, np.int64), np.zeros(_CELLS, np.int64)
-    room = min(index.shape[0], table.shape[0] // 2) - MOST_SAMPLES
+    room, brick_room = index.shape[0] - MOST_SAMPLES, rows.shape[0] - _MOST_BRICKS
+    last_i = last_j = last_k = np.int64(1 << 40)
+    brick = 0
     for n in range(begin, part_index.shape[0]):
-        if count > room or pair > pair_target.shape[0] - MOST_SAMPLES:
-            return count, n, pair
+        if count > room or pair > pair_target.shape[0] - MOST_SAMPLES or brick_count > brick_room:
+            return count, n, pair, brick_count
         frame = min(max(np.int64(spread[n, NUMBER] + 0.5), 0), moved.shape[0] - 1)
         found, samples, i, j, k = _targets(n, part_index, spread, frame, moved, cell, share)
         samples = _without_slivers(found, samples, part_hits[n], cell, share)
@@ -245,8 +252,17 @@ def move_rows(
             if shared == 0:
                 continue
             amount = shared / samples
-            row = int(find_or_insert(i + to // 16 - 1, j + to // 4 % 4 - 1, k + to % 4 - 1, table, index, count))
-            if row == count:
+            x, y, z = i + (to >> 4) - 1, j + ((to >> 2) & 3) - 1, k + (to & 3) - 1
+            if x >> BRICK_SHIFT != last_i or y >> BRICK_SHIFT != last_j or z >> BRICK_SHIFT != last_k:
+                last_i, last_j, last_k = x >> BRICK_SHIFT, y >> BRICK_SHIFT, z >> BRICK_SHIFT
+                brick = int(find_or_insert(last_i, last_j, last_k, table, brick_index, brick_count))
+                brick_count += brick == brick_count
+            within = ((x & 7) << 6) | ((y & 7) << 3) | (z & 7)
+            row = np.int64(rows[brick, within])
+            if row < 0:
+                row = count
+                rows[brick, within] = row
+                index[row, 0], index[row, 1], index[row, 2] = x, y, z
                 sums[row, LAST_SEEN] = part_last_seen[n]
                 count += 1
             hit = max(np.int64(amount * part_hits[n] + 0.5), 1)
@@ -268,7 +284,7 @@ def move_rows(
             pair_target[pair], pair_row[pair] = row, first + n
             pair_weight[pair] = amount * part_weight[n]
             pair += 1
-    return count, part_index.shape[0], pair
+    return count, part_index.shape[0], pair, brick_count
 
 
 @njit(**OPTIONS)
