@@ -70,7 +70,7 @@ class Build(ModelVerb):
     """What you know better than the recording's files."""
     submaps: bool = False
     """Store the sums of every 32 frames as well, so that the map can follow corrected poses later; it takes three to
-    five times the room."""
+    four times the room."""
     corrected_poses: Annotated[Path | None, arg(metavar="FILE")] = None
     """Move the map, which was built with --submaps, to corrected poses of its frames: a table of stamp tx ty tz qx qy
     qz qw of the depth camera, on the recording's clock. A map that is not there yet is built first."""
