@@ -10,6 +10,7 @@ from jaxtyping import Float, Int, UInt8
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.poses import inverse, rotation_angle_rad
 from avlmaps.core.progress import progress
+from avlmaps.core.registry import Kind
 from avlmaps.maps.keyframes.describe import KeyframeSettings, perceive_keyframes, select_keyframes
 from avlmaps.maps.types import Keyframes
 from avlmaps.perception.encoders import Encoders
@@ -122,7 +123,8 @@ def map_of(
     rng: np.random.Generator,
     settings: KeyframeSettings = _KEYFRAMES,
 ) -> MapOfPictures:
-    """Return the pictures of a map of a recording, without its voxels and sounds."""
+    """Return the pictures of a map of a recording, without its voxels, its sounds and the features of its views."""
+    used = used.without(Kind.VIEWS)
     keyframes, place_state = perceive_keyframes(
         recording, select_keyframes(recording, settings), used, rng, settings=settings
     )
