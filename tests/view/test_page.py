@@ -81,6 +81,16 @@ def test_default_questions_are_answered_by_the_map(room: AVLMap) -> None:
     assert asked and any(room.ask(question).found for _, question in asked)
 
 
+def test_a_large_map_is_asked_few_questions_of_one_part(
+    room: AVLMap, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    few = default_questions(MapOnPage(room).labels, few=True)
+    assert 0 < len(few) <= 4 and all(len(question.parts) == 1 for _, question in few)
+    monkeypatch.setattr("avlmaps.view.page.MOST_VOXELS", len(room.space) - 1)
+    told = write_page(tmp_path / "page.html", [room])
+    assert len(told["questions"]) == len(few)
+
+
 def test_a_file_that_cannot_be_written_is_one_sentence(room: AVLMap, tmp_path: Path) -> None:
     with pytest.raises(QueryError, match="cannot be written"):
         write_page(tmp_path / "missing" / "page.html", [room], ["the red thing"])

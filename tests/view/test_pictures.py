@@ -30,7 +30,9 @@ def ask(page, question: str) -> None:
 
 
 def colours_of(page) -> list[str]:
-    return page.locator("#legend li i").evaluate_all("all => all.map((e) => getComputedStyle(e).backgroundColor)")
+    return page.locator("#legend li:not(.source) i").evaluate_all(
+        "all => all.map((e) => getComputedStyle(e).backgroundColor)"
+    )
 
 
 def test_the_guide_is_clicked_through(browser, room: AVLMap, tmp_path: Path) -> None:  # noqa: F811
@@ -52,6 +54,11 @@ def test_the_guide_is_clicked_through(browser, room: AVLMap, tmp_path: Path) -> 
         page.click("#whole")
         assert len(colours_of(page)) == len({thing.name for thing in things})
         shoot(page, folder / "view-things.png")
+        if page.locator(".mark.source").count():
+            page.select_option("#colour", "picture")
+            page.click("#above")
+            page.locator(".mark.source").first.dispatch_event("click")
+            shoot(page, folder / "view-sources.png")
         page.locator("details:has(#things) summary").click()
         page.locator("#things button").first.click()
         assert page.evaluate("avlmapsView.viewer.camera.distance") <= 3.0

@@ -430,7 +430,7 @@ class Panel {
     for (const [share, tint] of Object.entries(SOURCE_TINTS)) {
       const edge = made("i");
       edge.style.background = `rgb(${tint.map((value) => Math.round(255 * value)).join(",")})`;
-      list.append(made("li", {}, edge, `a sound's source, with ${percent(Number(share))}`));
+      list.append(made("li", { className: "source" }, edge, `a sound's source, with ${percent(Number(share))}`));
     }
   }
 
@@ -500,7 +500,7 @@ class Panel {
     this.viewer.setLines(k, "sources", sources.flatMap(({ regions, position }) => {
       const floor = this.floorUnder(map, this.toLevel(k, position)[2]) + 0.04;
       return regions.flatMap(({ probability, outlines }) => outlines.map((corners) => ({
-        kind: "band", tint: SOURCE_TINTS[probability],
+        kind: "band", tint: SOURCE_TINTS[probability], through: true,
         places: band([...corners, corners[0]].map(([x, y]) => [x, y, floor]), probability > 0.5 ? 0.04 : 0.08),
       })));
     }));
