@@ -28,8 +28,8 @@ class SourceSettings:
     reverberant_m: float = 0.6
     hidden: float = 1.5
     reach_m: float = 2.5
-    blur_m: tuple[float, float] = (0.11, 0.5)
-    wide: float = 0.1
+    blur_m: tuple[float, float] = (0.11, 0.35)
+    wide: float = 0.2
     astray: float = 0.03
 
     @classmethod
