@@ -51,6 +51,11 @@ def test_edits_are_there_in_another_build_of_the_map(home: Path, walk: Path, run
     (row,) = json.loads(run("edit", home, "--list", "--json")[1])["edits"]
     assert row["state"] == "applied"
     assert json.loads(run("query", home, "my pad", "--json")[1])["found"]
+    nowhere = Spot(name="sofa", middle=(90.0, 0.0, 0.0), size=(1.0, 1.0, 1.0))
+    append_edit(home, Edit.new("rename", [nowhere], name="couch", world=read_edits(home)[0].world))
+    told = json.loads(run("info", home, "--json")[1])
+    assert told["edits"] == 2
+    assert "(rename sofa to couch) finds nothing to apply to: nothing like the sofa is at" in told["notices"][-1]
 
 
 def test_people_who_edit_at_once_lose_nothing(tmp_path: Path) -> None:

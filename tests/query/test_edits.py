@@ -159,6 +159,9 @@ def test_a_place_of_ones_own_is_a_goal_and_a_landmark() -> None:
 def test_an_edit_that_finds_nothing_is_reported_with_the_reason() -> None:
     (lost,) = AVLMap(STORED, edits=[STOOL, LOST]).edited.lost
     assert lost.edit is LOST and lost.why == "nothing like the sofa is at (4.00, 0.50, 0.20) m any more"
+    said_so = f"Edit {LOST.id} of 2026-11-26 (rename sofa to couch) finds nothing to apply to: {lost.why}."
+    assert str(lost) == said_so
+    assert said_so in AVLMap(STORED, edits=[LOST, STOOL]).edited.said_of([], ["couch"])
     other = msgspec.structs.replace(STOOL, world=World(name="other", fingerprint="g"))
     m = AVLMap(STORED, edits=[other])
     assert state([other]) == state(())

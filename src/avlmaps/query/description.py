@@ -27,4 +27,14 @@ def map_answer(avlmap: AVLMap, note: Callable[[AvlmapsError], object] = lambda _
             {**sound, "names": list(event.names), "confidences": list(event.confidences)}
             for sound, event in zip(described["sounds"], events, strict=True)
         ]
+    if avlmap.edited:
+        described |= {"edits": len(avlmap.edited.edits), "notices": [*described["notices"], *_lost_edits(avlmap)]}
     return {**described, "rules": rules_of(avlmap.stored.info.settings)}
+
+
+def _lost_edits(avlmap: AVLMap) -> list[str]:
+    """Return a sentence for each edit that finds nothing to apply to; why nobody knows where a model is not here."""
+    try:
+        return [str(one) for one in avlmap.edited.lost]
+    except AvlmapsError as error:
+        return [f"The edits are not checked: {error}"]

@@ -71,6 +71,12 @@ class LostEdit:
     edit: Edit
     why: str
 
+    def __str__(self) -> str:
+        edit = self.edit
+        did = f"{edit.does} {' and '.join(filter(None, (spot.name for spot in edit.at)))}".strip()
+        to = f" to {edit.name}" if edit.name and edit.does.startswith("rename") else ""
+        return f"Edit {edit.id} of {edit.day} ({did}{to}) finds nothing to apply to: {self.why}."
+
 
 def said(edit: Edit) -> str:
     """Return who did what and when, in words: ``named by a person on 2026-11-26``."""
@@ -570,6 +576,7 @@ class Edited:
             for one in self.claims
             if plain_name(one.name) in names or is_at(space.centres_of(one.rows))
         ]
+        said_of += [str(one) for one in self._lost.values() if plain_name(one.edit.name) in {*names, *rooms}]
         return tuple(dict.fromkeys(said_of))
 
 

@@ -115,9 +115,14 @@ class ServedMap:
     @property
     def version(self) -> str:
         """A word that is another one for another content; clients may use it as an ETag."""
-        info, edits = self.avlmap.stored.info, self.avlmap.edited.edits
-        edited = f"-{'-'.join(edit.id for edit in edits[-1:])}-{len(edits)}" if edits else ""
-        return f"{info.build_key[:16]}-{info.timings.finished}-{info.counts.sounds}{edited}".replace('"', "")
+        edits = self.avlmap.edited.edits
+        return f"{self.voxels_version}-{edits[-1].id}-{len(edits)}" if edits else self.voxels_version
+
+    @property
+    def voxels_version(self) -> str:
+        """The same for the voxels and their order, which no edit changes."""
+        info = self.avlmap.stored.info
+        return f"{info.build_key[:16]}-{info.timings.finished}-{info.counts.sounds}".replace('"', "")
 
     def as_edited_now(self) -> "ServedMap":
         """Return the same map with the edits of now."""

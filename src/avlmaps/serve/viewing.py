@@ -28,7 +28,7 @@ def drawn_map(task: Task, query: NoQuery) -> dict[str, Any]:
 
     del query
     told = {"map": task.map.page.layout.describe(), "palettes": palettes(), "robot": task.map.guide.has_robot}
-    return told | {"version": task.map.version}
+    return told | {"version": task.map.voxels_version}
 
 
 def drawn_voxels(task: Task, query: NoQuery) -> File:
@@ -73,7 +73,7 @@ def keyframe(task: Task, query: NoQuery) -> File:
 def ask_in_view(task: Task, query: AskQuery) -> File:
     """Return the length of the answer's JSON (4 bytes, little-endian), the JSON, and the heat of each drawn voxel."""
     answer = ask_map(task, query)
-    told = msgspec.json.encode({"answer": answer.to_dict(), "version": task.map.version})
+    told = msgspec.json.encode({"answer": answer.to_dict(), "version": task.map.voxels_version})
     return File(len(told).to_bytes(4, "little") + told + task.map.page.heat_of(answer), _BYTES)
 
 
