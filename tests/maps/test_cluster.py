@@ -20,23 +20,9 @@ from avlmaps.maps.pipeline import cluster_jobs
 from avlmaps.maps.pipeline.cluster import Pool, Spread
 from avlmaps.maps.pipeline.cluster_jobs import Done, FuseJob, fuse_job, software
 from avlmaps.perception.encoders import Encoders
+from helpers.pool_here import Here
 
 PROFILE = register_fakes()
-
-
-@dataclass
-class Here:
-    """A pool in this process, which does jobs in an order of its own."""
-
-    cores: int = 3
-    seed: int = 0
-    times: int = 1
-    change: Callable[[Any], Any] = lambda job: job
-
-    def run(self, function: Callable[[Any], Any], jobs: Sequence[Any]) -> Generator[tuple[int, Any]]:
-        for number in np.random.default_rng(self.seed).permutation(len(jobs)).tolist():
-            done = [function(self.change(jobs[number])) for _ in range(self.times)]
-            yield number, done[-1]
 
 
 @dataclass
@@ -200,7 +186,10 @@ def test_a_worker_with_other_weights_is_refused_by_their_checksum(tmp_path: Path
 
 
 def test_a_worker_that_lacks_a_model_says_so(tmp_path: Path) -> None:
-    said = refused(tmp_path / "a", lambda r: replace(r, encoders={**r.encoders, "pixels": "unheard-of"}), BackendError)
+    def other(request: Any) -> Any:
+        return replace(request, models=replace(request.models, names={**request.models.names, "pixels": "unheard-of"}))
+
+    said = refused(tmp_path / "a", other, BackendError)
     assert "There is no pixels backend called 'unheard-of'" in said
 
 
@@ -230,7 +219,7 @@ def test_an_encoder_that_is_an_object_cannot_travel(tmp_path: Path) -> None:
 
 def test_what_went_wrong_with_a_job_keeps_its_class() -> None:
     with pytest.raises(RecordingError, match="dark"):
-        Done("here", "RecordingError", "It is dark.").require()
+        Done("here", 0.0, "RecordingError", "It is dark.").require()
     with pytest.raises(MapError, match="loud"):
-        Done("here", "AudioError", "It is loud.").require()
-    Done("here").require()
+        Done("here", 0.0, "AudioError", "It is loud.").require()
+    Done("here", 0.0).require()

@@ -17,10 +17,12 @@ import numpy as np
 import pytest
 from build_fakes import SETTINGS, content_of, open_walk, register_fakes, write_beeps
 
-from avlmaps.core.errors import BackendError, MapError
+from avlmaps.core.errors import AvlmapsError, BackendError, MapError
+from avlmaps.days.together import build_together
 from avlmaps.maps.build import build_map
 from avlmaps.maps.pipeline.cluster import Spread
 from avlmaps.maps.pipeline.ray_pool import RayPool
+from avlmaps.perception.encoders import encoders_of
 
 PROFILE = register_fakes()
 # It is not imported here: what it may listen on it asks once, when it is.
@@ -81,6 +83,14 @@ def test_two_workers_make_the_map_of_one_process(
 ) -> None:
     assert (pool.cores, pool.machines) == (2, 1)
     assert build(folder / "two", pool, audio) == alone
+
+
+@needs_ray
+def test_whole_recordings_are_jobs_as_well(folder: Path, pool: RayPool, audio: Path, alone: dict[str, bytes]) -> None:
+    walks = [partial(open_walk, audio), partial(open_walk, seed=1)]
+    with pytest.raises(AvlmapsError):  # two walks that show other colours are not merged
+        build_together(walks, folder / "all.avlmap", encoders_of(PROFILE), pool, SETTINGS)
+    assert content_of(folder / "all-recordings" / "0001.avlmap") == alone
 
 
 @needs_ray

@@ -18,7 +18,7 @@ from avlmaps.core.progress import say
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Sequence
 
-    from avlmaps.maps.pipeline.workers import Workers
+    from avlmaps.maps.pipeline.ray_pool import RayPool
     from avlmaps.perception.cache.feature_store import CacheSettings
     from avlmaps.perception.encoders import Encoders
     from avlmaps.recordings.types import Recording
@@ -39,7 +39,8 @@ class Build(ModelVerb):
     """Recording: our folder, a bag (or a folder of its parts), a phone's scan, a data set; docs/recordings.md lists "
     "all."""
     more: Annotated[Positional[tuple[Path, ...]], arg(metavar="[BAG ...]")] = ()
-    """Further files of a bag that was split."""
+    """Further files of a bag that was split; with --ray, further recordings of the same place, in the order of their
+    days, which are found in the first by their pictures (as `merge` does)."""
     out: Annotated[Path, arg(metavar="MAP")]
     """Map folder to write, by custom NAME.avlmap."""
     profile: Annotated[str, arg(metavar="PROFILE")] = "embedded"
@@ -129,6 +130,8 @@ class Build(ModelVerb):
 def build(verb: "Build") -> dict[str, Any]:
     """Build a map and describe it."""
     from avlmaps.maps.build import build_map
+    from avlmaps.maps.pipeline.cluster import Spread
+    from avlmaps.maps.pipeline.workers import ALONE
     from avlmaps.maps.settings import SUBMAP_FRAMES, BuildSettings, FrameSettings, FusionSettings, GravitySettings
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.rules import build_settings
@@ -144,7 +147,8 @@ def build(verb: "Build") -> dict[str, Any]:
         choose_models(verb.profile, [word for words in verb.model for word in words]),
         _cache(verb.feature_cache, verb.feature_cache_gb),
     )
-    recording = _opening(verb)()
+    openings = _openings(verb)
+    recording = openings[0]()
     for notice in recording.notices:
         say(f"note: {notice}")
     settings = BuildSettings(
@@ -165,18 +169,26 @@ def build(verb: "Build") -> dict[str, Any]:
         from avlmaps.recordings.pose_file import read_pose_file
 
         poses = read_pose_file(verb.corrected_poses)
-    with _workers(verb, cache) as workers:
-        stored = build_map(
-            recording,
-            verb.out,
-            used,
-            build_settings(verb.rules, settings),
-            cache=cache,
-            workers=workers,
-            allow=verb.allow,
-            resume=not verb.fresh,
-            overwrite=verb.overwrite,
-        )
+    resolved = build_settings(verb.rules, settings)
+    with _pool(verb) as pool:
+        if pool is not None and verb.more:
+            from avlmaps.days.together import build_together
+
+            stored = build_together(
+                openings, verb.out, used, pool, resolved, cache=cache, allow=verb.allow, overwrite=verb.overwrite
+            )
+        else:
+            stored = build_map(
+                recording,
+                verb.out,
+                used,
+                resolved,
+                cache=cache,
+                workers=ALONE if pool is None else Spread(pool, openings[0], cache),
+                allow=verb.allow,
+                resume=not verb.fresh,
+                overwrite=verb.overwrite,
+            )
     answer: dict[str, Any] = {}
     if poses is not None:
         from avlmaps.maps.corrected import correct_stored
@@ -192,42 +204,47 @@ def build(verb: "Build") -> dict[str, Any]:
     return {**describe_map(stored), **answer, "elapsed_s": round(perf_counter() - begin, 3)}
 
 
-def _opening(verb: "Build") -> "Callable[[], Recording]":
-    """Return what opens the recording, here and on any machine that sees it at the same place."""
+def _openings(verb: "Build") -> "list[Callable[[], Recording]]":
+    """Return what opens each recording, here and on any machine that sees it at the same place."""
     from avlmaps.recordings.open import open_recording
 
-    topics = topics_of(verb.topics)
-    if Path(topics.get("pose", "")).is_file():
-        topics["pose"] = str(Path(topics["pose"]).absolute())
-    return partial(
+    files, topics = [verb.recording, *verb.more], topics_of(verb.topics)
+    audio, microphones, groups = verb.audio, verb.microphones, [files]
+    if verb.ray is not None:  # a path that is relative means another place on another machine
+        groups = [[path.absolute()] for path in files]
+        audio, microphones = audio and audio.absolute(), microphones and microphones.absolute()
+        if Path(topics.get("pose", "")).is_file():
+            topics["pose"] = str(Path(topics["pose"]).absolute())
+    if len(groups) > 1:
+        for name in ("audio", "microphones", "topics", "submaps", "corrected_poses", "close_loops", "fresh"):
+            if getattr(verb, name):
+                raise UsageError(
+                    f"--{name.replace('_', '-')} is of one recording; build a map of each, then `avlmaps merge` them."
+                )
+    open_one = partial(
         open_recording,
-        [path.absolute() for path in (verb.recording, *verb.more)]
-        if verb.ray is not None
-        else [verb.recording, *verb.more],
         format=verb.format,
-        audio=verb.audio and verb.audio.absolute(),
+        audio=audio,
         topics=topics,
         corrections=verb.reading.corrections(),
-        microphones=verb.microphones and verb.microphones.absolute(),
+        microphones=microphones,
     )
+    return [partial(open_one, group) for group in groups]
 
 
 @contextmanager
-def _workers(verb: "Build", cache: "CacheSettings") -> "Generator[Workers]":
-    """Give those who do the jobs of a build: this process, or a Ray cluster."""
-    from avlmaps.maps.pipeline.workers import ALONE
-
+def _pool(verb: "Build") -> "Generator[RayPool | None]":
+    """Give the cluster that --ray names; None without it."""
     if verb.ray is None:
-        yield ALONE
+        yield None
         return
     if len(verb.ray) > 1:
         raise UsageError(f"--ray takes one address and got {' '.join(verb.ray)}; give recordings before it.")
-    from avlmaps.maps.pipeline.cluster import Spread
     from avlmaps.maps.pipeline.ray_pool import RayPool
 
     with RayPool(*verb.ray) as pool:
         say(f"note: the cluster has {pool.cores} cores (machines: {pool.machines}).")
-        yield Spread(pool, _opening(verb), cache)
+        yield pool
 
 
 def choose_models(name: str, words: "Sequence[str]") -> "Encoders":

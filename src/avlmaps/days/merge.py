@@ -139,6 +139,11 @@ def _edits(stored: StoredMap, other: StoredMap, onto: Keyframes, moved: Float[np
     return tuple(sorted((*own, *(edit for edit in others if edit.id not in known)), key=lambda edit: edit.made))
 
 
+def merged_key(first: str, other: str, settings: MergeSettings = DEFAULTS) -> str:
+    """Return the build key of the map that two maps of these build keys become."""
+    return key_of("days", first, other, settings)
+
+
 def _dated(visits: tuple[Visit, ...], first_day: str, stored: StoredMap) -> tuple[Visit, ...]:
     if not first_day:
         return visits
@@ -303,7 +308,7 @@ def _manifest(
     return msgspec.structs.replace(
         info,
         avlmaps_version=__version__,
-        build_key=key_of("days", info.build_key, other.info.build_key, settings),
+        build_key=merged_key(info.build_key, other.info.build_key, settings),
         recording=recording,
         counts=counts,
         rig=RigInfo.of(stored.rig),

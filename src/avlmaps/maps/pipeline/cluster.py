@@ -11,7 +11,6 @@ from typing import Protocol, TypeVar
 import numpy as np
 
 from avlmaps.core.arrays import Int64
-from avlmaps.core.errors import BackendError
 from avlmaps.core.progress import progress
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator, VoxelSums
 from avlmaps.maps.fusion.sensor import SensorModel
@@ -21,6 +20,7 @@ from avlmaps.maps.pipeline.cluster_jobs import (
     AddJob,
     DescribeJob,
     FuseJob,
+    Models,
     NoFacts,
     Reopen,
     Request,
@@ -38,8 +38,6 @@ from avlmaps.maps.store.array_files import explain_write_errors
 from avlmaps.maps.store.checkpoints import find_checkpoint, key_of, load_checkpoint
 from avlmaps.maps.store.manifest import BadFrame
 from avlmaps.perception.cache.feature_store import DEFAULT_CACHE, CacheSettings
-from avlmaps.perception.models.settings import model_settings
-from avlmaps.perception.profiles import GIVEN
 from avlmaps.recordings.subset import Subset
 from avlmaps.recordings.types import Recording
 
@@ -156,13 +154,7 @@ class Spread:
         return total
 
     def _request(self, plan: BuildPlan) -> Request:
-        encoders, recording = plan.encoders, plan.recording
-        own = [kind for kind in encoders if encoders.name_of(kind).startswith(GIVEN)]
-        if own:
-            raise BackendError(
-                f"The encoder of {own[0]} is an object of this process, and other machines have none; register it as a "
-                "backend that they can import, and give its name."
-            )
+        models, recording = Models.of(plan.encoders, self._cache), plan.recording
         # A path that is relative means another place on another machine.
         path, token = plan.path.absolute(), secrets.token_hex(8)
         file = token_file(path, plan.key, token)
@@ -172,11 +164,7 @@ class Spread:
         return Request(
             reopen=self._reopen,
             path=path,
-            profile=encoders.name,
-            encoders={kind: encoders.name_of(kind) for kind in encoders},
-            weight_variance_m2=encoders.weight_variance_m2,
-            cache=self._cache,
-            models=model_settings(),
+            models=models,
             settings=plan.settings,
             ground=recording.ground if isinstance(recording, GroundedRecording) else None,
             key=plan.key,

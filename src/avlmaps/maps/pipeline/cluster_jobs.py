@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from importlib import metadata
 from pathlib import Path
+from time import process_time
 
 import msgspec
 import numpy as np
@@ -26,7 +27,6 @@ import numpy as np
 from avlmaps.core.arrays import Int64
 from avlmaps.core.errors import AvlmapsError, BackendError, MapError, RecordingError
 from avlmaps.core.progress import silence_progress
-from avlmaps.core.registry import Kind
 from avlmaps.core.version import __version__
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator, VoxelSums
 from avlmaps.maps.fusion.sensor import SensorModel
@@ -44,6 +44,7 @@ from avlmaps.perception.cache.cached_encoders import with_cache
 from avlmaps.perception.cache.feature_store import CacheSettings
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.models.settings import ModelSettings, model_settings, use_models
+from avlmaps.perception.profiles import GIVEN
 from avlmaps.recordings.subset import Subset
 from avlmaps.recordings.types import Ground, Recording
 
@@ -53,17 +54,55 @@ _COMPUTING = ("numpy", "numba", "onnxruntime", "opencv-python-headless", "scipy"
 
 
 @dataclass(frozen=True, slots=True)
+class Models:
+    """The models that perceive, by their names, which mean the same on every machine.
+
+    Attributes:
+        profile: name of the profile.
+        names: of each module's encoder.
+        weight_variance_m2: of the profile.
+        cache: of features.
+        settings: where models are and how they run.
+    """
+
+    profile: str
+    names: dict[str, str]
+    weight_variance_m2: float
+    cache: CacheSettings
+    settings: ModelSettings
+
+    @classmethod
+    def of(cls, encoders: Encoders, cache: CacheSettings) -> "Models":
+        """Return the names of encoders.
+
+        Raises:
+            BackendError: one of them is an object, which has none.
+        """
+        names = {kind.value: encoders.name_of(kind) for kind in encoders}
+        own = [module for module, name in names.items() if name.startswith(GIVEN)]
+        if own:
+            raise BackendError(
+                f"The encoder of {own[0]} is an object of this process, and other machines have none; register it as a "
+                "backend that they can import, and give its name."
+            )
+        return cls(encoders.name, names, encoders.weight_variance_m2, cache, model_settings())
+
+    def encoders(self) -> Encoders:
+        """Return the encoders on a worker; it loads models as the build does from then on."""
+        if self.settings != model_settings():
+            use_models(self.settings)
+        sources = Encoders.remembered(self.profile, self.names).sources
+        return Encoders.of(self.profile, sources, self.weight_variance_m2)
+
+
+@dataclass(frozen=True, slots=True)
 class Request:
     """From what a worker makes the plan of a build, and by what it knows that it is the same.
 
     Attributes:
         reopen: opens the recording.
         path: the map's folder.
-        profile: name of the profile.
-        encoders: name of each module's encoder.
-        weight_variance_m2: of the profile.
-        cache: of features.
-        models: where models are and how they run.
+        models: that perceive.
         settings: of the build.
         ground: that was found in the recording.
         key: of the build's plan.
@@ -75,11 +114,7 @@ class Request:
 
     reopen: Reopen
     path: Path
-    profile: str
-    encoders: dict[Kind, str]
-    weight_variance_m2: float
-    cache: CacheSettings
-    models: ModelSettings
+    models: Models
     settings: BuildSettings
     ground: Ground | None
     key: str
@@ -128,11 +163,13 @@ class Done:
 
     Attributes:
         host: of the worker.
+        cpu_s: seconds of processor time.
         error: the class of the error that a user can fix, ``""`` for none.
         why: its sentence.
     """
 
     host: str
+    cpu_s: float
     error: str = ""
     why: str = ""
 
@@ -199,15 +236,25 @@ def software() -> dict[str, str]:
     return found | {name: metadata.version(name) for name in _COMPUTING}
 
 
-def _do(request: Request, folder: Path, work: Callable[[BuildPlan, Path], None]) -> Done:
-    """Let a worker do a job into a folder that is renamed when it is whole; a user's errors become values."""
-    host = socket.gethostname()
+def done_by(work: Callable[[str], None]) -> Done:
+    """Do a job, of the worker's name, and return what became of it; errors of users become values."""
+    host, begin = socket.gethostname(), process_time()
     try:
-        with silence_progress(), _whole(folder) as attempt:
-            work(_plan(request, host), attempt)
+        with silence_progress():
+            work(host)
     except AvlmapsError as fault:
-        return Done(host, type(fault).__name__, str(fault))
-    return Done(host)
+        return Done(host, process_time() - begin, type(fault).__name__, str(fault))
+    return Done(host, process_time() - begin)
+
+
+def _do(request: Request, folder: Path, work: Callable[[BuildPlan, Path], None]) -> Done:
+    """Do a job into a folder that takes its name when it is whole."""
+
+    def into_folder(host: str) -> None:
+        with _whole(folder) as attempt:
+            work(_plan(request, host), attempt)
+
+    return done_by(into_folder)
 
 
 @contextmanager
@@ -238,28 +285,16 @@ def _plan(request: Request, host: str) -> BuildPlan:
     """
     if _known and _known[0][0] == request.token:
         return _known[0][1]
-    _require_same_software(request, host)
-    _require_same_folder(request, host)
-    try:
-        recording = request.reopen()
-    except AvlmapsError as fault:
-        raise MapError(
-            f"The worker on {host} cannot open the recording: {str(fault).rstrip('.')}. A recording must lie on "
-            "storage that all machines of the cluster see at the same path."
-        ) from fault
+    require_same_software(request.software, host)
+    require_seen(token_file(request.path, request.key, request.token), host)
+    recording = reopened(request.reopen, host)
     if recording.fingerprint != request.fingerprint:
         raise MapError(
             f"The worker on {host} sees another recording at {recording.path}; a recording must lie on storage that "
             "all machines of the cluster share."
         )
-    if request.models != model_settings():
-        use_models(request.models)
-    encoders = Encoders.of(
-        request.profile,
-        Encoders.remembered(request.profile, {kind.value: name for kind, name in request.encoders.items()}).sources,
-        request.weight_variance_m2,
-    )
-    plan = make_plan(recording, request.path, with_cache(encoders, request.cache), request.settings)
+    encoders = with_cache(request.models.encoders(), request.models.cache)
+    plan = make_plan(recording, request.path, encoders, request.settings)
     for module, checksum in request.checksums.items():
         own = plan.models[module].checksum if module in plan.models else "none"
         if own != checksum:
@@ -278,9 +313,21 @@ def _plan(request: Request, host: str) -> BuildPlan:
     return plan
 
 
-def _require_same_software(request: Request, host: str) -> None:
+def reopened(reopen: Reopen, host: str) -> Recording:
+    """Return the recording as a worker opens it; raises ``MapError`` where it cannot."""
+    try:
+        return reopen()
+    except AvlmapsError as fault:
+        raise MapError(
+            f"The worker on {host} cannot open the recording: {str(fault).rstrip('.')}. A recording must lie on "
+            "storage that all machines of the cluster see at the same path."
+        ) from fault
+
+
+def require_same_software(wanted: dict[str, str], host: str) -> None:
+    """Raise ``MapError`` where this worker computes by other software than the machine that gave the job."""
     own = software()
-    for name, version in request.software.items():
+    for name, version in wanted.items():
         if own.get(name) != version:
             raise MapError(
                 f"The worker on {host} runs {name} {own.get(name, 'none')} and this machine {version}; install the "
@@ -288,11 +335,13 @@ def _require_same_software(request: Request, host: str) -> None:
             )
 
 
-def _require_same_folder(request: Request, host: str) -> None:
-    if not token_file(request.path, request.key, request.token).is_file():
+def require_seen(token: Path, host: str) -> None:
+    """Raise ``MapError`` where this worker does not see a file that the machine that gave the job has made."""
+    if not token.is_file():
+        folder = token.parents[2] if token.parents[1].name == PARTS else token.parent
         raise MapError(
-            f"The worker on {host} does not see {request.path} as this machine does; the map must lie on storage that "
-            "all machines of the cluster share, at the same path."
+            f"The worker on {host} does not see {folder} as this machine does; the map must lie on storage that all "
+            "machines of the cluster share, at the same path."
         )
 
 

@@ -159,15 +159,14 @@ class RayPool:
         try:
             self._ray.init(include_dashboard=None if "address" in how else False, log_to_driver=False,
                            logging_level="ERROR", **how)  # fmt: skip
-        except (*_FAULTS, self._ray.exceptions.RayError) as fault:
+        except Exception as fault:  # noqa: BLE001 - Ray raises plain ones, among many others, where it cannot begin
             where = f"the Ray cluster at {self._address}" if "address" in how else "a Ray cluster on this machine"
-            raise MapError(
-                f"Could not use {where}: {_first_line(fault).rstrip('.')}. This machine must be part of the cluster, "
-                "with the same Ray and Python as the others."
-            ) from None
-
-
-_FAULTS = (OSError, RuntimeError, ValueError, TimeoutError, AssertionError)  # what Ray raises where it cannot begin
+            remedy = (
+                "This machine must be part of the cluster, with the same Ray and Python as the others."
+                if "address" in how
+                else "Try again when the machine is less busy, or build without a cluster."
+            )
+            raise MapError(f"Could not use {where}: {_first_line(fault).rstrip('.')}. {remedy}") from None
 
 
 def _environment(place: tuple[str, int] | None) -> dict[str, str]:

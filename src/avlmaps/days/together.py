@@ -1,0 +1,171 @@
+"""Several recordings of one place become one map: each is built by itself, then found in the first and merged."""
+
+import secrets
+import shutil
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+
+from avlmaps.core.errors import MapError
+from avlmaps.core.progress import progress, say
+from avlmaps.days.merge import merge_maps, merged_key
+from avlmaps.maps.build import build_map
+from avlmaps.maps.growing import require_place
+from avlmaps.maps.pipeline.cluster import Pool, Spread
+from avlmaps.maps.pipeline.cluster_jobs import (
+    Done,
+    Models,
+    Reopen,
+    done_by,
+    reopened,
+    require_same_software,
+    require_seen,
+    software,
+)
+from avlmaps.maps.settings import DEFAULTS, BuildSettings
+from avlmaps.maps.store.array_files import explain_write_errors
+from avlmaps.maps.store.manifest_file import MANIFEST
+from avlmaps.maps.store.reader import StoredMap, open_stored
+from avlmaps.perception.cache.feature_store import DEFAULT_CACHE, CacheSettings
+from avlmaps.perception.encoders import Encoders
+
+
+@dataclass(frozen=True, slots=True)
+class BuildJob:
+    """A whole recording that one worker is to build a map of; the fields are the arguments of ``build_map``."""
+
+    reopen: Reopen
+    path: Path
+    models: Models
+    settings: BuildSettings
+    allow: tuple[str, ...]
+    overwrite: bool
+    software: dict[str, str]
+    token: Path
+
+
+def build_together(
+    recordings: Sequence[Reopen],
+    out: Path | str,
+    encoders: Encoders,
+    pool: Pool,
+    settings: BuildSettings = DEFAULTS,
+    *,
+    cache: CacheSettings = DEFAULT_CACHE,
+    allow: Sequence[str] = (),
+    overwrite: bool = False,
+) -> StoredMap:
+    """Build the map of several recordings of one place with the workers of a pool, or finish one that was begun.
+
+    The maps of the single recordings lie beside it, in ``NAME-recordings``: a recording more costs its own work alone.
+    Where there are as many recordings as cores each is one job; else their parts are jobs.
+
+    Args:
+        recordings: open each recording, the earliest first.
+        out: folder of the map.
+        encoders: which models perceive.
+        pool: that does the jobs.
+        settings: of each build.
+        cache: of features.
+        allow: see ``build_map``.
+        overwrite: replace maps that came from other recordings or settings.
+
+    Raises:
+        AvlmapsError: as ``build_map`` and ``merge_maps``; a recording of another place is refused with the numbers.
+    """
+    out = Path(out)
+    folder = out.with_name(f"{out.name.removesuffix('.avlmap')}-recordings")
+    paths = [folder / f"{number:04d}.avlmap" for number in range(1, len(recordings) + 1)]
+    if len(recordings) >= pool.cores:
+        _build_each(recordings, paths, encoders, pool, settings, cache, tuple(allow), overwrite)
+    else:
+        for reopen, path in zip(recordings, paths, strict=True):
+            build_map(reopen(), path, encoders, settings, cache=cache, workers=Spread(pool, reopen, cache),
+                      allow=allow, overwrite=overwrite)  # fmt: skip
+    return merge_in_turn([open_stored(path) for path in paths], folder, out, overwrite=overwrite)
+
+
+def build_job(job: BuildJob) -> Done:
+    """Build the map of one recording on a worker."""
+
+    def work(host: str) -> None:
+        require_same_software(job.software, host)
+        require_seen(job.token, host)
+        recording = reopened(job.reopen, host)
+        build_map(recording, job.path, job.models.encoders(), job.settings, cache=job.models.cache, allow=job.allow,
+                  overwrite=job.overwrite)  # fmt: skip
+
+    return done_by(work)
+
+
+def _build_each(
+    recordings: Sequence[Reopen],
+    paths: Sequence[Path],
+    encoders: Encoders,
+    pool: Pool,
+    settings: BuildSettings,
+    cache: CacheSettings,
+    allow: tuple[str, ...],
+    overwrite: bool,
+) -> None:
+    """Let each recording be built by one worker."""
+    token = paths[0].parent.absolute() / f".cluster-{secrets.token_hex(8)}"
+    with explain_write_errors(token.parent):
+        token.parent.mkdir(parents=True, exist_ok=True)
+        token.touch()
+    models, known = Models.of(encoders, cache), software()
+    jobs = [
+        BuildJob(reopen, path.absolute(), models, settings, allow, overwrite, known, token)
+        for reopen, path in zip(recordings, paths, strict=True)
+    ]
+    try:
+        with closing(pool.run(build_job, jobs)) as results:
+            for _, result in progress(results, "building", total=len(jobs), unit="recording"):
+                result.require()
+    finally:
+        token.unlink(missing_ok=True)
+
+
+def merge_in_turn(days: Sequence[StoredMap], scratch: Path, out: Path, *, overwrite: bool = False) -> StoredMap:
+    """Merge maps in their order, each found in the ones before; what a stopped run had merged is used again.
+
+    Args:
+        days: maps of one recording each, the earliest first.
+        scratch: folder of the maps of the first two, three and so on.
+        out: folder of the map of all.
+        overwrite: replace another map there.
+
+    Raises:
+        MapError: see ``merge_maps``; what was merged before stays in ``scratch``.
+    """
+    keys = [days[0].info.build_key]
+    for day in days[1:]:
+        keys.append(merged_key(keys[-1], day.info.build_key))
+    paths = [days[0].path, *(scratch / f"first-{number:04d}.avlmap" for number in range(2, len(days))), out]
+    at, merged = next(
+        (number, found)
+        for number in range(len(days) - 1, -1, -1)
+        if (found := _finished(paths[number], keys[number])) is not None
+    )
+    if at == len(days) - 1:
+        say(f"{out} is finished already, of the same recordings with the same settings; nothing to do.")
+    elif (out / MANIFEST).is_file():
+        require_place(out, overwrite)
+    for number in range(at + 1, len(days)):
+        made = merge_maps(merged, days[number], paths[number], overwrite=overwrite or number < len(days) - 1)
+        if number > 1:
+            shutil.rmtree(merged.path, ignore_errors=True)
+        merged = made
+    return merged
+
+
+def _finished(path: Path, key: str) -> StoredMap | None:
+    """Return the map that is there, if it is the one of this key."""
+    if not (path / MANIFEST).is_file():
+        return None
+    try:
+        found = open_stored(path)
+    except MapError:
+        return None
+    return found if found.info.build_key == key else None

@@ -1,0 +1,150 @@
+"""Several recordings become one map: merged in their order, each step once, refused where the place differs."""
+
+import json
+import shutil
+import tempfile
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from avlmaps.core.errors import MapError
+from avlmaps.days import together
+from avlmaps.days.align import NotTheSamePlaceError
+from avlmaps.days.merge import merged_key
+from avlmaps.days.together import build_together
+from avlmaps.maps.store.reader import StoredMap, open_stored
+from avlmaps.perception.encoders import encoders_of
+from helpers.pool_here import Here
+from maps.build_fakes import SETTINGS, content_of, open_walk, register_fakes
+
+ENCODERS = encoders_of(register_fakes())
+WALKS = [partial(open_walk, seed=seed) for seed in range(4)]
+
+
+def in_memory() -> tempfile.TemporaryDirectory[str]:
+    """Return a folder in memory where there is one: each build syncs some hundred small files."""
+    memory = Path("/dev/shm")
+    return tempfile.TemporaryDirectory(dir=memory if memory.is_dir() else None)
+
+
+@pytest.fixture
+def tmp_path() -> Iterator[Path]:
+    with in_memory() as folder:
+        yield Path(folder)
+
+
+@pytest.fixture(scope="module")
+def built() -> Iterator[Path]:
+    """Give a folder where each recording has its map already."""
+    with in_memory() as folder, pytest.MonkeyPatch.context() as patch:
+        patch.setattr(together, "merge_maps", copied)
+        build(Path(folder) / "all.avlmap")
+        yield Path(folder) / "all-recordings"
+
+
+@pytest.fixture
+def out(built: Path, tmp_path: Path) -> Path:
+    shutil.copytree(built, tmp_path / "all-recordings")
+    return tmp_path / "all.avlmap"
+
+
+def copied(stored: StoredMap, other: StoredMap, out: Path, *, overwrite: bool) -> StoredMap:
+    """Write what stands for a merged map: the first one, by the key of both."""
+    assert overwrite or not out.exists()
+    shutil.rmtree(out, ignore_errors=True)
+    shutil.copytree(stored.path, out)
+    manifest = json.loads((out / "map.json").read_text())
+    manifest["checksum"] = ""
+    manifest["build_key"] = merged_key(stored.info.build_key, other.info.build_key)
+    (out / "map.json").write_text(json.dumps(manifest))
+    return open_stored(out)
+
+
+class Merges:
+    """Notes which maps are merged, and stops where it is to."""
+
+    def __init__(self, stop_at: int = -1, fault: Exception | None = None) -> None:
+        self.made: list[tuple[str, str, str]] = []
+        self.stop_at, self.fault = stop_at, fault or KeyboardInterrupt()
+
+    def __call__(self, stored: StoredMap, other: StoredMap, out: Path, *, overwrite: bool) -> StoredMap:
+        if len(self.made) == self.stop_at:
+            raise self.fault
+        self.made.append((stored.path.name, other.path.name, out.name))
+        return copied(stored, other, out, overwrite=overwrite)
+
+
+def build(out: Path, cores: int = 2, **how: Any) -> StoredMap:
+    return build_together(WALKS, out, ENCODERS, Here(cores), SETTINGS, **how)
+
+
+CHAIN = [
+    ("0001.avlmap", "0002.avlmap", "first-0002.avlmap"),
+    ("first-0002.avlmap", "0003.avlmap", "first-0003.avlmap"),
+    ("first-0003.avlmap", "0004.avlmap", "all.avlmap"),
+]
+
+
+def test_recordings_are_merged_in_their_order_and_only_their_maps_stay(
+    out: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    merges = Merges()
+    monkeypatch.setattr(together, "merge_maps", merges)
+    made = build(out)
+    assert merges.made == CHAIN and made.path == out
+    assert sorted(path.name for path in (out.parent / "all-recordings").iterdir()) == [
+        f"{number:04d}.avlmap" for number in range(1, 5)
+    ]
+    build(out)
+    assert merges.made == CHAIN, "a finished map is left as it is"
+
+
+@pytest.mark.parametrize("at", range(3))
+def test_a_run_that_was_stopped_merges_nothing_twice(out: Path, monkeypatch: pytest.MonkeyPatch, at: int) -> None:
+    stopped, after = Merges(at), Merges()
+    monkeypatch.setattr(together, "merge_maps", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        build(out)
+    monkeypatch.setattr(together, "merge_maps", after)
+    build(out)
+    assert stopped.made + after.made == CHAIN
+
+
+def test_another_place_is_refused_and_what_was_merged_stays(out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    refused = NotTheSamePlaceError("This is not seen to be the same place: of 12 keyframes 1 were located.")
+    monkeypatch.setattr(together, "merge_maps", Merges(1, refused))
+    with pytest.raises(NotTheSamePlaceError, match="of 12 keyframes 1"):
+        build(out)
+    assert not out.exists() and (out.parent / "all-recordings" / "first-0002.avlmap" / "map.json").is_file()
+
+
+def test_another_map_is_replaced_only_where_one_says_so(out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(together, "merge_maps", Merges())
+    shutil.copytree(out.parent / "all-recordings" / "0003.avlmap", out)
+    with pytest.raises(MapError, match="is a finished map already"):
+        build(out)
+    assert len(build(out, overwrite=True).info.build_key) == 64
+
+
+def test_whole_recordings_and_their_parts_are_jobs_to_the_same_maps(
+    built: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Four recordings on two cores are four jobs; on eight cores their parts are jobs."""
+    monkeypatch.setattr(together, "merge_maps", Merges())
+    build(tmp_path / "all.avlmap", cores=8)
+    for number in range(1, 5):
+        name = f"{number:04d}.avlmap"
+        assert content_of(tmp_path / "all-recordings" / name) == content_of(built / name)
+
+
+def test_a_worker_that_does_not_see_the_folder_is_refused(tmp_path: Path) -> None:
+    def elsewhere(job: Any) -> Any:
+        return together.BuildJob(
+            **{name: getattr(job, name) for name in job.__slots__ if name != "token"}, token=tmp_path / "no" / "token"
+        )
+
+    with pytest.raises(MapError, match=rf"does not see {tmp_path}/no as this machine does"):
+        build_together(WALKS, tmp_path / "all.avlmap", ENCODERS, Here(1, change=elsewhere), SETTINGS)
