@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Float, Float32, UInt8
 
 from avlmaps.core import poses, timeline
 from avlmaps.core.camera import Pinhole, Rig
@@ -144,33 +144,27 @@ def _some(names: Sequence[str]) -> str:
     return ", ".join(names[:_SHOWN]) + (" ..." if len(names) > _SHOWN else "")
 
 
-@dataclass(eq=False, repr=False)
-class FileRecording(Recording):
-    """Frames whose pictures are files, read on demand.
+@dataclass(eq=False, repr=False, kw_only=True)
+class ShotsRecording(Recording):
+    """Frames of shots, whose pictures a subclass reads on demand.
 
     Attributes:
-        path: the folder.
+        path: the file or folder.
         format: the format's name on the command line.
         rig: the cameras.
         shots: the usable frames in the order of time; their stamps count from the recording's start.
-        depth_units: units of a depth PNG in a metre.
         up_in_world: unit vector, or None where it is not known.
         audio: the sound track on the frames' clock, or None.
         notices: one sentence for each thing worth knowing.
-        video: the colour pictures, where they are one video.
-        trajectory: the poses at their own rate, where those of the frames were interpolated.
     """
 
     path: Path
     format: str
     rig: Rig
     shots: Shots
-    depth_units: float = 1000.0
     up_in_world: Float[np.ndarray, "3"] | None = None
     audio: AudioTrack | None = None
     notices: tuple[str, ...] = ()
-    video: VideoFrames | None = None
-    trajectory: timeline.Trajectory | None = None
     stamps_s: Float[np.ndarray, " n"] = field(init=False)
     world_from_camera: Float[np.ndarray, "n 4 4"] = field(init=False)
 
@@ -182,31 +176,54 @@ class FileRecording(Recording):
         """Read one frame; see ``Recording.frame``."""
         if not 0 <= index < len(self):
             raise IndexError(f"there is no frame {index}; the recording has {len(self)}")
-        depth_camera = self.rig.depth
-        if len(self.shots.depth):
-            depth_m = images.read_depth(self.path / self.shots.depth[index], depth_camera, self.depth_units)
-            if len(self.shots.confidence):
-                depth_m[images.read_mask(self.path / self.shots.confidence[index], depth_camera) == 0] = 0.0
-        else:
-            depth_m = np.zeros((depth_camera.height, depth_camera.width), np.float32)
         return Frame(
             index=index,
             name=self.name(index),
             stamp_s=float(self.stamps_s[index]),
             rgb=self._colour(index),
-            depth_m=depth_m,
+            depth_m=self._depth_m(index),
             world_from_camera=self.world_from_camera[index],
             rig=self.rig,
         )
+
+    def name(self, index: int) -> str:
+        """Return the recording's name of a frame."""
+        return self.shots.names[index]
+
+    def _colour(self, index: int) -> UInt8[np.ndarray, "h w 3"]:
+        raise NotImplementedError
+
+    def _depth_m(self, index: int) -> Float32[np.ndarray, "h w"]:
+        raise NotImplementedError
+
+
+@dataclass(eq=False, repr=False, kw_only=True)
+class FileRecording(ShotsRecording):
+    """Frames whose pictures are files in a folder.
+
+    Attributes:
+        depth_units: units of a depth PNG in a metre.
+        video: the colour pictures, where they are one video.
+        trajectory: the poses at their own rate, where those of the frames were interpolated.
+    """
+
+    depth_units: float = 1000.0
+    video: VideoFrames | None = None
+    trajectory: timeline.Trajectory | None = None
 
     def _colour(self, index: int) -> UInt8[np.ndarray, "h w 3"]:
         if self.video is not None:
             return self.video.picture(self.shots.video_frames[index])
         return images.read_colour(self.path / self.shots.colour[index], self.rig.rgb)
 
-    def name(self, index: int) -> str:
-        """Return the recording's name of a frame."""
-        return self.shots.names[index]
+    def _depth_m(self, index: int) -> Float32[np.ndarray, "h w"]:
+        camera = self.rig.depth
+        if not len(self.shots.depth):
+            return np.zeros((camera.height, camera.width), np.float32)
+        depth_m = images.read_depth(self.path / self.shots.depth[index], camera, self.depth_units)
+        if len(self.shots.confidence):
+            depth_m[images.read_mask(self.path / self.shots.confidence[index], camera) == 0] = 0.0
+        return depth_m
 
     def colour_file(self, index: int) -> Path | None:
         """Return the frame's colour file, where it has one of its own."""

@@ -1,19 +1,17 @@
 """A recording whose pictures a reader has to unpack: those of an archive, a database, a rare compression."""
 
 import hashlib
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Float, Float32, UInt8
+from jaxtyping import Float32, UInt8
 
-from avlmaps.core.camera import Pinhole, Rig
-from avlmaps.recordings.audio import AudioTrack
+from avlmaps.core.camera import Pinhole
 from avlmaps.recordings.content import add_files, stamp_of
-from avlmaps.recordings.formats.file_recording import Shots, geometry_digest
-from avlmaps.recordings.types import Frame, Recording
+from avlmaps.recordings.formats.file_recording import ShotsRecording, geometry_digest
 
 
 @runtime_checkable
@@ -29,60 +27,28 @@ class Pictures(Protocol):
         ...
 
 
-@dataclass(eq=False, repr=False)
-class StoredRecording(Recording):
+@dataclass(eq=False, repr=False, kw_only=True)
+class StoredRecording(ShotsRecording):
     """Frames whose pictures are unpacked on demand.
 
     Attributes:
-        path: the file or folder.
-        format: the format's name on the command line.
-        rig: the cameras.
-        shots: the usable frames in the order of time; ``colour`` and ``depth`` are names that ``pictures`` knows.
-        pictures: where the pictures lie.
-        up_in_world: unit vector, or None where it is not known.
-        audio: the sound track on the frames' clock, or None.
-        notices: one sentence for each thing worth knowing.
+        pictures: where they lie; ``colour`` and ``depth`` of the shots are names that it knows.
         depth_unit_m: metres of one unit of the depth as stored; 1 for floats.
     """
 
-    path: Path
-    format: str
-    rig: Rig
-    shots: Shots
     pictures: Pictures
-    up_in_world: Float[np.ndarray, "3"] | None = None
-    audio: AudioTrack | None = None
-    notices: tuple[str, ...] = ()
     depth_unit_m: float = 1.0
-    stamps_s: Float[np.ndarray, " n"] = field(init=False)
-    world_from_camera: Float[np.ndarray, "n 4 4"] = field(init=False)
 
-    def __post_init__(self) -> None:
-        self.stamps_s = self.shots.stamps_s
-        self.world_from_camera = self.shots.world_from_camera
+    def _colour(self, index: int) -> UInt8[np.ndarray, "h w 3"]:
+        return self.pictures.colour(self.shots.colour[index], self.rig.rgb)
 
-    def frame(self, index: int) -> Frame:
-        """Read one frame; see ``Recording.frame``."""
-        if not 0 <= index < len(self):
-            raise IndexError(f"there is no frame {index}; the recording has {len(self)}")
-        return Frame(
-            index=index,
-            name=self.name(index),
-            stamp_s=float(self.stamps_s[index]),
-            rgb=self.pictures.colour(self.shots.colour[index], self.rig.rgb),
-            depth_m=self.pictures.depth(self.shots.depth[index], self.rig.depth),
-            world_from_camera=self.world_from_camera[index],
-            rig=self.rig,
-        )
+    def _depth_m(self, index: int) -> Float32[np.ndarray, "h w"]:
+        return self.pictures.depth(self.shots.depth[index], self.rig.depth)
 
     @property
     def stored_depth_unit_m(self) -> float:
         """Metres of one unit of the depth as stored."""
         return self.depth_unit_m
-
-    def name(self, index: int) -> str:
-        """Return the recording's name of a frame."""
-        return self.shots.names[index]
 
     @cached_property
     def fingerprint(self) -> str:
