@@ -3,11 +3,13 @@
 import os
 import shutil
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from avlmaps.maps.store.edits import read_edits
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.view.page import write_page
 from helpers.viewing import Served, decoded, serving
@@ -175,6 +177,28 @@ def test_controls_have_names_and_the_page_fits_a_phone(browser, served: Served) 
     assert page.locator("#canvas").bounding_box()["height"] > 300
     assert page.faults == []
     page.close()
+
+
+def test_a_thing_is_renamed_where_it_is_clicked(browser, room: AVLMap, tmp_path: Path) -> None:
+    place = Path(shutil.copytree(room.stored.path, tmp_path / "home.avlmap"))
+    with contextmanager(serving)(place) as own:
+        page = opened(browser, own.url)
+        page.wait_for_selector("#things li", state="attached")  # the server knows the things by now
+        page.fill("#sentence", "the red thing")
+        page.keyboard.press("Enter")
+        page.wait_for_selector(".mark.goal", state="attached")
+        picture(page)
+        page.mouse.click(*goal_at(page))
+        page.fill("#rename input", "zorb")
+        page.click("#rename button")
+        page.wait_for_selector("#renamed")
+        assert "is called zorb from now on (named by a person on " in page.inner_text("#renamed")
+        page.fill("#sentence", "the zorb")
+        page.keyboard.press("Enter")
+        page.wait_for_selector("#answer .verdict.found")
+        assert page.faults == []
+        page.close()
+    assert [edit.name for edit in read_edits(place)] == ["zorb"]
 
 
 def test_the_file_opens_without_a_server(browser, room: AVLMap, tmp_path: Path) -> None:

@@ -627,10 +627,30 @@ class Panel {
       made("p", {}, rows.length ? "Taken for:" : voxel.note || "The map has no name for it."),
       made("table", {}, made("tbody", {}, ...rows)),
       made("p", { className: "soft", textContent: `${thing}${seen} At ${placeText(voxel.position)}.` }));
+    if (this.source.live && voxel.thing) $("voxel").append(this.renaming(k, voxel.thing.name, voxel.position));
     if (!voxel.seen_by?.length) return;
     const button = made("button", { type: "button", textContent: "Show the nearest view" });
     button.addEventListener("click", () => this.showMoment(k, voxel.seen_by[0], true));
     $("voxel").append(button);
+  }
+
+  /** Ask a person for the right name of a thing. */
+  renaming(k, thing, place) {
+    const to = made("input", { type: "text", maxLength: 80, required: true, placeholder: "another name" });
+    to.setAttribute("aria-label", `another name for the ${thing}`);
+    const form = made("form", { id: "rename" }, to, made("button", { type: "submit", textContent: "Rename" }));
+    const told = made("p", { className: "soft" });
+    form.append(told);
+    form.addEventListener("submit", async (event) => {
+      event.preventDefault();
+      try {
+        const { text } = await this.source.rename(k, thing, place, to.value);
+        form.replaceWith(made("p", { id: "renamed", textContent: `${text} Load the page again to see it in the lists.` }));
+      } catch (fault) {
+        told.textContent = fault.message;
+      }
+    });
+    return form;
   }
 
   bindTools() {

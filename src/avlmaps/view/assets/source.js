@@ -49,6 +49,12 @@ class LiveSource {
     return fetch(`${this.at[map]}/view/voxels/${number}`).then(answeredJson);
   }
 
+  /** Give the thing at a place another name; the answer's text says so. */
+  rename(map, thing, place, to) {
+    const at = place.map((value) => value.toFixed(3)).join(",");
+    return posted(`${this.at[map]}/edit`, { does: "rename", name: thing, at, to }).then(answeredJson);
+  }
+
   keyframe(map, number) {
     return `${this.at[map]}/keyframes/${number}`;
   }
