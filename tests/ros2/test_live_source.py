@@ -3,8 +3,10 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -36,27 +38,40 @@ def built(walk, tmp_path_factory) -> AVLMap:
 
 
 def mapped(
-    out: Path, walk: Path | None, *published: str, words: tuple[str, ...] = (), give_up_s: float = 4.0
+    out: Path,
+    walk: Path | None,
+    *published: str,
+    words: tuple[str, ...] = (),
+    give_up_s: float = 4.0,
+    stop_after_s: float | None = None,
 ) -> tuple[int, str, str]:
-    """Return the exit code and what is said while a recording is published."""
+    """Return the exit code and what is said while a recording is published; Ctrl-C comes so long after it began."""
     paths = os.pathsep.join(path for path in (str(ROOT / "tests"), os.environ.get("PYTHONPATH", "")) if path)
     environment = {**os.environ, "PYTHONPATH": paths}
     live = subprocess.Popen(
         [sys.executable, "-m", "avlmaps", "live", "--source", "ros2", "--out", out, "--profile", "colours",
          "--voxel-size-m", "0.1", "--every-frame", "--give-up-s", str(give_up_s), "--json", *words],
         env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # ignored where the tests run behind
     )  # fmt: skip
     publisher = (
         None if walk is None else subprocess.Popen([sys.executable, PUBLISHER, walk, *published], env=environment)
     )
+    begun = ""
     try:
+        if stop_after_s is not None:
+            assert live.stderr is not None
+            while "Mapping from ROS 2" not in begun:
+                begun += live.stderr.readline()
+            time.sleep(stop_after_s)
+            live.send_signal(signal.SIGINT)
         said, noted = live.communicate(timeout=200.0)
     finally:
         live.kill()
         if publisher is not None:
             publisher.kill()
             publisher.wait()
-    return live.returncode, said, noted
+    return live.returncode, said, begun + noted
 
 
 @pytest.mark.parametrize("published", [(), ("--packed",)])
@@ -87,6 +102,14 @@ def test_a_robot_that_stalls_and_comes_back_goes_on_in_the_same_map(walk: Path, 
     assert "Frames come from ROS 2 again, after 7 s" in noted or "again, after 6 s" in noted
     assert "the robot seems to have stopped" in noted
     assert json.loads(said)["live"]["frames_in"] >= 18
+
+
+def test_ctrl_c_ends_the_drive_and_the_map_is_whole(walk: Path, tmp_path: Path) -> None:
+    code, said, noted = mapped(tmp_path / "live.avlmap", walk, stop_after_s=3.0, give_up_s=100.0)
+    assert code == 0, noted
+    assert "Stopped by Ctrl-C; the map is finished" in noted
+    assert json.loads(said)["live"]["fused"] >= 1
+    assert len(AVLMap.open(tmp_path / "live.avlmap").points) > 1000
 
 
 FAULTS = {

@@ -11,6 +11,8 @@ from avlmaps.maps.store.reader import StoredMap
 from avlmaps.maps.store.writer import Written
 from avlmaps.maps.types import Submaps
 
+_REST_S = 1.0
+
 
 class Saver:
     """Writes maps into a folder whose lock its maker holds.
@@ -27,7 +29,7 @@ class Saver:
         Args:
             path: the folder.
             every_s: seconds from the state that is saved to the next, at least; where a save takes longer, it pauses as
-                long as it took.
+                long as it took, up to a second: a kill loses what came since.
             tell: called with a sentence where a save fails; the one before stays, and the next is tried as usual.
             broke: called with what ends the thread by a fault of ours.
         """
@@ -75,7 +77,7 @@ class Saver:
                 except MapError as fault:
                     self._tell(str(fault))
                 end_s = time.perf_counter()
-                self._from_s = max(came_s + self._every_s, 2.0 * end_s - begin_s)
+                self._from_s = max(came_s + self._every_s, end_s + min(end_s - begin_s, _REST_S))
         except BaseException as fault:
             self._broke(fault)
             raise

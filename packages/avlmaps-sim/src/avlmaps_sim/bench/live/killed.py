@@ -15,6 +15,7 @@ from avlmaps.maps.store.reader import open_stored
 from avlmaps.recordings.open import open_recording
 
 _WAITS_S = 60.0
+_LOOK_S = 0.2
 
 
 def lost_s(recording: Path, path: Path, profile: str, rng: np.random.Generator, within_s: float = 10.0) -> float:
@@ -65,10 +66,18 @@ def main() -> None:
             time.sleep(max(0.0, begin_s + since_s - time.monotonic()))
             frame = recording.frame(index)
             live.add_frame(frame.rgb, frame.depth_m, frame.rig, frame.world_from_camera, frame.stamp_s)
-            saved = "saved" if live.status().saved_age_s >= 0.0 else "-"
-            sys.stdout.write(f"{time.monotonic()} {len(live)} {saved}\n")
-            sys.stdout.flush()
-        time.sleep(_WAITS_S)  # the drive may be shorter than the time until the kill
+            _tell(live)
+        until_s = time.monotonic() + _WAITS_S  # the drive may be shorter than the time until the kill
+        while time.monotonic() < until_s:
+            time.sleep(_LOOK_S)
+            _tell(live)
+
+
+def _tell(live: LiveMap) -> None:
+    """Print when it is, how many frames are in the map, and whether it was saved already."""
+    saved = "saved" if live.status().saved_age_s >= 0.0 else "-"
+    sys.stdout.write(f"{time.monotonic()} {len(live)} {saved}\n")
+    sys.stdout.flush()
 
 
 if __name__ == "__main__":
