@@ -142,3 +142,21 @@ def test_poses_of_a_file_and_closed_loops_are_two_things(run, walk: Path, copied
     code, _, err = run("build", walk, "--out", copied, "--close-loops", "--corrected-poses", file, *BUILT)
     assert code == 2
     assert "choose one" in err
+
+
+def test_what_a_person_corrected_moves_with_the_map(walk: Path, copied: Path, tmp_path: Path, answer) -> None:
+    opened = AVLMap.open(copied)
+    thing = next(one for one in opened.things(least_confidence=0.2) if one.name == "red")
+    opened.edit.rename("red", "zorb", at=thing.position)
+    opened.edit.pin("my pad", (3.0, 3.0, 0.1))
+    opened.edit.forbid("the wet floor", box=(3.0, 3.0, 4.0, 4.0))
+    answer("build", walk, "--out", copied, "--corrected-poses", moved_file(walk, tmp_path / "poses.txt", 30.0), *BUILT)
+    moved = AVLMap.open(copied)
+    assert moved.edited.lost == ()
+    (zorb,) = moved.things(["zorb"])
+    np.testing.assert_allclose(
+        zorb.points.mean(axis=0), thing.points.mean(axis=0) + np.array([30.0, 0.0, 0.0]), atol=0.1
+    )
+    assert moved.ask("my pad").goals[0].position == pytest.approx((33.0, 3.0, 0.1), abs=1e-3)
+    (area,) = moved.edited.forbidden
+    np.testing.assert_allclose(area.corners, [(33.0, 3.0), (34.0, 3.0), (34.0, 4.0), (33.0, 4.0)], atol=1e-3)

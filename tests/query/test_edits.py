@@ -318,6 +318,22 @@ def test_a_damaged_line_is_named_and_never_skipped(tmp_path: Path, line: str, wh
         read_edits(tmp_path)
 
 
+def test_a_disk_that_fails_leaves_the_log_as_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    append_edit(tmp_path, STOOL)
+    before = (tmp_path / EDITS).read_bytes()
+
+    def full(*_: object) -> Path:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "replace", full)
+    with pytest.raises(MapError, match="No space left on device"):
+        append_edit(tmp_path, BENCH)
+    monkeypatch.undo()
+    assert (tmp_path / EDITS).read_bytes() == before and not list(tmp_path.glob("*.partial"))
+    append_edit(tmp_path, BENCH)
+    assert read_edits(tmp_path) == (STOOL, BENCH)
+
+
 # Making edits.
 
 
