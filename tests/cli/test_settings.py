@@ -110,6 +110,8 @@ SAME: dict[str, Callable[[], Any]] = {
     "record.category": of(RecordSettings, "categories"),
     "record.sources": of(RecordSettings, "sources"),
     "record.ambiguous": of(RecordSettings, "ambiguous"),
+    "record.directions_offset_deg": of(RecordSettings, "directions_offset_deg"),
+    "record.directions_outliers": of(RecordSettings, "directions_outliers"),
     "record.hearing": of(RecordSettings, "hearing"),
     "record.microphones": of(RecordSettings, "microphones"),
     "record.sensor": of(RecordSettings, "sensor"),

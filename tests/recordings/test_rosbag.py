@@ -1,5 +1,6 @@
 """Bags of both ROSes and MCAP open in place: topics by type, poses by /tf or odometry, sound, and plain sentences."""
 
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -115,6 +116,7 @@ def write_bag(
     depth: bool = True,
     depth_info: bool = True,
     colour_topic: str = "/camera/color/image_raw",
+    more: Callable[[BagMaker], None] = lambda maker: None,
 ) -> Path:
     maker = BagMaker(kind, folder)
     with maker.writer:
@@ -143,6 +145,7 @@ def write_bag(
             for piece in range(10):
                 part = tone[piece * len(tone) // 10 : (piece + 1) * len(tone) // 10]
                 maker.write("/audio/audio", maker.t("audio_common_msgs/msg/AudioData", part), START_S + piece * 0.1)
+        more(maker)
     return maker.path
 
 

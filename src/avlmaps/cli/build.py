@@ -65,8 +65,8 @@ class Build(ModelVerb):
     microphones: Annotated[Path | None, arg(metavar="FILE")] = None
     """Places of the microphones instead of the recording's own: a JSON file, as `avlmaps calibrate` writes it."""
     topics: Annotated[tuple[str, ...], arg(metavar="KIND=TOPIC ...")] = ()
-    """Topics of a ROS bag that their type does not identify: rgb=, depth=, pose= or audio=TOPIC; or pose=FILE, a
-    table of stamp tx ty tz qx qy qz qw."""
+    """Topics of a ROS bag that their type does not identify: rgb=, depth=, pose= or audio=TOPIC; directions=TOPIC,
+    azimuths that a device says of sounds; or pose=FILE, a table of stamp tx ty tz qx qy qz qw."""
     reading: Annotated[Reading, OmitArgPrefixes] = field(default_factory=Reading)
     """What you know better than the recording's files."""
     submaps: bool = False

@@ -10,6 +10,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Float
 from avlmaps.core.errors import AudioError
+from avlmaps.recordings.directions import DirectionTrack
 from avlmaps.recordings.microphones import Microphones
 
 LOWEST_RATE_HZ = 1000
@@ -56,6 +57,7 @@ class AudioTrack:
         microphones: where those of the channels are, None where that is not known (``channels.read_channels`` reads
             them all).
         files: one for each channel, where they are not channels of one file.
+        directions: what a device said of where its sounds came from, where there is one.
     """
 
     path: Path
@@ -65,6 +67,7 @@ class AudioTrack:
     channel: int | None = None
     microphones: Microphones | None = None
     files: tuple[Path, ...] = ()
+    directions: DirectionTrack | None = None
 
     @classmethod
     def open(cls, path: Path | str, start_s: float = 0.0) -> "AudioTrack":

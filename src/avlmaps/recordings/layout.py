@@ -9,6 +9,7 @@ frames.csv        name,stamp_s: when each picture was taken. It may be left out 
                   or where a video has stamps of its own; a video's frames are the depth pictures in the order of names
 audio.flac        or .wav, .ogg: the sound track, of one channel or of those that `microphones` places; without it that
                   of the video
+directions.csv    stamp_s,azimuth_rad[,elevation_rad][,confidence]: what a device said of where sounds came from
 events.csv, semantic/, objects.json   truth, which mapping never reads
 """
 

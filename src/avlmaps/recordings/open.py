@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 
@@ -49,7 +50,8 @@ def open_recording(
         topics = {**(topics or {}), "audio": "none"}  # its own sound need not be readable
     recording = found.open(path, topics=topics, more=more)
     if audio is not None:
-        recording.audio = AudioTrack.open(Path(audio))
+        directions = None if recording.audio is None else recording.audio.directions
+        recording.audio = replace(AudioTrack.open(Path(audio)), directions=directions)
         settle_sound(recording)
     if microphones is not None:
         if recording.audio is None:

@@ -20,6 +20,7 @@ from avlmaps.core.progress import progress
 from avlmaps.recordings import layout
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
 from avlmaps.recordings.channels import ChannelSound, write_channels
+from avlmaps.recordings.directions import DIRECTIONS, DirectionTrack, write_directions
 from avlmaps.recordings.memory import same_rig
 from avlmaps.recordings.microphones import MicrophoneNumbers, Microphones
 from avlmaps.recordings.types import Frame, Recording
@@ -155,6 +156,8 @@ class RecordingWriter:
         self._audio_start_s = audio.start_s if isinstance(audio, AudioTrack) else start_s
         placed = audio.microphones if isinstance(audio, AudioTrack) else microphones
         self._microphones = None if placed is None else MicrophoneNumbers.of(placed)
+        if isinstance(audio, AudioTrack) and audio.directions is not None:
+            self.set_directions(audio.directions)
         if isinstance(audio, AudioTrack) and audio.files:
             self._take_channels(audio.files)
             return
@@ -169,6 +172,10 @@ class RecordingWriter:
             _take(audio, self.path / f"audio{audio.suffix.lower()}", link=False)
         else:
             write_flac(self.path / "audio.flac", audio.blocks() if isinstance(audio, AudioTrack) else audio)
+
+    def set_directions(self, directions: DirectionTrack) -> None:
+        """Write what a device said of where the sounds of the track came from."""
+        write_directions(self.path / DIRECTIONS, directions)
 
     def _take_channels(self, files: tuple[Path, ...]) -> None:
         """Copy the files of the channels, each under a name of its own."""
@@ -236,7 +243,13 @@ def _make_empty(path: Path) -> None:
     if path.is_dir() and (path / layout.UNFINISHED).exists() and not (path / layout.DESCRIPTION).exists():
         for folder in ("rgb", "depth"):
             shutil.rmtree(path / folder, ignore_errors=True)
-        for name in (layout.POSES, layout.FRAMES, *(f.name for f in path.glob("audio.*")), layout.UNFINISHED):
+        for name in (
+            layout.POSES,
+            layout.FRAMES,
+            DIRECTIONS,
+            *(f.name for f in path.glob("audio.*")),
+            layout.UNFINISHED,
+        ):
             with suppress(FileNotFoundError):
                 (path / name).unlink()
     try:

@@ -52,6 +52,9 @@ class RecordSettings:
             follow the geometry; ``none``: no track.
         microphones: of acoustic hearing: ``mono``, ``stereo``, ``square4``, or a JSON file with ``positions_m``.
         rt60_s: how long every room takes to fall by 60 dB (acoustic, several microphones); by its surfaces if None.
+        directions: whether a device says where sounds come from, into directions.csv.
+        directions_offset_deg: by how much its azimuths are too great.
+        directions_outliers: share of its azimuths that are anything.
         sounds: folder of clips, as ``avlmaps add-sounds`` reads it; None makes them by rule.
         categories: only these kinds of sound; all that homes make if empty.
         sources: how many sounds; one for every twelve seconds of the walk if None.
@@ -74,6 +77,9 @@ class RecordSettings:
     hearing: Hearing = "overlay"
     microphones: str = "mono"
     rt60_s: float | None = None
+    directions: bool = False
+    directions_offset_deg: float = 0.0
+    directions_outliers: float = 0.1
     sounds: Path | None = None
     categories: tuple[str, ...] = ()
     sources: int | None = None
@@ -101,11 +107,22 @@ class RecordSettings:
             (0.0 <= self.snr_db <= 90.0, f"a signal-to-noise ratio of {self.snr_db:g} dB", "0 to 90"),
             (0 <= self.workers <= 256, f"{self.workers} processes", "0 (every core) to 256"),
             (self.rt60_s is None or 0.1 <= self.rt60_s <= 3.0, f"rooms that ring for {self.rt60_s} s", "0.1 to 3"),
+            (
+                -360.0 <= self.directions_offset_deg <= 360.0,
+                f"an offset of {self.directions_offset_deg:g} degrees",
+                "-360 to 360",
+            ),
+            (0.0 <= self.directions_outliers <= 1.0, f"a share of outliers of {self.directions_outliers:g}", "0 to 1"),
             (self.max_frames is None or self.max_frames >= 2, f"{self.max_frames} frames at most", "2 or more"),
         )
         for right, value, choice in checks:
             if not right:
                 raise RecordingError(f"A scene cannot be recorded with {value}; choose {choice}.")
+        if self.directions and self.hearing == "none":
+            raise RecordingError(
+                f"Hearing none has no sound whose direction could be said; leave out {option('directions')}, or choose "
+                f"{option('hearing', 'acoustic')}."
+            )
         if self.microphones != "mono" and self.hearing != "acoustic":
             raise RecordingError(
                 f"Hearing {self.hearing} has one microphone; several ({self.microphones}) need "
@@ -185,6 +202,14 @@ def record_scene(
     with RecordingWriter(out, rig, up_in_world=_UP, colour=settings.colour, origin=origin) as writer:
         if (track := _track(scene, settings, trip, soundings, for_track)) is not None:
             writer.set_audio(track, microphones=_microphones(settings))
+        if settings.directions:
+            from avlmaps_sim.hearing.directions import said_directions
+
+            offset_rad, chance = np.deg2rad(settings.directions_offset_deg), np.random.default_rng([seed, 1])
+            writer.set_directions(said_directions(
+                scene, soundings, trip.stamps_s, trip.world_from_camera, chance, offset_rad,
+                settings.directions_outliers,
+            ))  # fmt: skip
         _write_frames(scene, settings, trip, writer, for_frames)
         made_by = {"scene": scene.name, "seed": seed, "settings": _plain(settings)}
         write_truth(out, scene, soundings, {**made_by, "changes": to_json(changes)} if changes else made_by)

@@ -1,5 +1,6 @@
 """The plan of a build: what it is made of, which frames it fuses, and where it stores what it has finished."""
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -140,6 +141,11 @@ def audio_key(recording: Recording) -> list[str | float] | None:
         return None
     content = sampled_digest(track.path, LARGEST_BUDGET_BYTES).hex()
     known: list[str | float] = [track.path.name, content, track.rate_hz, track.duration_s, track.start_s]
+    if track.directions is not None:
+        said = track.directions
+        known += hashlib.sha256(b"".join(value.tobytes() for value in (
+            said.stamp_s, said.azimuth_rad, said.elevation_rad, said.confidence
+        ))).hexdigest(),  # fmt: skip
     if track.microphones is not None:
         array = track.microphones
         known += [*array.position_m.ravel().tolist(), *array.camera_from_robot.ravel().tolist()]

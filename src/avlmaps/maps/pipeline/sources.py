@@ -36,14 +36,15 @@ def locate_sources(
         walk: the camera's poses in the map's world; the recording's own by default.
     """
     begin = perf_counter()
-    if recording.audio is None or recording.audio.microphones is None or not len(heard):
+    track = recording.audio
+    if track is None or (track.microphones is None and track.directions is None) or not len(heard):
         return None, 0.0
     from avlmaps.maps.sources.find import find_sources
 
     known = walk or recording.trajectory or Trajectory(recording.stamps_s, recording.world_from_camera)
     spans_s = list(zip(heard.onset_s.tolist(), heard.offset_s.tolist(), strict=True))
     voxel_m = grid.centre_of(np.asarray(voxels.index))
-    found = find_sources(recording.audio, known, spans_s, voxel_m, up_in_world)
+    found = find_sources(track, known, spans_s, voxel_m, up_in_world)
     return found, perf_counter() - begin
 
 

@@ -67,7 +67,7 @@ def evidence_of(
     if len(microphones) == 1:
         at_s, level_db = levels_db(sound.samples[0], sound.rate_hz, begin_s, onset_s - begin_s)
         ear = _ears(walk, microphones, at_s if len(at_s) else np.array([onset_s, offset_s]))
-        legs = _Legs.of(ear[:, 0], walls, place)
+        legs = Legs.of(ear[:, 0], walls, place)
         heard = np.zeros(len(place))
         if len(level_db) > 1:
             away = np.linalg.norm(ear - place, axis=2)
@@ -79,9 +79,9 @@ def evidence_of(
     found = found.take(loudest_frames(found)).smoothed(settings.smoothing)
     if not len(found.at_s):
         ear = _ears(walk, microphones, np.array([onset_s, offset_s]))
-        return EventEvidence(np.zeros(len(place)), None, _Legs.of(ear.mean(axis=1), walls, place).expected(settings))
+        return EventEvidence(np.zeros(len(place)), None, Legs.of(ear.mean(axis=1), walls, place).expected(settings))
     ear = _ears(walk, microphones, found.at_s)
-    legs = _Legs.of(ear.mean(axis=1), walls, place)
+    legs = Legs.of(ear.mean(axis=1), walls, place)
     middle = len(found.at_s) // 2
     first, second = legs.steered(found, ear, place, middle)
     total = _weighed(first + second, found, settings)
@@ -104,7 +104,7 @@ def _ears(walk: Trajectory, microphones: Microphones, at_s: Float[np.ndarray, " 
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Legs:
+class Legs:
     """The robot's path in pieces, with what it saw from each.
 
     Attributes:
@@ -120,7 +120,7 @@ class _Legs:
     away_m: Float[np.ndarray, "l c"]
 
     @classmethod
-    def of(cls, ear: Float[np.ndarray, "k 3"], walls: Walls, place: Float[np.ndarray, "c 3"]) -> "_Legs":
+    def of(cls, ear: Float[np.ndarray, "k 3"], walls: Walls, place: Float[np.ndarray, "c 3"]) -> "Legs":
         """Cut a path into pieces and look round from each."""
         gone = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(ear, axis=0), axis=1))])
         piece = (gone / _LEG_M).astype(int)

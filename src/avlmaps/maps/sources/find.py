@@ -1,20 +1,23 @@
 """From a recording whose microphones are known, and the surfaces of its map: the evidence of where each sound began."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from avlmaps.core.arrays import Float
 from avlmaps.core.poses import rotation_to_level
-from avlmaps.core.progress import progress
+from avlmaps.core.progress import progress, say
 from avlmaps.core.timeline import Trajectory
-from avlmaps.maps.sources.candidates import candidates_of
+from avlmaps.maps.sources.bearings import Bearings, evidence_of_bearings, expected_alone
+from avlmaps.maps.sources.candidates import Candidates, candidates_of
 from avlmaps.maps.sources.density import Density, Plan, log_same_place
 from avlmaps.maps.sources.event import EventEvidence, evidence_of
 from avlmaps.maps.sources.settings import SourceSettings
 from avlmaps.maps.sources.walls import Walls
 from avlmaps.maps.types import SourceEvidence
 from avlmaps.recordings.audio import AudioTrack
+from avlmaps.recordings.directions import DirectionTrack
 
 _HEIGHT_STEP_M = 0.25
 _MOVING = -1.5  # logarithm of the odds below which the two halves of a sound are of two places
@@ -31,7 +34,7 @@ def find_sources(
     """Return the evidence of every sound over the candidates of a map; None where nothing can be said.
 
     Args:
-        track: with its microphones.
+        track: with its microphones, with what a device said of directions, or both.
         walk: the camera's poses in the world.
         spans_s: onset and offset of each sound, the recording's time.
         voxel_m: middles of the map's voxels, world.
@@ -40,20 +43,24 @@ def find_sources(
     Raises:
         AudioError: the track cannot be read.
     """
-    microphones = track.microphones
-    if microphones is None or not len(spans_s) or not len(voxel_m):
+    microphones, directions = track.microphones, track.directions
+    if (microphones is None and directions is None) or not len(spans_s) or not len(voxel_m):
         return None
     level = rotation_to_level(up_in_world)
     turn = np.eye(4)
     turn[:3, :3] = level
     walked = Trajectory(walk.stamps_s, turn @ walk.world_from_body)
     surface = voxel_m @ level.T
-    ear = microphones.in_world_m(walked.world_from_body).mean(axis=1)
+    ear = walked.world_from_body[:, :3, 3]
+    if microphones is not None:
+        ear = microphones.in_world_m(walked.world_from_body).mean(axis=1)
     candidates = candidates_of(surface, ear)
     if not len(candidates):
         return None
-    settings, plan = SourceSettings.of(len(microphones)), Plan.of(candidates.place_m)
+    channels = 0 if microphones is None else len(microphones)
+    settings, plan = SourceSettings.of(channels), Plan.of(candidates.place_m)
     walls: dict[int, Walls] = {}
+    layers: list[Walls] = []
     heard: list[EventEvidence] = []
     for begin_s, end_s in progress(spans_s, "sources", unit="sound"):
         span = float(begin_s), float(end_s)
@@ -62,15 +69,39 @@ def find_sources(
         layer = round(height_m / _HEIGHT_STEP_M)
         if layer not in walls:
             walls[layer] = Walls.of(surface, height_m)
-        heard.append(evidence_of(track, microphones, walked, span, candidates, walls[layer], settings))
+        layers.append(walls[layer])
+        if microphones is not None:
+            heard.append(evidence_of(track, microphones, walked, span, candidates, walls[layer], settings))
+        else:
+            alone = expected_alone(walked, span, candidates, walls[layer], settings)
+            heard.append(EventEvidence(np.zeros(len(candidates)), None, alone))
+    if directions is not None:
+        heard = _with_directions(heard, directions, walked, spans_s, layers, candidates)
     return SourceEvidence(
         place=(candidates.place_m.astype(np.float64) @ level).astype(np.float32),
         prior=candidates.prior.astype(np.float32),
         heard=np.maximum(np.stack([one.heard for one in heard]), _LEAST).astype(np.float16),
         expected=np.maximum(np.stack([one.expected for one in heard]), _LEAST).astype(np.float16),
         moving=np.array([moves(one, plan, candidates.prior, settings) for one in heard], np.uint8),
-        channels=np.array([len(microphones)], np.int64),
+        channels=np.array([channels], np.int64),
     )
+
+
+def _with_directions(
+    heard: Sequence[EventEvidence],
+    directions: DirectionTrack,
+    walked: Trajectory,
+    spans_s: Sequence[tuple[float, float]],
+    walls: Sequence[Walls],
+    candidates: Candidates,
+) -> list[EventEvidence]:
+    """Return the evidence with that of a device's directions, and say what was found out about the device."""
+    said = [Bearings.of(directions, walked, (float(begin_s), float(end_s))) for begin_s, end_s in spans_s]
+    more, device = evidence_of_bearings(said, walls, candidates, [one.expected for one in heard])
+    if device is not None:
+        say(f"note: {device.sentence}")
+    both = [one.heard + other for one, other in zip(heard, more, strict=True)]
+    return [replace(one, heard=total - total.max()) for one, total in zip(heard, both, strict=True)]
 
 
 def moves(one: EventEvidence, plan: Plan, prior: Float[np.ndarray, " c"], settings: SourceSettings) -> bool:

@@ -39,6 +39,7 @@ class SourceSettings:
 
 
 _OF_CHANNELS = {
+    0: SourceSettings(blur_m=(0.2, 0.6), wide=0.15, astray=0.05),  # a device's directions alone
     1: SourceSettings(reach_m=0.8, blur_m=(0.15, 0.5), wide=0.15, astray=0.03),
     2: SourceSettings(concentration=9.8, blur_m=(0.12, 0.5), wide=0.1, astray=0.03),
 }

@@ -3,7 +3,7 @@
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,7 @@ from avlmaps.recordings import layout
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.channels import tracked
 from avlmaps.recordings.corrections import corrected
+from avlmaps.recordings.directions import DIRECTIONS, read_directions
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
 from avlmaps.recordings.formats.columns import NAMED_FILE, POSE, named_order, split_header
 from avlmaps.recordings.formats.file_recording import FileRecording, Shots, find_audio, list_names, settle
@@ -58,6 +59,8 @@ def open_folder(path: Path, report: Report = stop_at_first) -> Recording:
     first_s = 0.0 if found.stamps_s is None else float(found.stamps_s[0]) - start_s
     audio_start_s = description.audio_start_s - (start_s if description.audio_start_s > _DATE_S else 0.0)
     up = description.up_in_world
+    heard = _open_audio(path, audio_start_s, video, first_s, description.placed)
+    audio, lone = _with_directions(path, heard, start_s)
     recording = FileRecording(
         path=path,
         format="folder",
@@ -65,12 +68,26 @@ def open_folder(path: Path, report: Report = stop_at_first) -> Recording:
         shots=shots,
         depth_units=description.depth_units_per_m,
         up_in_world=None if up is None else np.array(up) / np.linalg.norm(up),
-        audio=_open_audio(path, audio_start_s, video, first_s, description.placed),
-        notices=(*_turned_notices(video), *notices, *more),
+        audio=audio,
+        notices=(*_turned_notices(video), *notices, *more, *lone),
         video=video,
         trajectory=trajectory,
     )
     return corrected(recording, description.corrections())
+
+
+def _with_directions(path: Path, audio: AudioTrack | None, start_s: float) -> tuple[AudioTrack | None, tuple[str, ...]]:
+    """Return the track with what a device said of directions, where that lies beside it; and a notice or none."""
+    file = path / DIRECTIONS
+    if not file.exists():
+        return audio, ()
+    if audio is None:
+        return None, (f"{DIRECTIONS} is not used, because the recording has no sound track.",)
+    directions = read_directions(file)
+    if start_s and len(directions) and directions.stamp_s[0] > _DATE_S:
+        directions = replace(directions, stamp_s=directions.stamp_s - start_s)
+    directions.require_beside(audio.start_s, audio.end_s, str(file))
+    return replace(audio, directions=directions), ()
 
 
 def _check_sizes(folder: Path, description: Description, found: "_Pictures") -> None:

@@ -120,7 +120,9 @@ class Motion:
     z_is_up: bool = True
 
 
-def find_motion(bag: Bag, named: str, camera_frame: str, transforms: TransformTree, tf_topic: str) -> Motion:
+def find_motion(
+    bag: Bag, named: str, camera_frame: str, transforms: TransformTree, tf_topic: str, no_pose_topic: str = ""
+) -> Motion:
     """Find what moves the camera: transforms, else odometry or a topic of poses.
 
     Args:
@@ -129,6 +131,7 @@ def find_motion(bag: Bag, named: str, camera_frame: str, transforms: TransformTr
         camera_frame: the depth camera's frame.
         transforms: the tree of the bag's transforms.
         tf_topic: where they come from.
+        no_pose_topic: a topic of poses that are not the robot's.
 
     Raises:
         RecordingError: nothing moves it, or what does is not linked to it.
@@ -139,7 +142,9 @@ def find_motion(bag: Bag, named: str, camera_frame: str, transforms: TransformTr
         _check_pose_topic(bag, named)
     if (not named or named == tf_topic) and transforms.moves(camera_frame):
         return Motion(transforms, tf_topic)
-    candidates = [named] if named and named != tf_topic else bag.topics_of(_POSE_TYPES) if not named else []
+    candidates = [named] if named and named != tf_topic else []
+    if not named:
+        candidates = [topic for topic in bag.topics_of(_POSE_TYPES) if topic != no_pose_topic]
     if not candidates:
         raise RecordingError(
             f"{bag.path} has no poses: no /tf that moves {camera_frame!r}, no odometry and no pose topic; "

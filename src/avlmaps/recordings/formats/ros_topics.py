@@ -18,6 +18,7 @@ class RosTopics:
         pose: odometry, poses of the camera or the body, transforms, or a file of poses; empty: /tf first.
         audio: audio data; ``none`` leaves the sound out.
         audio_pcm: no topic: ``16000,1`` says that audio data are plain 16-bit samples, 16,000 a second, in one channel.
+        directions: azimuths of sounds, numbers or stamped poses; they are not found by type.
     """
 
     rgb: str = ""
@@ -25,6 +26,7 @@ class RosTopics:
     pose: str = ""
     audio: str = ""
     audio_pcm: str = ""
+    directions: str = ""
 
 
 def pair_images(colours: list[str], depths: list[str]) -> tuple[str, str]:

@@ -10,7 +10,7 @@ clouds of a LiDAR are projected into the colour camera.
 import hashlib
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import cached_property
 from itertools import islice
 from pathlib import Path
@@ -25,7 +25,7 @@ from avlmaps.core.timeline import associate, gap_notices, in_order
 from avlmaps.core.wording import option
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.content import add_files, stamp_of
-from avlmaps.recordings.formats import ros_clouds
+from avlmaps.recordings.formats import ros_clouds, ros_directions
 from avlmaps.recordings.formats.bag_files import Bag
 from avlmaps.recordings.formats.ros_audio import STAMPED, Pcm, SoundTopic, extract_audio
 from avlmaps.recordings.formats.ros_clock import PictureClock
@@ -101,7 +101,7 @@ class RosbagRecording(Recording):
             lost, within = len(depth) - len(a), f"{1000 * tolerance_s:.0f} ms"
             notices.append(f"{lost} of {len(depth)} {what} have no colour image within {within}.")
         stamps_s = rgb_s[rgb][b] if self._of_points else depth_s[depth][a]
-        motion = find_motion(self._bag, topics.pose, camera_frame, transforms, tf_topic)
+        motion = find_motion(self._bag, topics.pose, camera_frame, transforms, tf_topic, topics.directions)
         tree = motion.tree
         self.topics = {"rgb": self._rgb_topic, "depth": self._depth_topic, "pose": motion.topic}
         if cycle := tree.cycle(camera_frame):
@@ -138,6 +138,9 @@ class RosbagRecording(Recording):
         self.base_height = base_height(tree, camera_frame, float(stamps_s[rows[0]]))
         clock = PictureClock.of(depth_ns[depth][a][rows], stamps_s[rows], self._start_s)
         self.audio, audio_notices = self._read_audio(topics, clock)
+        if topics.directions:
+            self.audio, said = self._with_directions(topics.directions, clock)
+            audio_notices = (*audio_notices, *said)
         self.notices = (*notices, *gap_notices(self.stamps_s, "frames"), *audio_notices)
 
     def frame(self, index: int) -> Frame:
@@ -209,6 +212,28 @@ class RosbagRecording(Recording):
         folder = Path(self._folder.name)
         sound = SoundTopic(found[0], lambda: self._bag.messages(found[0]), clock)
         return extract_audio(sound, info, folder, pcm)
+
+    def _with_directions(self, topic: str, clock: PictureClock) -> tuple[AudioTrack, tuple[str, ...]]:
+        """Return the track with the directions on a topic.
+
+        Raises:
+            RecordingError: there is no such topic of angles, no sound beside it, or they are of another clock.
+        """
+        known = self._bag.topics_of(ros_directions.TYPES)
+        if topic not in known:
+            has = ", ".join(known) or "none"
+            raise RecordingError(
+                f"{self.path} has no topic {topic!r} of directions (std_msgs numbers or geometry_msgs/PoseStamped: "
+                f"{has}); name one of them."
+            )
+        if self.audio is None:
+            raise RecordingError(
+                f"{self.path} has no sound, so that the directions on {topic} are of nothing; leave them out."
+            )
+        found, notices = ros_directions.directions_of(topic, lambda: self._bag.messages(topic), clock)
+        found.require_beside(self.audio.start_s, self.audio.end_s, f"{self.path}, {topic}")
+        self.topics = {**self.topics, "directions": topic}
+        return replace(self.audio, directions=found), notices
 
 
 def _image_topics(bag: Bag, topics: RosTopics) -> tuple[str, str]:

@@ -45,6 +45,12 @@ class Record(Verb):
     microphones: Annotated[str, arg(metavar="NAME|FILE")] = "mono"
     """Microphones on the robot, of acoustic hearing: mono, stereo (0.2 m apart), square4 (0.2 m), or a JSON file with
     positions_m."""
+    directions: bool = False
+    """Record also what a device says of where sounds come from: azimuths in directions.csv, ten a second."""
+    directions_offset_deg: Annotated[float, arg(metavar="DEGREES")] = 0.0
+    """Offset of those azimuths, as of a device that is mounted turned, degrees."""
+    directions_outliers: Annotated[float, arg(metavar="SHARE")] = 0.1
+    """Share of those azimuths that are anything."""
     sensor: Literal["clean", "kinect", "realsense"] = "clean"
     """Camera whose faults colour and depth have."""
     drift: bool = False
@@ -99,6 +105,9 @@ def record(verb: "Record") -> dict[str, Any]:
         sensor=verb.sensor,
         hearing=verb.hearing,
         microphones=verb.microphones,
+        directions=verb.directions,
+        directions_offset_deg=verb.directions_offset_deg,
+        directions_outliers=verb.directions_outliers,
         sounds=verb.sounds,
         categories=verb.category,
         sources=verb.sources,

@@ -1,0 +1,62 @@
+"""What an array with a chip says of where sounds come from: an azimuth ten times a second while something sounds.
+
+The azimuth is that of the source, or of the last corner that it goes round where a wall lies between, plus the device's
+offset and an error; a share of the azimuths are anything. Devices say whole degrees.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from avlmaps.recordings.directions import DirectionTrack
+from avlmaps_sim.hearing.impulse import Acoustics
+from avlmaps_sim.hearing.schedule import Sounding
+from avlmaps_sim.scene import Scene
+
+RATE_HZ = 10.0
+ERROR_DEG = 8.0
+
+
+def said_directions(
+    scene: Scene,
+    soundings: Sequence[Sounding],
+    stamps_s: Float[np.ndarray, " n"],
+    world_from_camera: Float[np.ndarray, "n 4 4"],
+    rng: np.random.Generator,
+    offset_rad: float = 0.0,
+    outliers: float = 0.1,
+) -> DirectionTrack:
+    """Return the azimuths that a device on the robot says.
+
+    Args:
+        scene: the building.
+        soundings: what sounds when.
+        stamps_s: rising seconds.
+        world_from_camera: the camera's poses then.
+        rng: draws errors and outliers.
+        offset_rad: by how much all azimuths are too great.
+        outliers: share of the azimuths that are anything.
+    """
+    building = Acoustics(scene, 16_000)
+    at_s: list[float] = []
+    azimuth: list[float] = []
+    for sounding in sorted(soundings, key=lambda one: one.onset_s):
+        source = building.sounds_from(np.asarray(sounding.source.position))
+        times = np.arange(np.ceil(sounding.onset_s * RATE_HZ), sounding.offset_s * RATE_HZ) / RATE_HZ
+        times = times[(times >= stamps_s[0]) & (times <= stamps_s[-1])]
+        times = times[times > (at_s[-1] if at_s else -np.inf)]  # of sounds at once it says the first
+        rows = np.abs(stamps_s[None] - times[:, None]).argmin(axis=1) if len(times) else np.zeros(0, int)
+        for time_s, row in zip(times.tolist(), rows.tolist(), strict=True):
+            pose = world_from_camera[row]
+            ear = pose[:3, 3]
+            air, _ = building.floor_at(float(ear[2]))
+            corner = air.ways(source, ear[None])[0].corner
+            away = (source[:2] if corner is None else np.asarray(corner)) - ear[:2]
+            at_s.append(time_s)
+            azimuth.append(float(np.arctan2(away[1], away[0]) - np.arctan2(pose[1, 2], pose[0, 2])))
+    true = np.array(azimuth)
+    said = true + offset_rad + np.deg2rad(ERROR_DEG) * rng.standard_normal(len(true))
+    said = np.where(rng.random(len(true)) < outliers, rng.uniform(-np.pi, np.pi, len(true)), said)
+    whole = np.deg2rad(np.rint(np.rad2deg(np.angle(np.exp(1j * said)))))
+    return DirectionTrack.of(at_s, whole)
