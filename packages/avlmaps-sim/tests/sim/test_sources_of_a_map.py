@@ -100,7 +100,7 @@ def mapped(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
         max_frames=80,
     )  # fmt: skip
     record_scene(flat(), folder / "rec", settings, seed=1)
-    build_map(open_recording(folder / "rec"), folder / "flat.avlmap", progress=False)
+    build_map(open_recording(folder / "rec"), folder / "flat.avlmap", "synthetic", progress=False)
     return folder / "rec", folder / "flat.avlmap"
 
 
@@ -187,7 +187,7 @@ def test_priors_of_the_lexicon_can_be_left_out(mapped: tuple[Path, Path]) -> Non
 def test_a_map_of_one_microphone_says_what_it_lacks(tmp_path: Path) -> None:
     settings = RecordSettings(size=(64, 48), fps=2.0, hearing="acoustic", sources=1, workers=1, max_frames=20)
     record_scene(flat(), tmp_path / "rec", settings, seed=1)
-    build_map(open_recording(tmp_path / "rec"), tmp_path / "one.avlmap", progress=False)
+    build_map(open_recording(tmp_path / "rec"), tmp_path / "one.avlmap", "colours", progress=False)
     avlmap = AVLMap.open(tmp_path / "one.avlmap")
     assert avlmap.stored.sources() is None
     with pytest.raises(QueryError, match="where the microphones are"):
