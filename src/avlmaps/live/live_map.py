@@ -493,7 +493,10 @@ class LiveMap:
 
     def _show(self, stored: StoredMap, came_s: float) -> None:
         made = AVLMap(stored, self._query)
-        _warm(made)
+        if self._generation:
+            _warm(made)
+        else:  # it loads and compiles what every question needs, which takes longer than the next snapshot may wait
+            Thread(target=_warm, args=(made,), name="avlmaps-warm", daemon=True).start()
         self._snapshot = made, came_s
         self._generation += 1
 
