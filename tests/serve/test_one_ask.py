@@ -51,7 +51,7 @@ PARTS = [
 def home(walk: Path) -> Path:
     """A map of the same room by an encoder of names."""
     path = walk.parent / "home.avlmap"
-    build_map(open_recording(walk), path, "embedded", BuildSettings(voxel_size_m=0.1), progress=False)
+    build_map(open_recording(walk), path, "synthetic", BuildSettings(voxel_size_m=0.1), progress=False)
     return path
 
 
