@@ -16,6 +16,7 @@ import numpy as np
 from avlmaps.core.arrays import Float
 from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.sources.candidates import Candidates
+from avlmaps.maps.sources.density import Plan
 from avlmaps.maps.sources.event import Legs
 from avlmaps.maps.sources.settings import SourceSettings
 from avlmaps.maps.sources.walls import Walls
@@ -26,10 +27,10 @@ _SPREADS_DEG, _OUTLIERS = (6.0, 12.0, 25.0), (0.05, 0.2, 0.5)
 _ELEVATION_DEG = 15.0
 _INDEPENDENT_S = 0.25  # directions that follow sooner repeat one another
 _MOST = 120  # of a sound
-_COARSE = 2500  # candidates by which the device is found
 _STEEP = 0.9  # a camera that looks up or down like this heads where its picture's top is
 _LEAST_WEIGHT = 1e-3
 _SURE_DEG = 15.0
+_ASTRAY = 0.2  # share of the sounds that say nothing of the device
 
 _GRID = tuple(product(_SPREADS_DEG, _OUTLIERS))
 
@@ -157,17 +158,19 @@ def evidence_of_bearings(
         expected: log-likelihood of each candidate without the sound, for each.
     """
     place = candidates.place_m.astype(np.float64)
-    some = np.unique(np.linspace(0, len(place) - 1, min(len(place), _COARSE)).astype(int))
+    # Azimuths depend on the plan alone: one candidate for each of its cells stands for those above and below it.
+    _, some, cell = np.unique(Plan.of(place).cell, return_index=True, return_inverse=True)
     tables = [_log_density(*numbers) for numbers in _GRID]
     of_sound: list[Float[np.ndarray, "g o"]] = []
     for one, between, likely in zip(heard, walls, expected, strict=True):
         if not len(one):
             of_sound.append(np.zeros((len(_GRID), _BINS)))
             continue
-        before = np.log(candidates.prior[some] + 1e-300) + likely[some] + one.elevations(place[some])
-        before -= _log_sum(before[:, None])
+        share = candidates.prior * np.exp(likely - likely.max() + (high := one.elevations(place)) - high.max())
+        before = np.log(np.bincount(cell.reshape(-1), share) / share.sum() + 1e-300)
         counts = one.residuals(place[some], between)
         of_sound.append(np.stack([_log_sum(before[:, None] + counts @ table) for table in tables]))
+    of_sound = [_bounded(own) for own in of_sound]
     known = np.sum(of_sound, axis=0) if of_sound else np.zeros((len(_GRID), _BINS))
     result: list[Float[np.ndarray, " c"]] = []
     for one, between, own in zip(heard, walls, of_sound, strict=True):
@@ -186,6 +189,12 @@ def evidence_of_bearings(
         result.append(_log_sum(parts) + one.elevations(place))
     sounds = sum(len(one) > 0 for one in heard)
     return result, _device(known, sounds) if sounds else None
+
+
+def _bounded(own: Float[np.ndarray, "g o"]) -> Float[np.ndarray, "g o"]:
+    """Return what a sound says of the device where it may be astray: its place among no candidate, moving, of two."""
+    share = np.exp(own - own.max())
+    return np.log((1.0 - _ASTRAY) * share / share.mean() + _ASTRAY)
 
 
 def _device(known: Float[np.ndarray, "g o"], sounds: int) -> Device:

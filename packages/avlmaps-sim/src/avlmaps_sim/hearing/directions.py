@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
+from avlmaps.core.timeline import Trajectory
 from avlmaps.recordings.directions import DirectionTrack
 from avlmaps_sim.hearing.impulse import Acoustics
 from avlmaps_sim.hearing.schedule import Sounding
@@ -38,7 +39,7 @@ def said_directions(
         offset_rad: by how much all azimuths are too great.
         outliers: share of the azimuths that are anything.
     """
-    building = Acoustics(scene, 16_000)
+    building, walk = Acoustics(scene, 16_000), Trajectory(stamps_s, world_from_camera)
     at_s: list[float] = []
     azimuth: list[float] = []
     for sounding in sorted(soundings, key=lambda one: one.onset_s):
@@ -46,9 +47,7 @@ def said_directions(
         times = np.arange(np.ceil(sounding.onset_s * RATE_HZ), sounding.offset_s * RATE_HZ) / RATE_HZ
         times = times[(times >= stamps_s[0]) & (times <= stamps_s[-1])]
         times = times[times > (at_s[-1] if at_s else -np.inf)]  # of sounds at once it says the first
-        rows = np.abs(stamps_s[None] - times[:, None]).argmin(axis=1) if len(times) else np.zeros(0, int)
-        for time_s, row in zip(times.tolist(), rows.tolist(), strict=True):
-            pose = world_from_camera[row]
+        for time_s, pose in zip(times.tolist(), walk.at(times), strict=True):
             ear = pose[:3, 3]
             air, _ = building.floor_at(float(ear[2]))
             corner = air.ways(source, ear[None])[0].corner
