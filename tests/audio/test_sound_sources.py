@@ -245,3 +245,18 @@ def test_shares_of_candidates_add_up_to_their_cells() -> None:
     density = Density.of(plan, prior, evidence, np.zeros(len(place)), SourceSettings())
     share = density.of_candidates(prior, evidence)
     assert np.allclose(plan.sums(share), density.share, atol=1e-9)
+
+
+@given(st.integers(0, 20))
+@settings(max_examples=10, deadline=None)
+def test_near_the_robot_every_place_in_the_air_has_a_candidate_beside_it(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    ear = np.array([[*rng.uniform([1.5, 1.5], [4.5, 3.5]), 1.3]])
+    found = candidates_of(room(), ear)
+    assert found.prior.sum() == pytest.approx(1.0) and len(found.prior) == len(found.place_m)
+    place = ear[0] + rng.uniform([-0.4, -0.4, -0.9], [0.4, 0.4, 0.3])
+    assert np.linalg.norm(found.place_m - place, axis=1).min() < 0.15
+    near = np.linalg.norm(found.place_m[:, :2] - ear[0, :2], axis=1) < 0.6
+    columns = found.prior[near & found.in_air].sum() / (np.pi * 0.6**2)
+    every = found.prior[found.in_air].sum() / 30.0  # of a room of 6 x 5 m: finer cells are no likelier places
+    assert columns == pytest.approx(every, rel=0.3)

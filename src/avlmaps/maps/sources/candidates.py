@@ -12,6 +12,9 @@ from avlmaps.core.arrays import Bool, Float, Float32, Int
 CELL_M = 0.15
 _AIR_CELL_M = 0.3
 _AIR_HEIGHTS_M = (0.4, 0.9, 1.4)
+# Near the robot a cell is seen under a wide angle, and what sounds may be a thing that it passes: finer cells of air.
+_NEAR_M = 0.9
+_NEAR_HEIGHTS_M = (0.3, 0.5, 0.7, 0.9, 1.1, 1.3, 1.5, 1.7)
 _AIR_SHARE = 0.25  # prior probability that a sound comes from the air over the floor: somebody who has walked on
 _FLOOR_BELOW_EAR_M = (0.3, 2.2)
 _HIGHEST_OVER_EAR_M = 1.6
@@ -46,19 +49,41 @@ def candidates_of(voxel_m: Float[np.ndarray, "n 3"], ear_m: Float[np.ndarray, "k
     here = voxel_m[(voxel_m[:, 2] > low) & (voxel_m[:, 2] < high)]
     if not len(here):
         return Candidates(np.zeros((0, 3), np.float32), np.zeros(0), np.zeros(0, bool))
+    from scipy.spatial import KDTree
+
     surface = _means(here, np.floor(here / CELL_M).astype(np.int64))
     floor = here[here[:, 2] < ear_m[:, 2].min() - _FLOOR_BELOW_EAR_M[0]]
-    air = np.zeros((0, 3))
+    air, weight = np.zeros((0, 3)), np.zeros(0)
     if len(floor):
         column, lowest = _columns(floor)
-        air = np.concatenate([np.column_stack([column, lowest + height]) for height in _AIR_HEIGHTS_M])
-        key = _keys(np.floor(np.concatenate([here, air]) / _AIR_CELL_M).astype(np.int64))
-        air = air[~np.isin(key[len(here) :], key[: len(here)])]
+        is_near = KDTree(ear_m[:, :2]).query(column)[0] < _NEAR_M
+        wide = _free(_column_of(column[~is_near], lowest[~is_near], _AIR_HEIGHTS_M), here, _AIR_CELL_M)
+        fine = np.concatenate([column[is_near] + CELL_M * np.array(at) for at in _QUARTERS])
+        fine = _free(_column_of(fine, np.tile(lowest[is_near], len(_QUARTERS)), _NEAR_HEIGHTS_M), here, CELL_M)
+        air = np.concatenate([wide, fine])
+        one = len(_AIR_HEIGHTS_M) / (len(_QUARTERS) * len(_NEAR_HEIGHTS_M))  # a column has the same prior in all
+        weight = np.append(np.ones(len(wide)), np.full(len(fine), one))
     share = _AIR_SHARE if len(air) else 0.0
     own = _flattened(surface)
-    prior = np.concatenate([(1.0 - share) * own / own.sum(), np.full(len(air), share / max(len(air), 1))])
+    prior = np.concatenate([(1.0 - share) * own / own.sum(), share * weight / max(float(weight.sum()), 1e-12)])
     place = np.concatenate([surface, air]).astype(np.float32)
     return Candidates(place, prior, np.arange(len(place)) >= len(surface))
+
+
+_QUARTERS = ((-0.5, -0.5), (-0.5, 0.5), (0.5, -0.5), (0.5, 0.5))
+
+
+def _column_of(
+    xy: Float[np.ndarray, "k 2"], lowest: Float[np.ndarray, " k"], heights_m: tuple[float, ...]
+) -> Float[np.ndarray, "n 3"]:
+    """Return places at some heights over the lowest surface of each column."""
+    return np.concatenate([np.column_stack([xy, lowest + height]) for height in heights_m])
+
+
+def _free(air: Float[np.ndarray, "n 3"], here: Float[np.ndarray, "k 3"], cell_m: float) -> Float[np.ndarray, "m 3"]:
+    """Return the places in whose cell of that size no surface lies."""
+    key = _keys(np.floor(np.concatenate([here, air]) / cell_m).astype(np.int64))
+    return air[~np.isin(key[len(here) :], key[: len(here)])]
 
 
 def _flattened(surface: Float[np.ndarray, "c 3"]) -> Float[np.ndarray, " c"]:
