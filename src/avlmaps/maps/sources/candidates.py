@@ -55,7 +55,7 @@ def candidates_of(voxel_m: Float[np.ndarray, "n 3"], ear_m: Float[np.ndarray, "k
     floor = here[here[:, 2] < ear_m[:, 2].min() - _FLOOR_BELOW_EAR_M[0]]
     air, weight = np.zeros((0, 3)), np.zeros(0)
     if len(floor):
-        column, lowest = _columns(floor)
+        column, lowest = _columns(floor, ear_m)
         is_near = KDTree(ear_m[:, :2]).query(column)[0] < _NEAR_M
         wide = _free(_column_of(column[~is_near], lowest[~is_near], _AIR_HEIGHTS_M), here, _AIR_CELL_M)
         fine = np.concatenate([column[is_near] + CELL_M * np.array(at) for at in _QUARTERS])
@@ -70,6 +70,7 @@ def candidates_of(voxel_m: Float[np.ndarray, "n 3"], ear_m: Float[np.ndarray, "k
     return Candidates(place, prior, np.arange(len(place)) >= len(surface))
 
 
+_AROUND = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1], indexing="ij"), axis=-1).reshape(9, 2)
 _QUARTERS = ((-0.5, -0.5), (-0.5, 0.5), (0.5, -0.5), (0.5, 0.5))
 
 
@@ -108,12 +109,21 @@ def _means(point: Float[np.ndarray, "n 3"], cell: Int[np.ndarray, "n 3"]) -> Flo
     return np.stack([np.bincount(which, point[:, axis]) for axis in range(3)], axis=1) / count[:, None]
 
 
-def _columns(floor: Float[np.ndarray, "n 3"]) -> tuple[Float[np.ndarray, "k 2"], Float[np.ndarray, " k"]]:
-    """Return the middle of each column of air over the floor, and how high the lowest surface in it lies."""
+def _columns(
+    floor: Float[np.ndarray, "n 3"], ear_m: Float[np.ndarray, "e 3"]
+) -> tuple[Float[np.ndarray, "k 2"], Float[np.ndarray, " k"]]:
+    """Return the middle of each column of air over the floor, and how high the lowest surface in it lies.
+
+    Where the robot was there is floor, though its camera may not have seen it.
+    """
     cell = np.floor(floor[:, :2] / _AIR_CELL_M).astype(np.int64)
     _, first, which = np.unique(_keys(cell), return_index=True, return_inverse=True)
     column, lowest = cell[first], np.full(len(first), np.inf)
     np.minimum.at(lowest, which, floor[:, 2])
     level = float(np.quantile(lowest, 0.2))
     flat = np.abs(lowest - level) < 0.25
-    return (column[flat] + 0.5) * _AIR_CELL_M, lowest[flat]
+    passed = (np.floor(ear_m[:, None, :2] / _AIR_CELL_M).astype(np.int64) + _AROUND).reshape(-1, 2)
+    known = np.concatenate([column[flat], passed])
+    _, first = np.unique(_keys(known), return_index=True)
+    height = np.append(lowest[flat], np.full(len(passed), level))
+    return (known[first] + 0.5) * _AIR_CELL_M, height[first]
