@@ -32,6 +32,7 @@ _SPREAD_S = 15e-6  # usual error of a peak
 _FEWEST = 60  # frames with measured delays
 # What the walk must leave of doubt at most, one standard deviation, and how badly the result may fit.
 WORST_PLACE_M, WORST_DELAY_S, WORST_RESIDUAL_S = 0.01, 30e-6, 45e-6
+LEAST_EXPLAINED = 0.9  # of the clear delays: 1.0 in rooms with one source, 0.3 to 0.8 with several
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,7 +105,13 @@ def calibrate(track: AudioTrack, walk: Trajectory, between_s: tuple[float, float
             f"standard deviation), where {100 * WORST_PLACE_M:g} cm and {1e6 * WORST_DELAY_S:g} µs are needed. Let the "
             "robot turn on the spot and drive past the source on both sides, at 1 to 3 m from it."
         )
-    after_s = _scale(fit.residual_s(solution, measured))
+    after_s, explained = _scale(fit.residual_s(solution, measured)), fit.explained(measured)
+    if explained < LEAST_EXPLAINED:
+        raise RecordingError(
+            f"One still source explains {explained:.0%} of the clear delays alone ({LEAST_EXPLAINED:.0%} are needed): "
+            f"several things sounded, or one that moved. Give the time when a single source sounds "
+            f"({option('between', 'BEGIN END')}); are poses and clocks right?"
+        )
     if after_s > WORST_RESIDUAL_S:
         raise RecordingError(
             f"No array explains the delays: they differ by {1e6 * after_s:.0f} µs (at most "
@@ -282,6 +289,11 @@ class _Fit:
     def residual_s(self, solution: Float[np.ndarray, " n"], measured: _Measured) -> Float[np.ndarray, " k"]:
         """Return by how much each measured delay is longer than the unknowns say."""
         return (measured.delay_s - self._predicted_s(solution))[measured.used]
+
+    def explained(self, measured: _Measured) -> float:
+        """Return the share of the frames and pairs with a clear peak anywhere that have one where it is predicted."""
+        clear = self.found.curve.max(axis=2) > _LEAST_PEAK * self.found.weight[:, None]
+        return float(measured.used.sum() / max(int((clear | measured.used).sum()), 1))
 
     def _free(self, hold_heights: bool) -> Bool[np.ndarray, " n"]:
         count = self.basis.shape[1]
