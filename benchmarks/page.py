@@ -58,6 +58,11 @@ ENTRIES = (
         "corrected", "Corrected poses", "python benchmarks/corrected.py --scenes house:7",
         about="[How a map follows corrected poses](guides/correct-poses.md). The drive goes there and back.",
     ),
+    Entry(
+        "cluster", "A build on a cluster", "python benchmarks/cluster.py --recording RECORDING",
+        about="[How a cluster builds a map](guides/cluster.md). The plan multiplies what was measured on one core; no "
+        "cluster of several machines was tried.",
+    ),
     Entry("queries", "Queries", "python benchmarks/queries.py"),
     Entry("cold-start", "A query from the shell", "python benchmarks/cold_start.py"),
     Entry(
