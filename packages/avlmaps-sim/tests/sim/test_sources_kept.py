@@ -36,7 +36,7 @@ def heard(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     )  # fmt: skip
     record_scene(flat(), folder / "rec", settings, seed=1)
     built = BuildSettings(frames=FrameSettings(per_submap=32))
-    build_map(open_recording(folder / "rec"), folder / "flat.avlmap", settings=built, progress=False)
+    build_map(open_recording(folder / "rec"), folder / "flat.avlmap", "synthetic", built, progress=False)
     return folder / "rec", folder / "flat.avlmap"
 
 
