@@ -516,10 +516,9 @@ class Panel {
       const step = Math.max(1, Math.ceil(track.length / RAYS));
       return track.filter((_, i) => i % step === 0);
     });
-    this.viewer.fields.forEach((_, other) => this.viewer.setLines(other, "rays", other === k ? [
-      { kind: "line", tint: SOURCE_TINTS[0.5], through: true,
-        places: new Float32Array(places.flatMap((place) => [...place, ...end])) },
-    ] : null));
+    const rays = places.map((place) => ({ kind: "band", tint: SOURCE_TINTS[0.9], through: true,
+      places: band([place, end], 0.025) }));
+    this.viewer.fields.forEach((_, other) => this.viewer.setLines(other, "rays", other === k ? rays : null));
   }
 
   list() {
