@@ -270,6 +270,8 @@ def test_a_robot_that_gives_no_frame_is_said(tmp_path: Path, given: list, chosen
 def test_ros_that_is_not_here_and_topics_of_no_kind_are_said() -> None:
     with pytest.raises(RecordingError, match="no 'colour' among the topics"):
         ros_topics({"colour": "/rgb"})
+    with pytest.raises(RecordingError, match="no 'directions' among the topics"):
+        ros_topics({"directions": "/doa"})
     try:
         import rclpy  # noqa: F401  # pyright: ignore[reportMissingImports]
     except ImportError:
