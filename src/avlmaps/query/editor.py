@@ -10,7 +10,9 @@ import numpy as np
 from avlmaps.core.arrays import Float
 from avlmaps.core.errors import MapError, QueryError
 from avlmaps.maps.store.edits import LONGEST_NAME, Does, Edit, Spot, World, append_edit, in_force, read_edits
-from avlmaps.query.edits import Edited, SeenMap, apply, means, said
+from avlmaps.query.edit_spots import SeenMap, vector
+from avlmaps.query.edits import Edited, apply, means
+from avlmaps.query.found_edits import said
 from avlmaps.query.given_places import is_place, place_given, place_of
 from avlmaps.query.queryable import Queryable
 
@@ -122,7 +124,7 @@ class Editor:
         floor_m = float(self._map.space.level(np.array(found.position))[2])
         cut = [self._level(place) for place in plane] if plane else _corners(box) if box else []
         world = self._map.space.world
-        points = [_vector(world(np.array([xy[0], xy[1], floor_m]))) for xy in cut]
+        points = [vector(world(np.array([xy[0], xy[1], floor_m]))) for xy in cut]
         spot = self._map.edited.spot_of(found.name, found.rows)
         edit = self._new("split", [spot], cut=points, by=by)
         before = sum(bool(np.isin(one.rows, found.rows).any()) for one in self._after().claims)
@@ -165,7 +167,7 @@ class Editor:
         numbers = place_given(at)
         place = numbers if len(numbers) == 3 else self._map.space.world(np.append(numbers, self._floor_m()))
         return self._add(
-            "pin", [Spot(middle=_vector(place)).anchored(self._map.stored.keyframes)], name=_name(name), by=by
+            "pin", [Spot(middle=vector(place)).anchored(self._map.stored.keyframes)], name=_name(name), by=by
         )
 
     def undo(self, which: str = "", *, by: str = "") -> Edit:
@@ -242,14 +244,14 @@ class Editor:
         found = where.rooms[numbers[0]] if numbers[0] >= 0 else None
         if found is None or found.region < 0:
             raise QueryError(f"The floor of the room {room!r} is not mapped, so that it has no extent to name.")
-        spot = Spot(name=found.name, middle=found.position, corners=tuple(map(_vector, found.outline)))
+        spot = Spot(name=found.name, middle=found.position, corners=tuple(map(vector, found.outline)))
         return spot.anchored(self._map.stored.keyframes)
 
     def _area(self, corners: Sequence[Float[np.ndarray, "2"]]) -> Spot:
         floor_m = self._floor_m()
         points = [self._map.space.world(np.append(corner, floor_m)) for corner in corners]
-        middle = _vector(np.mean(points, axis=0))
-        return Spot(middle=middle, corners=tuple(map(_vector, points))).anchored(self._map.stored.keyframes)
+        middle = vector(np.mean(points, axis=0))
+        return Spot(middle=middle, corners=tuple(map(vector, points))).anchored(self._map.stored.keyframes)
 
     def _floor_m(self) -> float:
         """Return the level height of the floor on which the map's walk began."""
@@ -358,11 +360,6 @@ def _corners(box: Sequence[float]) -> list[Float[np.ndarray, "2"]]:
     if min(x1 - x0, y1 - y0) < 0.01:
         raise QueryError(f"The box {tuple(box)} has no area; give two opposite corners, x0,y0,x1,y1.")
     return [np.array(corner, np.float64) for corner in ((x0, y0), (x1, y0), (x1, y1), (x0, y1))]
-
-
-def _vector(point: Float[np.ndarray, "3"]) -> tuple[float, float, float]:
-    x, y, z = (round(float(value), 4) for value in point)
-    return x, y, z
 
 
 def _said(point: Sequence[float] | Float[np.ndarray, " n"]) -> str:

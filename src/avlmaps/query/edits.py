@@ -5,10 +5,9 @@ a person named them; a name that means the claim's finds it. A room's name is pu
 which rooms and areas follow.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import TYPE_CHECKING, Protocol
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,77 +15,20 @@ from avlmaps.core.arrays import Bool, Float, Int
 from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import Kind, lexicon
 from avlmaps.core.question import Part
-from avlmaps.maps.store.edits import Edit, Spot, World, in_force
+from avlmaps.maps.store.edits import Edit, in_force
 from avlmaps.query.colour_filter import colour_in, colour_share
-from avlmaps.query.components import linked
+from avlmaps.query.edit_spots import SeenMap, vector
 from avlmaps.query.factors import FOUND_AT, HeatSettings, NearAnchors, NearThings
+from avlmaps.query.found_edits import HALF, Claim, FoundEdits, plain_name, said, share_in
 from avlmaps.query.instances import Instances
 from avlmaps.query.modalities.area import same_place
-from avlmaps.query.raster import in_polygon
 from avlmaps.query.rooms import RoomField
 
 if TYPE_CHECKING:
-    from avlmaps.maps.obstacles import ForbiddenArea
     from avlmaps.maps.store.life import Life
-    from avlmaps.maps.store.reader import StoredMap
-    from avlmaps.maps.storeys import Storeys
     from avlmaps.query.contents import Room, Thing
-    from avlmaps.query.room_regions import RoomRegions
-    from avlmaps.query.voxel_space import Space
 
-_SAME_BOX, _ALIKE_BOX = 0.5, 0.2  # shares of two boxes together that both hold: certainly one thing, and perhaps
-_HALF = 0.5  # of its voxels: then a thing is in the claim
-_LEAST_LISTED = 0.2  # a person may name what the map is not certain of
-_SPECK = 0.05  # share of a thing; smaller pieces belong to the nearest larger one
-_SAME_ROOM = 0.25
 _AT_M = 1e-3
-_POSSESSIVES = ("the ", "a ", "an ", "my ", "your ", "our ")
-_DONE = {"rename": "named", "rename room": "named", "merge": "made one thing", "split": "split", "pin": "named",
-         "forbid": "forbidden"}  # fmt: skip
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Claim:
-    """Voxels that an edit made one thing.
-
-    Attributes:
-        name: of the thing.
-        rows: numbers of its voxels in the map, ascending.
-        confidence: that it has this name, in [0, 1]; 1 where a person said so.
-        is_named: whether a person said so.
-        edit: the last one that made it.
-    """
-
-    name: str
-    rows: Int[np.ndarray, " m"]
-    confidence: float
-    is_named: bool
-    edit: Edit
-
-
-@dataclass(frozen=True, slots=True)
-class LostEdit:
-    """An edit that finds nothing to apply to, and why."""
-
-    edit: Edit
-    why: str
-
-    def __str__(self) -> str:
-        edit = self.edit
-        did = f"{edit.does} {' and '.join(filter(None, (spot.name for spot in edit.at)))}".strip()
-        to = f" to {edit.name}" if edit.name and edit.does.startswith("rename") else ""
-        return f"Edit {edit.id} of {edit.day} ({did}{to}) finds nothing to apply to: {self.why}."
-
-
-def said(edit: Edit) -> str:
-    """Return who did what and when, in words: ``named by a person on 2026-11-26``."""
-    return f"{_DONE[edit.does]} by {edit.by or 'a person'} on {edit.day}"
-
-
-def plain_name(name: str) -> str:
-    """Return a name in lower case without the words before it: "My charging dock" is "charging dock"."""
-    word = " ".join(name.casefold().split())
-    return next((word.removeprefix(one) for one in _POSSESSIVES if word.startswith(one)), word)
 
 
 def means(asked: str) -> Callable[[str], bool]:
@@ -104,38 +46,6 @@ def means(asked: str) -> Callable[[str], bool]:
     return is_meant
 
 
-class SeenMap(Protocol):
-    """What edits need of a map: what its encoders see."""
-
-    @property
-    def stored(self) -> "StoredMap":
-        """The map as it lies on the disk."""
-        ...
-
-    @cached_property
-    def space(self) -> "Space":
-        """The voxels' places."""
-        ...
-
-    @cached_property
-    def storeys(self) -> "Storeys | None":
-        """The storeys of the map; None for a map of one."""
-        ...
-
-    @cached_property
-    def room_regions(self) -> "RoomRegions | None":
-        """The rooms that walls and doorways bound."""
-        ...
-
-    def sees(self, phrase: str) -> bool:
-        """Return whether the pixel encoder can look for a phrase."""
-        ...
-
-    def unedited_things(self, names: Sequence[str] | None = None, least_confidence: float = 0.5) -> "list[Thing]":
-        """Return the things of the map as the encoder sees them."""
-        ...
-
-
 def apply(edits: Sequence[Edit], avlmap: SeenMap) -> "Edited":
     """Return what edits make of a map: of no edits, everything stays the same object.
 
@@ -146,221 +56,8 @@ def apply(edits: Sequence[Edit], avlmap: SeenMap) -> "Edited":
     return Edited(in_force(edits), avlmap)
 
 
-class Edited:
-    """A map with its edits. What is computed of them once is stored.
-
-    Attributes:
-        edits: those in force.
-    """
-
-    def __init__(self, edits: tuple[Edit, ...], avlmap: SeenMap) -> None:
-        self.edits = edits
-        self._map = avlmap
-        self._lost: dict[str, LostEdit] = {}
-
-    def __bool__(self) -> bool:
-        return bool(self.edits)
-
-    # What was edited, found in the map as it is now.
-
-    @cached_property
-    def claims(self) -> tuple[Claim, ...]:
-        """The things that were renamed, merged or split, by their first voxel."""
-        claims: list[Claim] = []
-        for edit in self._of("rename", "merge", "split"):
-            found = [self._targets(spot.now(self._map.stored.keyframes), claims) for spot in edit.at]
-            if not all(found):
-                at = edit.at[[bool(one) for one in found].index(False)]
-                self._lose(edit, f"nothing like the {at.name or 'thing'} is at {_place(at.middle)} any more")
-                continue
-            targets = list({one.rows[0]: one for each in found for one in each}.values())
-            claims = [one for one in claims if all(one is not other for other in targets)]
-            claims += self._made(edit, targets)
-        return tuple(sorted(claims, key=lambda one: int(one.rows[0])))
-
-    def _made(self, edit: Edit, targets: Sequence[Claim]) -> list[Claim]:
-        """Return what an edit makes of things."""
-        if edit.does == "rename":
-            return [replace(one, name=edit.name, confidence=1.0, is_named=True, edit=edit) for one in targets]
-        if edit.does == "split":
-            return [replace(one, rows=rows, edit=edit) for one in targets for rows in self._pieces(one.rows, edit)]
-        first = targets[0]
-        named = bool(edit.name) or first.is_named
-        sure = 1.0 if edit.name else max(one.confidence for one in targets if one.name == first.name)
-        rows = np.unique(np.concatenate([one.rows for one in targets]))
-        return [Claim(edit.name or first.name, rows, sure, named, edit)]
-
-    def _pieces(self, rows: Int[np.ndarray, " m"], edit: Edit) -> list[Int[np.ndarray, " m"]]:
-        """Return the parts of a thing that a cut makes; the thing where it makes none."""
-        space = self._map.space
-        level = space.level(space.centres_of(rows))
-        cut = self._cut_of(edit)
-        if len(cut) == 2:
-            along = cut[1] - cut[0]
-            which = ((level[:, :2] - cut[0]) @ np.array([-along[1], along[0]]) > 0.0).astype(np.int64)
-        elif len(cut):
-            which = in_polygon(level[:, :2], cut).astype(np.int64)
-        else:
-            which = linked(np.asarray(space.index)[rows], 1)
-            which = _without_specks(which, level)
-        return [rows[which == number] for number in np.unique(which)]
-
-    def _cut_of(self, edit: Edit) -> Float[np.ndarray, "k 2"]:
-        """Return the points of a cut, level x and y, in the world as it is now."""
-        if not edit.cut:
-            return np.zeros((0, 2))
-        spot = edit.at[0]
-        with_cut = Spot(middle=spot.middle, corners=edit.cut, seen_from=spot.seen_from).now(self._map.stored.keyframes)
-        return self._map.space.level(np.array(with_cut.corners, np.float64))[:, :2]
-
-    def _targets(self, spot: Spot, claims: Sequence[Claim]) -> list[Claim]:
-        """Return the claims, or the thing of the map, that a spot is about; none where there is nothing like it."""
-        own = [(self._overlap(spot, self._box(one.rows)), one) for one in claims]
-        share, best = max(own, key=lambda one: one[0], default=(0.0, None))
-        if best is not None and share >= _SAME_BOX:
-            return [best]
-        thing = self._thing_at(spot) or self._thing_at(self._carried(spot))
-        if thing is None:
-            return [best] if best is not None and share >= _ALIKE_BOX else []
-        holding = [one for one in claims if _share(thing.rows, one.rows) >= _HALF]
-        inside = [one for one in claims if _share(one.rows, thing.rows) >= _HALF]
-        if holding or inside:
-            return holding[:1] or inside
-        taken = np.concatenate([np.zeros(0, np.int64), *(one.rows for one in claims)])
-        rows = np.setdiff1d(thing.rows, taken)
-        nobody = Edit(schema=1, id="", does="rename", made="")
-        return [Claim(thing.name, rows, thing.confidence, False, nobody)] if len(rows) else []
-
-    def _thing_at(self, spot: Spot | None) -> "Thing | None":
-        """Return the thing of the map, as its encoder sees it, that fills the box of a spot best."""
-        if spot is None:
-            return None
-        for names in ((spot.name,), None):
-            best, most = None, _ALIKE_BOX
-            for thing in self._things_called(names):
-                share = self._overlap(spot, self._box(thing.rows))
-                if share >= most:
-                    best, most = thing, share
-            if best is not None:
-                return best
-        return None
-
-    @cached_property
-    def _known_things(self) -> "dict[tuple[str, ...] | None, list[Thing]]":
-        return {}
-
-    def _things_called(self, names: tuple[str, ...] | None) -> "list[Thing]":
-        if names is not None and not self._map.sees(names[0]):
-            return []
-        if names not in self._known_things:
-            self._known_things[names] = self._map.unedited_things(names, _LEAST_LISTED)
-        return self._known_things[names]
-
-    def _carried(self, spot: Spot) -> Spot | None:
-        """Return where a later day found the thing of a spot, of which an earlier day knew; None where it did not."""
-        life = self._map.stored.life() if getattr(self._map.stored.info, "visits", ()) else None
-        if life is None:
-            return None
-        number = self._stay_at(life, spot)
-        if number is None or life.stays[number].moved_to is None:
-            return None
-        while (after := life.stays[number].moved_to) is not None:
-            number = after
-        points = self._map.space.grid.centre_of(life.voxels(number))
-        low, high = self._box_of(self._map.space.level(points))
-        middle = self._map.space.world((low + high) / 2.0)
-        return Spot(name=spot.name, middle=_vector(middle), size=_vector(high - low))
-
-    def _stay_at(self, life: "Life", spot: Spot) -> int | None:
-        """Return the number of the stay that fills the box of a spot best."""
-        level = self._map.space.level
-        near = [
-            (self._overlap(spot, self._box_of(level(self._map.space.grid.centre_of(life.voxels(number))))), number)
-            for number in range(len(life))
-            if len(life.voxels(number))
-        ]
-        share, number = max(near, default=(0.0, 0))
-        return number if share >= _ALIKE_BOX else None
-
-    def _box(self, rows: Int[np.ndarray, " m"]) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
-        return self._box_of(self._map.space.level(self._map.space.centres_of(rows)))
-
-    def _box_of(self, level: Float[np.ndarray, "m 3"]) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
-        half = self._map.space.grid.voxel_size_m / 2.0
-        return level.min(axis=0) - half, level.max(axis=0) + half
-
-    def _overlap(self, spot: Spot, box: tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]) -> float:
-        """Return which share of two boxes together both hold, in [0, 1]."""
-        middle, size = self._map.space.level(np.array(spot.middle)), np.array(spot.size)
-        low, high = middle - size / 2.0, middle + size / 2.0
-        both = np.prod(np.clip(np.minimum(high, box[1]) - np.maximum(low, box[0]), 0.0, None))
-        whole = np.prod(size) + np.prod(box[1] - box[0]) - both
-        return float(both / whole) if whole > 0.0 else 0.0
-
-    def spot_of(self, name: str, rows: Int[np.ndarray, " m"]) -> Spot:
-        """Return what an edit is about: the thing of some voxels."""
-        low, high = self._box(rows)
-        middle = self._map.space.world((low + high) / 2.0)
-        spot = Spot(name=name, middle=_vector(middle), size=_vector(high - low))
-        return spot.anchored(self._map.stored.keyframes)
-
-    @cached_property
-    def rooms(self) -> Mapping[int, Edit]:
-        """The edits of rooms, by the number of the region in ``AVLMap.room_regions``."""
-        edits, regions = self._of("rename room"), None
-        if edits:
-            regions = self._map.room_regions
-        found: dict[int, Edit] = {}
-        for edit in edits:
-            spot = edit.at[0].now(self._map.stored.keyframes)
-            number = -1 if regions is None else int(regions.at(np.array([spot.middle]))[0])
-            if regions is None or number < 0 or regions.share_of(number, np.array(spot.corners)) < _SAME_ROOM:
-                self._lose(edit, f"no room like the {spot.name} is at {_place(spot.middle)} any more")
-            else:
-                found[number] = edit
-        return found
-
-    @cached_property
-    def pins(self) -> Mapping[str, tuple[Edit, Float[np.ndarray, "3"]]]:
-        """The places that were named, by plain names: the last place of each."""
-        keyframes = self._map.stored.keyframes
-        return {plain_name(edit.name): (edit, np.array(edit.at[0].now(keyframes).middle)) for edit in self._of("pin")}
-
-    @cached_property
-    def forbidden(self) -> "tuple[ForbiddenArea, ...]":
-        """The areas that no robot enters; of one name the last."""
-        from avlmaps.maps.obstacles import ForbiddenArea
-
-        areas: dict[str, ForbiddenArea] = {}
-        storeys = self._map.storeys
-        for edit in self._of("forbid"):
-            corners = np.array(edit.at[0].now(self._map.stored.keyframes).corners, np.float64)
-            storey = 0 if storeys is None else int(storeys.of_places(corners.mean(axis=0))[0])
-            level = self._map.space.level(corners)[:, :2]
-            areas[plain_name(edit.name)] = ForbiddenArea(edit.name, said(edit), level, storey)
-        return tuple(areas.values())
-
-    @property
-    def lost(self) -> tuple[LostEdit, ...]:
-        """The edits that find nothing to apply to; finding that out looks for what each is about."""
-        _ = self.claims, self.rooms, self.pins, self.forbidden
-        return tuple(self._lost[edit.id] for edit in self.edits if edit.id in self._lost)
-
-    def _of(self, *does: str) -> list[Edit]:
-        """Return the edits of some kinds whose places are in the map's world."""
-        wanted = [edit for edit in self.edits if edit.does in does]
-        own: list[Edit] = []
-        for edit in wanted:
-            if edit.world is None or edit.world.is_that_of(World.of(self._map.stored.info)):
-                own.append(edit)
-            else:
-                self._lose(edit, f"it was made in a map of another recording, {edit.world.name}")
-        return own
-
-    def _lose(self, edit: Edit, why: str) -> None:
-        self._lost[edit.id] = LostEdit(edit, why)
-
-    # What follows for questions and lists.
+class Edited(FoundEdits):
+    """What follows from edits for questions and lists of a map."""
 
     @property
     def own_names(self) -> tuple[tuple[str, bool], ...]:
@@ -459,7 +156,7 @@ class Edited:
         taken = self._voxels(one for one in self.claims if one.is_named or one in given)
         count = np.bincount(instance, minlength=len(confidence))
         left = np.bincount(instance[~taken[rows]], minlength=len(confidence))
-        stays = (left > 0) & (left >= _HALF * count)
+        stays = (left > 0) & (left >= HALF * count)
         own = stays[instance] & ~taken[rows]
         number = np.cumsum(stays) - 1
         kept = int(stays.sum())
@@ -484,7 +181,7 @@ class Edited:
         from avlmaps.query.contents import thing_of
 
         taken = self._voxels(self.claims)
-        kept = [one for one in found if not len(one.rows) or taken[one.rows].mean() < _HALF]
+        kept = [one for one in found if not len(one.rows) or taken[one.rows].mean() < HALF]
         wanted = None if names is None else [means(name) for name in names]
 
         def is_wanted(name: str, sure: float) -> bool:
@@ -503,9 +200,9 @@ class Edited:
         """Return what people named most of some voxels; None where they named nothing there."""
         if not self.edits or not len(rows):
             return None
-        named = [(_share(rows, one.rows), one.name) for one in self.claims if one.is_named]
+        named = [(share_in(rows, one.rows), one.name) for one in self.claims if one.is_named]
         share, name = max(named, default=(0.0, ""))
-        return name if share >= _HALF else None
+        return name if share >= HALF else None
 
     def room_field(self, field: RoomField) -> RoomField:
         """Return how likely each place is each kind of room, where people said so with certainty."""
@@ -540,7 +237,7 @@ class Edited:
 
         stays, changed = list(life.stays), False
         for edit in self._of("rename"):
-            number = self._stay_at(life, edit.at[0].now(self._map.stored.keyframes))
+            number = self._spots.stay_at(life, edit.at[0].now(self._map.stored.keyframes))
             if number is None:
                 continue
             while (before := stays[number].moved_from) is not None:
@@ -580,40 +277,11 @@ class Edited:
         return tuple(dict.fromkeys(said_of))
 
 
-def _without_specks(which: Int[np.ndarray, " m"], level: Float[np.ndarray, "m 3"]) -> Int[np.ndarray, " m"]:
-    """Return pieces of which those that are specks belong to the nearest large one."""
-    from scipy.spatial import KDTree
-
-    count = np.bincount(which)
-    large = count >= max(2.0, _SPECK * len(which))
-    if large.all() or not large.any():
-        return which
-    on_large = large[which]
-    nearest = KDTree(level[on_large]).query(level[~on_large])[1]
-    out = which.copy()
-    out[~on_large] = which[on_large][nearest]
-    return out
-
-
 def _pinned(edit: Edit, place: Float[np.ndarray, "3"]) -> "Thing":
     from avlmaps.query.contents import Thing
 
     no_voxels = np.zeros(0, np.int64)
-    return Thing(edit.name, 1.0, _vector(place), (0.0, 0.0, 0.0), (0, 0, 0), no_voxels, place[None], said(edit))
-
-
-def _share(rows: Int[np.ndarray, " m"], others: Int[np.ndarray, " k"]) -> float:
-    """Return which share of some voxels are among others."""
-    return float(np.isin(rows, others).mean()) if len(rows) else 0.0
-
-
-def _vector(point: Float[np.ndarray, "3"]) -> tuple[float, float, float]:
-    x, y, z = (round(float(value), 4) for value in point)
-    return x, y, z
-
-
-def _place(point: Sequence[float]) -> str:
-    return "(" + ", ".join(f"{value:.2f}" for value in point) + ") m"
+    return Thing(edit.name, 1.0, vector(place), (0.0, 0.0, 0.0), (0, 0, 0), no_voxels, place[None], said(edit))
 
 
 def _the(name: str) -> str:

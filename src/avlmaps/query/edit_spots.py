@@ -1,0 +1,142 @@
+"""The boxes that edits are about, compared with the things of a map as it is now."""
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from avlmaps.core.arrays import Float, Int
+from avlmaps.maps.store.edits import Spot
+
+if TYPE_CHECKING:
+    from avlmaps.maps.store.life import Life
+    from avlmaps.maps.store.reader import StoredMap
+    from avlmaps.maps.storeys import Storeys
+    from avlmaps.query.contents import Thing
+    from avlmaps.query.room_regions import RoomRegions
+    from avlmaps.query.voxel_space import Space
+
+Box = tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]
+"""The lowest and the highest corner, metres, level frame."""
+ALIKE_BOX = 0.2  # share of two boxes together that both hold: perhaps one thing
+_LEAST_LISTED = 0.2  # a person may name what the map is not certain of
+
+
+class SeenMap(Protocol):
+    """What edits need of a map: what its encoders see."""
+
+    @property
+    def stored(self) -> "StoredMap":
+        """The map as it lies on the disk."""
+        ...
+
+    @cached_property
+    def space(self) -> "Space":
+        """The voxels' places."""
+        ...
+
+    @cached_property
+    def storeys(self) -> "Storeys | None":
+        """The storeys of the map; None for a map of one."""
+        ...
+
+    @cached_property
+    def room_regions(self) -> "RoomRegions | None":
+        """The rooms that walls and doorways bound."""
+        ...
+
+    def sees(self, phrase: str) -> bool:
+        """Return whether the pixel encoder can look for a phrase."""
+        ...
+
+    def unedited_things(self, names: Sequence[str] | None = None, least_confidence: float = 0.5) -> "list[Thing]":
+        """Return the things of the map as the encoder sees them."""
+        ...
+
+
+class Spots:
+    """Finds what fills the box of a spot, in a map without its edits."""
+
+    def __init__(self, avlmap: SeenMap) -> None:
+        self._map = avlmap
+
+    def thing_at(self, spot: Spot | None) -> "Thing | None":
+        """Return the thing of the map, as its encoder sees it, that fills the box of a spot best."""
+        if spot is None:
+            return None
+        for names in ((spot.name,), None):
+            best, most = None, ALIKE_BOX
+            for thing in self._things_called(names):
+                share = self.overlap(spot, self.box(thing.rows))
+                if share >= most:
+                    best, most = thing, share
+            if best is not None:
+                return best
+        return None
+
+    @cached_property
+    def _known_things(self) -> "dict[tuple[str, ...] | None, list[Thing]]":
+        return {}
+
+    def _things_called(self, names: tuple[str, ...] | None) -> "list[Thing]":
+        if names is not None and not self._map.sees(names[0]):
+            return []
+        if names not in self._known_things:
+            self._known_things[names] = self._map.unedited_things(names, _LEAST_LISTED)
+        return self._known_things[names]
+
+    def carried(self, spot: Spot) -> Spot | None:
+        """Return where a later day found the thing of a spot, of which an earlier day knew; None where it did not."""
+        life = self._map.stored.life() if getattr(self._map.stored.info, "visits", ()) else None
+        if life is None:
+            return None
+        number = self.stay_at(life, spot)
+        if number is None or life.stays[number].moved_to is None:
+            return None
+        while (after := life.stays[number].moved_to) is not None:
+            number = after
+        points = self._map.space.grid.centre_of(life.voxels(number))
+        low, high = self._box_of(self._map.space.level(points))
+        middle = self._map.space.world((low + high) / 2.0)
+        return Spot(name=spot.name, middle=vector(middle), size=vector(high - low))
+
+    def stay_at(self, life: "Life", spot: Spot) -> int | None:
+        """Return the number of the stay that fills the box of a spot best."""
+        level = self._map.space.level
+        near = [
+            (self.overlap(spot, self._box_of(level(self._map.space.grid.centre_of(life.voxels(number))))), number)
+            for number in range(len(life))
+            if len(life.voxels(number))
+        ]
+        share, number = max(near, default=(0.0, 0))
+        return number if share >= ALIKE_BOX else None
+
+    def box(self, rows: Int[np.ndarray, " m"]) -> Box:
+        """Return the box of some voxels."""
+        return self._box_of(self._map.space.level(self._map.space.centres_of(rows)))
+
+    def _box_of(self, level: Float[np.ndarray, "m 3"]) -> Box:
+        half = self._map.space.grid.voxel_size_m / 2.0
+        return level.min(axis=0) - half, level.max(axis=0) + half
+
+    def overlap(self, spot: Spot, box: Box) -> float:
+        """Return which share of two boxes together both hold, in [0, 1]."""
+        middle, size = self._map.space.level(np.array(spot.middle)), np.array(spot.size)
+        low, high = middle - size / 2.0, middle + size / 2.0
+        both = np.prod(np.clip(np.minimum(high, box[1]) - np.maximum(low, box[0]), 0.0, None))
+        whole = np.prod(size) + np.prod(box[1] - box[0]) - both
+        return float(both / whole) if whole > 0.0 else 0.0
+
+    def spot_of(self, name: str, rows: Int[np.ndarray, " m"]) -> Spot:
+        """Return what an edit is about: the thing of some voxels."""
+        low, high = self.box(rows)
+        middle = self._map.space.world((low + high) / 2.0)
+        spot = Spot(name=name, middle=vector(middle), size=vector(high - low))
+        return spot.anchored(self._map.stored.keyframes)
+
+
+def vector(point: Float[np.ndarray, "3"]) -> tuple[float, float, float]:
+    """Return a point or a size as an edit stores it: to a tenth of a millimetre."""
+    x, y, z = (round(float(value), 4) for value in point)
+    return x, y, z
