@@ -1,7 +1,10 @@
 """`avlmaps record`: what it prints, what it writes, and what it says when it cannot."""
 
+import json
+import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from avlmaps_sim import scenes
@@ -42,6 +45,28 @@ def test_people_read_a_table_of_what_sounds_where(run, tmp_path: Path) -> None:
     assert len(lines) == 5
     assert "m² of walkable floor" in lines[-2]
     assert lines[-1].startswith(f"wrote {tmp_path / 'rec'}: 4 frames, ")
+
+
+def test_directions_that_a_device_says_become_sources_of_the_map(answer, run, tmp_path: Path) -> None:
+    rec, path = tmp_path / "rec", tmp_path / "flat.avlmap"
+    few = ("--size", "64x48", "--fps", "4", "--max-frames", "30", "--workers", "1", "--sources", "2", "--seed", "1")
+    made = answer("record", "--scene", "house:7", "--out", rec, *few, "--directions", "--directions-offset-deg", "60")
+    assert (rec / "directions.csv").is_file()
+    status, built, told = run("build", rec, "--out", path, "--profile", "synthetic", "--json")
+    assert status == 0, told
+    offset = re.search(r"The directions are ([+-]\d+) degrees off", told)
+    assert offset is not None and float(offset[1]) == pytest.approx(60.0, abs=15.0), told
+
+    sources, sounds = answer("sources", path)["sources"], json.loads(built)["sounds"]
+    assert sorted(number for one in sources for number in one["sounds"]) == list(range(len(sounds)))
+    for event in made["events"]:
+        late_s = [abs(sound["onset_s"] - event["onset_s"]) for sound in sounds]
+        (one,) = (one for one in sources if int(np.argmin(late_s)) in one["sounds"])
+        assert np.linalg.norm(np.subtract(one["position"][:2], event["source"][:2])) < 0.6
+        assert one["within_50_m"] <= one["within_90_m"] and one["microphones"] == 0
+    status, table, _ = run("sources", path)
+    assert status == 0
+    assert [re.split(" {2,}", line)[0] for line in table.splitlines()[1:]] == [one["name"] for one in sources]
 
 
 def test_known_errors_are_one_sentence_and_status_1(run, tmp_path: Path) -> None:
