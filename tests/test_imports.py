@@ -2,6 +2,7 @@
 
 import ast
 import re
+from collections import Counter
 from collections.abc import Iterator
 from enum import StrEnum
 from functools import cache
@@ -138,3 +139,13 @@ def test_nothing_imports_a_module_by_the_name_that_it_had() -> None:
     for path in sorted({path for folder in folders for path in (ROOT / folder).rglob("*.py")} - own):
         found = old.search(path.read_text(encoding="utf-8"))
         assert found is None, f"{path.relative_to(ROOT)} names {found and found[0]}"
+
+
+def test_no_two_files_of_tests_have_one_name_where_their_folders_are_no_packages() -> None:
+    """pytest imports such a file by its bare name, and leaves out the second one with an error."""
+    tests = (ROOT / "tests", *ROOT.glob("packages/*/tests"))
+    files = [file for folder in tests for file in folder.rglob("test_*.py")]
+    bare = [file for file in files if not (file.parent / "__init__.py").is_file()]
+    foundation = ROOT / "packages" / "avlmaps-models"  # has a run of its own
+    names = Counter(file.name for file in bare if foundation not in file.parents)
+    assert [name for name, times in names.items() if times > 1] == []

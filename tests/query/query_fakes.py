@@ -138,6 +138,7 @@ def fake_map(
         ),
         rig=Rig(camera, camera),
         require_model=lambda kind: None,
+        sources=lambda: None,
         clip_path=lambda sound: Path(f"fake.avlmap/{sound}.flac"),
     )
 
