@@ -25,8 +25,11 @@ class Edit(ModelVerb):
     another day and corrected poses. Without an option the edits are listed.
 
     Example: avlmaps edit home.avlmap --rename chair --to stool --at 1.2,3.4
+
     Example: avlmaps edit home.avlmap --rename-room "bedroom 2" --to studio
+
     Example: avlmaps edit home.avlmap --pin "my charging dock" --at 0.5,2.0
+
     Example: avlmaps edit home.avlmap --forbid "the stairs" --box 1.0,2.0,2.5,4.0
     """
 
