@@ -95,6 +95,7 @@ def main() -> None:
         build_map(first(path, 4), Path(folder) / "warm", settings=SETTINGS)
         print("frames  keyframes  fuse s  describe s  head s  s a frame  parts MB  map MB")
         rows: list[dict[str, float]] = []
+        stored = None
         for frames in LENGTHS:
             pool = OneByOne()
             spread, begin = Weighed(pool, partial(first, path, frames)), process_time()
@@ -114,6 +115,7 @@ def main() -> None:
                 f"{total_s / frames:10.3f} {row['parts']:9.1f} {row['map']:7.1f}",
                 flush=True,
             )
+        assert stored is not None
         begin = process_time()
         merge_maps(stored, build_map(first(path, LENGTHS[1]), Path(folder) / f"{LENGTHS[1]}", settings=SETTINGS),
                    Path(folder) / "merged")  # fmt: skip
