@@ -171,6 +171,7 @@ def _numbers(
 def draw_reliability(answers: Sequence[Judged], path: Path) -> None:
     """Draw the share of right goals over their probability, with 95 % intervals, and how many there are of each."""
     from matplotlib.figure import Figure
+    from matplotlib.ticker import NullFormatter
 
     figure = Figure(figsize=(5.2, 5.6), layout="constrained")
     top, below = figure.subplots(2, 1, height_ratios=[4, 1], sharex=True)
@@ -184,6 +185,7 @@ def draw_reliability(answers: Sequence[Judged], path: Path) -> None:
     top.set_ylabel("share of first goals that are right")
     below.hist(p, bins=_BINS.tolist(), color="#7fa6c9")
     below.set_yscale("log")
+    below.yaxis.set_minor_formatter(NullFormatter())  # with one decade and a half all of them would be named
     below.set_ylabel("queries")
     below.set_xlabel("probability that the first goal is right")
     top.set_title(f"{len(answers)} queries in {len({one.scene for one in answers})} scenes", loc="left", fontsize=10)
