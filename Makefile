@@ -90,12 +90,17 @@ lint: $(READY)  ## Check style, types, the order of imports and the words of the
 	$(RUN)/lint-imports
 	$(RUN)/python tests/helpers/vocabulary.py
 
+# A virtual environment with the locked dependencies, and with others: of which Python, and the name of their file.
+define ENVIRONMENT
+$(1) -m venv $(@D)
+$(@D)/bin/python -m pip install --quiet --require-hashes -r requirements/lock.txt
+$(@D)/bin/python -m pip install --quiet -r requirements/$(2).txt
+$(@D)/bin/python -m pip $(EDITABLE)
+endef
+
 # torch is pinned without a hash, because each platform has its own build of a version.
 $(TORCH)/.ready: requirements/lock.txt requirements/foundation.txt $(PROJECTS)
-	$(PYTHON) -m venv $(TORCH)
-	$(TORCH)/bin/python -m pip install --quiet --require-hashes -r requirements/lock.txt
-	$(TORCH)/bin/python -m pip install --quiet -r requirements/foundation.txt
-	$(TORCH)/bin/python -m pip $(EDITABLE)
+	$(call ENVIRONMENT,$(PYTHON),foundation)
 	touch $@
 
 python312:  ## Say which Python 3.12 `make test-ros2` takes; fail where there is none.
@@ -109,10 +114,7 @@ test-cluster: $(CLUSTER)/.ready  ## Build on a Ray cluster of two workers and ki
 	$(CLUSTER)/bin/python -m pytest -rs tests/maps/test_cluster.py tests/maps/test_ray.py
 
 $(CLUSTER)/.ready: requirements/lock.txt requirements/cluster.txt $(PROJECTS)
-	$(PYTHON) -m venv $(CLUSTER)
-	$(CLUSTER)/bin/python -m pip install --quiet --require-hashes -r requirements/lock.txt
-	$(CLUSTER)/bin/python -m pip install --quiet -r requirements/cluster.txt
-	$(CLUSTER)/bin/python -m pip $(EDITABLE)
+	$(call ENVIRONMENT,$(PYTHON),cluster)
 	touch $@
 
 faults-ros2: $(ROS2)/.ready  ## Break a native drive on ROS 2 in 200 random ways (an hour): ros2_faults.jsonl.
@@ -123,10 +125,7 @@ INTERFACES := $(wildcard tests/ros2/interfaces/*) $(wildcard examples/ros2/avlma
 $(ROS2)/.ready: requirements/lock.txt requirements/ros2.txt $(PROJECTS) tests/ros2/build_interfaces.py \
   $(foreach one,$(INTERFACES),$(wildcard $(one)/* $(one)/*/*))
 	@$(MAKE) --no-print-directory python312
-	$(PYTHON312) -m venv $(ROS2)
-	$(ROS2)/bin/python -m pip install --quiet --require-hashes -r requirements/lock.txt
-	$(ROS2)/bin/python -m pip install --quiet -r requirements/ros2.txt
-	$(ROS2)/bin/python -m pip $(EDITABLE)
+	$(call ENVIRONMENT,$(PYTHON312),ros2)
 	$(ROS2)/bin/python tests/ros2/build_interfaces.py $(INTERFACES)
 	touch $@
 

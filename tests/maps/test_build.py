@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from build_fakes import SETTINGS, Walk, register_fakes, write_beeps
+from build_fakes import SETTINGS, Walk, content_of, register_fakes, write_beeps
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -36,18 +36,6 @@ PROFILE = register_fakes()
 
 def build(walk: Walk, path: Path, settings: BuildSettings = SETTINGS, **options: object) -> StoredMap:
     return build_map(walk, path, PROFILE, settings, progress=False, **options)  # pyright: ignore[reportArgumentType]
-
-
-def content_of(path: Path) -> dict[str, bytes]:
-    """Return every file of a map, and map.json without its timings."""
-    files = {
-        str(file.relative_to(path)): file.read_bytes()
-        for file in path.rglob("*")
-        if file.is_file() and file.name not in (".lock", ".checked.json")
-    }
-    manifest = json.loads(files.pop("map.json"))
-    manifest.pop("timings")
-    return {**files, "map.json": json.dumps(manifest, sort_keys=True).encode()}
 
 
 def test_a_build_leaves_the_files_of_its_manifest_and_nothing_else(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from build_fakes import register_fakes
+from build_fakes import content_of, register_fakes
 
 from avlmaps.core.errors import MapError
 from avlmaps.maps.store.reader import open_stored
@@ -70,18 +70,6 @@ def undisturbed(builder: Builder) -> Undisturbed:
     code, seconds = builder.build(new, NEW)
     assert code == 0
     return Undisturbed(old, new, seconds, int((builder.folder / "steps").read_text()))
-
-
-def content_of(path: Path) -> dict[str, bytes]:
-    """Return every file, and map.json without its timings."""
-    files = {
-        str(f.relative_to(path)): f.read_bytes()
-        for f in path.rglob("*")
-        if f.is_file() and f.name not in (".lock", ".checked.json")
-    }
-    manifest = json.loads(files.pop("map.json"))
-    manifest.pop("timings")
-    return {**files, "map.json": json.dumps(manifest, sort_keys=True).encode()}
 
 
 def check_between(path: Path, known: Undisturbed, *, had_old: bool) -> None:
