@@ -200,6 +200,8 @@ def test_what_robots_say_of_sound_is_read() -> None:
         RosSound("/audio").take(data, START_S, 10.0)
     with pytest.raises(RecordingError, match="is coded as 'mp3'"):
         RosSound("/audio").inform(SimpleNamespace(coding_format="mp3", sample_format="", sample_rate=0, channels=0))
+    sound.inform(SimpleNamespace(coding_format="mp3", sample_format="", sample_rate=0, channels=0))  # pcm was given
+    assert sound.take(data, START_S, 10.1) is not None
 
 
 class Played:

@@ -195,7 +195,9 @@ def test_edits_are_carried_into_the_map_of_all_days() -> None:
     onto = keyframes_at(moved(turn, places))
     world = World(name="monday", fingerprint="m")
     own = msgspec.structs.replace(STOOL, world=World(name="tuesday", fingerprint="t"))
-    (made,) = carried_edits([own], keyframes_at(places), world, onto, turn)
+    strange = msgspec.structs.replace(STOOL, world=World(name="another house", fingerprint="x"))
+    (made, foreign) = carried_edits([own, strange], keyframes_at(places), own.world, world, onto, turn)
+    assert foreign == strange, "an edit of another building does not become one of this"
     assert made.at[0].middle == pytest.approx(tuple(moved(turn, np.array(own.at[0].middle))))
     assert (made.id, made.world) == (own.id, world)
     assert made.at[0].now(onto) == made.at[0]

@@ -71,6 +71,7 @@ def test_directions_without_a_sound_are_left_out_with_a_notice(tmp_path: Path) -
         ("stamp_s,azimuth_rad,elevation_rad\n0,1,30\n", "elevation of row 1 is 30, .* look like degrees"),
         ("stamp_s,azimuth_rad,confidence\n0,1,1.5\n", "confidence of row 1 is 1.5; it must be from 0 to 1"),
         ("stamp_s,azimuth_rad\n0,x\n", "row 1: '0,x' is not 2 numbers"),
+        ("stamp_s,azimuth_rad\n0.7\n", "row 1: '0.7' is not 2 numbers"),
         ("stamp_s,azimuth_rad\n0,1,2\n", "row 1: '0,1,2' is not 2 numbers"),
         ("time,azimuth\n0,1\n", "first line names the columns"),
         ("stamp_s,azimuth_deg\n0,1\n", "first line names the columns"),

@@ -122,21 +122,26 @@ def merge_maps(
         sources, why_not = joined_sources(stored, other, moved, voxels, keyframes)
         content = MapContent(voxels, keyframes, stored.place_state, sounds, Path(clips), life, sources=sources)
         info = _manifest(stored, other, content, visits, settings, perf_counter() - begin_s, why_not)
-        edits = _edits(stored, other, keyframes, moved)
         with lock_folder(out), lock_folder(out, EDITING):
+            edits = _edits(stored, other, read_edits(out), keyframes, moved)
             write_map(out, content, info)
-            if edits or read_edits(out):
+            if edits:
                 write_edits(out, edits)
     return replace(open_stored(out), encoders=stored.encoders)
 
 
-def _edits(stored: StoredMap, other: StoredMap, onto: Keyframes, moved: Float[np.ndarray, "4 4"]) -> tuple[Edit, ...]:
-    """Return what people corrected in both maps, in the world of this one, in the order of time."""
+def _edits(
+    stored: StoredMap, other: StoredMap, replaced: Sequence[Edit], onto: Keyframes, moved: Float[np.ndarray, "4 4"]
+) -> tuple[Edit, ...]:
+    """Return what people corrected in both maps, in the world of this one, in the order of time.
+
+    What they corrected in the map that is replaced stays as well.
+    """
     world = World.of(stored.info)
-    own = carried_edits(read_edits(stored.path), stored.keyframes, world, onto, np.eye(4))
-    others = carried_edits(read_edits(other.path), other.keyframes, world, onto, moved)
-    known = {edit.id for edit in own}
-    return tuple(sorted((*own, *(edit for edit in others if edit.id not in known)), key=lambda edit: edit.made))
+    own = carried_edits(read_edits(stored.path), stored.keyframes, world, world, onto, np.eye(4))
+    others = carried_edits(read_edits(other.path), other.keyframes, World.of(other.info), world, onto, moved)
+    known = {edit.id: edit for edit in (*replaced, *others, *own)}
+    return tuple(sorted(known.values(), key=lambda edit: edit.made))
 
 
 def merged_key(first: str, other: str, settings: MergeSettings = DEFAULTS) -> str:

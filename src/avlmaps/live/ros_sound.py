@@ -28,13 +28,16 @@ class RosSound:
             pcm: of plain samples; None waits for an AudioInfo.
         """
         self._topic, self._pcm, self._rest, self._end_s = topic, pcm, b"", float("-inf")
+        self._is_given = pcm is not None
 
     def inform(self, info: Any) -> None:
-        """Take an AudioInfo, which says how AudioData is coded.
+        """Take an AudioInfo, which says how AudioData is coded; what the caller says counts, as in a bag.
 
         Raises:
             RecordingError: as what cannot be read live.
         """
+        if self._is_given:
+            return
         coding = (getattr(info, "coding_format", "") or "").lower()
         if coding not in ("wave", "wav", "pcm") or (info.sample_format or "S16LE").upper() != "S16LE":
             raise RecordingError(

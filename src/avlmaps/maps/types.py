@@ -145,7 +145,7 @@ class Submaps:
     Attributes:
         row_offsets: (b + 1,) into the voxels.
         index: which voxel, in the world of the poses that the frames were fused with.
-        feature: mean feature, in units of ``feature_scale``: a quarter of the room of the sums it came from.
+        feature: mean feature, in steps of ``feature_scale``: a quarter of the bytes of the sums it came from.
         feature_scale: of each voxel; 0 where no pixel with a feature fell.
         weight: sum of the weights behind it.
         rgb_sum: sum of weight times colour.

@@ -140,7 +140,7 @@ class AVLMap:
 
     def forget_edits(self) -> None:
         """Read what people corrected again at the next question."""
-        for name in ("edited", "room_field"):
+        for name in ("edited", "room_field", "source_map"):  # what lists things weighs them by what they are called
             self.__dict__.pop(name, None)
 
     def as_edited_now(self) -> Self:

@@ -131,6 +131,8 @@ def read_directions(path: Path) -> DirectionTrack:
     for number, row in enumerate(rows[1:]):
         words = row.split(",")
         try:
+            if len(words) != len(names):  # NumPy would repeat a single number
+                raise ValueError
             values[number] = [float(word) if word.strip() else np.nan for word in words]
         except ValueError:
             raise RecordingError(

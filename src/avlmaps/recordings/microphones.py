@@ -84,6 +84,11 @@ class Microphones:
     camera_from_robot: Float[np.ndarray, "4 4"] = field(default_factory=lambda: LEVEL_CAMERA_FROM_ROBOT)
     delay_s: Float[np.ndarray, " c"] | None = None
 
+    @property
+    def longest_m(self) -> float:
+        """The distance of the farthest two, metres."""
+        return float(np.linalg.norm(self.position_m[:, None] - self.position_m[None], axis=2).max())
+
     def __post_init__(self) -> None:
         place = self.position_m
         if place.ndim != 2 or place.shape[1] != 3 or not 1 <= len(place) <= MOST_CHANNELS:

@@ -125,9 +125,13 @@ class MovedSubmaps:
                 part, spread, moved, self._bricks, self._index, self._sums, self._counts, place, self._pairs
             )
             self._count, self._pair, self._brick = int(count), int(pair), int(brick)
-            if done < len(spread):  # one of them is full
+            if done == len(spread):
+                return
+            if self._count > len(self._index) - kernels.MOST_SAMPLES:
                 self._make_room(2 * len(self._index))
+            if self._pair > len(self._pairs[0]) - kernels.MOST_SAMPLES:
                 self._make_pairs(2 * len(self._pairs[0]))
+            if self._brick > len(self._bricks[2]) - kernels.MOST_BRICKS:
                 self._make_bricks(2 * len(self._bricks[2]))
 
     def _make_room(self, rows: int) -> None:

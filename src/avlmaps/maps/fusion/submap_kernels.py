@@ -33,7 +33,7 @@ VIEWS, LAST_SUBMAP, ITS_VIEWS = range(3)
 COUNT_COLUMNS = 3
 BRICK_SHIFT = 3  # the rows of the voxels of a cube of 2 to the power of this lie side by side
 BRICK_VOXELS = 512
-_MOST_BRICKS = 8  # that a voxel moves to
+MOST_BRICKS = 8  # that a voxel moves to
 _CELLS = 64  # a voxel that moves meets at most three along each axis; four are counted, as a power of two
 
 
@@ -237,7 +237,7 @@ def move_rows(
     table, brick_index, rows = bricks
     number, first, count, begin, pair, brick_count = place
     cell, share = np.empty(_CELLS, np.int64), np.zeros(_CELLS, np.int64)
-    room, brick_room = index.shape[0] - MOST_SAMPLES, rows.shape[0] - _MOST_BRICKS
+    room, brick_room = index.shape[0] - MOST_SAMPLES, rows.shape[0] - MOST_BRICKS
     last_i = last_j = last_k = np.int64(1 << 40)
     brick = 0
     for n in range(begin, part_index.shape[0]):

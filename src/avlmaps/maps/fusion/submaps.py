@@ -58,7 +58,7 @@ def submap_of(
 def in_steps(
     feature_sum: Float[np.ndarray, "n d"], weight: Float64[np.ndarray, " n"]
 ) -> tuple[Int8[np.ndarray, "n d"], Float32[np.ndarray, " n"]]:
-    """Return mean features in 254 steps from their least to their greatest number, and how large a step of each is.
+    """Return mean features in 254 steps from minus to plus their largest magnitude, and how large a step of each is.
 
     What is rounded is at most half a step, 1/254 of the largest number, and differs from submap to submap.
 

@@ -18,6 +18,7 @@ from typing import Any, Self, TypeVar
 from avlmaps.core.cores import usable_cores
 from avlmaps.core.errors import BackendError, MapError
 from avlmaps.core.extras import install_command
+from avlmaps.core.network import is_loopback
 from avlmaps.core.wording import flag
 
 J = TypeVar("J")
@@ -172,7 +173,7 @@ class RayPool:
 def _environment(place: tuple[str, int] | None) -> dict[str, str]:
     """Return what the environment says to Ray, where it does not say it already."""
     quiet = {"RAY_USAGE_STATS_ENABLED": "0"}
-    if place is not None and not place[0].startswith(("127.", "localhost", "::1")):
+    if place is not None and not is_loopback(place[0]):
         return quiet
     # Whether Ray may listen on other interfaces than loopback; Ray named it for the systems that needed it first.
     return {**quiet, "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0"}

@@ -86,7 +86,7 @@ def calibrate(track: AudioTrack, walk: Trajectory, between_s: tuple[float, float
     if len(found.at_s) < _FEWEST:
         raise RecordingError(_too_little(len(found.at_s), begin_s, end_s))
     fit = _Fit.of(found, array, walk)
-    start = np.concatenate([np.zeros(fit.basis.shape[1] * 4), fit.seek(np.zeros(len(array)))])
+    start = np.concatenate([np.zeros(fit.basis.shape[1] * 4), fit.seek()])
     solution, measured = fit.solve(start, hold_heights=False)
     covered = fit.covariance(solution, measured, hold_heights=False)
     held = bool(covered[0][:, 2].max() > WORST_PLACE_M)
@@ -146,8 +146,7 @@ def _too_little(frames: int, begin_s: float, end_s: float) -> str:
 
 def _frames(track: AudioTrack, array: Microphones, begin_s: float, end_s: float) -> Correlations:
     """Return the frames with most onset, of every stretch of the time some."""
-    apart = array.position_m[:, None] - array.position_m[None]
-    longest_m = float(np.linalg.norm(apart, axis=2).max()) + _SLACK_M
+    longest_m = array.longest_m + _SLACK_M
     pieces: list[Correlations] = []
     count = max(int(np.ceil((end_s - begin_s) / _BLOCK_S)), 1)
     each = min(_FRAMES_A_BLOCK, max(_MOST_FRAMES // count, 4))
@@ -199,7 +198,7 @@ class _Fit:
         basis = np.linalg.svd(np.eye(count) - 1.0 / count)[0][:, : count - 1]
         return cls(found, array, walk.at(found.at_s) @ array.camera_from_robot, basis)
 
-    def seek(self, late_s: Float[np.ndarray, " m"]) -> Float[np.ndarray, "3"]:
+    def seek(self) -> Float[np.ndarray, "3"]:
         """Return the place round the walk that the given array points to, on a coarse grid."""
         up = self.world_from_robot[:, :3, 2].mean(axis=0)
         level = np.eye(4)

@@ -73,9 +73,9 @@ def evidence_of(
             away = np.linalg.norm(ear - place, axis=2)
             heard = unknown_offset(level_db, away, settings.level_noise_db, settings.reverberant_m)
         return EventEvidence(heard - heard.max(initial=-np.inf), None, legs.expected(settings))
-    apart = microphones.position_m[:, None] - microphones.position_m[None]
-    longest_m = float(np.linalg.norm(apart, axis=2).max())
-    found = correlate(sound.samples, sound.rate_hz, begin_s, onset_s - begin_s, longest_m, delay_s=microphones.delay_s)
+    found = correlate(
+        sound.samples, sound.rate_hz, begin_s, onset_s - begin_s, microphones.longest_m, delay_s=microphones.delay_s
+    )
     found = found.take(loudest_frames(found)).smoothed(settings.smoothing)
     if not len(found.at_s):
         ear = _ears(walk, microphones, np.array([onset_s, offset_s]))

@@ -172,9 +172,7 @@ class _Heard:
         onset_s, offset_s = span_s[0], min(span_s[1], span_s[0] + _LONGEST_S)
         begin_s = max(onset_s - _BEFORE_S, track.start_s)
         sound = read_channels(track, begin_s, offset_s)
-        apart = array.position_m[:, None] - array.position_m[None]
-        longest_m = float(np.linalg.norm(apart, axis=2).max())
-        found = correlate(sound.samples, sound.rate_hz, begin_s, onset_s - begin_s, longest_m, array.delay_s)
+        found = correlate(sound.samples, sound.rate_hz, begin_s, onset_s - begin_s, array.longest_m, array.delay_s)
         known = np.flatnonzero((found.at_s >= walk.stamps_s[0]) & (found.at_s <= walk.stamps_s[-1]))
         found = found.take(known)
         found = found.take(loudest_frames(found, _MOST_FRAMES)).smoothed(_SMOOTHING)

@@ -211,15 +211,17 @@ def write_edits(folder: Path, edits: Sequence[Edit]) -> None:
 def carried_edits(
     edits: Sequence[Edit],
     keyframes: Keyframes,
+    own: World,
     world: World,
     onto: Keyframes,
     map_from_own: Float[np.ndarray, "4 4"],
 ) -> tuple[Edit, ...]:
-    """Return the edits of a map as those of another one that holds it.
+    """Return the edits of a map as those of another one that holds it; one that is of neither stays as it is.
 
     Args:
         edits: all of them.
         keyframes: of the map that they are of.
+        own: world of that map.
         world: of the other map.
         onto: keyframes of the other map.
         map_from_own: the other's world from the map's own.
@@ -235,6 +237,8 @@ def carried_edits(
         msgspec.structs.replace(
             edit, at=tuple(map(carried, edit.at)), cut=tuple(map(point, edit.cut)), world=edit.world and world
         )
+        if edit.world is None or edit.world.is_that_of(own)
+        else edit
         for edit in edits
     )
 
