@@ -30,3 +30,9 @@ def test_each_verb_tells_what_it_does_and_every_option(run) -> None:
         out = run(verb, "--help")[1]
         assert "--json" in out
         assert "(required)" in out or verb in ("demo", "profiles")
+
+
+def test_each_example_has_a_line_of_its_own_and_no_quotes_of_the_source_show() -> None:
+    for page in SNAPSHOTS.glob("*.txt"):
+        said = page.read_text(encoding="utf-8")
+        assert not [line for line in said.splitlines() if line.count("Example: ") > 1 or '" "' in line], page.name

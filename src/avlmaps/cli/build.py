@@ -36,8 +36,8 @@ class Build(ModelVerb):
     compiles: ClassVar[bool] = True
 
     recording: Annotated[Positional[Path], arg(metavar="REC")]
-    """Recording: our folder, a bag (or a folder of its parts), a phone's scan, a data set; docs/recordings.md lists "
-    "all."""
+    """Recording: our folder, a bag (or a folder of its parts), a phone's scan, a data set; docs/recordings.md lists
+    all."""
     more: Annotated[Positional[tuple[Path, ...]], arg(metavar="[BAG ...]")] = ()
     """Further files of a bag that was split; with --ray, further recordings of the same place, in the order of their
     days, which are found in the first by their pictures (as `merge` does)."""

@@ -24,8 +24,11 @@ class Export(ModelVerb):
     """Write a map for other programs: PLY, GLB, an occupancy grid for Nav2 (PGM and YAML), CSV, Rerun, Foxglove (MCAP).
 
     Example: avlmaps export home.avlmap --out home.glb
+
     Example: avlmaps export home.avlmap --out sofa.ply --heat "the sofa"
+
     Example: avlmaps export home.avlmap --out floor.pgm --radius-m 0.3
+
     Example: avlmaps export home.avlmap --out home.rrd --heat "the sofa"
 
     A map of several storeys gives an occupancy grid for each: floor-0.pgm is the lowest.

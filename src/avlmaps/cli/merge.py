@@ -23,6 +23,7 @@ class Merge(ModelVerb):
     only where the other day looked through their place; where it did not look, nothing is known of them.
 
     Example: avlmaps merge monday.avlmap tuesday.avlmap --out home.avlmap --first-day 2026-11-23 --day 2026-11-24
+
     Example: avlmaps changes home.avlmap
     """
 

@@ -156,13 +156,18 @@ def ground_lines(ground: Mapping[str, Any]) -> list[str]:
     return lines
 
 
+def _size(sides: Sequence[float]) -> str:
+    """Return a size; nothing for what has none: a room, a sound."""
+    return " x ".join(f"{side:.2f}" for side in sides) if any(sides) else ""
+
+
 def query_lines(answer: dict[str, Any]) -> list[str]:
     """Lay out the answer of `query`."""
     parts = ", ".join(f"{part['modality']} {part['query']!r} ({part['role']})" for part in answer["parts"])
-    lines = [f"query: {parts}"]
+    lines = [f"query: {parts}"] if parts else []
     lines += [f"note: {part['note']}" for part in answer["parts"] if part.get("note")]
     rows = [
-        (i, place(goal["position"]), f"{goal['probability']:.2f}", " x ".join(f"{side:.2f}" for side in goal["size"]))
+        (i, place(goal["position"]), f"{goal['probability']:.2f}", _size(goal["size"]))
         for i, goal in enumerate(answer["goals"], start=1)
     ]
     lines += [f"note: {note}" for note in answer.get("notes", [])]

@@ -25,7 +25,9 @@ class Things(ModelVerb):
     With --room, --near, --top or --page it lists things alone, each with its room.
 
     Example: avlmaps things home.avlmap --least 0.7 --csv things.csv
+
     Example: avlmaps things home.avlmap --room kitchen --name chair table
+
     Example: avlmaps things home.avlmap --near sofa --top 5
     """
 

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from avlmaps.core.arrays import Float, Int
+from avlmaps.core.arrays import Float, Int, UInt8
+from avlmaps.core.errors import MapError
 from avlmaps.core.poses import apply
 from avlmaps.days.align import (
     NotTheSamePlaceError,
@@ -21,9 +22,11 @@ from avlmaps.days.settings import MergeSettings
 from avlmaps.days.surfaces import Occupied, refine
 from avlmaps.maps.store.manifest import Visit
 from avlmaps.maps.store.reader import StoredMap
+from avlmaps.maps.types import Keyframes
 
 DEFAULTS = MergeSettings()
 _CLOCK_S = 1e8  # later stamps count from 1970: they are a clock's
+_LEAST_COMMON = 3
 _IDENTITY = tuple(tuple(float(value) for value in row) for row in np.eye(4))
 
 
@@ -108,6 +111,34 @@ def visits_of(stored: StoredMap) -> tuple[Visit, ...]:
             rig=info.rig, frames=info.counts.frames,
         ),
     )  # fmt: skip
+
+
+def require_another_drive(stored: StoredMap, other: StoredMap, visits: Sequence[Visit]) -> None:
+    """Raise ``MapError`` where the other map is of a drive that is one of the visits.
+
+    Its recording says so, or, where it was read in another way or while it was driven, its keyframes: no two drives
+    have the same pictures at the same stamps.
+    """
+    keyframes, others = stored.keyframes, other.keyframes
+    number = visit_of_stamps(visits, np.asarray(keyframes.stamp_s))
+    for count, visit in enumerate(visits):
+        rows = np.flatnonzero(number == count)
+        stamps = np.round(np.asarray(keyframes.stamp_s)[rows] - visit.shift_s, 4)
+        _, here, there = np.intersect1d(stamps, np.round(np.asarray(others.stamp_s), 4), return_indices=True)
+        same = len(here) >= _LEAST_COMMON and all(
+            np.array_equal(_jpeg(keyframes, int(rows[a])), _jpeg(others, int(b)))
+            for a, b in zip(here, there, strict=True)
+        )
+        if same or visit.recording.fingerprint == other.info.recording.fingerprint:
+            raise MapError(
+                f"{other.path} is of the same drive as visit {count + 1} of {stored.path} "
+                f"({visit.recording.name}{', ' + visit.day if visit.day else ''}), and one drive counts once; "
+                "merge the map of another drive."
+            )
+
+
+def _jpeg(keyframes: Keyframes, row: int) -> UInt8[np.ndarray, " bytes"]:
+    return np.asarray(keyframes.thumbnails[keyframes.thumbnail_offsets[row] : keyframes.thumbnail_offsets[row + 1]])
 
 
 def views_of(stored: StoredMap) -> list[DayViews]:

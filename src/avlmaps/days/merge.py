@@ -4,7 +4,7 @@ import math
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from datetime import UTC, date, datetime
+from datetime import UTC, date, datetime, timedelta
 from pathlib import Path
 from time import perf_counter
 
@@ -19,7 +19,7 @@ from avlmaps.core.version import __version__
 from avlmaps.core.wording import option
 from avlmaps.days import life as lives
 from avlmaps.days.evidence import Day, DayViews
-from avlmaps.days.find import DEFAULTS, Found, find_other, views_of, visit_of_stamps, visits_of
+from avlmaps.days.find import DEFAULTS, Found, find_other, require_another_drive, views_of, visit_of_stamps, visits_of
 from avlmaps.days.join import NO_SOURCES, joined_keyframes, joined_sounds, joined_sources, joined_voxels
 from avlmaps.days.settings import MergeSettings
 from avlmaps.days.surfaces import Occupied, resampled
@@ -77,8 +77,8 @@ def merge_maps(
         things_of: lists the things of a map; by its pixel encoder if None, and then what changed without a name too.
 
     Raises:
-        MapError: the maps have other voxels or models, no keyframes, the other is of several days, a day is no date
-            or not later, or the folder cannot be written.
+        MapError: the maps have other voxels or models, no keyframes, the other is of several days or of a drive that
+            the map has already, a day is no date, in the future or not later, or the folder cannot be written.
         NotTheSamePlaceError: it is not seen to be the same place.
     """
     begin_s, out = perf_counter(), Path(out)
@@ -89,6 +89,7 @@ def merge_maps(
             f"into {stored.path}, the earliest first."
         )
     visits = _dated(visits_of(stored), first_day, stored)
+    require_another_drive(stored, other, visits)
     known = Occupied.of(np.asarray(stored.voxels.index), stored.grid)
     found = find_other(stored, other, settings, known)
     moved, number = found.map_from_other, len(visits)
@@ -162,14 +163,23 @@ def _dated(visits: tuple[Visit, ...], first_day: str, stored: StoredMap) -> tupl
 
 def _date(said: str) -> date:
     try:
-        return date.fromisoformat(said)
+        day = date.fromisoformat(said)
     except ValueError:
         raise MapError(f"{said!r} is no day; write it as 2026-11-25.") from None
+    if day > (today := datetime.now(UTC).date()) + timedelta(days=1):  # it is tomorrow already elsewhere
+        raise MapError(f"{said} is in the future: today is {today}; give the day of the drive.")
+    return day
 
 
 def _visit(other: StoredMap, last: Visit, found: Found, day: str) -> Visit:
     """Return the entry of a new day, whose time follows that of the last one."""
     (own,) = visits_of(other)
+    if not day and own.day and last.day and not last.shift_s and own.end_s < last.begin_s:
+        raise MapError(
+            f"{other.path} was recorded before the map's last drive, by their clocks ({_when(own.begin_s)} and "
+            f"{_when(last.begin_s)}); merge drives in their order, or say its day where a clock was wrong: "
+            f"{option('day', 'DAY')}."
+        )
     day = _date(day).isoformat() if day else own.day
     if day and last.day and day < last.day:
         raise MapError(
@@ -184,6 +194,10 @@ def _visit(other: StoredMap, last: Visit, found: Found, day: str) -> Visit:
         day=day, recording=own.recording, begin_s=own.begin_s + shift_s, end_s=own.end_s + shift_s, shift_s=shift_s,
         map_from_recording=rows, rig=own.rig, frames=own.frames, checks=found.checks,  # pyright: ignore[reportArgumentType]
     )  # fmt: skip
+
+
+def _when(stamp_s: float) -> str:
+    return datetime.fromtimestamp(stamp_s, UTC).strftime("%Y-%m-%d %H:%M UTC")
 
 
 def _seen(thing: Thing, stored: StoredMap, map_from_own: Float[np.ndarray, "4 4"], shift_s: float) -> lives.SeenThing:
@@ -245,7 +259,7 @@ def _clusters(stored: StoredMap, rows: Int[np.ndarray, " r"], settings: MergeSet
     if "pixels" not in stored.info.models or not len(rows):
         return []
     wanted, avlmap, namer = settings.changes, AVLMap(stored, edits=()), VoxelNamer(stored)
-    named = np.array([name not in STRUCTURE for name in namer.names])
+    named = np.array([name not in (*STRUCTURE, "other") for name in namer.names])
     which = linked(np.asarray(stored.voxels.index)[rows], 1)
     found: list[Thing] = []
     for number in np.flatnonzero(np.bincount(which) >= wanted.least_voxels).tolist():

@@ -18,6 +18,7 @@ from avlmaps.core.arrays import Float
 from avlmaps.core.errors import BackendError, MapError
 from avlmaps.core.progress import silence_progress
 from avlmaps.core.registry import Kind
+from avlmaps.core.wording import option
 from avlmaps.maps.audio.growing import GrowingSounds
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
 from avlmaps.maps.fusion.free_space import FreeViewCollector, ThroughCounts, stack_views
@@ -535,7 +536,9 @@ def require_place(path: Path, overwrite: bool) -> None:
     if not is_map_or_free(path):
         raise MapError(f"{path} is there already and is not a map; give another path, nothing in it was touched.")
     if (path / MANIFEST).is_file() and not overwrite:
-        raise MapError(f"{path} is a finished map already; give another path, or replace it with overwrite=True.")
+        raise MapError(
+            f"{path} is a finished map already; give another path, or replace it with {option('overwrite')}."
+        )
 
 
 def write_stored(

@@ -63,7 +63,7 @@ class BodyShape:
         if not (0.0 < self.radius_m < 10.0 and 0.0 < self.step_m < self.height_m):
             raise NavigationError(
                 f"A body of radius {self.radius_m} m that steps over {self.step_m} m and is {self.height_m} m high is "
-                "none; give a radius over 0, and a step between 0 and the height."
+                "none; give a radius between 0 and 10 m, and a step between 0 and the height."
             )
         if self.flies_m is not None and not 0.0 <= self.flies_m < self.height_m:
             raise NavigationError(

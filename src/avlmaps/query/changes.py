@@ -270,8 +270,9 @@ def text_of(answer: "ChangesAnswer", kinds: Iterable[ChangeKind] = ("new", "move
     own = [one for one in answer["changes"] if one["kind"] in wanted]
     where = f" in the {place}" if place else ""
     if not own:
-        names = " or ".join(kind for kind in ("new", "moved", "gone") if kind in wanted)
-        return f"Nothing is known to be {names}{where} since {said(answer['since'])}."
+        words = {"new": "to be new", "moved": "to have moved", "gone": "to be gone"}
+        names = " or ".join(word for kind, word in words.items() if kind in wanted)
+        return f"Nothing is known {names}{where} since {said(answer['since'])}."
     parts: list[str] = []
     for one in own:
         there = f" ({one['room']})" if one["room"] and not place else ""

@@ -1,0 +1,67 @@
+"""What is no other day: the same drive again, a day in the future, drives against their order."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from avlmaps.core.errors import MapError
+from avlmaps.core.wording import Spelling, options_as
+from avlmaps.days import merge
+from avlmaps.days.find import require_another_drive, visits_of
+from avlmaps.maps.build import build_map
+from avlmaps.maps.store.manifest import Visit
+from avlmaps.maps.store.reader import StoredMap, open_stored
+from avlmaps.perception.encoders import encoders_of
+from maps.build_fakes import SETTINGS, open_walk, register_fakes
+
+
+@pytest.fixture(scope="module")
+def drives(tmp_path_factory: pytest.TempPathFactory) -> list[StoredMap]:
+    folder, encoders = tmp_path_factory.mktemp("drives"), encoders_of(register_fakes())
+    return [build_map(open_walk(seed=seed), folder / f"{seed}.avlmap", encoders, SETTINGS) for seed in range(2)]
+
+
+def of_another_file(stored: StoredMap) -> StoredMap:
+    """Return a map whose recording has another fingerprint, as where it was driven live or read in another way."""
+    recording = msgspec.structs.replace(stored.info.recording, fingerprint="0" * 64)
+    return replace(stored, info=msgspec.structs.replace(stored.info, recording=recording))
+
+
+@pytest.mark.parametrize("again", [lambda stored: stored, of_another_file], ids=["itself", "read in another way"])
+def test_one_drive_counts_once(
+    drives: list[StoredMap], tmp_path: Path, again: Callable[[StoredMap], StoredMap]
+) -> None:
+    with pytest.raises(MapError, match="the same drive as visit 1"):
+        merge.merge_maps(drives[0], again(drives[0]), tmp_path / "twice.avlmap")
+    assert not (tmp_path / "twice.avlmap").exists()
+
+
+def test_another_drive_is_another_one(drives: list[StoredMap]) -> None:
+    require_another_drive(drives[0], drives[1], visits_of(drives[0]))
+
+
+def test_no_day_is_in_the_future(drives: list[StoredMap], tmp_path: Path) -> None:
+    with pytest.raises(MapError, match="in the future"):
+        merge.merge_maps(drives[0], drives[1], tmp_path / "no.avlmap", first_day="2999-01-01")
+
+
+def test_clocks_give_the_order(drives: list[StoredMap], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def at_clocks(stored: StoredMap) -> tuple[Visit, ...]:
+        begin_s = 1.7e9 + (7200.0 if stored is drives[0] else 0.0)
+        (own,) = visits_of(stored)
+        return (msgspec.structs.replace(own, day="2023-11-14", begin_s=begin_s, end_s=begin_s + 60.0),)
+
+    monkeypatch.setattr(merge, "visits_of", at_clocks)
+    monkeypatch.setattr(merge, "find_other", lambda *_: merge.Found(np.eye(4), {}))
+    with pytest.raises(MapError, match=r"before the map's last drive, by their clocks .*day=DAY"):
+        merge.merge_maps(drives[0], drives[1], tmp_path / "no.avlmap")
+
+
+def test_a_map_that_stands_in_the_way_is_said_as_the_reader_spells(drives: list[StoredMap]) -> None:
+    with options_as(Spelling.FLAG), pytest.raises(MapError, match="--overwrite"):
+        merge.merge_maps(drives[0], drives[1], drives[0].path)
+    assert open_stored(drives[0].path).info.visits == ()
