@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from avlmaps.core.timeline import Trajectory
-from avlmaps.maps.sources.bearings import Bearings, evidence_of_bearings, expected_alone
+from avlmaps.maps.sources.bearings import Bearings, Device, evidence_of_bearings, expected_alone
 from avlmaps.maps.sources.candidates import Candidates, candidates_of
 from avlmaps.maps.sources.find import find_sources
 from avlmaps.maps.sources.settings import SourceSettings
@@ -130,5 +130,6 @@ def test_a_track_of_directions_alone_gives_sources(capsys: pytest.CaptureFixture
     found = find_sources(track, walk, SPANS, surface(), UP)
     assert found is not None and len(found) == len(SPANS) and found.channels[0] == 0
     assert "+8" in capsys.readouterr().err, "86 degrees are reported"
+    assert abs(Device.of(found.device[0]).offset_rad - 1.5) < 0.1 and Device.of(found.device[0]).sounds == len(SPANS)
     best = found.place[np.argmax(found.heard.astype(float) + np.log(found.prior), axis=1)]
     assert np.median(np.linalg.norm(best[:, :2] - PLACES[:, :2], axis=1)) < 0.4

@@ -198,6 +198,7 @@ class SourceEvidence:
         expected: log-likelihood without it: near the robot, in its sight.
         moving: 1 where the source moved while it sounded.
         channels: how many microphones listened, one number.
+        device: what was found out about each device that said directions, as ``Device.row``.
     """
 
     place: Float32[np.ndarray, "c 3"]
@@ -206,6 +207,7 @@ class SourceEvidence:
     expected: Float16[np.ndarray, "n c"]
     moving: UInt8[np.ndarray, " n"]
     channels: Int64[np.ndarray, " 1"]
+    device: Float64[np.ndarray, "d 4"] = field(default_factory=lambda: np.zeros((0, 4)))
 
     def __len__(self) -> int:
         return len(self.heard)

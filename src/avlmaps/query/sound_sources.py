@@ -151,13 +151,17 @@ class SourceMap:
     _priors: dict[tuple[str, ...], Float[np.ndarray, " c"]] = field(default_factory=dict, init=False)
 
     @classmethod
-    def of(cls, avlmap: Listening) -> "SourceMap":
+    def of(cls, avlmap: Listening, evidence: SourceEvidence | None = None) -> "SourceMap":
         """Return the evidence of a map.
+
+        Args:
+            avlmap: the map.
+            evidence: of its sounds; what it stores if None.
 
         Raises:
             QueryError: the map has none.
         """
-        evidence = avlmap.stored.sources()
+        evidence = avlmap.stored.sources() if evidence is None else evidence
         if evidence is None:
             raise QueryError(_unknown(avlmap.stored))
 

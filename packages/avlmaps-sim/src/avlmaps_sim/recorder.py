@@ -206,9 +206,9 @@ def record_scene(
             from avlmaps_sim.hearing.directions import said_directions
 
             offset_rad, chance = np.deg2rad(settings.directions_offset_deg), np.random.default_rng([seed, 1])
+            sounds = [(one.onset_s, one.offset_s, one.source.position) for one in soundings]
             writer.set_directions(said_directions(
-                scene, soundings, trip.stamps_s, trip.world_from_camera, chance, offset_rad,
-                settings.directions_outliers,
+                scene, sounds, trip.stamps_s, trip.world_from_camera, chance, offset_rad, settings.directions_outliers
             ))  # fmt: skip
         _write_frames(scene, settings, trip, writer, for_frames)
         made_by = {"scene": scene.name, "seed": seed, "settings": _plain(settings)}

@@ -1,15 +1,29 @@
 """The suite of sources: its measures by hand, and what it says of bad input."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from avlmaps.core.errors import AvlmapsError
-from avlmaps_sim.bench.sources.homes import HomeOutcome, Placed, area_of, in_room, matched, nearest_held
+from avlmaps.recordings.channels import ChannelSound, read_channels
+from avlmaps.recordings.microphones import microphones_named
+from avlmaps_sim.bench.sources.calibrated import Wrong, calibrated
+from avlmaps_sim.bench.sources.homes import (
+    HomeOutcome,
+    Mended,
+    Placed,
+    area_of,
+    code_of,
+    in_room,
+    matched,
+    nearest_held,
+)
 from avlmaps_sim.bench.sources.measured import MeasuredRoom, direct_to_reverberant_db, table, walks_of_ratios
-from avlmaps_sim.bench.sources.suite import table_of_homes
+from avlmaps_sim.bench.sources.suite import table_of_homes, table_of_lengths, table_of_mended
 from avlmaps_sim.bench.sources.sweep import USUAL, _trial, surfaces
+from avlmaps_sim.hearing import AcousticSettings
 from avlmaps_sim.truth import HeardEvent
 from helpers.hearing_scenes import area
 
@@ -48,6 +62,47 @@ def test_the_table_counts_what_was_placed() -> None:
     assert first["said %"] == 55.0 and last["said %"] == ""
     assert (first["in 90 % region %"], first["right thing of 3 %"], first["of"]) == (100.0, 100.0, 1)
     assert last["by"] == "room's middle" and last["in 90 % region %"] == ""
+
+
+def test_the_regions_are_counted_by_the_length_of_the_sound() -> None:
+    placed = [Placed("mono", 0.1, True, True, True, seconds=2.0), Placed("mono", 0.3, True, False, True, seconds=2.5),
+              Placed("mono", 0.3, True, False, False, seconds=8.0)]  # fmt: skip
+    made = table_of_lengths([HomeOutcome("house:1", 3, 3, tuple(placed))])
+    assert [(row[1], row[2], row[4], row[6]) for row in made["rows"]] == [
+        ("1 to 3", 2, 50.0, 100.0), ("6 and more", 1, 0.0, 0.0)
+    ]  # fmt: skip
+
+
+def test_what_was_mended_is_told_and_refusals_are_counted() -> None:
+    known = Mended((0.04, 0.002), (1e-4, 5e-6), 6.0, 4.0), Mended((0.02, float("nan")), (5e-5, float("nan")))
+    made = table_of_mended([HomeOutcome("house:1", 0, 0, (), one) for one in known])
+    rows = {row[0]: row[1:] for row in made["rows"]}
+    assert rows["an array's worst place as given, cm"] == [2, 3.0, 4.0]
+    assert rows["calibrated past a ticking thing, cm"] == [1, 0.2, 0.2]
+    assert rows["a device's offset, missed by degrees"] == [1, 6.0, 6.0]
+    assert made["note"].startswith("1 of 2")
+
+
+def test_an_array_that_was_put_wrong_is_calibrated_and_its_track_is_late(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    wrong = Wrong.of(microphones_named("square4"), rng)
+    found = calibrated(wrong, AcousticSettings(snr_db=20.0, rt60_s=0.4), rng, tmp_path / "drive.wav", 20.0)
+    before, after = wrong.off(wrong.given), wrong.off(found.microphones)
+    assert before[0] > 0.01 and before[1] > 1e-5
+    assert after[0] < 0.3 * before[0] and after[1] < 0.5 * before[1]
+
+
+def test_late_channels_are_late_by_what_was_drawn(tmp_path: Path) -> None:
+    wrong = replace(Wrong.of(microphones_named("stereo"), np.random.default_rng(1)), late_s=np.array([5e-4, -5e-4]))
+    samples = np.zeros((2, 16_000), np.float32)
+    samples[:, 8000] = 0.9
+    track = wrong.track(ChannelSound(samples, 16_000), tmp_path / "late.wav")
+    heard = read_channels(track, 0.0, 1.0).samples
+    assert np.abs(heard).argmax(axis=1).tolist() == [8008, 7992]
+
+
+def test_the_code_that_finds_sources_has_a_checksum() -> None:
+    assert code_of() == code_of() and len(code_of()) == 64
 
 
 def test_the_ratio_of_direct_sound_falls_as_the_reverberation_grows() -> None:

@@ -52,6 +52,17 @@ class Device:
     sounds: int
 
     @property
+    def row(self) -> Float[np.ndarray, "4"]:
+        """The four numbers, in this order."""
+        return np.array([self.offset_rad, self.offset_sd_rad, self.outliers, float(self.sounds)])
+
+    @classmethod
+    def of(cls, row: Float[np.ndarray, "4"]) -> "Device":
+        """Return the device of a row."""
+        offset_rad, offset_sd_rad, outliers, sounds = row.tolist()
+        return cls(offset_rad, offset_sd_rad, outliers, int(sounds))
+
+    @property
     def sentence(self) -> str:
         """What a person should know of it."""
         offset, spread = np.rad2deg([self.offset_rad, self.offset_sd_rad])

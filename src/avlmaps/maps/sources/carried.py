@@ -46,6 +46,7 @@ def carry_evidence(
         expected=np.concatenate([expected for _, expected in rows]).astype(np.float16),
         moving=np.concatenate([evidence.moving for evidence, _ in parts]),
         channels=parts[0][0].channels,
+        device=np.concatenate([evidence.device for evidence, _ in parts]),
     )
 
 

@@ -9,7 +9,7 @@ from avlmaps.core.arrays import Float
 from avlmaps.core.poses import rotation_to_level
 from avlmaps.core.progress import progress, say
 from avlmaps.core.timeline import Trajectory
-from avlmaps.maps.sources.bearings import Bearings, evidence_of_bearings, expected_alone
+from avlmaps.maps.sources.bearings import Bearings, Device, evidence_of_bearings, expected_alone
 from avlmaps.maps.sources.candidates import Candidates, candidates_of
 from avlmaps.maps.sources.density import Density, Plan, log_same_place
 from avlmaps.maps.sources.event import EventEvidence, evidence_of
@@ -75,8 +75,9 @@ def find_sources(
         else:
             alone = expected_alone(walked, span, candidates, walls[layer], settings)
             heard.append(EventEvidence(np.zeros(len(candidates)), None, alone))
+    device: Device | None = None
     if directions is not None:
-        heard = _with_directions(heard, directions, walked, spans_s, layers, candidates)
+        heard, device = _with_directions(heard, directions, walked, spans_s, layers, candidates)
     return SourceEvidence(
         place=(candidates.place_m.astype(np.float64) @ level).astype(np.float32),
         prior=candidates.prior.astype(np.float32),
@@ -84,6 +85,7 @@ def find_sources(
         expected=np.maximum(np.stack([one.expected for one in heard]), _LEAST).astype(np.float16),
         moving=np.array([moves(one, plan, candidates.prior, settings) for one in heard], np.uint8),
         channels=np.array([channels], np.int64),
+        device=np.zeros((0, 4)) if device is None else device.row[None],
     )
 
 
@@ -94,14 +96,14 @@ def _with_directions(
     spans_s: Sequence[tuple[float, float]],
     walls: Sequence[Walls],
     candidates: Candidates,
-) -> list[EventEvidence]:
-    """Return the evidence with that of a device's directions, and say what was found out about the device."""
+) -> tuple[list[EventEvidence], Device | None]:
+    """Return the evidence with that of a device's directions, and what was found out about the device."""
     said = [Bearings.of(directions, walked, (float(begin_s), float(end_s))) for begin_s, end_s in spans_s]
     more, device = evidence_of_bearings(said, walls, candidates, [one.expected for one in heard])
     if device is not None:
         say(f"note: {device.sentence}")
     both = [one.heard + other for one, other in zip(heard, more, strict=True)]
-    return [replace(one, heard=total - total.max()) for one, total in zip(heard, both, strict=True)]
+    return [replace(one, heard=total - total.max()) for one, total in zip(heard, both, strict=True)], device
 
 
 def moves(one: EventEvidence, plan: Plan, prior: Float[np.ndarray, " c"], settings: SourceSettings) -> bool:

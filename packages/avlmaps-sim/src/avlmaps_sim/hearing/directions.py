@@ -12,7 +12,7 @@ from jaxtyping import Float
 from avlmaps.core.timeline import Trajectory
 from avlmaps.recordings.directions import DirectionTrack
 from avlmaps_sim.hearing.impulse import Acoustics
-from avlmaps_sim.hearing.schedule import Sounding
+from avlmaps_sim.mesh import Triple
 from avlmaps_sim.scene import Scene
 
 RATE_HZ = 10.0
@@ -21,7 +21,7 @@ ERROR_DEG = 8.0
 
 def said_directions(
     scene: Scene,
-    soundings: Sequence[Sounding],
+    sounds: Sequence[tuple[float, float, Triple]],
     stamps_s: Float[np.ndarray, " n"],
     world_from_camera: Float[np.ndarray, "n 4 4"],
     rng: np.random.Generator,
@@ -32,7 +32,7 @@ def said_directions(
 
     Args:
         scene: the building.
-        soundings: what sounds when.
+        sounds: onset, offset and place of each.
         stamps_s: rising seconds.
         world_from_camera: the camera's poses then.
         rng: draws errors and outliers.
@@ -42,9 +42,9 @@ def said_directions(
     building, walk = Acoustics(scene, 16_000), Trajectory(stamps_s, world_from_camera)
     at_s: list[float] = []
     azimuth: list[float] = []
-    for sounding in sorted(soundings, key=lambda one: one.onset_s):
-        source = building.sounds_from(np.asarray(sounding.source.position))
-        times = np.arange(np.ceil(sounding.onset_s * RATE_HZ), sounding.offset_s * RATE_HZ) / RATE_HZ
+    for onset_s, offset_s, place in sorted(sounds):
+        source = building.sounds_from(np.asarray(place))
+        times = np.arange(np.ceil(onset_s * RATE_HZ), offset_s * RATE_HZ) / RATE_HZ
         times = times[(times >= stamps_s[0]) & (times <= stamps_s[-1])]
         times = times[times > (at_s[-1] if at_s else -np.inf)]  # of sounds at once it says the first
         for time_s, pose in zip(times.tolist(), walk.at(times), strict=True):

@@ -97,8 +97,8 @@ class Bench(ModelVerb):
     live: a live map at the pace of a robot: frames, questions, memory, its end beside the build, kills; needs --scenes,
     recordings with poses.
     change: what is new, gone and moved over several days, in ten held-out homes or in --scenes.
-    sources: where sounds came from: in ten held-out homes or in --scenes, with three arrays; in a measured room
-    (--rooms); in one room under varied conditions.
+    sources: where sounds came from: in ten held-out homes or in --scenes, with three arrays, a device that says
+    directions and an array that is calibrated in place; in a measured room (--rooms); in one room, varied.
     navigation: the paper's Tables I, II and VI and its commands, in twelve held-out homes or in --scenes.
     """
 

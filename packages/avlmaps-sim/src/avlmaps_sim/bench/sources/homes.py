@@ -1,29 +1,50 @@
 """Sources in homes: the normal walk with an array, its map, and each sound's source against the truth."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from hashlib import sha256
 from pathlib import Path
 from time import perf_counter
+from zlib import crc32
 
+import msgspec
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.core.errors import MapError
+from avlmaps.core.errors import MapError, RecordingError
+from avlmaps.core.files import write_bytes_atomically
+from avlmaps.core.progress import say
 from avlmaps.core.timeline import Trajectory
+from avlmaps.core.version import __version__
+from avlmaps.maps import sources
 from avlmaps.maps.build import build_map
+from avlmaps.maps.sources.bearings import Device
 from avlmaps.maps.sources.find import find_sources
+from avlmaps.query import sound_sources
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.contents import Thing
-from avlmaps.query.sound_sources import SourceMap, things_that_may_be
+from avlmaps.query.sound_sources import Joined, SourceMap, things_that_may_be
+from avlmaps.recordings.audio import AudioTrack
+from avlmaps.recordings.channels import read_channels
 from avlmaps.recordings.open import open_recording
+from avlmaps.recordings.types import Recording
 from avlmaps_sim.bench.harness.factors import outline_away_m
 from avlmaps_sim.bench.sources.arrays import ARRAYS, RECORDED, track_of
+from avlmaps_sim.bench.sources.calibrated import Wrong, calibrated
+from avlmaps_sim.hearing.acoustic import AcousticSettings
+from avlmaps_sim.hearing.directions import said_directions
 from avlmaps_sim.hearing.impulse import Acoustics
 from avlmaps_sim.recorder import RecordSettings, record_scene
 from avlmaps_sim.scene import Area, Scene, SceneObject
-from avlmaps_sim.truth import HeardEvent, read_truth
+from avlmaps_sim.truth import HeardEvent, Truth, read_truth
 
 SNR_DB = 20.0
+DEVICE, GIVEN, REFINED = "a device's directions", "square4, put wrong", "square4, put wrong, calibrated"
+WAYS = (*ARRAYS, DEVICE)
+"""What places sounds with and without the lexicon; the other two show what calibration is worth."""
+_OUTLIERS = 0.03
+_UNKNOWN = float("nan")
+_RECIPE = 1  # counts up when the measurement changes, so that what is stored is measured again
 _FRAMES, _SIZE, _FPS = 300, (160, 120), 5.0
 _OVERLAP_S = 0.2
 _AT_M = 0.3
@@ -58,6 +79,7 @@ class Placed:
         in_90: of 90 %.
         area_90_m2: of that region.
         right: probability that it gives to the truth within 0.5 m of the place.
+        seconds: how long it sounds.
         thing: whether the right thing is among the first three; None where no thing made it.
         same_room: whether the robot was in the source's room.
         elapsed_s: seconds that its evidence took.
@@ -69,22 +91,49 @@ class Placed:
     room: bool | None
     in_50: bool | None = None
     in_90: bool | None = None
-    area_90_m2: float = float("nan")
+    area_90_m2: float = _UNKNOWN
     thing: bool | None = None
     same_room: bool = True
-    elapsed_s: float = float("nan")
+    elapsed_s: float = _UNKNOWN
     voxels: int = 0
-    right: float = float("nan")
+    right: float = _UNKNOWN
+    seconds: float = _UNKNOWN
+
+
+@dataclass(frozen=True, slots=True)
+class Mended:
+    """What was found out of a device that says directions, and of an array that was put wrong.
+
+    Attributes:
+        places_m: error of the array's worst place, as given and calibrated; NaN where the latter was refused.
+        delays_s: of its worst channel's delay, likewise.
+        device_off_deg: by how much the device's offset was missed.
+        device_sd_deg: the standard deviation that is said of that.
+    """
+
+    places_m: tuple[float, float]
+    delays_s: tuple[float, float]
+    device_off_deg: float = _UNKNOWN
+    device_sd_deg: float = _UNKNOWN
 
 
 @dataclass(frozen=True, slots=True)
 class HomeOutcome:
-    """What was measured in one home: its sounds, those that the map holds, and every placement."""
+    """What was measured in one home.
+
+    Attributes:
+        spec: its name.
+        sounds: how many there were.
+        heard: how many of them the map holds.
+        placed: every placement.
+        mended: of device and array.
+    """
 
     spec: str
     sounds: int
     heard: int
     placed: tuple[Placed, ...]
+    mended: Mended | None = None
 
 
 def measure_home(job: HomeJob, open_spec: Callable[[str], Scene]) -> HomeOutcome:
@@ -92,7 +141,7 @@ def measure_home(job: HomeJob, open_spec: Callable[[str], Scene]) -> HomeOutcome
     scene = open_spec(job.spec)
     name = "".join(c if c.isalnum() else "-" for c in job.spec)
     folder = job.work / f"{name}-{job.seed}"
-    recording_path, map_path = folder / "recording", folder / "home.avlmap"
+    recording_path = folder / "recording"
     folder.mkdir(parents=True, exist_ok=True)
     if not recording_path.exists():
         settings = RecordSettings(
@@ -101,51 +150,127 @@ def measure_home(job: HomeJob, open_spec: Callable[[str], Scene]) -> HomeOutcome
         )  # fmt: skip
         record_scene(scene, folder / "recording.unfinished", settings, job.seed)
         (folder / "recording.unfinished").rename(recording_path)
-    recording, truth = open_recording(recording_path), read_truth(recording_path)
-    try:  # a finished one is taken as it is
-        avlmap = AVLMap(build_map(recording, map_path, progress=False))
-    except MapError:  # by another release
-        avlmap = AVLMap(build_map(recording, map_path, overwrite=True, progress=False))
-    things = avlmap.things()
-    heard = avlmap.stored.sounds
-    spans = list(zip(heard.onset_s.tolist(), heard.offset_s.tolist(), strict=True))
-    pairs = matched(truth.events, spans)
-    air = Acoustics(scene, 22_050)
-    true = {index: air.sounds_from(np.array(truth.events[index].source)) for index, _ in pairs}
-    placed: list[Placed] = []
-    things_named = avlmap.source_map.things if len(spans) else lambda names: ()
-    walk = Trajectory(recording.stamps_s, recording.world_from_camera)
+    avlmap = _map_of(recording_path, folder / "home.avlmap")
+    facts = (_RECIPE, __version__, avlmap.stored.info.build_key, code_of())
+    done = folder / f"outcome-{sha256(repr(facts).encode()).hexdigest()[:12]}.msgpack"
+    if not done.exists():
+        home = _Home(job, scene, open_recording(recording_path), read_truth(recording_path), avlmap)
+        write_bytes_atomically(done, msgspec.msgpack.encode(home.outcome(folder)))
+    return msgspec.msgpack.decode(done.read_bytes(), type=HomeOutcome)
+
+
+def code_of() -> str:
+    """Return a checksum of the code that finds sources: what it has measured is measured again when it changes."""
+    files = [*sorted(Path(sources.__file__).parent.glob("*.py")), Path(sound_sources.__file__)]
+    return sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
+
+
+def _map_of(recorded: Path, path: Path) -> AVLMap:
+    """Return the map of a recording: its sounds and surfaces, without sources."""
+    recording = open_recording(recorded)
     assert recording.audio is not None
-    for array in ARRAYS:
-        track = track_of(recording.audio, array, folder)
-        begin = perf_counter()
-        evidence = find_sources(track, walk, spans, avlmap.points, avlmap.stored.up_in_world)
-        each_s = (perf_counter() - begin) / max(len(spans), 1)
-        if evidence is None:
-            continue
-        known = SourceMap(evidence, avlmap.space, things_named)
+    recording.audio = replace(recording.audio, microphones=None)
+    try:  # a finished one is taken as it is
+        return AVLMap(build_map(recording, path, progress=False))
+    except MapError:  # by another release
+        return AVLMap(build_map(recording, path, overwrite=True, progress=False))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Home:
+    """One home, recorded and mapped."""
+
+    job: HomeJob
+    scene: Scene
+    recording: Recording
+    truth: Truth
+    avlmap: AVLMap
+
+    def outcome(self, folder: Path) -> HomeOutcome:
+        heard, things = self.avlmap.stored.sounds, self.avlmap.things()
+        spans = list(zip(heard.onset_s.tolist(), heard.offset_s.tolist(), strict=True))
+        pairs = matched(self.truth.events, spans)
+        air = Acoustics(self.scene, 22_050)
+        true = {index: air.sounds_from(np.array(self.truth.events[index].source)) for index, _ in pairs}
+        walk = Trajectory(self.recording.stamps_s, self.recording.world_from_camera)
+        tracks, mended, offset_rad = self._tracks(folder, walk)
+        placed: list[Placed] = []
+        for way, track in tracks.items():
+            begin = perf_counter()
+            evidence = find_sources(track, walk, spans, self.avlmap.points, self.avlmap.stored.up_in_world)
+            each_s = (perf_counter() - begin) / max(len(spans), 1)
+            if evidence is None:
+                continue
+            if len(evidence.device):
+                device = Device.of(evidence.device[0])
+                off = np.angle(np.exp(1j * (device.offset_rad - offset_rad)))
+                mended = replace(
+                    mended, device_off_deg=float(abs(np.rad2deg(off))),
+                    device_sd_deg=float(np.rad2deg(device.offset_sd_rad)),
+                )  # fmt: skip
+            known = SourceMap.of(self.avlmap, evidence)
+            for index, number in pairs:
+                for prior in (False, True) if way in WAYS else (False,):
+                    name = f"{way}, lexicon" if prior else way
+                    one = known.joined([number], self.truth.events[index].category, prior)
+                    placed.append(self._placed(name, known, one, self.truth.events[index], true[index], things, each_s))
         for index, number in pairs:
-            event = truth.events[index]
-            for prior in (False, True):
-                one = known.joined([number], event.category, prior)
-                at = known.position_of(one)
-                cell = nearest_held(one.density.plan.is_held, one.density.plan.cell_of(true[index][None, :2])[0])
-                placed.append(Placed(
-                    f"{array}, lexicon" if prior else array,
-                    float(np.linalg.norm(at[:2] - true[index][:2])),
-                    in_room(truth.areas, true[index], at),
-                    bool(one.density.region(0.5).ravel()[cell]),
-                    bool(one.density.region(0.9).ravel()[cell]),
-                    one.density.area_m2(0.9),
-                    right_thing(event, truth.objects, [n for n, _ in things_that_may_be(known, one, things)], things),
-                    same_room(truth.areas, event.source, event.robot),
-                    each_s,
-                    len(avlmap.space),
-                    one.density.spread.right,
-                ))  # fmt: skip
-    for index, number in pairs:
-        placed += baselines(truth.events[index], true[index], truth.areas, things, avlmap, number)
-    return HomeOutcome(job.spec, len(truth.events), len(pairs), tuple(placed))
+            event = self.truth.events[index]
+            placed += baselines(event, true[index], self.truth.areas, things, self.avlmap, number)
+        return HomeOutcome(self.job.spec, len(self.truth.events), len(pairs), tuple(placed), mended)
+
+    def _tracks(self, folder: Path, walk: Trajectory) -> tuple[dict[str, AudioTrack], Mended, float]:
+        """Return the tracks to compare, what was found out of the array that was put wrong, and the device's offset."""
+        audio = self.recording.audio
+        assert audio is not None and audio.microphones is not None
+        tracks = {array: track_of(audio, array, folder) for array in ARRAYS}
+        rng = np.random.default_rng([self.job.seed, crc32(self.job.spec.encode())])
+        offset_rad = float(rng.uniform(-np.pi, np.pi))
+        sounds = [(event.onset_s, event.offset_s, event.source) for event in self.truth.events]
+        said = said_directions(self.scene, sounds, walk.stamps_s, walk.world_from_body, rng, offset_rad, _OUTLIERS)
+        tracks[DEVICE] = replace(tracks["mono"], microphones=None, directions=said)
+        wrong = Wrong.of(audio.microphones, rng)
+        tracks[GIVEN] = wrong.track(read_channels(audio, audio.start_s, audio.end_s), folder / "wrong.flac")
+        room = AcousticSettings(snr_db=SNR_DB, rt60_s=float(rng.uniform(0.3, 0.8)))
+        before_m, before_s = wrong.off(wrong.given)
+        try:
+            found = calibrated(wrong, room, rng, folder / "drive.wav").microphones
+        except RecordingError as error:
+            say(f"note: {self.job.spec}: the array was not calibrated: {error}")
+            return tracks, Mended((before_m, _UNKNOWN), (before_s, _UNKNOWN)), offset_rad
+        refined = replace(found, camera_from_robot=audio.microphones.camera_from_robot)
+        tracks[REFINED] = replace(tracks[GIVEN], microphones=refined)
+        after_m, after_s = wrong.off(refined)
+        return tracks, Mended((before_m, after_m), (before_s, after_s)), offset_rad
+
+    def _placed(
+        self,
+        name: str,
+        known: SourceMap,
+        one: Joined,
+        event: HeardEvent,
+        true: Float[np.ndarray, "3"],
+        things: Sequence[Thing],
+        each_s: float,
+    ) -> Placed:
+        """Return one sound as it was placed, against the truth."""
+        at, plan = known.position_of(one), one.density.plan
+        cell = nearest_held(plan.is_held, plan.cell_of(true[None, :2])[0])
+        likely = [number for number, _ in things_that_may_be(known, one, things)]
+        return Placed(
+            name,
+            float(np.linalg.norm(at[:2] - true[:2])),
+            in_room(self.truth.areas, true, at),
+            bool(one.density.region(0.5).ravel()[cell]),
+            bool(one.density.region(0.9).ravel()[cell]),
+            one.density.area_m2(0.9),
+            right_thing(event, self.truth.objects, likely, things),
+            same_room(self.truth.areas, event.source, event.robot),
+            each_s,
+            len(self.avlmap.space),
+            one.density.spread.right,
+            event.offset_s - event.onset_s,
+        )
 
 
 def matched(events: Sequence[HeardEvent], spans_s: Sequence[tuple[float, float]]) -> list[tuple[int, int]]:

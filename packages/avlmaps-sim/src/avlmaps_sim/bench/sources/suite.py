@@ -11,15 +11,15 @@ from avlmaps_sim.bench.harness.intervals import in_percent, median_interval, wil
 from avlmaps_sim.bench.harness.workers import side_by_side
 from avlmaps_sim.bench.output import Table
 from avlmaps_sim.bench.sources import measured, sweep
-from avlmaps_sim.bench.sources.arrays import ARRAYS
-from avlmaps_sim.bench.sources.homes import HomeJob, HomeOutcome, Placed, measure_home
+from avlmaps_sim.bench.sources.homes import GIVEN, REFINED, WAYS, HomeJob, HomeOutcome, Placed, measure_home
 from avlmaps_sim.scenes import open_scene
 
 HOMES = tuple(f"house:{seed}:held-out" for seed in range(1_000_000, 1_000_010))
-_WAYS = (
-    *(name for array in ARRAYS for name in (array, f"{array}, lexicon")),
+_ROWS = (
+    *(name for way in WAYS for name in (way, f"{way}, lexicon")), GIVEN, REFINED,
     "robot's place (the paper)", "nearest thing", "room's middle",
 )  # fmt: skip
+_LENGTHS_S = ((0.0, 1.0), (1.0, 3.0), (3.0, 6.0), (6.0, np.inf))
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +52,9 @@ def run_sources(settings: SourcesBench, out: Path, seed: int) -> dict[str, Table
     homes = side_by_side(
         partial(measure_home, open_spec=open_scene), todo, settings.jobs, "sources", lambda one: one.spec
     )
-    tables: dict[str, Table] = {"homes": table_of_homes(homes)}
+    tables: dict[str, Table] = {
+        "homes": table_of_homes(homes), "by length": table_of_lengths(homes), "mended": table_of_mended(homes)
+    }  # fmt: skip
     if room is not None:
         tables["a measured room"] = room
     if settings.trials:
@@ -63,7 +65,7 @@ def run_sources(settings: SourcesBench, out: Path, seed: int) -> dict[str, Table
 def table_of_homes(homes: Sequence[HomeOutcome]) -> Table:
     """Return the table of all sounds of all homes, by array and baseline."""
     every = [placed for home in homes for placed in home.placed]
-    rows = [_row(way, [one for one in every if one.array == way]) for way in _WAYS]
+    rows = [_row(way, [one for one in every if one.array == way]) for way in _ROWS]
     count, heard = sum(home.sounds for home in homes), sum(home.heard for home in homes)
     columns = [
         "by", "sounds", "median error m", "95 %", "within 0.5 m %", "said %", "right room %", "95 %",
@@ -74,6 +76,44 @@ def table_of_homes(homes: Sequence[HomeOutcome]) -> Table:
         "probability of the truth within 0.5 m."
     )
     return {"columns": columns, "rows": [row for row in rows if row[1]], "note": note}
+
+
+def table_of_lengths(homes: Sequence[HomeOutcome]) -> Table:
+    """Return how often the regions hold the truth, by the length of the sound."""
+    every = [one for home in homes for one in home.placed if one.array in WAYS]
+    rows: list[list[object]] = []
+    for way in WAYS:
+        for low, high in _LENGTHS_S:
+            own = [one for one in every if one.array == way and low <= one.seconds < high]
+            if not own:
+                continue
+            in_50, in_90 = sum(bool(one.in_50) for one in own), sum(bool(one.in_90) for one in own)
+            rows.append([
+                way, f"{low:g} to {high:g}" if np.isfinite(high) else f"{low:g} and more", len(own),
+                round(float(np.median([one.error_m for one in own])), 2),
+                round(100.0 * in_50 / len(own), 1), in_percent(wilson(in_50, len(own))),
+                round(100.0 * in_90 / len(own), 1), in_percent(wilson(in_90, len(own))),
+            ])  # fmt: skip
+    columns = ["by", "seconds", "sounds", "median error m", "in 50 % region %", "95 %", "in 90 % region %", "95 %"]
+    return {"columns": columns, "rows": rows}
+
+
+def table_of_mended(homes: Sequence[HomeOutcome]) -> Table:
+    """Return by how much a device's offset was missed, and what calibration left of an array that was put wrong."""
+    known = [home.mended for home in homes if home.mended is not None]
+    after = [one for one in known if np.isfinite(one.places_m[1])]
+    said = [one for one in known if np.isfinite(one.device_off_deg)]
+    measured: list[tuple[str, list[float]]] = [
+        ("a device's offset, missed by degrees", [one.device_off_deg for one in said]),
+        ("the standard deviation that is said of it, degrees", [one.device_sd_deg for one in said]),
+        ("an array's worst place as given, cm", [100.0 * one.places_m[0] for one in known]),
+        ("calibrated past a ticking thing, cm", [100.0 * one.places_m[1] for one in after]),
+        ("its worst delay as given, µs", [1e6 * one.delays_s[0] for one in known]),
+        ("calibrated, µs", [1e6 * one.delays_s[1] for one in after]),
+    ]
+    rows = [[name, len(own), round(float(np.median(own)), 2), round(max(own), 2)] for name, own in measured if own]
+    note = f"{len(known) - len(after)} of {len(known)} calibrations were refused."
+    return {"columns": ["what", "homes", "median", "most"], "rows": rows, "note": note}
 
 
 def _row(way: str, own: Sequence[Placed]) -> list[object]:
