@@ -150,6 +150,10 @@ LEFT_OUT = {
     "another clock": (
         lambda robot: (robot.give("tf", ros.moved(np.eye(4), 5.0)), robot.see(0)), "check that both have one clock",
     ),
+    "another clock, later": (
+        lambda robot: (robot.give("tf", ros.moved(np.eye(4), START_S - 7.25)), robot.see(0)),
+        "7.250 s after the last pose",
+    ),
     "an encoding": (
         lambda robot: (robot.be(0), robot.see(0, rgb=lambda f, s: ros.colour(f, s, "yuv422"))), "has encoding 'yuv422'",
     ),
@@ -186,22 +190,106 @@ def test_pictures_of_two_moments_are_no_frame() -> None:
     assert "no colour picture has come" in RosFrames("/rgb", "/depth", "", print).missing()
 
 
+@pytest.mark.parametrize("off_s", [0.25, -3600.0])
+def test_pictures_of_two_clocks_are_said_to_differ_and_by_how_much(off_s: float) -> None:
+    robot = Robot()
+    robot.be(0)
+    robot.see(0, off_s=off_s)
+    assert robot.wait(PARTNER_WITHIN_S + 0.1) == []
+    robot.frames.ready(robot.now_s)
+    said = robot.frames.missing()
+    assert "no depth picture" not in said
+    assert f"the last of colour is {abs(off_s):.3f} s {'after' if off_s > 0 else 'before'} the last of depth" in said
+
+
+MISSING = {
+    "colour": (lambda robot: robot.give("depth", ros.depth(frame(0), START_S)), "no colour picture has come on /rgb"),
+    "depth": (lambda robot: robot.give("rgb", ros.colour(frame(0), START_S)), "no depth picture has come on /depth"),
+    "stamps": (lambda robot: robot.see(0, depth=lambda one, _: ros.depth(one, 0.0)), "on /depth have no stamps"),
+    "encoding": (
+        lambda robot: (robot.be(0), robot.see(0, rgb=lambda f, s: ros.colour(f, s, "yuv422"))), "none of 1 frames can",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", MISSING)
+def test_the_stream_that_is_missing_is_named(case: str) -> None:
+    happens, said = MISSING[case]
+    robot = Robot()
+    happens(robot)
+    robot.wait(PARTNER_WITHIN_S + 0.1)
+    assert said in robot.frames.missing()
+
+
+def test_calibration_that_has_not_come_is_not_taken_for_a_missing_pose() -> None:
+    told: list[str] = []
+    robot = Robot(told.append, knows=False)
+    robot.give("rgb_info", ros.camera_info(frame(0).rig.rgb))
+    robot.give("tf_static", ros.mount())
+    robot.be(0)
+    robot.see(0)
+    robot.wait(0.0)
+    assert robot.wait(POSE_WITHIN_S + 0.1) == []
+    assert told == ["note: Frames are left out: no CameraInfo has come beside /depth yet."]
+
+
 def test_what_robots_say_of_sound_is_read() -> None:
     samples = np.array([[0, 16384], [-16384, 0]], "<i2")
     data = SimpleNamespace(data=np.frombuffer(samples.tobytes(), np.uint8))
-    sound = RosSound("/audio", Pcm(16_000, 2))
+    told: list[str] = []
+    sound = RosSound("/audio", told.append, Pcm(16_000, 2))
     assert sound.take(data, None, 10.0) is None  # no picture says by which clock
     heard, begin_s = sound.take(data, START_S, 10.0) or (None, 0.0)
     assert heard is not None and begin_s == pytest.approx(START_S + 10.0 - 2 / 16_000)
     np.testing.assert_allclose(heard.samples, [0.25, -0.25])
     _, again_s = sound.take(data, START_S, 10.02) or (None, 0.0)
     assert again_s == pytest.approx(begin_s + 2 / 16_000)  # right after the one before
-    with pytest.raises(RecordingError, match="audio_pcm=16000,1"):
-        RosSound("/audio").take(data, START_S, 10.0)
-    with pytest.raises(RecordingError, match="is coded as 'mp3'"):
-        RosSound("/audio").inform(SimpleNamespace(coding_format="mp3", sample_format="", sample_rate=0, channels=0))
-    sound.inform(SimpleNamespace(coding_format="mp3", sample_format="", sample_rate=0, channels=0))  # pcm was given
+    sound.inform(audio_info("mp3"))  # pcm was given
     assert sound.take(data, START_S, 10.1) is not None
+    assert (sound.unheard, told) == (1, [])  # the one before the first picture
+
+
+def audio_info(coding: str = "wave", rate_hz: int = 16_000) -> SimpleNamespace:
+    return SimpleNamespace(coding_format=coding, sample_format="", sample_rate=rate_hz, channels=1)
+
+
+def audio_data(count: int = 1600) -> SimpleNamespace:
+    return SimpleNamespace(data=np.zeros(2 * count, np.uint8))
+
+
+def test_sound_is_heard_from_when_its_rate_is_known_and_what_came_before_is_counted() -> None:
+    told: list[str] = []
+    sound = RosSound("/audio", told.append)
+    for tenth in range(30):
+        assert sound.take(audio_data(), START_S, 10.0 + 0.1 * tenth) is None
+    assert len(told) == 1 and "audio_pcm=16000,1" in told[0]
+    sound.inform(audio_info("mp3"))
+    assert sound.take(audio_data(), START_S, 13.0) is None
+    assert len(told) == 2 and "is coded as 'mp3'" in told[1]
+    for _ in range(2):  # a latched one may come again
+        sound.inform(audio_info())
+    assert told[2:] == [
+        "note: The sound on /audio is heard from now on: 16000 samples a second, 1 channel(s); 31 messages before "
+        "could not be used."
+    ]
+    heard, begin_s = sound.take(audio_data(), START_S, 13.1) or (None, 0.0)
+    assert heard is not None and heard.rate_hz == 16_000
+    assert begin_s == pytest.approx(START_S + 13.0)
+    assert sound.unheard == 31
+
+
+@given(st.lists(st.sampled_from(["sound", "wave", "mp3", "9 Hz"]), max_size=20))
+def test_each_message_of_sound_is_heard_or_counted(events: list[str]) -> None:
+    sound, given_, heard = RosSound("/audio", lambda _: None), 0, 0
+    for number, event in enumerate(events):
+        if event == "sound":
+            given_ += 1
+            heard += sound.take(audio_data(), START_S, 10.0 + number) is not None
+        else:
+            sound.inform(audio_info("wave" if event == "9 Hz" else event, 9 if event == "9 Hz" else 16_000))
+    assert heard + sound.unheard == given_
+    last = [event for event in events if event != "sound"][-1:]
+    assert (sound.take(audio_data(), START_S, 99.0) is not None) == (last == ["wave"])
 
 
 class Played:
@@ -227,7 +315,7 @@ class Played:
         return "The network has nothing"
 
 
-def messages(count: int) -> list:
+def messages(count: int, sound: bool = False) -> list:
     rig = frame(0).rig
     every = [("tf_static", ros.mount()), ("rgb_info", ros.camera_info(rig.rgb)),
              ("depth_info", ros.camera_info(rig.depth))]  # fmt: skip
@@ -235,6 +323,9 @@ def messages(count: int) -> list:
         one, stamp_s = frame(number), START_S + 0.1 * number
         every += [("tf", ros.moved(one.world_from_camera, stamp_s)), ("rgb", ros.colour(one, stamp_s)),
                   ("depth", ros.depth(one, stamp_s))]  # fmt: skip
+        if sound:  # how it is coded is known after the sixth piece
+            every += [("audio_info", audio_info())] if number == 6 else []
+            every += [("audio", SimpleNamespace(header=ros.header(stamp_s, "ear"), audio=audio_data()))]
     return [(kind, message, 100.0) for kind, message in every]
 
 
@@ -249,6 +340,26 @@ def test_a_robot_is_mapped_and_what_was_lost_counts_as_late(tmp_path: Path) -> N
     assert status.fused == 12
     assert any("Mapping from ROS 2: rgb /rgb, depth /depth" in said for said in told)
     assert live.map.stored.info.counts.voxels > 100
+
+
+def test_a_live_map_hears_when_its_coding_is_known_after_its_sound(tmp_path: Path) -> None:
+    told: list[str] = []
+    live = LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP, live=replace(LiveSettings(gates=False), most_waiting=50))
+    with live, pytest.MonkeyPatch.context() as patch:
+        heard: list[float] = []
+        patch.setattr(live, "add_audio", lambda chunk, stamp_s: heard.append(stamp_s))
+        follow_ros2(live, RosTopics(), 1.0, told.append, join=lambda _: Played(messages(12, sound=True)))
+    np.testing.assert_allclose(heard, START_S + 0.1 * np.arange(6, 12))
+    assert any("heard from now on" in said for said in told)
+    assert "note: 6 messages of sound could not be used and are left out." in told
+
+
+def test_samples_a_second_that_cannot_be_are_refused_before_the_drive(tmp_path: Path) -> None:
+    with (
+        pytest.raises(RecordingError, match="audio_pcm takes samples a second"),
+        LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP) as live,
+    ):
+        follow_ros2(live, RosTopics(audio_pcm="loud"), 1.0, lambda _: None, join=lambda _: Played([]))
 
 
 @pytest.mark.parametrize(

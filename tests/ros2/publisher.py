@@ -49,6 +49,7 @@ def main() -> None:
     parser.add_argument("--packed", action="store_true", help="compressed pictures and depth")
     parser.add_argument("--lost", action="store_true", help="no transforms")
     parser.add_argument("--encoding", default="rgb8")
+    parser.add_argument("--coded-at", type=int, default=-1, help="frame before which the sound's coding is published")
     parser.add_argument("--stall", default="-1,0", help="frame, seconds")
     asked = parser.parse_args()
     stall_at, stall_s = (float(word) for word in asked.stall.split(","))
@@ -63,20 +64,22 @@ def main() -> None:
     moving = node.create_publisher(TFMessage, "/tf", QoSProfile(depth=100))
     mounts = node.create_publisher(TFMessage, "/tf_static", LATCHED)
     sound = node.create_publisher(AudioDataStamped, "/audio", 10)
-    coding = node.create_publisher(AudioInfo, "/audio_info", LATCHED)
     for info, camera in zip(infos, (recording.rig.rgb, recording.rig.depth), strict=True):
         info.publish(filled(CameraInfo(), ros.camera_info(camera)))
     if not asked.lost:
         mounts.publish(filled(TFMessage(), ros.mount()))
     track = recording.audio
-    if track is not None:
-        said = AudioInfo(channels=1, sample_rate=track.rate_hz, sample_format="S16LE", coding_format="wave")
-        coding.publish(said)
+    assert track is not None
+    coding = AudioInfo(channels=1, sample_rate=track.rate_hz, sample_format="S16LE", coding_format="wave")
+    if asked.coded_at < 0:
+        node.create_publisher(AudioInfo, "/audio_info", LATCHED).publish(coding)
     while not (rgb.get_subscription_count() and depth.get_subscription_count()):
         rclpy.spin_once(node, timeout_sec=0.1)
     time.sleep(1.5)  # the rest is discovered
     begin_s, heard_s = time.time(), 0.0
     for number, frame in enumerate(recording):
+        if number == asked.coded_at:
+            node.create_publisher(AudioInfo, "/audio_info", LATCHED).publish(coding)
         if number == stall_at:
             time.sleep(stall_s)
             begin_s += stall_s
@@ -88,7 +91,7 @@ def main() -> None:
         rgb.publish(filled(kind(), made))
         made = ros.compressed_depth(frame, stamp_s) if asked.packed else ros.depth(frame, stamp_s)
         depth.publish(filled(kind(), made))
-        if track is not None and frame.stamp_s > heard_s and stall_s == 0.0:
+        if frame.stamp_s > heard_s and stall_s == 0.0:
             samples = (32767.0 * track.read(heard_s, frame.stamp_s).samples).astype("<i2")
             plain = SimpleNamespace(
                 header=ros.header(begin_s + heard_s, "microphone"),

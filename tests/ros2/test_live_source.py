@@ -95,6 +95,14 @@ def test_the_live_map_of_a_robot_is_that_of_its_recording_and_answers(
     assert live.stored.info.up.vector() == pytest.approx([0.0, 0.0, 1.0])
 
 
+def test_sound_whose_coding_is_published_in_the_drive_is_heard_from_then_on(walk: Path, tmp_path: Path) -> None:
+    code, said, noted = mapped(tmp_path / "live.avlmap", walk, "--coded-at", "6")
+    assert code == 0, noted
+    assert "The sound on /audio is heard from now on" in noted
+    assert "messages of sound could not be used and are left out" in noted
+    assert json.loads(said)["live"]["sounds"] >= 1
+
+
 def test_a_robot_that_stalls_and_comes_back_goes_on_in_the_same_map(walk: Path, tmp_path: Path) -> None:
     code, said, noted = mapped(tmp_path / "live.avlmap", walk, "--stall", "12,7", give_up_s=20.0)
     assert code == 0, noted

@@ -1,9 +1,26 @@
-"""How long a live source has given nothing, and what is said of it."""
+"""What is said of a live source: that nothing comes, and each fault once."""
 
+import re
 import time
 from collections.abc import Callable
 
 STALLED_S = 5.0
+_MOST_SAID = 100
+_NUMBERS = re.compile(r"\d+(\.\d+)?")
+
+
+class Once:
+    """Says each thing once; with other numbers it is the same thing."""
+
+    def __init__(self, tell: Callable[[str], None]) -> None:
+        self._tell, self._said = tell, set[str]()
+
+    def __call__(self, sentence: str) -> None:
+        """Say a sentence as a note, unless it was said."""
+        about = _NUMBERS.sub("", sentence)
+        if about not in self._said and len(self._said) < _MOST_SAID:
+            self._said.add(about)
+            self._tell(f"note: {sentence}")
 
 
 class Patience:

@@ -125,7 +125,9 @@ class Ros2Inbox:
 
     def _look(self) -> None:
         """Subscribe to what is wanted and has been discovered."""
-        self._known = {name: kinds[0] for name, kinds in self._node.get_topic_names_and_types() if kinds}
+        every = self._node.get_topic_names_and_types()
+        # A topic to which others listen alone does not say yet whether what it will give is latched.
+        self._known = {name: kinds[0] for name, kinds in every if kinds and self._node.count_publishers(name)}
         if "rgb" not in self.chosen:
             self._choose_pictures()
         if "rgb" not in self.chosen:
@@ -138,6 +140,8 @@ class Ros2Inbox:
             self._subscribe("pose", pose, self._known[pose], depth=100)
         if "audio" not in self.chosen and self._topics.audio != "none":
             self._choose_sound()
+        if "audio" in self.chosen and "audio_info" not in self.chosen:  # it may be discovered long after the sound
+            self._choose_sound_info()
 
     def _choose_pictures(self) -> None:
         raw_first = sorted(self._known, key=lambda name: (self._known[name] == _COMPRESSED, name))
@@ -167,12 +171,15 @@ class Ros2Inbox:
     def _choose_sound(self) -> None:
         found = [name for name, kind in sorted(self._known.items()) if kind in _SOUNDS]
         wanted = self._topics.audio or next(iter(found), "")
-        if wanted not in found:
-            return
-        self._subscribe("audio", wanted, self._known[wanted], depth=200)
-        for name, kind in self._known.items():
-            if kind == _SOUND_INFO:
-                self._subscribe("audio_info", name, kind, depth=1)
+        if wanted in found:
+            self._subscribe("audio", wanted, self._known[wanted], depth=200)
+
+    def _choose_sound_info(self) -> None:
+        """Take the AudioInfo of the sound's own namespace rather than another."""
+        found = sorted(name for name, kind in self._known.items() if kind == _SOUND_INFO)
+        if found and self._known.get(self.chosen["audio"]) != _SOUNDS[0]:  # AudioStamped says by itself
+            info = max(found, key=lambda name: len(os.path.commonpath([name, self.chosen["audio"]])))
+            self._subscribe("audio_info", info, _SOUND_INFO, depth=1)
 
     def _subscribe(self, kind: str, topic: str, type_: str, depth: int, latched: bool | None = None) -> None:
         if latched is None:

@@ -14,7 +14,8 @@ import numpy as np
 from avlmaps.core.arrays import Float32, Float64, UInt8
 from avlmaps.core.camera import Rig
 from avlmaps.core.errors import RecordingError
-from avlmaps.recordings.formats.ros_messages import camera_of, colour_of, depth_of, is_rectified, pose_of
+from avlmaps.live.patience import Once
+from avlmaps.recordings.formats.ros_messages import camera_of, colour_of, depth_of, is_rectified, pose_of, stamp_of
 from avlmaps.recordings.formats.ros_motion import body_of
 from avlmaps.recordings.formats.ros_topics import PAIRING_TOLERANCE_S
 from avlmaps.recordings.formats.ros_transforms import HOLD_S, TransformTree
@@ -78,10 +79,11 @@ class RosFrames:
         """
         self.unpaired = self.unplaced = self.unread = 0
         self._topics = {"rgb": rgb_topic, "depth": depth_topic, "pose": pose_topic}
-        self._tell, self._told = tell, set[str]()
+        self._once = Once(tell)
         self._tree, self._moved, self._world = TransformTree(), 0, ""
         self._infos: dict[str, Any] = {}
         self._rig: Rig | None = None
+        self._camera_frame, self._last_s = "", dict[str, float]()  # stamp of the last picture of each kind
         self._pictures: dict[str, deque[_Picture]] = {"rgb": deque(maxlen=_HELD), "depth": deque(maxlen=_HELD)}
         self._pairs: deque[_Pair] = deque(maxlen=_HELD)
         self._first_s: float | None = None
@@ -123,7 +125,7 @@ class RosFrames:
             self._pairs.popleft()
             if rig is None or pose is None:
                 self.unplaced += 1
-                self._say_once(f"note: Frames are left out: {self.missing()}.")
+                self._once(f"Frames are left out: {self.missing()}.")
             elif (frame := self._read(pair, rig, pose)) is not None:
                 found.append(frame)
         return found
@@ -131,15 +133,26 @@ class RosFrames:
     def missing(self) -> str:
         """Return what there is too little of for a frame, as part of a sentence."""
         for kind, what in (("rgb", "colour picture"), ("depth", "depth picture")):
-            if not self._pictures[kind] and self._first_s is None:
+            if kind not in self._last_s:
                 return f"no {what} has come on {self._topics[kind]}"
+            if self._last_s[kind] <= 0.0:
+                return f"the {what}s on {self._topics[kind]} have no stamps; let their driver set them"
         if "rgb_info" not in self._infos:
             return f"no CameraInfo has come beside {self._topics['rgb']}"
-        if not self._pairs and not (self.unplaced or self.unread):
+        if self._first_s is None:
+            ahead_s = self._last_s["rgb"] - self._last_s["depth"]
             return (
                 f"no pictures of {self._topics['rgb']} and {self._topics['depth']} are of one moment (within "
-                f"{1000 * PAIRING_TOLERANCE_S:.0f} ms); check that both have stamps of one clock"
+                f"{1000 * PAIRING_TOLERANCE_S:.0f} ms): the last of colour is {abs(ahead_s):.3f} s "
+                f"{'after' if ahead_s > 0.0 else 'before'} the last of depth by their stamps; check that both have one "
+                "clock"
             )
+        if self._rig is None:
+            if "depth_info" not in self._infos:
+                return f"no CameraInfo has come beside {self._topics['depth']} yet"
+            return "no static transform between the cameras of colour and of depth has come yet"
+        if self.unread and not self.unplaced:
+            return f"none of {self.unread} frames can be read"
         return self._unplaced()
 
     def _unplaced(self) -> str:
@@ -148,16 +161,22 @@ class RosFrames:
             root = self._tree.root(frame)
             chain = f"; it hangs on {root!r}, and a transform to that is missing" if root != frame.lstrip("/") else ""
             return f"nothing moves the camera {frame!r}: no transform on /tf leads to it, and no odometry{chain}"
-        span = self._tree.span_s(frame)
+        if self._world and self._world not in self._tree.ancestors(frame):
+            return f"the transforms of the camera {frame!r} do not lead to {self._world!r} any more"
+        span, stamp_s = self._tree.span_s(frame), self._last_s["depth"]
+        if span is None or span[0] <= stamp_s <= span[1]:
+            return f"the camera {frame!r} has no pose at the pictures' stamps, between poses before and after them"
+        off_s, which = max((stamp_s - span[1], "after the last"), (span[0] - stamp_s, "before the first"))
         return (
-            f"the camera {frame!r} has no pose at the pictures' stamps (the last is of {self._stamp_s:.3f} s"
-            f"{f', poses go from {span[0]:.3f} to {span[1]:.3f} s' if span else ''}); check that both have one clock"
+            f"the camera {frame!r} has no pose at the pictures' stamps: the last picture is {off_s:.3f} s {which} "
+            f"pose; check that both have one clock, and that poses come within {POSE_WITHIN_S:g} s"
         )
 
     def _take_picture(self, kind: Literal["rgb", "depth"], message: Any, now_s: float) -> None:
-        stamp_s = _stamp_s(message)
+        stamp_s = stamp_of(message)
+        self._last_s[kind] = stamp_s
         if stamp_s <= 0.0:
-            self._say_once(f"note: The pictures on {self._topics[kind]} have no stamps; let their driver set them.")
+            self._once(f"The pictures on {self._topics[kind]} have no stamps; let their driver set them.")
             return
         held = self._pictures[kind]
         if held and stamp_s <= held[-1].stamp_s:  # again, or overtaken
@@ -166,20 +185,18 @@ class RosFrames:
             held.clear()  # the clock was set back, as where a simulation begins again
         held.append(_Picture(stamp_s, message, now_s))
         if kind == "depth":
-            self._camera_frame, self._stamp_s = message.header.frame_id, stamp_s
-
-    _camera_frame, _stamp_s = "", 0.0
+            self._camera_frame = message.header.frame_id
 
     def _take_pose(self, message: Any) -> None:
         named, topic = getattr(message, "child_frame_id", ""), self._topics["pose"]
         if not named:
             named, assumed = body_of(message, topic, self._camera_frame, self._tree.mounts())
             if assumed:
-                self._say_once(f"note: {assumed}")
+                self._once(assumed)
         self._move(message.header.frame_id or "world", named, message, static=False)
 
     def _move(self, parent: str, child: str, message: Any, static: bool) -> None:
-        stamp_s = _stamp_s(message)
+        stamp_s = stamp_of(message)
         self._tree.add(parent, child, pose_of(message), stamp_s, static)
         self._moved += 1
         if self._moved % _FORGET_EVERY == 0 and not static:
@@ -216,13 +233,9 @@ class RosFrames:
             return None
         rgb_topic, depth_topic = self._topics["rgb"], self._topics["depth"]
         if "depth_info" not in self._infos:
-            self._say_once(
-                f"note: {depth_topic} has no CameraInfo; that of {rgb_topic} is used, as for registered depth."
-            )
+            self._once(f"{depth_topic} has no CameraInfo; that of {rgb_topic} is used, as for registered depth.")
         if rgb_from_depth is None:
-            self._say_once(
-                f"note: No static transform links {frames[0]!r} and {frames[1]!r}; they are taken for one place."
-            )
+            self._once(f"No static transform links {frames[0]!r} and {frames[1]!r}; they are taken for one place.")
         rgb = self._camera(self._infos["rgb_info"], rgb_topic)
         depth = self._camera(self._infos.get("depth_info", self._infos["rgb_info"]), depth_topic)
         self._rig = Rig(rgb, depth, np.eye(4) if rgb_from_depth is None else rgb_from_depth)
@@ -231,7 +244,7 @@ class RosFrames:
     def _camera(self, info: Any, topic: str) -> Any:
         camera, distorted = camera_of(info, topic, is_rectified(topic))
         if distorted:
-            self._say_once(f"note: {topic} has lens distortion, which a pinhole leaves out; use rectified pictures.")
+            self._once(f"{topic} has lens distortion, which a pinhole leaves out; use rectified pictures.")
         return camera
 
     def _pose_of(self, pair: _Pair, now_s: float) -> Float64[np.ndarray, "4 4"] | None:
@@ -263,15 +276,6 @@ class RosFrames:
                     )
         except RecordingError as fault:
             self.unread += 1
-            self._say_once(f"note: {fault}")
+            self._once(str(fault))
             return None
         return RosFrame(rgb, depth_m, rig, pose, pair.depth.stamp_s)
-
-    def _say_once(self, sentence: str) -> None:
-        if len(self._told) < 100 and sentence not in self._told:
-            self._told.add(sentence)
-            self._tell(sentence)
-
-
-def _stamp_s(message: Any) -> float:
-    return message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec

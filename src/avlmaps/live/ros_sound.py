@@ -1,87 +1,120 @@
 """Pieces of sound out of the messages of a running robot."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.wording import option
+from avlmaps.live.patience import Once
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.formats.ros_audio import Pcm, sampled_pieces
+from avlmaps.recordings.formats.ros_messages import stamp_of
 
 DRIFT_S = 0.1
 """Sound without stamps is given a place again where it is off by more than this, seconds."""
+INFO_WITHIN_S = 2.0
+"""An AudioInfo that has not come so long after its sound is said to be missing; it may come later still."""
 
 
 class RosSound:
     """Reads the messages of one topic, and says when each sounds.
 
     AudioStamped has stamps and says how it is coded. AudioData is bytes of 16-bit samples, whose rate ``pcm`` or an
-    AudioInfo says; without a stamp it ends when it came.
+    AudioInfo says, which may come later than the sound; without a stamp it ends when it came.
+
+    Attributes:
+        unheard: messages that could not be used.
     """
 
-    def __init__(self, topic: str, pcm: Pcm | None = None) -> None:
+    def __init__(self, topic: str, tell: Callable[[str], None], pcm: Pcm | None = None) -> None:
         """Begin without sound.
 
         Args:
             topic: name, for sentences.
+            tell: called with a sentence for each thing that keeps sound from being heard, and when it is heard again.
             pcm: of plain samples; None waits for an AudioInfo.
         """
+        self.unheard = 0
         self._topic, self._pcm, self._rest, self._end_s = topic, pcm, b"", float("-inf")
-        self._is_given = pcm is not None
+        self._tell, self._once = tell, Once(tell)
+        self._is_given, self._first_s = pcm is not None, float("inf")
+        self._why = (
+            f"Nothing says how the sound on {topic} is coded, so that it is left out until something does; publish its "
+            "AudioInfo, say how many samples a second and in how many channels "
+            f"({option('topics', 'audio_pcm=16000,1')}), or leave it out ({option('topics', 'audio=none')})."
+        )
 
     def inform(self, info: Any) -> None:
-        """Take an AudioInfo, which says how AudioData is coded; what the caller says counts, as in a bag.
-
-        Raises:
-            RecordingError: as what cannot be read live.
-        """
+        """Take an AudioInfo, which says how AudioData is coded; what the caller says counts, as in a bag."""
         if self._is_given:
             return
-        coding = (getattr(info, "coding_format", "") or "").lower()
-        if coding not in ("wave", "wav", "pcm") or (info.sample_format or "S16LE").upper() != "S16LE":
+        try:
+            pcm = self._coding(info)
+        except RecordingError as fault:
+            self._pcm, self._rest, self._why = None, b"", str(fault)
+            self._once(self._why)
+            return
+        if pcm != self._pcm:
+            self._pcm, self._rest = pcm, b""
+            before = f"; {self.unheard} messages before could not be used" if self.unheard else ""
+            self._tell(
+                f"note: The sound on {self._topic} is heard from now on: {pcm.rate_hz} samples a second, "
+                f"{pcm.channels} channel(s){before}."
+            )
+
+    def _coding(self, info: Any) -> Pcm:
+        coding, samples = (str(getattr(info, of, "") or "")[:20] for of in ("coding_format", "sample_format"))
+        if coding.lower() not in ("wave", "wav", "pcm") or (samples or "S16LE").upper() != "S16LE":
             raise RecordingError(
-                f"The sound on {self._topic} is coded as {coding[:20]!r} {info.sample_format[:20]!r}; a live map takes "
+                f"The sound on {self._topic} is coded as {coding!r} {samples!r}; a live map takes "
                 f"16-bit samples (S16LE): record them so, or leave the sound out ({option('topics', 'audio=none')})."
             )
-        self._pcm = Pcm.check_rate(int(info.sample_rate), int(info.channels), f"The AudioInfo of {self._topic}")
+        return Pcm.check_rate(int(info.sample_rate), int(info.channels), f"The AudioInfo of {self._topic}")
 
     def take(self, message: Any, ahead_s: float | None, now_s: float) -> tuple[Sound, float] | None:
-        """Return a message's sound, of one channel, and when it begins; None where it holds none.
+        """Return a message's sound, of one channel, and when it begins; None where it cannot be used, which is counted.
 
         Args:
             message: AudioStamped, AudioDataStamped or AudioData.
             ahead_s: by how much the pictures' stamps are ahead of this machine's clock; None before the first.
             now_s: by this machine's clock.
-
-        Raises:
-            RecordingError: nothing says how it is coded.
         """
-        if hasattr(getattr(message, "audio", None), "audio_data"):
-            pcm, samples = next(iter(sampled_pieces([message], self._topic)))
-        else:
-            pcm, samples = self._plain(getattr(message, "audio", message))
+        pcm, samples = self._samples(message, now_s)
+        is_stamped = getattr(message, "header", None) is not None
+        if pcm is None or not (is_stamped or ahead_s is not None):
+            self.unheard += 1
+            return None
         length_s = len(samples) / pcm.rate_hz
         if not len(samples):
             return None
-        if (header := getattr(message, "header", None)) is not None:
-            begin_s = header.stamp.sec + 1e-9 * header.stamp.nanosec
-        elif ahead_s is None:
-            return None
+        if is_stamped:
+            begin_s = stamp_of(message)
         else:
+            assert ahead_s is not None
             begin_s = now_s + ahead_s - length_s
             if abs(begin_s - self._end_s) < DRIFT_S:
                 begin_s = self._end_s
         self._end_s = begin_s + length_s
         return Sound(samples.mean(axis=1).astype(np.float32), pcm.rate_hz), begin_s
 
-    def _plain(self, message: Any) -> tuple[Pcm, np.ndarray]:
+    def _samples(self, message: Any, now_s: float) -> tuple[Pcm | None, np.ndarray]:
+        """Return the samples of a message, (n, channels); no coding where nothing says how to read them."""
+        if hasattr(getattr(message, "audio", None), "audio_data"):
+            try:
+                return next(iter(sampled_pieces([message], self._topic)))
+            except RecordingError as fault:
+                self._once(str(fault))
+                return None, np.zeros((0, 1))
+        return self._plain(getattr(message, "audio", message), now_s)
+
+    def _plain(self, message: Any, now_s: float) -> tuple[Pcm | None, np.ndarray]:
         if self._pcm is None:
-            raise RecordingError(
-                f"Nothing says how the sound on {self._topic} is coded; publish its AudioInfo, say how many samples a "
-                f"second and in how many channels ({option('topics', 'audio_pcm=16000,1')}), or leave it out "
-                f"({option('topics', 'audio=none')})."
-            )
+            self._first_s = min(self._first_s, now_s)
+            if now_s - self._first_s > INFO_WITHIN_S:
+                self._once(self._why)
+            return None, np.zeros((0, 1))
         content = self._rest + np.asarray(message.data, np.uint8).tobytes()  # a message may end within a sample
         size = 2 * self._pcm.channels
         whole = len(content) // size * size

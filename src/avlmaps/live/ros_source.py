@@ -9,10 +9,11 @@ from avlmaps.core.errors import AudioError, BackendError, RecordingError
 from avlmaps.core.progress import say
 from avlmaps.core.wording import option
 from avlmaps.live.live_map import LiveMap
-from avlmaps.live.patience import Patience
+from avlmaps.live.patience import Once, Patience
 from avlmaps.live.ros_frames import RosFrames
 from avlmaps.live.ros_sound import RosSound
 from avlmaps.recordings.formats.ros_audio import Pcm
+from avlmaps.recordings.formats.ros_messages import stamp_of
 from avlmaps.recordings.formats.ros_topics import RosTopics
 
 _LOOK_S = 0.05
@@ -113,11 +114,12 @@ class _Source:
         self.frames_in = 0
         self._live, self._topics, self._inbox, self._tell = live, topics, inbox, tell
         self._frames: RosFrames | None = None
+        self._pcm = Pcm.parse_rate(topics.audio_pcm) if topics.audio_pcm else None
         self._sound: RosSound | None = None
         self._waiting: list[tuple[str, Any, float]] = []  # until the pictures' topics are known
         self._ahead_s: float | None = None
         self._doubts, self._lost = 0, 0
-        self._silent = False
+        self._refused, self._once = "", Once(tell)
 
     def step(self) -> int:
         """Take what arrived, and return how many frames that gave."""
@@ -137,7 +139,8 @@ class _Source:
                 self._live.add_frame(frame.rgb, frame.depth_m, frame.rig, frame.world_from_camera, frame.stamp_s)
                 came += 1
             except RecordingError as fault:
-                self._tell(f"note: {fault}")
+                self._refused = str(fault)
+                self._once(self._refused)
         self.frames_in += came
         if self._inbox.lost > self._lost:
             self._live.count_late(self._inbox.lost - self._lost)
@@ -152,6 +155,8 @@ class _Source:
         if self._frames is None:
             named = " and ".join(topic for topic in (self._topics.rgb, self._topics.depth) if topic)
             return f"nobody publishes {named}" if named else "nobody publishes pictures of colour and of depth"
+        if self._refused:
+            return f"the frames that came are refused, the last because: {self._refused.rstrip('.')}"
         return self._frames.missing()
 
     def finish(self) -> None:
@@ -163,6 +168,7 @@ class _Source:
             (frames.unpaired, "depth pictures had no colour picture of their moment"),
             (frames.unplaced, "frames had no pose of their moment"),
             (frames.unread, "frames could not be read"),
+            (self._sound.unheard if self._sound else 0, "messages of sound could not be used"),
         ):
             if count:
                 self._tell(f"note: {count} {what} and are left out.")
@@ -181,24 +187,18 @@ class _Source:
             case "rgb" | "depth" | "rgb_info" | "depth_info" | "tf" | "tf_static" | "pose":
                 self._frames.take(kind, message, now_s)
                 if kind == "depth":
-                    ahead_s = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec - now_s
+                    ahead_s = stamp_of(message) - now_s
                     self._ahead_s = ahead_s if self._ahead_s is None else max(ahead_s, self._ahead_s)
             case _:
                 raise ValueError(f"a message is for {kind!r}")
 
     def _hear(self, kind: str, message: Any, now_s: float) -> None:
-        if self._silent:
-            return
-        try:
-            if self._sound is None:
-                pcm = Pcm.parse_rate(self._topics.audio_pcm) if self._topics.audio_pcm else None
-                self._sound = RosSound(self._inbox.chosen.get("audio", "sound"), pcm)
-            if kind == "audio_info":
-                self._sound.inform(message)
-            elif (heard := self._sound.take(message, self._ahead_s, now_s)) is not None:
+        if self._sound is None:
+            self._sound = RosSound(self._inbox.chosen.get("audio", "sound"), self._tell, self._pcm)
+        if kind == "audio_info":
+            self._sound.inform(message)
+        elif (heard := self._sound.take(message, self._ahead_s, now_s)) is not None:
+            try:
                 self._live.add_audio(*heard)
-        except RecordingError as fault:  # it stays so
-            self._tell(f"note: {fault}")
-            self._silent = True
-        except AudioError as fault:
-            self._tell(f"note: {fault}")
+            except AudioError as fault:
+                self._once(str(fault))

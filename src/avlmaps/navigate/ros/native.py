@@ -34,6 +34,7 @@ from avlmaps.navigate.ros.nav2_tasks import MOVING, why_of
 from avlmaps.navigate.ros.own_map import OwnGrid, checked_grid
 from avlmaps.navigate.ros.session import Ear
 from avlmaps.navigate.ros.settings import RosSettings
+from avlmaps.recordings.formats.ros_messages import stamp_of
 
 # pyright: reportMissingImports=false
 _LOOK_EVERY_S = 0.05
@@ -224,14 +225,13 @@ class NativeSession:
     def _placed(self, message: Any, static: bool) -> None:
         transforms = []
         for one in message.transforms[:2000]:
-            shift, turn, stamp = one.transform.translation, one.transform.rotation, one.header.stamp
+            shift, turn = one.transform.translation, one.transform.rotation
             try:
                 matrix = rigid((shift.x, shift.y, shift.z), (turn.x, turn.y, turn.z, turn.w))
             except ValueError:
                 self._ear.tree.refused += 1
                 continue
-            taken_s = stamp.sec + 1e-9 * stamp.nanosec
-            transforms.append(Transform(one.header.frame_id[:256], one.child_frame_id[:256], matrix, taken_s))
+            transforms.append(Transform(one.header.frame_id[:256], one.child_frame_id[:256], matrix, stamp_of(one)))
         self._ear.tree.take(transforms, static)
         self._notify()
 

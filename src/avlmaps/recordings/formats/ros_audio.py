@@ -18,6 +18,7 @@ from avlmaps.core.errors import AudioError, RecordingError
 from avlmaps.core.wording import option
 from avlmaps.recordings.audio import LOWEST_RATE_HZ, AudioTrack, Sound, write_flac
 from avlmaps.recordings.formats.ros_clock import PictureClock
+from avlmaps.recordings.formats.ros_messages import stamp_of
 
 STAMPED = "audio_common_msgs/msg/AudioStamped"
 _PCM = ("wave", "wav", "pcm")
@@ -92,8 +93,7 @@ class SoundTopic:
         stamps: list[float] = []
         for received_ns, message in self.messages():
             received.append(received_ns)
-            header = getattr(message, "header", None)
-            stamps.append(float("nan") if header is None else header.stamp.sec + header.stamp.nanosec * 1e-9)
+            stamps.append(stamp_of(message) if getattr(message, "header", None) is not None else float("nan"))
         by_stamp = self.clock.of_stamps(np.array(stamps))
         if len(stamps) and np.isfinite(by_stamp).all() and self.clock.overlaps(by_stamp):
             return by_stamp, ()

@@ -8,7 +8,7 @@ import numpy as np
 from avlmaps.core.errors import RecordingError
 from avlmaps.recordings.directions import DirectionTrack
 from avlmaps.recordings.formats.ros_clock import PictureClock
-from avlmaps.recordings.formats.ros_messages import pose_of
+from avlmaps.recordings.formats.ros_messages import pose_of, stamp_of
 
 _NUMBERS = tuple(f"std_msgs/msg/{name}" for name in ("Int32", "Int16", "Float32", "Float64"))
 _POSES = ("geometry_msgs/msg/PoseStamped",)
@@ -38,7 +38,7 @@ def directions_of(
     for received_ns, message in messages():
         received.append(received_ns * 1e-9)
         if hasattr(message, "pose"):
-            stamped.append(message.header.stamp.sec + message.header.stamp.nanosec * 1e-9)
+            stamped.append(stamp_of(message))
             angle.append(_yaw(message))
             whole = False
         else:

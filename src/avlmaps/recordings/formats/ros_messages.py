@@ -36,6 +36,11 @@ def header_stamp_s(rawdata: bytes, is_ros2: bool) -> float:
     return seconds + nanoseconds * 1e-9
 
 
+def stamp_of(message: Any) -> float:
+    """Return the stamp of a message with a header, seconds."""
+    return message.header.stamp.sec + message.header.stamp.nanosec * 1e-9
+
+
 def colour_of(message: Any, name: str, camera: Pinhole | None = None) -> UInt8[np.ndarray, "h w 3"]:
     """Return the colour picture of an Image or a CompressedImage.
 

@@ -11,7 +11,7 @@ from avlmaps.core.poses import MAX_ROTATION_FAULT, from_quaternion
 from avlmaps.recordings.faults import stop_at_first
 from avlmaps.recordings.formats.bag_files import Bag
 from avlmaps.recordings.formats.columns import POSE
-from avlmaps.recordings.formats.ros_messages import pose_of
+from avlmaps.recordings.formats.ros_messages import pose_of, stamp_of
 from avlmaps.recordings.formats.ros_transforms import TransformTree
 from avlmaps.recordings.formats.tables import read_table
 from avlmaps.recordings.types import BaseHeight
@@ -87,9 +87,8 @@ def base_height(tree: TransformTree, camera_frame: str, stamp_s: float) -> BaseH
 def _add_tf(bag: Bag, topic: str, tree: TransformTree, static: bool) -> None:
     for _, message in bag.messages(topic):
         for transform in message.transforms:
-            stamp = transform.header.stamp
-            stamp_s = stamp.sec + stamp.nanosec * 1e-9
-            tree.add(transform.header.frame_id, transform.child_frame_id, pose_of(transform), stamp_s, static)
+            pose, at_s = pose_of(transform), stamp_of(transform)
+            tree.add(transform.header.frame_id, transform.child_frame_id, pose, at_s, static)
 
 
 def _check_pose_topic(bag: Bag, topic: str) -> None:
@@ -155,9 +154,8 @@ def find_motion(
     for _, message in bag.messages(topic):
         if not body:
             body, assumed = body_of(message, topic, camera_frame, tree)
-        stamp_s = message.header.stamp.sec + message.header.stamp.nanosec * 1e-9
         own = getattr(message, "child_frame_id", "") or body
-        tree.add(message.header.frame_id or "world", own, pose_of(message), stamp_s, static=False)
+        tree.add(message.header.frame_id or "world", own, pose_of(message), stamp_of(message), static=False)
     if not tree.moves(camera_frame):
         raise RecordingError(
             f"{bag.path} has poses of {body!r} on {topic} but no static transform from there to the camera "
