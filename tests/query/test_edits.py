@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from query_fakes import fake_encoders, fake_map, furnished_map, keyframes_at, voxels_of
+from query_fakes import FakeSounds, fake_encoders, fake_map, furnished_map, keyframes_at, sounds_of, voxels_of
 from test_named_areas import Rooms
 from walled_rooms import two_rooms_index
 
@@ -168,6 +168,38 @@ def test_an_edit_that_finds_nothing_is_reported_with_the_reason() -> None:
     assert "another recording, other" in m.edited.lost[0].why
     again = msgspec.structs.replace(STOOL, world=World(name="walk", fingerprint="of a recording that was mended"))
     assert not AVLMap(STORED, edits=[again]).edited.lost
+
+
+def test_a_map_without_pixel_features_asks_for_no_pixel_model() -> None:
+    stored = furnished_map(sounds=sounds_of([np.array([[1.0, 1.0, 0.0]])], [0.9]))
+    stored.encoders, stored.info.models = fake_encoders(sounds=FakeSounds()), {"sounds": None}
+    m = AVLMap(stored, edits=[STOOL, DOCK])
+    assert m.ask(sound="dog").found
+    (lost,) = m.edited.lost
+    assert lost.why.startswith("nothing like the chair is at")
+    assert m.ask("where is my dock?").goals[0].position == (3.0, 1.0, 0.0)
+
+
+def test_what_edits_are_about_is_searched_once_however_often_it_is_edited(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    searched: list[Any] = []
+    search = AVLMap.unedited_things
+
+    def counted(self: AVLMap, names: Any = None, least: float = 0.5, *more: Any) -> Any:
+        searched.append((least, None if names is None else tuple(names)))
+        return search(self, names, least, *more)
+
+    m = editable(tmp_path)
+    at = "0.6,0.6"
+    m.edit.rename("chair", "stool", at=at)
+    monkeypatch.setattr(AVLMap, "unedited_things", counted)
+    m.edit.history()
+    m.edit.split("table", box=(0.0, 0.0, 1.4, 2.0))
+    m.as_edited_now().edit.history()
+    m.edit.undo()
+    m.edit.history()
+    assert searched.count((0.2, ("chair",))) == 1 == searched.count((0.2, ("table",)))
 
 
 def shifted(by: int) -> Any:

@@ -10,10 +10,11 @@ from starlette.testclient import TestClient
 
 from avlmaps.maps.build import build_map
 from avlmaps.maps.settings import BuildSettings
+from avlmaps.query.avlmap import AVLMap
 from avlmaps.recordings.open import open_recording
 from avlmaps.serve.service import Service
 from avlmaps.serve.settings import ServeError
-from avlmaps.serve.shelf import Shelf, named_maps
+from avlmaps.serve.shelf import ServedMap, Shelf, named_maps
 
 
 @pytest.fixture(scope="module")
@@ -50,6 +51,27 @@ def test_the_new_map_answers_after_it_was_opened(place: Path, coarse: Path) -> N
     assert old.avlmap.ask("the red thing").goals, "who holds the old map goes on with it"
     assert new.avlmap.ask("the red thing").goals
     assert "was replaced" in notes[0]
+
+
+def test_an_edit_that_is_made_while_the_new_map_is_opened_counts_at_once(
+    place: Path, coarse: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shelf = Shelf({"home": place}, warm=False)
+    prepare = ServedMap.prepare
+
+    def edit_meanwhile(self: ServedMap) -> None:
+        prepare(self)
+        assert not self.avlmap.edited  # read, without what comes now
+        AVLMap.open(place).edit.pin("zorb pad", (0.5, 0.5, 0.1))
+        assert shelf.get("home").avlmap.edited, "the old map knows it meanwhile"
+
+    monkeypatch.setattr(ServedMap, "prepare", edit_meanwhile)
+    put(coarse, place)
+    shelf.refresh(wait_s=30.0)
+    monkeypatch.undo()
+    new = shelf.get("home").avlmap
+    assert new.stored.info.voxel_size_m == 0.3
+    assert new.ask("the zorb pad").found
 
 
 def test_a_map_that_cannot_be_opened_leaves_the_old_one(place: Path, serving: Callable[..., TestClient]) -> None:

@@ -60,6 +60,7 @@ if TYPE_CHECKING:
 
 # Keyframes that are matched one by one for a picture that cannot be located: more of them guess no better (measured).
 _GUESS_FROM = 20
+_LEAST_EDITED = 0.2  # a person may name what the map is not certain of
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +112,7 @@ class AVLMap:
         self._given_edits = edits
         self._rivals: tuple[tuple[str, ...], ClosestWords] | None = None
         self._known_searches: Mapping[Search, Segmentation] | None = None
+        self._to_edit: dict[str | None, Sequence[Thing]] = {}
 
     @classmethod
     def open(cls, path: str | Path, settings: QuerySettings | None = None) -> "AVLMap":
@@ -320,6 +322,17 @@ class AVLMap:
             return known[name, alone].instances if (name, alone) in known else self._search(name, alone).instances
 
         return find_things(self.stored, self.space, instances_of, names, least_confidence, structure, watch)
+
+    def things_to_edit(self, name: str | None) -> "Sequence[Thing]":
+        """Return the things that an edit may be about, as the encoder sees them: of a name, or of its vocabulary.
+
+        A map without pixel features has none. They are looked for once, for all edits and whatever is edited later.
+        """
+        if name not in self._to_edit:
+            is_seen = "pixels" in self.stored.info.models and (name is None or self.sees(name))
+            names = None if name is None else [name]
+            self._to_edit[name] = self.unedited_things(names, _LEAST_EDITED) if is_seen else ()
+        return self._to_edit[name]
 
     def _searched(
         self, watch: "Watch" = lambda stage, done, total: None, only_stored: bool = False

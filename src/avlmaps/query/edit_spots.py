@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 Box = tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]
 """The lowest and the highest corner, metres, level frame."""
 ALIKE_BOX = 0.2  # share of two boxes together that both hold: perhaps one thing
-_LEAST_LISTED = 0.2  # a person may name what the map is not certain of
 
 
 class SeenMap(Protocol):
@@ -46,12 +45,8 @@ class SeenMap(Protocol):
         """The rooms that walls and doorways bound."""
         ...
 
-    def sees(self, phrase: str) -> bool:
-        """Return whether the pixel encoder can look for a phrase."""
-        ...
-
-    def unedited_things(self, names: Sequence[str] | None = None, least_confidence: float = 0.5) -> "list[Thing]":
-        """Return the things of the map as the encoder sees them."""
+    def things_to_edit(self, name: str | None) -> "Sequence[Thing]":
+        """Return the things that an edit may be about, of a name or all, as the encoder sees them."""
         ...
 
 
@@ -65,26 +60,15 @@ class Spots:
         """Return the thing of the map, as its encoder sees it, that fills the box of a spot best."""
         if spot is None:
             return None
-        for names in ((spot.name,), None):
+        for name in (spot.name, None):
             best, most = None, ALIKE_BOX
-            for thing in self._things_called(names):
+            for thing in self._map.things_to_edit(name):
                 share = self.overlap(spot, self.box(thing.rows))
                 if share >= most:
                     best, most = thing, share
             if best is not None:
                 return best
         return None
-
-    @cached_property
-    def _known_things(self) -> "dict[tuple[str, ...] | None, list[Thing]]":
-        return {}
-
-    def _things_called(self, names: tuple[str, ...] | None) -> "list[Thing]":
-        if names is not None and not self._map.sees(names[0]):
-            return []
-        if names not in self._known_things:
-            self._known_things[names] = self._map.unedited_things(names, _LEAST_LISTED)
-        return self._known_things[names]
 
     def carried(self, spot: Spot) -> Spot | None:
         """Return where a later day found the thing of a spot, of which an earlier day knew; None where it did not."""

@@ -292,14 +292,16 @@ class _Slot:
 
     def _reopen(self, note: Callable[[str], None]) -> None:
         begin = perf_counter()
-        tried = self._source.stamp()
+        tried, edits = self._source.stamp(), stamp(self.path / EDITS)
         try:
             before, opened = self._opened()
         except (AvlmapsError, OSError) as error:
             self._stamp, self.fault = tried, error
             note(f"{self.name}: the map was replaced, and the new one cannot be opened ({error}); the old one answers.")
             return
-        self._stamp, self.map, self.fault = before, opened, None
+        with self._lock:  # what was edited while it was opened counts as well
+            self._stamp, self.map, self.fault, self._edits = before, opened, None, edits
+            self._take_edits(stamp(self.path / EDITS), note)
         if self._source.tells:
             note(f"{self.name}: the map was replaced; the new one was opened in {perf_counter() - begin:.1f} s.")
 
