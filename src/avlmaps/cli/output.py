@@ -10,6 +10,7 @@ from typing import Any
 from avlmaps.cli.address_space import AddressSpaceError
 from avlmaps.core.errors import AvlmapsError
 from avlmaps.core.printable import printable, printable_json
+from avlmaps.core.wording import place_text
 
 
 class UsageError(Exception):
@@ -126,7 +127,7 @@ def table_lines(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> lis
 
 def place(position: Sequence[float]) -> str:
     """Write a position as people read it."""
-    return "(" + ", ".join(f"{value:.2f}" for value in position) + ") m"
+    return place_text(position)
 
 
 def size_of(count: int) -> str:

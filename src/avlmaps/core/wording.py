@@ -6,7 +6,7 @@ that. A server in that process has readers of its own: what is done for them is 
 """
 
 import os
-from collections.abc import Generator
+from collections.abc import Generator, Iterable
 from contextlib import contextmanager
 from contextvars import ContextVar
 from enum import Enum
@@ -78,6 +78,16 @@ def asked_as(spelling: Spelling) -> Generator[None]:
         yield
     finally:
         _asked_as.reset(before)
+
+
+def coordinates(point: Iterable[float]) -> str:
+    """Return the numbers of a place as people read them: to a centimetre."""
+    return ", ".join(f"{value:.2f}" for value in point)
+
+
+def place_text(point: Iterable[float]) -> str:
+    """Return a place in metres as people read it: ``(1.00, 2.50, 0.00) m``."""
+    return f"({coordinates(point)}) m"
 
 
 def flag(name: str, value: str = "") -> str:

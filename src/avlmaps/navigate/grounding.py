@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core.errors import GoalNotFoundError, ProgramError
+from avlmaps.core.wording import place_text
 from avlmaps.language.program.vocabulary import Clip, Picture, Place, Target
 from avlmaps.language.storey_words import said_storeys
 from avlmaps.maps.storeys import said_storeys as storeys_in_words
@@ -225,8 +226,8 @@ class Seeker:
         self.note(heat.factors[0].note)
 
     def _chosen(self, thing: Thing, of: int) -> Thing:
-        place = ", ".join(f"{value:.2f}" for value in self.avlmap.space.world(thing.place))
-        line = f"{thing.name}: at ({place}) m, probability {thing.probability:.2f}"
+        place = place_text(self.avlmap.space.world(thing.place))
+        line = f"{thing.name}: at {place}, probability {thing.probability:.2f}"
         if thing.name and not self._last_line.startswith(line):
             spread = "" if thing.spread is None else f", {thing.spread.around('there')}"
             self._last_line = line + spread + (f", one of {of}" if of > 1 else "")

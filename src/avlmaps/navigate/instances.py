@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core.errors import GoalNotFoundError
-from avlmaps.core.wording import option
+from avlmaps.core.wording import option, place_text
 from avlmaps.navigate.footprint import Outline
 from avlmaps.query.factors import Factor, NearThings
 from avlmaps.query.goals import Goal
@@ -130,11 +130,11 @@ def explain_absence(heat: Heatmap, guess: bool = False) -> str:
     best = next(iter(heat.goals(1)), None)
     if best is None:
         return f"{what} {why}; say it in other words."
-    place = ", ".join(f"{value:.2f}" for value in best.position)
     advice = "say it in other words"
     if not guess:
         advice += f", or let the robot go to the best guess ({option('guess')})"
-    return f"{what} {why}. The best guess is at ({place}) m with probability {best.probability:.2f}; {advice}."
+    place = place_text(best.position)
+    return f"{what} {why}. The best guess is at {place} with probability {best.probability:.2f}; {advice}."
 
 
 def _absence(factor: Factor) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Float
 from avlmaps.core.errors import MapError, QueryError
+from avlmaps.core.wording import place_text
 from avlmaps.maps.store.edits import LONGEST_NAME, Does, Edit, Spot, World, append_edit, in_force, read_edits
 from avlmaps.query.edit_spots import SeenMap, vector
 from avlmaps.query.edits import Edited, apply, means
@@ -131,7 +132,7 @@ class Editor:
         after = sum(bool(np.isin(one.rows, found.rows).any()) for one in self._after(edit).claims)
         if after <= max(before, 1):
             how = "the cut does not meet it" if cut else "it is one connected piece; cut it by a plane or a box"
-            raise QueryError(f"The {found.name} at {_said(found.position)} stays whole: {how}.")
+            raise QueryError(f"The {found.name} at {place_text(found.position)} stays whole: {how}.")
         return self._append(edit)
 
     def forbid(self, name: str, *, box: Sequence[float] = (), room: str | None = None, by: str = "") -> Edit:
@@ -212,13 +213,14 @@ class Editor:
             things.sort(key=lambda one: (round(self._away_m(one, place), 2), -one.confidence))
             if not things:
                 raise QueryError(
-                    f"The map shows no {what} within {_NEAR_M:g} m of {_said(place)}; list them with `avlmaps things`."
+                    f"The map shows no {what} within {_NEAR_M:g} m of {place_text(place)}; list them with "
+                    "`avlmaps things`."
                 )
             return things[0]
         if not things:
             raise QueryError(f"The map shows no {what}; list what it shows with `avlmaps things`.")
         if len(things) > 1:
-            places = ", ".join(_said(one.position) for one in things[:_MOST_NAMED])
+            places = ", ".join(place_text(one.position) for one in things[:_MOST_NAMED])
             raise QueryError(f"There are {len(things)} things called {what}: say which by its place, one of {places}.")
         return things[0]
 
@@ -341,7 +343,7 @@ def edit_text(edit: Edit) -> str:
         case "forbid":
             what = f"No robot enters {edit.name}"
         case _:
-            what = f"{edit.name} is at {_said(edit.at[0].middle)}"
+            what = f"{edit.name} is at {place_text(edit.at[0].middle)}"
     return f"{what} from now on ({said(edit)}, edit {edit.id})."
 
 
@@ -360,7 +362,3 @@ def _corners(box: Sequence[float]) -> list[Float[np.ndarray, "2"]]:
     if min(x1 - x0, y1 - y0) < 0.01:
         raise QueryError(f"The box {tuple(box)} has no area; give two opposite corners, x0,y0,x1,y1.")
     return [np.array(corner, np.float64) for corner in ((x0, y0), (x1, y0), (x1, y1), (x0, y1))]
-
-
-def _said(point: Sequence[float] | Float[np.ndarray, " n"]) -> str:
-    return "(" + ", ".join(f"{value:.2f}" for value in point) + ") m"

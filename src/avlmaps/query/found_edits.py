@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from avlmaps.core.arrays import Float, Int
+from avlmaps.core.wording import place_text
 from avlmaps.maps.store.edits import Edit, Spot, World
 from avlmaps.query.components import linked
 from avlmaps.query.edit_spots import ALIKE_BOX, SeenMap, Spots
@@ -92,7 +93,7 @@ class FoundEdits:
             found = [self._targets(spot.now(self._map.stored.keyframes), claims) for spot in edit.at]
             if not all(found):
                 at = edit.at[[bool(one) for one in found].index(False)]
-                self._lose(edit, f"nothing like the {at.name or 'thing'} is at {_place(at.middle)} any more")
+                self._lose(edit, f"nothing like the {at.name or 'thing'} is at {place_text(at.middle)} any more")
                 continue
             targets = list({one.rows[0]: one for each in found for one in each}.values())
             claims = [one for one in claims if all(one is not other for other in targets)]
@@ -167,7 +168,7 @@ class FoundEdits:
             spot = edit.at[0].now(self._map.stored.keyframes)
             number = -1 if regions is None else int(regions.at(np.array([spot.middle]))[0])
             if regions is None or number < 0 or regions.share_of(number, np.array(spot.corners)) < _SAME_ROOM:
-                self._lose(edit, f"no room like the {spot.name} is at {_place(spot.middle)} any more")
+                self._lose(edit, f"no room like the {spot.name} is at {place_text(spot.middle)} any more")
             else:
                 found[number] = edit
         return found
@@ -231,7 +232,3 @@ def _without_specks(which: Int[np.ndarray, " m"], level: Float[np.ndarray, "m 3"
 def share_in(rows: Int[np.ndarray, " m"], others: Int[np.ndarray, " k"]) -> float:
     """Return which share of some voxels are among others."""
     return float(np.isin(rows, others).mean()) if len(rows) else 0.0
-
-
-def _place(point: Sequence[float]) -> str:
-    return "(" + ", ".join(f"{value:.2f}" for value in point) + ") m"

@@ -12,6 +12,7 @@ import numpy as np
 from avlmaps.core.arrays import Float
 from avlmaps.core.frames import FrameName
 from avlmaps.core.poses import apply
+from avlmaps.core.wording import coordinates
 
 
 def answer_in(answer: Mapping[str, Any], frame: FrameName, level_from_recording: Float[np.ndarray, "4 4"]) -> Any:
@@ -63,4 +64,4 @@ def _spoken(answer: dict[str, Any], spoken: Mapping[str, str]) -> dict[str, Any]
 
 
 def _words(position: Any) -> str:
-    return "(" + ", ".join(f"{value:.2f}" for value in position) + ")"
+    return f"({coordinates(position)})"

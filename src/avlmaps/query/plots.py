@@ -15,6 +15,7 @@ from avlmaps.core.frames import FrameName
 from avlmaps.core.poses import FRAME
 from avlmaps.core.printable import plot_text
 from avlmaps.core.question import Modality
+from avlmaps.core.wording import place_text
 from avlmaps.query.export import palette
 from avlmaps.query.factors import FOUND_AT, Factor, NearAnchors
 from avlmaps.query.goals import Goal
@@ -250,8 +251,8 @@ def _draw_goals(ax: "Axes", space: Space, goals: Sequence[Goal]) -> None:
     for number, goal in enumerate(goals, 1):
         level = space.level(np.array(goal.position))
         mark(ax, level, str(number), INK)
-        position = ", ".join(f"{value:.2f}" for value in (level if named else goal.position))
-        ax.plot([], [], " ", label=f"{number}: ({position}) m{named}, probability {goal.probability:.2f}")
+        position = place_text(level if named else goal.position)
+        ax.plot([], [], " ", label=f"{number}: {position}{named}, probability {goal.probability:.2f}")
 
 
 def mark(ax: "Axes", point_level: Float[np.ndarray, "3"], text: str, colour: str) -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from avlmaps.core.errors import QueryError
+from avlmaps.core.wording import place_text
 from avlmaps.query.changes import Days, RoomOf, when
 
 if TYPE_CHECKING:
@@ -114,8 +115,8 @@ def usual_place_text(days: Days, name: str, found: Sequence[Usual], room_of: Roo
         return f"No {name} was seen on any day."
 
     def at(one: Usual) -> str:
-        room, place = room_of(one.stay.position), ", ".join(f"{value:.2f}" for value in one.stay.position)
-        return (f"in the {room}, " if room else "") + f"at ({place}) m"
+        room = room_of(one.stay.position)
+        return (f"in the {room}, " if room else "") + f"at {place_text(one.stay.position)}"
 
     best = found[0]
     if best.is_usual:

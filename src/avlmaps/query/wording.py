@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from avlmaps.core.inflection import singulars_of
 from avlmaps.core.lexicon import Kind, lexicon
 from avlmaps.core.question import Modality, Part, Role
+from avlmaps.core.wording import place_text
 from avlmaps.query.answer import Alternative, PartAnswer
 from avlmaps.query.goals import Goal
 
@@ -86,7 +87,7 @@ def _beside(part: Part) -> str:
 
 def place_of(goal: Goal) -> str:
     """Return the place of a goal in words, metres."""
-    return "(" + ", ".join(f"{value:.2f}" for value in goal.position) + ") m"
+    return place_text(goal.position)
 
 
 def _likely(goal: Goal) -> str:

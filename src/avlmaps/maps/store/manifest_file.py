@@ -16,6 +16,7 @@ import numpy as np
 from avlmaps.core.errors import MapError
 from avlmaps.core.files import MANIFEST_BYTES, decode_json, read_regular, write_bytes_atomically
 from avlmaps.core.registry import Kind
+from avlmaps.core.wording import coordinates
 from avlmaps.maps.grid import index_ends
 from avlmaps.maps.store.array_files import explain_write_errors
 from avlmaps.maps.store.manifest import SCHEMA_VERSION, MapInfo
@@ -231,4 +232,4 @@ def _rigid_fault(poses: np.ndarray) -> str:
 
 
 def _place(point: np.ndarray) -> str:
-    return "(" + ", ".join(f"{value:.2f}" for value in point.tolist()) + ")"
+    return f"({coordinates(point)})"
