@@ -269,7 +269,7 @@ def test_sound_is_heard_from_when_its_rate_is_known_and_what_came_before_is_coun
     for _ in range(2):  # a latched one may come again
         sound.inform(audio_info())
     assert told[2:] == [
-        "note: The sound on /audio is heard from now on: 16000 samples a second, 1 channel(s); 31 messages before "
+        "note: The sound on /audio is used from now on: 16000 samples a second, 1 channel(s); 31 messages before "
         "could not be used."
     ]
     heard, begin_s = sound.take(audio_data(), START_S, 13.1) or (None, 0.0)
@@ -350,7 +350,7 @@ def test_a_live_map_hears_when_its_coding_is_known_after_its_sound(tmp_path: Pat
         patch.setattr(live, "add_audio", lambda chunk, stamp_s: heard.append(stamp_s))
         follow_ros2(live, RosTopics(), 1.0, told.append, join=lambda _: Played(messages(12, sound=True)))
     np.testing.assert_allclose(heard, START_S + 0.1 * np.arange(6, 12))
-    assert any("heard from now on" in said for said in told)
+    assert any("used from now on" in said for said in told)
     assert "note: 6 messages of sound could not be used and are left out." in told
 
 

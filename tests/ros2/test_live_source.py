@@ -98,7 +98,7 @@ def test_the_live_map_of_a_robot_is_that_of_its_recording_and_answers(
 def test_sound_whose_coding_is_published_in_the_drive_is_heard_from_then_on(walk: Path, tmp_path: Path) -> None:
     code, said, noted = mapped(tmp_path / "live.avlmap", walk, "--coded-at", "6")
     assert code == 0, noted
-    assert "The sound on /audio is heard from now on" in noted
+    assert "The sound on /audio is used from now on" in noted
     assert "messages of sound could not be used and are left out" in noted
     assert json.loads(said)["live"]["sounds"] >= 1
 

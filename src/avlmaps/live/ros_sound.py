@@ -15,7 +15,7 @@ from avlmaps.recordings.formats.ros_messages import stamp_of
 DRIFT_S = 0.1
 """Sound without stamps is given a place again where it is off by more than this, seconds."""
 INFO_WITHIN_S = 2.0
-"""An AudioInfo that has not come so long after its sound is said to be missing; it may come later still."""
+"""An AudioInfo that has not come within this time of its sound is said to be missing; it may come later still."""
 
 
 class RosSound:
@@ -33,7 +33,7 @@ class RosSound:
 
         Args:
             topic: name, for sentences.
-            tell: called with a sentence for each thing that keeps sound from being heard, and when it is heard again.
+            tell: called with a sentence for each thing that makes sound useless, and when it is of use again.
             pcm: of plain samples; None waits for an AudioInfo.
         """
         self.unheard = 0
@@ -60,7 +60,7 @@ class RosSound:
             self._pcm, self._rest = pcm, b""
             before = f"; {self.unheard} messages before could not be used" if self.unheard else ""
             self._tell(
-                f"note: The sound on {self._topic} is heard from now on: {pcm.rate_hz} samples a second, "
+                f"note: The sound on {self._topic} is used from now on: {pcm.rate_hz} samples a second, "
                 f"{pcm.channels} channel(s){before}."
             )
 

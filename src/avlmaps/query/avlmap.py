@@ -326,7 +326,7 @@ class AVLMap:
     def things_to_edit(self, name: str | None) -> "Sequence[Thing]":
         """Return the things that an edit may be about, as the encoder sees them: of a name, or of its vocabulary.
 
-        A map without pixel features has none. They are looked for once, for all edits and whatever is edited later.
+        A map without pixel features has none. They are looked for once, for the edits of now and of later.
         """
         if name not in self._to_edit:
             is_seen = "pixels" in self.stored.info.models and (name is None or self.sees(name))
