@@ -21,7 +21,8 @@ from avlmaps.core.camera import Rig
 from avlmaps.core.poses import inverse
 from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
-from avlmaps.maps.fusion.free_space import FreeViewCollector, FreeViews, clean
+from avlmaps.maps.fusion.free_space import FreeViewCollector, FreeViews, clean, count_where_it_matters
+from avlmaps.maps.fusion.moved_submaps import MovedSubmaps
 from avlmaps.maps.fusion.sensor import PERFECT
 from avlmaps.maps.fusion.submaps import concat_submaps, submap_of
 from avlmaps.maps.grid import GridSpec
@@ -75,6 +76,16 @@ def surface(total: VoxelAccumulator, clear_mm: np.ndarray, poses: np.ndarray, ri
     return evidence.index[kept]
 
 
+def followed(submaps: Submaps, poses: np.ndarray, rig: Rig) -> np.ndarray:
+    """Return the same of submaps, as a finished map that follows does it."""
+    total, views = MovedSubmaps(submaps, poses, GRID), FreeViews(submaps.clear_mm, poses)
+    evidence, camera = total.evidence(), rig.depth
+    kept, _ = clean(
+        evidence, [views], camera, GRID, PERFECT, lambda _: count_where_it_matters(evidence, GRID, camera, views)
+    )
+    return total.voxels(kept=kept).index
+
+
 def compared(found: np.ndarray, wanted: np.ndarray) -> tuple[float, float, float]:
     """Return the share of wanted voxels that are there, that are within a voxel, and of those found that are double."""
     there = {tuple(one) for one in found.tolist()}
@@ -106,8 +117,7 @@ def main() -> None:
                 submaps = fused(frames, off, features, step)
                 before = surface(VoxelAccumulator.of_submaps(submaps, off, GRID), submaps.clear_mm, off, frames[0].rig)
                 begin_s = process_time()
-                total = VoxelAccumulator.of_submaps(submaps, corrected, GRID)
-                found = surface(total, submaps.clear_mm, corrected, frames[0].rig)
+                found = followed(submaps, corrected, frames[0].rig)
                 took_s, area = process_time() - begin_s, len(wanted) * GRID.voxel_size_m**2
                 share, near, after = compared(found, wanted)
                 size = sum(np.asarray(getattr(submaps, field)).nbytes for field in Submaps.__dataclass_fields__)

@@ -17,7 +17,14 @@ from avlmaps.core.poses import apply
 from avlmaps.maps.build import build_map
 from avlmaps.maps.corrected import correct_stored
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
+from avlmaps.maps.fusion.free_space import (
+    FreeViewCollector,
+    count_through,
+    count_where_it_matters,
+    seen_through,
+)
 from avlmaps.maps.fusion.moved_submaps import MovedSubmaps
+from avlmaps.maps.fusion.sensor import PERFECT
 from avlmaps.maps.fusion.submaps import concat_submaps, in_steps, submap_of
 from avlmaps.maps.fusion.voxel_sums import VoxelSums
 from avlmaps.maps.grid import GridSpec
@@ -245,6 +252,39 @@ def test_features_in_steps_are_off_by_half_a_step_at_most(seed: int, dim: int) -
     wanted = np.where(weight[:, None] > 0.0, feature, 0.0)
     half = 0.5 * np.abs(wanted).max(axis=1, initial=0.0)[:, None] / 127.0
     assert (np.abs(steps * scale[:, None] - wanted) <= 1.001 * half + 1e-30).all()
+
+
+def test_looks_that_weigh_next_to_nothing_are_not_missed() -> None:
+    walk = Walk(8)
+    _, submap = one_submap(walk)
+    other = np.random.default_rng(0).integers(-127, 128, submap.feature.shape).astype(np.int8)
+    for weighs in (1.0, 1e-2, 1e-3, 1e-9):
+        faint = replace(submap, feature=other, weight=submap.weight * np.float32(weighs))
+        both = concat_submaps([submap, faint])
+        found = MovedSubmaps(both, np.concatenate([walk.world_from_camera] * 2), GridSpec(0.05)).table().sums()
+        one, two = (part.feature * (part.feature_scale * part.weight)[:, None] for part in (submap, faint))
+        np.testing.assert_array_equal(found.index, submap.index)
+        np.testing.assert_allclose(found.weight, submap.weight * (1.0 + weighs), rtol=1e-5)
+        step = 2.0 / 254.0 * np.abs(one + two).max(axis=1)
+        assert (np.abs(found.feature_sum - one - two).max(axis=1) <= step + 1e-6).all()
+
+
+@pytest.mark.parametrize("turn_deg", [0.0, 2.0])
+def test_a_quick_count_finds_the_same_surface(turn_deg: float) -> None:
+    walk = Walk(48)
+    free, total = FreeViewCollector(walk.rig.depth, PERFECT), VoxelAccumulator(GridSpec(0.05), 0)
+    poses = walk.world_from_camera @ np.stack([motion(turn_deg * (n % 2)) for n in range(len(walk))])
+    for frame, pose in zip(walk.frames(), poses, strict=True):
+        free.add(replace(frame, world_from_camera=pose))
+        total.add(frame)
+    evidence, views, grid = total.evidence(), free.views(), GridSpec(0.05)
+    quick = count_where_it_matters(evidence, grid, walk.rig.depth, views)
+    every = count_through(evidence.index, grid, walk.rig.depth, [views])
+    assert (quick[evidence.views <= 8] == every[evidence.views <= 8]).all()
+    assert ((quick == every) | (quick == 0)).all()
+    gone = seen_through(every, evidence.views)
+    assert gone.any()
+    assert np.sum(gone != seen_through(quick, evidence.views)) <= 0.01 * gone.sum()
 
 
 def test_submaps_of_halves_are_read_as_steps(tmp_path: Path) -> None:

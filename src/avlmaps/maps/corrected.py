@@ -16,7 +16,7 @@ from avlmaps.core.timeline import Trajectory
 from avlmaps.core.wording import option
 from avlmaps.maps.audio.events import track_of
 from avlmaps.maps.audio.segmentation import Segment
-from avlmaps.maps.fusion.free_space import FreeViews, clean
+from avlmaps.maps.fusion.free_space import FreeViews, clean, count_where_it_matters
 from avlmaps.maps.fusion.moved_submaps import MovedSubmaps
 from avlmaps.maps.fusion.sensor import NONE
 from avlmaps.maps.growing_walk import Motion
@@ -145,7 +145,11 @@ def _moved(stored: StoredMap, submaps: Submaps, now: Float[np.ndarray, "f 4 4"])
     sensor = NONE if stored.info.sensor is None else stored.info.sensor.model
     clear_mm = np.asarray(submaps.clear_mm)
     views = FreeViews(clear_mm, now[: len(clear_mm)])
-    kept, removed = clean(total.evidence(), [views], stored.rig.depth, stored.grid, sensor)
+    evidence, camera = total.evidence(), stored.rig.depth
+    kept, removed = clean(
+        evidence, [views], camera, stored.grid, sensor,
+        lambda _: count_where_it_matters(evidence, stored.grid, camera, views),
+    )  # fmt: skip
     if not kept.any():
         raise MapError("With the corrected poses every voxel is seen through or a speck; check the poses.")
     keyframes = moved_keyframes(stored.keyframes, np.asarray(submaps.stamp_s), now)

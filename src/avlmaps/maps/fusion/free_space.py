@@ -26,6 +26,7 @@ from avlmaps.recordings.types import Frame
 
 BLOCKS_WIDE = 80
 _BATCH_FRAMES = 64
+_SPARSE = 4  # frames
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,6 +174,28 @@ def count_through(
         count_frames(chunks, grid.voxel_size_m, clear, block_size(camera), intrinsics, pose, through)
     counts = np.empty_like(through)
     counts[chunks[0]] = through
+    return counts
+
+
+def count_where_it_matters(
+    evidence: Evidence, grid: GridSpec, camera: Pinhole, views: FreeViews
+) -> Int32[np.ndarray, " n"]:
+    """Return how many frames see through each voxel as `count_through` does, at a third of its time, or 0.
+
+    A voxel is no surface when half as many frames see through it as hit it. Where more than eight hit it, that is
+    more than four, and one of every fourth is nearly always among them; where none is, the others are not tried.
+
+    Args:
+        evidence: of the voxels.
+        grid: their size.
+        camera: of the frames.
+        views: of the frames, in the order in which they were taken.
+    """
+    first = np.arange(len(views)) % _SPARSE == 0
+    some, others = (FreeViews(views.clear_mm[part], views.clear_pose[part]) for part in (first, ~first))
+    counts = count_through(evidence.index, grid, camera, [some])
+    open_ = np.flatnonzero((counts > 0) | (evidence.views <= 2 * _SPARSE))
+    counts[open_] += count_through(evidence.index[open_], grid, camera, [others])
     return counts
 
 

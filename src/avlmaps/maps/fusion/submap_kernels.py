@@ -20,6 +20,7 @@ STEPS = 4  # samples along each axis, at most
 MOST_SAMPLES = STEPS**3
 EVEN = 12.0**0.5  # an even spread over a length has a standard deviation of the length over this
 WITHIN = 0.4999  # voxels: samples go no farther from the middle
+HIDDEN = np.float32(1.0 / 254.0)  # of a voxel's weight: as much as a feature in 254 steps is rounded by
 LEAST_HITS = 0.5  # a voxel gets less than this part of a hit from one that moves: it has none
 
 
@@ -334,6 +335,9 @@ def sum_features(
 ):
     """Write the sums of the features that some rows of a map have pairs of, times their weights.
 
+    A look that weighs less than half a step of the whole (from afar, where others were near) is not read: rounding
+    hides it. The others weigh as much more.
+
     Args:
         rows: of the map.
         start: where the pairs of each row begin in ``order``.
@@ -345,11 +349,21 @@ def sum_features(
         out: filled in.
     """
     for n in range(rows.shape[0]):
+        first, last = start[rows[n]], start[rows[n] + 1]
+        whole = read = np.float32(0.0)
+        for at in range(first, last):
+            whole += weight[order[at]]
+        least = whole * HIDDEN
+        for at in range(first, last):
+            read += weight[order[at]] if weight[order[at]] >= least else np.float32(0.0)
+        more = whole / read if read > 0.0 else np.float32(0.0)
         for column in range(out.shape[1]):
             out[n, column] = 0.0
-        for at in range(start[rows[n]], start[rows[n] + 1]):
+        for at in range(first, last):
             pair = order[at]
             source = row[pair]
-            factor = weight[pair] * scale[source]
+            if weight[pair] < least:
+                continue
+            factor = more * weight[pair] * scale[source]
             for column in range(out.shape[1]):
                 out[n, column] += factor * np.float32(feature[source, column])
