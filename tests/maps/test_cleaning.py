@@ -7,9 +7,12 @@ from hypothesis import strategies as st
 
 from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.progress import silence
+from avlmaps.maps.fusion import free_space
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
 from avlmaps.maps.fusion.free_space import (
     FreeViewCollector,
+    FreeViews,
     block_size,
     clean,
     concat_views,
@@ -102,6 +105,14 @@ def test_a_voxel_that_is_seen_through_has_no_pixel_in_it_or_before_it(seed):
     total = VoxelAccumulator(GRID, 0)
     total.add(frame)
     assert not count_through(total.evidence().index, GRID, CAMERA, [views_of([frame])]).any()
+
+
+def test_the_bar_of_cleaning_counts_frames(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(free_space, "_BATCH_FRAMES", 2)
+    views = FreeViews(np.zeros((5, 1, 1), np.uint16), np.tile(np.eye(4), (5, 1, 1)))
+    silence(False)
+    count_through(np.zeros((1, 3), np.int32), GRID, CAMERA, [views, views])
+    assert " 10/10 " in capsys.readouterr().err
 
 
 @settings(max_examples=10, deadline=None)

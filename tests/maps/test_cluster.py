@@ -178,6 +178,35 @@ def test_a_worker_with_other_software_is_refused_by_what_differs(tmp_path: Path)
     assert f"runs numpy {software()['numpy']} and this machine 1.0" in said
 
 
+def test_torch_is_compared_where_it_is_and_not_missed_where_it_is_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    versions = {name: "1.0" for name in software()} | {"torch": "2.9.1"}
+
+    def version(name: str) -> str:
+        if name not in versions:
+            raise cluster_jobs.metadata.PackageNotFoundError(name)
+        return versions[name]
+
+    monkeypatch.setattr(cluster_jobs.metadata, "version", version)
+    with_torch = software.__wrapped__()
+    assert with_torch["torch"] == "2.9.1"
+    del versions["torch"]
+    assert "torch" not in software.__wrapped__()
+    with pytest.raises(MapError, match=r"runs torch none and this machine 2\.9\.1; install the same"):
+        cluster_jobs.require_same_software(with_torch | software(), "here")
+
+
+def test_a_worker_checks_what_it_sees_once_for_a_build(
+    tmp_path: Path, alone: dict[str, bytes], audio: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    checked: list[str] = []
+    reopened = cluster_jobs.reopened
+    monkeypatch.setattr(cluster_jobs, "reopened", lambda *given: checked.append("") or reopened(*given))
+    assert build(tmp_path / "map", Here(), audio) == alone
+    assert len(checked) == 1, "fusing, describing and adding up are one build"
+    build(tmp_path / "other", Here(), audio)
+    assert len(checked) == 2
+
+
 def test_a_worker_with_other_weights_is_refused_by_their_checksum(tmp_path: Path) -> None:
     change = partial(replace, checksums={"pixels": "0123456789abcdef"})
     said = refused(tmp_path / "a", lambda r: change(r), BackendError)

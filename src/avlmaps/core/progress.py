@@ -3,7 +3,7 @@
 import os
 import sys
 import threading
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator, Sized
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
@@ -59,6 +59,7 @@ def progress(
     done: int = 0,
     unit: str = "frame",
     note: Callable[[], str] | None = None,
+    size: Callable[[T], int] = lambda item: 1,
 ) -> Iterator[T]:
     """Yield the items and show how far and how fast it goes.
 
@@ -67,7 +68,8 @@ def progress(
         label: a verb such as ``fusing``.
         total: how many there will be in all, where ``len`` does not say.
         done: how many were done before (a resumed run).
-        unit: what one item is.
+        unit: what is counted.
+        size: how many of them an item is, of which ``total`` is the sum.
         note: called at each item; returns a few words to put behind the bar.
     """
     from tqdm import tqdm
@@ -75,9 +77,8 @@ def progress(
     _keep_lock_to_this_process(tqdm)
     on_terminal = sys.stderr.isatty()
     bar = tqdm(
-        items,
         desc=printable(label),
-        total=total,
+        total=len(items) if total is None and isinstance(items, Sized) else total,
         initial=done,
         unit=f" {unit}s",
         file=sys.stderr,
@@ -88,10 +89,11 @@ def progress(
     )
     _open_bars.append(bar)
     try:
-        for item in bar:
+        for item in items:
             if note is not None:
                 bar.set_postfix_str(printable(note()), refresh=False)
             yield item
+            bar.update(size(item))
     finally:
         bar.close()
         _open_bars.remove(bar)

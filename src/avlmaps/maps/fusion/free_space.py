@@ -169,7 +169,8 @@ def count_through(
     batches = [
         (part, slice(first, first + _BATCH_FRAMES)) for part in parts for first in range(0, len(part), _BATCH_FRAMES)
     ]
-    for part, some in progress(batches, "carving", total=len(batches)):
+    frames = sum(map(len, parts))
+    for part, some in progress(batches, "carving", total=frames, size=lambda one: len(one[0].clear_pose[one[1]])):
         clear, pose = np.array(part.clear_mm[some]), np.array(part.clear_pose[some], np.float64)
         count_frames(chunks, grid.voxel_size_m, clear, block_size(camera), intrinsics, pose, through)
     counts = np.empty_like(through)

@@ -2,7 +2,7 @@
 
 import dataclasses
 import secrets
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from contextlib import closing
 from itertools import pairwise
 from pathlib import Path
@@ -10,7 +10,6 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
-from avlmaps.core.arrays import Int64
 from avlmaps.core.progress import progress
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator, VoxelSums
 from avlmaps.maps.fusion.sensor import SensorModel
@@ -38,8 +37,6 @@ from avlmaps.maps.store.array_files import explain_write_errors
 from avlmaps.maps.store.checkpoints import find_checkpoint, key_of, load_checkpoint
 from avlmaps.maps.store.manifest import BadFrame
 from avlmaps.perception.cache.feature_store import DEFAULT_CACHE, CacheSettings
-from avlmaps.recordings.subset import Subset
-from avlmaps.recordings.types import Recording
 
 J = TypeVar("J")
 A = TypeVar("A")
@@ -75,6 +72,7 @@ class Spread:
             slab_bytes: how much of the sums a worker adds up in one job.
         """
         self._pool, self._reopen, self._cache, self._slab_bytes = pool, reopen, cache, slab_bytes
+        self._tokens: dict[str, str] = {}  # by the plan's key: a worker checks what it sees once for a token
 
     def fuse(
         self,
@@ -95,38 +93,29 @@ class Spread:
             return
         request, tolerance = self._request(plan), Tolerance(plan.recording, plan.settings, known_bad)
         orders = [FuseJob(request, span, folder, sensor) for span, folder in jobs]
-
-        def frames() -> Iterator[None]:
-            with closing(self._pool.run(fuse_job, orders)) as results:
-                for number, result in results:
-                    result.require()
-                    order = orders[number]
-                    for bad in load_part(order.folder, plan.fusion_key, verify=False).info.bad_frames:
-                        tolerance.meet(bad)
-                    yield from (None for _ in range(*order.span))
-
-        total = done + sum(len(range(*span)) for span, _ in jobs)
-        for _ in progress(frames(), "fusing", total=total, done=done):
-            pass
+        counts = [len(range(*span)) for span, _ in jobs]
+        with closing(self._pool.run(fuse_job, orders)) as results:
+            total = done + sum(counts)
+            for number, result in progress(results, "fusing", total=total, done=done, size=lambda one: counts[one[0]]):
+                result.require()
+                for bad in load_part(orders[number].folder, plan.fusion_key, verify=False).info.bad_frames:
+                    tolerance.meet(bad)
 
     def describe(self, plan: BuildPlan, work: KeyframeLots) -> None:
         """Let each lot of keyframes be described by a worker; raises as ``fuse``."""
         if not work.lots:
             return
-        request, numbers = self._request(plan), _numbers(work.frames)
+        request, counts = self._request(plan), [len(lot) for lot in work.lots.values()]
         orders = [
-            DescribeJob(request, numbers[lot], folder, work.places, work.key) for folder, lot in work.lots.items()
+            DescribeJob(request, work.frames.indices[lot], folder, work.places, work.key)
+            for folder, lot in work.lots.items()
         ]
-
-        def keyframes() -> Iterator[None]:
-            with closing(self._pool.run(describe_job, orders)) as results:
-                for number, result in results:
-                    result.require()
-                    yield from (None for _ in orders[number].frames)
-
-        known = work.total - sum(map(len, work.lots.values()))
-        for _ in progress(keyframes(), "seeing", total=work.total, done=known, unit="keyframe"):
-            pass
+        known = work.total - sum(counts)
+        with closing(self._pool.run(describe_job, orders)) as results:
+            for _, result in progress(
+                results, "seeing", total=work.total, done=known, unit="keyframe", size=lambda one: counts[one[0]]
+            ):
+                result.require()
 
     def add_up(self, plan: BuildPlan, parts: Sequence[MapPart]) -> VoxelAccumulator:
         """Let workers add the parts up, each a slab of the building, and put the slabs together.
@@ -135,7 +124,7 @@ class Spread:
         a voxel are therefore added in the order of their frames, on each worker, and what is cut is the building.
         """
         grid, sums = GridSpec(plan.settings.voxel_size_m), [part.sums() for part in parts]
-        size = sum(len(one) * _row_bytes(one) for one in sums)
+        size = sum(getattr(one, field.name).nbytes for one in sums for field in dataclasses.fields(one))
         slabs = min(self._pool.cores, size // self._slab_bytes)
         if slabs < 2:
             return sum_parts(parts, grid)
@@ -156,7 +145,7 @@ class Spread:
     def _request(self, plan: BuildPlan) -> Request:
         models, recording = Models.of(plan.encoders, self._cache), plan.recording
         # A path that is relative means another place on another machine.
-        path, token = plan.path.absolute(), secrets.token_hex(8)
+        path, token = plan.path.absolute(), self._tokens.setdefault(plan.key, secrets.token_hex(8))
         file = token_file(path, plan.key, token)
         with explain_write_errors(file.parent):
             file.parent.mkdir(parents=True, exist_ok=True)
@@ -173,18 +162,6 @@ class Spread:
             software=software(),
             token=token,
         )
-
-
-def _numbers(frames: Recording) -> Int64[np.ndarray, " n"]:
-    """Return the numbers that the frames of a recording's subset have in the recording."""
-    return frames.indices if isinstance(frames, Subset) else np.arange(len(frames))
-
-
-def _row_bytes(sums: VoxelSums) -> int:
-    return sum(
-        array.itemsize * (array.shape[1] if array.ndim == 2 else 1)
-        for array in (getattr(sums, field.name) for field in dataclasses.fields(sums))
-    )
 
 
 def _slabs(parts: Sequence[VoxelSums], count: int) -> list[tuple[int, int]]:

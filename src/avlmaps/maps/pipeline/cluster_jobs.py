@@ -14,7 +14,7 @@ import socket
 import sys
 from bisect import bisect_left
 from collections.abc import Callable, Generator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib import metadata
@@ -50,7 +50,16 @@ from avlmaps.recordings.types import Ground, Recording
 
 Reopen = Callable[[], Recording]
 """Opens the recording on a machine: ``functools.partial(open_recording, "/shared/REC")``."""
-_COMPUTING = ("numpy", "numba", "onnxruntime", "opencv-python-headless", "scipy")
+_COMPUTING = (
+    "numpy",
+    "numba",
+    "onnxruntime",
+    "opencv-python-headless",
+    "scipy",
+    "torch",
+    "torchvision",
+    "transformers",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +118,7 @@ class Request:
         fingerprint: of the recording.
         checksums: of each module's weights.
         software: see ``software``.
-        token: name of a file in the map's folder, new in each request.
+        token: name of a file in the map's folder, new in each build.
     """
 
     reopen: Reopen
@@ -233,7 +242,10 @@ def software() -> dict[str, str]:
         code.update(path.relative_to(package).as_posix().encode() + b"\0" + path.read_bytes())
     found = {"Python": f"{sys.version_info[0]}.{sys.version_info[1]}"}
     found["avlmaps"] = f"{__version__} ({code.hexdigest()[:12]})"
-    return found | {name: metadata.version(name) for name in _COMPUTING}
+    for name in _COMPUTING:
+        with suppress(metadata.PackageNotFoundError):  # without models on torch nothing of it is there
+            found[name] = metadata.version(name)
+    return found
 
 
 def done_by(work: Callable[[str], None]) -> Done:
@@ -277,14 +289,22 @@ _known: list[tuple[str, BuildPlan]] = []  # the last plan that this worker made,
 
 
 def _plan(request: Request, host: str) -> BuildPlan:
+    """Return the plan of the build, with the ground that was found meanwhile; what a worker sees is checked once."""
+    if not _known or _known[0][0] != request.token:
+        _known[:] = [(request.token, _checked_plan(request, host))]
+    plan = _known[0][1]
+    return (
+        plan if request.ground is None else replace(plan, recording=GroundedRecording(plan.recording, request.ground))
+    )
+
+
+def _checked_plan(request: Request, host: str) -> BuildPlan:
     """Return the plan of the build, made from what this worker sees.
 
     Raises:
         MapError: it sees another map or recording, or computes by other software.
         BackendError: it lacks a model, or has other weights.
     """
-    if _known and _known[0][0] == request.token:
-        return _known[0][1]
     require_same_software(request.software, host)
     require_seen(token_file(request.path, request.key, request.token), host)
     recording = reopened(request.reopen, host)
@@ -307,9 +327,6 @@ def _plan(request: Request, host: str) -> BuildPlan:
             f"The worker on {host} would build another map, for a reason that it cannot name; check that its sound "
             "track and its settings are those of this machine."
         )
-    if request.ground is not None:
-        plan = replace(plan, recording=GroundedRecording(recording, request.ground))
-    _known[:] = [(request.token, plan)]
     return plan
 
 

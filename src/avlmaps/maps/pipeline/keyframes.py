@@ -63,7 +63,7 @@ class KeyframeLots:
         key: of the stage.
     """
 
-    frames: Recording
+    frames: Subset
     lots: dict[Path, Int[np.ndarray, " k"]]
     total: int
     places: Path
