@@ -17,6 +17,7 @@ from avlmaps.maps.pipeline.check import judge
 from avlmaps.maps.pipeline.write import carving_doubts
 from avlmaps.maps.store.manifest import Removed
 from avlmaps.query.contents import Contents
+from avlmaps.recordings import channels
 from avlmaps.recordings.channels import ChannelSound, write_channels
 from avlmaps.recordings.consistency.verdict import Grade, Reason
 from avlmaps.recordings.layout import DESCRIPTION
@@ -81,11 +82,16 @@ def test_exchanged_channels_are_a_finding_with_the_order_that_fits(right: Draft,
     assert "positions_m" in found[0].remedy
 
 
-def test_a_dead_channel_stays_with_the_map(right: Draft, tmp_path: Path) -> None:
+def test_a_dead_channel_stays_with_the_map_and_the_sound_is_read_for_it_once(
+    right: Draft, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = with_array(right, tmp_path / "dead", dead=1)
+    read, look = [], channels._looked_at
+    monkeypatch.setattr(channels, "_looked_at", lambda track: read.append(track) or look(track))
     stored = build_map(open_recording(path), tmp_path / "map", PROFILE, SETTINGS, progress=False)
     (doubt,) = stored.info.doubts
     assert "Channel 2 of dead/audio.flac" in doubt and "not connected" in doubt
+    assert len(read) == 1
 
 
 def test_much_that_is_seen_through_is_doubtful() -> None:

@@ -63,7 +63,6 @@ def calibrate_array(verb: "Calibrate") -> dict[str, Any]:
     """
     from avlmaps.core.errors import RecordingError
     from avlmaps.core.poses import FRAME
-    from avlmaps.core.timeline import Trajectory
     from avlmaps.core.wording import option
     from avlmaps.maps.sources.calibrate import calibrate
     from avlmaps.recordings.microphones import write_microphones
@@ -78,8 +77,7 @@ def calibrate_array(verb: "Calibrate") -> dict[str, Any]:
     )
     if recording.audio is None:
         raise RecordingError(f"{verb.recording} has no sound track, so that there is no array to calibrate.")
-    walk = recording.trajectory or Trajectory(recording.stamps_s, recording.world_from_camera)
-    found = calibrate(recording.audio, walk, verb.between)
+    found = calibrate(recording.audio, recording.walk, verb.between)
     write_microphones(verb.out, found.microphones)
     array = found.microphones
     late_s = [0.0] * len(array) if array.delay_s is None else array.delay_s.tolist()

@@ -211,7 +211,7 @@ class CorrectedRecording(Recording):
         whole, delay_s = self.whole, self.given.pose_delay_s
         if not delay_s or len(whole) == 0:
             return np.arange(len(whole)), whole.world_from_camera, ()
-        known = whole.trajectory or Trajectory(whole.stamps_s, whole.world_from_camera)
+        known = whole.walk
         stamps_s = whole.stamps_s + delay_s
         there = np.flatnonzero(known.covers(stamps_s))
         if len(there) == 0:

@@ -6,16 +6,13 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, UInt8
 from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.timeline import Trajectory
 from avlmaps.recordings.audio import AudioTrack
-
-if TYPE_CHECKING:
-    from avlmaps.core.timeline import Trajectory
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +133,12 @@ class Recording(ABC):
     notices: tuple[str, ...]
     topics: Mapping[str, str] = MappingProxyType({})
     base_height: "BaseHeight | None" = None
-    trajectory: "Trajectory | None" = None
+    trajectory: Trajectory | None = None
+
+    @property
+    def walk(self) -> Trajectory:
+        """The camera's poses all along: at their own rate where that is known, else those of the frames."""
+        return self.trajectory or Trajectory(self.stamps_s, self.world_from_camera)
 
     @abstractmethod
     def frame(self, index: int) -> Frame:

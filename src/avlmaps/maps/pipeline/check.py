@@ -8,7 +8,6 @@ import numpy as np
 
 from avlmaps.core.errors import AudioError, RecordingError
 from avlmaps.core.progress import say
-from avlmaps.core.timeline import Trajectory
 from avlmaps.core.wording import option
 from avlmaps.maps.audio.segmentation import segment
 from avlmaps.maps.gravity.up import some_frames, up_doubts
@@ -58,7 +57,8 @@ def checked(plan: BuildPlan, allowed: Sequence[str]) -> BuildPlan:
 
 def _doubts(recording: Recording, allowed: Sequence[str]) -> _Doubts:
     try:
-        verdict = judge(recording)
+        useless = _useless(recording)
+        verdict = judge(recording, useless)
     except RecordingError:  # no frame of the sample can be read; how many may be lost is decided later
         return _Doubts((), whole=False)
     refused = verdict.refused(tuple(allowed))
@@ -67,14 +67,16 @@ def _doubts(recording: Recording, allowed: Sequence[str]) -> _Doubts:
             f"{recording.path} cannot be right. {refused} To build it as it is: "
             f"{option('allow', refused.reason.value)}."
         )
-    array = _array_of(recording)
-    useless = useless_channels(array) if array is not None else []
     sentences = (*verdict.sentences(), *useless)
     return _Doubts(tuple(strip_folder(one, recording) for one in sentences), whole=not verdict.unread)
 
 
-def judge(recording: Recording) -> Verdict:
+def judge(recording: Recording, useless: Sequence[str] | None = None) -> Verdict:
     """Check a recording against itself, the up direction that was given against what it shows, and its microphones.
+
+    Args:
+        recording: to check.
+        useless: what ``useless_channels`` says of its sound, where that was read before.
 
     Raises:
         RecordingError: it has no frame that can be read.
@@ -83,7 +85,7 @@ def judge(recording: Recording) -> Verdict:
     if verdict.refused(()) is not None:  # with such poses nothing is level
         return verdict
     tilted = up_doubts(recording, some_frames(recording), np.random.default_rng(0))
-    wired, unsure = _of_microphones(recording)
+    wired, unsure = _of_microphones(recording, useless)
     findings = (*verdict.findings, *tilted, *wired)
     return replace(verdict, findings=findings, unchecked=(*verdict.unchecked, *unsure) if not findings else ())
 
@@ -94,15 +96,19 @@ def _array_of(recording: Recording) -> AudioTrack | None:
     return track if track is not None and track.microphones is not None and len(track.microphones) > 1 else None
 
 
-def _of_microphones(recording: Recording) -> tuple[list[Finding], list[str]]:
+def _useless(recording: Recording) -> list[str]:
+    array = _array_of(recording)
+    return useless_channels(array) if array is not None else []
+
+
+def _of_microphones(recording: Recording, useless: Sequence[str] | None) -> tuple[list[Finding], list[str]]:
     """Return what is wrong with the order of the channels, and what about it does not show."""
     track = _array_of(recording)
     try:
-        if track is None or useless_channels(track):
+        if track is None or (_useless(recording) if useless is None else useless):
             return [], []
-        walk = recording.trajectory or Trajectory(recording.stamps_s, recording.world_from_camera)
         spans_s = [(heard.onset_s, heard.offset_s) for heard in segment(track)]
-        found = check_wiring(track, walk, spans_s)
+        found = check_wiring(track, recording.walk, spans_s)
     except AudioError:  # the track is validated and read elsewhere, with a sentence for that
         return [], []
     if found is None:

@@ -41,10 +41,9 @@ def locate_sources(
         return None, 0.0
     from avlmaps.maps.sources.find import find_sources
 
-    known = walk or recording.trajectory or Trajectory(recording.stamps_s, recording.world_from_camera)
     spans_s = list(zip(heard.onset_s.tolist(), heard.offset_s.tolist(), strict=True))
     voxel_m = grid.centre_of(np.asarray(voxels.index))
-    found = find_sources(track, known, spans_s, voxel_m, up_in_world)
+    found = find_sources(track, walk or recording.walk, spans_s, voxel_m, up_in_world)
     return found, perf_counter() - begin
 
 

@@ -173,18 +173,19 @@ def evidence_of_bearings(
     _, some, cell = np.unique(Plan.of(place).cell, return_index=True, return_inverse=True)
     tables = [_log_density(*numbers) for numbers in _GRID]
     of_sound: list[Float[np.ndarray, "g o"]] = []
-    for one, between, likely in zip(heard, walls, expected, strict=True):
+    elevations = [one.elevations(place) for one in heard]
+    for one, between, likely, high in zip(heard, walls, expected, elevations, strict=True):
         if not len(one):
             of_sound.append(np.zeros((len(_GRID), _BINS)))
             continue
-        share = candidates.prior * np.exp(likely - likely.max() + (high := one.elevations(place)) - high.max())
+        share = candidates.prior * np.exp(likely - likely.max() + high - high.max())
         before = np.log(np.bincount(cell.reshape(-1), share) / share.sum() + 1e-300)
         counts = one.residuals(place[some], between)
         of_sound.append(np.stack([_log_sum(before[:, None] + counts @ table) for table in tables]))
     of_sound = [_bounded(own) for own in of_sound]
     known = np.sum(of_sound, axis=0) if of_sound else np.zeros((len(_GRID), _BINS))
     result: list[Float[np.ndarray, " c"]] = []
-    for one, between, own in zip(heard, walls, of_sound, strict=True):
+    for one, between, own, high in zip(heard, walls, of_sound, elevations, strict=True):
         if not len(one):
             result.append(np.zeros(len(place)))
             continue
@@ -197,7 +198,7 @@ def evidence_of_bearings(
             if len(chosen):
                 value = counts @ table[:, chosen] + np.log(weight[number, chosen])
                 parts = np.concatenate([parts, _log_sum(value.T)[None]])
-        result.append(_log_sum(parts) + one.elevations(place))
+        result.append(_log_sum(parts) + high)
     sounds = sum(len(one) > 0 for one in heard)
     return result, _device(known, sounds) if sounds else None
 

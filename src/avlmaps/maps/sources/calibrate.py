@@ -218,17 +218,19 @@ class _Fit:
         solution = start.copy()
         solution[: len(free)][~free] = 0.0
         measured = self._measure(solution, _WINDOWS_S[0])
-        for number, window_s in enumerate(_WINDOWS_S):
+        # The source alone at first: the array is nearly right, its place is a cell of the grid.
+        solution = self._with_source(solution, measured)
+        for window_s in _WINDOWS_S[1:]:
             measured = self._measure(solution, window_s)
-            # The source alone at first: the array is nearly right, its place is a cell of the grid.
-            chosen = free if number else np.arange(len(free)) >= len(free) - 3
-            solution = self._least_squares(solution, chosen, measured)
+            solution = self._least_squares(solution, free, measured)
         return solution, measured
 
     def only_source(self, solution: Float[np.ndarray, " n"], measured: _Measured) -> Float[np.ndarray, " n"]:
         """Return the unknowns with the array as given, and the place of the source that then fits best."""
-        given = np.concatenate([np.zeros(len(solution) - 3), solution[-3:]])
-        return self._least_squares(given, np.arange(len(given)) >= len(given) - 3, measured)
+        return self._with_source(np.concatenate([np.zeros(len(solution) - 3), solution[-3:]]), measured)
+
+    def _with_source(self, solution: Float[np.ndarray, " n"], measured: _Measured) -> Float[np.ndarray, " n"]:
+        return self._least_squares(solution, np.arange(len(solution)) >= len(solution) - 3, measured)
 
     def _least_squares(
         self, solution: Float[np.ndarray, " n"], chosen: Bool[np.ndarray, " n"], measured: _Measured

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from avlmaps.core.errors import RecordingError
-from avlmaps.core.timeline import Trajectory
 from avlmaps.recordings.consistency.agreement import APART_SAME_M, FEWEST_POINTS, Agreement, compare, without_occluded
 from avlmaps.recordings.consistency.blind_spots import blind_spots
 from avlmaps.recordings.consistency.causes import cause_of
@@ -232,8 +231,7 @@ def _explains(trial: Trial, found: _Found) -> bool:
 
 def pose_at(recording: Recording, sample: Sample) -> PoseAt:
     """Return a function that gives the uncorrected poses of the sample's frames at their stamps plus a delay."""
-    whole = uncorrected(recording)
-    known = whole.trajectory or Trajectory(whole.stamps_s, whole.world_from_camera)
+    known = uncorrected(recording).walk
 
     def at(delay_s: float) -> np.ndarray | None:
         wanted_s = sample.stamps_s + delay_s
