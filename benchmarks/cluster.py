@@ -70,9 +70,9 @@ class Weighed(Spread):
         return super().add_up(plan, parts)
 
 
-def first(path: Path, frames: int) -> Recording:
+def first(path: Path, frames: int, begin: int = 0) -> Recording:
     """Open every eighth of the first frames of a recording, so that the camera has gone through the room."""
-    return Subset(open_recording(path), range(0, STEP * frames, STEP))
+    return Subset(open_recording(path), range(begin, STEP * frames, STEP))
 
 
 def size(folder: Path) -> int:
@@ -117,8 +117,8 @@ def main() -> None:
             )
         assert stored is not None
         begin = process_time()
-        merge_maps(stored, build_map(first(path, LENGTHS[1]), Path(folder) / f"{LENGTHS[1]}", settings=SETTINGS),
-                   Path(folder) / "merged")  # fmt: skip
+        other = first(path, LENGTHS[1], STEP // 2)
+        merge_maps(stored, build_map(other, Path(folder) / "other", settings=SETTINGS), Path(folder) / "merged")
         merge_s = process_time() - begin
         plan(rows, merge_s, size_of_frames(path))
         if find_spec("ray") is not None:

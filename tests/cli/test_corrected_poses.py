@@ -59,6 +59,18 @@ def test_a_map_that_is_not_there_is_built_first(answer, walk: Path, tmp_path: Pa
     assert made["corrected"]["most_m"] == pytest.approx(0.2)
 
 
+def test_poses_may_have_the_dates_that_the_recording_has(answer, walk: Path, tmp_path: Path) -> None:
+    dated = shutil.copytree(walk, tmp_path / "dated")
+    for table, stamp in (("poses.csv", 0), ("frames.csv", 1)):
+        head, *rows = [line.split(",") for line in (dated / table).read_text().splitlines()]
+        for row in rows:
+            row[stamp] = str(float(row[stamp]) + 1.7e9)
+        (dated / table).write_text("\n".join(",".join(row) for row in [head, *rows]) + "\n")
+    file = moved_file(dated, tmp_path / "poses.txt", 0.2)
+    made = answer("build", dated, "--out", tmp_path / "map", "--corrected-poses", file, *BUILT)
+    assert made["corrected"]["most_m"] == pytest.approx(0.2)
+
+
 FILES = {
     "empty": ("", "holds no pose"),
     "words": ("here there\nand everywhere\n", "numbers"),

@@ -21,21 +21,42 @@ def test_a_recording_is_played_into_a_map(answer, walk: Path, tmp_path: Path, pa
 WHOLE = ("--profile", "colours", "--as-fast-as-possible", "--every-frame")
 
 
-def test_a_drive_updates_the_map_of_the_days_before(answer, walk: Path, built: Path, tmp_path: Path) -> None:
+@pytest.fixture
+def dated(walk: Path, tmp_path: Path) -> Path:
+    """The walk as a drive of another day: the first frame is missing, and its clock is one."""
+    path = shutil.copytree(walk, tmp_path / "dated")
+    for table, stamp in (("poses.csv", 0), ("frames.csv", 1)):
+        head, _, *rows = [line.split(",") for line in (path / table).read_text().splitlines()]
+        for row in rows:
+            row[stamp] = str(float(row[stamp]) + 1.7e9)
+        (path / table).write_text("\n".join(",".join(row) for row in [head, *rows]) + "\n")
+    for folder in ("rgb", "depth"):
+        (path / folder / "000000.png").unlink()
+    return path
+
+
+def test_a_drive_updates_the_map_of_the_days_before(answer, dated: Path, built: Path, tmp_path: Path) -> None:
     home = shutil.copytree(built, tmp_path / "home.avlmap")
     words = ("--into", home, "--voxel-size-m", "0.1", *WHOLE)
-    made = answer("live", walk, "--out", tmp_path / "today.avlmap", *words)
+    made = answer("live", dated, "--out", tmp_path / "today.avlmap", *words)
     assert made["into"]["checks"]["agreeing"] >= 5
+    assert made["into"]["days"][-1]["day"] == "2023-11-14", "by its clock"
     assert made["into"]["path"] == str(home)
     whole = answer("info", home, "--verify")
-    assert whole["frames"] == 2 * answer("info", built)["frames"]
+    assert whole["frames"] == 2 * answer("info", built)["frames"] - 1
 
 
-def test_a_drive_that_cannot_be_joined_leaves_the_map_as_it_was(run, walk: Path, built: Path, tmp_path: Path) -> None:
+def test_a_drive_that_is_in_the_map_already_is_not_joined_again(run, walk: Path, built: Path, tmp_path: Path) -> None:
+    words = ("--into", shutil.copytree(built, tmp_path / "home.avlmap"), "--voxel-size-m", "0.1", *WHOLE)
+    code, _, err = run("live", walk, "--out", tmp_path / "today.avlmap", *words)
+    assert code == 1 and "the same drive as visit 1" in err
+
+
+def test_a_drive_that_cannot_be_joined_leaves_the_map_as_it_was(run, dated: Path, built: Path, tmp_path: Path) -> None:
     home = shutil.copytree(built, tmp_path / "home.avlmap")
     before = (home / "map.json").read_bytes()
     words = ("--into", home, "--voxel-size-m", "0.2", *WHOLE)
-    code, _, err = run("live", walk, "--out", tmp_path / "today.avlmap", *words)
+    code, _, err = run("live", dated, "--out", tmp_path / "today.avlmap", *words)
     assert code == 1
     assert "has voxels of 0.1 m" in err
     assert (home / "map.json").read_bytes() == before

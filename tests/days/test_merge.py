@@ -49,11 +49,21 @@ def test_no_day_is_in_the_future(drives: list[StoredMap], tmp_path: Path) -> Non
         merge.merge_maps(drives[0], drives[1], tmp_path / "no.avlmap", first_day="2999-01-01")
 
 
+@pytest.mark.parametrize(("begins_s", "day"), [(0.0, ""), (1.7e9, "2023-11-14"), (4.2e9, ""), (1.7e12, "")])
+def test_a_day_is_that_of_the_clock_where_the_clock_can_be_right(
+    drives: list[StoredMap], begins_s: float, day: str
+) -> None:
+    recording = msgspec.structs.replace(drives[0].info.recording, begins_s=begins_s)
+    (visit,) = visits_of(replace(drives[0], info=msgspec.structs.replace(drives[0].info, recording=recording)))
+    assert visit.day == day
+
+
 def test_clocks_give_the_order(drives: list[StoredMap], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def at_clocks(stored: StoredMap) -> tuple[Visit, ...]:
-        begin_s = 1.7e9 + (7200.0 if stored is drives[0] else 0.0)
         (own,) = visits_of(stored)
-        return (msgspec.structs.replace(own, day="2023-11-14", begin_s=begin_s, end_s=begin_s + 60.0),)
+        begins_s = 1.7e9 + (7200.0 if stored is drives[0] else 0.0)
+        recording = msgspec.structs.replace(own.recording, begins_s=begins_s)
+        return (msgspec.structs.replace(own, day="2023-11-14", recording=recording),)
 
     monkeypatch.setattr(merge, "visits_of", at_clocks)
     monkeypatch.setattr(merge, "find_other", lambda *_: merge.Found(np.eye(4), {}))

@@ -180,6 +180,14 @@ def test_stamps_that_are_dates_are_counted_from_the_first(tmp_path: Path):
     recording = open_recording(path)
     assert np.allclose(recording.stamps_s, [0.0, 0.1, 0.2, 0.3, 0.4], atol=1e-6)
     assert recording.notices == ("The stamps are dates; time 0 is the first frame's, 1700000000.000000 s since 1970.",)
+    assert recording.begins_s == 1.7e9
+
+
+def test_a_clock_in_the_future_is_said(tmp_path: Path):
+    path = write_folder(tmp_path / "walk")
+    lines = [f"{4.2e9 + i},{pose_line(s.world_from_camera).replace(' ', ',')}" for i, s in enumerate(shots())]
+    (path / "poses.csv").write_text("\n".join(lines))
+    assert "begin on 2103-02-04, in the future" in open_recording(path).notices[-1]
 
 
 def test_frames_without_a_pose_are_left_out_and_told(tmp_path: Path):

@@ -5,9 +5,12 @@ from pathlib import Path
 import pytest
 
 from avlmaps.recordings.conformance import check, check_damage
+from avlmaps.recordings.corrections import Corrections, corrected
 from avlmaps.recordings.known_formats import FORMATS
 from avlmaps.recordings.open import find_format, open_recording
-from helpers.format_writers import WRITTEN
+from avlmaps.recordings.pose_file import on_clock_of
+from avlmaps.recordings.subset import Subset
+from helpers.format_writers import START_S, WRITTEN
 
 
 @pytest.mark.parametrize("name", WRITTEN)
@@ -18,6 +21,18 @@ def test_a_reader_gives_back_the_truth_that_was_written(tmp_path: Path, name: st
     recording = check(lambda: open_recording(path), truth, **(written.options or {}))
     assert recording.format == written.format
     assert (recording.up_in_world is not None) == written.knows_up
+
+
+@pytest.mark.parametrize("name", ["tum", "rtabmap"])
+def test_the_date_of_the_first_frame_is_kept_and_poses_of_a_file_may_have_it(tmp_path: Path, name: str) -> None:
+    truth = WRITTEN[name].truth()
+    whole = open_recording(WRITTEN[name].write(tmp_path / "walk", truth))
+    corrections = Corrections(up_in_world=(0.0, 0.0, 1.0))
+    for recording in (whole, Subset(whole, [0, 1]), corrected(whole, corrections)):
+        assert recording.begins_s == pytest.approx(START_S + truth.stamps_s[0], abs=1.0)
+        for stamps_s in (recording.stamps_s, recording.stamps_s + recording.begins_s):
+            assert on_clock_of(stamps_s, recording) == pytest.approx(recording.stamps_s, abs=1e-6)
+    assert open_recording(WRITTEN["folder"].write(tmp_path / "folder", truth)).begins_s == 0.0
 
 
 @pytest.mark.parametrize("name", WRITTEN)

@@ -154,6 +154,7 @@ def test_a_bag_knows_how_far_the_robots_base_lies_below_the_camera(tmp_path: Pat
     base = recording.base_height
     assert base is not None and not base.on_floor
     assert base.below_camera_m == pytest.approx(BODY_FROM_CAMERA[2, 3])
+    assert recording.begins_s == pytest.approx(START_S, abs=1.0)
 
 
 @pytest.mark.parametrize("kind", ["ros1", "ros2", "mcap"])

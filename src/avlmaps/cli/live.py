@@ -119,7 +119,7 @@ def _live(verb: Live) -> dict[str, Any]:
     return {
         **describe_map(stored),
         "live": {**status.to_dict(), "summary": str(status)},
-        **({} if first is None else {"into": _joined(first, stored, verb.day)}),
+        **({} if first is None else {"into": _joined(first, stored, _day(verb))}),
         "elapsed_s": round(perf_counter() - begin_s, 3),
     }
 
@@ -201,9 +201,20 @@ def _days_before(verb: Live) -> "StoredMap | None":
     return open_stored(verb.into)
 
 
-def _joined(first: "StoredMap", today: "StoredMap", day: str | None) -> dict[str, Any]:
+def _day(verb: Live) -> str:
+    """Return the day of the drive: as given, else by the clock of its recording."""
+    from avlmaps.days.find import clock_s, day_of
+    from avlmaps.recordings.open import open_recording
+
+    if verb.day is not None or verb.recording is None:
+        return verb.day or ""
+    recording = open_recording(verb.recording, format=verb.format, corrections=verb.reading.corrections())
+    return day_of(clock_s(recording, float(recording.stamps_s[0])))
+
+
+def _joined(first: "StoredMap", today: "StoredMap", day: str) -> dict[str, Any]:
     """Let a drive update the map of the days before, and return what changed."""
     from avlmaps.cli.merge import merged_answer
     from avlmaps.days.merge import merge_maps
 
-    return merged_answer(merge_maps(first, today, first.path, day=day or "", overwrite=True))
+    return merged_answer(merge_maps(first, today, first.path, day=day, overwrite=True))

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from time import time
 
 import numpy as np
 
@@ -20,11 +21,13 @@ from avlmaps.days.align import (
 from avlmaps.days.evidence import DayViews
 from avlmaps.days.settings import MergeSettings
 from avlmaps.days.surfaces import Occupied, refine
-from avlmaps.maps.store.manifest import Visit
+from avlmaps.maps.store.manifest import RecordingInfo, Visit
 from avlmaps.maps.store.reader import StoredMap
 from avlmaps.maps.types import Keyframes
+from avlmaps.recordings.types import Recording
 
 DEFAULTS = MergeSettings()
+_DAY_S = 86_400.0
 _CLOCK_S = 1e8  # later stamps count from 1970: they are a clock's
 _LEAST_COMMON = 3
 _IDENTITY = tuple(tuple(float(value) for value in row) for row in np.eye(4))
@@ -104,13 +107,24 @@ def visits_of(stored: StoredMap) -> tuple[Visit, ...]:
     seen = np.asarray(stored.voxels.last_seen_s)
     begin = min(begin, float(seen.min(initial=begin)))
     end = max(float(stamps.max(initial=begin)), float(seen.max(initial=begin)))
-    day = datetime.fromtimestamp(begin, UTC).date().isoformat() if begin > _CLOCK_S else ""
+    day = day_of(clock_s(info.recording, begin))
     return (
         Visit(
             day=day, recording=info.recording, begin_s=begin, end_s=end, shift_s=0.0, map_from_recording=_IDENTITY,  # pyright: ignore[reportArgumentType]
             rig=info.rig, frames=info.counts.frames,
         ),
     )  # fmt: skip
+
+
+def day_of(at_s: float | None) -> str:
+    """Return the day of a moment; "" where no clock said it."""
+    return "" if at_s is None else datetime.fromtimestamp(at_s, UTC).date().isoformat()
+
+
+def clock_s(recording: RecordingInfo | Recording, stamp_s: float) -> float | None:
+    """Return when a stamp of a recording was, seconds since 1970; None where no right clock said it."""
+    at_s = recording.begins_s + stamp_s
+    return at_s if _CLOCK_S < at_s < time() + _DAY_S else None  # it is tomorrow already elsewhere
 
 
 def require_another_drive(stored: StoredMap, other: StoredMap, visits: Sequence[Visit]) -> None:

@@ -19,7 +19,16 @@ from avlmaps.core.version import __version__
 from avlmaps.core.wording import option
 from avlmaps.days import life as lives
 from avlmaps.days.evidence import Day, DayViews
-from avlmaps.days.find import DEFAULTS, Found, find_other, require_another_drive, views_of, visit_of_stamps, visits_of
+from avlmaps.days.find import (
+    DEFAULTS,
+    Found,
+    clock_s,
+    find_other,
+    require_another_drive,
+    views_of,
+    visit_of_stamps,
+    visits_of,
+)
 from avlmaps.days.join import NO_SOURCES, joined_keyframes, joined_sounds, joined_sources, joined_voxels
 from avlmaps.days.settings import MergeSettings
 from avlmaps.days.surfaces import Occupied, resampled
@@ -174,10 +183,11 @@ def _date(said: str) -> date:
 def _visit(other: StoredMap, last: Visit, found: Found, day: str) -> Visit:
     """Return the entry of a new day, whose time follows that of the last one."""
     (own,) = visits_of(other)
-    if not day and own.day and last.day and not last.shift_s and own.end_s < last.begin_s:
+    own_s, last_s = clock_s(own.recording, own.begin_s), clock_s(last.recording, last.begin_s - last.shift_s)
+    if not day and last.day and own_s is not None and last_s is not None and own_s + own.end_s - own.begin_s < last_s:
         raise MapError(
-            f"{other.path} was recorded before the map's last drive, by their clocks ({_when(own.begin_s)} and "
-            f"{_when(last.begin_s)}); merge drives in their order, or say its day where a clock was wrong: "
+            f"{other.path} was recorded before the map's last drive, by their clocks ({_when(own_s)} and "
+            f"{_when(last_s)}); merge drives in their order, or say its day where a clock was wrong: "
             f"{option('day', 'DAY')}."
         )
     day = _date(day).isoformat() if day else own.day

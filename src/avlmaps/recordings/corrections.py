@@ -189,7 +189,7 @@ class CorrectedRecording(Recording):
         """
         self.whole, self.given = whole, given
         self.path, self.format = whole.path, whole.format
-        self.audio, self.topics = whole.audio, whole.topics
+        self.audio, self.topics, self.begins_s = whole.audio, whole.topics, whole.begins_s
         self.rig = corrected_rig(whole.rig, given.intrinsics, whole.path)
         self._scale = 1.0 if given.depth_unit_m is None else given.depth_unit_m / whole.stored_depth_unit_m
         self._at, world_from_camera, self.lost = self._delayed()

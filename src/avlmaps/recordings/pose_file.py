@@ -10,6 +10,7 @@ from avlmaps.core.poses import MAX_ROTATION_FAULT, from_quaternion
 from avlmaps.recordings.faults import stop_at_first
 from avlmaps.recordings.formats.columns import POSE
 from avlmaps.recordings.formats.tables import read_table
+from avlmaps.recordings.types import Recording
 
 
 def read_pose_file(path: Path) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n 4 4"]]:
@@ -30,3 +31,16 @@ def read_pose_file(path: Path) -> tuple[Float[np.ndarray, " n"], Float[np.ndarra
             "where 1 belongs); fix or remove the line."
         )
     return table.values[:, 0], from_quaternion(table.values[:, 1:4], table.values[:, 4:])
+
+
+def on_clock_of(stamps_s: Float[np.ndarray, " n"], recording: Recording) -> Float[np.ndarray, " n"]:
+    """Return the stamps of a pose file on a recording's clock, which begins at its first frame.
+
+    SLAM writes the stamps of the files that it read: those are taken where more of them lie among the frames so.
+    """
+    first_s, last_s = recording.stamps_s[0], recording.stamps_s[-1]
+    inside, as_files = (
+        int(((stamps >= first_s - 1.0) & (stamps <= last_s + 1.0)).sum())
+        for stamps in (stamps_s, stamps_s - recording.begins_s)
+    )
+    return stamps_s - recording.begins_s if as_files > inside else stamps_s

@@ -40,6 +40,7 @@ class Subset(Recording):
         self.notices = whole.notices
         self.base_height = whole.base_height
         self.trajectory = whole.trajectory
+        self.begins_s = whole.begins_s
 
     def frame(self, index: int) -> Frame:
         """Read one frame; its ``index`` is the one in the subset."""

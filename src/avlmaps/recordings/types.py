@@ -121,6 +121,7 @@ class Recording(ABC):
         base_height: where the robot's base is under the camera in the first frame, None where that is not known.
         trajectory: the poses at their own rate on the frames' clock, where the reader interpolated them; None where
             each frame has its own.
+        begins_s: what the clock of its files said at time 0, seconds: since 1970 where their stamps are dates.
     """
 
     path: Path
@@ -134,6 +135,7 @@ class Recording(ABC):
     topics: Mapping[str, str] = MappingProxyType({})
     base_height: "BaseHeight | None" = None
     trajectory: Trajectory | None = None
+    begins_s: float = 0.0
 
     @property
     def walk(self) -> Trajectory:

@@ -99,6 +99,13 @@ def test_sources_move_with_corrected_poses(heard: tuple[Path, Path], copy: Store
     assert lost.sources() is None, "old evidence does not fit new poses"
 
 
+@pytest.fixture
+def another_day(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Take a copy of a map for one of another drive."""
+    monkeypatch.setattr("avlmaps.days.merge.require_another_drive", lambda *_: None)
+
+
+@pytest.mark.usefixtures("another_day")
 def test_a_merged_map_has_the_sources_of_both_days(heard: tuple[Path, Path], copy: StoredMap, tmp_path: Path) -> None:
     first = open_stored(heard[1])
     merged = merge_maps(first, copy, tmp_path / "both.avlmap", day="2026-11-24", first_day="2026-11-23")
@@ -110,6 +117,7 @@ def test_a_merged_map_has_the_sources_of_both_days(heard: tuple[Path, Path], cop
     assert all(row.get("when", {}).get("day") in ("2026-11-23", "2026-11-24") for row in rows)
 
 
+@pytest.mark.usefixtures("another_day")
 def test_a_merge_says_why_it_does_not_know(heard: tuple[Path, Path], copy: StoredMap, tmp_path: Path) -> None:
     first = open_stored(heard[1])
     bare = without_sources(copy)

@@ -194,6 +194,7 @@ def _recording_info(recording: Recording) -> RecordingInfo:
         frames=len(recording),
         duration_s=recording.duration_s,
         notices=tuple(strip_folder(notice, recording) for notice in recording.notices),
+        begins_s=recording.begins_s,
     )
 
 

@@ -103,6 +103,7 @@ class RecordingInfo(msgspec.Struct, frozen=True, kw_only=True):
     frames: int
     duration_s: float
     notices: tuple[str, ...] = ()
+    begins_s: float = 0.0  # its time 0 on the clock of its files: since 1970, where their stamps are dates
 
 
 class Visit(msgspec.Struct, frozen=True, kw_only=True):

@@ -156,6 +156,7 @@ class ShotsRecording(Recording):
         up_in_world: unit vector, or None where it is not known.
         audio: the sound track on the frames' clock, or None.
         notices: one sentence for each thing worth knowing.
+        begins_s: what the clock of the files said at time 0.
     """
 
     path: Path
@@ -165,6 +166,7 @@ class ShotsRecording(Recording):
     up_in_world: Float[np.ndarray, "3"] | None = None
     audio: AudioTrack | None = None
     notices: tuple[str, ...] = ()
+    begins_s: float = 0.0
     stamps_s: Float[np.ndarray, " n"] = field(init=False)
     world_from_camera: Float[np.ndarray, "n 4 4"] = field(init=False)
 

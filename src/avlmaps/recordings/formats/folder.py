@@ -72,6 +72,7 @@ def open_folder(path: Path, report: Report = stop_at_first) -> Recording:
         notices=(*_turned_notices(video), *notices, *more, *lone),
         video=video,
         trajectory=trajectory,
+        begins_s=start_s,
     )
     return corrected(recording, description.corrections())
 

@@ -129,14 +129,14 @@ class RosbagRecording(Recording):
         notices += [*motion.notices, *tree.notices, *tree.seldom(camera_frame, stamps_s), *walk.notices]
         if self._of_points:
             self._camera_from_cloud = self._camera_from_cloud[rows]
-        self._start_s = float(stamps_s[rows[0]])
-        self.stamps_s = stamps_s[rows] - self._start_s
+        self.begins_s = float(stamps_s[rows[0]])
+        self.stamps_s = stamps_s[rows] - self.begins_s
         self.world_from_camera = poses[rows]
         self._rgb_at = [(int(rgb_ns[rgb[i]]), float(rgb_s[rgb[i]])) for i in b[rows]]
         self._depth_at = [(int(depth_ns[depth[i]]), float(depth_s[depth[i]])) for i in a[rows]]
         self.up_in_world = np.array([0.0, 0.0, 1.0]) if motion.z_is_up else None
         self.base_height = base_height(tree, camera_frame, float(stamps_s[rows[0]]))
-        clock = PictureClock.of(depth_ns[depth][a][rows], stamps_s[rows], self._start_s)
+        clock = PictureClock.of(depth_ns[depth][a][rows], stamps_s[rows], self.begins_s)
         self.audio, audio_notices = self._read_audio(topics, clock)
         if topics.directions:
             self.audio, said = self._with_directions(topics.directions, clock)

@@ -210,6 +210,7 @@ def open_rtabmap(path: Path, report: Report = stop_at_first) -> StoredRecording:
         up_in_world=np.array([0.0, 0.0, 1.0]),
         notices=(*notices, *more, *settled),
         depth_unit_m=unit_m,
+        begins_s=start_s,
     )
 
 

@@ -73,6 +73,7 @@ def open_tum(path: Path, report: Report = stop_at_first) -> FileRecording:
         audio=open_audio(path),
         notices=(*notices, *notice, *more),
         trajectory=timeline.Trajectory(trajectory.stamps_s - start_s, trajectory.world_from_body),
+        begins_s=float(start_s),
     )
 
 
