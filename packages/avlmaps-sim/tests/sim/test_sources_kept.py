@@ -11,10 +11,8 @@ from avlmaps.core.errors import QueryError
 from avlmaps.core.poses import apply
 from avlmaps.days.join import joined_sources
 from avlmaps.days.merge import merge_maps
-from avlmaps.maps.build import build_map
 from avlmaps.maps.corrected import correct_stored
 from avlmaps.maps.pipeline.sources import add_sources
-from avlmaps.maps.settings import BuildSettings, FrameSettings
 from avlmaps.maps.sources.density import Density, Plan
 from avlmaps.maps.sources.settings import SourceSettings
 from avlmaps.maps.store.reader import StoredMap, open_stored
@@ -22,22 +20,13 @@ from avlmaps.maps.store.writer import MapContent, write_map
 from avlmaps.maps.types import SourceEvidence
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.recordings.open import open_recording
-from avlmaps_sim.recorder import RecordSettings, record_scene
-from helpers.hearing_scenes import flat
+from helpers.hearing_scenes import heard_flat
 
 
 @pytest.fixture(scope="module")
 def heard(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     """Return a recording of a flat with an array, and its map with submaps."""
-    folder = tmp_path_factory.mktemp("flat")
-    settings = RecordSettings(
-        size=(160, 120), fps=4.0, hearing="acoustic", microphones="square4", snr_db=20.0, sources=4, workers=1,
-        max_frames=100,
-    )  # fmt: skip
-    record_scene(flat(), folder / "rec", settings, seed=1)
-    built = BuildSettings(frames=FrameSettings(per_submap=32))
-    build_map(open_recording(folder / "rec"), folder / "flat.avlmap", "synthetic", built, progress=False)
-    return folder / "rec", folder / "flat.avlmap"
+    return heard_flat(tmp_path_factory)
 
 
 @pytest.fixture

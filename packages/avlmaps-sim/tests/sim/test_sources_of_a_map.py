@@ -23,7 +23,7 @@ from avlmaps_sim.hearing import AcousticSettings, Sounding, Source
 from avlmaps_sim.hearing.array import heard_by_array
 from avlmaps_sim.recorder import RecordSettings, record_scene
 from avlmaps_sim.truth import read_truth
-from helpers.hearing_scenes import flat, shoebox
+from helpers.hearing_scenes import flat, heard_flat, shoebox
 
 SOURCE = np.array([1.5, 4.2, 0.6])
 
@@ -94,14 +94,7 @@ def test_exchanged_channels_lose_the_source(heard: tuple[AudioTrack, Trajectory]
 @pytest.fixture(scope="module")
 def mapped(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     """Return a recording of a flat with an array, and its map."""
-    folder = tmp_path_factory.mktemp("flat")
-    settings = RecordSettings(
-        size=(96, 72), fps=4.0, hearing="acoustic", microphones="square4", snr_db=20.0, sources=3, workers=1,
-        max_frames=80,
-    )  # fmt: skip
-    record_scene(flat(), folder / "rec", settings, seed=1)
-    build_map(open_recording(folder / "rec"), folder / "flat.avlmap", "synthetic", progress=False)
-    return folder / "rec", folder / "flat.avlmap"
+    return heard_flat(tmp_path_factory)
 
 
 def test_a_map_says_where_its_sounds_came_from(mapped: tuple[Path, Path]) -> None:
