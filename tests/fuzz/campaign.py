@@ -37,6 +37,14 @@ PATIENCE_S = 120
 _LONGEST_SENTENCE = 900
 
 
+def seeds_in(folder: Path) -> dict[str, Path]:
+    """Write the seeds, and build one here: the children then need not load the same modules and kernels again."""
+    seeds = write_seeds(folder)
+    with redirect_stderr(io.StringIO()), redirect_stdout(io.StringIO()):
+        assert build(seeds["folder"], folder / "first.avlmap") == 0
+    return seeds
+
+
 def broken(number: int, seeds: dict[str, Path], folder: Path) -> tuple[str, str, Path]:
     """Make a case; return the seed's name, what was done to it, and where it lies."""
     rng = np.random.default_rng([2026, number])
@@ -190,7 +198,7 @@ def main() -> None:
         from mistakes import run_mistake  # it needs this module
 
         here = Path(scratch)
-        seeds = write_seeds(here / "seeds")
+        seeds = seeds_in(here / "seeds")
         cases: list[tuple[int | str, Callable[[], dict[str, object]]]] = [
             *((n, partial(run_case, n, seeds, here)) for n in range(given.first, given.first + given.cases)),
             *((f"wrong {n}", partial(run_mistake, n, here)) for n in range(given.wrong)),

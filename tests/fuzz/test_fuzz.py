@@ -10,9 +10,8 @@ if sys.platform == "win32":
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from campaign import report, run_case
+from campaign import report, run_case, seeds_in
 from mistakes import run_mistake
-from seeds import write_seeds
 
 CASES = 80
 BLOCKS = 4
@@ -21,7 +20,7 @@ MISTAKES = 6
 
 @pytest.fixture(scope="module")
 def seeds(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    return write_seeds(tmp_path_factory.mktemp("seeds"))
+    return seeds_in(tmp_path_factory.mktemp("seeds"))
 
 
 @pytest.mark.slow
