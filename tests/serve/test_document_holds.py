@@ -154,3 +154,28 @@ def test_intrinsics_without_a_photo_are_refused(client: TestClient) -> None:
     for values in ({}, {"sentence": "the red thing"}):
         refused = client.post("/maps/room/picture", files={"intrinsics": (None, "525,525,320,240")}, data=values)
         assert refused.status_code == 400 and "photo" in refused.json()["error"]["message"]
+
+
+# What OpenAPI cannot state of an address: words and parts that exclude or need one another.
+AT_ODDS = (
+    ({"sentence": "red", "object": "red"}, 400, "takes a sentence, or parts"),
+    ({"sentence": "red", "area": " "}, 400, "takes a sentence, or parts"),
+    ({"object": " "}, 422, "The object in the query is empty"),
+    ({"sentence": " ", "sound": " "}, 422, "The sound in the query is empty"),
+    ({"sentence": "red", "primary": "sound"}, 422, "has no sound to be its primary part"),
+    ({"object": "red", "primary": "area"}, 422, "has no area to be its primary part"),
+    ({"object": "red", "intrinsics": "1,1,1,1"}, 400, "Intrinsics belong to a photo"),
+    ({"object": "red", "intrinsics": "x"}, 400, "Intrinsics are fx,fy,cx,cy"),
+    ({"sound": "dog", "at": "source"}, 422, "room.avlmap does not know where sounds came from"),
+)
+
+
+@pytest.mark.parametrize("path", ["ask", "view/ask", "picture"])
+def test_parts_of_a_query_that_are_at_odds_are_refused_with_one_sentence(client: TestClient, path: str) -> None:
+    nothing = client.get(f"/maps/room/{path}", params={"sentence": " "})
+    assert nothing.status_code == (200 if path == "picture" else 400)  # without a query the map is drawn
+    for query, status, said in AT_ODDS:
+        answered = client.get(f"/maps/room/{path}", params=query)
+        assert answered.status_code == status, (query, answered.text[:200])
+        message = answered.json()["error"]["message"]
+        assert said in message and "/" not in message, query

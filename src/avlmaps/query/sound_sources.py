@@ -51,7 +51,7 @@ class Listening(Queryable, Protocol):
 
 def _unknown(stored: "StoredMap") -> str:
     """Return why a map does not know where sounds came from, and what to do."""
-    what = f"{stored.path} does not know where sounds came from, only where the robot was"
+    what = f"{stored.path.name} does not know where sounds came from, only where the robot was"
     if stored.info.visits:
         return (
             f"{what}: it is of several days, and not all of them say where the microphones are, or they have other "
