@@ -43,7 +43,7 @@ def replay(
             tell(f"note: {fault}")
             continue
         heard_s = _play(recording, live, heard_s, frame.stamp_s)
-        told = _tell_doubts(live, told, tell)
+        told = tell_doubts(live, told, tell)
     _play(recording, live, heard_s, float("inf"))
 
 
@@ -71,7 +71,7 @@ def follow(
             _add(live, frame)
         except RecordingError as fault:
             tell(f"note: {fault}")
-        told = _tell_doubts(live, told, tell)
+        told = tell_doubts(live, told, tell)
     if not is_being_written(path):
         recording = open_recording(path)
         _play(recording, live, None if recording.audio is None else recording.audio.start_s, float("inf"))
@@ -81,7 +81,7 @@ def _add(live: LiveMap, frame: Frame, *, wait: bool = False) -> None:
     live.add_frame(frame.rgb, frame.depth_m, frame.camera, frame.world_from_camera, frame.stamp_s, wait=wait)
 
 
-def _tell_doubts(live: LiveMap, told: int, tell: Callable[[str], None]) -> int:
+def tell_doubts(live: LiveMap, told: int, tell: Callable[[str], None]) -> int:
     """Report the doubts after the first ``told``, and return how many there are."""
     doubts = live.doubts
     for doubt in doubts[told:]:

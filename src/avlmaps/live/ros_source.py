@@ -10,6 +10,7 @@ from avlmaps.core.progress import say
 from avlmaps.core.wording import option
 from avlmaps.live.live_map import LiveMap
 from avlmaps.live.patience import Once, Patience
+from avlmaps.live.replay import tell_doubts
 from avlmaps.live.ros_frames import RosFrames
 from avlmaps.live.ros_sound import RosSound
 from avlmaps.recordings.formats.ros_audio import Pcm
@@ -145,9 +146,7 @@ class _Source:
         if self._inbox.lost > self._lost:
             self._live.count_late(self._inbox.lost - self._lost)
             self._lost = self._inbox.lost
-        for doubt in self._live.doubts[self._doubts :]:
-            self._tell(f"note: {doubt}")
-            self._doubts += 1
+        self._doubts = tell_doubts(self._live, self._doubts, self._tell)
         return came
 
     def missing(self) -> str:

@@ -51,8 +51,8 @@ class Days:
         life = stored.life()
         if life is None:
             raise QueryError(
-                f"{stored.path.name} was seen on one day alone, so that nothing is known to have changed; add another day "
-                "with `avlmaps merge`."
+                f"{stored.path.name} was seen on one day alone, so that nothing is known to have changed; add another "
+                "day with `avlmaps merge`."
             )
         return cls(stored.info.visits, life if corrected is None else corrected(life))
 

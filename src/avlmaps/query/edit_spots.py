@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from avlmaps.core.arrays import Float, Int
+from avlmaps.core.poses import plain_point
 from avlmaps.maps.store.edits import Spot
 
 if TYPE_CHECKING:
@@ -83,7 +84,7 @@ class Spots:
         points = self._map.space.grid.centre_of(life.voxels(number))
         low, high = self._box_of(self._map.space.level(points))
         middle = self._map.space.world((low + high) / 2.0)
-        return Spot(name=spot.name, middle=vector(middle), size=vector(high - low))
+        return Spot(name=spot.name, middle=plain_point(middle), size=plain_point(high - low))
 
     def stay_at(self, life: "Life", spot: Spot) -> int | None:
         """Return the number of the stay that fills the box of a spot best."""
@@ -116,11 +117,5 @@ class Spots:
         """Return what an edit is about: the thing of some voxels."""
         low, high = self.box(rows)
         middle = self._map.space.world((low + high) / 2.0)
-        spot = Spot(name=name, middle=vector(middle), size=vector(high - low))
+        spot = Spot(name=name, middle=plain_point(middle), size=plain_point(high - low))
         return spot.anchored(self._map.stored.keyframes)
-
-
-def vector(point: Float[np.ndarray, "3"]) -> tuple[float, float, float]:
-    """Return a point or a size as an edit stores it: to a tenth of a millimetre."""
-    x, y, z = (round(float(value), 4) for value in point)
-    return x, y, z

@@ -9,9 +9,10 @@ import numpy as np
 
 from avlmaps.core.arrays import Float
 from avlmaps.core.errors import MapError, QueryError
+from avlmaps.core.poses import plain_point
 from avlmaps.core.wording import place_text
 from avlmaps.maps.store.edits import LONGEST_NAME, Does, Edit, Spot, World, append_edit, in_force, read_edits
-from avlmaps.query.edit_spots import SeenMap, vector
+from avlmaps.query.edit_spots import SeenMap
 from avlmaps.query.edits import Edited, apply, means
 from avlmaps.query.found_edits import said
 from avlmaps.query.given_places import is_place, place_given, place_of
@@ -125,7 +126,7 @@ class Editor:
         floor_m = float(self._map.space.level(np.array(found.position))[2])
         cut = [self._level(place) for place in plane] if plane else _corners(box) if box else []
         world = self._map.space.world
-        points = [vector(world(np.array([xy[0], xy[1], floor_m]))) for xy in cut]
+        points = [plain_point(world(np.array([xy[0], xy[1], floor_m]))) for xy in cut]
         spot = self._map.edited.spot_of(found.name, found.rows)
         edit = self._new("split", [spot], cut=points, by=by)
         before = sum(bool(np.isin(one.rows, found.rows).any()) for one in self._after().claims)
@@ -168,7 +169,7 @@ class Editor:
         numbers = place_given(at)
         place = numbers if len(numbers) == 3 else self._map.space.world(np.append(numbers, self._floor_m()))
         return self._add(
-            "pin", [Spot(middle=vector(place)).anchored(self._map.stored.keyframes)], name=_name(name), by=by
+            "pin", [Spot(middle=plain_point(place)).anchored(self._map.stored.keyframes)], name=_name(name), by=by
         )
 
     def undo(self, which: str = "", *, by: str = "") -> Edit:
@@ -246,14 +247,14 @@ class Editor:
         found = where.rooms[numbers[0]] if numbers[0] >= 0 else None
         if found is None or found.region < 0:
             raise QueryError(f"The floor of the room {room!r} is not mapped, so that it has no extent to name.")
-        spot = Spot(name=found.name, middle=found.position, corners=tuple(map(vector, found.outline)))
+        spot = Spot(name=found.name, middle=found.position, corners=tuple(map(plain_point, found.outline)))
         return spot.anchored(self._map.stored.keyframes)
 
     def _area(self, corners: Sequence[Float[np.ndarray, "2"]]) -> Spot:
         floor_m = self._floor_m()
         points = [self._map.space.world(np.append(corner, floor_m)) for corner in corners]
-        middle = vector(np.mean(points, axis=0))
-        return Spot(middle=middle, corners=tuple(map(vector, points))).anchored(self._map.stored.keyframes)
+        middle = plain_point(np.mean(points, axis=0))
+        return Spot(middle=middle, corners=tuple(map(plain_point, points))).anchored(self._map.stored.keyframes)
 
     def _floor_m(self) -> float:
         """Return the level height of the floor on which the map's walk began."""

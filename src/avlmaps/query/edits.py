@@ -14,10 +14,11 @@ import numpy as np
 from avlmaps.core.arrays import Bool, Float, Int
 from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.poses import plain_point
 from avlmaps.core.question import Part
 from avlmaps.maps.store.edits import Edit, in_force
 from avlmaps.query.colour_filter import colour_in, colour_share
-from avlmaps.query.edit_spots import SeenMap, vector
+from avlmaps.query.edit_spots import SeenMap
 from avlmaps.query.factors import FOUND_AT, HeatSettings, NearAnchors, NearThings
 from avlmaps.query.found_edits import HALF, Claim, FoundEdits, plain_name, said, share_in
 from avlmaps.query.instances import Instances
@@ -281,7 +282,7 @@ def _pinned(edit: Edit, place: Float[np.ndarray, "3"]) -> "Thing":
     from avlmaps.query.contents import Thing
 
     no_voxels = np.zeros(0, np.int64)
-    return Thing(edit.name, 1.0, vector(place), (0.0, 0.0, 0.0), (0, 0, 0), no_voxels, place[None], said(edit))
+    return Thing(edit.name, 1.0, plain_point(place), (0.0, 0.0, 0.0), (0, 0, 0), no_voxels, place[None], said(edit))
 
 
 def _the(name: str) -> str:

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from avlmaps.recordings.known_formats import some_name
+from avlmaps.recordings.known_formats import holds, some_name
 
 _EXPORT = "export its colour, depth and poses as a folder of recording.json, rgb/, depth/ and poses.csv"
 
@@ -20,10 +20,6 @@ class _Unreadable:
 
     matches: Callable[[Path], bool]
     why: str
-
-
-def _has(*names: str) -> Callable[[Path], bool]:
-    return lambda path: all((path / name).exists() for name in names)
 
 
 def _suffix(*suffixes: str) -> Callable[[Path], bool]:
@@ -83,7 +79,7 @@ _UNREADABLE = (
         "is ICL-NUIM in POV-Ray's own files; download its TUM RGB-D compatible PNGs and open those.",
     ),
     _Unreadable(
-        _has("images", "sparse"),
+        holds("images", "sparse"),
         "is a reconstruction of COLMAP, whose scale is not metres and which has no depth; record with a depth "
         f"camera, or {_EXPORT}.",
     ),

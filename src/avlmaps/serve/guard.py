@@ -46,7 +46,7 @@ class AccessGuard:
     def __init__(self, app: App, settings: ServeSettings) -> None:
         self._app = app
         self._settings = settings
-        self._token = None if settings.token is None else _digest(settings.token)
+        self._token = None if settings.token is None else token_digest(settings.token)
         self._hosts = {name.lower().rstrip(".") for name in settings.allowed_hosts}
         if is_loopback(settings.host):
             self._hosts |= {"localhost", "127.0.0.1", "::1", settings.host}
@@ -147,7 +147,7 @@ class AccessGuard:
             raise RequestError("Pages of other sites may not use this server.", 403, "origin")
 
     def _is_token(self, given: str) -> bool:
-        return hmac.compare_digest(_digest(given), self._token or b"")
+        return hmac.compare_digest(token_digest(given), self._token or b"")
 
     def _check_token(self, headers: dict[str, str]) -> None:
         scheme, _, given = headers.get("authorization", "").partition(" ")
@@ -245,6 +245,6 @@ def _host_name(host: str) -> str:
     return host.partition(":")[0].rstrip(".") if host.count(":") <= 1 else host
 
 
-def _digest(token: str) -> bytes:
+def token_digest(token: str) -> bytes:
     """Return a hash of equal length for every token, so that a comparison shows nothing of it."""
     return hashlib.sha256(token.encode("utf-8", "surrogatepass")).digest()

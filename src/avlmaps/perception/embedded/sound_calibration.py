@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from avlmaps.perception.models.sound_scores import sigmoid
+
 Array = Float[np.ndarray, "..."]
 
 
@@ -34,11 +36,6 @@ class Calibration:
     word: tuple[float, float]
     pair: tuple[float, float, float]
     taught: tuple[float, float]
-
-
-def sigmoid(x: Array) -> Array:
-    """Return 1 / (1 + exp(-x)) without overflow."""
-    return 0.5 * (1.0 + np.tanh(0.5 * np.asarray(x, np.float64)))
 
 
 def log_odds(p: Array) -> Array:

@@ -288,6 +288,12 @@ def _numbers(rig: Rig) -> list[float]:
     return [*camera(rig.rgb), *camera(rig.depth), *map(float, rig.rgb_from_depth.ravel())]
 
 
+def number_of(name: str) -> int:
+    """Return the number that is a file's name before its first dot, -1 where that is none."""
+    stem = name.split(".", 1)[0]
+    return int(stem) if stem.isascii() and stem.isdigit() else -1
+
+
 def list_names(folder: Path, suffixes: tuple[str, ...]) -> list[str]:
     """Return the names of a folder's files with one of the suffixes, in the order of the numbers in them.
 

@@ -25,7 +25,7 @@ from avlmaps.core.lzfse import decompress
 from avlmaps.recordings import images
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
 from avlmaps.recordings.formats.exr import read_channel
-from avlmaps.recordings.formats.file_recording import Shots, list_names, open_audio, settle
+from avlmaps.recordings.formats.file_recording import Shots, list_names, number_of, open_audio, settle
 from avlmaps.recordings.formats.intrinsics import fitted, median_camera, resized_notice
 from avlmaps.recordings.formats.json_files import parse_json, read_json, unread_notice
 from avlmaps.recordings.formats.phones import UP_IN_WORLD, from_opengl
@@ -174,8 +174,8 @@ def open_record3d(path: Path, report: Report = stop_at_first) -> StoredRecording
     described, colour_in, depth_in = layout
     file = inside / described
     given, plain = _metadata(files, file, described)
-    colour = {_number(name): name for name in files.names(colour_in, _COLOUR)}
-    depth = {_number(name): name for name in files.names(depth_in, (".depth", ".exr"))}
+    colour = {number_of(name): name for name in files.names(colour_in, _COLOUR)}
+    depth = {number_of(name): name for name in files.names(depth_in, (".depth", ".exr"))}
     numbers = [n for n in range(len(given.poses)) if n in colour and n in depth]
     if not numbers:
         raise RecordingError(
@@ -214,11 +214,6 @@ def _metadata(files: _Files, file: Path, name: str) -> tuple[_Metadata, dict[str
     if files.path.is_dir():
         return read_json(file, _Metadata)
     return parse_json(file, files.read(name, MANIFEST_BYTES), _Metadata)
-
-
-def _number(name: str) -> int:
-    stem = name.split(".", 1)[0]
-    return int(stem) if stem.isascii() and stem.isdigit() else -1
 
 
 def _fps(given: _Metadata) -> float:

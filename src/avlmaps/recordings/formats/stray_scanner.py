@@ -15,7 +15,7 @@ from avlmaps.core import poses
 from avlmaps.core.camera import Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
-from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names, open_audio, settle
+from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names, number_of, open_audio, settle
 from avlmaps.recordings.formats.intrinsics import fitted, median_camera
 from avlmaps.recordings.formats.phones import UP_IN_WORLD
 from avlmaps.recordings.formats.tables import read_matrix, read_table, text_lines
@@ -39,8 +39,8 @@ def open_stray_scanner(path: Path, report: Report = stop_at_first) -> FileRecord
     """
     rows = _odometry(path / "odometry.csv", report)
     video = VideoFrames(path / "rgb.mp4")
-    depth = {_number(name): name for name in list_names(path / "depth", (".png",))}
-    sure = {_number(name): name for name in _confidence(path)}
+    depth = {number_of(name): name for name in list_names(path / "depth", (".png",))}
+    sure = {number_of(name): name for name in _confidence(path)}
     numbers = rows[:, 1].astype(int)
     whole = np.array([n in depth and 0 <= n < len(video) for n in numbers], bool)
     notices: list[str] = []
@@ -113,8 +113,3 @@ def _rig(path: Path, rows: np.ndarray, video: VideoFrames, shots: Shots) -> tupl
             "was the video resized? Give the matrix of its present size."
         )
     return Rig(camera, fitted(camera, first_picture_size(path, shots.depth), file, "depth")), notices
-
-
-def _number(name: str) -> int:
-    stem = name.split(".", 1)[0]
-    return int(stem) if stem.isascii() and stem.isdigit() else -1

@@ -1,6 +1,5 @@
 """Plans that wait for their confirmation, and the tokens that confirm them."""
 
-import hashlib
 import hmac
 import secrets
 from collections import OrderedDict
@@ -11,6 +10,7 @@ from avlmaps.core.errors import AvlmapsError
 from avlmaps.core.motion import GroundPose
 from avlmaps.core.poses import FRAME
 from avlmaps.query.avlmap import AVLMap
+from avlmaps.serve.guard import token_digest
 
 _MOST_PLANS = 16
 
@@ -149,7 +149,7 @@ class PlanBook:
                 409, "stopped",
             )  # fmt: skip
         token = secrets.token_urlsafe(32)
-        self._waiting[_digest(token)] = plan, now_s + self.lifetime_s
+        self._waiting[token_digest(token)] = plan, now_s + self.lifetime_s
         while len(self._waiting) > _MOST_PLANS:
             self._waiting.popitem(last=False)
         return token
@@ -160,7 +160,7 @@ class PlanBook:
         Raises:
             DriveError: there is no such token, or it is too old.
         """
-        given = _digest(token)
+        given = token_digest(token)
         found = None
         for digest in list(self._waiting):  # all of them, so that the time shows nothing
             if hmac.compare_digest(digest, given):
@@ -182,7 +182,3 @@ class PlanBook:
         """Forget every plan, also those that are still computed."""
         self.cleared += 1
         self._waiting.clear()
-
-
-def _digest(token: str) -> bytes:
-    return hashlib.sha256(token.encode("utf-8", "surrogatepass")).digest()
