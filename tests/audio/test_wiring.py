@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from avlmaps.core.timeline import Trajectory
+from avlmaps.maps.sources.polarity import signs_along
+from avlmaps.maps.sources.settings import SourceSettings
 from avlmaps.maps.sources.wiring import Wiring, check_wiring
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.channels import ChannelSound, channel_faults, with_microphones, write_channels
@@ -94,6 +96,31 @@ def test_a_channel_wired_the_other_way_round_is_told(
     wiring = found(tmp_path, (ChannelSound(samples, square[0].rate_hz), square[1]),
                    microphones_named("square4"), (0, 1, 2, 3))  # fmt: skip
     assert wiring.reversed_channel == channel and not wiring.is_right
+
+
+@pytest.mark.parametrize("turned", [(), (0,), (3,), (1, 2)])
+def test_sources_are_found_though_signs_are_turned(
+    turned: tuple[int, ...], square: tuple[ChannelSound, Trajectory], tmp_path: Path
+) -> None:
+    sound, walk = square
+    samples = sound.samples.copy()
+    samples[list(turned)] *= -1.0
+    track = track_of(tmp_path, ChannelSound(samples, sound.rate_hz), microphones_named("square4"), (0, 1, 2, 3))
+    assert track.microphones is not None
+    place = np.random.default_rng(3).uniform((-4.0, -4.0, 0.0), (4.0, 4.0, 2.0), (3000, 3))
+    signs = signs_along(track, track.microphones, walk, SPANS[:3], place, SourceSettings.of(4))
+    wanted = np.ones(4)
+    wanted[list(turned)] = -1.0
+    assert np.array_equal(signs * signs[1], wanted * wanted[1]), "a sign of all channels is no matter"
+
+
+def test_noise_turns_no_sign(tmp_path: Path) -> None:
+    walk = curved_drive(28.0, 1.0)
+    noise = np.random.default_rng(4).standard_normal((4, 28 * 16_000)).astype(np.float32) * 0.01
+    track = track_of(tmp_path, ChannelSound(noise, 16_000), microphones_named("square4"), (0, 1, 2, 3))
+    assert track.microphones is not None
+    place = np.random.default_rng(5).uniform((-4.0, -4.0, 0.0), (4.0, 4.0, 2.0), (3000, 3))
+    assert (signs_along(track, track.microphones, walk, SPANS, place, SourceSettings.of(4)) == 1.0).all()
 
 
 def test_few_sounds_say_nothing(square: tuple[ChannelSound, Trajectory], tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from avlmaps.core.errors import AvlmapsError
+from avlmaps.maps.sources.correlation import SPEED_M_S
 from avlmaps.recordings.channels import ChannelSound, read_channels
 from avlmaps.recordings.microphones import microphones_named
 from avlmaps_sim.bench.sources.calibrated import Wrong, calibrated
@@ -20,7 +21,14 @@ from avlmaps_sim.bench.sources.homes import (
     matched,
     nearest_held,
 )
-from avlmaps_sim.bench.sources.measured import MeasuredRoom, direct_to_reverberant_db, table, walks_of_ratios
+from avlmaps_sim.bench.sources.measured import (
+    SOURCE_M,
+    MeasuredRoom,
+    arrays_of_four,
+    direct_to_reverberant_db,
+    table,
+    walks_of_ratios,
+)
 from avlmaps_sim.bench.sources.suite import table_of_homes, table_of_lengths, table_of_mended
 from avlmaps_sim.bench.sources.sweep import USUAL, _trial, surfaces
 from avlmaps_sim.hearing import AcousticSettings
@@ -117,15 +125,29 @@ def test_the_ratio_of_direct_sound_falls_as_the_reverberation_grows() -> None:
     assert np.allclose(np.diff(ratios), -6.02, atol=0.3)
 
 
-def test_ratios_that_obey_the_law_find_the_source() -> None:
+@pytest.mark.parametrize("front_db", [0.0, 5.0])
+def test_ratios_find_the_source_whichever_way_it_faces(front_db: float) -> None:
     rows, columns = np.divmod(np.arange(25), 5)
     place = np.column_stack([3.68 - 0.5 * columns, 3.0 + 0.5 * rows, np.full(25, 1.2)])
-    away = np.linalg.norm(place - np.array([3.36, 2.0, 1.5]), axis=1)
+    away = place - np.array([3.36, 2.0, 1.5])
+    facing = np.cos(np.arctan2(away[:, 1], away[:, 0]) - 1.0)
     tail = 0.01 * np.random.default_rng(1).standard_normal(3000)
     response = np.tile(tail, (25, 1))
-    response[:, 100] = 1.0 / away
+    response[:, 100] = 10.0 ** (front_db * facing / 20.0) / np.linalg.norm(away, axis=1)
     room = MeasuredRoom(place, response.astype(np.float32), 16_000)
-    assert np.median(walks_of_ratios(room, np.random.default_rng(0))) < 0.15
+    errors = walks_of_ratios(room, np.random.default_rng(0))
+    assert np.median(errors) < 0.3
+    assert np.median(walks_of_ratios(room, np.random.default_rng(0), 16)) < np.median(errors)
+
+
+def test_an_array_of_receivers_is_found_though_signs_are_turned() -> None:
+    rows, columns = np.divmod(np.arange(25), 5)
+    place = np.column_stack([3.68 - 0.5 * columns, 3.0 + 0.5 * rows, np.full(25, 1.2)])
+    late = np.linalg.norm(place - SOURCE_M, axis=1) / SPEED_M_S * 48_000
+    response = 0.02 * np.random.default_rng(2).standard_normal((25, 4000)) * np.exp(-np.arange(4000) / 1000.0)
+    response[np.arange(25), np.rint(late).astype(int) + 20] = np.where(np.arange(25) % 3, 1.0, -1.0)
+    errors = arrays_of_four(MeasuredRoom(place, response.astype(np.float32), 48_000), np.random.default_rng(0), 4)
+    assert np.median(errors) < 0.25
 
 
 def test_a_room_that_is_not_there_is_named(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ that holds reverberation alone says nothing.
 """
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -48,10 +48,13 @@ class Correlations:
             self.at_s[frames], self.pair, self.curve[frames], self.first_s, self.step_s, self.weight[frames]
         )
 
+    def turned(self, signs: Float[np.ndarray, " m"]) -> "Correlations":
+        """Return the same with the signs of some channels turned."""
+        both = (signs[self.pair[:, 0]] * signs[self.pair[:, 1]]).astype(np.float32)
+        return replace(self, curve=self.curve * both[:, None])
+
     def smoothed(self, steps: float) -> "Correlations":
         """Return the same with its curves smoothed over the delay by a Gaussian of that many steps."""
-        from dataclasses import replace
-
         from scipy.ndimage import gaussian_filter1d
 
         return replace(self, curve=gaussian_filter1d(self.curve, steps, axis=2)) if steps > 0.0 else self

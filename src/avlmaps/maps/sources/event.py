@@ -45,6 +45,7 @@ def evidence_of(
     candidates: Candidates,
     walls: Walls,
     settings: SourceSettings,
+    signs: Float[np.ndarray, " m"],
 ) -> EventEvidence:
     """Return the evidence of a sound.
 
@@ -56,6 +57,7 @@ def evidence_of(
         candidates: where it may have come from.
         walls: what lies between.
         settings: how much it counts.
+        signs: -1 for a channel that is wired the other way round, else 1.
 
     Raises:
         AudioError: the track cannot be read.
@@ -76,7 +78,7 @@ def evidence_of(
     found = correlate(
         sound.samples, sound.rate_hz, begin_s, onset_s - begin_s, microphones.longest_m, delay_s=microphones.delay_s
     )
-    found = found.take(loudest_frames(found)).smoothed(settings.smoothing)
+    found = found.take(loudest_frames(found)).turned(signs).smoothed(settings.smoothing)
     if not len(found.at_s):
         ear = _ears(walk, microphones, np.array([onset_s, offset_s]))
         return EventEvidence(np.zeros(len(place)), None, Legs.of(ear.mean(axis=1), walls, place).expected(settings))
@@ -93,8 +95,7 @@ def evidence_of(
 
 
 def _weighed(steered: Float[np.ndarray, " c"], found: Correlations, settings: SourceSettings) -> np.ndarray:
-    greatest = max(float(found.weight.sum()) * len(found.pair), 1.0)
-    value = settings.concentration * steered / greatest**settings.saturation
+    value = settings.weighed(steered, found)
     return value - value.max(initial=-np.inf)
 
 

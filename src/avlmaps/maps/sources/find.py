@@ -13,6 +13,7 @@ from avlmaps.maps.sources.bearings import Bearings, Device, evidence_of_bearings
 from avlmaps.maps.sources.candidates import Candidates, candidates_of
 from avlmaps.maps.sources.density import Density, Plan, log_same_place
 from avlmaps.maps.sources.event import EventEvidence, evidence_of
+from avlmaps.maps.sources.polarity import signs_along
 from avlmaps.maps.sources.settings import SourceSettings
 from avlmaps.maps.sources.walls import Walls
 from avlmaps.maps.types import SourceEvidence
@@ -60,6 +61,9 @@ def find_sources(
     channels = 0 if microphones is None else len(microphones)
     settings, plan = SourceSettings.of(channels), Plan.of(candidates.place_m)
     walls: dict[int, Walls] = {}
+    signs = np.ones(max(channels, 1))
+    if microphones is not None:
+        signs = signs_along(track, microphones, walked, spans_s, candidates.place_m, settings)
     layers: list[Walls] = []
     heard: list[EventEvidence] = []
     for begin_s, end_s in progress(spans_s, "sources", unit="sound"):
@@ -71,7 +75,7 @@ def find_sources(
             walls[layer] = Walls.of(surface, height_m)
         layers.append(walls[layer])
         if microphones is not None:
-            heard.append(evidence_of(track, microphones, walked, span, candidates, walls[layer], settings))
+            heard.append(evidence_of(track, microphones, walked, span, candidates, walls[layer], settings, signs))
         else:
             alone = expected_alone(walked, span, candidates, walls[layer], settings)
             heard.append(EventEvidence(np.zeros(len(candidates)), None, alone))

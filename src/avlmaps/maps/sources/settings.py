@@ -2,6 +2,11 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from avlmaps.core.arrays import Float
+from avlmaps.maps.sources.correlation import Correlations
+
 
 @dataclass(frozen=True, slots=True)
 class SourceSettings:
@@ -31,6 +36,11 @@ class SourceSettings:
     blur_m: tuple[float, float] = (0.11, 0.35)
     wide: float = 0.2
     astray: float = 0.03
+
+    def weighed(self, steered: Float[np.ndarray, " c"], found: Correlations) -> Float[np.ndarray, " c"]:
+        """Return the log-likelihood of steered sums, but for a constant."""
+        greatest = max(float(found.weight.sum()) * len(found.pair), 1.0)
+        return self.concentration * steered / greatest**self.saturation
 
     @classmethod
     def of(cls, channels: int) -> "SourceSettings":

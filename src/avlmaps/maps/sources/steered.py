@@ -23,14 +23,23 @@ def steer(
     ear_m: Float[np.ndarray, "f m 3"],
     place_m: Float[np.ndarray, "c 3"],
 ) -> Float[np.ndarray, " c"]:
-    """Return the sum over frames and pairs of the correlation at the delays of each place.
+    """Return the sum over frames and pairs of the correlation at the delays of each place; see ``steer_pairs``."""
+    return steer_pairs(found, ear_m, place_m).sum(axis=0)
+
+
+def steer_pairs(
+    found: Correlations,
+    ear_m: Float[np.ndarray, "f m 3"],
+    place_m: Float[np.ndarray, "c 3"],
+) -> Float[np.ndarray, "p c"]:
+    """Return for each pair the sum over frames of the correlation at the delays of each place.
 
     Args:
         found: the frames.
         ear_m: where the microphones were in each frame.
         place_m: where the sound seems to come from, the same frame of reference.
     """
-    total = np.zeros(len(place_m), np.float32)
+    total = np.zeros((len(found.pair), len(place_m)), np.float32)
     place = np.ascontiguousarray(place_m.T, np.float32)
     scale, last = np.float32(1.0 / (SPEED_M_S * found.step_s)), found.curve.shape[2] - 2
     first = np.float32(found.first_s / found.step_s)
@@ -43,5 +52,5 @@ def steer(
             whole = np.clip(at.astype(np.int32), 0, last)
             part = at - whole
             own = curve[number]
-            total += own[whole] * (1.0 - part) + own[whole + 1] * part
+            total[number] += own[whole] * (1.0 - part) + own[whole + 1] * part
     return total.astype(np.float64)

@@ -44,10 +44,19 @@ WAYS = (*ARRAYS, DEVICE)
 """What places sounds with and without the lexicon; the other two show what calibration is worth."""
 _OUTLIERS = 0.03
 _UNKNOWN = float("nan")
-_RECIPE = 1  # counts up when the measurement changes, so that what is stored is measured again
+_RECIPE = 2  # counts up when the measurement changes, so that what is stored is measured again
 _FRAMES, _SIZE, _FPS = 300, (160, 120), 5.0
 _OVERLAP_S = 0.2
 _AT_M = 0.3
+
+
+def code_of() -> str:
+    """Return a checksum of the code that finds sources: what it has measured is measured again when it changes."""
+    files = [*sorted(Path(sources.__file__).parent.glob("*.py")), Path(sound_sources.__file__)]
+    return sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
+
+
+_CODE = code_of()  # of the code as it was loaded
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,18 +160,12 @@ def measure_home(job: HomeJob, open_spec: Callable[[str], Scene]) -> HomeOutcome
         record_scene(scene, folder / "recording.unfinished", settings, job.seed)
         (folder / "recording.unfinished").rename(recording_path)
     avlmap = _map_of(recording_path, folder / "home.avlmap")
-    facts = (_RECIPE, __version__, avlmap.stored.info.build_key, code_of())
+    facts = (_RECIPE, __version__, avlmap.stored.info.build_key, _CODE)
     done = folder / f"outcome-{sha256(repr(facts).encode()).hexdigest()[:12]}.msgpack"
     if not done.exists():
         home = _Home(job, scene, open_recording(recording_path), read_truth(recording_path), avlmap)
         write_bytes_atomically(done, msgspec.msgpack.encode(home.outcome(folder)))
     return msgspec.msgpack.decode(done.read_bytes(), type=HomeOutcome)
-
-
-def code_of() -> str:
-    """Return a checksum of the code that finds sources: what it has measured is measured again when it changes."""
-    files = [*sorted(Path(sources.__file__).parent.glob("*.py")), Path(sound_sources.__file__)]
-    return sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
 
 
 def _map_of(recorded: Path, path: Path) -> AVLMap:
