@@ -1,5 +1,7 @@
 """What became of things: matched, gone, unknown, new, moved."""
 
+from dataclasses import replace
+
 import msgspec
 import numpy as np
 import pytest
@@ -7,7 +9,7 @@ from test_evidence import BACK, BOX, FRONT, GRID, MIDDLE, NOTHING, SETTINGS, day
 
 from avlmaps.core.errors import MapError
 from avlmaps.days.evidence import DayViews
-from avlmaps.days.life import SeenThing, begun, likeness, lived_on
+from avlmaps.days.life import SeenThing, begun, likeness, lived_on, look_alike
 from avlmaps.days.surfaces import Occupied
 from avlmaps.maps.store.life import Life, life_arrays, read_life
 
@@ -72,6 +74,40 @@ def test_an_alike_thing_elsewhere_is_the_one_that_is_gone() -> None:
 def test_another_one_is_not(other: SeenThing) -> None:
     old, new = moved_to(other)
     assert old.gone == 1 and (old.moved_to, new.moved_from) == (None, None)
+
+
+def followed(cosine: float, visit: int = 1, named: float = 0.2) -> bool:
+    """Return whether a stool is known to be the chair of a visit, the cosine between their looks being this."""
+    wide, place = [*FRONT, (2.0, 1.0, 0.3)], (0.65, 0.15, 0.15)
+    look = np.array([cosine, np.sqrt(1.0 - cosine**2)])
+    before = [views(wide, place, 6.0)] * visit
+    life, features = begun([thing(BOX, "stool")]), {0: np.array([1.0, 0.0])}
+    life = Life.of([msgspec.structs.replace(life.stays[0], gone=visit - 1 or None, confidence=named)], [BOX])
+    new = replace(thing(BOX + AWAY, "chair"), confidence=named, feature=look)
+    at_s = [1e5 * (number + 1) for number in range(visit + 1)]
+    now = day(views(wide, place, 6.0), new.index)
+    stays = lived_on(
+        life, [new], now, before, Occupied.of(BOX, GRID), visit, at_s, GRID, SETTINGS, features=features
+    ).stays
+    return stays[0].moved_to == 1 and stays[1].moved_from == 0
+
+
+def test_what_no_name_fits_is_followed_by_its_looks_from_a_day_to_the_next() -> None:
+    assert followed(0.9) and not followed(0.6), "looks decide where names are doubtful"
+    assert not followed(0.9, named=0.8), "two names that are sure are two things"
+    assert not followed(1.0, visit=2), "gone before this visit, and doubtful"
+
+
+def test_looks_count_less_the_more_they_differ() -> None:
+    cosines = np.linspace(-1.0, 1.0, 21)
+    alike = [look_alike(np.array([1.0, 0.0]), np.array([c, np.sqrt(max(1.0 - c * c, 0.0))])) for c in cosines]
+    assert alike[-1] == 1.0 and np.all(np.diff(alike) > 0.0)
+
+
+def test_a_small_thing_that_is_looked_through_is_gone() -> None:
+    small = BOX[:14]
+    (stay,) = after(begun([thing(small)]), [], views(FRONT, MIDDLE, 4.0), known=small).stays
+    assert stay.gone == 1
 
 
 def test_likeness_is_symmetric_and_one_for_the_same() -> None:

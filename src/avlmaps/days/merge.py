@@ -2,7 +2,7 @@
 
 import math
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from datetime import UTC, date, datetime, timedelta
 from pathlib import Path
@@ -48,6 +48,8 @@ from avlmaps.query.naming import VoxelNamer
 
 ThingsOf = Callable[[AVLMap], Sequence[Thing]]
 _DAY_S = 86_400.0
+_MOSTLY = 0.5  # a thing changed where the other days have no surface at this part of its voxels
+_BESIDE = 2  # voxels: so near to each other two are of one thing
 
 
 def default_things(least: float) -> ThingsOf:
@@ -123,7 +125,8 @@ def merge_maps(
         things += _unnamed_new(other, things, before, known, moved, settings)
     new = [_seen(one, other, moved, visit.shift_s) for one in things]
     at_s = [one.end_s for one in visits]
-    life = lives.lived_on(life, new, now, before, known, number, at_s, grid, settings.changes, same_thing)
+    looks = _looks(life, stored, known)
+    life = lives.lived_on(life, new, now, before, known, number, at_s, grid, settings.changes, same_thing, looks)
     kept = _still_there(stored, known, life, now, number, settings)
     voxels = joined_voxels(stored, kept, other, moved, visit.shift_s, life)
     keyframes = joined_keyframes(stored, other, moved, visit.shift_s)
@@ -217,7 +220,22 @@ def _seen(thing: Thing, stored: StoredMap, map_from_own: Float[np.ndarray, "4 4"
         index, *_ = resampled(index, stored.grid, map_from_own)
     seen_s = float(np.max(np.asarray(stored.voxels.last_seen_s)[thing.rows])) + shift_s
     position = plain_point(apply(map_from_own, np.array(thing.position)))
-    return lives.SeenThing(thing.name, thing.confidence, position, thing.size, thing.color, index, seen_s)
+    look = _look(stored, thing.rows)
+    return lives.SeenThing(thing.name, thing.confidence, position, thing.size, thing.color, index, seen_s, look)
+
+
+def _look(stored: StoredMap, rows: Int[np.ndarray, " r"]) -> Float[np.ndarray, " d"] | None:
+    """Return how some voxels look together, unit norm; None where they have no features."""
+    total = np.asarray(stored.voxels.feature)[rows].astype(np.float64).sum(axis=0)
+    length = float(np.linalg.norm(total))
+    return total / length if length > 0.0 else None
+
+
+def _looks(life: Life, stored: StoredMap, known: Occupied) -> dict[int, Float[np.ndarray, " d"]]:
+    """Return how the things look that are there still, by the number of their stay."""
+    rows = {n: known.row_of(life.voxels(n)) for n, stay in enumerate(life.stays) if stay.gone is None}
+    looks = {number: _look(stored, own[own >= 0]) for number, own in rows.items()}
+    return {number: look for number, look in looks.items() if look is not None}
 
 
 def same_thing(one: str, other: str) -> bool:
@@ -232,12 +250,9 @@ def _with_vanished(
     """Return a life with the surface that the new day looks through and that no thing owns, as things of their own."""
     index, grid = np.asarray(stored.voxels.index), stored.grid
     surface = now.has_surface(grid.centre_of(index))
-    free = (now.views.through(index, grid) >= settings.changes.through_views) & ~surface
-    for number, stay in enumerate(life.stays):
-        if stay.gone is None:
-            rows = known.row_of(life.voxels(number))
-            free[rows[rows >= 0]] = False
-    things = _clusters(stored, np.flatnonzero(free), settings)
+    loose, through = ~surface, now.views.through(index, grid) >= settings.changes.through_views
+    rows = [known.row_of(life.voxels(number)) for number, stay in enumerate(life.stays) if stay.gone is None]
+    things = _clusters(stored, loose, through, [own[own >= 0] for own in rows], settings)
     stamps = np.array([float(np.max(np.asarray(stored.voxels.last_seen_s)[one.rows])) for one in things])
     seen_on = visit_of_stamps(visits[:-1], stamps).tolist()
     begun = [lives.begun([_seen(one, stored, np.eye(4), 0.0)], on) for one, on in zip(things, seen_on, strict=True)]
@@ -258,32 +273,66 @@ def _unnamed_new(
     points = apply(moved, grid.centre_of(np.asarray(other.voxels.index)))
     index = grid.index_of(points)
     through = np.sum([views.through(index, grid) for views in before], axis=0) >= settings.changes.through_views
-    free = through & ~known.near(points)
-    for thing in things:
-        free[thing.rows] = False
-    return _clusters(other, np.flatnonzero(free), settings)
+    return _clusters(other, ~known.near(points), through, [thing.rows for thing in things], settings)
 
 
-def _clusters(stored: StoredMap, rows: Int[np.ndarray, " r"], settings: MergeSettings) -> list[Thing]:
-    """Return the groups of voxels that touch, each as a thing with the likeliest name of its voxels together."""
-    if "pixels" not in stored.info.models or not len(rows):
+def _clusters(
+    stored: StoredMap,
+    loose: Bool[np.ndarray, " n"],
+    through: Bool[np.ndarray, " n"],
+    owned: Sequence[Int[np.ndarray, " r"]],
+    settings: MergeSettings,
+) -> list[Thing]:
+    """Return what changed, each as a thing with the likeliest name of its voxels together.
+
+    Voxels that touch are one thing where rays of another day pass through enough of them; of a group that is too large
+    for a thing, those alone that rays pass through are. What lies beside a thing that changed itself is a part of it.
+
+    Args:
+        stored: the map.
+        loose: voxels where the other days have no surface.
+        through: voxels through which rays of another day pass.
+        owned: the voxels of each thing that has a name.
+        settings: the rule.
+    """
+    index = np.asarray(stored.voxels.index)
+    changed = [rows for rows in owned if loose[rows].mean() > _MOSTLY]
+    parts_of = Occupied.of(
+        np.concatenate([np.zeros((0, 3), np.int32), *(index[rows] for rows in changed)]), stored.grid
+    )
+    loose = loose.copy()
+    for rows in owned:
+        loose[rows] = False
+    if "pixels" not in stored.info.models or not (loose & through).any():
         return []
     wanted, avlmap, namer = settings.changes, AVLMap(stored, edits=()), VoxelNamer(stored)
+    voxel_m = stored.grid.voxel_size_m
     named = np.array([name not in (*STRUCTURE, "other") for name in namer.names])
-    which = linked(np.asarray(stored.voxels.index)[rows], 1)
+
+    def size_m(own: Int[np.ndarray, " k"]) -> Float[np.ndarray, "3"]:
+        return np.ptp(avlmap.space.level(avlmap.space.centres_of(own)), axis=0) + voxel_m
+
+    def groups(rows: Int[np.ndarray, " r"]) -> Iterator[Int[np.ndarray, " k"]]:
+        which = linked(index[rows], _BESIDE)
+        enough = np.bincount(which, weights=through[rows]) >= wanted.least_voxels
+        yield from (rows[which == number] for number in np.flatnonzero(enough))
+
     found: list[Thing] = []
-    for number in np.flatnonzero(np.bincount(which) >= wanted.least_voxels).tolist():
-        own = rows[which == number]
-        points = avlmap.space.centres_of(own)
-        size = np.ptp(avlmap.space.level(points), axis=0) + stored.grid.voxel_size_m
-        if size.max() > wanted.most_m or not named.any():
-            continue
-        share = np.where(named, namer.confidences(own).mean(axis=0), -1.0)
-        best = int(share.argmax())
-        r, g, b = (int(value) for value in np.asarray(stored.voxels.rgb)[own].mean(axis=0).round())
-        middle = points[np.argmin(np.linalg.norm(points - points.mean(axis=0), axis=1))]
-        likely = round(min(float(share[best]), wanted.confident_at - 0.01), 3)
-        found.append(Thing(namer.names[best], likely, plain_point(middle), plain_point(size), (r, g, b), own, points))
+    for whole in groups(np.flatnonzero(loose)):
+        for own in [whole] if size_m(whole).max() <= wanted.most_m else groups(whole[through[whole]]):
+            points, size = avlmap.space.centres_of(own), size_m(own)
+            if size[2] < wanted.lowest_voxels * voxel_m or size.max() > wanted.most_m or not named.any():
+                continue
+            if parts_of.near(points, _BESIDE + 0.5).any():
+                continue
+            share = np.where(named, namer.confidences(own).mean(axis=0), -1.0)
+            best = int(share.argmax())
+            r, g, b = (int(value) for value in np.asarray(stored.voxels.rgb)[own].mean(axis=0).round())
+            middle = points[np.argmin(np.linalg.norm(points - points.mean(axis=0), axis=1))]
+            likely = round(min(float(share[best]), wanted.confident_at - 0.01), 3)
+            found.append(
+                Thing(namer.names[best], likely, plain_point(middle), plain_point(size), (r, g, b), own, points)
+            )
     return found
 
 

@@ -40,9 +40,9 @@ class AlignSettings:
 class ChangeSettings:
     """From depth to what is there, gone, new and moved; see ``evidence`` for the rule."""
 
-    least_coverage: float = 0.3
+    least_coverage: float = 0.15
     """A verdict needs this part of a thing's voxels looked at."""
-    gone_at: float = 0.8
+    gone_at: float = 0.7
     """Gone where it is gone with this probability."""
     patch_m: float = 0.15
     """Voxels of one patch of this edge are not independent: together they count as one look."""
@@ -59,15 +59,18 @@ class ChangeSettings:
     within_s: float = 30 * 86_400.0
     """Nor what comes back after more time."""
     least_likeness: float = 0.3
-    """Of size and colour together, in [0, 1], for a thing to be the one that is gone from elsewhere."""
-    likeness_unnamed: float = 0.6
+    """Of size, colour and looks together, in [0, 1], for a thing to be the one that is gone from elsewhere."""
+    likeness_unnamed: float = 0.5
     """Likewise, where the names differ and one of them has little confidence."""
     confident_at: float = 0.5
     """A name of less confidence does not speak against another."""
-    least_voxels: int = 20
-    """Changed surface that nothing names counts as a thing from this number of voxels that touch."""
+    least_voxels: int = 12
+    """Surface that nothing names counts as a changed thing from this number of voxels that rays pass through on another
+    day."""
     most_m: float = 2.0
     """And up to this extent: longer ones are no thing that somebody carries."""
+    lowest_voxels: float = 2.5
+    """Nor is what is flatter: a table's top of which one day saw a little more."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -42,6 +42,14 @@ def test_what_nobody_could_notice_is_neither_right_nor_wrong() -> None:
     assert sum(counts.right.values()) == sum(counts.wrong.values()) == sum(counts.missed.values()) == 0
 
 
+def test_of_a_move_from_where_nobody_looked_either_end_is_neither_right_nor_wrong() -> None:
+    hidden = Happened("moved", "box", FAR, THERE)
+    said = [Happened("appeared", "box", None, THERE), Happened("gone", "box", FAR, None)]
+    assert sum(judged(said, [], (), [hidden]).wrong.values()) == 0
+    assert sum(judged([Happened("appeared", "box", None, FAR)], [], (), [hidden]).wrong.values()) == 1
+    assert sum(judged(said, [hidden]).wrong.values()) == 2, "where it could be noticed, both are wrong"
+
+
 def test_only_what_was_seen_counts_as_happened() -> None:
     changes = [
         Change(1, "removed", "box#1", "box", HERE, None), Change(1, "added", "bag#day1.1", "bag", None, THERE),

@@ -130,10 +130,16 @@ def judged(
         said: by the map.
         true: what happened.
         neither: places of changes that are neither right nor wrong to name (a door that swung).
-        hidden: likewise, changes that happened where nobody looked.
+        hidden: likewise, changes that happened where nobody looked; of a move also either end by itself.
         named: whether the name must fit.
     """
     counts = Counts()
+    ends = [
+        Happened(kind, one.name, before, after)
+        for one in hidden
+        if one.kind == "moved"
+        for kind, before, after in (("gone", one.before, None), ("appeared", None, one.after))
+    ]
     fits = np.array([[_fits(one, other, named) for other in true] for one in said]).reshape(len(said), len(true))
     rows, columns = linear_sum_assignment(-fits.astype(float))
     matched = [(int(i), int(j)) for i, j in zip(rows, columns, strict=True) if fits[i, j]]
@@ -145,7 +151,7 @@ def judged(
     right = {row for row, _ in matched}
     for number, one in enumerate(said):
         excused = any(_near(place, one.after or one.before) for place in neither)
-        if number not in right and not excused and not any(_fits(one, other, named) for other in hidden):
+        if number not in right and not excused and not any(_fits(one, other, named) for other in (*hidden, *ends)):
             counts.wrong[one.kind] += 1
     return counts
 

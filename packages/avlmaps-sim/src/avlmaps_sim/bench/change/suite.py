@@ -48,10 +48,11 @@ NOTE = (
     "are merged in their order. A change is right with its kind, a fitting name and its places within 0.5 m. Happened: "
     "to things that the walks saw before and after. Noticeable: in three frames at least, depth goes through the "
     "middle of where the thing was, or of where it appeared before that; the others, and doors that swung, are neither "
-    "right nor wrong to name. True perception: things are the voxels of the scene's own things, and all else is ours. "
-    "On the last day: stale is what is listed where such a thing stood on an earlier day and does so no more; a ghost "
-    "is listed where nothing stands; known are true things that some day saw. Rebuilt: the last day's map alone; never "
-    "forgets: all that was ever listed. Lost: of the first day's things that never changed, those said to be gone."
+    "right nor wrong to name, also on a later day; of a move where its old place was not seen, neither is its end. "
+    "True perception: things are the voxels of the scene's own things, and all else is ours. On the last day: stale is "
+    "what is listed where such a thing stood on an earlier day and does so no more; a ghost is listed where nothing "
+    "stands; known are true things that some day saw. Rebuilt: the last day's map alone; never forgets: all that was "
+    "ever listed. Lost: of the first day's things that never changed, those said to be gone."
 )
 TRUE, OURS = "true perception", "ours"
 MERGED, REBUILT, FOREVER = "merged", "rebuilt from the last day", "never forgets"
@@ -173,7 +174,7 @@ def _lived(
     """Merge the days of a home and judge what is said on each."""
     result = HomeResult(scene, area_m2=_floor_m2(places[0]))
     merged = places[0].avlmap.stored
-    names_before = set(seen[0])
+    names_before, hidden = set(seen[0]), list[Happened]()
     for day, place in enumerate(places[1:], 1):
         begin_s = perf_counter()
         folder = place.job.folder / f"merged-{'true' if way == TRUE else 'ours'}-{day}.avlmap"
@@ -195,7 +196,7 @@ def _lived(
         result.happened.update(one.kind for one in true)
         noticeable = _noticeable(true, places[: day + 1])
         doors = [one.before for one in changes if one.day == day and one.kind == "swung" and one.before is not None]
-        hidden = [one for one in true if one not in noticeable]
+        hidden += [one for one in true if one not in noticeable]  # a later day may notice it
         result.counts.add(judged(said, noticeable, doors, hidden))
         result.unnamed.add(judged(said, noticeable, doors, hidden, named=False))
         names_before |= seen[day]
