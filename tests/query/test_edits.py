@@ -17,6 +17,7 @@ from walled_rooms import two_rooms_index
 
 from avlmaps.core.errors import MapError, QueryError
 from avlmaps.core.poses import apply as moved
+from avlmaps.core.poses import plain_point
 from avlmaps.language.commands import read_command
 from avlmaps.language.intents import targets_of
 from avlmaps.language.own_names import stand_ins
@@ -301,6 +302,18 @@ def test_a_room_that_is_no_more_is_reported() -> None:
     m = two_named_rooms([gone, nook])
     assert [one.edit.name for one in m.edited.lost] == ["studio", "den"]
     assert [room.name for room in m.rooms()] == [room.name for room in raw.rooms()]
+
+
+def test_a_room_is_found_by_its_outline_where_its_middle_lies_in_another() -> None:
+    raw = two_named_rooms(())
+    (kitchen,) = (room for room in raw.rooms() if room.name == "kitchen")
+    (bedroom,) = (room for room in raw.rooms() if room.name == "bedroom")
+    moved_away = Spot(name="kitchen", middle=bedroom.position, corners=tuple(map(plain_point, kitchen.outline)))
+    m = two_named_rooms([Edit.new("rename room", [moved_away], name="studio", made=DAY)])
+    assert not m.edited.lost
+    assert {room.name: room.position for room in m.rooms()} == {
+        "studio": kitchen.position, "bedroom": bedroom.position,
+    }  # fmt: skip
 
 
 # Own names in sentences.

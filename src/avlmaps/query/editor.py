@@ -94,7 +94,7 @@ class Editor:
         """
         found = [self._thing(None, place) for place in things]
         if len({int(one.rows[0]) for one in found}) < 2:
-            raise QueryError(f"{len(found)} places mean fewer than two things; give a place on each that is merged.")
+            raise QueryError(f"{len(found)} place(s) mean fewer than two things; give a place on each that is merged.")
         spots = [self._map.edited.spot_of(one.name, one.rows) for one in found]
         return self._add("merge", spots, name=_name(to) if to else "", by=by)
 

@@ -17,10 +17,15 @@ from avlmaps.query.raster import in_polygon
 if TYPE_CHECKING:
     from avlmaps.maps.obstacles import ForbiddenArea
 
-_SAME_BOX = 0.5  # share of two boxes together that both hold: certainly one thing
+_SAME_BOX = 0.5
+"""Share of two boxes together that both hold from which they are certainly one thing: measured as ``ALIKE_BOX``, 71 of
+94 right pairs have it and none of 110 wrong ones (.34 at most); the half of a thing has no more."""
 HALF = 0.5  # of its voxels: then a thing is in the claim
 _SPECK = 0.05  # share of a thing; smaller pieces belong to the nearest larger one
 _SAME_ROOM = 0.25
+"""Share of a room's outline and a region together that both hold: perhaps one room. On the maps of ``ALIKE_BOX`` the
+regions that are most like the 16 rooms have .39 to .97, and those of other rooms .15 at most. A region that holds the
+room's middle may have less: one room was split in the rebuild, .36 and .57."""
 _POSSESSIVES = ("the ", "a ", "an ", "my ", "your ", "our ")
 _DONE = {"rename": "named", "rename room": "named", "merge": "made one thing", "split": "split", "pin": "named",
          "forbid": "forbidden"}  # fmt: skip
@@ -166,8 +171,11 @@ class FoundEdits:
         found: dict[int, Edit] = {}
         for edit in edits:
             spot = edit.at[0].now(self._map.stored.keyframes)
-            number = -1 if regions is None else int(regions.at(np.array([spot.middle]))[0])
-            if regions is None or number < 0 or regions.share_of(number, np.array(spot.corners)) < _SAME_ROOM:
+            share = np.zeros(1)
+            if regions is not None and len(regions) and spot.corners:
+                share = regions.shares_of(np.array(spot.middle), np.array(spot.corners))
+            number = int(share.argmax())
+            if share[number] < _SAME_ROOM:
                 self._lose(edit, f"no room like the {spot.name} is at {place_text(spot.middle)} any more")
             else:
                 found[number] = edit

@@ -245,19 +245,21 @@ class RoomRegions:
         place[-1] = NONE  # no region: of points outside, and of rooms that are groups of views
         return place[self.at(points_world)]
 
-    def share_of(self, number: int, corners_world: Float[np.ndarray, "k 3"]) -> float:
-        """Return which share of a room and of an area on its floor together both hold, in [0, 1].
+    def shares_of(
+        self, middle_world: Float[np.ndarray, "3"], corners_world: Float[np.ndarray, "k 3"]
+    ) -> Float[np.ndarray, " r"]:
+        """Return for each room which share of it and of an area together both hold, in [0, 1].
 
         Args:
-            number: of the room.
+            middle_world: of the area, metres: on its storey.
             corners_world: of the area, metres.
         """
-        storey = int(self._boxes[0][number])
-        grid, own = self.grids[storey], self.labels[storey] == number
-        level = self.plan.space.level(np.asarray(corners_world, np.float64))
-        middle = grid.level_of(np.argwhere(np.ones(own.shape, bool)) + 0.5)
-        inside = in_polygon(middle, level[:, :2]).reshape(own.shape)
-        return float(np.count_nonzero(inside & own) / max(np.count_nonzero(inside | own), 1))
+        storey = int(self.plan.storeys_of(middle_world[None])[0])
+        grid, label = self.grids[storey], self.labels[storey]
+        cells = grid.level_of(np.argwhere(np.ones(label.shape, bool)) + 0.5)
+        inside = in_polygon(cells, self.plan.space.level(corners_world)[:, :2]).reshape(label.shape)
+        both, own = (np.bincount(label[of & (label >= 0)], minlength=len(self)) for of in (inside, label >= 0))
+        return both / np.maximum(own + np.count_nonzero(inside) - both, 1)
 
     @cached_property
     def of_plan_cells(self) -> Int[np.ndarray, " c"]:
