@@ -69,3 +69,19 @@ def test_what_into_needs_is_said(run, walk: Path, tmp_path: Path, words: tuple[s
     code, _, err = run("live", walk, "--out", "today.avlmap", *words)
     assert code == 2
     assert "--into" in err
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--rate", "2", "--as-fast-as-possible"), "do not go together"),
+        (("--rate", "inf"), "--rate is inf"),
+        (("--give-up-s", "-5"), "--give-up-s is -5"),
+    ],
+)
+def test_options_that_contradict_are_refused(
+    run, walk: Path, tmp_path: Path, words: tuple[str, ...], said: str
+) -> None:
+    code, _, err = run("live", walk, "--out", tmp_path / "no.avlmap", *words)
+    assert code == 2 and said in err
+    assert not (tmp_path / "no.avlmap").exists()

@@ -105,8 +105,8 @@ def test_a_full_disk_is_one_sentence_and_leaves_no_rubbish(tmp_path: Path, monke
     with pytest.raises(MapError) as fault:
         write_array(tmp_path, "a", np.zeros(3))
     assert str(fault.value) == (
-        f"Cannot write {tmp_path}: No space left on device; make room or choose another folder, then run the same "
-        "build again: the finished stages are stored."
+        f"Cannot write {tmp_path}: No space left on device; make room or choose another folder. A build that "
+        "stopped continues from its finished stages."
     )
     assert not list(tmp_path.iterdir())
 

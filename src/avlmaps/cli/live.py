@@ -92,8 +92,12 @@ def _live(verb: Live) -> dict[str, Any]:
     from avlmaps.maps.settings import BuildSettings
 
     begin_s = perf_counter()
-    if not verb.rate > 0.0:
+    if not 0.0 < verb.rate < float("inf"):
         raise UsageError(f"--rate is {verb.rate:g}; choose a positive number, or --as-fast-as-possible.")
+    if verb.as_fast_as_possible and verb.rate != 1.0:
+        raise UsageError("--rate and --as-fast-as-possible do not go together; choose one of them.")
+    if not verb.give_up_s > 0.0:
+        raise UsageError(f"--give-up-s is {verb.give_up_s:g}; choose a positive number of seconds.")
     first = _days_before(verb)
     used = choose_models(verb.profile, [word for words in verb.model for word in words])
     up_in_world, play = _robot(verb) if verb.source == "ros2" else _recording(verb)

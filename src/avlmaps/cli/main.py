@@ -131,7 +131,7 @@ def _run(verb: "Verb") -> int:
     except KeyboardInterrupt as stop:
         if (status := getattr(stop, "status", None)) is not None:  # of a robot that was driving; its answer is printed
             return _complain(stop, status)
-        return _fail(verb, stop, "stopped; the same command continues where this one ended, where it can", 130)
+        return _fail(verb, stop, "stopped; a build continues where it ended, by the same command", 130)
     except Exception as fault:
         if isinstance(fault, BrokenPipeError) and reader_gone():
             return READER_GONE

@@ -30,7 +30,10 @@ class Sound:
 
     def __post_init__(self) -> None:
         if self.samples.ndim != 1 or self.samples.dtype != np.float32:
-            raise ValueError(f"samples are {self.samples.dtype} of {self.samples.shape}; they must be float32 of (n,)")
+            raise ValueError(
+                f"samples are {self.samples.dtype} of {self.samples.shape}; they must be float32 of (n,) in [-1, 1]: "
+                "of several channels the first, of 16 bits divided by 32768"
+            )
         if self.rate_hz < 1:
             raise ValueError(f"rate_hz is {self.rate_hz}; it must be positive")
 

@@ -9,6 +9,7 @@ from avlmaps.core.arrays import Float, UInt8
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.poses import orthonormalize
+from avlmaps.recordings.plausible import date_fault
 from avlmaps.recordings.types import Frame
 
 # A picture whose middle depth is farther than this was given in millimetres: 0.2 m of them are more.
@@ -50,6 +51,8 @@ def given_frame(
         pose = given
     if not _is_finite(stamp_s):
         raise RecordingError(f"stamp_s of {name} must be a finite number of seconds, not {stamp_s!r}.")
+    if fault := date_fault(np.array([float(stamp_s)]), "frames"):
+        raise RecordingError(fault)
     return Frame(index, name, float(stamp_s), colours, depths, pose, rig)
 
 
