@@ -23,7 +23,8 @@ def test_a_name_holds_in_every_front_until_it_is_undone(home: Path, run, tmp_pat
     first = things[0]
     at = ",".join(str(value) for value in first["position"])
     status, out, _ = run("edit", home, "--rename", first["name"], "--at", at, "--to", "zorb", "--by", "Anna")
-    assert status == 0 and out.startswith(f"The {first['name']} is called zorb from now on (named by Anna on ")
+    assert status == 0 and out.startswith(f"The {first['name']} at (")
+    assert " m is called zorb from now on (named by Anna on " in out
     assert run("edit", home, "--pin", "my pad", "--at", "0.5,0.5,0.1")[0] == 0
     answer = json.loads(run("query", home, "where is the zorb?", "--json")[1])
     assert answer["found"] and any(note.startswith("The zorb was named by Anna on ") for note in answer["notes"])

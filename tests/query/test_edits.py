@@ -408,6 +408,10 @@ def test_the_editor_says_what_it_cannot_do(tmp_path: Path) -> None:
         (lambda: m.edit.forbid("x", box=(0.0, 0.0, 0.0, 5.0)), "has no area"),
         (lambda: m.edit.forbid("x", room="kitchen"), "no floor plan"),
         (lambda: m.edit.pin("dock", "nowhere"), "A place is x,y"),
+        (lambda: m.edit.pin("dock", (500.0, 1.0)), "m outside of the map, which goes from"),
+        (lambda: m.edit.forbid("x", box=(900.0, 900.0, 901.0, 901.0)), "m outside of the map"),
+        (lambda: m.edit.rename("table", "table"), "called so already"),
+        (lambda: m.edit.merge((0.6, 0.6), (5.1, 3.1)), "from the others, more than 3 m"),
         (lambda: m.edit.undo(), "no edit in force"),
         (lambda: m.edit.undo("12345678"), "no edit '12345678'"),
     ):

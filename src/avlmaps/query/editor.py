@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 Place = Sequence[float] | str
 """x, y, z in metres of the recording frame, or x, y of the level frame; as numbers or as text."""
 _NEAR_M = 1.0  # how far from a thing a place may lie that means it
+_BESIDE_M = 5.0  # how far outside of the map a pinned place or a forbidden area may lie
+_APART_M = 3.0  # how far apart the boxes of things that are one may be
 _MOST_NAMED = 8
 
 
@@ -63,8 +65,10 @@ class Editor:
             QueryError: there is no such thing, or there are several, or the name is none.
             MapError: the map lies in memory alone, or cannot be written.
         """
-        found = self._thing(thing, at)
-        return self._add("rename", [self._map.edited.spot_of(found.name, found.rows)], name=_name(to), by=by)
+        found, to = self._thing(thing, at), _name(to)
+        if found.name == to:
+            raise QueryError(f"The {to} at {place_text(found.position)} is called so already.")
+        return self._add("rename", [self._map.edited.spot_of(found.name, found.rows)], name=to, by=by)
 
     def rename_room(self, room: str, to: str, *, by: str = "") -> Edit:
         """Give a room another name: "this room is the studio".
@@ -89,12 +93,19 @@ class Editor:
             by: who says so.
 
         Raises:
-            QueryError: fewer than two different things are meant.
+            QueryError: fewer than two different things are meant, or they lie far apart.
             MapError: see ``rename``.
         """
         found = [self._thing(None, place) for place in things]
         if len({int(one.rows[0]) for one in found}) < 2:
             raise QueryError(f"{len(found)} place(s) mean fewer than two things; give a place on each that is merged.")
+        for one in found:
+            nearest_m = min(_gap_m(one, other) for other in found if other.rows[0] != one.rows[0])
+            if nearest_m > _APART_M:
+                raise QueryError(
+                    f"The {one.name} at {place_text(one.position)} is {nearest_m:.1f} m from the others, more than "
+                    f"{_APART_M:g} m; things that are one touch or nearly do."
+                )
         spots = [self._map.edited.spot_of(one.name, one.rows) for one in found]
         return self._add("merge", spots, name=_name(to) if to else "", by=by)
 
@@ -146,12 +157,15 @@ class Editor:
             by: who says so.
 
         Raises:
-            QueryError: neither or both are given, the box is none, or there is no such room.
+            QueryError: neither or both are given, the box is none or far outside of the map, or there is no such room.
             MapError: see ``rename``.
         """
         if bool(box) == (room is not None):
             raise QueryError("An area is forbidden by a box x0,y0,x1,y1 or by a room; give one of them.")
-        spot = self._room(room) if room is not None else self._area(_corners(box))
+        corners = [] if room is not None else _corners(box)
+        if corners:
+            self._require_here(np.array(corners), "The box")
+        spot = self._room(room) if room is not None else self._area(corners)
         return self._add("forbid", [spot], name=_name(name), by=by)
 
     def pin(self, name: str, at: Place, *, by: str = "") -> Edit:
@@ -163,10 +177,11 @@ class Editor:
             by: who says so.
 
         Raises:
-            QueryError: the place or the name is none.
+            QueryError: the place or the name is none, or the place lies far outside of the map.
             MapError: see ``rename``.
         """
         numbers = place_given(at)
+        self._require_here(self._level(at)[None], "The place")
         place = numbers if len(numbers) == 3 else self._map.space.world(np.append(numbers, self._floor_m()))
         return self._add(
             "pin", [Spot(middle=plain_point(place)).anchored(self._map.stored.keyframes)], name=_name(name), by=by
@@ -229,6 +244,19 @@ class Editor:
         """Return how far a thing's voxels lie from a place: in space, or level where the place has no height."""
         points = thing.points if len(place) == 3 else self._map.space.level(thing.points)[:, :2]
         return float(np.linalg.norm(points - place, axis=1).min())
+
+    def _require_here(self, level: Float[np.ndarray, "n 2"], what: str) -> None:
+        """Raise ``QueryError`` where the box round level points is far outside of the map."""
+        centres = self._map.space.level_centres()[:, :2]
+        if not len(centres):
+            return
+        low, high = centres.min(axis=0), centres.max(axis=0)
+        gap = np.maximum(np.maximum(level.min(axis=0) - high, low - level.max(axis=0)), 0.0)
+        if (away_m := float(np.linalg.norm(gap))) > _BESIDE_M:
+            raise QueryError(
+                f"{what} lies {away_m:.1f} m outside of the map, which goes from {place_text(low)} to "
+                f"{place_text(high)} on the plan (level frame); give x and y in metres."
+            )
 
     def _room(self, room: str) -> Spot:
         """Return the room that is meant."""
@@ -333,7 +361,7 @@ def edit_text(edit: Edit) -> str:
     """Return what an edit did, in one sentence."""
     if edit.does == "undo":
         return f"Edit {edit.of} is undone."
-    before = " and the ".join(one.name for one in edit.at if one.name)
+    before = " and the ".join(f"{one.name} at {place_text(one.middle)}" for one in edit.at if one.name)
     match edit.does:
         case "rename" | "rename room":
             what = f"The {before} is called {edit.name}"
@@ -346,6 +374,13 @@ def edit_text(edit: Edit) -> str:
         case _:
             what = f"{edit.name} is at {place_text(edit.at[0].middle)}"
     return f"{what} from now on ({said(edit)}, edit {edit.id})."
+
+
+def _gap_m(one: "Thing", other: "Thing") -> float:
+    """Return how far apart the boxes of two things are."""
+    low, high = one.points.min(axis=0), one.points.max(axis=0)
+    gap = np.maximum(other.points.min(axis=0) - high, low - other.points.max(axis=0))
+    return float(np.linalg.norm(np.maximum(gap, 0.0)))
 
 
 def _name(name: str) -> str:
