@@ -296,7 +296,7 @@ def _clusters(
         settings: the rule.
     """
     index = np.asarray(stored.voxels.index)
-    changed = [rows for rows in owned if loose[rows].mean() > _MOSTLY]
+    changed = [rows for rows in owned if loose[rows].sum() > _MOSTLY * len(rows)]
     parts_of = Occupied.of(
         np.concatenate([np.zeros((0, 3), np.int32), *(index[rows] for rows in changed)]), stored.grid
     )

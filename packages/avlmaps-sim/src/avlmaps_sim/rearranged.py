@@ -58,24 +58,25 @@ class Change:
     after: Triple | None
 
 
-def rearranged(scene: Scene, day: int, which: Families = "all") -> tuple[Scene, tuple[Change, ...]]:
-    """Return a building on a later day, and all changes since day 0 in their order.
+def rearranged(scene: Scene, day: int, which: Families = "all", since: int = 0) -> tuple[Scene, tuple[Change, ...]]:
+    """Return a building on a later day, and all changes since the day of the scene in their order.
 
     The same scene and day give the same building; the changes of day 2 begin with those of day 1.
 
     Args:
-        scene: on day 0.
-        day: 0 or more.
+        scene: on the day ``since``.
+        day: not before that.
         which: families of shapes of what is brought.
+        since: 0 or more; day 0 is the scene as it was made.
 
     Raises:
         ValueError: the day is before the first.
     """
-    if day < 0:
-        raise ValueError(f"day {day} lies before day 0, on which the scene was made")
+    if day < since:
+        raise ValueError(f"day {day} lies before day {since}, on which the scene was made")
     named = int.from_bytes(sha256(scene.name.encode()).digest()[:4], "little")
     changes: list[Change] = []
-    for number in range(1, day + 1):
+    for number in range(since + 1, day + 1):
         scene, new = _next_day(scene, number, np.random.default_rng([named, 0xDA7, number]), which)
         changes += new
     return scene, tuple(changes)

@@ -1,6 +1,7 @@
 """Scenes by name: `house:12`, `office:3`, `house:12:held-out`, `house:12:lived-in`, `house:12:day-3`, a file."""
 
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -44,8 +45,18 @@ def open_changed(spec: str) -> tuple[Scene, tuple[Change, ...]]:
     before, day = _day_of(spec)
     if day is None or Path(spec).exists():
         return _opened(spec), ()
-    scene, changes = rearranged(_opened(before), day, _families_of(before))
+    scene, changes = _rearranged(before, day)
     return replace(scene, name=spec), changes
+
+
+@lru_cache(maxsize=2)  # days are mostly opened one after the other, and each follows from the one before
+def _rearranged(before: str, day: int) -> tuple[Scene, tuple[Change, ...]]:
+    """Return a scene some days later, and what changed since day 0."""
+    if day == 0:
+        return _opened(before), ()
+    scene, changes = _rearranged(before, day - 1)
+    scene, new = rearranged(scene, day, _families_of(before), day - 1)
+    return scene, (*changes, *new)
 
 
 def on_day(spec: str, day: int) -> str:

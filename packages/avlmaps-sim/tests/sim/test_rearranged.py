@@ -104,6 +104,9 @@ def test_the_same_day_is_the_same_scene_and_its_truth_is_json(scene: Scene, days
     one, changes = days[2]
     other, again = rearranged(scene, 2)
     assert changes == again and np.array_equal(one.mesh.vertex, other.mesh.vertex)
+    first, earlier = days[1]
+    other, later = rearranged(first, 2, since=1)
+    assert changes == (*earlier, *later) and np.array_equal(one.mesh.vertex, other.mesh.vertex)
     assert [entry["name"] for entry in json.loads(json.dumps(to_json(changes)))] == [one.name for one in changes]
     with pytest.raises(ValueError, match="day -1"):
         rearranged(scene, -1)

@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -127,11 +127,16 @@ def _home(job: SceneJob, days: int, open_spec: Callable[[str], Scene]) -> dict[s
     """Return the results of a home, by perception."""
     jobs = [replace(job, spec=on_day(job.spec, day)) for day in range(days)]
     places = [Workplace(jobs[0], open_spec), *(TurnedPlace(TurnedJob.of(one), open_spec) for one in jobs[1:])]
+    seen = [_seen_names(place) for place in places]  # each day is opened from the one before
     changes = open_changed(jobs[-1].spec)[1]
-    seen = [_seen_names(place) for place in places]
     results: dict[str, HomeResult] = {}
+
+    @cache  # of both perceptions
+    def noticeable(day: int, true: tuple[Happened, ...]) -> list[Happened]:
+        return _noticeable(true, places[: day + 1])
+
     for way, things_of in ((TRUE, _true_things(places)), (OURS, default_things(0.5))):
-        results[way] = _lived(job.spec, places, changes, seen, things_of, way)
+        results[way] = _lived(job.spec, places, changes, seen, things_of, way, noticeable)
     return results
 
 
@@ -170,6 +175,7 @@ def _lived(
     seen: Sequence[set[str]],
     things_of: ThingsOf,
     way: str,
+    noticeable_on: Callable[[int, tuple[Happened, ...]], list[Happened]],
 ) -> HomeResult:
     """Merge the days of a home and judge what is said on each."""
     result = HomeResult(scene, area_m2=_floor_m2(places[0]))
@@ -194,7 +200,7 @@ def _lived(
         said = said_changes(Days.of(merged), len(merged.info.visits) - 1)
         true = true_changes(changes, day, sorted(names_before), sorted(seen[day]))
         result.happened.update(one.kind for one in true)
-        noticeable = _noticeable(true, places[: day + 1])
+        noticeable = noticeable_on(day, tuple(true))
         doors = [one.before for one in changes if one.day == day and one.kind == "swung" and one.before is not None]
         hidden += [one for one in true if one not in noticeable]  # a later day may notice it
         result.counts.add(judged(said, noticeable, doors, hidden))
