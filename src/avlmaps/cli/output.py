@@ -17,6 +17,12 @@ class UsageError(Exception):
     """The words of a command do not fit together; exit status 2."""
 
 
+def require_share(least: float, what: str) -> None:
+    """Refuse a ``--least`` that is no probability or confidence."""
+    if not 0.0 <= least <= 1.0:
+        raise UsageError(f"--least takes a {what} from 0 to 1, not {least:g}.")
+
+
 class AnsweredError(Exception):
     """A verb failed and its answer, which is printed already, says why.
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from tyro.conf import Positional, arg
 
-from avlmaps.cli.output import UsageError, emit
+from avlmaps.cli.output import emit, require_share
 from avlmaps.cli.things import room_lines
 from avlmaps.cli.verb import ModelVerb
 from avlmaps.core.frames import FrameName
@@ -51,8 +51,7 @@ def rooms(verb: Rooms, opened: "AVLMap | None" = None) -> dict[str, Any]:
     from avlmaps.query.frames import answer_in
     from avlmaps.query.selection import MapLists
 
-    if not 0.0 <= verb.least <= 1.0:
-        raise UsageError(f"--least takes a probability from 0 to 1, not {verb.least:g}.")
+    require_share(verb.least, "probability")
     opened = AVLMap.open(verb.map) if opened is None else opened
     listed: dict[str, Any] = {"map": str(verb.map), "frame": FRAME, "rooms": MapLists(opened).rooms(verb.least)}
     if doubts := opened.stored.info.doubts:

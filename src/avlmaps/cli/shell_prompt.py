@@ -1,6 +1,5 @@
 """The prompt of `avlmaps shell`, with its history; needs prompt-toolkit."""
 
-import os
 import signal
 from pathlib import Path
 
@@ -10,6 +9,7 @@ from prompt_toolkit.history import FileHistory, InMemoryHistory
 from prompt_toolkit.output import create_output
 
 from avlmaps.cli.shell_lines import YES, checked
+from avlmaps.core.files import state_file
 from avlmaps.core.progress import say
 
 _MOST_HISTORY_BYTES = 1_000_000
@@ -56,10 +56,8 @@ class PromptLines:
 
 
 def history_path() -> Path:
-    """Return the file of the history, in the state folder of the XDG base directories."""
-    named = Path(os.environ.get("XDG_STATE_HOME", ""))
-    state = named if named.is_absolute() else Path.home() / ".local" / "state"
-    return state / "avlmaps" / "shell_history"
+    """Return the file of the history, in the user's state folder."""
+    return state_file("shell_history")
 
 
 def _history() -> FileHistory | InMemoryHistory:

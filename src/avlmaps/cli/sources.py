@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from tyro.conf import Positional, arg
 
-from avlmaps.cli.output import UsageError, emit, place, table_lines
+from avlmaps.cli.output import emit, place, require_share, table_lines
 from avlmaps.cli.verb import ModelVerb
 
 if TYPE_CHECKING:
@@ -49,8 +49,7 @@ def list_sources(verb: Sources) -> dict[str, Any]:
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.frames import answer_in
 
-    if not 0.0 <= verb.least <= 1.0:
-        raise UsageError(f"--least takes a confidence from 0 to 1, not {verb.least:g}.")
+    require_share(verb.least, "confidence")
     opened = AVLMap.open(verb.map)
     found = opened.sources(verb.sound, prior=verb.prior == "lexicon", least=verb.least)
     listed = {"map": str(verb.map), "frame": FRAME, "sources": [one.to_json() for one in found]}

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from tyro.conf import Positional, arg
 
-from avlmaps.cli.output import UsageError, emit, place, table_lines
+from avlmaps.cli.output import UsageError, emit, place, require_share, table_lines
 from avlmaps.cli.verb import ModelVerb
 from avlmaps.core.frames import FrameName
 from avlmaps.core.progress import say
@@ -73,8 +73,7 @@ def contents(verb: Things, opened: "AVLMap | None" = None) -> dict[str, Any]:
     from avlmaps.query.frames import answer_in
     from avlmaps.query.selection import MapLists, Wanted, page_of_things
 
-    if not 0.0 <= verb.least <= 1.0:
-        raise UsageError(f"--least takes a confidence from 0 to 1, not {verb.least:g}.")
+    require_share(verb.least, "confidence")
     if min(verb.page, 1 if verb.top is None else verb.top) < 1:
         raise UsageError("--top and --page take a number from 1 on.")
     opened = AVLMap.open(verb.map) if opened is None else opened

@@ -37,6 +37,12 @@ _KINDS = (
 )
 
 
+def state_file(name: str) -> Path:
+    """Return a file of avlmaps in the user's state folder (XDG)."""
+    named = Path(os.environ.get("XDG_STATE_HOME", ""))
+    return (named if named.is_absolute() else Path.home() / ".local" / "state") / "avlmaps" / name
+
+
 class RefusedFileError(OSError):
     """A file that is not read: it is not a regular file, or larger than its kind may be; ``strerror`` says why."""
 

@@ -21,10 +21,10 @@ from avlmaps.maps.pipeline.cluster_jobs import (
     reopened,
     require_same_software,
     require_seen,
+    show_token,
     software,
 )
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
-from avlmaps.maps.store.array_files import explain_write_errors
 from avlmaps.maps.store.manifest_file import MANIFEST
 from avlmaps.maps.store.reader import StoredMap, open_stored
 from avlmaps.perception.cache.feature_store import DEFAULT_CACHE, CacheSettings
@@ -111,9 +111,7 @@ def _build_each(
 ) -> None:
     """Let each recording be built by one worker."""
     token = paths[0].parent.absolute() / f".cluster-{secrets.token_hex(8)}"
-    with explain_write_errors(token.parent):
-        token.parent.mkdir(parents=True, exist_ok=True)
-        token.touch()
+    show_token(token)
     models, known = Models.of(encoders, cache), software()
     jobs = [
         BuildJob(reopen, path.absolute(), models, settings, allow, overwrite, known, token)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from avlmaps.core.arrays import Float32
+from avlmaps.core.arrays import Float, Float32
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.poses import apply
 
@@ -22,11 +22,21 @@ def depth_in_colour(depth_m: Float32[np.ndarray, "hd wd"], rig: Rig) -> tuple[Pi
     x = (column + 0.5 - rig.depth.cx) / rig.depth.fx * z
     y = (row + 0.5 - rig.depth.cy) / rig.depth.fy * z
     points = apply(rig.rgb_from_depth, np.stack([x, y, z], axis=1))
-    points = points[points[:, 2] > 0.0]
-    target = np.floor(camera.project(points)).astype(np.int64)
-    inside = ((target >= 0) & (target < (camera.width, camera.height))).all(axis=1)
-    seen = np.full(camera.height * camera.width, np.inf, np.float32)
-    cell = target[inside, 1] * camera.width + target[inside, 0]
-    np.minimum.at(seen, cell, points[inside, 2].astype(np.float32))
+    seen = nearest_depth(points[points[:, 2] > 0.0], camera)
     seen[np.isinf(seen)] = 0.0
-    return camera, seen.reshape(camera.height, camera.width)
+    return camera, seen
+
+
+def nearest_depth(points_camera: Float[np.ndarray, "n 3"], camera: Pinhole) -> Float32[np.ndarray, "h w"]:
+    """Return the z-depth of the nearest point in each pixel, metres; infinite where there is none.
+
+    Args:
+        points_camera: metres, in front of the camera.
+        camera: that sees them.
+    """
+    pixel = np.floor(camera.project(points_camera)).astype(np.int64)
+    inside = ((pixel >= 0) & (pixel < (camera.width, camera.height))).all(axis=1)
+    depth_m = np.full(camera.height * camera.width, np.inf, np.float32)
+    at = pixel[inside, 1] * camera.width + pixel[inside, 0]
+    np.minimum.at(depth_m, at, points_camera[inside, 2].astype(np.float32))
+    return depth_m.reshape(camera.height, camera.width)

@@ -32,6 +32,7 @@ from avlmaps.language.learned.linear import (
 )  # fmt: skip
 from avlmaps.language.lexer import Token
 from avlmaps.perception.embedded.words import words_checksum
+from avlmaps.perception.models.networks import open_network
 
 _BEAM = 4
 _MOST_TOKENS = 100
@@ -87,8 +88,6 @@ class LearnedReader:
         Raises:
             BackendError: a file is missing, or was made for another version of the word table or the word classes.
         """
-        import onnxruntime
-
         try:
             facts = json.loads(folder.joinpath("reader.json").read_text(encoding="utf-8"))
             graphs = [folder.joinpath(f"{name}.onnx").read_bytes() for name in ("words", "step")]
@@ -100,12 +99,7 @@ class LearnedReader:
         _check(facts)
         self._vocabulary = {word: at for at, word in enumerate(facts["vocabulary"], start=1)}
         self.limits = Limits(**facts.get("limits", {}))
-        options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = options.inter_op_num_threads = 1
-        options.log_severity_level = 3
-        self._words, self._step = (
-            onnxruntime.InferenceSession(graph, options, providers=["CPUExecutionProvider"]) for graph in graphs
-        )
+        self._words, self._step = map(open_network, graphs)
 
     def command(self, tokens: Sequence[Token]) -> list[Read]:
         """Return the readings of a command, the likeliest first; none where it is empty or too long."""

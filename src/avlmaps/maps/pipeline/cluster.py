@@ -26,6 +26,7 @@ from avlmaps.maps.pipeline.cluster_jobs import (
     add_job,
     describe_job,
     fuse_job,
+    show_token,
     software,
     token_file,
 )
@@ -33,7 +34,6 @@ from avlmaps.maps.pipeline.encode_fuse import Tolerance
 from avlmaps.maps.pipeline.keyframes import KeyframeLots
 from avlmaps.maps.pipeline.parts import MapPart, load_part, sum_parts
 from avlmaps.maps.pipeline.plan import BuildPlan, Span
-from avlmaps.maps.store.array_files import explain_write_errors
 from avlmaps.maps.store.checkpoints import find_checkpoint, key_of, load_checkpoint
 from avlmaps.maps.store.manifest import BadFrame
 from avlmaps.perception.cache.feature_store import DEFAULT_CACHE, CacheSettings
@@ -146,10 +146,7 @@ class Spread:
         models, recording = Models.of(plan.encoders, self._cache), plan.recording
         # A path that is relative means another place on another machine.
         path, token = plan.path.absolute(), self._tokens.setdefault(plan.key, secrets.token_hex(8))
-        file = token_file(path, plan.key, token)
-        with explain_write_errors(file.parent):
-            file.parent.mkdir(parents=True, exist_ok=True)
-            file.touch()
+        show_token(token_file(path, plan.key, token))
         return Request(
             reopen=self._reopen,
             path=path,

@@ -362,6 +362,13 @@ def require_seen(token: Path, host: str) -> None:
         )
 
 
+def show_token(token: Path) -> None:
+    """Make a file by which workers know that they see its folder itself."""
+    with explain_write_errors(token.parent):
+        token.parent.mkdir(parents=True, exist_ok=True)
+        token.touch()
+
+
 def token_file(path: Path, key: str, token: str) -> Path:
     """Return the file by which a worker knows that it sees the map's folder itself, not another at the same path."""
     return path / PARTS / f"cluster-{key[:12]}" / token

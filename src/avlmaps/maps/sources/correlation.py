@@ -18,7 +18,6 @@ SPEED_M_S = 343.0
 _LOW_HZ, _HIGH_HZ = 200.0, 3000.0  # above, arrays of 0.2 m are ambiguous, and cells too coarse
 _OVERSAMPLING = 4
 _DECAY_DB_PER_S = 120.0  # of rooms that fall by 60 dB in half a second
-_NOISE_SHARE = 0.2  # quantile of the quiet frames' power
 
 
 @dataclass(frozen=True, slots=True)

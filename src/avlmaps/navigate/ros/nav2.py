@@ -17,7 +17,6 @@ _UNDER_WAY = (1, 2, 3)
 _REFUSED, _UNKNOWN, _ENDED = 1, 2, 3  # return codes of action_msgs/CancelGoal
 _RESULT_WITHIN_S = 1.0  # after a list says that a goal is over, its result says why
 _NOBODY = [0] * 16
-_FORGOTTEN = "Nav2 does not know the goal any more; it was restarted"
 
 
 class Nav2Session(BridgeSession):

@@ -17,9 +17,9 @@ import numpy as np
 
 from avlmaps.core.arrays import Float, Float32, UInt8
 from avlmaps.core.camera import Pinhole
-from avlmaps.core.cores import usable_cores
 from avlmaps.core.errors import BackendError
 from avlmaps.perception.embedded.geometry import channels
+from avlmaps.perception.models.networks import open_network
 from avlmaps.recordings.registration import depth_in_colour
 from avlmaps.recordings.types import Frame
 
@@ -144,17 +144,12 @@ class SceneNetwork:
     @cached_property
     def _session(self) -> Any:
         """The network, ready to run."""
-        import onnxruntime
-
-        options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = min(4, usable_cores())
-        options.inter_op_num_threads = 1
-        # Threads that wait for the next frame leave the cores to decoding and fusion: a build takes 0.6 of the time.
-        options.add_session_config_entry("session.intra_op.allow_spinning", "0")
         weights = self._read_weights()
         try:
-            return onnxruntime.InferenceSession(weights, options, providers=["CPUExecutionProvider"])
+            return open_network(weights, most_threads=4)
         except Exception as fault:  # onnxruntime raises types of its own
+            import onnxruntime
+
             raise BackendError(
                 f"The weights of {self.notes.id} cannot be run by onnxruntime {onnxruntime.__version__} "
                 f"({type(fault).__name__}); update onnxruntime, or install or train the weights again."

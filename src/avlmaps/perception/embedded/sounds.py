@@ -33,6 +33,7 @@ from avlmaps.perception.embedded.sound_calibration import (
     typical_examples,
 )
 from avlmaps.perception.enrolment import TaughtSound, enrolled_sounds, sounds_folder
+from avlmaps.perception.models.networks import open_network
 from avlmaps.perception.protocols import ModelCard, WordEncoder
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.resample import resample
@@ -184,12 +185,7 @@ class EmbeddedSounds:
 
     @cached_property
     def _session(self) -> Any:
-        import onnxruntime
-
-        options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = options.inter_op_num_threads = 1
-        options.log_severity_level = 3
-        return onnxruntime.InferenceSession(self._network, options, providers=["CPUExecutionProvider"])
+        return open_network(self._network)
 
     @cached_property
     def _prototypes(self) -> Float32[np.ndarray, "kinds d"]:

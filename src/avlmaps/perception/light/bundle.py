@@ -10,11 +10,11 @@ from typing import Any
 
 import msgspec
 
-from avlmaps.core.cores import usable_cores
 from avlmaps.core.errors import BackendError
 from avlmaps.core.files import DESCRIPTION_BYTES, decode_json, read_regular
 from avlmaps.perception.models.checksums import checksum_of, remembered_sha256
 from avlmaps.perception.models.files import folders_of
+from avlmaps.perception.models.networks import open_network
 
 MODEL = "avlmaps/light-1"
 MANIFEST = "manifest.json"
@@ -151,17 +151,12 @@ class Bundle:
         Raises:
             BackendError: the file is missing, another one, or no network that onnxruntime can run.
         """
-        import onnxruntime
-
         path = self.path(name)
-        options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = min(_MOST_THREADS, usable_cores())
-        options.inter_op_num_threads = 1
-        options.log_severity_level = 3
-        options.add_session_config_entry("session.intra_op.allow_spinning", "0")  # decoding needs the cores, too
         try:
-            return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+            return open_network(str(path), _MOST_THREADS)
         except Exception as fault:  # onnxruntime raises types of its own
+            import onnxruntime
+
             raise BackendError(
                 f"{path} cannot be run by onnxruntime {onnxruntime.__version__} ({type(fault).__name__}); update "
                 f"onnxruntime, or get the files again with: {HOW_TO_GET}"

@@ -18,6 +18,7 @@ from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Kind, load
 from avlmaps.perception.models.checksums import checksum_of
 from avlmaps.perception.models.files import local_model
+from avlmaps.perception.models.networks import open_network
 from avlmaps.perception.models.sound_windows import usable_samples, windows
 from avlmaps.perception.protocols import ModelCard, WordEncoder
 from avlmaps.recordings.audio import Sound
@@ -213,13 +214,8 @@ class EfficientATSounds:
 
 def _opened(path: Path) -> tuple[Any, dict[str, list[Any]], list[int]]:
     """Return the network, its notes, and how many numbers each of its outputs has."""
-    import onnxruntime
-
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = options.inter_op_num_threads = 1
-    options.log_severity_level = 3
     try:
-        network = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+        network = open_network(str(path))
         held = network.get_modelmeta().custom_metadata_map
         notes = {key: json.loads(held[key]) for key in (NAMES, CENTRES)}
         return network, notes, [int(output.shape[1]) for output in network.get_outputs()]

@@ -8,6 +8,7 @@ from jaxtyping import Float, Float32
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import RecordingError
+from avlmaps.recordings.registration import nearest_depth
 
 TYPES = ("sensor_msgs/msg/PointCloud2",)
 # A LiDAR's lines are far apart: in a finer picture what is behind would be seen between them.
@@ -55,13 +56,7 @@ def depth_of_points(points_camera: Float[np.ndarray, "n 3"], camera: Pinhole) ->
     """Return a camera's picture of z-depth, metres, of points: the nearest in each pixel, without what is hidden."""
     import cv2
 
-    points = points_camera[points_camera[:, 2] > sys.float_info.epsilon]
-    pixel = np.floor(camera.project(points)).astype(np.int64)
-    inside = ((pixel >= 0) & (pixel < (camera.width, camera.height))).all(axis=1)
-    depth_m = np.full(camera.height * camera.width, np.inf, np.float32)
-    at = pixel[inside, 1] * camera.width + pixel[inside, 0]
-    np.minimum.at(depth_m, at, points[inside, 2].astype(np.float32))
-    depth_m = depth_m.reshape(camera.height, camera.width)
+    depth_m = nearest_depth(points_camera[points_camera[:, 2] > sys.float_info.epsilon], camera)
     around = 2 * _HIDDEN_PIXELS + 1
     nearest = cv2.erode(depth_m, np.ones((around, around), np.uint8), borderValue=np.inf)
     depth_m[np.isinf(depth_m) | (depth_m > _HIDDEN_FACTOR * nearest)] = 0.0

@@ -9,14 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from avlmaps.core.errors import NavigationError
+from avlmaps.core.files import state_file
 from avlmaps.core.printable import printable_json
 
 
 def default_log() -> Path:
-    """Return the log in the user's state folder (XDG)."""
-    named = Path(os.environ.get("XDG_STATE_HOME", ""))
-    state = named if named.is_absolute() else Path.home() / ".local" / "state"
-    return state / "avlmaps" / "orders.jsonl"
+    """Return the log in the user's state folder."""
+    return state_file("orders.jsonl")
 
 
 class OrderLog:
