@@ -1,6 +1,7 @@
 """What the shipped weights recognise: rendered rooms under several sensors, and real frames of two cameras."""
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from avlmaps.recordings.types import Frame, Ground
 from avlmaps_sim.bench.frames import ONCE, measure
 from avlmaps_sim.bench.labelled_folder import LabelledFolder
 from avlmaps_sim.bench.nyu import CLASSES, class_of_kinds
-from avlmaps_sim.render import Renderer
+from avlmaps_sim.render import Renderer, View
 from avlmaps_sim.scenes import open_scene
 from avlmaps_sim.sensor import CLEAN, KINECT, Sensor, SensorSettings
 from avlmaps_sim.walk import random_views
@@ -24,13 +25,20 @@ CAMERA = Pinhole(260.0, 260.0, 160.0, 120.0, 320, 240)
 Views = list[tuple[Frame, np.ndarray]]
 
 
-def views_of(scene_name: str, sensor: SensorSettings, count: int) -> Views:
-    """Render views of a home that no network saw, and what each pixel truly shows."""
-    scene, rng = open_scene(scene_name), np.random.default_rng(0)
+@cache
+def rendered(scene_name: str, count: int) -> tuple[np.ndarray, list[tuple[np.ndarray, View]]]:
+    """Return the names of what is in a home that no network saw, and poses with what is truly seen from them."""
+    scene = open_scene(scene_name)
     renderer, names = Renderer(scene), np.array([*scene.categories, ""])
-    frames = []
-    for number, pose in enumerate(random_views(scene, rng, count, CAMERA)):
-        view = renderer.render(CAMERA, pose)
+    poses = random_views(scene, np.random.default_rng(0), count, CAMERA)
+    return names, [(pose, renderer.render(CAMERA, pose)) for pose in poses]
+
+
+def views_of(scene_name: str, sensor: SensorSettings, count: int) -> Views:
+    """Return views of a home under a sensor, and what each pixel truly shows."""
+    names, seen = rendered(scene_name, count)
+    rng, frames = np.random.default_rng(0), []
+    for number, (pose, view) in enumerate(seen):
         rgb, depth_m = Sensor(sensor).spoil(view, CAMERA, rng)
         ground = Ground(np.array([0.0, 0.0, 1.0]), np.zeros(1), np.zeros(1))
         frame = Frame(number, str(number), 0.0, rgb, depth_m, pose, Rig(CAMERA, CAMERA), ground)
