@@ -22,6 +22,8 @@ from avlmaps.query.avlmap import AVLMap
 from avlmaps.recordings.open import open_recording
 from helpers.hearing_scenes import heard_flat
 
+pytestmark = pytest.mark.slow  # the recording and the map are made by the first of the modules that need them
+
 
 @pytest.fixture(scope="module")
 def heard(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:

@@ -25,6 +25,8 @@ from avlmaps_sim.recorder import RecordSettings, record_scene
 from avlmaps_sim.truth import read_truth
 from helpers.hearing_scenes import flat, heard_flat, shoebox
 
+pytestmark = pytest.mark.slow  # the recording and the map are made by the first of the modules that need them
+
 SOURCE = np.array([1.5, 4.2, 0.6])
 
 
