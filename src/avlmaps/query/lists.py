@@ -248,8 +248,7 @@ def _contents(avlmap: "Queryable", name: str) -> tuple[list[Goal], str]:
     goals = [_thing_goal(thing) for thing, is_in in zip(things, inside, strict=True) if is_in]
     if not rooms:
         return goals, f"The map shows no room that is a {name} as a whole."
-    what = counted([goal.name for goal in goals]) if goals else "no thing that the map is certain of"
-    return goals, f"In the {name}: {what}."
+    return goals, f"In the {name}: {counted([goal.name for goal in goals])}."
 
 
 def _beside(avlmap: "Queryable", subject: Answer) -> tuple[list[Goal], str]:
@@ -304,6 +303,8 @@ def _same_room(kind: str, name: str) -> bool:
 
 def counted(names: Sequence[str]) -> str:
     """Return names, the most frequent first, each with how often it occurs: ``chair (4), sofa``."""
+    if not names:
+        return "no thing that the map is certain of"
     often = Counter(names).most_common()
     shown = ", ".join(name if count == 1 else f"{name} ({count})" for name, count in often[:_MOST_NAMED])
     return shown + (f" and {len(often) - _MOST_NAMED} kinds more" if len(often) > _MOST_NAMED else "")

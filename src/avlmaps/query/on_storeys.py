@@ -71,8 +71,7 @@ def _no_such(storeys: Storeys | None, word: SaidStorey, notes: tuple[str, ...], 
 
 
 def _list(word: SaidStorey, goals: Sequence[Goal]) -> str:
-    what = counted([goal.name for goal in goals]) if goals else "no thing that the map is certain of"
-    return f"{_sentence(at_storey(word))}: {what}."
+    return f"{_sentence(at_storey(word))}: {counted([goal.name for goal in goals])}."
 
 
 def _restricted(

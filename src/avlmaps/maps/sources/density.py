@@ -144,21 +144,25 @@ class Density:
         near = np.linalg.norm(place - best, axis=1) < 2.0 * CELL_M  # between the cells' middles
         return (place[near] * share[near, None]).sum(axis=0) / share[near].sum()
 
+    @cached_property
+    def _away_and_share(self) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
+        """How far the cells that hold something are from the position, metres, and what they hold."""
+        held = np.flatnonzero(self.share.ravel() > 0.0)
+        return np.linalg.norm(self.plan.middle_m(held) - self.position_m, axis=1), self.share.ravel()[held]
+
     def within_m(self, probability: float) -> float:
         """Return the radius of the circle round the position that holds a probability, metres."""
-        held = np.flatnonzero(self.share.ravel() > 0.0)
-        away = np.linalg.norm(self.plan.middle_m(held) - self.position_m, axis=1)
+        away, share = self._away_and_share
         order = np.argsort(away, kind="stable")
-        total = np.cumsum(self.share.ravel()[held][order])
+        total = np.cumsum(share[order])
         return float(away[order][min(int(np.searchsorted(total, probability)), len(order) - 1)])
 
     @cached_property
     def spread(self) -> Spread:
         """How well the place is known; a cell that the circle of ``RIGHT_M`` cuts counts in part."""
-        held = np.flatnonzero(self.share.ravel() > 0.0)
-        away = np.linalg.norm(self.plan.middle_m(held) - self.position_m, axis=1)
+        away, share = self._away_and_share
         inside = np.clip((RIGHT_M - away) / CELL_M + 0.5, 0.0, 1.0)
-        right = float((inside * self.share.ravel()[held]).sum())
+        right = float((inside * share).sum())
         return Spread(min(right, 1.0), self.within_m(0.5), self.within_m(0.9))
 
     def of_candidates(
