@@ -84,6 +84,7 @@ _LARGE, _SMALL = r"biggest|largest|widest", r"smallest|tiniest"
 _LAST, _FIRST = r"last|latest|final|most recent", r"first|earliest"
 _BY_SIZE = rf"(?:(?P<last>{_LARGE})|(?P<first>{_SMALL}))"
 _BY_TIME = rf"(?:(?P<last>{_LAST})|(?P<first>{_FIRST}))"
+_THE_SOUND = rf"{_ARTICLE}(?:{_BY_TIME} )?(?:sound|noise)"
 _HEARD = r"(?: (?:that )?(?:you |i |it |was |were |we )?(?:heard|recorded|played|hear))?"
 _IN = r"in|inside|within"
 _NEXT = (
@@ -150,6 +151,8 @@ _PATTERNS: tuple[tuple[Listed, str], ...] = (
     (Listed.SOUND_BY_TIME, rf"what (?:sound )?(?:did you hear|was heard) {_BY_TIME}"),
     (Listed.SOUND_BY_TIME, rf"(?:what|which) (?:sound|noise) (?:came|was|was heard|did you hear) {_BY_TIME}"),
     (Listed.SOUND_BY_TIME, rf"what did you {_BY_TIME} hear"),
+    (Listed.SOUND_BY_TIME, rf"(?:from )?where (?:did|does|do|was|is) {_THE_SOUND} (?:come|came|coming)(?: from)?"),
+    (Listed.SOUND_BY_TIME, rf"(?:what|who)(?: is| was)? (?:made|makes|making) {_THE_SOUND}"),
     (Listed.CONTENTS, rf"{_WHAT_IS} (?:{_IN}) {_ARTICLE}(?P<room>.+)"),
     (Listed.CONTENTS, rf"what (?:things |objects )?does {_ARTICLE}(?P<room>.+?) (?:contain|have|hold)(?: in it)?"),
     (Listed.CONTENTS, rf"(?:{_ALL})(?: (?:that|which) (?:is|are))? (?:{_IN}|of) {_ARTICLE}(?P<room>.+)"),

@@ -255,12 +255,31 @@ def thing_alone(asked: Asked, avlmap: "Queryable") -> Question | None:
 
 
 def _answer_sentence(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
+    """Answer a sentence; one that asks where a sound came from means its source, where the map knows that."""
+    from avlmaps.language.source_words import asks_for_source
+
+    if asked.at is not None or not asks_for_source(asked.sentence):
+        return _answer_said(avlmap, asked, files)
+    if not len(avlmap.stored.sounds) or avlmap.stored.knows_sources:
+        return _answer_said(avlmap, replace(asked, at="source"), files)
+    answer = _answer_said(avlmap, asked, files)
+    if answer.parts and not any(one.part.modality is Modality.SOUND for one in answer.parts):
+        return answer
+    from avlmaps.query.sound_sources import unknown_sources
+
+    why = f"The place is where the robot was when it heard it: {unknown_sources(avlmap.stored)}"
+    return replace(answer, notes=(why, *answer.notes))
+
+
+def _answer_said(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
     from avlmaps.language.list_questions import read_list, said_number
     from avlmaps.query.lists import answer_list
 
     listed, numbered = read_list(asked.sentence, avlmap.edited.own_names), said_number(asked.sentence)
     if listed is not None:
-        return answer_list(avlmap, listed, asked.top, lambda words: _answer_words(avlmap, asked, words, files))
+        return answer_list(
+            avlmap, listed, asked.top, lambda words: _answer_words(avlmap, asked, words, files), asked.at
+        )
     if numbered is None:
         return _answer_read(avlmap, asked, files)
     number, what = numbered

@@ -3,13 +3,14 @@
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from avlmaps.core.arrays import Float
 from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.question import HeardAt
 from avlmaps.language.list_questions import Listed, ListQuestion
 from avlmaps.query.answer import Answer
 from avlmaps.query.changes import (
@@ -39,9 +40,12 @@ _HANGS = ("wall", "ceiling", "built in")  # such lies on nothing, even over a ta
 _MOST_NAMED = 12
 _LEAST_M2 = 1.0  # of a room; less is a corner that views disagree about
 _NO_SIZE = (0.0, 0.0, 0.0)
+_MOST_SOURCES = 5  # of sounds by time; each costs a density
 
 
-def answer_list(avlmap: "Queryable", question: ListQuestion, top: int, ask: Callable[[str], Answer]) -> Answer:
+def answer_list(
+    avlmap: "Queryable", question: ListQuestion, top: int, ask: Callable[[str], Answer], at: HeardAt | None = None
+) -> Answer:
     """Answer a question from the lists of a map.
 
     Args:
@@ -49,6 +53,7 @@ def answer_list(avlmap: "Queryable", question: ListQuestion, top: int, ask: Call
         question: the question.
         top: most goals.
         ask: answers what the question names by heat: "the bed", "this photo".
+        at: the place of sounds that are listed by time; None: where they were heard.
 
     Raises:
         QueryError: the map has no such list.
@@ -57,7 +62,7 @@ def answer_list(avlmap: "Queryable", question: ListQuestion, top: int, ask: Call
         case Listed.ROOM_BY_SIZE:
             goals, text = _rooms_by_size(avlmap, question.first)
         case Listed.SOUND_BY_TIME:
-            goals, text = _sounds_by_time(avlmap, question.first)
+            goals, text = (_sources_by_time if at == "source" else _sounds_by_time)(avlmap, question.first)
         case Listed.NAMES:
             return _names(avlmap, question, top)
         case Listed.CHANGES:
@@ -114,6 +119,30 @@ def _sounds_by_time(avlmap: "Queryable", first: bool) -> tuple[list[Goal], str]:
     ]
     which = "first" if first else "last"
     return goals, placed(f"the {which} sound is the {goals[0].name} at {sounds[0].onset_s:.1f} s, heard", goals[0])
+
+
+def _sources_by_time(avlmap: "Queryable", first: bool) -> tuple[list[Goal], str]:
+    """Return the sounds by their onset at the places that they came from, and what the first one may be.
+
+    Raises:
+        QueryError: the map does not know where sounds came from.
+    """
+    heard, _ = _sounds_by_time(avlmap, first)
+    if not heard:
+        return _sounds_by_time(avlmap, first)
+    from avlmaps.query.sound_sources import Listening, source_of
+
+    sounds = avlmap.sounds()
+    numbers = sorted(range(len(sounds)), key=lambda number: sounds[number].onset_s * (1.0 if first else -1.0))
+    found = [source_of(cast(Listening, avlmap), number) for number in numbers[:_MOST_SOURCES]]
+    goals = [
+        Goal(one.position, one.confidence, _NO_SIZE, {}, one.probability, one.name or "sound", one.spread)
+        for one in found
+    ]
+    text = f"the {'first' if first else 'last'} sound is the {goals[0].name} at {sounds[numbers[0]].onset_s:.1f} s; "
+    things = ", ".join(f"the {name} ({share:.2f})" for name, _, share in found[0].things)
+    told = placed(f"{text}it comes from a place", goals[0])
+    return goals, f"{told} It may be {things}." if things else told
 
 
 def _names(avlmap: "Queryable", question: ListQuestion, top: int) -> Answer:

@@ -16,7 +16,7 @@ from avlmaps.core.arrays import Float
 from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import Kind as Named
 from avlmaps.core.lexicon import lexicon
-from avlmaps.maps.sources.density import Density, Plan, log_same_place
+from avlmaps.maps.sources.density import Density, Plan, Spread, log_same_place
 from avlmaps.maps.sources.settings import SourceSettings
 from avlmaps.maps.types import SourceEvidence
 from avlmaps.query.queryable import Queryable
@@ -49,7 +49,7 @@ class Listening(Queryable, Protocol):
         ...
 
 
-def _unknown(stored: "StoredMap") -> str:
+def unknown_sources(stored: "StoredMap") -> str:
     """Return why a map does not know where sounds came from, and what to do."""
     what = f"{stored.path.name} does not know where sounds came from, only where the robot was"
     if stored.info.visits:
@@ -82,6 +82,7 @@ class SoundSource:
         events: numbers of its sounds in the map.
         moving: whether it moved while it sounded.
         microphones: how many listened.
+        spread: the radii, with the probability that it lies within ``RIGHT_M``.
     """
 
     name: str
@@ -97,6 +98,7 @@ class SoundSource:
     events: tuple[int, ...]
     moving: bool
     microphones: int
+    spread: Spread
 
     def to_json(self) -> dict[str, Any]:
         """Return the source as ``avlmaps sources --json`` prints it."""
@@ -163,7 +165,7 @@ class SourceMap:
         """
         evidence = avlmap.stored.sources() if evidence is None else evidence
         if evidence is None:
-            raise QueryError(_unknown(avlmap.stored))
+            raise QueryError(unknown_sources(avlmap.stored))
 
         def things(names: Sequence[str]) -> "Sequence[Thing]":
             if "pixels" not in avlmap.stored.info.models:
@@ -287,6 +289,17 @@ def list_sources(
     return sorted(found, key=lambda one: -one.confidence)
 
 
+def source_of(avlmap: Listening, number: int) -> SoundSource:
+    """Return the source of one sound by its likeliest name.
+
+    Raises:
+        QueryError: the map does not know where sounds came from.
+    """
+    event, known = avlmap.sounds()[number], avlmap.source_map
+    name, confidence = (event.names[0], event.confidences[0]) if event.names else ("", 0.0)
+    return _Places(avlmap).described(known, known.joined([number], name), name, float(confidence))
+
+
 def list_joined(
     avlmap: Listening, names: Sequence[str] = (), prior: bool = True, *, least: float = 0.0
 ) -> Iterator[tuple[str, float, Joined]]:
@@ -348,6 +361,7 @@ class _Places:
             events=joined.events,
             moving=any(bool(known.evidence.moving[event]) for event in joined.events),
             microphones=int(known.evidence.channels[0]),
+            spread=density.spread,
         )
 
     def _rooms_of(self, known: SourceMap, joined: Joined) -> tuple[tuple[str, float], ...]:

@@ -144,6 +144,29 @@ def test_an_answer_at_the_source_believes_no_more_than_its_region(mapped: tuple[
     assert things_in(heat, guess=True)[0].spread is not None
 
 
+def test_a_sentence_that_asks_where_a_sound_came_from_means_its_source(mapped: tuple[Path, Path]) -> None:
+    avlmap = AVLMap.open(mapped[1])
+    name = max(avlmap.sources(), key=lambda one: one.probability).name
+    chosen = avlmap.ask(f"where does the sound of {name} come from?")
+    assert chosen.goals[0].position == avlmap.ask(sound=name, at="source").goals[0].position
+    assert chosen.goals[0].spread is not None and "comes from" in chosen.text
+    for other in (avlmap.ask(f"where is the sound of {name}?"),
+                  avlmap.ask(f"where does the sound of {name} come from?", at="robot")):  # fmt: skip
+        assert other.goals[0].position == avlmap.ask(sound=name).goals[0].position
+
+
+def test_a_noise_without_a_name_is_the_last_sound(mapped: tuple[Path, Path]) -> None:
+    avlmap = AVLMap.open(mapped[1])
+    sounds, sources = avlmap.sounds(), avlmap.source_map
+    for sentence, number in (("where did the noise come from?", -1), ("what made the first noise?", 0)):
+        answer = avlmap.ask(sentence)
+        number = range(len(sounds))[number]
+        wanted = sources.position_of(sources.joined([number], sounds[number].names[0]))
+        assert answer.goals[0].position == pytest.approx(wanted.tolist(), abs=1e-6)
+        assert f"{sounds[number].onset_s:.1f} s" in answer.text and answer.goals[0].spread is not None
+    assert avlmap.ask("where was the last sound").goals[0].position == sounds[-1].position
+
+
 def test_things_list_what_was_heard_from_them(mapped: tuple[Path, Path]) -> None:
     avlmap = AVLMap.open(mapped[1])
     listed = avlmap.contents().to_json("flat")["things"]
@@ -187,6 +210,10 @@ def test_a_map_of_one_microphone_says_what_it_lacks(tmp_path: Path) -> None:
     assert avlmap.stored.sources() is None
     with pytest.raises(QueryError, match="where the microphones are"):
         avlmap.sources()
+    if len(avlmap.stored.sounds):
+        answer = avlmap.ask("where did the noise come from?")
+        assert answer.goals[0].position == avlmap.ask("the last sound").goals[0].position
+        assert "where the robot was" in answer.notes[0] and "where the microphones are" in answer.notes[0]
 
 
 def test_damaged_evidence_is_refused(mapped: tuple[Path, Path], tmp_path: Path) -> None:

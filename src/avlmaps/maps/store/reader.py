@@ -150,6 +150,11 @@ class StoredMap:
             arrays["feature"], arrays["feature_scale"] = in_steps(feature, np.ones(len(feature)))
         return validate_arrays(Submaps, arrays, f"{self.path}/submaps")
 
+    @property
+    def knows_sources(self) -> bool:
+        """Whether the map knows where its sounds came from; reads nothing."""
+        return any(name.startswith(SOURCES) for name in self.info.files)
+
     def sources(self) -> SourceEvidence | None:
         """Return what the microphones say of where each sound began; None where their places are not known.
 
