@@ -172,6 +172,7 @@ SAME: dict[str, Callable[[], Any]] = {
     "bench.navigation.guess": of(NavigationSettings, "guess"),
     "bench.laps": of(LiveBench, "laps"),
     "bench.trials": of(SourcesBench, "trials"),
+    "bench.rate": of(LiveBench, "rate"),
     "bench.kills": of(LiveBench, "kills"),
 }
 # What a person meets first: nothing behind them has such a default.

@@ -10,10 +10,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import avlmaps
 from avlmaps.core.errors import AudioError, MapError, RecordingError
 from avlmaps.live.gates import EncodingGate, Gates
+from avlmaps.live.kept_back import KeptBack
 from avlmaps.live.live_map import LiveMap
 from avlmaps.live.pose_check import PoseCheck
 from avlmaps.live.settings import LiveSettings
@@ -345,6 +348,74 @@ def test_frames_that_are_not_encoded_add_their_surface_alone(tmp_path: Path) -> 
     status = live.status()
     assert status.fused == 12 and 0 < status.encoded < 12
     assert live.map.stored.info.counts.frames == 12 and live.ask("something red").found
+
+
+def drive_forth_and_back(path: Path, chosen: LiveSettings) -> LiveMap:
+    order = [*range(18), *range(17, -1, -1)]
+    with LiveMap(path, ENCODERS, up_in_world=UP, live=chosen, settings=BuildSettings()) as live:
+        for number, at in enumerate(order):
+            add(live, replace(frame(at), index=number, stamp_s=0.1 * number))
+    return live
+
+
+def test_frames_that_were_kept_back_are_in_the_map_at_the_end(tmp_path: Path) -> None:
+    every = drive_forth_and_back(tmp_path / "every", EVERY).map.stored.voxels
+    few = LiveSettings(known_views=2, new_share=0.2, still_m=0.0, looks=1, encoded_share=0.4, later_looks=10_000)
+    live = drive_forth_and_back(tmp_path / "kept", few)
+    status, found = live.status(), live.map.stored.voxels
+    assert status.dropped["known"] > 3 and status.encoded < status.fused
+    assert status.encoded + status.encoded_later == 36 and status.kept == 0
+    np.testing.assert_array_equal(found.index, every.index)
+    np.testing.assert_array_equal(found.hits, every.hits)
+    np.testing.assert_allclose(found.weight, every.weight, rtol=1e-5)
+    np.testing.assert_allclose(found.feature, every.feature, atol=2e-3)
+    without = drive_forth_and_back(tmp_path / "none", replace(few, kept_frames=0))
+    assert without.status().encoded_later == 0 and without.map.stored.voxels.hits.sum() < every.hits.sum()
+
+
+def test_frames_that_were_kept_back_are_looked_at_when_none_comes(tmp_path: Path) -> None:
+    chosen = LiveSettings(first_frames=2, known_views=100, new_share=0.0, looks=2, snapshot_s=0.0)
+    with LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP, live=chosen) as live:
+        for number in range(12):
+            add(live, frame(number, step_m=0.005))
+        wait_for(lambda: live.status().encoded_later > 0 and live.status().kept == 0)
+        generation = live.generation
+        wait_for(lambda: live.generation > generation or live.status().snapshot_age_s < 1.0)
+        for number in range(12, 20):
+            add(live, frame(number, step_m=0.005))
+    assert live.status().fused == 20 and live.map.stored.info.counts.frames == 20
+
+
+@given(st.lists(st.tuples(st.floats(0.01, 1.0), st.booleans()), max_size=30), st.integers(0, 6))
+@settings(max_examples=30, deadline=None)
+def test_the_frames_that_are_worth_most_are_kept(worths: list[tuple[float, bool]], most: int) -> None:
+    kept = KeptBack(most)
+    for number, (worth, is_fused) in enumerate(worths):
+        kept.keep(frame(number), worth, is_fused=is_fused)
+    assert len(kept) == min(len(worths), most)
+    taken = []
+    while (one := kept.take()) is not None:
+        taken.append(one)
+    assert [worths[one.index][0] for one, _ in taken] == sorted((worth for worth, _ in worths), reverse=True)[:most]
+    for one, is_fused in taken:
+        assert is_fused == worths[one.index][1]
+        np.testing.assert_array_equal(one.rgb, frame(one.index).rgb)
+        np.testing.assert_array_equal(one.depth_m, frame(one.index).depth_m)
+
+
+def test_a_full_disk_is_said_once_and_what_is_kept_stays() -> None:
+    kept = KeptBack(4)
+    kept.keep(frame(0), 0.5, is_fused=True)
+    assert kept._file is not None
+    real = kept._file
+    with Path("/dev/full").open("r+b", buffering=0) as full, pytest.raises(MapError, match="cannot be stored"):
+        kept._file = full
+        kept.keep(frame(1), 0.9, is_fused=True)
+    kept._file = real
+    kept.keep(frame(2), 0.9, is_fused=True)
+    assert len(kept) == 1
+    (one, _) = kept.take() or pytest.fail("it is gone")
+    np.testing.assert_array_equal(one.rgb, frame(0).rgb)
 
 
 def test_poses_that_stop_fitting_the_pictures_are_in_doubt_within_three_seconds() -> None:

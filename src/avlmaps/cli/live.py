@@ -119,6 +119,8 @@ def _live(verb: Live) -> dict[str, Any]:
             serve_while(live, drive, verb.port, browse=verb.view)
         else:
             drive()
+        if kept := live.status().kept:
+            say(f"looking at up to {kept} frames that there was no time for; what is saved stays meanwhile")
     status, stored = live.status(), _with_sources(verb, live.map.stored)
     return {
         **describe_map(stored),

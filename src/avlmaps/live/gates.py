@@ -19,6 +19,7 @@ from avlmaps.maps.fusion.sensor import FusionSettings
 from avlmaps.recordings.types import Frame
 
 _ROWS, _COLUMNS = 30, 40  # points of a frame that are looked up
+LATER_SHARE = 0.02  # of the points of a frame that must be worth it, when there is time
 _PLACE_M = 0.2  # the points of a frame are this far apart at 5 m
 _AXIS = 1 << 20  # places along each axis
 
@@ -108,19 +109,35 @@ class EncodingGate:
             frame: the frame.
             waiting: frames behind it; the more, the more must be new in it. All of it new always opens.
         """
+        share = min(self._settings.encoded_share * (1 + waiting), 0.5)
+        return self._is_encoded(frame, self._settings.looks, share)
+
+    def opens_again(self, frame: Frame) -> bool:
+        """Return the same of a frame of before, now that there is time: beside how many looks it is worth something."""
+        return self._is_encoded(frame, self._settings.later_looks, LATER_SHARE)
+
+    def worth_later(self, frame: Frame) -> float:
+        """Return the share of a frame's points that are worth a look when there is time."""
+        return self._looked(frame, self._settings.later_looks)[0]
+
+    def _is_encoded(self, frame: Frame, looks: int, share: float) -> bool:
+        worth, weights = self._looked(frame, looks)
+        if worth > share:
+            self._weight.update(weights)
+        return worth > share
+
+    def _looked(self, frame: Frame, looks: int) -> tuple[float, dict[int, float]]:
+        """Return the share of points worth a look beside so many, and what places weigh with this one."""
         looked = Looked.of(frame, self._fusion.max_depth_m)
         if not len(looked.world):
-            return False
+            return 0.0, {}
         weight = np.maximum(np.exp(looked.distance_m**2 * (-0.5 / self._fusion.variance_m2)), 1e-30)
         places, at = np.unique(_keys(looked.world), return_inverse=True)
         best = np.zeros(len(places))
         np.maximum.at(best, at, weight)
         known = np.array([self._weight.get(place, 0.0) for place in places.tolist()])
-        worth = float((best * self._settings.looks > known)[at].mean())
-        if worth <= min(self._settings.encoded_share * (1 + waiting), 0.5):
-            return False
-        self._weight.update(zip(places.tolist(), (known + best).tolist(), strict=True))
-        return True
+        worth = float((best * looks > known)[at].mean())
+        return worth, dict(zip(places.tolist(), (known + best).tolist(), strict=True))
 
 
 def _keys(world: Float[np.ndarray, "n 3"]) -> Int64[np.ndarray, " n"]:

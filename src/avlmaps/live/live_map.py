@@ -21,7 +21,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from avlmaps.core.errors import AudioError, AvlmapsError, BackendError, MapError, RecordingError
-from avlmaps.live.gates import EncodingGate, Gates
+from avlmaps.live.gates import LATER_SHARE, EncodingGate, Gates
+from avlmaps.live.kept_back import KeptBack
 from avlmaps.live.pose_check import PoseCheck
 from avlmaps.live.saver import Saver
 from avlmaps.live.settings import LiveSettings
@@ -47,6 +48,9 @@ SPARSE = BuildSettings(keyframes=KeyframeSettings(translation_m=0.2, rotation_de
 _STEP_S = 0.1
 _IDLE_S = 0.05
 _MOST_DOUBTS = 100
+_CHANGES = "fused", "corrected", "encoded later"  # what is counted where the map has become another
+_STILL = 1e-3  # times what it is worth: a frame in which the camera stood makes room for every other
+_CALM_S = 0.5  # without a frame, before frames that were kept back are looked at
 _LOOKS_S = 0.3  # for keyframes, in each snapshot
 _LISTEN_S = 0.25  # from one look for sounds that ended to the next
 _REST_S = 1.0  # between two snapshots, at most, where one takes longer than that
@@ -106,8 +110,11 @@ class LiveMap:
         self._growing = GrowingMap(chosen, used, direction(up_in_world), wait=wait, looks_later=True)
         self._gates = Gates(self.settings, chosen.fusion.max_depth_m)
         self._encoding = EncodingGate(self.settings, self._growing.settings.fusion)
+        keeps = self.settings.gates and not chosen.frames.per_submap  # corrected poses would not reach them
+        self._kept = KeptBack(self.settings.kept_frames if keeps else 0)
         self._check, self._tally = PoseCheck(), Tally()
         self._queue: deque[tuple[Frame, float]] = deque()
+        self._is_standing = False  # the last frame was dropped as still, and there are frames to look at again
         self._is_pressed = False  # whether the frames come by the clock, and are late if we are slow
         self._door, self._ears = Condition(), Lock()
         self._last: Frame | None = None
@@ -258,6 +265,8 @@ class LiveMap:
             frames_in=self._tally.of("came"),
             fused=self._tally.of("fused"),
             encoded=self._tally.of("encoded"),
+            encoded_later=self._tally.of("encoded later"),
+            kept=len(self._kept),
             dropped=self._tally.dropped(),
             refused=self._tally.of("refused"),
             waiting=len(self._queue),
@@ -274,7 +283,9 @@ class LiveMap:
         )
 
     def close(self) -> AVLMap:
-        """Fuse what waits, find up, the floor, places and sounds as a build does, write the map and open it.
+        """Fuse what waits and end as a build does: find up, the floor, places and sounds, write the map and open it.
+
+        With gates, frames that were kept back are looked at first (``status().kept``), a tenth of a second each.
 
         Raises:
             MapError: no frame came, or the map cannot be written: the last save is still there, and closing may be
@@ -356,19 +367,25 @@ class LiveMap:
                 self._door.notify_all()
 
     def _fuse_all(self) -> None:
+        is_calm = False  # no frame came for a while
         while True:
             with self._door:
-                while not (self._queue or self._closing or self._to_correct) and self._asked is None:
-                    self._door.wait()
+                while not (self._queue or self._closing or self._to_correct or self._asked):
+                    if len(self._kept) and (is_calm or self._is_standing):
+                        break
+                    is_calm = not self._door.wait(_CALM_S if len(self._kept) else None) or is_calm
                 frame, arrived_s = self._queue.popleft() if self._queue else (None, 0.0)
                 self._door.notify_all()
             if frame is not None:
+                is_calm = False
                 self._fuse(frame, arrived_s)
             elif self._to_correct:
                 self._correct()
+            elif is_calm or self._is_standing or self._closing:
+                self._look_again()
             if self._asked is not None:  # set by the thread behind alone, which waits for the answer
                 self._freeze()
-            if frame is None and self._closing and not self._queue and not self._to_correct:
+            if frame is None and self._closing and not (self._queue or self._to_correct or len(self._kept)):
                 return
 
     def _fuse(self, frame: Frame, arrived_s: float) -> None:
@@ -377,9 +394,11 @@ class LiveMap:
             if (doubt := self._check.add(frame)) is not None:
                 self._doubt(doubt)
             reason = self._gates.reason_against(frame, growing.sums) if self.settings.gates else None
+            self._is_standing = reason == "still" and len(self._kept) > 0
             if reason is not None:
                 growing.pass_by(frame.stamp_s, frame.world_from_camera)
                 self._tally.drop(reason)
+                self._keep(frame, is_fused=False, times=1.0 if reason == "known" else _STILL)
             else:
                 encode = not self.settings.gates or self._encoding.opens(
                     frame, len(self._queue) if self._is_pressed else 0
@@ -389,6 +408,8 @@ class LiveMap:
                 self._tally.note("fused")
                 if encode:
                     self._tally.note("encoded")
+                else:
+                    self._keep(named, is_fused=True)
         except BackendError as fault:
             self._tally.drop("wrong")
             self._fault = fault
@@ -396,6 +417,27 @@ class LiveMap:
             self._tally.drop("wrong")
             self._doubt(str(fault))
         self._tally.took(time.perf_counter() - arrived_s)
+
+    def _keep(self, frame: Frame, *, is_fused: bool, times: float = 1.0) -> None:
+        """Keep a frame until there is time to look at it, where that will bring something."""
+        if self._kept.most and self._growing.looks_again:
+            worth = self._encoding.worth_later(frame)
+            try:
+                self._kept.keep(frame, times * worth if worth > LATER_SHARE else 0.0, is_fused=is_fused)
+            except MapError as fault:
+                self._doubt(str(fault))
+
+    def _look_again(self) -> None:
+        """Encode the frame that is worth most of those that were kept back, unless it brings nothing any more."""
+        self._is_standing = False
+        taken = self._kept.take()
+        if taken is None or not self._growing.sums or not self._encoding.opens_again(taken[0]):
+            return
+        try:
+            self._growing.look_again(taken[0], is_fused=taken[1])
+            self._tally.note("encoded later")
+        except AvlmapsError as fault:
+            self._doubt(str(fault))
 
     def _correct(self) -> None:
         with self._door:
@@ -444,12 +486,12 @@ class LiveMap:
             raise
 
     def _publish_all(self) -> None:
-        from_s, known = 0.0, (0, 0)
+        from_s, known = 0.0, (0,) * len(_CHANGES)
         while not self._stop_behind.wait(_IDLE_S):
-            begin_s, state = time.perf_counter(), (self._tally.of("fused"), self._tally.of("corrected"))
+            begin_s, state = time.perf_counter(), tuple(map(self._tally.of, _CHANGES))
             if state == known or begin_s < from_s:
                 self._try(self._publish_sounds)
-            elif (came := self._what_came()) is not None and not self._closing:
+            elif (came := self._what_came()) is not None and not (self._closing and not len(self._kept)):
                 known = state
                 self._try(partial(self._publish, *came))
                 end_s = time.perf_counter()

@@ -27,6 +27,11 @@ class LiveSettings:
     encoded_share: float = 0.05
     """A fused frame is encoded where more than this share of its points is worth it; else it adds its surface and
     colours alone. Twice that with one frame waiting behind it, and so on."""
+    kept_frames: int = 256
+    """Frames that were not encoded, or dropped by a gate, and are kept on the disk (2.2 MB each at 640x480) until there
+    is time: when no frame comes for half a second, when the robot stands, and at the end. 0 keeps none. With gates."""
+    later_looks: int = 100
+    """As `looks`, for these."""
     first_frames: int = 8
     """Frames in which up, the floor and the depth camera are found first, with gates; without them as in a build."""
     snapshot_s: float = 1.0
@@ -35,9 +40,9 @@ class LiveSettings:
     """Seconds from one save to the next, at least."""
 
     def __post_init__(self) -> None:
-        for name in ("most_waiting", "known_views", "looks", "first_frames"):
+        for name in ("most_waiting", "known_views", "looks", "later_looks", "first_frames"):
             if not getattr(self, name) >= 1:
                 raise MapError(f"{name} of a live map is {getattr(self, name)}; choose 1 or more.")
-        for name in ("still_m", "still_deg", "new_share", "encoded_share", "snapshot_s", "save_s"):
+        for name in ("still_m", "still_deg", "new_share", "encoded_share", "kept_frames", "snapshot_s", "save_s"):
             if not getattr(self, name) >= 0.0:
                 raise MapError(f"{name} of a live map is {getattr(self, name)}; choose 0 or more.")

@@ -18,6 +18,8 @@ class LiveStatus:
         frames_in: frames that came, refused ones left out.
         fused: frames that are in the map's sums.
         encoded: of these, how many were given to the encoder; the others added their surface and colours.
+        encoded_later: frames that were given to it when there was time, also such that a gate had dropped.
+        kept: frames that wait on the disk for that.
         dropped: frames that are not, by reason: ``late`` (others were waiting), ``still`` (the camera did not move),
             ``known`` (no new surface), ``wrong`` (an encoder failed on it).
         refused: frames and pieces of sound that were no such thing, or out of order.
@@ -37,6 +39,8 @@ class LiveStatus:
     frames_in: int
     fused: int
     encoded: int
+    encoded_later: int
+    kept: int
     dropped: dict[str, int]
     refused: int
     waiting: int
@@ -60,7 +64,8 @@ class LiveStatus:
     def __str__(self) -> str:
         dropped = ", ".join(f"{count} {reason}" for reason, count in sorted(self.dropped.items()))
         return (
-            f"{self.frames_in} frames came, {self.fused} fused, {self.encoded} of them encoded "
+            f"{self.frames_in} frames came, {self.fused} fused, {self.encoded} of them encoded, "
+            f"{self.encoded_later} later "
             f"({dropped or 'none'} dropped), p95 {self.frame_ms_p95:.0f} ms; "
             f"{self.voxels} voxels, {self.keyframes} keyframes, {self.sounds} sounds; {self.memory_mb:.0f} MB"
         )

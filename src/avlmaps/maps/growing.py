@@ -23,7 +23,7 @@ from avlmaps.maps.audio.growing import GrowingSounds
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
 from avlmaps.maps.fusion.free_space import FreeViewCollector, ThroughCounts, stack_views
 from avlmaps.maps.fusion.submaps import concat_submaps, submap_of
-from avlmaps.maps.fusion.voxel_sums import VoxelSums
+from avlmaps.maps.fusion.voxel_sums import VoxelSums, features_alone
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.growing_walk import HERE, Walk
 from avlmaps.maps.keyframes.growing import FrozenKeyframes, GrowingKeyframes, PicturedKeyframe
@@ -120,6 +120,11 @@ class GrowingMap:
         return len(self._walk) + len(self._waiting)
 
     @property
+    def looks_again(self) -> bool:
+        """Whether ``look_again`` brings something: the encoder takes every frame, and there is one."""
+        return Kind.PIXELS in self.encoders and not self.encoders.keyframes_only
+
+    @property
     def next_index(self) -> int:
         """The number of the next frame."""
         return len(self) + len(self._left_out)
@@ -157,6 +162,27 @@ class GrowingMap:
         enough = len(self._waiting) >= self._wait or waiting_bytes > _MOST_WAITING_BYTES
         if self._sensor is not None or enough:
             self._settle()
+
+    def look_again(self, frame: Frame, *, is_fused: bool) -> None:
+        """Encode a frame of before, and add what that brings; no other frame need wait for it.
+
+        Its pose must be that of now (a map with submaps takes none), and the first frames no longer wait.
+
+        Args:
+            frame: the frame.
+            is_fused: it was added without features; else its surface and colours are new as well.
+
+        Raises:
+            BackendError: its features are not what they must be; the map is as it was.
+        """
+        assert self._sensor is not None and self._free is not None and not self.settings.frames.per_submap
+        stamp_s = min(frame.stamp_s, float(self._walk.stamps_s[-1]))  # nothing is seen after the last frame of the map
+        with silence_progress(True):
+            part = self._empty(self._sensor)
+            part.add(replace(frame, stamp_s=stamp_s), self._encoded(replace(frame, ground=self._ground)))
+        if not is_fused:
+            self._free.add(frame)
+        self._merge(features_alone(part.sums()) if is_fused else part.sums())
 
     def add_audio(self, chunk: Any, stamp_s: Any = None) -> None:
         """Add a piece of sound; see ``GrowingTrack.add``. Another thread may do it.
@@ -457,15 +483,18 @@ class GrowingMap:
     def _end_part(self) -> None:
         if self._part is None:
             return
+        sums = self._part.sums()
+        self._merge(sums)
+        if self._part_walk:
+            self._keep_submap(sums)
+
+    def _merge(self, sums: VoxelSums) -> None:
         if self._total is None:
-            self._total = VoxelAccumulator(self._part.grid, self._part.dim)
+            self._total = VoxelAccumulator(GridSpec(self.settings.voxel_size_m), sums.feature_sum.shape[1])
         elif self._total_is_read:
             self._total = self._total.copy()
         self._total_is_read = False
-        sums = self._part.sums()
         self._total.merge(sums)
-        if self._part_walk:
-            self._keep_submap(sums)
 
     def _empty(self, sensor: SensorInfo) -> VoxelAccumulator:
         if self._dim is None and Kind.PIXELS in self.encoders:

@@ -1,6 +1,6 @@
 """Sums over voxels: the sums of fusion, in a table that grows in place, and in a sorted form that can be stored."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32, Int64
@@ -61,6 +61,15 @@ class VoxelSums:
 
     def __len__(self) -> int:
         return len(self.index)
+
+
+def features_alone(sums: VoxelSums) -> VoxelSums:
+    """Return sums of which the features alone are added where they are merged: all else is there already."""
+    count = len(sums)
+    return replace(
+        sums, rgb_sum=np.zeros((count, 3)), rgb_weight=np.zeros(count), hits=np.zeros(count, np.int64),
+        views=np.zeros(count, np.int32), sharp=np.zeros(count, np.int64),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)

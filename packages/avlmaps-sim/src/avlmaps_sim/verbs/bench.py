@@ -126,6 +126,8 @@ class Bench(ModelVerb):
     """Number of days of each home, the first included (change). Default: 5."""
     laps: Annotated[int, arg(metavar="N")] = 2
     """How often each recording is driven, forth and back (live)."""
+    rate: Annotated[float, arg(metavar="FACTOR")] = 1.0
+    """Speed of these drives: at 4, an hour of laps takes a quarter of one, and more frames are late (live)."""
     rooms: Annotated[Path | None, arg(metavar="DIR")] = None
     """Folder with measured/S1R01.flac to S1R25.flac, impulse responses of a room (sources)."""
     trials: Annotated[int, arg(metavar="N")] = 12
@@ -191,7 +193,9 @@ class Bench(ModelVerb):
 
         if self.laps < 1 or self.kills < 0:
             raise UsageError(f"--laps is {self.laps} and --kills {self.kills}; choose 1 lap or more, 0 kills or more.")
-        return LiveBench(self.laps, self.kills)
+        if not self.rate > 0.0:
+            raise UsageError(f"--rate is {self.rate:g}; choose a positive number.")
+        return LiveBench(self.laps, self.kills, self.rate)
 
     def sources_settings(self) -> "SourcesBench":
         """Return the settings of the suite sources."""

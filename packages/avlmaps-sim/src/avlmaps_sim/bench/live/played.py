@@ -29,7 +29,9 @@ class Played:
     Attributes:
         frames: that came.
         seconds: that it lasted.
+        close_s: seconds until it was closed, most of them for frames that had been kept back.
         status: at its end.
+        encoded_later: frames that were kept back and encoded after all.
         asked_ms: of each question meanwhile.
         processor_ms: a frame, by thread; ``all`` has reading the recording and the questions in it.
         oldest_save_s: the most that a kill would have lost.
@@ -39,6 +41,8 @@ class Played:
 
     frames: int = 0
     seconds: float = 0.0
+    close_s: float = 0.0
+    encoded_later: int = 0
     status: LiveStatus | None = None
     asked_ms: list[float] = field(default_factory=list)
     processor_ms: dict[str, float] = field(default_factory=dict)
@@ -86,7 +90,9 @@ def play(
     finally:
         over.set()
         person.join()
+        end_s = time.perf_counter()
         live.close()
+        found.close_s, found.encoded_later = time.perf_counter() - end_s, live.status().encoded_later
     return found
 
 

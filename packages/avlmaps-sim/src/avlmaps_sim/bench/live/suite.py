@@ -20,6 +20,7 @@ from avlmaps_sim.bench.live.played import Played, play
 from avlmaps_sim.bench.output import BenchError, Table
 
 _VOXEL_M = 0.05
+_SHOWN_LAPS = 12  # of an hour
 _Rows = list[list[object]]
 
 
@@ -74,13 +75,14 @@ def run_live(scenes: Sequence[Path], used: Encoders, profile: str, chosen: LiveB
                 pace.append([name, word, *_pace(found)])
                 processor.append([name, word, *_processor(found)])
                 if rate:
-                    laps += [[name, lap + 1, *of_lap] for lap, of_lap in enumerate(found.laps)]
+                    shown = np.unique(np.linspace(0, len(found.laps) - 1, _SHOWN_LAPS).astype(int)).tolist()
+                    laps += [[name, lap + 1, *found.laps[lap]] for lap in shown]
             ends += _ends(name, recording, place, used)
             kills += [lost_s(path, place / "killed", profile, rng) for _ in range(chosen.kills)]
     return {
         "pace": _table(
             "recording|pace|frames|s|frames/s|fused|encoded|late|frame to map ms p50|p95|questions|question ms p50|p95"
-            "|oldest save s|load of the machine", pace,
+            "|oldest save s|load of the machine|close s|encoded later", pace,
         ),
         "processor time a frame, ms": _table("recording|pace|all|fusing|snapshots|saving", processor),
         "laps over the same surface": _table("recording|lap|voxels|keyframes|fused until then|MB", laps),
@@ -105,7 +107,7 @@ def _pace(found: Played) -> list[object]:
         found.frames, round(found.seconds, 1), round(found.frames / found.seconds, 1), status.fused, status.encoded,
         status.dropped.get("late", 0), round(status.frame_ms_p50), round(status.frame_ms_p95), len(found.asked_ms),
         *(round(float(np.percentile(asked, p)), 1) for p in (50, 95)), round(found.oldest_save_s, 1),
-        round(found.load, 1),
+        round(found.load, 1), round(found.close_s, 1), found.encoded_later,
     ]  # fmt: skip
 
 
