@@ -113,7 +113,7 @@ class EncodingGate:
         return self._is_encoded(frame, self._settings.looks, share)
 
     def opens_again(self, frame: Frame) -> bool:
-        """Return the same of a frame of before, now that there is time: beside how many looks it is worth something."""
+        """Return the same of a frame of before, now that there is time."""
         return self._is_encoded(frame, self._settings.later_looks, LATER_SHARE)
 
     def worth_later(self, frame: Frame) -> float:
@@ -127,7 +127,7 @@ class EncodingGate:
         return worth > share
 
     def _looked(self, frame: Frame, looks: int) -> tuple[float, dict[int, float]]:
-        """Return the share of points worth a look beside so many, and what places weigh with this one."""
+        """Return the share of points worth a look beside others, and what places weigh with this one."""
         looked = Looked.of(frame, self._fusion.max_depth_m)
         if not len(looked.world):
             return 0.0, {}

@@ -50,7 +50,7 @@ _IDLE_S = 0.05
 _MOST_DOUBTS = 100
 _CHANGES = "fused", "corrected", "encoded later"  # what is counted where the map has become another
 _STILL = 1e-3  # times what it is worth: a frame in which the camera stood makes room for every other
-_CALM_S = 0.5  # without a frame, before frames that were kept back are looked at
+_CALM_S = 0.5  # without a frame, before frames on the disk are looked at
 _LOOKS_S = 0.3  # for keyframes, in each snapshot
 _LISTEN_S = 0.25  # from one look for sounds that ended to the next
 _REST_S = 1.0  # between two snapshots, at most, where one takes longer than that
@@ -285,7 +285,7 @@ class LiveMap:
     def close(self) -> AVLMap:
         """Fuse what waits and end as a build does: find up, the floor, places and sounds, write the map and open it.
 
-        With gates, frames that were kept back are looked at first (``status().kept``), a tenth of a second each.
+        With gates, frames that wait on the disk are looked at first (``status().kept``), a tenth of a second each.
 
         Raises:
             MapError: no frame came, or the map cannot be written: the last save is still there, and closing may be
@@ -428,7 +428,7 @@ class LiveMap:
                 self._doubt(str(fault))
 
     def _look_again(self) -> None:
-        """Encode the frame that is worth most of those that were kept back, unless it brings nothing any more."""
+        """Encode the frame that is worth most of those on the disk, unless it brings nothing any more."""
         self._is_standing = False
         taken = self._kept.take()
         if taken is None or not self._growing.sums or not self._encoding.opens_again(taken[0]):

@@ -28,8 +28,8 @@ class LiveSettings:
     """A fused frame is encoded where more than this share of its points is worth it; else it adds its surface and
     colours alone. Twice that with one frame waiting behind it, and so on."""
     kept_frames: int = 256
-    """Frames that were not encoded, or dropped by a gate, and are kept on the disk (2.2 MB each at 640x480) until there
-    is time: when no frame comes for half a second, when the robot stands, and at the end. 0 keeps none. With gates."""
+    """Frames that were not encoded, or dropped by a gate, and wait on the disk (2.2 MB each at 640x480) until there
+    is time: when no frame comes for half a second, when the robot stands, and at the end. 0 stores none. With gates."""
     later_looks: int = 100
     """As `looks`, for these."""
     first_frames: int = 8

@@ -29,9 +29,9 @@ class Played:
     Attributes:
         frames: that came.
         seconds: that it lasted.
-        close_s: seconds until it was closed, most of them for frames that had been kept back.
+        close_s: seconds until it was closed, most of them for frames that waited on the disk.
         status: at its end.
-        encoded_later: frames that were kept back and encoded after all.
+        encoded_later: frames that waited on the disk and were encoded after all.
         asked_ms: of each question meanwhile.
         processor_ms: a frame, by thread; ``all`` has reading the recording and the questions in it.
         oldest_save_s: the most that a kill would have lost.
