@@ -1,18 +1,10 @@
 """Small buildings with exact measures, for what is heard and recorded in them."""
 
-from pathlib import Path
-
 import numpy as np
-import pytest
 
-from avlmaps.maps.build import build_map
-from avlmaps.maps.settings import BuildSettings, FrameSettings
-from avlmaps.recordings.open import open_recording
 from avlmaps_sim.mesh import Material, Triple
-from avlmaps_sim.recorder import RecordSettings, record_scene
 from avlmaps_sim.scene import Area, Light, Scene, SceneBuilder
 from avlmaps_sim.shapes import box, sheet
-from helpers.made_once import made_once
 
 HEIGHT_M = 2.6
 _PAINT = Material((0.8, 0.8, 0.75))
@@ -88,19 +80,3 @@ def flat() -> Scene:
         look = Material((0.2 + 0.09 * index, 0.5, 0.9 - 0.09 * index))
         builder.add(category, box(low, high, look), area=room)
     return builder.build()
-
-
-def heard_flat(factory: pytest.TempPathFactory) -> tuple[Path, Path]:
-    """Return a recording of the flat with an array of four microphones, and its map with submaps; the caller's own."""
-    folder = made_once(factory, "heard-flat", _map_flat)
-    return folder / "rec", folder / "flat.avlmap"
-
-
-def _map_flat(folder: Path) -> None:
-    settings = RecordSettings(
-        size=(160, 120), fps=4.0, hearing="acoustic", microphones="square4", snr_db=20.0, sources=3, workers=1,
-        max_frames=80,
-    )  # fmt: skip
-    record_scene(flat(), folder / "rec", settings, seed=1)
-    built = BuildSettings(frames=FrameSettings(per_submap=32))
-    build_map(open_recording(folder / "rec"), folder / "flat.avlmap", "synthetic", built, progress=False)

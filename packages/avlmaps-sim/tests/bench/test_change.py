@@ -16,7 +16,7 @@ from avlmaps_sim.bench.change.scores import Happened, judged, judged_list, true_
 from avlmaps_sim.bench.change.suite import TRUE, run_change
 from avlmaps_sim.bench.harness.settings import SceneSettings
 from avlmaps_sim.rearranged import Change
-from helpers.hearing_scenes import heard_flat
+from helpers.heard_flat import heard_flat
 
 HERE, THERE, FAR = (0.0, 0.0, 0.2), (2.0, 0.0, 0.2), (9.0, 9.0, 0.2)
 

@@ -20,7 +20,7 @@ from avlmaps.maps.store.writer import MapContent, write_map
 from avlmaps.maps.types import SourceEvidence
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.recordings.open import open_recording
-from helpers.hearing_scenes import heard_flat
+from helpers.heard_flat import heard_flat
 
 pytestmark = pytest.mark.slow  # the recording and the map are made by the first of the modules that need them
 

@@ -23,7 +23,8 @@ from avlmaps_sim.hearing import AcousticSettings, Sounding, Source
 from avlmaps_sim.hearing.array import heard_by_array
 from avlmaps_sim.recorder import RecordSettings, record_scene
 from avlmaps_sim.truth import read_truth
-from helpers.hearing_scenes import flat, heard_flat, shoebox
+from helpers.heard_flat import heard_flat
+from helpers.hearing_scenes import flat, shoebox
 
 pytestmark = pytest.mark.slow  # the recording and the map are made by the first of the modules that need them
 
