@@ -4,8 +4,7 @@ from audio_fakes import tone
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps.recordings.audio import Sound
-from avlmaps.recordings.resample import resample
+from avlmaps.recordings.audio import Sound, resample
 
 
 @pytest.mark.parametrize(

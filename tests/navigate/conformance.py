@@ -11,7 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from avlmaps.navigate.ros import RosDriver, RosSettings
-from avlmaps.navigate.ros.standing import STILL_S
+from avlmaps.navigate.ros.contact import STILL_S
 
 __all__ = [
     "test_a_bridge_that_comes_back_is_used_to_stop",

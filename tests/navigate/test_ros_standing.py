@@ -4,9 +4,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from avlmaps.navigate.ros.echoes import Echoes
+from avlmaps.navigate.ros.contact import STILL_M, STILL_S, Stillness
 from avlmaps.navigate.ros.messages import Transform, rigid
-from avlmaps.navigate.ros.standing import STILL_M, STILL_S, Stillness
+from avlmaps.navigate.ros.session import Echoes
 from avlmaps.navigate.ros.tree import LiveTree
 
 LOOK_S = 0.02

@@ -15,9 +15,8 @@ from avlmaps.core.registry import Kind, find, forget_loaded, load
 from avlmaps.perception.conformance import check, example_frame, example_sound
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.light import bundle as files
-from avlmaps.perception.light.mel import log_mel
 from avlmaps.perception.light.pixels import LightPixels
-from avlmaps.perception.light.sounds import LightSounds
+from avlmaps.perception.light.sounds import LightSounds, log_mel
 from avlmaps.perception.light.tokens import TokenList, Tokens
 from avlmaps.perception.light.tower import interpolation
 from avlmaps.perception.light.views import LightViews

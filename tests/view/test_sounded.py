@@ -11,7 +11,7 @@ from avlmaps.maps.store.reader import open_stored
 from avlmaps.maps.store.writer import MapContent, write_map
 from avlmaps.maps.types import SourceEvidence
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.view.sounded import SHARES, drawn_sources
+from avlmaps.view.labels import SHARES, drawn_sources
 from helpers.viewing import Served, serving
 
 

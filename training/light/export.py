@@ -18,7 +18,7 @@ from training.light.towers import PictureTower, PictureWords, SoundTower, SoundW
 from avlmaps.core.files import sha256_of_file
 from avlmaps.core.lexicon import Kind, lexicon
 from avlmaps.perception.light import bundle as files
-from avlmaps.perception.light.mel import log_mel
+from avlmaps.perception.light.sounds import log_mel
 from avlmaps.perception.light.tokens import Tokens
 from avlmaps.perception.light.tower import interpolation, resized
 from avlmaps.perception.models.checksums import checksum_of, weights_in

@@ -12,8 +12,7 @@ from training.sounds.kinds import MADE, NAMES, kind_of
 
 from avlmaps.core.progress import progress
 from avlmaps.perception.embedded import logmel
-from avlmaps.recordings.audio import Sound
-from avlmaps.recordings.resample import resample
+from avlmaps.recordings.audio import Sound, resample
 from avlmaps_sim.synthesis import MAKERS
 
 SHIPPABLE = ("CC0", "CC-BY ")  # the start of a licence with which a clip may teach weights that ship

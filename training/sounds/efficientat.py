@@ -16,8 +16,7 @@ from jaxtyping import Float32
 from torch import Tensor, nn
 
 from avlmaps.perception.light.efficientat import RATE_HZ, log_mel
-from avlmaps.recordings.audio import Sound
-from avlmaps.recordings.resample import resample
+from avlmaps.recordings.audio import Sound, resample
 
 NORM_EPSILON = 1e-3  # of the batch norms
 

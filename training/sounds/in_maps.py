@@ -28,8 +28,7 @@ from avlmaps.query.factors import HeatSettings
 from avlmaps.query.heatmap import Heatmap, product
 from avlmaps.query.modalities.sound import SoundSettings, sound_factor
 from avlmaps.query.voxel_space import Space
-from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
-from avlmaps.recordings.resample import resample
+from avlmaps.recordings.audio import AudioTrack, Sound, resample, write_flac
 from avlmaps_sim.bench.harness.clips import unheard_folder
 from avlmaps_sim.bench.harness.evidence import LEAST_SEEN, Event, Evidence
 from avlmaps_sim.bench.harness.factors import true_things

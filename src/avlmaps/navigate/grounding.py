@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import product
+from numbers import Real
+from typing import cast
 
 import numpy as np
 from jaxtyping import Float
@@ -12,13 +14,35 @@ from avlmaps.core.wording import place_text
 from avlmaps.language.program.vocabulary import Clip, Picture, Place, Target
 from avlmaps.language.storey_words import said_storeys
 from avlmaps.maps.storeys import said_storeys as storeys_in_words
-from avlmaps.navigate.arguments import kind_of, text_of
 from avlmaps.navigate.file_access import Readable
 from avlmaps.navigate.footprint import Outline
 from avlmaps.navigate.instances import Thing, likely, nearest, same_thing, tells_one, things_in
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.on_storeys import at_storey, storeys_meant
+
+
+def text_of(value: object, skill: str) -> str:
+    """Return words, or raise ``ProgramError`` where it is something else."""
+    if not isinstance(value, str):
+        raise ProgramError(f"{skill} takes words, not {kind_of(value)}.")
+    return value
+
+
+def number_of(value: object, skill: str, most: float, unit: str) -> float:
+    """Return a number, or raise ``ProgramError`` where it is none, not finite or beyond ``most`` on either side."""
+    # NumPy's numbers are real ones too; NaN fails every comparison.
+    if isinstance(value, bool) or not isinstance(value, Real) or not abs(cast("float", value)) <= most:
+        shown = value if isinstance(value, float) else kind_of(value)
+        if isinstance(value, int) and not isinstance(value, bool):
+            shown = value if abs(value) < 10**12 else "a larger one"  # an integer may have any number of digits
+        raise ProgramError(f"{skill} takes a number of at most {most:g} {unit}, not {shown}.")
+    return float(value)
+
+
+def kind_of(value: object) -> str:
+    """Return the kind of a value, for the sentence of an error."""
+    return f"a {type(value).__name__.lower()}"
 
 
 class Seeker:

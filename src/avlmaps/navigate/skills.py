@@ -18,12 +18,11 @@ from jaxtyping import Float
 from avlmaps.core.errors import NavigationError, ProgramError
 from avlmaps.core.motion import Action, wrap_angle
 from avlmaps.language.program.vocabulary import Clip, Heat, Picture, Place, Target
-from avlmaps.navigate.arguments import kind_of, number_of, text_of
 from avlmaps.navigate.costmap import storey_of_walk
 from avlmaps.navigate.driver import Arrival, Driver
 from avlmaps.navigate.file_access import Readable
 from avlmaps.navigate.footprint import Outline, bearing_rad, middle_between, to_the_left
-from avlmaps.navigate.grounding import Seeker
+from avlmaps.navigate.grounding import Seeker, kind_of, number_of, text_of
 from avlmaps.navigate.instances import Thing
 from avlmaps.navigate.motion_log import Move, Triple, concat_motions
 from avlmaps.query.avlmap import AVLMap

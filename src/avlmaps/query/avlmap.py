@@ -397,7 +397,7 @@ class AVLMap:
             QueryError: ``least_confidence`` lies outside [0, 1], or the pixel encoder does not know a name.
         """
         from avlmaps.query.contents import Contents, require_known
-        from avlmaps.query.heard_from import with_heard
+        from avlmaps.query.sound_sources import with_heard
 
         models = self.stored.info.models
         require_known(self.knows, (names or ()) if "pixels" in models else ())

@@ -15,8 +15,8 @@ from avlmaps.core.errors import QueryError
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.contents import Watch, listed_rooms, put_storeys, require_known
 from avlmaps.query.given_places import is_place, place_given
-from avlmaps.query.heard_from import with_heard
 from avlmaps.query.schema import ListedThing, NearAnswer, RoomAnswer, SoundAnswer, ThingAnswer
+from avlmaps.query.sound_sources import with_heard
 from avlmaps.query.unknown_names import unknown_note
 from avlmaps.query.whereabouts import Whereabouts
 

@@ -55,3 +55,13 @@ def all_axes() -> tuple[str, ...]:
 
 def _determinant(letters: str) -> float:
     return float(np.linalg.det(np.array([_DIRECTIONS[letter] for letter in letters])))
+
+
+UP_IN_WORLD = np.array([0.0, 1.0, 0.0])
+
+
+def from_opengl(world_from_camera: Float[np.ndarray, "*n 4 4"]) -> Float[np.ndarray, "*n 4 4"]:
+    """Return poses of cameras with y down and z forward, given those with y up and z backward."""
+    opengl_from_opencv = np.eye(4)
+    opengl_from_opencv[:3, :3] = opencv_from_axes("opengl").T
+    return world_from_camera @ opengl_from_opencv

@@ -24,8 +24,7 @@ from avlmaps.serve.errors import RequestError
 from avlmaps.serve.guard import App, Receive, Scope, Send, refuse
 from avlmaps.serve.lanes import Cancellation, Lane, Report
 from avlmaps.serve.requests import NoQuery, checked
-from avlmaps.serve.responses import error_response
-from avlmaps.serve.service import Service
+from avlmaps.serve.service import Service, error_response
 from avlmaps.serve.tools import TOOLS, AgentTool, ToolResult
 from avlmaps.serve.work import Task, describe_map, encoded, list_maps
 

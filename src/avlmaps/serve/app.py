@@ -23,8 +23,7 @@ from avlmaps.serve.openapi import document
 from avlmaps.serve.operations import OPERATIONS, Operation
 from avlmaps.serve.page import CONTENT_POLICY, html_page
 from avlmaps.serve.requests import checked, checked_texts
-from avlmaps.serve.responses import JSON_TYPE, error_response
-from avlmaps.serve.service import Service
+from avlmaps.serve.service import JSON_TYPE, Service, error_response
 from avlmaps.serve.tools import TOOLS, AgentTool
 from avlmaps.serve.uploads import Uploads
 from avlmaps.serve.work import File, Task, encoded, list_maps

@@ -1,16 +1,20 @@
 """What every part of the server shares: settings, maps, lanes, and how errors are written."""
 
+import logging
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from starlette.responses import Response
+
 from avlmaps.query.avlmap import QuerySettings
 from avlmaps.query.modalities.sound import SoundSettings
-from avlmaps.serve.errors import Privacy
+from avlmaps.serve.errors import Privacy, RequestError
 from avlmaps.serve.lanes import Lane
 from avlmaps.serve.settings import ServeSettings
 from avlmaps.serve.shelf import MapSource, Shelf
+from avlmaps.serve.work import encoded
 
 if TYPE_CHECKING:
     from avlmaps.view.route import MakeRobot
@@ -71,3 +75,16 @@ class Service:
         """End the lanes after the work that they have."""
         self.quick.close()
         self.slow.close()
+
+
+JSON_TYPE = "application/json"
+log = logging.getLogger("avlmaps.serve")
+
+
+def error_response(service: Service, error: BaseException) -> Response:
+    """Return an error as the JSON that the command line prints; what is a fault of ours goes to the log."""
+    status, answer = service.privacy.described(error)
+    if status >= 500 and not isinstance(error, RequestError):
+        log.error("%s", error, exc_info=error if status == 500 else None)
+    headers = error.headers if isinstance(error, RequestError) else {}
+    return Response(encoded(answer), status, headers, JSON_TYPE)

@@ -68,7 +68,7 @@ def test_a_long_sound_is_encoded_whole_and_begins_as_the_published_code_heard_it
 
 
 def test_another_rate_is_brought_to_its_own(encoder):
-    from avlmaps.recordings.resample import resample
+    from avlmaps.recordings.audio import resample
 
     sound = example_sound(seconds=2.0, rate_hz=16_000)
     np.testing.assert_allclose(encoder.encode(sound), encoder.encode(resample(sound, RATE_HZ)), atol=1e-5)

@@ -24,9 +24,8 @@ from avlmaps.core.lexicon import lexicon
 from avlmaps.core.registry import Kind, forget_loaded, load
 from avlmaps.perception.conformance import check, example_frame, example_sound
 from avlmaps.perception.light import bundle as files
-from avlmaps.perception.light.mel import log_mel
 from avlmaps.perception.light.pixels import LightPixels
-from avlmaps.perception.light.sounds import LightSounds
+from avlmaps.perception.light.sounds import LightSounds, log_mel
 from avlmaps.perception.light.tower import interpolation
 from avlmaps.perception.light.views import LightViews
 from avlmaps.perception.models.prompts import AREA_PROMPTS, THINGS, TIPS_PROMPTS, clean

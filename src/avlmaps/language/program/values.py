@@ -5,7 +5,7 @@ from types import NoneType
 from typing import Any
 
 from avlmaps.language.program.budget import refused
-from avlmaps.language.program.literals import bounded
+from avlmaps.language.program.lexer import bounded
 from avlmaps.language.program.table import Skill
 from avlmaps.language.program.value_types import ValueType, check_sign, kind_of_result
 from avlmaps.language.program.vocabulary import Clip, Heat, Picture, Place

@@ -50,7 +50,7 @@ def detect_events(
         return collect([], encoder.card.dim)
     clips_folder.mkdir(parents=True, exist_ok=True)
     if cuts_by_changes(encoder, settings):
-        pieces = by_changes(recording.audio, cast(FrameSoundEncoder, encoder), settings.changes)
+        pieces = by_changes(recording.audio, cast("FrameSoundEncoder", encoder), settings.changes)
     else:
         pieces = _by_energy(recording.audio, encoder, settings)
     heard: list[Heard] = []

@@ -20,13 +20,11 @@ from avlmaps.core.errors import NavigationError
 from avlmaps.core.motion import GroundPose
 from avlmaps.navigate.driver import Arrival
 from avlmaps.navigate.interrupts import Halt
-from avlmaps.navigate.ros.calling_off import AGAIN_S, call_off, ended_within
 from avlmaps.navigate.ros.contact import Contact
-from avlmaps.navigate.ros.goals import End, Goal, MovementPlan, Stopwatch, Task, Track
+from avlmaps.navigate.ros.goals import End, Goal, MovementPlan, Stopwatch, Task, Tasks, Track
 from avlmaps.navigate.ros.guard import GoalGuard
 from avlmaps.navigate.ros.plans import LEAST_M, LONGEST_M, Standing, ahead_of, place_to_stand, plan_turn
-from avlmaps.navigate.ros.session import Opener
-from avlmaps.navigate.ros.tasks import Tasks
+from avlmaps.navigate.ros.session import AGAIN_S, Opener, call_off, ended_within
 
 _LOOK_EVERY_S = 0.1
 _ASK_S = 1.5

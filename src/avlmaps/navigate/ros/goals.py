@@ -1,16 +1,19 @@
 """The task of a ROS robot, and its state."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import StrEnum
 from time import monotonic
-from typing import Any
+from typing import Any, ClassVar
 from uuid import uuid4
 
 import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core.motion import GroundPose
+from avlmaps.navigate.ros.frames import Frames
+from avlmaps.navigate.ros.settings import RosSettings
 
 _STEP_M = 0.05
 _MOST_PLACES = 20_000
@@ -132,3 +135,30 @@ class Stopwatch:
     def took_s(self) -> float:
         """Seconds since it was made."""
         return monotonic() - self._begun_s
+
+
+class Tasks(ABC):
+    """Makes the tasks of one kind of robot.
+
+    Attributes:
+        frames: the robot's frames, and how they lie to the map.
+        settings: names, patience, speeds.
+    """
+
+    called: ClassVar[str]
+    """The program that drives the robot, as notes name it."""
+
+    def __init__(self, frames: Frames, settings: RosSettings) -> None:
+        self.frames, self.settings = frames, settings
+
+    @abstractmethod
+    def pose(self, pose: GroundPose) -> Task:
+        """Return the task of standing at a pose, level frame."""
+
+    def turn(self, start: GroundPose, angle_rad: float) -> tuple[Task, ...]:
+        """Return the tasks of a turn on the spot; the first whose server is there is done."""
+        return (self.pose(start.turned(angle_rad)),)
+
+    def forward(self, start: GroundPose, distance_m: float) -> tuple[Task, ...]:
+        """Return the tasks of a straight drive; the first whose server is there is done."""
+        return (self.pose(start.ahead(distance_m)),)

@@ -18,9 +18,8 @@ from time import monotonic, sleep
 import msgspec
 
 from avlmaps.core.errors import AvlmapsError
-from avlmaps.navigate.ros.calling_off import call_off
 from avlmaps.navigate.ros.goals import Goal, Task
-from avlmaps.navigate.ros.session import Ear
+from avlmaps.navigate.ros.session import Ear, call_off
 from avlmaps.navigate.ros.settings import RosSettings
 from avlmaps.navigate.ros.transports import RosKind, session_opener
 

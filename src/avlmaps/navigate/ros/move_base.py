@@ -11,9 +11,8 @@ import msgspec
 
 from avlmaps.core.motion import GroundPose
 from avlmaps.navigate.ros.bridge import BridgeSession
-from avlmaps.navigate.ros.goals import End, Goal, Task
+from avlmaps.navigate.ros.goals import End, Goal, Task, Tasks
 from avlmaps.navigate.ros.messages import GoalState, GoalStates, GoalUpdate, sanitize_line, stamped_pose
-from avlmaps.navigate.ros.tasks import Tasks
 
 # actionlib_msgs/GoalStatus
 _PENDING, _ACTIVE, _PREEMPTED, _SUCCEEDED, _ABORTED, _REJECTED, _PREEMPTING, _RECALLING, _RECALLED, _LOST = range(10)

@@ -5,7 +5,7 @@ Importing this module imports rclpy; only `transports` does, and only when a rob
 
 import os
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import partial
 from itertools import count
@@ -28,13 +28,24 @@ from unique_identifier_msgs.msg import UUID as GoalUuid  # noqa: N811 - a class
 from avlmaps.core.errors import AvlmapsError
 from avlmaps.core.ros_interfaces import interface
 from avlmaps.navigate.ros.goals import End, Goal
-from avlmaps.navigate.ros.interfaces import filled
 from avlmaps.navigate.ros.messages import Transform, rigid, sanitize_line
 from avlmaps.navigate.ros.nav2_tasks import MOVING, why_of
 from avlmaps.navigate.ros.own_map import OwnGrid, checked_grid
 from avlmaps.navigate.ros.session import Ear
 from avlmaps.navigate.ros.settings import RosSettings
 from avlmaps.recordings.formats.ros_messages import stamp_of
+
+
+def filled(message: Any, values: Mapping[str, Any]) -> Any:
+    """Set fields of a message by nested dictionaries, and return it; those that are not named stay as they are."""
+    for name, value in values.items():
+        field = getattr(message, name)
+        if isinstance(value, Mapping):
+            filled(field, value)
+        else:
+            setattr(message, name, type(field)(value) if isinstance(field, (int, float)) else value)
+    return message
+
 
 # pyright: reportMissingImports=false
 _LOOK_EVERY_S = 0.05

@@ -3,9 +3,8 @@
 from typing import ClassVar
 
 from avlmaps.core.motion import GroundPose
-from avlmaps.navigate.ros.goals import Task
+from avlmaps.navigate.ros.goals import Task, Tasks
 from avlmaps.navigate.ros.messages import duration, stamped_pose
-from avlmaps.navigate.ros.tasks import Tasks
 
 NAVIGATE, SPIN, STRAIGHT = "navigate_to_pose", "spin", "drive_on_heading"
 ASKED_FOR = (NAVIGATE, "navigate_through_poses", "follow_waypoints", SPIN, STRAIGHT)

@@ -6,14 +6,73 @@ writes what arrives into an `Ear`.
 """
 
 import threading
+from bisect import bisect_right
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from time import monotonic
 from typing import Protocol
+from uuid import uuid4
 
-from avlmaps.navigate.ros.echoes import Echoes
 from avlmaps.navigate.ros.goals import Goal
 from avlmaps.navigate.ros.tree import LiveTree
+
+AGAIN_S = 0.5
+"""Time after which a cancel is sent again."""
+
+_MOST_ECHOES = 2000
+
+
+class Echoes:
+    """How late what arrives is at most: messages of ours that come back through the same queue.
+
+    A bridge and a network keep the order of what they bring. What arrives after an echo left the robot after that echo
+    was sent, independent of the clocks of the two machines. Written by the transport, from any thread.
+    """
+
+    def __init__(self, clock: Callable[[], float]) -> None:
+        """Begin with no echo."""
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._name, self._count = uuid4().hex, 0
+        self._sent_s: dict[int, float] = {}
+        self._back_s: list[float] = []
+        self._sent_of_back_s: list[float] = []
+
+    def next(self) -> str:
+        """Return the text of the next echo, which is sent now."""
+        with self._lock:
+            self._count += 1
+            self._sent_s[self._count] = self._clock()
+            if len(self._sent_s) > _MOST_ECHOES:
+                self._sent_s.pop(next(iter(self._sent_s)))
+            return f"{self._name} {self._count}"
+
+    def back(self, text: str) -> None:
+        """Take in a text that came back; those of other clients are left out."""
+        name, _, number = text.partition(" ")
+        if name != self._name or not number.isdecimal():
+            return
+        with self._lock:
+            sent_s = self._sent_s.pop(int(number[:12]), None)
+            if sent_s is None or (self._sent_of_back_s and sent_s < self._sent_of_back_s[-1]):
+                return
+            self._back_s.append(self._clock())
+            self._sent_of_back_s.append(sent_s)
+            del self._back_s[:-_MOST_ECHOES], self._sent_of_back_s[:-_MOST_ECHOES]
+
+    def sent_before(self, arrived_s: float) -> float | None:
+        """Return a time after which what arrived then left the robot; None where no echo has ever come back."""
+        with self._lock:
+            if not self._back_s:
+                return None
+            index = bisect_right(self._back_s, arrived_s) - 1
+            return self._sent_of_back_s[index] if index >= 0 else None
+
+    @property
+    def heard(self) -> bool:
+        """Whether an echo has come back."""
+        with self._lock:
+            return bool(self._back_s)
 
 
 class Servers:
@@ -153,3 +212,25 @@ class Session(Protocol):
 
 Opener = Callable[[Ear, float], Session]
 """Opens a session within some seconds; raises `NavigationError` where nobody answers."""
+
+
+def ended_within(goal: Goal, session: Session, wait_s: float) -> bool:
+    """Wait until a goal is over, or the session; return whether the goal is."""
+    with session.heard:
+        session.heard.wait_for(lambda: goal.end is not None or session.lost is not None, wait_s)
+    return goal.end is not None
+
+
+def call_off(goal: Goal, session: Session, until_s: float, given_up: Callable[[], bool] = lambda: False) -> bool:
+    """Cancel a goal again and again until it is over, the session is lost or a time has come.
+
+    Args:
+        goal: ours; no other goal is cancelled.
+        session: stands.
+        until_s: by `time.monotonic`.
+        given_up: returns whether to stop sooner.
+    """
+    while goal.end is None and session.lost is None and not given_up() and (left_s := until_s - monotonic()) > 0.0:
+        session.cancel(goal)
+        ended_within(goal, session, min(left_s, AGAIN_S))
+    return goal.end is not None

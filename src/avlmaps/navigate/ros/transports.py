@@ -6,13 +6,13 @@ from typing import Literal
 from avlmaps.core.errors import BackendError, NavigationError
 from avlmaps.core.wording import option
 from avlmaps.navigate.ros.frames import Frames
+from avlmaps.navigate.ros.goals import Tasks
 from avlmaps.navigate.ros.move_base import MoveBaseSession, MoveBaseTasks
 from avlmaps.navigate.ros.nav2 import Nav2Session
 from avlmaps.navigate.ros.nav2_tasks import Nav2Tasks
 from avlmaps.navigate.ros.own_map import OwnGrid, read_over_bridge
 from avlmaps.navigate.ros.session import Opener
 from avlmaps.navigate.ros.settings import RosSettings
-from avlmaps.navigate.ros.tasks import Tasks
 
 RosKind = Literal["nav2", "move_base"]
 NATIVE = "native"

@@ -35,8 +35,7 @@ from avlmaps.perception.embedded.sound_calibration import (
 from avlmaps.perception.enrolment import TaughtSound, enrolled_sounds, sounds_folder
 from avlmaps.perception.models.networks import open_network
 from avlmaps.perception.protocols import ModelCard, WordEncoder
-from avlmaps.recordings.audio import Sound
-from avlmaps.recordings.resample import resample
+from avlmaps.recordings.audio import Sound, resample
 
 _BATCH = 16
 
@@ -98,7 +97,7 @@ class EmbeddedSounds:
         self._network = network
         self._folder = folder
         about = json.loads(notes)
-        self._words: WordEncoder = cast(WordEncoder, load(Kind.WORDS, "embedded")) if words is None else words
+        self._words: WordEncoder = cast("WordEncoder", load(Kind.WORDS, "embedded")) if words is None else words
         self.kinds = tuple(KnownKind(k["name"], tuple(k["called"]), k["origin"], k["clips"]) for k in about["kinds"])
         self.sources = frozenset[int](about.get("sources", ()))  # freesound's numbers of the recordings it learnt from
         # features of some of the clips that the network learnt from, sorted by kind
@@ -136,7 +135,7 @@ class EmbeddedSounds:
         mels = logmel.normalised(logmel.mel_power(resample(sound, logmel.RATE_HZ).samples))
         windows = logmel.windows(mels)
         parts = [
-            cast(np.ndarray, self._session.run(None, {"heard": logmel.heard(windows[at : at + _BATCH])})[0])
+            cast("np.ndarray", self._session.run(None, {"heard": logmel.heard(windows[at : at + _BATCH])})[0])
             for at in range(0, len(windows), _BATCH)
         ]
         features = np.concatenate(parts).astype(np.float32)

@@ -119,7 +119,7 @@ class EfficientATSounds:
             raise BackendError(
                 f"{path} names {len(self.vocabulary)} sounds and gives {widths} numbers; make it with: {HOW_TO_GET}"
             )
-        self._words: WordEncoder = cast(WordEncoder, load(Kind.WORDS, "embedded"))
+        self._words: WordEncoder = cast("WordEncoder", load(Kind.WORDS, "embedded"))
         self.card = ModelCard(
             id="efficientat/mn04_as",
             dim=sum(widths) + 1,

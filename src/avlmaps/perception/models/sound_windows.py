@@ -7,8 +7,7 @@ import numpy as np
 from jaxtyping import Float32
 
 from avlmaps.core.errors import AudioError
-from avlmaps.recordings.audio import Sound
-from avlmaps.recordings.resample import resample
+from avlmaps.recordings.audio import Sound, resample
 
 T = TypeVar("T")
 WORDS_AT_ONCE = 64

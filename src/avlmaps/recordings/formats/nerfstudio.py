@@ -18,11 +18,11 @@ from jaxtyping import Float
 
 from avlmaps.core.camera import Rig
 from avlmaps.core.errors import RecordingError
+from avlmaps.recordings.camera_axes import from_opengl
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
 from avlmaps.recordings.formats.file_recording import FileRecording, Shots, open_audio, settle
 from avlmaps.recordings.formats.intrinsics import fitted, median_camera, resized_notice
 from avlmaps.recordings.formats.json_files import read_json, unread_notice
-from avlmaps.recordings.formats.phones import from_opengl
 from avlmaps.recordings.images import first_picture_size
 
 DESCRIPTION = "transforms.json"

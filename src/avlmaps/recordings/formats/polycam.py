@@ -15,12 +15,12 @@ from jaxtyping import Float
 from avlmaps.core.camera import Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import DESCRIPTION_BYTES
+from avlmaps.recordings.camera_axes import UP_IN_WORLD, from_opengl
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
 from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names, open_audio, settle
 from avlmaps.recordings.formats.intrinsics import fitted, median_camera, resized_notice
 from avlmaps.recordings.formats.json_files import read_json, unread_notice
 from avlmaps.recordings.formats.nerfstudio import INTERVAL_S
-from avlmaps.recordings.formats.phones import UP_IN_WORLD, from_opengl
 from avlmaps.recordings.images import first_picture_size
 
 # What the app writes beside; it says nothing about how the pictures are read.

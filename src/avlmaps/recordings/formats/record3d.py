@@ -23,12 +23,12 @@ from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import MANIFEST_BYTES, PICTURE_BYTES
 from avlmaps.core.lzfse import decompress
 from avlmaps.recordings import images
+from avlmaps.recordings.camera_axes import UP_IN_WORLD, from_opengl
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
 from avlmaps.recordings.formats.exr import read_channel
 from avlmaps.recordings.formats.file_recording import Shots, list_names, number_of, open_audio, settle
 from avlmaps.recordings.formats.intrinsics import fitted, median_camera, resized_notice
 from avlmaps.recordings.formats.json_files import parse_json, read_json, unread_notice
-from avlmaps.recordings.formats.phones import UP_IN_WORLD, from_opengl
 from avlmaps.recordings.formats.stored_recording import StoredRecording
 from avlmaps.recordings.plausible import pace_fault
 

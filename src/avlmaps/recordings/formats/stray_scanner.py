@@ -14,10 +14,10 @@ import numpy as np
 from avlmaps.core import poses
 from avlmaps.core.camera import Rig
 from avlmaps.core.errors import RecordingError
+from avlmaps.recordings.camera_axes import UP_IN_WORLD
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
 from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names, number_of, open_audio, settle
 from avlmaps.recordings.formats.intrinsics import fitted, median_camera
-from avlmaps.recordings.formats.phones import UP_IN_WORLD
 from avlmaps.recordings.formats.tables import read_matrix, read_table, text_lines
 from avlmaps.recordings.images import first_picture_size
 from avlmaps.recordings.plausible import pace_fault

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.recordings.audio import Sound
-from avlmaps.recordings.resample import resample
+from avlmaps.recordings.audio import Sound, resample
 from avlmaps_sim.hearing.impulse import Acoustics
 from avlmaps_sim.hearing.overlay import add_at, room_noise
 from avlmaps_sim.hearing.schedule import Sounding

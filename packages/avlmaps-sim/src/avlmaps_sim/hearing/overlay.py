@@ -5,8 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float32
 
-from avlmaps.recordings.audio import Sound
-from avlmaps.recordings.resample import resample
+from avlmaps.recordings.audio import Sound, resample
 from avlmaps_sim.hearing.schedule import Sounding
 from avlmaps_sim.mixing.background import background
 from avlmaps_sim.mixing.clips import amplify, gain_for

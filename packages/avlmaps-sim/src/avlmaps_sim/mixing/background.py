@@ -7,8 +7,7 @@ import numpy as np
 from jaxtyping import Float, Float32
 
 from avlmaps.core.errors import AudioError
-from avlmaps.recordings.audio import AudioTrack, Sound
-from avlmaps.recordings.resample import resample
+from avlmaps.recordings.audio import AudioTrack, Sound, resample
 
 KINDS = ("white", "pink", "room")
 _LONGEST_S = 120.0  # of a recorded background; more of it is not read

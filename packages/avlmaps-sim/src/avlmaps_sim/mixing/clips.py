@@ -9,8 +9,7 @@ import numpy as np
 from jaxtyping import Float32
 
 from avlmaps.core.errors import AudioError
-from avlmaps.recordings.audio import AudioTrack, Sound
-from avlmaps.recordings.resample import resample
+from avlmaps.recordings.audio import AudioTrack, Sound, resample
 
 SUFFIXES = {".wav", ".flac", ".ogg", ".oga", ".opus", ".mp3", ".m4a"}
 AUDIBLE_DB = -40.0  # below a clip's loudest 10 ms; what is quieter at its ends is cut off

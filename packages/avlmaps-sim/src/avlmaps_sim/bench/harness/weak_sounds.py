@@ -8,8 +8,7 @@ import numpy as np
 from jaxtyping import Float, Float32
 
 from avlmaps.perception.embedded import logmel
-from avlmaps.recordings.audio import Sound
-from avlmaps.recordings.resample import resample
+from avlmaps.recordings.audio import Sound, resample
 from avlmaps_sim.hearing import Synthesised
 
 _EXAMPLES = 4
