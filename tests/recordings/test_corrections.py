@@ -18,7 +18,7 @@ from avlmaps.recordings.camera_axes import NAMED, all_axes, opencv_from_axes
 from avlmaps.recordings.corrections import Corrections, GivenCamera, PoseKind, corrected, reread_poses
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.validate import validate
-from avlmaps.recordings.writer import write_recording
+from avlmaps_sim.mixing.copying import write_recording
 
 QUATERNIONS = st.lists(st.floats(-1.0, 1.0), min_size=4, max_size=4).filter(lambda q: np.linalg.norm(q) > 0.1)
 

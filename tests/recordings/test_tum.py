@@ -10,7 +10,7 @@ from recording_scenes import pose_line, save_depth, save_rgb, shot
 from avlmaps.core import poses
 from avlmaps.core.errors import RecordingError
 from avlmaps.recordings.open import open_recording
-from avlmaps.recordings.writer import write_recording
+from avlmaps_sim.mixing.copying import write_recording
 
 START = 1305031102.0
 

@@ -1,13 +1,12 @@
 """`avlmaps changes`: what is new, moved and gone in a map of several days."""
 
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any
 
-from tyro.conf import Positional, arg
+from tyro.conf import arg
 
 from avlmaps.cli.output import emit, place, table_lines
-from avlmaps.cli.verb import ModelVerb
+from avlmaps.cli.verb import MapVerb
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -16,7 +15,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Changes(ModelVerb):
+class Changes(MapVerb):
     """List what is new, moved and gone in a map of several days, each with the day on which it was noticed.
 
     Gone means that a later day looked through its place from where it had been seen. Things whose place nobody looked
@@ -25,10 +24,6 @@ class Changes(ModelVerb):
     Example: avlmaps changes home.avlmap --since 2026-11-24
     """
 
-    compiles: ClassVar[bool] = True
-
-    map: Annotated[Positional[Path], arg(metavar="MAP")]
-    """Map folder (NAME.avlmap)."""
     since: Annotated[str | None, arg(metavar="DAY")] = None
     """List what changed after this day: a date such as 2026-11-24, or the number of a visit, from 1. Default: the
     first."""

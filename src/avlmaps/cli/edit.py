@@ -1,13 +1,12 @@
 """`avlmaps edit`: a person corrects a map."""
 
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any
 
-from tyro.conf import Positional, arg
+from tyro.conf import arg
 
 from avlmaps.cli.output import UsageError, emit, place, table_lines
-from avlmaps.cli.verb import ModelVerb, OptionalText
+from avlmaps.cli.verb import MapVerb, OptionalText
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -18,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Edit(ModelVerb):
+class Edit(MapVerb):
     """Correct a map: name things, rooms and places, merge and split things, forbid areas, undo.
 
     Edits are a list beside the map. They hold for every question, list and path, and survive another build of the map,
@@ -33,10 +32,6 @@ class Edit(ModelVerb):
     Example: avlmaps edit home.avlmap --forbid "the stairs" --box 1.0,2.0,2.5,4.0
     """
 
-    compiles: ClassVar[bool] = True
-
-    map: Annotated[Positional[Path], arg(metavar="MAP")]
-    """Map folder (NAME.avlmap)."""
     list: bool = False
     """List all edits with their day and who made them, and which find nothing to apply to any more."""
     rename: Annotated[OptionalText, arg(metavar="NAME")] = None

@@ -2,12 +2,12 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from tyro.conf import Positional, arg
+from tyro.conf import arg
 
 from avlmaps.cli.output import UsageError, emit, size_of
-from avlmaps.cli.verb import ModelVerb
+from avlmaps.cli.verb import MapVerb
 from avlmaps.core.frames import FrameName
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ _LEVEL = (".pgm", ".glb", *_LAYERED)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Export(ModelVerb):
+class Export(MapVerb):
     """Write a map for other programs: PLY, GLB, an occupancy grid for Nav2 (PGM and YAML), CSV, Rerun, Foxglove (MCAP).
 
     Example: avlmaps export home.avlmap --out home.glb
@@ -34,10 +34,6 @@ class Export(ModelVerb):
     A map of several storeys gives an occupancy grid for each: floor-0.pgm is the lowest.
     """
 
-    compiles: ClassVar[bool] = True
-
-    map: Annotated[Positional[Path], arg(metavar="MAP")]
-    """Map folder (NAME.avlmap)."""
     out: Annotated[Path, arg(metavar="FILE")]
     """File to write; its suffix chooses the format: .ply points, .glb blocks, .pgm occupancy grid, .csv table, .rrd for
     Rerun (extra rerun), .mcap with Foxglove's schemas (extra foxglove), .openlex3d folder for OpenLex3D's evaluator."""

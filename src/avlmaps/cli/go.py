@@ -3,12 +3,12 @@
 from dataclasses import dataclass, field
 from math import isfinite, radians
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tyro.conf import OmitArgPrefixes, Positional, arg
 
 from avlmaps.cli.output import AnsweredError, UsageError, emit, error_answer, kind_named, place, table_lines
-from avlmaps.cli.verb import ModelVerb
+from avlmaps.cli.verb import MapVerb
 from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ class Chat:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Go(ModelVerb):
+class Go(MapVerb):
     """Drive the robot by a sentence: avlmaps writes a program, runs it, and reports how near each stop came.
 
     The map is all that the robot knows. Its body is simulated in --scene, which must be the scene that was recorded:
@@ -48,10 +48,6 @@ class Go(ModelVerb):
     Example: avlmaps go MAP "first go to the sofa, then face the tv" --scene house:7 --plot way.png
     """
 
-    compiles: ClassVar[bool] = True
-
-    map: Annotated[Positional[Path], arg(metavar="MAP")]
-    """Map folder (NAME.avlmap)."""
     sentence: Annotated[Positional[str], arg(metavar="SENTENCE")]
     """Command for the robot."""
     scene: Annotated[str | None, arg(metavar="SCENE")] = None

@@ -2,12 +2,12 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import Positional, arg
 
 from avlmaps.cli.output import UsageError, emit
-from avlmaps.cli.verb import ModelVerb
+from avlmaps.cli.verb import MapVerb
 from avlmaps.core.frames import FrameName
 from avlmaps.core.progress import say
 
@@ -18,16 +18,12 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Locate(ModelVerb):
+class Locate(MapVerb):
     """Find the 6-DoF pose of a photo's camera in the map, or report that the photo cannot be located.
 
     Example: avlmaps locate home.avlmap photo.jpg
     """
 
-    compiles: ClassVar[bool] = True
-
-    map: Annotated[Positional[Path], arg(metavar="MAP")]
-    """Map folder (NAME.avlmap)."""
     image: Annotated[Positional[Path], arg(metavar="PHOTO")]
     """Photo to locate."""
     intrinsics: Annotated[str | None, arg(metavar="FX,FY,CX,CY")] = None

@@ -1,15 +1,14 @@
 """`avlmaps query`: ask a map for places."""
 
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from tyro.conf import Positional, arg
 
 from avlmaps.cli.address_space import require_address_space
 from avlmaps.cli.locate import numbers_of
 from avlmaps.cli.output import emit, query_lines
-from avlmaps.cli.verb import ModelVerb, OptionalPath, OptionalText
+from avlmaps.cli.verb import MapVerb, OptionalPath, OptionalText
 from avlmaps.core.frames import FrameName
 
 if TYPE_CHECKING:
@@ -17,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Query(ModelVerb):
+class Query(MapVerb):
     """Query a map with a sentence, or part by part; the product of the parts' heatmaps gives the goals.
 
     Examples:
@@ -25,8 +24,8 @@ class Query(ModelVerb):
     avlmaps query MAP --object "red cabinet" --sound-clip bark.ogg --plot heat.png
     """
 
-    map: Annotated[Positional[Path], arg(metavar="MAP")]
-    """Map folder (NAME.avlmap)."""
+    compiles: ClassVar[bool] = False  # `asking` announces loops where the question runs some
+
     sentence: Annotated[Positional[str], arg(metavar="[SENTENCE]")] = ""
     """Query in words; leave it out to name the parts with options."""
     object: Annotated[OptionalText, arg(metavar="NAME")] = None

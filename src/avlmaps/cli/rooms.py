@@ -2,13 +2,13 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from tyro.conf import Positional, arg
+from tyro.conf import arg
 
 from avlmaps.cli.output import emit, require_share
 from avlmaps.cli.things import room_lines
-from avlmaps.cli.verb import ModelVerb
+from avlmaps.cli.verb import MapVerb
 from avlmaps.core.frames import FrameName
 
 if TYPE_CHECKING:
@@ -16,16 +16,12 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rooms(ModelVerb):
+class Rooms(MapVerb):
     """List the rooms of a map: name, probability of the name, floor area and place of each.
 
     Example: avlmaps rooms home.avlmap --plot rooms.png
     """
 
-    compiles: ClassVar[bool] = True
-
-    map: Annotated[Positional[Path], arg(metavar="MAP")]
-    """Map folder (NAME.avlmap)."""
     least: Annotated[float, arg(metavar="PROBABILITY")] = 0.0
     """List rooms whose name has at least this probability, 0 to 1."""
     frame: Annotated[Literal["recording", "level"], arg(metavar="recording|level")] = "recording"

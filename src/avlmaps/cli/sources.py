@@ -1,20 +1,19 @@
 """`avlmaps sources`: where the sounds of a map came from."""
 
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from tyro.conf import Positional, arg
+from tyro.conf import arg
 
 from avlmaps.cli.output import emit, place, require_share, table_lines
-from avlmaps.cli.verb import ModelVerb
+from avlmaps.cli.verb import MapVerb
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sources(ModelVerb):
+class Sources(MapVerb):
     """List where the sounds of a map came from: a region with a probability, rooms and things that it may be.
 
     The recording must say where its microphones are (docs/concepts/sound-sources.md). Sounds of one kind from one place
@@ -23,10 +22,6 @@ class Sources(ModelVerb):
     Example: avlmaps sources home.avlmap --sound "dog bark"
     """
 
-    compiles: ClassVar[bool] = True
-
-    map: Annotated[Positional[Path], arg(metavar="MAP")]
-    """Map folder (NAME.avlmap)."""
     sound: Annotated[tuple[str, ...], arg(metavar="NAME ...")] = ()
     """List the sources of these sounds. Default: of every sound, by its likeliest name."""
     prior: Literal["lexicon", "none"] = "lexicon"

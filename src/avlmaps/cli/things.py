@@ -2,12 +2,12 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from tyro.conf import Positional, arg
+from tyro.conf import arg
 
 from avlmaps.cli.output import UsageError, emit, place, require_share, table_lines
-from avlmaps.cli.verb import ModelVerb
+from avlmaps.cli.verb import MapVerb
 from avlmaps.core.frames import FrameName
 from avlmaps.core.progress import say
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Things(ModelVerb):
+class Things(MapVerb):
     """List the things, sounds and rooms of a map, each with its confidence; of rooms the area as well.
 
     With --room, --near, --top or --page it lists things alone, each with its room.
@@ -31,10 +31,6 @@ class Things(ModelVerb):
     Example: avlmaps things home.avlmap --near sofa --top 5
     """
 
-    compiles: ClassVar[bool] = True
-
-    map: Annotated[Positional[Path], arg(metavar="MAP")]
-    """Map folder (NAME.avlmap)."""
     least: Annotated[float, arg(metavar="CONFIDENCE")] = 0.5
     """List things with at least this confidence, 0 to 1."""
     name: Annotated[tuple[str, ...], arg(metavar="NAME ...")] = ()

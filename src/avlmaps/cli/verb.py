@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal, Optional
 
-from tyro.conf import arg
+from tyro.conf import Positional, arg
 
 # The parser checks the default of a `str | None` with a package that takes longer to load than a question to answer;
 # it knows these itself.
@@ -39,3 +39,13 @@ class ModelVerb(Verb):
         Literal["auto", "float32", "float16", "bfloat16"] | None, arg(metavar="auto|float32|float16|bfloat16")
     ] = None
     """Precision of large models. Default: AVLMAPS_PRECISION, or float16 on CUDA and float32 elsewhere."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MapVerb(ModelVerb):
+    """A verb of one map."""
+
+    compiles: ClassVar[bool] = True
+
+    map: Annotated[Positional[Path], arg(metavar="MAP")]
+    """Map folder (NAME.avlmap)."""

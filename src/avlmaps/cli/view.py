@@ -5,13 +5,13 @@ import sys
 import threading
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 from urllib.parse import quote, urlencode
 
 from tyro.conf import Positional, arg
 
 from avlmaps.cli.output import UsageError, emit, size_of
-from avlmaps.cli.verb import ModelVerb
+from avlmaps.cli.verb import MapVerb
 from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ _ANSWER_S = 600.0  # the contents of a large map take their time, and the page w
 
 
 @dataclass(frozen=True, kw_only=True)
-class View(ModelVerb):
+class View(MapVerb):
     """Show a map in the browser: look, click, ask in words, by photo or by sound, and drive.
 
     It is a page of `avlmaps serve`, and answers this machine alone. For another --host it makes a token, which is part
@@ -41,10 +41,6 @@ class View(ModelVerb):
     avlmaps view home.avlmap --out home.html --questions "the sofa" "the chair near the tv"
     """
 
-    compiles: ClassVar[bool] = True
-
-    map: Annotated[Positional[Path], arg(metavar="MAP")]
-    """Map folder (NAME.avlmap)."""
     other: Annotated[Positional[Path | None], arg(metavar="[MAP]")] = None
     """Second map of the same place, to compare: side by side, or before and after."""
     host: Annotated[str, arg(metavar="ADDRESS")] = "127.0.0.1"

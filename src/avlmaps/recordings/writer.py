@@ -16,14 +16,13 @@ from avlmaps.core import poses
 from avlmaps.core.camera import Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import sync_folder, write_bytes_atomically
-from avlmaps.core.progress import progress
 from avlmaps.recordings import layout
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
 from avlmaps.recordings.channels import ChannelSound, write_channels
 from avlmaps.recordings.directions import DIRECTIONS, DirectionTrack, write_directions
 from avlmaps.recordings.memory import same_rig
 from avlmaps.recordings.microphones import MicrophoneNumbers, Microphones
-from avlmaps.recordings.types import Frame, Recording
+from avlmaps.recordings.types import Frame
 
 _JPEG_QUALITY = 95
 _MAX_DEPTH_VALUE = 65534
@@ -128,8 +127,8 @@ class RecordingWriter:
             RecordingError: as ``add``, or a file is missing.
         """
         self._announce(name, stamp_s)
-        _take(colour, self.path / "rgb" / f"{name}{colour.suffix.lower()}", link)
-        _take(depth, self.path / "depth" / f"{name}.png", link)
+        take_file(colour, self.path / "rgb" / f"{name}{colour.suffix.lower()}", link)
+        take_file(depth, self.path / "depth" / f"{name}.png", link)
         self._log(name, stamp_s, world_from_camera)
 
     def set_audio(
@@ -169,7 +168,7 @@ class RecordingWriter:
         if isinstance(audio, Path):
             if audio.suffix.lower() not in _COPIED_AUDIO:
                 raise RecordingError(f"{audio} is not FLAC, WAV or OGG; open it with AudioTrack.open and give that.")
-            _take(audio, self.path / f"audio{audio.suffix.lower()}", link=False)
+            take_file(audio, self.path / f"audio{audio.suffix.lower()}", link=False)
         else:
             write_flac(self.path / "audio.flac", audio.blocks() if isinstance(audio, AudioTrack) else audio)
 
@@ -182,7 +181,7 @@ class RecordingWriter:
         assert self._microphones is not None
         names = [f"audio.{number + 1}{path.suffix.lower()}" for number, path in enumerate(files)]
         for path, name in zip(files, names, strict=True):
-            _take(path, self.path / name, link=False)
+            take_file(path, self.path / name, link=False)
         self._microphones = msgspec.structs.replace(self._microphones, files=names)
 
     def _announce(self, name: str, stamp_s: float) -> None:
@@ -279,7 +278,7 @@ def _write_picture(path: Path, picture: np.ndarray) -> None:
         raise RecordingError(f"{path} could not be written ({error.strerror or error}).") from None
 
 
-def _take(source: Path, target: Path, link: bool) -> None:
+def take_file(source: Path, target: Path, link: bool) -> None:
     """Link or copy a file, following a symbolic link to what it stands for."""
     try:
         if link:
@@ -290,64 +289,3 @@ def _take(source: Path, target: Path, link: bool) -> None:
     except OSError as error:
         where = error.filename or source
         raise RecordingError(f"{source} could not be copied to {target} ({where}: {error.strerror}).") from None
-
-
-def write_recording(
-    recording: Recording,
-    out: Path,
-    audio: Path | Sound | AudioTrack | None = None,
-    audio_start_s: float = 0.0,
-    link: bool = True,
-    origin: str = "",
-) -> Path:
-    """Write any recording in our own format: the same pictures bit for bit, the same stamps and poses.
-
-    Pictures that are JPEG or PNG files already are linked or copied; others are encoded as PNG, depth in whole
-    millimetres. Truth that lies beside a recording in our own format (``semantic/``, ``objects.json``, and
-    ``events.csv`` where the sound track stays) goes along, so that the copy can be evaluated as well.
-
-    Args:
-        recording: what to copy.
-        out: the folder to make.
-        audio: another sound track; by default the recording's own goes along, if it has one.
-        audio_start_s: the recording's time at which that other track begins.
-        link: whether hard links will do where the file system can.
-        origin: what makes the copy, for its description.
-
-    Raises:
-        RecordingError: ``out`` is not empty, or a picture is missing.
-    """
-    units, up = recording.depth_units_per_m, recording.up_in_world
-    origin = origin or f"copied from {recording.format} {recording.path.name}"
-    with RecordingWriter(out, recording.rig, up, depth_units_per_m=units, origin=origin) as writer:
-        for index in progress(range(len(recording)), "copying frames", total=len(recording)):
-            _copy_frame(recording, index, writer, link)
-        if recording.format == "folder":
-            _take_truth(recording, out, keep_events=audio is None, link=link)
-        if audio is not None:
-            writer.set_audio(audio, audio_start_s)
-        elif recording.audio is not None:
-            writer.set_audio(recording.audio)
-    return out
-
-
-def _copy_frame(recording: Recording, index: int, writer: RecordingWriter, link: bool) -> None:
-    colour, depth = recording.colour_file(index), recording.depth_file(index)
-    if colour is None or depth is None:
-        writer.add(recording.frame(index))
-        return
-    stamp_s, pose = float(recording.stamps_s[index]), recording.world_from_camera[index]
-    writer.add_files(recording.name(index), stamp_s, pose, colour, depth, link)
-
-
-def _take_truth(recording: Recording, out: Path, keep_events: bool, link: bool) -> None:
-    for name in ("objects.json", *(["events.csv"] if keep_events else [])):
-        if (recording.path / name).is_file():
-            _take(recording.path / name, out / name, link=False)
-    if not (recording.path / "semantic").is_dir():
-        return
-    (out / "semantic").mkdir()
-    copied = {recording.name(index) for index in range(len(recording))}
-    for file in (recording.path / "semantic").iterdir():
-        if file.stem in copied:
-            _take(file, out / "semantic" / file.name, link)

@@ -19,6 +19,9 @@ from avlmaps.serve.work import encoded
 if TYPE_CHECKING:
     from avlmaps.view.route import MakeRobot
 
+JSON_TYPE = "application/json"
+log = logging.getLogger("avlmaps.serve")
+
 
 @dataclass(frozen=True, slots=True)
 class Service:
@@ -75,10 +78,6 @@ class Service:
         """End the lanes after the work that they have."""
         self.quick.close()
         self.slow.close()
-
-
-JSON_TYPE = "application/json"
-log = logging.getLogger("avlmaps.serve")
 
 
 def error_response(service: Service, error: BaseException) -> Response:

@@ -1,65 +1,59 @@
 """The parts of a program: a few frozen types, and nothing that reaches outside them."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+from typing import cast
+
+
+class _Part:
+    """An expression; those right inside are among its fields."""
+
+    __slots__ = ()
+
+    @property
+    def children(self) -> "tuple[Expression, ...]":
+        """The expressions right inside, in the order of the text."""
+        held = (getattr(self, each.name) for each in fields(self))  # pyright: ignore[reportArgumentType] - a dataclass
+        every = (one for value in held for one in (value if isinstance(value, tuple) else (value,)))
+        return tuple(cast("Expression", one) for one in every if isinstance(one, _Part))
 
 
 @dataclass(frozen=True, slots=True)
-class Constant:
+class Constant(_Part):
     """None, True, False, a number or a string, as written."""
 
     value: bool | int | float | str | None
     line: int = field(compare=False)
 
-    @property
-    def children(self) -> "tuple[Expression, ...]":
-        """The expressions right inside."""
-        return ()
-
 
 @dataclass(frozen=True, slots=True)
-class Name:
+class Name(_Part):
     """A value that was given a name before."""
 
     name: str
     line: int = field(compare=False)
 
-    @property
-    def children(self) -> "tuple[Expression, ...]":
-        """The expressions right inside."""
-        return ()
-
 
 @dataclass(frozen=True, slots=True)
-class Collection:
+class Collection(_Part):
     """A list or a tuple, written out."""
 
     elements: "tuple[Expression, ...]"
     is_list: bool
     line: int = field(compare=False)
 
-    @property
-    def children(self) -> "tuple[Expression, ...]":
-        """The expressions right inside."""
-        return self.elements
-
 
 @dataclass(frozen=True, slots=True)
-class Unary:
+class Unary(_Part):
     """`-x`, `+x` or `not x`."""
 
     operator: str
     operand: "Expression"
     line: int = field(compare=False)
 
-    @property
-    def children(self) -> "tuple[Expression, ...]":
-        """The expressions right inside."""
-        return (self.operand,)
-
 
 @dataclass(frozen=True, slots=True)
-class Binary:
+class Binary(_Part):
     """Arithmetic on two values."""
 
     operator: str
@@ -67,14 +61,9 @@ class Binary:
     right: "Expression"
     line: int = field(compare=False)
 
-    @property
-    def children(self) -> "tuple[Expression, ...]":
-        """The expressions right inside."""
-        return (self.left, self.right)
-
 
 @dataclass(frozen=True, slots=True)
-class Comparison:
+class Comparison(_Part):
     """`a < b`, or a chain such as `a < b <= c`."""
 
     first: "Expression"
@@ -82,28 +71,18 @@ class Comparison:
     rest: "tuple[Expression, ...]"
     line: int = field(compare=False)
 
-    @property
-    def children(self) -> "tuple[Expression, ...]":
-        """The expressions right inside."""
-        return (self.first, *self.rest)
-
 
 @dataclass(frozen=True, slots=True)
-class Logical:
+class Logical(_Part):
     """`a and b and c`, or the same with `or`."""
 
     operator: str
     operands: "tuple[Expression, ...]"
     line: int = field(compare=False)
 
-    @property
-    def children(self) -> "tuple[Expression, ...]":
-        """The expressions right inside."""
-        return self.operands
-
 
 @dataclass(frozen=True, slots=True)
-class Conditional:
+class Conditional(_Part):
     """`a if test else b`."""
 
     test: "Expression"
@@ -111,24 +90,14 @@ class Conditional:
     otherwise: "Expression"
     line: int = field(compare=False)
 
-    @property
-    def children(self) -> "tuple[Expression, ...]":
-        """The expressions right inside."""
-        return (self.test, self.chosen, self.otherwise)
-
 
 @dataclass(frozen=True, slots=True)
-class Element:
+class Element(_Part):
     """One element of a list or a tuple."""
 
     of: "Expression"
     index: "Expression"
     line: int = field(compare=False)
-
-    @property
-    def children(self) -> "tuple[Expression, ...]":
-        """The expressions right inside."""
-        return (self.of, self.index)
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,7 +116,7 @@ class Argument:
 
 
 @dataclass(frozen=True, slots=True)
-class SkillCall:
+class SkillCall(_Part):
     """A call of a skill, its arguments in the order in which they are computed."""
 
     skill: str
@@ -161,17 +130,12 @@ class SkillCall:
 
 
 @dataclass(frozen=True, slots=True)
-class BuiltinCall:
+class BuiltinCall(_Part):
     """A call of `len`, `min`, `max`, `abs`, `range` or `round`."""
 
     function: str
     arguments: "tuple[Expression, ...]"
     line: int = field(compare=False)
-
-    @property
-    def children(self) -> "tuple[Expression, ...]":
-        """The expressions right inside."""
-        return self.arguments
 
 
 Expression = (

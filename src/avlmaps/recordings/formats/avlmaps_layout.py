@@ -36,7 +36,7 @@ from avlmaps.core.files import DESCRIPTION_BYTES, decode_json, read_regular
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
 from avlmaps.recordings.formats.columns import POSE
-from avlmaps.recordings.formats.file_recording import FileRecording, Shots, find_audio, list_names, settle
+from avlmaps.recordings.formats.file_recording import FileRecording, Shots, find_audio, list_names
 from avlmaps.recordings.formats.tables import read_table
 from avlmaps.recordings.images import first_picture_size
 
@@ -126,17 +126,11 @@ def open_avlmaps(path: Path, report: Report = stop_at_first) -> FileRecording:
         world_from_camera=world_from_camera,
     )
     rig = _rig(path, shots, given)
-    shots, further = settle(path, shots, report, lambda _: path / "poses.txt")
     audio = find_audio(path) or next(iter(sorted(path.glob("output_level_*.wav"))), None)
-    return FileRecording(
-        path=path,
-        format="avlmaps",
-        rig=rig,
-        shots=shots,
-        up_in_world=np.array([0.0, 0.0, 1.0]),
-        audio=AudioTrack.open(audio) if audio else None,
-        notices=(*notices, notice, *further),
-    )
+    return FileRecording.settled(
+        path, "avlmaps", rig, shots, (*notices, notice), report, lambda _: path / "poses.txt",
+        up_in_world=np.array([0.0, 0.0, 1.0]), audio=AudioTrack.open(audio) if audio else None,
+    )  # fmt: skip
 
 
 def _complete(

@@ -3,12 +3,12 @@
 import hashlib
 import os
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from jaxtyping import Float, Float32, UInt8
@@ -24,6 +24,7 @@ from avlmaps.recordings.plausible import date_fault, plausible_walk
 from avlmaps.recordings.types import Frame, Recording
 from avlmaps.recordings.video import VideoFrames
 
+R = TypeVar("R", bound="ShotsRecording")
 _SHOWN = 3
 _NUMBER = re.compile(r"([0-9]+(?:\.[0-9]+)?)")
 
@@ -173,6 +174,23 @@ class ShotsRecording(Recording):
     def __post_init__(self) -> None:
         self.stamps_s = self.shots.stamps_s
         self.world_from_camera = self.shots.world_from_camera
+
+    @classmethod
+    def settled(
+        cls: type[R],
+        path: Path,
+        format: str,
+        rig: Rig,
+        shots: Shots,
+        notices: Iterable[str],
+        report: Report,
+        pose_file: Callable[[int], Path] | None,
+        **more: Any,
+    ) -> R:
+        """Return the recording of shots as they were found, with the sound beside them; see ``settle``."""
+        shots, settled = settle(path, shots, report, pose_file)
+        more.setdefault("audio", open_audio(path))
+        return cls(path=path, format=format, rig=rig, shots=shots, notices=(*notices, *settled), **more)
 
     def frame(self, index: int) -> Frame:
         """Read one frame; see ``Recording.frame``."""

@@ -17,7 +17,7 @@ from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
 from avlmaps.recordings.formats.columns import POSE
-from avlmaps.recordings.formats.file_recording import FileRecording, Shots, open_audio, settle
+from avlmaps.recordings.formats.file_recording import FileRecording, Shots
 from avlmaps.recordings.formats.intrinsics import fitted
 from avlmaps.recordings.formats.tables import read_table, text_lines
 from avlmaps.recordings.images import first_picture_size
@@ -68,17 +68,10 @@ def open_icl_nuim(path: Path, report: Report = stop_at_first) -> FileRecording:
         fitted(_CAMERA, first_picture_size(path, shots.colour), path, "colour"),
         fitted(_CAMERA, first_picture_size(path, shots.depth), path, "depth"),
     )
-    shots, settled = settle(path, shots, report, lambda _: truth)
-    return FileRecording(
-        path=path,
-        format="icl-nuim",
-        rig=rig,
-        shots=shots,
-        depth_units=UNITS_PER_M,
+    return FileRecording.settled(
+        path, "icl-nuim", rig, shots, notices, report, lambda _: truth, depth_units=UNITS_PER_M,
         up_in_world=np.array([0.0, -1.0, 0.0]),
-        audio=open_audio(path),
-        notices=(*notices, *settled),
-    )
+    )  # fmt: skip
 
 
 def _associations(file: Path, report: Report) -> list[tuple[int, str, str]]:

@@ -20,7 +20,7 @@ from avlmaps.core.camera import Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.recordings.camera_axes import from_opengl
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
-from avlmaps.recordings.formats.file_recording import FileRecording, Shots, open_audio, settle
+from avlmaps.recordings.formats.file_recording import FileRecording, Shots
 from avlmaps.recordings.formats.intrinsics import fitted, median_camera, resized_notice
 from avlmaps.recordings.formats.json_files import read_json, unread_notice
 from avlmaps.recordings.images import first_picture_size
@@ -104,15 +104,8 @@ def open_nerfstudio(path: Path, report: Report = stop_at_first) -> FileRecording
         world_from_camera=_poses(file, frames, given.applied_scale),
     )
     rig, more = _rig(file, given, frames, shots)
-    shots, settled = settle(path, shots, report, lambda _: file)
-    return FileRecording(
-        path=path,
-        format="nerfstudio",
-        rig=rig,
-        shots=shots,
-        depth_units=units,
-        audio=open_audio(path),
-        notices=(*notices, *more, *settled),
+    return FileRecording.settled(
+        path, "nerfstudio", rig, shots, (*notices, *more), report, lambda _: file, depth_units=units
     )
 
 

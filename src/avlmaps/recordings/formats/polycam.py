@@ -17,7 +17,7 @@ from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import DESCRIPTION_BYTES
 from avlmaps.recordings.camera_axes import UP_IN_WORLD, from_opengl
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
-from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names, open_audio, settle
+from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names
 from avlmaps.recordings.formats.intrinsics import fitted, median_camera, resized_notice
 from avlmaps.recordings.formats.json_files import read_json, unread_notice
 from avlmaps.recordings.formats.nerfstudio import INTERVAL_S
@@ -106,16 +106,10 @@ def open_polycam(path: Path, report: Report = stop_at_first) -> FileRecording:
     camera, more = median_camera(files[0], numbers, found[0].width, found[0].height)
     rgb_size, depth_size = first_picture_size(path, shots.colour), first_picture_size(path, shots.depth)
     rig = Rig(fitted(camera, rgb_size, files[0], "colour"), fitted(camera, depth_size, files[0], "depth"))
-    shots, settled = settle(path, shots, report, files.__getitem__)
-    return FileRecording(
-        path=path,
-        format="polycam",
-        rig=rig,
-        shots=shots,
+    return FileRecording.settled(
+        path, "polycam", rig, shots, (*notices, *more, *resized_notice(camera, rgb_size)), report, files.__getitem__,
         up_in_world=UP_IN_WORLD.copy(),
-        audio=open_audio(path),
-        notices=(*notices, *more, *resized_notice(camera, rgb_size), *settled),
-    )
+    )  # fmt: skip
 
 
 def _by_stem(folder: Path, suffixes: tuple[str, ...]) -> dict[str, str]:

@@ -26,7 +26,7 @@ from avlmaps.recordings import images
 from avlmaps.recordings.camera_axes import UP_IN_WORLD, from_opengl
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
 from avlmaps.recordings.formats.exr import read_channel
-from avlmaps.recordings.formats.file_recording import Shots, list_names, number_of, open_audio, settle
+from avlmaps.recordings.formats.file_recording import Shots, list_names, number_of, open_audio
 from avlmaps.recordings.formats.intrinsics import fitted, median_camera, resized_notice
 from avlmaps.recordings.formats.json_files import parse_json, read_json, unread_notice
 from avlmaps.recordings.formats.stored_recording import StoredRecording
@@ -197,17 +197,10 @@ def open_record3d(path: Path, report: Report = stop_at_first) -> StoredRecording
     if fault := pace_fault(shots.stamps_s, "frames", 1.0 / _fps(given)):
         raise RecordingError(f"{file}: {fault}")
     rig, more = _rig(files, file, given, shots)
-    shots, settled = settle(path, shots, report, lambda _: file)
-    return StoredRecording(
-        path=path,
-        format="record3d",
-        rig=rig,
-        shots=shots,
-        pictures=_Pictures(files),
-        up_in_world=UP_IN_WORLD.copy(),
-        audio=open_audio(path) if path.is_dir() else None,
-        notices=(*notices, *more, *settled),
-    )
+    return StoredRecording.settled(
+        path, "record3d", rig, shots, (*notices, *more), report, lambda _: file, pictures=_Pictures(files),
+        up_in_world=UP_IN_WORLD.copy(), audio=open_audio(path) if path.is_dir() else None,
+    )  # fmt: skip
 
 
 def _metadata(files: _Files, file: Path, name: str) -> tuple[_Metadata, dict[str, Any]]:

@@ -20,7 +20,7 @@ from jaxtyping import Float
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
-from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names, open_audio, settle
+from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names
 from avlmaps.recordings.formats.intrinsics import fitted, resized_notice
 from avlmaps.recordings.formats.json_files import read_json, unread_notice
 from avlmaps.recordings.formats.tables import text_lines
@@ -89,15 +89,8 @@ def open_redwood(path: Path, report: Report = stop_at_first) -> FileRecording:
         world_from_camera=pose[[row[2] for row in rows]],
     )
     rig, units, more = _rig(path, shots)
-    shots, settled = settle(path, shots, report, lambda _: log)
-    return FileRecording(
-        path=path,
-        format="redwood",
-        rig=rig,
-        shots=shots,
-        depth_units=units,
-        audio=open_audio(path),
-        notices=(*notices, *more, *settled),
+    return FileRecording.settled(
+        path, "redwood", rig, shots, (*notices, *more), report, lambda _: log, depth_units=units
     )
 
 

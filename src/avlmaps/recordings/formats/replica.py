@@ -18,7 +18,7 @@ from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import DESCRIPTION_BYTES
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
-from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names, open_audio, settle
+from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names
 from avlmaps.recordings.formats.json_files import read_json, unread_notice
 from avlmaps.recordings.formats.tables import read_table
 from avlmaps.recordings.images import first_picture_size
@@ -74,17 +74,10 @@ def open_replica(path: Path, report: Report = stop_at_first) -> FileRecording:
         world_from_camera=table.values.reshape(-1, 4, 4)[posed],
     )
     rig, scale, notice = _camera(path, shots)
-    shots, more = settle(path, shots, report, lambda _: path / "traj.txt")
-    return FileRecording(
-        path=path,
-        format="replica",
-        rig=rig,
-        shots=shots,
-        depth_units=scale,
+    return FileRecording.settled(
+        path, "replica", rig, shots, (*notices, *notice), report, lambda _: path / "traj.txt", depth_units=scale,
         up_in_world=np.array([0.0, 0.0, 1.0]),
-        audio=open_audio(path),
-        notices=(*notices, *notice, *more),
-    )
+    )  # fmt: skip
 
 
 def _digits(name: str) -> str:

@@ -15,7 +15,7 @@ from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
-from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names, open_audio, settle
+from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names
 from avlmaps.recordings.formats.intrinsics import resized_notice
 from avlmaps.recordings.formats.tables import read_matrix, read_pose_files
 from avlmaps.recordings.images import first_picture_size
@@ -56,16 +56,10 @@ def open_scannet(path: Path, report: Report = stop_at_first) -> FileRecording:
         world_from_camera=read_pose_files(pose_files, report),
     )
     rig, resized = _rig(path, shots)
-    shots, more = settle(path, shots, report, pose_files.__getitem__)
-    return FileRecording(
-        path=path,
-        format="scannet",
-        rig=rig,
-        shots=shots,
+    return FileRecording.settled(
+        path, "scannet", rig, shots, (*left_out, *resized), report, pose_files.__getitem__,
         up_in_world=np.array([0.0, 0.0, 1.0]),
-        audio=open_audio(path),
-        notices=(*left_out, *resized, *more),
-    )
+    )  # fmt: skip
 
 
 def _rig(path: Path, shots: Shots) -> tuple[Rig, tuple[str, ...]]:

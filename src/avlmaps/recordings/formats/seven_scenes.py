@@ -15,7 +15,7 @@ import numpy as np
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
-from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names, open_audio, settle
+from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names
 from avlmaps.recordings.formats.tables import read_matrix, read_pose_files
 from avlmaps.recordings.images import first_picture_size
 from avlmaps.recordings.unreadable import why_unreadable
@@ -60,15 +60,7 @@ def open_seven_scenes(path: Path, report: Report = stop_at_first) -> FileRecordi
         world_from_camera=read_pose_files(pose_files, report),
     )
     rig, notice = _rig(path, shots)
-    shots, more = settle(path, shots, report, pose_files.__getitem__)
-    return FileRecording(
-        path=path,
-        format="7scenes",
-        rig=rig,
-        shots=shots,
-        audio=open_audio(path),
-        notices=(*notices, *notice, *more),
-    )
+    return FileRecording.settled(path, "7scenes", rig, shots, (*notices, *notice), report, pose_files.__getitem__)
 
 
 def _whole(colour: Iterable[str], files: set[str]) -> list[str]:

@@ -16,7 +16,7 @@ from avlmaps.core.camera import Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.recordings.camera_axes import UP_IN_WORLD
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
-from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names, number_of, open_audio, settle
+from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names, number_of
 from avlmaps.recordings.formats.intrinsics import fitted, median_camera
 from avlmaps.recordings.formats.tables import read_matrix, read_table, text_lines
 from avlmaps.recordings.images import first_picture_size
@@ -68,17 +68,10 @@ def open_stray_scanner(path: Path, report: Report = stop_at_first) -> FileRecord
     if fault := pace_fault(shots.stamps_s, "rows of odometry.csv"):
         raise RecordingError(f"{path}: {fault}")
     rig, more = _rig(path, rows, video, shots)
-    shots, settled = settle(path, shots, report, lambda _: path / "odometry.csv")
-    return FileRecording(
-        path=path,
-        format="stray-scanner",
-        rig=rig,
-        shots=shots,
-        up_in_world=UP_IN_WORLD.copy(),
-        audio=open_audio(path),
-        notices=(*notices, *more, *settled),
-        video=video,
-    )
+    return FileRecording.settled(
+        path, "stray-scanner", rig, shots, (*notices, *more), report, lambda _: path / "odometry.csv",
+        up_in_world=UP_IN_WORLD.copy(), video=video,
+    )  # fmt: skip
 
 
 def _odometry(file: Path, report: Report) -> np.ndarray:

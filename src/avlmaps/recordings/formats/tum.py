@@ -17,7 +17,7 @@ from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
 from avlmaps.recordings.formats.columns import POSE
-from avlmaps.recordings.formats.file_recording import FileRecording, Shots, open_audio, settle
+from avlmaps.recordings.formats.file_recording import FileRecording, Shots
 from avlmaps.recordings.formats.tables import read_table, text_lines
 from avlmaps.recordings.images import first_picture_size
 from avlmaps.recordings.plausible import clock_fault, date_fault
@@ -62,19 +62,11 @@ def open_tum(path: Path, report: Report = stop_at_first) -> FileRecording:
         world_from_camera=trajectory.at(stamps_s),
     )
     rig, up_in_world, notice = _camera(path, shots)
-    shots, more = settle(path, shots, report, pose_file=None)
-    return FileRecording(
-        path=path,
-        format="tum",
-        rig=rig,
-        shots=shots,
-        depth_units=UNITS_PER_M,
-        up_in_world=up_in_world,
-        audio=open_audio(path),
-        notices=(*notices, *notice, *more),
+    return FileRecording.settled(
+        path, "tum", rig, shots, (*notices, *notice), report, None, depth_units=UNITS_PER_M, up_in_world=up_in_world,
         trajectory=timeline.Trajectory(trajectory.stamps_s - start_s, trajectory.world_from_body),
         begins_s=float(start_s),
-    )
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)

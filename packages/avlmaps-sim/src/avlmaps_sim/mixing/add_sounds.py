@@ -314,7 +314,7 @@ def _there(track: AudioTrack | None, rate_hz: int) -> Iterator[Float32[np.ndarra
 
 
 def _write(recording: Recording, out: Path, seconds: Iterable[Sound], events: Sequence[Event]) -> None:
-    from avlmaps.recordings.writer import write_recording
+    from avlmaps_sim.mixing.copying import write_recording
 
     with TemporaryDirectory() as scratch:
         track = Path(scratch) / "audio.flac"
