@@ -8,18 +8,9 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext, redi
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from avlmaps.cli import output
 from avlmaps.cli.address_space import require_address_space
 from avlmaps.cli.model_options import models_in_force
-from avlmaps.cli.output import (
-    AnsweredError,
-    UsageError,
-    emit,
-    error_answer,
-    fault_sentence,
-    is_short_of_memory,
-    kind_of,
-    system_sentence,
-)
 from avlmaps.cli.pipes import READER_GONE, drop, reader_gone, settle_streams
 from avlmaps.cli.shortened_files import end_at_shortened_files
 from avlmaps.core.errors import AvlmapsError, BackendError
@@ -54,11 +45,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if reader_gone():
             sys.exit(READER_GONE)
         drop(sys.stdout)
-        sys.exit(_complain(system_sentence(error), 1))
+        sys.exit(_complain(output.system_sentence(error), 1))
     except Exception as fault:  # of loading the verbs; what a verb meets is a sentence already
-        if not is_short_of_memory(fault):
+        if not output.is_short_of_memory(fault):
             raise
-        sys.exit(_complain(fault_sentence(fault), 1))
+        sys.exit(_complain(output.fault_sentence(fault), 1))
     except KeyboardInterrupt:  # while it was reading its words
         sys.exit(_complain("stopped", 130))
 
@@ -82,7 +73,7 @@ def _main(words: list[str]) -> None:
             verb = read_command(words)
     except BackendError as error:  # the verb is of a package that is not installed
         if _wants_json(words):
-            _emit_error(kind_of(error), str(error))
+            _emit_error(output.kind_of(error), str(error))
         sys.exit(_complain(error, 1))
     sys.exit(_run(verb))
 
@@ -122,9 +113,9 @@ def _run(verb: "Verb") -> int:
     try:
         with models_in_force(verb), _compiling(verb):
             verb.run()
-    except AnsweredError as error:
+    except output.AnsweredError as error:
         return _complain(error, error.status)
-    except UsageError as error:
+    except output.UsageError as error:
         return _fail(verb, error, str(error), 2)
     except AvlmapsError as error:
         return _fail(verb, error, _swapped(verb) or str(error), 1)
@@ -135,10 +126,10 @@ def _run(verb: "Verb") -> int:
     except Exception as fault:
         if isinstance(fault, BrokenPipeError) and reader_gone():
             return READER_GONE
-        if isinstance(fault, OSError) or is_short_of_memory(fault):
-            return _fail(verb, fault, fault_sentence(fault), 1)
+        if isinstance(fault, OSError) or output.is_short_of_memory(fault):
+            return _fail(verb, fault, output.fault_sentence(fault), 1)
         if verb.json:
-            _emit_error(kind_of(fault), fault_sentence(fault))
+            _emit_error(output.kind_of(fault), output.fault_sentence(fault))
         raise
     return 0
 
@@ -171,14 +162,14 @@ def _fail(verb: "Verb", error: BaseException, message: str, status: int) -> int:
     for said, option in _ATTACHED.items():
         message = message.replace(said, option)
     if verb.json:
-        _emit_error(kind_of(error), message)
+        _emit_error(output.kind_of(error), message)
     return _complain(message, status)
 
 
 def _emit_error(kind: str, message: str) -> None:
     """Print an error as JSON, unless standard output is what failed: the sentence and the status report it too."""
     try:
-        emit({"error": error_answer(kind, message)}, (), as_json=True)
+        output.emit({"error": output.error_answer(kind, message)}, (), as_json=True)
         sys.stdout.flush()
     except OSError:
         drop(sys.stdout)

@@ -14,30 +14,18 @@ from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.conformance import NonConformanceError, hold
 from avlmaps.core.errors import AvlmapsError
 from avlmaps.core.registry import Kind
-from avlmaps.perception.protocols import (
-    FrameSoundEncoder,
-    LearnedMatcher,
-    LocalEncoder,
-    LocalFeatures,
-    Matcher,
-    ModelCard,
-    PixelEncoder,
-    PlaceEncoder,
-    SoundEncoder,
-    ViewEncoder,
-    WordEncoder,
-)
+from avlmaps.perception import protocols
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.types import Frame
 
 PROTOCOLS: dict[Kind, type] = {
-    Kind.WORDS: WordEncoder,
-    Kind.PIXELS: PixelEncoder,
-    Kind.VIEWS: ViewEncoder,
-    Kind.SOUNDS: SoundEncoder,
-    Kind.LOCAL: LocalEncoder,
-    Kind.PLACE: PlaceEncoder,
-    Kind.MATCHER: Matcher,
+    Kind.WORDS: protocols.WordEncoder,
+    Kind.PIXELS: protocols.PixelEncoder,
+    Kind.VIEWS: protocols.ViewEncoder,
+    Kind.SOUNDS: protocols.SoundEncoder,
+    Kind.LOCAL: protocols.LocalEncoder,
+    Kind.PLACE: protocols.PlaceEncoder,
+    Kind.MATCHER: protocols.Matcher,
 }
 PHRASES = ("red chair", "dog bark", "kitchen")
 
@@ -53,7 +41,7 @@ def check(kind: Kind, backend: Any) -> None:
     _CHECKS[kind](backend)
 
 
-def _check_card(card: ModelCard) -> None:
+def _check_card(card: protocols.ModelCard) -> None:
     hold(card.id and card.licence, f"the card {card} must name a model and its licence")
     hold(card.dim >= 1, f"the card's dim is {card.dim}")
     hold(
@@ -106,11 +94,11 @@ def _equal(one: np.ndarray, other: np.ndarray) -> bool:
     return one.shape == other.shape and np.allclose(one, other, rtol=1e-4, atol=1e-5)
 
 
-def _check_word_encoder(encoder: WordEncoder) -> None:
+def _check_word_encoder(encoder: protocols.WordEncoder) -> None:
     _check_words(encoder.encode, encoder.card.dim, zero_allowed=False)
 
 
-def _check_pixel_encoder(encoder: PixelEncoder) -> None:
+def _check_pixel_encoder(encoder: protocols.PixelEncoder) -> None:
     features = encoder.encode(example_frame())
     hold(features.ndim == 3, f"pixel features must have three axes, not {features.ndim}")
     flat = features.reshape(-1, features.shape[-1])
@@ -125,7 +113,7 @@ def _check_pixel_encoder(encoder: PixelEncoder) -> None:
         )
 
 
-def _check_view_encoder(encoder: ViewEncoder) -> None:
+def _check_view_encoder(encoder: protocols.ViewEncoder) -> None:
     frames = [example_frame(seed) for seed in range(3)]
     _check_rows(encoder.encode(frames), 3, encoder.card.dim, "view features")
     alone = np.concatenate([encoder.encode([frame]) for frame in frames])
@@ -133,13 +121,13 @@ def _check_view_encoder(encoder: ViewEncoder) -> None:
     _check_words(encoder.encode_words, encoder.card.dim, zero_allowed=False)
 
 
-def _check_sound_encoder(encoder: SoundEncoder) -> None:
+def _check_sound_encoder(encoder: protocols.SoundEncoder) -> None:
     short, long = encoder.encode(example_sound()), encoder.encode(example_sound(seconds=30.0))
     _check_rows(short, len(short), encoder.card.dim, "sound features")
     _check_rows(long, len(long), encoder.card.dim, "sound features")
     hold(len(short) >= 1, "any sound must have a window")
     hold(len(long) > len(short), "a long sound must be encoded whole, by windows")
-    if isinstance(encoder, FrameSoundEncoder):
+    if isinstance(encoder, protocols.FrameSoundEncoder):
         hold(
             abs(len(long) - 30.0 / encoder.hop_s - 0.5) <= 0.5 + 1e-6,
             f"30 s must have a vector for each of its steps of {encoder.hop_s} s, not {len(long)}",
@@ -162,16 +150,16 @@ def _check_scores(scores: np.ndarray, shape: tuple[int, ...], what: str) -> None
     hold(((scores >= 0.0) & (scores <= 1.0)).all(), f"{what} must lie in [0, 1]")
 
 
-def _example_local(encoder_dim: int, seed: int = 0, count: int = 40) -> LocalFeatures:
+def _example_local(encoder_dim: int, seed: int = 0, count: int = 40) -> protocols.LocalFeatures:
     rng = np.random.default_rng(seed)
     descriptors = np.abs(rng.standard_normal((count, encoder_dim))).astype(np.float32)
     descriptors /= np.linalg.norm(descriptors, axis=1, keepdims=True)
     xy = rng.uniform(0, 64, (count, 2)).astype(np.float32)
     score = rng.uniform(0.1, 0.9, count).astype(np.float32)
-    return LocalFeatures(xy, descriptors, np.ones(count, np.float32), score, (64, 64))
+    return protocols.LocalFeatures(xy, descriptors, np.ones(count, np.float32), score, (64, 64))
 
 
-def _check_local_encoder(encoder: LocalEncoder) -> None:
+def _check_local_encoder(encoder: protocols.LocalEncoder) -> None:
     frame = example_frame(width=320, height=240)
     found = encoder.encode(frame.rgb)
     _check_rows(found.descriptors, len(found.xy), encoder.card.dim, "local descriptors")
@@ -185,7 +173,7 @@ def _check_local_encoder(encoder: LocalEncoder) -> None:
     hold(blank.descriptors.shape == (0, encoder.card.dim), "a blank picture has no keypoints, and descriptors (0, d)")
 
 
-def _check_place_encoder(encoder: PlaceEncoder) -> None:
+def _check_place_encoder(encoder: protocols.PlaceEncoder) -> None:
     dim = 128
     local = [_example_local(dim, seed) for seed in range(4)]
     rgb = example_frame().rgb
@@ -194,14 +182,16 @@ def _check_place_encoder(encoder: PlaceEncoder) -> None:
     hold(all(_equal(state[key], again[key]) for key in state), "the same seed must learn the same")
     rows = np.stack([encoder.encode(rgb, features, state) for features in local])
     _check_rows(rows, 4, rows.shape[1], "place descriptors")
-    none = LocalFeatures(np.zeros((0, 2), np.float32), np.zeros((0, dim), np.float32), np.zeros(0, np.float32))
+    none = protocols.LocalFeatures(
+        np.zeros((0, 2), np.float32), np.zeros((0, dim), np.float32), np.zeros(0, np.float32)
+    )
     blank = encoder.encode(rgb, none, state)
     _check_rows(blank[None], 1, rows.shape[1], "the descriptor of a picture without keypoints", zero_allowed=True)
     hold(not (state and blank.any()), "what learns from keypoints must have descriptor zero where there are none")
     hold(_equal(rows[0], encoder.encode(rgb, local[0], state)), "the same picture must give the same descriptor")
 
 
-def _check_matcher(matcher: Matcher) -> None:
+def _check_matcher(matcher: protocols.Matcher) -> None:
     a, other = _example_local(matcher.card.dim, 0), _example_local(matcher.card.dim, 1, count=55)
     order = np.random.default_rng(1).permutation(len(a.xy))
     b = _taken(a, order)
@@ -211,7 +201,7 @@ def _check_matcher(matcher: Matcher) -> None:
     hold(np.array_equal(pairs, matcher.match(a, b)), "the same keypoints must give the same matches")
     as_before = {(i, order[j]) for i, j in pairs.tolist()} ^ {(i, j) for i, j in matcher.match(a, a).tolist()}
     hold(len(as_before) <= 0.1 * len(pairs) + 1, "the order of a picture's keypoints must not matter")
-    if not isinstance(matcher, LearnedMatcher):
+    if not isinstance(matcher, protocols.LearnedMatcher):
         hold(len(pairs) >= len(a.xy) // 2, "a picture must match itself")
         hold(np.array_equal(order[pairs[:, 1]], pairs[:, 0]), "a picture's keypoints must match themselves")
     none = _taken(a, order[:0])
@@ -219,7 +209,7 @@ def _check_matcher(matcher: Matcher) -> None:
         hold(found.shape == (0, 2), "matching with nothing must give no matches, shape (0, 2)")
 
 
-def _taken(local: LocalFeatures, rows: np.ndarray) -> LocalFeatures:
+def _taken(local: protocols.LocalFeatures, rows: np.ndarray) -> protocols.LocalFeatures:
     return replace(
         local, xy=local.xy[rows], descriptors=local.descriptors[rows], scale=local.scale[rows], score=local.score[rows]
     )

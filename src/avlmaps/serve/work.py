@@ -26,23 +26,9 @@ from avlmaps.query.schema import (
     locate_answer,
 )
 from avlmaps.query.selection import MapLists, ThingsPage, Wanted, page_of_things
+from avlmaps.serve import requests
 from avlmaps.serve.errors import RequestError, without_folders
 from avlmaps.serve.lanes import Cancellation
-from avlmaps.serve.requests import (
-    CLIP,
-    PHOTO,
-    AskQuery,
-    EditQuery,
-    ListedThingsQuery,
-    LocateQuery,
-    NoQuery,
-    PathQuery,
-    PictureQuery,
-    PlaceQuery,
-    RoomsQuery,
-    ThingsQuery,
-    TilesQuery,
-)
 from avlmaps.serve.settings import Limits
 from avlmaps.serve.shelf import ServedMap, Shelf
 from avlmaps.serve.tiles import TilesAnswer
@@ -141,7 +127,7 @@ def list_maps(shelf: Shelf) -> MapsAnswer:
     return {"maps": entries}
 
 
-def describe_map(task: Task, query: NoQuery) -> dict[str, Any]:
+def describe_map(task: Task, query: requests.NoQuery) -> dict[str, Any]:
     """Return what ``avlmaps info --json`` prints, with the map's name for its path."""
     del query
     described = map_answer(task.map.avlmap)
@@ -154,15 +140,15 @@ def lists_of(task: Task) -> MapLists:
     return MapLists(task.map.avlmap, task.map.once, task.watch.step)
 
 
-def wanted(query: ThingsQuery) -> Wanted:
+def wanted(query: requests.ThingsQuery) -> Wanted:
     """Return which things a request means."""
     named = Wanted(least=query.least, name=query.name, structure=query.structure)
-    if not isinstance(query, ListedThingsQuery):
+    if not isinstance(query, requests.ListedThingsQuery):
         return named
     return replace(named, room=query.room, near=query.near, top=query.top, page=query.page)
 
 
-def list_contents(task: Task, query: ThingsQuery) -> ContentsAnswer:
+def list_contents(task: Task, query: requests.ThingsQuery) -> ContentsAnswer:
     """Return what ``avlmaps things --json`` prints."""
     lists = lists_of(task)
     answer: ContentsAnswer = {
@@ -185,30 +171,30 @@ def _noted(task: Task, answer: Noted) -> Noted:
     return answer
 
 
-def list_things(task: Task, query: ListedThingsQuery) -> ListedThingsAnswer:
+def list_things(task: Task, query: requests.ListedThingsQuery) -> ListedThingsAnswer:
     """Return a page of the things that are meant."""
     page = page_of_things(lists_of(task), wanted(query))
     return _noted(task, ListedThingsAnswer(map=task.map.name, frame=FRAME, **page))
 
 
-def list_sounds(task: Task, query: NoQuery) -> SoundsAnswer:
+def list_sounds(task: Task, query: requests.NoQuery) -> SoundsAnswer:
     """Return the sounds of a map."""
     del query
     return _noted(task, SoundsAnswer(map=task.map.name, frame=FRAME, sounds=lists_of(task).sounds()))
 
 
-def list_rooms(task: Task, query: RoomsQuery) -> RoomsAnswer:
+def list_rooms(task: Task, query: requests.RoomsQuery) -> RoomsAnswer:
     """Return what ``avlmaps rooms --json`` prints."""
     return _noted(task, RoomsAnswer(map=task.map.name, frame=FRAME, rooms=lists_of(task).rooms(query.least)))
 
 
-def list_edits(task: Task, query: NoQuery) -> EditsAnswer:
+def list_edits(task: Task, query: requests.NoQuery) -> EditsAnswer:
     """Return what ``avlmaps edit --list --json`` prints."""
     del query
     return {**task.map.avlmap.edit.history(), "map": task.map.name}
 
 
-def edit(task: Task, query: EditQuery) -> EditsAnswer:
+def edit(task: Task, query: requests.EditQuery) -> EditsAnswer:
     """Correct the map, and return all edits; later queries know it.
 
     Raises:
@@ -241,7 +227,7 @@ def edit(task: Task, query: EditQuery) -> EditsAnswer:
     return {**editor.history(), "map": task.map.name, "text": edit_text(made)}
 
 
-def sound_clip(task: Task, query: NoQuery) -> File:
+def sound_clip(task: Task, query: requests.NoQuery) -> File:
     """Return the FLAC file of a sound."""
     del query
     stored, number = task.map.avlmap.stored, int(task.path["sound"])
@@ -256,7 +242,7 @@ def sound_clip(task: Task, query: NoQuery) -> File:
     return File(content, "audio/flac", {"etag": f'"{task.map.version}"'})
 
 
-def ask_map(task: Task, query: AskQuery) -> Answer:
+def ask_map(task: Task, query: requests.AskQuery) -> Answer:
     """Answer a sentence or parts, with the files of the request.
 
     Raises:
@@ -272,21 +258,21 @@ def ask_map(task: Task, query: AskQuery) -> Answer:
         object=query.object,
         sound=query.sound,
         area=query.area,
-        image=PHOTO if PHOTO in attachments else None,
-        clip=CLIP if CLIP in attachments else None,
+        image=requests.PHOTO if requests.PHOTO in attachments else None,
+        clip=requests.CLIP if requests.CLIP in attachments else None,
         primary=query.primary,
         at=query.at,
     )
 
 
-def ask(task: Task, query: AskQuery) -> QueryAnswer:
+def ask(task: Task, query: requests.AskQuery) -> QueryAnswer:
     """Return what ``avlmaps query --json`` prints."""
     return ask_map(task, query).to_dict()
 
 
-def locate(task: Task, query: LocateQuery) -> LocateAnswer:
+def locate(task: Task, query: requests.LocateQuery) -> LocateAnswer:
     """Return what ``avlmaps locate --json`` prints."""
-    photo = task.uploads.attachments(task.limits).get(PHOTO)
+    photo = task.uploads.attachments(task.limits).get(requests.PHOTO)
     if not isinstance(photo, Photo):
         raise RequestError("There is no photo; send one as the file 'photo' of a form, or as the body.")
     camera = camera_of(query.intrinsics, photo.rgb)
@@ -295,7 +281,7 @@ def locate(task: Task, query: LocateQuery) -> LocateAnswer:
     return locate_answer(found, task.map.avlmap.stored.info.doubts)
 
 
-def place(task: Task, query: PlaceQuery) -> PlaceAnswer:
+def place(task: Task, query: requests.PlaceQuery) -> PlaceAnswer:
     """Return what is at a place."""
     avlmap = task.map.avlmap
     point = np.array([query.x, query.y, 0.0 if query.z is None else query.z])
@@ -305,40 +291,40 @@ def place(task: Task, query: PlaceQuery) -> PlaceAnswer:
     return describe_place(avlmap, point, query.radius_m)
 
 
-def path(task: Task, query: PathQuery) -> PathAnswer:
+def path(task: Task, query: requests.PathQuery) -> PathAnswer:
     """Return the path between two places."""
     finder = task.map.paths_by_stairs if query.stairs else task.map.paths
     return finder.answer(place_of(query.start), place_of(query.goal))
 
 
-def picture(task: Task, query: PictureQuery) -> File:
+def picture(task: Task, query: requests.PictureQuery) -> File:
     """Return a PNG of an answer, or of the map."""
     from avlmaps.serve.pictures import full_picture, map_picture, small_picture
 
-    values = {name: getattr(query, name) for name in AskQuery.__struct_fields__}
+    values = {name: getattr(query, name) for name in requests.AskQuery.__struct_fields__}
     named = any(values[name] is not None for name in ("object", "sound", "area"))
     asks = named or bool((query.sentence or "").strip()) or task.uploads != Uploads()
     if not asks:
         camera_of(query.intrinsics, None)  # they belong to a photo
         content = map_picture(task.map) if query.size == "full" else small_picture(task.map)
         return File(content, "image/png")
-    answer = ask_map(task, AskQuery(**values))
+    answer = ask_map(task, requests.AskQuery(**values))
     task.watch.step("drawing")
     draw = full_picture if query.size == "full" else small_picture
     return File(draw(task.map, answer), "image/png")
 
 
-def tiles(task: Task, query: NoQuery) -> TilesAnswer:
+def tiles(task: Task, query: requests.NoQuery) -> TilesAnswer:
     """Return the list of tiles."""
     del query
     return task.map.pyramid.index(task.map.version)
 
 
-def tile(task: Task, query: TilesQuery) -> File:
+def tile(task: Task, query: requests.TilesQuery) -> File:
     """Return one tile."""
     heat = None
     if query.heat is not None:
-        shown = ask_map(task, AskQuery(sentence=query.heat)).heat
+        shown = ask_map(task, requests.AskQuery(sentence=query.heat)).heat
         heat = None if shown is None else shown.shown
     level, i, j, k = (int(task.path[name]) for name in ("level", "i", "j", "k"))
     content = task.map.pyramid.tile(level, (i, j, k), heat)

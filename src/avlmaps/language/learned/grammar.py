@@ -14,28 +14,7 @@ from enum import Enum, auto
 from functools import cached_property
 from typing import Any
 
-from avlmaps.language.intents import (
-    Ask,
-    Beside,
-    Between,
-    Circle,
-    Clarify,
-    Face,
-    Go,
-    Intent,
-    Move,
-    Pick,
-    Reason,
-    Refuse,
-    Repeat,
-    Return,
-    Side,
-    StopAt,
-    TargetKind,
-    Turn,
-    VisitEach,
-    Wait,
-)  # fmt: skip
+from avlmaps.language import intents
 
 
 class Slot(Enum):
@@ -96,19 +75,19 @@ class Row:
     """
 
     symbols: tuple[str, ...]
-    intent: type[Intent]
+    intent: type[intents.Intent]
     fields: Mapping[str, Any]
 
     @cached_property
     def slots(self) -> tuple[Slot | Amount, ...]:
         """What is written behind the symbols."""
-        if issubclass(self.intent, Refuse | Clarify):
+        if issubclass(self.intent, intents.Refuse | intents.Clarify):
             return (Slot.END,)
         every = [one for each in self.fields.values() for one in (each if isinstance(each, tuple) else (each,))]
         return tuple(one for one in every if isinstance(one, Amount | Slot))
 
 
-def _row(symbols: str, intent: type[Intent], **fields: Any) -> Row:
+def _row(symbols: str, intent: type[intents.Intent], **fields: Any) -> Row:
     return Row(tuple(symbols.split()), intent, fields)
 
 
@@ -120,34 +99,37 @@ VIEWS = {"views_2": 2.0, "views_3": 3.0, "views_4": 4.0}
 BIT = {"bit": 0.5}
 _METRES = Amount("metres", BIT)
 ROWS = (
-    _row("go", Go, to=Slot.TARGET),
-    _row("face", Face, to=Slot.TARGET, side=Side.AHEAD),
-    *(_row(f"face_{side}", Face, to=Slot.TARGET, side=side) for side in (Side.LEFT, Side.RIGHT, Side.BEHIND)),
-    _row("turn", Turn, degrees=Amount("clock"), heading=None),
-    _row("turn left", Turn, degrees=Amount("degrees", DEGREES, sign=-1), heading=None),
-    _row("turn right", Turn, degrees=Amount("degrees", DEGREES), heading=None),
-    _row("turn_to", Turn, degrees=None, heading=Amount("degrees", HEADINGS, wraps=True)),
-    _row("forward", Move, metres=_METRES),
-    _row("back", Move, metres=Amount("metres", BIT, sign=-1)),
-    _row("between", Between, of=(Slot.TARGET, Slot.TARGET)),
+    _row("go", intents.Go, to=Slot.TARGET),
+    _row("face", intents.Face, to=Slot.TARGET, side=intents.Side.AHEAD),
     *(
-        _row(f"beside_{side}", Beside, metres=Amount("metres", BIT, optional=True), of=Slot.TARGET, side=side)
-        for side in Side
-        if side is not Side.AHEAD
+        _row(f"face_{side}", intents.Face, to=Slot.TARGET, side=side)
+        for side in (intents.Side.LEFT, intents.Side.RIGHT, intents.Side.BEHIND)
     ),
-    _row("stop_at", StopAt, metres=_METRES, of=Slot.TARGET),
-    _row("circle", Circle, of=Slot.TARGET, views=None),
-    _row("views", Circle, views=Amount("count", VIEWS), of=Slot.TARGET),
-    _row("each", VisitEach, of=Slot.TARGET),
-    _row("wait", Wait, seconds=Amount("seconds", optional=True)),
-    _row("return", Return),
-    _row("repeat", Repeat, times=Amount("count", TIMES), body=Slot.BODY),
-    *(_row(f"refuse_{reason}", Refuse, reason=reason) for reason in Reason),
-    _row("clarify", Clarify),
+    _row("turn", intents.Turn, degrees=Amount("clock"), heading=None),
+    _row("turn left", intents.Turn, degrees=Amount("degrees", DEGREES, sign=-1), heading=None),
+    _row("turn right", intents.Turn, degrees=Amount("degrees", DEGREES), heading=None),
+    _row("turn_to", intents.Turn, degrees=None, heading=Amount("degrees", HEADINGS, wraps=True)),
+    _row("forward", intents.Move, metres=_METRES),
+    _row("back", intents.Move, metres=Amount("metres", BIT, sign=-1)),
+    _row("between", intents.Between, of=(Slot.TARGET, Slot.TARGET)),
+    *(
+        _row(f"beside_{side}", intents.Beside, metres=Amount("metres", BIT, optional=True), of=Slot.TARGET, side=side)
+        for side in intents.Side
+        if side is not intents.Side.AHEAD
+    ),
+    _row("stop_at", intents.StopAt, metres=_METRES, of=Slot.TARGET),
+    _row("circle", intents.Circle, of=Slot.TARGET, views=None),
+    _row("views", intents.Circle, views=Amount("count", VIEWS), of=Slot.TARGET),
+    _row("each", intents.VisitEach, of=Slot.TARGET),
+    _row("wait", intents.Wait, seconds=Amount("seconds", optional=True)),
+    _row("return", intents.Return),
+    _row("repeat", intents.Repeat, times=Amount("count", TIMES), body=Slot.BODY),
+    *(_row(f"refuse_{reason}", intents.Refuse, reason=reason) for reason in intents.Reason),
+    _row("clarify", intents.Clarify),
 )
-ASKS = {f"ask_{ask}": ask for ask in Ask}
-KINDS = tuple(str(kind) for kind in TargetKind)
-PICKS = {f"pick_{pick}": pick for pick in Pick if pick}
+ASKS = {f"ask_{ask}": ask for ask in intents.Ask}
+KINDS = tuple(str(kind) for kind in intents.TargetKind)
+PICKS = {f"pick_{pick}": pick for pick in intents.Pick if pick}
 STOPS = tuple(row.symbols[0] for row in ROWS if row.slots == (Slot.END,))
 STARTS = tuple(dict.fromkeys(row.symbols[0] for row in ROWS if row.slots != (Slot.END,)))
 SYMBOLS = (

@@ -18,18 +18,10 @@ from jaxtyping import Float32
 
 from avlmaps.core.errors import BackendError
 from avlmaps.language.intents import Inquiry, Intent
+from avlmaps.language.learned import linear  # fmt: skip
 from avlmaps.language.learned.features import columns, features
 from avlmaps.language.learned.grammar import INDEX, SYMBOLS
 from avlmaps.language.learned.limits import Limits
-from avlmaps.language.learned.linear import (
-    MOST_SYMBOLS,
-    MalformedError,
-    Pointable,
-    State,
-    Symbol,
-    inquiry_of,
-    intents_of,
-)  # fmt: skip
 from avlmaps.language.lexer import Token
 from avlmaps.perception.embedded.words import words_checksum
 from avlmaps.perception.models.networks import open_network
@@ -49,7 +41,7 @@ class Line:
         log: the logarithm of its probability.
     """
 
-    symbols: tuple[Symbol, ...]
+    symbols: tuple[linear.Symbol, ...]
     log: float
 
 
@@ -72,8 +64,8 @@ class Read:
 
 @dataclass(slots=True)
 class _Open:
-    state: State
-    symbols: tuple[Symbol, ...]
+    state: linear.State
+    symbols: tuple[linear.Symbol, ...]
     log: float
     first: Float32[np.ndarray, " d"]
     second: Float32[np.ndarray, " d"]
@@ -106,8 +98,8 @@ class LearnedReader:
         found: dict[Any, Read] = {}
         for line in self.lines(tokens, is_question=False):
             try:
-                meaning = intents_of(line.symbols, tokens)
-            except MalformedError:
+                meaning = linear.intents_of(line.symbols, tokens)
+            except linear.MalformedError:
                 continue
             _add(found, Read(meaning, float(np.exp(line.log)), _pointed(line)))
         return _sorted(found)
@@ -118,8 +110,8 @@ class LearnedReader:
         for line in self.lines(tokens, is_question=True):
             purpose = line.symbols == ("purpose", "end")
             try:
-                meaning = None if purpose else inquiry_of(line.symbols, tokens)
-            except MalformedError:
+                meaning = None if purpose else linear.inquiry_of(line.symbols, tokens)
+            except linear.MalformedError:
                 continue
             _add(found, Read(meaning, float(np.exp(line.log)), _pointed(line), purpose))
         return _sorted(found)
@@ -144,11 +136,11 @@ class LearnedReader:
         return self._search(tokens, states, begin[0, 0], start, is_question=is_question)
 
     def _search(self, tokens: Sequence[Token], states: Any, begin: Any, start: int, *, is_question: bool) -> list[Line]:
-        can = Pointable(tokens)
+        can = linear.Pointable(tokens)
         texts = [token.text for token in tokens]
-        beam = [_Open(State(can, is_question), (), 0.0, begin, begin)]
+        beam = [_Open(linear.State(can, is_question), (), 0.0, begin, begin)]
         done: list[Line] = []
-        for _ in range(MOST_SYMBOLS):
+        for _ in range(linear.MOST_SYMBOLS):
             last = np.array([[_number(one.symbols[-1]) if one.symbols else start] for one in beam], np.int64)
             outputs: Any = self._step.run(
                 None,
@@ -156,7 +148,7 @@ class LearnedReader:
                  "second": np.stack([one.second for one in beam])[None]},
             )  # fmt: skip
             said, first, second = outputs
-            after: list[tuple[float, int, Symbol]] = []
+            after: list[tuple[float, int, linear.Symbol]] = []
             for at, one in enumerate(beam):
                 after += [(one.log + log, at, symbol) for symbol, log in _following(one.state, said[at], texts)]
             after.sort(key=lambda each: (-each[0], each[1], str(each[2])))
@@ -176,10 +168,12 @@ class LearnedReader:
         return sorted(done, key=lambda line: -line.log)[:_BEAM]
 
 
-def _following(state: State, said: Float32[np.ndarray, " k"], texts: Sequence[str]) -> list[tuple[Symbol, float]]:
+def _following(
+    state: linear.State, said: Float32[np.ndarray, " k"], texts: Sequence[str]
+) -> list[tuple[linear.Symbol, float]]:
     """Return what may follow, likely enough to matter; a name's word may stand at any of its places."""
     may = state.open()
-    found: list[tuple[Symbol, float]] = [(symbol, float(said[INDEX[symbol]])) for symbol in may.symbols]
+    found: list[tuple[linear.Symbol, float]] = [(symbol, float(said[INDEX[symbol]])) for symbol in may.symbols]
     base = len(SYMBOLS)
     if state.kind in _NAMED:
         by_word: dict[str, list[int]] = {}
@@ -193,7 +187,7 @@ def _following(state: State, said: Float32[np.ndarray, " k"], texts: Sequence[st
     return [one for one in found if one[1] > _LEAST]
 
 
-def _number(symbol: Symbol) -> int:
+def _number(symbol: linear.Symbol) -> int:
     return INDEX[symbol] if isinstance(symbol, str) else len(SYMBOLS) + symbol
 
 

@@ -6,37 +6,12 @@ from time import monotonic
 from typing import Any
 
 from avlmaps.core.errors import AvlmapsError, ProgramError
-from avlmaps.language.program import syntax
+from avlmaps.language.program import syntax, value_types, values
 from avlmaps.language.program.budget import Budget, refused
 from avlmaps.language.program.calls import check_exactly_one, parameter_of
 from avlmaps.language.program.check import check_argument, grown, misfit
 from avlmaps.language.program.table import SKILLS
 from avlmaps.language.program.trace import Step, Trace, told
-from avlmaps.language.program.value_types import (
-    COLLECTIONS,
-    ValueType,
-    check_comparison,
-    check_function,
-    check_indexed,
-    check_truth,
-    check_unpacked,
-    check_walked,
-)
-from avlmaps.language.program.values import (
-    Made,
-    Sizes,
-    Value,
-    adopted,
-    call_function,
-    combined,
-    element_of,
-    handed_on,
-    is_among,
-    kind_of,
-    shown,
-    signed,
-    size_of_shown,
-)
 from avlmaps.language.program.vocabulary import Vocabulary
 
 # Between two skills the clock is read once in this many steps.
@@ -113,7 +88,7 @@ class _Run:
         self.steps: list[Step] = []
         self.worked_out = 0
         self.made = 0
-        self.sizes = Sizes()
+        self.sizes = values.Sizes()
 
     # ---- the budget
 
@@ -138,7 +113,7 @@ class _Run:
                 "raise the budget",
             )
 
-    def keep_value(self, line: int, value: Value) -> None:
+    def keep_value(self, line: int, value: values.Value) -> None:
         """Count the elements of a value that was made."""
         self.keep(line, self.sizes.of(line, value))
 
@@ -181,7 +156,7 @@ class _Run:
 
     def loop(self, statement: syntax.For) -> _Next:
         through = self.value(statement.through)
-        check_walked(statement.line, kind_of(through))
+        value_types.check_walked(statement.line, values.kind_of(through))
         for element in through:
             self.step(statement.line)
             self.give(statement.line, statement.target, element)
@@ -193,7 +168,7 @@ class _Run:
         if not target.unpacks:
             self.names[target.names[0]] = value
             return
-        check_unpacked(line, kind_of(value))
+        value_types.check_unpacked(line, values.kind_of(value))
         if len(value) != len(target.names):
             raise misfit(line, target, len(value))
         self.names.update(zip(target.names, value, strict=True))
@@ -201,7 +176,7 @@ class _Run:
     def update(self, statement: syntax.Update) -> None:
         before = self.value(syntax.Name(statement.name, statement.line))
         value = self.value(statement.value)
-        if statement.operator == "+" and kind_of(before) is kind_of(value) is ValueType.LIST:
+        if statement.operator == "+" and values.kind_of(before) is values.kind_of(value) is value_types.ValueType.LIST:
             raise grown(statement)
         self.names[statement.name] = self.arithmetic(statement.line, statement.operator, before, value)
 
@@ -213,13 +188,13 @@ class _Run:
 
     def truth(self, part: syntax.Expression) -> bool:
         value = self.value(part)
-        check_truth(part.line, kind_of(value))
+        value_types.check_truth(part.line, values.kind_of(value))
         return bool(value)
 
-    def constant(self, part: syntax.Constant) -> Value:
+    def constant(self, part: syntax.Constant) -> values.Value:
         return part.value
 
-    def name(self, part: syntax.Name) -> Value:
+    def name(self, part: syntax.Name) -> values.Value:
         try:
             return self.names[part.name]
         except KeyError:
@@ -227,31 +202,31 @@ class _Run:
                 part.line, f"`{part.name}` has no value yet; give it one before, on every way that leads here"
             ) from None
 
-    def collection(self, part: syntax.Collection) -> Value:
+    def collection(self, part: syntax.Collection) -> values.Value:
         elements = [self.value(element) for element in part.elements]
         made = elements if part.is_list else tuple(elements)
         self.keep_value(part.line, made)
         return made
 
-    def unary(self, part: syntax.Unary) -> Value:
+    def unary(self, part: syntax.Unary) -> values.Value:
         if part.operator == "not":
             return not self.truth(part.operand)
-        return signed(part.line, part.operator, self.value(part.operand))
+        return values.signed(part.line, part.operator, self.value(part.operand))
 
-    def binary(self, part: syntax.Binary) -> Value:
+    def binary(self, part: syntax.Binary) -> values.Value:
         left = self.value(part.left)
         return self.arithmetic(part.line, part.operator, left, self.value(part.right))
 
-    def arithmetic(self, line: int, operator: str, left: Any, right: Any) -> Value:
+    def arithmetic(self, line: int, operator: str, left: Any, right: Any) -> values.Value:
         try:
-            made = combined(line, operator, left, right, self.budget.factors)
+            made = values.combined(line, operator, left, right, self.budget.factors)
         except ProgramError:
             raise
         except AvlmapsError as fault:
             raise _SkillFailedError(line, f"`{operator}`", fault) from fault
         if isinstance(made, (str, list, tuple)):
             self.keep_value(line, made)
-        elif isinstance(made, Made):
+        elif isinstance(made, values.Made):
             self.keep(line, len(made.how))
             self.look_at_clock(line)
         return made
@@ -260,7 +235,7 @@ class _Run:
         left = self.value(part.first)
         for operator, operand in zip(part.operators, part.rest, strict=True):
             right = self.value(operand)
-            check_comparison(part.line, operator, kind_of(left), kind_of(right))
+            value_types.check_comparison(part.line, operator, values.kind_of(left), values.kind_of(right))
             for value in (left, right):
                 self.step(part.line, self.sizes.of(part.line, value))
             if not _COMPARE[operator](left, right):
@@ -268,38 +243,38 @@ class _Run:
             left = right
         return True
 
-    def logical(self, part: syntax.Logical) -> Value:
+    def logical(self, part: syntax.Logical) -> values.Value:
         stops_at = part.operator == "or"
         for operand in part.operands[:-1]:
             value = self.value(operand)
-            check_truth(operand.line, kind_of(value))
+            value_types.check_truth(operand.line, values.kind_of(value))
             if bool(value) is stops_at:
                 return value
         return self.value(part.operands[-1])
 
-    def conditional(self, part: syntax.Conditional) -> Value:
+    def conditional(self, part: syntax.Conditional) -> values.Value:
         return self.value(part.chosen if self.truth(part.test) else part.otherwise)
 
-    def element(self, part: syntax.Element) -> Value:
+    def element(self, part: syntax.Element) -> values.Value:
         of, index = self.value(part.of), self.value(part.index)
-        check_indexed(part.line, kind_of(of), kind_of(index))
-        return element_of(part.line, of, index)
+        value_types.check_indexed(part.line, values.kind_of(of), values.kind_of(index))
+        return values.element_of(part.line, of, index)
 
-    def builtin_call(self, part: syntax.BuiltinCall) -> Value:
+    def builtin_call(self, part: syntax.BuiltinCall) -> values.Value:
         arguments = [self.value(argument) for argument in part.arguments]
-        kinds = tuple(kind_of(argument) for argument in arguments)
-        check_function(part.line, part.function, kinds)
-        if part.function in ("min", "max") and kinds[0] in COLLECTIONS:
+        kinds = tuple(values.kind_of(argument) for argument in arguments)
+        value_types.check_function(part.line, part.function, kinds)
+        if part.function in ("min", "max") and kinds[0] in value_types.COLLECTIONS:
             self.step(part.line, len(arguments[0]))
-        return call_function(part.line, part.function, arguments)
+        return values.call_function(part.line, part.function, arguments)
 
     # ---- skills
 
-    def skill_call(self, part: syntax.SkillCall) -> Value:
+    def skill_call(self, part: syntax.SkillCall) -> values.Value:
         skill = SKILLS[part.skill]
         arguments = {argument.parameter: self.value(argument.value) for argument in part.arguments}
         for name, value in arguments.items():
-            check_argument(part.line, skill, parameter_of(skill, name), kind_of(value))
+            check_argument(part.line, skill, parameter_of(skill, name), values.kind_of(value))
         check_exactly_one(part.line, skill, sum(value is not None for value in arguments.values()))
         self.look_at_clock(part.line)
         if len(self.steps) == self.budget.skill_calls:
@@ -307,25 +282,25 @@ class _Run:
                 part.line,
                 f"the program calls more than {self.budget.skill_calls} skills; shorten its loops or raise the budget",
             )
-        seen = {name: shown(value) for name, value in arguments.items()}
-        self.keep(part.line, size_of_shown(seen))
+        seen = {name: values.shown(value) for name, value in arguments.items()}
+        self.keep(part.line, values.size_of_shown(seen))
         return self.perform(part, arguments, seen)
 
-    def perform(self, part: syntax.SkillCall, arguments: dict[str, Any], seen: dict[str, Any]) -> Value:
+    def perform(self, part: syntax.SkillCall, arguments: dict[str, Any], seen: dict[str, Any]) -> values.Value:
         """Call the skill, the one place where a program reaches anything."""
         skill, began = SKILLS[part.skill], self.clock()
-        given = {name: handed_on(value) for name, value in arguments.items()}
+        given = {name: values.handed_on(value) for name, value in arguments.items()}
         try:
             returned = getattr(self.vocabulary, skill.name)(**given)
         except AvlmapsError as fault:
             self.record(Step(skill.name, seen, None, part.line, self.clock() - began, str(fault)))
             raise _SkillFailedError(part.line, skill.name, fault) from fault
         how = f"{skill.name}({', '.join(f'{name}={told(value)}' for name, value in seen.items())})"
-        result = adopted(skill, returned, how)
-        content = shown(result)
+        result = values.adopted(skill, returned, how)
+        content = values.shown(result)
         self.record(Step(skill.name, seen, content, part.line, self.clock() - began))
         self.keep_value(part.line, result)
-        self.keep(part.line, size_of_shown(content))
+        self.keep(part.line, values.size_of_shown(content))
         return result
 
     def record(self, step: Step) -> None:
@@ -333,7 +308,7 @@ class _Run:
         self.on_step(step)
 
 
-_EVALUATE: dict[type, Callable[[_Run, Any], Value]] = {
+_EVALUATE: dict[type, Callable[[_Run, Any], values.Value]] = {
     syntax.Constant: _Run.constant,
     syntax.Name: _Run.name,
     syntax.Collection: _Run.collection,
@@ -353,8 +328,8 @@ _COMPARE: dict[str, Callable[[Any, Any], bool]] = {
     "<=": lambda left, right: left <= right,
     ">": lambda left, right: left > right,
     ">=": lambda left, right: left >= right,
-    "in": is_among,
-    "not in": lambda left, right: not is_among(left, right),
+    "in": values.is_among,
+    "not in": lambda left, right: not values.is_among(left, right),
     "is": lambda left, right: left is right,
     "is not": lambda left, right: left is not right,
 }

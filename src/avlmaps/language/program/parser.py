@@ -1,33 +1,17 @@
 """From text to a program: its statements, read and then checked."""
 
 from avlmaps.core.errors import ProgramError
+from avlmaps.language.program import syntax
 from avlmaps.language.program.budget import refused
 from avlmaps.language.program.calls import check_assignable
 from avlmaps.language.program.check import check
 from avlmaps.language.program.expressions import Expressions
 from avlmaps.language.program.lexer import Form, tokens_of
-from avlmaps.language.program.syntax import (
-    Assign,
-    Branch,
-    Collection,
-    Element,
-    Expression,
-    For,
-    If,
-    Name,
-    Perform,
-    Program,
-    SkillCall,
-    Statement,
-    Target,
-    Update,
-    Word,
-)
 
 _UPDATES = frozenset({"+=", "-=", "*=", "/=", "//=", "%="})
 
 
-def parse_program(text: str) -> Program:
+def parse_program(text: str) -> syntax.Program:
     """Return the program that a text is, with every check that can be made before it runs.
 
     Args:
@@ -41,7 +25,7 @@ def parse_program(text: str) -> Program:
     if not statements:
         raise ProgramError("The program is empty; write at least one line, such as `robot.move_to('chair')`.")
     check(statements)
-    return Program(statements, text)
+    return syntax.Program(statements, text)
 
 
 class _Statements(Expressions):
@@ -49,13 +33,13 @@ class _Statements(Expressions):
 
     loops = 0
 
-    def run(self) -> tuple[Statement, ...]:
-        statements: list[Statement] = []
+    def run(self) -> tuple[syntax.Statement, ...]:
+        statements: list[syntax.Statement] = []
         while self.here.form is not Form.END:
             statements += self._line()
         return tuple(statements)
 
-    def _line(self) -> list[Statement]:
+    def _line(self) -> list[syntax.Statement]:
         """Read one statement with its blocks, or those that share a line with `;`."""
         if self.here.form is Form.INDENT:
             raise refused(
@@ -69,7 +53,7 @@ class _Statements(Expressions):
             raise refused(self.here.line, f"`{self.here.text}` belongs to no `if`; put it right under its block")
         return self._simple_line()
 
-    def _simple_line(self) -> list[Statement]:
+    def _simple_line(self) -> list[syntax.Statement]:
         statements = [self._simple()]
         while self.took(";") and self.here.form is not Form.LINE_END:
             statements.append(self._simple())
@@ -78,7 +62,7 @@ class _Statements(Expressions):
         self.take()
         return statements
 
-    def _block(self, word: str, after: str) -> tuple[Statement, ...]:
+    def _block(self, word: str, after: str) -> tuple[syntax.Statement, ...]:
         self.need(":", f"after {after}")
         if self.here.form is not Form.LINE_END:
             return tuple(self._simple_line())
@@ -86,25 +70,25 @@ class _Statements(Expressions):
         if self.here.form is not Form.INDENT:
             raise refused(self.here.line, f"the block of `{word}` is missing; indent the lines that belong to it")
         self.take()
-        statements: list[Statement] = []
+        statements: list[syntax.Statement] = []
         while self.here.form is not Form.DEDENT:
             statements += self._line()
         self.take()
         return tuple(statements)
 
-    def _if(self) -> If:
+    def _if(self) -> syntax.If:
         line, branches, otherwise = self.here.line, [], ()
         while self.sees("if", "elif"):
             if branches and self.here.text == "if":
                 break
             word = self.take()
             test = self.whole()
-            branches.append(Branch(test, self._block(word.text, f"the condition of `{word.text}`"), word.line))
+            branches.append(syntax.Branch(test, self._block(word.text, f"the condition of `{word.text}`"), word.line))
         if self.took("else"):
             otherwise = self._block("else", "`else`")
-        return If(tuple(branches), otherwise, line)
+        return syntax.If(tuple(branches), otherwise, line)
 
-    def _for(self) -> For:
+    def _for(self) -> syntax.For:
         line = self.take().line
         target = self._for_target()
         self.need("in", "after the name that `for` gives")
@@ -112,9 +96,9 @@ class _Statements(Expressions):
         self.loops += 1
         body = self._block("for", "what `for` goes through")
         self.loops -= 1
-        return For(target, through, body, line)
+        return syntax.For(target, through, body, line)
 
-    def _for_target(self) -> Target:
+    def _for_target(self) -> syntax.Target:
         bracketed = self.took("(")
         names, unpacks = [], False
         while self.here.form is Form.NAME:
@@ -126,14 +110,14 @@ class _Statements(Expressions):
             self.need(")", "after the names that `for` gives")
         if not names:
             raise refused(self.here.line, f"there should be a name after `for`, not {self.here.shown}")
-        return Target(tuple(names), unpacks)
+        return syntax.Target(tuple(names), unpacks)
 
-    def _simple(self) -> Statement:
+    def _simple(self) -> syntax.Statement:
         token, after = self.here, self.tokens[min(self.at + 1, len(self.tokens) - 1)]
         if self.sees("pass", "break", "continue"):
             if token.text != "pass" and not self.loops:
                 raise refused(token.line, f"`{token.text}` is in no loop; put it into the block of a `for`")
-            return Word(self.take().text, token.line)
+            return syntax.Word(self.take().text, token.line)
         if token.form is Form.NAME and after.form is Form.SIGN and (after.text == "=" or after.text in _UPDATES):
             check_assignable(token.line, token.text)
         found = self.listed("=", ":", ";", *_UPDATES)
@@ -141,28 +125,28 @@ class _Statements(Expressions):
             return self._assigned(self._target(found, token.line), token.line)
         if self.sees(*_UPDATES):
             operator = self.take().text.removesuffix("=")
-            if not isinstance(found, Name):
+            if not isinstance(found, syntax.Name):
                 raise refused(token.line, f"`{operator}=` updates one name; write it out with `=`")
-            return Update(found.name, operator, self.listed(";"), token.line)
+            return syntax.Update(found.name, operator, self.listed(";"), token.line)
         if self.sees(":"):
             raise refused(token.line, "a `:` has no meaning here; a name is given a value with `=` alone")
-        if not isinstance(found, SkillCall):
+        if not isinstance(found, syntax.SkillCall):
             raise refused(token.line, "the line works out a value and does nothing with it; name it or call a skill")
-        return Perform(found, token.line)
+        return syntax.Perform(found, token.line)
 
-    def _assigned(self, target: Target, line: int) -> Assign:
+    def _assigned(self, target: syntax.Target, line: int) -> syntax.Assign:
         value = self.listed("=", ";")
         if self.sees("="):
             raise refused(line, "a line has one `=`; give each name its value on a line of its own")
-        return Assign(target, value, line)
+        return syntax.Assign(target, value, line)
 
-    def _target(self, written: Expression, line: int) -> Target:
-        if isinstance(written, Name):
-            return Target((check_assignable(line, written.name),), unpacks=False)
-        if isinstance(written, Collection) and not written.is_list and written.elements:
-            names = [part.name for part in written.elements if isinstance(part, Name)]
+    def _target(self, written: syntax.Expression, line: int) -> syntax.Target:
+        if isinstance(written, syntax.Name):
+            return syntax.Target((check_assignable(line, written.name),), unpacks=False)
+        if isinstance(written, syntax.Collection) and not written.is_list and written.elements:
+            names = [part.name for part in written.elements if isinstance(part, syntax.Name)]
             if len(names) == len(written.elements):
-                return Target(tuple(check_assignable(line, name) for name in names), unpacks=True)
-        if isinstance(written, Element):
+                return syntax.Target(tuple(check_assignable(line, name) for name in names), unpacks=True)
+        if isinstance(written, syntax.Element):
             raise refused(line, "a list is not changed but made again, as in `a = a + [b]`")
         raise refused(line, "only a name is given a value, or several as in `a, b = 1, 2`; put it left of the `=`")

@@ -17,15 +17,8 @@ from avlmaps.core.registry import Kind
 from avlmaps.maps.keyframes.describe import describe_keyframe, learn_places, select_keyframes, stack_keyframes
 from avlmaps.maps.pipeline.parts import MapPart
 from avlmaps.maps.pipeline.plan import BUILD_VERSION, BuildPlan
+from avlmaps.maps.store import checkpoints
 from avlmaps.maps.store.array_validation import RAGGED, ROWS_OR_NONE, array_fields, validate_arrays
-from avlmaps.maps.store.checkpoints import (
-    Computed,
-    find_checkpoint,
-    key_of,
-    load_checkpoint,
-    load_or_compute,
-    save_checkpoint,
-)
 from avlmaps.maps.types import Keyframes
 from avlmaps.perception.cache.cached_encoders import cache_note
 from avlmaps.perception.protocols import LocalFeatures, ViewEncoder
@@ -80,14 +73,16 @@ def describe_keyframes(
     chosen = select_keyframes(good, plan.settings.keyframes)
     cards = [plan.models.get(kind.value) for kind in (Kind.LOCAL, Kind.PLACE, Kind.VIEWS)]
     seed, settings = plan.settings.seed, plan.settings.keyframes
-    key = key_of("keyframes", BUILD_VERSION, plan.recording.fingerprint, settings, seed, cards, fused[chosen].tolist())
+    key = checkpoints.key_of(
+        "keyframes", BUILD_VERSION, plan.recording.fingerprint, settings, seed, cards, fused[chosen].tolist()
+    )
     home = plan.folder("keyframes", key)
     place_state, local, learning_s = _learn(plan, good, chosen, key)
     size = max(1, plan.settings.frames.per_part // 4)  # describing takes longer than fusing
     lots = {home / f"{start:08d}": chosen[start : start + size] for start in range(0, len(chosen), size)}
-    missing = {folder: lot for folder, lot in lots.items() if find_checkpoint(folder, _Facts, key) is None}
+    missing = {folder: lot for folder, lot in lots.items() if checkpoints.find_checkpoint(folder, _Facts, key) is None}
     describe(plan, KeyframeLots(good, missing, len(chosen), _places(plan, key), local, key))
-    kept = [load_checkpoint(folder, _Facts, key) for folder in lots]
+    kept = [checkpoints.load_checkpoint(folder, _Facts, key) for folder in lots]
     pieces = [validate_arrays(Keyframes, lot.arrays, str(lot.folder)) for lot in kept]
     return KeyframeResult(concat_keyframes(pieces), place_state, learning_s + sum(lot.facts.elapsed_s for lot in kept))
 
@@ -98,13 +93,13 @@ def _learn(
     """Return the state of the place encoder, the keypoints that it learned from (if it did now), and the seconds."""
     local: dict[int, LocalFeatures] = {}
 
-    def compute() -> Computed[_Facts]:
+    def compute() -> checkpoints.Computed[_Facts]:
         begin = perf_counter()
         state, keypoints = learn_places(good, chosen, plan.encoders, plan.rng(RANDOMNESS))
         local.update(keypoints)
-        return Computed(_Facts(perf_counter() - begin), state)
+        return checkpoints.Computed(_Facts(perf_counter() - begin), state)
 
-    found = load_or_compute(_places(plan, key), key, _Facts, compute)
+    found = checkpoints.load_or_compute(_places(plan, key), key, _Facts, compute)
     return found.arrays, local, found.facts.elapsed_s
 
 
@@ -116,7 +111,7 @@ def _places(plan: BuildPlan, key: str) -> Path:
 def describe_lots(plan: BuildPlan, work: KeyframeLots) -> None:
     """Encode lots of keyframes and store each lot in its folder."""
     left = sum(map(len, work.lots.values()))
-    place_state = load_checkpoint(work.places, _Facts, work.key).arrays
+    place_state = checkpoints.load_checkpoint(work.places, _Facts, work.key).arrays
     blind = plan.encoders.without(Kind.VIEWS)  # the views are encoded ahead, in batches
     with closing(_viewed(plan, work.frames, list(work.lots.values()))) as viewed:
         ahead = progress(
@@ -133,7 +128,7 @@ def describe_lots(plan: BuildPlan, work: KeyframeLots) -> None:
             ]
             pieces = stack_keyframes(seen)
             arrays = {name: getattr(pieces, name) for name in array_fields(Keyframes)}
-            save_checkpoint(folder, work.key, _Facts(perf_counter() - begin), arrays)
+            checkpoints.save_checkpoint(folder, work.key, _Facts(perf_counter() - begin), arrays)
         for _ in ahead:  # nothing is left; this completes the bar
             pass
 

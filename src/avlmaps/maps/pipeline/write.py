@@ -19,19 +19,7 @@ from avlmaps.maps.pipeline.keyframes import KeyframeResult
 from avlmaps.maps.pipeline.parts import MapPart
 from avlmaps.maps.pipeline.plan import BuildPlan, strip_folder
 from avlmaps.maps.pipeline.sounds import SoundResult
-from avlmaps.maps.store.manifest import (
-    BadFrame,
-    Box,
-    Counts,
-    GroundInfo,
-    MapInfo,
-    RecordingInfo,
-    Removed,
-    RigInfo,
-    SensorInfo,
-    Timings,
-    UpInfo,
-)
+from avlmaps.maps.store import manifest
 from avlmaps.maps.store.writer import MapContent, write_map
 from avlmaps.maps.types import Keyframes, SourceEvidence, Voxels
 from avlmaps.recordings.types import Recording
@@ -47,15 +35,15 @@ class Merged:
     """The voxels of the map, what was removed from them, and the seconds that it took."""
 
     voxels: Voxels
-    sensor: SensorInfo
-    removed: Removed
+    sensor: manifest.SensorInfo
+    removed: manifest.Removed
     elapsed_s: float
 
 
 def merge(
     plan: BuildPlan,
     parts: Sequence[MapPart],
-    sensor: SensorInfo,
+    sensor: manifest.SensorInfo,
     add_up: Callable[[BuildPlan, Sequence[MapPart]], VoxelAccumulator],
 ) -> Merged:
     """Add the parts up to the voxels of the map, and remove those that are no surface."""
@@ -66,7 +54,7 @@ def surfaces(
     plan: BuildPlan,
     total: VoxelAccumulator,
     views: Sequence[FreeViews],
-    sensor: SensorInfo,
+    sensor: manifest.SensorInfo,
     counts: ThroughCounts | None = None,
 ) -> Merged:
     """Return the voxels of the sums that are a surface.
@@ -95,7 +83,7 @@ def surfaces(
             f"Every voxel of {plan.recording.path} is seen through or a speck, so that the map would be empty; check "
             f"its poses and its depth scale, or use every depth as it is ({option('sensor', 'none')})."
         )
-    return Merged(total.voxels(kept=kept), sensor, Removed(**removed), perf_counter() - begin)
+    return Merged(total.voxels(kept=kept), sensor, manifest.Removed(**removed), perf_counter() - begin)
 
 
 def write(
@@ -107,7 +95,7 @@ def write(
     heard: SoundResult,
     merged: Merged,
     sources: tuple[SourceEvidence | None, float] = (None, 0.0),
-) -> MapInfo:
+) -> manifest.MapInfo:
     """Write the map and, last of all, its manifest; then the parts go."""
     keyframes = with_clear_views(pictures.keyframes, [part.views() for part in parts])
     submaps = concat_submaps([part.submap() for part in parts]) if plan.settings.frames.per_submap else None
@@ -126,7 +114,7 @@ def write(
     if sources[0] is not None:
         stages_s["sources"] = sources[1]
     finished = datetime.now(UTC).isoformat(timespec="seconds")
-    timings = Timings(finished=finished, elapsed_s=sum(stages_s.values()), stages_s=stages_s)
+    timings = manifest.Timings(finished=finished, elapsed_s=sum(stages_s.values()), stages_s=stages_s)
     bad = sorted((frame for part in parts for frame in part.info.bad_frames), key=lambda frame: frame.index)
     fused = sum(part.info.fused for part in parts)
     return write_map(plan.path, content, manifest_of(plan, up.up, floor.ground, content, merged, timings, fused, bad))
@@ -148,23 +136,23 @@ def with_clear_views(keyframes: Keyframes, views: Sequence[FreeViews]) -> Keyfra
 
 def manifest_of(
     plan: BuildPlan,
-    up: UpInfo,
-    ground: GroundInfo,
+    up: manifest.UpInfo,
+    ground: manifest.GroundInfo,
     content: MapContent,
     merged: Merged,
-    timings: Timings,
+    timings: manifest.Timings,
     fused: int,
-    bad: Sequence[BadFrame] = (),
-) -> MapInfo:
+    bad: Sequence[manifest.BadFrame] = (),
+) -> manifest.MapInfo:
     """Return the content of ``map.json`` but for its list of files."""
     doubts = (*plan.doubts, *carving_doubts(merged.removed, len(content.voxels)))
-    return MapInfo(
+    return manifest.MapInfo(
         avlmaps_version=__version__,
         build_key=plan.key,
         voxel_size_m=plan.settings.voxel_size_m,
         up=up,
         ground=ground,
-        rig=RigInfo.of(plan.recording.rig),
+        rig=manifest.RigInfo.of(plan.recording.rig),
         profile=plan.encoders.name,
         models=plan.models,
         settings=plan.settings,
@@ -172,13 +160,13 @@ def manifest_of(
         removed=merged.removed,
         seed=plan.settings.seed,
         recording=_recording_info(plan.recording),
-        counts=Counts(
+        counts=manifest.Counts(
             frames=fused,
             keyframes=len(content.keyframes),
             voxels=len(content.voxels),
             sounds=len(content.sounds),
         ),
-        bounding_box_m=Box.of(content.voxels.index, plan.settings.voxel_size_m),
+        bounding_box_m=manifest.Box.of(content.voxels.index, plan.settings.voxel_size_m),
         bad_frames=tuple(bad),
         notices=(*doubts, *_notices(plan, up, ground, len(bad))),
         doubts=doubts,
@@ -186,8 +174,8 @@ def manifest_of(
     )
 
 
-def _recording_info(recording: Recording) -> RecordingInfo:
-    return RecordingInfo(
+def _recording_info(recording: Recording) -> manifest.RecordingInfo:
+    return manifest.RecordingInfo(
         name=recording.path.name,
         format=recording.format,
         fingerprint=recording.fingerprint,
@@ -198,7 +186,7 @@ def _recording_info(recording: Recording) -> RecordingInfo:
     )
 
 
-def _notices(plan: BuildPlan, up: UpInfo, ground: GroundInfo, bad: int) -> Iterator[str]:
+def _notices(plan: BuildPlan, up: manifest.UpInfo, ground: manifest.GroundInfo, bad: int) -> Iterator[str]:
     if up.known_from == "camera":
         yield "The up direction is a guess from how the camera was held: too little smooth surface is in view."
     elif up.support < _GUESS:
@@ -210,7 +198,7 @@ def _notices(plan: BuildPlan, up: UpInfo, ground: GroundInfo, bad: int) -> Itera
         yield "The recording has no sound track, so that the map holds no sounds."
 
 
-def carving_doubts(removed: Removed, voxels: int) -> Iterator[str]:
+def carving_doubts(removed: manifest.Removed, voxels: int) -> Iterator[str]:
     """Yield a sentence where too much of a map was seen through.
 
     Args:

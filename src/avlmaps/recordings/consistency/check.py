@@ -11,24 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from avlmaps.core.errors import RecordingError
+from avlmaps.recordings.consistency import limits
 from avlmaps.recordings.consistency.agreement import APART_SAME_M, FEWEST_POINTS, Agreement, compare, without_occluded
 from avlmaps.recordings.consistency.blind_spots import blind_spots
 from avlmaps.recordings.consistency.causes import cause_of
 from avlmaps.recordings.consistency.edges import Edges, Shift, find_edges, shift_of
 from avlmaps.recordings.consistency.jumps import find_exchanged, find_jump
-from avlmaps.recordings.consistency.limits import (
-    BAD_LIKENESS,
-    BAD_PAIR,
-    IMPOSSIBLE_AGREEING,
-    IMPOSSIBLE_LIKENESS,
-    LEAST_AGREEING,
-    apart_agrees,
-    bad_pairs,
-    can_be_judged,
-    geometry_agrees,
-    opposite_pairs,
-    unlike,
-)
 from avlmaps.recordings.consistency.sample import Sample, Surfaces, draw_sample
 from avlmaps.recordings.consistency.single_frames import of_colour, of_depth, of_intrinsics, of_motion
 from avlmaps.recordings.consistency.suspects import PoseAt, Trial, Trials, find_cause, find_closer
@@ -59,10 +47,10 @@ def check_recording(recording: Recording) -> Verdict:
         *of_intrinsics(sample, recording),
         *of_depth(sample, surfaces, median_m),
         *of_colour(sample, surfaces),
-        *of_motion(recording, after, can_be_judged(after)),
+        *of_motion(recording, after, limits.can_be_judged(after)),
         *_of_agreement(recording, sample, found, median_m),
     ]
-    checked = can_be_judged(after)
+    checked = limits.can_be_judged(after)
     return Verdict(
         frames=len(sample),
         pairs=after.pairs,
@@ -88,13 +76,13 @@ class _Found:
 
 def _most_unlike(after: Agreement, apart: Agreement) -> Agreement | None:
     """Return the pairs that do not look alike: those that follow one another if they do not, else those from apart."""
-    return next((one for one in (after, apart) if can_be_judged(one) and unlike(one)), None)
+    return next((one for one in (after, apart) if limits.can_be_judged(one) and limits.unlike(one)), None)
 
 
 def _of_agreement(recording: Recording, sample: Sample, found: _Found, median_m: float) -> Iterator[Finding]:
     after, apart = found.after, found.apart
-    if can_be_judged(after) and not geometry_agrees(after):
-        grade = Grade.IMPOSSIBLE if after.same_share < IMPOSSIBLE_AGREEING else Grade.SUSPICIOUS
+    if limits.can_be_judged(after) and not limits.geometry_agrees(after):
+        grade = Grade.IMPOSSIBLE if after.same_share < limits.IMPOSSIBLE_AGREEING else Grade.SUSPICIOUS
         sentence = (
             f"Frames that should see the same place do not agree: of the points of one frame {after.same_share:.0%} "
             f"lie on the surface that another sees, and {after.through_share:.1%} are seen through ({after.pairs} "
@@ -102,7 +90,7 @@ def _of_agreement(recording: Recording, sample: Sample, found: _Found, median_m:
         )
         cause = _cause(recording, sample, found, median_m)
         yield Finding(Reason.GEOMETRY, grade, sentence, cause or _other_cause(recording, sample, after))
-    elif not apart_agrees(apart):
+    elif not limits.apart_agrees(apart):
         sentence = (
             f"Frames that look at the same place from apart do not agree: {apart.same_share:.0%} of their points lie "
             f"on one surface, and {apart.through_share:.1%} are seen through ({apart.pairs} pairs of frames)."
@@ -110,7 +98,7 @@ def _of_agreement(recording: Recording, sample: Sample, found: _Found, median_m:
         other = "The poses drift, depth and positions have different scales, or much was moved; check them."
         cause = _cause(recording, sample, found, median_m)
         yield Finding(Reason.GEOMETRY, Grade.SUSPICIOUS, sentence, cause or other)
-    elif can_be_judged(after) and (closer := find_closer(_trials(recording, sample))) is not None:
+    elif limits.can_be_judged(after) and (closer := find_closer(_trials(recording, sample))) is not None:
         then = _off(closer.agreement, closer.apart)
         sentence = (
             f"The depths of the same points in two frames differ by {_off(after, apart):.1%}, and by {then:.1%} if the "
@@ -120,18 +108,18 @@ def _of_agreement(recording: Recording, sample: Sample, found: _Found, median_m:
     elif misplaced := find_exchanged(recording, sample, after) or find_jump(recording, sample, after):
         yield misplaced
     elif differing := _most_unlike(after, apart):
-        grade = Grade.IMPOSSIBLE if after.likeness < IMPOSSIBLE_LIKENESS else Grade.SUSPICIOUS
+        grade = Grade.IMPOSSIBLE if after.likeness < limits.IMPOSSIBLE_LIKENESS else Grade.SUSPICIOUS
         sentence = (
             "The colour pictures do not show what the depth pictures show: the brightness of the same points in two "
             f"frames{' from apart' if differing is apart else ''} correlates by {differing.likeness:.2f} where right "
             f"recordings have {'0.85' if differing is apart else '0.9'} and more, and hardly at all in "
-            f"{int((differing.alike < BAD_LIKENESS).sum())} of {int(np.isfinite(differing.alike).sum())} pairs."
+            f"{int((differing.alike < limits.BAD_LIKENESS).sum())} of {int(np.isfinite(differing.alike).sum())} pairs."
         )
         other = "Check that colour and depth of a frame belong together (order of names, clock, intrinsics of colour)."
         shift = shift_of(found.edges, sample)
         where = "" if shift is None else " ".join(_shift_words(shift, recording))
         yield Finding(Reason.COLOUR, grade, sentence, _cause(recording, sample, found, median_m) or where or other)
-    elif opposite := opposite_pairs(found.tint):
+    elif opposite := limits.opposite_pairs(found.tint):
         sentence = (
             f"Red and blue of the same points are exchanged in {opposite} of "
             f"{int(np.isfinite(found.tint.alike).sum())} pairs of frames: some colour pictures are RGB, others BGR."
@@ -171,8 +159,8 @@ def _other_cause(recording: Recording, sample: Sample, after: Agreement) -> str:
         return str(exchanged)
     used = after.points >= FEWEST_POINTS
     share = np.where(used, after.same / np.maximum(after.points, 1), np.nan)
-    bad, others = bad_pairs(after), share[share >= BAD_PAIR]
-    if 0 < bad <= 0.4 * after.pairs and len(others) and float(np.median(others)) > LEAST_AGREEING:
+    bad, others = limits.bad_pairs(after), share[share >= limits.BAD_PAIR]
+    if 0 < bad <= 0.4 * after.pairs and len(others) and float(np.median(others)) > limits.LEAST_AGREEING:
         pair = sample.only(sample.follows).pairs[int(np.nanargmin(share))]
         a, b = (recording.name(int(sample.index[i])) for i in pair)
         return (
@@ -200,15 +188,15 @@ def _words(recording: Recording, best: Trial, median_m: float, gain: str) -> str
 def _gain(found: _Found, best: Trial) -> str:
     """Return how much better it agrees, in parentheses."""
     for before, after, right in (
-        (found.after, best.agreement, geometry_agrees(found.after)),
-        (found.apart, best.apart, apart_agrees(found.apart)),
+        (found.after, best.agreement, limits.geometry_agrees(found.after)),
+        (found.apart, best.apart, limits.apart_agrees(found.apart)),
     ):
         if not right:
             return (
                 f"(seen through {before.through_share:.1%} -> {after.through_share:.1%}, "
                 f"agreeing {before.same_share:.0%} -> {after.same_share:.0%})"
             )
-    after = unlike(found.after)
+    after = limits.unlike(found.after)
     before, then = (found.after, best.agreement) if after else (found.apart, best.apart)
     return f"(correlation {before.likeness:.2f} -> {then.likeness:.2f})"
 
@@ -216,16 +204,16 @@ def _gain(found: _Found, best: Trial) -> str:
 def _explains(trial: Trial, found: _Found) -> bool:
     """Return whether a suspect makes the pairs agree, clearly better than they did."""
     after, apart = trial.agreement, trial.apart
-    if not can_be_judged(after) or not geometry_agrees(after) or not apart_agrees(apart):
+    if not limits.can_be_judged(after) or not limits.geometry_agrees(after) or not limits.apart_agrees(apart):
         return False
     if _most_unlike(after, apart) is not None:
         return False
-    if trial.score < LEAST_AGREEING * 0.9:
+    if trial.score < limits.LEAST_AGREEING * 0.9:
         return False
-    if not geometry_agrees(found.after):
+    if not limits.geometry_agrees(found.after):
         return after.same_share > found.after.same_share + 0.5 * (1.0 - found.after.same_share)
-    if not apart_agrees(found.apart):
-        return can_be_judged(apart) and apart.same_share > 0.5 * (1.0 + found.apart.same_share)
+    if not limits.apart_agrees(found.apart):
+        return limits.can_be_judged(apart) and apart.same_share > 0.5 * (1.0 + found.apart.same_share)
     return True
 
 

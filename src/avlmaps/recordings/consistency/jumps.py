@@ -9,15 +9,8 @@ from jaxtyping import Float, Int
 
 from avlmaps.core.arrays import Bool
 from avlmaps.core.poses import rotation_angle_rad
+from avlmaps.recordings.consistency import limits
 from avlmaps.recordings.consistency.agreement import FEWEST_POINTS, Agreement, compare
-from avlmaps.recordings.consistency.limits import (
-    BAD_PAIR,
-    FEWEST_PAIRS,
-    HARDLY_ANY,
-    LEAST_AGREEING,
-    LEAST_LIKENESS,
-    can_be_judged,
-)
 from avlmaps.recordings.consistency.sample import Sample, Surfaces, draw_pairs
 from avlmaps.recordings.consistency.verdict import Finding, Grade, Reason
 from avlmaps.recordings.types import Recording
@@ -54,11 +47,11 @@ def find_jump(recording: Recording, sample: Sample, after: Agreement) -> Finding
         over, beside = (
             compare(near.only(kind), surfaces, near.world_from_camera) for kind in (near.follows, ~near.follows)
         )
-        few = over.pairs >= FEWEST_PAIRS and over.same_share < HARDLY_ANY
-        seen = (can_be_judged(over) or few) and can_be_judged(beside)
-        far_off = over.same_share < BAD_PAIR or np.nanmedian(over.off) > _MISFIT_RATIO * np.nanmedian(beside.off)
+        few = over.pairs >= limits.FEWEST_PAIRS and over.same_share < limits.HARDLY_ANY
+        seen = (limits.can_be_judged(over) or few) and limits.can_be_judged(beside)
+        far_off = over.same_share < limits.BAD_PAIR or np.nanmedian(over.off) > _MISFIT_RATIO * np.nanmedian(beside.off)
         step = far_off or most[row] == LEAST_ACROSS_STEP
-        better = beside.same_share > max(LEAST_AGREEING, over.same_share + 0.1)
+        better = beside.same_share > max(limits.LEAST_AGREEING, over.same_share + 0.1)
         if seen and step and better and over.same_share < most[row]:
             sentence = (
                 f"Frames {recording.name(a)} and {recording.name(b)} do not agree ({over.same_share:.0%} of the points "
@@ -119,9 +112,9 @@ def _better_order(near: Sample, *, colour: bool) -> list[int] | None:
         other = replace(touched, grey=touched.grey[rows]) if colour else touched
         poses = near.world_from_camera if colour else near.world_from_camera[rows]
         before, after = compare(touched, surfaces, near.world_from_camera), compare(other, surfaces, poses)
-        if not can_be_judged(before) or not can_be_judged(after) or before.pairs < 2 * len(moved) - 1:
+        if not limits.can_be_judged(before) or not limits.can_be_judged(after) or before.pairs < 2 * len(moved) - 1:
             continue
-        least = LEAST_LIKENESS if colour else LEAST_AGREEING
+        least = limits.LEAST_LIKENESS if colour else limits.LEAST_AGREEING
         now, then = (one.likeness if colour else one.same_share for one in (before, after))
         if now < _EXCHANGED and then > max(least, now + (_COLOUR_RIGHT if colour else _PUT_RIGHT)):
             return near.index[moved].tolist()
