@@ -423,6 +423,14 @@ def test_the_editor_says_what_it_cannot_do(tmp_path: Path) -> None:
         m.edit.pin("dock", (1.0, 1.0))
 
 
+def test_an_edit_does_not_bring_back_the_folder_of_a_map_that_is_gone(tmp_path: Path) -> None:
+    m = editable(tmp_path)
+    m.stored.path = tmp_path / "gone.avlmap"
+    with pytest.raises(MapError, match="is gone"):
+        m.edit.pin("dock", (1.0, 1.0))
+    assert not m.stored.path.exists()
+
+
 def test_the_editor_makes_the_edits_and_the_map_knows_them_at_once(tmp_path: Path) -> None:
     m = editable(tmp_path)
     assert m.edit.rename("chair", "stool", at="0.6,0.6", by="Anna").by == "Anna"

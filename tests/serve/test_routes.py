@@ -84,6 +84,7 @@ def test_the_page_lists_every_operation_and_loads_nothing_from_elsewhere(client:
     assert page.status_code == 200
     for one in OPERATIONS:
         assert one.about.replace("'", "&#x27;") in page.text
+    assert f"curl -G {str(client.base_url).rstrip('/')}/maps/NAME/ask" in page.text, "its own address, to paste"
     assert "<script" not in page.text
     assert not [word for word in page.text.split('"') if word.startswith(("http:", "https:", "//"))]
     assert page.headers["content-security-policy"].startswith("default-src 'none'")

@@ -321,6 +321,8 @@ class Editor:
         stored = self._map.stored
         if not stored.info.files:
             raise MapError("The map lies in memory alone; save it, and edit what is saved.")
+        if not stored.path.is_dir():  # to lock it would make it, and the map may come back
+            raise MapError(f"{stored.path} is gone, so that the edit has no place; bring the map back first.")
         append_edit(stored.path, edit)
         self._map.forget_edits()
         return edit

@@ -8,6 +8,7 @@ import numpy as np
 from avlmaps.core.arrays import Float, Float32, Int
 from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import NamedPixelEncoder, ScaledEncoder
+from avlmaps.query.encoded_words import encoded_words
 
 if TYPE_CHECKING:
     from avlmaps.maps.store.reader import StoredMap
@@ -43,7 +44,7 @@ class VoxelNamer:
             names, features = encoder.names, np.asarray(encoder.codes, np.float32)
         else:
             names = tuple(encoder.vocabulary if vocabulary is None else vocabulary)
-            features = np.asarray(encoder.encode_words(list(names)), np.float32).reshape(len(names), -1)
+            features = encoded_words(encoder, names) if names else np.zeros((0, 0), np.float32)
         known = np.any(features != 0.0, axis=1) if len(names) else np.zeros(0, bool)
         self.names = tuple(name for name, is_known in zip(names, known, strict=True) if is_known)
         self._columns = np.ascontiguousarray(features[known].T)

@@ -14,6 +14,7 @@ import numpy as np
 from avlmaps.core.arrays import Bool, Float16, Float32, Int
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder
 from avlmaps.query import scores
+from avlmaps.query.encoded_words import encoded_words
 from avlmaps.query.object_settings import ObjectSettings
 from avlmaps.query.synonyms import is_a, is_open
 
@@ -47,7 +48,7 @@ class EncodedWord:
             some, clear = weights > 0.0, weights >= CLEARLY_MEANT
             rows = np.sqrt(weights[some])[:, None] * encoder.codes[some]
             return cls(np.ascontiguousarray(rows), encoder.codes[clear], encoder.understood(word), weights)
-        row = np.asarray(encoder.encode_words([word]), np.float32)
+        row = encoded_words(encoder, [word])
         row = row[np.any(row != 0.0, axis=1)]
         return cls(row, row, encoder.understood(word), np.zeros(0, np.float32))
 
@@ -83,7 +84,7 @@ class Vocabulary:
     def encoded(cls, encoder: PixelEncoder, vocabulary: Sequence[str]) -> "Vocabulary":
         """Encode a vocabulary and ``other``; words of which the encoder understands nothing are left out."""
         names = [*dict.fromkeys(word for word in vocabulary if word != "other"), "other"]
-        encoded = np.asarray(encoder.encode_words(names), np.float32)
+        encoded = encoded_words(encoder, names)
         known = np.any(encoded != 0.0, axis=1)
         words = tuple(word for word, is_known in zip(names, known, strict=True) if is_known)
         understood = tuple(encoder.understood(word) for word in words)

@@ -133,8 +133,9 @@ def _json(answer: Any) -> Response:
 
 
 async def _page(request: Request) -> Response:
-    del request
-    return HTMLResponse(html_page(), headers={"content-security-policy": CONTENT_POLICY})
+    return HTMLResponse(
+        html_page(str(request.base_url).rstrip("/")), headers={"content-security-policy": CONTENT_POLICY}
+    )
 
 
 async def _health(request: Request) -> Response:
@@ -259,8 +260,9 @@ async def _read(operation: Operation, request: Request) -> tuple[Any, Uploads]:
         return checked_texts(pairs, operation.query), Uploads(photo=await request.body())
     if operation.body == "form" and not kind and not await request.body():
         return checked_texts(pairs, operation.query), Uploads()
+    photo = "image/jpeg, image/png, " if operation.body == "photo" else ""
     raise RequestError(
-        f"A body of type {kind[:80]!r} is not read here; send application/json or multipart/form-data.", 415
+        f"A body of type {kind[:80]!r} is not read here; send {photo}application/json or multipart/form-data.", 415
     )
 
 

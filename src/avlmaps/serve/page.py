@@ -19,8 +19,8 @@ th,td{border-color:#3a3d42}}
 """
 
 
-def html_page() -> str:
-    """Return the page."""
+def html_page(address: str) -> str:
+    """Return the page of the server at an address, such as ``http://127.0.0.1:8750``."""
     described = document([], "", False)
     sections = "\n".join(
         _section(path, method.upper(), operation)
@@ -35,8 +35,8 @@ def html_page() -> str:
 In the browser, a map is at <code>/maps/NAME/view</code>.
 For programs: <a href="openapi.json">openapi.json</a> (OpenAPI 3.1). For agents: MCP by streamable HTTP at
 <code>/mcp</code>.</p>
-<pre>curl -G http://127.0.0.1:8750/maps/NAME/ask --data-urlencode "sentence=the chair near the table"
-curl -F photo=@photo.jpg http://127.0.0.1:8750/maps/NAME/locate</pre>
+<pre>curl -G {escape(address)}/maps/NAME/ask --data-urlencode "sentence=the chair near the table"
+curl -F photo=@photo.jpg {escape(address)}/maps/NAME/locate</pre>
 <p>Answers are the JSON that the command line prints under <code>--json</code>. Errors are
 <code>{{"error": {{"kind": ..., "message": ...}}}}</code>. Send <code>Accept: text/event-stream</code> for the
 progress of work that takes long.</p>

@@ -118,6 +118,10 @@ class RecordSettings:
         for right, value, choice in checks:
             if not right:
                 raise RecordingError(f"A scene cannot be recorded with {value}; choose {choice}.")
+        if self.directions_offset_deg and not self.directions:
+            raise RecordingError(
+                f"{option('directions-offset-deg')} is of the azimuths of {option('directions')}; give both or neither."
+            )
         if self.directions and self.hearing == "none":
             raise RecordingError(
                 f"Hearing none has no sound whose direction could be said; leave out {option('directions')}, or choose "

@@ -79,3 +79,8 @@ def test_a_recording_has_them_and_settings_that_cannot_be_are_refused(tmp_path: 
         RecordSettings(directions_outliers=1.5)
     with pytest.raises(RecordingError, match="Hearing none"):
         RecordSettings(directions=True, hearing="none")
+
+
+def test_an_offset_of_no_device_is_refused() -> None:
+    with pytest.raises(RecordingError, match="give both or neither"):
+        RecordSettings(directions_offset_deg=90.0)

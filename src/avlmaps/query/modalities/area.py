@@ -11,6 +11,7 @@ from avlmaps.core.lexicon import Kind, lexicon
 from avlmaps.core.question import Part, Role
 from avlmaps.maps.types import Keyframes
 from avlmaps.perception.protocols import NamedViewEncoder, ScaledEncoder, ViewEncoder
+from avlmaps.query.encoded_words import encoded_words
 from avlmaps.query.factors import FOUND_AT, HeatSettings, NearAnchors, stretch_scores
 from avlmaps.query.rooms import InRooms, RoomField, Rooms, RoomSettings
 from avlmaps.query.unknown_names import unknown_note
@@ -124,7 +125,7 @@ def view_shares(
         weights = np.asarray(encoder.name_weights(name), np.float64)
         return ViewShares(encoder.names, share, weights, np.clip(share @ weights, 0.0, 1.0))
     others = [area for area in AREA_NAMES if not same_place(area, name)]
-    words = np.asarray(encoder.encode_words([name, *others]), np.float64)
+    words = encoded_words(encoder, [name, *others]).astype(np.float64)
     apart = words - words.mean(axis=0) if isinstance(encoder, ScaledEncoder) else words
     competes = np.r_[True, _cosine(apart[1:], apart[0]) < settings.same_word_cosine]
     cosine = _cosines(view, words[competes])
@@ -150,7 +151,7 @@ def name_shares(
     if isinstance(encoder, NamedViewEncoder):
         share = _named_shares(view, encoder)
         return share / np.maximum(share.sum(axis=1, keepdims=True), 1e-12)
-    words = np.asarray(encoder.encode_words(list(AREA_NAMES)), np.float64)
+    words = encoded_words(encoder, AREA_NAMES).astype(np.float64)
     return _softmax(_cosines(view, words), encoder, settings)
 
 

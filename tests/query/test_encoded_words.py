@@ -1,0 +1,29 @@
+"""Words of an encoder that somebody brought are checked."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from avlmaps.core.errors import BackendError
+from avlmaps.query.encoded_words import encoded_words
+
+
+def refuse(words: list[str]) -> Any:
+    raise RuntimeError("out of memory")
+
+
+@pytest.mark.parametrize(
+    ("gives", "said"),
+    [
+        (lambda words: np.ones((1, 3)), r"gave \(1, 3\) for 2 words"),
+        (lambda words: np.ones(3), r"gave \(3,\)"),
+        (lambda words: np.full((len(words), 3), np.nan), "NaN or infinity"),
+        (refuse, "RuntimeError: out of memory"),
+    ],
+    ids=["one row", "no rows", "NaN", "fails"],
+)
+def test_what_is_no_row_for_each_word_is_a_sentence(gives: Any, said: str) -> None:
+    with pytest.raises(BackendError, match=said):
+        encoded_words(SimpleNamespace(encode_words=gives), ["red", "green"])  # pyright: ignore[reportArgumentType]
