@@ -52,7 +52,7 @@ def evidence(track: DirectionTrack, walk: Trajectory, spans: list[tuple[float, f
     walls = Walls.of(surface(), 1.1)
     heard = [Bearings.of(track, walk, span) for span in spans]
     expected = [expected_alone(walk, span, candidates, walls, SourceSettings.of(0)) for span in spans]
-    return candidates, *evidence_of_bearings(heard, [walls] * len(spans), candidates, expected)
+    return candidates, *evidence_of_bearings(heard, [walls] * len(spans), candidates, expected, track.known_rad)
 
 
 def errors_m(candidates: Candidates, values: list[np.ndarray], places: np.ndarray) -> np.ndarray:
@@ -91,6 +91,22 @@ def test_an_offset_that_the_walk_does_not_show_widens_the_region() -> None:
     assert device is not None and np.rad2deg(device.offset_sd_rad) > 30.0
     assert "not determined" in device.sentence
     assert np.ptp(values[0]) < 2.0, "no place is told from another"
+
+
+def test_an_offset_that_is_known_makes_up_for_a_still_robot() -> None:
+    walk = curved_drive(28.0)
+    still = Trajectory(walk.stamps_s, np.tile(walk.world_from_body[:1], (len(walk.stamps_s), 1, 1)))
+    track = replace(said(still, 0.6, np.random.default_rng(3)), known_rad=(0.6, 0.1))
+    _, values, device = evidence(track, still, SPANS[:1])
+    assert device is not None and np.rad2deg(device.offset_sd_rad) < 25.0
+    assert np.ptp(values[0]) > 2.0, "now places are told from one another"
+
+
+def test_a_device_that_was_put_on_anew_is_found_though_another_offset_was_known() -> None:
+    walk = curved_drive(28.0, 2.0)
+    track = replace(said(walk, 1.5, np.random.default_rng(1)), known_rad=(-1.0, 0.05))
+    _, _, device = evidence(track, walk)
+    assert device is not None and abs(device.offset_rad - 1.5) < 0.1
 
 
 def test_outliers_alone_say_nothing() -> None:

@@ -64,6 +64,8 @@ class Build(ModelVerb):
     """Sound file to use instead of the recording's own track."""
     microphones: Annotated[Path | None, arg(metavar="FILE")] = None
     """Places of the microphones instead of the recording's own: a JSON file, as `avlmaps calibrate` writes it."""
+    same_device: Annotated[Path | None, arg(metavar="MAP")] = None
+    """Map of an earlier recording with the same device that says directions: its offset is known from there."""
     topics: Annotated[tuple[str, ...], arg(metavar="KIND=TOPIC ...")] = ()
     """Topics of a ROS bag that their type does not identify: rgb=, depth=, pose= or audio=TOPIC; directions=TOPIC,
     azimuths that a device says of sounds; or pose=FILE, a table of stamp tx ty tz qx qy qz qw."""
@@ -151,6 +153,11 @@ def build(verb: "Build") -> dict[str, Any]:
     recording = openings[0]()
     for notice in recording.notices:
         say(f"note: {notice}")
+    if verb.same_device is not None:
+        from avlmaps.maps.pipeline.sources import take_device
+        from avlmaps.maps.store.reader import open_stored
+
+        take_device(recording, open_stored(verb.same_device))
     settings = BuildSettings(
         voxel_size_m=verb.voxel_size_m,
         frames=FrameSettings(
@@ -217,7 +224,16 @@ def _openings(verb: "Build") -> "list[Callable[[], Recording]]":
         if Path(topics.get("pose", "")).is_file():
             topics["pose"] = str(Path(topics["pose"]).absolute())
     if len(groups) > 1:
-        for name in ("audio", "microphones", "topics", "submaps", "corrected_poses", "close_loops", "fresh"):
+        for name in (
+            "audio",
+            "microphones",
+            "same_device",
+            "topics",
+            "submaps",
+            "corrected_poses",
+            "close_loops",
+            "fresh",
+        ):
             if getattr(verb, name):
                 raise UsageError(
                     f"--{name.replace('_', '-')} is of one recording; build a map of each, then `avlmaps merge` them."

@@ -30,12 +30,14 @@ class DirectionTrack:
         azimuth_rad: (n,) from where the depth camera looks, counter-clockwise, but for the device's offset.
         elevation_rad: (n,) over the horizon; NaN where it is not known.
         confidence: (n,) how much each counts, 0 to 1.
+        known_rad: the device's offset and the standard deviation of that, as an earlier recording has shown them.
     """
 
     stamp_s: Float[np.ndarray, " n"]
     azimuth_rad: Float[np.ndarray, " n"]
     elevation_rad: Float[np.ndarray, " n"]
     confidence: Float[np.ndarray, " n"]
+    known_rad: tuple[float, float] | None = None
 
     @classmethod
     def of(

@@ -1,11 +1,15 @@
 """A simulated device that says directions: azimuths of the sources, with the offset and the outliers asked for."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from avlmaps.core.errors import RecordingError
+from avlmaps.maps.build import build_map
+from avlmaps.maps.pipeline.sources import take_device
+from avlmaps.maps.store.reader import open_stored
 from avlmaps.recordings.open import open_recording
 from avlmaps_sim.hearing.directions import ERROR_DEG, said_directions
 from avlmaps_sim.mesh import Triple
@@ -84,3 +88,25 @@ def test_a_recording_has_them_and_settings_that_cannot_be_are_refused(tmp_path: 
 def test_an_offset_of_no_device_is_refused() -> None:
     with pytest.raises(RecordingError, match="give both or neither"):
         RecordSettings(directions_offset_deg=90.0)
+
+
+def test_the_next_map_begins_with_the_offset_that_the_first_one_stored(tmp_path: Path) -> None:
+    settings = RecordSettings(
+        size=(64, 48), fps=4.0, sources=3, workers=1, max_frames=80, directions=True, directions_offset_deg=60.0
+    )
+    record_scene(flat(), tmp_path / "rec", settings, seed=1)
+    first = build_map(open_recording(tmp_path / "rec"), tmp_path / "first.avlmap", "colours", progress=False)
+    found = first.sources()
+    assert found is not None and found.device.shape == (1, 4)
+    again = open_stored(first.path).sources()
+    assert again is not None and np.array_equal(again.device, found.device)
+    record_scene(flat(), tmp_path / "next", settings, seed=2)
+    recording = open_recording(tmp_path / "next")
+    take_device(recording, first)
+    assert recording.audio is not None and recording.audio.directions is not None
+    assert recording.audio.directions.known_rad == tuple(found.device[0, :2].tolist())
+    after = build_map(recording, tmp_path / "next.avlmap", "colours", progress=False).sources()
+    assert after is not None and len(after.device) == 1
+    recording.audio = replace(recording.audio, directions=None)
+    with pytest.raises(RecordingError, match="no directions"):
+        take_device(recording, first)

@@ -146,6 +146,7 @@ def audio_key(recording: Recording) -> list[str | float] | None:
         known += hashlib.sha256(b"".join(value.tobytes() for value in (
             said.stamp_s, said.azimuth_rad, said.elevation_rad, said.confidence
         ))).hexdigest(),  # fmt: skip
+        known += said.known_rad or ()
     if track.microphones is not None:
         array = track.microphones
         known += [*array.position_m.ravel().tolist(), *array.camera_from_robot.ravel().tolist()]

@@ -8,6 +8,7 @@ import numpy as np
 from msgspec import structs
 
 from avlmaps.core.arrays import Float
+from avlmaps.core.errors import MapError, RecordingError
 from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.store.lock import lock_folder
@@ -45,6 +46,22 @@ def locate_sources(
     voxel_m = grid.centre_of(np.asarray(voxels.index))
     found = find_sources(track, walk or recording.walk, spans_s, voxel_m, up_in_world)
     return found, perf_counter() - begin
+
+
+def take_device(recording: Recording, stored: StoredMap) -> None:
+    """Begin with the offset of the device that says directions as the map of an earlier recording has it.
+
+    Raises:
+        RecordingError: the recording has no directions.
+        MapError: the map knows of no such device.
+    """
+    track, found = recording.audio, stored.sources()
+    if track is None or track.directions is None:
+        raise RecordingError(f"{recording.path} has no directions that a device said, so that no offset is of use.")
+    if found is None or not len(found.device):
+        raise MapError(f"{stored.path} knows of no device that says directions; name a map of a recording with one.")
+    offset_rad, sd_rad = found.device[-1, :2].tolist()
+    recording.audio = replace(track, directions=replace(track.directions, known_rad=(offset_rad, sd_rad)))
 
 
 def add_sources(stored: StoredMap, recording: Recording) -> StoredMap:

@@ -30,6 +30,7 @@ _MOST = 120  # of a sound
 _STEEP = 0.9  # a camera that looks up or down like this heads where its picture's top is
 _LEAST_WEIGHT = 1e-3
 _SURE_DEG = 15.0
+_MOUNTED_DEG, _REMOUNTED = 3.0, 0.05  # between two recordings it moves a little, or was mounted again
 _ASTRAY = 0.2  # share of the sounds that say nothing of the device
 
 _GRID = tuple(product(_SPREADS_DEG, _OUTLIERS))
@@ -159,6 +160,7 @@ def evidence_of_bearings(
     walls: Sequence[Walls],
     candidates: Candidates,
     expected: Sequence[Float[np.ndarray, " c"]],
+    known_rad: tuple[float, float] | None = None,
 ) -> tuple[list[Float[np.ndarray, " c"]], Device | None]:
     """Return the log-likelihood of each candidate for each sound, and what was found out about the device.
 
@@ -167,6 +169,7 @@ def evidence_of_bearings(
         walls: what lies between, for each.
         candidates: where the sounds may have come from.
         expected: log-likelihood of each candidate without the sound, for each.
+        known_rad: the device's offset and its standard deviation, as an earlier recording has shown them.
     """
     place = candidates.place_m.astype(np.float64)
     # Azimuths depend on the plan alone: one candidate for each of its cells stands for those above and below it.
@@ -184,6 +187,7 @@ def evidence_of_bearings(
         of_sound.append(np.stack([_log_sum(before[:, None] + counts @ table) for table in tables]))
     of_sound = [_bounded(own) for own in of_sound]
     known = np.sum(of_sound, axis=0) if of_sound else np.zeros((len(_GRID), _BINS))
+    known = known + _known_before(known_rad)
     result: list[Float[np.ndarray, " c"]] = []
     for one, between, own, high in zip(heard, walls, of_sound, elevations, strict=True):
         if not len(one):
@@ -201,6 +205,15 @@ def evidence_of_bearings(
         result.append(_log_sum(parts) + high)
     sounds = sum(len(one) > 0 for one in heard)
     return result, _device(known, sounds) if sounds else None
+
+
+def _known_before(known_rad: tuple[float, float] | None) -> Float[np.ndarray, " o"]:
+    """Return the log-prior of each offset: round the one that is known, or, where the device was turned, any."""
+    if known_rad is None:
+        return np.zeros(_BINS)
+    kappa = 1.0 / (known_rad[1] ** 2 + np.deg2rad(_MOUNTED_DEG) ** 2)
+    share = np.exp(kappa * (np.cos(2.0 * np.pi * np.arange(_BINS) / _BINS - known_rad[0]) - 1.0))
+    return np.log((1.0 - _REMOUNTED) * share / share.sum() + _REMOUNTED / _BINS)
 
 
 def _bounded(own: Float[np.ndarray, "g o"]) -> Float[np.ndarray, "g o"]:

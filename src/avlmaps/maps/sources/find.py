@@ -103,7 +103,7 @@ def _with_directions(
 ) -> tuple[list[EventEvidence], Device | None]:
     """Return the evidence with that of a device's directions, and what was found out about the device."""
     said = [Bearings.of(directions, walked, (float(begin_s), float(end_s))) for begin_s, end_s in spans_s]
-    more, device = evidence_of_bearings(said, walls, candidates, [one.expected for one in heard])
+    more, device = evidence_of_bearings(said, walls, candidates, [one.expected for one in heard], directions.known_rad)
     if device is not None:
         say(f"note: {device.sentence}")
     both = [one.heard + other for one, other in zip(heard, more, strict=True)]
