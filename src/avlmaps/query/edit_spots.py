@@ -24,8 +24,8 @@ ALIKE_BOX = 0.2
 """Share of two boxes together that both hold: perhaps one thing.
 
 Chosen on maps of two simulated homes and four rebuilds of them: of every second or third frame, and by poses that
-drift by .15, .37 and 1.1 m. Of 94 pairs of one thing 91 have this share; of 110 pairs of a thing and the other one that is most like
-it 5. By name first, 89 of 110 things are found again, 15 are lost, and 6 find a thing of their name of
+drift by .15, .37 and 1.1 m. Of 94 pairs of one thing 91 have this share; of 110 pairs of a thing and the other one that
+is most like it 5. By name first, 89 of 110 things are found again, 15 are lost, and 6 find a thing of their name of
 which the truth is not clear. With .15, 88 are found and three more are wrong; with .25, 86; with
 .4, 80.
 """
