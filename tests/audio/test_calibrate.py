@@ -96,6 +96,19 @@ def test_several_sources_are_refused(tmp_path: Path) -> None:
         calibrate(track_of(tmp_path, sound, true), walk)
 
 
+def test_a_source_that_moves_with_the_robot_is_refused(tmp_path: Path) -> None:
+    rng, array, walk = np.random.default_rng(3), microphones_named("square4"), curved_drive(20.0)
+    late_s = np.linalg.norm(array.position_m - [1.0, 0.4, -0.3], axis=1) / 343.0
+    sound = 1e-4 * rng.standard_normal((4, 20 * RATE_HZ))
+    hertz = np.fft.rfftfreq(4096, 1.0 / RATE_HZ)
+    for begin in range(RATE_HZ // 2, 19 * RATE_HZ, RATE_HZ // 4):
+        burst = np.fft.rfft(rng.standard_normal(800) * np.exp(-np.arange(800) / 200.0), 4096)
+        sound[:, begin : begin + 4096] += np.fft.irfft(burst * np.exp(-2j * np.pi * hertz * late_s[:, None]), 4096)
+    track = track_of(tmp_path, ChannelSound((0.1 * sound).astype(np.float32), RATE_HZ), array)
+    with pytest.raises(RecordingError, match=r"would lie \d+ cm from its given place"):
+        calibrate(track, walk)
+
+
 def test_silence_and_one_microphone_are_refused(tmp_path: Path) -> None:
     walk, array = curved_drive(6.0), microphones_named("square4")
     with pytest.raises(RecordingError, match="Too little sounds"):

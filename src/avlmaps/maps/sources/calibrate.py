@@ -32,6 +32,7 @@ _SPREAD_S = 15e-6  # usual error of a peak
 _FEWEST = 60  # frames with measured delays
 # What the walk must leave of doubt at most, one standard deviation, and how badly the result may fit.
 WORST_PLACE_M, WORST_DELAY_S, WORST_RESIDUAL_S = 0.01, 30e-6, 45e-6
+MOST_MOVED_M = 0.1
 LEAST_EXPLAINED = 0.9  # of the clear delays: 1.0 in rooms with one source, 0.3 to 0.8 with several
 
 
@@ -118,10 +119,17 @@ def calibrate(track: AudioTrack, walk: Trajectory, between_s: tuple[float, float
             f"{1e6 * WORST_RESIDUAL_S:g}) from those of one still source. Give the time when a single source sounds "
             f"({option('between', 'BEGIN END')}), in a room with few echoes; are poses and clocks right?"
         )
+    moved_m = fit.moved_m(solution)
+    if moved_m.max() > MOST_MOVED_M:
+        raise RecordingError(
+            f"Microphone {int(moved_m.argmax()) + 1} would lie {100 * moved_m.max():.0f} cm from its given place, more "
+            f"than the {100 * MOST_MOVED_M:g} cm that a ruler may be off: a source that moves with the robot looks so, "
+            "and so do channels in another order. Let the source stand still in the room, and check the given places."
+        )
     refined = fit.array_of(solution)
     return Calibration(
         refined, fit.source_of(solution), _scale(fit.residual_s(fit.only_source(solution, measured), measured)),
-        after_s, place_sd.max(axis=1), delay_sd, np.linalg.norm(refined.position_m - array.position_m, axis=1),
+        after_s, place_sd.max(axis=1), delay_sd, moved_m,
         frames, held,
     )  # fmt: skip
 
@@ -281,6 +289,10 @@ class _Fit:
         """Return the array of the unknowns."""
         (place, late_s), given = self._split(solution), self.array.delay_s
         return replace(self.array, position_m=place, delay_s=late_s if given is None else given + late_s)
+
+    def moved_m(self, solution: Float[np.ndarray, " n"]) -> Float[np.ndarray, " m"]:
+        """Return how far each microphone lies from where it was given."""
+        return np.linalg.norm(self._split(solution)[0] - self.array.position_m, axis=1)
 
     @staticmethod
     def source_of(solution: Float[np.ndarray, " n"]) -> Float[np.ndarray, "3"]:
