@@ -190,6 +190,7 @@ def test_what_is_usual_is_said_with_its_days() -> None:
     assert usual_text(found, "on the table") == (
         "Usually on the table: book (3 of 3 days), bag (2 of 3 days). Seen there on 1 day only: cup."
     )
+    assert usual_text([found[0], found[0]], "here") == "Usually here: 2 books (3 of 3 days)."
     bag = usual(known, lambda one: one.name == "bag")
     assert usual_place_text(known, "bag", bag, lambda _: "hall") == (
         "The bag is usually in the hall, at (1.00, 1.00, 0.80) m: on 2 of 3 days on which its place was looked at."

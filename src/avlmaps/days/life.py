@@ -19,6 +19,7 @@ from avlmaps.days.surfaces import AROUND, Occupied, packed
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.store.life import Life, Stay
 
+_DARK = 20.0  # of 255: what is darker has hardly a hue
 _NAMED = 0.3  # a name that fits is worth this much likeness
 
 SameName = Callable[[str, str], bool]
@@ -260,13 +261,14 @@ def look_alike(one: Float[np.ndarray, " d"], other: Float[np.ndarray, " d"]) -> 
 def likeness(one: Stay, other: Stay) -> float:
     """Return how alike two things are by size and colour, in [0, 1].
 
-    exp(−½ (Δ log size / 0.5)² − ½ (Δ RGB / 60)²): the size is height, and the diagonal of the footprint, which turning
-    leaves nearly as it is.
+    exp(−½ (Δ log size / 0.5)² − ½ (Δ brightness / 60)² − ½ (Δ hue / 0.25)²): the size is height, and the diagonal of
+    the footprint, which turning leaves nearly as it is; the hue is RGB over its brightness, as light leaves it nearly.
     """
-    sizes: list[Float[np.ndarray, 2]] = []
-    for stay in (one, other):
-        x, y, z = stay.size
-        sizes.append(np.log(np.maximum([float(np.hypot(x, y)), z], 0.05)))
-    off = float(np.square((sizes[0] - sizes[1]) / 0.5).sum())
-    tint = float(np.square(np.subtract(one.color, other.color) / 60.0).sum()) / 3.0
-    return float(np.exp(-0.5 * (off + tint)))
+    x, y, z = np.array([one.size, other.size]).T
+    size = np.log(np.maximum([np.hypot(x, y), z], 0.05))
+    color = np.array([one.color, other.color], np.float64)
+    bright = color.mean(axis=1)
+    hue = color / (bright + _DARK)[:, None]
+    off = float(np.square((size[:, 0] - size[:, 1]) / 0.5).sum())
+    off += float(((bright[0] - bright[1]) / 60.0) ** 2 + np.square((hue[0] - hue[1]) / 0.25).mean())
+    return float(np.exp(-0.5 * off))

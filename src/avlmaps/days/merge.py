@@ -2,7 +2,7 @@
 
 import math
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import UTC, date, datetime, timedelta
 from pathlib import Path
@@ -32,6 +32,7 @@ from avlmaps.days.find import (
 from avlmaps.days.join import NO_SOURCES, joined_keyframes, joined_sounds, joined_sources, joined_voxels
 from avlmaps.days.settings import MergeSettings
 from avlmaps.days.surfaces import Occupied, resampled
+from avlmaps.days.unnamed import changed_things
 from avlmaps.maps.growing import require_place
 from avlmaps.maps.store.checkpoints import key_of
 from avlmaps.maps.store.edits import Edit, World, carried_edits, read_edits, write_edits
@@ -42,14 +43,10 @@ from avlmaps.maps.store.reader import StoredMap, open_stored
 from avlmaps.maps.store.writer import MapContent, write_map
 from avlmaps.maps.types import Keyframes
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.query.components import linked
-from avlmaps.query.contents import STRUCTURE, Thing
-from avlmaps.query.naming import VoxelNamer
+from avlmaps.query.contents import Thing
 
 ThingsOf = Callable[[AVLMap], Sequence[Thing]]
 _DAY_S = 86_400.0
-_MOSTLY = 0.5  # a thing changed where the other days have no surface at this part of its voxels
-_BESIDE = 2  # voxels: so near to each other two are of one thing
 
 
 def default_things(least: float) -> ThingsOf:
@@ -252,7 +249,7 @@ def _with_vanished(
     surface = now.has_surface(grid.centre_of(index))
     loose, through = ~surface, now.views.through(index, grid) >= settings.changes.through_views
     rows = [known.row_of(life.voxels(number)) for number, stay in enumerate(life.stays) if stay.gone is None]
-    things = _clusters(stored, loose, through, [own[own >= 0] for own in rows], settings)
+    things = changed_things(stored, loose, through, [own[own >= 0] for own in rows], settings.changes)
     stamps = np.array([float(np.max(np.asarray(stored.voxels.last_seen_s)[one.rows])) for one in things])
     seen_on = visit_of_stamps(visits[:-1], stamps).tolist()
     begun = [lives.begun([_seen(one, stored, np.eye(4), 0.0)], on) for one, on in zip(things, seen_on, strict=True)]
@@ -273,67 +270,7 @@ def _unnamed_new(
     points = apply(moved, grid.centre_of(np.asarray(other.voxels.index)))
     index = grid.index_of(points)
     through = np.sum([views.through(index, grid) for views in before], axis=0) >= settings.changes.through_views
-    return _clusters(other, ~known.near(points), through, [thing.rows for thing in things], settings)
-
-
-def _clusters(
-    stored: StoredMap,
-    loose: Bool[np.ndarray, " n"],
-    through: Bool[np.ndarray, " n"],
-    owned: Sequence[Int[np.ndarray, " r"]],
-    settings: MergeSettings,
-) -> list[Thing]:
-    """Return what changed, each as a thing with the likeliest name of its voxels together.
-
-    Voxels that touch are one thing where rays of another day pass through enough of them; of a group that is too large
-    for a thing, those alone that rays pass through are. What lies beside a thing that changed itself is a part of it.
-
-    Args:
-        stored: the map.
-        loose: voxels where the other days have no surface.
-        through: voxels through which rays of another day pass.
-        owned: the voxels of each thing that has a name.
-        settings: the rule.
-    """
-    index = np.asarray(stored.voxels.index)
-    changed = [rows for rows in owned if loose[rows].sum() > _MOSTLY * len(rows)]
-    parts_of = Occupied.of(
-        np.concatenate([np.zeros((0, 3), np.int32), *(index[rows] for rows in changed)]), stored.grid
-    )
-    loose = loose.copy()
-    for rows in owned:
-        loose[rows] = False
-    if "pixels" not in stored.info.models or not (loose & through).any():
-        return []
-    wanted, avlmap, namer = settings.changes, AVLMap(stored, edits=()), VoxelNamer(stored)
-    voxel_m = stored.grid.voxel_size_m
-    named = np.array([name not in (*STRUCTURE, "other") for name in namer.names])
-
-    def size_m(own: Int[np.ndarray, " k"]) -> Float[np.ndarray, "3"]:
-        return np.ptp(avlmap.space.level(avlmap.space.centres_of(own)), axis=0) + voxel_m
-
-    def groups(rows: Int[np.ndarray, " r"]) -> Iterator[Int[np.ndarray, " k"]]:
-        which = linked(index[rows], _BESIDE)
-        enough = np.bincount(which, weights=through[rows]) >= wanted.least_voxels
-        yield from (rows[which == number] for number in np.flatnonzero(enough))
-
-    found: list[Thing] = []
-    for whole in groups(np.flatnonzero(loose)):
-        for own in [whole] if size_m(whole).max() <= wanted.most_m else groups(whole[through[whole]]):
-            points, size = avlmap.space.centres_of(own), size_m(own)
-            if size[2] < wanted.lowest_voxels * voxel_m or size.max() > wanted.most_m or not named.any():
-                continue
-            if parts_of.near(points, _BESIDE + 0.5).any():
-                continue
-            share = np.where(named, namer.confidences(own).mean(axis=0), -1.0)
-            best = int(share.argmax())
-            r, g, b = (int(value) for value in np.asarray(stored.voxels.rgb)[own].mean(axis=0).round())
-            middle = points[np.argmin(np.linalg.norm(points - points.mean(axis=0), axis=1))]
-            likely = round(min(float(share[best]), wanted.confident_at - 0.01), 3)
-            found.append(
-                Thing(namer.names[best], likely, plain_point(middle), plain_point(size), (r, g, b), own, points)
-            )
-    return found
+    return changed_things(other, ~known.near(points), through, [thing.rows for thing in things], settings.changes)
 
 
 def _still_there(

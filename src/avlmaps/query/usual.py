@@ -1,5 +1,6 @@
 """What is usual in a map of several days: on how many of the days that looked at a place something was there."""
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -7,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from avlmaps.core.errors import QueryError
+from avlmaps.core.inflection import plural_of
 from avlmaps.core.wording import place_text
 from avlmaps.query.changes import Days, RoomOf, when
 
@@ -100,13 +102,18 @@ def usual_text(found: Sequence[Usual], where: str) -> str:
     often = [one for one in found if one.is_usual]
     once = [one for one in found if one.there == 1]
     rest = [one for one in found if one not in often and one not in once]
-    named = ", ".join(f"{one.stay.name} ({one.counted})" for one in often)
-    parts = [f"Usually {where}: {named}." if often else f"Nothing is known to be usually {where}."]
+    parts = [f"Usually {where}: {_listed(often)}." if often else f"Nothing is known to be usually {where}."]
     if rest:
-        parts.append(f"Now and then: {', '.join(f'{one.stay.name} ({one.counted})' for one in rest)}.")
+        parts.append(f"Now and then: {_listed(rest)}.")
     if once:
-        parts.append(f"Seen there on 1 day only: {', '.join(one.stay.name for one in once)}.")
+        parts.append(f"Seen there on 1 day only: {_listed(once, counted=False)}.")
     return " ".join(parts)
+
+
+def _listed(some: Sequence[Usual], *, counted: bool = True) -> str:
+    """Return names with their days; what has both in common is counted."""
+    number = Counter((one.stay.name, f" ({one.counted})" if counted else "") for one in some)
+    return ", ".join(f"{name if n == 1 else f'{n} {plural_of(name)}'}{days}" for (name, days), n in number.items())
 
 
 def usual_place_text(days: Days, name: str, found: Sequence[Usual], room_of: RoomOf) -> str:
