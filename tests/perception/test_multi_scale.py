@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.perception.embedded.edge_aware import NEAR_M, REACH_CELLS, smoothed
-from avlmaps.perception.embedded.multi_scale import LOOKS, see_multi_scale
+from avlmaps.perception.embedded.multi_scale import AUGMENTATIONS, see_multi_scale
 from avlmaps.perception.embedded.pixels import EmbeddedPixels
-from avlmaps.perception.embedded.scene_network import PLAIN, Look, load_network
+from avlmaps.perception.embedded.scene_network import PLAIN, Augmentation, load_network
 from avlmaps.recordings.types import Frame
 from avlmaps_sim.render import Renderer
 from avlmaps_sim.scenes import open_scene
@@ -35,14 +35,15 @@ def mirror(frame: Frame) -> Frame:
 
 
 @pytest.mark.parametrize("scale", [1.0, 1.2])
-def test_a_mirrored_look_is_a_plain_one_at_the_mirrored_frame(rendered: Frame, scale: float) -> None:
+def test_a_mirrored_view_is_a_plain_one_at_the_mirrored_frame(rendered: Frame, scale: float) -> None:
     network = load_network()
-    one, other = network.see(mirror(rendered), Look(scale)), network.see(rendered, Look(scale, mirrored=True))
+    plain, other = Augmentation(scale), network.see(rendered, Augmentation(scale, mirrored=True))
+    one = network.see(mirror(rendered), plain)
     # Depths are taken at the pixel right of a cell's middle, in the mirror left of it: thin edges may differ.
     differs = np.abs(one.category[:, ::-1] - other.category).max(axis=2)
     assert (differs < 0.05).mean() > 0.95
     np.testing.assert_allclose(one.room, other.room, atol=0.05)
-    assert np.abs(network.see(rendered, Look(scale)).category - other.category).max() > 0.05  # and it is another look
+    assert np.abs(network.see(rendered, plain).category - other.category).max() > 0.05  # and it is another view
 
 
 def test_several_scales_give_distributions_on_the_grid_of_one(rendered: Frame) -> None:
@@ -55,7 +56,7 @@ def test_several_scales_give_distributions_on_the_grid_of_one(rendered: Frame) -
 
 
 def test_the_plain_look_is_the_first_and_none_comes_twice() -> None:
-    assert LOOKS[0] == PLAIN and len(set(LOOKS)) == len(LOOKS)
+    assert AUGMENTATIONS[0] == PLAIN and len(set(AUGMENTATIONS)) == len(AUGMENTATIONS)
 
 
 def test_a_frame_of_odd_size_is_seen(rendered: Frame) -> None:

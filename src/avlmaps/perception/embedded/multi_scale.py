@@ -12,22 +12,31 @@ import numpy as np
 
 from avlmaps.perception.embedded.edge_aware import smoothed
 from avlmaps.perception.embedded.paired_networks import PairedNetworks
-from avlmaps.perception.embedded.scene_network import PLAIN, Look, SceneNetwork, Seen, at_working_size, subsampled
+from avlmaps.perception.embedded.scene_network import (
+    PLAIN,
+    Augmentation,
+    SceneNetwork,
+    Seen,
+    at_working_size,
+    subsampled,
+)
 from avlmaps.recordings.types import Frame
 
 # The first is as maps look, and gives the grid. Larger pictures are worse by themselves.
-LOOKS = tuple(Look(scale, mirrored) for scale, mirrored in product((PLAIN.scale, 1.2, 1.4), (PLAIN.mirrored, True)))
+AUGMENTATIONS = tuple(
+    Augmentation(scale, mirrored) for scale, mirrored in product((PLAIN.scale, 1.2, 1.4), (PLAIN.mirrored, True))
+)
 
 
 def see_multi_scale(network: SceneNetwork | PairedNetworks, frame: Frame) -> Seen:
-    """Encode a frame in every look.
+    """Encode a frame in every augmentation.
 
     Returns:
-        the mean, on the grid of the plain look.
+        the mean, on the grid of the plain one.
     """
     import cv2
 
-    first, *others = (network.see(frame, look) for look in LOOKS)
+    first, *others = (network.see(frame, one) for one in AUGMENTATIONS)
     rows, columns = first.known.shape
     resized = [cv2.resize(seen.category, (columns, rows), interpolation=cv2.INTER_LINEAR) for seen in others]
     category = np.stack([first.category, *resized]).mean(axis=0)

@@ -16,7 +16,7 @@ from avlmaps.core.arrays import Bool, Float32
 from avlmaps.perception.embedded.scene_network import (
     PLAIN,
     SYNTHETIC_WEIGHTS,
-    Look,
+    Augmentation,
     Notes,
     SceneNetwork,
     Seen,
@@ -56,9 +56,9 @@ class PairedNetworks:
         both = f"{first.checksum} {second.checksum} {NO_SAY} {SAME_SAY}"
         self.checksum = sha256(both.encode()).hexdigest()
 
-    def see(self, frame: Frame, look: Look = PLAIN) -> Seen:
+    def see(self, frame: Frame, augmentation: Augmentation = PLAIN) -> Seen:
         """Encode a frame with both networks."""
-        seen, second = self._first.see(frame, look), self._second.see(frame, look)
+        seen, second = self._first.see(frame, augmentation), self._second.see(frame, augmentation)
         other = np.zeros_like(seen.category)
         other[..., self._column] = second.category
         share = share_of_second(seen.category, other, seen.known)

@@ -31,8 +31,8 @@ SYNTHETIC_WEIGHTS: Final = "scene_encoder_synthetic"
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
-    """How a frame is looked at.
+class Augmentation:
+    """How a frame is changed before the network sees it (test-time augmentation).
 
     Attributes:
         scale: how wide the picture is, times ``Notes.width_px``.
@@ -43,8 +43,8 @@ class Look:
     mirrored: bool = False
 
 
-# As maps look at each of their many frames.
-PLAIN = Look()
+# As maps see each of their many frames.
+PLAIN = Augmentation()
 _ACROSS = 4  # the channel of geometry that changes its sign in a mirror: the normal along right
 
 
@@ -155,16 +155,16 @@ class SceneNetwork:
                 f"({type(fault).__name__}); update onnxruntime, or install or train the weights again."
             ) from fault
 
-    def see(self, frame: Frame, look: Look = PLAIN) -> Seen:
+    def see(self, frame: Frame, augmentation: Augmentation = PLAIN) -> Seen:
         """Encode a frame; its ``ground`` gives the up direction, where it is known."""
         import cv2
 
         multiple, fineness = self.notes.multiple, self.notes.fineness
-        camera, depth_m, rgb = at_working_size(frame, round(look.scale * self.notes.width_px), fineness)
+        camera, depth_m, rgb = at_working_size(frame, round(augmentation.scale * self.notes.width_px), fineness)
         up, height_m = _ground_of(frame)
         geometry = channels(depth_m, camera, up, height_m)
         colour = rgb.astype(np.float32).transpose(2, 0, 1) / 127.5 - 1.0
-        if look.mirrored:
+        if augmentation.mirrored:
             geometry, colour = geometry[:, :, ::-1].copy(), colour[:, :, ::-1]
             geometry[_ACROSS] *= -1.0
         geometry, colour = _padded(geometry, multiple), _padded(colour, fineness * multiple)
@@ -174,7 +174,7 @@ class SceneNetwork:
         )
         h, w = (depth_m.shape[0] + 1) // 2, (depth_m.shape[1] + 1) // 2
         category = score[0, :, :h, :w].transpose(1, 2, 0) + self._bias
-        if look.mirrored:
+        if augmentation.mirrored:
             category = category[:, ::-1]
         known = cv2.resize((depth_m > 0.0).astype(np.uint8), (w, h), interpolation=cv2.INTER_AREA) > 0
         return Seen(
