@@ -15,6 +15,7 @@ from avlmaps.core.arrays import Bool, Float, Int
 MAX_DISORDER_S = 1.0
 # A pause is worth a report when it lasts this long and this many times the usual interval.
 MIN_GAP_S = 1.0
+_ANOTHER_DRIVE_S = 3600.0
 MIN_GAP_INTERVALS = 5.0
 # A pose may be held this long past the ends of its stream: a frame of a 30 Hz camera may stick out by one interval.
 EDGE_TOLERANCE_S = 0.04
@@ -79,7 +80,10 @@ def gap_notices(stamps_s: Float[np.ndarray, " n"], what: str, show: int = 3) -> 
     longest = gaps[np.argsort(-interval_s[gaps], kind="stable")[:show]]
     pauses = ", ".join(f"{interval_s[g]:.3g} s after {stamps_s[g] - stamps_s[0]:.2f} s" for g in sorted(longest))
     more = f" and {len(gaps) - show} more" if len(gaps) > show else ""
-    return (f"There are no {what} for {pauses}{more}.",)
+    told = (f"There are no {what} for {pauses}{more}.",)
+    if interval_s[longest[0]] < _ANOTHER_DRIVE_S:
+        return told
+    return (*told, "A pause of hours means several drives: build a map of each, then `avlmaps merge` them.")
 
 
 def associate(

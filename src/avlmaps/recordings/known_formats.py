@@ -78,7 +78,8 @@ class Format:
             recording = opener(path, topics or {}, more)
         elif more:
             raise RecordingError(
-                f"{path} is of the format {self.name}, which is one folder or file; leave {more[0]} out."
+                f"{path} is of the format {self.name}, which is one folder or file; leave {more[0]} "
+                "out, or build a map of each and `avlmaps merge` them."
             )
         elif topics:
             raise RecordingError(f"{path} is of the format {self.name}, which has no topics; leave them out.")
