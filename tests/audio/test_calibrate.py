@@ -72,6 +72,7 @@ def straight(tmp_path_factory: pytest.TempPathFactory) -> tuple[AudioTrack, Traj
     return track_of(tmp_path_factory.mktemp("straight"), heard(true, drive, np.zeros(4), rng), true), drive
 
 
+@pytest.mark.slow
 def test_a_drive_that_does_not_turn_is_refused_with_what_is_unknown(straight: tuple[AudioTrack, Trajectory]) -> None:
     with pytest.raises(RecordingError, match=r"does not determine the array: .*known to .* cm .*turn on the spot"):
         calibrate(*straight)

@@ -129,6 +129,7 @@ def there_and_back(path: Path, stray_m: float) -> tuple[Path, np.ndarray]:
     return path, true
 
 
+@pytest.mark.slow
 def test_a_drive_that_comes_back_is_put_right_by_its_own_pictures(answer, tmp_path: Path) -> None:
     recording, true = there_and_back(tmp_path / "rec", 0.36)
     right, _ = there_and_back(tmp_path / "right", 0.0)

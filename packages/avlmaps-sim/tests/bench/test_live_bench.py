@@ -12,6 +12,7 @@ from avlmaps_sim.bench.output import BenchError
 from helpers.walked_room import write_walk
 
 
+@pytest.mark.slow
 def test_a_drive_ends_as_its_build_and_says_what_it_took(tmp_path: Path) -> None:
     walk, used = write_walk(tmp_path / "rec"), avlmaps.Encoders.named("colours")
     tables = run_live([walk], used, "colours", LiveBench(laps=2, kills=0, rate=20.0), 0)

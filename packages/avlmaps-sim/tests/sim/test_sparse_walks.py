@@ -11,6 +11,8 @@ from avlmaps.recordings.open import open_recording
 from avlmaps_sim.recorder import RecordSettings, record_scene
 from avlmaps_sim.scenes import open_scene
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module", params=["house:1", "house:16"])
 def sparse(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
