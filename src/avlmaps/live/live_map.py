@@ -285,7 +285,7 @@ class LiveMap:
     def close(self) -> AVLMap:
         """Fuse what waits and end as a build does: find up, the floor, places and sounds, write the map and open it.
 
-        With gates, frames that wait on the disk are looked at first (``status().kept``), a tenth of a second each.
+        With gates, frames that wait on the disk are looked at first (``status().kept``), a sixth of a second each.
 
         Raises:
             MapError: no frame came, or the map cannot be written: the last save is still there, and closing may be
