@@ -137,12 +137,16 @@ def _beside(live: AVLMap, built: AVLMap) -> list[object]:
     apart_m, alone = _goals(live, built)
     near = [sum(m <= limit + 1e-6 for m in apart_m) for limit in (_VOXEL_M, 0.1)]
     median = round(float(np.median(apart_m)), 3) if apart_m else float("nan")
-    return [*counts, "yes" if _equal(live.stored, built.stored) else "no", len(apart_m), alone, *near, median]
+    return [*counts, _equality(live.stored, built.stored), len(apart_m), alone, *near, median]
 
 
-def _equal(one: StoredMap, other: StoredMap) -> bool:
+def _equality(one: StoredMap, other: StoredMap) -> str:
+    """Say whether two maps have the same voxels, or which of their arrays differ."""
     names = [field.name for field in fields(one.voxels)]
-    return all(np.array_equal(getattr(one.voxels, name), getattr(other.voxels, name)) for name in names)
+    differ = [name for name in names if not np.array_equal(getattr(one.voxels, name), getattr(other.voxels, name))]
+    if len(differ) == len(names):
+        return "no"
+    return f"all but {', '.join(differ)}" if differ else "yes"
 
 
 def _goals(one: AVLMap, other: AVLMap) -> tuple[list[float], int]:
