@@ -25,6 +25,7 @@ from avlmaps.maps.fusion.free_space import (
 )
 from avlmaps.maps.fusion.moved_submaps import MovedSubmaps
 from avlmaps.maps.fusion.sensor import PERFECT
+from avlmaps.maps.fusion.submap_kernels import sum_features
 from avlmaps.maps.fusion.submaps import concat_submaps, in_steps, submap_of
 from avlmaps.maps.fusion.voxel_sums import VoxelSums
 from avlmaps.maps.grid import GridSpec
@@ -267,6 +268,17 @@ def test_looks_that_weigh_next_to_nothing_are_not_missed() -> None:
         np.testing.assert_allclose(found.weight, submap.weight * (1.0 + weighs), rtol=1e-5)
         step = 2.0 / 254.0 * np.abs(one + two).max(axis=1)
         assert (np.abs(found.feature_sum - one - two).max(axis=1) <= step + 1e-6).all()
+
+
+def test_many_faint_looks_together_are_not_missed() -> None:
+    for count, first in ((300, 1.0), (2000, 20.0), (100_000, 1.0)):
+        weight, order = np.ones(count, np.float32), np.arange(count)
+        weight[0] = first
+        feature, out = np.tile(np.array([[3, -2]], np.int8), (count, 1)), np.zeros((1, 2), np.float32)
+        feature[0] *= -1
+        scale, start = np.ones(count, np.float32), np.array([0, count])
+        sum_features(np.zeros(1, np.int64), start, order, order.astype(np.int32), weight, feature, scale, out)
+        np.testing.assert_allclose(out[0], weight @ feature, rtol=1e-3)
 
 
 @pytest.mark.parametrize("turn_deg", [0.0, 2.0])

@@ -21,6 +21,7 @@ MOST_SAMPLES = STEPS**3
 EVEN = 12.0**0.5  # an even spread over a length has a standard deviation of the length over this
 WITHIN = 0.4999  # voxels: samples go no farther from the middle
 HIDDEN = np.float32(1.0 / 254.0)  # of a voxel's weight: as much as a feature in 254 steps is rounded by
+MOSTLY = np.float32(0.9)  # of a voxel's weight: where the other looks hold less, the faint ones are many
 LEAST_HITS = 0.5  # a voxel gets less than this part of a hit from one that moves: it has none
 
 
@@ -336,7 +337,7 @@ def sum_features(
     """Write the sums of the features that some rows of a map have pairs of, times their weights.
 
     A look that weighs less than half a step of the whole (from afar, where others were near) is not read: rounding
-    hides it. The others weigh as much more.
+    hides it. The others weigh as much more. Where such looks hold a tenth of the weight together, all are read.
 
     Args:
         rows: of the map.
@@ -356,6 +357,8 @@ def sum_features(
         least = whole * HIDDEN
         for at in range(first, last):
             read += weight[order[at]] if weight[order[at]] >= least else np.float32(0.0)
+        if read < MOSTLY * whole:
+            least, read = np.float32(0.0), whole
         more = whole / read if read > 0.0 else np.float32(0.0)
         for column in range(out.shape[1]):
             out[n, column] = 0.0
