@@ -1,5 +1,6 @@
 """A live map ends as a build does, answers meanwhile, and refuses what is no frame without losing anything."""
 
+import resource
 import subprocess
 import sys
 import threading
@@ -404,18 +405,30 @@ def test_the_frames_that_are_worth_most_are_kept(worths: list[tuple[float, bool]
 
 
 def test_a_full_disk_is_said_once_and_what_is_kept_stays() -> None:
-    kept = KeptBack(4)
-    kept.keep(frame(0), 0.5, is_fused=True)
-    assert kept._file is not None
-    real = kept._file
-    with Path("/dev/full").open("r+b", buffering=0) as full, pytest.raises(MapError, match="cannot be stored"):
-        kept._file = full
-        kept.keep(frame(1), 0.9, is_fused=True)
-    kept._file = real
-    kept.keep(frame(2), 0.9, is_fused=True)
-    assert len(kept) == 1
-    (one, _) = kept.take() or pytest.fail("it is gone")
-    np.testing.assert_array_equal(one.rgb, frame(0).rgb)
+    kept, whole, one = KeptBack(9), resource.getrlimit(resource.RLIMIT_FSIZE), frame(0)
+    room = int(2.5 * (one.rgb.nbytes + one.depth_m.nbytes))  # of files: for two frames, and a part of a third
+    resource.setrlimit(resource.RLIMIT_FSIZE, (room, whole[1]))
+    try:
+        for number in range(2):
+            kept.keep(frame(number), 0.5 - 0.1 * number, is_fused=True)
+        with pytest.raises(MapError, match="cannot be stored"):
+            kept.keep(frame(2), 0.9, is_fused=True)
+        kept.keep(frame(3), 0.9, is_fused=True)
+        for number in range(2):
+            taken, _ = kept.take() or pytest.fail("it is gone")
+            np.testing.assert_array_equal(taken.rgb, frame(number).rgb)
+            np.testing.assert_array_equal(taken.depth_m, frame(number).depth_m)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, whole)
+    assert kept.take() is None
+
+
+def test_kept_frames_give_the_disk_back_when_the_map_is_closed(tmp_path: Path) -> None:
+    few = LiveSettings(known_views=2, new_share=0.2, still_m=0.0, looks=1, encoded_share=0.4, later_looks=10_000)
+    live = drive_forth_and_back(tmp_path / "kept", few)
+    assert live.status().encoded_later > 0 and live._kept._file is None
+    live._kept.keep(frame(0), 1.0, is_fused=False)
+    assert live._kept._file is None and live.status().kept == 0
 
 
 def test_poses_that_stop_fitting_the_pictures_are_in_doubt_within_three_seconds() -> None:

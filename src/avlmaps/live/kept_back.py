@@ -35,7 +35,7 @@ class KeptBack:
             most: frames; what is worth least makes room for another.
         """
         self.most = most
-        self._free, self._places = list(range(most)), dict[int, _Place]()
+        self._free, self._places = list(range(most))[::-1], dict[int, _Place]()
         self._file: BinaryIO | None = None
 
     def __len__(self) -> int:
@@ -63,7 +63,7 @@ class KeptBack:
         at = self._free[-1]
         try:
             if self._file is None:
-                self._file = tempfile.TemporaryFile(prefix="avlmaps-frames-")  # noqa: SIM115 - it goes with us
+                self._file = tempfile.TemporaryFile(prefix="avlmaps-frames-")  # noqa: SIM115 - see close
             self._file.seek(at * (frame.rgb.nbytes + frame.depth_m.nbytes))
             for picture in (frame.rgb, frame.depth_m):
                 self._file.write(np.ascontiguousarray(picture).data)
@@ -94,3 +94,11 @@ class KeptBack:
         )
         self._free.append(at)
         return replace(frame, rgb=rgb, depth_m=depth_m), place.is_fused
+
+    def close(self) -> None:
+        """Give the disk back; what is stored is gone, and nothing more is stored."""
+        self.most = 0
+        self._places.clear()
+        if self._file is not None:
+            self._file.close()
+            self._file = None

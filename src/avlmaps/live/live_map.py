@@ -296,6 +296,7 @@ class LiveMap:
             self._closing = True
             self._door.notify_all()
         self._fuser.join()
+        self._kept.close()
         self._stop_behind.set()
         self._behind.join()
         self._saver.close()
