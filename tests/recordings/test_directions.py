@@ -1,14 +1,17 @@
 """Directions that a device says: files of them read as written, topics of bags, and a sentence for each fault."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from test_rosbag import START_S, BagMaker, write_bag
 
+from avlmaps.cli.build import Build, _openings
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.poses import from_quaternion
+from avlmaps.maps.pipeline import sources
 from avlmaps.maps.pipeline.plan import audio_key
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.directions import DIRECTIONS, DirectionTrack, read_directions, write_directions
@@ -52,6 +55,19 @@ def test_a_recording_has_its_directions_and_a_copy_too(tmp_path: Path) -> None:
         assert audio is not None and audio.directions is not None and same(audio.directions, TRACK)
     assert audio_key(open_recording(folder)) != plain, "another map is made of it"
     assert len(TRACK.between(0.15, 1.0)) == 1
+
+
+def test_what_opens_a_recording_on_another_machine_knows_its_device(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = recorded(tmp_path / "rec")
+    write_directions(folder / DIRECTIONS, TRACK)
+    earlier = SimpleNamespace(sources=lambda: SimpleNamespace(device=np.array([[0.5, 0.1, 0.0, 3.0]])))
+    monkeypatch.setattr(sources, "open_stored", lambda path: earlier)
+    (opened,) = _openings(Build(recording=folder, out=tmp_path / "map", same_device=tmp_path / "earlier"))
+    audio = opened().audio
+    assert audio is not None and audio.directions is not None and audio.directions.known_rad == (0.5, 0.1)
+    assert audio_key(opened()) != audio_key(open_recording(folder)), "another map is made of it"
 
 
 def test_directions_without_a_sound_are_left_out_with_a_notice(tmp_path: Path) -> None:

@@ -153,11 +153,6 @@ def build(verb: "Build") -> dict[str, Any]:
     recording = openings[0]()
     for notice in recording.notices:
         say(f"note: {notice}")
-    if verb.same_device is not None:
-        from avlmaps.maps.pipeline.sources import take_device
-        from avlmaps.maps.store.reader import open_stored
-
-        take_device(recording, open_stored(verb.same_device))
     settings = BuildSettings(
         voxel_size_m=verb.voxel_size_m,
         frames=FrameSettings(
@@ -246,7 +241,12 @@ def _openings(verb: "Build") -> "list[Callable[[], Recording]]":
         corrections=verb.reading.corrections(),
         microphones=microphones,
     )
-    return [partial(open_one, group) for group in groups]
+    openings: list[Callable[[], Recording]] = [partial(open_one, group) for group in groups]
+    if verb.same_device is None:
+        return openings
+    from avlmaps.maps.pipeline.sources import open_with_device
+
+    return [partial(open_with_device, one, verb.same_device.absolute()) for one in openings]
 
 
 @contextmanager

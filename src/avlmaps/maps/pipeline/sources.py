@@ -1,7 +1,9 @@
 """The stage of the sources: where each sound began, of a recording whose microphones are known."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
+from pathlib import Path
 from time import perf_counter
 
 import numpy as np
@@ -46,6 +48,13 @@ def locate_sources(
     voxel_m = grid.centre_of(np.asarray(voxels.index))
     found = find_sources(track, walk or recording.walk, spans_s, voxel_m, up_in_world)
     return found, perf_counter() - begin
+
+
+def open_with_device(reopen: Callable[[], Recording], path: Path) -> Recording:
+    """Open a recording and take the device of a map with it, here or on another machine; see ``take_device``."""
+    recording = reopen()
+    take_device(recording, open_stored(path))
+    return recording
 
 
 def take_device(recording: Recording, stored: StoredMap) -> None:
