@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 class Things(MapVerb):
     """List the things, sounds and rooms of a map, each with its confidence; of rooms the area as well.
 
-    With --room, --near, --top or --page it lists things alone, each with its room.
+    With --room, --near, --at, --top or --page it lists things alone, each with its room.
 
     Example: avlmaps things home.avlmap --least 0.7 --csv things.csv
 
@@ -41,6 +41,9 @@ class Things(MapVerb):
     """List the things of this room, or of all rooms of a kind, as `avlmaps rooms` names them."""
     near: Annotated[str | None, arg(metavar="NAME|X,Y,Z")] = None
     """List the things nearest to a thing or to a place first: x,y,z in the frame of --frame, or level x,y."""
+    at: Annotated[str | None, arg(metavar="DAY")] = None
+    """Of a map of several days: list what was there on this day, a date such as 2026-11-24, or the number of a visit,
+    from 1. What moved or went since is where it was."""
     top: Annotated[int | None, arg(metavar="N")] = None
     """Maximum number of things on a page. Default: all."""
     page: Annotated[int, arg(metavar="N")] = 1
@@ -75,7 +78,7 @@ def contents(verb: Things, opened: "AVLMap | None" = None) -> dict[str, Any]:
     opened = AVLMap.open(verb.map) if opened is None else opened
     wanted = Wanted(
         least=verb.least, name=verb.name, structure=verb.structure, room=verb.room, near=_near(verb, opened),
-        top=verb.top, page=verb.page,
+        top=verb.top, page=verb.page, at=verb.at,
     )  # fmt: skip
     if wanted.is_whole:
         listed: Mapping[str, Any] = opened.contents(verb.least, verb.name or None, verb.structure).to_json(

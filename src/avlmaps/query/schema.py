@@ -235,8 +235,42 @@ class SoundAnswer(TypedDict):
     storey: NotRequired[Storey]
 
 
+class ThingName(TypedDict):
+    """A thing that a sound may come from."""
+
+    name: str
+    position: Position
+    probability: Unit
+
+
+class SourceAnswer(TypedDict):
+    """A place that sounds came from."""
+
+    name: Annotated[str, Meta(description="what it sounds like; empty without a list of names")]
+    confidence: Annotated[float, Meta(ge=0.0, le=1.0, description="that a sound of it is one")]
+    probability: Annotated[float, Meta(ge=0.0, le=1.0, description="that a goal at the position is right")]
+    position: Annotated[Position, Meta(description="likeliest place")]
+    within_50_m: Annotated[float, Meta(description="radius on the plan that holds it with a probability of 0.5")]
+    within_90_m: Annotated[float, Meta(description="of 0.9")]
+    area_50_m2: Annotated[float, Meta(description="of the smallest region that holds it with a probability of 0.5")]
+    area_90_m2: Annotated[float, Meta(description="of 0.9")]
+    rooms: Annotated[list["RoomName"], Meta(description="rooms that it may be in, likeliest first")]
+    things: Annotated[list[ThingName], Meta(description="things that it may be, likeliest first")]
+    sounds: Annotated[list[int], Meta(description="numbers of its sounds in the map, from 0")]
+    moving: Annotated[bool, Meta(description="whether it moved while it sounded")]
+    microphones: Annotated[int, Meta(description="how many listened")]
+
+
+class SourcesAnswer(TypedDict):
+    """Where the sounds of a map came from."""
+
+    map: str
+    frame: Frame
+    sources: list[SourceAnswer]
+
+
 class RoomName(TypedDict):
-    """A kind of room that a room may be."""
+    """A kind of room that a room may be, or the room that something may be in."""
 
     name: str
     probability: Unit

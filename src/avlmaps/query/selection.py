@@ -48,22 +48,29 @@ class MapLists:
         """The floors and rooms."""
         return self.once("whereabouts", lambda: Whereabouts.of(self.avlmap))
 
-    def things(self, least: float = 0.5, names: Sequence[str] = (), structure: bool = False) -> list[ThingAnswer]:
-        """Return the things, most confident first; none of a map without a model of pixels.
+    def things(
+        self, least: float = 0.5, names: Sequence[str] = (), structure: bool = False, at: str | None = None
+    ) -> list[ThingAnswer]:
+        """Return the things, perhaps those of a day, most confident first; none of a map without a model of pixels.
 
         Raises:
-            QueryError: ``least`` lies outside [0, 1], or the pixel encoder does not know a name.
+            QueryError: ``least`` lies outside [0, 1], the pixel encoder does not know a name, or there is no such day.
         """
 
         def found() -> list[ThingAnswer]:
             if "pixels" not in self.avlmap.stored.info.models:
                 return []
             require_known(self.avlmap.knows, names)
-            things = self.avlmap.things(tuple(names) or None, least, structure, watch=self.watch)
-            heard = with_heard(self.avlmap, things, are_all=not names)
-            return put_storeys([thing.to_json() for thing in heard], self.avlmap.storeys)
+            things = self.avlmap.things(tuple(names) or None, least, structure, watch=self.watch, at=at)
+            if at is None:  # sounds come from the things of now
+                things = with_heard(self.avlmap, things, are_all=not names)
+            return put_storeys([thing.to_json() for thing in things], self.avlmap.storeys)
 
-        return self.once(("things", least, tuple(names), structure), found)
+        return self.once(("things", least, tuple(names), structure, at), found)
+
+    def wanted(self, wanted: "Wanted") -> list[ThingAnswer]:
+        """Return the things of the names, confidence and day that are wanted, of all rooms."""
+        return self.things(wanted.least, wanted.name, wanted.structure, wanted.at)
 
     def sounds(self) -> list[SoundAnswer]:
         """Return the sounds in the order of their onset."""
@@ -94,6 +101,7 @@ class Wanted:
             The nearest come first.
         top: most things of a page; None for all.
         page: which page, counted from 1.
+        at: of a map of several days, those that were there on that day: a date, or the number of a visit from 1.
     """
 
     least: float = 0.5
@@ -103,11 +111,12 @@ class Wanted:
     near: str | Sequence[float] | None = None
     top: int | None = None
     page: int = 1
+    at: str | None = None
 
     @property
     def is_whole(self) -> bool:
         """Whether nothing but names and confidence is selected: all things, on one page."""
-        return self.room is None and self.near is None and self.top is None and self.page == 1
+        return self.room is self.near is self.top is self.at is None and self.page == 1
 
 
 class ThingsPage(TypedDict):
@@ -139,13 +148,13 @@ def page_of_things(lists: MapLists, wanted: Wanted) -> ThingsPage:
     """Return a page of the things that are meant; where nothing but names is selected, all of them, without a count.
 
     Raises:
-        QueryError: there is no such room, name or page, or no such thing to be near to.
+        QueryError: there is no such room, name, day or page, or no such thing to be near to.
     """
     if wanted.is_whole:
-        return {"things": [_listed(thing) for thing in lists.things(wanted.least, wanted.name, wanted.structure)]}
+        return {"things": [_listed(thing) for thing in lists.wanted(wanted)]}
     about = None
     if wanted.room is None and wanted.near is None:
-        rows = [_listed(thing) for thing in lists.things(wanted.least, wanted.name, wanted.structure)]
+        rows = [_listed(thing) for thing in lists.wanted(wanted)]
     else:
         chosen, about = selected(lists, wanted)
         names = lists.where.names
@@ -158,8 +167,8 @@ def page_of_things(lists: MapLists, wanted: Wanted) -> ThingsPage:
 
 def things_with_rooms(lists: MapLists, wanted: Wanted) -> list[Selected]:
     """Return the things of some names, each with its room."""
-    things = lists.things(wanted.least, wanted.name, wanted.structure)
-    key = ("rooms of things", wanted.least, tuple(wanted.name), wanted.structure)
+    things = lists.wanted(wanted)
+    key = ("rooms of things", wanted.least, tuple(wanted.name), wanted.structure, wanted.at)
     places = np.array([thing["position"] for thing in things], np.float64).reshape(-1, 3)
     rooms: list[int] = lists.once(key, lambda: lists.where.rooms_of(places).tolist())
     return [Selected(thing, room) for thing, room in zip(things, rooms, strict=True)]
@@ -177,7 +186,7 @@ def selected(lists: MapLists, wanted: Wanted) -> tuple[list[Selected], NearAnswe
         found = [one for one in found if one.room in numbers]
     if wanted.near is None:
         return found, None
-    place, about = _near(lists, wanted.near)
+    place, about = _near(lists, wanted.near, wanted.at)
     itself = None if about is None else about["position"]
     level = lists.avlmap.space.level
     found = [replace(one, away_m=_away(level, one.thing, place)) for one in found if one.thing["position"] != itself]
@@ -209,13 +218,15 @@ def _row(one: Selected, room: str | None) -> ListedThing:
     return row
 
 
-def _near(lists: MapLists, near: str | Sequence[float]) -> tuple[Float[np.ndarray, " n"], NearAnswer | None]:
+def _near(
+    lists: MapLists, near: str | Sequence[float], at: str | None
+) -> tuple[Float[np.ndarray, " n"], NearAnswer | None]:
     """Return the place that is meant, and the thing there if one is named."""
     if is_place(near):
         return place_given(near), None
     name = str(near)
     known = lists.avlmap.knows(name)
-    things = lists.things(names=[name]) if known else []
+    things = lists.things(names=[name], at=at) if known else []
     if not things:
         why = "" if known else f": {unknown_note(name)}"
         raise QueryError(f"The map shows no {name[:60]!r} to be near to{why}; give a place as x,y,z, or another name.")

@@ -8,7 +8,7 @@ left out.
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from avlmaps.maps.store.manifest import Visit
     from avlmaps.maps.store.reader import StoredMap
     from avlmaps.query.contents import Thing
-    from avlmaps.query.schema import DayAnswer, HeardFromAnswer
+    from avlmaps.query.schema import DayAnswer, HeardFromAnswer, SourceAnswer
 
 
 _MAKERS_SHARE = 0.5  # probability that a sound comes from a thing that usually makes it, where there is one
@@ -105,7 +105,7 @@ class SoundSource:
     microphones: int
     spread: Spread
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> "SourceAnswer":
         """Return the source as ``avlmaps sources --json`` prints it."""
         return {
             "name": self.name,

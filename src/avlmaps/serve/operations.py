@@ -6,7 +6,15 @@ from typing import Any, Literal
 
 from avlmaps.navigate.paths import PathAnswer
 from avlmaps.query.places import PlaceAnswer
-from avlmaps.query.schema import ContentsAnswer, EditsAnswer, LocateAnswer, QueryAnswer, RoomsAnswer
+from avlmaps.query.schema import (
+    ChangesAnswer,
+    ContentsAnswer,
+    EditsAnswer,
+    LocateAnswer,
+    QueryAnswer,
+    RoomsAnswer,
+    SourcesAnswer,
+)
 from avlmaps.serve import requests, viewing, work
 from avlmaps.serve.tiles import TilesAnswer
 
@@ -52,7 +60,7 @@ OPERATIONS = (
               requests.NoQuery, dict, work.describe_map, "slow"),
     Operation("listContents", "/contents", "List things, sounds and rooms, as `avlmaps things` does.",
               requests.ThingsQuery, ContentsAnswer, work.list_contents, "slow"),
-    Operation("listThings", "/things", "List the things of a map, of a room, or near a place; a page of them.",
+    Operation("listThings", "/things", "List the things of a map, a room or a day, or near a place; a page of them.",
               requests.ListedThingsQuery, work.ListedThingsAnswer, work.list_things, "slow"),
     Operation("listSounds", "/sounds", "List the sounds of a map.",
               requests.NoQuery, work.SoundsAnswer, work.list_sounds, "slow"),
@@ -60,6 +68,10 @@ OPERATIONS = (
               requests.NoQuery, "audio/flac", work.sound_clip, "slow"),
     Operation("listRooms", "/rooms", "List the rooms of a map, as `avlmaps rooms` does.",
               requests.RoomsQuery, RoomsAnswer, work.list_rooms, "slow"),
+    Operation("listSources", "/sources", "List where the sounds came from, as `avlmaps sources` does.",
+              requests.SourcesQuery, SourcesAnswer, work.list_sources, "slow"),
+    Operation("listChanges", "/changes", "List what is new, moved and gone since a day, as `avlmaps changes` does.",
+              requests.ChangesQuery, ChangesAnswer, work.list_changes, "slow"),
     Operation("listEdits", "/edits", "List what people corrected, as `avlmaps edit --list` does.",
               requests.NoQuery, EditsAnswer, work.list_edits, "slow"),
     Operation("editMap", "/edit", "Correct the map, as `avlmaps edit` does; later queries know it.",

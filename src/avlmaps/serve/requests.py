@@ -25,6 +25,7 @@ _NUMBER = r"-?\d{1,6}(\.\d{1,9})?"
 _PLACE = {"pattern": rf"^{_NUMBER}(,{_NUMBER}){{1,2}}$"}
 _FOCAL, _OFFSET = r"[1-9]\d{0,4}(\.\d{1,9})?", r"\d{1,5}(\.\d{1,9})?"
 _INTRINSICS = {"pattern": f"^{_FOCAL},{_FOCAL},{_OFFSET},{_OFFSET}$"}
+_DAY = "a day: a date such as 2026-11-24, or the number of a visit from 1"
 Place = Annotated[str, Meta(max_length=100, extra_json_schema=_PLACE)]
 Intrinsics = Annotated[Short, Meta(extra_json_schema=_INTRINSICS)]
 
@@ -52,6 +53,27 @@ class ListedThingsQuery(ThingsQuery, forbid_unknown_fields=True):
         Annotated[int, Meta(ge=1, le=10_000)] | None, Meta(description="Most things of a page. Default: all.")
     ] = None
     page: Annotated[int, Meta(ge=1, le=10_000, description="Which page, counted from 1.")] = 1
+    at: Annotated[Short | None, Meta(description=f"Of a map of several days: those that were there on {_DAY}.")] = None
+
+
+class SourcesQuery(Struct, forbid_unknown_fields=True):
+    """Which sources of sounds are listed."""
+
+    sound: Annotated[
+        list[Name], Meta(max_length=64, description="List the sources of these sounds only. Default: of every sound.")
+    ] = []
+    prior: Annotated[
+        Literal["lexicon", "none"],
+        Meta(description="lexicon: what usually makes such a sound is likelier; none: by the microphones alone."),
+    ] = "lexicon"
+    least: Annotated[float, Meta(ge=0.0, le=1.0, description="Of sounds with at least this confidence.")] = 0.0
+
+
+class ChangesQuery(Struct, forbid_unknown_fields=True):
+    """Which changes are listed."""
+
+    since: Annotated[Short, Meta(description=f"List what changed after {_DAY}. Default: the first.")] = "1"
+    first_seen: Annotated[bool, Meta(description="List also what was first seen, where nobody had looked.")] = False
 
 
 class RoomsQuery(Struct, forbid_unknown_fields=True):

@@ -15,6 +15,7 @@ from avlmaps.query.given_places import place_of
 from avlmaps.query.places import PlaceAnswer, column_point, describe_place
 from avlmaps.query.queryable import Photo
 from avlmaps.query.schema import (
+    ChangesAnswer,
     ContentsAnswer,
     EditsAnswer,
     Frame,
@@ -23,6 +24,7 @@ from avlmaps.query.schema import (
     QueryAnswer,
     RoomsAnswer,
     SoundAnswer,
+    SourcesAnswer,
     locate_answer,
 )
 from avlmaps.query.selection import MapLists, ThingsPage, Wanted, page_of_things
@@ -145,7 +147,7 @@ def wanted(query: requests.ThingsQuery) -> Wanted:
     named = Wanted(least=query.least, name=query.name, structure=query.structure)
     if not isinstance(query, requests.ListedThingsQuery):
         return named
-    return replace(named, room=query.room, near=query.near, top=query.top, page=query.page)
+    return replace(named, room=query.room, near=query.near, top=query.top, page=query.page, at=query.at)
 
 
 def list_contents(task: Task, query: requests.ThingsQuery) -> ContentsAnswer:
@@ -186,6 +188,17 @@ def list_sounds(task: Task, query: requests.NoQuery) -> SoundsAnswer:
 def list_rooms(task: Task, query: requests.RoomsQuery) -> RoomsAnswer:
     """Return what ``avlmaps rooms --json`` prints."""
     return _noted(task, RoomsAnswer(map=task.map.name, frame=FRAME, rooms=lists_of(task).rooms(query.least)))
+
+
+def list_sources(task: Task, query: requests.SourcesQuery) -> SourcesAnswer:
+    """Return what ``avlmaps sources --json`` prints."""
+    found = task.map.avlmap.sources(query.sound, prior=query.prior == "lexicon", least=query.least)
+    return {"map": task.map.name, "frame": FRAME, "sources": [one.to_json() for one in found]}
+
+
+def list_changes(task: Task, query: requests.ChangesQuery) -> ChangesAnswer:
+    """Return what ``avlmaps changes --json`` prints."""
+    return {**task.map.avlmap.changes(query.since, first_seen=query.first_seen), "map": task.map.name}
 
 
 def list_edits(task: Task, query: requests.NoQuery) -> EditsAnswer:
