@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from avlmaps.recordings.layout import DESCRIPTION, UNFINISHED
+
 
 @pytest.mark.parametrize("pace", [["--as-fast-as-possible", "--every-frame"], ["--rate", "50"]])
 def test_a_recording_is_played_into_a_map(answer, walk: Path, tmp_path: Path, pace: list[str]) -> None:
@@ -44,6 +46,13 @@ def test_a_drive_updates_the_map_of_the_days_before(answer, dated: Path, built: 
     assert made["into"]["path"] == str(home)
     whole = answer("info", home, "--verify")
     assert whole["frames"] == 2 * answer("info", built)["frames"] - 1
+
+
+def test_a_drive_whose_writer_stopped_updates_the_map_as_well(answer, dated: Path, built: Path, tmp_path: Path) -> None:
+    (dated / DESCRIPTION).rename(dated / UNFINISHED)
+    words = ("--into", shutil.copytree(built, tmp_path / "home.avlmap"), "--voxel-size-m", "0.1", "--give-up-s", "0.3")
+    made = answer("live", dated, "--out", tmp_path / "today.avlmap", *words, "--profile", "colours", "--every-frame")
+    assert made["into"]["days"][-1]["day"] == "2023-11-14", "by its clock"
 
 
 def test_a_drive_that_is_in_the_map_already_is_not_joined_again(run, walk: Path, built: Path, tmp_path: Path) -> None:

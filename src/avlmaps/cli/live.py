@@ -208,11 +208,12 @@ def _days_before(verb: Live) -> "StoredMap | None":
 
 
 def _day(verb: Live) -> str:
-    """Return the day of the drive: as given, else by the clock of its recording."""
+    """Return the day of the drive: as given, else by the clock of its recording, where that was finished."""
     from avlmaps.days.find import clock_s, day_of
+    from avlmaps.live.growing_folder import is_being_written
     from avlmaps.recordings.open import open_recording
 
-    if verb.day is not None or verb.recording is None:
+    if verb.day is not None or verb.recording is None or is_being_written(verb.recording):
         return verb.day or ""
     recording = open_recording(verb.recording, format=verb.format, corrections=verb.reading.corrections())
     return day_of(clock_s(recording, float(recording.stamps_s[0])))
