@@ -26,9 +26,7 @@ from avlmaps.query.voxel_space import Space
 if TYPE_CHECKING:
     from avlmaps.maps.store.manifest import Visit
     from avlmaps.maps.store.reader import StoredMap
-    from avlmaps.query.contents import Thing
     from avlmaps.query.schema import DayAnswer, HeardFromAnswer, SourceAnswer
-
 
 _MAKERS_SHARE = 0.5  # probability that a sound comes from a thing that usually makes it, where there is one
 _AT_THING_M = 0.4

@@ -181,7 +181,7 @@ def count_through(
 def count_where_it_matters(
     evidence: Evidence, grid: GridSpec, camera: Pinhole, views: FreeViews
 ) -> Int32[np.ndarray, " n"]:
-    """Return how many frames see through each voxel as `count_through` does, at a third of its time, or 0.
+    """Return how many frames see through each voxel as `count_through` does, or 0 sooner.
 
     A voxel is no surface when half as many frames see through it as hit it. Where more than eight hit it, that is
     more than four, and one of every fourth is nearly always among them; where none is, the others are not tried.
