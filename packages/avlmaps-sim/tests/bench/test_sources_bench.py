@@ -126,7 +126,8 @@ def test_the_ratio_of_direct_sound_falls_as_the_reverberation_grows() -> None:
 
 
 @pytest.mark.parametrize("front_db", [0.0, 5.0])
-def test_ratios_find_the_source_whichever_way_it_faces(front_db: float) -> None:
+def test_ratios_find_the_source_whichever_way_it_faces(front_db: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("avlmaps_sim.bench.sources.measured._WALKS", 25)
     rows, columns = np.divmod(np.arange(25), 5)
     place = np.column_stack([3.68 - 0.5 * columns, 3.0 + 0.5 * rows, np.full(25, 1.2)])
     away = place - np.array([3.36, 2.0, 1.5])
