@@ -78,6 +78,18 @@ def test_pictures_without_a_partner_or_a_pose_are_left_out_and_told(tmp_path: Pa
     assert np.array_equal(recording.frame(4).rgb, shot(5).rgb)
 
 
+def test_drives_of_two_days_in_one_folder_are_told_once(tmp_path: Path):
+    path = _write(tmp_path / "freiburg1", count=12)
+    for name in ("rgb.txt", "depth.txt", "groundtruth.txt"):
+        first, *rows = (path / name).read_text().splitlines()
+        pairs = [row.split(" ", 1) for row in rows]
+        later = [f"{float(at) + (86_400.0 if float(at) > START + 0.19 else 0.0):.6f} {rest}" for at, rest in pairs]
+        (path / name).write_text("\n".join([first, *later]) + "\n")
+    notices = open_recording(path).notices
+    assert sum("several drives" in one for one in notices) == 1
+    assert any("no frames for 86400 s" in one for one in notices)
+
+
 def test_lines_of_no_pose_are_not_used_and_told(tmp_path: Path):
     path = _write(tmp_path / "freiburg1")
     with (path / "groundtruth.txt").open("a") as stream:

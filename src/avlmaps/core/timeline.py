@@ -78,7 +78,10 @@ def gap_notices(stamps_s: Float[np.ndarray, " n"], what: str, show: int = 3) -> 
     if len(gaps) == 0:
         return ()
     longest = gaps[np.argsort(-interval_s[gaps], kind="stable")[:show]]
-    pauses = ", ".join(f"{interval_s[g]:.3g} s after {stamps_s[g] - stamps_s[0]:.2f} s" for g in sorted(longest))
+    lasted = [f"{interval_s[g]:.{'3g' if interval_s[g] < 1000.0 else '0f'}}" for g in sorted(longest)]
+    pauses = ", ".join(
+        f"{own} s after {stamps_s[g] - stamps_s[0]:.2f} s" for own, g in zip(lasted, sorted(longest), strict=True)
+    )
     more = f" and {len(gaps) - show} more" if len(gaps) > show else ""
     told = (f"There are no {what} for {pauses}{more}.",)
     if interval_s[longest[0]] < _ANOTHER_DRIVE_S:

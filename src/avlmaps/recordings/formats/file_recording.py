@@ -190,7 +190,8 @@ class ShotsRecording(Recording):
         """Return the recording of shots as they were found, with the sound beside them; see ``settle``."""
         shots, settled = settle(path, shots, report, pose_file)
         more.setdefault("audio", open_audio(path))
-        return cls(path=path, format=format, rig=rig, shots=shots, notices=(*notices, *settled), **more)
+        told = tuple(dict.fromkeys((*notices, *settled)))  # of frames and of their poses the same may be said
+        return cls(path=path, format=format, rig=rig, shots=shots, notices=told, **more)
 
     def frame(self, index: int) -> Frame:
         """Read one frame; see ``Recording.frame``."""
