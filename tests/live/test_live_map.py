@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 
 import avlmaps
 from avlmaps.core.errors import AudioError, MapError, RecordingError
+from avlmaps.live import live_map
 from avlmaps.live.gates import EncodingGate, Gates
 from avlmaps.live.kept_back import KeptBack
 from avlmaps.live.live_map import LiveMap
@@ -385,6 +386,23 @@ def test_frames_that_were_kept_back_are_looked_at_when_none_comes(tmp_path: Path
         for number in range(12, 20):
             add(live, frame(number, step_m=0.005))
     assert live.status().fused == 20 and live.map.stored.info.counts.frames == 20
+
+
+def test_kept_frames_wait_for_the_first_ones(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(live_map, "_CALM_S", 0.01)
+    chosen = LiveSettings(
+        first_frames=8, known_views=100, new_share=0.0, looks=1, encoded_share=0.4, later_looks=10_000
+    )
+    with LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP, live=chosen) as live:
+        for number in range(5):
+            add(live, frame(number, step_m=0.005))
+        wait_for(lambda: live.status().fused == 5)
+        kept = live.status().kept
+        time.sleep(0.2)
+        assert live.status().kept == kept > 0
+        for number in range(5, 12):
+            add(live, frame(number, step_m=0.005))
+    assert live.status().encoded + live.status().encoded_later == 12
 
 
 @given(st.lists(st.tuples(st.floats(0.01, 1.0), st.booleans()), max_size=30), st.integers(0, 6))

@@ -372,7 +372,7 @@ class LiveMap:
         while True:
             with self._door:
                 while not (self._queue or self._closing or self._to_correct or self._asked):
-                    if len(self._kept) and (is_calm or self._is_standing):
+                    if len(self._kept) and self._growing.sums and (is_calm or self._is_standing):
                         break
                     is_calm = not self._door.wait(_CALM_S if len(self._kept) else None) or is_calm
                 frame, arrived_s = self._queue.popleft() if self._queue else (None, 0.0)
@@ -431,6 +431,8 @@ class LiveMap:
     def _look_again(self) -> None:
         """Encode the frame that is worth most of those on the disk, unless it brings nothing any more."""
         self._is_standing = False
+        if not (self._growing.sums or self._closing):  # they add to the first frames, which wait for one another
+            return
         taken = self._kept.take()
         if taken is None or not self._growing.sums or not self._encoding.opens_again(taken[0]):
             return
