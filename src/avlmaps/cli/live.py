@@ -100,7 +100,7 @@ def _live(verb: Live) -> dict[str, Any]:
         raise UsageError(f"--give-up-s is {verb.give_up_s:g}; choose a positive number of seconds.")
     first = _days_before(verb)
     used = choose_models(verb.profile, [word for words in verb.model for word in words])
-    up_in_world, play = _robot(verb) if verb.source == "ros2" else _recording(verb)
+    up_in_world, begins_s, play = _robot(verb) if verb.source == "ros2" else _recording(verb)
     with LiveMap(
         verb.out,
         used,
@@ -108,6 +108,7 @@ def _live(verb: Live) -> dict[str, Any]:
         settings=replace(BuildSettings() if verb.every_frame else SPARSE, voxel_size_m=verb.voxel_size_m),
         live=LiveSettings(gates=not verb.every_frame),
         overwrite=verb.overwrite,
+        begins_s=begins_s,
     ) as live:
 
         def drive(over: Callable[[], bool] = lambda: False) -> None:
@@ -125,7 +126,7 @@ def _live(verb: Live) -> dict[str, Any]:
     return {
         **describe_map(stored),
         "live": {**status.to_dict(), "summary": str(status)},
-        **({} if first is None else {"into": _joined(first, stored, _day(verb))}),
+        **({} if first is None else {"into": _joined(first, stored, verb.day or "")}),
         "elapsed_s": round(perf_counter() - begin_s, 3),
     }
 
@@ -133,8 +134,8 @@ def _live(verb: Live) -> dict[str, Any]:
 _Play = Callable[["LiveMap", Callable[[], bool]], None]  # gives a map frames until it says that it is over
 
 
-def _recording(verb: Live) -> tuple[Any, _Play]:
-    """Return up in the world of a recording, and what plays it."""
+def _recording(verb: Live) -> tuple[Any, float, _Play]:
+    """Return up in the world of a recording, what its clock said at time 0, and what plays it."""
     from avlmaps.live.growing_folder import is_being_written
     from avlmaps.live.replay import follow, replay
     from avlmaps.recordings.layout import UNFINISHED, decode_description
@@ -147,16 +148,16 @@ def _recording(verb: Live) -> tuple[Any, _Play]:
         raise UsageError("--topics is of --source ros2; a bag whose topics must be named is mapped by build.")
     if is_being_written(path):
         up_in_world = decode_description(path / UNFINISHED).up_in_world
-        return up_in_world, lambda live, over: follow(path, live, verb.give_up_s, over=over)
+        return up_in_world, 0.0, lambda live, over: follow(path, live, verb.give_up_s, over=over)
     recording = open_recording(path, format=verb.format, corrections=verb.reading.corrections())
     for notice in recording.notices:
         say(f"note: {notice}")
     rate = None if verb.as_fast_as_possible else verb.rate
-    return recording.up_in_world, lambda live, over: replay(recording, live, rate, over=over)
+    return recording.up_in_world, recording.begins_s, lambda live, over: replay(recording, live, rate, over=over)
 
 
-def _robot(verb: Live) -> tuple[Any, _Play]:
-    """Return up in ROS's world, by its own convention (REP 103), and what gives the frames of a running robot."""
+def _robot(verb: Live) -> tuple[Any, float, _Play]:
+    """Return up in ROS's world (REP 103), 0 because its stamps are dates, and what gives the frames of a running robot."""
     from avlmaps.live.ros_source import follow_ros2, open_ros2, ros_topics
 
     if verb.recording is not None or verb.as_fast_as_possible or verb.rate != 1.0 or verb.format != "auto":
@@ -176,7 +177,7 @@ def _robot(verb: Live) -> tuple[Any, _Play]:
         except KeyboardInterrupt:
             say("note: Stopped by Ctrl-C; the map is finished.")
 
-    return (0.0, 0.0, 1.0), play
+    return (0.0, 0.0, 1.0), 0.0, play
 
 
 def _with_sources(verb: Live, stored: "StoredMap") -> "StoredMap":
@@ -205,18 +206,6 @@ def _days_before(verb: Live) -> "StoredMap | None":
     if verb.into.resolve() == verb.out.resolve():
         raise UsageError("--into is the map of the days before, and --out that of this drive; name two folders.")
     return open_stored(verb.into)
-
-
-def _day(verb: Live) -> str:
-    """Return the day of the drive: as given, else by the clock of its recording, where that was finished."""
-    from avlmaps.days.find import clock_s, day_of
-    from avlmaps.live.growing_folder import is_being_written
-    from avlmaps.recordings.open import open_recording
-
-    if verb.day is not None or verb.recording is None or is_being_written(verb.recording):
-        return verb.day or ""
-    recording = open_recording(verb.recording, format=verb.format, corrections=verb.reading.corrections())
-    return day_of(clock_s(recording, float(recording.stamps_s[0])))
 
 
 def _joined(first: "StoredMap", today: "StoredMap", day: str) -> dict[str, Any]:

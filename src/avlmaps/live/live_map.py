@@ -13,6 +13,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import replace
 from functools import partial
+from math import isfinite
 from pathlib import Path
 from threading import Condition, Event, Lock, Thread
 from types import TracebackType
@@ -84,6 +85,7 @@ class LiveMap:
         live: LiveSettings | None = None,
         query: QuerySettings | None = None,
         overwrite: bool = False,
+        begins_s: float = 0.0,
     ) -> None:
         """Begin an empty map, and hold its folder.
 
@@ -95,19 +97,23 @@ class LiveMap:
             live: which frames are fused, and how often it is saved.
             query: how to query.
             overwrite: replace a map that is there.
+            begins_s: what the clock said at stamp 0, seconds since 1970, so that the day is known when days are merged;
+                0 where the stamps are dates already, or no clock is known.
 
         Raises:
-            MapError: the folder is something else or a map, or another process writes it.
+            MapError: ``begins_s`` is not finite, the folder is something else or a map, or another process writes it.
             BackendError: there is no such profile.
         """
         self.path, self.settings, self._query = Path(path), live or LiveSettings(), query
+        if not isfinite(begins_s):
+            raise MapError(f"begins_s is {begins_s}, which is no time; give seconds since 1970, or leave it out.")
         used = encoders_of("embedded" if encoders is None else encoders)
         require_place(self.path, overwrite)
         self._held = contextlib.ExitStack()
         self._held.enter_context(lock_folder(self.path))
         chosen = settings or (SPARSE if self.settings.gates else BuildSettings())
         wait = self.settings.first_frames if self.settings.gates else None
-        self._growing = GrowingMap(chosen, used, direction(up_in_world), wait=wait, looks_later=True)
+        self._growing = GrowingMap(chosen, used, direction(up_in_world), wait=wait, looks_later=True, begins_s=begins_s)
         self._gates = Gates(self.settings, chosen.fusion.max_depth_m)
         self._encoding = EncodingGate(self.settings, self._growing.settings.fusion)
         keeps = self.settings.gates and not chosen.frames.per_submap  # corrected poses would not reach them

@@ -72,6 +72,7 @@ class GrowingMap:
         *,
         wait: int | None = None,
         looks_later: bool = False,
+        begins_s: float = 0.0,
     ) -> None:
         """Begin without frames.
 
@@ -81,11 +82,12 @@ class GrowingMap:
             up_in_world: unit vector; None finds it in the frames.
             wait: frames in which up, the floor and the sensor are found first; ``gravity.frames`` if None.
             looks_later: keyframes are looked at by ``finish``, and not when they are added.
+            begins_s: what the clock said at time 0, as of a recording.
         """
         self.settings = settings.for_profile(encoders.weight_variance_m2)
         self.encoders = encoders
         self._given_up = up_in_world
-        self._walk = Walk(up_in_world)
+        self._walk = Walk(up_in_world, begins_s)
         self._wait = min(wait or self.settings.gravity.frames, self.settings.gravity.frames)
         self._waiting: list[_Waiting] = []
         self._left_out: list[BadFrame] = []

@@ -62,9 +62,9 @@ class _Poses:
 class Walk(Recording):
     """The frames of a growing map as a recording: all stamps and poses, and some frames spread over them."""
 
-    def __init__(self, up_in_world: Float[np.ndarray, "3"] | None) -> None:
+    def __init__(self, up_in_world: Float[np.ndarray, "3"] | None, begins_s: float = 0.0) -> None:
         self.path, self.format, self.audio, self.notices = HERE, "memory", None, ()
-        self.up_in_world = up_in_world
+        self.up_in_world, self.begins_s = up_in_world, begins_s
         self._fused, self._passed = _Poses(), _Poses()
         self._held: list[Frame] = []
         self._stride, self._came, self.has_doubled = 1, 0, False
