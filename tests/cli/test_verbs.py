@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import soundfile
 
+from avlmaps.cli.info import next_lines
 from avlmaps.core.errors import BackendError
 from avlmaps.core.poses import rotation_angle_rad
 from helpers.raycast import render
@@ -271,3 +272,13 @@ def test_info_and_build_end_with_what_to_do_next_in_three_lines(built: Path, wal
         assert len(details) > len(lines) - 3 and not [line for line in details if line.startswith("next:")]
         for words in following:  # each can be run
             assert run(*words[1:3], "--help")[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("verdict", "says"), [("fine", "avlmaps build 'a b.bag' c.bag --out"), ("impossible", "correct")]
+)
+def test_what_is_next_has_every_part_and_builds_nothing_impossible(verdict: str, says: str) -> None:
+    lines = next_lines({"path": "a b.bag", "more": ["c.bag"], "consistency": {"verdict": verdict}})
+    assert lines[0].startswith(f"next: {says}") and len(lines) == 3
+    assert all("'a b.bag' c.bag" in line for line in lines[1:])
+    assert next_lines({"path": "rec", "consistency": None})[0] == "next: avlmaps build rec --out rec.avlmap"

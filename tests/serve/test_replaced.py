@@ -92,10 +92,12 @@ def test_a_map_that_cannot_be_opened_leaves_the_old_one(place: Path, serving: Ca
 def test_a_map_that_vanishes_goes_on_answering(place: Path) -> None:
     shelf = Shelf({"home": place})
     held = shelf.get("home")
+    assert not shelf.is_stale("home")
     shutil.rmtree(place)
     shelf.refresh(wait_s=1.0)
     assert shelf.get("home") is held
     assert held.avlmap.ask("the red thing").goals
+    assert shelf.is_stale("home")
 
 
 def test_names_come_from_folders_or_are_given(tmp_path: Path) -> None:

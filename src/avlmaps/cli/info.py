@@ -93,7 +93,8 @@ def describe_path(
         for fault in faults:
             say(f"fault: {fault}")
         raise
-    return {**_describe_recording(recording), "consistency": _consistency(recording), "faults": faults}
+    parts = {"more": [str(one) for one in more]} if more else {}
+    return {**_describe_recording(recording), **parts, "consistency": _consistency(recording), "faults": faults}
 
 
 def _consistency(recording: "Recording") -> dict[str, Any] | None:
@@ -223,8 +224,8 @@ def info_lines(answer: dict[str, Any], *, verbose: bool) -> list[str]:
 
 
 def next_lines(answer: dict[str, Any]) -> list[str]:
-    """Return what to do next with a map or a recording, in three lines."""
-    path = shlex.quote(str(answer["path"]))
+    """Return what to do next with a map or a recording; one that contradicts itself is not to be built."""
+    path = shlex.join([str(answer["path"]), *answer.get("more", ())])
     if "voxels" in answer:
         return [
             f'next: avlmaps query {path} "where is the chair?"',
@@ -232,8 +233,10 @@ def next_lines(answer: dict[str, Any]) -> list[str]:
             f"      avlmaps info {path} --verbose   (every detail)",
         ]
     out = shlex.quote(f"{Path(answer['path']).stem or 'home'}.avlmap")
+    is_impossible = (answer.get("consistency") or {}).get("verdict") == "impossible"
+    first = "correct what is impossible, as said above" if is_impossible else f"avlmaps build {path} --out {out}"
     return [
-        f"next: avlmaps build {path} --out {out}",
+        f"next: {first}",
         f"      avlmaps info {path} --verify    (decodes every picture)",
         f"      avlmaps info {path} --verbose   (every detail)",
     ]

@@ -157,7 +157,7 @@ def _recording(verb: Live) -> tuple[Any, float, _Play]:
 
 
 def _robot(verb: Live) -> tuple[Any, float, _Play]:
-    """Return up in ROS's world (REP 103), 0 because its stamps are dates, and what gives the frames of a running robot."""
+    """Return up in ROS's world (REP 103), 0 as its stamps are dates, and what gives the frames of a running robot."""
     from avlmaps.live.ros_source import follow_ros2, open_ros2, ros_topics
 
     if verb.recording is not None or verb.as_fast_as_possible or verb.rate != 1.0 or verb.format != "auto":

@@ -21,7 +21,6 @@ from avlmaps.days import life as lives
 from avlmaps.days.evidence import Day, DayViews
 from avlmaps.days.find import (
     DEFAULTS,
-    Found,
     clock_s,
     find_other,
     require_another_drive,
@@ -98,10 +97,11 @@ def merge_maps(
         )
     visits = _dated(visits_of(stored), first_day, stored)
     require_another_drive(stored, other, visits)
+    visit = _visit(other, visits[-1], day)  # before the search, which takes long
     known = Occupied.of(np.asarray(stored.voxels.index), stored.grid)
     found = find_other(stored, other, settings, known)
     moved, number = found.map_from_other, len(visits)
-    visit = _visit(other, visits[-1], found, day)
+    visit = msgspec.structs.replace(visit, map_from_recording=_rows(moved), checks=found.checks)
     visits = (*visits, visit)
     listed = things_of or default_things(settings.least_confidence)
     grid = stored.grid
@@ -180,8 +180,8 @@ def _date(said: str) -> date:
     return day
 
 
-def _visit(other: StoredMap, last: Visit, found: Found, day: str) -> Visit:
-    """Return the entry of a new day, whose time follows that of the last one."""
+def _visit(other: StoredMap, last: Visit, day: str) -> Visit:
+    """Return the entry of a new day, whose time follows that of the last one, and whose place is to be found."""
     (own,) = visits_of(other)
     own_s, last_s = clock_s(own.recording, own.begin_s), clock_s(last.recording, last.begin_s - last.shift_s)
     if not day and last.day and own_s is not None and last_s is not None and own_s + own.end_s - own.begin_s < last_s:
@@ -199,11 +199,12 @@ def _visit(other: StoredMap, last: Visit, found: Found, day: str) -> Visit:
     if own.begin_s <= last.end_s:  # two clocks that begin at 0
         days = (_date(day) - _date(last.day)).days if day and last.day else 1
         shift_s = last.begin_s - own.begin_s + max(days * _DAY_S, math.ceil(last.end_s - last.begin_s) + 1.0)
-    rows = tuple(tuple(float(value) for value in row) for row in found.map_from_other)
-    return Visit(
-        day=day, recording=own.recording, begin_s=own.begin_s + shift_s, end_s=own.end_s + shift_s, shift_s=shift_s,
-        map_from_recording=rows, rig=own.rig, frames=own.frames, checks=found.checks,  # pyright: ignore[reportArgumentType]
-    )  # fmt: skip
+    begin_s, end_s = own.begin_s + shift_s, own.end_s + shift_s
+    return msgspec.structs.replace(own, day=day, begin_s=begin_s, end_s=end_s, shift_s=shift_s)
+
+
+def _rows(pose: Float[np.ndarray, "4 4"]) -> tuple[tuple[float, ...], ...]:
+    return tuple(tuple(float(value) for value in row) for row in pose)
 
 
 def _when(stamp_s: float) -> str:

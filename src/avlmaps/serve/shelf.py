@@ -305,6 +305,11 @@ class _Slot:
         if self._source.tells:
             note(f"{self.name}: the map was replaced; the new one was opened in {perf_counter() - begin:.1f} s.")
 
+    @property
+    def is_stale(self) -> bool:
+        """Whether the map that answers is not the one in the folder: that is gone, or cannot be opened."""
+        return self.fault is not None or self._source.stamp() is None
+
     def wait(self, timeout_s: float) -> None:
         thread = self._opening
         if thread is not None:
@@ -378,8 +383,8 @@ class Shelf:
         return [self.get(name) for name in self.names]
 
     def is_stale(self, name: str) -> bool:
-        """Return whether a map was replaced by one that cannot be opened."""
-        return self._slots[name].fault is not None
+        """Return whether a map is gone, or was replaced by one that cannot be opened; the old one answers."""
+        return self._slots[name].is_stale
 
     def refresh(self, wait_s: float = 0.0) -> None:
         """Look for replaced maps, and wait up to a time until they are open."""
