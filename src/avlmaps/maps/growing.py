@@ -391,7 +391,7 @@ class GrowingMap:
 
     def _rehearse(self) -> "GrowingMap":
         """Return a map of the frames that wait, as if no other came; what encoders made of them is used again."""
-        other = GrowingMap(self.settings, self.encoders, self._given_up)
+        other = GrowingMap(self.settings, self.encoders, self._given_up, begins_s=self._walk.begins_s)
         other._rehearsed, other._dim = self._rehearsal.features, self._dim
         other._keyframes.share(self._rehearsal.described)
         other._left_out = list(self._left_out)
