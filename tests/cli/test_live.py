@@ -10,7 +10,6 @@ from avlmaps.maps.store.reader import open_stored
 from avlmaps.recordings.layout import DESCRIPTION, UNFINISHED
 
 
-
 @pytest.mark.parametrize("pace", [["--as-fast-as-possible", "--every-frame"], ["--rate", "50"]])
 def test_a_recording_is_played_into_a_map(answer, walk: Path, tmp_path: Path, pace: list[str]) -> None:
     path = tmp_path / "live.avlmap"
