@@ -18,7 +18,7 @@ pytestmark = pytest.mark.slow
 def sparse(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return 60 frames of a whole walk, steps of a metre and more between them."""
     path = tmp_path_factory.mktemp("sparse") / "walk"
-    settings = RecordSettings(size=(160, 120), max_frames=60, hearing="none")
+    settings = RecordSettings(size=(160, 120), max_frames=60, hearing="none", workers=1)
     record_scene(open_scene(request.param), path, settings)
     return path
 
