@@ -12,16 +12,15 @@ import numpy as np
 
 from avlmaps.core.arrays import Float
 from avlmaps.core.timeline import Trajectory
-from avlmaps.maps.sources.correlation import Correlations, correlate
+from avlmaps.maps.sources.correlation import Correlations
 from avlmaps.maps.sources.settings import SourceSettings
-from avlmaps.maps.sources.steered import loudest_frames, steer_pairs
+from avlmaps.maps.sources.steered import loudest_of_sound, steer_pairs
 from avlmaps.recordings.audio import AudioTrack
-from avlmaps.recordings.channels import read_channels
 from avlmaps.recordings.microphones import Microphones
 
 MOST_MICROPHONES = 8  # more choices than can be tried beyond
 _RARE = 4.0  # log-odds against a turned channel
-_MOST_SOUNDS, _MOST_FRAMES, _MOST_PLACES, _LONGEST_S, _BEFORE_S = 6, 40, 4000, 5.0, 1.0
+_MOST_SOUNDS, _MOST_FRAMES, _MOST_PLACES, _LONGEST_S = 6, 40, 4000, 5.0
 
 
 def signs_of(
@@ -72,14 +71,10 @@ def signs_along(
         return plain
     place = place_m[:: -(-len(place_m) // _MOST_PLACES)].astype(np.float64)
     steered: list[tuple[Correlations, Float[np.ndarray, "p c"]]] = []
-    for onset_s, offset_s in sorted(spans_s, key=lambda span: span[0] - span[1])[:_MOST_SOUNDS]:
-        begin_s = max(onset_s - _BEFORE_S, track.start_s)
-        sound = read_channels(track, begin_s, min(offset_s, onset_s + _LONGEST_S))
-        found = correlate(
-            sound.samples, sound.rate_hz, begin_s, onset_s - begin_s, microphones.longest_m, microphones.delay_s
+    for span_s in sorted(spans_s, key=lambda span: span[0] - span[1])[:_MOST_SOUNDS]:
+        found = loudest_of_sound(
+            track, microphones, walk, span_s, longest_s=_LONGEST_S, most=_MOST_FRAMES, smoothing=settings.smoothing
         )
-        found = found.take(np.flatnonzero((found.at_s >= walk.stamps_s[0]) & (found.at_s <= walk.stamps_s[-1])))
-        found = found.take(loudest_frames(found, _MOST_FRAMES)).smoothed(settings.smoothing)
         if len(found.at_s):
             steered.append((found, steer_pairs(found, microphones.in_world_m(walk.at(found.at_s)), place)))
     return signs_of(steered, settings) if steered else plain

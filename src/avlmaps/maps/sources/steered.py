@@ -7,15 +7,54 @@ pairs and bins of weight times cosine at the delays of its place (SRP-PHAT, DiBi
 import numpy as np
 
 from avlmaps.core.arrays import Float, Int
-from avlmaps.maps.sources.correlation import SPEED_M_S, Correlations
+from avlmaps.core.timeline import Trajectory
+from avlmaps.maps.sources.correlation import SPEED_M_S, Correlations, correlate
+from avlmaps.recordings.audio import AudioTrack
+from avlmaps.recordings.channels import read_channels
+from avlmaps.recordings.microphones import Microphones
 
 MOST_FRAMES = 150
+_BEFORE_S = 1.0  # of a sound, by which its noise is known
 
 
 def loudest_frames(found: Correlations, most: int = MOST_FRAMES) -> Int[np.ndarray, " k"]:
     """Return the frames that say most, in the order of time."""
     useful = np.flatnonzero(found.weight > 0.0)
     return np.sort(useful[np.argsort(-found.weight[useful], kind="stable")[:most]])
+
+
+def loudest_of_sound(
+    track: AudioTrack,
+    microphones: Microphones,
+    walk: Trajectory,
+    span_s: tuple[float, float],
+    *,
+    longest_s: float,
+    most: int,
+    smoothing: float,
+) -> Correlations:
+    """Return the frames of a sound that say most of those at which the robot's place is known; perhaps none.
+
+    Args:
+        track: of the channels of these microphones.
+        microphones: of the robot.
+        walk: the camera's poses.
+        span_s: onset and offset of the sound.
+        longest_s: of it that is read.
+        most: frames.
+        smoothing: of their curves, steps.
+
+    Raises:
+        AudioError: the track cannot be read.
+    """
+    onset_s, offset_s = span_s
+    begin_s = max(onset_s - _BEFORE_S, track.start_s)
+    sound = read_channels(track, begin_s, min(offset_s, onset_s + longest_s))
+    found = correlate(
+        sound.samples, sound.rate_hz, begin_s, onset_s - begin_s, microphones.longest_m, microphones.delay_s
+    )
+    found = found.take(np.flatnonzero((found.at_s >= walk.stamps_s[0]) & (found.at_s <= walk.stamps_s[-1])))
+    return found.take(loudest_frames(found, most)).smoothed(smoothing)
 
 
 def steer(

@@ -14,13 +14,12 @@ import numpy as np
 from avlmaps.core.arrays import Float, Int
 from avlmaps.core.poses import apply, rotation_to_level
 from avlmaps.core.timeline import Trajectory
-from avlmaps.maps.sources.correlation import SPEED_M_S, Correlations, correlate
-from avlmaps.maps.sources.steered import loudest_frames
+from avlmaps.maps.sources.correlation import SPEED_M_S, Correlations
+from avlmaps.maps.sources.steered import loudest_of_sound
 from avlmaps.recordings.audio import AudioTrack
-from avlmaps.recordings.channels import read_channels
 from avlmaps.recordings.microphones import Microphones
 
-_MOST_SOUNDS, _MOST_FRAMES, _LONGEST_S, _BEFORE_S = 30, 80, 10.0, 1.0
+_MOST_SOUNDS, _MOST_FRAMES, _LONGEST_S = 30, 80, 10.0
 _LEAST_FRAMES = 6
 _MOST_ORDERED = 4  # microphones of which every order is tried; of more, exchanges one after the other
 MOST_MICROPHONES = 8
@@ -169,13 +168,9 @@ class _Heard:
         cls, track: AudioTrack, array: Microphones, walk: Trajectory, span_s: tuple[float, float]
     ) -> "_Heard | None":
         """Return what was heard of a sound; None where hardly a frame stands out."""
-        onset_s, offset_s = span_s[0], min(span_s[1], span_s[0] + _LONGEST_S)
-        begin_s = max(onset_s - _BEFORE_S, track.start_s)
-        sound = read_channels(track, begin_s, offset_s)
-        found = correlate(sound.samples, sound.rate_hz, begin_s, onset_s - begin_s, array.longest_m, array.delay_s)
-        known = np.flatnonzero((found.at_s >= walk.stamps_s[0]) & (found.at_s <= walk.stamps_s[-1]))
-        found = found.take(known)
-        found = found.take(loudest_frames(found, _MOST_FRAMES)).smoothed(_SMOOTHING)
+        found = loudest_of_sound(
+            track, array, walk, span_s, longest_s=_LONGEST_S, most=_MOST_FRAMES, smoothing=_SMOOTHING
+        )
         if len(found.at_s) < _LEAST_FRAMES:
             return None
         poses = walk.at(found.at_s)
