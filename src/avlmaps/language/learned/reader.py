@@ -18,7 +18,7 @@ from jaxtyping import Float32
 
 from avlmaps.core.errors import BackendError
 from avlmaps.language.intents import Inquiry, Intent
-from avlmaps.language.learned import linear  # fmt: skip
+from avlmaps.language.learned import linear
 from avlmaps.language.learned.features import columns, features
 from avlmaps.language.learned.grammar import INDEX, SYMBOLS
 from avlmaps.language.learned.limits import Limits

@@ -14,6 +14,7 @@ from avlmaps.language.program import syntax, value_types
 from avlmaps.language.program.budget import refused
 from avlmaps.language.program.calls import check_exactly_one, nearest, parameter_of
 from avlmaps.language.program.table import SKILLS, Parameter, Skill
+from avlmaps.language.program.value_types import ValueType
 
 # Passes over the program in which the kinds of its names settle; a program that needs more is left to the run.
 _MOST_PASSES = 6
@@ -26,7 +27,7 @@ class Unsure(Enum):
     NOT_YET = auto()
 
 
-Guess = value_types.ValueType | Unsure
+Guess = ValueType | Unsure
 
 
 def check(statements: tuple[syntax.Statement, ...]) -> None:
@@ -43,30 +44,26 @@ def check(statements: tuple[syntax.Statement, ...]) -> None:
             kinds.see(statement)
 
 
-def check_argument(line: int, skill: Skill, parameter: Parameter, kind: value_types.ValueType) -> None:
+def check_argument(line: int, skill: Skill, parameter: Parameter, kind: ValueType) -> None:
     """Refuse a skill an argument of a kind that its parameter does not take."""
     if kind in parameter.kinds:
         return
-    takes = [str(each) for each in value_types.ValueType if each in parameter.kinds]
+    takes = [str(each) for each in ValueType if each in parameter.kinds]
     wanted = takes[0] if len(takes) == 1 else f"{', '.join(takes[:-1])} or {takes[-1]}"
-    makers = [
-        f"`{other.name}`"
-        for other in SKILLS.values()
-        if other.returns in parameter.kinds - {value_types.ValueType.NOTHING}
-    ]
+    makers = [f"`{other.name}`" for other in SKILLS.values() if other.returns in parameter.kinds - {ValueType.NOTHING}]
     made = f"; {' or '.join(makers)} gives one" if makers and len(parameter.kinds) == 1 else ""
     raise refused(
         line, f"`{skill.name}` takes {wanted} as its `{parameter.name}`, not {kind}; it is {skill.signature}{made}"
     )
 
 
-def kind_of_constant(value: object) -> value_types.ValueType:
+def kind_of_constant(value: object) -> ValueType:
     """Return the kind of a literal."""
     if value is None:
-        return value_types.ValueType.NOTHING
+        return ValueType.NOTHING
     if isinstance(value, bool):
-        return value_types.ValueType.TRUTH
-    return value_types.ValueType.STRING if isinstance(value, str) else value_types.ValueType.NUMBER
+        return ValueType.TRUTH
+    return ValueType.STRING if isinstance(value, str) else ValueType.NUMBER
 
 
 def _names_given(statement: syntax.Statement) -> tuple[str, ...]:
@@ -156,7 +153,7 @@ class _Kinds:
                     statement.line, statement.operator, self.names.get(statement.name, Unsure.NOT_YET),
                     self.of(statement.value),
                 )  # fmt: skip
-                if self.settled and statement.operator == "+" and made is value_types.ValueType.LIST:
+                if self.settled and statement.operator == "+" and made is ValueType.LIST:
                     raise grown(statement)
                 self._join(statement.name, made)
             case syntax.Perform():
@@ -166,11 +163,11 @@ class _Kinds:
                     self._truth(branch.test)
             case syntax.For():
                 kind = self.of(statement.through)
-                if isinstance(kind, value_types.ValueType):
+                if isinstance(kind, ValueType):
                     value_types.check_walked(statement.line, kind)
-                counts = kind is value_types.ValueType.RANGE and not statement.target.unpacks
+                counts = kind is ValueType.RANGE and not statement.target.unpacks
                 for name in statement.target.names:
-                    self._join(name, value_types.ValueType.NUMBER if counts else Unsure.ANYTHING)
+                    self._join(name, ValueType.NUMBER if counts else Unsure.ANYTHING)
 
     def _give(self, statement: syntax.Assign) -> None:
         target, value = statement.target, statement.value
@@ -183,7 +180,7 @@ class _Kinds:
                 raise misfit(statement.line, target, len(kinds))
         else:
             kind = self.of(value)
-            if isinstance(kind, value_types.ValueType):
+            if isinstance(kind, ValueType):
                 value_types.check_unpacked(statement.line, kind)
             kinds = [Unsure.ANYTHING] * len(target.names)
         for name, kind in zip(target.names, kinds, strict=True):
@@ -194,7 +191,7 @@ class _Kinds:
 
     def _truth(self, test: syntax.Expression) -> None:
         kind = self.of(test)
-        if isinstance(kind, value_types.ValueType):
+        if isinstance(kind, ValueType):
             value_types.check_truth(test.line, kind)
 
     def of(self, part: syntax.Expression) -> Guess:
@@ -210,16 +207,16 @@ class _Kinds:
     def collection(self, part: syntax.Collection) -> Guess:
         for element in part.elements:
             self.of(element)
-        return value_types.ValueType.LIST if part.is_list else value_types.ValueType.TUPLE
+        return ValueType.LIST if part.is_list else ValueType.TUPLE
 
     def unary(self, part: syntax.Unary) -> Guess:
         if part.operator == "not":
             self._truth(part.operand)
-            return value_types.ValueType.TRUTH
+            return ValueType.TRUTH
         kind = self.of(part.operand)
-        if isinstance(kind, value_types.ValueType):
+        if isinstance(kind, ValueType):
             value_types.check_sign(part.line, part.operator, kind)
-        return value_types.ValueType.NUMBER
+        return ValueType.NUMBER
 
     def binary(self, part: syntax.Binary) -> Guess:
         return self.arithmetic(part.line, part.operator, self.of(part.left), self.of(part.right))
@@ -227,15 +224,15 @@ class _Kinds:
     def comparison(self, part: syntax.Comparison) -> Guess:
         kinds = [self.of(each) for each in (part.first, *part.rest)]
         for operator, left, right in zip(part.operators, kinds, kinds[1:], strict=False):
-            if isinstance(left, value_types.ValueType) and isinstance(right, value_types.ValueType):
+            if isinstance(left, ValueType) and isinstance(right, ValueType):
                 value_types.check_comparison(part.line, operator, left, right)
-        return value_types.ValueType.TRUTH
+        return ValueType.TRUTH
 
     def logical(self, part: syntax.Logical) -> Guess:
         # Each operand is computed once: twice at each level would double the work with every level of nesting.
         kinds = [self.of(operand) for operand in part.operands]
         for operand, kind in zip(part.operands[:-1], kinds, strict=False):
-            if isinstance(kind, value_types.ValueType):
+            if isinstance(kind, ValueType):
                 value_types.check_truth(operand.line, kind)
         return reduce(_joined, kinds)
 
@@ -245,33 +242,31 @@ class _Kinds:
 
     def element(self, part: syntax.Element) -> Guess:
         of, index = self.of(part.of), self.of(part.index)
-        if isinstance(of, value_types.ValueType) and isinstance(index, value_types.ValueType):
+        if isinstance(of, ValueType) and isinstance(index, ValueType):
             value_types.check_indexed(part.line, of, index)
         return Unsure.ANYTHING
 
     def function(self, call: syntax.BuiltinCall) -> Guess:
         kinds = tuple(self.of(argument) for argument in call.arguments)
-        known = tuple(kind for kind in kinds if isinstance(kind, value_types.ValueType))
+        known = tuple(kind for kind in kinds if isinstance(kind, ValueType))
         if len(known) == len(kinds):
             value_types.check_function(call.line, call.function, known)
-        return value_types.ValueType.RANGE if call.function == "range" else value_types.ValueType.NUMBER
+        return ValueType.RANGE if call.function == "range" else ValueType.NUMBER
 
     def skill(self, call: syntax.SkillCall) -> Guess:
         skill = SKILLS[call.skill]
         kinds = [self.of(argument.value) for argument in call.arguments]
         for argument, kind in zip(call.arguments, kinds, strict=True):
-            if isinstance(kind, value_types.ValueType):
+            if isinstance(kind, ValueType):
                 check_argument(argument.value.line, skill, parameter_of(skill, argument.parameter), kind)
-        surely = sum(
-            isinstance(kind, value_types.ValueType) and kind is not value_types.ValueType.NOTHING for kind in kinds
-        )
-        if surely > 1 or all(kind is value_types.ValueType.NOTHING for kind in kinds):
+        surely = sum(isinstance(kind, ValueType) and kind is not ValueType.NOTHING for kind in kinds)
+        if surely > 1 or all(kind is ValueType.NOTHING for kind in kinds):
             check_exactly_one(call.line, skill, surely)
         return skill.returns
 
     def arithmetic(self, line: int, operator: str, left: Guess, right: Guess) -> Guess:
         """Return the kind that an operator makes of two, as far as they are known."""
-        if isinstance(left, value_types.ValueType) and isinstance(right, value_types.ValueType):
+        if isinstance(left, ValueType) and isinstance(right, ValueType):
             return value_types.kind_of_result(line, operator, left, right)
         return Unsure.NOT_YET if Unsure.NOT_YET in (left, right) else Unsure.ANYTHING
 

@@ -12,6 +12,8 @@ from avlmaps.language.program.calls import check_exactly_one, parameter_of
 from avlmaps.language.program.check import check_argument, grown, misfit
 from avlmaps.language.program.table import SKILLS
 from avlmaps.language.program.trace import Step, Trace, told
+from avlmaps.language.program.value_types import ValueType
+from avlmaps.language.program.values import Value
 from avlmaps.language.program.vocabulary import Vocabulary
 
 # Between two skills the clock is read once in this many steps.
@@ -113,7 +115,7 @@ class _Run:
                 "raise the budget",
             )
 
-    def keep_value(self, line: int, value: values.Value) -> None:
+    def keep_value(self, line: int, value: Value) -> None:
         """Count the elements of a value that was made."""
         self.keep(line, self.sizes.of(line, value))
 
@@ -176,7 +178,7 @@ class _Run:
     def update(self, statement: syntax.Update) -> None:
         before = self.value(syntax.Name(statement.name, statement.line))
         value = self.value(statement.value)
-        if statement.operator == "+" and values.kind_of(before) is values.kind_of(value) is value_types.ValueType.LIST:
+        if statement.operator == "+" and values.kind_of(before) is values.kind_of(value) is ValueType.LIST:
             raise grown(statement)
         self.names[statement.name] = self.arithmetic(statement.line, statement.operator, before, value)
 
@@ -191,10 +193,10 @@ class _Run:
         value_types.check_truth(part.line, values.kind_of(value))
         return bool(value)
 
-    def constant(self, part: syntax.Constant) -> values.Value:
+    def constant(self, part: syntax.Constant) -> Value:
         return part.value
 
-    def name(self, part: syntax.Name) -> values.Value:
+    def name(self, part: syntax.Name) -> Value:
         try:
             return self.names[part.name]
         except KeyError:
@@ -202,22 +204,22 @@ class _Run:
                 part.line, f"`{part.name}` has no value yet; give it one before, on every way that leads here"
             ) from None
 
-    def collection(self, part: syntax.Collection) -> values.Value:
+    def collection(self, part: syntax.Collection) -> Value:
         elements = [self.value(element) for element in part.elements]
         made = elements if part.is_list else tuple(elements)
         self.keep_value(part.line, made)
         return made
 
-    def unary(self, part: syntax.Unary) -> values.Value:
+    def unary(self, part: syntax.Unary) -> Value:
         if part.operator == "not":
             return not self.truth(part.operand)
         return values.signed(part.line, part.operator, self.value(part.operand))
 
-    def binary(self, part: syntax.Binary) -> values.Value:
+    def binary(self, part: syntax.Binary) -> Value:
         left = self.value(part.left)
         return self.arithmetic(part.line, part.operator, left, self.value(part.right))
 
-    def arithmetic(self, line: int, operator: str, left: Any, right: Any) -> values.Value:
+    def arithmetic(self, line: int, operator: str, left: Any, right: Any) -> Value:
         try:
             made = values.combined(line, operator, left, right, self.budget.factors)
         except ProgramError:
@@ -243,7 +245,7 @@ class _Run:
             left = right
         return True
 
-    def logical(self, part: syntax.Logical) -> values.Value:
+    def logical(self, part: syntax.Logical) -> Value:
         stops_at = part.operator == "or"
         for operand in part.operands[:-1]:
             value = self.value(operand)
@@ -252,15 +254,15 @@ class _Run:
                 return value
         return self.value(part.operands[-1])
 
-    def conditional(self, part: syntax.Conditional) -> values.Value:
+    def conditional(self, part: syntax.Conditional) -> Value:
         return self.value(part.chosen if self.truth(part.test) else part.otherwise)
 
-    def element(self, part: syntax.Element) -> values.Value:
+    def element(self, part: syntax.Element) -> Value:
         of, index = self.value(part.of), self.value(part.index)
         value_types.check_indexed(part.line, values.kind_of(of), values.kind_of(index))
         return values.element_of(part.line, of, index)
 
-    def builtin_call(self, part: syntax.BuiltinCall) -> values.Value:
+    def builtin_call(self, part: syntax.BuiltinCall) -> Value:
         arguments = [self.value(argument) for argument in part.arguments]
         kinds = tuple(values.kind_of(argument) for argument in arguments)
         value_types.check_function(part.line, part.function, kinds)
@@ -270,7 +272,7 @@ class _Run:
 
     # ---- skills
 
-    def skill_call(self, part: syntax.SkillCall) -> values.Value:
+    def skill_call(self, part: syntax.SkillCall) -> Value:
         skill = SKILLS[part.skill]
         arguments = {argument.parameter: self.value(argument.value) for argument in part.arguments}
         for name, value in arguments.items():
@@ -286,7 +288,7 @@ class _Run:
         self.keep(part.line, values.size_of_shown(seen))
         return self.perform(part, arguments, seen)
 
-    def perform(self, part: syntax.SkillCall, arguments: dict[str, Any], seen: dict[str, Any]) -> values.Value:
+    def perform(self, part: syntax.SkillCall, arguments: dict[str, Any], seen: dict[str, Any]) -> Value:
         """Call the skill, the one place where a program reaches anything."""
         skill, began = SKILLS[part.skill], self.clock()
         given = {name: values.handed_on(value) for name, value in arguments.items()}
@@ -308,7 +310,7 @@ class _Run:
         self.on_step(step)
 
 
-_EVALUATE: dict[type, Callable[[_Run, Any], values.Value]] = {
+_EVALUATE: dict[type, Callable[[_Run, Any], Value]] = {
     syntax.Constant: _Run.constant,
     syntax.Name: _Run.name,
     syntax.Collection: _Run.collection,
