@@ -5,12 +5,14 @@ sentence reports it.
 """
 
 from dataclasses import dataclass
+from time import time
 
 import numpy as np
 
 from avlmaps.core import poses
 from avlmaps.core.arrays import Bool, Float, Int
 
+DAY_S = 86_400.0
 # Messages of one stream may arrive a little out of order; a step back by more is a clock that was reset.
 MAX_DISORDER_S = 1.0
 # A pause is worth a report when it lasts this long and this many times the usual interval.
@@ -67,6 +69,11 @@ def in_order(stamps_s: Float[np.ndarray, " n"], what: str) -> InOrder:
     if not new.all():
         notices.append(f"{int((~new).sum())} {what} repeat the stamp of the one before and are left out.")
     return InOrder(index[new], tuple(notices))
+
+
+def is_in_future(at_s: float) -> bool:
+    """Return whether a moment, seconds since 1970, is still to come wherever it is tomorrow already."""
+    return at_s > time() + DAY_S
 
 
 def gap_notices(stamps_s: Float[np.ndarray, " n"], what: str, show: int = 3) -> tuple[str, ...]:

@@ -124,8 +124,7 @@ def thumbnail(stored: StoredMap, row: int) -> np.ndarray:
     """Return the picture of a keyframe, (h, w, 3) RGB, as small as the map stores it."""
     import cv2
 
-    keyframes = stored.keyframes
-    code = np.asarray(keyframes.thumbnails[keyframes.thumbnail_offsets[row] : keyframes.thumbnail_offsets[row + 1]])
+    code = stored.keyframes.jpeg(row)
     if not len(code):
         return np.zeros((1, 1, 3), np.uint8)
     picture = cv2.imdecode(code, cv2.IMREAD_COLOR)

@@ -4,13 +4,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from time import time
 
 import numpy as np
 
-from avlmaps.core.arrays import Float, Int, UInt8
+from avlmaps.core.arrays import Float, Int
 from avlmaps.core.errors import MapError
 from avlmaps.core.poses import apply
+from avlmaps.core.timeline import is_in_future
 from avlmaps.days.align import (
     NotTheSamePlaceError,
     consensus,
@@ -23,11 +23,9 @@ from avlmaps.days.settings import MergeSettings
 from avlmaps.days.surfaces import Occupied, refine
 from avlmaps.maps.store.manifest import RecordingInfo, Visit
 from avlmaps.maps.store.reader import StoredMap
-from avlmaps.maps.types import Keyframes
 from avlmaps.recordings.types import Recording
 
 DEFAULTS = MergeSettings()
-_DAY_S = 86_400.0
 _CLOCK_S = 1e8  # later stamps count from 1970: they are a clock's
 _LEAST_COMMON = 3
 _IDENTITY = tuple(tuple(float(value) for value in row) for row in np.eye(4))
@@ -124,7 +122,7 @@ def day_of(at_s: float | None) -> str:
 def clock_s(recording: RecordingInfo | Recording, stamp_s: float) -> float | None:
     """Return when a stamp of a recording was, seconds since 1970; None where no right clock said it."""
     at_s = recording.begins_s + stamp_s
-    return at_s if _CLOCK_S < at_s < time() + _DAY_S else None  # it is tomorrow already elsewhere
+    return at_s if at_s > _CLOCK_S and not is_in_future(at_s) else None
 
 
 def require_another_drive(stored: StoredMap, other: StoredMap, visits: Sequence[Visit]) -> None:
@@ -140,8 +138,7 @@ def require_another_drive(stored: StoredMap, other: StoredMap, visits: Sequence[
         stamps = np.round(np.asarray(keyframes.stamp_s)[rows] - visit.shift_s, 4)
         _, here, there = np.intersect1d(stamps, np.round(np.asarray(others.stamp_s), 4), return_indices=True)
         same = len(here) >= _LEAST_COMMON and all(
-            np.array_equal(_jpeg(keyframes, int(rows[a])), _jpeg(others, int(b)))
-            for a, b in zip(here, there, strict=True)
+            np.array_equal(keyframes.jpeg(int(rows[a])), others.jpeg(int(b))) for a, b in zip(here, there, strict=True)
         )
         if same or visit.recording.fingerprint == other.info.recording.fingerprint:
             raise MapError(
@@ -149,10 +146,6 @@ def require_another_drive(stored: StoredMap, other: StoredMap, visits: Sequence[
                 f"({visit.recording.name}{', ' + visit.day if visit.day else ''}), and one drive counts once; "
                 "merge the map of another drive."
             )
-
-
-def _jpeg(keyframes: Keyframes, row: int) -> UInt8[np.ndarray, " bytes"]:
-    return np.asarray(keyframes.thumbnails[keyframes.thumbnail_offsets[row] : keyframes.thumbnail_offsets[row + 1]])
 
 
 def views_of(stored: StoredMap) -> list[DayViews]:

@@ -4,7 +4,7 @@ import math
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from datetime import UTC, date, datetime, timedelta
+from datetime import UTC, date, datetime, time
 from pathlib import Path
 from time import perf_counter
 
@@ -15,6 +15,7 @@ from avlmaps.core.arrays import Bool, Float, Int
 from avlmaps.core.errors import MapError
 from avlmaps.core.lexicon import Kind, lexicon
 from avlmaps.core.poses import apply, inverse, plain_point
+from avlmaps.core.timeline import DAY_S, is_in_future
 from avlmaps.core.version import __version__
 from avlmaps.core.wording import option
 from avlmaps.days import life as lives
@@ -45,7 +46,6 @@ from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.contents import Thing
 
 ThingsOf = Callable[[AVLMap], Sequence[Thing]]
-_DAY_S = 86_400.0
 
 
 def default_things(least: float) -> ThingsOf:
@@ -175,8 +175,8 @@ def _date(said: str) -> date:
         day = date.fromisoformat(said)
     except ValueError:
         raise MapError(f"{said!r} is no day; write it as 2026-11-25.") from None
-    if day > (today := datetime.now(UTC).date()) + timedelta(days=1):  # it is tomorrow already elsewhere
-        raise MapError(f"{said} is in the future: today is {today}; give the day of the drive.")
+    if is_in_future(datetime.combine(day, time.min, UTC).timestamp()):
+        raise MapError(f"{said} is in the future: today is {datetime.now(UTC).date()}; give the day of the drive.")
     return day
 
 
@@ -198,7 +198,7 @@ def _visit(other: StoredMap, last: Visit, day: str) -> Visit:
     shift_s = 0.0
     if own.begin_s <= last.end_s:  # two clocks that begin at 0
         days = (_date(day) - _date(last.day)).days if day and last.day else 1
-        shift_s = last.begin_s - own.begin_s + max(days * _DAY_S, math.ceil(last.end_s - last.begin_s) + 1.0)
+        shift_s = last.begin_s - own.begin_s + max(days * DAY_S, math.ceil(last.end_s - last.begin_s) + 1.0)
     begin_s, end_s = own.begin_s + shift_s, own.end_s + shift_s
     return msgspec.structs.replace(own, day=day, begin_s=begin_s, end_s=end_s, shift_s=shift_s)
 
@@ -231,9 +231,18 @@ def _look(stored: StoredMap, rows: Int[np.ndarray, " r"]) -> Float[np.ndarray, "
 
 def _looks(life: Life, stored: StoredMap, known: Occupied) -> dict[int, Float[np.ndarray, " d"]]:
     """Return how the things look that are there still, by the number of their stay."""
-    rows = {n: known.row_of(life.voxels(n)) for n, stay in enumerate(life.stays) if stay.gone is None}
-    looks = {number: _look(stored, own[own >= 0]) for number, own in rows.items()}
+    looks = {number: _look(stored, rows) for number, rows in _rows_there(life, known).items()}
     return {number: look for number, look in looks.items() if look is not None}
+
+
+def _rows_there(life: Life, known: Occupied) -> dict[int, Int[np.ndarray, " r"]]:
+    """Return the voxels of what is not gone, by the number of its stay."""
+    return {number: _rows_of(number, life, known) for number, stay in enumerate(life.stays) if stay.gone is None}
+
+
+def _rows_of(number: int, life: Life, known: Occupied) -> Int[np.ndarray, " r"]:
+    rows = known.row_of(life.voxels(number))  # the map's voxels are sorted likewise
+    return rows[rows >= 0]
 
 
 def same_thing(one: str, other: str) -> bool:
@@ -249,8 +258,7 @@ def _with_vanished(
     index, grid = np.asarray(stored.voxels.index), stored.grid
     surface = now.has_surface(grid.centre_of(index))
     loose, through = ~surface, now.views.through(index, grid) >= settings.changes.through_views
-    rows = [known.row_of(life.voxels(number)) for number, stay in enumerate(life.stays) if stay.gone is None]
-    things = changed_things(stored, loose, through, [own[own >= 0] for own in rows], settings.changes)
+    things = changed_things(stored, loose, through, [*_rows_there(life, known).values()], settings.changes)
     stamps = np.array([float(np.max(np.asarray(stored.voxels.last_seen_s)[one.rows])) for one in things])
     seen_on = visit_of_stamps(visits[:-1], stamps).tolist()
     begun = [lives.begun([_seen(one, stored, np.eye(4), 0.0)], on) for one, on in zip(things, seen_on, strict=True)]
@@ -287,8 +295,7 @@ def _still_there(
     through = now.views.through(index, grid) >= settings.changes.through_views
     goes = through & ~surface
     for number, stay in enumerate(life.stays):
-        rows = known.row_of(life.voxels(number))  # the map's voxels are sorted likewise
-        rows = rows[rows >= 0]
+        rows = _rows_of(number, life, known)
         if stay.gone == visit or stay.is_person:
             goes[rows] = ~surface[rows] | stay.is_person
         elif stay.is_there(visit) and stay.first < visit:

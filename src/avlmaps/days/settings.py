@@ -4,6 +4,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from avlmaps.core.timeline import DAY_S
+
 
 @dataclass(frozen=True, slots=True)
 class AlignSettings:
@@ -56,7 +58,7 @@ class ChangeSettings:
     """With another name, where this part of the smaller lies in the other, and it is this part of its voxels."""
     reach_m: float = 20.0
     """What moved farther is not recognised."""
-    within_s: float = 30 * 86_400.0
+    within_s: float = 30 * DAY_S
     """Nor what comes back after more time."""
     least_likeness: float = 0.3
     """Of size, colour and looks together, in [0, 1], for a thing to be the one that is gone from elsewhere."""

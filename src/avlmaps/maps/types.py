@@ -76,6 +76,11 @@ class Keyframes:
     def __repr__(self) -> str:
         return f"Keyframes({len(self)} with {len(self.xy):,} keypoints)"
 
+    def jpeg(self, row: int) -> UInt8[np.ndarray, " n"]:
+        """Return the file of a keyframe's picture; empty where it has none."""
+        first, last = (int(edge) for edge in self.thumbnail_offsets[row : row + 2])
+        return np.asarray(self.thumbnails[first:last])
+
     def take(self, rows: Int[np.ndarray, " r"]) -> "Keyframes":
         """Return some of them."""
         offsets, points = _ragged(np.asarray(self.offsets), rows)

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -134,8 +133,7 @@ def layers_of(
     if heat is not None and (asked := opened.ask(heat).heat) is not None:
         warm = heat, np.asarray(asked.values, np.float32)
     keyframes, rig = stored.keyframes, stored.rig
-    edges = keyframes.thumbnail_offsets
-    pictures = tuple(bytes(keyframes.thumbnails[a:b]) for a, b in pairwise(edges))
+    pictures = tuple(keyframes.jpeg(row).tobytes() for row in range(len(keyframes)))
     return Layers(
         frame=frame,
         points=placed(opened.points).astype(np.float32),

@@ -14,10 +14,10 @@ from fnmatch import fnmatch
 from functools import cache
 from itertools import islice
 from pathlib import Path
-from time import time
 
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.registry import entry_points
+from avlmaps.core.timeline import is_in_future
 from avlmaps.core.wording import option
 from avlmaps.recordings import layout
 from avlmaps.recordings.faults import Report, stop_at_first
@@ -28,7 +28,6 @@ ENTRY_POINT_GROUP = "avlmaps.formats"
 LOOKED_AT = 2000
 # A sound track that covers a smaller share of the frames is worth a notice.
 _LEAST_SHARED = 0.5
-_DAY_S = 86_400.0
 _YEAR_9999_S = 253_402_300_799.0
 _HERE = "avlmaps.recordings.formats"
 _BAG_SUFFIXES = (".bag", ".mcap", ".db3")
@@ -86,7 +85,7 @@ class Format:
         else:
             recording = opener(path, report=report) if self.tells_faults else opener(path)
         settle_sound(recording)
-        if recording.begins_s > time() + _DAY_S:
+        if is_in_future(recording.begins_s):
             when = datetime.fromtimestamp(min(recording.begins_s, _YEAR_9999_S), UTC).date()
             notice = f"The stamps begin on {when}, in the future: the clock was wrong, and no day is taken from it."
             recording.notices = (*recording.notices, notice)

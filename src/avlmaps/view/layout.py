@@ -150,8 +150,7 @@ class Layout:
         keyframes = self.avlmap.stored.keyframes
         if not 0 <= number < len(keyframes):
             return None
-        start, stop = (int(value) for value in keyframes.thumbnail_offsets[number : number + 2])
-        return np.asarray(keyframes.thumbnails[start:stop]).tobytes() or None
+        return keyframes.jpeg(number).tobytes() or None
 
 
 def _order_of_file(
