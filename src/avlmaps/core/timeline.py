@@ -17,8 +17,8 @@ DAY_S = 86_400.0
 MAX_DISORDER_S = 1.0
 # A pause is worth a report when it lasts this long and this many times the usual interval.
 MIN_GAP_S = 1.0
-_ANOTHER_DRIVE_S = 3600.0
 MIN_GAP_INTERVALS = 5.0
+_ANOTHER_DRIVE_S = 3600.0  # a pause from which on it is another drive
 # A pose may be held this long past the ends of its stream: a frame of a 30 Hz camera may stick out by one interval.
 EDGE_TOLERANCE_S = 0.04
 
@@ -84,16 +84,17 @@ def gap_notices(stamps_s: Float[np.ndarray, " n"], what: str, show: int = 3) -> 
     gaps = np.flatnonzero(interval_s > max(MIN_GAP_S, MIN_GAP_INTERVALS * float(np.median(interval_s))))
     if len(gaps) == 0:
         return ()
-    longest = gaps[np.argsort(-interval_s[gaps], kind="stable")[:show]]
-    lasted = [f"{interval_s[g]:.{'3g' if interval_s[g] < 1000.0 else '0f'}}" for g in sorted(longest)]
-    pauses = ", ".join(
-        f"{own} s after {stamps_s[g] - stamps_s[0]:.2f} s" for own, g in zip(lasted, sorted(longest), strict=True)
-    )
+    longest = np.sort(gaps[np.argsort(-interval_s[gaps], kind="stable")[:show]])
+    pauses = ", ".join(f"{_plain(interval_s[g])} s after {stamps_s[g] - stamps_s[0]:.2f} s" for g in longest)
     more = f" and {len(gaps) - show} more" if len(gaps) > show else ""
     told = (f"There are no {what} for {pauses}{more}.",)
-    if interval_s[longest[0]] < _ANOTHER_DRIVE_S:
+    if interval_s[longest].max() < _ANOTHER_DRIVE_S:
         return told
     return (*told, "A pause of hours means several drives: build a map of each, then `avlmaps merge` them.")
+
+
+def _plain(length_s: float) -> str:
+    return f"{length_s:.3g}" if length_s < 1000.0 else f"{length_s:.0f}"
 
 
 def associate(

@@ -57,7 +57,7 @@ def _determinant(letters: str) -> float:
     return float(np.linalg.det(np.array([_DIRECTIONS[letter] for letter in letters])))
 
 
-UP_IN_WORLD = np.array([0.0, 1.0, 0.0])
+UP_IN_WORLD = np.array([0.0, 1.0, 0.0])  # of phones: ARKit's world has y up, against gravity
 
 
 def from_opengl(world_from_camera: Float[np.ndarray, "*n 4 4"]) -> Float[np.ndarray, "*n 4 4"]:
