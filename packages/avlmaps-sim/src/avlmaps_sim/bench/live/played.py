@@ -34,7 +34,7 @@ class Played:
         encoded_later: frames that waited on the disk and were encoded after all.
         asked_ms: of each question meanwhile.
         processor_ms: a frame, by thread; ``all`` has reading the recording and the questions in it.
-        oldest_save_s: the most that a kill would have lost.
+        oldest_save_s: how old the last save was at most; a kill loses what is new since, and often nothing is.
         laps: after each lap: voxels, keyframes, frames fused until then, resident MB.
         load: of the machine, at the end.
     """
