@@ -85,7 +85,7 @@ def gap_notices(stamps_s: Float[np.ndarray, " n"], what: str, show: int = 3) -> 
     if len(gaps) == 0:
         return ()
     longest = np.sort(gaps[np.argsort(-interval_s[gaps], kind="stable")[:show]])
-    pauses = ", ".join(f"{_plain(interval_s[g])} s after {stamps_s[g] - stamps_s[0]:.2f} s" for g in longest)
+    pauses = ", ".join(f"{_plain(float(interval_s[g]))} s after {stamps_s[g] - stamps_s[0]:.2f} s" for g in longest)
     more = f" and {len(gaps) - show} more" if len(gaps) > show else ""
     told = (f"There are no {what} for {pauses}{more}.",)
     if interval_s[longest].max() < _ANOTHER_DRIVE_S:
