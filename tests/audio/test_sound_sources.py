@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from avlmaps.maps.sources.candidates import CELL_M, candidates_of
 from avlmaps.maps.sources.carried import carry_evidence
 from avlmaps.maps.sources.correlation import SPEED_M_S, correlate
-from avlmaps.maps.sources.density import Density, Plan, Spread, log_same_place
+from avlmaps.maps.sources.density import CandidateGrid, Density, Spread, log_same_place
 from avlmaps.maps.sources.level import levels_db, unknown_offset
 from avlmaps.maps.sources.settings import SourceSettings
 from avlmaps.maps.sources.steered import steer
@@ -119,10 +119,10 @@ def test_sound_from_behind_a_wall_comes_through_the_doorway() -> None:
 # --- probabilities
 
 
-def densities(seed: int) -> tuple[Plan, np.ndarray, list[Density]]:
+def densities(seed: int) -> tuple[CandidateGrid, np.ndarray, list[Density]]:
     rng = np.random.default_rng(seed)
     place = room(step=0.15)
-    plan, prior = Plan.of(place), uniform(place)
+    plan, prior = CandidateGrid.of(place), uniform(place)
     spots = place[rng.choice(len(place), 2)]
     out = [
         Density.of(plan, prior, -((place - at) ** 2).sum(axis=1) / 0.1, np.zeros(len(place)), SourceSettings())
@@ -161,7 +161,7 @@ def around(sigma_m: float, seed: int, numbers: SourceSettings) -> Density:
     place, rng = room(step=0.15), np.random.default_rng(seed)
     at = rng.uniform([1.5, 1.5, 0.0], [4.5, 3.5, 0.0])
     evidence = -((place - at)[:, :2] ** 2).sum(axis=1) / (2.0 * sigma_m**2)
-    return Density.of(Plan.of(place), uniform(place), evidence, np.zeros(len(place)), numbers)
+    return Density.of(CandidateGrid.of(place), uniform(place), evidence, np.zeros(len(place)), numbers)
 
 
 @given(st.floats(0.05, 1.5), st.floats(1.1, 4.0), st.integers(0, 9))
@@ -182,7 +182,7 @@ def test_larger_errors_never_make_a_place_likelier(blur_m: float, wider: float, 
 @given(st.integers(0, 200))
 @settings(max_examples=20, deadline=None)
 def test_a_source_that_lies_in_one_cell_is_right_with_certainty(seed: int) -> None:
-    plan = Plan.of(room(step=0.15))
+    plan = CandidateGrid.of(room(step=0.15))
     share = np.zeros(plan.shape)
     share.ravel()[np.random.default_rng(seed).choice(np.flatnonzero(plan.is_held))] = 1.0
     assert Density(plan, share).spread == Spread(1.0, 0.0, 0.0)
@@ -240,7 +240,7 @@ def test_what_a_day_did_not_see_is_less_likely_by_its_distance() -> None:
 
 def test_shares_of_candidates_add_up_to_their_cells() -> None:
     place = room(step=0.15)
-    plan, prior = Plan.of(place), uniform(place)
+    plan, prior = CandidateGrid.of(place), uniform(place)
     evidence = -((place - place[100]) ** 2).sum(axis=1) / 0.1
     density = Density.of(plan, prior, evidence, np.zeros(len(place)), SourceSettings())
     share = density.of_candidates(prior, evidence)

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.inflection import plural_of, singulars_of
-from avlmaps.core.lexicon import Entry, Kind, lexicon, noun_of
+from avlmaps.core.lexicon import Entry, EntryKind, lexicon, noun_of
 from avlmaps.core.spelling import distance, squeezed
 
 KNOWN = lexicon()
@@ -33,8 +33,8 @@ def test_every_spelling_in_any_case_joined_or_split_names_its_entry(entry: Entry
     assert same(f"  {spelling}  ", entry)
 
 
-@pytest.mark.parametrize("kind", [Kind.THING, Kind.ROOM])
-def test_plurals_name_the_entry_too(kind: Kind) -> None:
+@pytest.mark.parametrize("kind", [EntryKind.THING, EntryKind.ROOM])
+def test_plurals_name_the_entry_too(kind: EntryKind) -> None:
     for entry in KNOWN.entries(kind):
         assert same(entry.plural, entry), entry
         for spelling in entry.spellings:
@@ -42,7 +42,7 @@ def test_plurals_name_the_entry_too(kind: Kind) -> None:
 
 
 def test_no_spelling_names_two_entries_of_a_kind_unless_it_is_declared_ambiguous() -> None:
-    for kind in Kind:
+    for kind in EntryKind:
         seen: dict[str, str] = {}
         for entry in KNOWN.entries(kind):
             keys = [squeezed(spelling) for spelling in entry.spellings]
@@ -52,7 +52,7 @@ def test_no_spelling_names_two_entries_of_a_kind_unless_it_is_declared_ambiguous
 
 
 def test_names_are_unique_and_ambiguous_words_name_entries() -> None:
-    for kind in Kind:
+    for kind in EntryKind:
         names = [squeezed(entry.name) for entry in KNOWN.entries(kind)]
         assert len(set(names)) == len(names)
         for senses in KNOWN.ambiguous[kind].values():
@@ -61,15 +61,15 @@ def test_names_are_unique_and_ambiguous_words_name_entries() -> None:
 
 
 def test_what_entries_refer_to_are_entries_by_their_names() -> None:
-    def is_name(name: str, kind: Kind) -> bool:
+    def is_name(name: str, kind: EntryKind) -> bool:
         entry = KNOWN.find(name, kind)
         return entry is not None and entry.name == name
 
     for entry in ENTRIES:
         assert all(is_name(name, entry.kind) for name in (*entry.wider, *entry.like)), entry
-        assert all(is_name(name, Kind.THING) for name in entry.makers), entry
-        assert all(is_name(name, Kind.SOUND) for name in entry.sounds), entry
-        assert all(is_name(name, Kind.ROOM) for name in entry.rooms if name != "*"), entry
+        assert all(is_name(name, EntryKind.THING) for name in entry.makers), entry
+        assert all(is_name(name, EntryKind.SOUND) for name in entry.sounds), entry
+        assert all(is_name(name, EntryKind.ROOM) for name in entry.rooms if name != "*"), entry
         assert all(word == word.strip() and word for word in entry.spellings), entry
         assert entry not in KNOWN.wider(entry.name, entry.kind), f"{entry} is wider than itself"
 
@@ -88,9 +88,9 @@ def test_wider_kinds_and_members_are_two_sides_of_one_relation(entry: Entry) -> 
 
 
 def test_a_thing_makes_the_sounds_that_name_it_as_their_maker() -> None:
-    for sound in KNOWN.entries(Kind.SOUND):
+    for sound in KNOWN.entries(EntryKind.SOUND):
         for maker in sound.makers:
-            thing = KNOWN.find(maker, Kind.THING)
+            thing = KNOWN.find(maker, EntryKind.THING)
             assert thing is not None
             assert sound.name in thing.sounds
 
@@ -104,14 +104,14 @@ def test_a_thing_makes_the_sounds_that_name_it_as_their_maker() -> None:
     ],
 )  # fmt: skip
 def test_the_head_is_the_longest_known_tail_before_what_describes_it(phrase: str, name: str | None) -> None:
-    head = KNOWN.head(phrase, Kind.THING)
+    head = KNOWN.head(phrase, EntryKind.THING)
     assert (head.name if head else None) == name
 
 
 def test_one_word_may_have_several_senses_and_several_kinds() -> None:
-    assert [entry.name for entry in KNOWN.senses("hall", Kind.ROOM)] == ["hallway", "entrance hall"]
-    assert {entry.kind for entry in KNOWN.senses("toilet")} == {Kind.THING, Kind.ROOM}
-    assert KNOWN.find("toilet").kind is Kind.THING
+    assert [entry.name for entry in KNOWN.senses("hall", EntryKind.ROOM)] == ["hallway", "entrance hall"]
+    assert {entry.kind for entry in KNOWN.senses("toilet")} == {EntryKind.THING, EntryKind.ROOM}
+    assert KNOWN.find("toilet").kind is EntryKind.THING
 
 
 def test_a_kind_takes_in_its_kinds_and_not_the_other_way_round() -> None:
@@ -134,7 +134,7 @@ def test_a_misspelt_word_is_corrected(wrong: str, right: str) -> None:
 
 def test_a_word_that_is_like_none_is_not_corrected() -> None:
     for word in ("elephant", "zebra", "dragon", "wug", "xyz"):
-        assert KNOWN.suggest(word, Kind.THING) == ()
+        assert KNOWN.suggest(word, EntryKind.THING) == ()
 
 
 @given(ENTRY)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from avlmaps.core.lexicon import Kind, lexicon, squeezed
+from avlmaps.core.lexicon import EntryKind, lexicon, squeezed
 from avlmaps.perception.embedded.words import EmbeddedWords
 from avlmaps.perception.models.prompts import THINGS
 from avlmaps.query.modalities.area import AREA_NAMES
@@ -41,13 +41,13 @@ def weights(name: str) -> dict:
     return json.loads(files("avlmaps.perception.embedded").joinpath(f"weights/{name}").read_text(encoding="utf-8"))
 
 
-def unknown(words, kind: Kind) -> list[str]:
+def unknown(words, kind: EntryKind) -> list[str]:
     return [word for word in words if KNOWN.find(word, kind) is None]
 
 
 def test_the_pixel_networks_names_and_their_other_phrases_are_entries() -> None:
     notes = weights("scene_encoder.json")
-    for kind, names in ((Kind.THING, notes["categories"]), (Kind.ROOM, notes["rooms"])):
+    for kind, names in ((EntryKind.THING, notes["categories"]), (EntryKind.ROOM, notes["rooms"])):
         for name in names:
             if name == "other":
                 continue
@@ -55,7 +55,10 @@ def test_the_pixel_networks_names_and_their_other_phrases_are_entries() -> None:
             assert entry.split == "training"
             assert list(entry.learnt) == notes["called"].get(name, []), name
     trained = {
-        entry.name for kind in (Kind.THING, Kind.ROOM) for entry in KNOWN.entries(kind) if entry.split == "training"
+        entry.name
+        for kind in (EntryKind.THING, EntryKind.ROOM)
+        for entry in KNOWN.entries(kind)
+        if entry.split == "training"
     }
     assert trained == {*notes["categories"], *notes["rooms"]} - {"other"}
 
@@ -78,15 +81,15 @@ def test_the_training_tables_are_those_of_the_shipped_notes(monkeypatch: pytest.
     assert [labels.room_of(area) for area in ("study", "storage", "toilets", "copy corner", "lounge", "garage")] == [
         "office", "storage room", "bathroom", "copy room", "living room", "",
     ]  # fmt: skip
-    trained = {entry.name for entry in KNOWN.entries(Kind.SOUND) if entry.split == "training"}
+    trained = {entry.name for entry in KNOWN.entries(EntryKind.SOUND) if entry.split == "training"}
     assert trained == set(sounds.NAMES)
     assert sounds.KINDS["television or music"] == ("music", "television")
 
 
 def test_things_of_the_simulator_and_of_other_encoders_are_entries() -> None:
-    assert {KNOWN.named(category, Kind.THING).name for category in categories()} == set(categories())
-    assert {KNOWN.named(name, Kind.THING).split for name in THINGS} == {"training"}
-    assert not unknown([*HANGING_M, *NYU40], Kind.THING)
+    assert {KNOWN.named(category, EntryKind.THING).name for category in categories()} == set(categories())
+    assert {KNOWN.named(name, EntryKind.THING).split for name in THINGS} == {"training"}
+    assert not unknown([*HANGING_M, *NYU40], EntryKind.THING)
 
 
 def test_rooms_of_the_simulator_and_of_queries_are_entries() -> None:
@@ -99,28 +102,28 @@ def test_rooms_of_the_simulator_and_of_queries_are_entries() -> None:
         for kind, _ in programme(np.random.default_rng(seed))
     }
     assert len(drawn) > 15
-    assert not unknown([*drawn, *AREA_NAMES], Kind.ROOM)
+    assert not unknown([*drawn, *AREA_NAMES], EntryKind.ROOM)
 
 
 def test_sounds_of_collections_are_entries_and_those_of_the_simulator_agree() -> None:
     assert len(ESC50) == 50
-    assert not unknown(ESC50, Kind.SOUND)
+    assert not unknown(ESC50, EntryKind.SOUND)
     for kind in SOUND_KINDS:
-        assert KNOWN.named(kind.names[0], Kind.SOUND).makers == kind.objects
+        assert KNOWN.named(kind.names[0], EntryKind.SOUND).makers == kind.objects
 
 
 @pytest.mark.shared
 def test_clips_of_the_collection_are_entries(shared_data: Path) -> None:
     with (shared_data / "data/sounds/index.csv").open(encoding="utf-8") as file:
-        assert not unknown({row["category"] for row in csv.DictReader(file)}, Kind.SOUND)
+        assert not unknown({row["category"] for row in csv.DictReader(file)}, EntryKind.SOUND)
 
 
 def test_words_of_the_demonstration_are_entries() -> None:
     things = [*questions.FURNITURE, *questions.SMALL, *questions.RARE, *questions.SPOKEN]
-    assert all(KNOWN.named(name, Kind.THING) for name in things)
-    assert all(KNOWN.named(name, Kind.ROOM) for name in questions.ROOMS)
+    assert all(KNOWN.named(name, EntryKind.THING) for name in things)
+    assert all(KNOWN.named(name, EntryKind.ROOM) for name in questions.ROOMS)
     for name, spoken in questions.SPOKEN.items():
-        assert KNOWN.find(spoken, Kind.THING).name == name
+        assert KNOWN.find(spoken, EntryKind.THING).name == name
         assert spoken.lower() != name
 
 
@@ -132,7 +135,7 @@ def test_aliases_of_the_word_encoder_are_known() -> None:
 def test_no_paraphrase_by_which_sounds_are_tested_was_learnt() -> None:
     with files("avlmaps_sim.bench.data").joinpath("sounds_paraphrases.csv").open(encoding="utf-8") as file:
         tested = {squeezed(row["phrase"]) for row in csv.DictReader(file)}
-    assert {squeezed(word) for entry in KNOWN.entries(Kind.SOUND) for word in entry.learnt}.isdisjoint(tested)
+    assert {squeezed(word) for entry in KNOWN.entries(EntryKind.SOUND) for word in entry.learnt}.isdisjoint(tested)
 
 
 def test_no_spoken_word_of_the_demonstration_is_a_label() -> None:

@@ -10,7 +10,7 @@ import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.perception.embedded.pixels import EmbeddedPixels
 from avlmaps.perception.embedded.scene_network import load_network
 from avlmaps_sim.homes import furnish
@@ -28,7 +28,7 @@ def pieces(rng: np.random.Generator, count: int, bias: float) -> Any:
 
 
 def area(name: str) -> float:
-    entry = lexicon().find(name, Kind.THING)
+    entry = lexicon().find(name, EntryKind.THING)
     assert entry is not None
     found = instances.usual_area_m2(entry)
     assert found is not None
@@ -59,7 +59,7 @@ def test_larger_things_show_more_surface():
 
 def test_every_kind_with_a_size_in_the_lexicon_has_a_usual_area():
     notes = load_network().notes
-    sized = {name for name in notes.categories if (e := lexicon().find(name, Kind.THING)) and e.size_m is not None}
+    sized = {name for name in notes.categories if (e := lexicon().find(name, EntryKind.THING)) and e.size_m is not None}
     assert set(notes.instances.area_m2) == sized
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from avlmaps.core.lexicon import Kind
+from avlmaps.core.lexicon import EntryKind
 from avlmaps.perception.embedded.pixels import EmbeddedPixels
 from avlmaps.query.unknown_names import unknown_note
 
@@ -93,4 +93,4 @@ def test_a_misspelt_noun_is_answered_with_the_right_spelling(wrong: str, right: 
 def test_a_known_word_that_was_not_learnt_is_told_from_an_unknown_one() -> None:
     assert "'harp' is a known word" in unknown_note("old harp")
     assert "'wug' is not a known thing" in unknown_note("wooden wug")
-    assert unknown_note("kitchn", Kind.ROOM).endswith("did you mean kitchen?")
+    assert unknown_note("kitchn", EntryKind.ROOM).endswith("did you mean kitchen?")

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.perception.embedded.pixels import EmbeddedPixels
 from avlmaps.perception.embedded.views import EmbeddedViews
 from avlmaps.perception.protocols import SurveyedEncoder
@@ -28,8 +28,8 @@ def votes(things: Sequence[str], kinds: Sequence[str], contents: RoomContents = 
 @pytest.mark.parametrize("table", [FURNISHED, NAMED], ids=["furnished", "named"])
 def test_a_table_names_things_and_rooms_of_the_lexicon(table: RoomContents) -> None:
     known = lexicon()
-    assert all(known.find(thing, Kind.THING).name == thing for thing in table.things)  # pyright: ignore[reportOptionalMemberAccess]
-    assert all(known.find(kind, Kind.ROOM).name == kind for kind in table.kinds)  # pyright: ignore[reportOptionalMemberAccess]
+    assert all(known.find(thing, EntryKind.THING).name == thing for thing in table.things)  # pyright: ignore[reportOptionalMemberAccess]
+    assert all(known.find(kind, EntryKind.ROOM).name == kind for kind in table.kinds)  # pyright: ignore[reportOptionalMemberAccess]
     assert table.surface_m2.shape == (len(table.things), len(table.kinds))
     assert (table.surface_m2 >= 0.0).all()
     assert (table.surface_m2.sum(axis=1) > 0.0).all() and (table.surface_m2.sum(axis=0) > 0.0).all()
@@ -85,7 +85,7 @@ def test_nothing_speaks_against_a_room_that_the_lexicon_places_it_in(table: Room
     """The homes that are counted have no table to dine at in a kitchen; real ones do."""
     kinds = table.kinds
     for thing in table.things:
-        entry = lexicon().named(thing, Kind.THING)
+        entry = lexicon().named(thing, EntryKind.THING)
         usual = np.array([kind in entry.rooms for kind in kinds])
         common = commonness([thing], kinds, table)
         assert (votes([thing], kinds, table)[0][usual] >= 0.0).all(), thing

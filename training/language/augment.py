@@ -10,8 +10,7 @@ from typing import Any
 from training.language.rows import Example
 
 from avlmaps.core.inflection import plural_of
-from avlmaps.core.lexicon import Kind as Entries
-from avlmaps.core.lexicon import lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.language.intents import (
     Beside,
     Clarify,
@@ -111,9 +110,9 @@ class Names:
 def lexicon_names() -> Names:
     """Return the names of the lexicon, and sounds with a verb that says them."""
     book = lexicon()
-    things = {name for entry in book.entries(Entries.THING) for name in (entry.name, *entry.synonyms)}
-    rooms = {name for entry in book.entries(Entries.ROOM) for name in (entry.name, *entry.synonyms)}
-    sounds = {name for entry in book.entries(Entries.SOUND) for name in (entry.name, *entry.synonyms)}
+    things = {name for entry in book.entries(EntryKind.THING) for name in (entry.name, *entry.synonyms)}
+    rooms = {name for entry in book.entries(EntryKind.ROOM) for name in (entry.name, *entry.synonyms)}
+    sounds = {name for entry in book.entries(EntryKind.SOUND) for name in (entry.name, *entry.synonyms)}
     return Names(_sayable(things), _sayable(rooms), _sayable(sounds))
 
 

@@ -16,7 +16,7 @@ from training.light.tokenizers import write_tokens
 from training.light.towers import PictureTower, PictureWords, SoundTower, SoundWords
 
 from avlmaps.core.files import sha256_of_file
-from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.perception.light import bundle as files
 from avlmaps.perception.light.sounds import log_mel
 from avlmaps.perception.light.tokens import Tokens
@@ -74,7 +74,7 @@ def export_pictures(
     tokenizer = load_helper(Tipsv2Tokenizer, folder, model)
     most = int(network.config.text_config.max_position_embeddings)
     patch = int(network.config.vision_config.patch_size)
-    things, rooms = (phrases_of(kind)[:most_phrases] for kind in (Kind.THING, Kind.ROOM))
+    things, rooms = (phrases_of(kind)[:most_phrases] for kind in (EntryKind.THING, EntryKind.ROOM))
     sentences = [*_sentences(things, TIPS_PROMPTS), *_sentences(rooms, AREA_PROMPTS)]
     tokens = write_tokens(tokenizer, out / files.PICTURE_TOKENS, most, sentences)
 
@@ -149,7 +149,7 @@ def export_sounds(
         hop=int(heard.hop_length), bands=int(heard.feature_size), lowest_hz=float(heard.frequency_min),
         highest_hz=float(heard.frequency_max),
     )  # fmt: skip
-    phrases = phrases_of(Kind.SOUND)[:most_phrases]
+    phrases = phrases_of(EntryKind.SOUND)[:most_phrases]
     tokens = write_tokens(tokenizer, out / files.SOUND_TOKENS, _MOST_SOUND_TOKENS, _sentences(phrases, (SOUND_PROMPT,)))
 
     tower, reader = SoundTower(network).eval(), SoundWords(network).eval()
@@ -225,11 +225,11 @@ def revision_of(folder: Path) -> str:
     return folder.name if folder.parent.name == "snapshots" else ""
 
 
-def phrases_of(kind: Kind) -> list[str]:
+def phrases_of(kind: EntryKind) -> list[str]:
     """Return the names and synonyms of the lexicon's entries of a kind, as they are looked up; the names first."""
     entries = lexicon().entries(kind)
-    names = [*(["other"] if kind is Kind.THING else []), *(entry.name for entry in entries)]
-    names += [*(OTHERS if kind is Kind.SOUND else []), *(name for entry in entries for name in entry.synonyms)]
+    names = [*(["other"] if kind is EntryKind.THING else []), *(entry.name for entry in entries)]
+    names += [*(OTHERS if kind is EntryKind.SOUND else []), *(name for entry in entries for name in entry.synonyms)]
     return list(dict.fromkeys(map(clean, names)))
 
 

@@ -20,8 +20,8 @@ from training.pixels.borrowed import borrowed_furniture
 from training.pixels.worlds import FIRST_CALIBRATION_SEED
 
 from avlmaps.core.errors import MapError
-from avlmaps.core.lexicon import Entry, Kind, lexicon
-from avlmaps.core.registry import Kind as Module
+from avlmaps.core.lexicon import Entry, EntryKind, lexicon
+from avlmaps.core.registry import Kind
 from avlmaps.maps.build import build_map
 from avlmaps.maps.keyframes.describe import KeyframeSettings
 from avlmaps.maps.settings import BuildSettings
@@ -120,7 +120,7 @@ def pieces_of(options: Options, number: int) -> Iterator[Pieces]:
 def _map_of(recording: Recording, path: Path, model: str) -> StoredMap:
     """Return the map of a recording by the weights as they are now; one that is there already is not made again."""
     eyes = f"trained@{model}"
-    chosen = profile("trained").choosing({Module.PIXELS: eyes, Module.VIEWS: eyes})
+    chosen = profile("trained").choosing({Kind.PIXELS: eyes, Kind.VIEWS: eyes})
     try:
         return build_map(recording, path, chosen, FEW_KEYFRAMES)
     except MapError:  # by other weights
@@ -141,7 +141,7 @@ def fit_instances(found: list[Pieces], names: tuple[str, ...]) -> InstanceNotes:
     Raises:
         ValueError: at no bias are enough of the confident pieces true.
     """
-    entries = {name: lexicon().find(name, Kind.THING) for name in names}
+    entries = {name: lexicon().find(name, EntryKind.THING) for name in names}
     areas = {name: usual_area_m2(entry) for name, entry in entries.items() if entry is not None}
     usual = {name: round(area, 4) for name, area in areas.items() if area is not None}
     unfitted = InstanceNotes(slopes=SLOPES, area_m2=usual)

@@ -1,6 +1,6 @@
 """The names that the network distinguishes. The order is that of its outputs, so new names go to the end."""
 
-from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 
 CATEGORIES = (
     "wall", "floor", "ceiling", "column", "stairs", "railing",
@@ -41,8 +41,8 @@ FIRST_COARSE = 160
 def room_of(area: str) -> str:
     """Return the room of ``ROOMS`` that an area is, or ``""``: what homes call a study is an office."""
     known = lexicon()
-    for entry in known.senses(area, Kind.ROOM):
-        for name in (entry.name, *(wide.name for wide in known.wider(entry.name, Kind.ROOM))):
+    for entry in known.senses(area, EntryKind.ROOM):
+        for name in (entry.name, *(wide.name for wide in known.wider(entry.name, EntryKind.ROOM))):
             if name in ROOMS:
                 return name
     return ""

@@ -2,16 +2,16 @@
 
 from training.pixels.labels import CATEGORIES, ROOMS
 
-from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 
 # The wider words that notes carry besides the categories that have narrower ones; everything else is left to the
 # nearness of words.
 _WIDE = {
-    Kind.THING: ("table", "seat", "place to sit", "place to sleep", "cupboard", "light", "screen", "shelf", "counter",
-                 "furniture"),
-    Kind.ROOM: ("workplace", "place to cook"),
+    EntryKind.THING: ("table", "seat", "place to sit", "place to sleep", "cupboard", "light", "screen", "shelf",
+                      "counter", "furniture"),
+    EntryKind.ROOM: ("workplace", "place to cook"),
 }  # fmt: skip
-_NAMES = {Kind.THING: CATEGORIES, Kind.ROOM: ROOMS}
+_NAMES = {EntryKind.THING: CATEGORIES, EntryKind.ROOM: ROOMS}
 
 
 def _called() -> dict[str, tuple[str, ...]]:
@@ -22,7 +22,7 @@ def _called() -> dict[str, tuple[str, ...]]:
 def _kinds() -> dict[str, tuple[str, ...]]:
     out: dict[str, tuple[str, ...]] = {}
     for kind, words in _WIDE.items():
-        for word in (*words, *(CATEGORIES if kind is Kind.THING else ())):
+        for word in (*words, *(CATEGORIES if kind is EntryKind.THING else ())):
             members = {word, *(entry.name for entry in lexicon().members(word))}
             names = tuple(name for name in _NAMES[kind] if name in members)
             if word in words or (len(names) > 1 and word != "other"):

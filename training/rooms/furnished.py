@@ -5,7 +5,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps_sim.free_space import STRUCTURE
 from avlmaps_sim.scene import Scene
 
@@ -56,16 +56,18 @@ def mean_surfaces(rooms: Iterable[tuple[str, Contents]]) -> Surfaces:
 def kind_of_room(kind: str) -> str | None:
     """Return the kind of room that the view encoder distinguishes: a toilet is a bathroom, a corridor a hallway."""
     known = lexicon()
-    entry = known.find(kind, Kind.ROOM)
-    family = () if entry is None else (entry, *known.wider(entry.name, Kind.ROOM))
+    entry = known.find(kind, EntryKind.ROOM)
+    family = () if entry is None else (entry, *known.wider(entry.name, EntryKind.ROOM))
     return next((each.name for each in family if each.split == "training"), None)
 
 
 def write_table(surfaces: Surfaces, path: Path) -> None:
     """Write the table: a row for each thing, a column for each kind of room, in the order of the lexicon."""
     known = lexicon()
-    kinds = [entry.name for entry in known.entries(Kind.ROOM) if any(entry.name in row for row in surfaces.values())]
-    things = [entry.name for entry in known.entries(Kind.THING) if entry.name in surfaces]
+    kinds = [
+        entry.name for entry in known.entries(EntryKind.ROOM) if any(entry.name in row for row in surfaces.values())
+    ]
+    things = [entry.name for entry in known.entries(EntryKind.THING) if entry.name in surfaces]
     with path.open("w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(["thing", *kinds])

@@ -5,7 +5,7 @@ known kinds; the paraphrases by which the encoder is tested (``avlmaps_sim/bench
 none of them.
 """
 
-from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps_sim.bench import sound_categories
 from avlmaps_sim.bench.sound_categories import CATEGORIES, ESC50
 
@@ -27,7 +27,7 @@ _UNSPOKEN = frozenset({"fan or air conditioner", "television or music", "drinkin
 
 
 def _called(name: str) -> tuple[str, ...]:
-    entry = lexicon().named(name, Kind.SOUND)
+    entry = lexicon().named(name, EntryKind.SOUND)
     return entry.learnt if name in _UNSPOKEN else (name, *entry.learnt)
 
 

@@ -6,9 +6,10 @@ from typing import Annotated, Any
 
 from tyro.conf import OmitArgPrefixes, Positional, arg
 
-from avlmaps.cli.output import emit, place, table_lines
+from avlmaps.cli.output import emit, table_lines
 from avlmaps.cli.reading_options import Reading
 from avlmaps.cli.verb import Verb
+from avlmaps.core.wording import place_text
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,14 +41,14 @@ class Calibrate(Verb):
         """Calibrate."""
         answer = calibrate_array(self)
         rows = [
-            (str(number + 1), place(one["position_m"]), f"{100 * one['moved_m']:.1f} cm", f"{100 * one['sd_m']:.2f} cm",
-             f"{1e6 * one['delay_s']:.0f} µs")
+            (str(number + 1), place_text(one["position_m"]), f"{100 * one['moved_m']:.1f} cm",
+             f"{100 * one['sd_m']:.2f} cm", f"{1e6 * one['delay_s']:.0f} µs")
             for number, one in enumerate(answer["microphones"])
         ]  # fmt: skip
         heights = " Heights stay as given: this drive does not show them." if answer["held_heights"] else ""
         lines = [
             *table_lines(("channel", "place (robot's frame)", "moved", "known to", "late by"), rows),
-            f"source at {place(answer['source'])} ({answer['frame']} frame), {answer['measured_frames']} frames",
+            f"source at {place_text(answer['source'])} ({answer['frame']} frame), {answer['measured_frames']} frames",
             f"residual: {1e6 * answer['residual_before_s']:.0f} µs before, {1e6 * answer['residual_after_s']:.0f} µs "
             f"after.{heights}",
             f"wrote {answer['out']}",

@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import arg
 
-from avlmaps.cli.output import emit, place, table_lines
+from avlmaps.cli.output import emit, table_lines
 from avlmaps.cli.verb import MapVerb
+from avlmaps.core.wording import place_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -53,8 +54,9 @@ def change_lines(answer: "Mapping[str, Any]") -> list[str]:
         return [f"nothing is known to have changed since {said(answer['since'])}", *not_known]
     rows = [
         (
-            one["kind"], one["name"], f"{one['confidence']:.2f}", place(one["position"]),
-            place(one["from"]) if one["from"] else "", one["room"] or "", said(one["noticed"]), said(one["last_seen"]),
+            one["kind"], one["name"], f"{one['confidence']:.2f}", place_text(one["position"]),
+            place_text(one["from"]) if one["from"] else "", one["room"] or "", said(one["noticed"]),
+            said(one["last_seen"]),
         )
         for one in answer["changes"]
     ]  # fmt: skip

@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import arg
 
-from avlmaps.cli.output import UsageError, emit, place, table_lines
+from avlmaps.cli.output import UsageError, emit, table_lines
 from avlmaps.cli.verb import MapVerb, OptionalText
+from avlmaps.core.wording import place_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -153,7 +154,7 @@ def edit_lines(answer: "Mapping[str, Any]") -> "list[str]":
     rows = [
         (
             one["id"], one["does"], ", ".join(one["of"]), one["name"],
-            place(one["position"]) if one["position"] else "", one["by"] or "a person", one["made"][:10],
+            place_text(one["position"]) if one["position"] else "", one["by"] or "a person", one["made"][:10],
             one["state"] + (f": {one['why']}" if "why" in one else ""),
         )
         for one in answer["edits"]

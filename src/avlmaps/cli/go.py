@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tyro.conf import OmitArgPrefixes, Positional, arg
 
-from avlmaps.cli.output import AnsweredError, UsageError, emit, error_answer, kind_named, place, table_lines
+from avlmaps.cli.output import AnsweredError, UsageError, emit, error_answer, kind_named, table_lines
 from avlmaps.cli.verb import MapVerb
 from avlmaps.core.progress import say
+from avlmaps.core.wording import place_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -298,7 +299,7 @@ def failure(answer: dict[str, Any]) -> dict[str, Any] | None:
         return None
     if answer["error"] is not None:
         return error_answer(kind_named(answer["error_type"]), answer["error"])
-    missed = [goal["name"] or place(goal["goal"]) for goal in answer["subgoals"] if not goal["reached"]]
+    missed = [goal["name"] or place_text(goal["goal"]) for goal in answer["subgoals"] if not goal["reached"]]
     message = (
         f"The robot did not reach {len(missed)} of {len(answer['subgoals'])} goals: {', '.join(missed)}."
         if missed
@@ -312,7 +313,7 @@ def go_lines(answer: dict[str, Any]) -> list[str]:
     lines = [*([answer["plan"]] if answer.get("plan") else []), *answer["program"].splitlines()]
     rows = [
         (
-            number, goal["name"] or goal["skill"].replace("_", " "), place(goal["goal"]), place(goal["stop"]),
+            number, goal["name"] or goal["skill"].replace("_", " "), place_text(goal["goal"]), place_text(goal["stop"]),
             f"{goal['distance_m']:.2f} m" + ("" if goal["reached"] else ", not reached"),
         )
         for number, goal in enumerate(answer["subgoals"], 1)

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import OmitArgPrefixes, Positional, arg
 
-from avlmaps.cli.output import UsageError, emit, ground_lines, place, size_of
+from avlmaps.cli.output import UsageError, emit, ground_lines, size_of
 from avlmaps.cli.reading_options import Reading
 from avlmaps.cli.verb import Verb
 from avlmaps.core.errors import AvlmapsError
 from avlmaps.core.progress import say
+from avlmaps.core.wording import place_text
 
 if TYPE_CHECKING:
     from avlmaps.maps.store.reader import StoredMap
@@ -257,7 +258,9 @@ def _entry_lines(entries: dict[str, Any], layouts: dict[str, Callable[[Any], lis
 
 
 def _sound_lines(sounds: list[dict[str, Any]]) -> list[str]:
-    rows = [f"  {s['onset_s']:8.2f} - {s['offset_s']:.2f} s at {place(s['position'])}{_names_of(s)}" for s in sounds]
+    rows = [
+        f"  {s['onset_s']:8.2f} - {s['offset_s']:.2f} s at {place_text(s['position'])}{_names_of(s)}" for s in sounds
+    ]
     return [f"sounds: {len(sounds)}", *rows]
 
 

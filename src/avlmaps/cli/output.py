@@ -131,11 +131,6 @@ def table_lines(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> lis
     return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in cells]
 
 
-def place(position: Sequence[float]) -> str:
-    """Write a position as people read it."""
-    return place_text(position)
-
-
 def size_of(count: int) -> str:
     """Write a number of bytes as people read it."""
     size = float(count)
@@ -174,7 +169,7 @@ def query_lines(answer: dict[str, Any]) -> list[str]:
     lines = [f"query: {parts}"] if parts else []
     lines += [f"note: {part['note']}" for part in answer["parts"] if part.get("note")]
     rows = [
-        (i, place(goal["position"]), f"{goal['probability']:.2f}", _size(goal["size"]))
+        (i, place_text(goal["position"]), f"{goal['probability']:.2f}", _size(goal["size"]))
         for i, goal in enumerate(answer["goals"], start=1)
     ]
     lines += [f"note: {note}" for note in answer.get("notes", [])]

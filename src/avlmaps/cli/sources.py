@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tyro.conf import arg
 
-from avlmaps.cli.output import emit, place, require_share, table_lines
+from avlmaps.cli.output import emit, require_share, table_lines
 from avlmaps.cli.verb import MapVerb
+from avlmaps.core.wording import place_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -57,8 +58,8 @@ def source_lines(answer: "Mapping[str, Any]") -> list[str]:
         return ["no sounds"]
     rows = [
         (
-            one["name"] or "unnamed", f"{one['confidence']:.2f}", f"{one['probability']:.2f}", place(one["position"]),
-            f"{one['within_50_m']:.2f} m", f"{one['within_90_m']:.2f} m",
+            one["name"] or "unnamed", f"{one['confidence']:.2f}", f"{one['probability']:.2f}",
+            place_text(one["position"]), f"{one['within_50_m']:.2f} m", f"{one['within_90_m']:.2f} m",
             ", ".join(f"{room['name']} {room['probability']:.2f}" for room in one["rooms"][:2]),
             ", ".join(f"{thing['name']} {thing['probability']:.2f}" for thing in one["things"]),
             str(len(one["sounds"])) + (", moving" if one["moving"] else ""),

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tyro.conf import arg
 
-from avlmaps.cli.output import UsageError, emit, place, require_share, table_lines
+from avlmaps.cli.output import UsageError, emit, require_share, table_lines
 from avlmaps.cli.verb import MapVerb
 from avlmaps.core.frames import FrameName
 from avlmaps.core.progress import say
+from avlmaps.core.wording import place_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -121,7 +122,7 @@ def thing_lines(things: "Sequence[ListedThing]", frame: str = FrameName.RECORDIN
     if not things:
         return ["no things with this confidence; lower --least to list less certain ones"]
     rows = [
-        (t["name"], f"{t['confidence']:.2f}", place(t["position"]), " x ".join(f"{side:.2f}" for side in t["size"]))
+        (t["name"], f"{t['confidence']:.2f}", place_text(t["position"]), " x ".join(f"{s:.2f}" for s in t["size"]))
         for t in things
     ]
     head = ("thing", "confidence", f"position ({frame} frame)", "size in m (level axes)")
@@ -142,7 +143,7 @@ def sound_lines(sounds: "list[SoundAnswer]", frame: str = FrameName.RECORDING) -
         return ["no sounds"]
     rows = [
         (", ".join(f"{n} {c:.2f}" for n, c in zip(s["names"], s["confidences"], strict=True)) or "unnamed",
-         f"{s['onset_s']:.1f} - {s['offset_s']:.1f} s", place(s["position"]))
+         f"{s['onset_s']:.1f} - {s['offset_s']:.1f} s", place_text(s["position"]))
         for s in sounds
     ]  # fmt: skip
     head = ("sound", "time", f"position of the robot ({frame} frame)")
@@ -158,7 +159,7 @@ def room_lines(rooms: "list[RoomAnswer]", frame: str = FrameName.RECORDING) -> l
             r["room"],
             f"{r['probability']:.2f}",
             "" if r["area_m2"] is None else f"{r['area_m2']:.1f} m²",
-            place(r["position"]),
+            place_text(r["position"]),
             str(r["views"]),
             ", ".join(f"{other['name']} {other['probability']:.2f}" for other in r["names"][1:]),
         )

@@ -5,6 +5,7 @@ plural, so "Arm-chairs" is an armchair. How to add a thing stands in ``docs/guid
 """
 
 import tomllib
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -28,7 +29,7 @@ _LINKS = frozenset({
 })  # fmt: skip
 
 
-class Kind(StrEnum):
+class EntryKind(StrEnum):
     """The kind of an entry."""
 
     THING = "thing"
@@ -64,7 +65,7 @@ class Entry:
     """
 
     name: str
-    kind: Kind
+    kind: EntryKind
     plural: str = ""
     synonyms: tuple[str, ...] = ()
     learnt: tuple[str, ...] = ()
@@ -111,20 +112,20 @@ class Lexicon:
     def __init__(self, source: Mapping[str, Any]) -> None:
         self.colours = _listed(source.get("colours", ""))
         self.materials = _listed(source.get("materials", ""))
-        self.ambiguous: dict[Kind, dict[str, tuple[str, ...]]] = {
+        self.ambiguous: dict[EntryKind, dict[str, tuple[str, ...]]] = {
             kind: {squeezed(word): _listed(names) for word, names in source.get("ambiguous", {}).get(kind, {}).items()}
-            for kind in Kind
+            for kind in EntryKind
         }
-        self._said = {kind: dict(_flat(source.get(kind, {}))) for kind in Kind}
-        self._index = {kind: self._indexed(kind) for kind in Kind}
-        self._known: dict[Kind, dict[str, Entry]] = {kind: {} for kind in Kind}
+        self._said = {kind: dict(_flat(source.get(kind, {}))) for kind in EntryKind}
+        self._index = {kind: self._indexed(kind) for kind in EntryKind}
+        self._known: dict[EntryKind, dict[str, Entry]] = {kind: {} for kind in EntryKind}
 
-    def entries(self, kind: Kind | None = None) -> tuple[Entry, ...]:
+    def entries(self, kind: EntryKind | None = None) -> tuple[Entry, ...]:
         """Return the entries, or those of one kind, in the order of the file."""
-        kinds = Kind if kind is None else (kind,)
+        kinds = EntryKind if kind is None else (kind,)
         return tuple(self._entry(each, name) for each in kinds for name in self._said[each])
 
-    def named(self, name: str, kind: Kind) -> Entry:
+    def named(self, name: str, kind: EntryKind) -> Entry:
         """Return the entry of exactly this name.
 
         Raises:
@@ -134,7 +135,7 @@ class Lexicon:
             raise KeyError(f"the lexicon has no {kind} {name!r}; add it to core/lexicon.toml")
         return self._entry(kind, name)
 
-    def find(self, phrase: str, kind: Kind | None = None) -> Entry | None:
+    def find(self, phrase: str, kind: EntryKind | None = None) -> Entry | None:
         """Return the entry that a phrase names exactly, by any of its spellings; None where there is none.
 
         Without a kind things come before rooms and rooms before sounds. An ambiguous word names its likeliest entry.
@@ -144,15 +145,15 @@ class Lexicon:
             kind: only entries of this kind.
         """
         for key in (squeezed(phrase), *(squeezed(single) for single in singulars_of(phrase))):
-            for each in Kind if kind is None else (kind,):
+            for each in EntryKind if kind is None else (kind,):
                 if (name := self._index[each].get(key)) is not None:
                     return self._entry(each, name)
         return None
 
-    def senses(self, phrase: str, kind: Kind | None = None) -> tuple[Entry, ...]:
+    def senses(self, phrase: str, kind: EntryKind | None = None) -> tuple[Entry, ...]:
         """Return every entry that a phrase can name, the likeliest first: several for an ambiguous word."""
         out: dict[str, Entry] = {}
-        for each in Kind if kind is None else (kind,):
+        for each in EntryKind if kind is None else (kind,):
             if (found := self.find(phrase, each)) is not None:
                 out[f"{each} {found.name}"] = found
             for single in (phrase, *singulars_of(phrase)):
@@ -160,7 +161,7 @@ class Lexicon:
                     out.setdefault(f"{each} {name}", self._entry(each, name))
         return tuple(out.values())
 
-    def head(self, phrase: str, kind: Kind | None = None) -> Entry | None:
+    def head(self, phrase: str, kind: EntryKind | None = None) -> Entry | None:
         """Return the entry that the longest known tail of a phrase names; None where even its last word is unknown.
 
         A description after the noun is left out: "bottle of wine" is a bottle, "red chest of drawers" a chest of
@@ -178,7 +179,7 @@ class Lexicon:
                     return found
         return None
 
-    def wider(self, name: str, kind: Kind | None = None) -> tuple[Entry, ...]:
+    def wider(self, name: str, kind: EntryKind | None = None) -> tuple[Entry, ...]:
         """Return all kinds that an entry belongs to, nearest first: an armchair is a chair, a seat and furniture."""
         entry = self.find(name, kind)
         out: dict[str, Entry] = {}
@@ -194,7 +195,7 @@ class Lexicon:
         """Return all entries that a wider kind takes in, in the order of the file: "seat" takes in chair and sofa."""
         return tuple(entry for each in self.senses(wider) for entry in self._members[each.kind].get(each.name, ()))
 
-    def is_a(self, other: str, wanted: str, kind: Kind | None = None) -> bool:
+    def is_a(self, other: str, wanted: str, kind: EntryKind | None = None) -> bool:
         """Return whether what one phrase names is what another wants.
 
         Args:
@@ -210,7 +211,7 @@ class Lexicon:
                 return True
         return _ends_with(other, wanted)
 
-    def suggest(self, word: str, kind: Kind | None = None, most: int = 3) -> tuple[str, ...]:
+    def suggest(self, word: str, kind: EntryKind | None = None, most: int = 3) -> tuple[str, ...]:
         """Return known spellings close to a word that may be misspelt, the closest first: "labtop" gives laptop.
 
         Args:
@@ -220,7 +221,9 @@ class Lexicon:
         """
         return tuple(spelling for spelling, _ in self.scored_suggestions(word, kind, most))
 
-    def scored_suggestions(self, word: str, kind: Kind | None = None, most: int = 3) -> tuple[tuple[str, float], ...]:
+    def scored_suggestions(
+        self, word: str, kind: EntryKind | None = None, most: int = 3
+    ) -> tuple[tuple[str, float], ...]:
         """Return the names of `suggest`, each with its likeness: 1 is the word itself, 0 nothing in common."""
         return self._spellers[kind].suggest(word, most)
 
@@ -237,24 +240,24 @@ class Lexicon:
         return frozenset(single | {squeezed(phrase) for phrase in phrases})
 
     @cached_property
-    def _spellers(self) -> "dict[Kind | None, Speller]":
+    def _spellers(self) -> "dict[EntryKind | None, Speller]":
         # Names that encoders were trained on are the common ones; they win where two words are as near.
         entries = sorted(self.entries(), key=lambda entry: entry.split != "training")
-        kinds: tuple[Kind | None, ...] = (None, *Kind)
+        kinds: tuple[EntryKind | None, ...] = (None, *EntryKind)
         return {
             kind: Speller(word for entry in entries if kind in (None, entry.kind) for word in entry.spellings)
             for kind in kinds
         }
 
     @cached_property
-    def _members(self) -> dict[Kind, dict[str, tuple[Entry, ...]]]:
-        out: dict[Kind, dict[str, tuple[Entry, ...]]] = {kind: {} for kind in Kind}
+    def _members(self) -> dict[EntryKind, dict[str, tuple[Entry, ...]]]:
+        out: dict[EntryKind, dict[str, tuple[Entry, ...]]] = {kind: {} for kind in EntryKind}
         for entry in self.entries():
             for parent in self.wider(entry.name, entry.kind):
                 out[entry.kind][parent.name] = (*out[entry.kind].get(parent.name, ()), entry)
         return out
 
-    def _indexed(self, kind: Kind) -> dict[str, str]:
+    def _indexed(self, kind: EntryKind) -> dict[str, str]:
         """Return the name of the entry that each spelling means, by the squeezed spelling.
 
         Names come first, then what the file calls ambiguous, then other spellings, then what encoders take for it.
@@ -270,12 +273,12 @@ class Lexicon:
                         index.setdefault(key, name)
         return index
 
-    def _entry(self, kind: Kind, name: str) -> Entry:
+    def _entry(self, kind: EntryKind, name: str) -> Entry:
         if (known := self._known[kind].get(name)) is None:
             known = self._known[kind][name] = self._made(kind, name, self._said[kind][name])
         return known
 
-    def _made(self, kind: Kind, name: str, said: Mapping[str, Any]) -> Entry:
+    def _made(self, kind: EntryKind, name: str, said: Mapping[str, Any]) -> Entry:
         learnt = _listed(said.get("learnt", ""))
         # An encoder may take other things for one of its own: a tap for a sink. They are no synonyms.
         special = _listed(said.get("such_as", ""))
@@ -284,7 +287,7 @@ class Lexicon:
         return Entry(
             name=name,
             kind=kind,
-            plural=said.get("plural") or (name if kind is Kind.SOUND else plural_of(name)),
+            plural=said.get("plural") or (name if kind is EntryKind.SOUND else plural_of(name)),
             synonyms=(*same, *_listed(said.get("also", ""))),
             learnt=learnt,
             wider=_listed(said.get("wider", "")),
@@ -292,7 +295,7 @@ class Lexicon:
             mount=said.get("mount", "floor"),
             size_m=_size(said["size"]) if "size" in said else None,
             soft=said.get("soft", False),
-            sounds=self._sounds_of.get(name, ()) if kind is Kind.THING else (),
+            sounds=self._sounds_of.get(name, ()) if kind is EntryKind.THING else (),
             makers=_listed(said.get("makers", "")),
             rooms=_listed(said.get("rooms", "")),
             like=_listed(said.get("like", "")),
@@ -307,7 +310,7 @@ class Lexicon:
     def _sounds_of(self) -> dict[str, tuple[str, ...]]:
         """The sounds that each thing makes, from what makes each sound."""
         out: dict[str, tuple[str, ...]] = {}
-        for name, said in self._said[Kind.SOUND].items():
+        for name, said in self._said[EntryKind.SOUND].items():
             for maker in _listed(said.get("makers", "")):
                 out[maker] = (*out.get(maker, ()), name)
         return out
@@ -359,3 +362,10 @@ def _ends_with(phrase: str, tail: str) -> bool:
     """Return whether a phrase is another one, or ends in it: an office chair is a chair."""
     phrase, tail = " ".join(phrase.lower().split()), " ".join(tail.lower().split())
     return bool(tail) and (phrase == tail or phrase.endswith(f" {tail}"))
+
+
+def __getattr__(name: str) -> Any:
+    if name == "Kind":  # its name in earlier releases
+        warnings.warn("lexicon.Kind is EntryKind now; the old name goes in the next release.", DeprecationWarning, 2)
+        return EntryKind
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

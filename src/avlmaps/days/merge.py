@@ -13,7 +13,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Int
 from avlmaps.core.errors import MapError
-from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.poses import apply, inverse, plain_point
 from avlmaps.core.timeline import DAY_S, is_in_future
 from avlmaps.core.version import __version__
@@ -248,7 +248,7 @@ def _rows_of(number: int, life: Life, known: Occupied) -> Int[np.ndarray, " r"]:
 def same_thing(one: str, other: str) -> bool:
     """Return whether two names may be of one thing: they are the same, or one takes the other in."""
     words = lexicon()
-    return one == other or words.is_a(one, other, Kind.THING) or words.is_a(other, one, Kind.THING)
+    return one == other or words.is_a(one, other, EntryKind.THING) or words.is_a(other, one, EntryKind.THING)
 
 
 def _with_vanished(

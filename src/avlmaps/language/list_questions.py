@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
-from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.language.lexer import without_spoken_end
 from avlmaps.language.names import mended
 from avlmaps.language.own_names import OwnName, stand_ins
@@ -222,7 +222,7 @@ def read_list(text: str, own: Sequence[OwnName] = ()) -> ListQuestion | None:
             said["thing"] = said.pop("place")
         if said.get("room"):
             said["room"] = mended(said["room"]) or said["room"]
-        if said.get("room") and lexicon().find(said["room"], Kind.ROOM) is None:
+        if said.get("room") and lexicon().find(said["room"], EntryKind.ROOM) is None:
             continue
         if said.get("thing") and (_PHOTO.search(said["thing"]) or " or " in said["thing"]):
             continue
@@ -246,7 +246,7 @@ def said_number(text: str) -> tuple[int, str] | None:
     """Return how many of what a phrase names: "two chairs in the kitchen" is 2 and "chairs in the kitchen"."""
     plain = _WHERE.sub("", _plain(text)).removeprefix("the ")
     found = re.fullmatch(rf"({'|'.join(NUMBERS)}|[2-9]|[1-9]\d) ([a-z][^.?!]*)", plain)
-    if found is None or lexicon().head(_TAIL.sub("", found[2]).strip(), Kind.THING) is None:
+    if found is None or lexicon().head(_TAIL.sub("", found[2]).strip(), EntryKind.THING) is None:
         return None
     return NUMBERS.get(found[1]) or int(found[1]), found[2]
 

@@ -4,8 +4,7 @@ from functools import cache
 from importlib.resources import files
 
 from avlmaps.core.inflection import forms_of, singulars_of
-from avlmaps.core.lexicon import Kind as Entries
-from avlmaps.core.lexicon import lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.language.word_classes import listed, load_word_classes
 from avlmaps.perception.embedded.words import is_word
 
@@ -121,7 +120,7 @@ def _is_known(words: tuple[str, ...]) -> bool:
 def _is_name(phrase: str) -> bool:
     """Return whether a phrase is exactly the name of a thing or a room."""
     book = lexicon()
-    if book.find(phrase, Entries.THING) is not None or book.find(phrase, Entries.ROOM) is not None:
+    if book.find(phrase, EntryKind.THING) is not None or book.find(phrase, EntryKind.ROOM) is not None:
         return True
     words = phrase.split()
     described = words[0] in book.words() or words[0] in _adjectives()

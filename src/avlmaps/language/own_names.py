@@ -8,7 +8,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.language.intents import Target
 
 OwnName = tuple[str, bool]
@@ -44,7 +44,7 @@ def stand_ins(text: str, names: Sequence[OwnName]) -> StandIns:
     """Return a sentence with a known word for each own name in it that the lexicon does not have."""
     out, own = text, dict[str, str]()
     for name, is_room in sorted(names, key=lambda one: -len(one[0])):
-        if lexicon().find(name, Kind.ROOM if is_room else Kind.THING) is not None:
+        if lexicon().find(name, EntryKind.ROOM if is_room else EntryKind.THING) is not None:
             continue
         said = re.compile(rf"(?<![\w-])(?:(?:the|a|an|my|your|our) )?{re.escape(name)}(?![\w-])", re.IGNORECASE)
         if not said.search(out):

@@ -5,8 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from avlmaps.core.errors import QueryError
-from avlmaps.core.lexicon import Kind as Entries
-from avlmaps.core.lexicon import lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import MOST_CHARACTERS, Modality, Part, Question
 from avlmaps.language.asking_back import lacks_file
 from avlmaps.language.foreign import ASK, language_of
@@ -220,7 +219,7 @@ def _for_use(sentence: Sentence, use: str, limits: Limits) -> Inquiry:
         QueryError: where they should be is not understood.
     """
     names = [name.strip() for name in load_word_classes().lists["uses"][use].split(",")]
-    rooms = [token.text for token in sentence.tokens if lexicon().find(token.text, Entries.ROOM) is not None]
+    rooms = [token.text for token in sentence.tokens if lexicon().find(token.text, EntryKind.ROOM) is not None]
     near = tuple(Target(TargetKind.AREA, room) for room in rooms if room not in use)
     place = _place_of_use(sentence, use)
     if place:

@@ -17,8 +17,7 @@ from typing import Any
 import numpy as np
 
 from avlmaps.core.errors import AvlmapsError, BackendError
-from avlmaps.core.lexicon import Kind as Entry
-from avlmaps.core.lexicon import lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import ModelCard
 
@@ -91,7 +90,7 @@ def _made(kind: Kind, encoder: Any) -> dict[str, Any]:
         return refused
 
     if kind is Kind.PIXELS:
-        things = tuple(entry.name for entry in lexicon().entries(Entry.THING) if entry.split == "training")
+        things = tuple(entry.name for entry in lexicon().entries(EntryKind.THING) if entry.split == "training")
         return {"vocabulary": things, "understood": understood, "encode": refuse("encode")}
     if kind is Kind.VIEWS:
         return {"encode": refuse("encode")}

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from avlmaps.core.errors import QueryError
-from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import HeardAt, Modality, Part, Question, Role
 from avlmaps.perception.protocols import NamedPixelEncoder
 from avlmaps.query.answer import Alternative, Answer, PartAnswer
@@ -247,7 +247,7 @@ def thing_alone(asked: Asked, avlmap: "Queryable") -> Question | None:
     if not asked.sentence.strip():
         return Question.of(asked.parts) if len(asked.parts) == 1 and asked.object is not None else None
     kinds = {entry.kind for entry in lexicon().senses(asked.sentence)}
-    if kinds != {Kind.THING} or "pixels" not in avlmap.stored.info.models:
+    if kinds != {EntryKind.THING} or "pixels" not in avlmap.stored.info.models:
         return None
     encoder = avlmap.stored.encoders.pixels
     is_name = isinstance(encoder, NamedPixelEncoder) and asked.sentence in encoder.vocabulary

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from avlmaps.core.errors import QueryError
-from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.poses import FRAME
 
 if TYPE_CHECKING:
@@ -242,9 +242,9 @@ def things_at(
 
 def is_meant(name: str) -> Callable[[str], bool]:
     """Return whether a thing's name is meant by a word: by itself, by another word for it, or by a wider one."""
-    entry = lexicon().find(name, Kind.THING)
+    entry = lexicon().find(name, EntryKind.THING)
     own = name if entry is None else entry.name
-    return lambda other: other in (name, own) or lexicon().is_a(other, own, Kind.THING)
+    return lambda other: other in (name, own) or lexicon().is_a(other, own, EntryKind.THING)
 
 
 def room_namer(avlmap: "Queryable") -> RoomOf:

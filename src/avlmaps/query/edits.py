@@ -13,7 +13,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Int
 from avlmaps.core.errors import QueryError
-from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.poses import plain_point
 from avlmaps.core.question import Part
 from avlmaps.maps.store.edits import Edit, in_force
@@ -35,14 +35,14 @@ _AT_M = 1e-3
 def means(asked: str) -> Callable[[str], bool]:
     """Return whether the name of a thing is meant by a word: it is the same, another word for it, or a narrower one."""
     known, word = lexicon(), plain_name(asked)
-    entry = known.find(word, Kind.THING) or known.head(word, Kind.THING)
+    entry = known.find(word, EntryKind.THING) or known.head(word, EntryKind.THING)
 
     def is_meant(name: str) -> bool:
         own = plain_name(name)
         if own == word:
             return True
-        of = known.find(own, Kind.THING) or known.head(own, Kind.THING)
-        return entry is not None and of is not None and known.is_a(of.name, entry.name, Kind.THING)
+        of = known.find(own, EntryKind.THING) or known.head(own, EntryKind.THING)
+        return entry is not None and of is not None and known.is_a(of.name, entry.name, EntryKind.THING)
 
     return is_meant
 
@@ -113,7 +113,7 @@ class Edited(FoundEdits):
             return raw
         rows = np.flatnonzero(raw.mask)
         rows, instance, confidence, given = self._claimed(rows, raw.instance, raw.confidence, word)
-        if colour is not None and lexicon().find(word, Kind.THING) is None and len(given):
+        if colour is not None and lexicon().find(word, EntryKind.THING) is None and len(given):
             last = np.arange(len(confidence) - len(given), len(confidence))
             rgb = np.asarray(self._map.stored.voxels.rgb)
             for number, claim in zip(last, given, strict=True):

@@ -9,7 +9,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Float
 from avlmaps.core.errors import QueryError
-from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import HeardAt
 from avlmaps.language.list_questions import Listed, ListQuestion
 from avlmaps.query.answer import Answer
@@ -187,7 +187,7 @@ def _changes(avlmap: "Queryable", question: ListQuestion, top: int) -> Answer:
 
 def _last_seen(avlmap: "Queryable", name: str, top: int) -> Answer:
     """Return where a thing was last seen, and on which day."""
-    entry = lexicon().head(name, Kind.THING)
+    entry = lexicon().head(name, EntryKind.THING)
     if entry is None:
         raise QueryError(f"{name!r} is no thing that is known; name a thing, such as: where was the bag last seen?")
     answer = last_seen(Days.of(avlmap.stored, avlmap.edited.life), name, is_meant(entry.name), room_namer(avlmap))
@@ -235,7 +235,7 @@ def lies(avlmap: "Queryable", how: str, stay: "Stay", mark: Goal) -> bool:
         return False
     if how == "near":
         return _gap_m(own, size, place, mark_size) <= BESIDE_M
-    entry = lexicon().find(stay.name, Kind.THING)
+    entry = lexicon().find(stay.name, EntryKind.THING)
     if entry is not None and entry.mount in _HANGS:
         return False
     over = bool((np.abs(own - place)[:2] <= mark_size[:2] / 2.0).all())
@@ -253,7 +253,7 @@ def _about(avlmap: "Queryable", question: ListQuestion, top: int, ask: Callable[
     elif question.of is Listed.CONTENTS:
         goals, text = _contents(avlmap, question.name)
     else:
-        goals, text = _beside(avlmap, subject)
+        goals, text = _things_beside(avlmap, subject)
     return _answer(avlmap, goals[:top], text, subject)
 
 
@@ -280,7 +280,7 @@ def _contents(avlmap: "Queryable", name: str) -> tuple[list[Goal], str]:
     return goals, f"In the {name}: {counted([goal.name for goal in goals])}."
 
 
-def _beside(avlmap: "Queryable", subject: Answer) -> tuple[list[Goal], str]:
+def _things_beside(avlmap: "Queryable", subject: Answer) -> tuple[list[Goal], str]:
     level, things = avlmap.space.level, _things(avlmap)
     own, size = level(np.array([subject.goals[0].position]))[0], np.array(subject.goals[0].size)
     near: list[tuple[float, Thing]] = []
@@ -327,7 +327,7 @@ def _thing_goal(thing: "Thing") -> Goal:
 
 
 def _same_room(kind: str, name: str) -> bool:
-    return kind == name or lexicon().is_a(kind, name, Kind.ROOM)
+    return kind == name or lexicon().is_a(kind, name, EntryKind.ROOM)
 
 
 def counted(names: Sequence[str]) -> str:

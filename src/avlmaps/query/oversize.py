@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from avlmaps.core.arrays import Float, Float32, Int
-from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.query.components import linked
 
 # The log-odds fall by this times ln of how many times too long an instance is: twice what they rise by with its area.
@@ -27,7 +27,7 @@ def longest_m(names: Sequence[str]) -> float:
 
     Infinity where the lexicon does not say it of all of them.
     """
-    entries = [lexicon().find(name, Kind.THING) for name in names]
+    entries = [lexicon().find(name, EntryKind.THING) for name in names]
     sizes = [entry.size_m for entry in entries if entry is not None and entry.size_m is not None]
     if not sizes or len(sizes) < len(names):
         return float("inf")

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 
 from avlmaps.core.arrays import Float, Float64
-from avlmaps.core.lexicon import Entry, Kind, lexicon
+from avlmaps.core.lexicon import Entry, EntryKind, lexicon
 from avlmaps.perception.room_contents import RoomContents
 
 # A kind of room in which a thing was never counted holds it as often as this share of the mean of all kinds.
@@ -36,10 +36,10 @@ def votes(things: Sequence[str], kinds: Sequence[str], contents: RoomContents) -
         contents: the table.
     """
     ratios, known = _log_ratios(contents), lexicon()
-    row_of = {known.find(name, Kind.THING): number for number, name in enumerate(contents.things)}
+    row_of = {known.find(name, EntryKind.THING): number for number, name in enumerate(contents.things)}
     out = np.zeros((len(things), len(kinds)))
     for number, thing in enumerate(things):
-        entry = known.find(thing, Kind.THING)
+        entry = known.find(thing, EntryKind.THING)
         row = row_of.get(entry)
         if entry is not None and row is not None:
             out[number] = _not_against(_for_kinds(ratios[row], kinds, contents), kinds, (entry,))
@@ -63,12 +63,12 @@ def commonness(things: Sequence[str], kinds: Sequence[str], contents: RoomConten
     rows = [
         number
         for number, name in enumerate(contents.things)
-        if any(name == thing or is_a(name, thing, Kind.THING) for thing in things)
+        if any(name == thing or is_a(name, thing, EntryKind.THING) for thing in things)
     ]
     surface_m2 = contents.surface_m2[rows].sum(axis=0, keepdims=True)
     if not surface_m2.any():
         return None
-    entries = filter(None, (lexicon().find(thing, Kind.THING) for thing in things))
+    entries = filter(None, (lexicon().find(thing, EntryKind.THING) for thing in things))
     return _not_against(_for_kinds(_nats_of(contents, surface_m2)[0], kinds, contents), kinds, entries)
 
 
@@ -93,14 +93,14 @@ def _for_kinds(
 
 @cache
 def _columns(kinds: tuple[str, ...], contents: RoomContents) -> tuple[int | None, ...]:
-    column_of = {lexicon().find(name, Kind.ROOM): number for number, name in enumerate(contents.kinds)}
+    column_of = {lexicon().find(name, EntryKind.ROOM): number for number, name in enumerate(contents.kinds)}
     return tuple(_column(kind, column_of) for kind in kinds)
 
 
 def _column(kind: str, column_of: Mapping[Entry | None, int]) -> int | None:
     known = lexicon()
-    entry = known.find(kind, Kind.ROOM) or known.head(kind, Kind.ROOM)
+    entry = known.find(kind, EntryKind.ROOM) or known.head(kind, EntryKind.ROOM)
     if entry is None:
         return None
-    family = (entry, *known.wider(entry.name, Kind.ROOM))
+    family = (entry, *known.wider(entry.name, EntryKind.ROOM))
     return next((column_of[each] for each in family if each in column_of), None)

@@ -7,7 +7,7 @@ from functools import cache, cached_property
 import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Float32, Int
-from avlmaps.core.lexicon import Entry, Kind, lexicon
+from avlmaps.core.lexicon import Entry, EntryKind, lexicon
 from avlmaps.perception.room_contents import RoomContents
 from avlmaps.query.factors import NearAnchors
 from avlmaps.query.floor_plan import CELL_M, FloorPlan
@@ -103,7 +103,7 @@ class RoomField:
         total = np.zeros((len(regions), len(self.kinds)))
         np.add.at(total, room[own], self.share[own].astype(np.float64))
         total += 1e-6
-        passage = np.array([lexicon().find(kind, Kind.ROOM) in _passages() for kind in self.kinds])
+        passage = np.array([lexicon().find(kind, EntryKind.ROOM) in _passages() for kind in self.kinds])
         fewest = np.minimum(regions.neighbours, len(_PASSAGE_ODDS) - 1)
         total *= np.where(passage, np.array(_PASSAGE_ODDS)[fewest][:, None], 1.0)
         return total / total.sum(axis=1, keepdims=True)
@@ -114,7 +114,7 @@ KeptField = Callable[[str, FloorPlan, tuple[str, ...], Float[np.ndarray, "k n"],
 
 @cache
 def _passages() -> frozenset[Entry | None]:
-    known = (lexicon().find(name, Kind.ROOM) for name in _PASSAGES)
+    known = (lexicon().find(name, EntryKind.ROOM) for name in _PASSAGES)
     return frozenset(entry for entry in known if entry is not None)
 
 

@@ -14,9 +14,8 @@ import numpy as np
 
 from avlmaps.core.arrays import Float
 from avlmaps.core.errors import QueryError
-from avlmaps.core.lexicon import Kind as Named
-from avlmaps.core.lexicon import lexicon
-from avlmaps.maps.sources.density import Density, Plan, Spread, log_same_place
+from avlmaps.core.lexicon import EntryKind, lexicon
+from avlmaps.maps.sources.density import CandidateGrid, Density, Spread, log_same_place
 from avlmaps.maps.sources.settings import SourceSettings
 from avlmaps.maps.types import SourceEvidence
 from avlmaps.query.contents import Thing
@@ -189,13 +188,13 @@ class SourceMap:
         return SourceSettings.of(int(self.evidence.channels[0]))
 
     @cached_property
-    def plan(self) -> Plan:
+    def plan(self) -> CandidateGrid:
         """The cells of the plan."""
-        return Plan.of(self.space.level(self.place))
+        return CandidateGrid.of(self.space.level(self.place))
 
     def prior_of(self, kind: str) -> Float[np.ndarray, " c"]:
         """Return the prior of a kind of sound: half of it at things of the map that usually make it."""
-        entry = lexicon().find(kind, Named.SOUND) if kind else None
+        entry = lexicon().find(kind, EntryKind.SOUND) if kind else None
         makers = () if entry is None else tuple(entry.makers)
         if makers not in self._priors:
             self._priors[makers] = self._with_makers(makers)

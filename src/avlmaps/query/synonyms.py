@@ -5,7 +5,7 @@ a sofa would win half of its voxels. Words which name the wanted thing, or a kin
 lists them.
 """
 
-from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder, ScaledEncoder
 
 
@@ -19,9 +19,9 @@ def is_a(other: str, wanted: str) -> bool:
         wanted: ``chair``, ``chairs`` or ``seat``; a chair is not an office chair.
     """
     known = lexicon()
-    if known.is_a(other, wanted, Kind.THING):
+    if known.is_a(other, wanted, EntryKind.THING):
         return True
-    entry, special = known.find(other, Kind.THING), known.find(wanted, Kind.THING)
+    entry, special = known.find(other, EntryKind.THING), known.find(wanted, EntryKind.THING)
     return entry is not None and special is not None and not set(entry.learnt).isdisjoint(special.spellings)
 
 

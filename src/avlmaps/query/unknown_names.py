@@ -1,11 +1,11 @@
 """The note on a name that an encoder of a closed set does not know."""
 
-from avlmaps.core.lexicon import Kind, lexicon, noun_of
+from avlmaps.core.lexicon import EntryKind, lexicon, noun_of
 
-_WHO = {Kind.THING: "pixel", Kind.ROOM: "view"}
+_WHO = {EntryKind.THING: "pixel", EntryKind.ROOM: "view"}
 
 
-def unknown_note(phrase: str, kind: Kind = Kind.THING) -> str:
+def unknown_note(phrase: str, kind: EntryKind = EntryKind.THING) -> str:
     """Return one sentence on why a phrase cannot be found: misspelt, a known word that is not learnt, or unknown.
 
     Args:
@@ -23,7 +23,7 @@ def unknown_note(phrase: str, kind: Kind = Kind.THING) -> str:
     return f"{noun!r} is not a known {kind}, so the {who} encoder has nothing to look for"
 
 
-def _respelt(phrase: str, noun: str, kind: Kind) -> tuple[str, str]:
+def _respelt(phrase: str, noun: str, kind: EntryKind) -> tuple[str, str]:
     """Return the misspelt words of a phrase and the known name that was probably meant, or ``""`` for that."""
     known = lexicon()
     before = phrase.lower().split()[: phrase.split().index(noun)]

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from avlmaps.core.inflection import singulars_of
-from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import Modality, Part, Role
 from avlmaps.core.wording import place_text
 from avlmaps.query.answer import Alternative, PartAnswer
@@ -15,7 +15,7 @@ _PHOTO, _CLIP = "the place of the photo", "a sound like the clip"
 def in_words(parts: Sequence[Part]) -> str:
     """Return a query in words: ``the chair near the sofa in the kitchen``."""
     lead = next(part for part in parts if part.role is Role.PRIMARY)
-    return " ".join([_named(lead), *(_beside(part) for part in parts if part is not lead)])
+    return " ".join([_named(lead), *(_context_words(part) for part in parts if part is not lead)])
 
 
 def found_text(parts: Sequence[Part], goal: Goal, count: int | None = None) -> str:
@@ -43,7 +43,7 @@ def absent_text(parts: Sequence[PartAnswer], goals: Sequence[Goal], alone: Alter
     if missing:
         why = " and ".join(_not_found(part.part) for part in missing)
     else:
-        where = " ".join(_beside(one.part) for one in parts if one is not lead)
+        where = " ".join(_context_words(one.part) for one in parts if one is not lead)
         why = f"{_not_found(lead.part)} {where}".rstrip()
     if alone is not None and alone.goals and lead.found:
         goal, what = alone.goals[0], f"the best {_bare(lead.part)}" if lead.part.at != "source" else "the best guess"
@@ -69,7 +69,7 @@ def _bare(part: Part) -> str:
 def _is(part: Part) -> str:
     """Return the verb of a part: "no chairs are", "no chair is"."""
     last = part.query.split()[-1:] if part.modality is Modality.OBJECT else []
-    entry = lexicon().find(last[0], Kind.THING) if last and singulars_of(last[0]) else None
+    entry = lexicon().find(last[0], EntryKind.THING) if last and singulars_of(last[0]) else None
     return "is" if entry is None else "are"
 
 
@@ -81,7 +81,7 @@ def _named(part: Part) -> str:
     return f"the {_bare(part)}"
 
 
-def _beside(part: Part) -> str:
+def _context_words(part: Part) -> str:
     return f"{'in' if part.modality is Modality.AREA else 'near'} {_named(part)}"
 
 

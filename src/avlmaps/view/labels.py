@@ -17,7 +17,7 @@ from avlmaps.query.naming import VoxelNamer
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from avlmaps.maps.sources.density import Plan
+    from avlmaps.maps.sources.density import CandidateGrid
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.contents import Room, SoundEvent, Thing
     from avlmaps.view.layout import Layout
@@ -52,7 +52,7 @@ def drawn_sources(avlmap: "AVLMap") -> list[dict[str, Any]]:
     return told
 
 
-def _outlines(cells: Bool[np.ndarray, "nx ny"], plan: "Plan") -> Iterator[Float[np.ndarray, "k 2"]]:
+def _outlines(cells: Bool[np.ndarray, "nx ny"], plan: "CandidateGrid") -> Iterator[Float[np.ndarray, "k 2"]]:
     """Yield the corners of each piece of a region, level frame, the largest first."""
     from scipy.ndimage import label
 

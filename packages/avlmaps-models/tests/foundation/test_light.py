@@ -19,8 +19,7 @@ from training.light.parity import parity, rank_correlation
 from training.light.quantise import Bits, in_blocks, quantise
 from training.light.tokenizers import UnknownTokenizerError, list_of, write_tokens
 
-from avlmaps.core.lexicon import Kind as Kinds
-from avlmaps.core.lexicon import lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.registry import Kind, forget_loaded, load
 from avlmaps.perception.conformance import check, example_frame, example_sound
 from avlmaps.perception.light import bundle as files
@@ -187,7 +186,7 @@ def test_a_tokenizer_of_another_kind_is_refused() -> None:
 
 
 def test_every_word_that_a_query_compares_with_comes_with_the_files() -> None:
-    wanted = {Kinds.THING: (*THINGS, "other"), Kinds.ROOM: AREA_NAMES, Kinds.SOUND: OTHERS}
+    wanted = {EntryKind.THING: (*THINGS, "other"), EntryKind.ROOM: AREA_NAMES, EntryKind.SOUND: OTHERS}
     for kind, words in wanted.items():
         phrases = phrases_of(kind)
         assert set(map(clean, words)) <= set(phrases)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import Modality, Role
 from avlmaps.query.evidence import Evidence as QueryEvidence
 from avlmaps.query.probability import FACTORS, probability_of
@@ -45,7 +45,7 @@ def test_what_has_an_answer_is_there_and_what_has_none_is_not(evidence: Evidence
         assert query.parts[0].role is Role.PRIMARY and sum(part.role is Role.PRIMARY for part in query.parts) == 1
         known = [
             part.query in (things if part.modality is Modality.OBJECT else sounds)
-            or any(lexicon().is_a(thing, part.query, Kind.THING) for thing in things)
+            or any(lexicon().is_a(thing, part.query, EntryKind.THING) for thing in things)
             for part in query.parts
             if part.modality in (Modality.OBJECT, Modality.SOUND)
         ]

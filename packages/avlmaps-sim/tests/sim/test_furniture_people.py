@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps_sim.furniture import families, make
 from avlmaps_sim.furniture.garments import fabric, thrown_over
 from avlmaps_sim.furniture.people import seated
@@ -39,7 +39,7 @@ def test_families_differ_and_some_are_held_out(category: str) -> None:
     assert len(families(category)) >= _RANGE[category][3]
     assert 1 <= len(families(category, "held-out")) <= 2
     assert set(families(category, "training")).isdisjoint(families(category, "held-out"))
-    assert lexicon().find(category, Kind.THING) is not None
+    assert lexicon().find(category, EntryKind.THING) is not None
 
 
 @given(st.integers(0, 2**31), st.floats(0.3, 0.7))

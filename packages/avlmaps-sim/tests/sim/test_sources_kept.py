@@ -13,7 +13,7 @@ from avlmaps.days.join import joined_sources
 from avlmaps.days.merge import merge_maps
 from avlmaps.maps.corrected import correct_stored
 from avlmaps.maps.pipeline.sources import add_sources
-from avlmaps.maps.sources.density import Density, Plan
+from avlmaps.maps.sources.density import CandidateGrid, Density
 from avlmaps.maps.sources.settings import SourceSettings
 from avlmaps.maps.store.reader import StoredMap, open_stored
 from avlmaps.maps.store.writer import MapContent, write_map
@@ -41,7 +41,7 @@ def copy(heard: tuple[Path, Path], tmp_path: Path) -> StoredMap:
 def places(sources: SourceEvidence | None) -> np.ndarray:
     """Return the likeliest place on the plan of each sound alone."""
     assert sources is not None
-    plan, prior = Plan.of(sources.place), sources.prior.astype(np.float64)
+    plan, prior = CandidateGrid.of(sources.place), sources.prior.astype(np.float64)
     settings = SourceSettings.of(int(sources.channels[0]))
     found = [
         Density.of(plan, prior, heard.astype(np.float64) + expected, expected.astype(np.float64), settings).position_m

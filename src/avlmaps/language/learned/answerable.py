@@ -8,8 +8,7 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 from avlmaps.core.inflection import singulars_of
-from avlmaps.core.lexicon import Kind as Entries
-from avlmaps.core.lexicon import lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.language import lexer
 from avlmaps.language.intents import Ask, Inquiry, TargetKind
 from avlmaps.language.learned.said import DETERMINERS, PREPOSITIONS, Claimed, words
@@ -148,7 +147,7 @@ def _soundless(said: Claimed, inquiry: Inquiry) -> str | None:
     words_of = about.name.split()
     told = sounding_words() | words().lists["ringers"]
     sounds = any(sounds_like(word) or word in told for word in words_of)
-    if sounds or any(lexicon().find(" ".join(words_of[at:]), Entries.SOUND) for at in range(len(words_of))):
+    if sounds or any(lexicon().find(" ".join(words_of[at:]), EntryKind.SOUND) for at in range(len(words_of))):
         return None
     return about.name
 

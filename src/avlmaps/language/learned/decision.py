@@ -8,8 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from avlmaps.core.inflection import singulars_of, stem_of
-from avlmaps.core.lexicon import Kind as Entries
-from avlmaps.core.lexicon import lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.language import lexer
 from avlmaps.language.intents import (
     Clarify,
@@ -211,7 +210,7 @@ def _is_name(token: Token, said: set[str]) -> bool:
     """Return whether a word is the name of a thing or a room that no reading has."""
     if token.kind != "word" or token.text in said or token.text in _NO_NAMES or len(token.text) < 3:
         return False
-    return any(lexicon().find(token.text, kind) is not None for kind in (Entries.THING, Entries.ROOM))
+    return any(lexicon().find(token.text, kind) is not None for kind in (EntryKind.THING, EntryKind.ROOM))
 
 
 def _is_number(tokens: Sequence[Token], at: int) -> bool:

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float32, Int64
 
 from avlmaps.core.inflection import singulars_of
-from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.language import lexer
 from avlmaps.language.lexer import Token
 from avlmaps.language.names import also_things, describing_words, sounding_words
@@ -147,7 +147,7 @@ def _lists() -> dict[str, frozenset[str]]:
 def _entries(phrase: str) -> tuple[str, ...]:
     """Return the kinds of what a phrase names exactly."""
     book = lexicon()
-    found = [str(kind) for kind in Kind if book.find(phrase, kind) is not None]
+    found = [str(kind) for kind in EntryKind if book.find(phrase, kind) is not None]
     if "thing" not in found and any(one in also_things() for one in (phrase, *singulars_of(phrase))):
         found.append("thing")
     return tuple(found)

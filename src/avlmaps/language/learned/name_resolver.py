@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from avlmaps.core.lexicon import Kind as Entries
-from avlmaps.core.lexicon import lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.language.asking_back import missing_file, strange_word, unclear, unknown
 from avlmaps.language.intents import (
     Beside,
@@ -100,7 +99,7 @@ def kind_of(name: str, kind: TargetKind) -> TargetKind:
     words = name.split()
     for start in range(len(words)):
         tail = " ".join(words[start:])
-        thing, room = (lexicon().find(tail, each) is not None for each in (Entries.THING, Entries.ROOM))
+        thing, room = (lexicon().find(tail, each) is not None for each in (EntryKind.THING, EntryKind.ROOM))
         if thing and not room and not start:
             return TargetKind.OBJECT
         if room and not thing:

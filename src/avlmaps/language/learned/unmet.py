@@ -8,8 +8,7 @@ reading becomes the rule's question, so that nothing moves on half of a sentence
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 
-from avlmaps.core.lexicon import Kind as Entries
-from avlmaps.core.lexicon import lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.language import lexer
 from avlmaps.language.intents import (
     Ask,
@@ -251,7 +250,7 @@ def _superlatives(said: Claimed) -> Clarify | None:
 
 
 def _is_entry(name: str) -> bool:
-    return any(lexicon().find(name, kind) is not None for kind in (Entries.THING, Entries.ROOM))
+    return any(lexicon().find(name, kind) is not None for kind in (EntryKind.THING, EntryKind.ROOM))
 
 
 def _is_quality(said: Claimed, at: int) -> bool:
@@ -270,7 +269,7 @@ def is_superlative(word: str) -> bool:
     """Return whether a word is the highest degree of an adjective: "quietest"."""
     if not word.endswith("est") or len(word) < 6 or word in _NO_SUPERLATIVES:
         return False
-    if any(lexicon().find(word, kind) is not None for kind in (Entries.THING, Entries.ROOM)):
+    if any(lexicon().find(word, kind) is not None for kind in (EntryKind.THING, EntryKind.ROOM)):
         return False
     stem = word.removesuffix("est")
     stems = (

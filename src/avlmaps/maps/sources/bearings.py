@@ -16,7 +16,7 @@ import numpy as np
 from avlmaps.core.arrays import Float
 from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.sources.candidates import Candidates
-from avlmaps.maps.sources.density import Plan
+from avlmaps.maps.sources.density import CandidateGrid
 from avlmaps.maps.sources.event import Legs
 from avlmaps.maps.sources.settings import SourceSettings
 from avlmaps.maps.sources.walls import Walls
@@ -173,7 +173,7 @@ def evidence_of_bearings(
     """
     place = candidates.place_m.astype(np.float64)
     # Azimuths depend on the plan alone: one candidate for each of its cells stands for those above and below it.
-    _, some, cell = np.unique(Plan.of(place).cell, return_index=True, return_inverse=True)
+    _, some, cell = np.unique(CandidateGrid.of(place).cell, return_index=True, return_inverse=True)
     tables = [_log_density(*numbers) for numbers in _GRID]
     of_sound: list[Float[np.ndarray, "g o"]] = []
     elevations = [one.elevations(place) for one in heard]

@@ -21,7 +21,7 @@ _BEST, _MOST = 64, 1500  # cells that may be the answer, and that it is compared
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class CandidateGrid:
     """The cells of ``CELL_M`` over and under the candidates, level frame.
 
     Attributes:
@@ -37,8 +37,8 @@ class Plan:
     is_held: Bool[np.ndarray, "nx ny"]
 
     @classmethod
-    def of(cls, place_m: Float[np.ndarray, "c 3"]) -> "Plan":
-        """Return the plan of candidates; there is at least one."""
+    def of(cls, place_m: Float[np.ndarray, "c 3"]) -> "CandidateGrid":
+        """Return the grid of candidates; there is at least one."""
         cell = np.floor(np.asarray(place_m, np.float64)[:, :2] / CELL_M).astype(np.int64)
         low = cell.min(axis=0) - _MARGIN
         size = cell.max(axis=0) - low + _MARGIN + 1
@@ -89,13 +89,13 @@ class Density:
         share: (nx, ny) probabilities that sum up to 1.
     """
 
-    plan: Plan
+    plan: CandidateGrid
     share: Float[np.ndarray, "nx ny"]
 
     @classmethod
     def of(
         cls,
-        plan: Plan,
+        plan: CandidateGrid,
         prior: Float[np.ndarray, " c"],
         evidence: Float[np.ndarray, " c"],
         expected: Float[np.ndarray, " c"],

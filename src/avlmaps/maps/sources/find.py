@@ -11,7 +11,7 @@ from avlmaps.core.progress import progress, say
 from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.sources.bearings import Bearings, Device, evidence_of_bearings, expected_alone
 from avlmaps.maps.sources.candidates import Candidates, candidates_of
-from avlmaps.maps.sources.density import Density, Plan, log_same_place
+from avlmaps.maps.sources.density import CandidateGrid, Density, log_same_place
 from avlmaps.maps.sources.event import EventEvidence, evidence_of
 from avlmaps.maps.sources.polarity import signs_along
 from avlmaps.maps.sources.settings import SourceSettings
@@ -59,7 +59,7 @@ def find_sources(
     if not len(candidates):
         return None
     channels = 0 if microphones is None else len(microphones)
-    settings, plan = SourceSettings.of(channels), Plan.of(candidates.place_m)
+    settings, plan = SourceSettings.of(channels), CandidateGrid.of(candidates.place_m)
     walls: dict[int, Walls] = {}
     signs = np.ones(max(channels, 1))
     if microphones is not None:
@@ -110,7 +110,7 @@ def _with_directions(
     return [replace(one, heard=total - total.max()) for one, total in zip(heard, both, strict=True)], device
 
 
-def moves(one: EventEvidence, plan: Plan, prior: Float[np.ndarray, " c"], settings: SourceSettings) -> bool:
+def moves(one: EventEvidence, plan: CandidateGrid, prior: Float[np.ndarray, " c"], settings: SourceSettings) -> bool:
     """Return whether the two halves of a sound come from two places."""
     if one.halves is None:
         return False

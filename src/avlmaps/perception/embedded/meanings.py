@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from avlmaps.core.arrays import Float32
-from avlmaps.core.lexicon import Entry, Kind, lexicon, noun_of
+from avlmaps.core.lexicon import Entry, EntryKind, lexicon, noun_of
 from avlmaps.perception.protocols import WordEncoder
 
 # A phrase that starts with one of these describes, without a noun of its own.
@@ -47,7 +47,7 @@ class Meanings:
     called: tuple[tuple[str, ...], ...]
     kinds: dict[str, tuple[str, ...]]
     words: WordEncoder
-    kind: Kind = Kind.THING
+    kind: EntryKind = EntryKind.THING
     temperature: float = 0.07
     least_cosine: float = 0.5
     least_within: float = 0.3

@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 from jaxtyping import Float, Float32
 
-from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 
 # The subset of seven of its ImageNet sentences that the authors of CLIP found to do as well as all eighty.
 CLIP_PROMPTS = (
@@ -38,7 +38,7 @@ TIPS_PROMPTS = (
 # Captions of a picture taken there; the mean over a few sentences is steadier than one of them.
 AREA_PROMPTS = ("a photo of a {}.", "a photo of the {} of a building.", "a view inside a {}.")
 # Things of homes and offices, as the embedded encoder knows them.
-THINGS = tuple(entry.name for entry in lexicon().entries(Kind.THING) if entry.split == "training")
+THINGS = tuple(entry.name for entry in lexicon().entries(EntryKind.THING) if entry.split == "training")
 
 _REMEMBERED = 4096
 

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from avlmaps.core.arrays import Float, Float32, Int
-from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import Part, Role
 from avlmaps.maps.types import Keyframes
 from avlmaps.perception.protocols import NamedViewEncoder, ScaledEncoder, ViewEncoder
@@ -207,12 +207,12 @@ def same_place(area: str, asked: str) -> bool:
     known, name = lexicon(), area.casefold()
     if name == words or words.endswith(f" {name}"):
         return True
-    ours, theirs = known.senses(name, Kind.ROOM), known.senses(words, Kind.ROOM)
+    ours, theirs = known.senses(name, EntryKind.ROOM), known.senses(words, EntryKind.ROOM)
     if any(entry in theirs for entry in ours):
         return True
     return any(
-        not wide.generic and wide in theirs for entry in ours for wide in known.wider(entry.name, Kind.ROOM)
-    ) or any(wide in ours for entry in theirs for wide in known.wider(entry.name, Kind.ROOM))
+        not wide.generic and wide in theirs for entry in ours for wide in known.wider(entry.name, EntryKind.ROOM)
+    ) or any(wide in ours for entry in theirs for wide in known.wider(entry.name, EntryKind.ROOM))
 
 
 def _cosine(rows: Float[np.ndarray, "n d"], row: Float[np.ndarray, " d"]) -> Float[np.ndarray, " n"]:
@@ -315,7 +315,7 @@ def area_factor(
     missed = f"no view is like {part.query!r}; the best score is {best:.2f}, below {FOUND_AT:.2f}"
     note = "" if best >= FOUND_AT else missed
     if isinstance(encoder, NamedViewEncoder) and not (encoder.name_weights(part.query).any() or weights.any()):
-        note = f"{unknown_note(part.query, Kind.ROOM)}; it knows: {', '.join(encoder.names)}"
+        note = f"{unknown_note(part.query, EntryKind.ROOM)}; it knows: {', '.join(encoder.names)}"
     if not len(keyframes):
         note = "the map holds no keyframes"
     group = modes(space.level(anchors)[:, :2], scores, settings.link_m)

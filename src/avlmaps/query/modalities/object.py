@@ -8,7 +8,7 @@ import numpy as np
 
 from avlmaps.core.arrays import UInt8
 from avlmaps.core.errors import QueryError
-from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import Part
 from avlmaps.core.spelling import squeezed
 from avlmaps.perception.protocols import NamedPixelEncoder
@@ -45,7 +45,7 @@ def object_factor(
         QueryError: the encoder understands nothing of the word.
     """
     encoder = voxels.encoder
-    compound = " " in part.query.strip() and lexicon().find(part.query, Kind.THING) is not None  # a white board
+    compound = " " in part.query.strip() and lexicon().find(part.query, EntryKind.THING) is not None  # a white board
     by_colour = voxels.rgb is not None and isinstance(encoder, NamedPixelEncoder) and not compound
     colour = colour_in(part.query) if by_colour else None
     if colour is not None and voxels.rgb is not None and not colour.thing:
@@ -179,10 +179,10 @@ def _is_whole(understood: str, name: str) -> bool:
     """Return whether what an encoder understands of a name is all of it: itself, a synonym, or its narrower kinds."""
     if squeezed(understood) == squeezed(name):
         return True
-    entry = lexicon().find(name, Kind.THING)
+    entry = lexicon().find(name, EntryKind.THING)
     if entry is None or entry.is_compound(name):
         return False
-    return all(lexicon().is_a(kind, entry.name, Kind.THING) for kind in understood.split(" or "))
+    return all(lexicon().is_a(kind, entry.name, EntryKind.THING) for kind in understood.split(" or "))
 
 
 def _absence(word: str, voxels: int, found: Segmentation) -> str:

@@ -40,7 +40,7 @@ def check_recording(recording: Recording) -> Verdict:
     after = without_occluded(after, following, surfaces)
     apart = compare(distant, surfaces, sample.world_from_camera, floor_m=APART_SAME_M)
     apart = without_occluded(apart, distant, surfaces)
-    found = _Found(after, apart, find_edges(sample), compare(sample.of_tint(), surfaces, sample.world_from_camera))
+    found = _Found(after, apart, find_edges(sample), compare(sample.of_redness(), surfaces, sample.world_from_camera))
     known = sample.depth_m[sample.depth_m > 0.0]
     median_m = float(np.median(known)) if known.size else float("nan")
     findings = [
@@ -71,7 +71,7 @@ class _Found:
     after: Agreement
     apart: Agreement
     edges: Edges
-    tint: Agreement
+    redness: Agreement
 
 
 def _most_unlike(after: Agreement, apart: Agreement) -> Agreement | None:
@@ -119,10 +119,10 @@ def _of_agreement(recording: Recording, sample: Sample, found: _Found, median_m:
         shift = shift_of(found.edges, sample)
         where = "" if shift is None else " ".join(_shift_words(shift, recording))
         yield Finding(Reason.COLOUR, grade, sentence, _cause(recording, sample, found, median_m) or where or other)
-    elif opposite := limits.opposite_pairs(found.tint):
+    elif opposite := limits.opposite_pairs(found.redness):
         sentence = (
             f"Red and blue of the same points are exchanged in {opposite} of "
-            f"{int(np.isfinite(found.tint.alike).sum())} pairs of frames: some colour pictures are RGB, others BGR."
+            f"{int(np.isfinite(found.redness.alike).sum())} pairs of frames: some colour pictures are RGB, others BGR."
         )
         yield Finding(Reason.COLOUR, Grade.SUSPICIOUS, sentence, "Write all pictures in one order of channels.")
     elif shift := shift_of(found.edges, sample):

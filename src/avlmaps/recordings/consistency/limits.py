@@ -61,7 +61,7 @@ def unlike(found: Agreement) -> bool:
     return found.likeness < LEAST_LIKENESS or (bad >= 2 and bad > MOST_BAD_PAIRS * np.isfinite(found.alike).sum())
 
 
-def opposite_pairs(tint: Agreement) -> int:
+def opposite_pairs(redness: Agreement) -> int:
     """Return in how many pairs red and blue are exchanged, of an agreement whose likeness is that of red less blue."""
-    count = int((tint.alike < OPPOSITE).sum())
-    return count if count > 1 or bool((tint.alike < SURELY_OPPOSITE).any()) else 0
+    count = int((redness.alike < OPPOSITE).sum())
+    return count if count > 1 or bool((redness.alike < SURELY_OPPOSITE).any()) else 0

@@ -41,7 +41,7 @@ class Sample:
         world_from_camera: (f, 4, 4) poses as they are read.
         depth_m: (f, h, w) z-depth, 0 where there is none.
         grey: (f, hc, wc) brightness, 0 to 255.
-        tint: (f, hc, wc) red less blue, -255 to 255.
+        redness: (f, hc, wc) red less blue, -255 to 255.
         rig: the cameras at these sizes.
         pairs: (p, 2) rows of frames that should see the same place, the earlier first.
         follows: (p,) whether the frames of a pair follow one another; the others look at one place from apart.
@@ -53,7 +53,7 @@ class Sample:
     world_from_camera: Float[np.ndarray, "f 4 4"]
     depth_m: Float32[np.ndarray, "f h w"]
     grey: Float32[np.ndarray, "f hc wc"]
-    tint: Float32[np.ndarray, "f hc wc"]
+    redness: Float32[np.ndarray, "f hc wc"]
     rig: Rig
     pairs: Int[np.ndarray, "p 2"]
     follows: Bool[np.ndarray, " p"]
@@ -66,9 +66,9 @@ class Sample:
         """Return the same pictures with some of the pairs."""
         return replace(self, pairs=self.pairs[chosen], follows=self.follows[chosen])
 
-    def of_tint(self) -> "Sample":
+    def of_redness(self) -> "Sample":
         """Return the same frames with red less blue for brightness."""
-        return replace(self, grey=self.tint)
+        return replace(self, grey=self.redness)
 
 
 def draw_sample(recording: Recording) -> Sample:
@@ -96,7 +96,7 @@ def draw_pairs(recording: Recording, pairs: Int[np.ndarray, "p 2"], follows: Boo
     read: list[int] = []
     depth: list[np.ndarray] = []
     grey: list[np.ndarray] = []
-    tint: list[np.ndarray] = []
+    redness: list[np.ndarray] = []
     fault: RecordingError | None = None
     for number in index.tolist():
         try:
@@ -106,9 +106,9 @@ def draw_pairs(recording: Recording, pairs: Int[np.ndarray, "p 2"], follows: Boo
             continue
         read.append(number)
         depth.append(_nearest(frame.depth_m, rig.depth))
-        bright, warm = _colour(frame.rgb, rig.rgb)
+        bright, red = _colour(frame.rgb, rig.rgb)
         grey.append(bright)
-        tint.append(warm)
+        redness.append(red)
     if not read:
         raise fault or RecordingError(f"{recording.path} has no frame; there is nothing to check.")
     kept = np.isin(pairs, read).all(axis=1)
@@ -118,7 +118,7 @@ def draw_pairs(recording: Recording, pairs: Int[np.ndarray, "p 2"], follows: Boo
         world_from_camera=recording.world_from_camera[read],
         depth_m=np.stack(depth),
         grey=np.stack(grey),
-        tint=np.stack(tint),
+        redness=np.stack(redness),
         rig=rig,
         pairs=np.searchsorted(np.array(read), pairs[kept]),
         follows=follows[kept],

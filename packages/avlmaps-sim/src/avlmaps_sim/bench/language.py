@@ -15,7 +15,7 @@ from typing import Any
 
 from avlmaps.core.errors import LanguageError, QueryError
 from avlmaps.core.inflection import singulars_of, stem_of
-from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.language.list_questions import Listed, ListQuestion
 from avlmaps.language.sentence import Given
 from avlmaps_sim.bench.harness.intervals import wilson
@@ -272,7 +272,7 @@ def _is_both(name: str) -> bool:
     """Return whether a name is one of a thing and of a room."""
     words = name.lower().split()
     tail = words[-1] if words else ""
-    return lexicon().find(tail, Kind.THING) is not None and lexicon().find(tail, Kind.ROOM) is not None
+    return lexicon().find(tail, EntryKind.THING) is not None and lexicon().find(tail, EntryKind.ROOM) is not None
 
 
 def _name(kind: str, name: Any) -> Any:
@@ -282,7 +282,7 @@ def _name(kind: str, name: Any) -> Any:
         joined = str(name).lower().replace("door bell", "doorbell")
         return frozenset(stem_of(word) for word in joined.split() if word not in _WHO)
     words = [word for word in str(name).lower().replace("-", " ").split() if word not in ("the", "a", "an", "my")]
-    wanted = Kind.ROOM if kind == "area" else Kind.THING
+    wanted = EntryKind.ROOM if kind == "area" else EntryKind.THING
     for start in range(len(words)):
         entry = lexicon().find(" ".join(words[start:]), wanted)
         if entry is not None:

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.progress import progress
 from avlmaps.query.naming import VoxelNamer
 from avlmaps_sim.bench.harness.chosen import chosen_on
@@ -111,7 +111,7 @@ def measure(avlmap: "AVLMap", things: Sequence[SceneObject], same: Mapping[str, 
     present = {name[number] for number in seen}
     vocabulary = [word for word in avlmap.stored.encoders.pixels.vocabulary if word not in STRUCTURE]
     words = sorted({same.get(word, word) for word in vocabulary} | (present - set(STRUCTURE)))
-    answers = cache(lambda name, word: name == word or lexicon().is_a(name, word, Kind.THING))
+    answers = cache(lambda name, word: name == word or lexicon().is_a(name, word, EntryKind.THING))
     said, held, best, reached = [], np.zeros(len(centres), bool), {}, {}
     covered: dict[str, np.ndarray] = {}
     for word in words:
@@ -206,7 +206,7 @@ def run_objects(settings: "IndexingSettings | None", out: Path) -> dict[str, Any
 
 def _same(things: Sequence[SceneObject]) -> dict[str, str]:
     """Return the lexicon's name for what scenes from files call otherwise: ``picture frame`` counts as ``picture``."""
-    entries = {thing.category: lexicon().find(thing.category, Kind.THING) for thing in things}
+    entries = {thing.category: lexicon().find(thing.category, EntryKind.THING) for thing in things}
     return {word: entry.name for word, entry in entries.items() if entry is not None}
 
 

@@ -12,14 +12,14 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import Modality, Part, Question
 from avlmaps.language.questions import parse_sentence
 from avlmaps_sim.demo.evidence import Box, Evidence
 
 # Spoken names of labels of training; none of these words was ever a label. The largest come first.
 SPOKEN = {
-    name: lexicon().named(name, Kind.THING).spoken
+    name: lexicon().named(name, EntryKind.THING).spoken
     for name in ("sofa", "refrigerator", "wardrobe", "bookshelf", "stove", "tv", "chest of drawers", "sink",
                  "nightstand", "trash can", "computer", "carpet")
 }  # fmt: skip

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 
 ANYWHERE = ("*",)
 
@@ -54,7 +54,7 @@ _AREA = {"storage room": "storage"}
 
 
 def _kind(name: str, height_m: float, level_db: float, indoors: bool) -> SoundKind:
-    entry = lexicon().named(name, Kind.SOUND)
+    entry = lexicon().named(name, EntryKind.SOUND)
     floor = tuple(_AREA.get(room, room) for room in entry.rooms)
     return SoundKind((name, *entry.synonyms), entry.makers, floor, height_m, level_db, indoors)
 
@@ -70,5 +70,5 @@ _FOREIGN = SoundKind(("",), ("window",), ANYWHERE, 1.5, indoors=False)
 
 def kind_of(name: str) -> SoundKind:
     """Return the kind of a sound by its name; one that no home makes comes in by the windows, or from anywhere."""
-    entry = lexicon().find(name.replace("_", " "), Kind.SOUND)
+    entry = lexicon().find(name.replace("_", " "), EntryKind.SOUND)
     return _FOREIGN if entry is None else _BY_NAME.get(entry.name, _FOREIGN)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps_sim.hearing.sound_paths import Air
 from avlmaps_sim.scene import Area, Scene, SceneObject
 
@@ -63,7 +63,7 @@ class Rooms:
         volume, surface = size[:, 0] * height, 2 * size[:, 0] + size[:, 1] * height
         absorbing = np.zeros((len(BANDS_HZ), len(areas)))
         for index, area in enumerate(areas):
-            entry = lexicon().find(area.kind, Kind.ROOM)
+            entry = lexicon().find(area.kind, EntryKind.ROOM)
             floor = _TILES if entry is not None and entry.tiled else _BOARDS
             absorbing[:, index] = size[index, 0] * (floor + _PLASTER) + size[index, 1] * height[index] * _PLASTER
             absorbing[:, index] += 4.0 * _AIR_PER_M * volume[index]
@@ -125,7 +125,7 @@ def _taken_by(thing: SceneObject) -> Float[np.ndarray, " b"]:
     x, y, z = thing.size
     if thing.category in _STRUCTURE:
         return np.zeros(len(BANDS_HZ))
-    entry = lexicon().find(thing.category, Kind.THING)
+    entry = lexicon().find(thing.category, EntryKind.THING)
     if entry is not None and entry.name == "carpet":
         return x * y * _RUG
     return (x * y + (x + y) * z) * (_SOFT if entry is not None and entry.soft else _WOODEN)

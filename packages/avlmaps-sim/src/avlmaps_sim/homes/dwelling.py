@@ -15,7 +15,7 @@ from avlmaps_sim.homes.furnish import Furnisher
 from avlmaps_sim.homes.layout import Programme, floor_of
 from avlmaps_sim.homes.on_walls import adorn, dress_windows, light_up
 from avlmaps_sim.homes.placing import Footprint, ground_of
-from avlmaps_sim.homes.plan import WELL, Plan, Room, walls_between
+from avlmaps_sim.homes.plan import WELL, Room, Storey, walls_between
 from avlmaps_sim.homes.programme import home_programme, office_programme, upstairs
 from avlmaps_sim.homes.stairs import build_stairs
 from avlmaps_sim.homes.walls import build_shell, looks_of
@@ -34,7 +34,7 @@ RULES: dict[str, Callable[[Furnisher], None]] = {
 }  # fmt: skip
 
 
-def _plan(rng: np.random.Generator, programme: Programme, corridor: str, stairs: bool = False) -> Plan:
+def _plan(rng: np.random.Generator, programme: Programme, corridor: str, stairs: bool = False) -> Storey:
     """Draw plans until every room can be reached, and no more through other rooms than can be helped."""
     height = draw(rng, 2.3, 3.4) if chance(rng, 0.4) else draw(rng, 2.45, 2.75)
     open_plan = 0.85 if chance(rng, 0.5) else 0.1
@@ -48,10 +48,10 @@ def _plan(rng: np.random.Generator, programme: Programme, corridor: str, stairs:
             break
     walls = lit_by_day(rng, laid, walls)
     ceiling = laid[-1].kind == WELL or not chance(rng, 0.06)
-    return Plan(tuple(laid), tuple(walls), draw(rng, 0.09, 0.2), draw(rng, 0.22, 0.4), ceiling)
+    return Storey(tuple(laid), tuple(walls), draw(rng, 0.09, 0.2), draw(rng, 0.22, 0.4), ceiling)
 
 
-def _upper(rng: np.random.Generator, ground: Plan) -> Plan | None:
+def _upper(rng: np.random.Generator, ground: Storey) -> Storey | None:
     """Draw the floor above a floor with stairs; None where no doors reach all of it."""
     floor_m = ground.rooms[0].floor_m + ground.rooms[0].height_m + ground.slab_m
     for _ in range(4):
@@ -59,11 +59,11 @@ def _upper(rng: np.random.Generator, ground: Plan) -> Plan | None:
         walls = joined_up(rng, rooms, walls_between([room.polygon for room in rooms]), 0.0)
         if walls is not None:
             lit = lit_by_day(rng, rooms, walls, has_entrance=False)
-            return Plan(tuple(rooms), tuple(lit), ground.wall_m, ground.outer_m, ceiling=not chance(rng, 0.06))
+            return Storey(tuple(rooms), tuple(lit), ground.wall_m, ground.outer_m, ceiling=not chance(rng, 0.06))
     return None
 
 
-def _furnished(rng: np.random.Generator, builder: SceneBuilder, plan: Plan, which: Families) -> None:
+def _furnished(rng: np.random.Generator, builder: SceneBuilder, plan: Storey, which: Families) -> None:
     """Build a floor and furnish its rooms."""
     home = looks_of(rng, replace(plan.rooms[0], kind="living room"), None)
     looks = [looks_of(rng, room, home) for room in plan.rooms]

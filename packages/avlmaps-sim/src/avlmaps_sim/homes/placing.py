@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy import ndimage
 
-from avlmaps_sim.homes.plan import OUTSIDE, Hole, Plan
+from avlmaps_sim.homes.plan import OUTSIDE, Hole, Storey
 from avlmaps_sim.homes.polygons import corners_of, inside, overlapping, shrunk
 
 _WAY_M = 0.38  # a robot of 0.25 m and the coarseness of the grids that look for its way
@@ -196,7 +196,7 @@ class Ground:
         (self._way if way else self._zone).append(corners_of(centre, half_m, np.asarray(heading_rad)))
 
 
-def ground_of(plan: Plan, room: int) -> Ground:
+def ground_of(plan: Storey, room: int) -> Ground:
     """Return the bare floor of a room, with clear zones before its doors."""
     inner = shrunk(plan.rooms[room].polygon, plan.wall_m / 2)
     sides = []

@@ -101,7 +101,7 @@ class Room:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Plan:
+class Storey:
     """One floor of a building.
 
     Attributes:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from avlmaps_sim.furniture.recipe_helpers import chance, draw, pick
-from avlmaps_sim.homes.plan import WELL, WELL_LENGTH_M, Plan, Wall
+from avlmaps_sim.homes.plan import WELL, WELL_LENGTH_M, Storey, Wall
 from avlmaps_sim.homes.walls import heading_of, placed, surface
 from avlmaps_sim.mesh import Material, Mesh, joined
 from avlmaps_sim.scene import SceneBuilder
@@ -13,14 +13,14 @@ _LANDING_M = 1.0
 _RISER_M = 0.18
 
 
-def mouth_of(plan: Plan) -> Wall:
+def mouth_of(plan: Storey) -> Wall:
     """Return the open side of the stairwell, seen so that the well lies on its left."""
     index = next(i for i, room in enumerate(plan.rooms) if room.kind == WELL)
     wall, on_left = next((w, left) for w, left in plan.walls_of(index) if not w.built)
     return wall if on_left else Wall(wall.b, wall.a, wall.right, wall.left, (), built=False)
 
 
-def build_stairs(rng: np.random.Generator, builder: SceneBuilder, ground: Plan, upper: Plan, area: int) -> None:
+def build_stairs(rng: np.random.Generator, builder: SceneBuilder, ground: Storey, upper: Storey, area: int) -> None:
     """Add stairs and railings to a scene.
 
     Args:

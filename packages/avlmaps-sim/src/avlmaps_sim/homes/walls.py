@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps_sim.furniture import Families, Piece
 from avlmaps_sim.furniture.openings import door, folding_door, window
 from avlmaps_sim.furniture.recipe_helpers import chance, draw, pick
-from avlmaps_sim.homes.plan import OUTSIDE, WELL, Hole, Plan, Room, Wall
+from avlmaps_sim.homes.plan import OUTSIDE, WELL, Hole, Room, Storey, Wall
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Triple, joined
 from avlmaps_sim.scene import SceneBuilder
@@ -56,7 +56,7 @@ def _pale(rng: np.random.Generator) -> Triple:
 
 def looks_of(rng: np.random.Generator, room: Room, home: Looks | None) -> Looks:
     """Draw the looks of a room; most rooms share the home's own looks."""
-    entry = lexicon().find(room.kind, Kind.ROOM)
+    entry = lexicon().find(room.kind, EntryKind.ROOM)
     wet = entry is not None and entry.wet
     floor_kind = pick(rng, ("tile", "tile", "stone", "marble") if wet else
                       ("parquet", "parquet", "parquet", "wood", "carpet", "tile", "stone", "concrete"))  # fmt: skip
@@ -139,7 +139,7 @@ def _skirting(
     return out
 
 
-def wall_mesh(plan: Plan, wall: Wall, looks: list[Looks], edge: Material, outer: Material, skirting_m: float) -> Mesh:
+def wall_mesh(plan: Storey, wall: Wall, looks: list[Looks], edge: Material, outer: Material, skirting_m: float) -> Mesh:
     """Return a wall in the world, with its holes and its skirting."""
     inner = plan.wall_m / 2
     rooms = [plan.rooms[i] for i in (wall.left, wall.right) if i != OUTSIDE]
@@ -161,7 +161,7 @@ def wall_mesh(plan: Plan, wall: Wall, looks: list[Looks], edge: Material, outer:
     return placed(joined(parts), wall.a, heading_of(wall.along), floor)
 
 
-def _extension(plan: Plan, wall: Wall, end: Float[np.ndarray, "2"]) -> float:
+def _extension(plan: Storey, wall: Wall, end: Float[np.ndarray, "2"]) -> float:
     """Return how far a wall runs on beyond its end: into the wall across it, not into one that continues it."""
     for other in plan.walls:
         if other is wall or not other.built:
@@ -201,13 +201,13 @@ class Leaf:
     room: int
 
 
-def area_of(plan: Plan, room: int, first_area: int) -> int:
+def area_of(plan: Storey, room: int, first_area: int) -> int:
     """Return the index of a room's area in the scene, −1 for a stairwell."""
     return -1 if plan.rooms[room].kind == WELL else first_area + room
 
 
 def build_shell(
-    rng: np.random.Generator, builder: SceneBuilder, plan: Plan, looks: list[Looks], first_area: int, which: Families
+    rng: np.random.Generator, builder: SceneBuilder, plan: Storey, looks: list[Looks], first_area: int, which: Families
 ) -> list[Leaf]:
     """Add walls, floors, ceilings, doors and windows of a floor to a scene; return the leaves that stand in rooms."""
     edge = surface(pick(rng, ("white", "white", "painted", "wood")), rng)
@@ -231,7 +231,7 @@ def build_shell(
     return leaves
 
 
-def _fill(rng: np.random.Generator, builder: SceneBuilder, plan: Plan, wall: Wall, hole: Hole, first_area: int,
+def _fill(rng: np.random.Generator, builder: SceneBuilder, plan: Storey, wall: Wall, hole: Hole, first_area: int,
           style: int, which: Families) -> list[Leaf]:  # fmt: skip
     outer = wall.right == OUTSIDE
     thick = plan.outer_m if outer else plan.wall_m

@@ -6,9 +6,10 @@ from typing import Annotated
 
 from tyro.conf import OmitArgPrefixes, Positional, arg
 
-from avlmaps.cli.output import emit, place, table_lines
+from avlmaps.cli.output import emit, table_lines
 from avlmaps.cli.reading_options import Reading
 from avlmaps.cli.verb import Verb
+from avlmaps.core.wording import place_text
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,7 +66,7 @@ class AddSounds(Verb):
             background=self.background,
             snr_db=self.snr_db,
         )
-        rows = [(f"{e.onset_s:.2f}", f"{e.offset_s:.2f}", e.category, place(e.position)) for e in events]
+        rows = [(f"{e.onset_s:.2f}", f"{e.offset_s:.2f}", e.category, place_text(e.position)) for e in events]
         answer = {"recording": str(self.out), "sounds": len(events), "events": [e.to_json() for e in events]}
         emit(
             answer,

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from tyro.conf import arg
 
-from avlmaps.cli.output import UsageError, emit, place, table_lines
+from avlmaps.cli.output import UsageError, emit, table_lines
 from avlmaps.cli.verb import Verb
+from avlmaps.core.wording import place_text
 
 if TYPE_CHECKING:
     from avlmaps_sim.scene import Scene
@@ -78,7 +79,7 @@ class Record(Verb):
         """Record."""
         answer = record(self)
         rows = [
-            (f"{e['onset_s']:.2f}", f"{e['offset_s']:.2f}", e["category"], place(e["source"]), e["object"] or "-")
+            (f"{e['onset_s']:.2f}", f"{e['offset_s']:.2f}", e["category"], place_text(e["source"]), e["object"] or "-")
             for e in answer["events"]
         ]
         lines = table_lines(("onset_s", "offset_s", "category", "sounds at", "made by"), rows) if rows else []

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from avlmaps.core.errors import QueryError
-from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import Modality, Part, Role
-from avlmaps.core.registry import Kind as Module
+from avlmaps.core.registry import Kind
 from avlmaps.query.evidence import Evidence
 from avlmaps.query.heatmap import Heatmap, product
 from avlmaps.query.modalities.area import area_names
@@ -67,9 +67,9 @@ def judged_job(job: SceneJob, most: int, open_spec: Callable[[str], Scene]) -> l
 def judged(place: Workplace, tasks: Sequence[Task]) -> list[Judged]:
     """Return the answers of a scene's map to its labelled queries."""
     encoders = place.avlmap.stored.encoders
-    names = [name for name in encoders.pixels.vocabulary if lexicon().find(name, Kind.THING) is not None]
-    sounds = [entry.name for entry in lexicon().entries(Kind.SOUND)] if place.has((Module.SOUNDS,)) else []
-    rooms = area_names(encoders.views) if place.has((Module.VIEWS,)) else ()
+    names = [name for name in encoders.pixels.vocabulary if lexicon().find(name, EntryKind.THING) is not None]
+    sounds = [entry.name for entry in lexicon().entries(EntryKind.SOUND)] if place.has((Kind.SOUNDS,)) else []
+    rooms = area_names(encoders.views) if place.has((Kind.VIEWS,)) else ()
     queries = labelled_queries(place.evidence, tasks, names, sounds, rooms, place.job.rng(7))
     asked = _Asked(place)
     return [asked.judge(query) for query in queries]

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import Modality, Part, Role
 from avlmaps_sim.bench.harness.evidence import Box, Evidence, shown_boxes
 from avlmaps_sim.bench.indexing.rules import between_m
@@ -142,7 +142,7 @@ def _holds(evidence: Evidence, task: Task, kind: str) -> bool:
     return any(
         thing.area < 0 or evidence.areas[thing.area].kind == kind
         for thing in evidence.objects
-        if lexicon().is_a(thing.category, task.category, Kind.THING) or thing.category == task.category
+        if lexicon().is_a(thing.category, task.category, EntryKind.THING) or thing.category == task.category
     )
 
 
@@ -160,7 +160,7 @@ def _alone(
     for name in silent:
         yield _single("sound", Modality.SOUND, name, ())
     for name in rooms:
-        own = [area for area in evidence.areas if area.kind == name or lexicon().is_a(area.kind, name, Kind.ROOM)]
+        own = [area for area in evidence.areas if area.kind == name or lexicon().is_a(area.kind, name, EntryKind.ROOM)]
         yield _single("area", Modality.AREA, name, [_box_of(area) for area in own])
 
 
@@ -174,9 +174,9 @@ def _box_of(area: Area) -> Box:
 
 
 def _is(category: str, name: str) -> bool:
-    return category == name or lexicon().is_a(category, name, Kind.THING)
+    return category == name or lexicon().is_a(category, name, EntryKind.THING)
 
 
 def _any_is(held: Sequence[str], name: str) -> bool:
     """Return whether a home holds what a name means, or may be taken to mean."""
-    return any(_is(category, name) or lexicon().is_a(name, category, Kind.THING) for category in held)
+    return any(_is(category, name) or lexicon().is_a(name, category, EntryKind.THING) for category in held)

@@ -128,11 +128,11 @@ def _ends(name: str, recording: Recording, place: Path, used: Encoders) -> list[
     for gates in (True, False):
         play(recording, place / "end", used, rate=None, settings=LiveSettings(gates=gates))
         live = AVLMap.open(place / "end")
-        rows.append([name, "on" if gates else "off", *_beside(live, AVLMap(built))])
+        rows.append([name, "on" if gates else "off", *_compared(live, AVLMap(built))])
     return rows
 
 
-def _beside(live: AVLMap, built: AVLMap) -> list[object]:
+def _compared(live: AVLMap, built: AVLMap) -> list[object]:
     counts: list[object] = [len(live.stored.voxels), len(built.stored.voxels)]
     apart_m, alone = _goals(live, built)
     near = [sum(m <= limit + 1e-6 for m in apart_m) for limit in (_VOXEL_M, 0.1)]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool
 
-from avlmaps.core.lexicon import Kind, lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps_sim.bench.rooms.truth import CELL_M, Floor
 
 
@@ -102,5 +102,5 @@ def _matched(floor: Floor, listed: Sequence[Listed]) -> list[Matched]:
 
 def _same(name: str, kind: str) -> bool:
     known = lexicon()
-    a, b = known.find(name, Kind.ROOM), known.find(kind, Kind.ROOM)
-    return name == kind or (a is not None and a == b) or known.is_a(name, kind, Kind.ROOM)
+    a, b = known.find(name, EntryKind.ROOM), known.find(kind, EntryKind.ROOM)
+    return name == kind or (a is not None and a == b) or known.is_a(name, kind, EntryKind.ROOM)

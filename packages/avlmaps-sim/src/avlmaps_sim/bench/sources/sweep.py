@@ -13,7 +13,7 @@ from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
 from avlmaps.core.timeline import Trajectory
-from avlmaps.maps.sources.density import Density, Plan
+from avlmaps.maps.sources.density import CandidateGrid, Density
 from avlmaps.maps.sources.find import find_sources
 from avlmaps.maps.sources.settings import SourceSettings
 from avlmaps.recordings.audio import AudioTrack, Sound
@@ -107,7 +107,7 @@ def _trial(condition: Condition, rng: np.random.Generator) -> tuple[float, bool]
         span = (_ONSET_S, _ONSET_S + _SECONDS)
         found = find_sources(track, Trajectory(stamps_s, believed), [span], surfaces(), _UP)
     assert found is not None
-    plan, prior = Plan.of(found.place), found.prior.astype(np.float64)
+    plan, prior = CandidateGrid.of(found.place), found.prior.astype(np.float64)
     expected = found.expected[0].astype(np.float64)
     evidence = found.heard[0].astype(np.float64) + expected
     density = Density.of(plan, prior, evidence, expected, SourceSettings.of(len(array)))
