@@ -141,6 +141,8 @@ def test_regions_hold_what_they_say_and_lie_within_one_another(seed: int, low: f
     assert not (small & ~large).any()
     assert one.within_m(low) <= one.within_m(high)
     assert one.share[small].min() >= one.share[~small].max()
+    cell = int(np.random.default_rng(seed).integers(one.share.size))
+    assert small.ravel()[cell] == (one.likelier_than(cell) < low)
 
 
 @given(st.integers(0, 20))

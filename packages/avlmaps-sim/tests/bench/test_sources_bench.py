@@ -29,7 +29,7 @@ from avlmaps_sim.bench.sources.measured import (
     table,
     walks_of_ratios,
 )
-from avlmaps_sim.bench.sources.suite import table_of_homes, table_of_lengths, table_of_mended
+from avlmaps_sim.bench.sources.suite import table_of_homes, table_of_lengths, table_of_mended, table_of_regions
 from avlmaps_sim.bench.sources.sweep import USUAL, _trial, surfaces
 from avlmaps_sim.hearing import AcousticSettings
 from avlmaps_sim.truth import HeardEvent
@@ -60,8 +60,8 @@ def test_a_truth_off_the_map_counts_at_the_nearest_cell() -> None:
 
 def test_the_table_counts_what_was_placed() -> None:
     placed = [
-        Placed("square4", 0.1, True, True, True, 1.0, True, True, 0.5, 9, 0.9),
-        Placed("square4", 0.7, False, False, True, 2.0, None, True, 0.5, 9, 0.2),
+        Placed("square4", 0.1, True, 0.3, 1.0, True, True, 0.5, 9, 0.9),
+        Placed("square4", 0.7, False, 0.6, 2.0, None, True, 0.5, 9, 0.2),
         Placed("room's middle", 1.0, True),
     ]
     made = table_of_homes([HomeOutcome("house:1", 3, 2, tuple(placed))])
@@ -73,12 +73,21 @@ def test_the_table_counts_what_was_placed() -> None:
 
 
 def test_the_regions_are_counted_by_the_length_of_the_sound() -> None:
-    placed = [Placed("mono", 0.1, True, True, True, seconds=2.0), Placed("mono", 0.3, True, False, True, seconds=2.5),
-              Placed("mono", 0.3, True, False, False, seconds=8.0)]  # fmt: skip
+    placed = [Placed("mono", 0.1, True, 0.4, seconds=2.0), Placed("mono", 0.3, True, 0.5, seconds=2.5),
+              Placed("mono", 0.3, True, 0.9, seconds=8.0)]  # fmt: skip
     made = table_of_lengths([HomeOutcome("house:1", 3, 3, tuple(placed))])
     assert [(row[1], row[2], row[4], row[6]) for row in made["rows"]] == [
         ("1 to 3", 2, 50.0, 100.0), ("6 and more", 1, 0.0, 0.0)
     ]  # fmt: skip
+
+
+def test_the_regions_are_counted_by_what_they_promise() -> None:
+    placed = [Placed("mono", 0.1, True, begin) for begin in (0.0, 0.45, 0.5, 0.93)]
+    made = table_of_regions([HomeOutcome("house:1", 4, 4, (*placed, Placed("nearest thing", 1.0, True)))])
+    (row,) = made["rows"]
+    held = dict(zip(made["columns"], row, strict=True))
+    assert (held["by"], held["sounds"], held["in 10 % region %"]) == ("mono", 4, 25.0)
+    assert [held[f"in {share} % region %"] for share in (40, 50, 90, 95)] == [25.0, 50.0, 75.0, 100.0]
 
 
 def test_what_was_mended_is_told_and_refusals_are_counted() -> None:

@@ -130,6 +130,11 @@ class Density:
         inside[self._order[:count]] = True
         return inside.reshape(self.share.shape)
 
+    def likelier_than(self, cell: int) -> float:
+        """Return the probability of the cells that come before a flat cell: regions of more hold it."""
+        before = int(np.flatnonzero(self._order == cell)[0])
+        return float(self.share.ravel()[self._order[:before]].sum())
+
     def area_m2(self, probability: float) -> float:
         """Return the area of that region, m²."""
         return float(self.region(probability).sum()) * CELL_M**2

@@ -44,7 +44,7 @@ WAYS = (*ARRAYS, DEVICE)
 """What places sounds with and without the lexicon; the other two show what calibration is worth."""
 _OUTLIERS = 0.03
 _UNKNOWN = float("nan")
-_RECIPE = 2  # counts up when the measurement changes, so that what is stored is measured again
+_RECIPE = 3  # counts up when the measurement changes, so that what is stored is measured again
 _FRAMES, _SIZE, _FPS = 300, (160, 120), 5.0
 _OVERLAP_S = 0.2
 _AT_M = 0.3
@@ -84,9 +84,8 @@ class Placed:
         array: a name of ``ARRAYS`` with its prior, or a baseline.
         error_m: on the plan, from the place where it sounded.
         room: whether the place lies in the right room; None where the source is in none.
-        in_50: whether the region of 50 % holds the truth; None of a baseline.
-        in_90: of 90 %.
-        area_90_m2: of that region.
+        held_from: probability of what is likelier than the truth's cell: regions of more hold it; None of a baseline.
+        area_90_m2: of the region of 90 %.
         right: probability that it gives to the truth within 0.5 m of the place.
         seconds: how long it sounds.
         thing: whether the right thing is among the first three; None where no thing made it.
@@ -98,8 +97,7 @@ class Placed:
     array: str
     error_m: float
     room: bool | None
-    in_50: bool | None = None
-    in_90: bool | None = None
+    held_from: float | None = None
     area_90_m2: float = _UNKNOWN
     thing: bool | None = None
     same_room: bool = True
@@ -107,6 +105,10 @@ class Placed:
     voxels: int = 0
     right: float = _UNKNOWN
     seconds: float = _UNKNOWN
+
+    def is_in(self, probability: float) -> bool:
+        """Return whether the region of a probability holds the truth."""
+        return self.held_from is not None and self.held_from < probability
 
 
 @dataclass(frozen=True, slots=True)
@@ -264,8 +266,7 @@ class _Home:
             name,
             float(np.linalg.norm(at[:2] - true[:2])),
             in_room(self.truth.areas, true, at),
-            bool(one.density.region(0.5).ravel()[cell]),
-            bool(one.density.region(0.9).ravel()[cell]),
+            one.density.likelier_than(cell),
             one.density.area_m2(0.9),
             right_thing(event, self.truth.objects, likely, things),
             same_room(self.truth.areas, event.source, event.robot),

@@ -19,6 +19,7 @@ _ROWS = (
     *(name for way in WAYS for name in (way, f"{way}, lexicon")), GIVEN, REFINED,
     "robot's place (the paper)", "nearest thing", "room's middle",
 )  # fmt: skip
+_PROMISED = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
 _LENGTHS_S = ((0.0, 1.0), (1.0, 3.0), (3.0, 6.0), (6.0, np.inf))
 
 
@@ -53,7 +54,8 @@ def run_sources(settings: SourcesBench, out: Path, seed: int) -> dict[str, Table
         partial(measure_home, open_spec=open_scene), todo, settings.jobs, "sources", lambda one: one.spec
     )
     tables: dict[str, Table] = {
-        "homes": table_of_homes(homes), "by length": table_of_lengths(homes), "mended": table_of_mended(homes)
+        "homes": table_of_homes(homes), "regions": table_of_regions(homes), "by length": table_of_lengths(homes),
+        "mended": table_of_mended(homes),
     }  # fmt: skip
     if room is not None:
         tables["a measured room"] = room
@@ -78,6 +80,19 @@ def table_of_homes(homes: Sequence[HomeOutcome]) -> Table:
     return {"columns": columns, "rows": [row for row in rows if row[1]], "note": note}
 
 
+def table_of_regions(homes: Sequence[HomeOutcome]) -> Table:
+    """Return for each way how many of the truths lie in the region of each probability."""
+    every = [one for home in homes for one in home.placed if one.held_from is not None]
+    rows: list[list[object]] = []
+    for way in _ROWS:
+        own = [one for one in every if one.array == way]
+        if own:
+            held = (100.0 * sum(one.is_in(share) for one in own) / len(own) for share in _PROMISED)
+            rows.append([way, len(own), *(round(percent, 1) for percent in held)])
+    columns = ["by", "sounds", *(f"in {100.0 * share:g} % region %" for share in _PROMISED)]
+    return {"columns": columns, "rows": rows}
+
+
 def table_of_lengths(homes: Sequence[HomeOutcome]) -> Table:
     """Return how often the regions hold the truth, by the length of the sound."""
     every = [one for home in homes for one in home.placed if one.array in WAYS]
@@ -87,7 +102,7 @@ def table_of_lengths(homes: Sequence[HomeOutcome]) -> Table:
             own = [one for one in every if one.array == way and low <= one.seconds < high]
             if not own:
                 continue
-            in_50, in_90 = sum(bool(one.in_50) for one in own), sum(bool(one.in_90) for one in own)
+            in_50, in_90 = (sum(one.is_in(share) for one in own) for share in (0.5, 0.9))
             rows.append([
                 way, f"{low:g} to {high:g}" if np.isfinite(high) else f"{low:g} and more", len(own),
                 round(float(np.median([one.error_m for one in own])), 2),
@@ -122,9 +137,9 @@ def _row(way: str, own: Sequence[Placed]) -> list[object]:
     error = np.array([one.error_m for one in own])
     median, low, high = median_interval(error)
     room = [one.room for one in own if one.room is not None]
-    regions = [one for one in own if one.in_90 is not None]
+    regions = [one for one in own if one.held_from is not None]
     things = [one.thing for one in own if one.thing is not None]
-    in_50, in_90 = sum(bool(one.in_50) for one in regions), sum(bool(one.in_90) for one in regions)
+    in_50, in_90 = (sum(one.is_in(share) for one in regions) for share in (0.5, 0.9))
 
     def percent(hits: int, count: int) -> object:
         return round(100.0 * hits / count, 1) if count else ""
