@@ -21,9 +21,12 @@ def refuse(words: list[str]) -> Any:
         (lambda words: np.ones(3), r"gave \(3,\)"),
         (lambda words: np.full((len(words), 3), np.nan), "NaN or infinity"),
         (refuse, "RuntimeError: out of memory"),
+        (lambda words: np.ones((len(words), 4)) / 2.0, r"gave \(2, 4\) for 2 words; its features have 3 numbers"),
+        (lambda words: 10.0 * np.eye(len(words), 3), "length 10 to 10; each has unit length"),
     ],
-    ids=["one row", "no rows", "NaN", "fails"],
+    ids=["one row", "no rows", "NaN", "fails", "other features", "long"],
 )
 def test_what_is_no_row_for_each_word_is_a_sentence(gives: Any, said: str) -> None:
     with pytest.raises(BackendError, match=said):
-        encoded_words(SimpleNamespace(encode_words=gives), ["red", "green"])  # pyright: ignore[reportArgumentType]
+        card = SimpleNamespace(dim=3)
+        encoded_words(SimpleNamespace(encode_words=gives, card=card), ["red", "green"])  # pyright: ignore[reportArgumentType]

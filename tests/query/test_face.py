@@ -1,5 +1,6 @@
 """The lines that a person types: each is tried on one small map, and the examples run on it."""
 
+import re
 import runpy
 import sys
 from pathlib import Path
@@ -13,6 +14,8 @@ from hypothesis.extra import numpy as some
 
 import avlmaps
 from avlmaps.core.errors import AvlmapsError, BackendError, MapError, QueryError, RecordingError
+from avlmaps.maps.settings import GravitySettings
+from avlmaps.recordings.example_room import example_truth
 from avlmaps.recordings.memory import MemoryRecording
 from helpers.raycast import render
 from helpers.room import Room
@@ -210,11 +213,15 @@ def frame(folder: Path) -> avlmaps.Frame:
     return avlmaps.open_recording(folder / "rec").frame(0)
 
 
+FAR_AWAY = np.eye(4)
+FAR_AWAY[:3, 3] = 500_000.0, 4_649_776.0, 30.0  # metres of UTM
+
 BAD_FRAMES = {
     "rgb of floats": (dict(rgb=np.zeros((120, 160, 3))), r"rgb .* must be uint8 of shape \(h, w, 3\), not float64"),
     "rgb without channels": (dict(rgb=np.zeros((120, 160), np.uint8)), r"not uint8 of \(120, 160\)"),
     "rgba": (dict(rgb=np.zeros((120, 160, 4), np.uint8)), "leave the fourth channel out"),
     "millimetres": (dict(depth_m=np.full((120, 160), 1200.0)), r"must be in metres; its median is 1,200"),
+    "centimetres": (dict(depth_m=np.full((120, 160), 250.0)), "looks like centimetres"),
     "whole numbers": (dict(depth_m=np.full((120, 160), 1200, np.uint16)), r"not uint16 up to 1200; millimetres"),
     "kilometres": (dict(depth_m=np.full((120, 160), 0.002)), r"must be in metres; .* largest 0.002"),
     "negative depth": (dict(depth_m=np.full((120, 160), -1.0)), "negative depths, down to -1 m"),
@@ -227,6 +234,7 @@ BAD_FRAMES = {
     "a pose that stretches": (dict(world_from_camera=np.diag([2.0, 2, 2, 1])), "not a rigid transform"),
     "a pose of three rows": (dict(world_from_camera=np.eye(4)[:3]), r"has shape \(3, 4\); it must be 4x4"),
     "a pose of nothing": (dict(world_from_camera=np.full((4, 4), np.nan)), "NaN or infinity"),
+    "a pose on the Earth": (dict(world_from_camera=FAR_AWAY), "4.64978e.06 m from the origin"),
     "a stamp that is none": (dict(stamp_s=np.nan), "stamp_s .* must be a finite number of seconds"),
     "a stamp in words": (dict(stamp_s="now"), "stamp_s .* must be a finite number of seconds"),
     "features of two axes": (dict(features=np.ones((4, 3), np.float32)), r"given are float32 of \(4, 3\)"),
@@ -274,6 +282,60 @@ def test_any_arrays_make_a_frame_or_a_sentence(rgb, depth, pose, stamp) -> None:
     assert len(live) in (0, 1)
 
 
+ASIDE = np.zeros((4, 4))
+ASIDE[0, 3] = 1.0
+WRONG_WALKS = {
+    "poses the other way round": (lambda i, pose: np.linalg.inv(pose), "look like camera_from_world"),
+    "poses of OpenGL": (lambda i, pose: pose @ np.diag([1.0, -1, -1, 1]), "OpenGL camera"),
+    "a jump": (lambda i, pose: pose + 5.0 * (i > 6) * ASIDE, r"jumps by 5\.0"),
+    "one pose elsewhere": (lambda i, pose: pose + 90.0 * (i == 5) * ASIDE, r"1 frame\(s\) are up to 90 m from"),
+}
+
+
+@pytest.mark.parametrize("kind", WRONG_WALKS)
+def test_frames_that_contradict_one_another_are_said_with_every_answer(kind: str, tmp_path: Path) -> None:
+    truth, (moved, said) = example_truth(frames=14), WRONG_WALKS[kind]
+    live = avlmaps.VoxelMap(0.1, avlmaps.Encoders(pixels=Hues()))
+    for index, pose in enumerate(truth.world_from_camera):
+        live.add(truth.rgb[index], truth.depth_m[index], truth.rig.rgb, moved(index, pose))
+    assert any(re.search(said, doubt) for doubt in live.doubts), live.doubts
+    assert set(live.doubts) <= set(live.ask("red").notes)
+    assert set(live.doubts) <= set(live.save(tmp_path / "m").stored.info.doubts)
+
+
+def test_frames_that_agree_are_not_doubted() -> None:
+    truth = example_truth(frames=14)
+    live = avlmaps.VoxelMap(0.1, avlmaps.Encoders(pixels=Hues()))
+    for index, pose in enumerate(truth.world_from_camera):
+        live.add(truth.rgb[index], truth.depth_m[index], truth.rig.rgb, pose)
+    assert live.doubts == ()
+
+
+def test_an_encoder_that_is_interrupted_costs_no_frame_that_waits() -> None:
+    class Interrupted(Hues):
+        left = 5
+
+        def encode(self, frame: avlmaps.Frame) -> np.ndarray:
+            self.left -= 1
+            if self.left == 0:
+                raise KeyboardInterrupt
+            return super().encode(frame)
+
+    class OfTheFloor(Interrupted):
+        reads_ground = True  # so that frames wait for the floor
+
+    truth = example_truth(frames=10)
+    few = avlmaps.BuildSettings(voxel_size_m=0.1, gravity=GravitySettings(frames=8))
+    live = avlmaps.VoxelMap(0.1, avlmaps.Encoders(pixels=OfTheFloor()), settings=few)
+    for index in range(7):
+        live.add(truth.rgb[index], truth.depth_m[index], truth.rig.rgb, truth.world_from_camera[index])
+    with pytest.raises(KeyboardInterrupt):
+        live.add(truth.rgb[7], truth.depth_m[7], truth.rig.rgb, truth.world_from_camera[7])
+    assert len(live) == 8
+    live.add(truth.rgb[8], truth.depth_m[8], truth.rig.rgb, truth.world_from_camera[8])
+    assert len(live) == 9 and live.map.stored.info.counts.frames == 9
+
+
 def test_what_is_no_map_size_up_or_profile_is_refused() -> None:
     for size in (0.0, -1.0, "5 cm", 50.0):
         with pytest.raises(MapError, match="voxel"):
@@ -283,6 +345,8 @@ def test_what_is_no_map_size_up_or_profile_is_refused() -> None:
             avlmaps.VoxelMap(up_in_world=up)  # pyright: ignore[reportArgumentType]
     with pytest.raises(BackendError, match="no profile called 'embeded'"):
         avlmaps.VoxelMap(encoders="embeded")
+    with pytest.raises(BackendError, match=r"not Hues; an encoder of your own goes in as avlmaps.Encoders"):
+        avlmaps.VoxelMap(encoders=Hues())  # pyright: ignore[reportArgumentType]
     with pytest.raises(MapError, match="has no frame yet"):
         avlmaps.VoxelMap(encoders="colours").ask("the chair")
 

@@ -400,6 +400,7 @@ class LiveMap:
         try:
             if (doubt := self._check.add(frame)) is not None:
                 self._doubt(doubt)
+                growing.doubt(doubt)
             reason = self._gates.reason_against(frame, growing.sums) if self.settings.gates else None
             self._is_standing = reason == "still" and len(self._kept) > 0
             if reason is not None:

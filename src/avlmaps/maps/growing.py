@@ -28,6 +28,7 @@ from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.growing_walk import HERE, Walk
 from avlmaps.maps.keyframes.growing import FrozenKeyframes, GrowingKeyframes, PicturedKeyframe
 from avlmaps.maps.perceived import as_grid, encode_pixels, require_unit
+from avlmaps.maps.pipeline.check import judge
 from avlmaps.maps.pipeline.estimate import estimate_ground, estimate_sensor, estimate_up
 from avlmaps.maps.pipeline.keyframes import RANDOMNESS
 from avlmaps.maps.pipeline.plan import BUILD_VERSION, BuildPlan
@@ -47,10 +48,12 @@ from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.protocols import GroundReader
 from avlmaps.recordings.growing_track import GrowingTrack
 from avlmaps.recordings.memory import next_of
+from avlmaps.recordings.plausible import plausible_walk
 from avlmaps.recordings.types import Frame, Ground, Recording
 
 # Features of waiting frames take no more memory than this.
 _MOST_WAITING_BYTES = 5e8
+_MOST_DOUBTS = 5
 # Findings of the floor and up within these are one.
 _SAME_FLOOR_M = 0.05
 _SAME_UP = 0.9994  # cosine of 2 degrees
@@ -103,6 +106,9 @@ class GrowingMap:
         self._submaps: list[Submaps] = []
         self.finishing = RLock()  # held while a map is made, and while poses are corrected
         self._corrections = 0
+        self._told: list[str] = []
+        self._found: tuple[str, ...] = ()  # by the check of the frames that are held
+        self._checked_frames = 0
         if self.settings.frames.per_submap and encoders.keyframes_only:
             raise MapError(
                 f"The encoders {encoders.name} decide late which frames they look at, so that a growing map stores no "
@@ -223,6 +229,7 @@ class GrowingMap:
             step = PoseCorrection.of(stamps_s, poses, before.stamps_s, before.world_from_camera)
             self._walk.move(step)
             self._corrections += 1
+            self._checked_frames = 0
             self._waiting = [replace(one, frame=moved_frame(one.frame, step)) for one in self._waiting]
             self._rehearsal = _Rehearsal()
             self._keyframes.move(step)
@@ -321,10 +328,31 @@ class GrowingMap:
         """
         if not len(self):
             raise MapError("The map has no frame yet; add one.")
+        self._check_again(final)
         if self._sensor is None:  # the frames wait on, so that a question changes nothing
-            return self._rehearse().stored(final=final)
+            return self._rehearse()._settled(final)
+        return self._settled(final)
+
+    def _settled(self, final: bool) -> StoredMap:
+        """Do what ``stored`` does, by what the frames were last found to be."""
         self._settle()
         return self.finish(self.freeze(), final=final)
+
+    def doubt(self, sentence: str) -> None:
+        """Store with the map why it may be wrong, the first few times; every answer repeats it."""
+        if len(self._told) < _MOST_DOUBTS:
+            self._told.append(sentence)
+
+    def _check_again(self, final: bool) -> None:
+        """Check the frames that are held, as a build does, where there are many more than the last time."""
+        count = len(self)
+        if count < 2 or self._checked_frames == count or (not final and count < 2 * self._checked_frames):
+            return
+        self._checked_frames, motion = count, self._walk.motion()
+        names = [f"{stamp_s:.2f} s" for stamp_s in motion.stamps_s.tolist()]
+        found = plausible_walk(motion.stamps_s, motion.world_from_camera[:, :3, 3], names, strays_are="check the poses")
+        odd = *found.notices, found.fault, *judge(self._walk.held()).sentences()
+        self._found = tuple(sentence for sentence in odd if sentence)
 
     def freeze(self) -> "FrozenSums":
         """Return what came until now, which frames to come do not change. It takes the time of a frame.
@@ -400,6 +428,7 @@ class GrowingMap:
             other._walk.spread(one.frame, self.settings.gravity.frames)
             other._walk.pass_by(one.frame.stamp_s, one.frame.world_from_camera)
         other._sounds = self._sounds
+        other._told, other._found = self._told, self._found
         other._settle()
         return other
 
@@ -437,13 +466,14 @@ class GrowingMap:
             elif self._walk.has_doubled:
                 self._ground = self._find_upright(self._walk.held())
             faults: list[BackendError] = []
-            waiting, self._waiting = self._waiting, []
-            for one in waiting:
+            while self._waiting:  # what is interrupted loses no frame
+                one = self._waiting[0]
                 try:
                     self._fuse(replace(one, frame=replace(one.frame, ground=self._ground)))
                 except BackendError as fault:
                     faults.append(fault)
                     self._left_out.append(BadFrame(index=one.frame.index, why=str(fault)))
+                del self._waiting[0]
         if faults:
             raise faults[0]
 
@@ -526,7 +556,8 @@ class GrowingMap:
         if self._sounds is not None:
             walk.audio = self._sounds.track
         key = key_of("growing", BUILD_VERSION, walk.fingerprint, self.encoders.name, models, self.settings)
-        return BuildPlan(walk, HERE, self.encoders, self.settings, models, key, "")
+        doubts = tuple(dict.fromkeys((*self._told, *self._found)))
+        return BuildPlan(walk, HERE, self.encoders, self.settings, models, key, "", doubts)
 
     def _content(
         self, plan: BuildPlan, came: "FrozenSums", up: UpInfo, ground: GroundInfo, final: bool, looks_s: float

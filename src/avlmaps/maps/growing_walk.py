@@ -14,7 +14,7 @@ from avlmaps.maps.pose_correction import PoseCorrection, moved_frame
 from avlmaps.recordings.memory import MemoryRecording, frame_digest
 from avlmaps.recordings.types import Frame, Recording
 
-HERE = Path("memory")
+HERE = Path("the frames")  # as sentences name what came from no file
 
 
 @dataclass(frozen=True, slots=True)

@@ -294,10 +294,16 @@ def encoders_of(chosen: str | Profile | Encoders) -> Encoders:
     """Return the encoders of a profile or of its name; encoders are themselves.
 
     Raises:
-        BackendError: there is no such profile or backend, or an object lacks a method of its protocol.
+        BackendError: it is none of these, there is no such profile or backend, or an object lacks a method of its
+            protocol.
     """
     if isinstance(chosen, Encoders):
         return chosen
+    if not isinstance(chosen, str | Profile):
+        raise BackendError(
+            f"Encoders are an avlmaps.Encoders or the name of a profile, not {type(chosen).__qualname__}; an encoder "
+            "of your own goes in as avlmaps.Encoders(pixels=encoder)."
+        )
     used = profile(chosen)
     given = {kind.value: getattr(used, kind.value) for kind in MODULES}
     return Encoders(used.name, **given, weight_variance_m2=used.weight_variance_m2)

@@ -153,6 +153,11 @@ class VoxelMap:
                 self._map = AVLMap(self._growing.stored(), self._query)
             return self._map
 
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Why the map may be wrong, one sentence each: frames that contradict one another. Answers repeat them."""
+        return self.map.stored.info.doubts
+
     def ask(self, question: Any = "", *args: Any, **parts: Any) -> "Answer":
         """Answer a query; see ``AVLMap.ask``."""
         return self.map.ask(question, *args, **parts)

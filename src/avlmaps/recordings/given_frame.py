@@ -9,11 +9,12 @@ from avlmaps.core.arrays import Float, UInt8
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.poses import orthonormalize
-from avlmaps.recordings.plausible import date_fault
+from avlmaps.recordings.plausible import MAX_FROM_ORIGIN_M, date_fault
 from avlmaps.recordings.types import Frame
 
 # A picture whose middle depth is farther than this was given in millimetres: 0.2 m of them are more.
 _FARTHEST_MIDDLE_M = 200.0
+_FARTHEST_MIDDLE_CM = 900.0  # and in centimetres it would be a room
 # One that has no depth beyond this was given in kilometres, or divided twice.
 _NEAREST_FARTHEST_M = 0.02
 
@@ -47,6 +48,12 @@ def given_frame(
     rig = _rig(name, camera, colours, depths)
     given = _numbers(name, "world_from_camera", world_from_camera).astype(np.float64)
     pose = orthonormalize(given, name)
+    away_m = float(np.abs(pose[:3, 3]).max())
+    if away_m > MAX_FROM_ORIGIN_M:
+        raise RecordingError(
+            f"The pose of {name} lies {away_m:,.6g} m from the origin, where places are no longer exact to a "
+            "millimetre; subtract the first position from all of them."
+        )
     if np.abs(pose - given).max() < _EXACT:  # that of a recording's frame stays bit by bit what it was
         pose = given
     if not _is_finite(stamp_s):
@@ -96,9 +103,10 @@ def _depths(name: str, given: Any) -> Float[np.ndarray, "hd wd"]:
         raise RecordingError(f"depth_m of {name} holds negative depths, down to {seen.min():.4g} m; 0 says none.")
     middle_m, farthest_m = (float(np.median(seen)), float(seen.max())) if len(seen) else (1.0, 1.0)
     if middle_m > _FARTHEST_MIDDLE_M or farthest_m < _NEAREST_FARTHEST_M:
+        unit = "millimetres" if middle_m > _FARTHEST_MIDDLE_CM else "centimetres, or millimetres of what is near"
         raise RecordingError(
             f"depth_m of {name} must be in metres; its median is {middle_m:,.4g} and its largest {farthest_m:,.4g}"
-            f"{', which looks like millimetres' if middle_m > _FARTHEST_MIDDLE_M else ''}."
+            f"{f', which looks like {unit}' if middle_m > _FARTHEST_MIDDLE_M else ''}."
         )
     return depth
 

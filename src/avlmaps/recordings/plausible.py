@@ -114,7 +114,11 @@ class Plausible:
 
 
 def plausible_walk(
-    stamps_s: Float[np.ndarray, " n"], positions_m: Float[np.ndarray, "n 3"], names: Sequence[str]
+    stamps_s: Float[np.ndarray, " n"],
+    positions_m: Float[np.ndarray, "n 3"],
+    names: Sequence[str],
+    *,
+    strays_are: str = "left out",
 ) -> Plausible:
     """Leave out poses that are out of place, and find out whether the rest can be one walk.
 
@@ -127,6 +131,7 @@ def plausible_walk(
         stamps_s: rising.
         positions_m: where the camera was.
         names: what the recording calls each frame.
+        strays_are: what is said to be done with frames that are out of place.
     """
     every = np.arange(len(stamps_s))
     if not len(every):
@@ -143,7 +148,7 @@ def plausible_walk(
         shown = ", ".join(names[i] for i in first) + (" ..." if len(strays) > _SHOWN else "")
         notices.append(
             f"{len(strays)} frame(s) are up to {away_m.max():,.0f} m from the others, too far to be reached in time; "
-            f"left out: {shown}."
+            f"{strays_are}: {shown}."
         )
     rows: list[int] = kept.tolist()
     return Plausible(kept, (*notices, *shifts), fault or _extent_fault(positions_m[kept], [names[i] for i in rows]))
