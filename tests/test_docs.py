@@ -1,8 +1,11 @@
 """The documentation: tutorials run as they stand, the menu names every page, the reference names what is public."""
 
+import ast
+import importlib
 import re
 import subprocess
 import sys
+import textwrap
 from pathlib import Path
 
 import pytest
@@ -11,6 +14,7 @@ import avlmaps
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
+OURS = ("avlmaps", "avlmaps_sim", "avlmaps_models")
 PAGES = sorted(page.relative_to(DOCS).as_posix() for page in DOCS.rglob("*.md"))
 
 
@@ -27,6 +31,26 @@ def test_the_tutorial_runs_from_top_to_bottom(tmp_path: Path) -> None:
     assert not re.search(r"\.\d{5,}[,)]", done.stdout), f"positions are plain: {done.stdout}"
     assert (tmp_path / "heat.png").stat().st_size > 1000
     assert (tmp_path / "home.ply").stat().st_size > 1000
+
+
+def _python_of(page: Path) -> list[str]:
+    """Return the blocks of Python of a page: fenced ones, and indented ones that begin with an import."""
+    text = page.read_text(encoding="utf-8")
+    indented = re.findall(r"(?:^    (?:from|import) .*\n)(?:^(?:    (?!```).*)?\n)*", text, re.MULTILINE)
+    return [*re.findall(r"^```python\n(.*?)```", text, re.DOTALL | re.MULTILINE), *map(textwrap.dedent, indented)]
+
+
+@pytest.mark.filterwarnings("error::DeprecationWarning")
+@pytest.mark.parametrize("page", ["../README.md", *(page for page in PAGES if _python_of(DOCS / page))])
+def test_the_python_of_the_documents_can_be_read_and_its_imports_are_there(page: str) -> None:
+    for block in _python_of(DOCS / page):
+        for line in ast.walk(ast.parse(block)):
+            if isinstance(line, ast.ImportFrom) and (line.module or "").partition(".")[0] in OURS:
+                there = importlib.import_module(line.module or "")
+                for name in line.names:
+                    assert hasattr(there, name.name), f"{page}: {line.module} has no {name.name}"
+            elif isinstance(line, ast.Attribute) and isinstance(line.value, ast.Name) and line.value.id == "avlmaps":
+                assert hasattr(avlmaps, line.attr), f"{page}: avlmaps.{line.attr}"
 
 
 @pytest.mark.parametrize("page", PAGES)

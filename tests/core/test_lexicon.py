@@ -153,6 +153,8 @@ def test_edit_distance_is_symmetric_bounded_and_zero_for_equals(one: str, other:
     assert distance(one, other) <= max(len(one), len(other))
     assert (distance(one, other) == 0.0) == (one == other)
     assert distance(one + "z", other + "z") <= distance(one, other)
+    letters, others = set(one), set(other)
+    assert distance(one, other) >= max(len(letters - others), len(others - letters)), "as suggestions rely on"
 
 
 def test_a_swap_counts_once_and_a_doubled_letter_half() -> None:

@@ -52,9 +52,10 @@ class Speller:
     """
 
     def __init__(self, spellings: Iterable[str]) -> None:
-        self._of: dict[str, str] = {}
+        of: dict[str, str] = {}
         for spelling in spellings:
-            self._of.setdefault(squeezed(spelling), spelling)
+            of.setdefault(squeezed(spelling), spelling)
+        self._known = [(key, spelling, frozenset(key)) for key, spelling in of.items()]
 
     def suggest(self, word: str, most: int = 3) -> tuple[tuple[str, float], ...]:
         """Return the nearest spellings with how alike they are (1 is equal), the nearest first.
@@ -64,11 +65,14 @@ class Speller:
         key = squeezed(word)
         if len(key) < 4:
             return ()
+        letters = frozenset(key)
         found: list[tuple[float, bool, str]] = []
-        for other, spelling in self._of.items():
+        for other, spelling, others in self._known:
             longest = max(len(key), len(other))
             limit = _MOST_CHANGED * longest
-            if len(other) > 2 and abs(len(key) - len(other)) <= limit:
+            # Each letter that only one of them has costs a change of its own.
+            fewest = max(len(letters - others), len(others - letters))
+            if len(other) > 2 and max(fewest, abs(len(key) - len(other))) <= limit:
                 away = distance(key, other, limit)
                 if away <= limit:
                     found.append((away / longest, other[0] != key[0], spelling))
