@@ -29,9 +29,15 @@ settings.load_profile("ci")
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Share what workers compile."""
+    """Share what workers compile; write no file through to the disk, since no test cuts the power."""
     if hasattr(config, "workerinput"):
         compile_each_kernel_once()
+    os.fsync = _left_to_the_system  # a build waits for the disk 90 times
+
+
+def _left_to_the_system(descriptor: int) -> None:
+    """Stand for ``os.fsync``: refuse what is no open file, as it does."""
+    os.fstat(descriptor)
 
 
 @pytest.hookimpl(wrapper=True)

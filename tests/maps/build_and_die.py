@@ -41,6 +41,7 @@ def count_steps(fatal: int | None) -> list[str]:
 
         return call
 
+    os.fsync = os.fstat  # a kill leaves to the system what was written: nothing waits for the disk
     for name in DEADLY:
         setattr(os, name, watched(name))
     return steps
