@@ -105,10 +105,14 @@ def _pace(found: Played) -> list[object]:
     assert status is not None
     return [
         found.frames, round(found.seconds, 1), round(found.frames / found.seconds, 1), status.fused, status.encoded,
-        status.dropped.get("late", 0), round(status.frame_ms_p50), round(status.frame_ms_p95), len(found.asked_ms),
+        status.dropped.get("late", 0), _whole(status.frame_ms_p50), _whole(status.frame_ms_p95), len(found.asked_ms),
         *(round(float(np.percentile(asked, p)), 1) for p in (50, 95)), round(found.oldest_save_s, 1),
         round(found.load, 1), round(found.close_s, 1), found.encoded_later,
     ]  # fmt: skip
+
+
+def _whole(ms: float) -> float:
+    return round(ms) if np.isfinite(ms) else ms  # where every frame came late none has an age
 
 
 def _processor(found: Played) -> list[float]:
