@@ -21,6 +21,7 @@ from avlmaps.live.gates import EncodingGate, Gates
 from avlmaps.live.kept_back import KeptBack
 from avlmaps.live.live_map import LiveMap
 from avlmaps.live.pose_check import PoseCheck
+from avlmaps.live.saver import Unsaved
 from avlmaps.live.settings import LiveSettings
 from avlmaps.live.status import Tally
 from avlmaps.maps.build import build_map
@@ -396,13 +397,123 @@ def test_kept_frames_wait_for_the_first_ones(tmp_path: Path, monkeypatch: pytest
     with LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP, live=chosen) as live:
         for number in range(5):
             add(live, frame(number, step_m=0.005))
-        wait_for(lambda: live.status().fused == 5)
+        wait_for(lambda: live.status().fused == 5 == live.status().encoded + live.status().kept)
         kept = live.status().kept
         time.sleep(0.2)
         assert live.status().kept == kept > 0
         for number in range(5, 12):
             add(live, frame(number, step_m=0.005))
     assert live.status().encoded + live.status().encoded_later == 12
+
+
+# Looks at every place are worth one: what is not encoded at once is encoded at the end.
+LATER = LiveSettings(known_views=100, new_share=0.0, looks=1, encoded_share=0.4, later_looks=10_000)
+
+
+@pytest.mark.parametrize("frames", [1, 5, 7])
+def test_a_drive_shorter_than_the_first_frames_ends_with_what_was_kept(tmp_path: Path, frames: int) -> None:
+    ends = []
+    for name, chosen in (("every", EVERY), ("kept", LATER)):
+        with LiveMap(tmp_path / name, ENCODERS, up_in_world=UP, live=chosen, settings=BuildSettings()) as live:
+            for number in range(frames):
+                add(live, frame(number, step_m=0.005))
+        ends.append(live)
+    every, kept = (live.map.stored.voxels for live in ends)
+    status = ends[1].status()
+    assert status.encoded + status.encoded_later == status.fused == frames
+    assert (status.encoded_later > 0) == (frames > 2)
+    np.testing.assert_array_equal(kept.index, every.index)
+    np.testing.assert_array_equal(kept.hits, every.hits)
+    np.testing.assert_allclose(kept.weight, every.weight, rtol=1e-5)
+    np.testing.assert_allclose(kept.feature, every.feature, atol=2e-3)
+
+
+def while_busy(live: LiveMap, numbers: range) -> None:
+    """Add frames that nobody takes, as the thread that fuses is at another; the first is that one."""
+    begun, go_on, check = threading.Event(), threading.Event(), live._check.add
+
+    def slow(one: avlmaps.Frame) -> str | None:
+        begun.set()
+        assert go_on.wait(60.0)
+        live._check.add = check  # type: ignore[method-assign]
+        return check(one)
+
+    live._check.add = slow  # type: ignore[method-assign]
+    for number in numbers:
+        one = frame(number)
+        live.add_frame(one.rgb, one.depth_m, one.camera, one.world_from_camera, one.stamp_s)
+        assert begun.wait(60.0)
+    go_on.set()
+
+
+@pytest.mark.parametrize("before", [0, 12], ids=["at the start", "later"])
+def test_late_frames_are_in_the_map_at_the_end(tmp_path: Path, before: int) -> None:
+    with LiveMap(tmp_path / "every", ENCODERS, up_in_world=UP, live=EVERY) as every:
+        for number in range(before + 20):
+            add(every, frame(number))
+    with LiveMap(tmp_path / "late", ENCODERS, up_in_world=UP, live=LATER, settings=BuildSettings()) as live:
+        for number in range(before):
+            add(live, frame(number))
+        wait_for(lambda: live.status().waiting == 0)
+        while_busy(live, range(before, before + 8))  # one is fused, two wait, five are late
+        for number in range(before + 8, before + 20):
+            add(live, frame(number))
+    status, made, wanted = live.status(), live.map.stored.voxels, every.map.stored.voxels
+    assert status.dropped == {"late": 5} and status.late_kept == 5
+    assert "5 late, 5 of them stored" in str(status)
+    assert status.fused == before + 15 and status.encoded + status.encoded_later == status.frames_in == before + 20
+    np.testing.assert_array_equal(made.index, wanted.index)
+    np.testing.assert_array_equal(made.hits, wanted.hits)
+    np.testing.assert_allclose(made.weight, wanted.weight, rtol=1e-5)
+    np.testing.assert_allclose(made.feature, wanted.feature, atol=2e-3)
+
+
+@pytest.mark.parametrize(("most", "kept"), [(256, live_map._MOST_LATE), (0, 0)])
+def test_late_frames_in_memory_are_bounded(tmp_path: Path, most: int, kept: int) -> None:
+    chosen = replace(LATER, kept_frames=most)
+    with LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP, live=chosen) as live:
+        while_busy(live, range(30))
+        assert len(live._late) <= kept
+    status = live.status()
+    assert status.dropped == {"late": 27} and status.late_kept == kept
+    assert status.encoded + status.encoded_later == (3 + kept if most else status.encoded)
+
+
+@given(st.lists(st.sampled_from(["came", "frozen", "saved"]), max_size=40))
+def test_unsaved_is_the_oldest_that_no_save_has(events: list[str]) -> None:
+    unsaved, saved_s, came, frozen = Unsaved(), float("nan"), [], []
+    for now_s, event in enumerate(events):
+        if event == "came":
+            unsaved.note(now_s - 0.5)
+            came.append(now_s - 0.5)
+        elif event == "frozen":
+            unsaved.freeze(now_s)
+            frozen.append(now_s)
+        elif frozen:
+            saved_s = frozen.pop(0)
+        left = [one for one in came if not one < saved_s]
+        assert unsaved.since_s(saved_s) == (left[0] if left else None)
+
+
+def test_a_quiet_map_has_nothing_unsaved(tmp_path: Path) -> None:
+    chosen = LiveSettings(first_frames=1, known_views=100, new_share=0.0, kept_frames=0, snapshot_s=0.0, save_s=0.0)
+    with LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP, live=chosen) as live:
+        assert live.status().unsaved_s == 0.0
+        for number in range(20):
+            add(live, frame(number))
+        wait_for(lambda: len(live) == 20 and live.status().unsaved_s == 0.0)
+        wait_for(lambda: live.status().saved_age_s > 0.5)
+        assert live.status().unsaved_s == 0.0
+        live._saver.write = lambda *args: (_ for _ in ()).throw(MapError("The disk is full."))  # type: ignore[method-assign]
+        add(live, frame(20))
+        wait_for(lambda: "The disk is full." in live.doubts)
+        time.sleep(0.1)
+        assert 0.1 <= live.status().unsaved_s <= live.status().saved_age_s
+        del live._saver.write
+        add(live, frame(21))
+        wait_for(lambda: live.status().unsaved_s == 0.0)
+        add(live, frame(22))
+    assert live.status().unsaved_s == 0.0
 
 
 @given(st.lists(st.tuples(st.floats(0.01, 1.0), st.booleans()), max_size=30), st.integers(0, 6))

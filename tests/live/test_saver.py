@@ -32,14 +32,14 @@ def test_between_two_saves_it_rests_as_long_as_one_took_but_a_second_at_most(
             begun.append(clock.now_s)
             clock.now_s += took_s
             if len(begun) < 2:
-                self.offer(STATE, clock.now_s)
+                self.offer(STATE, clock.now_s, clock.now_s)
             else:
                 self._ended = True
 
     monkeypatch.setattr(saver, "time", SimpleNamespace(perf_counter=lambda: clock.now_s))
     monkeypatch.setattr(saver, "Condition", Door)
     one = SlowSaver(tmp_path / "map", every_s, faults.append, faults.append)
-    one.offer(STATE, 0.0)
+    one.offer(STATE, 0.0, 0.0)
     one.thread.join(60.0)
     assert not one.thread.is_alive() and not faults
     assert begun == pytest.approx([0.0, max(every_s, took_s + min(took_s, 1.0))])

@@ -70,14 +70,19 @@ class Gates:
             frame: the frame.
             sums: of the map, as parts that add up to it.
         """
-        pose = np.asarray(frame.world_from_camera, np.float64)
-        if self._last is None or not sums or self._new_share(frame, sums) > self._settings.new_share:
-            self._last = pose
+        if not sums or self._last is None or self._new_share(frame, sums) > self._settings.new_share:
+            self._last = np.asarray(frame.world_from_camera, np.float64)
             return None
+        return "still" if self.is_still(frame) else "known"
+
+    def is_still(self, frame: Frame) -> bool:
+        """Return whether the camera did not move since the last frame that was to be fused."""
+        if self._last is None:
+            return False
+        pose = np.asarray(frame.world_from_camera, np.float64)
         moved_m = float(np.linalg.norm(pose[:3, 3] - self._last[:3, 3]))
         turned_rad = float(rotation_angle_rad(pose[None], self._last[None])[0])
-        still = moved_m < self._settings.still_m and turned_rad < np.radians(self._settings.still_deg)
-        return "still" if still else "known"
+        return moved_m < self._settings.still_m and turned_rad < np.radians(self._settings.still_deg)
 
     def _new_share(self, frame: Frame, sums: Sequence[VoxelAccumulator]) -> float:
         """Return the share of points in voxels that too few frames hit."""

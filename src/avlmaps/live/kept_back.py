@@ -1,4 +1,4 @@
-"""Frames that were not given to the encoder, on the disk, until there is time to look at them."""
+"""Frames that came late or were not given to the encoder, on the disk, until there is time to look at them."""
 
 import tempfile
 from dataclasses import dataclass, replace
@@ -41,8 +41,8 @@ class KeptBack:
     def __len__(self) -> int:
         return len(self._places)
 
-    def keep(self, frame: Frame, worth: float, *, is_fused: bool) -> None:
-        """Store a frame, if it is worth more than one that is stored, or there is room.
+    def keep(self, frame: Frame, worth: float, *, is_fused: bool) -> bool:
+        """Store a frame, if it is worth more than one that is stored, or there is room; return whether it is stored.
 
         Args:
             frame: the frame.
@@ -53,11 +53,11 @@ class KeptBack:
             MapError: the disk is full; from then on nothing is stored, and what was is still there.
         """
         if not self.most or not worth:
-            return
+            return False
         if not self._free:
             least = min(self._places, key=lambda at: self._places[at].worth, default=None)
             if least is None or self._places[least].worth >= worth:
-                return
+                return False
             del self._places[least]
             self._free.append(least)
         at = self._free[-1]
@@ -79,6 +79,7 @@ class KeptBack:
         rgb = np.broadcast_to(np.uint8(0), frame.rgb.shape)  # of no memory
         depth_m = np.broadcast_to(np.float32(0.0), frame.depth_m.shape)
         self._places[at] = _Place(worth, replace(frame, rgb=rgb, depth_m=depth_m), is_fused)
+        return True
 
     def take(self) -> tuple[Frame, bool] | None:
         """Return the frame that is worth most, and whether its surface is in the map; None where there is none."""

@@ -9,7 +9,7 @@ writes these maps into the folder. A question uses the snapshot that there is; n
 import contextlib
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import Future
 from dataclasses import replace
 from functools import partial
@@ -25,7 +25,7 @@ from avlmaps.core.errors import AudioError, AvlmapsError, BackendError, MapError
 from avlmaps.live.gates import LATER_SHARE, EncodingGate, Gates
 from avlmaps.live.kept_back import KeptBack
 from avlmaps.live.pose_check import PoseCheck
-from avlmaps.live.saver import Saver
+from avlmaps.live.saver import Saver, Unsaved
 from avlmaps.live.settings import LiveSettings
 from avlmaps.live.status import LiveStatus, Tally, memory_mb
 from avlmaps.maps.growing import FrozenSums, GrowingMap, require_place
@@ -53,6 +53,7 @@ _CHANGES = "fused", "corrected", "encoded later"  # what is counted where the ma
 _STILL = 1e-3  # times what it is worth: a frame in which the camera stood makes room for every other
 _CALM_S = 0.5  # without a frame, before frames on the disk are looked at
 _LOOKS_S = 0.3  # for keyframes, in each snapshot
+_MOST_LATE = 8  # late frames in memory, until the thread that fuses writes them to the disk
 _LISTEN_S = 0.25  # from one look for sounds that ended to the next
 _REST_S = 1.0  # between two snapshots, at most, where one takes longer than that
 
@@ -71,7 +72,7 @@ class LiveMap:
             live.ask("the chair near the sound of a dog").text
 
     The folder is a whole map at any moment from the first save on, also when the process is killed; another process
-    may open it. What came after the last save is lost then, a few seconds (``status().saved_age_s``). At the end, it is
+    may open it. What came after the last save is lost then, a few seconds (``status().unsaved_s``). At the end, it is
     the map that a build makes of the frames that were fused.
     """
 
@@ -120,6 +121,9 @@ class LiveMap:
         self._kept = KeptBack(self.settings.kept_frames if keeps else 0)
         self._check, self._tally = PoseCheck(), Tally()
         self._queue: deque[tuple[Frame, float]] = deque()
+        self._late: deque[Frame] = deque()  # older than those in the queue, to be stored
+        self._in_hand_s: float | None = None  # when the frame arrived that is being fused
+        self._unsaved, self._unsaved_sounds = Unsaved(), Unsaved()
         self._is_standing = False  # the last frame was dropped as still, and there are frames to look at again
         self._is_pressed = False  # whether the frames come by the clock, and are late if we are slow
         self._door, self._ears = Condition(), Lock()
@@ -158,7 +162,7 @@ class LiveMap:
             camera: a ``Pinhole`` of the colour picture, whose view the depth shares; or a ``Rig`` of both cameras.
             world_from_camera: 4x4 pose of the depth camera (OpenCV axes), metres.
             stamp_s: seconds, rising from frame to frame; by default 0.1 s after the one before.
-            wait: until there is room in the queue; else the frame that waits the longest is dropped for it.
+            wait: until there is room in the queue; else the frame that waits the longest is late, and makes room.
 
         Raises:
             RecordingError: it is no frame, comes out of order or again, or is of another camera; the map is as it was.
@@ -184,8 +188,10 @@ class LiveMap:
             self._tally.note("came")
             self._last = frame
             if len(self._queue) >= self.settings.most_waiting:
-                self._queue.popleft()
                 self._tally.drop("late")
+                self._late.append(self._queue.popleft()[0])
+                if len(self._late) > (_MOST_LATE if self._kept.most else 0):
+                    self._late.popleft()
             self._queue.append((frame, arrived_s))
             self._is_pressed = not wait
             self._door.notify_all()
@@ -274,6 +280,7 @@ class LiveMap:
             encoded_later=self._tally.of("encoded later"),
             kept=len(self._kept),
             dropped=self._tally.dropped(),
+            late_kept=self._tally.of("late kept"),
             refused=self._tally.of("refused"),
             waiting=len(self._queue),
             frame_ms_p50=p50_ms,
@@ -283,6 +290,7 @@ class LiveMap:
             sounds=counts.sounds if counts else 0,
             snapshot_age_s=now_s - snapshot[1] if snapshot is not None else float("nan"),
             saved_age_s=now_s - self._saver.saved_s,
+            unsaved_s=self._unsaved_s(now_s),
             memory_mb=memory_mb(),
             sound_gaps=0 if track is None else track.gaps,
             doubts=self.doubts,
@@ -346,6 +354,17 @@ class LiveMap:
 
     # The caller's thread
 
+    def _unsaved_s(self, now_s: float) -> float:
+        """Return how old the oldest thing is that came and is in no save."""
+        if self._closed:
+            return 0.0
+        with self._door:
+            since_s = [self._in_hand_s, *(arrived_s for _, arrived_s in self._queue)]
+        since_s += [
+            self._unsaved.since_s(self._saver.saved_s), self._unsaved_sounds.since_s(self._saver.heard_s),
+        ]  # fmt: skip
+        return now_s - min((one for one in since_s if one is not None), default=now_s)
+
     def _require_open(self) -> None:
         if self._closing:
             raise MapError(f"The live map {self.path} is closed; begin another.")
@@ -382,10 +401,12 @@ class LiveMap:
                         break
                     is_calm = not self._door.wait(_CALM_S if len(self._kept) else None) or is_calm
                 frame, arrived_s = self._queue.popleft() if self._queue else (None, 0.0)
+                self._in_hand_s = None if frame is None else arrived_s
+                late, self._late = self._late, deque()
                 self._door.notify_all()
             if frame is not None:
                 is_calm = False
-                self._fuse(frame, arrived_s)
+                self._fuse_after(late, frame, arrived_s)
             elif self._to_correct:
                 self._correct()
             elif is_calm or self._is_standing or self._closing:
@@ -394,6 +415,15 @@ class LiveMap:
                 self._freeze()
             if frame is None and self._closing and not (self._queue or self._to_correct or len(self._kept)):
                 return
+
+    def _fuse_after(self, late: Iterable[Frame], frame: Frame, arrived_s: float) -> None:
+        """Fuse a frame, and store those before it that came late."""
+        for one in late:
+            self._growing.pass_by(one.stamp_s, one.world_from_camera)
+        self._fuse(frame, arrived_s)
+        for one in late:
+            if self._keep(one, is_fused=False, times=_STILL if self._gates.is_still(one) else 1.0):
+                self._tally.note("late kept")
 
     def _fuse(self, frame: Frame, arrived_s: float) -> None:
         growing = self._growing
@@ -413,6 +443,7 @@ class LiveMap:
                 )
                 named = replace(frame, index=growing.next_index, name=f"{growing.next_index:06d}")
                 growing.add(named, encode=encode)
+                self._unsaved.note(arrived_s)
                 self._tally.note("fused")
                 if encode:
                     self._tally.note("encoded")
@@ -424,30 +455,38 @@ class LiveMap:
         except AvlmapsError as fault:
             self._tally.drop("wrong")
             self._doubt(str(fault))
+        self._in_hand_s = None
         self._tally.took(time.perf_counter() - arrived_s)
 
-    def _keep(self, frame: Frame, *, is_fused: bool, times: float = 1.0) -> None:
-        """Keep a frame until there is time to look at it, where that will bring something."""
-        if self._kept.most and self._growing.looks_again:
-            worth = self._encoding.worth_later(frame)
-            try:
-                self._kept.keep(frame, times * worth if worth > LATER_SHARE else 0.0, is_fused=is_fused)
-            except MapError as fault:
-                self._doubt(str(fault))
+    def _keep(self, frame: Frame, *, is_fused: bool, times: float = 1.0) -> bool:
+        """Keep a frame until there is time, where looking at it will bring something; return whether it is stored."""
+        if not self._kept.most or not self._growing.looks_again:
+            return False
+        worth = self._encoding.worth_later(frame)
+        try:
+            return self._kept.keep(frame, times * worth if worth > LATER_SHARE else 0.0, is_fused=is_fused)
+        except MapError as fault:
+            self._doubt(str(fault))
+            return False
 
     def _look_again(self) -> None:
         """Encode the frame that is worth most of those on the disk, unless it brings nothing any more."""
         self._is_standing = False
         if not (self._growing.sums or self._closing):  # they add to the first frames, which wait for one another
             return
-        taken = self._kept.take()
-        if taken is None or not self._growing.sums or not self._encoding.opens_again(taken[0]):
-            return
+        came_s = time.perf_counter()
         try:
-            self._growing.look_again(taken[0], is_fused=taken[1])
-            self._tally.note("encoded later")
+            if not self._growing.sums:  # the drive is over before all of these came
+                self._growing.settle()
+            taken = self._kept.take()
+            if taken is not None and self._encoding.opens_again(taken[0]):
+                self._growing.look_again(taken[0], is_fused=taken[1])
+                self._unsaved.note(came_s)
+                self._tally.note("encoded later")
         except AvlmapsError as fault:
             self._doubt(str(fault))
+            if not self._growing.sums:
+                self._kept.close()
 
     def _correct(self) -> None:
         with self._door:
@@ -459,6 +498,7 @@ class LiveMap:
             if not isinstance(fault, AvlmapsError):
                 raise
             return
+        self._unsaved.note(time.perf_counter())
         self._tally.note("corrected")
         self._check = PoseCheck()  # the next pose is of the corrected world, which is no jump
         answer.set_result(moved)
@@ -466,6 +506,7 @@ class LiveMap:
     def _freeze(self) -> None:
         try:
             came = self._growing.freeze(), time.perf_counter()
+            self._unsaved.freeze(came[1])
         except MapError:  # up and the floor are not found yet
             came = None
         with self._door:
@@ -523,11 +564,12 @@ class LiveMap:
         return answer.result()
 
     def _publish(self, came: FrozenSums, came_s: float) -> None:
+        heard_s = time.perf_counter()
         with self._growing.finishing:
             if not self._growing.is_current(came):  # poses were corrected since: the next one has them
                 return
             stored = self._growing.finish(came, looks_s=_LOOKS_S)
-        self._saver.offer(stored, came_s)
+        self._saver.offer(stored, came_s, heard_s)
         self._show(stored, came_s)
 
     def _publish_sounds(self) -> None:
@@ -540,7 +582,9 @@ class LiveMap:
         if heard is None or np.array_equal(heard.offset_s, stored.sounds.offset_s):
             return
         stored = self._growing.with_sounds(stored, heard)
-        self._saver.offer(stored, snapshot[1])
+        self._unsaved_sounds.note(now_s)
+        self._unsaved_sounds.freeze(now_s)
+        self._saver.offer(stored, snapshot[1], now_s)
         self._show(stored, snapshot[1])
 
     def _show(self, stored: StoredMap, came_s: float) -> None:

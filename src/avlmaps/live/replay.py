@@ -102,4 +102,5 @@ def _play(recording: Recording, live: LiveMap, heard_s: float | None, until_s: f
 
 def _note(live: LiveMap) -> str:
     status = live.status()
-    return f"{status.fused} fused, {status.dropped.get('late', 0)} late, {status.voxels} voxels"
+    late = status.dropped.get("late", 0)
+    return f"{status.fused} fused, {late} late, {status.voxels} voxels, {status.unsaved_s:.0f} s unsaved"

@@ -1,9 +1,10 @@
 """The thread that writes a live map: the newest one that it was given, so that nothing else waits for the disk."""
 
 import time
+from collections import deque
 from collections.abc import Callable
 from pathlib import Path
-from threading import Condition, Thread
+from threading import Condition, Lock, Thread
 
 from avlmaps.core.errors import MapError
 from avlmaps.maps.growing import write_stored
@@ -14,11 +15,45 @@ from avlmaps.maps.types import Submaps
 _REST_S = 1.0
 
 
+class Unsaved:
+    """Since when there is something that no save holds. Several threads may use it."""
+
+    def __init__(self) -> None:
+        """Begin with nothing."""
+        self._lock = Lock()
+        self._new_s: float | None = None  # when the oldest came that was not frozen yet
+        self._frozen: deque[tuple[float, float]] = deque()  # when it was frozen, and when the oldest of it came
+
+    def note(self, came_s: float) -> None:
+        """Take note of something that came into the map (``time.perf_counter()``)."""
+        with self._lock:
+            self._new_s = came_s if self._new_s is None else min(self._new_s, came_s)
+
+    def freeze(self, now_s: float) -> None:
+        """Take note that the state of this moment holds all of it, and may be saved."""
+        with self._lock:
+            if self._new_s is not None:
+                self._frozen.append((now_s, self._new_s))
+                self._new_s = None
+
+    def since_s(self, saved_s: float) -> float | None:
+        """Return when the oldest came that the save of a moment lacks; None where it lacks nothing.
+
+        Args:
+            saved_s: the moment; NaN for no save.
+        """
+        with self._lock:
+            while self._frozen and self._frozen[0][0] <= saved_s:
+                self._frozen.popleft()
+            return self._frozen[0][1] if self._frozen else self._new_s
+
+
 class Saver:
     """Writes maps into a folder whose lock its maker holds.
 
     Attributes:
-        saved_s: when what the last save holds came, by the clock of ``offer``; NaN before the first.
+        saved_s: up to when the last save holds the frames, by the clock of ``offer``; NaN before the first.
+        heard_s: and up to when the sounds.
     """
 
     def __init__(
@@ -33,19 +68,25 @@ class Saver:
             tell: called with a sentence where a save fails; the one before stays, and the next is tried as usual.
             broke: called with what ends the thread by a fault of ours.
         """
-        self.saved_s = float("nan")
+        self.saved_s = self.heard_s = float("nan")
         self._path, self._every_s, self._tell, self._broke = path, every_s, tell, broke
         self._door = Condition()
-        self._next: tuple[StoredMap, float] | None = None
+        self._next: tuple[StoredMap, float, float] | None = None
         self._ended, self._from_s = False, float("-inf")
         self._written: Written = {}
         self.thread = Thread(target=self._work, name="avlmaps-save", daemon=True)
         self.thread.start()
 
-    def offer(self, stored: StoredMap, came_s: float) -> None:
-        """Give it the state of a moment (``time.perf_counter()``), in the place of one that it did not write yet."""
+    def offer(self, stored: StoredMap, came_s: float, heard_s: float) -> None:
+        """Give it the state of two moments (``time.perf_counter()``), in the place of one that it did not write yet.
+
+        Args:
+            stored: the map.
+            came_s: up to when it holds the frames.
+            heard_s: and the sounds.
+        """
         with self._door:
-            self._next = stored, came_s
+            self._next = stored, came_s, heard_s
             self._door.notify_all()
 
     def close(self) -> None:
@@ -70,10 +111,10 @@ class Saver:
     def _work(self) -> None:
         try:
             while (one := self._awaited()) is not None:
-                begin_s, (stored, came_s) = time.perf_counter(), one
+                begin_s, (stored, came_s, heard_s) = time.perf_counter(), one
                 try:
                     self.write(stored)
-                    self.saved_s = came_s
+                    self.saved_s, self.heard_s = came_s, heard_s
                 except MapError as fault:
                     self._tell(str(fault))
                 end_s = time.perf_counter()
@@ -82,7 +123,7 @@ class Saver:
             self._broke(fault)
             raise
 
-    def _awaited(self) -> tuple[StoredMap, float] | None:
+    def _awaited(self) -> tuple[StoredMap, float, float] | None:
         """Return what is to be written, as soon as there is something and it is time; None at the end."""
         with self._door:
             while not self._ended:

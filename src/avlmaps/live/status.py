@@ -22,6 +22,7 @@ class LiveStatus:
         kept: frames that wait on the disk for that.
         dropped: frames that are not, by reason: ``late`` (others were waiting), ``still`` (the camera did not move),
             ``known`` (no new surface), ``wrong`` (an encoder failed on it).
+        late_kept: of the late frames, how many were put on the disk, to come into the map when there is time.
         refused: frames and pieces of sound that were no such thing, or out of order.
         waiting: frames that wait.
         frame_ms_p50: milliseconds from a frame's arrival until it is in the sums or dropped by a gate, median.
@@ -30,7 +31,9 @@ class LiveStatus:
         keyframes: of the last snapshot.
         sounds: of the last snapshot.
         snapshot_age_s: since what the last snapshot holds came; NaN without one.
-        saved_age_s: since what the last save holds came; NaN without one.
+        saved_age_s: since what the last save holds came; NaN without one. It grows also while nothing new comes.
+        unsaved_s: since the oldest frame or sound came that a kill would lose now; 0 where there is none. Frames that
+            wait on the disk are not counted here, but by ``kept``: a kill loses them as well.
         memory_mb: resident memory of the process; 0 where the system does not say.
         sound_gaps: gaps in the sound, which are silent.
         doubts: one sentence for each thing that is not as it should be.
@@ -42,6 +45,7 @@ class LiveStatus:
     encoded_later: int
     kept: int
     dropped: dict[str, int]
+    late_kept: int
     refused: int
     waiting: int
     frame_ms_p50: float
@@ -51,6 +55,7 @@ class LiveStatus:
     sounds: int
     snapshot_age_s: float
     saved_age_s: float
+    unsaved_s: float
     memory_mb: float
     sound_gaps: int
     doubts: tuple[str, ...]
@@ -62,7 +67,10 @@ class LiveStatus:
         }
 
     def __str__(self) -> str:
-        dropped = ", ".join(f"{count} {reason}" for reason, count in sorted(self.dropped.items()))
+        said = {reason: f"{count} {reason}" for reason, count in self.dropped.items()}
+        if self.late_kept:
+            said["late"] += f", {self.late_kept} of them stored"
+        dropped = ", ".join(said[reason] for reason in sorted(said))
         return (
             f"{self.frames_in} frames came, {self.fused} fused, {self.encoded} of them encoded, "
             f"{self.encoded_later} later "
@@ -82,7 +90,7 @@ class Tally:
         self._took_ms: deque[float] = deque(maxlen=5000)
 
     def note(self, what: str) -> None:
-        """Count one of ``came``, ``fused`` or ``refused``."""
+        """Count one of ``came``, ``fused``, ``refused`` and the like."""
         with self._lock:
             self._counts[what] += 1
 

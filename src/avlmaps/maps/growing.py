@@ -169,7 +169,34 @@ class GrowingMap:
         waiting_bytes = sum(one.features.nbytes for one in self._waiting if one.features is not None)
         enough = len(self._waiting) >= self._wait or waiting_bytes > _MOST_WAITING_BYTES
         if self._sensor is not None or enough:
-            self._settle()
+            self.settle()
+
+    def settle(self) -> None:
+        """Fuse the first frames, which no longer wait for others: up, the floor and the sensor are what they show.
+
+        Raises:
+            BackendError: the features of a frame are wrong; it is left out.
+        """
+        if not self._waiting:
+            return
+        with silence_progress(True):
+            if self._sensor is None:
+                held = self._walk.held()
+                self._sensor, self._ground = estimate_sensor(held, self.settings), self._find_upright(held)
+                self._rehearsal = _Rehearsal()
+            elif self._walk.has_doubled:
+                self._ground = self._find_upright(self._walk.held())
+            faults: list[BackendError] = []
+            while self._waiting:  # what is interrupted loses no frame
+                one = self._waiting[0]
+                try:
+                    self._fuse(replace(one, frame=replace(one.frame, ground=self._ground)))
+                except BackendError as fault:
+                    faults.append(fault)
+                    self._left_out.append(BadFrame(index=one.frame.index, why=str(fault)))
+                del self._waiting[0]
+        if faults:
+            raise faults[0]
 
     def look_again(self, frame: Frame, *, is_fused: bool) -> None:
         """Encode a frame of before, and add what that brings; no other frame need wait for it.
@@ -335,7 +362,7 @@ class GrowingMap:
 
     def _settled(self, final: bool) -> StoredMap:
         """Do what ``stored`` does, by what the frames were last found to be."""
-        self._settle()
+        self.settle()
         return self.finish(self.freeze(), final=final)
 
     def doubt(self, sentence: str) -> None:
@@ -429,7 +456,7 @@ class GrowingMap:
             other._walk.pass_by(one.frame.stamp_s, one.frame.world_from_camera)
         other._sounds = self._sounds
         other._told, other._found = self._told, self._found
-        other._settle()
+        other.settle()
         return other
 
     def _encoded(self, frame: Frame) -> np.ndarray:
@@ -453,29 +480,6 @@ class GrowingMap:
             raise BackendError(f"{frame.name} has features, and the frames before had none; give them with all frames.")
         self._dim = grid.shape[2]
         return np.array(grid)
-
-    def _settle(self) -> None:
-        """Fuse what waits; one whose features are wrong is left out, and the first of these is raised."""
-        if not self._waiting:
-            return
-        with silence_progress(True):
-            if self._sensor is None:
-                held = self._walk.held()
-                self._sensor, self._ground = estimate_sensor(held, self.settings), self._find_upright(held)
-                self._rehearsal = _Rehearsal()
-            elif self._walk.has_doubled:
-                self._ground = self._find_upright(self._walk.held())
-            faults: list[BackendError] = []
-            while self._waiting:  # what is interrupted loses no frame
-                one = self._waiting[0]
-                try:
-                    self._fuse(replace(one, frame=replace(one.frame, ground=self._ground)))
-                except BackendError as fault:
-                    faults.append(fault)
-                    self._left_out.append(BadFrame(index=one.frame.index, why=str(fault)))
-                del self._waiting[0]
-        if faults:
-            raise faults[0]
 
     def _fuse(self, came: "_Waiting") -> None:
         sensor, frame, features = self._sensor, came.frame, came.features

@@ -34,7 +34,7 @@ class Played:
         encoded_later: frames that waited on the disk and were encoded after all.
         asked_ms: of each question meanwhile.
         processor_ms: a frame, by thread; ``all`` has reading the recording and the questions in it.
-        oldest_save_s: how old the last save was at most; a kill loses what is new since, and often nothing is.
+        unsaved_s: how old the oldest thing was, at most, that a kill would have lost.
         laps: after each lap: voxels, keyframes, frames fused until then, resident MB.
         load: of the machine, at the end.
     """
@@ -46,7 +46,7 @@ class Played:
     status: LiveStatus | None = None
     asked_ms: list[float] = field(default_factory=list)
     processor_ms: dict[str, float] = field(default_factory=dict)
-    oldest_save_s: float = 0.0
+    unsaved_s: float = 0.0
     laps: list[tuple[int, int, int, int]] = field(default_factory=list)
     load: float = 0.0
 
@@ -79,7 +79,7 @@ def play(
             heard_s = _hear(recording, live, heard_s, stamp_s)
             status = live.status()
             found.frames += 1
-            found.oldest_save_s = max(found.oldest_save_s, float(np.nan_to_num(status.saved_age_s)))
+            found.unsaved_s = max(found.unsaved_s, status.unsaved_s)
             if ends_lap:
                 found.laps.append((status.voxels, status.keyframes, status.fused, round(status.memory_mb)))
         found.seconds, cpu_s = time.perf_counter() - begin_s, time.process_time() - begin_cpu_s

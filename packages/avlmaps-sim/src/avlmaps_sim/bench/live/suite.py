@@ -82,7 +82,7 @@ def run_live(scenes: Sequence[Path], used: Encoders, profile: str, chosen: LiveB
     return {
         "pace": _table(
             "recording|pace|frames|s|frames/s|fused|encoded|late|frame to map ms p50|p95|questions|question ms p50|p95"
-            "|oldest save s|load of the machine|close s|encoded later", pace,
+            "|most unsaved s|load of the machine|close s|encoded later|late stored", pace,
         ),
         "processor time a frame, ms": _table("recording|pace|all|fusing|snapshots|saving", processor),
         "laps over the same surface": _table("recording|lap|voxels|keyframes|fused until then|MB", laps),
@@ -106,8 +106,9 @@ def _pace(found: Played) -> list[object]:
     return [
         found.frames, round(found.seconds, 1), round(found.frames / found.seconds, 1), status.fused, status.encoded,
         status.dropped.get("late", 0), _whole(status.frame_ms_p50), _whole(status.frame_ms_p95), len(found.asked_ms),
-        *(round(float(np.percentile(asked, p)), 1) for p in (50, 95)), round(found.oldest_save_s, 1),
+        *(round(float(np.percentile(asked, p)), 1) for p in (50, 95)), round(found.unsaved_s, 1),
         round(found.load, 1), round(found.close_s, 1), found.encoded_later,
+        status.late_kept,
     ]  # fmt: skip
 
 
