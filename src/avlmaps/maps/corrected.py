@@ -26,7 +26,7 @@ from avlmaps.maps.pose_correction import PoseCorrection
 from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.manifest import Box, Removed, Timings, UpInfo
 from avlmaps.maps.store.reader import StoredMap, open_stored
-from avlmaps.maps.store.writer import MapContent, write_map
+from avlmaps.maps.store.writer import MapContent, as_written, write_map
 from avlmaps.maps.types import HeardSounds, Keyframes, SourceEvidence, Submaps
 from avlmaps.recordings.types import Recording
 
@@ -72,10 +72,13 @@ def correct_stored(
     """
     begin_s = perf_counter()
     submaps = require_submaps(stored)
-    frames_s, before = np.asarray(submaps.stamp_s), np.asarray(submaps.pose)
-    motion = PoseCorrection.of(stamps_s, poses, frames_s, before)
-    now = motion.moved(frames_s, before)
+    frames_s, last = np.asarray(submaps.stamp_s), np.asarray(submaps.pose)
+    motion = PoseCorrection.of(stamps_s, poses, frames_s, last)
+    now = motion.moved(frames_s, last)
     with lock_folder(stored.path), silence_progress(True):
+        before = MapContent(
+            stored.voxels, stored.keyframes, stored.place_state, stored.sounds, stored.path / "sounds", submaps=submaps
+        )
         content, removed = _moved(stored, submaps, now)
         sources, sources_s = _sources(stored, content, Trajectory(frames_s, now), motion.turn, recording)
         content = replace(content, sources=sources)
@@ -103,6 +106,7 @@ def correct_stored(
                 timings=Timings(finished=finished, elapsed_s=info.timings.elapsed_s + elapsed_s,
                                 stages_s={**info.timings.stages_s, "correcting": elapsed_s, **sources_s}),
             ),
+            as_written(stored.path, before, info.files),
         )  # fmt: skip
     opened = replace(open_stored(stored.path), encoders=stored.encoders)
     return opened, Corrected(median_m, most_m, info.counts.voxels, count, perf_counter() - begin_s)

@@ -15,7 +15,7 @@ from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.reader import StoredMap, open_stored
-from avlmaps.maps.store.writer import MapContent, write_map
+from avlmaps.maps.store.writer import MapContent, as_written, write_map
 from avlmaps.maps.types import HeardSounds, SourceEvidence, Voxels
 from avlmaps.recordings.types import Recording
 
@@ -98,5 +98,6 @@ def add_sources(stored: StoredMap, recording: Recording) -> StoredMap:
         stages_s={**info.timings.stages_s, "sources": elapsed_s},
     )
     with lock_folder(stored.path):
-        write_map(stored.path, content, structs.replace(info, files={}, timings=timings))
+        written = as_written(stored.path, content, info.files)
+        write_map(stored.path, content, structs.replace(info, files={}, timings=timings), written)
     return replace(open_stored(stored.path), encoders=stored.encoders)

@@ -3,7 +3,7 @@
 Until ``map.json`` is replaced, in one step, the folder is the old map (or none); from then on it is the new one.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
@@ -88,6 +88,25 @@ def write_map(path: Path, content: MapContent, info: MapInfo, written: Written |
         written.clear()
         written.update(now)
     return whole
+
+
+def as_written(path: Path, content: MapContent, files: Mapping[str, FileInfo]) -> Written:
+    """Return the content of a map as it was opened, for `write_map`: what of it the new map has is not written again.
+
+    Args:
+        path: the map's folder, whose lock the caller holds.
+        content: the arrays and clips that were read from it.
+        files: of its manifest.
+    """
+    there = Written()
+    for name, source, _ in _writes(path, content):
+        file = files.get(name)
+        if file is None or not (path / file.path).is_file():
+            continue
+        # What was written otherwise was converted as it was read.
+        if isinstance(source, Path) or (source.dtype.str, source.shape) == (file.dtype, file.shape):
+            there[name] = source, file
+    return there
 
 
 def _writes(path: Path, content: MapContent) -> Iterator[tuple[str, np.ndarray | Path, Callable[[], FileInfo]]]:
