@@ -67,8 +67,8 @@ class Go(MapVerb):
     """JSON file of the robot's frames and settings: namespace, radius, speed, timeouts (docs/robots.md)."""
     start: Annotated[str | None, arg(metavar="X,Y,HEADING")] = None
     """Start of the simulated robot: metres, degrees counter-clockwise from +x. Default: the start of the recording."""
-    at: Literal["robot", "source"] = "robot"
-    """Place of a sound: where the robot was when it heard it, or where it came from (see `avlmaps sources`)."""
+    at: Annotated[Literal["robot", "source"] | None, arg(metavar="robot|source")] = None
+    """Place of a sound: where the robot was when it heard it, or its source. Default: as the words say, else robot."""
     found_at: Annotated[float, arg(metavar="PROBABILITY")] = 0.5
     """Drive to what is found from this probability on, 0 to 1."""
     guess: bool = False
@@ -231,16 +231,13 @@ def translator_for(verb: "Go", avlmap: "AVLMap | None" = None) -> "Translator":
         verb: the command; it names the translator.
         avlmap: the map, whose encoder may know words that the lexicon does not.
     """
-    from avlmaps.language.sentence import Given
-
-    came = Given(
-        None if verb.image is None else str(verb.image), None if verb.sound_clip is None else str(verb.sound_clip),
-        None if avlmap is None else avlmap.knows, verb.at, () if avlmap is None else avlmap.edited.own_names,
-    )  # fmt: skip
     if verb.language != "chat":
         from avlmaps.language.learned_translator import LearnedTranslator
+        from avlmaps.language.sentence import Given
+        from avlmaps.navigate.instruct import given_by
 
-        return LearnedTranslator(came)
+        image, clip = (None if file is None else str(file) for file in (verb.image, verb.sound_clip))
+        return LearnedTranslator(Given(image, clip, at=verb.at) if avlmap is None else given_by(avlmap, image, clip))
     from avlmaps.language.chat import ChatSettings, ChatTranslator
 
     chat = verb.chat

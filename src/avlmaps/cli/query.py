@@ -34,8 +34,8 @@ class Query(MapVerb):
     """Sound, by name."""
     sound_clip: Annotated[OptionalPath, arg(metavar="FILE")] = None
     """Sound, by a sound file of one like it."""
-    at: Literal["robot", "source"] = "robot"
-    """Place of a sound: where the robot was when it heard it, or where it came from (see `avlmaps sources`)."""
+    at: Annotated[Literal["robot", "source"] | None, arg(metavar="robot|source")] = None
+    """Place of a sound: where the robot was when it heard it, or its source. Default: as the words say, else robot."""
     area: Annotated[OptionalText, arg(metavar="NAME")] = None
     """Area, by name: a room or a part of the building."""
     image: Annotated[OptionalPath, arg(metavar="PHOTO")] = None
@@ -82,7 +82,7 @@ def ask(verb: "Query", opened: "AVLMap | None" = None) -> dict[str, Any]:
         from avlmaps.query.rules import query_settings
 
         settings = query_settings(verb.rules, settings)
-    if verb.at != settings.sounds.at:
+    if verb.at is not None:
         settings = replace(settings, sounds=replace(settings.sounds, at=verb.at))
     if opened is not None and opened.settings != settings:
         opened = AVLMap(opened.stored, settings)

@@ -59,8 +59,8 @@ class Serve(ModelVerb):
     """A further name of this server in the Host header, such as that of a reverse proxy; may be repeated."""
     found_at: Annotated[float, arg(metavar="PROBABILITY")] = 0.5
     """Call a query found, and drive to it, from this probability of its first goal on, 0 to 1."""
-    at: Literal["robot", "source"] = "robot"
-    """Place of a sound: where the robot was when it heard it, or where it came from (see `avlmaps sources`)."""
+    at: Annotated[Literal["robot", "source"] | None, arg(metavar="robot|source")] = None
+    """Place of a sound: where the robot was when it heard it, or its source. Default: as the words say, else robot."""
 
     drive: Annotated[Path | None, arg(metavar="ROBOT.json")] = None
     """Drive the robot of this file as well: plans, confirmations and stops under /drive, every order logged."""

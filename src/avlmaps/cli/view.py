@@ -53,8 +53,8 @@ class View(MapVerb):
     """Scene in which a simulated robot drives the commands typed in the page, as for `avlmaps go`."""
     found_at: Annotated[float, arg(metavar="PROBABILITY")] = 0.5
     """Call a query found from this probability of its first goal on, 0 to 1."""
-    at: Literal["robot", "source"] = "robot"
-    """Place of a sound: where the robot was when it heard it, or where it came from (see `avlmaps sources`)."""
+    at: Annotated[Literal["robot", "source"] | None, arg(metavar="robot|source")] = None
+    """Place of a sound: where the robot was when it heard it, or its source. Default: as the words say, else robot."""
     out: Annotated[Path | None, arg(metavar="FILE")] = None
     """Write one HTML file, and serve nothing."""
     questions: Annotated[tuple[str, ...], arg(metavar="SENTENCE ...")] = ()

@@ -9,6 +9,8 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any, ClassVar
 
+from avlmaps.core.question import HeardAt
+
 
 class TargetKind(StrEnum):
     """The kind of a target; the value is its key in JSON."""
@@ -78,12 +80,14 @@ class Target:
         near: what it is near, in, on, or between, in the order of the words; a chain ("the lamp on the table by the
             sofa") is made flat, since a program multiplies all heats.
         pick: which one of several.
+        at: the place of a sound or a clip that is meant; None: where it was heard, or what the settings say.
     """
 
     kind: TargetKind
     name: str = ""
     near: "tuple[Target, ...]" = ()
     pick: Pick = Pick.ANY
+    at: HeardAt | None = None
 
     def __post_init__(self) -> None:
         """Make chains flat."""
@@ -107,6 +111,8 @@ class Target:
             told["near"] = [one.to_json() for one in self.near]
         if self.pick:
             told["pick"] = str(self.pick)
+        if self.at:
+            told["at"] = self.at
         return told
 
 

@@ -56,7 +56,7 @@ class LearnedTranslator:
             LanguageError: the command is empty or too long.
         """
         read = self.read(command)
-        said = verbalise(read.intents, self.given.at)
+        said = verbalise(read.intents)
         if read.stops is not None:
             raise UnclearError(said, getattr(read.stops, "choices", ()))
         return Translation(write_program(read.intents), read.notes, said)
@@ -86,5 +86,5 @@ def explanation(translator: Translator, command: str) -> list[str]:
     if not isinstance(translator, LearnedTranslator):
         return ["readings: this translator weighs none"]
     read = translator.read(command)
-    lines = [f"reading {one.probability:5.2f}: {verbalise(one.intents, translator.given.at)}" for one in read.readings]
+    lines = [f"reading {one.probability:5.2f}: {verbalise(one.intents)}" for one in read.readings]
     return [*lines, f"decided by: {_WHY[read.why]}"]

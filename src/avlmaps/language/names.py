@@ -157,6 +157,12 @@ def past_forms() -> frozenset[str]:
     return frozenset([*irregular, *(form for form in _forms() if form.endswith("ed"))])
 
 
+@cache
+def third_forms() -> frozenset[str]:
+    """Return the verbs that sound, as one says of a thing: "barks", "rings"."""
+    return frozenset(forms_of(verb)[3] for verb in load_word_classes().lists["verbs"].split())
+
+
 def sounds_like(word: str) -> bool:
     """Return whether a word names a sound by itself: "laughter", "barking", "knock"."""
     return word in listed("noises") or (word in _forms() and word.endswith("ing"))

@@ -1,10 +1,11 @@
 """Words of a command in the order and the person that the networks know: what is said of the robot is said to it.
 
-Four forms are rewritten, token by token, before a command is read:
+Five forms are rewritten, token by token, before a command is read:
 
 - what another person should make the robot do: "send the robot to the lab", "tell it to turn left";
 - a time before an order: "in five minutes go to the door", "go to the door in five minutes";
 - a loop as programs have it: "for i in range(3): go to the door";
+- what a thing does by which it is found: "the thing that rings" is "the thing that is ringing";
 - a label as data sets have it: "the object of class lamp", "the sound labelled glass breaking".
 """
 
@@ -14,7 +15,7 @@ from functools import cache
 
 from avlmaps.language import lexer
 from avlmaps.language.lexer import Token
-from avlmaps.language.names import is_entry
+from avlmaps.language.names import is_entry, sounding_forms, third_forms
 from avlmaps.language.word_classes import load_word_classes
 
 _ROBOTS = frozenset({"robot", "bot", "machine", "rover", "droid", "vehicle", "unit", "roomba", "turtlebot", "agent"})
@@ -72,6 +73,8 @@ _GENERIC = (
     | _ANY
     | _SOUNDS
 )
+_WHATEVER = frozenset({"what", "whatever", "whoever"})
+_RELATIVE = frozenset({"that", "which", "who"})
 _CUTS = frozenset({"then", "finally"})
 # Who says what they heard, saw or think, and how: "I think I heard the kettle; go to the kitchen".
 _SPEAKERS = frozenset({"i", "we", "he", "she", "they", "someone", "somebody", "everyone", "everybody"})
@@ -90,7 +93,7 @@ _ASKED_FOR = _BEFORE | {"can", "could", "would", "will", "so", "kindly", "robot"
 def rephrased(tokens: Sequence[Token]) -> tuple[list[Token], list[str]]:
     """Return tokens with these forms rewritten, and one sentence for each that a person should know of."""
     notes: list[str] = []
-    found = _unlabelled(_looped(_joined(tokens)))
+    found = _unlabelled(_looped(_sounding(_joined(tokens))))
     found = _said_to_it(found)
     return _waiting_first(found, notes), notes
 
@@ -133,6 +136,19 @@ def _joined(tokens: Sequence[Token]) -> list[Token]:
         elif (token.kind == "number" or token.text == "(") and found and found[-1].text == "sleep":
             found[-1] = _word(found[-1], "wait")
         found.append(token)
+    return found
+
+
+def _sounding(tokens: Sequence[Token]) -> list[Token]:
+    """Return tokens with "the thing that rings" as "the thing that is ringing": rings are things, too."""
+    found: list[Token] = []
+    for token in tokens:
+        before = [one.text for one in found[-2:]]
+        relates = before[-1:] and (before[-1] in _WHATEVER or (before[-1] in _RELATIVE and before[0] in _GENERIC))
+        if relates and token.text in third_forms():
+            found += [_word(token, "is"), _word(token, sounding_forms()[token.text])]
+        else:
+            found.append(token)
     return found
 
 

@@ -1,13 +1,120 @@
-"""Whether a sentence asks where a sound came from, and not where somebody heard it."""
+"""Whether words mean the place where a sound came from, and not where somebody heard it.
+
+One reading for questions and commands: a question is read as a whole, a command round each sound that it names, so that
+each of its parts has its own place.
+"""
 
 import re
+from collections.abc import Collection, Iterator, Sequence
 
+from avlmaps.language.lexer import Token
+from avlmaps.language.names import past_forms, sounding_words, sounds_like, third_forms
+
+# Whose way it is, and no sound's: "go back to where you came from".
+_WHO = ("you", "we", "i", "they", "he", "she", "robot")
+_NOT_OF_ANYBODY = "".join(f"(?<!\\b{who} )" for who in _WHO)
 _ORIGIN = re.compile(
-    r"\b(?:come|comes|came|coming|originat(?:e|es|ed|ing)) from\b|\bfrom where\b|\bsources? of\b|"
-    r"\b(?:where|what|which \w+)\b.*\bfrom\W*$|\b(?:what|who) (?:is |was )?(?:made|makes|making|causes|caused)\b"
+    rf"{_NOT_OF_ANYBODY}\b(?:come|comes|came|coming) from\b|\b(?:originat|emanat)(?:e|es|ed|ing)\b|"
+    r"\bfrom where (?:do|does|did|is|was|has)\b|\b(?:sources?|origins?) of\b|\b(?:its|their) (?:source|origin)\b|"
+    rf"\b(?:where|what|which \w+)\b(?!.*\b(?:{'|'.join(_WHO)}) c[ao]me from).*\bfrom\W*$"
 )
+_MAKER = re.compile(
+    r"\b(?:what|who|whatever|whoever|that|which|thing|one|something|somebody|someone|device|machine|is|was)"
+    r"(?: ?'s| is| was| keeps| kept)? (?:made|makes|making|causes|caused|causing|emits|emitted|emitting|produces|"
+    r"produced|producing|responsible for)\b(?! (?:of|from|in|by|up)\b)"
+)
+_ITSELF = re.compile(
+    r"\b(?:that|which|who|what|whatever|whoever)"
+    r"((?: ?'s| is| are| was| were| keeps| kept| has been| just| still| always| started| starts)*) (\w+)"
+)
+_HEARD = re.compile(r"\b(?:hear|hears|heard|hearing|listened)\b")
+_SOUND_OF = re.compile(r"\b(?:sounds?|noises?) of\b")
+# Verbs that sound, and are said of much that does not: "the chair that goes with it", "the boy who is running".
+_SILENT = frozenset({
+    "goes", "going", "went", "falls", "falling", "fell", "runs", "running", "ran", "steps", "stepping", "stepped",
+    "plays", "playing", "played", "calls", "calling", "called", "brushes", "brushing", "brushed",
+    "sweeps", "sweeping", "swept",
+    "stirs", "stirring", "stirred", "cooks", "cooking", "cooked", "fries", "frying", "fried", "stomps", "breathes",
+})  # fmt: skip
+_BREAKS = frozenset({"then", "finally", "and", "but", "or"})
+_RECORDINGS = frozenset({"recording", "clip", "audio", "tape", "sound", "noise"})
+_REFERS = frozenset({"it", "its", "that", "this", "they", "them", "their"})
 
 
-def asks_for_source(text: str) -> bool:
-    """Return whether a sentence means the place where a sound came from: "where does the barking come from?"."""
-    return _ORIGIN.search(text.lower()) is not None
+def asks_for_source(text: str, sound: Collection[str] = ()) -> bool:
+    """Return whether words mean the place where a sound came from.
+
+    "Where does the barking come from?", "what is making the noise" and "the thing that rings" do; "where you heard the
+    barking", "the sound of barking" and "where you came from" do not.
+
+    Args:
+        text: the words.
+        sound: those among them that name the sound, where they are known.
+    """
+    text = text.lower()
+    if _ORIGIN.search(text):
+        return True
+    if _HEARD.search(text):
+        return False
+    return _MAKER.search(text) is not None or (_SOUND_OF.search(text) is None and _sounds_itself(text, sound))
+
+
+def _sounds_itself(text: str, sound: Collection[str]) -> bool:
+    """Return whether a thing is named by the sound that it makes: "the phone that is ringing", "whatever beeps"."""
+    for found in _ITSELF.finditer(text):
+        verb = found[2]
+        if verb not in sound if sound else verb in _SILENT:
+            continue
+        if found[1] and (sounds_like(verb) or verb in sounding_words()):
+            return True
+        # "That bark" and "that barking" point at a sound; "that barks" and "that barked" say what a thing does.
+        if not found[1] and verb in past_forms() | third_forms():
+            return True
+    return False
+
+
+def seeks_source(tokens: Sequence[Token], own: Sequence[int], others: Collection[int] = ()) -> bool:
+    """Return whether a command means where the sound came from that it names by some of its words.
+
+    Only the words round the sound count, up to the next step or the next thing that is named, and what refers to it
+    behind: "the dog barks, go to where it comes from".
+
+    Args:
+        tokens: the command.
+        own: the words of the sound.
+        others: the words of everything else that the command names.
+    """
+    if not own or tokens[own[0]].start == tokens[own[0]].end:  # a file that came along stands behind the sentence
+        own = [number for number, token in enumerate(tokens) if token.text in _RECORDINGS][:1]
+    if not own:
+        return False
+    begin, end = min(own), max(own) + 1
+    while begin > 0 and not _is_break(tokens[begin - 1]) and begin - 1 not in others:
+        begin -= 1
+    while end < len(tokens) and not _is_break(tokens[end]) and end not in others:
+        end += 1
+    sound = {tokens[number].text for number in own}
+    clauses = (_text(tokens[begin:end]), *_behind(tokens, end, others))
+    return any(asks_for_source(clause, sound) for clause in clauses)
+
+
+def _behind(tokens: Sequence[Token], at: int, others: Collection[int]) -> Iterator[str]:
+    """Yield the clauses behind a place that refer to what was said before, up to the next name."""
+    clause: list[Token] = []
+    for number in range(at, len(tokens) + 1):
+        if number < len(tokens) and not _is_break(tokens[number]) and number not in others:
+            clause.append(tokens[number])
+            continue
+        if not _REFERS.isdisjoint(token.text for token in clause):
+            yield _text(clause)
+        if number in others:
+            return
+        clause = []
+
+
+def _is_break(token: Token) -> bool:
+    return token.kind == "punct" or token.text in _BREAKS
+
+
+def _text(tokens: Sequence[Token]) -> str:
+    return " ".join(token.text for token in tokens)

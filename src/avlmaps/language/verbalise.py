@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 
-from avlmaps.core.question import HeardAt
 from avlmaps.language.intents import (
     Beside,
     Between,
@@ -35,39 +34,34 @@ _SIDES = {
 }  # fmt: skip
 
 
-def verbalise(intents: Sequence[Intent], at: HeardAt = "robot") -> str:
-    """Return one sentence that says what the robot will do, or why it does nothing.
-
-    Args:
-        intents: what the robot is to do.
-        at: the place of a sound that is meant.
-    """
+def verbalise(intents: Sequence[Intent]) -> str:
+    """Return one sentence that says what the robot will do, or why it does nothing."""
     if intents and isinstance(intents[0], Refuse):
         return intents[0].said
     if intents and isinstance(intents[0], Clarify):
         return intents[0].question
     if tuple(intents) == (Wait(),):
         return "I will stop and stay here."
-    return f"I will {_steps(intents, at)}."
+    return f"I will {_steps(intents)}."
 
 
-def _steps(intents: Sequence[Intent], at: HeardAt) -> str:
+def _steps(intents: Sequence[Intent]) -> str:
     said: list[str] = []
     for intent in intents:
-        step = _step(intent, at)
+        step = _step(intent)
         said.append(step)
     return ", then ".join(said)
 
 
-def _step(intent: Intent, at: HeardAt) -> str:
+def _step(intent: Intent) -> str:
     match intent:
         case Go(to=target):
-            return f"go to {phrase(target, at)}"
+            return f"go to {phrase(target)}"
         case Face(to=target, side=Side.AHEAD):
-            return f"face {phrase(target, at)}"
+            return f"face {phrase(target)}"
         case Face(to=target, side=side):
             where = "behind me" if side is Side.BEHIND else f"on my {side}"
-            return f"turn until {phrase(target, at)} is {where}"
+            return f"turn until {phrase(target)} is {where}"
         case Turn(degrees=None, heading=heading):
             return f"turn to {_COMPASS.get(round(heading or 0), f'{heading:g} degrees on the compass')}"
         case Turn(degrees=degrees):
@@ -75,29 +69,29 @@ def _step(intent: Intent, at: HeardAt) -> str:
         case Move(metres=metres):
             return f"move {'forward' if metres > 0 else 'back'} {abs(metres):g} m"
         case Between(of=(a, b)):
-            return f"stop between {phrase(a, at)} and {phrase(b, at)}"
+            return f"stop between {phrase(a)} and {phrase(b)}"
         case Beside(of=target, side=side, metres=metres):
-            return f"stop {'' if metres is None else f'{metres:g} m '}{_SIDES[side]} {phrase(target, at)}"
+            return f"stop {'' if metres is None else f'{metres:g} m '}{_SIDES[side]} {phrase(target)}"
         case StopAt(of=target, metres=metres):
-            return f"stop {metres:g} m from {phrase(target, at)}"
+            return f"stop {metres:g} m from {phrase(target)}"
         case _:
-            return _other(intent, at)
+            return _other(intent)
 
 
-def _other(intent: Intent, at: HeardAt) -> str:
+def _other(intent: Intent) -> str:
     match intent:
         case Circle(of=target, views=None, way=way):
-            return f"drive around {phrase(target, at)} {way}".rstrip()
+            return f"drive around {phrase(target)} {way}".rstrip()
         case Circle(of=target, views=views, way=way):
-            return f"look at {phrase(target, at)} from {views} points around it {way}".rstrip()
+            return f"look at {phrase(target)} from {views} points around it {way}".rstrip()
         case VisitEach(of=target):
-            return f"go to each of these, the nearest first: {phrase(target, at)}"
+            return f"go to each of these, the nearest first: {phrase(target)}"
         case Wait(seconds=seconds):
             return "stay there" if seconds is None else f"wait {seconds:g} seconds"
         case Return():
             return "come back here"
         case Repeat(times=times, body=body):
-            return f"{_TIMES.get(times, f'{times} times')}: {_steps(body, at)}"
+            return f"{_TIMES.get(times, f'{times} times')}: {_steps(body)}"
         case _:
             return str(intent)
 
@@ -108,21 +102,22 @@ def _turn(degrees: float) -> str:
     return f"turn {'right' if degrees > 0 else 'left'} {abs(degrees):g} degrees"
 
 
-def phrase(target: Target, at: HeardAt = "robot") -> str:
+def phrase(target: Target) -> str:
     """Return a target in words: "the chair nearest to where breathing was heard"."""
     pick = {Pick.OTHER: "other ", Pick.FARTHEST: "farthest "}.get(target.pick, "")
     match target.kind:
         case TargetKind.OBJECT | TargetKind.AREA:
             own = f"the {pick}{target.name}"
         case TargetKind.SOUND:
-            own = f"where {target.name} was heard" if at == "robot" else f"where the sound of {target.name} comes from"
+            at_source = target.at == "source"
+            own = f"where the sound of {target.name} comes from" if at_source else f"where {target.name} was heard"
         case TargetKind.IMAGE:
             own = f"where the picture {target.name} was taken"
         case TargetKind.CLIP:
-            own = f"where a sound like {target.name} {'was heard' if at == 'robot' else 'comes from'}"
+            own = f"where a sound like {target.name} {'comes from' if target.at == 'source' else 'was heard'}"
         case TargetKind.HERE:
             return "here"
     areas = [one for one in target.near if one.kind is TargetKind.AREA]
     others = [one for one in target.near if one.kind is not TargetKind.AREA]
-    near = f" nearest to {' and '.join(phrase(one, at) for one in others)}" if others else ""
-    return own + near + "".join(f" in {phrase(one, at)}" for one in areas)
+    near = f" nearest to {' and '.join(phrase(one) for one in others)}" if others else ""
+    return own + near + "".join(f" in {phrase(one)}" for one in areas)

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core.errors import GoalNotFoundError, ProgramError
+from avlmaps.core.question import HeardAt
 from avlmaps.core.wording import place_text
 from avlmaps.language.program.vocabulary import Clip, Picture, Place, Target
 from avlmaps.language.storey_words import said_storeys
@@ -20,6 +21,7 @@ from avlmaps.navigate.instances import Thing, likely, nearest, same_thing, tells
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.on_storeys import at_storey, storeys_meant
+from avlmaps.query.sound_sources import no_sources
 
 
 def text_of(value: object, skill: str) -> str:
@@ -69,7 +71,9 @@ class Seeker:
         self._instances: set[Place] = set()
         self._last_line = ""
 
-    def heat(self, skill: str, obj: object, sound: object, img: object, area: object, *, primary: bool) -> Heatmap:
+    def heat(
+        self, skill: str, obj: object, sound: object, img: object, area: object, at: object, *, primary: bool
+    ) -> Heatmap:
         """Return the heatmap of the one thing that is given.
 
         Args:
@@ -78,10 +82,11 @@ class Seeker:
             sound: words for a sound, or a clip.
             img: a picture.
             area: words for an area.
+            at: the place of a sound, ``robot`` or ``source``; the map's settings overrule it.
             primary: whether it is what is sought itself.
 
         Raises:
-            ProgramError: not exactly one is given, or it is of the wrong kind.
+            ProgramError: not exactly one is given, it is of the wrong kind, or it has no such place.
             QueryError: the map cannot answer the query.
         """
         given = {"obj": obj, "sound": sound, "img": img, "area": area}
@@ -89,20 +94,33 @@ class Seeker:
         if len(named) != 1:
             what = " and ".join(named) or "none of them"
             raise ProgramError(f"{skill} takes exactly one of obj, sound, img and area; it was given {what}.")
+        place = self._place(skill, at, sound)
         if img is not None:
             if not isinstance(img, Picture):
                 raise ProgramError(f"{skill} takes as img what load_image returns, not {kind_of(img)}.")
             heat = self.avlmap.image(self.readable.find(img.path, "picture"), primary=primary)
         elif isinstance(sound, Clip):
-            heat = self.avlmap.sound_clip(self.readable.find(sound.path, "clip"), primary=primary)
+            heat = self.avlmap.sound_clip(self.readable.find(sound.path, "clip"), primary=primary, at=place)
         elif sound is not None:
-            heat = self._named(text_of(sound, skill), lambda name: self.avlmap.sound(name, primary))
+            heat = self._named(text_of(sound, skill), lambda name: self.avlmap.sound(name, primary, at=place))
         elif area is not None:
             heat = self._named(text_of(area, skill), lambda name: self.avlmap.area(name, primary))
         else:
             heat = self._named(text_of(obj, skill), lambda name: self.avlmap.object(name, primary))
         self._note(heat)
         return heat
+
+    def _place(self, skill: str, at: object, sound: object) -> HeardAt | None:
+        """Return the place of a sound that a program means: where the map does not know its source, the robot's."""
+        if at not in ("robot", "source"):
+            raise ProgramError(f'{skill} takes at="robot" or at="source", not {at!r}.')
+        if at == "robot" or self.avlmap.settings.sounds.at is not None:
+            return None
+        if sound is None:
+            raise ProgramError(f'{skill} takes at="source" with a sound; what is seen has no other place.')
+        why = no_sources(self.avlmap.stored)
+        self.note(why)
+        return None if why else "source"
 
     def _named(self, name: str, heat_of: Callable[[str], Heatmap]) -> Heatmap:
         """Return the heat of a name; where it names a storey ("bed upstairs"), with the goals on that one alone.

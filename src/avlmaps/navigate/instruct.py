@@ -15,12 +15,14 @@ from avlmaps.core.errors import LanguageError, ProgramError
 from avlmaps.core.motion import Action
 from avlmaps.core.poses import FRAME
 from avlmaps.language.program import Budget, Step, Trace, parse_program, run_program
+from avlmaps.language.sentence import Given
 from avlmaps.language.translator import Translation, Translator
 from avlmaps.navigate.driver import Driver
 from avlmaps.navigate.file_access import Readable, offered_by
 from avlmaps.navigate.motion_log import Move
 from avlmaps.navigate.skills import Robot, RobotSettings
 from avlmaps.query.avlmap import AVLMap
+from avlmaps.query.sound_sources import no_sources
 
 _MOST_PROGRAMS = 6
 _NEAR_M = 1.0  # within this distance a goal counts as reached where the paper judges
@@ -118,6 +120,18 @@ class Outcome:
             "elapsed_s": round(self.elapsed_s, 3),
             "frame": FRAME,
         }
+
+
+def given_by(avlmap: AVLMap, image: str | None = None, clip: str | None = None) -> Given:
+    """Return what a command to a robot on a map may mean: the map's names, and which places its sounds have.
+
+    Args:
+        avlmap: the map.
+        image: the file that "this photo" means.
+        clip: the file that "this recording" means.
+    """
+    sounds_at, own = avlmap.settings.sounds.at, avlmap.edited.own_names
+    return Given(image, clip, avlmap.knows, sounds_at, own, no_sources(avlmap.stored))
 
 
 def _silent(_: str) -> None:

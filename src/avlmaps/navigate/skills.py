@@ -109,9 +109,13 @@ class Robot:
         sound: str | Clip | None = None,
         img: Picture | None = None,
         area: str | None = None,
+        at: str = "robot",
     ) -> Heat:
-        """Return the heatmap of what is sought itself (falls to nothing within 0.5 m). Give exactly one argument."""
-        return cast("Heat", self.seeker.heat("get_major_map", obj, sound, img, area, primary=True))
+        """Return the heatmap of what is sought itself (falls to nothing within 0.5 m). Give exactly one thing.
+
+        A sound is sought where it was heard, or with at="source" where it came from.
+        """
+        return cast("Heat", self.seeker.heat("get_major_map", obj, sound, img, area, at, primary=True))
 
     def get_map(
         self,
@@ -119,9 +123,13 @@ class Robot:
         sound: str | Clip | None = None,
         img: Picture | None = None,
         area: str | None = None,
+        at: str = "robot",
     ) -> Heat:
-        """Return the heatmap of what the sought thing is near or in (falls off over 5 m). Give exactly one argument."""
-        return cast("Heat", self.seeker.heat("get_map", obj, sound, img, area, primary=False))
+        """Return the heatmap of what the sought thing is near or in (falls off over 5 m). Give exactly one thing.
+
+        A sound is taken where it was heard, or with at="source" where it came from.
+        """
+        return cast("Heat", self.seeker.heat("get_map", obj, sound, img, area, at, primary=False))
 
     def get_max_pos_3d(self, heat: Heat) -> Place:
         """Return the best place of a heatmap, or of several multiplied with each other."""

@@ -257,18 +257,14 @@ def thing_alone(asked: Asked, avlmap: "Queryable") -> Question | None:
 def _answer_sentence(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
     """Answer a sentence; one that asks where a sound came from means its source, where the map knows that."""
     from avlmaps.language.source_words import asks_for_source
+    from avlmaps.query.sound_sources import no_sources
 
-    if asked.at is not None or not asks_for_source(asked.sentence):
+    if (asked.at or avlmap.settings.sounds.at) is not None or not asks_for_source(asked.sentence):
         return _answer_said(avlmap, asked, files)
-    if not len(avlmap.stored.sounds) or avlmap.stored.knows_sources:
-        return _answer_said(avlmap, replace(asked, at="source"), files)
-    answer = _answer_said(avlmap, asked, files)
-    if answer.parts and not any(one.part.modality is Modality.SOUND for one in answer.parts):
-        return answer
-    from avlmaps.query.sound_sources import unknown_sources
-
-    why = f"The place is where the robot was when it heard it: {unknown_sources(avlmap.stored)}"
-    return replace(answer, notes=(why, *answer.notes))
+    why = no_sources(avlmap.stored)
+    answer = _answer_said(avlmap, asked if why else replace(asked, at="source"), files)
+    silent = answer.parts and not any(one.part.modality is Modality.SOUND for one in answer.parts)
+    return answer if silent or not why else replace(answer, notes=(why, *answer.notes))
 
 
 def _answer_said(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:

@@ -481,7 +481,7 @@ class AVLMap:
         Args:
             text: what it is called.
             primary: whether that place is what is sought.
-            at: ``robot`` or ``source``; by default as ``settings.sounds.at`` says, which is ``robot``.
+            at: ``robot`` or ``source``; by default as ``settings.sounds.at`` says, else ``robot``.
 
         Raises:
             QueryError: the text is empty, or the map does not know where its sounds came from.

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from avlmaps.maps.store.reader import StoredMap
     from avlmaps.maps.storeys import Storeys
     from avlmaps.query.contents import Room, SoundEvent, Thing
+    from avlmaps.query.modalities.sound import SoundSettings
     from avlmaps.query.room_regions import RoomRegions
     from avlmaps.query.rooms import RoomField, Rooms
 
@@ -41,11 +42,16 @@ Attachment = UInt8[np.ndarray, "h w 3"] | Photo | Sound
 
 
 class FoundSettings(Protocol):
-    """The part of a map's settings that decides what is found."""
+    """The part of a map's settings that decides what is found, and where."""
 
     @property
     def found_at(self) -> float:
         """The least probability of a first goal that counts as found, in [0, 1]."""
+        ...
+
+    @property
+    def sounds(self) -> "SoundSettings":
+        """Among others, the place that every sound has."""
         ...
 
 

@@ -30,8 +30,8 @@ PAPER_HEARING = HearingSettings(
 # Heat falls from the camera's place, through walls; cosines are stretched over the keyframes; each view speaks for
 # itself, and things do not.
 PAPER_AREAS = AreaSettings(anchor="camera", extent="cones", score="min-max", pool_m=0.0)
-# Scores are stretched over the sounds of the map.
-PAPER_SOUNDS = SoundSettings(normalise="min-max")
+# Scores are stretched over the sounds of the map; each is where the robot was, whatever the words.
+PAPER_SOUNDS = SoundSettings(normalise="min-max", at="robot")
 # A voxel is the object where its word is the closest of all; no instance is left out for its confidence; its room
 # and its size have no say.
 PAPER_OBJECTS = ObjectSettings(

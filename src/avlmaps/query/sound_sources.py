@@ -66,6 +66,13 @@ def unknown_sources(stored: "StoredMap") -> str:
     )
 
 
+def no_sources(stored: "StoredMap") -> str:
+    """Return why the robot's place stands for the source of a sound; "" where the map knows sources, or no sound."""
+    if stored.knows_sources or not len(stored.sounds):
+        return ""
+    return f"The place is where the robot was when it heard it: {unknown_sources(stored)}"
+
+
 @dataclass(frozen=True, slots=True)
 class SoundSource:
     """A place that sounds came from.

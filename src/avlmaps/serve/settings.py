@@ -65,7 +65,7 @@ class ServeSettings:
         tls_certificate: PEM file of the certificate and its chain; None for plain HTTP.
         tls_key: PEM file of its key.
         found_at: a query is found from this probability of its first goal on.
-        at: the place of a sound, where a request does not say.
+        at: the place of a sound, where a request does not say; None: as its words say, else where it was heard.
         limits: limits of each request.
     """
 
@@ -76,7 +76,7 @@ class ServeSettings:
     tls_certificate: Path | None = None
     tls_key: Path | None = None
     found_at: float = FOUND_AT
-    at: HeardAt = "robot"
+    at: HeardAt | None = None
     limits: Limits = field(default_factory=Limits)
 
     def __post_init__(self) -> None:

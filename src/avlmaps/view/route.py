@@ -13,12 +13,11 @@ from jaxtyping import Float
 from avlmaps.core.errors import NavigationError
 from avlmaps.core.motion import GroundPose
 from avlmaps.language.learned_translator import LearnedTranslator, explanation
-from avlmaps.language.sentence import Given
 from avlmaps.navigate.bodies import BASE, BodyShape
 from avlmaps.navigate.costmap import costmap_of, obstacles_for
 from avlmaps.navigate.driver import MapDriver
 from avlmaps.navigate.file_access import Readable
-from avlmaps.navigate.instruct import Outcome, instruct
+from avlmaps.navigate.instruct import Outcome, given_by, instruct
 from avlmaps.navigate.rehearsal import FreeBody
 from avlmaps.navigate.skills import RobotSettings
 
@@ -104,9 +103,7 @@ class Guide:
             LanguageError: the command is not understood.
             NavigationError: there is no room for the robot.
         """
-        avlmap = self.avlmap
-        given = Given(photo, clip, avlmap.knows, avlmap.settings.sounds.at, avlmap.edited.own_names)
-        translator = LearnedTranslator(given)
+        translator = LearnedTranslator(given_by(self.avlmap, photo, clip))
         readings = explanation(translator, command)[:_MOST_READINGS]
         translation = translator.program_for(command)
         readable = Readable(() if folder is None else (folder,))

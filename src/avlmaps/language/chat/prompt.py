@@ -32,6 +32,8 @@ _CONVENTIONS = """\
 - get_major_map is for the thing that is sought, get_map for what it is near to or in. Each is given exactly one of
   obj=, sound=, img=, area=. Heatmaps multiply: one major map times any number of maps, and the best place of the
   product is where all agree. Rooms are areas; what was heard is a sound.
+- A sound is where the robot heard it. Give at="source" with it where the person means what makes it, or where it comes
+  from.
 - A thing alone can be given to a movement as a phrase; go to it with move_to_object. A sound, an area, a picture, or a
   thing near another is given as a heatmap or as its best place; go to that with move_to.
 - Distances are in metres (a foot is 0.3048, a step 0.5), angles in degrees. turn(90) is to the right, turn(-90) to the

@@ -9,7 +9,7 @@ A target is its kind, its words, a pick, and what it is near; an amount stands b
 `grammar` has the table of the intents.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -212,13 +212,20 @@ class State:
         return Open(frozenset(symbols), tokens)
 
 
-def intents_of(line: Sequence[Symbol], tokens: Sequence[Token]) -> tuple[Intent, ...]:
+def intents_of(
+    line: Sequence[Symbol], tokens: Sequence[Token], at_source: Callable[[Sequence[int]], bool] = lambda _: False
+) -> tuple[Intent, ...]:
     """Return the intents of a line that ends with ``end``.
+
+    Args:
+        line: the line.
+        tokens: the sentence.
+        at_source: says of the words of a sound whether the place is meant that it came from.
 
     Raises:
         MalformedError: it means nothing.
     """
-    intents, at = _Line(line, tokens).intents(0)
+    intents, at = _Line(line, tokens, at_source).intents(0)
     if not intents or at != len(line) - 1 or line[at] != "end":
         raise MalformedError("the line ends too early or too late")
     return tuple(intents)
@@ -247,6 +254,7 @@ class _Line:
 
     symbols: Sequence[Symbol]
     tokens: Sequence[Token]
+    at_source: Callable[[Sequence[int]], bool] = lambda _: False
 
     def intents(self, at: int) -> tuple[list[Intent], int]:
         found: list[Intent] = []
@@ -318,11 +326,13 @@ class _Line:
         if not isinstance(kind, str) or kind not in KINDS:
             raise MalformedError("a target without a kind")
         at += 1
-        words: list[str] = []
+        words: list[int] = []
         while isinstance(symbol := self.peek(at), int):
-            words.append(self.tokens[symbol].text)
+            words.append(symbol)
             at += 1
         pick = PICKS.get(symbol, Pick.ANY)
         if not words and kind in ("object", "sound", "area"):
             raise MalformedError("a target without a name")
-        return Target(TargetKind(kind), " ".join(words), (), pick), at + (pick is not Pick.ANY)
+        name = " ".join(self.tokens[word].text for word in words)
+        place = "source" if kind in ("sound", "clip") and self.at_source(words) else None
+        return Target(TargetKind(kind), name, (), pick, place), at + (pick is not Pick.ANY)

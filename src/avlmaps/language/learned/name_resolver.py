@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from avlmaps.core.lexicon import EntryKind, lexicon
+from avlmaps.core.question import HeardAt
 from avlmaps.language.asking_back import missing_file, strange_word, unclear, unknown
 from avlmaps.language.intents import (
     Beside,
@@ -69,13 +70,24 @@ class NameResolver:
                 path = given.image if target.kind is TargetKind.IMAGE else given.clip
                 if path is None:
                     self._ask(missing_file(target.kind))
-                return replace(target, name=path or "", near=near)
+                return replace(target, name=path or "", near=near, at=self._place(target))
             case TargetKind.OBJECT | TargetKind.AREA:
                 return replace(self._thing(target), near=near)
             case TargetKind.SOUND:
-                return replace(target, name=_sound(target.name), near=near)
+                return replace(target, name=_sound(target.name), near=near, at=self._place(target))
             case _:
-                return replace(target, near=near)
+                return replace(target, near=near, at=self._place(target))
+
+    def _place(self, target: Target) -> HeardAt | None:
+        """Return the place of a sound that is meant: the one that was chosen for all, else as the words say."""
+        given = self.sentence.given
+        sounds = target.kind in (TargetKind.SOUND, TargetKind.CLIP)
+        if not sounds or given.at is not None:
+            return "source" if sounds and given.at == "source" else None
+        if target.at == "source" and given.no_sources:
+            self.notes.append(given.no_sources)
+            return None
+        return target.at
 
     def _thing(self, target: Target) -> Target:
         name = target.name

@@ -7,7 +7,7 @@ before that: where it would rather write nonsense, its readings are unlikely.
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
 from importlib.resources.abc import Traversable
@@ -17,12 +17,13 @@ import numpy as np
 from jaxtyping import Float32
 
 from avlmaps.core.errors import BackendError
-from avlmaps.language.intents import Inquiry, Intent
+from avlmaps.language.intents import Inquiry, Intent, Target, on_targets
 from avlmaps.language.learned import linear
 from avlmaps.language.learned.features import columns, features
 from avlmaps.language.learned.grammar import INDEX, SYMBOLS
 from avlmaps.language.learned.limits import Limits
 from avlmaps.language.lexer import Token
+from avlmaps.language.source_words import seeks_source
 from avlmaps.perception.embedded.words import words_checksum
 from avlmaps.perception.models.networks import open_network
 
@@ -98,7 +99,7 @@ class LearnedReader:
         found: dict[Any, Read] = {}
         for line in self.lines(tokens, is_question=False):
             try:
-                meaning = linear.intents_of(line.symbols, tokens)
+                meaning = linear.intents_of(line.symbols, tokens, lambda own, line=line: _at_source(line, tokens, own))
             except linear.MalformedError:
                 continue
             _add(found, Read(meaning, float(np.exp(line.log)), _pointed(line)))
@@ -195,12 +196,23 @@ def _pointed(line: Line) -> frozenset[int]:
     return frozenset(symbol for symbol in line.symbols if isinstance(symbol, int))
 
 
+def _at_source(line: Line, tokens: Sequence[Token], own: Sequence[int]) -> bool:
+    """Return whether the place is meant that a sound came from which a line names by some of its words."""
+    return seeks_source(tokens, own, _pointed(line) - frozenset(own))
+
+
 def _add(found: dict[Any, Read], read: Read) -> None:
     key = (read.meaning, read.is_purpose)
+    if isinstance(read.meaning, tuple):  # where a sound is meant to be is no other reading
+        key = (tuple(on_targets(one, _anywhere) for one in read.meaning), read.is_purpose)
     before = found.get(key)
     if before is not None:
         read = Read(before.meaning, before.probability + read.probability, before.used, before.is_purpose)
     found[key] = read
+
+
+def _anywhere(target: Target) -> Target:
+    return replace(target, at=None, near=tuple(map(_anywhere, target.near)))
 
 
 def _sorted(found: dict[Any, Read]) -> list[Read]:

@@ -71,9 +71,8 @@ def bind_skill(
 def check_exactly_one(line: int, skill: Skill, given: int) -> None:
     """Refuse none, or several, of what are alternatives."""
     if skill.takes_exactly_one and given != 1:
-        names = [each.name for each in skill.parameters]
         many = "none" if given == 0 else given
-        raise refused(line, f"`{skill.name}` takes exactly one of {_listed(names, 'or')}, not {many}")
+        raise refused(line, f"`{skill.name}` takes exactly one of {_listed(skill.alternatives, 'or')}, not {many}")
 
 
 def bind_builtin(

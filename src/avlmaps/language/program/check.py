@@ -259,8 +259,10 @@ class _Kinds:
         for argument, kind in zip(call.arguments, kinds, strict=True):
             if isinstance(kind, ValueType):
                 check_argument(argument.value.line, skill, parameter_of(skill, argument.parameter), kind)
-        surely = sum(isinstance(kind, ValueType) and kind is not ValueType.NOTHING for kind in kinds)
-        if surely > 1 or all(kind is ValueType.NOTHING for kind in kinds):
+        both = zip(call.arguments, kinds, strict=True)
+        chosen = [kind for argument, kind in both if argument.parameter in skill.alternatives]
+        surely = sum(isinstance(kind, ValueType) and kind is not ValueType.NOTHING for kind in chosen)
+        if surely > 1 or all(kind is ValueType.NOTHING for kind in chosen):
             check_exactly_one(call.line, skill, surely)
         return skill.returns
 

@@ -277,7 +277,7 @@ class _Run:
         arguments = {argument.parameter: self.value(argument.value) for argument in part.arguments}
         for name, value in arguments.items():
             check_argument(part.line, skill, parameter_of(skill, name), values.kind_of(value))
-        check_exactly_one(part.line, skill, sum(value is not None for value in arguments.values()))
+        check_exactly_one(part.line, skill, sum(arguments.get(name) is not None for name in skill.alternatives))
         self.look_at_clock(part.line)
         if len(self.steps) == self.budget.skill_calls:
             raise refused(

@@ -71,9 +71,15 @@ class Skill:
         return f"{self.name}({', '.join(each.text for each in self.parameters)}) -> {self.returns_text}"
 
     @property
+    def alternatives(self) -> tuple[str, ...]:
+        """The parameters of which exactly one is given: several that are None unless they are; none of most skills."""
+        names = tuple(each.name for each in self.parameters if each.default == "None")
+        return names if len(names) > 1 else ()
+
+    @property
     def takes_exactly_one(self) -> bool:
-        """Whether its parameters are alternatives: several, each None unless it is given."""
-        return len(self.parameters) > 1 and all(each.default == "None" for each in self.parameters)
+        """Whether it has alternatives."""
+        return bool(self.alternatives)
 
     @property
     def moves(self) -> bool:

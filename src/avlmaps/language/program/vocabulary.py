@@ -94,8 +94,12 @@ class Vocabulary(Protocol):
         sound: str | Clip | None = None,
         img: Picture | None = None,
         area: str | None = None,
+        at: str = "robot",
     ) -> Heat:
-        """Return the heatmap of what is sought itself (falls to nothing within 0.5 m). Give exactly one argument."""
+        """Return the heatmap of what is sought itself (falls to nothing within 0.5 m). Give exactly one thing.
+
+        A sound is sought where it was heard, or with at="source" where it came from.
+        """
         ...
 
     def get_map(
@@ -104,8 +108,12 @@ class Vocabulary(Protocol):
         sound: str | Clip | None = None,
         img: Picture | None = None,
         area: str | None = None,
+        at: str = "robot",
     ) -> Heat:
-        """Return the heatmap of what the sought thing is near or in (falls off over 5 m). Give exactly one argument."""
+        """Return the heatmap of what the sought thing is near or in (falls off over 5 m). Give exactly one thing.
+
+        A sound is taken where it was heard, or with at="source" where it came from.
+        """
         ...
 
     def get_max_pos_3d(self, heat: Heat) -> Place:

@@ -250,10 +250,14 @@ def _argument(target: Target) -> str:
         case TargetKind.OBJECT:
             return f"obj={_quoted(target.name)}"
         case TargetKind.SOUND:
-            return f"sound={_quoted(target.name)}"
+            return f"sound={_quoted(target.name)}{_at(target)}"
         case TargetKind.AREA:
             return f"area={_quoted(target.name)}"
         case TargetKind.IMAGE:
             return f"img=robot.load_image({_quoted(target.name)})"
         case _:
-            return f"sound=robot.load_sound({_quoted(target.name)})"
+            return f"sound=robot.load_sound({_quoted(target.name)}){_at(target)}"
+
+
+def _at(target: Target) -> str:
+    return "" if target.at is None else f', at="{target.at}"'

@@ -25,8 +25,9 @@ class SoundSettings:
 
     normalise: Literal["none", "min-max"] = "none"
     """``none`` takes the encoder's calibrated scores; ``min-max`` stretches them over the heard sounds (the paper)."""
-    at: HeardAt = "robot"
-    """Where the heat of a sound is: where the robot was when it heard it (the paper), or where it came from."""
+    at: HeardAt | None = None
+    """Where the heat of every sound is: where the robot was when it heard it (the paper), or where it came from. None:
+    where a query says, else where the robot was."""
     prior: Literal["lexicon", "none"] = "lexicon"
     """Whether things that usually make a sound count as its source, besides what the microphones say."""
 

@@ -23,9 +23,8 @@ from avlmaps.core.poses import FRAME
 from avlmaps.core.printable import printable
 from avlmaps.language.learned_translator import LearnedTranslator, UnclearError
 from avlmaps.language.program import Budget, parse_program
-from avlmaps.language.sentence import Given
 from avlmaps.language.translator import Translation
-from avlmaps.navigate.instruct import Outcome, instruct
+from avlmaps.navigate.instruct import Outcome, given_by, instruct
 from avlmaps.navigate.rehearsal import NO_FILES, path_in_world, rehearse
 from avlmaps.navigate.skills import Robot, RobotSettings
 from avlmaps.serve.drive.brake import Brake
@@ -169,9 +168,7 @@ class Dispatcher:
         if program.strip():
             parse_program(program)
             return Translation(program)
-        own = now.avlmap.edited.own_names
-        given = Given(knows=now.avlmap.knows, at=now.avlmap.settings.sounds.at, own=own)
-        return LearnedTranslator(given).program_for(words)
+        return LearnedTranslator(given_by(now.avlmap)).program_for(words)
 
     @property
     def _settings(self) -> RobotSettings:
