@@ -162,6 +162,25 @@ def test_the_best_guess_is_gone_to_only_when_that_is_asked_for() -> None:
     assert any("probability of 'dog' is" in note for note in robot.seeker.notes)
 
 
+def test_a_map_without_sources_has_the_robots_place_and_says_so() -> None:
+    robot = furnished_robot(sounds=sounds_of([track(5.0, 3.1)], [0.9]))
+    robot.move_to(robot.get_major_map(sound="dog", at="source"))
+    assert robot.moves[-1].name == "'dog'" and robot.moves[-1].goal[:2] == pytest.approx((5.1, 3.1), abs=0.15)
+    (note,) = robot.seeker.notes
+    assert note.startswith("The place is where the robot was when it heard it: ") and "microphones" in note
+    plain = furnished_robot(sounds=sounds_of([track(5.0, 3.1)], [0.9]))
+    plain.move_to(plain.get_major_map(sound="dog"))
+    assert plain.moves[-1].goal == robot.moves[-1].goal and plain.seeker.notes == []
+
+
+def test_a_program_names_a_place_that_a_sound_has() -> None:
+    robot = furnished_robot(sounds=sounds_of([track(5.0, 3.1)], [0.9]))
+    with pytest.raises(ProgramError, match="'kitchen'"):
+        robot.get_map(sound="dog", at="kitchen")
+    with pytest.raises(ProgramError, match="with a sound"):
+        robot.get_map(obj="chair", at="source")
+
+
 def test_a_guess_leaves_out_what_is_nowhere_near() -> None:
     robot = furnished_robot(settings=RobotSettings(guess=True), sounds=sounds_of([track(60.0, 60.0)], [0.9]))
     robot.move_to(robot.get_major_map(obj="chair") * robot.get_map(sound="dog"))

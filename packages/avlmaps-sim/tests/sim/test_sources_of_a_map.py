@@ -7,13 +7,20 @@ import pytest
 
 from avlmaps.cli.things import thing_lines
 from avlmaps.core.errors import GoalNotFoundError, MapError, QueryError
+from avlmaps.core.motion import GroundPose
 from avlmaps.core.poses import rotation_to_level
 from avlmaps.core.timeline import Trajectory
+from avlmaps.language.learned_translator import LearnedTranslator
 from avlmaps.maps.build import build_map
 from avlmaps.maps.sources.find import find_sources
 from avlmaps.maps.store.reader import open_stored
 from avlmaps.navigate.instances import things_in
+from avlmaps.navigate.instruct import given_by
+from avlmaps.navigate.skills import Robot
 from avlmaps.query.avlmap import AVLMap, QuerySettings
+from avlmaps.query.heatmap import Heatmap
+from avlmaps.query.modalities.sound import SoundSettings
+from avlmaps.query.rules import query_settings
 from avlmaps.query.schema import ListedThing
 from avlmaps.recordings.audio import AudioTrack, Sound
 from avlmaps.recordings.channels import with_microphones, write_channels
@@ -25,7 +32,9 @@ from avlmaps_sim.recorder import RecordSettings, record_scene
 from avlmaps_sim.truth import read_truth
 from helpers.heard_flat import heard_flat
 from helpers.hearing_scenes import flat, shoebox
+from helpers.kinematic import KinematicDriver
 
+ROBOT = SoundSettings(at="robot")
 pytestmark = pytest.mark.slow  # the recording and the map are made by the first of the modules that need them
 
 SOURCE = np.array([1.5, 4.2, 0.6])
@@ -154,6 +163,23 @@ def test_a_sentence_that_asks_where_a_sound_came_from_means_its_source(mapped: t
     for other in (avlmap.ask(f"where is the sound of {name}?"),
                   avlmap.ask(f"where does the sound of {name} come from?", at="robot")):  # fmt: skip
         assert other.goals[0].position == avlmap.ask(sound=name).goals[0].position
+
+
+def test_commands_and_questions_choose_the_same_place(mapped: tuple[Path, Path]) -> None:
+    avlmap = AVLMap.open(mapped[1])
+    name = max(avlmap.sources(), key=lambda one: one.probability).name
+    paper = AVLMap.open(mapped[1], query_settings("paper"))
+    for known, at in ((avlmap, "source"), (paper, None), (AVLMap(avlmap.stored, QuerySettings(sounds=ROBOT)), None)):
+        said = f"where the sound of {name} comes from"
+        plan = LearnedTranslator(given_by(known)).program_for(f"go to {said}")
+        assert ('at="source"' in plan.program) == (at == "source") and plan.notes == ()
+        robot = Robot(known, KinematicDriver(GroundPose(0.0, 0.0)))
+        heat = robot.get_major_map(sound=name, at="source")
+        assert isinstance(heat, Heatmap) and heat.factors[0].part.at == at
+        answer = known.ask(said)
+        assert answer.parts[0].part.at == at and answer.goals[0].position == heat.goals(1)[0].position
+    plain = Robot(avlmap, KinematicDriver(GroundPose(0.0, 0.0))).get_major_map(sound=name)
+    assert isinstance(plain, Heatmap) and plain.factors[0].part.at is None
 
 
 def test_a_noise_without_a_name_is_the_last_sound(mapped: tuple[Path, Path]) -> None:
