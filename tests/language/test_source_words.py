@@ -113,10 +113,12 @@ def test_a_place_that_is_chosen_for_all_wins() -> None:
 
 def test_without_sources_it_is_the_robots_place_and_the_plan_says_so() -> None:
     asks = "go to where the barking comes from"
-    plan = LearnedTranslator(Given(at=None, no_sources="The place is the robot's.")).program_for(asks)
+    plan = LearnedTranslator(Given(at=None, no_sources=lambda: "The place is the robot's.")).program_for(asks)
     assert plan.plan == "I will go to where barking was heard." and "at=" not in plan.program
     assert plan.notes == ("The place is the robot's.",)
-    assert LearnedTranslator(Given(at=None, no_sources="-")).program_for("go to the sound of barking").notes == ()
+    assert (
+        LearnedTranslator(Given(at=None, no_sources=lambda: "-")).program_for("go to the sound of barking").notes == ()
+    )
 
 
 def test_the_plan_says_which_place_is_meant() -> None:

@@ -139,6 +139,7 @@ def fake_map(
         rig=Rig(camera, camera),
         require_model=lambda kind: None,
         sources=lambda: None,
+        knows_sources=False,
         clip_path=lambda sound: Path(f"fake.avlmap/{sound}.flac"),
     )
 

@@ -31,7 +31,7 @@ class Given:
         knows: says whether the map's encoder knows a word that the lexicon does not; None: only the lexicon counts.
         at: the place of every sound; None: as the words say, else where it was heard.
         own: names that people gave to things and rooms of the map.
-        no_sources: why the map does not know where sounds came from; "" where it does, or where no map is known yet.
+        no_sources: says why the map does not know where sounds came from; "" where it does, or no map is known yet.
     """
 
     image: str | None = None
@@ -39,7 +39,7 @@ class Given:
     knows: Callable[[str], bool] | None = None
     at: HeardAt | None = "robot"
     own: tuple[OwnName, ...] = ()
-    no_sources: str = ""
+    no_sources: Callable[[], str] = lambda: ""
 
     def tokens(self, words: Iterable[str], at: int) -> list[Token]:
         """Return the files that a sentence may speak of as tokens behind it, so that "this photo" can point to one."""

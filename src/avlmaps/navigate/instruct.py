@@ -131,7 +131,7 @@ def given_by(avlmap: AVLMap, image: str | None = None, clip: str | None = None) 
         clip: the file that "this recording" means.
     """
     sounds_at, own = avlmap.settings.sounds.at, avlmap.edited.own_names
-    return Given(image, clip, avlmap.knows, sounds_at, own, no_sources(avlmap.stored))
+    return Given(image, clip, avlmap.knows, sounds_at, own, lambda: no_sources(avlmap.stored))
 
 
 def _silent(_: str) -> None:

@@ -84,10 +84,10 @@ class NameResolver:
         sounds = target.kind in (TargetKind.SOUND, TargetKind.CLIP)
         if not sounds or given.at is not None:
             return "source" if sounds and given.at == "source" else None
-        if target.at == "source" and given.no_sources:
-            self.notes.append(given.no_sources)
-            return None
-        return target.at
+        why = given.no_sources() if target.at == "source" else ""
+        if why:
+            self.notes.append(why)
+        return None if why else target.at
 
     def _thing(self, target: Target) -> Target:
         name = target.name
