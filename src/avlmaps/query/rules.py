@@ -30,7 +30,7 @@ PAPER_HEARING = HearingSettings(
 # Heat falls from the camera's place, through walls; cosines are stretched over the keyframes; each view speaks for
 # itself, and things do not.
 PAPER_AREAS = AreaSettings(anchor="camera", extent="cones", score="min-max", pool_m=0.0)
-# Scores are stretched over the sounds of the map; each is where the robot was, whatever the words.
+# Scores are stretched over the sounds of the map; no words change that each is where the robot was.
 PAPER_SOUNDS = SoundSettings(normalise="min-max", at="robot")
 # A voxel is the object where its word is the closest of all; no instance is left out for its confidence; its room
 # and its size have no say.
