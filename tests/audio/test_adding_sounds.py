@@ -34,6 +34,7 @@ def digest(folder: Path) -> str:
     return hashlib.sha256((folder / "audio.flac").read_bytes() + (folder / "events.csv").read_bytes()).hexdigest()
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bytes(tmp_path: Path, clips: Path) -> None:
     walk = straight_walk(60.0, 0.5)
     for name, seed in (("a", 1), ("b", 1), ("c", 2)):

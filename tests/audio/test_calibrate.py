@@ -89,6 +89,7 @@ def test_too_little_sound_is_refused(
         calibrate(*straight, between)
 
 
+@pytest.mark.slow
 def test_several_sources_are_refused(tmp_path: Path) -> None:
     rng, true, walk = np.random.default_rng(9), microphones_named("square4"), curved_drive(24.0)
     others = [(PLACE, 0.0, 14.0), (np.array([-2.5, -1.0, 1.0]), 14.0, 19.0), (np.array([3.0, -2.0, 1.0]), 19.0, 24.0)]

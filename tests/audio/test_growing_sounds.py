@@ -55,6 +55,7 @@ def track(tmp_path_factory: pytest.TempPathFactory) -> AudioTrack:
     return track_of(tmp_path_factory.mktemp("track") / "a.flac", SAMPLES)
 
 
+@pytest.mark.slow
 @given(cuts=st.lists(st.integers(0, len(SAMPLES)), max_size=30), asked=st.integers(0, 30))
 @settings(max_examples=15, deadline=None)
 def test_however_the_track_is_cut_the_sounds_are_those_of_the_whole_track(
@@ -95,6 +96,7 @@ def test_a_sound_is_listed_within_a_second_of_its_end() -> None:
     assert sounds.heard(walk, final=False).offset_s[1] == pytest.approx(11.0, abs=0.1)
 
 
+@pytest.mark.slow
 def test_the_window_of_a_long_track_moves_on_and_keeps_what_was_heard(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

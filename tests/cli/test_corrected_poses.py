@@ -53,12 +53,14 @@ def test_a_finished_map_follows_poses_of_a_file(answer, walk: Path, copied: Path
     assert "corrected after it was built" in " ".join(answer("info", copied)["notices"])
 
 
+@pytest.mark.slow
 def test_a_map_that_is_not_there_is_built_first(answer, walk: Path, tmp_path: Path) -> None:
     file = moved_file(walk, tmp_path / "poses.txt", 0.2)
     made = answer("build", walk, "--out", tmp_path / "map", "--corrected-poses", file, *BUILT)
     assert made["corrected"]["most_m"] == pytest.approx(0.2)
 
 
+@pytest.mark.slow
 def test_poses_may_have_the_dates_that_the_recording_has(answer, walk: Path, tmp_path: Path) -> None:
     dated = shutil.copytree(walk, tmp_path / "dated")
     for table, stamp in (("poses.csv", 0), ("frames.csv", 1)):

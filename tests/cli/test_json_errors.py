@@ -122,6 +122,7 @@ def test_each_error_of_the_family_has_a_kind_of_its_own() -> None:
     assert len({kind_named(name) for name in family}) == len(family) >= 9
 
 
+@pytest.mark.slow
 def test_a_cold_cache_is_announced_once_and_a_warm_one_not(tmp_path: Path) -> None:
     code = (
         "import numpy as np\n"

@@ -94,6 +94,7 @@ def test_a_wrong_choice_is_one_sentence(words, status: int, sentence: str, walk:
     assert not (tmp_path / "m.avlmap" / "map.json").exists()
 
 
+@pytest.mark.slow
 def test_chosen_backends_build_the_map_and_info_tells_them(walk: Path, answer, tmp_path: Path) -> None:
     out, store = tmp_path / "m.avlmap", tmp_path / "store"
     words = ("--voxel-size-m", 0.1, "--frame-step", 4, "--model", "pixels=colours", "--feature-cache", store)

@@ -5,6 +5,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 Run = Callable[..., tuple[int, str, str]]
 Answer = Callable[..., dict[str, Any]]
 
@@ -52,6 +54,7 @@ def test_another_recording_repairs_nothing(built: Path, walk: Path, tmp_path: Pa
     assert all(path.read_bytes() == content for path, content in files.items()), "nothing was touched"
 
 
+@pytest.mark.slow
 def test_the_cameras_height_puts_the_floor_where_it_says(walk: Path, tmp_path: Path, answer: Answer) -> None:
     made = answer(
         "build", walk, "--out", tmp_path / "told.avlmap", "--voxel-size-m", "0.1", "--profile", "colours",

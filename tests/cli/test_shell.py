@@ -266,6 +266,7 @@ def test_at_a_prompt_questions_completion_history_and_the_end(built: Path, tmp_p
     assert history.stat().st_mode & 0o077 == 0
 
 
+@pytest.mark.slow
 def test_ctrl_c_stops_an_answer_and_not_the_shell(built: Path, tmp_path: Path, terminals) -> None:
     slow = (
         "import sys, time\nfrom avlmaps.cli import query\nreal = query.ask\n"
@@ -288,6 +289,7 @@ def test_ctrl_c_stops_an_answer_and_not_the_shell(built: Path, tmp_path: Path, t
     assert not (tmp_path / "avlmaps").exists()
 
 
+@pytest.mark.slow
 def test_without_prompt_toolkit_a_terminal_gets_one_sentence_and_a_pipe_works(
     piped, built: Path, tmp_path: Path, terminals
 ) -> None:

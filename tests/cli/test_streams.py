@@ -24,6 +24,7 @@ def ran(*words: object, redirect: str = "", **surroundings: str) -> tuple[int, s
     return done.returncode, done.stdout.decode("utf-8", "replace"), done.stderr.decode("utf-8", "replace")
 
 
+@pytest.mark.slow
 def test_an_answer_to_a_closed_output_is_lost_and_that_is_an_error(built: Path) -> None:
     for words in (["info", built], ["things", built, "--json"], ["query", built, "--object", "red"], ["--version"]):
         status, _, said = ran(*words, redirect=">&-")
@@ -48,6 +49,7 @@ def test_an_error_keeps_its_sentence_and_status_with_closed_streams() -> None:
     assert ran("info", "nothing.avlmap", redirect="<&- >&- 2>&-")[0] == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1", "cp1252"])
 def test_what_an_encoding_lacks_is_escaped(built: Path, tmp_path: Path, encoding: str) -> None:
     place = tmp_path / "Über ☃ 🪑.avlmap"

@@ -8,7 +8,7 @@ from avlmaps.days.unnamed import changed_things
 from avlmaps.maps.store.reader import StoredMap, open_stored
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.contents import Thing
-from helpers.office import write_office
+from helpers.office import office_of
 
 SETTINGS = ChangeSettings()
 
@@ -16,7 +16,7 @@ SETTINGS = ChangeSettings()
 @pytest.fixture(scope="module")
 def office(tmp_path_factory: pytest.TempPathFactory) -> tuple[StoredMap, np.ndarray]:
     """Return a map, and the rows of one of its chairs."""
-    stored = open_stored(write_office(tmp_path_factory.mktemp("office")))
+    stored = open_stored(office_of(tmp_path_factory))
     return stored, AVLMap(stored).things(["office chair"])[0].rows
 
 

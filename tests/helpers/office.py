@@ -6,6 +6,7 @@ from typing import Any
 
 import msgspec
 import numpy as np
+import pytest
 
 from avlmaps.maps.build import build_map
 from avlmaps.maps.settings import BuildSettings
@@ -14,6 +15,7 @@ from avlmaps.maps.store.writer import MapContent, write_map
 from avlmaps.maps.types import Keyframes, Voxels
 from avlmaps.perception.embedded.codes import features_of
 from avlmaps.recordings.open import open_recording
+from helpers.made_once import made_once
 from helpers.walked_room import write_walk
 
 VOXEL_M = 0.1
@@ -36,7 +38,12 @@ def names() -> list[str]:
     return [name for *_, things in ROOMS for name, count in things.items() for _ in range(count)]
 
 
-def write_office(folder: Path) -> Path:
+def office_of(factory: pytest.TempPathFactory) -> Path:
+    """Return the map of the office, in a folder of the caller's own."""
+    return made_once(factory, "office", _write_office) / "office.avlmap"
+
+
+def _write_office(folder: Path) -> None:
     """Build the map of a small room, and put the office's voxels and views in the place of its own."""
     path = folder / "office.avlmap"
     recording = open_recording(write_walk(folder / "rec"))
@@ -74,7 +81,7 @@ def write_office(folder: Path) -> Path:
         path / "sounds",
     )
     write_map(path, content, info)
-    return open_stored(path).path
+    open_stored(path)
 
 
 def _voxels() -> tuple[np.ndarray, np.ndarray]:

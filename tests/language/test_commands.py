@@ -53,6 +53,7 @@ def test_many_speakers_stay_understood(name: str) -> None:
     assert found["misread"] <= SPEAKERS[name][1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_the_development_lists_stay_understood(name: str) -> None:
     found = counted(name)

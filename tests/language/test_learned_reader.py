@@ -297,6 +297,7 @@ def alone(row: Any, reader: LearnedReader) -> str:
     return judge_intents([to_json(intent) for intent in intents], row)
 
 
+@pytest.mark.slow
 def test_most_rows_that_it_has_not_learnt_are_right() -> None:
     outcomes = [judge(row).outcome for row in held_out()]
     assert outcomes.count("right") >= RIGHT * len(outcomes)

@@ -296,6 +296,7 @@ for number in range(100_000):
 """
 
 
+@pytest.mark.slow
 def test_what_a_kill_leaves_is_a_whole_map(tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
     for trial in range(2):
@@ -575,6 +576,7 @@ def test_a_pose_that_jumps_is_said_at_once() -> None:
     assert "The pose jumps at 1.00 s: 4" in str(check.add(replace(frame(90), stamp_s=1.0)))
 
 
+@pytest.mark.slow
 def test_corrected_poses_move_a_live_map_and_are_no_jump(tmp_path: Path) -> None:
     chosen = BuildSettings(frames=FrameSettings(per_submap=8), gravity=GravitySettings(frames=8))
     frames = [frame(number) for number in range(50)]

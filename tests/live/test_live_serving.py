@@ -58,6 +58,7 @@ def test_a_drive_that_fails_raises_where_it_is_waited_for(tmp_path: Path) -> Non
     live.close()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="a signal of POSIX ends it")
 def test_the_command_serves_until_it_is_stopped(tmp_path: Path) -> None:
     recorded(tmp_path / "rec", 20)

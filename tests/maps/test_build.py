@@ -425,6 +425,7 @@ def test_a_recording_that_is_written_while_it_is_mapped_makes_no_map(tmp_path: P
     assert not (tmp_path / "map/map.json").exists() and not list((tmp_path / "map").glob("parts/*"))
 
 
+@pytest.mark.slow
 def test_changed_content_of_the_same_size_is_another_recording_to_a_build(tmp_path: Path) -> None:
     walk = write_folder(tmp_path / "walk")
     allow = ["geometry"]  # its floor is no plane of one world

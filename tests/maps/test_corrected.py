@@ -114,6 +114,7 @@ def test_a_map_with_submaps_has_the_voxels_of_one_without(tmp_path: Path) -> Non
     assert len(submaps.stamp_s) == FRAMES
 
 
+@pytest.mark.slow
 @given(st.tuples(*[st.integers(-40, 40)] * 3))
 @settings(max_examples=8, deadline=None)
 def test_a_shift_by_whole_voxels_moves_voxels(shift: tuple[int, int, int]) -> None:
@@ -154,6 +155,7 @@ def test_up_turns_with_the_poses(tmp_path: Path) -> None:
     np.testing.assert_allclose(after.up_in_world, [0.0, -1.0, 0.0], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_second_correction_replaces_the_first(tmp_path: Path) -> None:
     walk, stray = Walk(), strayed(Walk())
     twice = built(tmp_path, walk)
@@ -344,10 +346,15 @@ CASES = {
 }
 
 
+@pytest.fixture(scope="module")
+def unmoved(tmp_path_factory: pytest.TempPathFactory) -> StoredMap:
+    return built(tmp_path_factory.mktemp("unmoved"))
+
+
 @pytest.mark.parametrize("case", CASES)
-def test_what_is_no_correction_is_refused_and_the_map_stays(tmp_path: Path, case: str) -> None:
+def test_what_is_no_correction_is_refused_and_the_map_stays(unmoved: StoredMap, case: str) -> None:
     stamps, poses, said = CASES[case]
-    stored = built(tmp_path)
+    stored = unmoved
     before = (stored.path / "map.json").read_bytes()
     with pytest.raises(AvlmapsError, match=said):
         correct_stored(stored, stamps, poses)

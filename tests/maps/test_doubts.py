@@ -34,6 +34,7 @@ def right() -> Draft:
     return RoomWalk("room", seed=61, frames=12).draft(Pinhole(45.0, 45.0, 32.0, 24.0, 64, 48))
 
 
+@pytest.mark.slow
 def test_it_is_refused_with_the_cause_and_the_name_that_lets_it_through(right: Draft, tmp_path: Path) -> None:
     walk = replace(right, poses=poses.inverse(right.poses)).write(tmp_path / "walk")
     said = r"walk cannot be right\. .*Corrections\.poses=camera-from-world.*allow=geometry\."
@@ -73,6 +74,7 @@ def with_array(draft: Draft, folder: Path, order: tuple[int, ...] = (0, 1, 2, 3)
     return path
 
 
+@pytest.mark.slow
 def test_exchanged_channels_are_a_finding_with_the_order_that_fits(right: Draft, tmp_path: Path) -> None:
     whole = judge(open_recording(with_array(right, tmp_path / "whole")))
     assert not whole.findings
@@ -82,6 +84,7 @@ def test_exchanged_channels_are_a_finding_with_the_order_that_fits(right: Draft,
     assert "positions_m" in found[0].remedy
 
 
+@pytest.mark.slow
 def test_a_dead_channel_stays_with_the_map_and_the_sound_is_read_for_it_once(
     right: Draft, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -347,6 +347,7 @@ def test_a_second_build_with_another_voxel_size_encodes_nothing(
     assert COUNTS == {}
 
 
+@pytest.mark.slow
 def test_a_map_is_the_same_with_the_cache_and_without(torch_like: Profile, tmp_path: Path) -> None:
     for name, cache in (
         ("none", CacheSettings("off")),
@@ -357,6 +358,7 @@ def test_a_map_is_the_same_with_the_cache_and_without(torch_like: Profile, tmp_p
     assert array_files(tmp_path / "none") == array_files(tmp_path / "filling") == array_files(tmp_path / "filled")
 
 
+@pytest.mark.slow
 def test_the_same_holds_for_small_models_whose_features_are_not_rounded(tmp_path: Path, home: Path) -> None:
     small = counted("counted")
     build_map(Walk(), tmp_path / "none", small, SETTINGS)

@@ -62,6 +62,7 @@ def filmed_desks(on_floor: int) -> tuple[Frame, ...]:
     return tuple(film(office(), desk_walk(60, on_floor)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("height_m", [0.15, 0.3, 0.6, 1.0, 1.35, 1.8])
 def test_the_floor_is_found_and_not_the_table_tops(height_m: float) -> None:
     assert np.abs(errors_m(walked(height_m), height_m)).max() < 0.03
@@ -105,6 +106,7 @@ def test_each_camera_stands_over_the_floor_of_its_own_storey() -> None:
     assert [round(floor.height_m, 1) for floor in find_ground(both, UP).floors] == [0.0, 2.9]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("height_m", [0.3, 1.35])
 @pytest.mark.parametrize("steps", [3, 14])
 def test_stairs_lift_the_floor_with_the_camera(height_m: float, steps: int) -> None:
@@ -149,6 +151,7 @@ def test_the_floor_does_not_lie_above_the_robots_base() -> None:
     assert found.floors[0].height_m < 0.2
 
 
+@pytest.mark.slow
 @settings(max_examples=5)
 @given(st.floats(-np.pi, np.pi), st.tuples(*[st.floats(-40.0, 40.0)] * 3), st.sampled_from([0, 1, 2]))
 def test_the_floor_is_the_same_in_every_world(yaw_rad: float, shift_m: tuple[float, float, float], axis: int) -> None:
@@ -171,6 +174,7 @@ def test_the_floor_is_the_same_in_every_world(yaw_rad: float, shift_m: tuple[flo
     assert after.floors[0].confidence == pytest.approx(before.floors[0].confidence, abs=0.1)
 
 
+@pytest.mark.slow
 @settings(max_examples=5)
 @given(st.integers(0, 1000), st.integers(2, 10))
 def test_more_samples_do_not_flip_a_confident_answer(seed: int, few: int) -> None:

@@ -179,6 +179,7 @@ def test_where_the_camera_was_carried_is_free_though_the_floor_was_never_seen():
             assert after.state_at(point) == before.state_at(point) != FREE
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_a_walk_only_ever_makes_unknown_cells_free(seed):

@@ -70,6 +70,7 @@ def test_it_is_found_held_to_its_protocol_and_makes_a_map_that_remembers_it(inst
     assert told["descriptors"][1] == 144
 
 
+@pytest.mark.slow
 def test_the_command_line_lists_it_and_a_map_without_it_is_told_plainly(installed: Path, tmp_path: Path) -> None:
     listed = json.loads(_run(installed, "-m", "avlmaps", "profiles", "--json").stdout)
     (mine,) = [entry for entry in listed["other_backends"] if entry["name"] == "thumbnail"]

@@ -46,6 +46,7 @@ def test_a_mirrored_view_is_a_plain_one_at_the_mirrored_frame(rendered: Frame, s
     assert np.abs(network.see(rendered, plain).category - other.category).max() > 0.05  # and it is another view
 
 
+@pytest.mark.slow
 def test_several_scales_give_distributions_on_the_grid_of_one(rendered: Frame) -> None:
     plain, often = EmbeddedPixels().see(rendered), EmbeddedPixels().see_multi_scale(rendered)
     assert often.category.shape == plain.category.shape and often.category.dtype == np.float32

@@ -62,6 +62,7 @@ def rewrite(folder: Path, name: str, content: bytes | None = None, **changes: ob
     path.write_bytes(msgspec.json.encode(notes))
 
 
+@pytest.mark.slow
 def test_both_networks_are_the_pair_and_satisfy_the_protocols(eyes: Path) -> None:
     bring(eyes, DEFAULT_WEIGHTS, SYNTHETIC_WEIGHTS)
     assert open_trained().checksum == load_pair().checksum

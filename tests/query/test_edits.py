@@ -89,6 +89,7 @@ def test_an_empty_log_changes_nothing_bit_for_bit() -> None:
     assert m.edited.instances(found, "chair") is found
 
 
+@pytest.mark.slow
 @given(edits=st.lists(st.sampled_from(EVERY), max_size=5))
 def test_the_same_edits_twice_are_as_once(edits: list[Edit]) -> None:
     again = [msgspec.structs.replace(one, id=f"{one.id}-2") for one in edits]  # not even told by their ids

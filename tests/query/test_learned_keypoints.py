@@ -66,6 +66,7 @@ def watching() -> Watching:
     return Watching()
 
 
+@pytest.mark.slow
 def test_a_matcher_is_given_the_scores_and_the_sizes_of_both_pictures(watching: Watching) -> None:
     stored = stored_by(Scored(), watching)
     large = WALK.room.render(WALK.world_from_camera[4], CAMERA.resized(480, 360))[0]
@@ -77,6 +78,7 @@ def test_a_matcher_is_given_the_scores_and_the_sizes_of_both_pictures(watching: 
         assert kept.score.dtype == np.float32 and len(kept.score) == len(kept.xy) > 100
 
 
+@pytest.mark.slow
 def test_keypoints_without_scores_reach_a_matcher_without_any_and_with_the_size_of_the_picture(
     watching: Watching,
 ) -> None:

@@ -159,6 +159,7 @@ def test_the_focal_length_is_kept_where_the_caller_is_sure(stored: MapOfPictures
     assert found.camera == sure
 
 
+@pytest.mark.slow
 def test_the_pose_is_that_of_the_camera_that_took_the_photo() -> None:
     """With a colour camera beside the depth camera, whose poses the recording holds."""
     recording = RoomWalk(frames=8, turn=0.3, rig=Rig(CAMERA, Pinhole(290.0, 290.0, 160.0, 120.0, 320, 240), APART))
@@ -180,6 +181,7 @@ def test_a_hundred_pictures_of_other_places_are_refused(stored: MapOfPictures) -
     assert max(one.inliers for one in found) < LocateSettings().min_inliers
 
 
+@pytest.mark.slow
 def test_the_mirrored_room_is_another_place(stored: MapOfPictures) -> None:
     for index in range(0, 30, 3):
         mirrored = np.ascontiguousarray(WALK.frame(index).rgb[:, ::-1])

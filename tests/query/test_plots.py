@@ -28,6 +28,7 @@ def colours_in(path: Path) -> int:
     return len(np.unique(cv2.imread(str(path)).reshape(-1, 3), axis=0))
 
 
+@pytest.mark.slow
 def test_a_product_has_a_panel_for_each_part_and_one_for_all(tmp_path: Path) -> None:
     m = AVLMap(furnished_map(sounds=sounds_of([WALK[3:8]], [0.9]), keyframes=keyframes_at(WALK)))
     one = m.object("chair", primary=True).plot(tmp_path / "one.png")
@@ -36,6 +37,7 @@ def test_a_product_has_a_panel_for_each_part_and_one_for_all(tmp_path: Path) -> 
     assert cv2.imread(str(three)).shape[1] > 1.5 * cv2.imread(str(one)).shape[1]
 
 
+@pytest.mark.slow
 def test_a_map_is_drawn_with_its_sounds(tmp_path: Path) -> None:
     stored = furnished_map(sounds=sounds_of([WALK[3:8]], [0.9]), keyframes=keyframes_at(WALK))
     assert colours_in(plot_map(stored, tmp_path / "map.png")) > 20

@@ -74,6 +74,7 @@ def test_on_homes_left_out_it_says_more_than_the_rate_alone() -> None:
         assert brier(probability[own], right[own], weight[own]) < 0.85 * rate * (1.0 - rate), kind
 
 
+@pytest.mark.slow
 def test_those_who_are_certain_are_mostly_right() -> None:
     rows = read_rows()
     probability, right = held_out(rows), np.array([row.right for row in rows])

@@ -78,6 +78,7 @@ def told(avlmap: AVLMap, names: tuple[str, ...] = ()) -> list[Any]:
     return [contents, *({**answer, "elapsed_ms": 0.0} for answer in answers)]
 
 
+@pytest.mark.slow
 @settings(max_examples=4)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_answers_are_the_same_with_and_without_what_is_stored(

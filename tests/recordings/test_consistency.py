@@ -82,6 +82,7 @@ WRONG = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WRONG)
 def test_the_remedy_that_is_named_puts_the_recording_right(name: str, right: Draft, tmp_path: Path) -> None:
     wrong = WRONG[name](right)

@@ -361,6 +361,7 @@ def test_a_copy_takes_its_sound_track_along(tmp_path: Path):
     assert audio is not None and audio.start_s == -0.25 and audio.duration_s == pytest.approx(0.5)
 
 
+@pytest.mark.slow
 def test_opening_five_thousand_frames_opens_few_pictures_and_takes_little_memory(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

@@ -23,7 +23,7 @@ from avlmaps.serve.agents import agent_server
 from avlmaps.serve.app import create_app
 from avlmaps.serve.service import Service
 from helpers.agent_talk import texts, told
-from helpers.office import ROOM_M, ROOMS, names, write_office
+from helpers.office import ROOM_M, ROOMS, names, office_of
 
 BUDGET, MOST_OF_TOOLS = 8_000, 1_500
 UPSTAIRS = {kind for kind, floor, *_ in ROOMS if floor == 1}
@@ -31,7 +31,7 @@ UPSTAIRS = {kind for kind, floor, *_ in ROOMS if floor == 1}
 
 @pytest.fixture(scope="module")
 def office(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_office(tmp_path_factory.mktemp("office"))
+    return office_of(tmp_path_factory)
 
 
 @pytest.fixture(scope="module")

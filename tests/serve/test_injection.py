@@ -6,6 +6,8 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from avlmaps.core.errors import AvlmapsError
 from avlmaps.core.printable import UNSAFE
 from avlmaps.query.avlmap import AVLMap
@@ -17,6 +19,7 @@ from helpers.signing import signed
 COUNT = 220
 
 
+@pytest.mark.slow
 def test_injected_strings_move_nothing_and_confirm_nothing(service: Service, tmp_path: Path) -> None:
     with injected_server(tmp_path, service) as (campaign, driven):
         report = campaign.run(COUNT, seed=1)

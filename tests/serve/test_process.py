@@ -91,6 +91,7 @@ def test_a_process_answers_programs_and_agents_and_finishes_what_runs(start: Sta
     assert "Traceback" not in process.stderr.read()
 
 
+@pytest.mark.slow
 def test_a_killed_server_starts_again_on_the_same_port_with_the_same_answers(start: Start) -> None:
     process, ready = start("--port", "0")
     port = ready["url"].rpartition(":")[2]
@@ -119,6 +120,7 @@ def own_certificate(folder: Path) -> tuple[Path, Path]:
     return files
 
 
+@pytest.mark.slow
 def test_with_tls_files_it_speaks_https_and_nothing_else(start: Start, tmp_path: Path) -> None:
     certificate, key = own_certificate(tmp_path)
     process, ready = start("--port", "0", "--tls-cert", certificate, "--tls-key", key)
@@ -144,6 +146,7 @@ def test_tls_files_that_are_none_are_one_sentence(
     assert "The TLS files cannot be used" in error
 
 
+@pytest.mark.slow
 def test_an_agent_is_served_by_standard_input_and_output(room: Path) -> None:
     async def conversation() -> Any:
         words = ["-m", "avlmaps", "serve", str(room), "--stdio"]

@@ -242,6 +242,7 @@ def test_saying_that_there_is_none_is_right_only_where_there_is_none(tmp_path: P
     assert not Step(asks[-1], {"found": True, "goals": [{"position": [0, 0, 0], "score": 1.0}]}, "p.png").right
 
 
+@pytest.mark.slow
 def test_the_chosen_home_is_one_that_no_training_has_seen_and_can_be_asked() -> None:
     scene = choose_home(0)
     assert fits(scene)

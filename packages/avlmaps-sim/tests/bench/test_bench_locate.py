@@ -10,6 +10,7 @@ from avlmaps_sim.bench.locate import COLUMNS, errors_of, foreign_errors, map_of,
 from helpers.picture_room import RoomWalk
 
 
+@pytest.mark.slow
 def test_the_table_has_a_row_for_the_place_and_one_for_others() -> None:
     table = run(RoomWalk(frames=24, turn=0.3), 0, steps=(2, 4), photos=5)
     assert table["columns"] == list(COLUMNS)
@@ -23,6 +24,7 @@ def test_the_table_has_a_row_for_the_place_and_one_for_others() -> None:
     assert other[6:12] == [""] * 6
 
 
+@pytest.mark.slow
 def test_photos_of_other_places_can_be_given() -> None:
     other = RoomWalk(frames=3, seed=5)
     table = run(RoomWalk(frames=20), 0, steps=(2,), photos=2, foreign=[other.frame(i).rgb for i in range(3)])

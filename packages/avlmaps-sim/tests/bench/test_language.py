@@ -18,6 +18,7 @@ REACHED = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", REACHED)
 def test_a_sealed_list_stays_understood(name: str) -> None:
     judged = [judge(row) for row in shipped(name)]

@@ -27,6 +27,7 @@ def test_a_drive_ends_as_its_build_and_says_what_it_took(tmp_path: Path) -> None
         run_live([], used, "colours", LiveBench(), 0)
 
 
+@pytest.mark.slow
 def test_a_kill_leaves_a_whole_map_and_the_lost_seconds_are_counted(tmp_path: Path) -> None:
     walk = write_walk(tmp_path / "rec")
     assert lost_s(walk, tmp_path / "map", "colours", np.random.default_rng(0), 0.5) >= 0.0

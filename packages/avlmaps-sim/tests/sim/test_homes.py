@@ -58,6 +58,7 @@ def test_the_same_seed_makes_the_same_home() -> None:
     assert again.lights == first.lights
 
 
+@pytest.mark.slow
 def test_other_seeds_make_other_homes() -> None:
     plans = {tuple((area.kind, round(float(area_m2(area.polygon)), 3)) for area in home(seed).areas) for seed in SEEDS}
     assert len(plans) == len(SEEDS)

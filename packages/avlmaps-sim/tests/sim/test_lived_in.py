@@ -72,6 +72,7 @@ def test_the_cloth_of_a_tub_becomes_a_shower_curtain() -> None:
     assert (scene.instance == 0).any() and (scene.instance == 2).any()
 
 
+@pytest.mark.slow
 def test_a_scene_of_that_name_holds_people_and_mirrors_that_reflect() -> None:
     bare, full = open_scene("house:3:training"), open_scene("house:3:training:lived-in")
     assert full.objects[: len(bare.objects)] == bare.objects and len(full.objects) > len(bare.objects)

@@ -102,6 +102,7 @@ def test_its_events_say_what_sounds_where_and_the_track_is_loud_then(recorded: P
     assert [(e.category, e.position) for e in short] == [(e.category, e.robot) for e in truth.events]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hearing", ["overlay", "acoustic"])
 def test_the_same_seed_gives_the_same_bytes_on_however_many_processes(
     hearing: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -139,12 +140,14 @@ def ran(script: str, folder: Path) -> "subprocess.CompletedProcess[str]":
     return subprocess.run(command, cwd=folder, env=path, timeout=240, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.slow
 def test_a_script_needs_no_guard(tmp_path: Path) -> None:
     done = ran(_UNGUARDED.format(scene="flat()"), tmp_path)
     assert done.returncode == 0, done.stderr
     assert len(open_folder(tmp_path / "rec")) == 4
 
 
+@pytest.mark.slow
 def test_processes_that_die_are_told_and_never_waited_for(tmp_path: Path) -> None:
     own = "Own(**{name: getattr(flat(), name) for name in Scene.__dataclass_fields__})"
     done = ran(_OF_ITS_OWN + _UNGUARDED.format(scene=own), tmp_path)
