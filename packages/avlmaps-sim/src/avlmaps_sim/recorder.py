@@ -16,6 +16,7 @@ from jaxtyping import Float, UInt8
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.progress import progress, say
+from avlmaps.core.timeline import Trajectory
 from avlmaps.core.wording import option
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.channels import ChannelSound
@@ -218,6 +219,26 @@ def record_scene(
         made_by = {"scene": scene.name, "seed": seed, "settings": _plain(settings)}
         write_truth(out, scene, soundings, {**made_by, "changes": to_json(changes)} if changes else made_by)
     return SceneRecording(out, len(trip.stamps_s), trip.duration_s, tuple(soundings), floor)
+
+
+def sound_again(
+    scene: Scene, walk: Trajectory, duration_s: float, settings: RecordSettings, rng: np.random.Generator
+) -> tuple[Sound | ChannelSound | None, list[Sounding]]:
+    """Return the track of other sounds along a walk that was recorded, and these; no track for hearing ``none``.
+
+    Args:
+        scene: the building.
+        walk: the camera's true poses.
+        duration_s: of the track.
+        settings: the sounds, and how they reach the microphones.
+        rng: draws kinds, places and noise.
+
+    Raises:
+        AudioError: the folder of clips cannot be used.
+    """
+    trip = _Trip(walk.stamps_s, walk.world_from_body, duration_s)
+    soundings = _soundings(scene, settings, trip, rng)
+    return _track(scene, settings, trip, soundings, rng), soundings
 
 
 def _plain(settings: RecordSettings) -> dict[str, Any]:

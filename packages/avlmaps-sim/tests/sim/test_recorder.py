@@ -12,12 +12,13 @@ import numpy as np
 import pytest
 
 from avlmaps.core.errors import AvlmapsError, RecordingError
+from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.formats.folder import open_folder
 from avlmaps.recordings.layout import UNFINISHED
 from avlmaps_sim import recorder
 from avlmaps_sim.mesh import Material
 from avlmaps_sim.mixing.add_sounds import read_events
-from avlmaps_sim.recorder import RecordSettings, record_scene
+from avlmaps_sim.recorder import RecordSettings, record_scene, sound_again
 from avlmaps_sim.render import Renderer
 from avlmaps_sim.scene import SceneBuilder
 from avlmaps_sim.sensor import OdometryFaults
@@ -153,6 +154,17 @@ def test_processes_that_die_are_told_and_never_waited_for(tmp_path: Path) -> Non
     done = ran(_OF_ITS_OWN + _UNGUARDED.format(scene=own), tmp_path)
     assert done.returncode == 1
     assert "keep the script's own work under if __name__ == '__main__'" in done.stderr
+
+
+def test_other_sounds_play_along_a_walk_that_was_recorded(recorded: Path) -> None:
+    walk, first = open_folder(recorded).walk, read_truth(recorded).events
+    tracks = []
+    for seed in (1, 1, 2):
+        track, played = sound_again(flat(), walk, 8.0, SMALL, np.random.default_rng(seed))
+        assert isinstance(track, Sound) and len(track.samples) == 8 * track.rate_hz and played
+        tracks.append(track.samples)
+        assert [one.source.clip for one in played] != [event.clip for event in first]
+    assert np.array_equal(tracks[0], tracks[1]) and not np.array_equal(tracks[0], tracks[2])
 
 
 def test_another_seed_drives_and_hears_otherwise(recorded: Path, tmp_path: Path) -> None:

@@ -56,7 +56,10 @@ def unknown_offset(
         noise_db: standard deviation of what was measured.
         reverberant_m: distance at which a level is that of the reverberant field; inf for ratios.
     """
-    away = np.maximum(distance_m, _NEAREST_M)
-    expected_db = 10.0 * np.log10(1.0 / away**2 + 1.0 / reverberant_m**2)
-    rest = measured_db[:, None] - expected_db
+    rest = measured_db[:, None] - against_1_m_db(distance_m, reverberant_m)
     return -0.5 * ((rest - rest.mean(axis=0)) ** 2).sum(axis=0) / noise_db**2
+
+
+def against_1_m_db(distance_m: Float[np.ndarray, "*k"], reverberant_m: float = np.inf) -> Float[np.ndarray, "*k"]:
+    """Return by how much a sound is louder at each distance than its direct sound is at 1 m."""
+    return 10.0 * np.log10(1.0 / np.maximum(distance_m, _NEAREST_M) ** 2 + 1.0 / reverberant_m**2)

@@ -1,4 +1,7 @@
-"""Sources in homes: the normal walk with an array, its map, and each sound's source against the truth."""
+"""Sources in homes: the normal walk with an array, its map, and each sound's source against the truth.
+
+What sounds is drawn by each home's own number, so that homes differ in their kinds of sound, and twice for each walk.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -14,36 +17,41 @@ from jaxtyping import Float
 from avlmaps.core.errors import MapError, RecordingError
 from avlmaps.core.files import write_bytes_atomically
 from avlmaps.core.progress import say
-from avlmaps.core.timeline import Trajectory
 from avlmaps.core.version import __version__
 from avlmaps.maps import sources
+from avlmaps.maps.audio.events import detect_events
 from avlmaps.maps.build import build_map
 from avlmaps.maps.sources.bearings import Device
 from avlmaps.maps.sources.find import find_sources
+from avlmaps.maps.types import HeardSounds
 from avlmaps.query import sound_sources
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.contents import Thing
 from avlmaps.query.sound_sources import Joined, SourceMap, things_that_may_be
 from avlmaps.recordings.audio import AudioTrack
-from avlmaps.recordings.channels import read_channels
+from avlmaps.recordings.channels import ChannelSound, read_channels, with_microphones, write_channels
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Recording
 from avlmaps_sim.bench.harness.factors import outline_away_m
 from avlmaps_sim.bench.sources.arrays import ARRAYS, RECORDED, track_of
 from avlmaps_sim.bench.sources.calibrated import Wrong, calibrated
+from avlmaps_sim.bench.sources.loudness import loudness_known
 from avlmaps_sim.hearing.acoustic import AcousticSettings
 from avlmaps_sim.hearing.directions import said_directions
 from avlmaps_sim.hearing.impulse import Acoustics
-from avlmaps_sim.recorder import RecordSettings, record_scene
+from avlmaps_sim.recorder import RecordSettings, record_scene, sound_again
 from avlmaps_sim.scene import Area, Scene, SceneObject
 from avlmaps_sim.truth import HeardEvent, Truth, read_truth
 
 SNR_DB = 20.0
 DEVICE, GIVEN, REFINED = "a device's directions", "square4, put wrong", "square4, put wrong, calibrated"
+LOUDNESS = "mono, loudness known"
+"""What the loudness of a sound would be worth, were it known: see ``loudness.py``."""
 WAYS = (*ARRAYS, DEVICE)
 """What places sounds with and without the lexicon; the other two show what calibration is worth."""
 _OUTLIERS = 0.03
 _UNKNOWN = float("nan")
+_SETS = 2  # of sounds on the walk of a home
 _RECIPE = 3  # counts up when the measurement changes, so that what is stored is measured again
 _FRAMES, _SIZE, _FPS = 300, (160, 120), 5.0
 _OVERLAP_S = 0.2
@@ -116,21 +124,22 @@ class Mended:
     """What was found out of a device that says directions, and of an array that was put wrong.
 
     Attributes:
-        places_m: error of the array's worst place, as given and calibrated; NaN where the latter was refused.
+        places_m: error of the array's worst place, as given and calibrated; NaN where none was put wrong, or where
+            calibration was refused.
         delays_s: of its worst channel's delay, likewise.
         device_off_deg: by how much the device's offset was missed.
         device_sd_deg: the standard deviation that is said of that.
     """
 
-    places_m: tuple[float, float]
-    delays_s: tuple[float, float]
+    places_m: tuple[float, float] = (_UNKNOWN, _UNKNOWN)
+    delays_s: tuple[float, float] = (_UNKNOWN, _UNKNOWN)
     device_off_deg: float = _UNKNOWN
     device_sd_deg: float = _UNKNOWN
 
 
 @dataclass(frozen=True, slots=True)
 class HomeOutcome:
-    """What was measured in one home.
+    """What was measured in one home, of one set of sounds.
 
     Attributes:
         spec: its name.
@@ -147,27 +156,30 @@ class HomeOutcome:
     mended: Mended | None = None
 
 
-def measure_home(job: HomeJob, open_spec: Callable[[str], Scene]) -> HomeOutcome:
-    """Record, map and measure one home; what is there already is not made again."""
+def measure_home(job: HomeJob, open_spec: Callable[[str], Scene]) -> tuple[HomeOutcome, ...]:
+    """Record, map and measure one home, each set of sounds; what is there already is not made again."""
     scene = open_spec(job.spec)
     name = "".join(c if c.isalnum() else "-" for c in job.spec)
     folder = job.work / f"{name}-{job.seed}"
     recording_path = folder / "recording"
     folder.mkdir(parents=True, exist_ok=True)
+    settings = RecordSettings(
+        size=_SIZE, fps=_FPS, max_frames=_FRAMES, hearing="acoustic", microphones=RECORDED, snr_db=SNR_DB, sources=14,
+        ambiguous=2, sounds=job.sounds, workers=1,
+    )  # fmt: skip
     if not recording_path.exists():
-        settings = RecordSettings(
-            size=_SIZE, fps=_FPS, max_frames=_FRAMES, hearing="acoustic", microphones=RECORDED, snr_db=SNR_DB,
-            sources=14, ambiguous=2, sounds=job.sounds, workers=1,
-        )  # fmt: skip
         record_scene(scene, folder / "recording.unfinished", settings, job.seed)
         (folder / "recording.unfinished").rename(recording_path)
     avlmap = _map_of(recording_path, folder / "home.avlmap")
-    facts = (_RECIPE, __version__, avlmap.stored.info.build_key, _CODE)
-    done = folder / f"outcome-{sha256(repr(facts).encode()).hexdigest()[:12]}.msgpack"
-    if not done.exists():
-        home = _Home(job, scene, open_recording(recording_path), read_truth(recording_path), avlmap)
-        write_bytes_atomically(done, msgspec.msgpack.encode(home.outcome(folder)))
-    return msgspec.msgpack.decode(done.read_bytes(), type=HomeOutcome)
+    home = _Home(job, scene, settings, recording_path, avlmap)
+    outcomes: list[HomeOutcome] = []
+    for number in range(_SETS):
+        facts = (_RECIPE, __version__, avlmap.stored.info.build_key, _CODE, number)
+        done = folder / f"outcome-{sha256(repr(facts).encode()).hexdigest()[:12]}.msgpack"
+        if not done.exists():
+            write_bytes_atomically(done, msgspec.msgpack.encode(home.outcome(folder / f"sounds-{number}", number)))
+        outcomes.append(msgspec.msgpack.decode(done.read_bytes(), type=HomeOutcome))
+    return tuple(outcomes)
 
 
 def _map_of(recorded: Path, path: Path) -> AVLMap:
@@ -182,23 +194,50 @@ def _map_of(recorded: Path, path: Path) -> AVLMap:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class _Played:
+    """One set of sounds on a walk.
+
+    Attributes:
+        events: what sounded.
+        audio: the track of all microphones.
+        heard: the sounds that a build finds in it.
+    """
+
+    events: tuple[HeardEvent, ...]
+    audio: AudioTrack
+    heard: HeardSounds
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class _Home:
     """One home, recorded and mapped."""
 
     job: HomeJob
     scene: Scene
-    recording: Recording
-    truth: Truth
+    settings: RecordSettings
+    recorded: Path
     avlmap: AVLMap
 
-    def outcome(self, folder: Path) -> HomeOutcome:
-        heard, things = self.avlmap.stored.sounds, self.avlmap.things()
+    def outcome(self, folder: Path, number: int) -> HomeOutcome:
+        """Measure the set of sounds of a number; the first one also with an array that was put wrong."""
+        folder.mkdir(exist_ok=True)
+        recording, truth = open_recording(self.recorded), read_truth(self.recorded)
+        rng = np.random.default_rng([self.job.seed, crc32(self.job.spec.encode()), number])
+        played = self._played(recording, folder, rng)
+        heard, things = played.heard, self.avlmap.things()
         spans = list(zip(heard.onset_s.tolist(), heard.offset_s.tolist(), strict=True))
-        pairs = matched(self.truth.events, spans)
+        pairs = matched(played.events, spans)
         air = Acoustics(self.scene, 22_050)
-        true = {index: air.sounds_from(np.array(self.truth.events[index].source)) for index, _ in pairs}
-        walk = Trajectory(self.recording.stamps_s, self.recording.world_from_camera)
-        tracks, mended, offset_rad = self._tracks(folder, walk)
+        true = {index: air.sounds_from(np.array(played.events[index].source)) for index, _ in pairs}
+        tracks = {array: track_of(played.audio, array, folder) for array in ARRAYS}
+        offset_rad = float(rng.uniform(-np.pi, np.pi))
+        sounds, walk = [(event.onset_s, event.offset_s, event.source) for event in played.events], recording.walk
+        said = said_directions(self.scene, sounds, walk.stamps_s, walk.world_from_body, rng, offset_rad, _OUTLIERS)
+        tracks[DEVICE] = replace(tracks["mono"], microphones=None, directions=said)
+        mended = Mended()
+        if not number:
+            more, mended = self._wrong(played.audio, folder, rng)
+            tracks |= more
         placed: list[Placed] = []
         for way, track in tracks.items():
             begin = perf_counter()
@@ -214,39 +253,54 @@ class _Home:
                     device_sd_deg=float(np.rad2deg(device.offset_sd_rad)),
                 )  # fmt: skip
             known = SourceMap.of(self.avlmap, evidence)
-            for index, number in pairs:
+            for index, row in pairs:
+                event = played.events[index]
                 for prior in (False, True) if way in WAYS else (False,):
                     name = f"{way}, lexicon" if prior else way
-                    one = known.joined([number], self.truth.events[index].category, prior)
-                    placed.append(self._placed(name, known, one, self.truth.events[index], true[index], things, each_s))
-        for index, number in pairs:
-            event = self.truth.events[index]
-            placed += baselines(event, true[index], self.truth.areas, things, self.avlmap, number)
-        return HomeOutcome(self.job.spec, len(self.truth.events), len(pairs), tuple(placed), mended)
+                    one = known.joined([row], event.category, prior)
+                    placed.append(self._placed(name, known, one, event, true[index], truth, things, each_s))
+                if way == "mono":
+                    louder = loudness_known(track, walk, spans[row], true[index], evidence, row, rng)
+                    one = SourceMap.of(self.avlmap, louder).joined([row], event.category, prior=False)
+                    placed.append(self._placed(LOUDNESS, known, one, event, true[index], truth, things, each_s))
+        for index, row in pairs:
+            robot = heard.track[heard.track_offsets[row] : heard.track_offsets[row + 1]]
+            placed += baselines(played.events[index], true[index], truth.areas, things, robot)
+        return HomeOutcome(self.job.spec, len(played.events), len(pairs), tuple(placed), mended)
 
-    def _tracks(self, folder: Path, walk: Trajectory) -> tuple[dict[str, AudioTrack], Mended, float]:
-        """Return the tracks to compare, what was found out of the array that was put wrong, and the device's offset."""
-        audio = self.recording.audio
-        assert audio is not None and audio.microphones is not None
-        tracks = {array: track_of(audio, array, folder) for array in ARRAYS}
-        rng = np.random.default_rng([self.job.seed, crc32(self.job.spec.encode())])
-        offset_rad = float(rng.uniform(-np.pi, np.pi))
-        sounds = [(event.onset_s, event.offset_s, event.source) for event in self.truth.events]
-        said = said_directions(self.scene, sounds, walk.stamps_s, walk.world_from_body, rng, offset_rad, _OUTLIERS)
-        tracks[DEVICE] = replace(tracks["mono"], microphones=None, directions=said)
+    def _played(self, recording: Recording, folder: Path, rng: np.random.Generator) -> _Played:
+        """Let sounds play on the walk, and find them as a build does."""
+        own = recording.audio
+        assert own is not None and own.microphones is not None
+        track, soundings = sound_again(self.scene, recording.walk, own.end_s - own.start_s, self.settings, rng)
+        assert isinstance(track, ChannelSound)
+        write_channels(folder / "track.flac", track)
+        recording.audio = AudioTrack.open(folder / "track.flac", own.start_s)
+        encoder, hearing = self.avlmap.stored.encoders.sounds, self.avlmap.stored.info.settings.hearing
+        heard = detect_events(recording, encoder, hearing, folder / "clips")
+        events = tuple(
+            HeardEvent(one.onset_s, one.offset_s, one.source.category, one.source.clip, one.robot, one.source.position,
+                       one.source.instance)
+            for one in soundings
+        )  # fmt: skip
+        return _Played(events, with_microphones(recording.audio, own.microphones), heard)
+
+    def _wrong(self, audio: AudioTrack, folder: Path, rng: np.random.Generator) -> tuple[dict[str, AudioTrack], Mended]:
+        """Return the tracks of an array that was put wrong, as given and calibrated, and how far it errs then."""
+        assert audio.microphones is not None
         wrong = Wrong.of(audio.microphones, rng)
-        tracks[GIVEN] = wrong.track(read_channels(audio, audio.start_s, audio.end_s), folder / "wrong.flac")
+        tracks = {GIVEN: wrong.track(read_channels(audio, audio.start_s, audio.end_s), folder / "wrong.flac")}
         room = AcousticSettings(snr_db=SNR_DB, rt60_s=float(rng.uniform(0.3, 0.8)))
         before_m, before_s = wrong.off(wrong.given)
         try:
             found = calibrated(wrong, room, rng, folder / "drive.wav").microphones
         except RecordingError as error:
             say(f"note: {self.job.spec}: the array was not calibrated: {error}")
-            return tracks, Mended((before_m, _UNKNOWN), (before_s, _UNKNOWN)), offset_rad
+            return tracks, Mended((before_m, _UNKNOWN), (before_s, _UNKNOWN))
         refined = replace(found, camera_from_robot=audio.microphones.camera_from_robot)
         tracks[REFINED] = replace(tracks[GIVEN], microphones=refined)
         after_m, after_s = wrong.off(refined)
-        return tracks, Mended((before_m, after_m), (before_s, after_s)), offset_rad
+        return tracks, Mended((before_m, after_m), (before_s, after_s))
 
     def _placed(
         self,
@@ -255,6 +309,7 @@ class _Home:
         one: Joined,
         event: HeardEvent,
         true: Float[np.ndarray, "3"],
+        truth: Truth,
         things: Sequence[Thing],
         each_s: float,
     ) -> Placed:
@@ -265,11 +320,11 @@ class _Home:
         return Placed(
             name,
             float(np.linalg.norm(at[:2] - true[:2])),
-            in_room(self.truth.areas, true, at),
+            in_room(truth.areas, true, at),
             one.density.likelier_than(cell),
             one.density.area_m2(0.9),
-            right_thing(event, self.truth.objects, likely, things),
-            same_room(self.truth.areas, event.source, event.robot),
+            right_thing(event, truth.objects, likely, things),
+            same_room(truth.areas, event.source, event.robot),
             each_s,
             len(self.avlmap.space),
             one.density.spread.right,
@@ -347,12 +402,10 @@ def baselines(
     true: np.ndarray,
     areas: Sequence[Area],
     things: Sequence[Thing],
-    avlmap: AVLMap,
-    number: int,
+    track: Float[np.ndarray, "k 3"],
 ) -> list[Placed]:
     """Return where the robot was (the paper), the thing nearest to it, and the middle of the room that it was in."""
-    offsets = avlmap.stored.sounds.track_offsets
-    robot = np.asarray(avlmap.stored.sounds.track[offsets[number] : offsets[number + 1]], np.float64).mean(axis=0)
+    robot = np.asarray(track, np.float64).mean(axis=0)
     found = {"robot's place (the paper)": robot}
     if things:
         away = [float(np.linalg.norm(np.array(thing.position[:2]) - robot[:2])) for thing in things]
