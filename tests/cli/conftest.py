@@ -1,5 +1,6 @@
 """A short walk in the analytic room with one real-looking sound, and its map: made once, used by every verb's test."""
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -22,3 +23,17 @@ def built(walk: Path) -> Path:
         main(["build", str(walk), "--out", str(out), "--voxel-size-m", "0.1", "--profile", "colours"])
     assert stop.value.code == 0
     return out
+
+
+@pytest.fixture
+def dated(walk: Path, tmp_path: Path) -> Path:
+    """The walk as a drive of another day: the first frame is missing, and its clock is one."""
+    path = shutil.copytree(walk, tmp_path / "dated")
+    for table, stamp in (("poses.csv", 0), ("frames.csv", 1)):
+        head, _, *rows = [line.split(",") for line in (path / table).read_text().splitlines()]
+        for row in rows:
+            row[stamp] = str(float(row[stamp]) + 1.7e9)
+        (path / table).write_text("\n".join(",".join(row) for row in [head, *rows]) + "\n")
+    for folder in ("rgb", "depth"):
+        (path / folder / "000000.png").unlink()
+    return path

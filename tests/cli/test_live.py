@@ -25,20 +25,6 @@ def test_a_recording_is_played_into_a_map(answer, walk: Path, tmp_path: Path, pa
 WHOLE = ("--profile", "colours", "--as-fast-as-possible", "--every-frame")
 
 
-@pytest.fixture
-def dated(walk: Path, tmp_path: Path) -> Path:
-    """The walk as a drive of another day: the first frame is missing, and its clock is one."""
-    path = shutil.copytree(walk, tmp_path / "dated")
-    for table, stamp in (("poses.csv", 0), ("frames.csv", 1)):
-        head, _, *rows = [line.split(",") for line in (path / table).read_text().splitlines()]
-        for row in rows:
-            row[stamp] = str(float(row[stamp]) + 1.7e9)
-        (path / table).write_text("\n".join(",".join(row) for row in [head, *rows]) + "\n")
-    for folder in ("rgb", "depth"):
-        (path / folder / "000000.png").unlink()
-    return path
-
-
 @pytest.mark.slow
 def test_a_drive_updates_the_map_of_the_days_before(answer, dated: Path, built: Path, tmp_path: Path) -> None:
     home = shutil.copytree(built, tmp_path / "home.avlmap")

@@ -282,3 +282,15 @@ def test_what_is_next_has_every_part_and_builds_nothing_impossible(verdict: str,
     assert lines[0].startswith(f"next: {says}") and len(lines) == 3
     assert all("'a b.bag' c.bag" in line for line in lines[1:])
     assert next_lines({"path": "rec", "consistency": None})[0] == "next: avlmaps build rec --out rec.avlmap"
+
+
+def test_another_day_is_merged_and_its_changes_are_told(dated: Path, built: Path, tmp_path: Path, answer, run) -> None:
+    today, home = tmp_path / "today.avlmap", tmp_path / "home.avlmap"
+    answer("build", dated, "--out", today, "--voxel-size-m", "0.1", "--profile", "colours")
+    made = answer("merge", built, today, "--out", home)
+    assert made["path"] == str(home) and made["checks"]["agreeing"] >= 5
+    np.testing.assert_allclose(made["map_from_recording"], np.eye(4), atol=0.05)
+    told = answer("changes", home)
+    assert [day["day"] for day in told["days"]] == [None, "2023-11-14"] and told["changes"] == []
+    status, out, _ = run("changes", home)
+    assert status == 0 and out.startswith("nothing is known to have changed")

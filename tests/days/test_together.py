@@ -2,8 +2,6 @@
 
 import json
 import shutil
-import tempfile
-from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -24,25 +22,14 @@ ENCODERS = encoders_of(register_fakes())
 WALKS = [partial(open_walk, seed=seed) for seed in range(4)]
 
 
-def in_memory() -> tempfile.TemporaryDirectory[str]:
-    """Return a folder in memory where there is one: each build syncs some hundred small files."""
-    memory = Path("/dev/shm")
-    return tempfile.TemporaryDirectory(dir=memory if memory.is_dir() else None)
-
-
-@pytest.fixture
-def tmp_path() -> Iterator[Path]:
-    with in_memory() as folder:
-        yield Path(folder)
-
-
 @pytest.fixture(scope="module")
-def built() -> Iterator[Path]:
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Give a folder where each recording has its map already."""
-    with in_memory() as folder, pytest.MonkeyPatch.context() as patch:
+    folder = tmp_path_factory.mktemp("built")
+    with pytest.MonkeyPatch.context() as patch:
         patch.setattr(together, "merge_maps", copied)
-        build(Path(folder) / "all.avlmap")
-        yield Path(folder) / "all-recordings"
+        build(folder / "all.avlmap")
+    return folder / "all-recordings"
 
 
 @pytest.fixture

@@ -37,7 +37,7 @@ class NamedEncoder:
         """Finds the meaning of a phrase among the names."""
         notes = self._network.notes
         called = tuple((name, *notes.called.get(name, ())) for name in self.names)
-        kind = words_known.Kind.ROOM if self.names == notes.rooms else words_known.Kind.THING
+        kind = words_known.EntryKind.ROOM if self.names == notes.rooms else words_known.EntryKind.THING
         return Meanings(self.names, called, notes.kinds, self._words, kind)
 
     def name_weights(self, word: str) -> Float32[np.ndarray, " k"]:
