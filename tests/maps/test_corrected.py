@@ -290,12 +290,12 @@ def test_looks_that_weigh_next_to_nothing_are_not_missed() -> None:
 
 def test_many_faint_looks_together_are_not_missed() -> None:
     for count, first in ((300, 1.0), (2000, 20.0), (100_000, 1.0)):
-        weight, order = np.ones(count, np.float32), np.arange(count)
+        weight, row = np.ones(count, np.float32), np.arange(count, dtype=np.int32)
         weight[0] = first
         feature, out = np.tile(np.array([[3, -2]], np.int8), (count, 1)), np.zeros((1, 2), np.float32)
         feature[0] *= -1
         scale, start = np.ones(count, np.float32), np.array([0, count])
-        sum_features(np.zeros(1, np.int64), start, order, order.astype(np.int32), weight, feature, scale, out)
+        sum_features(np.zeros(1, np.int64), start, row, weight, feature, scale, out)
         np.testing.assert_allclose(out[0], weight @ feature, rtol=1e-3)
 
 

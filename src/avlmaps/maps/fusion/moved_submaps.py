@@ -162,14 +162,14 @@ class MovedSubmaps:
 
     def _features(self, rows: Int64[np.ndarray, " k"], take: _Take) -> None:
         """Give the sums of features of some voxels, block by block, from several threads."""
-        target, row, weight = (column[: self._pair] for column in self._pairs)
-        start = np.zeros(self._count + 1, np.int64)
-        order = kernels.group_pairs(target, start)
+        target, row_of, weight_of = (column[: self._pair] for column in self._pairs)
+        start, row, weight = np.zeros(self._count + 1, np.int64), np.empty_like(row_of), np.empty_like(weight_of)
+        kernels.group_pairs(target, row_of, weight_of, start, row, weight)
         feature, scale = _read_only(np.asarray(self._feature)), _read_only(np.asarray(self._scale))
 
         def work(block: slice) -> None:
             summed = np.empty((block.stop - block.start, feature.shape[1]), np.float32)
-            kernels.sum_features(rows[block], start, order, row, weight, feature, scale, summed)
+            kernels.sum_features(rows[block], start, row, weight, feature, scale, summed)
             take(block, summed)
 
         with ThreadPoolExecutor(usable_cores()) as pool:

@@ -23,7 +23,8 @@ WITHIN = 0.4999  # voxels: samples go no farther from the middle
 HIDDEN = np.float32(1.0 / 254.0)  # of a voxel's weight: as much as a feature in 254 steps is rounded by
 MOSTLY = np.float32(0.9)  # of a voxel's weight: where the other looks hold less, the faint ones are many
 LEAST_HITS = 0.5  # a voxel gets less than this part of a hit from one that moves: it has none
-
+# Where each sample lies on an axis that has 0 to 4 of them, lengths of the axis from its middle.
+PLACES = np.array([[(sample + 0.5) / max(steps, 1) - 0.5 for sample in range(STEPS)] for steps in range(STEPS + 1)])
 
 Pairs = tuple[np.ndarray, np.ndarray, np.ndarray]
 Bricks = tuple[np.ndarray, np.ndarray, np.ndarray]
@@ -167,21 +168,20 @@ def _targets(
     steps_c = _steps(lzz)
     found = 0
     for a in range(steps_a):
-        ua = EVEN * ((a + 0.5) / steps_a - 0.5)
+        ua = EVEN * PLACES[steps_a, a]
         off_x = _within(mx + lxx * ua)
         for b in range(steps_b):
-            ub = EVEN * ((b + 0.5) / steps_b - 0.5)
+            ub = EVEN * PLACES[steps_b, b]
             off_y, along_z = _within(my + lyx * ua + lyy * ub), mz + lzx * ua + lzy * ub
             for c in range(steps_c):
-                off_z = _within(along_z + lzz * EVEN * ((c + 0.5) / steps_c - 0.5))
+                off_z = _within(along_z + lzz * EVEN * PLACES[steps_c, c])
                 # as far from the middle as half the diagonal of a voxel: these are positive, and cut off as floored
                 p = np.int64(from_x + ax * off_x + ay * off_y + az * off_z)
                 q = np.int64(from_y + bx * off_x + by * off_y + bz * off_z)
                 r = np.int64(from_z + cx * off_x + cy * off_y + cz * off_z)
                 place = (p * 16 + q * 4 + r) & (_CELLS - 1)
-                if share[place] == 0:
-                    cell[found] = place
-                    found += 1
+                cell[found] = place  # written over unless it is new
+                found += share[place] == 0
                 share[place] += 1
     return found, steps_a * steps_b * steps_c, i, j, k
 
@@ -238,7 +238,7 @@ def move_rows(
     pair_target, pair_row, pair_weight = pairs
     table, brick_index, rows = bricks
     number, first, count, begin, pair, brick_count = place
-    cell, share = np.empty(_CELLS, np.int64), np.zeros(_CELLS, np.int64)
+    cell, share = np.empty(_CELLS + 1, np.int64), np.zeros(_CELLS, np.int64)
     room, brick_room = index.shape[0] - MOST_SAMPLES, rows.shape[0] - MOST_BRICKS
     last_i = last_j = last_k = np.int64(1 << 40)
     brick = 0
@@ -280,9 +280,9 @@ def move_rows(
             seen = np.int32(min(part_views[n], hit))  # no more frames than hits
             if counts[row, LAST_SUBMAP] != number:
                 counts[row, LAST_SUBMAP], counts[row, ITS_VIEWS] = number, 0
-            if seen > counts[row, ITS_VIEWS]:
-                counts[row, VIEWS] += seen - counts[row, ITS_VIEWS]
-                counts[row, ITS_VIEWS] = seen
+            before = counts[row, ITS_VIEWS]
+            counts[row, VIEWS] += max(seen - before, 0)
+            counts[row, ITS_VIEWS] = max(seen, before)
             pair_target[pair], pair_row[pair] = row, first + n
             pair_weight[pair] = amount * part_weight[n]
             pair += 1
@@ -290,18 +290,27 @@ def move_rows(
 
 
 @njit(**OPTIONS)
-def group_pairs(target: Int32[np.ndarray, " pairs"], start: Int64[np.ndarray, " rows1"]):
-    """Return the pairs in the order of their targets; ``start`` gets where each target's begin, and is 0 before."""
+def group_pairs(
+    target: Int32[np.ndarray, " pairs"],
+    row: Int32[np.ndarray, " pairs"],
+    weight: Float32[np.ndarray, " pairs"],
+    start: Int64[np.ndarray, " rows1"],
+    rows: Int32[np.ndarray, " pairs"],
+    weights: Float32[np.ndarray, " pairs"],
+):
+    """Write the rows and weights of pairs in the order of their targets, to be read one after the other.
+
+    ``start`` gets where each target's begin, and is 0 before.
+    """
     for pair in range(target.shape[0]):
         start[target[pair] + 1] += 1
-    for row in range(start.shape[0] - 1):
-        start[row + 1] += start[row]
+    for to in range(start.shape[0] - 1):
+        start[to + 1] += start[to]
     place = start.copy()
-    order = np.empty(target.shape[0], np.int64)
     for pair in range(target.shape[0]):
-        order[place[target[pair]]] = pair
+        at = place[target[pair]]
+        rows[at], weights[at] = row[pair], weight[pair]
         place[target[pair]] += 1
-    return order
 
 
 @njit(**OPTIONS)
@@ -327,7 +336,6 @@ def round_to_steps(
 def sum_features(
     rows: Int64[np.ndarray, " k"],
     start: Int64[np.ndarray, " rows1"],
-    order: Int64[np.ndarray, " pairs"],
     row: Int32[np.ndarray, " pairs"],
     weight: Float32[np.ndarray, " pairs"],
     feature: Int8[np.ndarray, "n d"],
@@ -341,9 +349,8 @@ def sum_features(
 
     Args:
         rows: of the map.
-        start: where the pairs of each row begin in ``order``.
-        order: numbers of pairs.
-        row: of the submaps' voxels, for each pair.
+        start: where the pairs of each row begin.
+        row: of the submaps' voxels, for each pair, as `group_pairs` puts them.
         weight: of each pair.
         feature: of the submaps' voxels, in steps.
         scale: how large a step is.
@@ -353,20 +360,19 @@ def sum_features(
         first, last = start[rows[n]], start[rows[n] + 1]
         whole = read = np.float32(0.0)
         for at in range(first, last):
-            whole += weight[order[at]]
+            whole += weight[at]
         least = whole * HIDDEN
         for at in range(first, last):
-            read += weight[order[at]] if weight[order[at]] >= least else np.float32(0.0)
+            read += weight[at] if weight[at] >= least else np.float32(0.0)
         if read < MOSTLY * whole:
             least, read = np.float32(0.0), whole
         more = whole / read if read > 0.0 else np.float32(0.0)
         for column in range(out.shape[1]):
             out[n, column] = 0.0
         for at in range(first, last):
-            pair = order[at]
-            source = row[pair]
-            if weight[pair] < least:
+            if weight[at] < least:
                 continue
-            factor = more * weight[pair] * scale[source]
+            source = row[at]
+            factor = more * weight[at] * scale[source]
             for column in range(out.shape[1]):
                 out[n, column] += factor * np.float32(feature[source, column])

@@ -29,8 +29,9 @@ def chunks_of(index: Int32[np.ndarray, "n 3"]) -> Chunks:
     of = np.empty(len(index), np.int32)
     slots = np.full(1 << (2 * len(index) + 1).bit_length(), -1, np.int32)
     count = _cubes(index, slots, np.empty((len(index), 3), np.int32), of)
-    start = np.zeros(count + 1, np.int64)
-    order = group_pairs(of, start)
+    start, order = np.zeros(count + 1, np.int64), np.empty(len(index), np.int32)
+    no_weight = np.zeros(len(index), np.float32)
+    group_pairs(of, np.arange(len(index), dtype=np.int32), no_weight, start, order, no_weight)
     grouped = index[order]
     middle, radius = np.empty((count, 3)), np.empty(count)
     _spheres(grouped, start, middle, radius)
