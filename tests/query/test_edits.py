@@ -11,7 +11,17 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from query_fakes import FakeSounds, fake_encoders, fake_map, furnished_map, keyframes_at, sounds_of, voxels_of
+from query_fakes import (
+    FakePixels,
+    FakeSounds,
+    box,
+    fake_encoders,
+    fake_map,
+    furnished_map,
+    keyframes_at,
+    sounds_of,
+    voxels_of,
+)
 from test_named_areas import Rooms
 from walled_rooms import two_rooms_index
 
@@ -422,6 +432,23 @@ def test_the_editor_says_what_it_cannot_do(tmp_path: Path) -> None:
     m.stored.info.files = {}
     with pytest.raises(MapError, match="in memory alone"):
         m.edit.pin("dock", (1.0, 1.0))
+
+
+def test_what_is_merged_hangs_together_in_any_order(tmp_path: Path) -> None:
+    chairs = [box((x, 10, 1), (x + 4, 14, 9)) for x in (10, 24, 116, 130)]
+    floor = box((0, 0, 0), (150, 40, 1))
+    encoder = FakePixels(("floor", "chair"))
+    words = ["floor"] * len(floor) + ["chair"] * sum(map(len, chairs))
+    stored = fake_map(
+        voxels_of(np.concatenate([floor, *chairs]), encoder.encode_words(words)), encoders=fake_encoders(encoder)
+    )
+    stored.path, stored.info.files = tmp_path, {"voxels/index": None}
+    places = [(0.6, 0.6), (1.3, 0.6), (5.9, 0.6), (6.6, 0.6)]
+    for order in permutations(places):
+        with pytest.raises(QueryError, match=r"is 4\.5 m from the others"):
+            AVLMap(stored, edits=()).edit.merge(*order)
+    assert not (tmp_path / EDITS).exists()
+    AVLMap(stored, edits=()).edit.merge(*places[2:])
 
 
 def test_an_edit_does_not_bring_back_the_folder_of_a_map_that_is_gone(tmp_path: Path) -> None:

@@ -345,6 +345,18 @@ def test_a_copy_is_the_same_recording_bit_for_bit(tmp_path: Path):
         assert original.name(index) == copy.name(index)
 
 
+def test_a_copy_of_a_copy_has_the_day_of_the_recording(tmp_path: Path):
+    original = open_recording(write_seven_scenes(tmp_path / "scene"))
+    original.begins_s = 1.7e9 + 0.25
+    for name in ("copy", "again"):
+        write_recording(original, tmp_path / name)
+        copy = open_recording(tmp_path / name)
+        assert copy.begins_s == 1.7e9 + 0.25 and np.array_equal(copy.stamps_s, original.stamps_s)
+        original = copy
+    plain = write_recording(open_recording(write_seven_scenes(tmp_path / "other")), tmp_path / "plain")
+    assert "begins_s" not in (plain / "recording.json").read_text()  # versions of before open it
+
+
 def test_a_copy_without_links_shares_no_file_with_the_original(tmp_path: Path):
     original = open_recording(write_seven_scenes(tmp_path / "scene"))
     write_recording(original, tmp_path / "copy", link=False)

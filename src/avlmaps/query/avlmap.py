@@ -290,16 +290,20 @@ class AVLMap:
         """Return the things of the map, most confident first; see ``contents.find_things``.
 
         With ``at``, of a map of several days, those that were there on that day: a date, or the number of a visit from
-        1. What moved or went since is where it was; ``rows`` holds what is left of it.
+        1. What moved or went since is where it was; ``rows`` holds what is left of it, ``heard`` what was heard from
+        it on that day, where the map knows where its sounds came from.
 
         Raises:
             QueryError: the map was not seen on such a day, or on one day alone.
         """
         if at is not None:
             from avlmaps.query.changes import Days, things_at
+            from avlmaps.query.sound_sources import with_heard_then
 
             days = Days.of(self.stored, self.edited.life)
-            return things_at(self.space, days, at, names, least_confidence)
+            found = things_at(self.space, days, at, names, least_confidence)
+            every = found if names is None else things_at(self.space, days, at, None, least_confidence)
+            return with_heard_then(self, days.visit_of(at), found, every)
         seen = names
         if names is not None and self.edited:
             seen = [name for name in names if self.sees(name)]

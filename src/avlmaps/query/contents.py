@@ -61,7 +61,7 @@ class Thing:
         rows: numbers of its voxels in the map.
         points: middles of its voxels, metres, recording frame.
         edited: who corrected it and when, in words; empty for what nobody corrected.
-        heard: sounds that may have come from it; only lists of all that a map holds know them.
+        heard: sounds that may have come from it; only lists of all that a map holds, or held on a day, know them.
     """
 
     name: str

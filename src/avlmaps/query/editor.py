@@ -99,13 +99,16 @@ class Editor:
         found = [self._thing(None, place) for place in things]
         if len({int(one.rows[0]) for one in found}) < 2:
             raise QueryError(f"{len(found)} place(s) mean fewer than two things; give a place on each that is merged.")
-        for one in found:
-            nearest_m = min(_gap_m(one, other) for other in found if other.rows[0] != one.rows[0])
+        joined, apart = found[:1], found[1:]
+        while apart:  # two pairs, each near each other, are not one thing either
+            gaps = [min(_gap_m(one, other) for other in joined) for one in apart]
+            nearest_m, one = min(gaps), apart.pop(int(np.argmin(gaps)))
             if nearest_m > _APART_M:
                 raise QueryError(
                     f"The {one.name} at {place_text(one.position)} is {nearest_m:.1f} m from the others, more than "
                     f"{_APART_M:g} m; things that are one touch or nearly do."
                 )
+            joined.append(one)
         spots = [self._map.edited.spot_of(one.name, one.rows) for one in found]
         return self._add("merge", spots, name=_name(to) if to else "", by=by)
 

@@ -62,7 +62,7 @@ class MapLists:
                 return []
             require_known(self.avlmap.knows, names)
             things = self.avlmap.things(tuple(names) or None, least, structure, watch=self.watch, at=at)
-            if at is None:  # sounds come from the things of now
+            if at is None:  # those of a day come with the sounds of that day
                 things = with_heard(self.avlmap, things, are_all=not names)
             return put_storeys([thing.to_json() for thing in things], self.avlmap.storeys)
 

@@ -25,7 +25,7 @@ from avlmaps.query.voxel_space import Space
 if TYPE_CHECKING:
     from avlmaps.maps.store.manifest import Visit
     from avlmaps.maps.store.reader import StoredMap
-    from avlmaps.query.schema import DayAnswer, HeardFromAnswer, SourceAnswer
+    from avlmaps.query.schema import HeardFromAnswer, SourceAnswer
 
 _MAKERS_SHARE = 0.5  # probability that a sound comes from a thing that usually makes it, where there is one
 _AT_THING_M = 0.4
@@ -310,12 +310,26 @@ def source_of(avlmap: Listening, number: int) -> SoundSource:
 
 
 def list_joined(
-    avlmap: Listening, names: Sequence[str] = (), prior: bool = True, *, least: float = 0.0
+    avlmap: Listening,
+    names: Sequence[str] = (),
+    prior: bool = True,
+    *,
+    least: float = 0.0,
+    counts: Callable[[int], bool] = lambda event: True,
 ) -> Iterator[tuple[str, float, Joined]]:
-    """Yield the sources of a map's sounds, each with its name and the confidence of it; see ``list_sources``."""
+    """Yield the sources of a map's sounds, each with its name and the confidence of it; see ``list_sources``.
+
+    Args:
+        avlmap: the map.
+        names: kinds of sound.
+        prior: whether things that usually make such a sound count.
+        least: sources of a lower confidence are left out, in [0, 1].
+        counts: says of a sound by its number whether it counts.
+    """
     known = avlmap.source_map
     for kind, scores in _by_kind(avlmap, names).items():
-        events = [event for event, score in sorted(scores.items(), key=lambda one: -one[1]) if score >= least]
+        ranked = sorted(scores.items(), key=lambda one: -one[1])
+        events = [event for event, score in ranked if score >= least and counts(event)]
         for one in known.sources(events, kind, prior):
             yield kind, max(scores[event] for event in one.events), one
 
@@ -420,13 +434,37 @@ def with_heard(avlmap: Listening, things: Sequence[Thing], *, are_all: bool = Tr
         things: of it.
         are_all: whether these are all that it lists; else a sound may have come from the others as well.
     """
-    if not things or avlmap.stored.sources() is None:
+    if not things or not avlmap.stored.knows_sources:
         return list(things)
-    rivals = [] if are_all else _others(avlmap.things(), things)
+    return _with_heard(avlmap, things, [] if are_all else _others(avlmap.things(), things))
+
+
+def with_heard_then(avlmap: Listening, visit: int, things: Sequence[Thing], every: Sequence[Thing]) -> list[Thing]:
+    """Return things that were there on a day with the sounds of that day; see ``with_heard``.
+
+    Args:
+        avlmap: the map, of several days.
+        visit: the number of the day, from 0.
+        things: that were there.
+        every: all that were there; a sound may have come from the others as well.
+    """
+    if not things or not avlmap.stored.knows_sources:
+        return list(things)
+    listed = {(thing.name, thing.position) for thing in things}
+    return _with_heard(avlmap, things, [one for one in every if (one.name, one.position) not in listed], visit)
+
+
+def _with_heard(
+    avlmap: Listening, things: Sequence[Thing], rivals: Sequence[Thing], visit: int | None = None
+) -> list[Thing]:
     every = [*things, *rivals]
     heard: list[list[HeardFromAnswer]] = [[] for _ in every]
     sounds, visits = avlmap.sounds(), avlmap.stored.info.visits
-    for kind, confidence, one in list_joined(avlmap):
+
+    def counts(event: int) -> bool:
+        return visit is None or _visit_of(visits, sounds[event].onset_s) == visit
+
+    for kind, confidence, one in list_joined(avlmap, counts=counts):
         onset_s = max(sounds[event].onset_s for event in one.events)
         for number, share in things_that_may_be(avlmap.source_map, one, every):
             if kind and confidence * share >= _LEAST_HEARD:
@@ -434,7 +472,8 @@ def with_heard(avlmap: Listening, things: Sequence[Thing], *, are_all: bool = Tr
                     "sound": kind, "probability": round(confidence * share, 3), "onset_s": onset_s
                 }  # fmt: skip
                 if visits:
-                    row["when"] = _day_of(visits, onset_s)
+                    number_of_day = _visit_of(visits, onset_s)
+                    row["when"] = {"visit": number_of_day + 1, "day": visits[number_of_day].day or None}
                 heard[number].append(row)
     ordered = [sorted(rows, key=lambda row: -row["probability"])[:_MOST_HEARD] for rows in heard[: len(things)]]
     return [replace(thing, heard=tuple(rows)) for thing, rows in zip(things, ordered, strict=True)]
@@ -446,7 +485,6 @@ def _others(every: Sequence[Thing], listed: Sequence[Thing]) -> list[Thing]:
     return [thing for thing in every if np.isin(thing.rows, taken).mean() < 0.5]
 
 
-def _day_of(visits: "Sequence[Visit]", onset_s: float) -> "DayAnswer":
-    """Return the visit in which a sound began."""
-    number = max((n for n, visit in enumerate(visits) if visit.begin_s <= onset_s + 1e-6), default=0)
-    return {"visit": number + 1, "day": visits[number].day or None}
+def _visit_of(visits: "Sequence[Visit]", onset_s: float) -> int:
+    """Return the number of the visit in which a sound began, from 0."""
+    return max((n for n, visit in enumerate(visits) if visit.begin_s <= onset_s + 1e-6), default=0)

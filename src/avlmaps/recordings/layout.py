@@ -88,6 +88,7 @@ class Description(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
         camera_axes: where the axes of the poses' camera point (``--camera-axes``); OpenCV's if None.
         pose_delay_s: by how much the stamps of poses.csv are later than the pictures' (``--pose-delay``).
         microphones: where those of the track's channels are; None where that is not known.
+        begins_s: what the clock said at time 0, seconds since 1970; stamps that are dates say it themselves.
     """
 
     schema_version: int
@@ -104,6 +105,7 @@ class Description(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     camera_axes: str | None = None
     pose_delay_s: float | None = None
     microphones: MicrophoneNumbers | msgspec.UnsetType | None = msgspec.UNSET
+    begins_s: float | msgspec.UnsetType = msgspec.UNSET
 
     @property
     def placed(self) -> MicrophoneNumbers | None:

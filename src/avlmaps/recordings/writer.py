@@ -47,6 +47,7 @@ class RecordingWriter:
         colour: the files that colour is written to: ``png`` preserves every bit, ``jpg`` takes a tenth of the space.
         depth_units_per_m: units of the depth files in a metre; 1000 says millimetres.
         origin: what makes the recording, for its description.
+        begins_s: what the clock said at time 0, seconds since 1970; 0 where nobody knows.
     """
 
     path: Path
@@ -55,6 +56,7 @@ class RecordingWriter:
     colour: Literal["png", "jpg"] = "png"
     depth_units_per_m: float = 1000.0
     origin: str = ""
+    begins_s: float = 0.0
     _stamps_s: list[float] = field(default_factory=list, init=False)
     _names: set[str] = field(default_factory=set, init=False)
     _audio_start_s: float = field(default=0.0, init=False)
@@ -233,6 +235,7 @@ class RecordingWriter:
             frames=len(self._stamps_s),
             origin=self.origin,
             microphones=self._microphones or msgspec.UNSET,
+            begins_s=self.begins_s or msgspec.UNSET,
         )
         return msgspec.json.format(msgspec.json.encode(description), indent=2) + b"\n"
 

@@ -106,6 +106,16 @@ def test_a_merged_map_has_the_sources_of_both_days(heard: tuple[Path, Path], cop
     assert np.median(apart) < 0.2
     rows = [row for thing in AVLMap(merged).contents().things for row in thing.heard]
     assert all(row.get("when", {}).get("day") in ("2026-11-23", "2026-11-24") for row in rows)
+    known = AVLMap(merged)
+    for visit, day in enumerate(("2026-11-23", "2026-11-24"), 1):
+        then = known.things(at=day)
+        rows = [row for thing in then for row in thing.heard]
+        assert rows and all(row.get("when") == {"visit": visit, "day": day} for row in rows)
+        onsets = np.asarray(merged.sounds.onset_s)
+        assert all(np.abs(onsets - row["onset_s"]).min() < 1e-6 for row in rows)
+        speaking = next(thing for thing in then if thing.heard)
+        (alone, *_) = (one for one in known.things([speaking.name], at=day) if one.position == speaking.position)
+        assert alone.heard == speaking.heard  # what is not listed may have made the sound as well
 
 
 @pytest.mark.usefixtures("another_day")

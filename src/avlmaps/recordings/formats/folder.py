@@ -72,7 +72,7 @@ def open_folder(path: Path, report: Report = stop_at_first) -> Recording:
         notices=(*_turned_notices(video), *notices, *more, *lone),
         video=video,
         trajectory=trajectory,
-        begins_s=start_s,
+        begins_s=start_s + (description.begins_s or 0.0),
     )
     return corrected(recording, description.corrections())
 

@@ -16,7 +16,7 @@ def write_recording(
     link: bool = True,
     origin: str = "",
 ) -> Path:
-    """Write any recording in our own format: the same pictures bit for bit, the same stamps and poses.
+    """Write any recording in our own format: the same pictures bit for bit, the same stamps, clock and poses.
 
     Pictures that are JPEG or PNG files already are linked or copied; others are encoded as PNG, depth in whole
     millimetres. Truth that lies beside a recording in our own format (``semantic/``, ``objects.json``, and
@@ -35,7 +35,8 @@ def write_recording(
     """
     units, up = recording.depth_units_per_m, recording.up_in_world
     origin = origin or f"copied from {recording.format} {recording.path.name}"
-    with RecordingWriter(out, recording.rig, up, depth_units_per_m=units, origin=origin) as writer:
+    begins_s = recording.begins_s
+    with RecordingWriter(out, recording.rig, up, depth_units_per_m=units, origin=origin, begins_s=begins_s) as writer:
         for index in progress(range(len(recording)), "copying frames", total=len(recording)):
             _copy_frame(recording, index, writer, link)
         if recording.format == "folder":
