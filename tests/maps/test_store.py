@@ -19,9 +19,10 @@ from avlmaps.core.errors import BackendError, MapError
 from avlmaps.core.registry import Kind
 from avlmaps.maps.build import build_map
 from avlmaps.maps.repair import damaged_files, repair_map
-from avlmaps.maps.store import integrity
-from avlmaps.maps.store.array_files import SMALL_BYTES, read_array, write_array
+from avlmaps.maps.store import array_files, integrity
+from avlmaps.maps.store.array_files import SMALL_BYTES, read_array, sync_files, write_array
 from avlmaps.maps.store.array_validation import array_fields, check_order, validate_arrays
+from avlmaps.maps.store.checkpoints import DONE, save_checkpoint
 from avlmaps.maps.store.lock import is_locked, lock_folder
 from avlmaps.maps.store.reader import has_unfinished_build, open_stored, verify_stored
 from avlmaps.maps.types import HeardSounds, Voxels
@@ -101,14 +102,38 @@ def test_a_full_disk_is_one_sentence_and_leaves_no_rubbish(tmp_path: Path, monke
     def full(_: int) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
+    written = write_array(tmp_path / "written", "a", np.zeros(3))
     monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(MapError) as fault:
-        write_array(tmp_path, "a", np.zeros(3))
-    assert str(fault.value) == (
-        f"Cannot write {tmp_path}: No space left on device; make room or choose another folder. A build that "
-        "stopped continues from its finished stages."
-    )
-    assert not list(tmp_path.iterdir())
+    monkeypatch.setattr(array_files, "_hashed", lambda *_: full(0))
+    for folder, write in (
+        (tmp_path, lambda: write_array(tmp_path, "a", np.zeros(3))),
+        (tmp_path / "written", lambda: sync_files(tmp_path / "written", [written])),
+    ):
+        with pytest.raises(MapError) as fault:
+            write()
+        assert str(fault.value) == (
+            f"Cannot write {folder}: No space left on device; make room or choose another folder. A build that "
+            "stopped continues from its finished stages."
+        )
+    assert list(tmp_path.iterdir()) == [tmp_path / "written"]
+
+
+class Facts(msgspec.Struct):
+    """The facts of a stage that has none."""
+
+
+def test_what_is_put_on_the_disk_is_every_file_before_its_manifest(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    synced: list[int] = []
+    monkeypatch.setattr(os, "fsync", lambda descriptor: synced.append(os.fstat(descriptor).st_ino))
+    save_checkpoint(tmp_path, "key", Facts(), {"a": np.zeros(3), "b/c": np.ones(2)})
+    done = synced.index((tmp_path / DONE).stat().st_ino)
+    files = [path for path in tmp_path.rglob("*") if path.name != DONE]
+    assert len(files) == 3 and {path.stat().st_ino for path in (tmp_path, *files)} <= set(synced[:done])
+    synced.clear()
+    write_array(tmp_path, "a", np.zeros(3))
+    assert synced == [next(tmp_path.glob("a-*")).stat().st_ino], "what takes a file's place is on the disk before"
 
 
 def test_a_map_comes_back_with_all_that_it_is_of(built: Path) -> None:

@@ -9,7 +9,7 @@ from avlmaps.core.progress import say
 from avlmaps.core.wording import option
 from avlmaps.maps.build import build_map
 from avlmaps.maps.pipeline.plan import make_plan
-from avlmaps.maps.store.array_files import FileInfo, explain_write_errors, refuse_links, sync_names, verify_file
+from avlmaps.maps.store.array_files import FileInfo, explain_write_errors, refuse_links, sync_files, verify_file
 from avlmaps.maps.store.integrity import IntegrityCheck, remember_checked
 from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.manifest import MapInfo
@@ -106,7 +106,7 @@ def _put_back(path: Path, info: MapInfo, made: MapInfo, damaged: dict[str, str])
     with explain_write_errors(path):
         for name, file in wanted.items():
             _replace(path / _WORKSHOP, made.files[name], path, file)
-        sync_names(path, wanted.values())
+        sync_files(path, wanted.values())
     if not same:
         write_manifest(path, made)
     whole = info if same else made

@@ -1,7 +1,8 @@
 """Immutable array files, named by their content: what maps, parts and checkpoints are made of.
 
-A file is written under a temporary name, synced and renamed to ``<name>-<sha256>.npy``. A name therefore never stands
-for two contents, an old manifest's files are never touched by a new build, and the same build gives the same names.
+A file is written under a temporary name and renamed to ``<name>-<sha256>.npy``. A name therefore never stands for two
+contents, an old manifest's files are never touched by a new build, and the same build gives the same names. All files
+are put on the disk together, before the manifest that lists them is written: one by one takes four times as long.
 """
 
 import errno
@@ -11,6 +12,7 @@ import itertools
 import os
 import re
 from collections.abc import Generator, Iterable
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 from typing import BinaryIO
@@ -26,6 +28,7 @@ SMALL_BYTES = 1 << 20  # files up to this size are read whole and always compare
 MOST_BYTES = 1 << 42
 _QUOTED = 200  # characters of what a damaged manifest says
 _CHUNK_BYTES = 1 << 24
+_SYNCED_AT_ONCE = 8
 # Only files that are named so are ever removed: a name, sixteen digits of its checksum, its suffix. People have folders
 # called ``sounds`` of their own, and choose the folder above them for a map.
 _STORED = re.compile(r"[A-Za-z0-9_]+-[0-9a-f]{16}(\.[^./]+)?|\..+\.\d+\.partial")
@@ -110,18 +113,33 @@ def _write(folder: Path, name: str, suffix: str, chunks: Iterable[bytes | memory
         try:
             with open_new(partial) as stream:
                 size, checksum = _hashed(stream, chunks)
-            final = stem.with_name(f"{stem.name}-{checksum[:16]}{suffix}")
+                final = stem.with_name(f"{stem.name}-{checksum[:16]}{suffix}")
+                if final.exists():  # of another manifest, whose file a power cut must not take
+                    os.fsync(stream.fileno())
             partial.replace(final)
         finally:
             partial.unlink(missing_ok=True)
     return final.relative_to(folder).as_posix(), size, checksum
 
 
-def sync_names(folder: Path, files: Iterable[FileInfo]) -> None:
-    """Put the names of written files on the disk; to be called before the manifest that lists them is written."""
-    for parent in sorted({(folder / file.path).parent for file in files}):
-        sync_folder(parent)
-        sync_folder(parent.parent)
+def sync_files(folder: Path, files: Iterable[FileInfo]) -> None:
+    """Put written files and their names on the disk; to be called before the manifest that lists them is written.
+
+    Raises:
+        MapError: the disk is full.
+    """
+    paths = [folder / file.path for file in files]
+    folders = {above for path in paths for above in (path.parent, path.parent.parent)}
+    with explain_write_errors(folder), ThreadPoolExecutor(_SYNCED_AT_ONCE) as pool:
+        list(itertools.chain(pool.map(_sync, paths), pool.map(sync_folder, folders)))
+
+
+def _sync(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDWR if os.name == "nt" else os.O_RDONLY)  # Windows syncs what can be written
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def _hashed(stream: BinaryIO, chunks: Iterable[bytes | memoryview]) -> tuple[int, str]:
@@ -130,7 +148,6 @@ def _hashed(stream: BinaryIO, chunks: Iterable[bytes | memoryview]) -> tuple[int
         digest.update(chunk)
         size += stream.write(chunk)
     stream.flush()
-    os.fsync(stream.fileno())
     return size, digest.hexdigest()
 
 

@@ -22,7 +22,7 @@ from avlmaps.maps.store.array_files import (
     FileInfo,
     explain_write_errors,
     read_array,
-    sync_names,
+    sync_files,
     verify_file,
     write_array,
     write_copy,
@@ -101,7 +101,7 @@ def save_checkpoint(
     done = _Done(key=key, facts=msgspec.Raw(msgspec.json.encode(facts)), files=written)
     with explain_write_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
-        sync_names(folder, written.values())
+        sync_files(folder, written.values())
         write_bytes_atomically(folder / DONE, msgspec.json.encode(done))
 
 

@@ -23,7 +23,7 @@ import numpy as np
 from avlmaps.core.errors import MapError
 from avlmaps.core.files import DESCRIPTION_BYTES, decode_json, read_regular, write_bytes_atomically
 from avlmaps.core.version import __version__
-from avlmaps.maps.store.array_files import FileInfo, is_stored_file, read_array, sync_names, write_array
+from avlmaps.maps.store.array_files import FileInfo, is_stored_file, read_array, sync_files, write_array
 from avlmaps.maps.store.integrity import Stamp, stamp
 from avlmaps.maps.store.manifest import MapInfo
 
@@ -111,7 +111,7 @@ class Derivation:
             return False
         try:
             files = {name: write_array(self._place, f"{self.name}_{name}", array) for name, array in arrays.items()}
-            sync_names(self._place, files.values())
+            sync_files(self._place, files.values())
         except (MapError, OSError):
             return False
         if not self._write_entry(files):

@@ -12,7 +12,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from avlmaps.maps.store.array_files import FileInfo, is_stored_file, sync_names, write_array, write_copy
+from avlmaps.maps.store.array_files import FileInfo, is_stored_file, sync_files, write_array, write_copy
 from avlmaps.maps.store.array_validation import array_fields
 from avlmaps.maps.store.checkpoints import remove_stages, stage_folders
 from avlmaps.maps.store.derived import remove_derived
@@ -80,7 +80,7 @@ def write_map(path: Path, content: MapContent, info: MapInfo, written: Written |
     files = {name: file for name, (_, file) in now.items()}
     size = sum(file.bytes for file in files.values())
     whole = msgspec.structs.replace(info, files=dict(sorted(files.items())), bytes=size)
-    sync_names(path, files.values())
+    sync_files(path, files.values())
     write_manifest(path, whole)
     remember_checked(path, files.values())  # their checksums are those of what was written just now
     sweep(path, whole)
