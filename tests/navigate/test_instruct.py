@@ -10,6 +10,7 @@ from avlmaps.core.errors import LanguageError
 from avlmaps.core.motion import GroundPose
 from avlmaps.language.learned_translator import LearnedTranslator
 from avlmaps.language.program import Budget
+from avlmaps.language.sentence import Given
 from avlmaps.language.translator import Translation
 from avlmaps.navigate.driver import Arrival
 from avlmaps.navigate.instruct import Outcome, instruct
@@ -59,6 +60,15 @@ def test_a_sentence_is_obeyed_and_told_as_it_goes() -> None:
     assert lines[1].startswith("> ")
     assert any("'chair' near 'dog': at (5.1" in line for line in lines)
     assert "turn(angle_deg=-90)" in lines[-1]
+
+
+def test_a_translator_that_knows_no_map_is_given_this_one() -> None:
+    said = "go to where the sound of the dog comes from"
+    outcome, lines = told(said)
+    assert outcome.ok and outcome.notes[0].startswith("The place is where the robot was when it heard it: ")
+    assert "I will go to where dog was heard." in lines
+    fixed, _ = told(said, LearnedTranslator(Given(at="robot")))
+    assert fixed.ok and fixed.notes == () and fixed.program == outcome.program
 
 
 def test_the_outcome_is_the_contract_of_the_command_line() -> None:

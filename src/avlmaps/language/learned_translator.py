@@ -36,13 +36,14 @@ class LearnedTranslator:
 
     Attributes:
         given: files and words that came along.
+        knows_map: whether they were given, so that no map's own names and places need be.
     """
 
     name = "learned"
 
     def __init__(self, given: Given | None = None) -> None:
         """Take the files and names that came along with the commands."""
-        self.given = given or Given()
+        self.given, self.knows_map = given or Given(), given is not None
 
     def read(self, command: str) -> Command:
         """Return the meaning of a command, with all readings that were weighed."""

@@ -14,6 +14,7 @@ from jaxtyping import Float
 from avlmaps.core.errors import LanguageError, ProgramError
 from avlmaps.core.motion import Action
 from avlmaps.core.poses import FRAME
+from avlmaps.language.learned_translator import LearnedTranslator
 from avlmaps.language.program import Budget, Step, Trace, parse_program, run_program
 from avlmaps.language.sentence import Given
 from avlmaps.language.translator import Translation, Translator
@@ -157,7 +158,7 @@ def instruct(
         command: what a person says, such as ``go to the chair near the sound of glass breaking``.
         avlmap: the map.
         driver: moves the robot, in the map's level frame.
-        translator: turns the command into a program.
+        translator: turns the command into a program; a learned one that knows no map is given this one.
         budget: what each run of a program may use up.
         settings: how the robot takes its skills.
         readable: which files the program may load; by default those in the working directory, and those that the
@@ -170,6 +171,8 @@ def instruct(
         LanguageError: the command was not understood. All later faults are in the outcome.
     """
     begin = perf_counter()
+    if translation is None and isinstance(translator, LearnedTranslator) and not translator.knows_map:
+        translator = LearnedTranslator(given_by(avlmap))
     translation = translation or translator.program_for(command)
     robot = Robot(avlmap, driver, settings, readable or offered_by(command), lambda line: tell(f"  {line}"), pause)
     run = _Run(command, translator, robot, budget, tell)

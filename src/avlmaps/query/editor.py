@@ -26,7 +26,7 @@ Place = Sequence[float] | str
 """x, y, z in metres of the recording frame, or x, y of the level frame; as numbers or as text."""
 _NEAR_M = 1.0  # how far from a thing a place may lie that means it
 _BESIDE_M = 5.0  # how far outside of the map a pinned place or a forbidden area may lie
-_APART_M = 3.0  # how far apart the boxes of things that are one may be
+_APART_M = 3.0  # how far apart things that are one may be
 _MOST_NAMED = 8
 
 
@@ -382,10 +382,10 @@ def edit_text(edit: Edit) -> str:
 
 
 def _gap_m(one: "Thing", other: "Thing") -> float:
-    """Return how far apart the boxes of two things are."""
-    low, high = one.points.min(axis=0), one.points.max(axis=0)
-    gap = np.maximum(other.points.min(axis=0) - high, low - other.points.max(axis=0))
-    return float(np.linalg.norm(np.maximum(gap, 0.0)))
+    """Return how far apart two things are, from voxel to voxel."""
+    from scipy.spatial import KDTree
+
+    return float(np.min(KDTree(one.points).query(other.points)[0]))
 
 
 def _name(name: str) -> str:
