@@ -1,5 +1,6 @@
 """A live map ends as a build does, answers meanwhile, and refuses what is no frame without losing anything."""
 
+import _thread
 import resource
 import subprocess
 import sys
@@ -21,6 +22,7 @@ from avlmaps.live.gates import EncodingGate, Gates
 from avlmaps.live.kept_back import KeptBack
 from avlmaps.live.live_map import LiveMap
 from avlmaps.live.pose_check import PoseCheck
+from avlmaps.live.replay import end_drive
 from avlmaps.live.saver import Unsaved
 from avlmaps.live.settings import LiveSettings
 from avlmaps.live.status import Tally
@@ -429,7 +431,7 @@ def test_a_drive_shorter_than_the_first_frames_ends_with_what_was_kept(tmp_path:
     np.testing.assert_allclose(kept.feature, every.feature, atol=2e-3)
 
 
-def while_busy(live: LiveMap, numbers: range) -> None:
+def while_busy(live: LiveMap, numbers: range, pause_s: float = 0.0) -> None:
     """Add frames that nobody takes, as the thread that fuses is at another; the first is that one."""
     begun, go_on, check = threading.Event(), threading.Event(), live._check.add
 
@@ -444,6 +446,7 @@ def while_busy(live: LiveMap, numbers: range) -> None:
         one = frame(number)
         live.add_frame(one.rgb, one.depth_m, one.camera, one.world_from_camera, one.stamp_s)
         assert begun.wait(60.0)
+    time.sleep(pause_s)
     go_on.set()
 
 
@@ -478,6 +481,55 @@ def test_late_frames_in_memory_are_bounded(tmp_path: Path, most: int, kept: int)
     status = live.status()
     assert status.dropped == {"late": 27} and status.late_kept == kept
     assert status.encoded + status.encoded_later == (3 + kept if most else status.encoded)
+
+
+def test_a_frame_that_waited_too_long_is_encoded_later(tmp_path: Path) -> None:
+    chosen = replace(LATER, looks=10_000, encoded_share=0.0, fresh_s=0.05)
+    with LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP, live=chosen) as live:
+        for number in range(10):
+            add(live, frame(number))  # who waits for the map is not late
+        wait_for(lambda: live.status().encoded == 10)
+        while_busy(live, range(10, 13), pause_s=0.1)
+        wait_for(lambda: live.status().fused == 13)
+        assert live.status().encoded == 10
+    assert live.status().encoded_later == 3
+
+
+def test_where_nothing_is_new_there_is_time_for_frames_of_before(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(live_map, "_CALM_S", 600.0)
+    chosen = replace(LATER, known_views=2, new_share=0.2, still_m=0.0)
+    with LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP, live=chosen) as live:
+        for number, at in enumerate([*range(18), *range(17, -1, -1)]):
+            add(live, replace(frame(at), index=number, stamp_s=0.1 * number))
+        wait_for(lambda: live.status().encoded_later > 0)
+        assert live.status().dropped["known"] > 0 == live.status().dropped.get("still", 0)
+
+
+def test_ctrl_c_while_it_ends_leaves_out_what_waits(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    said: list[str] = []
+    live = LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP, live=LATER)
+    for number in range(14):
+        add(live, frame(number, step_m=0.005))
+    wait_for(lambda: live.status().encoded + live.status().kept == 14)
+    look_again = live._growing.look_again
+
+    def slowly(one: avlmaps.Frame, *, is_fused: bool) -> None:
+        _thread.interrupt_main()
+        time.sleep(0.5)
+        look_again(one, is_fused=is_fused)
+
+    live._growing.look_again = slowly  # type: ignore[method-assign]
+    within_s = time.monotonic()
+    end_drive(live, said.append)
+    assert time.monotonic() - within_s < 60.0
+    assert "frames wait" in said[0] and "are left out" in said[1] and len(said) == 2
+    assert "encoding what waited" in capsys.readouterr().err
+    status = live.status()
+    assert status.encoded + status.encoded_later < status.fused == 14 and status.unsaved_s == 0.0
+    assert len(open_stored(tmp_path / "map", verify=True).voxels) > 0
+    assert live.close() is live.map
 
 
 @given(st.lists(st.sampled_from(["came", "frozen", "saved"]), max_size=40))

@@ -88,6 +88,7 @@ class Live(ModelVerb):
 def _live(verb: Live) -> dict[str, Any]:
     from avlmaps.cli.build import choose_models
     from avlmaps.live.live_map import SPARSE, LiveMap
+    from avlmaps.live.replay import end_drive
     from avlmaps.live.settings import LiveSettings
     from avlmaps.maps.settings import BuildSettings
 
@@ -110,18 +111,16 @@ def _live(verb: Live) -> dict[str, Any]:
         overwrite=verb.overwrite,
         begins_s=begins_s,
     ) as live:
-
-        def drive(over: Callable[[], bool] = lambda: False) -> None:
-            play(live, over)
-
         if verb.serve or verb.view:
             from avlmaps.cli.live_serving import serve_while
 
-            serve_while(live, drive, verb.port, browse=verb.view)
+            serve_while(live, lambda over: play(live, over), verb.port, browse=verb.view)
         else:
-            drive()
-        if kept := live.status().kept:
-            say(f"looking at up to {kept} frames that there was no time for; what is saved stays meanwhile")
+            try:
+                play(live, lambda: False)
+            except KeyboardInterrupt:
+                say("note: Stopped by Ctrl-C; the map is finished.")
+            end_drive(live)
     status, stored = live.status(), _with_sources(verb, live.map.stored)
     return {
         **describe_map(stored),
@@ -172,10 +171,7 @@ def _robot(verb: Live) -> tuple[Any, float, _Play]:
     inbox = open_ros2(topics)  # before the map's folder is made
 
     def play(live: "LiveMap", over: Callable[[], bool]) -> None:
-        try:
-            follow_ros2(live, topics, verb.give_up_s, over=over, join=lambda _: inbox)
-        except KeyboardInterrupt:
-            say("note: Stopped by Ctrl-C; the map is finished.")
+        follow_ros2(live, topics, verb.give_up_s, over=over, join=lambda _: inbox)
 
     return (0.0, 0.0, 1.0), 0.0, play
 

@@ -10,6 +10,7 @@ from urllib.parse import quote
 from avlmaps.cli.view import open_browser, require_port, run_page
 from avlmaps.core.progress import say
 from avlmaps.live.live_map import LiveMap
+from avlmaps.live.replay import end_drive, end_now
 from avlmaps.maps.store.reader import StoredMap
 from avlmaps.serve.running import listening_socket, url_of
 from avlmaps.serve.service import Service
@@ -59,16 +60,23 @@ class Drive:
         return not self._thread.is_alive()
 
     def end(self) -> None:
-        """Let it end after the frame that it has, wait until the map is closed, and raise what went wrong."""
+        """Let it end after the frame that it has, wait until the map is closed, and raise what went wrong.
+
+        Ctrl-C meanwhile leaves out the frames that wait on the disk.
+        """
         self._over.set()
-        self._thread.join()
+        try:
+            self._thread.join()
+        except KeyboardInterrupt:
+            end_now(self._live)
+            self._thread.join()
         if self._fault is not None:
             raise self._fault
 
     def _run(self) -> None:
         try:
             self._drive(self._over.is_set)
-            self._live.close()
+            end_drive(self._live)
             say("The drive is over; its map is answered on until Ctrl-C.")
         except BaseException as fault:  # noqa: BLE001 - raised where it is waited for
             self._fault = fault

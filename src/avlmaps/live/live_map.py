@@ -9,7 +9,7 @@ writes these maps into the folder. A question uses the snapshot that there is; n
 import contextlib
 import time
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future
 from dataclasses import replace
 from functools import partial
@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from avlmaps.core.errors import AudioError, AvlmapsError, BackendError, MapError, RecordingError
+from avlmaps.core.progress import progress
 from avlmaps.live.gates import LATER_SHARE, EncodingGate, Gates
 from avlmaps.live.kept_back import KeptBack
 from avlmaps.live.pose_check import PoseCheck
@@ -48,12 +49,13 @@ if TYPE_CHECKING:
 SPARSE = BuildSettings(keyframes=KeyframeSettings(translation_m=0.2, rotation_deg=14.0))
 _STEP_S = 0.1
 _IDLE_S = 0.05
+_LOOK_S = 0.1  # at how far the end is
 _MOST_DOUBTS = 100
 _CHANGES = "fused", "corrected", "encoded later"  # what is counted where the map has become another
 _STILL = 1e-3  # times what it is worth: a frame in which the camera stood makes room for every other
 _CALM_S = 0.5  # without a frame, before frames on the disk are looked at
 _LOOKS_S = 0.3  # for keyframes, in each snapshot
-_MOST_LATE = 8  # late frames in memory, until the thread that fuses writes them to the disk
+_MOST_LATE = 24  # late frames in memory, until the thread that fuses writes them to the disk
 _LISTEN_S = 0.25  # from one look for sounds that ended to the next
 _REST_S = 1.0  # between two snapshots, at most, where one takes longer than that
 
@@ -124,7 +126,7 @@ class LiveMap:
         self._late: deque[Frame] = deque()  # older than those in the queue, to be stored
         self._in_hand_s: float | None = None  # when the frame arrived that is being fused
         self._unsaved, self._unsaved_sounds = Unsaved(), Unsaved()
-        self._is_standing = False  # the last frame was dropped as still, and there are frames to look at again
+        self._is_known = False  # the last frame brought nothing new, and there are frames to look at again
         self._is_pressed = False  # whether the frames come by the clock, and are late if we are slow
         self._door, self._ears = Condition(), Lock()
         self._last: Frame | None = None
@@ -136,7 +138,9 @@ class LiveMap:
         self._to_correct: deque[_Correction] = deque()  # under the door
         self._snapshot: tuple[AVLMap, float] | None = None
         self._generation, self._listened_s = 0, 0.0
-        self._closing, self._closed = False, False
+        self._closing, self._closed, self._leaves_kept = False, False, False
+        self._ending = Lock()
+        self._final: AVLMap | None = None  # what ``close`` returned
         self._saver = Saver(self.path, self.settings.save_s, self._doubt, self._break)
         self._fuser = Thread(target=self._fuse_and_answer, name="avlmaps-fuse", daemon=True)
         self._stop_behind = Event()
@@ -296,10 +300,13 @@ class LiveMap:
             doubts=self.doubts,
         )
 
-    def close(self) -> AVLMap:
+    def close(self, *, kept: bool = True) -> AVLMap:
         """Fuse what waits and end as a build does: find up, the floor, places and sounds, write the map and open it.
 
-        With gates, frames that wait on the disk are looked at first (``status().kept``), a sixth of a second each.
+        Args:
+            kept: encode the frames first that wait on the disk (``status().kept``), a sixth of a second each. False
+                leaves them out: what they alone have seen, and their part of the features. So it ends a ``close`` that
+                another thread is in, or that was interrupted.
 
         Raises:
             MapError: no frame came, or the map cannot be written: the last save is still there, and closing may be
@@ -307,8 +314,16 @@ class LiveMap:
             BackendError: an encoder is missing, or broke its protocol.
         """
         with self._door:
-            self._closing = True
+            self._closing, self._leaves_kept = True, self._leaves_kept or not kept
             self._door.notify_all()
+        with self._ending:
+            self._final = self._end() if self._final is None else self._final
+            return self._final
+
+    def _end(self) -> AVLMap:
+        if waiting := self._to_look_at():
+            for _ in progress(self._looks_until_the_end(), "encoding what waited", total=waiting):
+                pass
         self._fuser.join()
         self._kept.close()
         self._stop_behind.set()
@@ -331,6 +346,15 @@ class LiveMap:
         self._generation += 1
         return self._snapshot[0]
 
+    def _looks_until_the_end(self) -> Iterator[None]:
+        """Yield once for each frame on the disk that was looked at, until the thread that fuses has ended."""
+        before = self._to_look_at()
+        while self._fuser.is_alive():
+            self._fuser.join(_LOOK_S)
+            left = self._to_look_at()
+            yield from [None] * (before - left)
+            before = left
+
     def __enter__(self) -> "LiveMap":
         return self
 
@@ -338,7 +362,7 @@ class LiveMap:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         try:
-            self.close()
+            self.close(kept=not isinstance(error, KeyboardInterrupt))
         except AvlmapsError:
             if error is None:
                 raise
@@ -397,7 +421,7 @@ class LiveMap:
         while True:
             with self._door:
                 while not (self._queue or self._closing or self._to_correct or self._asked):
-                    if len(self._kept) and self._growing.sums and (is_calm or self._is_standing):
+                    if self._to_look_at() and self._growing.sums and (is_calm or self._is_known):
                         break
                     is_calm = not self._door.wait(_CALM_S if len(self._kept) else None) or is_calm
                 frame, arrived_s = self._queue.popleft() if self._queue else (None, 0.0)
@@ -409,11 +433,11 @@ class LiveMap:
                 self._fuse_after(late, frame, arrived_s)
             elif self._to_correct:
                 self._correct()
-            elif is_calm or self._is_standing or self._closing:
+            elif is_calm or self._is_known or self._closing:
                 self._look_again()
             if self._asked is not None:  # set by the thread behind alone, which waits for the answer
                 self._freeze()
-            if frame is None and self._closing and not (self._queue or self._to_correct or len(self._kept)):
+            if frame is None and self._closing and not (self._queue or self._to_correct or self._to_look_at()):
                 return
 
     def _fuse_after(self, late: Iterable[Frame], frame: Frame, arrived_s: float) -> None:
@@ -432,14 +456,15 @@ class LiveMap:
                 self._doubt(doubt)
                 growing.doubt(doubt)
             reason = self._gates.reason_against(frame, growing.sums) if self.settings.gates else None
-            self._is_standing = reason == "still" and len(self._kept) > 0
+            self._is_known = reason is not None and len(self._kept) > 0
             if reason is not None:
                 growing.pass_by(frame.stamp_s, frame.world_from_camera)
                 self._tally.drop(reason)
                 self._keep(frame, is_fused=False, times=1.0 if reason == "known" else _STILL)
             else:
-                encode = not self.settings.gates or self._encoding.opens(
-                    frame, len(self._queue) if self._is_pressed else 0
+                encode = not self.settings.gates or (
+                    self._has_time(arrived_s)
+                    and self._encoding.opens(frame, len(self._queue) if self._is_pressed else 0)
                 )
                 named = replace(frame, index=growing.next_index, name=f"{growing.next_index:06d}")
                 growing.add(named, encode=encode)
@@ -458,6 +483,10 @@ class LiveMap:
         self._in_hand_s = None
         self._tally.took(time.perf_counter() - arrived_s)
 
+    def _has_time(self, arrived_s: float) -> bool:
+        """Return whether a frame may be encoded at once."""
+        return not self._is_pressed or time.perf_counter() - arrived_s <= self.settings.fresh_s
+
     def _keep(self, frame: Frame, *, is_fused: bool, times: float = 1.0) -> bool:
         """Keep a frame until there is time, where looking at it will bring something; return whether it is stored."""
         if not self._kept.most or not self._growing.looks_again:
@@ -469,9 +498,13 @@ class LiveMap:
             self._doubt(str(fault))
             return False
 
+    def _to_look_at(self) -> int:
+        """Return how many frames on the disk are to be looked at before the end."""
+        return 0 if self._leaves_kept else len(self._kept)
+
     def _look_again(self) -> None:
         """Encode the frame that is worth most of those on the disk, unless it brings nothing any more."""
-        self._is_standing = False
+        self._is_known = False
         if not (self._growing.sums or self._closing):  # they add to the first frames, which wait for one another
             return
         came_s = time.perf_counter()
@@ -542,7 +575,7 @@ class LiveMap:
             begin_s, state = time.perf_counter(), tuple(map(self._tally.of, _CHANGES))
             if state == known or begin_s < from_s:
                 self._try(self._publish_sounds)
-            elif (came := self._what_came()) is not None and not (self._closing and not len(self._kept)):
+            elif (came := self._what_came()) is not None and not (self._closing and not self._to_look_at()):
                 known = state
                 self._try(partial(self._publish, *came))
                 end_s = time.perf_counter()

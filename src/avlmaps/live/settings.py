@@ -27,9 +27,13 @@ class LiveSettings:
     encoded_share: float = 0.05
     """A fused frame is encoded where more than this share of its points is worth it; else it adds its surface and
     colours alone. Twice that with one frame waiting behind it, and so on."""
+    fresh_s: float = 0.06
+    """A frame that waited longer in the queue, seconds, is not encoded at once, so that those behind it are not late.
+    With gates."""
     kept_frames: int = 256
-    """Frames that were not encoded, or dropped by a gate, and wait on the disk (2.2 MB each at 640x480) until there
-    is time: when no frame comes for half a second, when the robot stands, and at the end. 0 stores none. With gates."""
+    """Frames that were not encoded, came late or were dropped by a gate, and wait on the disk (2.2 MB each at 640x480)
+    until there is time: when no frame comes for half a second, when those that come bring nothing new, and at the end.
+    0 stores none. With gates."""
     later_looks: int = 100
     """As `looks`, for these."""
     first_frames: int = 8
@@ -43,6 +47,15 @@ class LiveSettings:
         for name in ("most_waiting", "known_views", "looks", "later_looks", "first_frames"):
             if not getattr(self, name) >= 1:
                 raise MapError(f"{name} of a live map is {getattr(self, name)}; choose 1 or more.")
-        for name in ("still_m", "still_deg", "new_share", "encoded_share", "kept_frames", "snapshot_s", "save_s"):
+        for name in (
+            "still_m",
+            "still_deg",
+            "new_share",
+            "encoded_share",
+            "fresh_s",
+            "kept_frames",
+            "snapshot_s",
+            "save_s",
+        ):
             if not getattr(self, name) >= 0.0:
                 raise MapError(f"{name} of a live map is {getattr(self, name)}; choose 0 or more.")

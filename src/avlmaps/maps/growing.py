@@ -84,7 +84,8 @@ class GrowingMap:
             encoders: the encoders.
             up_in_world: unit vector; None finds it in the frames.
             wait: frames in which up, the floor and the sensor are found first; ``gravity.frames`` if None.
-            looks_later: keyframes are looked at by ``finish``, and not when they are added.
+            looks_later: keyframes are looked at by ``finish``, and not when they are added; it also finds up and the
+                floor of a walk that has doubled.
             begins_s: what the clock said at time 0, as of a recording.
         """
         self.settings = settings.for_profile(encoders.weight_variance_m2)
@@ -116,6 +117,7 @@ class GrowingMap:
             )
         self._free: FreeViewCollector | None = None
         self._through: ThroughCounts | None = None
+        self._looks_later, self._is_outgrown = looks_later, False  # whether up and the floor are those of half the walk
         self._keyframes = GrowingKeyframes(encoders, self.settings.keyframes, looks_later=looks_later)
         self._sounds: GrowingSounds | None = None
         self._dim: int | None = None
@@ -184,6 +186,8 @@ class GrowingMap:
                 held = self._walk.held()
                 self._sensor, self._ground = estimate_sensor(held, self.settings), self._find_upright(held)
                 self._rehearsal = _Rehearsal()
+            elif self._walk.has_doubled and self._looks_later:
+                self._is_outgrown = True
             elif self._walk.has_doubled:
                 self._ground = self._find_upright(self._walk.held())
             faults: list[BackendError] = []
@@ -414,8 +418,11 @@ class GrowingMap:
         """
         plan = self._plan(came.walk)
         with self.finishing, silence_progress(True):
-            if final or self._upright is None:
-                self._upright = self._upright_of(came.walk.held())[:2]
+            if final or self._upright is None or self._is_outgrown:
+                up, floor, ground = self._upright_of(came.walk.held())
+                self._upright = up, floor
+                if self._is_outgrown:
+                    self._is_outgrown, self._ground = False, ground
             content, info = self._content(plan, came, *self._upright, final, looks_s)
         rig, grid = came.walk.rig, GridSpec(self.settings.voxel_size_m)
         arrays = MapArrays(content.voxels, content.keyframes, content.place_state, content.sounds)
