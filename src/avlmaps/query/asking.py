@@ -52,7 +52,7 @@ class Asked:
         clip: a sound clip, likewise.
         primary: the part that is sought. None: the sentence says it, or the first of object, image, sound, area.
         top: most goals.
-        at: the place of its sounds; None: as the map's settings say.
+        at: the place of its sounds; None: as the map's settings say, else as the words do.
     """
 
     sentence: str = ""

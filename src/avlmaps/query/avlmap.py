@@ -812,7 +812,7 @@ class AVLMap:
             clip: a sound clip; with a sentence, what "this recording" in it means.
             primary: which part is sought; the others say where it is.
             at: the place of a sound: ``robot``, where it was heard, or ``source``, where it came from; by default as
-                ``settings.sounds.at`` says.
+                ``settings.sounds.at`` says, else as the words do.
 
         Raises:
             AskError: there is nothing to ask, both a sentence and parts, or a file that the sentence does not speak of.

@@ -101,7 +101,7 @@ class AskQuery(Struct, forbid_unknown_fields=True):
     top: Annotated[int, Meta(ge=1, le=100, description="Most goals.")] = 3
     at: Annotated[
         HeardAt | None,
-        Meta(description="Place of a sound: robot, where it was heard, or source, where it came from."),
+        Meta(description="Place of a sound: robot, where it was heard, or source. Default: as the words say."),
     ] = None
     intrinsics: Annotated[
         Intrinsics | None,
