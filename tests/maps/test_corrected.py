@@ -261,6 +261,18 @@ def test_a_map_grows_beyond_the_room_that_was_made_for_it() -> None:
     np.testing.assert_array_equal(moved.voxels().feature, np.tile(once.voxels().feature, (6, 1)))
 
 
+def test_the_order_of_submaps_does_not_matter() -> None:
+    parts = [one_submap(Walk(4, seed=seed))[1] for seed in range(5)]
+    poses = [motion(17.0 * n, (0.3 * n, 0.1, 0.0)) @ Walk(4).world_from_camera for n in range(5)]
+    one = MovedSubmaps(concat_submaps(parts), np.concatenate(poses), GridSpec(0.05))
+    other = MovedSubmaps(concat_submaps(parts[::-1]), np.concatenate(poses[::-1]), GridSpec(0.05))
+    for name in ("index", "hits", "views", "sharp"):
+        np.testing.assert_array_equal(getattr(one.evidence(), name), getattr(other.evidence(), name))
+    np.testing.assert_allclose(one.voxels().weight, other.voxels().weight, rtol=1e-6)
+    np.testing.assert_allclose(one.voxels().feature, other.voxels().feature, atol=1e-3)  # a step of a half
+    np.testing.assert_array_equal(one.voxels().last_seen_s, other.voxels().last_seen_s)
+
+
 @given(st.integers(0, 10_000), st.integers(0, 40))
 @settings(max_examples=30, deadline=None)
 def test_features_in_steps_are_off_by_half_a_step_at_most(seed: int, dim: int) -> None:

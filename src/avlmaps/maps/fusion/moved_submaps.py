@@ -4,12 +4,12 @@ What is a sum of a few numbers is added at once. Features are long, and are summ
 a surface alone: until then a list says which of them go where, and how much they count.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from avlmaps.core.arrays import Bool, Float32, Float64, Int32, Int64
+from avlmaps.core.arrays import Bool, Float32, Float64, Int32, Int64, UInt16
 from avlmaps.core.cores import usable_cores
 from avlmaps.core.errors import MapError
 from avlmaps.core.poses import inverse
@@ -24,6 +24,7 @@ _PAIRS_PER_VOXEL = 3  # at first
 _BRICKS = 1024
 _FIELDS = ("index", "weight", "rgb_sum", "rgb_weight", "hits", "views", "sharp", "last_seen_s")
 
+_Pairs = tuple[Int32[np.ndarray, " p"], Int32[np.ndarray, " p"], Float32[np.ndarray, " p"]]
 _Take = Callable[[slice, np.ndarray], None]
 
 
@@ -44,15 +45,15 @@ class MovedSubmaps:
         self._feature, self._scale = submaps.feature, submaps.feature_scale
         moved = np.ascontiguousarray((pose @ inverse(np.asarray(submaps.fused_pose)))[:, :3], np.float64)
         moved[:, :, 3] /= grid.voxel_size_m
-        self._count, self._pair, self._brick = 0, 0, 0
-        self._make_bricks(_BRICKS)
-        self._make_room(kernels.MOST_SAMPLES + len(submaps.index) // 2)
-        self._make_pairs(kernels.MOST_SAMPLES + _PAIRS_PER_VOXEL * len(submaps.index))
-        for number, (first, part, spread, frames) in enumerate(_each(submaps), start=1):
-            _require_within(part[0], moved[frames])
-            self._add(number, first, part, spread, np.ascontiguousarray(moved[frames]))
-        self._index, self._sums = self._index[: self._count], self._sums[: self._count]
-        self._views = self._counts[: self._count, kernels.VIEWS]
+        middle = int(np.searchsorted(submaps.row_offsets[:-1], len(submaps.index) // 2))
+        # Two halves however many cores there are: the same sums in the same order, everywhere.
+        with ThreadPoolExecutor(2) as pool:
+            halves = [pool.submit(_Sums, submaps, half, moved) for half in (range(middle), range(middle, len(submaps)))]
+        sums, others = (half.result() for half in halves)
+        sums.join(others)
+        self._count, self._pairs = sums.count, sums.pairs()
+        self._index, self._sums = sums.index[: sums.count], sums.sums[: sums.count]
+        self._views = sums.counts[: sums.count, kernels.VIEWS]
         self._order = sorted_rows(self._index)
 
     def evidence(self) -> Evidence:
@@ -109,60 +110,9 @@ class MovedSubmaps:
             self._features(np.arange(count), take)
         return table
 
-    def _add(
-        self,
-        number: int,
-        first: int,
-        part: tuple[np.ndarray, ...],
-        spread: Float32[np.ndarray, "n 10"],
-        moved: Float64[np.ndarray, "f 3 4"],
-    ) -> None:
-        """Add one submap."""
-        done = 0
-        while done < len(spread):
-            place = number, first, self._count, done, self._pair, self._brick
-            count, done, pair, brick = kernels.move_rows(
-                part, spread, moved, self._bricks, self._index, self._sums, self._counts, place, self._pairs
-            )
-            self._count, self._pair, self._brick = int(count), int(pair), int(brick)
-            if done == len(spread):
-                return
-            if self._count > len(self._index) - kernels.MOST_SAMPLES:
-                self._make_room(2 * len(self._index))
-            if self._pair > len(self._pairs[0]) - kernels.MOST_SAMPLES:
-                self._make_pairs(2 * len(self._pairs[0]))
-            if self._brick > len(self._bricks[2]) - kernels.MOST_BRICKS:
-                self._make_bricks(2 * len(self._bricks[2]))
-
-    def _make_room(self, rows: int) -> None:
-        """Make room for this many voxels; what is not touched takes no memory."""
-        if self._count:
-            self._index, self._sums = with_rows(self._index, rows), with_rows(self._sums, rows)
-            self._counts = with_rows(self._counts, rows)
-        else:
-            self._index, self._sums = np.zeros((rows, 3), np.int32), np.zeros((rows, kernels.SUM_COLUMNS))
-            self._counts = np.zeros((rows, kernels.COUNT_COLUMNS), np.int32)
-
-    def _make_bricks(self, most: int) -> None:
-        """Make room for this many bricks."""
-        rows = np.full((most, kernels.BRICK_VOXELS), -1, np.int32)
-        index, slots = np.zeros((most, 3), np.int32), np.full(1 << (2 * most).bit_length(), -1, np.int32)
-        if self._brick:
-            _, known, held = self._bricks
-            index[: self._brick], rows[: self._brick] = known[: self._brick], held[: self._brick]
-        rehash(slots, index, self._brick)
-        self._bricks: kernels.Bricks = slots, index, rows
-
-    def _make_pairs(self, most: int) -> None:
-        """Make room for this many pairs, whose rows are 32-bit: 2 billion voxels are half a terabyte of features."""
-        every = np.empty(most, np.int32), np.empty(most, np.int32), np.empty(most, np.float32)
-        for column, array in enumerate(every):
-            array[: self._pair] = self._pairs[column][: self._pair] if self._pair else ()
-        self._pairs: tuple[Int32[np.ndarray, " p"], Int32[np.ndarray, " p"], Float32[np.ndarray, " p"]] = every
-
     def _features(self, rows: Int64[np.ndarray, " k"], take: _Take) -> None:
         """Give the sums of features of some voxels, block by block, from several threads."""
-        target, row_of, weight_of = (column[: self._pair] for column in self._pairs)
+        target, row_of, weight_of = self._pairs
         start, row, weight = np.zeros(self._count + 1, np.int64), np.empty_like(row_of), np.empty_like(weight_of)
         kernels.group_pairs(target, row_of, weight_of, start, row, weight)
         feature, scale = _read_only(np.asarray(self._feature)), _read_only(np.asarray(self._scale))
@@ -176,15 +126,104 @@ class MovedSubmaps:
             list(pool.map(work, blocks(len(rows), feature.shape[1])))
 
 
-def _each(
-    submaps: Submaps,
-) -> Iterator[tuple[int, tuple[np.ndarray, ...], Float32[np.ndarray, "n 10"], slice]]:
-    """Yield of each submap its first row, its sums but for the features, how points lie in its voxels, its frames."""
-    for number in range(len(submaps.row_offsets) - 1):
-        rows = slice(*(int(at) for at in submaps.row_offsets[number : number + 2]))
-        part = tuple(_read_only(np.ascontiguousarray(getattr(submaps, name)[rows])) for name in _FIELDS)
-        spread = np.asarray(submaps.spread[rows]).astype(np.float32)
-        yield rows.start, part, spread, slice(*submaps.frame_offsets[number : number + 2])
+class _Sums:
+    """The sums of some submaps at other poses, without features; what goes where is in its pairs.
+
+    Attributes:
+        count: of voxels.
+        index: which each is, with room for more.
+        sums: `kernels.SUM_COLUMNS` of each.
+        counts: `kernels.COUNT_COLUMNS` of each.
+    """
+
+    def __init__(self, submaps: Submaps, numbers: range, moved: Float64[np.ndarray, "f 3 4"]) -> None:
+        """Add up these submaps, whose frames move so."""
+        self.count, self._pair, self._brick = 0, 0, 0
+        self._make_bricks(_BRICKS)
+        self._make_room(kernels.MOST_SAMPLES + len(submaps.index) // 2)
+        self._make_pairs(kernels.MOST_SAMPLES + _PAIRS_PER_VOXEL * len(submaps.index))
+        for number in numbers:
+            rows = slice(*(int(at) for at in submaps.row_offsets[number : number + 2]))
+            frames = slice(*(int(at) for at in submaps.frame_offsets[number : number + 2]))
+            part = tuple(_read_only(np.ascontiguousarray(getattr(submaps, name)[rows])) for name in _FIELDS)
+            _require_within(part[0], moved[frames])
+            spread = _read_only(np.ascontiguousarray(submaps.spread[rows]).view(np.uint16))
+            self._add(number + 1, rows.start, part, spread, np.ascontiguousarray(moved[frames]))
+
+    def pairs(self) -> _Pairs:
+        """Return the row here, the row of all submaps and the weight of each feature that counts."""
+        target, row, weight = self._pairs
+        return target[: self._pair], row[: self._pair], weight[: self._pair]
+
+    def join(self, others: "_Sums") -> None:
+        """Add the sums of submaps that come after these."""
+        self._make_room(self.count + others.count)
+        self._make_bricks(self._brick + others._brick)
+        self._make_pairs(self._pair + others._pair)
+        to, (_, bricks, rows) = np.empty(others.count, np.int32), others._bricks
+        part = others.index[: others.count], others.sums, others.counts
+        part_bricks = bricks[: others._brick], rows
+        here = self._bricks, self.index, self.sums, self.counts
+        count, brick = kernels.join_rows(part, part_bricks, *here, (self.count, self._brick), to)
+        pairs = slice(self._pair, self._pair + others._pair)
+        target, row, weight = others.pairs()
+        self._pairs[0][pairs], self._pairs[1][pairs], self._pairs[2][pairs] = to[target], row, weight
+        self.count, self._brick, self._pair = int(count), int(brick), pairs.stop
+
+    def _add(
+        self,
+        number: int,
+        first: int,
+        part: tuple[np.ndarray, ...],
+        spread: UInt16[np.ndarray, "n 10"],
+        moved: Float64[np.ndarray, "f 3 4"],
+    ) -> None:
+        """Add one submap."""
+        done = 0
+        while done < len(spread):
+            place = number, first, self.count, done, self._pair, self._brick
+            count, done, pair, brick = kernels.move_rows(
+                part, spread, moved, self._bricks, self.index, self.sums, self.counts, place, self._pairs
+            )
+            self.count, self._pair, self._brick = int(count), int(pair), int(brick)
+            if done == len(spread):
+                return
+            if self.count > len(self.index) - kernels.MOST_SAMPLES:
+                self._make_room(2 * len(self.index))
+            if self._pair > len(self._pairs[0]) - kernels.MOST_SAMPLES:
+                self._make_pairs(2 * len(self._pairs[0]))
+            if self._brick > len(self._bricks[2]) - kernels.MOST_BRICKS:
+                self._make_bricks(2 * len(self._bricks[2]))
+
+    def _make_room(self, rows: int) -> None:
+        """Make room for this many voxels; what is not touched takes no memory."""
+        if self.count:
+            self.index, self.sums = with_rows(self.index, rows), with_rows(self.sums, rows)
+            self.counts = with_rows(self.counts, rows)
+        else:
+            self.index, self.sums = np.zeros((rows, 3), np.int32), np.zeros((rows, kernels.SUM_COLUMNS))
+            self.counts = np.zeros((rows, kernels.COUNT_COLUMNS), np.int32)
+
+    def _make_bricks(self, most: int) -> None:
+        """Make room for this many bricks."""
+        if self._brick and most <= len(self._bricks[2]):
+            return
+        rows = np.full((most, kernels.BRICK_VOXELS), -1, np.int32)
+        index, slots = np.zeros((most, 3), np.int32), np.full(1 << (2 * most).bit_length(), -1, np.int32)
+        if self._brick:
+            _, known, held = self._bricks
+            index[: self._brick], rows[: self._brick] = known[: self._brick], held[: self._brick]
+        rehash(slots, index, self._brick)
+        self._bricks: kernels.Bricks = slots, index, rows
+
+    def _make_pairs(self, most: int) -> None:
+        """Make room for this many pairs, whose rows are 32-bit: 2 billion voxels are half a terabyte of features."""
+        if self._pair and most <= len(self._pairs[0]):
+            return
+        every = np.empty(most, np.int32), np.empty(most, np.int32), np.empty(most, np.float32)
+        for column, array in enumerate(every):
+            array[: self._pair] = self._pairs[column][: self._pair] if self._pair else ()
+        self._pairs: _Pairs = every
 
 
 def _read_only(array: np.ndarray) -> np.ndarray:

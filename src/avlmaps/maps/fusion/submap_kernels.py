@@ -7,7 +7,7 @@ voxel, so that a shift by whole voxels moves voxels, and no shift changes nothin
 """
 
 import numpy as np
-from jaxtyping import Float32, Float64, Int8, Int32, Int64
+from jaxtyping import Float32, Float64, Int8, Int32, Int64, UInt16
 from numba import njit
 
 from avlmaps.core.kernel_types import Real, Whole
@@ -25,6 +25,7 @@ MOSTLY = np.float32(0.9)  # of a voxel's weight: where the other looks hold less
 LEAST_HITS = 0.5  # a voxel gets less than this part of a hit from one that moves: it has none
 # Where each sample lies on an axis that has 0 to 4 of them, lengths of the axis from its middle.
 PLACES = np.array([[(sample + 0.5) / max(steps, 1) - 0.5 for sample in range(STEPS)] for steps in range(STEPS + 1)])
+OF_HALF = np.float32(2.0**112)  # a half's exponent counts from 112 later than a float32's; Numba has no halves
 
 Pairs = tuple[np.ndarray, np.ndarray, np.ndarray]
 Bricks = tuple[np.ndarray, np.ndarray, np.ndarray]
@@ -140,7 +141,7 @@ def _within(value: Real):
 def _targets(
     n: Whole,
     index: Int32[np.ndarray, "n 3"],
-    spread: Float32[np.ndarray, "n columns"],
+    lies: Float32[np.ndarray, " columns"],
     frame: Whole,
     moved: Float64[np.ndarray, "frames 3 4"],
     cell: Int64[np.ndarray, " cells"],
@@ -154,9 +155,9 @@ def _targets(
     ax, ay, az, at = moved[frame, 0, 0], moved[frame, 0, 1], moved[frame, 0, 2], moved[frame, 0, 3]
     bx, by, bz, bt = moved[frame, 1, 0], moved[frame, 1, 1], moved[frame, 1, 2], moved[frame, 1, 3]
     cx, cy, cz, ct = moved[frame, 2, 0], moved[frame, 2, 1], moved[frame, 2, 2], moved[frame, 2, 3]
-    mx, my, mz = np.float64(spread[n, 0]), np.float64(spread[n, 1]), np.float64(spread[n, 2])
-    lxx, lyx, lyy = np.float64(spread[n, 3]), np.float64(spread[n, 4]), np.float64(spread[n, 5])
-    lzx, lzy, lzz = np.float64(spread[n, 6]), np.float64(spread[n, 7]), np.float64(spread[n, 8])
+    mx, my, mz = np.float64(lies[0]), np.float64(lies[1]), np.float64(lies[2])
+    lxx, lyx, lyy = np.float64(lies[3]), np.float64(lies[4]), np.float64(lies[5])
+    lzx, lzy, lzz = np.float64(lies[6]), np.float64(lies[7]), np.float64(lies[8])
     x, y, z = index[n, 0] + 0.5, index[n, 1] + 0.5, index[n, 2] + 0.5
     middle_x = ax * x + ay * y + az * z + at
     middle_y = bx * x + by * y + bz * z + bt
@@ -206,7 +207,7 @@ def _without_slivers(
 @njit(**OPTIONS)
 def move_rows(
     part: tuple[np.ndarray, ...],
-    spread: Float32[np.ndarray, "n columns"],
+    spread: UInt16[np.ndarray, "n columns"],
     moved: Float64[np.ndarray, "frames 3 4"],
     bricks: Bricks,
     index: Int32[np.ndarray, "rows 3"],
@@ -221,7 +222,7 @@ def move_rows(
 
     Args:
         part: (index, weight, rgb_sum, rgb_weight, hits, views, sharp, last_seen_s) of the submap.
-        spread: of `finish_spread`.
+        spread: of `finish_spread`, the bits of its halves.
         moved: (frames, 3, 4) corrected from uncorrected world of each of its frames, voxels.
         bricks: hash table of bricks, (b, 3) which each is, (b, BRICK_VOXELS) rows of its voxels or -1.
         index: (rows, 3), those that are new are written.
@@ -241,12 +242,18 @@ def move_rows(
     cell, share = np.empty(_CELLS + 1, np.int64), np.zeros(_CELLS, np.int64)
     room, brick_room = index.shape[0] - MOST_SAMPLES, rows.shape[0] - MOST_BRICKS
     last_i = last_j = last_k = np.int64(1 << 40)
-    brick = 0
+    brick, bits = 0, np.empty(SPREAD_COLUMNS, np.uint32)
+    lies = bits.view(np.float32)
     for n in range(begin, part_index.shape[0]):
         if count > room or pair > pair_target.shape[0] - MOST_SAMPLES or brick_count > brick_room:
             return count, n, pair, brick_count
-        frame = min(max(np.int64(spread[n, NUMBER] + 0.5), 0), moved.shape[0] - 1)
-        found, samples, i, j, k = _targets(n, part_index, spread, frame, moved, cell, share)
+        for column in range(SPREAD_COLUMNS):
+            half = np.uint32(spread[n, column])
+            bits[column] = (half & np.uint32(0x8000)) << np.uint32(16) | (half & np.uint32(0x7FFF)) << np.uint32(13)
+        for column in range(SPREAD_COLUMNS):
+            lies[column] *= OF_HALF
+        frame = min(max(np.int64(lies[NUMBER] + 0.5), 0), moved.shape[0] - 1)
+        found, samples, i, j, k = _targets(n, part_index, lies, frame, moved, cell, share)
         samples = _without_slivers(found, samples, part_hits[n], cell, share)
         for at in range(found):
             shared, to = share[cell[at]], cell[at]
@@ -287,6 +294,58 @@ def move_rows(
             pair_weight[pair] = amount * part_weight[n]
             pair += 1
     return count, part_index.shape[0], pair, brick_count
+
+
+@njit(**OPTIONS)
+def join_rows(
+    part: tuple[np.ndarray, np.ndarray, np.ndarray],
+    part_bricks: tuple[np.ndarray, np.ndarray],
+    bricks: Bricks,
+    index: Int32[np.ndarray, "rows 3"],
+    sums: Float64[np.ndarray, "rows columns"],
+    counts: Int32[np.ndarray, "rows few"],
+    place: tuple[int, int],
+    to: Int32[np.ndarray, " n"],
+):
+    """Add the voxels of other submaps to a map, which has room for them, brick by brick.
+
+    Args:
+        part: (index, sums, counts) of the others, as those of `move_rows`.
+        part_bricks: (b, 3) which each of their bricks is, (b, BRICK_VOXELS) rows of its voxels or -1.
+        bricks: of the map, as those of `move_rows`.
+        index: likewise.
+        sums: likewise.
+        counts: likewise; the submaps are others, so that their frames are, too.
+        place: count of voxels in the map, and of bricks.
+        to: filled in with the row of the map of each.
+
+    Returns:
+        Count of voxels now, and of bricks.
+    """
+    part_index, part_sums, part_counts = part
+    table, brick_index, rows = bricks
+    others, part_rows = part_bricks
+    count, brick_count = place
+    for one in range(others.shape[0]):
+        brick = int(find_or_insert(others[one, 0], others[one, 1], others[one, 2], table, brick_index, brick_count))
+        brick_count += brick == brick_count
+        for within in range(BRICK_VOXELS):
+            n = part_rows[one, within]
+            if n < 0:
+                continue
+            row = np.int64(rows[brick, within])
+            if row < 0:
+                row = count
+                rows[brick, within] = row
+                index[row, 0], index[row, 1], index[row, 2] = part_index[n, 0], part_index[n, 1], part_index[n, 2]
+                sums[row, LAST_SEEN] = part_sums[n, LAST_SEEN]
+                count += 1
+            for column in range(LAST_SEEN):
+                sums[row, column] += part_sums[n, column]
+            sums[row, LAST_SEEN] = max(sums[row, LAST_SEEN], part_sums[n, LAST_SEEN])
+            counts[row, VIEWS] += part_counts[n, VIEWS]
+            to[n] = row
+    return count, brick_count
 
 
 @njit(**OPTIONS)
