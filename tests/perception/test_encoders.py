@@ -81,7 +81,7 @@ def test_what_an_object_lacks_is_named() -> None:
         Encoders.named("embedded", pixel=Words())
     with pytest.raises(BackendError, match=r"no profile called 'embeded'.*Did you mean embedded"):
         Encoders.named("embeded")
-    with pytest.raises(BackendError, match="'own' has no views backend"):
+    with pytest.raises(BackendError, match="given have no views backend"):
         Encoders(pixels=Words()).load(Kind.VIEWS)
 
 

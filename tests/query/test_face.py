@@ -15,6 +15,7 @@ from hypothesis.extra import numpy as some
 import avlmaps
 from avlmaps.core.errors import AvlmapsError, BackendError, MapError, QueryError, RecordingError
 from avlmaps.maps.settings import GravitySettings
+from avlmaps.query.export_layers import layers_of
 from avlmaps.recordings.example_room import example_truth
 from avlmaps.recordings.memory import MemoryRecording
 from helpers.raycast import render
@@ -206,6 +207,17 @@ def test_raw_features_are_queried_by_words_of_ones_own(folder: Path, tmp_path: P
     live.save(tmp_path / "raw")
     worded = avlmaps.open_map(tmp_path / "raw", encoders=avlmaps.Encoders(pixels=Hues()))
     assert worded.object("red").peak > 0.0
+
+
+def test_a_map_without_a_model_for_things_says_so_and_is_exported(folder: Path) -> None:
+    live = avlmaps.VoxelMap(0.1, avlmaps.Encoders())
+    for frame in avlmaps.open_recording(folder / "rec"):
+        add(live, frame)
+    layers = layers_of(live.map)
+    assert layers.things == () and len(layers.points) == len(live.points) and layers.sounds == ()
+    assert any("names none" in doubt for doubt in live.map.contents().doubts)
+    with pytest.raises((BackendError, MapError), match=r"no pixels backend; .* encoders=avlmaps.Encoders\(pixels"):
+        live.ask("the chair")
 
 
 @pytest.fixture

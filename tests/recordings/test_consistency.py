@@ -16,12 +16,17 @@ from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.wording import Spelling, options_as
 from avlmaps.recordings.camera_axes import opencv_from_axes
-from avlmaps.recordings.consistency.check import check_recording
+from avlmaps.recordings.consistency.causes import cause_of
+from avlmaps.recordings.consistency.check import check_recording, pose_at
 from avlmaps.recordings.consistency.edges import find_edges, shift_of
 from avlmaps.recordings.consistency.sample import Sample, choose_pairs, draw_sample
+from avlmaps.recordings.consistency.suspects import Suspect, Trials
 from avlmaps.recordings.consistency.verdict import Grade, Reason, Verdict
 from avlmaps.recordings.corrections import Corrections
+from avlmaps.recordings.example_room import example_truth
+from avlmaps.recordings.memory import MemoryRecording
 from avlmaps.recordings.open import open_recording
+from avlmaps.recordings.types import Frame
 from avlmaps_sim.bench.recordings.drafts import Draft, RoomWalk
 from avlmaps_sim.bench.recordings.outcomes import Judge, Outcome
 from avlmaps_sim.bench.recordings.situations import situations
@@ -116,6 +121,8 @@ def test_a_wrong_option_is_found_out(right: Draft, tmp_path: Path) -> None:
         ("half of the pictures BGR", Reason.COLOUR),
         ("colour camera 0.3 m beside", Reason.COLOUR),
         ("colour shifted by a sixteenth", Reason.COLOUR),
+        ("poses jump by 2.5 m", Reason.MOTION),
+        ("a third of the pictures black", Reason.COLOUR),
     ],
 )
 def test_a_mistake_is_named(name: str, reason: Reason, right: Draft, tmp_path: Path) -> None:
@@ -123,6 +130,38 @@ def test_a_mistake_is_named(name: str, reason: Reason, right: Draft, tmp_path: P
     found = verdict(situation.change(right, right, np.random.default_rng(0)), tmp_path)
     assert reason in {finding.reason for finding in found.findings}
     assert re.search(situation.cause, " ".join(found.sentences()))
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("all poses the same", "All poses are the same"),
+        ("depth cut off at 2 m", "exactly the largest one, 2 m"),
+    ],
+)
+def test_its_very_cause_is_said(name: str, said: str, right: Draft, tmp_path: Path) -> None:
+    situation = next(one for one in situations() if one.name == name)
+    found = verdict(situation.change(right, right, np.random.default_rng(0)), tmp_path)
+    assert said in " ".join(found.sentences())
+
+
+def test_rotations_and_positions_of_two_conventions_are_read_as_they_were() -> None:
+    walk = example_truth(frames=16)
+    frames = [
+        Frame(i, f"{i:06d}", i / 10.0, walk.rgb[i], walk.depth_m[i], pose, walk.rig)
+        for i, pose in enumerate(walk.world_from_camera)
+    ]
+    other, turned = walk.world_from_camera.copy(), walk.world_from_camera.copy()
+    other[:, :3, 3] = other[:, [2, 0, 1], 3]
+    turned[:, :3, :3] = np.swapaxes(turned[:, :3, :3], 1, 2)
+    for written, suspect in ((other, Suspect(places=(2, 3, 1))), (turned, Suspect(turned_back=True))):
+        read = [replace(frame, world_from_camera=pose) for frame, pose in zip(frames, written, strict=True)]
+        recording = MemoryRecording(read)
+        sample = draw_sample(recording)
+        trial = Trials(sample, pose_at(recording, sample)).run(suspect)
+        assert trial.agreement.same_share > 0.99
+    words = cause_of(Suspect(places=(2, -3, 1)), walk.rig, 0.001, 2.0, "")
+    assert "whose x, y, z they call y, -z, x: write rotations and positions in the axes of one world" in words
 
 
 def test_one_frame_and_none_that_overlaps_say_nothing(right: Draft, tmp_path: Path) -> None:

@@ -44,7 +44,7 @@ class Source:
         if self.name.startswith(GIVEN):
             raise BackendError(
                 f"The {self.kind} of this map were made by an object of the class "
-                f"{self.name.removeprefix(GIVEN)}, which it does not hold; open it with "
+                f"{self.name.removeprefix(GIVEN)}, which it does not hold; open it in Python with "
                 f"encoders=avlmaps.Encoders({self.kind}=...)."
             )
         return load(self.kind, self.name)
@@ -243,6 +243,11 @@ class Encoders:
             BackendError: there is none, or it cannot be loaded.
         """
         if kind not in self.sources:
+            if self.name == _OWN:
+                raise BackendError(
+                    f"The encoders that were given have no {kind} backend; a map that was made without it is queried "
+                    f"with one in Python: encoders=avlmaps.Encoders({kind}=...)."
+                )
             raise BackendError(no_backend(self.name, kind))
         return self.sources[kind].load()
 

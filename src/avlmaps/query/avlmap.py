@@ -408,7 +408,8 @@ class AVLMap:
         things = self.things(names, least_confidence, structure) if "pixels" in models else []
         rooms = self.rooms() if "views" in models else []
         things = with_heard(self, things, are_all=not names)
-        return Contents(things, self.sounds(), rooms, self.stored.info.doubts, self.storeys)
+        unnamed = () if "pixels" in models else ("The map was made without a model for things, so that it names none.",)
+        return Contents(things, self.sounds(), rooms, (*self.stored.info.doubts, *unnamed), self.storeys)
 
     def sounds(self, most_names: int = 3) -> list["SoundEvent"]:
         """Return the sounds of the map in the order of their onset; see ``contents.find_sounds``."""

@@ -124,7 +124,8 @@ def layers_of(
 
     qx, qy, qz, qw = (float(value) for value in to_quaternion(axes))
     boxes: list[Box] = []
-    for thing in opened.things(least_confidence=least_confidence):
+    known = "pixels" in stored.info.models  # else it names none, and shows the rest
+    for thing in opened.things(least_confidence=least_confidence) if known else []:
         corners = space.level(thing.points)
         middle = (corners.min(axis=0) + corners.max(axis=0)) / 2.0
         x, y, z = (float(value) for value in axes[:3, :3] @ middle + axes[:3, 3])

@@ -61,7 +61,17 @@ def _looks(suspect: Suspect, rig: Rig, median_m: float) -> list[str]:
         said.append(f"the camera looks turned by {suspect.rolled_deg:+.0f} degrees about its own axis in its mount")
     if suspect.along_ray:
         said.append("the depth looks like the distance along the ray, not along the camera's axis")
-    return said + _turned(suspect.turn_colour, suspect.turn_depth)
+    return said + _of_two_worlds(suspect) + _turned(suspect.turn_colour, suspect.turn_depth)
+
+
+def _of_two_worlds(suspect: Suspect) -> list[str]:
+    said: list[str] = []
+    if suspect.turned_back:
+        said.append("the rotations look like those of camera_from_world, the positions like those of the camera")
+    if suspect.places is not None:
+        axes = ", ".join(f"{'-' if axis < 0 else ''}{'xyz'[abs(axis) - 1]}" for axis in suspect.places)
+        said.append(f"the positions look written in other axes than the rotations, whose x, y, z they call {axes}")
+    return said
 
 
 def _camera(axes: str) -> str:
@@ -142,4 +152,8 @@ def _by_hand(suspect: Suspect, median_m: float) -> str:
         todo.append("correct the transform from what the poses are of to the camera")
     if suspect.along_ray:
         todo.append("write the depth along the camera's axis (z)")
+    if suspect.turned_back:
+        todo.append("write the inverse of each rotation")
+    if suspect.places is not None:
+        todo.append("write rotations and positions in the axes of one world")
     return ", ".join(todo)

@@ -17,12 +17,14 @@ from avlmaps.recordings.consistency.blind_spots import blind_spots
 from avlmaps.recordings.consistency.causes import cause_of
 from avlmaps.recordings.consistency.edges import Edges, Shift, find_edges, shift_of
 from avlmaps.recordings.consistency.jumps import find_exchanged, find_jump
-from avlmaps.recordings.consistency.sample import Sample, Surfaces, draw_sample
+from avlmaps.recordings.consistency.sample import Sample, Surfaces, draw_sample, steps_between_all
 from avlmaps.recordings.consistency.single_frames import of_colour, of_depth, of_intrinsics, of_motion
 from avlmaps.recordings.consistency.suspects import PoseAt, Trial, Trials, find_cause, find_closer
 from avlmaps.recordings.consistency.verdict import Finding, Grade, Reason, Verdict
 from avlmaps.recordings.corrections import NONE, CorrectedRecording, uncorrected
 from avlmaps.recordings.types import Recording
+
+_STANDS = 0.01  # steps between poses that are one
 
 
 def check_recording(recording: Recording) -> Verdict:
@@ -155,6 +157,8 @@ def _off(after: Agreement, apart: Agreement) -> float:
 
 
 def _other_cause(recording: Recording, sample: Sample, after: Agreement) -> str:
+    if float(steps_between_all(sample.world_from_camera).max(initial=0.0)) < _STANDS:
+        return "All poses are the same, though the pictures are not: the poses are missing, or those of another camera."
     if (exchanged := find_exchanged(recording, sample, after)) is not None:
         return str(exchanged)
     used = after.points >= FEWEST_POINTS

@@ -24,10 +24,17 @@ LEAST_COLOURED = 0.6
 IMPOSSIBLE_COLOURED = 0.05
 # Dark to the eye, and nothing at all.
 DARK, FLAT = 8.0, 1.5
+# More frames than this that are black are no camera that begins.
+MOST_BLACK = 0.1
+# Share of the depths that are exactly the largest one, in the middle of the frames: those of a wall differ.
+MOST_CUT_OFF = 0.05
+FARTHEST_FUSED_M = 10.0
 # Share of pairs with one depth picture although the camera moved.
 MOST_FROZEN = 0.08
 # Faster than anybody walks, frame after frame.
 MOST_SPEED_M_S = 4.0
+# Beyond that pace by as much, one step alone is a jump.
+LEAST_JUMP_M = 0.5
 _NEAR_IN_TIME_S = 1.0
 _CENTRE_MARGIN = 0.2
 _FOCAL_RANGE = (0.25, 4.0)
@@ -122,7 +129,20 @@ def _flat_depth(sample: Sample, there: np.ndarray) -> Iterator[Finding]:
     if len(spread) >= 3 and float(np.median(spread)) < 0.01:
         sentence = "The depth pictures are flat: every pixel has the same depth."
         yield Finding(Reason.DEPTH, Grade.IMPOSSIBLE, sentence, "Check how they were written.")
+    else:
+        yield from _cut_off(sample, there)
     yield from _frozen(sample, np.where(there, sample.depth_m, np.nan), Reason.DEPTH)
+
+
+def _cut_off(sample: Sample, there: np.ndarray) -> Iterator[Finding]:
+    """Find depths that end at one number, as where a range is cut off or "nothing" is written as the farthest."""
+    most_m = float(sample.depth_m.max())
+    shares = [float((d[t] == most_m).mean()) for d, t in zip(sample.depth_m, there, strict=True) if t.any()]
+    share = float(np.median(shares))
+    if share > MOST_CUT_OFF and most_m < FARTHEST_FUSED_M:
+        sentence = f"{share:.0%} of the depths of a frame are exactly the largest one, {most_m:.4g} m."
+        remedy = "They look cut off there, or none was measured: write 0 for these, or the map has a wall there."
+        yield Finding(Reason.DEPTH, Grade.SUSPICIOUS, sentence, remedy)
 
 
 def _frozen(sample: Sample, pictures: np.ndarray, reason: Reason) -> Iterator[Finding]:
@@ -146,6 +166,15 @@ def of_colour(sample: Sample, surfaces: Surfaces) -> Iterator[Finding]:
     spread = sample.grey.std(axis=(1, 2))
     level = float(np.median(sample.grey))
     flat = float((spread < FLAT).mean())
+    black = (spread < FLAT) & (sample.grey.mean(axis=(1, 2)) < DARK)
+    if MOST_BLACK < float(black.mean()) <= 0.5:
+        which = np.flatnonzero(black)
+        sentence = (
+            f"{black.mean():.0%} of the {len(sample)} colour pictures that were looked at are black, from "
+            f"{sample.stamps_s[which[0]]:.2f} to {sample.stamps_s[which[-1]]:.2f} s."
+        )
+        remedy = "Nothing is recognised in them; check the camera, or leave these frames out."
+        yield Finding(Reason.COLOUR, Grade.SUSPICIOUS, sentence, remedy)
     if flat > 0.5:
         shade = "black" if level < DARK else "of one colour"
         sentence = f"{flat:.0%} of the {len(sample)} colour pictures that were looked at are {shade}."
@@ -187,6 +216,17 @@ def of_motion(recording: Recording, found: Agreement, judged: bool) -> Iterator[
     if speed > MOST_SPEED_M_S:
         sentence = f"The camera moves at {speed:.3g} m/s in a quarter of the steps or faster, more than anybody walks."
         remedy = "Check that positions are in metres and stamps in seconds."
+        yield Finding(Reason.MOTION, Grade.SUSPICIOUS, sentence, remedy)
+        return
+    far = np.flatnonzero(moved_m > LEAST_JUMP_M + MOST_SPEED_M_S * apart_s)
+    if len(far):
+        at = int(far[np.argmax(moved_m[far])])
+        sentence = (
+            f"The poses jump by {moved_m[at]:.3g} m within {apart_s[at]:.2g} s between {recording.name(at)} and "
+            f"{recording.name(at + 1)}, faster than anybody walks"
+            f"{f', and at {len(far) - 1} other places' if len(far) > 1 else ''}."
+        )
+        remedy = "If tracking began again there, the map shows the place twice: cut the recording, or fix the poses."
         yield Finding(Reason.MOTION, Grade.SUSPICIOUS, sentence, remedy)
     elif len(recording) >= 20 and pace_s < _NEAR_IN_TIME_S and not judged and found.outside > 0.0:
         sentence = (

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import permutations, product
 
 import numpy as np
 from jaxtyping import Float
@@ -91,6 +91,9 @@ class Suspect:
         turn_colour: how colour pictures are turned.
         turn_depth: how depth pictures are turned.
         along_ray: whether the depth is the distance along the ray.
+        turned_back: whether the rotations alone are those of camera_from_world.
+        places: which axes of the positions are x, y and z of the rotations, counted from 1, negative where they point
+            the other way; None where they are the same.
     """
 
     given: Corrections = NONE
@@ -103,6 +106,8 @@ class Suspect:
     turn_colour: Turn | None = None
     turn_depth: Turn | None = None
     along_ray: bool = False
+    turned_back: bool = False
+    places: tuple[int, int, int] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,7 +169,7 @@ class Trials:
         median_m, scale, pose = (
             self._median_m * suspect.scale,
             suspect.scale,
-            reread_poses(pose, given) @ _rolled(suspect.rolled_deg),
+            _replaced(reread_poses(pose, given), suspect) @ _rolled(suspect.rolled_deg),
         )
         after = compare(sample.only(sample.follows), surfaces, pose, rig, scale, _FLOOR_SHARE * median_m)
         apart = compare(sample.only(~sample.follows), surfaces, pose, rig, scale, _APART_FLOOR_SHARE * median_m)
@@ -194,6 +199,19 @@ class Trials:
         if np.isfinite(found.likeness) and found.textured > 0.05 * self._points:
             score *= 0.5 + 0.5 * max(found.likeness, 0.0)
         return score
+
+
+def _replaced(pose: Float[np.ndarray, "f 4 4"], suspect: Suspect) -> Float[np.ndarray, "f 4 4"]:
+    """Return poses whose rotations or positions alone are read in another way."""
+    if not suspect.turned_back and suspect.places is None:
+        return pose
+    other = pose.copy()
+    if suspect.turned_back:
+        other[:, :3, :3] = np.swapaxes(pose[:, :3, :3], 1, 2)
+    if suspect.places is not None:
+        axes = np.array(suspect.places)
+        other[:, :3, 3] = np.sign(axes) * pose[:, :3, 3][:, np.abs(axes) - 1]
+    return other
 
 
 def _rolled(degrees: float) -> Float[np.ndarray, "4 4"]:
@@ -274,7 +292,7 @@ def find_cause(trials: Trials, enough: Callable[[Trial], bool]) -> Trial | None:
     if best is not None:
         return _refined(trials, best)
     posed = [trials.run(suspect) for suspect in _posed()]
-    best = _best([trial for trial in posed if enough(trial)])
+    best = _best([trial for trial in (*posed, *map(trials.run, _apart())) if enough(trial)])
     if best is not None:
         return best
     # two mistakes of different kinds: what helped most of how poses are read, with each scale and camera
@@ -325,6 +343,15 @@ def _posed() -> Iterator[Suspect]:
         yield Suspect(Corrections(poses=kinds, camera_axes=axes))
 
 
+def _apart() -> Iterator[Suspect]:
+    """Yield rotations and positions that are of two conventions."""
+    yield Suspect(turned_back=True)
+    for x, y, z in permutations((1, 2, 3)):
+        for signs in product((1, -1), repeat=3):
+            if (x, y, z, *signs) != (1, 2, 3, 1, 1, 1):
+                yield Suspect(places=(x * signs[0], y * signs[1], z * signs[2]))
+
+
 def _scales() -> Iterator[Suspect]:
     yield from (Suspect(scale=scale) for scale in _SCALES)
 
@@ -363,6 +390,8 @@ def _with(a: Suspect, b: Suspect) -> Suspect:
         turn_colour=a.turn_colour,
         turn_depth=a.turn_depth,
         along_ray=a.along_ray,
+        turned_back=a.turned_back,
+        places=a.places,
     )
 
 

@@ -62,10 +62,14 @@ def _of_poses() -> Iterator[Situation]:
         "inverse poses of an OpenGL camera", group, _on_poses(lambda p: poses.inverse(p @ _GL)), "camera-from-world"
     )
     yield Situation("rotations transposed", group, _on_poses(_transposed), geometry)
+    yield Situation(
+        "positions in other axes", group, _on_poses(lambda p: _placed(p, p[:, [2, 0, 1], 3])), f"other axes|{geometry}"
+    )
     yield Situation("poses of another walk", group, lambda d, o, g: replace(d, poses=o.poses[: len(d)]), geometry)
     yield Situation("poses reversed", group, _on_poses(lambda p: p[::-1].copy()), geometry)
     yield Situation("all poses the same", group, _on_poses(lambda p: np.repeat(p[:1], len(p), axis=0)), geometry)
     yield Situation("poses jump by 0.5 m", group, _on_poses(lambda p: _jump(p, (0.5, 0.0, 0.0))), geometry)
+    yield Situation("poses jump by 2.5 m", group, _on_poses(lambda p: _jump(p, (2.5, 0.0, 0.0))), geometry)
     yield Situation("poses turn by 20 degrees", group, _on_poses(lambda p: _jump(p, (0.0, 0.0, 0.0), 20.0)), geometry)
     yield Situation(
         "noise of 5 cm and 3 degrees", group, lambda d, o, g: replace(d, poses=_noisy(d.poses, g)), geometry
@@ -84,6 +88,12 @@ def _transposed(written: np.ndarray) -> np.ndarray:
     turned = written.copy()
     turned[:, :3, :3] = np.swapaxes(written[:, :3, :3], 1, 2)
     return turned
+
+
+def _placed(written: np.ndarray, positions: np.ndarray) -> np.ndarray:
+    placed = written.copy()
+    placed[:, :3, 3] = positions
+    return placed
 
 
 def _jump(written: np.ndarray, by_m: tuple[float, float, float], degrees: float = 0.0) -> np.ndarray:
@@ -189,6 +199,7 @@ def _of_depth() -> Iterator[Situation]:
         _on_depth(lambda d: np.roll(d, d.shape[1] // 16, axis=0)),
         depth,
     )
+    yield Situation("depth cut off at 2 m", group, _on_depth(lambda d: np.minimum(d, 2000)), depth)
     yield Situation("depth of two neighbours exchanged", group, _neighbours(1, 0, colour=False), "exchanged|depth")
     yield Situation("no depth in half of the frames", group, _half_empty, "no depth")
     yield Situation("depth froze", group, _frozen, depth)
@@ -256,6 +267,7 @@ def _of_colour() -> Iterator[Situation]:
         lambda d, o, g: _reordered(d, np.minimum(np.arange(len(d)) + 3, len(d) - 1), colour=True, depth=False), colour,
     )  # fmt: skip
     yield Situation("colour black", group, _on_colour(lambda c: np.zeros_like(c)), "black")
+    yield Situation("a third of the pictures black", group, _black, "black")
     yield Situation("colour dark", group, _on_colour(lambda c: (c * 0.03).astype(np.uint8)), "dark|one colour|black")
     yield Situation(
         "colour 10 frames late",
@@ -263,6 +275,11 @@ def _of_colour() -> Iterator[Situation]:
         lambda d, o, g: _reordered(d, np.minimum(np.arange(len(d)) + 10, len(d) - 1), colour=True, depth=False),
         colour,
     )
+
+
+def _black(draft: Draft, other: Draft, rng: np.random.Generator) -> Draft:
+    third = len(draft) // 3
+    return replace(draft, rgb=(*map(np.zeros_like, draft.rgb[:third]), *draft.rgb[third:]))
 
 
 def _bgr(chosen: Callable[[int, int, np.random.Generator], bool]) -> Change:
