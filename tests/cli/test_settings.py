@@ -174,6 +174,7 @@ SAME: dict[str, Callable[[], Any]] = {
     "bench.trials": of(SourcesBench, "trials"),
     "bench.rate": of(LiveBench, "rate"),
     "bench.kills": of(LiveBench, "kills"),
+    "bench.ends": of(LiveBench, "ends"),
 }
 # What a person meets first: nothing behind them has such a default.
 OWN = {

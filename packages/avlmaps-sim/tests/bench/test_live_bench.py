@@ -15,16 +15,36 @@ from helpers.walked_room import write_walk
 @pytest.mark.slow
 def test_a_drive_ends_as_its_build_and_says_what_it_took(tmp_path: Path) -> None:
     walk, used = write_walk(tmp_path / "rec"), avlmaps.Encoders.named("colours")
-    tables = run_live([walk], used, "colours", LiveBench(laps=2, kills=0, rate=20.0), 0)
+    tables = run_live([walk], used, "colours", LiveBench(laps=2, kills=0, rate=20.0), 0, tmp_path)
     for table in tables.values():
         assert all(len(row) == len(table["columns"]) for row in table["rows"])
     ends = tables["the end beside the build of all frames"]
-    gated, every = (dict(zip(ends["columns"], row, strict=True)) for row in ends["rows"])
+    gated, by_clock, every = (dict(zip(ends["columns"], row, strict=True)) for row in ends["rows"])
+    assert by_clock["pace"] == "20 times" and gated["late"] == every["late"] == 0
     assert every["equal bit by bit"] == "yes" and every["voxels live"] == every["build"]
     assert (gated["gates"], every["gates"]) == ("on", "off") and every["in one alone"] == 0
     assert [row[1] for row in tables["laps over the same surface"]["rows"]] == [1, 2]
     with pytest.raises(BenchError, match="name one or more"):
-        run_live([], used, "colours", LiveBench(), 0)
+        run_live([], used, "colours", LiveBench(), 0, tmp_path)
+
+
+def test_kills_that_are_stored_are_not_made_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    walk, used, killed = write_walk(tmp_path / "rec"), avlmaps.Encoders.named("colours"), []
+
+    def kill(*args: object) -> float:
+        killed.append(args)
+        if len(killed) == 3:
+            raise KeyboardInterrupt
+        return float(len(killed))
+
+    monkeypatch.setattr("avlmaps_sim.bench.live.suite.lost_s", kill)
+    chosen = LiveBench(laps=0, kills=4)
+    with pytest.raises(KeyboardInterrupt):
+        run_live([walk], used, "colours", chosen, 0, tmp_path / "out")
+    (table,) = run_live([walk], used, "colours", chosen, 0, tmp_path / "out").values()
+    assert len(killed) == 5 and table["rows"] == [[4, 4, 3.0, 5.0, 0]]
+    again = run_live([walk], used, "colours", LiveBench(laps=0, kills=2), 0, tmp_path / "out")
+    assert len(killed) == 5 and again["kills at random moments"]["rows"] == [[2, 2, 1.5, 2.0, 0]]
 
 
 @pytest.mark.slow

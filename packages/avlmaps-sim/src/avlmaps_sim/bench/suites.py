@@ -100,7 +100,7 @@ def run_suite(suite: str, inputs: SuiteInputs, out: Path) -> dict[str, Any]:
     elif suite == "live":
         from avlmaps_sim.bench.live.suite import LiveBench, run_live
 
-        tables = run_live(inputs.scenes, used, inputs.profile, inputs.live or LiveBench(), inputs.seed)
+        tables = run_live(inputs.scenes, used, inputs.profile, inputs.live or LiveBench(), inputs.seed, out)
     elif suite == "sources":
         from avlmaps_sim.bench.sources.suite import SourcesBench, run_sources
 

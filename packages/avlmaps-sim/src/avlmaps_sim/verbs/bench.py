@@ -125,7 +125,7 @@ class Bench(ModelVerb):
     days: Annotated[int | None, arg(metavar="N")] = None
     """Number of days of each home, the first included (change). Default: 5."""
     laps: Annotated[int, arg(metavar="N")] = 2
-    """How often each recording is driven, forth and back (live)."""
+    """How often each recording is driven, forth and back; 0 for kills alone (live)."""
     rate: Annotated[float, arg(metavar="FACTOR")] = 1.0
     """Speed of these drives: at 4, an hour of laps takes a quarter of one, and more frames are late (live)."""
     rooms: Annotated[Path | None, arg(metavar="DIR")] = None
@@ -133,7 +133,9 @@ class Bench(ModelVerb):
     trials: Annotated[int, arg(metavar="N")] = 12
     """Number of trials of each condition in the one room (sources)."""
     kills: Annotated[int, arg(metavar="N")] = 40
-    """How many live maps are killed at a random moment (live)."""
+    """How many live maps are killed at a random moment; those in --out are not repeated (live)."""
+    ends: bool = True
+    """Whether a drive's end is compared with the build, and it is also driven as fast as the map takes it (live)."""
     indexing: Annotated[Indexing, OmitArgPrefixes] = field(default_factory=Indexing)
     """Options of the suites indexing, objects and navigation."""
     navigation: Annotated[Navigation, OmitArgPrefixes] = field(default_factory=Navigation)
@@ -191,11 +193,13 @@ class Bench(ModelVerb):
         """Return the settings of the suite live."""
         from avlmaps_sim.bench.live.suite import LiveBench
 
-        if self.laps < 1 or self.kills < 0:
-            raise UsageError(f"--laps is {self.laps} and --kills {self.kills}; choose 1 lap or more, 0 kills or more.")
+        if min(self.laps, self.kills) < 0 or not self.laps + self.kills:
+            raise UsageError(
+                f"--laps is {self.laps} and --kills {self.kills}; choose 0 or more, and 1 or more of one of them."
+            )
         if not self.rate > 0.0:
             raise UsageError(f"--rate is {self.rate:g}; choose a positive number.")
-        return LiveBench(self.laps, self.kills, self.rate)
+        return LiveBench(self.laps, self.kills, self.rate, self.ends)
 
     def sources_settings(self) -> "SourcesBench":
         """Return the settings of the suite sources."""

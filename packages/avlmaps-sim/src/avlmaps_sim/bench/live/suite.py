@@ -1,13 +1,19 @@
 """The tables of `avlmaps bench live`."""
 
+import json
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
 
+from avlmaps.core.files import write_bytes_atomically
+from avlmaps.core.progress import say
+from avlmaps.core.version import __version__
 from avlmaps.core.wording import option
+from avlmaps.live import live_map
 from avlmaps.live.settings import LiveSettings
 from avlmaps.maps.build import build_map
 from avlmaps.maps.store.reader import StoredMap
@@ -29,17 +35,21 @@ class LiveBench:
     """What can be chosen.
 
     Attributes:
-        laps: how often each recording is driven at its own pace.
-        kills: how many processes are killed.
+        laps: how often each recording is driven at its own pace; 0 measures kills alone.
+        kills: how many processes are killed; those that a folder of work holds, of the same code, are not repeated.
         rate: how many times faster than it was recorded a recording is driven.
+        ends: whether its end is compared with the build, and it is also driven as fast as the map takes it.
     """
 
     laps: int = 2
     kills: int = 40
     rate: float = 1.0
+    ends: bool = True
 
 
-def run_live(scenes: Sequence[Path], used: Encoders, profile: str, chosen: LiveBench, seed: int) -> dict[str, Table]:
+def run_live(
+    scenes: Sequence[Path], used: Encoders, profile: str, chosen: LiveBench, seed: int, out: Path
+) -> dict[str, Table]:
     """Return the tables.
 
     Args:
@@ -48,6 +58,7 @@ def run_live(scenes: Sequence[Path], used: Encoders, profile: str, chosen: LiveB
         profile: their profile, for processes that are killed.
         chosen: laps and kills.
         seed: of the moments of the kills.
+        out: folder whose ``work`` stores the outcome of each kill.
 
     Raises:
         BenchError: no recording was given, or one of fewer than two frames.
@@ -59,27 +70,27 @@ def run_live(scenes: Sequence[Path], used: Encoders, profile: str, chosen: LiveB
     laps: _Rows = []
     ends: _Rows = []
     kills: list[float] = []
-    rng = np.random.default_rng(seed)
     for path in scenes:
         recording, name = open_recording(path), path.resolve().name
         if len(recording) < 2:
             raise BenchError(f"{path} has {len(recording)} frames; a drive takes two or more.")
         with tempfile.TemporaryDirectory() as folder:
             place = Path(folder)
-            for rate in (chosen.rate, None):
+            for rate in _paces(chosen):
                 found = play(
                     recording, place / "live", used, rate=rate, laps=chosen.laps if rate else 1,
                     settings=LiveSettings(),
                 )  # fmt: skip
-                word = "as fast as it can" if rate is None else "its own" if rate == 1.0 else f"{rate:g} times"
+                word = _pace_word(rate)
                 pace.append([name, word, *_pace(found)])
                 processor.append([name, word, *_processor(found)])
                 if rate:
                     shown = np.unique(np.linspace(0, len(found.laps) - 1, _SHOWN_LAPS).astype(int)).tolist()
                     laps += [[name, lap + 1, *found.laps[lap]] for lap in shown]
-            ends += _ends(name, recording, place, used)
-            kills += [lost_s(path, place / "killed", profile, rng) for _ in range(chosen.kills)]
-    return {
+            if chosen.laps and chosen.ends:
+                ends += _ends(name, recording, place, used, chosen.rate)
+            kills += _kills(path, place / "killed", profile, chosen.kills, seed, out / "work")
+    tables = {
         "pace": _table(
             "recording|pace|frames|s|frames/s|fused|encoded|late|frame to map ms p50|p95|questions|question ms p50|p95"
             "|most unsaved s|load of the machine|close s|encoded later|late stored", pace,
@@ -87,13 +98,23 @@ def run_live(scenes: Sequence[Path], used: Encoders, profile: str, chosen: LiveB
         "processor time a frame, ms": _table("recording|pace|all|fusing|snapshots|saving", processor),
         "laps over the same surface": _table("recording|lap|voxels|keyframes|fused until then|MB", laps),
         "the end beside the build of all frames": _table(
-            "recording|gates|voxels live|build|equal bit by bit|things in both|in one alone|within a voxel|within 0.1 m"
-            "|median m", ends,
+            "recording|gates|pace|late|voxels live|build|equal bit by bit|things in both|in one alone|within a voxel"
+            "|within 0.1 m|median m", ends,
         ),
         "kills at random moments": _table(
             "kills|whole maps left|lost s median|most|lost more than 5 s", _killed(kills)
         ),
     }  # fmt: skip
+    return {name: table for name, table in tables.items() if table["rows"]}
+
+
+def _pace_word(rate: float | None) -> str:
+    return "as fast as it can" if rate is None else "its own" if rate == 1.0 else f"{rate:g} times"
+
+
+def _paces(chosen: LiveBench) -> tuple[float | None, ...]:
+    """Return the rates of the drives; None is as fast as the map takes it."""
+    return () if not chosen.laps else (chosen.rate, None) if chosen.ends else (chosen.rate,)
 
 
 def _table(columns: str, rows: _Rows) -> Table:
@@ -120,20 +141,37 @@ def _processor(found: Played) -> list[float]:
     return [round(found.processor_ms[name], 1) for name in ("all", "fusing", "snapshots", "saving")]
 
 
+def _kills(recording: Path, path: Path, profile: str, kills: int, seed: int, work: Path) -> list[float]:
+    """Return how much each kill lost; those of before are read from the folder of work, and each new one is added."""
+    code = [file.read_bytes() for file in sorted(Path(live_map.__file__).parent.glob("*.py"))]
+    facts = recording.resolve().name, profile, seed, __version__, sha256(b"".join(code)).hexdigest()
+    stored = work / f"live-kills-{sha256(repr(facts).encode()).hexdigest()[:12]}.json"
+    lost: list[float] = json.loads(stored.read_bytes())[:kills] if stored.is_file() else []
+    if lost:
+        say(f"live: {len(lost)} kills of before are taken from {stored}")
+    for number in range(len(lost), kills):
+        lost.append(lost_s(recording, path, profile, np.random.default_rng([seed, number])))
+        stored.parent.mkdir(parents=True, exist_ok=True)
+        write_bytes_atomically(stored, json.dumps(lost).encode())
+        say(f"live: kill {number + 1} of {kills} lost {lost[-1]:.1f} s")
+    return lost
+
+
 def _killed(lost: list[float]) -> list[list[object]]:
     if not lost:
         return []
     return [[len(lost), len(lost), round(float(np.median(lost)), 1), round(max(lost), 1), sum(s > 5.0 for s in lost)]]
 
 
-def _ends(name: str, recording: Recording, place: Path, used: Encoders) -> list[list[object]]:
-    """Compare maps at the end of a drive, with gates and without, with the build."""
+def _ends(name: str, recording: Recording, place: Path, used: Encoders, rate: float) -> list[list[object]]:
+    """Compare maps at the end of a drive, with gates, by the clock too, and without, with the build."""
     built = build_map(recording, place / "built", used, progress=False, allow=["geometry", "colour"])
     rows: list[list[object]] = []
-    for gates in (True, False):
-        play(recording, place / "end", used, rate=None, settings=LiveSettings(gates=gates))
-        live = AVLMap.open(place / "end")
-        rows.append([name, "on" if gates else "off", *_compared(live, AVLMap(built))])
+    for gates, pace in ((True, None), (True, rate), (False, None)):
+        played = play(recording, place / "end", used, rate=pace, settings=LiveSettings(gates=gates))
+        late = 0 if played.status is None else played.status.dropped.get("late", 0)
+        compared = _compared(AVLMap.open(place / "end"), AVLMap(built))
+        rows.append([name, "on" if gates else "off", _pace_word(pace), late, *compared])
     return rows
 
 
