@@ -57,6 +57,8 @@ if TYPE_CHECKING:
     from avlmaps.query.object_settings import ObjectSettings
     from avlmaps.query.voxel_map import VoxelMap
     from avlmaps.recordings.audio import Sound
+    from avlmaps.recordings.channels import ChannelSound
+    from avlmaps.recordings.microphones import Microphones
     from avlmaps.recordings.open import open_recording
     from avlmaps.recordings.types import Frame, Recording
     from avlmaps.recordings.writer import RecordingWriter
@@ -89,6 +91,8 @@ _HOMES = {
         "query.object_settings": "ObjectSettings",
         "query.voxel_map": "VoxelMap",
         "recordings.audio": "Sound",
+        "recordings.channels": "ChannelSound",
+        "recordings.microphones": "Microphones",
         "recordings.open": "open_recording",
         "recordings.types": "Frame Recording",
         "recordings.writer": "RecordingWriter",
@@ -105,6 +109,7 @@ __all__ = [
     "BackendError",
     "BodyShape",
     "BuildSettings",
+    "ChannelSound",
     "Encoders",
     "Frame",
     "FrameSettings",
@@ -117,6 +122,7 @@ __all__ = [
     "LiveSettings",
     "Located",
     "MapError",
+    "Microphones",
     "Modality",
     "NavigationError",
     "ObjectSettings",

@@ -1,5 +1,6 @@
 """Sounds that come piece by piece are, at the end, those of the whole track; before, they are listed soon."""
 
+import contextlib
 from dataclasses import fields
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from avlmaps.maps.audio.segmentation import segment
 from avlmaps.maps.audio.settings import HearingSettings
 from avlmaps.maps.types import HeardSounds
 from avlmaps.recordings.audio import AudioTrack, Sound
+from avlmaps.recordings.channels import ChannelSound, read_channels
 from avlmaps.recordings.growing_track import GAP_S, GrowingTrack
 
 PLAIN = HearingSettings()
@@ -153,6 +155,7 @@ def test_a_clock_that_drifts_stays_within_the_gap(tmp_path: Path) -> None:
         (Sound(np.full(5, np.nan, np.float32), RATE_HZ), None, "not finite numbers"),
         (Sound(np.full(5, 900.0, np.float32), RATE_HZ), None, r"as large as 900; they must lie in \[-1, 1\]"),
         (Sound(np.zeros(5, np.float32), RATE_HZ), "now", "must be a finite number of seconds, not 'now'"),
+        (ChannelSound(np.zeros((2, 5), np.float32), RATE_HZ), None, r"has 2 channel\(s\), those before 1"),
         (Sound(np.zeros(1600, np.float32), RATE_HZ), 0.2, r"lies before the end of the sound that came \(1.000 s\)"),
         (Sound(np.zeros(5, np.float32), RATE_HZ), 1.7e9, "after the sound before it ended"),
     ],
@@ -167,6 +170,31 @@ def test_what_is_no_piece_of_the_track_is_refused_and_costs_nothing(
     assert track.end_s == 1.0
     track.add(Sound(np.zeros(RATE_HZ, np.float32), RATE_HZ))
     assert track.end_s == 2.0
+
+
+@given(pieces=st.lists(st.tuples(st.integers(1, 4000), st.integers(-300, 600)), min_size=1, max_size=6))
+def test_channels_stay_beside_one_another_however_the_track_is_cut(
+    pieces: list[tuple[int, int]], tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    """What every channel holds is what the first holds, plus its number: through gaps and overlaps."""
+    track = GrowingTrack(tmp_path_factory.mktemp("channels") / "track.f32")
+    rng, at_s = np.random.default_rng(len(pieces)), 0.0
+    off = np.array([0.0, 0.25, 0.5], np.float32)
+    for count, gap_ms in pieces:
+        first = rng.uniform(-0.5, 0.2, count).astype(np.float32)
+        with contextlib.suppress(AudioError):  # a piece that came already
+            track.add(ChannelSound(first + off[:, None], RATE_HZ), at_s)
+        at_s = (track.end_s or 0.0) + gap_ms / 1000.0
+    whole = track.track
+    assert whole is not None and whole.channels == 3
+    every = read_channels(whole, whole.start_s, whole.end_s).samples
+    sounds = every.any(axis=0)
+    np.testing.assert_allclose((every - every[0])[:, sounds], np.tile(off[:, None], sounds.sum()), atol=1e-6)
+    np.testing.assert_array_equal(whole.read(whole.start_s, whole.end_s).samples, every[0])
+    half = whole.since(every.shape[1] // 2)
+    np.testing.assert_array_equal(
+        read_channels(half, half.start_s, half.end_s).samples, every[:, every.shape[1] // 2 :]
+    )
 
 
 def test_a_track_alone_on_a_walk_without_sounds_has_none(tmp_path: Path) -> None:

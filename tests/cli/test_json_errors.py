@@ -30,7 +30,7 @@ ERRORS = (
     (("live", "nowhere", "--out", "OUT"), 1, "recording"),
     (("live", "--out", "OUT"), 2, "usage"),
     (("live", "REC", "--out", "OUT", "--source", "ros2"), 2, "usage"),
-    (("live", "REC", "--out", "OUT", "--topics", "rgb=/rgb"), 2, "usage"),
+    (("live", "REC", "--out", "OUT", "--topics", "rgb=/rgb"), 1, "recording"),
     (("merge", "nowhere.avlmap", "MAP", "--out", "OUT"), 1, "map"),
     (("changes", "nowhere.avlmap"), 1, "map"),
     (("edit", "nowhere.avlmap"), 1, "map"),

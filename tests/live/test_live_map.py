@@ -282,6 +282,56 @@ def test_sounds_are_in_the_map_with_the_frames(tmp_path: Path) -> None:
     assert heard == pytest.approx(1.0, abs=0.1)
 
 
+def test_channels_that_are_not_the_microphones_and_directions_out_of_order_cost_nothing(tmp_path: Path) -> None:
+    with LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP, live=EVERY, microphones="square4") as live:
+        add(live, frame(0))
+        four = avlmaps.ChannelSound(np.zeros((4, 1600), np.float32), 16_000)
+        live.add_audio(four, 0.0)
+        for chunk, said in (
+            (avlmaps.ChannelSound(four.samples[:2], 16_000), "2 channel.s., but 4 microphone.s. are described"),
+            (avlmaps.Sound(four.samples[0], 16_000), "1 channel.s., those before 4"),
+            (avlmaps.ChannelSound(four.samples, 8_000), "8000 samples a second, those before 16000"),
+        ):
+            with pytest.raises(avlmaps.AudioError, match=said):
+                live.add_audio(chunk)
+        live.add_directions(0.1, 1.5)
+        live.add_directions([0.2, 0.3], [1.5, -1.5])
+        for stamp_s, azimuth_rad, said in (
+            (0.3, 1.0, "0.300 s, and one of 0.300 s came before"),
+            ([0.5, 0.4], [1.0, 1.0], "stamps must rise"),
+            (0.5, 90.0, "look like degrees"),
+            ([0.5, 0.6], [1.0], "as many numbers as there are stamps"),
+            (0.5, None, "azimuth_rad is None"),
+            (0.5, "left", "azimuth_rad is 'left'"),
+        ):
+            with pytest.raises(avlmaps.RecordingError, match=said):
+                live.add_directions(stamp_s, azimuth_rad)
+        with pytest.raises(avlmaps.AudioError, match="before the first piece"):
+            live.place_microphones(avlmaps.Microphones(np.zeros((1, 3))))
+        assert live.status().refused == 9
+        live.add_audio(four)
+        live.add_directions(0.5, 1.0)
+        track = live._growing.sound_track
+        assert track is not None and (track.end_s, track.channels) == (0.2, 4)
+        assert not live.doubts
+
+
+def test_one_channel_of_several_microphones_is_a_doubt_and_several_without_places_are_mixed(tmp_path: Path) -> None:
+    with LiveMap(tmp_path / "one", ENCODERS, up_in_world=UP, live=EVERY, microphones="stereo") as live:
+        add(live, frame(0))
+        live.add_audio(avlmaps.Sound(np.zeros(1600, np.float32), 16_000))
+        assert "one channel, and 2 microphones" in live.doubts[0]
+    with LiveMap(tmp_path / "two", ENCODERS, up_in_world=UP, live=EVERY) as live:
+        add(live, frame(0))
+        live.add_audio(avlmaps.ChannelSound(np.array([[0.5] * 9, [0.1] * 9], np.float32), 16_000))
+        track = live._growing.sound_track
+        assert track is not None and track.track is not None and track.channels == 1
+        np.testing.assert_allclose(track.track.read().samples, 0.3, atol=1e-6)
+    with pytest.raises(avlmaps.RecordingError, match="no microphones called 'cube9'"):
+        LiveMap(tmp_path / "three", ENCODERS, microphones="cube9")
+    assert not (tmp_path / "three").exists()
+
+
 KILLED = """
 import sys, time
 sys.path[:0] = {path!r}

@@ -17,6 +17,7 @@ from avlmaps.core.progress import say
 if TYPE_CHECKING:
     from avlmaps.live.live_map import LiveMap
     from avlmaps.maps.store.reader import StoredMap
+    from avlmaps.recordings.microphones import Microphones
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,8 +37,12 @@ class Live(ModelVerb):
     """Source of frames and sound: REC, or what a running robot publishes in ROS 2 (by rclpy, in the Python that ROS 2
     was built for), until Ctrl-C."""
     topics: Annotated[tuple[str, ...], arg(metavar="KIND=TOPIC ...")] = ()
-    """With --source ros2: topics that their type does not identify: rgb=, depth=, pose= or audio=TOPIC; audio=none
-    leaves the sound out, audio_pcm=16000,1 says how plain samples are coded."""
+    """Topics of ROS (a bag, or --source ros2) that their type does not identify: rgb=, depth=, pose= or audio=TOPIC;
+    audio=none leaves the sound out, audio_pcm=16000,1 says how plain samples are coded; directions=TOPIC, azimuths that
+    a device says of sounds."""
+    microphones: Annotated[Path | None, arg(metavar="FILE")] = None
+    """Places of the microphones, instead of the recording's own, or of what --source ros2 publishes: a JSON file, as
+    `avlmaps calibrate` writes it. With them the map knows where sounds came from."""
     out: Annotated[Path, arg(metavar="MAP")]
     """Map folder to write, by custom NAME.avlmap."""
     rate: Annotated[float, arg(metavar="FACTOR")] = 1.0
@@ -101,27 +106,28 @@ def _live(verb: Live) -> dict[str, Any]:
         raise UsageError(f"--give-up-s is {verb.give_up_s:g}; choose a positive number of seconds.")
     first = _days_before(verb)
     used = choose_models(verb.profile, [word for words in verb.model for word in words])
-    up_in_world, begins_s, play = _robot(verb) if verb.source == "ros2" else _recording(verb)
+    source = _robot(verb) if verb.source == "ros2" else _recording(verb)
     with LiveMap(
         verb.out,
         used,
-        up_in_world=up_in_world,
+        up_in_world=source.up_in_world,
         settings=replace(BuildSettings() if verb.every_frame else SPARSE, voxel_size_m=verb.voxel_size_m),
         live=LiveSettings(gates=not verb.every_frame),
         overwrite=verb.overwrite,
-        begins_s=begins_s,
+        begins_s=source.begins_s,
+        microphones=source.microphones,
     ) as live:
         if verb.serve or verb.view:
             from avlmaps.cli.live_serving import serve_while
 
-            serve_while(live, lambda over: play(live, over), verb.port, browse=verb.view)
+            serve_while(live, lambda over: source.play(live, over), verb.port, browse=verb.view)
         else:
             try:
-                play(live, lambda: False)
+                source.play(live, lambda: False)
             except KeyboardInterrupt:
                 say("note: Stopped by Ctrl-C; the map is finished.")
             end_drive(live)
-    status, stored = live.status(), _with_sources(verb, live.map.stored)
+    status, stored = live.status(), live.map.stored
     return {
         **describe_map(stored),
         "live": {**status.to_dict(), "summary": str(status)},
@@ -130,33 +136,61 @@ def _live(verb: Live) -> dict[str, Any]:
     }
 
 
-_Play = Callable[["LiveMap", Callable[[], bool]], None]  # gives a map frames until it says that it is over
+@dataclass(frozen=True)
+class _Source:
+    """Where frames and sound come from.
+
+    Attributes:
+        up_in_world: up in the world of its poses, where that is known.
+        begins_s: what its clock said at time 0; 0 where stamps are dates.
+        microphones: where those of its sound are, where that is known before.
+        play: gives a map frames and sound until it says that it is over.
+    """
+
+    up_in_world: Any
+    begins_s: float
+    microphones: "Microphones | Path | None"
+    play: Callable[["LiveMap", Callable[[], bool]], None]
 
 
-def _recording(verb: Live) -> tuple[Any, float, _Play]:
-    """Return up in the world of a recording, what its clock said at time 0, and what plays it."""
+def _recording(verb: Live) -> _Source:
+    """Return what plays a recording."""
     from avlmaps.live.growing_folder import is_being_written
     from avlmaps.live.replay import follow, replay
     from avlmaps.recordings.layout import UNFINISHED, decode_description
     from avlmaps.recordings.open import open_recording
 
-    path = verb.recording
+    path, microphones = verb.recording, verb.microphones
     if path is None:
         raise UsageError("live needs a recording, REC, or --source ros2.")
-    if verb.topics:
-        raise UsageError("--topics is of --source ros2; a bag whose topics must be named is mapped by build.")
     if is_being_written(path):
         up_in_world = decode_description(path / UNFINISHED).up_in_world
-        return up_in_world, 0.0, lambda live, over: follow(path, live, verb.give_up_s, over=over)
-    recording = open_recording(path, format=verb.format, corrections=verb.reading.corrections())
+        return _Source(
+            up_in_world,
+            0.0,
+            microphones,
+            lambda live, over: follow(path, live, verb.give_up_s, over=over, microphones=microphones),
+        )
+    recording = open_recording(
+        path,
+        format=verb.format,
+        topics=topics_of(verb.topics),
+        corrections=verb.reading.corrections(),
+        microphones=microphones,
+    )
     for notice in recording.notices:
         say(f"note: {notice}")
     rate = None if verb.as_fast_as_possible else verb.rate
-    return recording.up_in_world, recording.begins_s, lambda live, over: replay(recording, live, rate, over=over)
+    return _Source(
+        recording.up_in_world,
+        recording.begins_s,
+        None if recording.audio is None else recording.audio.microphones,
+        lambda live, over: replay(recording, live, rate, over=over),
+    )
 
 
-def _robot(verb: Live) -> tuple[Any, float, _Play]:
-    """Return up in ROS's world (REP 103), 0 as its stamps are dates, and what gives the frames of a running robot."""
+def _robot(verb: Live) -> _Source:
+    """Return what gives the frames of a running robot; z is up in ROS's world (REP 103), and its stamps are dates."""
     from avlmaps.live.ros_source import follow_ros2, open_ros2, ros_topics
 
     if verb.recording is not None or verb.as_fast_as_possible or verb.rate != 1.0 or verb.format != "auto":
@@ -173,22 +207,7 @@ def _robot(verb: Live) -> tuple[Any, float, _Play]:
     def play(live: "LiveMap", over: Callable[[], bool]) -> None:
         follow_ros2(live, topics, verb.give_up_s, over=over, join=lambda _: inbox)
 
-    return (0.0, 0.0, 1.0), 0.0, play
-
-
-def _with_sources(verb: Live, stored: "StoredMap") -> "StoredMap":
-    """Return the map of a drive that is over, with where its sounds came from, if the microphones are known."""
-    from avlmaps.live.growing_folder import is_being_written
-    from avlmaps.maps.pipeline.sources import add_sources
-    from avlmaps.recordings.open import open_recording
-
-    if not len(stored.sounds):
-        return stored
-    if verb.recording is None or is_being_written(verb.recording):
-        say("note: Where sounds came from is not known while a robot drives; build the map of its finished recording.")
-        return stored
-    recording = open_recording(verb.recording, format=verb.format, corrections=verb.reading.corrections())
-    return add_sources(stored, recording)
+    return _Source((0.0, 0.0, 1.0), 0.0, verb.microphones, play)
 
 
 def _days_before(verb: Live) -> "StoredMap | None":

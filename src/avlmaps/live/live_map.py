@@ -9,7 +9,7 @@ writes these maps into the folder. A question uses the snapshot that there is; n
 import contextlib
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import Future
 from dataclasses import replace
 from functools import partial
@@ -38,8 +38,10 @@ from avlmaps.perception.encoders import Encoders, encoders_of
 from avlmaps.perception.profiles import Profile
 from avlmaps.query.avlmap import AVLMap, QuerySettings
 from avlmaps.query.voxel_map import direction
+from avlmaps.recordings.directions import given_directions
 from avlmaps.recordings.given_frame import given_frame
 from avlmaps.recordings.memory import next_of
+from avlmaps.recordings.microphones import Microphones, microphones_named
 from avlmaps.recordings.types import Frame
 
 if TYPE_CHECKING:
@@ -70,7 +72,7 @@ class LiveMap:
     Example:
         with avlmaps.LiveMap("home.avlmap") as live:
             live.add_frame(rgb, depth_m, camera, world_from_camera, stamp_s)
-            live.add_audio(avlmaps.Sound(samples, 16_000), stamp_s)
+            live.add_audio(avlmaps.Sound(samples, 16_000), stamp_s)  # of an array: microphones=..., ChannelSound
             live.ask("the chair near the sound of a dog").text
 
     The folder is a whole map at any moment from the first save on, also when the process is killed; another process
@@ -89,6 +91,7 @@ class LiveMap:
         query: QuerySettings | None = None,
         overwrite: bool = False,
         begins_s: float = 0.0,
+        microphones: Microphones | str | Path | None = None,
     ) -> None:
         """Begin an empty map, and hold its folder.
 
@@ -102,21 +105,27 @@ class LiveMap:
             overwrite: replace a map that is there.
             begins_s: what the clock said at stamp 0, seconds since 1970, so that the day is known when days are merged;
                 0 where the stamps are dates already, or no clock is known.
+            microphones: where those of the sound's channels are, as ``microphones`` of ``recording.json``; the name of
+                an array or a JSON file will do. With them the map knows where its sounds came from.
 
         Raises:
             MapError: ``begins_s`` is not finite, the folder is something else or a map, or another process writes it.
+            RecordingError: the microphones cannot be.
             BackendError: there is no such profile.
         """
         self.path, self.settings, self._query = Path(path), live or LiveSettings(), query
         if not isfinite(begins_s):
             raise MapError(f"begins_s is {begins_s}, which is no time; give seconds since 1970, or leave it out.")
         used = encoders_of("embedded" if encoders is None else encoders)
+        array = microphones_named(str(microphones)) if isinstance(microphones, str | Path) else microphones
         require_place(self.path, overwrite)
         self._held = contextlib.ExitStack()
         self._held.enter_context(lock_folder(self.path))
         chosen = settings or (SPARSE if self.settings.gates else BuildSettings())
         wait = self.settings.first_frames if self.settings.gates else None
         self._growing = GrowingMap(chosen, used, direction(up_in_world), wait=wait, looks_later=True, begins_s=begins_s)
+        if array is not None:
+            self._growing.place_microphones(array)
         self._gates = Gates(self.settings, chosen.fusion.max_depth_m)
         self._encoding = EncodingGate(self.settings, self._growing.settings.fusion)
         keeps = self.settings.gates and not chosen.frames.per_submap  # corrected poses would not reach them
@@ -200,18 +209,60 @@ class LiveMap:
             self._is_pressed = not wait
             self._door.notify_all()
 
+    @property
+    def microphones(self) -> Microphones | None:
+        """Where those of the sound's channels are; None where that is not known."""
+        return self._growing.microphones
+
+    def place_microphones(self, microphones: Microphones) -> None:
+        """Say where the microphones are, where that was not known at the beginning.
+
+        Raises:
+            AudioError: sound came before.
+        """
+        self._growing.place_microphones(microphones)
+
     def add_audio(self, chunk: Any, stamp_s: Any = None) -> None:
         """Add a piece of the microphone's sound; see ``VoxelMap.add_audio``.
 
+        Args:
+            chunk: a ``Sound`` of one channel, or a ``ChannelSound`` of several: (m, n) float32 samples and their rate.
+            stamp_s: when its first sample sounds, on the clock of the frames; None where the one before ended.
+
         Raises:
-            AudioError: it is no sound, is of another rate, repeats what came, or is of another clock.
+            AudioError: it is no sound, has another rate, other channels or not those of the microphones, repeats what
+                came, or is of another clock; what came stays as it was.
             MapError: the map is closed.
         """
+        with self._hearing():
+            self._growing.add_audio(chunk, stamp_s)
+
+    def add_directions(self, stamp_s: Any, azimuth_rad: Any, elevation_rad: Any = None, confidence: Any = None) -> None:
+        """Add what a device said of where sounds come from: one direction, or some.
+
+        The device's constant offset is found along the drive, and its outliers count little, as in a build.
+
+        Args:
+            stamp_s: when, on the clock of the frames; rising, also from call to call.
+            azimuth_rad: from where the depth camera looks, counter-clockwise, but for the device's offset.
+            elevation_rad: over the horizon; NaN or None where it is not known.
+            confidence: how much each counts, 0 to 1; None for 1.
+
+        Raises:
+            RecordingError: they are no angles in radians, or out of the order of time; what came stays as it was.
+            MapError: the map is closed.
+        """
+        with self._hearing():
+            self._growing.add_directions(given_directions(stamp_s, azimuth_rad, elevation_rad, confidence))
+
+    @contextlib.contextmanager
+    def _hearing(self) -> Generator[None]:
+        """Let one thread give sounds, and count what is refused."""
         self._require_open()
         with self._ears:
             try:
-                self._growing.add_audio(chunk, stamp_s)
-            except AudioError:
+                yield
+            except (AudioError, RecordingError):
                 self._tally.note("refused")
                 raise
 
@@ -270,7 +321,7 @@ class LiveMap:
     @property
     def doubts(self) -> tuple[str, ...]:
         """One sentence for each thing that is not as it should be: poses that do not fit, saves that failed."""
-        return tuple(self._doubts)
+        return (*self._doubts, *self._growing.doubts)
 
     def status(self) -> LiveStatus:
         """Return how the map fares."""
@@ -612,13 +663,17 @@ class LiveMap:
             return
         self._listened_s = now_s
         stored, heard = snapshot[0].stored, self._growing.heard()
-        if heard is None or np.array_equal(heard.offset_s, stored.sounds.offset_s):
+        if heard is None:
             return
-        stored = self._growing.with_sounds(stored, heard)
-        self._unsaved_sounds.note(now_s)
-        self._unsaved_sounds.freeze(now_s)
-        self._saver.offer(stored, snapshot[1], now_s)
-        self._show(stored, snapshot[1])
+        same = np.array_equal(heard.offset_s, stored.sounds.offset_s)
+        if same and not self._growing.sources_wait:
+            return
+        newer = self._growing.with_sounds(stored, heard)
+        if not same or newer.sources() is not stored.sources():
+            self._unsaved_sounds.note(now_s)
+            self._unsaved_sounds.freeze(now_s)
+            self._saver.offer(newer, snapshot[1], now_s)
+            self._show(newer, snapshot[1])
 
     def _show(self, stored: StoredMap, came_s: float) -> None:
         made = AVLMap(stored, self._query)

@@ -8,6 +8,8 @@ from avlmaps.core.errors import RecordingError
 from avlmaps.core.progress import progress, say
 from avlmaps.live.growing_folder import growing_frames, is_being_written
 from avlmaps.live.live_map import LiveMap
+from avlmaps.recordings.audio import AudioTrack
+from avlmaps.recordings.channels import read_channels
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Frame, Recording
 
@@ -28,7 +30,7 @@ def replay(
         tell: called with each doubt, as soon as it is known.
         over: whether to end before the recording does; queried before each frame.
     """
-    begin_s, told, heard_s = time.perf_counter(), 0, None if recording.audio is None else recording.audio.start_s
+    begin_s, told, ears = time.perf_counter(), 0, Ears(recording.audio, live)
     shown = progress(range(len(recording)), "mapping", total=len(recording), note=lambda: _note(live))
     for index in shown:
         if over():
@@ -42,9 +44,9 @@ def replay(
         except RecordingError as fault:
             tell(f"note: {fault}")
             continue
-        heard_s = _play(recording, live, heard_s, frame.stamp_s)
+        ears.hear(frame.stamp_s)
         told = tell_doubts(live, told, tell)
-    _play(recording, live, heard_s, float("inf"))
+    ears.hear(float("inf"))
 
 
 def follow(
@@ -53,6 +55,7 @@ def follow(
     give_up_s: float = 60.0,
     tell: Callable[[str], None] = say,
     over: Callable[[], bool] = lambda: False,
+    microphones: Path | None = None,
 ) -> None:
     """Give a live map the frames of a recording while it is written; its sound comes when it is finished.
 
@@ -62,6 +65,7 @@ def follow(
         give_up_s: end when nothing came for this long.
         tell: called with each doubt and what else is worth knowing.
         over: whether to end before the recording does; queried at each frame.
+        microphones: where those of its sound are, instead of what it says.
     """
     told = 0
     for frame in progress(growing_frames(path, give_up_s, tell), "mapping", note=lambda: _note(live)):
@@ -73,8 +77,10 @@ def follow(
             tell(f"note: {fault}")
         told = tell_doubts(live, told, tell)
     if not is_being_written(path):
-        recording = open_recording(path)
-        _play(recording, live, None if recording.audio is None else recording.audio.start_s, float("inf"))
+        track = open_recording(path, microphones=microphones).audio
+        if track is not None and track.microphones is not None and live.microphones is None:
+            live.place_microphones(track.microphones)
+        Ears(track, live).hear(float("inf"))
 
 
 def end_drive(live: LiveMap, tell: Callable[[str], None] = say) -> None:
@@ -110,15 +116,33 @@ def tell_doubts(live: LiveMap, told: int, tell: Callable[[str], None]) -> int:
     return len(doubts)
 
 
-def _play(recording: Recording, live: LiveMap, heard_s: float | None, until_s: float) -> float | None:
-    """Give the sound up to a moment, and return up to when it came."""
-    track = recording.audio
-    if track is None or heard_s is None:
-        return None
-    end_s = min(until_s, track.end_s)
-    if end_s > heard_s:
-        live.add_audio(track.read(heard_s, end_s), heard_s)
-    return max(heard_s, end_s)
+class Ears:
+    """Gives a live map what a recording heard, piece by piece: its channels, and what a device said."""
+
+    def __init__(self, track: AudioTrack | None, live: LiveMap) -> None:
+        """Begin before the first sample.
+
+        Args:
+            track: what was heard; its microphones must be those of the map.
+            live: the map.
+        """
+        self._track, self._live = track, live
+        self._heard_s, self._said_s = 0.0 if track is None else track.start_s, float("-inf")
+
+    def hear(self, until_s: float) -> None:
+        """Give what was heard up to a moment."""
+        track, live = self._track, self._live
+        if track is None:
+            return
+        if (end_s := min(until_s, track.end_s)) > self._heard_s:
+            is_placed = track.microphones is not None and live.microphones is not None
+            piece = read_channels(track, self._heard_s, end_s) if is_placed else track.read(self._heard_s, end_s)
+            live.add_audio(piece, self._heard_s)
+            self._heard_s = end_s
+        if track.directions is not None and until_s > self._said_s:
+            said = track.directions.between(self._said_s, until_s)
+            self._said_s = until_s
+            live.add_directions(said.stamp_s, said.azimuth_rad, said.elevation_rad, said.confidence)
 
 
 def _note(live: LiveMap) -> str:

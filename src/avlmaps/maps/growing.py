@@ -15,9 +15,10 @@ import numpy as np
 from msgspec import structs
 
 from avlmaps.core.arrays import Float
-from avlmaps.core.errors import BackendError, MapError
+from avlmaps.core.errors import AudioError, BackendError, MapError
 from avlmaps.core.progress import silence_progress
 from avlmaps.core.registry import Kind
+from avlmaps.core.timeline import Trajectory
 from avlmaps.core.wording import option
 from avlmaps.maps.audio.growing import GrowingSounds
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
@@ -36,6 +37,7 @@ from avlmaps.maps.pipeline.sounds import silence
 from avlmaps.maps.pipeline.write import manifest_of, surfaces, with_clear_views
 from avlmaps.maps.pose_correction import PoseCorrection, moved_frame
 from avlmaps.maps.settings import SUBMAP_FRAMES, BuildSettings
+from avlmaps.maps.sources.growing import AT_ONCE, GrowingSources, require_fit
 from avlmaps.maps.store.checkpoints import key_of
 from avlmaps.maps.store.integrity import IntegrityCheck
 from avlmaps.maps.store.lock import lock_folder
@@ -43,11 +45,15 @@ from avlmaps.maps.store.manifest import BadFrame, GroundInfo, MapInfo, ModelInfo
 from avlmaps.maps.store.manifest_file import MANIFEST
 from avlmaps.maps.store.reader import GIVEN_FEATURES, MapArrays, StoredMap, open_stored
 from avlmaps.maps.store.writer import MapContent, Written, is_map_or_free, write_map
-from avlmaps.maps.types import HeardSounds, Submaps
+from avlmaps.maps.types import HeardSounds, SourceEvidence, Submaps, Voxels
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.protocols import GroundReader
+from avlmaps.recordings.audio import Sound
+from avlmaps.recordings.channels import ChannelSound
+from avlmaps.recordings.directions import DirectionTrack
 from avlmaps.recordings.growing_track import GrowingTrack
 from avlmaps.recordings.memory import next_of
+from avlmaps.recordings.microphones import Microphones
 from avlmaps.recordings.plausible import plausible_walk
 from avlmaps.recordings.types import Frame, Ground, Recording
 
@@ -120,6 +126,8 @@ class GrowingMap:
         self._looks_later, self._is_outgrown = looks_later, False  # whether up and the floor are those of half the walk
         self._keyframes = GrowingKeyframes(encoders, self.settings.keyframes, looks_later=looks_later)
         self._sounds: GrowingSounds | None = None
+        self._sources = GrowingSources(AT_ONCE if looks_later else None)
+        self._sources_corrections = 0  # how often poses had been corrected when sources were last located
         self._dim: int | None = None
         self._rehearsed: dict[int, tuple[Ground, np.ndarray]] | None = None
         self._rehearsal = _Rehearsal()
@@ -223,16 +231,45 @@ class GrowingMap:
             self._free.add(frame)
         self._merge(features_alone(part.sums()) if is_fused else part.sums())
 
+    @property
+    def microphones(self) -> Microphones | None:
+        """Where those of the channels are; None where that is not known."""
+        return self._sources.microphones
+
+    def place_microphones(self, microphones: Microphones) -> None:
+        """Say where the microphones of the channels are, before the first piece of sound.
+
+        Raises:
+            AudioError: sound came before.
+        """
+        if self._sounds is not None:
+            raise AudioError("Sound came before its microphones were described; describe them before the first piece.")
+        self._sources.microphones = microphones
+
     def add_audio(self, chunk: Any, stamp_s: Any = None) -> None:
         """Add a piece of sound; see ``GrowingTrack.add``. Another thread may do it.
 
+        Several channels become one, their mean, where nobody said where their microphones are, as in a build.
+
         Raises:
-            AudioError: it is no sound, of another rate, repeats what came, or is of another clock.
+            AudioError: it is no sound, has another rate or other channels, repeats what came, or is of another clock.
         """
+        if isinstance(chunk, ChannelSound):
+            require_fit(self.microphones, len(chunk.samples))
+            if self.microphones is None:
+                chunk = Sound(chunk.samples.mean(axis=0), chunk.rate_hz)
         if self._sounds is None:
             encoder = self.encoders.sounds if Kind.SOUNDS in self.encoders else None
             self._sounds = GrowingSounds(encoder, self.settings.hearing)
         self._sounds.add(chunk, stamp_s)
+
+    def add_directions(self, said: DirectionTrack) -> None:
+        """Add what a device said of where sounds come from, in the order of time. Another thread may do it.
+
+        Raises:
+            RecordingError: it is not later than what came.
+        """
+        self._sources.add_directions(said)
 
     def correct_poses(self, stamps_s: Any, poses: Any) -> tuple[float, float]:
         """Move what came to corrected poses of it; frames to come have poses of the corrected world.
@@ -336,16 +373,51 @@ class GrowingMap:
         return self._sounds.heard(motion, final=False)
 
     def with_sounds(self, made: StoredMap, sounds: HeardSounds) -> StoredMap:
-        """Return a map of ``finish`` with the sounds of ``heard`` instead of its own."""
+        """Return a map of ``finish`` with the sounds of ``heard`` instead of its own, and where they came from."""
         assert self._sounds is not None
+        with self.finishing, silence_progress(True):
+            sources = made.sources()
+            if self._sources_corrections == self._corrections:  # else the surfaces are of other poses than the walk
+                sources = self._located(sounds, made.arrays.voxels, made.up_in_world, final=False)
         folder, counts = self._sounds.clips_folder, structs.replace(made.info.counts, sounds=len(sounds))
         return replace(
             made,
             path=folder,
             info=structs.replace(made.info, counts=counts),
-            arrays=replace(made.arrays, sounds=sounds),
+            arrays=replace(made.arrays, sounds=sounds, sources=sources),
             integrity=IntegrityCheck(folder, {}),
         )
+
+    @property
+    def sources_wait(self) -> bool:
+        """Whether sounds are over that are not located yet; ``with_sounds`` locates the next ones."""
+        return self._sources.waiting > 0
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What is left out of the evidence of sources, and why."""
+        alone = self._sounds is not None and self._sounds.growing.channels == 1
+        microphones = self.microphones
+        few = (
+            f"The sound has one channel, and {len(microphones)} microphones are described; where sounds came from is "
+            "not known: give all channels (avlmaps.ChannelSound)."
+            if alone and microphones is not None and len(microphones) > 1
+            else ""
+        )
+        return tuple(one for one in (few, self._sources.doubt) if one)
+
+    def _located(
+        self, sounds: HeardSounds, voxels: Voxels, up_in_world: Float[np.ndarray, "3"], *, final: bool
+    ) -> SourceEvidence | None:
+        """Return where sounds came from, over the surfaces of a map; None where nothing shows that."""
+        raw, motion = None if self._sounds is None else self._sounds.track, self._walk.motion()
+        track = None if raw is None else self._sources.track(raw, raw.channels)
+        if track is None or not len(sounds) or not len(motion.stamps_s):
+            return None
+        spans_s = list(zip(sounds.onset_s.tolist(), sounds.offset_s.tolist(), strict=True))
+        voxel_m = GridSpec(self.settings.voxel_size_m).centre_of(np.asarray(voxels.index))
+        find = self._sources.at_the_end if final else self._sources.until_now
+        return find(track, Trajectory(motion.stamps_s, motion.world_from_camera), spans_s, voxel_m, up_in_world)
 
     def stored(self, *, final: bool = False) -> StoredMap:
         """Return the map of the frames that came, in memory.
@@ -418,6 +490,9 @@ class GrowingMap:
         """
         plan = self._plan(came.walk)
         with self.finishing, silence_progress(True):
+            if came.corrections != self._sources_corrections:
+                self._sources_corrections = came.corrections
+                self._sources.forget()
             if final or self._upright is None or self._is_outgrown:
                 up, floor, ground = self._upright_of(came.walk.held())
                 self._upright = up, floor
@@ -425,7 +500,9 @@ class GrowingMap:
                     self._is_outgrown, self._ground = False, ground
             content, info = self._content(plan, came, *self._upright, final, looks_s)
         rig, grid = came.walk.rig, GridSpec(self.settings.voxel_size_m)
-        arrays = MapArrays(content.voxels, content.keyframes, content.place_state, content.sounds)
+        arrays = MapArrays(
+            content.voxels, content.keyframes, content.place_state, content.sounds, content.sources
+        )  # fmt: skip
         up = self._upright[0].vector()
         return StoredMap(
             content.clips_folder, info, grid, up, arrays, self.encoders, rig, IntegrityCheck(content.clips_folder, {})
@@ -461,7 +538,7 @@ class GrowingMap:
         for one in self._waiting:
             other._walk.spread(one.frame, self.settings.gravity.frames)
             other._walk.pass_by(one.frame.stamp_s, one.frame.world_from_camera)
-        other._sounds = self._sounds
+        other._sounds, other._sources = self._sounds, self._sources
         other._told, other._found = self._told, self._found
         other.settle()
         return other
@@ -596,7 +673,8 @@ class GrowingMap:
         if self._sounds is not None and Kind.SOUNDS in self.encoders:
             clips, sounds = self._sounds.clips_folder, self._sounds.heard(came.walk.motion(), final=final)
         keyframes = with_clear_views(keyframes, [stack_views(clear, pose, self._free.shape)])
-        content = MapContent(merged.voxels, keyframes, state, sounds, clips)
+        sources = self._located(sounds, merged.voxels, up.vector(), final=final)
+        content = MapContent(merged.voxels, keyframes, state, sounds, clips, sources=sources)
         finished = datetime.now(UTC).isoformat(timespec="seconds")
         stages_s = {"growing": begin - self._begin_s, "merging": perf_counter() - begin}
         timings = Timings(finished=finished, elapsed_s=sum(stages_s.values()), stages_s=stages_s)
@@ -618,7 +696,9 @@ def write_stored(
     path: Path, made: StoredMap, written: Written | None = None, submaps: Submaps | None = None
 ) -> MapInfo:
     """Write a map of ``GrowingMap`` into its folder, whose lock the caller holds; see ``write_map``."""
-    content = MapContent(made.voxels, made.keyframes, made.place_state, made.sounds, made.path, submaps=submaps)
+    content = MapContent(
+        made.voxels, made.keyframes, made.place_state, made.sounds, made.path, submaps=submaps, sources=made.sources()
+    )  # fmt: skip
     return write_map(path, content, made.info, written)
 
 

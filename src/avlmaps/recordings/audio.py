@@ -138,6 +138,22 @@ class AudioTrack:
         piece = containers.read_piece(self.path, begin, end, self.rate_hz, self.channel)
         return _checked(piece, self.path, self.rate_hz, begin)
 
+    def every_channel(self, begin: int, end: int) -> Float[np.ndarray, "n m"]:
+        """Return samples of all channels, as they are stored; fewer where the track ends before.
+
+        Args:
+            begin: the first sample, from the track's beginning.
+            end: the one after the last.
+
+        Raises:
+            AudioError: the file cannot be read.
+        """
+        from avlmaps.recordings.containers import read_all_channels
+
+        parts = [read_all_channels(path, begin, end, self.rate_hz) for path in self.files or (self.path,)]
+        length = min(len(part) for part in parts)
+        return np.concatenate([part[:length] for part in parts], axis=1)
+
     def blocks(self, seconds: float = 10.0) -> Iterator[Sound]:
         """Go through the whole track in pieces of one length (the last may be shorter), one in memory at a time.
 

@@ -102,19 +102,15 @@ def read_channels(track: AudioTrack, onset_s: float, offset_s: float) -> Channel
     Raises:
         AudioError: the file cannot be read, or holds samples that are not finite numbers.
     """
-    from avlmaps.recordings.containers import read_all_channels
-
     begin, end = (round((at_s - track.start_s) * track.rate_hz) for at_s in (onset_s, offset_s))
     count = round(track.duration_s * track.rate_hz)
     inside_begin, inside_end = min(max(begin, 0), count), min(max(end, 0), count)
-    parts = [read_all_channels(path, inside_begin, inside_end, track.rate_hz) for path in track.files or (track.path,)]
-    length = min(len(part) for part in parts)
-    piece = np.concatenate([part[:length] for part in parts], axis=1)
+    piece = track.every_channel(inside_begin, inside_end)
     if not np.isfinite(piece).all():
         raise AudioError(f"{track.path} holds samples that are not finite numbers; convert it again from its source.")
     samples = np.zeros((piece.shape[1], max(end - begin, 0)), np.float32)
-    if length:
-        samples[:, inside_begin - begin : inside_begin - begin + length] = piece.T
+    if len(piece):
+        samples[:, inside_begin - begin : inside_begin - begin + len(piece)] = piece.T
     return ChannelSound(samples, track.rate_hz)
 
 

@@ -7,6 +7,7 @@ elsewhere has an offset, which a build finds along the walk (``avlmaps.maps.sour
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -87,6 +88,21 @@ class DirectionTrack:
             return f"the confidence of row {unsure[0] + 1} is {self.confidence[unsure[0]]:g}; it must be from 0 to 1"
         return ""
 
+    @classmethod
+    def joined(cls, parts: "Sequence[DirectionTrack]") -> "DirectionTrack":
+        """Return parts that follow one another as one track, with what the first knows of the device.
+
+        Raises:
+            RecordingError: their stamps do not rise.
+        """
+        return cls(
+            np.concatenate([part.stamp_s for part in parts]),
+            np.concatenate([part.azimuth_rad for part in parts]),
+            np.concatenate([part.elevation_rad for part in parts]),
+            np.concatenate([part.confidence for part in parts]),
+            parts[0].known_rad,
+        )
+
     def between(self, onset_s: float, offset_s: float) -> "DirectionTrack":
         """Return the part of a stretch of time."""
         rows = slice(*np.searchsorted(self.stamp_s, [onset_s, offset_s]).tolist())
@@ -107,6 +123,31 @@ class DirectionTrack:
                 f"{self.stamp_s[-1]:.2f} s, lie outside of the sound ({start_s:.2f} to {end_s:.2f} s); give them in "
                 "seconds of the recording's clock."
             )
+
+
+def given_directions(stamp_s: Any, azimuth_rad: Any, elevation_rad: Any, confidence: Any) -> DirectionTrack:
+    """Return the directions that a program gave, of one moment or of some; None where something is not known.
+
+    Raises:
+        RecordingError: they are no numbers, of different length, or no directions.
+    """
+    names = ("stamp_s", "azimuth_rad", "elevation_rad", "confidence")
+    column: dict[str, np.ndarray] = {}
+    for name, given in zip(names, (stamp_s, azimuth_rad, elevation_rad, confidence), strict=True):
+        try:
+            value = np.atleast_1d(np.asarray(given, np.float64)) if given is not None or len(column) < 2 else None
+        except (TypeError, ValueError):
+            value = np.zeros((0, 0))
+        if value is not None:
+            column[name] = value
+        if value is not None and (value.ndim != 1 or value.shape != column["stamp_s"].shape):
+            raise RecordingError(
+                f"Directions are a number, or as many numbers as there are stamps, for each of {', '.join(names)} "
+                f"(the last two may be left out); {name} is {given!r}."
+            )
+    return DirectionTrack.of(
+        column["stamp_s"], column["azimuth_rad"], column.get("elevation_rad"), column.get("confidence")
+    )
 
 
 def read_directions(path: Path) -> DirectionTrack:

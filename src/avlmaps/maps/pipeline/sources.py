@@ -2,20 +2,16 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
 from time import perf_counter
 
 import numpy as np
-from msgspec import structs
 
 from avlmaps.core.arrays import Float
 from avlmaps.core.errors import MapError, RecordingError
 from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.grid import GridSpec
-from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.reader import StoredMap, open_stored
-from avlmaps.maps.store.writer import MapContent, as_written, write_map
 from avlmaps.maps.types import HeardSounds, SourceEvidence, Voxels
 from avlmaps.recordings.types import Recording
 
@@ -71,33 +67,3 @@ def take_device(recording: Recording, stored: StoredMap) -> None:
         raise MapError(f"{stored.path} knows of no device that says directions; name a map of a recording with one.")
     offset_rad, sd_rad = found.device[-1, :2].tolist()
     recording.audio = replace(track, directions=replace(track.directions, known_rad=(offset_rad, sd_rad)))
-
-
-def add_sources(stored: StoredMap, recording: Recording) -> StoredMap:
-    """Find where the sounds of a finished map came from, by its recording, and write that into its folder.
-
-    The map of a live drive needs this: its microphones come as one. Where the recording does not say where its
-    microphones are, the map stays as it is.
-
-    Raises:
-        MapError: the folder is in use or cannot be written.
-        AudioError: the recording's sound cannot be read.
-    """
-    found, elapsed_s = locate_sources(recording, stored.up_in_world, stored.sounds, stored.voxels, stored.grid)
-    if found is None:
-        return stored
-    info, folder = stored.info, stored.path / "sounds"
-    content = MapContent(
-        stored.voxels, stored.keyframes, stored.place_state, stored.sounds, folder, stored.life(), stored.submaps(),
-        found,
-    )  # fmt: skip
-    timings = structs.replace(
-        info.timings,
-        finished=datetime.now(UTC).isoformat(timespec="seconds"),
-        elapsed_s=info.timings.elapsed_s + elapsed_s,
-        stages_s={**info.timings.stages_s, "sources": elapsed_s},
-    )
-    with lock_folder(stored.path):
-        written = as_written(stored.path, content, info.files)
-        write_map(stored.path, content, structs.replace(info, files={}, timings=timings), written)
-    return replace(open_stored(stored.path), encoders=stored.encoders)

@@ -155,13 +155,29 @@ def _log_density(spread_deg: float, outliers: float) -> Float[np.ndarray, "b o"]
     return np.log(density)[step].astype(np.float32)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class BearingEvidence:
+    """What the directions of some sounds say.
+
+    Attributes:
+        heard: for each sound the log-likelihood of each candidate.
+        of_device: (s, g, o) for each sound the log-likelihood of each combination of noise, outliers and offset.
+        device: what all of them say of the device; None without directions.
+    """
+
+    heard: list[Float[np.ndarray, " c"]]
+    of_device: Float[np.ndarray, "s g o"]
+    device: Device | None
+
+
 def evidence_of_bearings(
     heard: Sequence[Bearings],
     walls: Sequence[Walls],
     candidates: Candidates,
     expected: Sequence[Float[np.ndarray, " c"]],
     known_rad: tuple[float, float] | None = None,
-) -> tuple[list[Float[np.ndarray, " c"]], Device | None]:
+    others: Float[np.ndarray, "s g o"] | None = None,
+) -> BearingEvidence:
     """Return the log-likelihood of each candidate for each sound, and what was found out about the device.
 
     Args:
@@ -170,6 +186,7 @@ def evidence_of_bearings(
         candidates: where the sounds may have come from.
         expected: log-likelihood of each candidate without the sound, for each.
         known_rad: the device's offset and its standard deviation, as an earlier recording has shown them.
+        others: what other sounds say of the device (``BearingEvidence.of_device``).
     """
     place = candidates.place_m.astype(np.float64)
     # Azimuths depend on the plan alone: one candidate for each of its cells stands for those above and below it.
@@ -185,11 +202,11 @@ def evidence_of_bearings(
         before = np.log(np.bincount(cell.reshape(-1), share) / share.sum() + 1e-300)
         counts = one.residuals(place[some], between)
         of_sound.append(np.stack([_log_sum(before[:, None] + counts @ table) for table in tables]))
-    of_sound = [_bounded(own) for own in of_sound]
-    known = np.sum(of_sound, axis=0) if of_sound else np.zeros((len(_GRID), _BINS))
-    known = known + _known_before(known_rad)
+    of_device = np.array([_bounded(own) for own in of_sound]).reshape(-1, len(_GRID), _BINS)
+    every = of_device if others is None else np.concatenate([others, of_device])
+    known = every.sum(axis=0) + _known_before(known_rad)
     result: list[Float[np.ndarray, " c"]] = []
-    for one, between, own, high in zip(heard, walls, of_sound, elevations, strict=True):
+    for one, between, own, high in zip(heard, walls, of_device, elevations, strict=True):
         if not len(one):
             result.append(np.zeros(len(place)))
             continue
@@ -203,8 +220,8 @@ def evidence_of_bearings(
                 value = counts @ table[:, chosen] + np.log(weight[number, chosen])
                 parts = np.concatenate([parts, _log_sum(value.T)[None]])
         result.append(_log_sum(parts) + high)
-    sounds = sum(len(one) > 0 for one in heard)
-    return result, _device(known, sounds) if sounds else None
+    sounds = int((np.ptp(every, axis=(1, 2)) > 0.0).sum())  # those of which no direction was said have all alike
+    return BearingEvidence(result, of_device, _device(known, sounds) if sounds else None)
 
 
 def _known_before(known_rad: tuple[float, float] | None) -> Float[np.ndarray, " o"]:

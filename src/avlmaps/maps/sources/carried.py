@@ -38,7 +38,7 @@ def carry_evidence(
     if not len(candidates) or not parts:
         return None
     place = candidates.place_m.astype(np.float64) @ level
-    rows = [_laid(evidence, moved, place) for evidence, moved in parts]
+    rows = [laid(evidence, moved, place) for evidence, moved in parts]
     return SourceEvidence(
         place=place.astype(np.float32),
         prior=candidates.prior.astype(np.float32),
@@ -50,10 +50,16 @@ def carry_evidence(
     )
 
 
-def _laid(
+def laid(
     evidence: SourceEvidence, moved: Float[np.ndarray, "4 4"], place: Float[np.ndarray, "c 3"]
 ) -> tuple[Float[np.ndarray, "n c"], Float[np.ndarray, "n c"]]:
-    """Return what sounds say of other candidates."""
+    """Return what sounds say of other candidates: their log-likelihoods with what was heard, and without.
+
+    Args:
+        evidence: of the sounds.
+        moved: from its world to that of the candidates.
+        place: the candidates.
+    """
     from scipy.spatial import KDTree
 
     own = apply(moved, np.asarray(evidence.place, np.float64))
@@ -74,4 +80,5 @@ def _means(
     values: Float16[np.ndarray, "n own"], row: Int[np.ndarray, "c k"], weight: Float[np.ndarray, "c k"]
 ) -> Float[np.ndarray, "n c"]:
     """Return the weighted means of some columns."""
-    return (np.asarray(values, np.float64)[:, row] * weight).sum(axis=2)
+    # One sound at a time: an hour's drive has hundreds, each over tens of thousands of candidates.
+    return np.stack([(own.astype(np.float64)[row] * weight).sum(axis=1) for own in np.asarray(values)])

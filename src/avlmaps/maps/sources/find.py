@@ -1,7 +1,7 @@
 """From a recording whose microphones are known, and the surfaces of its map: the evidence of where each sound began."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from avlmaps.core.arrays import Float
 from avlmaps.core.poses import rotation_to_level
 from avlmaps.core.progress import progress, say
 from avlmaps.core.timeline import Trajectory
-from avlmaps.maps.sources.bearings import Bearings, Device, evidence_of_bearings, expected_alone
+from avlmaps.maps.sources.bearings import BearingEvidence, Bearings, evidence_of_bearings, expected_alone
 from avlmaps.maps.sources.candidates import Candidates, candidates_of
 from avlmaps.maps.sources.density import CandidateGrid, Density, log_same_place
 from avlmaps.maps.sources.event import EventEvidence, evidence_of
@@ -22,7 +22,22 @@ from avlmaps.recordings.directions import DirectionTrack
 
 _HEIGHT_STEP_M = 0.25
 _MOVING = -1.5  # logarithm of the odds below which the two halves of a sound are of two places
-_LEAST = -60.0  # of a log-likelihood: no difference below matters
+LEAST = -60.0  # of a log-likelihood: no difference below matters
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Found:
+    """The evidence of some sounds, and what it took.
+
+    Attributes:
+        evidence: of these sounds.
+        signs: (m,) -1 for a channel that is wired the other way round, else 1.
+        of_device: what each sound says of the device that says directions, as ``BearingEvidence``.
+    """
+
+    evidence: SourceEvidence
+    signs: Float[np.ndarray, " m"]
+    of_device: Float[np.ndarray, "s g o"]
 
 
 def find_sources(
@@ -44,6 +59,36 @@ def find_sources(
     Raises:
         AudioError: the track cannot be read.
     """
+    found = find_among(track, walk, spans_s, voxel_m, up_in_world, signs_by_s=spans_s)
+    return None if found is None else found.evidence
+
+
+def find_among(
+    track: AudioTrack,
+    walk: Trajectory,
+    spans_s: Sequence[tuple[float, float]],
+    voxel_m: Float[np.ndarray, "n 3"],
+    up_in_world: Float[np.ndarray, "3"],
+    *,
+    signs_by_s: Sequence[tuple[float, float]],
+    signs: Float[np.ndarray, " m"] | None = None,
+    others: Float[np.ndarray, "s g o"] | None = None,
+) -> Found | None:
+    """Return the evidence of some sounds of a drive; see ``find_sources``.
+
+    Args:
+        track: as there.
+        walk: as there.
+        spans_s: of these sounds.
+        voxel_m: as there.
+        up_in_world: as there.
+        signs_by_s: of the sounds by which the signs of the channels are found.
+        signs: those, where they are known.
+        others: what the other sounds of the drive say of the device (``Found.of_device``).
+
+    Raises:
+        AudioError: the track cannot be read.
+    """
     microphones, directions = track.microphones, track.directions
     if (microphones is None and directions is None) or not len(spans_s) or not len(voxel_m):
         return None
@@ -61,9 +106,10 @@ def find_sources(
     channels = 0 if microphones is None else len(microphones)
     settings, plan = SourceSettings.of(channels), CandidateGrid.of(candidates.place_m)
     walls: dict[int, Walls] = {}
-    signs = np.ones(max(channels, 1))
-    if microphones is not None:
-        signs = signs_along(track, microphones, walked, spans_s, candidates.place_m, settings)
+    if signs is None:
+        signs = np.ones(max(channels, 1))
+        if microphones is not None:
+            signs = signs_along(track, microphones, walked, signs_by_s, candidates.place_m, settings)
     layers: list[Walls] = []
     heard: list[EventEvidence] = []
     for begin_s, end_s in progress(spans_s, "sources", unit="sound"):
@@ -79,35 +125,39 @@ def find_sources(
         else:
             alone = expected_alone(walked, span, candidates, walls[layer], settings)
             heard.append(EventEvidence(np.zeros(len(candidates)), None, alone))
-    device: Device | None = None
+    said = None
     if directions is not None:
-        heard, device = _with_directions(heard, directions, walked, spans_s, layers, candidates)
-    return SourceEvidence(
+        said = _said(heard, directions, walked, spans_s, layers, candidates, others)
+        both = [one.heard + other for one, other in zip(heard, said.heard, strict=True)]
+        heard = [replace(one, heard=total - total.max()) for one, total in zip(heard, both, strict=True)]
+    evidence = SourceEvidence(
         place=(candidates.place_m.astype(np.float64) @ level).astype(np.float32),
         prior=candidates.prior.astype(np.float32),
-        heard=np.maximum(np.stack([one.heard for one in heard]), _LEAST).astype(np.float16),
-        expected=np.maximum(np.stack([one.expected for one in heard]), _LEAST).astype(np.float16),
+        heard=np.maximum(np.stack([one.heard for one in heard]), LEAST).astype(np.float16),
+        expected=np.maximum(np.stack([one.expected for one in heard]), LEAST).astype(np.float16),
         moving=np.array([moves(one, plan, candidates.prior, settings) for one in heard], np.uint8),
         channels=np.array([channels], np.int64),
-        device=np.zeros((0, 4)) if device is None else device.row[None],
+        device=np.zeros((0, 4)) if said is None or said.device is None else said.device.row[None],
     )
+    return Found(evidence, signs, np.zeros((0, 1, 1)) if said is None else said.of_device)
 
 
-def _with_directions(
+def _said(
     heard: Sequence[EventEvidence],
     directions: DirectionTrack,
     walked: Trajectory,
     spans_s: Sequence[tuple[float, float]],
     walls: Sequence[Walls],
     candidates: Candidates,
-) -> tuple[list[EventEvidence], Device | None]:
-    """Return the evidence with that of a device's directions, and what was found out about the device."""
+    others: Float[np.ndarray, "s g o"] | None,
+) -> BearingEvidence:
+    """Return the evidence of a device's directions, with what was found out about the device."""
     said = [Bearings.of(directions, walked, (float(begin_s), float(end_s))) for begin_s, end_s in spans_s]
-    more, device = evidence_of_bearings(said, walls, candidates, [one.expected for one in heard], directions.known_rad)
-    if device is not None:
-        say(f"note: {device.sentence}")
-    both = [one.heard + other for one, other in zip(heard, more, strict=True)]
-    return [replace(one, heard=total - total.max()) for one, total in zip(heard, both, strict=True)], device
+    expected = [one.expected for one in heard]
+    found = evidence_of_bearings(said, walls, candidates, expected, directions.known_rad, others)
+    if found.device is not None:
+        say(f"note: {found.device.sentence}")
+    return found
 
 
 def moves(one: EventEvidence, plan: CandidateGrid, prior: Float[np.ndarray, " c"], settings: SourceSettings) -> bool:

@@ -48,12 +48,15 @@ class MapArrays:
         keyframes: stored pictures.
         place_state: what the place encoder learned from the keyframes.
         sounds: what was heard.
+        sources: what the microphones say of where each sound began, of a map in memory; that of a folder is read
+            from there.
     """
 
     voxels: Voxels
     keyframes: Keyframes
     place_state: dict[str, np.ndarray]
     sounds: HeardSounds
+    sources: SourceEvidence | None = None
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -153,7 +156,7 @@ class StoredMap:
     @property
     def knows_sources(self) -> bool:
         """Whether the map knows where its sounds came from; reads nothing."""
-        return any(name.startswith(SOURCES) for name in self.info.files)
+        return self.arrays.sources is not None or any(name.startswith(SOURCES) for name in self.info.files)
 
     def sources(self) -> SourceEvidence | None:
         """Return what the microphones say of where each sound began; None where their places are not known.
@@ -163,7 +166,7 @@ class StoredMap:
         """
         names = {name.removeprefix(SOURCES): file for name, file in self.info.files.items() if name.startswith(SOURCES)}
         if not names:
-            return None
+            return self.arrays.sources
         arrays = {name: read_array(self.path, file) for name, file in names.items()}
         found = validate_arrays(SourceEvidence, arrays, f"{self.path}/sources")
         if len(found) != self.info.counts.sounds:

@@ -13,6 +13,7 @@ import numpy as np
 
 from avlmaps.core.errors import QueryError
 from avlmaps.live.live_map import LiveMap
+from avlmaps.live.replay import Ears
 from avlmaps.live.settings import LiveSettings
 from avlmaps.live.status import LiveStatus
 from avlmaps.perception.encoders import Encoders
@@ -65,18 +66,22 @@ def play(
         settings: of the live map.
     """
     found, over = Played(), threading.Event()
-    live = LiveMap(path, used, up_in_world=recording.up_in_world, live=settings, overwrite=True)
+    track = recording.audio
+    live = LiveMap(
+        path, used, up_in_world=recording.up_in_world, live=settings, overwrite=True,
+        microphones=None if track is None else track.microphones,
+    )  # fmt: skip
+    ears = Ears(track, live)
     person = threading.Thread(target=_ask, args=(live, over, found.asked_ms))
     person.start()
     begin_s, begin_cpu_s = time.perf_counter(), time.process_time()
-    heard_s = 0.0 if recording.audio is None else recording.audio.start_s
     try:
         for frame, stamp_s, ends_lap in _frames(recording, laps):
             if rate is not None:
                 since_s = stamp_s - float(recording.stamps_s[0])
                 time.sleep(max(0.0, begin_s + since_s / rate - time.perf_counter()))
             live.add_frame(frame.rgb, frame.depth_m, frame.rig, frame.world_from_camera, stamp_s, wait=rate is None)
-            heard_s = _hear(recording, live, heard_s, stamp_s)
+            ears.hear(stamp_s)
             status = live.status()
             found.frames += 1
             found.unsaved_s = max(found.unsaved_s, status.unsaved_s)
@@ -106,14 +111,6 @@ def _frames(recording: Recording, laps: int) -> Iterator[tuple[Frame, float, boo
             since_s = abs(float(stamps_s[index] - stamps_s[order[0]]))
             stamp_s = float(stamps_s[index]) if lap == 0 else float(stamps_s[0]) + lap * lap_s + since_s
             yield recording.frame(index), stamp_s, number == len(recording) - 1
-
-
-def _hear(recording: Recording, live: LiveMap, heard_s: float, stamp_s: float) -> float:
-    track = recording.audio
-    if track is None or not heard_s < stamp_s < track.end_s:
-        return heard_s
-    live.add_audio(track.read(heard_s, stamp_s), heard_s)
-    return stamp_s
 
 
 def _ask(live: LiveMap, over: threading.Event, took_ms: list[float]) -> None:
