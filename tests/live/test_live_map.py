@@ -301,7 +301,7 @@ def test_channels_that_are_not_the_microphones_and_directions_out_of_order_cost_
             ([0.5, 0.4], [1.0, 1.0], "stamps must rise"),
             (0.5, 90.0, "look like degrees"),
             ([0.5, 0.6], [1.0], "as many numbers as there are stamps"),
-            (0.5, None, "azimuth_rad is None"),
+            (0.5, None, "azimuth of row 1 is NaN"),
             (0.5, "left", "azimuth_rad is 'left'"),
         ):
             with pytest.raises(avlmaps.RecordingError, match=said):

@@ -134,13 +134,14 @@ def given_directions(stamp_s: Any, azimuth_rad: Any, elevation_rad: Any, confide
     names = ("stamp_s", "azimuth_rad", "elevation_rad", "confidence")
     column: dict[str, np.ndarray] = {}
     for name, given in zip(names, (stamp_s, azimuth_rad, elevation_rad, confidence), strict=True):
+        if given is None and name in names[2:]:
+            continue
         try:
-            value = np.atleast_1d(np.asarray(given, np.float64)) if given is not None or len(column) < 2 else None
+            column[name] = np.atleast_1d(np.asarray(given, np.float64))
+            fits = column[name].ndim == 1 and column[name].shape == column["stamp_s"].shape
         except (TypeError, ValueError):
-            value = np.zeros((0, 0))
-        if value is not None:
-            column[name] = value
-        if value is not None and (value.ndim != 1 or value.shape != column["stamp_s"].shape):
+            fits = False
+        if not fits:
             raise RecordingError(
                 f"Directions are a number, or as many numbers as there are stamps, for each of {', '.join(names)} "
                 f"(the last two may be left out); {name} is {given!r}."

@@ -1,4 +1,4 @@
-"""Where the sounds of a drive that is not over came from, so far as its map shows by now.
+"""Where the sounds of a drive that is not over came from, as its map shows it until now.
 
 Each sound is located when it is over, on the surfaces that there are then. What came before is carried over to the
 candidates of now. Three things are known better later: surfaces, the signs of the channels, and the offset of a device
