@@ -174,7 +174,7 @@ def test_a_name_with_a_storey_means_what_is_there(name: str, upstairs: bool) -> 
     found = seeker()
     assert (found.best(name).place[2] > 1.0) == upstairs
     assert {thing.place[2] > 1.0 for thing in found.every(name, np.zeros(2))} == {upstairs}
-    heat = found.heat("get_major_map", name, None, None, None, None, primary=True)
+    heat = found.heat("get_major_map", name, None, None, None, "robot", primary=True)
     for several in (heat, heat * heat, heat.include_uncertain()):
         assert {goal.position[2] > 1.0 for goal in several.goals(9)} == {upstairs}
 
