@@ -19,7 +19,7 @@ from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.microphones import Microphones
 
 MOST_MICROPHONES = 8  # more choices than can be tried beyond
-_RARE = 4.0  # log-odds against a turned channel
+_RARE = 2.4  # log-odds against a turned channel
 _MOST_SOUNDS, _MOST_FRAMES, _MOST_PLACES, _LONGEST_S = 6, 40, 4000, 5.0
 
 

@@ -26,15 +26,15 @@ class SourceSettings:
         astray: share of the events whose evidence says nothing.
     """
 
-    concentration: float = 15.0
+    concentration: float = 9.0
     saturation: float = 0.7
     smoothing: float = 5.0
     level_noise_db: float = 8.0
     reverberant_m: float = 0.6
     hidden: float = 1.5
     reach_m: float = 2.5
-    blur_m: tuple[float, float] = (0.11, 0.35)
-    wide: float = 0.2
+    blur_m: tuple[float, float] = (0.075, 0.35)
+    wide: float = 0.15
     astray: float = 0.03
 
     def weighed(self, steered: Float[np.ndarray, " c"], found: Correlations) -> Float[np.ndarray, " c"]:
@@ -49,7 +49,7 @@ class SourceSettings:
 
 
 _OF_CHANNELS = {
-    0: SourceSettings(blur_m=(0.2, 0.6), wide=0.15, astray=0.05),  # a device's directions alone
-    1: SourceSettings(reach_m=0.8, blur_m=(0.15, 0.5), wide=0.15, astray=0.03),
-    2: SourceSettings(concentration=9.8, blur_m=(0.12, 0.5), wide=0.1, astray=0.03),
+    0: SourceSettings(blur_m=(0.07, 0.35), wide=0.1, astray=0.02),  # a device's directions alone
+    1: SourceSettings(reach_m=1.0, blur_m=(0.15, 0.6)),
+    2: SourceSettings(wide=0.3),
 }

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from avlmaps.maps.sources.candidates import CELL_M
 from avlmaps_sim.bench.harness.intervals import in_percent, median_interval, wilson
 from avlmaps_sim.bench.harness.workers import side_by_side
 from avlmaps_sim.bench.output import Table
@@ -94,7 +95,7 @@ def table_of_regions(homes: Sequence[HomeOutcome]) -> Table:
             held = (100.0 * sum(one.is_in(share) for one in own) / len(own) for share in _PROMISED)
             rows.append([way, len(own), *(round(percent, 1) for percent in held)])
     columns = ["by", "sounds", *(f"in {100.0 * share:g} % region %" for share in _PROMISED)]
-    return {"columns": columns, "rows": rows}
+    return {"columns": columns, "rows": rows, "note": f"A region is of whole cells of {CELL_M:g} m, at least one."}
 
 
 def table_of_lengths(homes: Sequence[HomeOutcome]) -> Table:
