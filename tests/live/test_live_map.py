@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable
 from dataclasses import fields, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -30,6 +31,7 @@ from avlmaps.maps.build import build_map
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
 from avlmaps.maps.fusion.sensor import FusionSettings
 from avlmaps.maps.grid import GridSpec
+from avlmaps.maps.growing import GrowingMap
 from avlmaps.maps.settings import BuildSettings, FrameSettings, GravitySettings
 from avlmaps.maps.store.reader import open_stored
 
@@ -514,7 +516,7 @@ def test_late_frames_are_in_the_map_at_the_end(tmp_path: Path, before: int) -> N
             add(live, frame(number))
     status, made, wanted = live.status(), live.map.stored.voxels, every.map.stored.voxels
     assert status.dropped == {"late": 5} and status.late_kept == 5
-    assert "5 late, 5 of them stored" in str(status)
+    assert "5 late dropped; 5 of the late ones stored" in str(status)
     assert status.fused == before + 15 and status.encoded + status.encoded_later == status.frames_in == before + 20
     np.testing.assert_array_equal(made.index, wanted.index)
     np.testing.assert_array_equal(made.hits, wanted.hits)
@@ -531,6 +533,27 @@ def test_late_frames_in_memory_are_bounded(tmp_path: Path, most: int, kept: int)
     status = live.status()
     assert status.dropped == {"late": 27} and status.late_kept == kept
     assert status.encoded + status.encoded_later == (3 + kept if most else status.encoded)
+
+
+def test_up_and_the_floor_of_a_walk_that_doubled_are_found_behind(monkeypatch: pytest.MonkeyPatch) -> None:
+    found: list[int] = []
+    find = GrowingMap._upright_of
+
+    def counted(self: GrowingMap, held: avlmaps.Recording) -> Any:
+        found.append(len(held))
+        return find(self, held)
+
+    monkeypatch.setattr(GrowingMap, "_upright_of", counted)
+    settings = BuildSettings(gravity=GravitySettings(frames=8))
+    growing = GrowingMap(settings, ENCODERS, np.array(UP), looks_later=True)
+    for number in range(20):
+        growing.add(frame(number))
+    assert found == [8], "in the first frames alone"
+    ground = growing._ground
+    made = growing.finish(growing.freeze())
+    assert len(found) == 2 and growing._ground is not ground and made.info.counts.frames == 20
+    growing.finish(growing.freeze())
+    assert len(found) == 2
 
 
 def test_a_frame_that_waited_too_long_is_encoded_later(tmp_path: Path) -> None:
