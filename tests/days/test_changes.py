@@ -79,6 +79,11 @@ def test_a_day_is_a_date_or_a_number(said: str | int, visit: int) -> None:
     assert days().visit_of(said) == visit
 
 
+@pytest.mark.parametrize(("said", "visit"), [("visit 2", 1), ("Day 3", 2), ("yesterday", 2), ("today", 2)])
+def test_a_day_is_said_as_lists_name_it_and_as_people_do(said: str, visit: int) -> None:
+    assert days(("2020-01-01", "2020-01-02", "2020-01-03")).visit_of(said) == visit
+
+
 @pytest.mark.parametrize(
     ("said", "why"),
     [("0", "no visit 0"), ("4", "has 3"), ("monday", "no day"), ("2026-11-22", "first day is 2026-11-23")],
@@ -125,6 +130,8 @@ def test_where_a_thing_was_last_seen_is_where_its_last_stay_was() -> None:
         ("what has moved since 2026-11-24?", Listed.CHANGES, "", "moved", "2026-11-24"),
         ("what's missing from the bedroom", Listed.CHANGES, "bedroom", "gone", ""),
         ("what has changed in the house since visit 2", Listed.CHANGES, "", "", "2"),
+        ("what is new since yesterday?", Listed.CHANGES, "", "new", "yesterday"),
+        ("what has moved since day 3", Listed.CHANGES, "", "moved", "3"),
         ("where was the suitcase last seen?", Listed.LAST_SEEN, "suitcase", "", ""),
         ("where did you last see my bag?", Listed.LAST_SEEN, "bag", "", ""),
     ],

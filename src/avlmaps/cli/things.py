@@ -86,7 +86,7 @@ def contents(verb: Things, opened: "AVLMap | None" = None) -> dict[str, Any]:
             str(verb.map)
         )
     else:
-        doubts = opened.stored.info.doubts
+        doubts = opened.doubts_of_things
         listed = {"map": str(verb.map), "frame": FRAME, **page_of_things(MapLists(opened), wanted)}
         listed |= {"notes": list(doubts)} if doubts else {}
     answer = answer_in(listed, FrameName(verb.frame), opened.space.level_from_recording)

@@ -112,7 +112,7 @@ _CHANGED = {
     "new": "new|added|brought|appeared", "gone": "gone|missing|removed|taken(?: away)?|disappeared|lost",
     "moved": "moved|somewhere else|elsewhere|in another place", "": "changed|different|other than before",
 }  # fmt: skip
-_SINCE = r"(?: since (?:visit (?P<visit>[0-9]+)|(?P<date>[0-9]{4}-[0-9]{2}-[0-9]{2})))?"
+_SINCE = r"(?: since (?:(?:visit|day) (?P<visit>[0-9]+)|(?P<date>[0-9]{4}-[0-9]{2}-[0-9]{2}|yesterday|today)))?"
 _CHANGES = "|".join(_CHANGED.values())
 _SEEN_LAST = r"(?:last seen|seen last|last noticed|last found)"
 _USUALLY = (

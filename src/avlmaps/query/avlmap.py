@@ -408,8 +408,15 @@ class AVLMap:
         things = self.things(names, least_confidence, structure) if "pixels" in models else []
         rooms = self.rooms() if "views" in models else []
         things = with_heard(self, things, are_all=not names)
-        unnamed = () if "pixels" in models else ("The map was made without a model for things, so that it names none.",)
-        return Contents(things, self.sounds(), rooms, (*self.stored.info.doubts, *unnamed), self.storeys)
+        return Contents(things, self.sounds(), rooms, self.doubts_of_things, self.storeys)
+
+    @property
+    def doubts_of_things(self) -> tuple[str, ...]:
+        """Why a list of its things may be wrong, one sentence each."""
+        doubts = self.stored.info.doubts
+        if "pixels" in self.stored.info.models:
+            return doubts
+        return (*doubts, "The map was made without a model for things, so that it names none.")
 
     def sounds(self, most_names: int = 3) -> list["SoundEvent"]:
         """Return the sounds of the map in the order of their onset; see ``contents.find_sounds``."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from datetime import date
+from datetime import date, timedelta
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -69,10 +69,16 @@ class Days:
     def visit_of(self, said: str | int) -> int:
         """Return the number of the visit that a day names: a number from 1, or the last one up to a date.
 
+        Args:
+            said: "2", "visit 2" or "day 2", as lists name it; "2026-11-25", "yesterday" or "today".
+
         Raises:
             QueryError: there is no such visit, or the days are not known.
         """
-        text = str(said).strip()
+        text = str(said).strip().lower()
+        text = text.removeprefix("visit ").removeprefix("day ").strip()
+        if text in ("today", "yesterday"):
+            text = (date.today() - timedelta(days=text == "yesterday")).isoformat()
         if text.isdecimal():
             if not 1 <= int(text) <= len(self.visits):
                 raise QueryError(f"There is no visit {text}; the map has {len(self.visits)}, counted from 1.")

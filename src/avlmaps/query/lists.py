@@ -174,6 +174,8 @@ def _changes(avlmap: "Queryable", question: ListQuestion, top: int) -> Answer:
         inside = Whereabouts.of(avlmap).parts_of(lambda kind: _same_room(kind, question.name), places)
         listed = [one for one, is_in in zip(listed, inside, strict=True) if is_in]
     answer["changes"] = listed
+    if question.name and not _has_room(avlmap, question.name):
+        return _answer(avlmap, [], _no_room(question.name), count=0)
     goals = [
         Goal(
             tuple(one["position"]), one["confidence"], tuple(one["size"]), {}, one["confidence"], one["name"],  # pyright: ignore[reportArgumentType]
@@ -208,6 +210,8 @@ def _usual(avlmap: "Queryable", question: ListQuestion, top: int, ask: Callable[
         found = usual(days, lambda stay: meant(stay.name))
         text = usual_place_text(days, name, found, room_namer(avlmap))
     elif question.how == "in":
+        if not _has_room(avlmap, name):
+            return _answer(avlmap, [], _no_room(name))
         places = np.array([stay.position for stay in days.life.stays]).reshape(-1, 3)
         inside = Whereabouts.of(avlmap).parts_of(lambda kind: _same_room(kind, name), places)
         within = {id(stay) for stay, is_in in zip(days.life.stays, inside, strict=True) if is_in}
@@ -271,13 +275,20 @@ def _room_of(avlmap: "Queryable", subject: Answer) -> tuple[list[Goal], str]:
 
 def _contents(avlmap: "Queryable", name: str) -> tuple[list[Goal], str]:
     where, things = Whereabouts.of(avlmap), _things(avlmap)
-    rooms = [room for room in where.rooms if room.may_be(lambda kind: _same_room(kind, name))]
     places = np.array([thing.position for thing in things]).reshape(-1, 3)
     inside = where.parts_of(lambda kind: _same_room(kind, name), places)
     goals = [_thing_goal(thing) for thing, is_in in zip(things, inside, strict=True) if is_in]
-    if not rooms:
-        return goals, f"The map shows no room that is a {name} as a whole."
+    if not _has_room(avlmap, name):
+        return goals, _no_room(name)
     return goals, f"In the {name}: {counted([goal.name for goal in goals])}."
+
+
+def _has_room(avlmap: "Queryable", name: str) -> bool:
+    return any(room.may_be(lambda kind: _same_room(kind, name)) for room in Whereabouts.of(avlmap).rooms)
+
+
+def _no_room(name: str) -> str:
+    return f"The map shows no room that is a {name} as a whole."
 
 
 def _things_beside(avlmap: "Queryable", subject: Answer) -> tuple[list[Goal], str]:

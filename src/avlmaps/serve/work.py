@@ -168,7 +168,8 @@ Noted = TypeVar("Noted", ContentsAnswer, ListedThingsAnswer, SoundsAnswer, Rooms
 
 def _noted(task: Task, answer: Noted) -> Noted:
     """Add what is doubtful about the map to an answer."""
-    if doubts := task.map.avlmap.stored.info.doubts:
+    opened = task.map.avlmap
+    if doubts := opened.doubts_of_things if "things" in answer else opened.stored.info.doubts:
         answer["notes"] = [without_folders(doubt) for doubt in doubts]
     return answer
 
