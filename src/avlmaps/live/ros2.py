@@ -16,6 +16,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from avlmaps.core.ros_interfaces import interface
+from avlmaps.recordings.formats import ros_directions
 from avlmaps.recordings.formats.ros_topics import RosTopics, info_beside, pair_images
 
 # pyright: reportMissingImports=false
@@ -140,6 +141,9 @@ class Ros2Inbox:
             self._subscribe("pose", pose, self._known[pose], depth=100)
         if "audio" not in self.chosen and self._topics.audio != "none":
             self._choose_sound()
+        said = self._topics.directions
+        if said and "directions" not in self.chosen and self._known.get(said) in ros_directions.TYPES:
+            self._subscribe("directions", said, self._known[said], depth=100)
         if "audio" in self.chosen and "audio_info" not in self.chosen:  # it may be discovered long after the sound
             self._choose_sound_info()
 

@@ -9,6 +9,7 @@ from avlmaps.core.errors import RecordingError
 from avlmaps.core.wording import option
 from avlmaps.live.patience import Once
 from avlmaps.recordings.audio import Sound
+from avlmaps.recordings.channels import ChannelSound
 from avlmaps.recordings.formats.ros_audio import Pcm, sampled_pieces
 from avlmaps.recordings.formats.ros_messages import stamp_of
 
@@ -28,15 +29,18 @@ class RosSound:
         unheard: messages that could not be used.
     """
 
-    def __init__(self, topic: str, tell: Callable[[str], None], pcm: Pcm | None = None) -> None:
+    def __init__(
+        self, topic: str, tell: Callable[[str], None], pcm: Pcm | None = None, microphones: int | None = None
+    ) -> None:
         """Begin without sound.
 
         Args:
             topic: name, for sentences.
             tell: called with a sentence for each thing that makes sound useless, and when it is of use again.
             pcm: of plain samples; None waits for an AudioInfo.
+            microphones: how many are described; None where none are.
         """
-        self.unheard = 0
+        self.unheard, self._microphones = 0, microphones
         self._topic, self._pcm, self._rest, self._end_s = topic, pcm, b"", float("-inf")
         self._tell, self._once = tell, Once(tell)
         self._is_given, self._first_s = pcm is not None, float("inf")
@@ -73,8 +77,10 @@ class RosSound:
             )
         return Pcm.check_rate(int(info.sample_rate), int(info.channels), f"The AudioInfo of {self._topic}")
 
-    def take(self, message: Any, ahead_s: float | None, now_s: float) -> tuple[Sound, float] | None:
-        """Return a message's sound, of one channel, and when it begins; None where it cannot be used, which is counted.
+    def take(self, message: Any, ahead_s: float | None, now_s: float) -> tuple[Sound | ChannelSound, float] | None:
+        """Return a message's sound, and when it begins; None where it cannot be used, which is counted.
+
+        It has every channel where their microphones are described; else channels are mixed.
 
         Args:
             message: AudioStamped, AudioDataStamped or AudioData.
@@ -97,6 +103,15 @@ class RosSound:
             if abs(begin_s - self._end_s) < DRIFT_S:
                 begin_s = self._end_s
         self._end_s = begin_s + length_s
+        channels = samples.shape[1]
+        if channels == self._microphones:
+            return ChannelSound(samples.T.astype(np.float32), pcm.rate_hz), begin_s
+        if self._microphones is not None:
+            self._once(
+                f"The sound on {self._topic} has {channels} channel(s), but {self._microphones} microphone(s) are "
+                "described, so that it is heard as one and where sounds came from is not known; give one position for "
+                f"each channel ({option('microphones', 'FILE')})."
+            )
         return Sound(samples.mean(axis=1).astype(np.float32), pcm.rate_hz), begin_s
 
     def _samples(self, message: Any, now_s: float) -> tuple[Pcm | None, np.ndarray]:

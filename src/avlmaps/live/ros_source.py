@@ -12,12 +12,14 @@ from avlmaps.live.live_map import LiveMap
 from avlmaps.live.patience import Once, Patience
 from avlmaps.live.replay import tell_doubts
 from avlmaps.live.ros_frames import RosFrames
+from avlmaps.live.ros_said import RosDirections
 from avlmaps.live.ros_sound import RosSound
 from avlmaps.recordings.formats.ros_audio import Pcm
 from avlmaps.recordings.formats.ros_messages import stamp_of
 from avlmaps.recordings.formats.ros_topics import RosTopics
 
 _LOOK_S = 0.05
+_SAID = ("rgb", "depth", "pose", "audio", "directions")  # at the beginning, what is read
 
 
 class Inbox(Protocol):
@@ -45,8 +47,7 @@ def ros_topics(named: Mapping[str, str]) -> RosTopics:
     Raises:
         RecordingError: one is for nothing that is known.
     """
-    # A live map finds its sources by microphones; what a device says of directions is read from a bag.
-    known = [one.name for one in fields(RosTopics) if one.name != "directions"]
+    known = [one.name for one in fields(RosTopics)]
     for name in named:
         if name not in known:
             raise RecordingError(f"There is no {name!r} among the topics that can be named: {', '.join(known)}.")
@@ -117,6 +118,7 @@ class _Source:
         self._frames: RosFrames | None = None
         self._pcm = Pcm.parse_rate(topics.audio_pcm) if topics.audio_pcm else None
         self._sound: RosSound | None = None
+        self._said = RosDirections(topics.directions, tell)
         self._waiting: list[tuple[str, Any, float]] = []  # until the pictures' topics are known
         self._ahead_s: float | None = None
         self._doubts, self._lost = 0, 0
@@ -163,18 +165,26 @@ class _Source:
         frames = self._frames
         if frames is None:
             return
+        self._say(self._said.rest())
+        named = self._topics.directions
+        if named and "directions" not in self._inbox.chosen:
+            self._tell(
+                f"note: No direction came on {named}: nobody published std_msgs numbers or geometry_msgs/PoseStamped "
+                "there."
+            )
         for count, what in (
             (frames.unpaired, "depth pictures had no colour picture of their moment"),
             (frames.unplaced, "frames had no pose of their moment"),
             (frames.unread, "frames could not be read"),
             (self._sound.unheard if self._sound else 0, "messages of sound could not be used"),
+            (self._said.unread, "directions came before the first picture"),
         ):
             if count:
                 self._tell(f"note: {count} {what} and are left out.")
 
     def _begin(self) -> None:
         chosen = self._inbox.chosen
-        said = ", ".join(f"{kind} {chosen[kind]}" for kind in ("rgb", "depth", "pose", "audio") if kind in chosen)
+        said = ", ".join(f"{kind} {chosen[kind]}" for kind in _SAID if kind in chosen)
         self._tell(f"note: Mapping from ROS 2: {said}.")
         self._frames = RosFrames(chosen["rgb"], chosen["depth"], chosen.get("pose", ""), self._tell)
 
@@ -183,6 +193,8 @@ class _Source:
         match kind:
             case "audio" | "audio_info":
                 self._hear(kind, message, now_s)
+            case "directions":
+                self._say(self._said.take(message, self._ahead_s, now_s))
             case "rgb" | "depth" | "rgb_info" | "depth_info" | "tf" | "tf_static" | "pose":
                 self._frames.take(kind, message, now_s)
                 if kind == "depth":
@@ -193,11 +205,20 @@ class _Source:
 
     def _hear(self, kind: str, message: Any, now_s: float) -> None:
         if self._sound is None:
-            self._sound = RosSound(self._inbox.chosen.get("audio", "sound"), self._tell, self._pcm)
+            placed = self._live.microphones
+            microphones = None if placed is None else len(placed)
+            self._sound = RosSound(self._inbox.chosen.get("audio", "sound"), self._tell, self._pcm, microphones)
         if kind == "audio_info":
             self._sound.inform(message)
         elif (heard := self._sound.take(message, self._ahead_s, now_s)) is not None:
             try:
                 self._live.add_audio(*heard)
             except AudioError as fault:
+                self._once(str(fault))
+
+    def _say(self, directions: list[tuple[float, float]]) -> None:
+        for stamp_s, azimuth_rad in directions:
+            try:
+                self._live.add_directions(stamp_s, azimuth_rad)
+            except RecordingError as fault:
                 self._once(str(fault))

@@ -13,6 +13,7 @@ from avlmaps.recordings.formats.ros_messages import pose_of, stamp_of
 _NUMBERS = tuple(f"std_msgs/msg/{name}" for name in ("Int32", "Int16", "Float32", "Float64"))
 _POSES = ("geometry_msgs/msg/PoseStamped",)
 TYPES = (*_NUMBERS, *_POSES)
+BEYOND_A_TURN_RAD = 2.0 * np.pi + 1e-3
 
 
 def directions_of(
@@ -39,11 +40,9 @@ def directions_of(
         received.append(received_ns * 1e-9)
         if hasattr(message, "pose"):
             stamped.append(stamp_of(message))
-            angle.append(_yaw(message))
-            whole = False
-        else:
-            angle.append(float(message.data))
-            whole = whole and isinstance(message.data, int | np.integer)
+        value, is_whole = angle_of(message)
+        angle.append(value)
+        whole = whole and is_whole
     if not angle:
         raise RecordingError(f"The topic {topic} has no messages, so that it says no directions; name another.")
     at_s = clock.of_stamps(np.array(stamped)) if stamped else clock.of_received(np.array(received))
@@ -57,10 +56,17 @@ def directions_of(
             f"{int((~used).sum())} of {len(used)} directions of {topic} are no numbers, or came at one moment."
         )
     at_s, azimuth = at_s[used], azimuth[used]
-    if whole or np.abs(azimuth).max(initial=0.0) > 2.0 * np.pi + 1e-3:
+    if whole or np.abs(azimuth).max(initial=0.0) > BEYOND_A_TURN_RAD:
         azimuth = np.deg2rad(azimuth)
         notices.append(f"The directions of {topic} are taken as degrees.")
     return DirectionTrack.of(at_s, np.angle(np.exp(1j * azimuth))), tuple(notices)
+
+
+def angle_of(message: Any) -> tuple[float, bool]:
+    """Return the angle that a message says, a pose in radians, and whether it is a whole number."""
+    if hasattr(message, "pose"):
+        return _yaw(message), False
+    return float(message.data), isinstance(message.data, int | np.integer)
 
 
 def _yaw(message: Any) -> float:
