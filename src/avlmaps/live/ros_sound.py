@@ -109,8 +109,8 @@ class RosSound:
         if self._microphones is not None:
             self._once(
                 f"The sound on {self._topic} has {channels} channel(s), but {self._microphones} microphone(s) are "
-                "described, so that it is heard as one and where sounds came from is not known; give one position for "
-                f"each channel ({option('microphones', 'FILE')})."
+                "described, so that they are mixed into one and where sounds came from is not known; give one position "
+                f"for each channel ({option('microphones', 'FILE')})."
             )
         return Sound(samples.mean(axis=1).astype(np.float32), pcm.rate_hz), begin_s
 
