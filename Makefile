@@ -53,7 +53,7 @@ demo: $(READY)  ## Make a home, walk it, hear it, map it, ask it; pictures land 
 test: $(READY)  ## Run every test (offline, two cores, no GPU).
 	$(RUN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder --durations=30
 
-test-most: $(READY)  ## Run every test that is not marked slow, without the data beside the checkout (5 minutes).
+test-most: $(READY)  ## Run every test that is not marked slow, without the data beside the checkout (3 to 4 minutes).
 	$(RUN)/python -m pytest -q -n 3 --dist loadfile --no-loadscope-reorder -m "not slow and not shared"
 
 test-fast: $(READY)  ## Run the quick tests: core, imports, laws of the query, planner, help (under a minute).
