@@ -112,8 +112,8 @@ def test_a_full_disk_is_one_sentence_and_leaves_no_rubbish(tmp_path: Path, monke
         with pytest.raises(MapError) as fault:
             write()
         assert str(fault.value) == (
-            f"Cannot write {folder}: No space left on device; make room or choose another folder. What was finished there "
-            "is kept, and trying again goes on from it."
+            f"Cannot write {folder}: No space left on device; make room or choose another folder. What was "
+            "finished there stays, and a second try continues from it."
         )
     assert list(tmp_path.iterdir()) == [tmp_path / "written"]
 

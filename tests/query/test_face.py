@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as some
 
 import avlmaps
-from avlmaps.core.errors import AvlmapsError, BackendError, MapError, QueryError, RecordingError
+from avlmaps.core.errors import AudioError, AvlmapsError, BackendError, MapError, QueryError, RecordingError
 from avlmaps.maps.settings import GravitySettings
 from avlmaps.query.export_layers import layers_of
 from avlmaps.recordings.example_room import example_truth
@@ -346,6 +346,16 @@ def test_an_encoder_that_is_interrupted_costs_no_frame_that_waits() -> None:
     assert len(live) == 8
     live.add(truth.rgb[8], truth.depth_m[8], truth.rig.rgb, truth.world_from_camera[8])
     assert len(live) == 9 and live.map.stored.info.counts.frames == 9
+
+
+def test_sound_of_another_clock_than_the_frames_is_refused_from_its_first_piece(frame: avlmaps.Frame) -> None:
+    live = avlmaps.VoxelMap(0.1, avlmaps.Encoders(pixels=Hues()))
+    add(live, frame)
+    piece = avlmaps.Sound(np.zeros(1600, np.float32), 16_000)
+    for stamp_s, said in ((1.7e9, "more than 600 s from the frames"), (1.7e18, "nanoseconds since 1970")):
+        with pytest.raises(AudioError, match=said):
+            live.add_audio(piece, stamp_s)
+    live.add_audio(piece, 0.0)
 
 
 def test_what_is_no_map_size_up_or_profile_is_refused() -> None:

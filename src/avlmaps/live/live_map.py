@@ -14,6 +14,7 @@ from concurrent.futures import Future
 from dataclasses import replace
 from functools import partial
 from math import isfinite
+from numbers import Real
 from pathlib import Path
 from threading import Condition, Event, Lock, Thread
 from types import TracebackType
@@ -42,6 +43,7 @@ from avlmaps.recordings.directions import given_directions
 from avlmaps.recordings.given_frame import given_frame
 from avlmaps.recordings.memory import next_of
 from avlmaps.recordings.microphones import Microphones, microphones_named
+from avlmaps.recordings.plausible import date_fault
 from avlmaps.recordings.types import Frame
 
 if TYPE_CHECKING:
@@ -109,13 +111,15 @@ class LiveMap:
                 an array or a JSON file will do. With them the map knows where its sounds came from.
 
         Raises:
-            MapError: ``begins_s`` is not finite, the folder is something else or a map, or another process writes it.
+            MapError: ``begins_s`` is no time, the folder is something else or a map, or another process writes it.
             RecordingError: the microphones cannot be.
             BackendError: there is no such profile.
         """
         self.path, self.settings, self._query = Path(path), live or LiveSettings(), query
-        if not isfinite(begins_s):
-            raise MapError(f"begins_s is {begins_s}, which is no time; give seconds since 1970, or leave it out.")
+        if not isinstance(begins_s, Real) or not isfinite(begins_s):
+            raise MapError(f"begins_s is {begins_s!r}, which is no time; give seconds since 1970, or leave it out.")
+        if fault := date_fault(np.array([begins_s]), "begins_s"):
+            raise MapError(fault)
         used = encoders_of("embedded" if encoders is None else encoders)
         array = microphones_named(str(microphones)) if isinstance(microphones, str | Path) else microphones
         require_place(self.path, overwrite)

@@ -6,6 +6,8 @@ is that of a build. Of a longer one they are found again each time it has double
 
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from math import isfinite
+from numbers import Real
 from pathlib import Path
 from threading import RLock
 from time import perf_counter
@@ -51,10 +53,10 @@ from avlmaps.perception.protocols import GroundReader
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.channels import ChannelSound
 from avlmaps.recordings.directions import DirectionTrack
-from avlmaps.recordings.growing_track import GrowingTrack
+from avlmaps.recordings.growing_track import LONGEST_GAP_S, GrowingTrack
 from avlmaps.recordings.memory import next_of
 from avlmaps.recordings.microphones import Microphones
-from avlmaps.recordings.plausible import plausible_walk
+from avlmaps.recordings.plausible import date_fault, plausible_walk
 from avlmaps.recordings.types import Frame, Ground, Recording
 
 # Features of waiting frames take no more memory than this.
@@ -258,10 +260,26 @@ class GrowingMap:
             require_fit(self.microphones, len(chunk.samples))
             if self.microphones is None:
                 chunk = Sound(chunk.samples.mean(axis=0), chunk.rate_hz)
+        if self.sound_track is None or self.sound_track.end_s is None:
+            self._require_clock_of_frames(stamp_s)
         if self._sounds is None:
             encoder = self.encoders.sounds if Kind.SOUNDS in self.encoders else None
             self._sounds = GrowingSounds(encoder, self.settings.hearing)
         self._sounds.add(chunk, stamp_s)
+
+    def _require_clock_of_frames(self, stamp_s: Any) -> None:
+        """Raise ``AudioError`` where the first piece of sound is of another clock than the frames before it."""
+        came_s = self._walk.motion().stamps_s
+        if not isinstance(stamp_s, Real) or not isfinite(float(stamp_s)):
+            return  # None, or refused with what it is
+        fault = date_fault(np.array([float(stamp_s)]), "pieces of sound")
+        if not fault and len(came_s) and not -LONGEST_GAP_S < stamp_s - came_s[0] < np.ptp(came_s) + LONGEST_GAP_S:
+            fault = (
+                f"The first piece of sound is of {stamp_s:.6g} s, more than {LONGEST_GAP_S:.0f} s from the frames "
+                f"({came_s[0]:.6g} to {came_s[-1]:.6g} s); give stamps of the frames' clock."
+            )
+        if fault:
+            raise AudioError(fault)
 
     def add_directions(self, said: DirectionTrack) -> None:
         """Add what a device said of where sounds come from, in the order of time. Another thread may do it.

@@ -29,6 +29,8 @@ class Sound:
     rate_hz: int
 
     def __post_init__(self) -> None:
+        if not isinstance(self.samples, np.ndarray):  # pyright: ignore[reportUnnecessaryIsInstance] - people's own
+            raise TypeError(f"samples are a {type(self.samples).__name__}; they must be an array of float32 of (n,)")
         if self.samples.ndim != 1 or self.samples.dtype != np.float32:
             raise ValueError(
                 f"samples are {self.samples.dtype} of {self.samples.shape}; they must be float32 of (n,) in [-1, 1]: "

@@ -66,7 +66,7 @@ def explain_write_errors(folder: Path) -> Generator[None]:
         make_room = "make room or " if fault.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG) else ""
         raise MapError(
             f"Cannot write {place}: {why}; {make_room}choose another folder. What was finished "
-            "there is kept, and trying again goes on from it."
+            "there stays, and a second try continues from it."
         ) from fault
 
 
