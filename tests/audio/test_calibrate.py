@@ -56,6 +56,19 @@ def test_places_off_by_centimetres_and_a_delay_are_recovered(name: str, seed: in
         assert np.array_equal(found.microphones.position_m[:, 2], given.position_m[:, 2])
 
 
+@pytest.mark.parametrize("turned", [(0,), (1, 3)])
+def test_turned_signs_are_taken_back_and_the_array_is_found_as_without(turned: tuple[int, ...], tmp_path: Path) -> None:
+    rng, true, walk = np.random.default_rng(0), microphones_named("square4"), curved_drive(25.0, 2.0)
+    given, sound = wrong(true, rng), heard(true, walk, np.zeros(4), rng)
+    plain = calibrate(track_of(tmp_path, sound, given), walk)
+    samples = sound.samples.copy()
+    samples[list(turned)] *= -1.0
+    found = calibrate(track_of(tmp_path, ChannelSound(samples, RATE_HZ), given), walk)
+    rest = tuple(channel for channel in range(4) if channel not in turned)
+    assert plain.turned == () and found.turned in (turned, rest) and len(found.turned) <= 2
+    assert np.allclose(found.microphones.position_m, plain.microphones.position_m, atol=1e-3)
+
+
 def test_a_right_array_stays(tmp_path: Path) -> None:
     rng, true, walk = np.random.default_rng(4), microphones_named("square4"), curved_drive(20.0)
     found = calibrate(track_of(tmp_path, heard(true, walk, np.zeros(4), rng), true), walk)

@@ -51,6 +51,7 @@ class Calibrate(Verb):
             f"source at {place_text(answer['source'])} ({answer['frame']} frame), {answer['measured_frames']} frames",
             f"residual: {1e6 * answer['residual_before_s']:.0f} µs before, {1e6 * answer['residual_after_s']:.0f} µs "
             f"after.{heights}",
+            *(f"channel {number} is wired the other way round; this is taken back" for number in answer["turned"]),
             f"wrote {answer['out']}",
         ]
         emit(answer, lines, self.json)
@@ -93,6 +94,7 @@ def calibrate_array(verb: "Calibrate") -> dict[str, Any]:
             )
         ],
         "held_heights": found.held_heights,
+        "turned": [channel + 1 for channel in found.turned],
         "frame": FRAME,
         "source": found.source_m.tolist(),
         "measured_frames": found.frames,

@@ -119,10 +119,14 @@ def _of_microphones(recording: Recording, useless: Sequence[str] | None) -> tupl
         f"over {found.sounds} sounds along the drive they reach {found.fit:.2f} of the greatest correlation as "
         f"described, and {found.best_fit:.2f}"
     )
-    if found.reversed_channel is not None:
-        number = found.reversed_channel + 1
-        sentence = f"Channel {number} of the microphones is wired the other way round: {fits} with its sign turned."
-        return [_doubtful(sentence, f"Exchange the two wires of microphone {number}, or turn that channel's sign.")], []
+    if found.turned:
+        named = " and ".join(str(channel + 1) for channel in found.turned)
+        of_them = ("Channels", "are", "their signs") if len(found.turned) > 1 else ("Channel", "is", "its sign")
+        sentence = (
+            f"{of_them[0]} {named} of the microphones {of_them[1]} wired the other way round: {fits} with {of_them[2]} "
+            "turned, as sources are found."
+        )
+        return [_doubtful(sentence, f"Exchange the two wires of each ({named}), or turn its sign.")], []
     if not found.is_right:
         moved = [str(channel + 1) for channel, microphone in enumerate(found.order) if channel != microphone]
         order = ", ".join(str(microphone + 1) for microphone in found.order)

@@ -16,7 +16,9 @@ from avlmaps.core.poses import apply, inverse, rotation_to_level
 from avlmaps.core.timeline import Trajectory
 from avlmaps.core.wording import option
 from avlmaps.maps.sources.correlation import SPEED_M_S, Correlations, correlate
-from avlmaps.maps.sources.steered import loudest_frames, steer
+from avlmaps.maps.sources.polarity import MOST_MICROPHONES, signs_of
+from avlmaps.maps.sources.settings import SourceSettings
+from avlmaps.maps.sources.steered import loudest_frames, steer, steer_pairs
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.channels import read_channels
 from avlmaps.recordings.microphones import Microphones
@@ -50,6 +52,7 @@ class Calibration:
         moved_m: (m,) how far each microphone is from where it was given.
         frames: how many had a measured delay.
         held_heights: whether the walk does not show heights, so that z stays as given.
+        turned: channels that are wired the other way round, which is taken back here as where sources are found.
     """
 
     microphones: Microphones
@@ -61,6 +64,7 @@ class Calibration:
     moved_m: Float[np.ndarray, " m"]
     frames: int
     held_heights: bool
+    turned: tuple[int, ...] = ()
 
 
 def calibrate(track: AudioTrack, walk: Trajectory, between_s: tuple[float, float] | None = None) -> Calibration:
@@ -87,6 +91,8 @@ def calibrate(track: AudioTrack, walk: Trajectory, between_s: tuple[float, float
     if len(found.at_s) < _FEWEST:
         raise RecordingError(_too_little(len(found.at_s), begin_s, end_s))
     fit = _Fit.of(found, array, walk)
+    signs = fit.signs()
+    fit = replace(fit, found=found.turned(signs))
     start = np.concatenate([np.zeros(fit.basis.shape[1] * 4), fit.seek()])
     solution, measured = fit.solve(start, hold_heights=False)
     covered = fit.covariance(solution, measured, hold_heights=False)
@@ -130,7 +136,7 @@ def calibrate(track: AudioTrack, walk: Trajectory, between_s: tuple[float, float
     return Calibration(
         refined, fit.source_of(solution), _scale(fit.residual_s(fit.only_source(solution, measured), measured)),
         after_s, place_sd.max(axis=1), delay_sd, moved_m,
-        frames, held,
+        frames, held, tuple(np.flatnonzero(signs < 0.0).tolist()),
     )  # fmt: skip
 
 
@@ -206,8 +212,20 @@ class _Fit:
         basis = np.linalg.svd(np.eye(count) - 1.0 / count)[0][:, : count - 1]
         return cls(found, array, walk.at(found.at_s) @ array.camera_from_robot, basis)
 
+    def signs(self) -> Float[np.ndarray, " m"]:
+        """Return the sign of each channel, as it is found for sources; 1 for all of two channels, or of very many."""
+        if not 3 <= len(self.array) <= MOST_MICROPHONES:
+            return np.ones(len(self.array))
+        found, ears, place = self._grid()
+        return signs_of([(found, steer_pairs(found, ears, place))], SourceSettings.of(len(self.array)))
+
     def seek(self) -> Float[np.ndarray, "3"]:
         """Return the place round the walk that the given array points to, on a coarse grid."""
+        found, ears, place = self._grid()
+        return place[int(np.argmax(steer(found, ears, place)))]
+
+    def _grid(self) -> tuple[Correlations, Float[np.ndarray, "k m 3"], Float[np.ndarray, "c 3"]]:
+        """Return some frames, where the microphones were then, and places round the walk."""
         up = self.world_from_robot[:, :3, 2].mean(axis=0)
         level = np.eye(4)
         level[:3, :3] = rotation_to_level(up / np.linalg.norm(up))
@@ -218,7 +236,7 @@ class _Fit:
                 float(np.median(middle[:, 2])) + np.array(_HEIGHTS_M)]  # fmt: skip
         place = apply(inverse(level), np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3))
         some = np.unique(np.linspace(0, len(ears) - 1, min(len(ears), 200)).astype(int))
-        return place[int(np.argmax(steer(self.found.take(some).smoothed(_SMOOTHING), ears[some], place)))]
+        return self.found.take(some).smoothed(_SMOOTHING), ears[some], place
 
     def solve(self, start: Float[np.ndarray, " n"], hold_heights: bool) -> tuple[Float[np.ndarray, " n"], _Measured]:
         """Return the unknowns and the delays that they were found by: measured near the prediction, again and again."""

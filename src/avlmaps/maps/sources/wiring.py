@@ -11,10 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from avlmaps.core.arrays import Float, Int
+from avlmaps.core.arrays import Float
 from avlmaps.core.poses import apply, rotation_to_level
 from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.sources.correlation import SPEED_M_S, Correlations
+from avlmaps.maps.sources.polarity import signs_of
+from avlmaps.maps.sources.settings import SourceSettings
 from avlmaps.maps.sources.steered import loudest_of_sound
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.microphones import Microphones
@@ -39,7 +41,7 @@ class Wiring:
 
     Attributes:
         order: the microphone (its position's number, from 0) of each channel that fits best.
-        reversed_channel: the channel whose sign is turned, None where none is.
+        turned: the channels whose sign is turned; sources are found with it taken back (``polarity``).
         fit: share of the greatest possible correlation that the order of the recording reaches, mean over the sounds.
         best_fit: that of ``order``.
         sounds: how many were heard well enough.
@@ -47,7 +49,7 @@ class Wiring:
     """
 
     order: Order
-    reversed_channel: int | None
+    turned: tuple[int, ...]
     fit: float
     best_fit: float
     sounds: int
@@ -56,7 +58,7 @@ class Wiring:
     @property
     def is_right(self) -> bool:
         """Whether nothing else fits better than what the recording says."""
-        return not _moved(self.order) and self.reversed_channel is None
+        return not _moved(self.order) and not self.turned
 
 
 def check_wiring(track: AudioTrack, walk: Trajectory, spans_s: Sequence[tuple[float, float]]) -> Wiring | None:
@@ -80,19 +82,20 @@ def check_wiring(track: AudioTrack, walk: Trajectory, spans_s: Sequence[tuple[fl
     own = tuple(range(len(array)))
     orders = _orders_of(len(array), heard)
     fits = {order: np.array([one.fit(order) for one in heard]) for order in orders}
-    flipped = [np.array([one.fit(own, channel) for one in heard]) for channel in own] if len(own) > 2 else []
     best = max(orders, key=lambda order: float(fits[order].sum()))
-    turned = max(range(len(flipped)), key=lambda number: float(flipped[number].sum())) if flipped else None
-    if turned is not None and flipped[turned].sum() > fits[best].sum() and _is_better(flipped[turned], fits[own]):
-        return Wiring(own, turned, _mean(fits[own]), _mean(flipped[turned]), len(heard))
+    signs = signs_of([one.steered for one in heard], SourceSettings.of(len(own))) if len(own) > 2 else np.ones(2)
+    taken_back = np.array([one.fit(own, signs) for one in heard])
+    if (signs < 0.0).any() and taken_back.sum() > fits[best].sum() and _is_better(taken_back, fits[own]):
+        turned = tuple(np.flatnonzero(signs < 0.0).tolist())
+        return Wiring(own, turned, _mean(fits[own]), _mean(taken_back), len(heard))
     if not _is_better(fits[best], fits[own]):
         unsure = tuple(order for order in orders if order != own and not _is_better(fits[own], fits[order]))
-        return Wiring(own, None, _mean(fits[own]), _mean(fits[own]), len(heard), unsure)
+        return Wiring(own, (), _mean(fits[own]), _mean(fits[own]), len(heard), unsure)
     alike = [order for order in orders if order == best or not _is_better(fits[best], fits[order])]
     fewest = min(_moved(order) for order in alike)
     best = max((order for order in alike if _moved(order) == fewest), key=lambda order: _mean(fits[order]))
     others = tuple(order for order in alike if order != best)
-    return Wiring(best, None, _mean(fits[own]), _mean(fits[best]), len(heard), others)
+    return Wiring(best, (), _mean(fits[own]), _mean(fits[best]), len(heard), others)
 
 
 def _moved(order: Order) -> int:
@@ -155,12 +158,12 @@ class _Heard:
     """One sound: how well each pair of channels fits each pair of microphones, over places round the robot.
 
     Attributes:
-        pair: (p, 2) channels.
+        found: the correlations.
         fits: (p, m, m, c) sums over the frames of the correlation of a pair of channels, at the delays of a pair of
             microphones and a place; as a share of the greatest possible.
     """
 
-    pair: Int[np.ndarray, "p 2"]
+    found: Correlations
     fits: Float[np.ndarray, "p m m c"]
 
     @classmethod
@@ -176,15 +179,27 @@ class _Heard:
         poses = walk.at(found.at_s)
         ear = array.in_world_m(poses)
         place = _places(ear, poses @ array.camera_from_robot)
-        return cls(found.pair, _pair_fits(found, ear, place))
+        return cls(found, _pair_fits(found, ear, place))
 
-    def fit(self, order: Order, reversed_channel: int | None = None) -> float:
+    @property
+    def steered(self) -> tuple[Correlations, Float[np.ndarray, "p c"]]:
+        """The correlations, and the sum of each pair at each place, as ``signs_of`` takes them."""
+        one, other = self.found.pair.T
+        return self.found, self.fits[np.arange(len(one)), one, other] * _greatest(self.found)
+
+    def fit(self, order: Order, signs: Float[np.ndarray, " m"] | None = None) -> float:
         """Return how well the best place fits where the channels are those of microphones in an order."""
-        one, other = np.array(order)[self.pair].T
-        chosen = self.fits[np.arange(len(self.pair)), one, other]
-        if reversed_channel is not None:
-            chosen = chosen * np.where((self.pair == reversed_channel).any(axis=1), -1.0, 1.0)[:, None]
+        pair = self.found.pair
+        one, other = np.array(order)[pair].T
+        chosen = self.fits[np.arange(len(pair)), one, other]
+        if signs is not None:
+            chosen = chosen * (signs[pair[:, 0]] * signs[pair[:, 1]])[:, None]
         return float(chosen.sum(axis=0).max())
+
+
+def _greatest(found: Correlations) -> float:
+    """Return the greatest possible sum over the frames and pairs."""
+    return max(float(found.weight.sum()) * len(found.pair), 1e-9)
 
 
 def _places(ear: Float[np.ndarray, "f m 3"], world_from_robot: Float[np.ndarray, "f 4 4"]) -> Float[np.ndarray, "c 3"]:
@@ -212,4 +227,4 @@ def _pair_fits(
             whole = np.clip(at.astype(np.int64), 0, last)
             part = (at - whole).astype(np.float32)
             total[:, one, other] += curve[:, whole] * (1.0 - part) + curve[:, whole + 1] * part
-    return total / max(float(found.weight.sum()) * len(found.pair), 1e-9)
+    return total / _greatest(found)
