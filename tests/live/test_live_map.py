@@ -17,7 +17,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import avlmaps
-from avlmaps.core.errors import AudioError, MapError, RecordingError
+from avlmaps.core.errors import AudioError, BackendError, MapError, RecordingError
 from avlmaps.live import live_map
 from avlmaps.live.gates import EncodingGate, Gates
 from avlmaps.live.kept_back import KeptBack
@@ -199,6 +199,32 @@ def test_a_second_writer_a_finished_map_and_an_empty_one_get_a_sentence(tmp_path
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_a_frame_that_an_encoder_fails_on_costs_no_other(tmp_path: Path) -> None:
+    class Fails:
+        calls = 0
+
+        def encode(self, frame: avlmaps.Frame) -> np.ndarray:
+            self.calls += 1
+            if self.calls == 3:
+                raise RuntimeError("out of memory")
+            return np.ones((6, 8, 1), np.float32)
+
+        def encode_words(self, words: list[str]) -> np.ndarray:
+            return np.ones((len(words), 1), np.float32)
+
+    faults: list[str] = []
+    with LiveMap(tmp_path / "m", avlmaps.Encoders(pixels=Fails()), up_in_world=UP, live=EVERY) as live:
+        for number in range(8):
+            try:
+                add(live, frame(number))
+            except BackendError as fault:
+                faults.append(str(fault))
+            wait_for(lambda: live.status().waiting == 0)
+    info = open_stored(tmp_path / "m").info
+    assert len(faults) == 1 and "out of memory" in faults[0]
+    assert info.counts.frames == 7
+
+
 def test_a_fault_of_ours_ends_the_waiting_and_is_raised(tmp_path: Path) -> None:
     with LiveMap(tmp_path / "m.avlmap", ENCODERS, up_in_world=UP, live=EVERY) as live:
         for number in range(3):

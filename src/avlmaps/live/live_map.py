@@ -183,7 +183,7 @@ class LiveMap:
 
         Raises:
             RecordingError: it is no frame, comes out of order or again, or is of another camera; the map is as it was.
-            BackendError: an encoder failed on frames before; they are left out.
+            BackendError: an encoder failed on frames before; they are left out, and this one is added.
             MapError: the map is closed.
         """
         arrived_s = time.perf_counter()
@@ -212,6 +212,7 @@ class LiveMap:
             self._queue.append((frame, arrived_s))
             self._is_pressed = not wait
             self._door.notify_all()
+            self._raise_fault()
 
     @property
     def microphones(self) -> Microphones | None:
@@ -449,6 +450,9 @@ class LiveMap:
             raise MapError(f"The live map {self.path} is closed; begin another.")
         if self._broken is not None:
             raise self._broken
+
+    def _raise_fault(self) -> None:
+        """Raise what an encoder failed with since the last time."""
         fault, self._fault = self._fault, None
         if fault is not None:
             raise fault
