@@ -1,0 +1,93 @@
+"""Sounds that are located one after the other, while a drive goes on."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_bearings import PLACES, SPANS, UP, said, surface
+
+from avlmaps.core.timeline import Trajectory
+from avlmaps.maps.sources.bearings import Device
+from avlmaps.maps.sources.find import find_sources
+from avlmaps.maps.sources.growing import GrowingSources
+from avlmaps.maps.types import SourceEvidence
+from avlmaps.recordings.audio import AudioTrack
+from avlmaps.recordings.directions import DirectionTrack
+from helpers.heard_in_the_open import curved_drive
+
+WALK = curved_drive(28.0, 2.0)
+OFFSET_RAD = np.deg2rad(90.0)
+
+
+@pytest.fixture(scope="module")
+def directions() -> DirectionTrack:
+    return said(WALK, OFFSET_RAD, np.random.default_rng(1), 0.2)
+
+
+def until(end_s: float) -> tuple[AudioTrack, Trajectory, list[tuple[float, float]]]:
+    """Return what has come until a moment: the track, the walk, and the sounds that are over."""
+    count = int(np.searchsorted(WALK.stamps_s, end_s))
+    walk = Trajectory(WALK.stamps_s[:count], WALK.world_from_body[:count])
+    return AudioTrack(Path("none"), 16_000, end_s), walk, [span for span in SPANS if span[1] < end_s]
+
+
+def step(growing: GrowingSources, end_s: float) -> SourceEvidence | None:
+    raw, walk, spans_s = until(end_s)
+    track = growing.track(raw, 1)
+    assert track is not None
+    return growing.until_now(track, walk, spans_s, surface(), UP)
+
+
+def off_m(evidence: SourceEvidence) -> np.ndarray:
+    total = evidence.heard.astype(float) + evidence.expected.astype(float) + np.log(evidence.prior)
+    return np.linalg.norm(evidence.place[total.argmax(axis=1)][:, :2] - PLACES[: len(evidence), :2], axis=1)
+
+
+def test_a_device_becomes_known_while_sounds_come_and_the_end_is_that_of_a_build(directions: DirectionTrack) -> None:
+    growing = GrowingSources(3)
+    found: SourceEvidence | None = None
+    doubt_rad: list[float] = []
+    for number, (begin_s, end_s) in enumerate(SPANS):
+        growing.add_directions(directions.between(begin_s, end_s))
+        found = step(growing, end_s + 0.3)
+        assert found is not None and len(found) == number + 1 and growing.waiting == 0
+        doubt_rad.append(Device.of(found.device[0]).offset_sd_rad)
+        assert step(growing, end_s + 0.4) is found, "nothing came"
+    assert found is not None
+    device = Device.of(found.device[0])
+    assert device.sounds == len(SPANS) and doubt_rad[-1] < doubt_rad[0]
+    assert abs(np.angle(np.exp(1j * (device.offset_rad - OFFSET_RAD)))) < np.deg2rad(6.0)
+    raw, walk, spans_s = until(28.0)
+    track = growing.track(raw, 1)
+    assert track is not None and track.directions is not None
+    end = growing.at_the_end(track, walk, spans_s, surface(), UP)
+    built = find_sources(track, walk, spans_s, surface(), UP)
+    assert end is not None and built is not None
+    np.testing.assert_array_equal(end.heard, built.heard)
+    assert np.abs(off_m(found) - off_m(end)).max() < 0.3, "all are looked at again with the device of now"
+
+
+def test_what_waits_is_located_the_newest_first_and_again_after_a_correction(
+    directions: DirectionTrack, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("avlmaps.maps.sources.growing._RECENT", 0)
+    growing = GrowingSources(2)
+    found: SourceEvidence | None = None
+    growing.add_directions(directions)
+    for waiting in (4, 2, 0):
+        found = step(growing, 28.0)
+        assert found is not None and growing.waiting == waiting
+        located = (found.heard != 0.0).sum(axis=1) > 0
+        assert not located[:waiting].any() and located[waiting:].all()
+    assert found is not None and Device.of(found.device[0]).sounds == len(SPANS), "what was located before counts"
+    growing.forget()
+    found = step(growing, 28.0)
+    assert found is not None and growing.waiting == 4 and not found.heard[:4].any()
+
+
+def test_directions_of_another_clock_are_left_out_and_said(directions: DirectionTrack) -> None:
+    growing = GrowingSources()
+    late = DirectionTrack.of(directions.stamp_s + 1000.0, directions.azimuth_rad)
+    growing.add_directions(late)
+    assert growing.track(until(28.0)[0], 1) is None
+    assert "lie outside of the sound" in growing.doubt
