@@ -615,7 +615,8 @@ def test_ctrl_c_while_it_ends_leaves_out_what_waits(tmp_path: Path, capsys: pyte
     look_again = live._growing.look_again
 
     def slowly(one: avlmaps.Frame, *, is_fused: bool) -> None:
-        _thread.interrupt_main()
+        if not live.status().encoded_later:
+            _thread.interrupt_main()
         time.sleep(0.5)
         look_again(one, is_fused=is_fused)
 
