@@ -6,7 +6,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -606,8 +606,16 @@ def test_where_nothing_is_new_there_is_time_for_frames_of_before(
         assert live.status().dropped["known"] > 0 == live.status().dropped.get("still", 0)
 
 
-def test_ctrl_c_while_it_ends_leaves_out_what_waits(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_ctrl_c_while_it_ends_leaves_out_what_waits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     said: list[str] = []
+    shown: list[str] = []
+
+    def bar(items: Iterable[None], label: str, *, total: int) -> Iterable[None]:
+        shown.append(label)
+        assert total > 0
+        return items
+
+    monkeypatch.setattr(live_map, "progress", bar)
     live = LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP, live=LATER)
     for number in range(14):
         add(live, frame(number, step_m=0.005))
@@ -616,6 +624,7 @@ def test_ctrl_c_while_it_ends_leaves_out_what_waits(tmp_path: Path, capsys: pyte
 
     def slowly(one: avlmaps.Frame, *, is_fused: bool) -> None:
         if not live.status().encoded_later:
+            wait_for(lambda: "encoding what waited" in shown)
             _thread.interrupt_main()
         time.sleep(0.5)
         look_again(one, is_fused=is_fused)
@@ -625,7 +634,6 @@ def test_ctrl_c_while_it_ends_leaves_out_what_waits(tmp_path: Path, capsys: pyte
     end_drive(live, said.append)
     assert time.monotonic() - within_s < 60.0
     assert "frames wait" in said[0] and "are left out" in said[1] and len(said) == 2
-    assert "encoding what waited" in capsys.readouterr().err
     status = live.status()
     assert status.encoded + status.encoded_later < status.fused == 14 and status.unsaved_s == 0.0
     assert len(open_stored(tmp_path / "map", verify=True).voxels) > 0
