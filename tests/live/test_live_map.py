@@ -550,6 +550,20 @@ def test_late_frames_are_in_the_map_at_the_end(tmp_path: Path, before: int) -> N
     np.testing.assert_allclose(made.feature, wanted.feature, atol=2e-3)
 
 
+def test_the_first_frames_of_all_may_come_late(tmp_path: Path) -> None:
+    with LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP, live=LATER) as live:
+        with live._door:  # nobody takes a frame meanwhile
+            for number in range(6):
+                one = frame(number)
+                live.add_frame(one.rgb, one.depth_m, one.camera, one.world_from_camera, 2.0 * number)
+        for number in range(6, 9):
+            add(live, replace(frame(number), stamp_s=2.0 * number))
+    assert live.status().late_kept == 4 and live.status().encoded_later >= 4
+    made = open_stored(tmp_path / "map", verify=True)
+    assert made.info.recording.duration_s == pytest.approx(8.0)
+    assert made.voxels.hits.sum() > 0 and live.status().fused == 5
+
+
 @pytest.mark.parametrize(("most", "kept"), [(256, live_map._MOST_LATE), (0, 0)])
 def test_late_frames_in_memory_are_bounded(tmp_path: Path, most: int, kept: int) -> None:
     chosen = replace(LATER, kept_frames=most)

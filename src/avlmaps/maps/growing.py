@@ -225,7 +225,8 @@ class GrowingMap:
             BackendError: its features are not what they must be; the map is as it was.
         """
         assert self._sensor is not None and self._free is not None and not self.settings.frames.per_submap
-        stamp_s = min(frame.stamp_s, float(self._walk.stamps_s[-1]))  # nothing is seen after the last frame of the map
+        fused_s = self._walk.stamps_s  # nothing is seen before the first frame of the map or after its last
+        stamp_s = float(np.clip(frame.stamp_s, fused_s[0], fused_s[-1]))
         with silence_progress(True):
             part = self._empty(self._sensor)
             part.add(replace(frame, stamp_s=stamp_s), self._encoded(replace(frame, ground=self._ground)))
