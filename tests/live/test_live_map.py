@@ -198,7 +198,6 @@ def test_a_second_writer_a_finished_map_and_an_empty_one_get_a_sentence(tmp_path
         add(again, frame(0))
 
 
-@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
 def test_a_frame_that_an_encoder_fails_on_costs_no_other(tmp_path: Path) -> None:
     class Fails:
         calls = 0
@@ -225,6 +224,7 @@ def test_a_frame_that_an_encoder_fails_on_costs_no_other(tmp_path: Path) -> None
     assert info.counts.frames == 7
 
 
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
 def test_a_fault_of_ours_ends_the_waiting_and_is_raised(tmp_path: Path) -> None:
     with LiveMap(tmp_path / "m.avlmap", ENCODERS, up_in_world=UP, live=EVERY) as live:
         for number in range(3):
