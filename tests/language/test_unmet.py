@@ -148,6 +148,16 @@ def test_what_the_map_cannot_know_is_asked(command: str) -> None:
     stops(command)
 
 
+@pytest.mark.parametrize("thing", ["chair", "bag", "tv", "coffee table"])
+@pytest.mark.parametrize("form", [
+    "go to the {} that is gone", "go to the {} which has been moved", "drive to the {} that is no longer there",
+    "face the {} that somebody took", "go to the missing {}", "visit the kitchen, then the {} that was removed",
+    "go to the {} that was not there before", "go to the {} that went missing",
+])  # fmt: skip
+def test_a_thing_that_has_changed_is_no_other_of_its_name(form: str, thing: str) -> None:
+    stops(form.format(thing))
+
+
 @pytest.mark.parametrize(
     "said", ["stop", "Stop!", "STOP NOW", "halt", "stop stop stop", "Stopp!", "whoa, stop it", "stop the robot"]
 )

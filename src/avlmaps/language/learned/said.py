@@ -53,6 +53,7 @@ def words() -> Words:
         "bans",
         "scales",
         "choosing",
+        "changed",
         "cancels",
         "conditions",
         "ways",

@@ -210,6 +210,18 @@ def _excluded(said: Claimed) -> Clarify | Refuse | None:
     return None
 
 
+def _changed(said: Claimed) -> Clarify | None:
+    """Return the question for "the chair that is gone": a reading goes to a chair that is there."""
+    found = said.spans("changed")
+    if not found:
+        return None
+    phrase = " ".join(said.texts[slice(*found[0])])
+    return Clarify(
+        f"'{phrase}': a name does not say what has changed. Ask what changed, or where it was last seen; then name its "
+        "place."
+    )
+
+
 def _ways(said: Claimed) -> Clarify | None:
     """Return the question for a wall or a path that should be followed and is driven to."""
     for start, end in said.spans("ways"):
@@ -407,13 +419,13 @@ def _has_unit(tokens: list[Token], at: int) -> bool:
 
 
 _RULES: tuple[Callable[[Claimed], Clarify | Refuse | None], ...] = (
-    _away, _picked, _leaving, _outside, _through, _edges, _no_thing, _excluded, _ways, _superlatives, _nameless,
-    _unread, _unheard, _amounts, _sides, unaccounted,
+    _away, _picked, _leaving, _outside, _through, _edges, _no_thing, _excluded, _changed, _ways, _superlatives,
+    _nameless, _unread, _unheard, _amounts, _sides, unaccounted,
 )  # fmt: skip
 
 
 _ASKED: tuple[Callable[[Claimed], Clarify | Refuse | None], ...] = (
-    _picked, _excluded, _superlatives, _nameless, _unread, _unheard, _amounts, _qualities,
+    _picked, _excluded, _changed, _superlatives, _nameless, _unread, _unheard, _amounts, _qualities,
 )  # fmt: skip
 
 
