@@ -87,6 +87,8 @@ def test_what_cannot_be_obeyed_is_told_with_status_1_and_json_all_the_same(run, 
         (("MAP", "go to the chair", "--scene", "house:7", "--start", "nan,1,2"), 2, "--start takes x,y,heading"),
         (("MAP", "go to the chair", "--robot", "nav2", "--start", "1,2,3"), 2, "belong to a simulated robot"),
         (("MAP", "go to the chair", "--scene", "missing.glb"), 1, "there is no scene"),
+        (("MAP", "go to the chair", "--scene", "house:7", "--found-at", "2"), 1, "at a probability of 2"),
+        (("MAP", "go to the chair", "--dry-run", "--found-at", "2"), 1, "at a probability of 2"),
     ],
 )
 def test_each_mistake_is_one_sentence(run, built: Path, words: tuple[str, ...], status: int, sentence: str) -> None:
@@ -117,6 +119,16 @@ def test_a_dry_run_prints_the_program_and_opens_nothing(answer) -> None:
     said = answer("go", "nowhere.avlmap", "go to the chair, then turn left", "--dry-run")
     assert said["program"].splitlines() == ['robot.move_to_object("chair")', "robot.turn(-90)"]
     assert said["steps"] == said["actions"] == said["subgoals"] == []
+
+
+@pytest.mark.parametrize("at", ["source", "robot"])
+def test_a_place_of_sounds_is_said_to_be_idle_where_no_sound_is_named(answer, at: str) -> None:
+    given = ("--dry-run", "--at", at)
+    assert answer("go", "nowhere.avlmap", "go to the chair", *given)["notes"] == [
+        f"--at {at} has no effect: no sound is named."
+    ]
+    assert answer("go", "nowhere.avlmap", "go to the barking", *given)["notes"] == []
+    assert answer("go", "nowhere.avlmap", "go to the chair", "--dry-run")["notes"] == []
 
 
 def test_a_chat_model_without_its_extra_says_how_to_get_it(run, built: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -294,3 +294,10 @@ def test_another_day_is_merged_and_its_changes_are_told(dated: Path, built: Path
     assert [day["day"] for day in told["days"]] == [None, "2023-11-14"] and told["changes"] == []
     status, out, _ = run("changes", home)
     assert status == 0 and out.startswith("nothing is known to have changed")
+    status, out, err = run("changes", home, "--since", "")
+    assert status == 1 and out == "" and "day" in err
+
+
+def test_a_map_without_features_of_things_is_not_offered_a_question() -> None:
+    lines = next_lines({"path": "a.avlmap", "voxels": 9, "models": {"sounds": "x"}})
+    assert [line.split()[-2] for line in lines[:1]] == ["view"] and lines[0].startswith("next: ") and len(lines) == 2

@@ -1,5 +1,7 @@
 """A map that grows frame by frame is the map that a build makes of the same frames, whatever is queried on the way."""
 
+import gc
+import warnings
 from dataclasses import fields, replace
 from pathlib import Path
 
@@ -197,3 +199,13 @@ def test_only_a_few_frames_are_held_however_many_come() -> None:
     held = growing._walk.held()
     assert len(held) <= 4 and held.stamps_s[0] == 0.0
     assert len(growing._keyframes.undecided) < 8 and not growing._waiting
+
+
+def test_its_temporary_files_are_closed_when_it_goes(tmp_path: Path) -> None:
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always", ResourceWarning)
+        growing = grown(Walk(6), encoders(Words()), frames=3)
+        assert len(growing.stored().keyframes)
+        del growing
+        gc.collect()
+    assert [str(one.message) for one in said if one.category is ResourceWarning] == []

@@ -41,7 +41,7 @@ def list_changes(verb: Changes) -> "ChangesAnswer":
     """Return what changed in a map."""
     from avlmaps.query.avlmap import AVLMap
 
-    return AVLMap.open(verb.map).changes(verb.since or 1, first_seen=verb.first_seen)
+    return AVLMap.open(verb.map).changes(1 if verb.since is None else verb.since, first_seen=verb.first_seen)
 
 
 def change_lines(answer: "Mapping[str, Any]") -> list[str]:

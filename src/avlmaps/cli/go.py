@@ -1,6 +1,6 @@
 """`avlmaps go`: turn a command into a program, and run it on a simulated or a real robot."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import isfinite, radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from avlmaps.navigate.driver import Driver
     from avlmaps.navigate.instruct import Outcome
     from avlmaps.navigate.interrupts import Halt
-    from avlmaps.query.avlmap import AVLMap
+    from avlmaps.query.avlmap import AVLMap, QuerySettings
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,6 +132,7 @@ def go(verb: "Go") -> dict[str, Any]:
         )
     if verb.robot != "simulated" and (verb.scene or start):
         raise UsageError(f"--scene and --start belong to a simulated robot; --robot {verb.robot} is where it is.")
+    settings = _query_settings(verb)
     translator = translator_for(verb)
     if verb.explain and verb.dry_run:
         from avlmaps.language.learned_translator import explanation
@@ -139,11 +140,26 @@ def go(verb: "Go") -> dict[str, Any]:
         for line in explanation(translator, verb.sentence):
             say(line)
     if verb.dry_run:
-        return plan_answer(translator.program_for(verb.sentence))
+        return plan_answer(_read(verb, translator))
     from avlmaps.navigate.interrupts import raised_signals
 
     with raised_signals():
-        return _driven(verb, start)
+        return _driven(verb, start, settings)
+
+
+def _query_settings(verb: "Go") -> "QuerySettings":
+    from avlmaps.query.avlmap import QuerySettings
+    from avlmaps.query.modalities.sound import SoundSettings
+
+    return QuerySettings(found_at=verb.found_at, sounds=SoundSettings(at=verb.at))
+
+
+def _read(verb: "Go", translator: "Translator") -> "Translation":
+    """Return the program of the sentence; a place that was chosen for its sounds is said to be idle without one."""
+    translation = translator.program_for(verb.sentence)
+    if verb.at is None or "sound=" in translation.program:
+        return translation
+    return replace(translation, notes=(*translation.notes, f"--at {verb.at} has no effect: no sound is named."))
 
 
 def plan_answer(translation: "Translation") -> dict[str, Any]:
@@ -155,12 +171,10 @@ def plan_answer(translation: "Translation") -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _driven(verb: "Go", start: "GroundPose | None") -> dict[str, Any]:
-    from avlmaps.query.avlmap import AVLMap, QuerySettings
-    from avlmaps.query.modalities.sound import SoundSettings
+def _driven(verb: "Go", start: "GroundPose | None", settings: "QuerySettings") -> dict[str, Any]:
+    from avlmaps.query.avlmap import AVLMap
 
-    sounds = SoundSettings(at=verb.at)
-    avlmap = AVLMap.open(verb.map, QuerySettings(found_at=verb.found_at, sounds=sounds))
+    avlmap = AVLMap.open(verb.map, settings)
     translator = translator_for(verb, avlmap)
     if verb.explain:
         from avlmaps.language.learned_translator import explanation
@@ -168,7 +182,7 @@ def _driven(verb: "Go", start: "GroundPose | None") -> dict[str, Any]:
         for line in explanation(translator, verb.sentence):
             say(line)
     # A sentence that is not understood fails here, before a scene is made.
-    translation = translator.program_for(verb.sentence)
+    translation = _read(verb, translator)
     robot = simulated_robot(verb, avlmap, start) if verb.robot == "simulated" else _real(verb, avlmap)
     return drive(verb, avlmap, robot, translator, translation)
 

@@ -1,6 +1,7 @@
 """Keyframes of a walk that is not over: chosen as in a build, each looked at once, as soon as it is decided."""
 
 import tempfile
+import weakref
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
@@ -235,6 +236,7 @@ class _PictureFile:
         try:
             if self._file is None:
                 self._file = tempfile.TemporaryFile(prefix="avlmaps-keyframes-")  # noqa: SIM115 - it goes with us
+                weakref.finalize(self, self._file.close)
             self._file.seek(self._end)
             self._file.write(png.data)
             self._file.flush()
