@@ -1,5 +1,6 @@
 """Sounds that are located one after the other, while a drive goes on."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,9 @@ from avlmaps.maps.sources.find import find_sources
 from avlmaps.maps.sources.growing import GrowingSources
 from avlmaps.maps.types import SourceEvidence
 from avlmaps.recordings.audio import AudioTrack
+from avlmaps.recordings.channels import ChannelSound, with_microphones, write_channels
 from avlmaps.recordings.directions import DirectionTrack
+from avlmaps.recordings.microphones import microphones_named
 from helpers.heard_in_the_open import curved_drive
 
 WALK = curved_drive(28.0, 2.0)
@@ -91,3 +94,32 @@ def test_directions_of_another_clock_are_left_out_and_said(directions: Direction
     growing.add_directions(late)
     assert growing.track(until(28.0)[0], 1) is None
     assert "lie outside of the sound" in growing.doubt
+
+
+def test_directions_that_came_before_their_sound_are_used_when_it_has_come(directions: DirectionTrack) -> None:
+    growing = GrowingSources()
+    growing.add_directions(directions)
+    assert growing.track(until(2.0)[0], 1) is None and growing.doubt
+    track = growing.track(until(28.0)[0], 1)
+    assert track is not None and track.directions is not None and not growing.doubt
+
+
+def test_a_device_may_begin_to_speak_after_sounds_that_an_array_located(
+    directions: DirectionTrack, tmp_path: Path
+) -> None:
+    growing = GrowingSources(3)
+    growing.microphones = microphones_named("square4")
+    noise = np.random.default_rng(2).normal(0.0, 0.05, (4, 28 * 16_000)).astype(np.float32)
+    write_channels(tmp_path / "track.flac", ChannelSound(noise, 16_000))
+    recorded = with_microphones(AudioTrack.open(tmp_path / "track.flac"), growing.microphones)
+    device: list[int] = []
+    for begin_s, end_s in SPANS[:2]:
+        if begin_s > SPANS[0][0]:
+            growing.add_directions(directions.between(begin_s, end_s))
+        _, walk, spans_s = until(end_s + 0.3)
+        track = growing.track(replace(recorded, duration_s=end_s + 0.3), 4)
+        assert track is not None
+        found = growing.until_now(track, walk, spans_s, surface(), UP)
+        assert found is not None and len(found) == len(spans_s)
+        device.append(Device.of(found.device[0]).sounds if len(found.device) else 0)
+    assert device == [0, 1]

@@ -224,6 +224,25 @@ def test_a_frame_that_an_encoder_fails_on_costs_no_other(tmp_path: Path) -> None
     assert info.counts.frames == 7
 
 
+def test_late_frames_of_an_encoder_that_always_fails_end_with_a_sentence(tmp_path: Path) -> None:
+    class Fails:
+        def encode(self, frame: avlmaps.Frame) -> np.ndarray:
+            raise RuntimeError("out of memory")
+
+        def encode_words(self, words: list[str]) -> np.ndarray:
+            return np.ones((len(words), 1), np.float32)
+
+    live = LiveMap(tmp_path / "m", avlmaps.Encoders(pixels=Fails()), up_in_world=UP)
+    with live._door:  # nobody takes a frame meanwhile
+        for number in range(4):
+            one = frame(number)
+            live.add_frame(one.rgb, one.depth_m, one.camera, one.world_from_camera, one.stamp_s)
+    wait_for(lambda: live.status().kept > 0)
+    with pytest.raises(MapError, match="No frame came"):
+        live.close()
+    assert live._broken is None
+
+
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
 def test_a_fault_of_ours_ends_the_waiting_and_is_raised(tmp_path: Path) -> None:
     with LiveMap(tmp_path / "m.avlmap", ENCODERS, up_in_world=UP, live=EVERY) as live:

@@ -34,6 +34,9 @@ from avlmaps.maps.store.array_files import write_array
 from avlmaps.maps.store.reader import StoredMap, open_stored
 from avlmaps.maps.types import Submaps
 from avlmaps.perception.encoders import Encoders
+from avlmaps.recordings.audio import AudioTrack
+from avlmaps.recordings.channels import ChannelSound
+from avlmaps.recordings.microphones import microphones_named
 
 WITH = replace(SETTINGS, frames=replace(SETTINGS.frames, per_submap=4))
 FRAMES = 22
@@ -413,13 +416,41 @@ def test_a_growing_map_follows_and_goes_on(tmp_path: Path) -> None:
     require_same_voxels(found, again)
 
 
-def test_a_growing_map_follows_while_its_first_frames_wait() -> None:
-    walk = Walk(8)
-    growing = GrowingMap(WITH, encoders(), walk.up_in_world)
+def test_a_growing_map_follows_while_its_first_frames_wait(tmp_path: Path) -> None:
+    walk, shift = Walk(8), motion(shift=(0.0, 0.0, 1.0))
+    beeps = AudioTrack.open(write_beeps(tmp_path / "beeps.flac")).read().samples
+    growing, other = (GrowingMap(WITH, encoders(), walk.up_in_world) for _ in range(2))
+    for one in (growing, other):
+        one.place_microphones(microphones_named("stereo"))
     for frame in walk.frames():
         growing.add(frame)
-    growing.correct_poses(walk.stamps_s, motion(shift=(0.0, 0.0, 1.0)) @ walk.world_from_camera)
-    other = GrowingMap(WITH, encoders(), walk.up_in_world)
+        other.add(replace(frame, world_from_camera=shift @ frame.world_from_camera))
+    for one in (growing, other):
+        one.add_audio(ChannelSound(np.stack([beeps, np.roll(beeps, 2)]), 16_000), 0.0)
+    assert growing.stored().sources() is not None
+    growing.correct_poses(walk.stamps_s, shift @ walk.world_from_camera)
+    found, wanted = growing.stored(), other.stored()
+    require_same_voxels(wanted, found)
+    there, now = wanted.sources(), found.sources()
+    assert there is not None and now is not None
+    np.testing.assert_allclose(np.median(now.place, axis=0), np.median(there.place, axis=0), atol=0.05)
+
+
+def test_sounds_wait_for_the_surfaces_of_corrected_poses(tmp_path: Path) -> None:
+    walk = Walk(8)
+    growing = GrowingMap(WITH, encoders(), walk.up_in_world, wait=4)
+    growing.place_microphones(microphones_named("stereo"))
     for frame in walk.frames():
-        other.add(replace(frame, world_from_camera=motion(shift=(0.0, 0.0, 1.0)) @ frame.world_from_camera))
-    require_same_voxels(other.stored(), growing.stored())
+        growing.add(frame)
+    beeps = AudioTrack.open(write_beeps(tmp_path / "beeps.flac")).read().samples
+    every = ChannelSound(np.stack([beeps, beeps]), 16_000)
+    growing.add_audio(ChannelSound(every.samples[:, :24_000], 16_000), 0.0)
+    made = growing.stored()
+    growing.add_audio(ChannelSound(every.samples[:, 24_000:], 16_000))
+    growing.correct_poses(walk.stamps_s, motion(shift=(0.0, 0.0, 1.0)) @ walk.world_from_camera)
+    heard = growing.heard()
+    assert heard is not None and len(heard) == len(made.sounds) + 1
+    assert growing.with_sounds(made, heard) is made
+    newer = growing.with_sounds(growing.stored(), heard)
+    sources = newer.sources()
+    assert sources is not None and len(sources) == len(newer.sounds) == 2

@@ -570,15 +570,15 @@ class LiveMap:
         try:
             if not self._growing.sums:  # the drive is over before all of these came
                 self._growing.settle()
-            taken = self._kept.take()
+            taken = self._kept.take() if self._growing.sums else None
             if taken is not None and self._encoding.opens_again(taken[0]):
                 self._growing.look_again(taken[0], is_fused=taken[1])
                 self._unsaved.note(came_s)
                 self._tally.note("encoded later")
         except AvlmapsError as fault:
             self._doubt(str(fault))
-            if not self._growing.sums:
-                self._kept.close()
+        if not self._growing.sums:  # no first frame was right
+            self._kept.close()
 
     def _correct(self) -> None:
         with self._door:
@@ -677,7 +677,7 @@ class LiveMap:
         if same and not self._growing.sources_wait:
             return
         newer = self._growing.with_sounds(stored, heard)
-        if not same or newer.sources() is not stored.sources():
+        if newer is not stored and (not same or newer.sources() is not stored.sources()):
             self._unsaved_sounds.note(now_s)
             self._unsaved_sounds.freeze(now_s)
             self._saver.offer(newer, snapshot[1], now_s)

@@ -39,7 +39,8 @@ class LiveSettings:
     first_frames: int = 8
     """Frames in which up, the floor and the depth camera are found first, with gates; without them as in a build."""
     snapshot_s: float = 1.0
-    """Seconds from one snapshot for questions to the next, at least; where one takes long, four times that."""
+    """Seconds from one snapshot for questions to the next, at least; where one takes long, it pauses as long as that
+    took, up to a second."""
     save_s: float = 1.5
     """Seconds from one save to the next, at least."""
 

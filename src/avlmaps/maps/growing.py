@@ -129,7 +129,7 @@ class GrowingMap:
         self._keyframes = GrowingKeyframes(encoders, self.settings.keyframes, looks_later=looks_later)
         self._sounds: GrowingSounds | None = None
         self._sources = GrowingSources(AT_ONCE if looks_later else None)
-        self._sources_corrections = 0  # how often poses had been corrected when sources were last located
+        self._finished_corrections = 0  # how often poses had been corrected when a map was last finished
         self._dim: int | None = None
         self._rehearsed: dict[int, tuple[Ground, np.ndarray]] | None = None
         self._rehearsal = _Rehearsal()
@@ -320,6 +320,7 @@ class GrowingMap:
             self._waiting = [replace(one, frame=moved_frame(one.frame, step)) for one in self._waiting]
             self._rehearsal = _Rehearsal()
             self._keyframes.move(step)
+            self._sources.forget()
             if self._part is not None:
                 self._follow(step)
             if self._given_up is not None:
@@ -392,12 +393,15 @@ class GrowingMap:
         return self._sounds.heard(motion, final=False)
 
     def with_sounds(self, made: StoredMap, sounds: HeardSounds) -> StoredMap:
-        """Return a map of ``finish`` with the sounds of ``heard`` instead of its own, and where they came from."""
+        """Return a map of ``finish`` with the sounds of ``heard`` instead of its own, and where they came from.
+
+        Where poses were corrected since it is the map itself: its surfaces are of other poses than the walk.
+        """
         assert self._sounds is not None
         with self.finishing, silence_progress(True):
-            sources = made.sources()
-            if self._sources_corrections == self._corrections:  # else the surfaces are of other poses than the walk
-                sources = self._located(sounds, made.arrays.voxels, made.up_in_world, final=False)
+            if self._finished_corrections != self._corrections:
+                return made
+            sources = self._located(sounds, made.arrays.voxels, made.up_in_world, final=False)
         folder, counts = self._sounds.clips_folder, structs.replace(made.info.counts, sounds=len(sounds))
         return replace(
             made,
@@ -509,9 +513,7 @@ class GrowingMap:
         """
         plan = self._plan(came.walk)
         with self.finishing, silence_progress(True):
-            if came.corrections != self._sources_corrections:
-                self._sources_corrections = came.corrections
-                self._sources.forget()
+            self._finished_corrections = came.corrections
             if final or self._upright is None or self._is_outgrown:
                 up, floor, ground = self._upright_of(came.walk.held())
                 self._upright = up, floor

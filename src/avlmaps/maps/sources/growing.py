@@ -79,6 +79,7 @@ class GrowingSources:
             self._said = [DirectionTrack.joined(self._said)] if self._said else []
             said = self._said[0] if self._said else None
         try:
+            self.doubt = ""
             if said is not None:
                 said.require_beside(heard.start_s, heard.end_s, "What the device said")
         except RecordingError as fault:
@@ -116,7 +117,8 @@ class GrowingSources:
             now = np.union1d(now, np.arange(max(0, len(row) - _RECENT), len(row)))
         old = np.setdiff1d(np.flatnonzero(row >= 0), now)
         heard = [spans_s[number] for number in sorted({*old.tolist(), *now.tolist()})]
-        others = self._of_device[row[old]] if track.directions is not None and len(old) else None
+        told = track.directions is not None and self._of_device.shape[1] > 1  # else the device said nothing before
+        others = self._of_device[row[old]] if told and len(old) else None
         signs = self._signs if len(old) >= _SIGNS_BY else None
         wanted = [spans_s[number] for number in now.tolist()]
         found = find_among(track, walk, wanted, voxel_m, up_in_world, signs_by_s=heard, signs=signs, others=others)
