@@ -10,6 +10,7 @@ from recording_scenes import pose_line, save_depth, save_rgb, shot
 from avlmaps.core import poses
 from avlmaps.core.errors import RecordingError
 from avlmaps.recordings.open import open_recording
+from avlmaps.recordings.types import BaseHeight
 from avlmaps_sim.mixing.copying import write_recording
 
 START = 1305031102.0
@@ -103,6 +104,20 @@ def test_a_copy_keeps_depth_at_its_own_resolution(tmp_path: Path):
     copy = open_recording(write_recording(original, tmp_path / "copy"))
     assert np.array_equal(copy.frame(3).depth_m, original.frame(3).depth_m)
     assert np.array_equal(copy.up_in_world, [0.0, 0.0, 1.0])
+
+
+def test_a_copy_keeps_the_poses_at_their_own_rate_and_the_height_of_the_base(tmp_path: Path):
+    original = open_recording(_write(tmp_path / "freiburg1"))
+    assert original.trajectory is not None and len(original.trajectory.stamps_s) > len(original)
+    original.base_height = BaseHeight(0.42, on_floor=True)
+    copy = open_recording(write_recording(original, tmp_path / "copy"))
+    assert copy.trajectory is not None and copy.base_height == original.base_height
+    np.testing.assert_allclose(copy.trajectory.stamps_s, original.trajectory.stamps_s, atol=1e-12)
+    np.testing.assert_allclose(copy.trajectory.world_from_body, original.trajectory.world_from_body, atol=1e-9)
+    np.testing.assert_allclose(copy.world_from_camera, original.world_from_camera, atol=1e-9)
+    np.testing.assert_array_equal(copy.stamps_s, original.stamps_s)
+    again = open_recording(write_recording(copy, tmp_path / "again"))
+    assert again.walk.stamps_s.tolist() == copy.walk.stamps_s.tolist() and again.base_height == copy.base_height
 
 
 def test_clocks_that_never_meet_are_told_with_their_times(tmp_path: Path):

@@ -27,6 +27,7 @@ from avlmaps.core.files import DESCRIPTION_BYTES, decode_json, read_regular
 from avlmaps.recordings.corrections import Corrections, PoseKind
 from avlmaps.recordings.faults import Fault, Report
 from avlmaps.recordings.microphones import MicrophoneNumbers
+from avlmaps.recordings.types import BaseHeight
 
 SCHEMA_VERSION = 1
 DESCRIPTION = "recording.json"
@@ -89,6 +90,7 @@ class Description(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
         pose_delay_s: by how much the stamps of poses.csv are later than the pictures' (``--pose-delay``).
         microphones: where those of the track's channels are; None where that is not known.
         begins_s: what the clock said at time 0, seconds since 1970; stamps that are dates say it themselves.
+        base_height: where the robot's base is under the camera in the first frame.
     """
 
     schema_version: int
@@ -106,6 +108,7 @@ class Description(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     pose_delay_s: float | None = None
     microphones: MicrophoneNumbers | msgspec.UnsetType | None = msgspec.UNSET
     begins_s: float | msgspec.UnsetType = msgspec.UNSET
+    base_height: BaseHeight | msgspec.UnsetType = msgspec.UNSET
 
     @property
     def placed(self) -> MicrophoneNumbers | None:

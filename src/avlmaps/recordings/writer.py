@@ -2,6 +2,7 @@
 
 import os
 import shutil
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,13 +17,14 @@ from avlmaps.core import poses
 from avlmaps.core.camera import Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import sync_folder, write_bytes_atomically
+from avlmaps.core.timeline import Trajectory
 from avlmaps.recordings import layout
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
 from avlmaps.recordings.channels import ChannelSound, write_channels
 from avlmaps.recordings.directions import DIRECTIONS, DirectionTrack, write_directions
 from avlmaps.recordings.memory import same_rig
 from avlmaps.recordings.microphones import MicrophoneNumbers, Microphones
-from avlmaps.recordings.types import Frame
+from avlmaps.recordings.types import BaseHeight, Frame
 
 _JPEG_QUALITY = 95
 _MAX_DEPTH_VALUE = 65534
@@ -48,6 +50,9 @@ class RecordingWriter:
         depth_units_per_m: units of the depth files in a metre; 1000 says millimetres.
         origin: what makes the recording, for its description.
         begins_s: what the clock said at time 0, seconds since 1970; 0 where nobody knows.
+        trajectory: the poses at their own rate, on the frames' clock, in place of the frames' own, which a reader
+            interpolates from them; None where each frame has its own.
+        base_height: where the robot's base is under the camera, None where that is not known.
     """
 
     path: Path
@@ -57,6 +62,8 @@ class RecordingWriter:
     depth_units_per_m: float = 1000.0
     origin: str = ""
     begins_s: float = 0.0
+    trajectory: Trajectory | None = None
+    base_height: BaseHeight | None = None
     _stamps_s: list[float] = field(default_factory=list, init=False)
     _names: set[str] = field(default_factory=set, init=False)
     _audio_start_s: float = field(default=0.0, init=False)
@@ -197,9 +204,7 @@ class RecordingWriter:
 
     def _log(self, name: str, stamp_s: float, world_from_camera: Float[np.ndarray, "4 4"]) -> None:
         assert self._poses is not None and self._frames is not None
-        quaternion = poses.to_quaternion(world_from_camera[None])[0]
-        numbers = [stamp_s, *world_from_camera[:3, 3].tolist(), *quaternion.tolist()]
-        self._poses.write(",".join(repr(float(number)) for number in numbers) + "\n")
+        self._poses.writelines(_pose_lines(np.array([stamp_s]), world_from_camera[None]))
         self._poses.flush()
         self._frames.write(f"{name},{float(stamp_s)!r}\n")
         self._frames.flush()  # last: a frame that is listed is whole
@@ -210,6 +215,12 @@ class RecordingWriter:
         """Write the description, which makes the folder a recording, and take the marker away."""
         if not self._stamps_s:
             raise RecordingError(f"{self.path} got no frame, so there is no recording to finish.")
+        if self.trajectory is not None:
+            lines = [
+                layout.POSES_HEADER + "\n",
+                *_pose_lines(self.trajectory.stamps_s, self.trajectory.world_from_body),
+            ]
+            write_bytes_atomically(self.path / layout.POSES, "".join(lines).encode())
         for folder in (self.path / "rgb", self.path / "depth", self.path):
             sync_folder(folder)
         write_bytes_atomically(self.path / layout.DESCRIPTION, self._description())
@@ -217,8 +228,7 @@ class RecordingWriter:
 
     def _description(self) -> bytes:
         """Return the content of the description of the frames until now."""
-        interval_s = float(np.median(np.diff(self._stamps_s))) if len(self._stamps_s) > 1 else 0.0
-        rate_hz = round(1.0 / interval_s, 6) if interval_s > 0.0 else None
+        rate_hz = _rate_hz(self._stamps_s)
         rig = self.rig
         description = layout.Description(
             schema_version=layout.SCHEMA_VERSION,
@@ -229,15 +239,26 @@ class RecordingWriter:
             ),
             depth_units_per_m=self.depth_units_per_m,
             rgb_rate_hz=rate_hz,
-            pose_rate_hz=rate_hz,
+            pose_rate_hz=rate_hz if self.trajectory is None else _rate_hz(self.trajectory.stamps_s),
             up_in_world=None if self.up_in_world is None else _triple(self.up_in_world),
             audio_start_s=self._audio_start_s,
             frames=len(self._stamps_s),
             origin=self.origin,
             microphones=self._microphones or msgspec.UNSET,
             begins_s=self.begins_s or msgspec.UNSET,
+            base_height=self.base_height or msgspec.UNSET,
         )
         return msgspec.json.format(msgspec.json.encode(description), indent=2) + b"\n"
+
+
+def _rate_hz(stamps_s: Sequence[float] | Float[np.ndarray, " n"]) -> float | None:
+    interval_s = float(np.median(np.diff(stamps_s))) if len(stamps_s) > 1 else 0.0
+    return round(1.0 / interval_s, 6) if interval_s > 0.0 else None
+
+
+def _pose_lines(stamps_s: Float[np.ndarray, " n"], world_from_camera: Float[np.ndarray, "n 4 4"]) -> Iterator[str]:
+    rows = np.column_stack([stamps_s, world_from_camera[:, :3, 3], poses.to_quaternion(world_from_camera)])
+    yield from (",".join(map(repr, row)) + "\n" for row in rows.tolist())
 
 
 def _make_empty(path: Path) -> None:

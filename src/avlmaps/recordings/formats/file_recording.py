@@ -21,7 +21,7 @@ from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.content import add_files, stamp_of
 from avlmaps.recordings.faults import Fault, Report
 from avlmaps.recordings.plausible import date_fault, plausible_walk
-from avlmaps.recordings.types import Frame, Recording
+from avlmaps.recordings.types import BaseHeight, Frame, Recording
 from avlmaps.recordings.video import VideoFrames
 
 R = TypeVar("R", bound="ShotsRecording")
@@ -226,11 +226,13 @@ class FileRecording(ShotsRecording):
         depth_units: units of a depth PNG in a metre.
         video: the colour pictures, where they are one video.
         trajectory: the poses at their own rate, where those of the frames were interpolated.
+        base_height: where the robot's base is under the camera, where that is known.
     """
 
     depth_units: float = 1000.0
     video: VideoFrames | None = None
     trajectory: timeline.Trajectory | None = None
+    base_height: BaseHeight | None = None
 
     def _colour(self, index: int) -> UInt8[np.ndarray, "h w 3"]:
         if self.video is not None:

@@ -73,6 +73,7 @@ def open_folder(path: Path, report: Report = stop_at_first) -> Recording:
         video=video,
         trajectory=trajectory,
         begins_s=start_s + (description.begins_s or 0.0),
+        base_height=description.base_height or None,
     )
     return corrected(recording, description.corrections())
 

@@ -18,9 +18,10 @@ def write_recording(
 ) -> Path:
     """Write any recording in our own format: the same pictures bit for bit, the same stamps, clock and poses.
 
-    Pictures that are JPEG or PNG files already are linked or copied; others are encoded as PNG, depth in whole
-    millimetres. Truth that lies beside a recording in our own format (``semantic/``, ``objects.json``, and
-    ``events.csv`` where the sound track stays) goes along, so that the copy can be evaluated as well.
+    Poses that were interpolated keep their own rate. Pictures that are JPEG or PNG files already are linked or copied;
+    others are encoded as PNG, depth in whole millimetres. Truth that lies beside a recording in our own format
+    (``semantic/``, ``objects.json``, and ``events.csv`` where the sound track stays) goes along, so that the copy can be
+    evaluated as well.
 
     Args:
         recording: what to copy.
@@ -35,8 +36,16 @@ def write_recording(
     """
     units, up = recording.depth_units_per_m, recording.up_in_world
     origin = origin or f"copied from {recording.format} {recording.path.name}"
-    begins_s = recording.begins_s
-    with RecordingWriter(out, recording.rig, up, depth_units_per_m=units, origin=origin, begins_s=begins_s) as writer:
+    with RecordingWriter(
+        out,
+        recording.rig,
+        up,
+        depth_units_per_m=units,
+        origin=origin,
+        begins_s=recording.begins_s,
+        trajectory=recording.trajectory,
+        base_height=recording.base_height,
+    ) as writer:
         for index in progress(range(len(recording)), "copying frames", total=len(recording)):
             _copy_frame(recording, index, writer, link)
         if recording.format == "folder":
