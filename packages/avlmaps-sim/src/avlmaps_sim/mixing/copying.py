@@ -20,8 +20,8 @@ def write_recording(
 
     Poses that were interpolated keep their own rate. Pictures that are JPEG or PNG files already are linked or copied;
     others are encoded as PNG, depth in whole millimetres. Truth that lies beside a recording in our own format
-    (``semantic/``, ``objects.json``, and ``events.csv`` where the sound track stays) goes along, so that the copy can be
-    evaluated as well.
+    (``semantic/``, ``objects.json``, and ``events.csv`` where the sound track stays) goes along, so that the copy can
+    be evaluated as well.
 
     Args:
         recording: what to copy.
