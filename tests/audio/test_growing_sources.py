@@ -56,6 +56,7 @@ def test_a_device_becomes_known_while_sounds_come_and_the_end_is_that_of_a_build
         assert found is not None and len(found) == number + 1 and growing.waiting == 0
         doubt_rad.append(Device.of(found.device[0]).offset_sd_rad)
         assert step(growing, end_s + 0.4) is found, "nothing came"
+        assert growing.known(until(end_s + 0.4)[2]) is found
     assert found is not None
     device = Device.of(found.device[0])
     assert device.sounds == len(SPANS) and doubt_rad[-1] < doubt_rad[0]
@@ -77,11 +78,16 @@ def test_what_waits_is_located_the_newest_first_and_again_after_a_correction(
     growing = GrowingSources(2)
     found: SourceEvidence | None = None
     growing.add_directions(directions)
+    assert growing.known(until(28.0)[2]) is None and growing.waiting == len(SPANS)
     for waiting in (4, 2, 0):
         found = step(growing, 28.0)
         assert found is not None and growing.waiting == waiting
         located = (found.heard != 0.0).sum(axis=1) > 0
         assert not located[:waiting].any() and located[waiting:].all()
+        one_more = growing.known([*until(28.0)[2], (90.0, 91.0)])
+        assert one_more is not None and growing.waiting == waiting + 1
+        np.testing.assert_array_equal(one_more.heard[:-1], found.heard)
+        assert not (one_more.heard[-1].any() or one_more.expected[-1].any() or one_more.moving[-1])
     assert found is not None and Device.of(found.device[0]).sounds == len(SPANS), "what was located before counts"
     growing.forget()
     found = step(growing, 28.0)

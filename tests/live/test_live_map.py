@@ -33,7 +33,10 @@ from avlmaps.maps.fusion.sensor import FusionSettings
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.growing import GrowingMap
 from avlmaps.maps.settings import BuildSettings, FrameSettings, GravitySettings
-from avlmaps.maps.store.reader import open_stored
+from avlmaps.maps.sources.growing import GrowingSources
+from avlmaps.maps.store.reader import StoredMap, open_stored
+from avlmaps.maps.types import SourceEvidence
+from avlmaps.query.avlmap import AVLMap
 
 ENCODERS = avlmaps.Encoders.named("colours")
 CAMERA = avlmaps.Pinhole(80.0, 80.0, 40.0, 30.0, 80, 60)
@@ -327,6 +330,45 @@ def test_sounds_are_in_the_map_with_the_frames(tmp_path: Path) -> None:
             live.add_audio(avlmaps.Sound(samples[1600 * number : 1600 * (number + 1)], 16_000), 0.1 * number)
     (heard,) = live.map.stored.sounds.onset_s
     assert heard == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_sound_has_its_name_before_its_source_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    may_locate, locate = threading.Event(), GrowingSources.until_now
+
+    def located_when_it_may(self: GrowingSources, *args: Any) -> SourceEvidence | None:
+        may_locate.wait(20.0)
+        return locate(self, *args)
+
+    def snapshot_with(is_so: Callable[[StoredMap], bool]) -> AVLMap:
+        until_s = time.monotonic() + 20.0
+        while time.monotonic() < until_s:
+            if live.generation and is_so(live.map.stored):
+                return live.map
+            time.sleep(0.01)
+        raise AssertionError("no such snapshot was published")
+
+    monkeypatch.setattr(GrowingSources, "until_now", located_when_it_may)
+    ears = avlmaps.Encoders.named("colours", sounds="embedded")
+    rng = np.random.default_rng(0)
+    source = rng.normal(scale=1e-3, size=64_100)
+    source[16_000:24_000] += 0.3 * rng.normal(size=8_000)
+    two = np.stack([source[100:], source[95:-5]]).astype(np.float32)
+    few = BuildSettings(gravity=GravitySettings(frames=8))
+    with LiveMap(tmp_path / "map", ears, up_in_world=UP, live=EVERY, settings=few, microphones="stereo") as live:
+        for number in range(40):
+            add(live, frame(number))
+            piece = slice(1600 * number, 1600 * (number + 1))
+            live.add_audio(avlmaps.ChannelSound(two[:, piece], 16_000), 0.1 * number)
+        named = snapshot_with(lambda stored: len(stored.sounds) == 1)
+        assert named.stored.arrays.sources_wait == 1 and not may_locate.is_set()
+        assert "1 wait; ask again" in " ".join(named.ask("where does the last sound come from?").notes)
+        with pytest.raises(avlmaps.QueryError, match="1 wait; ask again in a moment"):
+            named.sources()
+        may_locate.set()
+        located = snapshot_with(lambda stored: len(stored.sounds) == 1 and not stored.arrays.sources_wait)
+        assert len(located.sources()) == 1 and not located.ask("where does the last sound come from?").notes
+    sources = live.map.stored.sources()
+    assert sources is not None and len(sources) == 1 and sources.heard.any()
 
 
 def test_channels_that_are_not_the_microphones_and_directions_out_of_order_cost_nothing(tmp_path: Path) -> None:

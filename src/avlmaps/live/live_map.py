@@ -673,11 +673,13 @@ class LiveMap:
         stored, heard = snapshot[0].stored, self._growing.heard()
         if heard is None:
             return
-        same = np.array_equal(heard.offset_s, stored.sounds.offset_s)
-        if same and not self._growing.sources_wait:
+        if not np.array_equal(heard.offset_s, stored.sounds.offset_s):
+            newer = self._growing.with_sounds(stored, heard)  # a name need not wait for its source
+        elif stored.arrays.sources_wait:
+            newer = self._growing.with_sources(stored)
+        else:
             return
-        newer = self._growing.with_sounds(stored, heard)
-        if newer is not stored and (not same or newer.sources() is not stored.sources()):
+        if newer is not stored:
             self._unsaved_sounds.note(now_s)
             self._unsaved_sounds.freeze(now_s)
             self._saver.offer(newer, snapshot[1], now_s)

@@ -47,10 +47,10 @@ from avlmaps.maps.store.manifest import BadFrame, GroundInfo, MapInfo, ModelInfo
 from avlmaps.maps.store.manifest_file import MANIFEST
 from avlmaps.maps.store.reader import GIVEN_FEATURES, MapArrays, StoredMap, open_stored
 from avlmaps.maps.store.writer import MapContent, Written, is_map_or_free, write_map
-from avlmaps.maps.types import HeardSounds, SourceEvidence, Submaps, Voxels
+from avlmaps.maps.types import HeardSounds, SourceEvidence, Submaps
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.protocols import GroundReader
-from avlmaps.recordings.audio import Sound
+from avlmaps.recordings.audio import AudioTrack, Sound
 from avlmaps.recordings.channels import ChannelSound
 from avlmaps.recordings.directions import DirectionTrack
 from avlmaps.recordings.growing_track import LONGEST_GAP_S, GrowingTrack
@@ -393,28 +393,45 @@ class GrowingMap:
         return self._sounds.heard(motion, final=False)
 
     def with_sounds(self, made: StoredMap, sounds: HeardSounds) -> StoredMap:
-        """Return a map of ``finish`` with the sounds of ``heard`` instead of its own, and where they came from.
+        """Return a map of ``finish`` with the sounds of ``heard`` instead, and what is known of their sources.
 
-        Where poses were corrected since it is the map itself: its surfaces are of other poses than the walk.
+        It locates none, so that a sound has its name at once. Where poses were corrected since it is the map itself:
+        its surfaces are of other poses than the walk.
         """
         assert self._sounds is not None
-        with self.finishing, silence_progress(True):
+        with self.finishing:
             if self._finished_corrections != self._corrections:
                 return made
-            sources = self._located(sounds, made.arrays.voxels, made.up_in_world, final=False)
+            sources, wait = self._known(sounds)
         folder, counts = self._sounds.clips_folder, structs.replace(made.info.counts, sounds=len(sounds))
         return replace(
             made,
             path=folder,
             info=structs.replace(made.info, counts=counts),
-            arrays=replace(made.arrays, sounds=sounds, sources=sources),
+            arrays=replace(made.arrays, sounds=sounds, sources=sources, sources_wait=wait),
             integrity=IntegrityCheck(folder, {}),
         )
 
-    @property
-    def sources_wait(self) -> bool:
-        """Whether sounds are over that are not located yet; ``with_sounds`` locates the next ones."""
-        return self._sources.waiting > 0
+    def with_sources(self, made: StoredMap, *, final: bool = False) -> StoredMap:
+        """Return a map with the next of its sounds located that wait for it, on its surfaces.
+
+        Args:
+            made: of ``finish`` or ``with_sounds``.
+            final: locate all of them, as a build does.
+        """
+        with self.finishing, silence_progress(True):
+            heard = self._heard_by(made.sounds)
+            if heard is None or self._finished_corrections != self._corrections:
+                return made
+            track, spans_s = heard
+            motion, voxels = self._walk.motion(), made.arrays.voxels
+            walk = Trajectory(motion.stamps_s, motion.world_from_camera)
+            voxel_m = GridSpec(self.settings.voxel_size_m).centre_of(np.asarray(voxels.index))
+            find = self._sources.at_the_end if final else self._sources.until_now
+            sources = find(track, walk, spans_s, voxel_m, made.up_in_world)
+            if sources is made.arrays.sources:
+                return made
+            return replace(made, arrays=replace(made.arrays, sources=sources, sources_wait=self._sources.waiting))
 
     @property
     def doubts(self) -> tuple[str, ...]:
@@ -429,18 +446,18 @@ class GrowingMap:
         )
         return tuple(one for one in (few, self._sources.doubt) if one)
 
-    def _located(
-        self, sounds: HeardSounds, voxels: Voxels, up_in_world: Float[np.ndarray, "3"], *, final: bool
-    ) -> SourceEvidence | None:
-        """Return where sounds came from, over the surfaces of a map; None where nothing shows that."""
-        raw, motion = None if self._sounds is None else self._sounds.track, self._walk.motion()
+    def _heard_by(self, sounds: HeardSounds) -> tuple[AudioTrack, list[tuple[float, float]]] | None:
+        """Return what shows where sounds came from, and when they were; None where nothing shows that."""
+        raw = None if self._sounds is None else self._sounds.track
         track = None if raw is None else self._sources.track(raw, raw.channels)
-        if track is None or not len(sounds) or not len(motion.stamps_s):
+        if track is None or not len(sounds) or not len(self._walk.motion().stamps_s):
             return None
-        spans_s = list(zip(sounds.onset_s.tolist(), sounds.offset_s.tolist(), strict=True))
-        voxel_m = GridSpec(self.settings.voxel_size_m).centre_of(np.asarray(voxels.index))
-        find = self._sources.at_the_end if final else self._sources.until_now
-        return find(track, Trajectory(motion.stamps_s, motion.world_from_camera), spans_s, voxel_m, up_in_world)
+        return track, list(zip(sounds.onset_s.tolist(), sounds.offset_s.tolist(), strict=True))
+
+    def _known(self, sounds: HeardSounds) -> tuple[SourceEvidence | None, int]:
+        """Return what is known by now of where sounds came from, and how many of them wait to be located."""
+        heard = self._heard_by(sounds)
+        return (None, 0) if heard is None else (self._sources.known(heard[1]), self._sources.waiting)
 
     def stored(self, *, final: bool = False) -> StoredMap:
         """Return the map of the frames that came, in memory.
@@ -462,7 +479,7 @@ class GrowingMap:
     def _settled(self, final: bool) -> StoredMap:
         """Do what ``stored`` does, by what the frames were last found to be."""
         self.settle()
-        return self.finish(self.freeze(), final=final)
+        return self.with_sources(self.finish(self.freeze(), final=final), final=final)
 
     def doubt(self, sentence: str) -> None:
         """Store with the map why it may be wrong, the first few times; every answer repeats it."""
@@ -502,6 +519,8 @@ class GrowingMap:
     def finish(self, came: "FrozenSums", *, final: bool = False, looks_s: float = np.inf) -> StoredMap:
         """Return the map of what came; another thread may add frames meanwhile, and only one may finish.
 
+        Of the sources of sounds it has what is known; ``with_sources`` locates them.
+
         Args:
             came: from ``freeze``, later than the last time.
             final: as of ``stored``.
@@ -521,8 +540,9 @@ class GrowingMap:
                     self._is_outgrown, self._ground = False, ground
             content, info = self._content(plan, came, *self._upright, final, looks_s)
         rig, grid = came.walk.rig, GridSpec(self.settings.voxel_size_m)
+        sources, wait = self._known(content.sounds)
         arrays = MapArrays(
-            content.voxels, content.keyframes, content.place_state, content.sounds, content.sources
+            content.voxels, content.keyframes, content.place_state, content.sounds, sources, wait
         )  # fmt: skip
         up = self._upright[0].vector()
         return StoredMap(
@@ -694,8 +714,7 @@ class GrowingMap:
         if self._sounds is not None and Kind.SOUNDS in self.encoders:
             clips, sounds = self._sounds.clips_folder, self._sounds.heard(came.walk.motion(), final=final)
         keyframes = with_clear_views(keyframes, [stack_views(clear, pose, self._free.shape)])
-        sources = self._located(sounds, merged.voxels, up.vector(), final=final)
-        content = MapContent(merged.voxels, keyframes, state, sounds, clips, sources=sources)
+        content = MapContent(merged.voxels, keyframes, state, sounds, clips)
         finished = datetime.now(UTC).isoformat(timespec="seconds")
         stages_s = {"growing": begin - self._begin_s, "merging": perf_counter() - begin}
         timings = Timings(finished=finished, elapsed_s=sum(stages_s.values()), stages_s=stages_s)

@@ -134,7 +134,12 @@ def _sources_by_time(avlmap: "Queryable", first: bool) -> tuple[list[Goal], str]
 
     sounds = avlmap.sounds()
     numbers = sorted(range(len(sounds)), key=lambda number: sounds[number].onset_s * (1.0 if first else -1.0))
-    found = [source_of(cast(Listening, avlmap), number) for number in numbers[:_MOST_SOURCES]]
+    listening = cast(Listening, avlmap)
+    if not listening.source_map.is_located(numbers[0]):
+        goals, text = _sounds_by_time(avlmap, first)
+        return goals, f"{text} Where it came from is not found yet; ask again in a moment."
+    located = [number for number in numbers if listening.source_map.is_located(number)]
+    found = [source_of(listening, number) for number in located[:_MOST_SOURCES]]
     goals = [
         Goal(one.position, one.confidence, _NO_SIZE, {}, one.probability, one.name or "sound", one.spread)
         for one in found

@@ -54,6 +54,8 @@ class Listening(Queryable, Protocol):
 def unknown_sources(stored: "StoredMap") -> str:
     """Return why a map does not know where sounds came from, and what to do."""
     what = f"{stored.path.name} does not know where sounds came from, only where the robot was"
+    if stored.arrays.sources_wait:
+        return f"Where the sounds came from is not found yet, {stored.arrays.sources_wait} wait; ask again in a moment."
     if stored.info.visits:
         return (
             f"{what}: it is of several days, and not all of them say where the microphones are, or they have other "
@@ -221,6 +223,10 @@ class SourceMap:
             return prior
         return (1.0 - _MAKERS_SHARE) * prior + _MAKERS_SHARE * near / near.sum()
 
+    def is_located(self, event: int) -> bool:
+        """Return whether anything is known of where a sound came from; in a map that grows, it may wait."""
+        return bool(self.evidence.heard[event].any() or self.evidence.expected[event].any())
+
     def joined(self, events: Sequence[int], kind: str, prior: bool = True) -> Joined:
         """Return what several sounds say together, as if they were of one source.
 
@@ -240,13 +246,13 @@ class SourceMap:
         """Return the sources of sounds of one kind: each sound joins the source that it fits best, or begins its own.
 
         Args:
-            events: numbers of the sounds, the clearest first.
+            events: numbers of the sounds, the clearest first; one that is not located is left out.
             kind: what they are.
             prior: whether things that usually make such a sound count.
         """
         base = np.asarray(self.evidence.prior, np.float64)
         found: list[Joined] = []
-        for event in events:
+        for event in filter(self.is_located, events):
             alone = self.joined([event], kind, prior)
             fits = [log_same_place(one.density, alone.density, base) for one in found]
             best = int(np.argmax(fits)) if fits else -1

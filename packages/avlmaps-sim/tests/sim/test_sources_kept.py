@@ -92,9 +92,9 @@ def sources_of_all_sounds(live: LiveMap, seconds: float = 120.0) -> SourceEviden
     """Wait until a snapshot has located all of its sounds."""
     until_s = time.monotonic() + seconds
     while time.monotonic() < until_s:
-        stored = live.map.stored if live.generation else None
-        found = None if stored is None else stored.sources()
-        if found is not None and not live._growing.sources_wait and found.heard.any(axis=1).all():
+        arrays = live.map.stored.arrays if live.generation else None
+        found = None if arrays is None or arrays.sources_wait else arrays.sources
+        if found is not None and found.heard.any(axis=1).all():
             return found
         time.sleep(0.05)
     raise AssertionError("no sound was located")

@@ -21,8 +21,8 @@ from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.directions import DirectionTrack
 from avlmaps.recordings.microphones import Microphones
 
-AT_ONCE = 3
-"""Sounds that a live map locates between two snapshots, the newest first."""
+AT_ONCE = 1
+"""Sounds that a live map locates before it looks for new ones again, the newest first."""
 _SAME_S = 0.1  # limits of a sound that are found again, with the background better known
 _SIGNS_BY = 6  # sounds, by which the signs of the channels are settled until the end
 _RECENT = 8  # sounds whose directions are looked at again, now that the device is known better
@@ -95,6 +95,15 @@ class GrowingSources:
         self._of_device: Float[np.ndarray, "n g o"] = np.zeros((0, 1, 1))
         self._signs: Float[np.ndarray, " m"] | None = None
 
+    def known(self, spans_s: Spans) -> SourceEvidence | None:
+        """Return the evidence of the sounds that are over, as far as they are located. One that waits has all zeros.
+
+        The same object as before where nothing changed.
+        """
+        row = self._rows(spans_s)
+        self.waiting = int((row < 0).sum())
+        return self._chosen(row)
+
     def until_now(
         self,
         track: AudioTrack,
@@ -103,15 +112,11 @@ class GrowingSources:
         voxel_m: Float[np.ndarray, "n 3"],
         up_in_world: Float[np.ndarray, "3"],
     ) -> SourceEvidence | None:
-        """Return the evidence of the sounds that are over; see ``find_sources``. One that waits has none: all zeros.
-
-        The same object as before where nothing changed.
-        """
+        """Locate the next sounds that wait, and return what is ``known`` then; see ``find_sources``."""
         row = self._rows(spans_s)
         fresh = np.flatnonzero(row < 0)
-        self.waiting = len(fresh)
         if not len(fresh):
-            return self._chosen(row)
+            return self.known(spans_s)
         now = fresh if self._at_once is None else fresh[-self._at_once :]
         if track.microphones is None:
             now = np.union1d(now, np.arange(max(0, len(row) - _RECENT), len(row)))
@@ -152,13 +157,15 @@ class GrowingSources:
         return row
 
     def _chosen(self, row: Int[np.ndarray, " n"]) -> SourceEvidence | None:
-        """Return the evidence of sounds that are all known."""
+        """Return the evidence of sounds by their rows, with zeros where it is -1."""
         evidence = self._evidence
         if evidence is None or not len(row) or np.array_equal(row, np.arange(len(evidence))):
             return evidence if len(row) else None
+        known = row >= 0
         return replace(
-            evidence, heard=evidence.heard[row], expected=evidence.expected[row], moving=evidence.moving[row]
-        )
+            evidence, heard=evidence.heard[row] * known[:, None], expected=evidence.expected[row] * known[:, None],
+            moving=evidence.moving[row] * known,
+        )  # fmt: skip
 
     def _keep(
         self,

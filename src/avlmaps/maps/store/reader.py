@@ -50,6 +50,7 @@ class MapArrays:
         sounds: what was heard.
         sources: what the microphones say of where each sound began, of a map in memory; that of a folder is read
             from there.
+        sources_wait: of how many sounds the source is looked for still, in a map that grows.
     """
 
     voxels: Voxels
@@ -57,6 +58,7 @@ class MapArrays:
     place_state: dict[str, np.ndarray]
     sounds: HeardSounds
     sources: SourceEvidence | None = None
+    sources_wait: int = 0
 
 
 @dataclass(frozen=True, slots=True, repr=False)

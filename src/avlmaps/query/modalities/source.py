@@ -88,7 +88,8 @@ def source_factor(
     order = np.argsort(-scores, kind="stable")
     kind, with_prior = "" if part.is_file else part.query, settings.prior == "lexicon"
     found = sources.sources([i for i in order.tolist() if scores[i] >= FOUND_AT], kind, with_prior)
-    found += [sources.joined([i], kind, with_prior) for i in order.tolist() if _LEAST <= scores[i] < FOUND_AT]
+    unsure = [i for i in order.tolist() if _LEAST <= scores[i] < FOUND_AT and sources.is_located(i)]
+    found += [sources.joined([i], kind, with_prior) for i in unsure]
     return anchors_of(space, sources, found, scores, replace(part, at="source"), heat)
 
 
