@@ -23,7 +23,7 @@ from avlmaps.live.gates import EncodingGate, Gates
 from avlmaps.live.kept_back import KeptBack
 from avlmaps.live.live_map import LiveMap
 from avlmaps.live.pose_check import PoseCheck
-from avlmaps.live.replay import end_drive
+from avlmaps.live.replay import end_drive, tell_doubts
 from avlmaps.live.saver import Unsaved
 from avlmaps.live.settings import LiveSettings
 from avlmaps.live.status import Tally
@@ -410,6 +410,13 @@ def test_one_channel_of_several_microphones_is_a_doubt_and_several_without_place
         add(live, frame(0))
         live.add_audio(avlmaps.Sound(np.zeros(1600, np.float32), 16_000))
         assert "one channel, and 2 microphones" in live.doubts[0]
+        told: list[str] = []
+        known: set[str] = set()
+        for one in ("", "a save failed"):
+            if one:
+                live._doubt(one)
+            tell_doubts(live, known, told.append)
+        assert [one[:16] for one in told] == ["note: The sound ", "note: a save fai"]
     with LiveMap(tmp_path / "two", ENCODERS, up_in_world=UP, live=EVERY) as live:
         add(live, frame(0))
         live.add_audio(avlmaps.ChannelSound(np.array([[0.5] * 9, [0.1] * 9], np.float32), 16_000))

@@ -225,7 +225,8 @@ class LiveMap:
         Raises:
             AudioError: sound came before.
         """
-        self._growing.place_microphones(microphones)
+        with self._ears:
+            self._growing.place_microphones(microphones)
 
     def add_audio(self, chunk: Any, stamp_s: Any = None) -> None:
         """Add a piece of the microphone's sound; see ``VoxelMap.add_audio``.

@@ -30,7 +30,7 @@ def replay(
         tell: called with each doubt, as soon as it is known.
         over: whether to end before the recording does; queried before each frame.
     """
-    begin_s, told, ears = time.perf_counter(), 0, Ears(recording.audio, live)
+    begin_s, told, ears = time.perf_counter(), set[str](), Ears(recording.audio, live)
     shown = progress(range(len(recording)), "mapping", total=len(recording), note=lambda: _note(live))
     for index in shown:
         if over():
@@ -45,7 +45,7 @@ def replay(
             tell(f"note: {fault}")
             continue
         ears.hear(frame.stamp_s)
-        told = tell_doubts(live, told, tell)
+        tell_doubts(live, told, tell)
     ears.hear(float("inf"))
 
 
@@ -67,7 +67,7 @@ def follow(
         over: whether to end before the recording does; queried at each frame.
         microphones: where those of its sound are, instead of what it says.
     """
-    told = 0
+    told: set[str] = set()
     for frame in progress(growing_frames(path, give_up_s, tell), "mapping", note=lambda: _note(live)):
         if over():
             return
@@ -75,7 +75,7 @@ def follow(
             _add(live, frame)
         except RecordingError as fault:
             tell(f"note: {fault}")
-        told = tell_doubts(live, told, tell)
+        tell_doubts(live, told, tell)
     if not is_being_written(path):
         track = open_recording(path, microphones=microphones).audio
         if track is not None and track.microphones is not None and live.microphones is None:
@@ -108,12 +108,12 @@ def _add(live: LiveMap, frame: Frame, *, wait: bool = False) -> None:
     live.add_frame(frame.rgb, frame.depth_m, frame.camera, frame.world_from_camera, frame.stamp_s, wait=wait)
 
 
-def tell_doubts(live: LiveMap, told: int, tell: Callable[[str], None]) -> int:
-    """Report the doubts after the first ``told``, and return how many there are."""
-    doubts = live.doubts
-    for doubt in doubts[told:]:
-        tell(f"note: {doubt}")
-    return len(doubts)
+def tell_doubts(live: LiveMap, told: set[str], tell: Callable[[str], None]) -> None:
+    """Report the doubts that were not reported yet, and add them to those that were."""
+    for doubt in live.doubts:
+        if doubt not in told:
+            told.add(doubt)
+            tell(f"note: {doubt}")
 
 
 class Ears:

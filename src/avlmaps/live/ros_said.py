@@ -10,7 +10,7 @@ from avlmaps.recordings.formats.ros_directions import BEYOND_A_TURN_RAD, angle_o
 from avlmaps.recordings.formats.ros_messages import stamp_of
 
 HELD = 100
-"""Floats that wait until one is no angle in radians; if none of them is not, they are radians."""
+"""Floats that wait until one is no angle in radians; if all are, they are taken as radians."""
 
 
 class RosDirections:

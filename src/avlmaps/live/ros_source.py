@@ -121,7 +121,7 @@ class _Source:
         self._said = RosDirections(topics.directions, tell)
         self._waiting: list[tuple[str, Any, float]] = []  # until the pictures' topics are known
         self._ahead_s: float | None = None
-        self._doubts, self._lost = 0, 0
+        self._doubts, self._lost = set[str](), 0
         self._refused, self._once = "", Once(tell)
 
     def step(self) -> int:
@@ -148,7 +148,7 @@ class _Source:
         if self._inbox.lost > self._lost:
             self._live.count_late(self._inbox.lost - self._lost)
             self._lost = self._inbox.lost
-        self._doubts = tell_doubts(self._live, self._doubts, self._tell)
+        tell_doubts(self._live, self._doubts, self._tell)
         return came
 
     def missing(self) -> str:

@@ -144,7 +144,7 @@ def given_directions(stamp_s: Any, azimuth_rad: Any, elevation_rad: Any, confide
         if not fits:
             raise RecordingError(
                 f"Directions are a number, or as many numbers as there are stamps, for each of {', '.join(names)} "
-                f"(the last two may be left out); {name} is {given!r}."
+                f"(the last two may be left out); {name} is {repr(given)[:_SHOWN]}."
             )
     return DirectionTrack.of(
         column["stamp_s"], column["azimuth_rad"], column.get("elevation_rad"), column.get("confidence")

@@ -17,6 +17,7 @@ GAP_S = 0.1  # a piece that is later or earlier than this is not in its place; l
 LONGEST_GAP_S = 600.0  # a longer one is another clock
 _LARGEST = 16.0  # samples beyond this come from another scale
 _BYTES = 4
+_SILENCE_S = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,8 +122,7 @@ class GrowingTrack:
                 f"({end_s:.3f} s), more than {LONGEST_GAP_S:.0f} s; give stamps of the frames' clock."
             )
         if late_s >= GAP_S:
-            silent = ChannelSound(np.zeros((channels, round(late_s * sound.rate_hz)), np.float32), sound.rate_hz)
-            added = self._append([silent, sound])
+            added = self._append([*_silence(channels, round(late_s * sound.rate_hz), sound.rate_hz), sound])
             self.gaps, self.gap_s = self.gaps + 1, self.gap_s + late_s
             return added
         if late_s <= -GAP_S:
@@ -153,6 +153,13 @@ class GrowingTrack:
             ) from fault
         self._count += sum(sound.samples.shape[1] for sound in sounds)
         return [sound.channel(0) for sound in sounds]
+
+
+def _silence(channels: int, count: int, rate_hz: int) -> Iterator[ChannelSound]:
+    """Yield silence in pieces: ten minutes of eight channels are a gigabyte."""
+    step = _SILENCE_S * rate_hz
+    for at in range(0, count, step):
+        yield ChannelSound(np.zeros((channels, min(step, count - at)), np.float32), rate_hz)
 
 
 def _checked(chunk: Any, rate_hz: int, channels: int) -> ChannelSound:

@@ -79,11 +79,11 @@ class GrowingSources:
             self._said = [DirectionTrack.joined(self._said)] if self._said else []
             said = self._said[0] if self._said else None
         try:
-            self.doubt = ""
             if said is not None:
                 said.require_beside(heard.start_s, heard.end_s, "What the device said")
+            self.doubt = ""
         except RecordingError as fault:
-            said, self.doubt = None, str(fault)
+            said, self.doubt = None, self.doubt or str(fault)  # its numbers change with every piece
         placed = self.microphones if self.microphones is not None and len(self.microphones) == channels else None
         return None if placed is None and said is None else replace(heard, microphones=placed, directions=said)
 

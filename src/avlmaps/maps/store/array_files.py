@@ -65,8 +65,8 @@ def explain_write_errors(folder: Path) -> Generator[None]:
             why = "it is a symbolic link that leads nowhere"
         make_room = "make room or " if fault.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG) else ""
         raise MapError(
-            f"Cannot write {place}: {why}; {make_room}choose another folder. What was finished "
-            "there stays, and a second try continues from it."
+            f"Cannot write {place}: {why}; {make_room}choose another folder. What was finished there "
+            "stays, and a second try continues from it."
         ) from fault
 
 

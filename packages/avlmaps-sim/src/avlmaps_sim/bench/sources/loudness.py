@@ -11,6 +11,7 @@ from jaxtyping import Float
 
 from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.sources.event import BEFORE_S
+from avlmaps.maps.sources.find import LEAST
 from avlmaps.maps.sources.level import against_1_m_db, levels_db
 from avlmaps.maps.sources.settings import SourceSettings
 from avlmaps.maps.types import SourceEvidence
@@ -55,5 +56,5 @@ def loudness_known(
     off = at_1_m_db[:-1] - at_1_m_db[-1] - KNOWN_DB * rng.standard_normal()
     heard = np.array(evidence.heard)
     total = heard[number].astype(np.float64) - 0.5 * (off / KNOWN_DB) ** 2
-    heard[number] = np.maximum(total - total.max(), -60.0)
+    heard[number] = np.maximum(total - total.max(), LEAST)
     return replace(evidence, heard=heard)
