@@ -175,6 +175,13 @@ def test_one_frame_and_none_that_overlaps_say_nothing(right: Draft, tmp_path: Pa
     assert not found.sentences() and "there is one frame" in found.unchecked[0]
 
 
+@pytest.mark.parametrize(("kept", "said"), [(12, "Only 40% of the frames have a pose"), (16, "")])
+def test_a_drive_most_of_which_has_no_pose_is_doubted(kept: int, said: str, right: Draft, tmp_path: Path) -> None:
+    found = verdict(replace(right, poses=right.poses[:kept], pose_stamps_s=right.pose_stamps_s[:kept]), tmp_path)
+    assert (found.grade is Grade.SUSPICIOUS) == bool(said)
+    assert [one.startswith(said) for one in found.sentences()] == [True] * bool(said)
+
+
 def test_frames_that_see_nothing_in_common_are_not_called_fine(tmp_path: Path) -> None:
     sparse = RoomWalk("keyframes", seed=52, frames=4, rate_hz=0.2, turn_rad_s=0.3).draft(CAMERA)
     found = verdict(sparse, tmp_path)

@@ -157,7 +157,7 @@ def test_frames_outside_the_poses_are_left_out_and_told(tmp_path: Path):
     (path / "poses.csv").write_text("".join(f"{t},0,0,0,0,0,0,1\n" for t in (0.0, 0.1, 0.2)))
     _describe(path, rgb_rate_hz=10.0)
     recording = open_recording(path)
-    assert recording.stamps_s.tolist() == [0.0, 0.1, 0.2]
+    assert recording.stamps_s.tolist() == [0.0, 0.1, 0.2] and recording.posed == pytest.approx(0.6)
     assert recording.notices[0] == (
         "2 of 5 frame(s) lie outside the poses of poses.csv (0.00 to 0.20 s) or in a gap of them; left out."
     )

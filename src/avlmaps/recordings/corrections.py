@@ -194,6 +194,7 @@ class CorrectedRecording(Recording):
         self._scale = 1.0 if given.depth_unit_m is None else given.depth_unit_m / whole.stored_depth_unit_m
         self._at, world_from_camera, self.lost = self._delayed()
         self.notices = (*whole.notices, *self.lost)
+        self.posed = whole.posed * len(self._at) / max(len(whole), 1)
         self.stamps_s = whole.stamps_s[self._at]
         self.world_from_camera = reread_poses(world_from_camera, given)
         known = whole.trajectory

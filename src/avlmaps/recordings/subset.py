@@ -41,6 +41,7 @@ class Subset(Recording):
         self.base_height = whole.base_height
         self.trajectory = whole.trajectory
         self.begins_s = whole.begins_s
+        self.posed = whole.posed
 
     def frame(self, index: int) -> Frame:
         """Read one frame; its ``index`` is the one in the subset."""

@@ -36,6 +36,8 @@ MOST_SPEED_M_S = 4.0
 # Beyond that pace by as much, one step alone is a jump.
 LEAST_JUMP_M = 0.5
 _NEAR_IN_TIME_S = 1.0
+# With poses of fewer frames most of the drive is not in the map.
+LEAST_POSED = 0.5
 _CENTRE_MARGIN = 0.2
 _FOCAL_RANGE = (0.25, 4.0)
 _MOST_ASPECT = 1.15
@@ -204,6 +206,14 @@ def of_colour(sample: Sample, surfaces: Surfaces) -> Iterator[Finding]:
         sentence = f"The colour camera sees {share:.0%} of what the depth camera sees; the rest has no colour."
         remedy = "Check the intrinsics of both cameras and the transform between them (rgb_from_depth)."
         yield Finding(Reason.INTRINSICS, grade, sentence, remedy)
+
+
+def of_poses(recording: Recording) -> Iterator[Finding]:
+    """Find a drive most of which has no pose."""
+    if recording.posed < LEAST_POSED:
+        sentence = f"Only {recording.posed:.0%} of the frames have a pose; the others are left out."
+        remedy = "What they show is not in the map: check that pictures and poses are of one drive and one clock."
+        yield Finding(Reason.MOTION, Grade.SUSPICIOUS, sentence, remedy)
 
 
 def of_motion(recording: Recording, found: Agreement, judged: bool) -> Iterator[Finding]:

@@ -68,6 +68,11 @@ class Shots:
         )
 
 
+def share_posed(world_from_camera: Float[np.ndarray, "n 4 4"]) -> float:
+    """Return the share of poses that are none of a lost camera (NaN, infinity)."""
+    return float(np.isfinite(world_from_camera).all(axis=(1, 2)).mean()) if len(world_from_camera) else 1.0
+
+
 def settle(
     path: Path, shots: Shots, report: Report, pose_file: Callable[[int], Path] | None
 ) -> tuple[Shots, tuple[str, ...]]:
@@ -158,6 +163,7 @@ class ShotsRecording(Recording):
         audio: the sound track on the frames' clock, or None.
         notices: one sentence for each thing worth knowing.
         begins_s: what the clock of the files said at time 0.
+        posed: share of the frames that have a pose.
     """
 
     path: Path
@@ -168,6 +174,7 @@ class ShotsRecording(Recording):
     audio: AudioTrack | None = None
     notices: tuple[str, ...] = ()
     begins_s: float = 0.0
+    posed: float = 1.0
     stamps_s: Float[np.ndarray, " n"] = field(init=False)
     world_from_camera: Float[np.ndarray, "n 4 4"] = field(init=False)
 
@@ -187,7 +194,11 @@ class ShotsRecording(Recording):
         pose_file: Callable[[int], Path] | None,
         **more: Any,
     ) -> R:
-        """Return the recording of shots as they were found, with the sound beside them; see ``settle``."""
+        """Return the recording of shots as they were found, with the sound beside them; see ``settle``.
+
+        ``more`` may say of how many frames these are those with a pose (``posed``).
+        """
+        more["posed"] = more.get("posed", 1.0) * share_posed(shots.world_from_camera)
         shots, settled = settle(path, shots, report, pose_file)
         more.setdefault("audio", open_audio(path))
         told = tuple(dict.fromkeys((*notices, *settled)))  # of frames and of their poses the same may be said

@@ -70,7 +70,7 @@ def open_icl_nuim(path: Path, report: Report = stop_at_first) -> FileRecording:
     )
     return FileRecording.settled(
         path, "icl-nuim", rig, shots, notices, report, lambda _: truth, depth_units=UNITS_PER_M,
-        up_in_world=np.array([0.0, -1.0, 0.0]),
+        up_in_world=np.array([0.0, -1.0, 0.0]), posed=len(posed) / len(rows),
     )  # fmt: skip
 
 

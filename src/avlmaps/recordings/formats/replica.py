@@ -76,7 +76,7 @@ def open_replica(path: Path, report: Report = stop_at_first) -> FileRecording:
     rig, scale, notice = _camera(path, shots)
     return FileRecording.settled(
         path, "replica", rig, shots, (*notices, *notice), report, lambda _: path / "traj.txt", depth_units=scale,
-        up_in_world=np.array([0.0, 0.0, 1.0]),
+        up_in_world=np.array([0.0, 0.0, 1.0]), posed=len(posed) / len(numbers),
     )  # fmt: skip
 
 

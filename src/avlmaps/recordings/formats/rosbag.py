@@ -121,6 +121,7 @@ class RosbagRecording(Recording):
             notices.append(
                 f"{int((~known).sum())} of {len(known)} frames lie outside of the known poses and are left out."
             )
+        self.posed = float(known.mean())
         rows = np.flatnonzero(known)
         walk = plausible_walk(stamps_s[rows], poses[rows, :3, 3], [f"{i:06d}" for i in range(len(rows))])
         if walk.fault:

@@ -49,7 +49,7 @@ def open_tum(path: Path, report: Report = stop_at_first) -> FileRecording:
     """
     colour, depth = _stream(path, "rgb.txt", report), _stream(path, "depth.txt", report)
     trajectory, notices = _trajectory(path / "groundtruth.txt", report)
-    of_colour, of_depth, unpaired = _pairs(path, colour, depth, trajectory)
+    of_colour, of_depth, posed, unpaired = _pairs(path, colour, depth, trajectory)
     notices = [*colour.notices, *depth.notices, *notices, *unpaired]
     colour_files = [colour.files[int(i)] for i in of_colour]
     stamps_s = depth.stamps_s[of_depth]
@@ -65,7 +65,7 @@ def open_tum(path: Path, report: Report = stop_at_first) -> FileRecording:
     return FileRecording.settled(
         path, "tum", rig, shots, (*notices, *notice), report, None, depth_units=UNITS_PER_M, up_in_world=up_in_world,
         trajectory=timeline.Trajectory(trajectory.stamps_s - start_s, trajectory.world_from_body),
-        begins_s=float(start_s),
+        begins_s=float(start_s), posed=posed,
     )  # fmt: skip
 
 
@@ -101,8 +101,8 @@ def _stream(folder: Path, name: str, report: Report) -> _Stream:
 
 def _pairs(
     path: Path, colour: _Stream, depth: _Stream, trajectory: timeline.Trajectory
-) -> tuple[Int[np.ndarray, " n"], Int[np.ndarray, " n"], list[str]]:
-    """Pair colour with depth where a pose is known; return the rows of both and the notices about the others."""
+) -> tuple[Int[np.ndarray, " n"], Int[np.ndarray, " n"], float, list[str]]:
+    """Pair colour with depth where a pose is known; return the rows of both, the share with a pose, and notices."""
     of_colour, of_depth = timeline.associate(colour.stamps_s, depth.stamps_s, _PAIR_TOLERANCE_S)
     if len(of_colour) == 0:
         raise RecordingError(
@@ -124,7 +124,7 @@ def _pairs(
         notices.append(f"{unpaired} colour picture(s) have no depth picture within {_PAIR_TOLERANCE_S} s; left out.")
     if not covered.all():
         notices.append(f"{int((~covered).sum())} frame(s) lie outside groundtruth.txt or in a gap of it; left out.")
-    return of_colour[covered], of_depth[covered], notices
+    return of_colour[covered], of_depth[covered], float(covered.mean()), notices
 
 
 def _trajectory(path: Path, report: Report) -> tuple[timeline.Trajectory, tuple[str, ...]]:
