@@ -46,15 +46,23 @@ def test_the_server_takes_each_snapshot_and_the_end(tmp_path: Path) -> None:
     assert notes == []
 
 
-def test_a_drive_that_fails_raises_where_it_is_waited_for(tmp_path: Path) -> None:
+def test_a_drive_that_fails_says_so_and_raises_where_it_is_waited_for(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     live = LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP, live=CHOSEN)
+    for number in range(4):
+        add(live, frame(number))
+    wait_for(lambda: live.generation >= 1)
 
     def fails(over: object) -> None:
-        raise ZeroDivisionError
+        raise ZeroDivisionError("nothing is left")
 
+    drive = Drive(live, fails)
+    wait_for(lambda: drive.has_ended)
+    assert "no frame comes any more; stop with Ctrl-C. nothing is left" in capsys.readouterr().err
     with pytest.raises(ZeroDivisionError):
-        within(60.0, Drive(live, fails).end)
-    add(live, frame(0))
+        within(60.0, drive.end)
+    add(live, frame(4))
     live.close()
 
 

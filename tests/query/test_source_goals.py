@@ -10,9 +10,13 @@ from avlmaps.language.learned_translator import LearnedTranslator
 from avlmaps.language.sentence import Given
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.sources.density import Spread
+from avlmaps.maps.types import SourceEvidence
 from avlmaps.query.answer import PartAnswer
+from avlmaps.query.factors import HeatSettings
 from avlmaps.query.heatmap import Heatmap
-from avlmaps.query.modalities.source import SourceAnchors
+from avlmaps.query.modalities.sound import SoundSettings
+from avlmaps.query.modalities.source import SourceAnchors, source_factor
+from avlmaps.query.sound_sources import SourceMap
 from avlmaps.query.voxel_space import Space
 from avlmaps.query.wording import absent_text, found_text
 
@@ -74,6 +78,23 @@ def test_a_goal_at_a_source_says_where_the_sound_comes_from() -> None:
     chair = Part(Modality.OBJECT, "chair", Role.PRIMARY)
     context = Part(Modality.SOUND, "barking", at="source")
     assert "near where the sound of barking comes from" in found_text([chair, context], heat.goals()[0])
+
+
+def test_a_sound_that_is_not_located_yet_is_not_called_unheard() -> None:
+    place = np.array([[x, y, 0.05] for x in np.arange(0.05, 3, 0.3) for y in np.arange(0.05, 3, 0.3)], np.float32)
+    waiting = np.zeros((1, len(place)), np.float16)
+    located = -np.linalg.norm(place - place[20], axis=1).astype(np.float16)[None]
+    evidence = SourceEvidence(
+        place=place, prior=np.full(len(place), 1.0 / len(place), np.float32),
+        heard=np.concatenate([waiting, located]), expected=np.concatenate([waiting, 0.1 * located]),
+        moving=np.zeros(2, np.uint8), channels=np.array([4], np.int64),
+    )  # fmt: skip
+    sources = SourceMap(evidence, SPACE, lambda names: [])
+    part, heat = Part(Modality.SOUND, "barking", Role.PRIMARY), HeatSettings()
+    asked = ([0.9, 0.2], "where it came from is not known"), ([0.2, 0.3], "no detected sound is like 'barking'")
+    for scores, said in asked:
+        factor = source_factor(SPACE, sources, np.array(scores), part, SoundSettings(), heat)
+        assert not factor.found and said in factor.note
 
 
 def test_a_plan_says_where_a_sound_comes_from_where_that_is_meant() -> None:

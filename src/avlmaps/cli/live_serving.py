@@ -80,6 +80,8 @@ class Drive:
             say("The drive is over; its map is answered on until Ctrl-C.")
         except BaseException as fault:  # noqa: BLE001 - raised where it is waited for
             self._fault = fault
+            if self._live.generation:  # else the command ends with it at once
+                say(f"note: The drive ended, and no frame comes any more; stop with Ctrl-C. {fault}")
 
 
 def serve_while(live: LiveMap, drive: Callable[[Callable[[], bool]], None], port: int, *, browse: bool) -> None:

@@ -81,4 +81,5 @@ def _means(
 ) -> Float[np.ndarray, "n c"]:
     """Return the weighted means of some columns."""
     # One sound at a time: an hour's drive has hundreds, each over tens of thousands of candidates.
-    return np.stack([(own.astype(np.float64)[row] * weight).sum(axis=1) for own in np.asarray(values)])
+    means = [(own.astype(np.float64)[row] * weight).sum(axis=1) for own in np.asarray(values)]
+    return np.reshape(means, (len(values), len(row)))

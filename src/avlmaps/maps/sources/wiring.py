@@ -15,7 +15,7 @@ from avlmaps.core.arrays import Float
 from avlmaps.core.poses import apply, rotation_to_level
 from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.sources.correlation import SPEED_M_S, Correlations
-from avlmaps.maps.sources.polarity import signs_of
+from avlmaps.maps.sources.polarity import MOST_MICROPHONES, signs_of
 from avlmaps.maps.sources.settings import SourceSettings
 from avlmaps.maps.sources.steered import loudest_of_sound
 from avlmaps.recordings.audio import AudioTrack
@@ -24,7 +24,6 @@ from avlmaps.recordings.microphones import Microphones
 _MOST_SOUNDS, _MOST_FRAMES, _LONGEST_S = 30, 80, 10.0
 _LEAST_FRAMES = 6
 _MOST_ORDERED = 4  # microphones of which every order is tried; of more, exchanges one after the other
-MOST_MICROPHONES = 8
 _AZIMUTHS, _AWAY_M, _OVER_EAR_M = 48, (0.5, 1.0, 2.0, 4.0), (-0.9, -0.3, 0.3)
 _SMOOTHING = 5.0
 # An order fits better when the sounds' fits grow by a factor, and by some standard errors of its logarithm: by much,

@@ -1,6 +1,5 @@
 """Where a sound came from, as heat."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -11,7 +10,7 @@ from avlmaps.core.question import Part, Role
 from avlmaps.maps.sources.density import RIGHT_M, Spread
 from avlmaps.query.factors import FOUND_AT, HeatSettings, NearAnchors
 from avlmaps.query.modalities.sound import SoundSettings
-from avlmaps.query.sound_sources import Joined, SourceMap
+from avlmaps.query.sound_sources import SourceMap
 from avlmaps.query.voxel_space import Space
 
 _LEAST = 0.05  # sounds of a lower score are left out
@@ -26,9 +25,11 @@ class SourceAnchors(NearAnchors):
     Attributes:
         spreads: for each source, how well its place is known.
         part: says that the place is the source's.
+        waits: whether such a sound was heard whose place is not found yet, in a map that grows.
     """
 
     spreads: tuple[Spread, ...]
+    waits: bool = False
     found: bool = field(init=False)
     note: str = field(init=False)
 
@@ -55,6 +56,8 @@ class SourceAnchors(NearAnchors):
 
     def _absence(self) -> str:
         best = float(self.scores.max(initial=0.0))
+        if best < FOUND_AT and self.waits:
+            return "it was heard, but where it came from is not known (a map that grows finds it in a moment)"
         if best < FOUND_AT:
             return f"no detected sound is like {self.part.query!r}; the best score is {best:.2f}"
         spread = self.spreads[int(self.instance[np.argmax(self.scores * self.confidence[self.instance])])]
@@ -90,18 +93,6 @@ def source_factor(
     found = sources.sources([i for i in order.tolist() if scores[i] >= FOUND_AT], kind, with_prior)
     unsure = [i for i in order.tolist() if _LEAST <= scores[i] < FOUND_AT and sources.is_located(i)]
     found += [sources.joined([i], kind, with_prior) for i in unsure]
-    return anchors_of(space, sources, found, scores, replace(part, at="source"), heat)
-
-
-def anchors_of(
-    space: Space,
-    sources: SourceMap,
-    found: Sequence[Joined],
-    scores: Float[np.ndarray, " sounds"],
-    part: Part,
-    heat: HeatSettings,
-) -> SourceAnchors:
-    """Return the heat of some sources; see ``source_factor``."""
     places, values, which = [np.zeros((0, 3))], [np.zeros(0)], [np.zeros(0, np.int64)]
     for number, one in enumerate(found):
         cells, share = sources.anchors(one)
@@ -109,7 +100,8 @@ def anchors_of(
         values.append(share * max(float(np.clip(scores[i], 0.0, 1.0)) for i in one.events))
         which.append(np.full(len(cells), number))
     return SourceAnchors(
-        space=space, part=part, falloff_per_m=heat.falloff_per_m(part.role), anchors=np.concatenate(places),
-        scores=np.concatenate(values), instance=np.concatenate(which), understood=part.query,
-        spreads=tuple(one.density.spread for one in found),
+        space=space, part=replace(part, at="source"), falloff_per_m=heat.falloff_per_m(part.role),
+        anchors=np.concatenate(places), scores=np.concatenate(values), instance=np.concatenate(which),
+        understood=part.query, spreads=tuple(one.density.spread for one in found),
+        waits=any(scores[i] >= FOUND_AT and not sources.is_located(i) for i in order.tolist()),
     )  # fmt: skip
