@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,10 +13,14 @@ from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.timeline import Trajectory
+from avlmaps.live.live_map import LiveMap
+from avlmaps.live.replay import end_drive, replay
+from avlmaps.live.settings import LiveSettings
 from avlmaps.maps.build import build_map
-from avlmaps.maps.pipeline.check import judge
+from avlmaps.maps.pipeline.check import doubts_of_channels, judge
 from avlmaps.maps.pipeline.write import carving_doubts
 from avlmaps.maps.store.manifest import Removed
+from avlmaps.maps.store.reader import open_stored
 from avlmaps.query.contents import Contents
 from avlmaps.recordings import channels
 from avlmaps.recordings.channels import ChannelSound, write_channels
@@ -95,6 +100,27 @@ def test_a_dead_channel_stays_with_the_map_and_the_sound_is_read_for_it_once(
     (doubt,) = stored.info.doubts
     assert "Channel 2 of dead/audio.flac" in doubt and "not connected" in doubt
     assert len(read) == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("wrong", [{"order": (0, 2, 1, 3)}, {"dead": 1}], ids=["exchanged", "dead"])
+def test_a_live_map_ends_with_the_doubts_about_channels_that_a_build_has(
+    right: Draft, tmp_path: Path, wrong: dict[str, Any]
+) -> None:
+    recording = open_recording(with_array(right, tmp_path / "rec", **wrong))
+    assert recording.audio is not None
+    live = LiveMap(
+        tmp_path / "map", PROFILE, up_in_world=recording.up_in_world, settings=SETTINGS, live=LiveSettings(gates=False),
+        microphones=recording.audio.microphones,
+    )  # fmt: skip
+    replay(recording, live, rate=None)
+    assert not live.doubts
+    said: list[str] = []
+    end_drive(live, said.append)
+    built = doubts_of_channels(recording.audio, recording.walk)
+    wanted = tuple(one.replace(str(recording.audio.path), "the sound") for one in built)
+    assert len(wanted) == 1 and live.doubts == wanted == open_stored(live.path).info.doubts
+    assert said == [f"note: {wanted[0]}"]
 
 
 def test_much_that_is_seen_through_is_doubtful() -> None:

@@ -17,6 +17,7 @@ from audio_common_msgs.msg import AudioDataStamped, AudioInfo
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+from std_msgs.msg import Int32
 from tf2_msgs.msg import TFMessage
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -50,6 +51,7 @@ def main() -> None:
     parser.add_argument("--lost", action="store_true", help="no transforms")
     parser.add_argument("--encoding", default="rgb8")
     parser.add_argument("--coded-at", type=int, default=-1, help="frame before which the sound's coding is published")
+    parser.add_argument("--array", action="store_true", help="sound of two channels")
     parser.add_argument("--stall", default="-1,0", help="frame, seconds")
     asked = parser.parse_args()
     stall_at, stall_s = (float(word) for word in asked.stall.split(","))
@@ -70,7 +72,9 @@ def main() -> None:
         mounts.publish(filled(TFMessage(), ros.mount()))
     track = recording.audio
     assert track is not None
-    coding = AudioInfo(channels=1, sample_rate=track.rate_hz, sample_format="S16LE", coding_format="wave")
+    channels = 2 if asked.array else 1
+    said = node.create_publisher(Int32, "/sound_direction", 10)
+    coding = AudioInfo(channels=channels, sample_rate=track.rate_hz, sample_format="S16LE", coding_format="wave")
     if asked.coded_at < 0:
         node.create_publisher(AudioInfo, "/audio_info", LATCHED).publish(coding)
     while not (rgb.get_subscription_count() and depth.get_subscription_count()):
@@ -92,7 +96,10 @@ def main() -> None:
         made = ros.compressed_depth(frame, stamp_s) if asked.packed else ros.depth(frame, stamp_s)
         depth.publish(filled(kind(), made))
         if frame.stamp_s > heard_s and stall_s == 0.0:
-            samples = (32767.0 * track.read(heard_s, frame.stamp_s).samples).astype("<i2")
+            heard = track.read(heard_s, frame.stamp_s).samples
+            each = [np.roll(heard, 3 * channel) for channel in range(channels)]  # it comes from the left
+            samples = (32767.0 * np.column_stack(each)).astype("<i2")
+            said.publish(Int32(data=60))
             plain = SimpleNamespace(
                 header=ros.header(begin_s + heard_s, "microphone"),
                 audio=SimpleNamespace(data=np.frombuffer(samples.tobytes(), np.uint8)),

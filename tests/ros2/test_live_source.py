@@ -15,6 +15,7 @@ from scipy.spatial import KDTree
 
 from avlmaps.maps.build import build_map
 from avlmaps.maps.settings import BuildSettings
+from avlmaps.maps.sources.bearings import Device
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.recordings.open import open_recording
 from helpers.walked_room import write_walk
@@ -93,6 +94,18 @@ def test_the_live_map_of_a_robot_is_that_of_its_recording_and_answers(
     assert min(np.linalg.norm(np.subtract(one.goals[0].position, goal.position)) for goal in other.goals) < 0.5
     assert counts["sounds"] >= 1
     assert live.stored.info.up.vector() == pytest.approx([0.0, 0.0, 1.0])
+
+
+def test_two_channels_and_the_directions_of_a_device_show_where_a_sound_came_from(walk: Path, tmp_path: Path) -> None:
+    words = ("--microphones", "stereo", "--topics", "directions=/sound_direction")
+    code, said, noted = mapped(tmp_path / "live.avlmap", walk, "--array", words=words, give_up_s=20.0)
+    assert code == 0, noted
+    assert "directions /sound_direction" in noted and "/sound_direction are taken as degrees" in noted
+    assert "mixed into one" not in noted and "came before the first picture" not in noted
+    assert json.loads(said)["live"]["refused"] == 0
+    sources = AVLMap.open(tmp_path / "live.avlmap").stored.sources()
+    assert sources is not None and sources.channels[0] == 2 and np.ptp(sources.heard.astype(float)) > 1.0
+    assert len(sources.device) == 1 and Device.of(sources.device[0]).sounds >= 1
 
 
 def test_sound_whose_coding_is_published_in_the_drive_is_heard_from_then_on(walk: Path, tmp_path: Path) -> None:

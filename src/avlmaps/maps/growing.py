@@ -31,7 +31,7 @@ from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.growing_walk import HERE, Walk
 from avlmaps.maps.keyframes.growing import FrozenKeyframes, GrowingKeyframes, PicturedKeyframe
 from avlmaps.maps.perceived import as_grid, encode_pixels, require_unit
-from avlmaps.maps.pipeline.check import judge
+from avlmaps.maps.pipeline.check import doubts_of_channels, judge
 from avlmaps.maps.pipeline.estimate import estimate_ground, estimate_sensor, estimate_up
 from avlmaps.maps.pipeline.keyframes import RANDOMNESS
 from avlmaps.maps.pipeline.plan import BUILD_VERSION, BuildPlan
@@ -117,6 +117,7 @@ class GrowingMap:
         self._corrections = 0
         self._told: list[str] = []
         self._found: tuple[str, ...] = ()  # by the check of the frames that are held
+        self._of_channels: tuple[str, ...] = ()  # what the end found of the array's
         self._checked_frames = 0
         if self.settings.frames.per_submap and encoders.keyframes_only:
             raise MapError(
@@ -435,7 +436,7 @@ class GrowingMap:
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """What is left out of the evidence of sources, and why."""
+        """What is left out of the evidence of sources, and why; from the end on what is odd about channels as well."""
         alone = self._sounds is not None and self._sounds.growing.channels == 1
         microphones = self.microphones
         few = (
@@ -444,12 +445,24 @@ class GrowingMap:
             if alone and microphones is not None and len(microphones) > 1
             else ""
         )
-        return tuple(one for one in (few, self._sources.doubt) if one)
+        return tuple(one for one in (few, self._sources.doubt, *self._of_channels) if one)
+
+    def _doubts_of_channels(self) -> tuple[str, ...]:
+        """Check the channels of an array along the whole drive, as a build does."""
+        track, motion = self._placed_track(), self._walk.motion()
+        if track is None or track.microphones is None or len(track.microphones) < 2 or not len(motion.stamps_s):
+            return ()
+        said = doubts_of_channels(track, Trajectory(motion.stamps_s, motion.world_from_camera))
+        return tuple(one.replace(str(track.path), "the sound") for one in said)
+
+    def _placed_track(self) -> AudioTrack | None:
+        """Return the track with its microphones and what a device said; None where neither is known."""
+        raw = None if self._sounds is None else self._sounds.track
+        return None if raw is None else self._sources.track(raw, raw.channels)
 
     def _heard_by(self, sounds: HeardSounds) -> tuple[AudioTrack, list[tuple[float, float]]] | None:
         """Return what shows where sounds came from, and when they were; None where nothing shows that."""
-        raw = None if self._sounds is None else self._sounds.track
-        track = None if raw is None else self._sources.track(raw, raw.channels)
+        track = self._placed_track()
         if track is None or not len(sounds) or not len(self._walk.motion().stamps_s):
             return None
         return track, list(zip(sounds.onset_s.tolist(), sounds.offset_s.tolist(), strict=True))
@@ -472,6 +485,8 @@ class GrowingMap:
         if not len(self):
             raise MapError("The map has no frame yet; add one.")
         self._check_again(final)
+        if final:
+            self._of_channels = self._doubts_of_channels()
         if self._sensor is None:  # the frames wait on, so that a question changes nothing
             return self._rehearse()._settled(final)
         return self._settled(final)
@@ -580,7 +595,7 @@ class GrowingMap:
             other._walk.spread(one.frame, self.settings.gravity.frames)
             other._walk.pass_by(one.frame.stamp_s, one.frame.world_from_camera)
         other._sounds, other._sources = self._sounds, self._sources
-        other._told, other._found = self._told, self._found
+        other._told, other._found, other._of_channels = self._told, self._found, self._of_channels
         other.settle()
         return other
 
@@ -685,7 +700,7 @@ class GrowingMap:
         if self._sounds is not None:
             walk.audio = self._sounds.track
         key = key_of("growing", BUILD_VERSION, walk.fingerprint, self.encoders.name, models, self.settings)
-        doubts = tuple(dict.fromkeys((*self._told, *self._found)))
+        doubts = tuple(dict.fromkeys((*self._told, *self._found, *self._of_channels)))
         return BuildPlan(walk, HERE, self.encoders, self.settings, models, key, "", doubts)
 
     def _content(

@@ -8,6 +8,7 @@ import numpy as np
 
 from avlmaps.core.errors import AudioError, RecordingError
 from avlmaps.core.progress import say
+from avlmaps.core.timeline import Trajectory
 from avlmaps.core.wording import option
 from avlmaps.maps.audio.segmentation import segment
 from avlmaps.maps.gravity.up import some_frames, up_doubts
@@ -85,9 +86,24 @@ def judge(recording: Recording, useless: Sequence[str] | None = None) -> Verdict
     if verdict.refused(()) is not None:  # with such poses nothing is level
         return verdict
     tilted = up_doubts(recording, some_frames(recording), np.random.default_rng(0))
-    wired, unsure = _of_microphones(recording, useless)
+    array = _array_of(recording)
+    wired, unsure = ([], []) if array is None else _of_microphones(array, recording.walk, useless)
     findings = (*verdict.findings, *tilted, *wired)
     return replace(verdict, findings=findings, unchecked=(*verdict.unchecked, *unsure) if not findings else ())
+
+
+def doubts_of_channels(track: AudioTrack, walk: Trajectory) -> tuple[str, ...]:
+    """Return what is doubtful about the channels of an array, as a build finds it: their wiring, and those of no use.
+
+    Args:
+        track: with its microphones, more than one.
+        walk: the camera's poses.
+
+    Raises:
+        AudioError: the track cannot be read.
+    """
+    useless = useless_channels(track)
+    return (*map(str, _of_microphones(track, walk, useless)[0]), *useless)
 
 
 def _array_of(recording: Recording) -> AudioTrack | None:
@@ -101,14 +117,15 @@ def _useless(recording: Recording) -> list[str]:
     return useless_channels(array) if array is not None else []
 
 
-def _of_microphones(recording: Recording, useless: Sequence[str] | None) -> tuple[list[Finding], list[str]]:
+def _of_microphones(
+    track: AudioTrack, walk: Trajectory, useless: Sequence[str] | None
+) -> tuple[list[Finding], list[str]]:
     """Return what is wrong with the order of the channels, and what about it does not show."""
-    track = _array_of(recording)
     try:
-        if track is None or (_useless(recording) if useless is None else useless):
+        if useless_channels(track) if useless is None else useless:
             return [], []
         spans_s = [(heard.onset_s, heard.offset_s) for heard in segment(track)]
-        found = check_wiring(track, recording.walk, spans_s)
+        found = check_wiring(track, walk, spans_s)
     except AudioError:  # the track is validated and read elsewhere, with a sentence for that
         return [], []
     if found is None:
