@@ -418,6 +418,23 @@ def test_a_live_map_takes_directions_of_a_topic_and_says_what_is_no_direction(tm
     assert "No direction came on /doa" in told[-1]
 
 
+def test_ctrl_c_loses_no_direction_that_is_held_back(tmp_path: Path) -> None:
+    class Stopped(Played):
+        def take(self, wait_s: float) -> list:
+            if not (some := super().take(wait_s)):
+                raise KeyboardInterrupt
+            return some
+
+    told: list[str] = []
+    every = [*messages(6), *(("directions", SimpleNamespace(data=0.1), 100.0 + at) for at in range(3))]
+    live = LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP, live=replace(LiveSettings(gates=False), most_waiting=50))
+    chosen = {"rgb": "/rgb", "depth": "/depth", "directions": "/doa"}
+    with live:
+        with pytest.raises(KeyboardInterrupt):
+            follow_ros2(live, RosTopics(directions="/doa"), 9.0, told.append, join=lambda _: Stopped(every, chosen))
+        assert [len(one) for one in live._growing._sources._said] == [1, 1, 1]
+
+
 def test_samples_a_second_that_cannot_be_are_refused_before_the_drive(tmp_path: Path) -> None:
     with (
         pytest.raises(RecordingError, match="audio_pcm takes samples a second"),

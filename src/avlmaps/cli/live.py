@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Live(ModelVerb):
-    """Map a recording while it is played, as on a robot: late frames are dropped, and the map is saved all along.
+    """Map a recording while it is played, or a robot while it drives; the map is saved all along.
 
     Example:
     avlmaps live REC --out home.avlmap --rate 1
@@ -41,7 +41,7 @@ class Live(ModelVerb):
     audio=none leaves the sound out, audio_pcm=16000,1 says how plain samples are coded; directions=TOPIC, azimuths that
     a device says of sounds."""
     microphones: Annotated[Path | None, arg(metavar="FILE")] = None
-    """Places of the microphones, instead of the recording's own, or of what --source ros2 publishes: a JSON file, as
+    """Places of the microphones, instead of the recording's own, or of the sound of --source ros2: a JSON file, as
     `avlmaps calibrate` writes it. With them the map knows where sounds came from."""
     out: Annotated[Path, arg(metavar="MAP")]
     """Map folder to write, by custom NAME.avlmap."""

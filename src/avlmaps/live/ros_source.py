@@ -96,11 +96,17 @@ def follow_ros2(
     with join(topics) as inbox:
         source = _Source(live, topics, inbox, tell)
         patience = Patience("from ROS 2", give_up_s, tell, "the robot seems to have stopped")
-        while not over():
-            if inbox.fault:
-                raise RecordingError(f"ROS 2 cannot be read any more ({inbox.fault}); start again with another map.")
-            if patience.is_over(source.step()):
-                break
+        try:
+            while not over():
+                if inbox.fault:
+                    raise RecordingError(
+                        f"ROS 2 cannot be read any more ({inbox.fault}); start again with another map."
+                    )
+                if patience.is_over(source.step()):
+                    break
+        except KeyboardInterrupt:  # as a drive usually ends
+            source.finish()
+            raise
         if not source.frames_in and not over():
             raise RecordingError(
                 f"No frame came from ROS 2 within {give_up_s:.0f} s: {source.missing()}. {inbox.described()}. Name the "
