@@ -110,14 +110,37 @@ def test_directions_that_came_before_their_sound_are_used_when_it_has_come(direc
     assert track is not None and track.directions is not None and not growing.doubt
 
 
+def noise_of_four(folder: Path, growing: GrowingSources) -> AudioTrack:
+    """Return a track of an array that hears nothing in common, and let the sources have the array."""
+    growing.microphones = microphones_named("square4")
+    noise = np.random.default_rng(2).normal(0.0, 0.05, (4, 28 * 16_000)).astype(np.float32)
+    write_channels(folder / "track.flac", ChannelSound(noise, 16_000))
+    return with_microphones(AudioTrack.open(folder / "track.flac"), growing.microphones)
+
+
+def test_signs_do_not_change_with_the_order_in_which_sounds_are_located(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    growing = GrowingSources(1)
+    track = growing.track(noise_of_four(tmp_path, growing), 4)
+    assert track is not None
+
+    def by_their_number(*args: object) -> np.ndarray:
+        spans_s = args[3]
+        assert isinstance(spans_s, list)
+        return np.array([1.0, 1.0 - 2.0 * (len(spans_s) % 2), 1.0, 1.0])
+
+    monkeypatch.setattr("avlmaps.maps.sources.find.signs_along", by_their_number)
+    for waiting in (2, 1, 0):
+        growing.until_now(track, WALK, SPANS[:3], surface(), UP)
+        assert growing.waiting == waiting
+
+
 def test_a_device_may_begin_to_speak_after_sounds_that_an_array_located(
     directions: DirectionTrack, tmp_path: Path
 ) -> None:
     growing = GrowingSources(3)
-    growing.microphones = microphones_named("square4")
-    noise = np.random.default_rng(2).normal(0.0, 0.05, (4, 28 * 16_000)).astype(np.float32)
-    write_channels(tmp_path / "track.flac", ChannelSound(noise, 16_000))
-    recorded = with_microphones(AudioTrack.open(tmp_path / "track.flac"), growing.microphones)
+    recorded = noise_of_four(tmp_path, growing)
     device: list[int] = []
     for begin_s, end_s in SPANS[:2]:
         if begin_s > SPANS[0][0]:

@@ -121,12 +121,12 @@ class GrowingSources:
         if track.microphones is None:
             now = np.union1d(now, np.arange(max(0, len(row) - _RECENT), len(row)))
         old = np.setdiff1d(np.flatnonzero(row >= 0), now)
-        heard = [spans_s[number] for number in sorted({*old.tolist(), *now.tolist()})]
         told = track.directions is not None and self._of_device.shape[1] > 1  # else the device said nothing before
         others = self._of_device[row[old]] if told and len(old) else None
         signs = self._signs if len(old) >= _SIGNS_BY else None
         wanted = [spans_s[number] for number in now.tolist()]
-        found = find_among(track, walk, wanted, voxel_m, up_in_world, signs_by_s=heard, signs=signs, others=others)
+        # By all sounds, also those that wait: else signs change with the order, and what was located waits again.
+        found = find_among(track, walk, wanted, voxel_m, up_in_world, signs_by_s=spans_s, signs=signs, others=others)
         if found is None:
             return None
         if self._signs is not None and not np.array_equal(self._signs, found.signs):
