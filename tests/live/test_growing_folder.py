@@ -11,6 +11,7 @@ from test_live_map import ENCODERS, UP, frame
 
 import avlmaps
 from avlmaps.core.errors import RecordingError
+from avlmaps.core.timeline import Trajectory
 from avlmaps.live import patience
 from avlmaps.live.growing_folder import growing_frames, is_being_written
 from avlmaps.live.live_map import LiveMap
@@ -41,6 +42,20 @@ def test_what_is_followed_is_what_is_recorded(tmp_path: Path) -> None:
         np.testing.assert_array_equal(one.rgb, other.rgb)
         np.testing.assert_array_equal(one.depth_m, other.depth_m)
         np.testing.assert_allclose(one.world_from_camera, other.world_from_camera, atol=1e-12)
+
+
+def test_poses_at_their_own_rate_replace_those_of_frames_behind_a_follower(tmp_path: Path) -> None:
+    poses = np.stack([frame(number).world_from_camera for number in range(12)])
+    poses[:, :3, 3] += 1.0 / 3.0
+    dense = Trajectory(np.arange(12) / 7.0, poses)
+    writer = avlmaps.RecordingWriter(tmp_path / "rec", frame(0).rig, np.array(UP), trajectory=dense)
+    with writer:
+        for number in range(3):
+            writer.add(frame(number))
+        followed = growing_frames(tmp_path / "rec", give_up_s=30.0)
+        came = [next(followed) for _ in range(3)]
+    assert len((tmp_path / "rec" / POSES).read_text().splitlines()) == 13
+    assert len(came) == 3 and not list(followed)
 
 
 def test_a_writer_that_stalls_or_stops_is_said_and_what_came_is_mapped(

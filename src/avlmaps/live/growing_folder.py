@@ -73,7 +73,8 @@ class _Written:
         try:
             # Before the poses: that of a frame which is listed is there already.
             rows = [(name, float(stamp)) for name, stamp in self._listed.new()]
-            for row in self._posed.new():
+            # With no frame there is none to come; a finished recording may have other rows, at the poses' own rate.
+            for row in self._posed.new() if rows else ():
                 stamp_s, *pose = (float(word) for word in row)
                 if len(pose) < 7:
                     raise ValueError(f"{len(row)} columns, where a pose has 8")
