@@ -71,6 +71,25 @@ def test_a_device_becomes_known_while_sounds_come_and_the_end_is_that_of_a_build
     assert np.abs(off_m(found) - off_m(end)).max() < 0.3, "all are looked at again with the device of now"
 
 
+def test_the_offset_of_an_earlier_drive_counts_as_in_a_build(directions: DirectionTrack) -> None:
+    known_rad = float(OFFSET_RAD), 0.01
+    growing = GrowingSources()
+    growing.known_rad = known_rad
+    growing.add_directions(directions.between(*SPANS[0]))
+    raw, walk, spans_s = until(SPANS[0][1] + 0.3)
+    track = growing.track(raw, 1)
+    assert track is not None and track.directions is not None
+    found = growing.until_now(track, walk, spans_s, surface(), UP)
+    said_alone = replace(track.directions, known_rad=None)
+    built, alone = (
+        find_sources(replace(track, directions=one), walk, spans_s, surface(), UP)
+        for one in (replace(said_alone, known_rad=known_rad), said_alone)
+    )
+    assert found is not None and built is not None and alone is not None
+    np.testing.assert_array_equal(found.heard, built.heard)
+    assert Device.of(found.device[0]).offset_sd_rad < 0.5 * Device.of(alone.device[0]).offset_sd_rad
+
+
 def test_what_waits_is_located_the_newest_first_and_again_after_a_correction(
     directions: DirectionTrack, monkeypatch: pytest.MonkeyPatch
 ) -> None:

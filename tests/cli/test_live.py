@@ -5,7 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from avlmaps.core.errors import MapError
 from avlmaps.days.find import visits_of
+from avlmaps.live.live_map import LiveMap
 from avlmaps.maps.store.reader import open_stored
 from avlmaps.recordings.layout import DESCRIPTION, UNFINISHED
 
@@ -85,4 +87,12 @@ def test_options_that_contradict_are_refused(
 ) -> None:
     code, _, err = run("live", walk, "--out", tmp_path / "no.avlmap", *words)
     assert code == 2 and said in err
+    assert not (tmp_path / "no.avlmap").exists()
+
+
+def test_a_device_that_is_not_known_or_not_recorded_is_refused(run, walk: Path, built: Path, tmp_path: Path) -> None:
+    code, _, err = run("live", walk, "--out", tmp_path / "no.avlmap", "--same-device", built)
+    assert code == 1 and "has no directions that a device said" in err
+    with pytest.raises(MapError, match="knows of no device that says directions"):
+        LiveMap(tmp_path / "no.avlmap", "colours", same_device=built)
     assert not (tmp_path / "no.avlmap").exists()

@@ -43,6 +43,8 @@ class Live(ModelVerb):
     microphones: Annotated[Path | None, arg(metavar="FILE")] = None
     """Places of the microphones, instead of the recording's own, or of the sound of --source ros2: a JSON file, as
     `avlmaps calibrate` writes it. With them the map knows where sounds came from."""
+    same_device: Annotated[Path | None, arg(metavar="MAP")] = None
+    """Map of an earlier drive with the same device that says directions: its offset is known from there."""
     out: Annotated[Path, arg(metavar="MAP")]
     """Map folder to write, by custom NAME.avlmap."""
     rate: Annotated[float, arg(metavar="FACTOR")] = 1.0
@@ -116,6 +118,7 @@ def _live(verb: Live) -> dict[str, Any]:
         overwrite=verb.overwrite,
         begins_s=source.begins_s,
         microphones=source.microphones,
+        same_device=verb.same_device,
     ) as live:
         if verb.serve or verb.view:
             from avlmaps.cli.live_serving import serve_while
@@ -157,6 +160,8 @@ def _recording(verb: Live) -> _Source:
     """Return what plays a recording."""
     from avlmaps.live.growing_folder import is_being_written
     from avlmaps.live.replay import follow, replay
+    from avlmaps.maps.pipeline.sources import take_device
+    from avlmaps.maps.store.reader import open_stored
     from avlmaps.recordings.layout import UNFINISHED, decode_description
     from avlmaps.recordings.open import open_recording
 
@@ -178,6 +183,8 @@ def _recording(verb: Live) -> _Source:
         corrections=verb.reading.corrections(),
         microphones=microphones,
     )
+    if verb.same_device is not None:
+        take_device(recording, open_stored(verb.same_device))
     for notice in recording.notices:
         say(f"note: {notice}")
     rate = None if verb.as_fast_as_possible else verb.rate
@@ -202,6 +209,10 @@ def _robot(verb: Live) -> _Source:
             "--depth-unit, --intrinsics and the like are of a recording; leave them out with --source ros2."
         )
     topics = ros_topics(topics_of(verb.topics))
+    if verb.same_device is not None and not topics.directions:
+        raise UsageError(
+            "--same-device is of a device that says directions; name its topic (--topics directions=TOPIC)."
+        )
     inbox = open_ros2(topics)  # before the map's folder is made
 
     def play(live: "LiveMap", over: Callable[[], bool]) -> None:

@@ -32,6 +32,7 @@ from avlmaps.live.settings import LiveSettings
 from avlmaps.live.status import LiveStatus, Tally, memory_mb
 from avlmaps.maps.growing import FrozenSums, GrowingMap, require_place
 from avlmaps.maps.keyframes.describe import KeyframeSettings
+from avlmaps.maps.pipeline.sources import device_of
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.reader import StoredMap, open_stored
@@ -94,6 +95,7 @@ class LiveMap:
         overwrite: bool = False,
         begins_s: float = 0.0,
         microphones: Microphones | str | Path | None = None,
+        same_device: str | Path | None = None,
     ) -> None:
         """Begin an empty map, and hold its folder.
 
@@ -109,9 +111,12 @@ class LiveMap:
                 0 where the stamps are dates already, or no clock is known.
             microphones: where those of the sound's channels are, as ``microphones`` of ``recording.json``; the name of
                 an array or a JSON file will do. With them the map knows where its sounds came from.
+            same_device: map of an earlier drive with the same device that says directions: its offset is known from
+                there.
 
         Raises:
-            MapError: ``begins_s`` is no time, the folder is something else or a map, or another process writes it.
+            MapError: ``begins_s`` is no time, the folder is something else or a map, another process writes it, or
+                ``same_device`` is no map or knows of none.
             RecordingError: the microphones cannot be.
             BackendError: there is no such profile.
         """
@@ -122,6 +127,7 @@ class LiveMap:
             raise MapError(fault)
         used = encoders_of("embedded" if encoders is None else encoders)
         array = microphones_named(str(microphones)) if isinstance(microphones, str | Path) else microphones
+        known_rad = None if same_device is None else device_of(open_stored(Path(same_device)))
         require_place(self.path, overwrite)
         self._held = contextlib.ExitStack()
         self._held.enter_context(lock_folder(self.path))
@@ -130,6 +136,8 @@ class LiveMap:
         self._growing = GrowingMap(chosen, used, direction(up_in_world), wait=wait, looks_later=True, begins_s=begins_s)
         if array is not None:
             self._growing.place_microphones(array)
+        if known_rad is not None:
+            self._growing.know_device(known_rad)
         self._gates = Gates(self.settings, chosen.fusion.max_depth_m)
         self._encoding = EncodingGate(self.settings, self._growing.settings.fusion)
         keeps = self.settings.gates and not chosen.frames.per_submap  # corrected poses would not reach them

@@ -250,6 +250,10 @@ class GrowingMap:
             raise AudioError("Sound came before its microphones were described; describe them before the first piece.")
         self._sources.microphones = microphones
 
+    def know_device(self, known_rad: tuple[float, float]) -> None:
+        """Say what an earlier map shows of the device that says directions; see ``DirectionTrack.known_rad``."""
+        self._sources.known_rad = known_rad
+
     def add_audio(self, chunk: Any, stamp_s: Any = None) -> None:
         """Add a piece of sound; see ``GrowingTrack.add``. Another thread may do it.
 

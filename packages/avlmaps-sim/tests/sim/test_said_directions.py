@@ -7,6 +7,9 @@ import numpy as np
 import pytest
 
 from avlmaps.core.errors import RecordingError
+from avlmaps.live.live_map import LiveMap
+from avlmaps.live.replay import replay
+from avlmaps.live.settings import LiveSettings
 from avlmaps.maps.build import build_map
 from avlmaps.maps.pipeline.sources import take_device
 from avlmaps.maps.store.reader import open_stored
@@ -108,6 +111,14 @@ def test_the_next_map_begins_with_the_offset_that_the_first_one_stored(tmp_path:
     assert recording.audio.directions.known_rad == tuple(found.device[0, :2].tolist())
     after = build_map(recording, tmp_path / "next.avlmap", "colours", progress=False).sources()
     assert after is not None and len(after.device) == 1
+    live = LiveMap(
+        tmp_path / "live.avlmap", "colours", up_in_world=recording.up_in_world, live=LiveSettings(gates=False),
+        same_device=first.path,
+    )  # fmt: skip
+    replay(open_recording(tmp_path / "next"), live, rate=None)
+    ended = live.close().stored.sources()
+    assert ended is not None
+    np.testing.assert_allclose(ended.device, after.device, atol=1e-3)
     recording.audio = replace(recording.audio, directions=None)
     with pytest.raises(RecordingError, match="no directions"):
         take_device(recording, first)

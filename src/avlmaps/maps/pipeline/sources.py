@@ -60,10 +60,20 @@ def take_device(recording: Recording, stored: StoredMap) -> None:
         RecordingError: the recording has no directions.
         MapError: the map knows of no such device.
     """
-    track, found = recording.audio, stored.sources()
+    track = recording.audio
     if track is None or track.directions is None:
         raise RecordingError(f"{recording.path} has no directions that a device said, so that no offset is of use.")
+    recording.audio = replace(track, directions=replace(track.directions, known_rad=device_of(stored)))
+
+
+def device_of(stored: StoredMap) -> tuple[float, float]:
+    """Return the offset of a map's device that says directions, and the standard deviation of that.
+
+    Raises:
+        MapError: the map knows of no such device.
+    """
+    found = stored.sources()
     if found is None or not len(found.device):
         raise MapError(f"{stored.path} knows of no device that says directions; name a map of a recording with one.")
     offset_rad, sd_rad = found.device[-1, :2].tolist()
-    recording.audio = replace(track, directions=replace(track.directions, known_rad=(offset_rad, sd_rad)))
+    return offset_rad, sd_rad

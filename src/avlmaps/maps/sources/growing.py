@@ -35,6 +35,7 @@ class GrowingSources:
 
     Attributes:
         microphones: one for each channel; None where they are not known.
+        known_rad: of the device that says directions, as ``DirectionTrack.known_rad``.
         waiting: how many sounds are not located yet.
         doubt: why what a device said is left out; empty where it is not.
     """
@@ -46,6 +47,7 @@ class GrowingSources:
             at_once: how many are located in one call at most; None for all.
         """
         self.microphones: Microphones | None = None
+        self.known_rad: tuple[float, float] | None = None
         self.waiting, self.doubt = 0, ""
         self._at_once, self._lock = at_once, Lock()
         self._said: list[DirectionTrack] = []
@@ -81,6 +83,7 @@ class GrowingSources:
         try:
             if said is not None:
                 said.require_beside(heard.start_s, heard.end_s, "What the device said")
+                said = replace(said, known_rad=self.known_rad)
             self.doubt = ""
         except RecordingError as fault:
             said, self.doubt = None, self.doubt or str(fault)  # its numbers change with every piece
