@@ -1,9 +1,13 @@
 """The probability of a goal at the source of a sound: the name's, times that of its place."""
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from query_fakes import furnished_map, sounds_of
 
 from avlmaps.core.question import HeardAt, Modality, Part, Role
 from avlmaps.language.learned_translator import LearnedTranslator
@@ -12,6 +16,7 @@ from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.sources.density import Spread
 from avlmaps.maps.types import SourceEvidence
 from avlmaps.query.answer import PartAnswer
+from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.factors import HeatSettings
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.modalities.sound import SoundSettings
@@ -103,3 +108,34 @@ def test_a_plan_says_where_a_sound_comes_from_where_that_is_meant() -> None:
         "I will go to where smoke alarm was heard.",
         "I will go to where the sound of smoke alarm comes from.",
     ]
+
+
+class Asked(AVLMap):
+    """A map that notes what it is asked for, and answers where it was heard."""
+
+    def heat(self, part: Part, intrinsics: Any = None, attachments: Any = None) -> Heatmap:
+        self.__dict__.setdefault("parts", []).append(part)
+        return super().heat(replace(part, at="robot"), intrinsics, attachments)
+
+
+@pytest.mark.parametrize(
+    ("words", "places"),
+    [
+        ("the chair between where the barking comes from and where you heard the phone", ["source", None]),
+        ("the chair between the source of the barking and the source of the beeping", ["source", "source"]),
+        ("the chair near where the barking comes from", ["source"]),
+        ("the chair near the sound of barking", [None]),
+        ("where does the barking near the sound of water come from?", ["source", "source"]),
+    ],
+)
+def test_each_sound_that_says_where_a_thing_is_has_its_own_place(
+    words: str, places: list[HeardAt | None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("avlmaps.query.sound_sources.no_sources", lambda stored: "")
+    asked = Asked(furnished_map(sounds=sounds_of([np.ones((3, 3))], [1.0])))
+    asked.ask(words)
+    assert [part.at for part in asked.__dict__["parts"] if part.modality is Modality.SOUND] == places
+    for chosen in AT:
+        asked.__dict__["parts"].clear()
+        asked.ask(words, at=chosen)
+        assert {part.at for part in asked.__dict__["parts"] if part.modality is Modality.SOUND} == {chosen}

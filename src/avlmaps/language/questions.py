@@ -83,7 +83,7 @@ def parse_sentence(sentence: str) -> Question:
 
 def question_of(target: Target) -> Question:
     """Return a target as a question to the map."""
-    parts = [Part(_MODALITIES[one.kind], one.name, is_file=one.is_file) for one in (target, *target.near)]
+    parts = [Part(_MODALITIES[one.kind], one.name, is_file=one.is_file, at=one.at) for one in (target, *target.near)]
     return Question.of(parts)
 
 

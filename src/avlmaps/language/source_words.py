@@ -1,7 +1,7 @@
 """Whether words mean the place where a sound came from, and not where somebody heard it.
 
 One reading for questions and commands: a question is read as a whole, a command round each sound that it names, so that
-each of its parts has its own place.
+each of its parts has its own place; so have several sounds of a question that say where a thing is.
 """
 
 import re

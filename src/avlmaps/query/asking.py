@@ -53,6 +53,7 @@ class Asked:
         primary: the part that is sought. None: the sentence says it, or the first of object, image, sound, area.
         top: most goals.
         at: the place of its sounds; None: as the map's settings say, else as the words do.
+        at_by_words: its words chose ``at``: of several sounds, each may have a place of its own.
     """
 
     sentence: str = ""
@@ -64,6 +65,7 @@ class Asked:
     primary: Modality | None = None
     top: int = 3
     at: HeardAt | None = None
+    at_by_words: bool = False
 
     def __post_init__(self) -> None:
         named = any(part is not None for part in (self.object, self.sound, self.area))
@@ -262,7 +264,7 @@ def _answer_sentence(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
     if (asked.at or avlmap.settings.sounds.at) is not None or not asks_for_source(asked.sentence):
         return _answer_said(avlmap, asked, files)
     why = no_sources(avlmap.stored)
-    answer = _answer_said(avlmap, asked if why else replace(asked, at="source"), files)
+    answer = _answer_said(avlmap, asked if why else replace(asked, at="source", at_by_words=True), files)
     silent = answer.parts and not any(one.part.modality is Modality.SOUND for one in answer.parts)
     return answer if silent or not why else replace(answer, notes=(why, *answer.notes))
 
@@ -300,7 +302,7 @@ def _answer_read(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
     """Answer the questions that a sentence is read as; the likeliest counts."""
     questions, notes, counted = _questions(asked, avlmap.edited.own_names)
     answers: list[tuple[Question, Answer]] = []
-    for question in (one.heard_at(asked.at) for one in questions):
+    for question in (_placed(one, asked.at) for one in questions):
         if asked.primary is not None:
             question = Question.of(question.parts, asked.primary)
         used = {part.query for part in question.parts if part.is_file}
@@ -324,25 +326,39 @@ def _answer_read(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
     )
 
 
+def _placed(question: Question, at: HeardAt | None) -> Question:
+    """Return a question with its sounds at a place.
+
+    Several that say where a thing is have each the place of its own words, if those of one do. Where a sound is sought,
+    the words round it stand at both ends: "where does the barking near the sound of water come from?".
+    """
+    places = [part.at for part in question.parts if part.modality is Modality.SOUND]
+    each = len(places) > 1 and any(places) and question.parts[0].modality is not Modality.SOUND
+    return question if each else question.heard_at(at)
+
+
 def _questions(asked: Asked, own: "tuple[OwnName, ...]") -> tuple[tuple[Question, ...], tuple[str, ...], bool]:
     """Return the questions that a sentence is read as, how its words were taken, and whether it asks how many."""
     from avlmaps.language.intents import Ask
     from avlmaps.language.list_questions import said_alternatives
 
     said = said_alternatives(asked.sentence) or (asked.sentence,)
-    read = [_read(words, asked.image, asked.clip, own) for words in said]
+    at = None if asked.at_by_words else "robot"
+    read = [_read(words, asked.image, asked.clip, own, at) for words in said]
     questions = tuple(dict.fromkeys(question for one in read for question in one.questions))
     notes = tuple(dict.fromkeys(note for one in read for note in one.notes))
     return questions, notes, read[0].inquiry.ask is Ask.HOW_MANY
 
 
 @lru_cache(maxsize=512)
-def _read(sentence: str, image: str | None, clip: str | None, own: "tuple[OwnName, ...]") -> "AskedSentence":
+def _read(
+    sentence: str, image: str | None, clip: str | None, own: "tuple[OwnName, ...]", at: HeardAt | None
+) -> "AskedSentence":
     """Return the reading of a sentence; it depends on nothing but the words, and agents repeat theirs."""
     from avlmaps.language.questions import read_question
     from avlmaps.language.sentence import Given
 
-    return read_question(sentence, Given(image, clip, knows=lambda _: True, own=own))
+    return read_question(sentence, Given(image, clip, knows=lambda _: True, at=at, own=own))
 
 
 def _probability(factor: Factor) -> float:

@@ -231,15 +231,17 @@ def intents_of(
     return tuple(intents)
 
 
-def inquiry_of(line: Sequence[Symbol], tokens: Sequence[Token]) -> Inquiry | None:
-    """Return the question of a line that ends with ``end``; None where it says that it cannot be answered.
+def inquiry_of(
+    line: Sequence[Symbol], tokens: Sequence[Token], at_source: Callable[[Sequence[int]], bool] = lambda _: False
+) -> Inquiry | None:
+    """Return the question of a line that ends with ``end``, see ``intents_of``; None where it cannot be answered.
 
     Raises:
         MalformedError: it means nothing.
     """
     if list(line) == ["refuse", "end"]:
         return None
-    written, targets, at = _Line(line, tokens), [], 1
+    written, targets, at = _Line(line, tokens, at_source), [], 1
     while line[at : at + 1] and line[at] != "end":
         target, at = written.target(at)
         targets.append(target)

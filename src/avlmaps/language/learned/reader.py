@@ -6,7 +6,7 @@ before that: where it would rather write nonsense, its readings are unlikely.
 """
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
@@ -99,7 +99,7 @@ class LearnedReader:
         found: dict[Any, Read] = {}
         for line in self.lines(tokens, is_question=False):
             try:
-                meaning = linear.intents_of(line.symbols, tokens, lambda own, line=line: _at_source(line, tokens, own))
+                meaning = linear.intents_of(line.symbols, tokens, _at_source(line, tokens))
             except linear.MalformedError:
                 continue
             _add(found, Read(meaning, float(np.exp(line.log)), _pointed(line)))
@@ -111,7 +111,7 @@ class LearnedReader:
         for line in self.lines(tokens, is_question=True):
             purpose = line.symbols == ("purpose", "end")
             try:
-                meaning = None if purpose else linear.inquiry_of(line.symbols, tokens)
+                meaning = None if purpose else linear.inquiry_of(line.symbols, tokens, _at_source(line, tokens))
             except linear.MalformedError:
                 continue
             _add(found, Read(meaning, float(np.exp(line.log)), _pointed(line), purpose))
@@ -196,15 +196,17 @@ def _pointed(line: Line) -> frozenset[int]:
     return frozenset(symbol for symbol in line.symbols if isinstance(symbol, int))
 
 
-def _at_source(line: Line, tokens: Sequence[Token], own: Sequence[int]) -> bool:
-    """Return whether the place is meant that a sound came from which a line names by some of its words."""
-    return seeks_source(tokens, own, _pointed(line) - frozenset(own))
+def _at_source(line: Line, tokens: Sequence[Token]) -> Callable[[Sequence[int]], bool]:
+    """Return what says whether the place is meant that a sound came from which a line names by some of its words."""
+    return lambda own: seeks_source(tokens, own, _pointed(line) - frozenset(own))
 
 
 def _add(found: dict[Any, Read], read: Read) -> None:
     key = (read.meaning, read.is_purpose)
     if isinstance(read.meaning, tuple):  # where a sound is meant to be is no other reading
         key = (tuple(on_targets(one, _anywhere) for one in read.meaning), read.is_purpose)
+    elif read.meaning is not None:
+        key = (replace(read.meaning, of=tuple(map(_anywhere, read.meaning.of))), read.is_purpose)
     before = found.get(key)
     if before is not None:
         read = Read(before.meaning, before.probability + read.probability, before.used, before.is_purpose)
