@@ -2,15 +2,25 @@
 
 import json
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
 import soundfile
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import AvlmapsError, RecordingError
 from avlmaps.recordings.audio import AudioTrack, Sound
-from avlmaps.recordings.channels import ChannelSound, channel_faults, read_channels, with_microphones
+from avlmaps.recordings.channels import (
+    ChannelSound,
+    channel_faults,
+    read_channels,
+    useless_channels,
+    with_microphones,
+)
+from avlmaps.recordings.growing_track import GrowingTrack
 from avlmaps.recordings.microphones import Microphones, microphones_named
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Frame
@@ -129,6 +139,18 @@ def test_faults_of_channels_are_named_and_a_sound_array_has_none(tmp_path: Path)
     humming = good * 0.02
     humming += 0.05 * np.sin(2 * np.pi * 100.0 * np.arange(good.shape[1]) / RATE_HZ).astype(np.float32)
     assert [said for said in faults(tmp_path, humming) if "hum at 100 Hz" in said]
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(1, 60_000), st.sampled_from([8_000, 11_025, 22_050, 44_100]), st.floats(0.0, 2e9))
+def test_tracks_of_any_length_and_rate_are_looked_at_for_faults(count: int, rate_hz: int, start_s: float) -> None:
+    with TemporaryDirectory() as folder:
+        growing = GrowingTrack(Path(folder) / "track.f32")
+        one = np.random.default_rng(count).normal(0.0, 0.1, count).astype(np.float32)
+        growing.add(ChannelSound(np.stack([one, one]), rate_hz), start_s)
+        assert growing.track is not None
+        (said,) = useless_channels(growing.track)
+    assert "holds the same sound as channel 1" in said
 
 
 def test_an_unknown_array_is_refused_with_what_to_write(tmp_path: Path) -> None:

@@ -155,9 +155,11 @@ def useless_channels(track: AudioTrack) -> list[str]:
 
 
 def _looked_at(track: AudioTrack) -> Float[np.ndarray, "k m n"]:
-    length_s = min(_LOOK_S, track.duration_s)
-    begin_s = track.start_s + np.linspace(0.0, track.duration_s - length_s, _LOOKS)
-    looks = [read_channels(track, at_s, at_s + length_s).samples for at_s in begin_s.tolist()]
+    count = round(track.duration_s * track.rate_hz)
+    length = min(round(_LOOK_S * track.rate_hz), count)
+    begins = np.linspace(0, count - length, _LOOKS).round().astype(int)  # whole samples, so that all are as long
+    edges_s = track.start_s + np.stack([begins, begins + length], axis=1) / track.rate_hz
+    looks = [read_channels(track, *edges).samples for edges in edges_s.tolist()]
     return np.stack(looks).astype(np.float64)
 
 
