@@ -109,7 +109,7 @@ def test_two_channels_and_the_directions_of_a_device_show_where_a_sound_came_fro
 
 
 def test_sound_whose_coding_is_published_in_the_drive_is_heard_from_then_on(walk: Path, tmp_path: Path) -> None:
-    code, said, noted = mapped(tmp_path / "live.avlmap", walk, "--coded-at", "6")
+    code, said, noted = mapped(tmp_path / "live.avlmap", walk, "--coded-at", "6", give_up_s=12.0)
     assert code == 0, noted
     assert "The sound on /audio is used from now on" in noted
     assert "messages of sound could not be used and are left out" in noted
