@@ -85,16 +85,14 @@ def follow(
 
 def end_drive(live: LiveMap, tell: Callable[[str], None] = say) -> None:
     """Close a map, and report what that finds odd; where Ctrl-C comes meanwhile, without the frames that wait."""
-    known = live.doubts
+    told = set(live.doubts)
     if waiting := live.status().kept:
         tell(f"{waiting} frames wait that there was no time for. What is saved stays; Ctrl-C leaves them out.")
     try:
         live.close()
     except KeyboardInterrupt:
         end_now(live, tell)
-    for doubt in live.doubts:
-        if doubt not in known:
-            tell(f"note: {doubt}")
+    tell_doubts(live, told, tell)
 
 
 def end_now(live: LiveMap, tell: Callable[[str], None] = say) -> None:

@@ -1,10 +1,10 @@
 """Directions of sounds out of the messages of a device."""
 
 from collections.abc import Callable
+from math import radians
 from typing import Any
 
-import numpy as np
-
+from avlmaps.core.motion import wrap_angle
 from avlmaps.live.patience import Once
 from avlmaps.recordings.formats.ros_directions import BEYOND_A_TURN_RAD, angle_of
 from avlmaps.recordings.formats.ros_messages import stamp_of
@@ -65,5 +65,4 @@ class RosDirections:
 
     def _in_radians(self, one: tuple[float, float]) -> tuple[float, float]:
         stamp_s, angle = one
-        azimuth = np.deg2rad(angle) if self._in_degrees else angle
-        return stamp_s, float(np.angle(np.exp(1j * azimuth)))
+        return stamp_s, wrap_angle(radians(angle) if self._in_degrees else angle)

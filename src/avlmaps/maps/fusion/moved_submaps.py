@@ -140,8 +140,9 @@ class _Sums:
         """Add up these submaps, whose frames move so."""
         self.count, self._pair, self._brick = 0, 0, 0
         self._make_bricks(_BRICKS)
-        self._make_room(kernels.MOST_SAMPLES + len(submaps.index) // 2)
-        self._make_pairs(kernels.MOST_SAMPLES + _PAIRS_PER_VOXEL * len(submaps.index))
+        own = int(submaps.row_offsets[numbers.stop] - submaps.row_offsets[numbers.start])
+        self._make_room(kernels.MOST_SAMPLES + own // 2)
+        self._make_pairs(kernels.MOST_SAMPLES + _PAIRS_PER_VOXEL * own)
         for number in numbers:
             rows = slice(*(int(at) for at in submaps.row_offsets[number : number + 2]))
             frames = slice(*(int(at) for at in submaps.frame_offsets[number : number + 2]))
