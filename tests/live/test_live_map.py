@@ -201,18 +201,25 @@ def test_a_second_writer_a_finished_map_and_an_empty_one_get_a_sentence(tmp_path
         add(again, frame(0))
 
 
+class Ones:
+    """Encodes everything alike."""
+
+    def encode(self, frame: avlmaps.Frame) -> np.ndarray:
+        return np.ones((6, 8, 1), np.float32)
+
+    def encode_words(self, words: list[str]) -> np.ndarray:
+        return np.ones((len(words), 1), np.float32)
+
+
 def test_a_frame_that_an_encoder_fails_on_costs_no_other(tmp_path: Path) -> None:
-    class Fails:
+    class Fails(Ones):
         calls = 0
 
         def encode(self, frame: avlmaps.Frame) -> np.ndarray:
             self.calls += 1
             if self.calls == 3:
                 raise RuntimeError("out of memory")
-            return np.ones((6, 8, 1), np.float32)
-
-        def encode_words(self, words: list[str]) -> np.ndarray:
-            return np.ones((len(words), 1), np.float32)
+            return super().encode(frame)
 
     faults: list[str] = []
     with LiveMap(tmp_path / "m", avlmaps.Encoders(pixels=Fails()), up_in_world=UP, live=EVERY) as live:
@@ -225,15 +232,14 @@ def test_a_frame_that_an_encoder_fails_on_costs_no_other(tmp_path: Path) -> None
     info = open_stored(tmp_path / "m").info
     assert len(faults) == 1 and "out of memory" in faults[0]
     assert info.counts.frames == 7
+    assert [(bad.index, bad.why) for bad in info.bad_frames] == [(2, faults[0])]
+    assert "1 of 8 frames were left out (bad_frames in map.json says why)." in info.notices
 
 
 def test_late_frames_of_an_encoder_that_always_fails_end_with_a_sentence(tmp_path: Path) -> None:
-    class Fails:
+    class Fails(Ones):
         def encode(self, frame: avlmaps.Frame) -> np.ndarray:
             raise RuntimeError("out of memory")
-
-        def encode_words(self, words: list[str]) -> np.ndarray:
-            return np.ones((len(words), 1), np.float32)
 
     live = LiveMap(tmp_path / "m", avlmaps.Encoders(pixels=Fails()), up_in_world=UP)
     with live._door:  # nobody takes a frame meanwhile
@@ -318,6 +324,47 @@ def test_a_thread_that_breaks_between_two_snapshots_leaves_nobody_waiting(tmp_pa
     delattr(live._growing, part)
     within(60.0, live.close)
     assert live.map.stored.info.counts.frames == len(live) > 0
+
+
+def breaks(*_: object, **__: object) -> Any:
+    raise ZeroDivisionError("division by zero")
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+@pytest.mark.parametrize("lost", [2, 0], ids=["the one that fuses", "the one behind"])
+def test_a_thread_that_breaks_while_closing_is_told_and_its_map_is_written(tmp_path: Path, lost: int) -> None:
+    live = LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP, live=EVERY)
+    for number in range(3):
+        add(live, frame(number))
+    wait_for(lambda: len(live) == 3)
+    if lost:
+        live._check.add = breaks  # type: ignore[method-assign]
+    else:
+        live._what_came = breaks  # type: ignore[method-assign]
+        wait_for(lambda: live._broken is not None)
+    with live._door:  # nobody takes these before it is closed
+        for number in range(3, 3 + lost):
+            one = frame(number)
+            live.add_frame(one.rgb, one.depth_m, one.camera, one.world_from_camera, one.stamp_s)
+    with pytest.raises(MapError, match=rf"\(ZeroDivisionError: division by zero\); .* with 3 frames, and {lost} that"):
+        live.close()
+    assert live.close().stored.info.counts.frames == 3 == open_stored(tmp_path / "map", verify=True).info.counts.frames
+
+
+def test_an_end_that_breaks_is_a_sentence_and_what_was_saved_stays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    chosen = LiveSettings(first_frames=1, known_views=100, new_share=0.0, snapshot_s=0.0, save_s=0.0)
+    live = LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP, live=chosen)
+    for number in range(3):
+        add(live, frame(number))
+    wait_for(lambda: live.status().saved_age_s >= 0.0)
+    with monkeypatch.context() as patch:
+        patch.setattr(GrowingMap, "stored", breaks)
+        with pytest.raises(MapError, match=r"could not be finished \(ZeroDivisionError: division by zero\)"):
+            live.close()
+    assert open_stored(tmp_path / "map", verify=True).info.counts.frames > 0
+    assert live.close().stored.info.counts.frames == 3
 
 
 def test_sounds_are_in_the_map_with_the_frames(tmp_path: Path) -> None:
@@ -630,6 +677,22 @@ def test_the_first_frames_of_all_may_come_late(tmp_path: Path) -> None:
     made = open_stored(tmp_path / "map", verify=True)
     assert made.info.recording.duration_s == pytest.approx(8.0)
     assert made.voxels.hits.sum() > 0 and live.status().fused == 5
+
+
+def test_a_late_frame_that_the_encoder_fails_on_is_listed(tmp_path: Path) -> None:
+    class FailsLater(Ones):
+        def encode(self, frame: avlmaps.Frame) -> np.ndarray:
+            assert frame.index not in (10, 11), "out of memory"
+            return super().encode(frame)
+
+    encoders = avlmaps.Encoders(pixels=FailsLater())
+    with LiveMap(tmp_path / "late", encoders, up_in_world=UP, live=LATER) as live:
+        for number in range(8):
+            add(live, frame(number))
+        wait_for(lambda: live.status().waiting == 0)
+        while_busy(live, range(8, 16))
+    bad = open_stored(tmp_path / "late").info.bad_frames
+    assert [one.index for one in bad] == [11, 12] and all("out of memory" in one.why for one in bad)
 
 
 @pytest.mark.parametrize(("most", "kept"), [(256, live_map._MOST_LATE), (0, 0)])

@@ -145,7 +145,7 @@ def test_frames_that_cannot_be_read_are_left_out_and_told(tmp_path: Path) -> Non
         (3, "walk/000003.png is truncated; leave that frame out."),
         (17, "walk/000017.png is truncated; leave that frame out."),
     ]
-    assert "2 of 20 frames could not be read and were left out (bad_frames in map.json)." in stored.info.notices
+    assert "2 of 20 frames were left out (bad_frames in map.json says why)." in stored.info.notices
     good = [i for i in range(20) if i not in (3, 17)]
     alone = build(Subset(Walk(20), good), tmp_path / "b")  # pyright: ignore[reportArgumentType]
     assert np.array_equal(stored.voxels.hits, alone.voxels.hits)

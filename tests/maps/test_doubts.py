@@ -117,8 +117,7 @@ def test_a_live_map_ends_with_the_doubts_about_channels_that_a_build_has(
     assert not live.doubts
     said: list[str] = []
     end_drive(live, said.append)
-    built = doubts_of_channels(recording.audio, recording.walk)
-    wanted = tuple(one.replace(str(recording.audio.path), "the sound") for one in built)
+    wanted = doubts_of_channels(recording.audio, recording.walk, "the sound")
     assert len(wanted) == 1 and live.doubts == wanted == open_stored(live.path).info.doubts
     assert said == [f"note: {wanted[0]}"]
 

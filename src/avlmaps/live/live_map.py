@@ -153,6 +153,7 @@ class LiveMap:
         self._last: Frame | None = None
         self._fault: BackendError | None = None
         self._broken: BaseException | None = None
+        self._is_told = False  # a call raised what broke
         self._doubts: list[str] = []
         self._asked: Future[_Came | None] | None = None  # what the thread behind waits for; under the door
         self._fuser_ended = False  # under the door
@@ -374,8 +375,9 @@ class LiveMap:
                 another thread is in, or that was interrupted.
 
         Raises:
-            MapError: no frame came, or the map cannot be written: the last save is still there, and closing may be
-                tried again.
+            MapError: no frame came, or the map cannot be finished: the last save is still there, and closing may be
+                tried again. Or a thread broke, which no call reported yet: what was fused is written, and closing again
+                returns that map.
             BackendError: an encoder is missing, or broke its protocol.
         """
         with self._door:
@@ -390,6 +392,7 @@ class LiveMap:
             for _ in progress(self._looks_until_the_end(), "encoding what waited", total=waiting):
                 pass
         self._fuser.join()
+        lost = len(self._queue) + (self._in_hand_s is not None) + self._to_look_at()
         self._kept.close()
         self._stop_behind.set()
         self._behind.join()
@@ -398,10 +401,15 @@ class LiveMap:
             try:
                 if len(self._growing):
                     self._saver.write(self._growing.stored(final=True), self._growing.submaps())
-            except BaseException:
+            except BaseException as fault:
                 if not len(self._growing) or not self.path.is_dir():
                     self._held.close()
-                raise
+                if isinstance(fault, AvlmapsError) or not isinstance(fault, Exception):
+                    raise
+                raise MapError(
+                    f"The live map {self.path} could not be finished ({type(fault).__name__}: {fault}); what was saved "
+                    "is still there. Close it again, or build it from a recording of the drive."
+                ) from fault
             self._closed = True
             self._held.close()
         if not len(self._growing):
@@ -409,6 +417,13 @@ class LiveMap:
         stored = replace(open_stored(self.path), encoders=self._growing.encoders)
         self._snapshot = AVLMap(stored, self._query), time.perf_counter()
         self._generation += 1
+        if self._broken is not None and not self._is_told:
+            self._is_told = True
+            raise MapError(
+                f"A thread of the live map broke ({type(self._broken).__name__}: {self._broken}); the map {self.path} "
+                f"is whole, with {len(self._growing)} frames, and {lost} that waited are left out. Closing it again "
+                "returns it; please report this fault."
+            ) from self._broken
         return self._snapshot[0]
 
     def _looks_until_the_end(self) -> Iterator[None]:
@@ -458,6 +473,7 @@ class LiveMap:
         if self._closing:
             raise MapError(f"The live map {self.path} is closed; begin another.")
         if self._broken is not None:
+            self._is_told = True
             raise self._broken
 
     def _raise_fault(self) -> None:
@@ -518,7 +534,7 @@ class LiveMap:
                 self._tally.note("late kept")
 
     def _fuse(self, frame: Frame, arrived_s: float) -> None:
-        growing = self._growing
+        growing, number = self._growing, self._growing.next_index
         try:
             if (doubt := self._check.add(frame)) is not None:
                 self._doubt(doubt)
@@ -534,7 +550,7 @@ class LiveMap:
                     self._has_time(arrived_s)
                     and self._encoding.opens(frame, len(self._queue) if self._is_pressed else 0)
                 )
-                named = replace(frame, index=growing.next_index, name=f"{growing.next_index:06d}")
+                named = replace(frame, index=number, name=f"{number:06d}")
                 growing.add(named, encode=encode)
                 self._unsaved.note(arrived_s)
                 self._tally.note("fused")
@@ -545,6 +561,9 @@ class LiveMap:
         except BackendError as fault:
             self._tally.drop("wrong")
             self._fault = fault
+            if growing.next_index == number:  # else it waits, or was listed
+                growing.leave_out(str(fault))
+                growing.pass_by(frame.stamp_s, frame.world_from_camera)
         except AvlmapsError as fault:
             self._tally.drop("wrong")
             self._doubt(str(fault))
@@ -575,7 +594,7 @@ class LiveMap:
         self._is_known = False
         if not (self._growing.sums or self._closing):  # they add to the first frames, which wait for one another
             return
-        came_s = time.perf_counter()
+        came_s, taken = time.perf_counter(), None
         try:
             if not self._growing.sums:  # the drive is over before all of these came
                 self._growing.settle()
@@ -586,6 +605,8 @@ class LiveMap:
                 self._tally.note("encoded later")
         except AvlmapsError as fault:
             self._doubt(str(fault))
+            if taken is not None and not taken[1]:
+                self._growing.leave_out(str(fault))
         if not self._growing.sums:  # no first frame was right
             self._kept.close()
 

@@ -169,7 +169,7 @@ class GrowingMap:
         Raises:
             RecordingError: it is not later, or has other cameras.
             BackendError: the features, or the encoder's, are not what they must be. Where frames had waited, it may
-                be one of those; it is left out.
+                be one of those, which is left out; then this frame has its number (``next_index``).
         """
         frame = next_of(frame, self.last_stamp_s, self._walk.rig_or(frame.rig))
         if features is not None:
@@ -183,6 +183,10 @@ class GrowingMap:
         enough = len(self._waiting) >= self._wait or waiting_bytes > _MOST_WAITING_BYTES
         if self._sensor is not None or enough:
             self.settle()
+
+    def leave_out(self, why: str) -> None:
+        """List a frame that an encoder failed on and that will not come again; it takes the next number."""
+        self._left_out.append(BadFrame(index=self.next_index, why=why))
 
     def settle(self) -> None:
         """Fuse the first frames, which no longer wait for others: up, the floor and the sensor are what they show.
@@ -456,8 +460,7 @@ class GrowingMap:
         track, motion = self._placed_track(), self._walk.motion()
         if track is None or track.microphones is None or len(track.microphones) < 2 or not len(motion.stamps_s):
             return ()
-        said = doubts_of_channels(track, Trajectory(motion.stamps_s, motion.world_from_camera))
-        return tuple(one.replace(str(track.path), "the sound") for one in said)
+        return doubts_of_channels(track, Trajectory(motion.stamps_s, motion.world_from_camera), "the sound")
 
     def _placed_track(self) -> AudioTrack | None:
         """Return the track with its microphones and what a device said; None where neither is known."""

@@ -148,10 +148,15 @@ def channel_faults(track: AudioTrack) -> list[str]:
     ]  # fmt: skip
 
 
-def useless_channels(track: AudioTrack) -> list[str]:
-    """Return those of the faults with which an array shows no direction: a channel that is dead, or another's copy."""
+def useless_channels(track: AudioTrack, name: str = "") -> list[str]:
+    """Return those of the faults with which an array shows no direction: a channel that is dead, or another's copy.
+
+    Args:
+        track: to look at.
+        name: of the track in the sentences; its path if empty.
+    """
     samples = _looked_at(track)
-    return [*_dead(samples, track), *_copied(samples, track)]
+    return [*_dead(samples, track, name), *_copied(samples, track, name)]
 
 
 def _looked_at(track: AudioTrack) -> Float[np.ndarray, "k m n"]:
@@ -163,21 +168,21 @@ def _looked_at(track: AudioTrack) -> Float[np.ndarray, "k m n"]:
     return np.stack(looks).astype(np.float64)
 
 
-def _named(track: AudioTrack, channel: int) -> str:
-    return str(track.files[channel]) if track.files else f"Channel {channel + 1} of {track.path}"
+def _named(track: AudioTrack, channel: int, name: str = "") -> str:
+    return str(track.files[channel]) if track.files else f"Channel {channel + 1} of {name or track.path}"
 
 
-def _dead(samples: Float[np.ndarray, "k m n"], track: AudioTrack) -> list[str]:
+def _dead(samples: Float[np.ndarray, "k m n"], track: AudioTrack, name: str = "") -> list[str]:
     level_db = 10.0 * np.log10((samples**2).mean(axis=(0, 2)) + 1e-20)
     dead = np.flatnonzero(level_db < level_db.max() - _DEAD_DB)
     return [
-        f"{_named(track, int(i))} is {level_db.max() - level_db[i]:.0f} dB below the loudest, as of a microphone that "
-        "is not connected; check it, or leave it out."
+        f"{_named(track, int(i), name)} is {level_db.max() - level_db[i]:.0f} dB below the loudest, as of a microphone "
+        "that is not connected; check it, or leave it out."
         for i in dead
     ]
 
 
-def _copied(samples: Float[np.ndarray, "k m n"], track: AudioTrack) -> list[str]:
+def _copied(samples: Float[np.ndarray, "k m n"], track: AudioTrack, name: str = "") -> list[str]:
     """Name a channel that holds another's sound: two microphones never hear quite the same."""
     power = (samples**2).mean(axis=(0, 2))
     said: list[str] = []
@@ -186,8 +191,8 @@ def _copied(samples: Float[np.ndarray, "k m n"], track: AudioTrack) -> list[str]
         rest = float(((samples[:, other] - scale * samples[:, one]) ** 2).mean())
         if power[one] > 0.0 and 10.0 * np.log10((rest + 1e-20) / (float(power[other]) + 1e-20)) < -_DEAD_DB:
             said.append(
-                f"{_named(track, other)} holds the same sound as channel {one + 1}, as of one microphone that was "
-                "copied, so that both together show no direction; record each microphone's own channel."
+                f"{_named(track, other, name)} holds the same sound as channel {one + 1}, as of one microphone that "
+                "was copied, so that both together show no direction; record each microphone's own channel."
             )
     return said
 

@@ -92,17 +92,18 @@ def judge(recording: Recording, useless: Sequence[str] | None = None) -> Verdict
     return replace(verdict, findings=findings, unchecked=(*verdict.unchecked, *unsure) if not findings else ())
 
 
-def doubts_of_channels(track: AudioTrack, walk: Trajectory) -> tuple[str, ...]:
+def doubts_of_channels(track: AudioTrack, walk: Trajectory, name: str) -> tuple[str, ...]:
     """Return what is doubtful about the channels of an array, as a build finds it: their wiring, and those of no use.
 
     Args:
         track: with its microphones, more than one.
         walk: the camera's poses.
+        name: of the track in the sentences.
 
     Raises:
         AudioError: the track cannot be read.
     """
-    useless = useless_channels(track)
+    useless = useless_channels(track, name)
     return (*map(str, _of_microphones(track, walk, useless)[0]), *useless)
 
 

@@ -168,7 +168,7 @@ def manifest_of(
         ),
         bounding_box_m=manifest.Box.of(content.voxels.index, plan.settings.voxel_size_m),
         bad_frames=tuple(bad),
-        notices=(*doubts, *_notices(plan, up, ground, len(bad))),
+        notices=(*doubts, *_notices(plan, up, ground, fused, len(bad))),
         doubts=doubts,
         timings=timings,
     )
@@ -186,14 +186,14 @@ def _recording_info(recording: Recording) -> manifest.RecordingInfo:
     )
 
 
-def _notices(plan: BuildPlan, up: manifest.UpInfo, ground: manifest.GroundInfo, bad: int) -> Iterator[str]:
+def _notices(plan: BuildPlan, up: manifest.UpInfo, ground: manifest.GroundInfo, fused: int, bad: int) -> Iterator[str]:
     if up.known_from == "camera":
         yield "The up direction is a guess from how the camera was held: too little smooth surface is in view."
     elif up.support < _GUESS:
         yield f"The up direction is a guess: only {up.support:.0%} of the surface in view agrees with it."
     yield from ground_notices(ground)
     if bad:
-        yield f"{bad} of {len(plan.recording)} frames could not be read and were left out (bad_frames in map.json)."
+        yield f"{bad} of {fused + bad} frames were left out (bad_frames in map.json says why)."
     if plan.recording.audio is None:
         yield "The recording has no sound track, so that the map holds no sounds."
 

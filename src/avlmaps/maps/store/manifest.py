@@ -243,7 +243,7 @@ class Removed(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class BadFrame(msgspec.Struct, frozen=True, kw_only=True):
-    """A frame that could not be read and was left out, with the sentence that says why."""
+    """A frame that was left out (it could not be read, or an encoder failed on it), and the sentence that says why."""
 
     index: int
     why: str
@@ -308,7 +308,7 @@ class MapInfo(msgspec.Struct, frozen=True, kw_only=True):
         recording: what was recorded.
         counts: how much there is.
         bounding_box_m: where the voxels are.
-        bad_frames: frames that were left out because they could not be read.
+        bad_frames: frames that were left out: they could not be read, or an encoder failed on them.
         notices: a sentence for each thing worth knowing.
         doubts: those of them that say why the map may be wrong; every answer repeats them.
         files: every file, by what it holds (``voxels/feature``); nothing else in the folder is part of the map.
