@@ -367,6 +367,15 @@ def test_an_end_that_breaks_is_a_sentence_and_what_was_saved_stays(
     assert live.close().stored.info.counts.frames == 3
 
 
+def test_a_process_does_not_end_while_questions_are_prepared(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    prepares: list[threading.Thread] = []
+    monkeypatch.setattr(live_map, "_warm", lambda made: prepares.append(threading.current_thread()))
+    with LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP, live=LiveSettings(first_frames=1, snapshot_s=0.0)) as live:
+        add(live, frame(0))
+        wait_for(lambda: len(prepares) == 1)
+    assert prepares[0].name == "avlmaps-warm" and not prepares[0].daemon
+
+
 def test_sounds_are_in_the_map_with_the_frames(tmp_path: Path) -> None:
     ears = avlmaps.Encoders.named("colours", sounds="embedded")
     samples = np.random.default_rng(0).normal(scale=1e-3, size=64_000).astype(np.float32)

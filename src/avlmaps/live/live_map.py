@@ -720,7 +720,8 @@ class LiveMap:
         if self._generation:
             _warm(made)
         else:  # it loads and compiles what every question needs, which takes longer than the next snapshot may wait
-            Thread(target=_warm, args=(made,), name="avlmaps-warm", daemon=True).start()
+            # No daemon: a process that ends while one is in compiled code is aborted.
+            Thread(target=_warm, args=(made,), name="avlmaps-warm", daemon=False).start()
         self._snapshot = made, came_s
         self._generation += 1
 
