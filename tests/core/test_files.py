@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from avlmaps.core.files import replace_atomically, sha256_of_file, sync_folder, write_bytes_atomically
+from avlmaps.core.files import replace_atomically, sha256_of_file, sync_folder, user_path, write_bytes_atomically
 
 
 def test_a_file_is_replaced_whole_and_nothing_is_left_beside_it(tmp_path: Path):
@@ -45,3 +45,11 @@ def test_a_files_hash_does_not_depend_on_the_chunks_it_is_read_in(tmp_path: Path
 
 def test_a_folder_that_cannot_be_opened_is_left_alone(tmp_path: Path):
     sync_folder(tmp_path / "nowhere")
+
+
+def test_a_path_of_a_user_has_the_home_as_in_a_shell(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("USERPROFILE", str(tmp_path))
+    assert user_path("~/walk") == user_path(Path("~/walk")) == tmp_path / "walk"
+    for same in ("walk", "/walk/~", "a~/b", "~nobody-of-this-name/walk"):
+        assert user_path(same) == Path(same)

@@ -401,3 +401,32 @@ def test_the_examples_are_short() -> None:
             line for line in path.read_text().splitlines() if line.strip() and not line.startswith(('"""', "import"))
         ]
         assert len(code) <= 20, path
+
+
+def test_maps_recordings_and_pictures_are_written_and_opened_under_the_home(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    home = tmp_path / "home"
+    monkeypatch.setenv("HOME", str(home))
+    monkeypatch.setenv("USERPROFILE", str(home))
+    monkeypatch.chdir(tmp_path)
+    camera, encoders = avlmaps.Pinhole(40.0, 40.0, 20.0, 15.0, 40, 30), avlmaps.Encoders.named("colours")
+    frame = np.full((30, 40, 3), 200, np.uint8), np.full((30, 40), 2.0, np.float32), camera, np.eye(4)
+    grown = avlmaps.VoxelMap(encoders=encoders, up_in_world=(0, -1, 0))
+    grown.add(*frame)
+    grown.save("~/grown.avlmap")
+    with avlmaps.LiveMap("~/live.avlmap", encoders, up_in_world=(0, -1, 0)) as live:
+        live.add_frame(*frame)
+    with avlmaps.RecordingWriter(Path("~/walk"), avlmaps.Rig(camera, camera), np.array([0.0, -1.0, 0.0])) as writer:
+        writer.add(avlmaps.Frame(0, "000000", 0.0, *frame[:2], np.eye(4), avlmaps.Rig(camera, camera)))
+    assert len(avlmaps.open_recording("~/walk")) == 1
+    built = avlmaps.build_map("~/walk", "~/built.avlmap", encoders=encoders, progress=False)
+    built.object("white").plot("~/heat.png")
+    for name in ("grown", "live", "built"):
+        assert len(avlmaps.open_map(f"~/{name}.avlmap").points) == len(avlmaps.AVLMap.open(f"~/{name}.avlmap").points)
+    from avlmaps.cli.export import Export, export
+
+    export(Export(map=Path("~/built.avlmap"), out=Path("~/cloud.ply")))
+    written = "built.avlmap cloud.ply grown.avlmap heat.png live.avlmap walk"
+    assert sorted(one.name for one in home.glob("[!.]*")) == written.split()
+    assert list(tmp_path.iterdir()) == [home]

@@ -13,6 +13,7 @@ from avlmaps.cli.info import describe_map, info_lines
 from avlmaps.cli.output import UsageError, emit
 from avlmaps.cli.reading_options import Reading, topics_of
 from avlmaps.cli.verb import ModelVerb
+from avlmaps.core.files import user_path
 from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
@@ -281,4 +282,4 @@ def _cache(place: str, limit_gb: float) -> "CacheSettings":
 
     if place in ("auto", "off"):
         return CacheSettings(place, limit_gb)
-    return CacheSettings(Path(place).expanduser(), limit_gb)
+    return CacheSettings(user_path(place), limit_gb)

@@ -4,11 +4,11 @@ import shlex
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 
 from prompt_toolkit.completion import CompleteEvent, Completer, Completion
 from prompt_toolkit.document import Document
 
+from avlmaps.core.files import user_path
 from avlmaps.core.lexicon import lexicon
 from avlmaps.core.printable import UNSAFE
 
@@ -74,7 +74,7 @@ def _files(typed: str) -> Iterator[Completed]:
     """Yield the files and folders whose names begin so, written as the shell reads them back."""
     plain = typed.replace("\\ ", " ").strip("'\"")
     folder, _, begin = plain.rpartition("/")
-    base = Path(f"{folder}/" if plain.startswith("/") else folder or ".").expanduser()
+    base = user_path(f"{folder}/" if plain.startswith("/") else folder or ".")
     try:
         entries = sorted(base.iterdir())
     except OSError:

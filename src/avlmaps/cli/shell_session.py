@@ -19,6 +19,7 @@ from avlmaps.cli.info import Info, describe_path, info_lines, plot_named
 from avlmaps.cli.output import UsageError, query_lines
 from avlmaps.cli.usage import read_verb
 from avlmaps.core.errors import AvlmapsError
+from avlmaps.core.files import user_path
 from avlmaps.core.printable import printable
 from avlmaps.core.progress import say
 
@@ -204,7 +205,7 @@ class Session:
     def locate(self, rest: str) -> Reply:
         """Locate a photo."""
         verb = read_verb(locating.Locate, [str(self.given.map), *_split(rest)], "locate")
-        answer = locating.locate_photo(verb.map, verb.image.expanduser(), verb.intrinsics, self.opened)
+        answer = locating.locate_photo(verb.map, user_path(verb.image), verb.intrinsics, self.opened)
         return Reply(answer, locating.locate_lines(answer))
 
     def plot(self, rest: str) -> Reply:
@@ -212,7 +213,7 @@ class Session:
         words = _split(rest)
         if len(words) != 1 or words[0].startswith("-"):
             raise UsageError("plot takes the name of a picture, such as: plot heat.png")
-        file = Path(words[0]).expanduser()
+        file = user_path(words[0])
         if self._last is None:
             plotted = str(plot_named(self.opened.stored, file))
         else:
@@ -227,7 +228,7 @@ class Session:
         words = _split(rest)
         out = ["--out", *words] if words and not words[0].startswith("-") else words
         verb = read_verb(exporting.Export, [str(self.given.map), *out], "export")
-        answer = exporting.export(replace(verb, out=verb.out.expanduser()), self.opened)
+        answer = exporting.export(verb, self.opened)
         return Reply(answer, exporting.export_lines(answer))
 
     def help(self, rest: str) -> Reply:
@@ -293,7 +294,7 @@ def _is_for_verb(word: str, rest: str) -> bool:
     """Return whether a line that begins with a verb is for it; "things near the sofa" is a question."""
     if word in _WITH_WORDS or not rest or rest.startswith("-"):
         return True
-    return word == "locate" and (bool(_PICTURE.search(rest.split(" -")[0])) or Path(rest).expanduser().is_file())
+    return word == "locate" and (bool(_PICTURE.search(rest.split(" -")[0])) or user_path(rest).is_file())
 
 
 def _split(rest: str) -> list[str]:

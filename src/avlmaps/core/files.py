@@ -43,6 +43,14 @@ def state_file(name: str) -> Path:
     return (named if named.is_absolute() else Path.home() / ".local" / "state") / "avlmaps" / name
 
 
+def user_path(path: Path | str) -> Path:
+    """Return a path that a user gave, its ``~`` the home as in a shell; where there is no such home it stays a name."""
+    try:
+        return Path(path).expanduser()
+    except RuntimeError:
+        return Path(path)
+
+
 class RefusedFileError(OSError):
     """A file that is not read: it is not a regular file, or larger than its kind may be; ``strerror`` says why."""
 

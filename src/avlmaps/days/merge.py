@@ -13,6 +13,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Int
 from avlmaps.core.errors import MapError
+from avlmaps.core.files import user_path
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.poses import apply, inverse, plain_point
 from avlmaps.core.timeline import DAY_S, is_in_future
@@ -88,7 +89,7 @@ def merge_maps(
             the map has already, a day is no date, in the future or not later, or the folder cannot be written.
         NotTheSamePlaceError: it is not seen to be the same place.
     """
-    begin_s, out = perf_counter(), Path(out)
+    begin_s, out = perf_counter(), user_path(out)
     require_place(out, overwrite)
     if other.info.visits:
         raise MapError(

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from avlmaps.core.errors import MapError
+from avlmaps.core.files import user_path
 from avlmaps.core.progress import progress, say
 from avlmaps.days.merge import merge_maps, merged_key
 from avlmaps.maps.build import build_map
@@ -74,7 +75,7 @@ def build_together(
     Raises:
         AvlmapsError: as ``build_map`` and ``merge_maps``; a recording of another place is refused with the numbers.
     """
-    out = Path(out)
+    out = user_path(out)
     folder = out.with_name(f"{out.name.removesuffix('.avlmap')}-recordings")
     paths = [folder / f"{number:04d}.avlmap" for number in range(1, len(recordings) + 1)]
     if len(recordings) >= pool.cores:

@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from avlmaps.core.errors import AudioError, AvlmapsError, BackendError, MapError, RecordingError
+from avlmaps.core.files import user_path
 from avlmaps.core.progress import progress
 from avlmaps.live.gates import LATER_SHARE, EncodingGate, Gates
 from avlmaps.live.kept_back import KeptBack
@@ -120,14 +121,14 @@ class LiveMap:
             RecordingError: the microphones cannot be.
             BackendError: there is no such profile.
         """
-        self.path, self.settings, self._query = Path(path), live or LiveSettings(), query
+        self.path, self.settings, self._query = user_path(path), live or LiveSettings(), query
         if not isinstance(begins_s, Real) or not isfinite(begins_s):
             raise MapError(f"begins_s is {begins_s!r}, which is no time; give seconds since 1970, or leave it out.")
         if fault := date_fault(np.array([begins_s]), "begins_s"):
             raise MapError(fault)
         used = encoders_of("embedded" if encoders is None else encoders)
         array = microphones_named(str(microphones)) if isinstance(microphones, str | Path) else microphones
-        known_rad = None if same_device is None else device_of(open_stored(Path(same_device)))
+        known_rad = None if same_device is None else device_of(open_stored(same_device))
         require_place(self.path, overwrite)
         self._held = contextlib.ExitStack()
         self._held.enter_context(lock_folder(self.path))

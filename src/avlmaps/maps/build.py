@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from avlmaps.core.errors import MapError
+from avlmaps.core.files import user_path
 from avlmaps.core.progress import silence_progress
 from avlmaps.core.registry import Kind
 from avlmaps.maps.grid import GridSpec
@@ -67,7 +68,7 @@ def build_map(
         BackendError: the profile is not known, or a package for it is missing.
     """
     stamp = recording.change_stamp()
-    plan = make_plan(recording, Path(path), with_cache(encoders_of(profile), cache), settings)
+    plan = make_plan(recording, user_path(path), with_cache(encoders_of(profile), cache), settings)
     with silence_progress(not progress), lock_folder(plan.path):
         if claim(plan, resume, overwrite) is None:
             plan = checked(plan, allow)
@@ -108,7 +109,7 @@ def build_part(
     Raises:
         MapError: there are no such frames, or too many of them cannot be read.
     """
-    out, used = Path(out), with_cache(encoders_of(profile), cache)
+    out, used = user_path(out), with_cache(encoders_of(profile), cache)
     settings = settings.for_profile(used.weight_variance_m2)
     if not 0 <= start < stop <= len(recording):
         raise MapError(f"There are no frames {start} to {stop}; {recording.path} has frames 0 to {len(recording)}.")

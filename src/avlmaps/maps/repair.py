@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from avlmaps.core.errors import MapError
+from avlmaps.core.files import user_path
 from avlmaps.core.progress import say
 from avlmaps.core.wording import option
 from avlmaps.maps.build import build_map
@@ -66,7 +67,7 @@ def repair_map(path: Path | str, recording: Recording | None) -> Repaired:
     Raises:
         MapError: files are damaged and there is no recording, or it is not the one, or the models are other ones.
     """
-    path = Path(path)
+    path = user_path(path)
     refuse_links(path)
     info, damaged = _manifest(path), damaged_files(path)
     if not damaged:

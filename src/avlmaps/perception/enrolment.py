@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Float32
 
 from avlmaps.core.errors import AudioError, BackendError
-from avlmaps.core.files import replace_atomically, write_bytes_atomically
+from avlmaps.core.files import replace_atomically, user_path, write_bytes_atomically
 from avlmaps.perception.protocols import SoundEncoder
 from avlmaps.perception.user_folder import user_folder
 from avlmaps.recordings.audio import AudioTrack, Sound
@@ -48,7 +48,7 @@ class TaughtSound:
 
 def sounds_folder(folder: Path | None = None) -> Path:
     """Return the folder of taught sounds."""
-    return (user_folder() if folder is None else Path(folder)) / "sounds"
+    return (user_folder() if folder is None else user_path(folder)) / "sounds"
 
 
 def teach_sound(
@@ -130,7 +130,7 @@ def _audible(clip: Path | str | Sound) -> tuple[str, Sound]:
         label, sound = "the clip", clip
     else:
         label = Path(clip).name
-        track = AudioTrack.open(Path(clip))
+        track = AudioTrack.open(user_path(clip))
         if track.duration_s > LONGEST_CLIP_S:
             raise AudioError(
                 f"{clip} is {track.duration_s:.0f} s long; cut out a piece of at most {LONGEST_CLIP_S:.0f} s "

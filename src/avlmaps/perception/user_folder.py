@@ -4,6 +4,8 @@ import os
 import sys
 from pathlib import Path
 
+from avlmaps.core.files import user_path
+
 
 def user_folder() -> Path:
     """Return the folder of this person's own profile; it need not exist yet.
@@ -13,7 +15,7 @@ def user_folder() -> Path:
     """
     own = os.environ.get("AVLMAPS_HOME")
     if own:
-        return Path(own).expanduser()
+        return user_path(own)
     if sys.platform == "win32":
         base = Path(os.environ.get("APPDATA") or Path.home() / "AppData" / "Roaming")
     elif sys.platform == "darwin":
@@ -31,7 +33,7 @@ def cache_folder() -> Path:
     """
     own = os.environ.get("AVLMAPS_HOME")
     if own:
-        return Path(own).expanduser() / "cache"
+        return user_path(own) / "cache"
     if sys.platform == "win32":
         base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
     elif sys.platform == "darwin":

@@ -7,12 +7,12 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from avlmaps.core.errors import QueryError
+from avlmaps.core.files import user_path
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import HeardAt, Modality, Part, Question, Role
 from avlmaps.perception.protocols import NamedPixelEncoder
@@ -133,7 +133,7 @@ class Files:
         from avlmaps.query.queryable import Photo
 
         if self.attachments is None:
-            return read_picture(Path(picture).expanduser()).shape[:2]
+            return read_picture(user_path(picture)).shape[:2]
         attached = self.attachments.get(picture)
         rgb = attached.rgb if isinstance(attached, Photo) else attached
         if not isinstance(rgb, np.ndarray):

@@ -14,6 +14,7 @@ import numpy as np
 from avlmaps.core.arrays import Float, Float16, Int, Int32, UInt8
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import BackendError, MapError, QueryError
+from avlmaps.core.files import user_path
 from avlmaps.core.question import HeardAt, Modality, Part, Question, Role
 from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder, SurveyedEncoder
@@ -123,7 +124,7 @@ class AVLMap:
         """
         from avlmaps.maps.store.reader import open_stored
 
-        return cls(open_stored(Path(path)), settings)
+        return cls(open_stored(path), settings)
 
     @cached_property
     def edited(self) -> "Edited":
@@ -517,7 +518,7 @@ class AVLMap:
         """
         name = "a clip" if isinstance(clip, Sound) else str(clip)
         part = Part(Modality.SOUND, name, _role(primary), is_file=True)
-        sound = require_audible(clip, name) if isinstance(clip, Sound) else read_clip(Path(clip).expanduser())
+        sound = require_audible(clip, name) if isinstance(clip, Sound) else read_clip(user_path(clip))
         heard = self.stored.sounds
         scores = np.zeros(0)
         if len(heard):
@@ -863,7 +864,7 @@ def _photo(picture: "str | Path | Photo | UInt8[np.ndarray, 'h w 3']", intrinsic
         return Photo(np.asarray(picture))
     from avlmaps.query.focal import focal_35mm_of
 
-    path = Path(picture).expanduser()
+    path = user_path(picture)
     return Photo(read_picture(path), None if intrinsics is not None else focal_35mm_of(path))
 
 

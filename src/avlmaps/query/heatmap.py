@@ -173,7 +173,7 @@ class Heatmap(Heat):
         from avlmaps.query.plots import draw_heat, save
 
         figure = draw_heat(self.factors, self.shown, self.found, self.goals(top))
-        return figure if path is None else save(figure, Path(path))
+        return figure if path is None else save(figure, path)
 
 
 def _is_region(factor: Factor, lead: Factor) -> bool:

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float, Float32
 
 from avlmaps.core.errors import QueryError
+from avlmaps.core.files import user_path
 from avlmaps.core.frames import FrameName
 from avlmaps.core.poses import FRAME
 from avlmaps.core.printable import plot_text
@@ -90,7 +91,7 @@ def plot_map(
     Raises:
         QueryError: the picture cannot be written there.
     """
-    return save(draw_map(stored, things, rooms), Path(path))
+    return save(draw_map(stored, things, rooms), path)
 
 
 def draw_map(
@@ -305,12 +306,13 @@ def _rgb(colour: str) -> Float[np.ndarray, "3"]:
     return np.array(to_rgb(colour))
 
 
-def save(figure: "Figure", path: Path) -> Path:
+def save(figure: "Figure", path: Path | str) -> Path:
     """Write a picture, in the format of its suffix.
 
     Raises:
         QueryError: the picture cannot be written there.
     """
+    path = user_path(path)
     if path.suffix.lower().lstrip(".") not in figure.canvas.get_supported_filetypes():
         raise QueryError(f"A picture cannot be written as {path.name!r}; give it the suffix .png, .jpg, .svg or .pdf.")
     try:

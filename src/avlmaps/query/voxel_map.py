@@ -11,6 +11,7 @@ import numpy as np
 from avlmaps.core.arrays import Float, Float16, Int32, UInt8
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import MapError
+from avlmaps.core.files import user_path
 from avlmaps.maps.growing import GrowingMap
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.perception.encoders import Encoders, encoders_of
@@ -211,7 +212,7 @@ class VoxelMap:
             MapError: there is nothing to write, the folder is something else or a map, or it cannot be written.
         """
         with self._lock:
-            return AVLMap(self._growing.save(Path(path), overwrite=overwrite), self._query).prepare()
+            return AVLMap(self._growing.save(user_path(path), overwrite=overwrite), self._query).prepare()
 
     def __len__(self) -> int:
         """Return how many frames are in the map."""

@@ -11,7 +11,7 @@ import numpy as np
 from avlmaps.core import poses
 from avlmaps.core.arrays import Float
 from avlmaps.core.errors import RecordingError
-from avlmaps.core.files import DESCRIPTION_BYTES, decode_json, read_regular, write_bytes_atomically
+from avlmaps.core.files import DESCRIPTION_BYTES, decode_json, read_regular, user_path, write_bytes_atomically
 
 # Two microphones nearer than this hear the same; a robot is smaller than this.
 LEAST_APART_M, MOST_APART_M = 0.01, 5.0
@@ -162,7 +162,7 @@ def microphones_named(words: str) -> Microphones:
     """
     if words in PRESETS:
         return Microphones(np.array(PRESETS[words], np.float64))
-    path = Path(words)
+    path = user_path(words)
     try:
         return decode_json(read_regular(path, DESCRIPTION_BYTES), MicrophoneNumbers).microphones()
     except OSError as error:

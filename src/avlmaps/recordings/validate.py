@@ -7,7 +7,7 @@ import msgspec
 import numpy as np
 
 from avlmaps.core.errors import AvlmapsError, RecordingError
-from avlmaps.core.files import PICTURE_BYTES, decode_json, read_regular
+from avlmaps.core.files import PICTURE_BYTES, decode_json, read_regular, user_path
 from avlmaps.core.progress import progress
 from avlmaps.recordings import images
 from avlmaps.recordings.channels import channel_faults
@@ -36,7 +36,7 @@ def validate(
         max_decoded: how many frames to decode, spread evenly; all of them if None.
         more: further files of a bag that was split.
     """
-    path = Path(path)
+    path = user_path(path)
     faults: list[Fault] = []
     try:
         recording = uncorrected(find_format(path, format).open(path, faults.append, more=more))

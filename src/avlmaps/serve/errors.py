@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from avlmaps.core.errors import AvlmapsError, LanguageError, NavigationError, NoFloorError, QueryError
+from avlmaps.core.files import user_path
 from avlmaps.core.printable import printable
 from avlmaps.query.asking import AskError
 from avlmaps.query.schema import ErrorAnswer
@@ -58,7 +59,7 @@ class Privacy:
         """
         spellings: dict[str, str] = {}
         for path, name in names:
-            for spelling in (str(path), str(path.expanduser().absolute()), str(path.expanduser().resolve())):
+            for spelling in (str(path), str(user_path(path).absolute()), str(user_path(path).resolve())):
                 spellings[spelling] = name
         self._spellings = sorted(spellings.items(), key=lambda pair: -len(pair[0]))
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import FrameType
 
-from avlmaps.core.files import read_regular
+from avlmaps.core.files import read_regular, user_path
 from avlmaps.core.wording import option
 from avlmaps.serve.guard import App
 from avlmaps.serve.service import Service
@@ -30,7 +30,7 @@ def read_token(path: Path | None) -> str | None:
     if path is None:
         return os.environ.get(TOKEN_VARIABLE) or None
     try:
-        token = read_regular(path.expanduser(), _TOKEN_BYTES).decode().strip()
+        token = read_regular(user_path(path), _TOKEN_BYTES).decode().strip()
     except (OSError, UnicodeDecodeError) as error:
         reason = (error.strerror if isinstance(error, OSError) else None) or "it is no text"
         raise ServeError(f"The token file {path} cannot be read ({reason}); write the token into it as text.") from None

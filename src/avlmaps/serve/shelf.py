@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Protocol, TypeVar, cast
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import AvlmapsError, BackendError, QueryError
+from avlmaps.core.files import user_path
 from avlmaps.core.question import Modality, Part, Role
 from avlmaps.language.questions import parse_sentence
 from avlmaps.maps.store.edits import EDITS
@@ -403,8 +404,8 @@ def named_maps(words: Sequence[str]) -> dict[str, Path]:
     maps: dict[str, Path] = {}
     for word in words:
         given, mark, rest = word.partition("=")
-        named = bool(mark) and "/" not in given and "\\" not in given and not Path(word).expanduser().exists()
-        path = Path(rest if named else word).expanduser().absolute()
+        named = bool(mark) and "/" not in given and "\\" not in given and not user_path(word).exists()
+        path = user_path(rest if named else word).absolute()
         name = given if named else path.name.removesuffix(".avlmap")
         if not name or len(name) > _LONGEST_NAME or not all(c.isalnum() or c in "-_. " for c in name) or name[0] == ".":
             raise ServeError(f"{name!r} cannot be the name of a map; name it with letters, such as: home={path.name}.")

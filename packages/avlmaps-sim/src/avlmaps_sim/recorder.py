@@ -15,6 +15,7 @@ from jaxtyping import Float, UInt8
 
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
+from avlmaps.core.files import user_path
 from avlmaps.core.progress import progress, say
 from avlmaps.core.timeline import Trajectory
 from avlmaps.core.wording import option
@@ -192,7 +193,7 @@ def record_scene(
         RecordingError: the folder is not empty, or the scene has no floor to speak of, or is none in metres.
         AudioError: the folder of clips cannot be used.
     """
-    settings, out = settings or RecordSettings(), Path(out)
+    settings, out = settings or RecordSettings(), user_path(out)
     if (out / DESCRIPTION).exists():  # reported before the work is done, not after
         raise RecordingError(f"{out} holds a recording already; choose another folder or remove it.")
     space = require_floor(scene, settings.walk)

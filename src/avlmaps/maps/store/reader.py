@@ -12,6 +12,7 @@ import numpy as np
 from avlmaps.core.arrays import Float
 from avlmaps.core.camera import Rig
 from avlmaps.core.errors import MapError
+from avlmaps.core.files import user_path
 from avlmaps.core.poses import FRAME, rotation_to_level
 from avlmaps.core.registry import Kind
 from avlmaps.core.suggestions import near_path
@@ -216,7 +217,7 @@ def open_stored(path: Path | str, *, verify: bool = False) -> StoredMap:
         MapError: there is no map there, it is half built, of another schema version, or damaged. The
             sentence names the file.
     """
-    path = Path(path)
+    path = user_path(path)
     content = _manifest_content(path)
     while True:
         try:
@@ -236,7 +237,7 @@ def verify_stored(path: Path | str) -> StoredMap:
 
 def has_unfinished_build(path: Path | str) -> bool:
     """Return whether a build in this folder is not finished, so that building again resumes it."""
-    parts = Path(path) / PARTS
+    parts = user_path(path) / PARTS
     return parts.is_dir() and any(parts.iterdir())
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core.errors import NavigationError
-from avlmaps.core.files import write_bytes_atomically
+from avlmaps.core.files import user_path, write_bytes_atomically
 from avlmaps.core.motion import GroundPose, wrap_angle
 
 _MOST_BYTES = 10_000
@@ -148,7 +148,7 @@ class Frames:
         """Write them to a JSON file that ``read`` takes."""
         shift = self.map_from_avlmap
         file = RobotFile(self.map_frame, self.base_frame, _Shift(shift.x_m, shift.y_m, degrees(shift.yaw_rad)))
-        write_bytes_atomically(Path(path), msgspec.json.format(msgspec.json.encode(file), indent=2) + b"\n")
+        write_bytes_atomically(user_path(path), msgspec.json.format(msgspec.json.encode(file), indent=2) + b"\n")
 
 
 class _Shift(msgspec.Struct, forbid_unknown_fields=True):
@@ -173,7 +173,7 @@ class RobotFile(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
             NavigationError: it cannot be read, or is no such file.
         """
         try:
-            with Path(path).open("rb") as stream:
+            with user_path(path).open("rb") as stream:
                 content = stream.read(_MOST_BYTES)
             return msgspec.json.decode(content, type=cls)
         except (OSError, ValueError, RecursionError) as fault:

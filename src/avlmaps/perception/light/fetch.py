@@ -20,7 +20,7 @@ from urllib.parse import quote, urlsplit
 from urllib.request import HTTPRedirectHandler, Request, build_opener
 
 from avlmaps.core.errors import BackendError
-from avlmaps.core.files import DESCRIPTION_BYTES, sync_folder
+from avlmaps.core.files import DESCRIPTION_BYTES, sync_folder, user_path
 from avlmaps.core.network import is_loopback
 from avlmaps.core.progress import progress
 from avlmaps.core.version import __version__
@@ -69,7 +69,7 @@ def fetch_light(place: str = "") -> Fetched:
             "No files of the profile light are published yet; make them with python -m training.light (docs/guides/"
             f"light.md), then fetch them with {option('from', 'URL|DIR')} or {PLACE_VARIABLE}."
         )
-    source = _page(place) if "://" in place else _Folder(Path(place).expanduser())
+    source = _page(place) if "://" in place else _Folder(user_path(place))
     content = source.small(MANIFEST)
     manifest = parse_manifest(content, source.said(MANIFEST))
     target = (model_settings().folder or fetched_folder()) / MODEL

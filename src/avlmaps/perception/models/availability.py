@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Literal
 
 from avlmaps.core.errors import BackendError
+from avlmaps.core.files import user_path
 from avlmaps.core.registry import Backend, load
 from avlmaps.perception.models.files import folders_of
 from avlmaps.perception.models.published_models import Published, published_models
@@ -89,14 +90,14 @@ def _size(size_mb: float) -> str:
 
 def _places(model: str) -> Iterator[Path]:
     known, folder = _published(model), model_settings().folder
-    if known.fetched or (Path(model).expanduser() / "manifest.json").is_file():
+    if known.fetched or (user_path(model) / "manifest.json").is_file():
         yield from (place / "manifest.json" for place in folders_of(model))
         return
     names = known.files or (model,)
     for name in names:
         if folder is not None:
             yield from (folder / name, folder / name.replace("/", "--"), folder / Path(name).name)
-        yield Path(name).expanduser()
+        yield user_path(name)
         yield from (_torch_cache() / place / Path(name).name for place in ("checkpoints", "netvlad"))
         if known.package and (package := find_spec(known.package)) is not None and package.origin:
             yield Path(package.origin).parent / name
@@ -113,11 +114,11 @@ def _places(model: str) -> Iterator[Path]:
 def _hub_cache() -> Path:
     """Return where the hub's files are cached, by the environment variables that its own library obeys."""
     if own := os.environ.get("HF_HUB_CACHE") or os.environ.get("HUGGINGFACE_HUB_CACHE"):
-        return Path(own).expanduser()
+        return user_path(own)
     base = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache")
-    return Path(os.environ.get("HF_HOME") or base / "huggingface").expanduser() / "hub"
+    return user_path(os.environ.get("HF_HOME") or base / "huggingface") / "hub"
 
 
 def _torch_cache() -> Path:
     base = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache")
-    return Path(os.environ.get("TORCH_HOME") or base / "torch").expanduser() / "hub"
+    return user_path(os.environ.get("TORCH_HOME") or base / "torch") / "hub"

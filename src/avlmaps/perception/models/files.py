@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from avlmaps.core.errors import BackendError
+from avlmaps.core.files import user_path
 from avlmaps.core.wording import option
 from avlmaps.perception.models.settings import model_settings
 from avlmaps.perception.user_folder import user_folder
@@ -30,7 +31,7 @@ def places_of(model: str) -> list[Path]:
     """Return where a model may lie, the likeliest first."""
     folder = model_settings().folder
     inside = [folder / model, folder / model.replace("/", "--"), folder / Path(model).name] if folder else []
-    return [*inside, Path(model).expanduser()]
+    return [*inside, user_path(model)]
 
 
 def folders_of(model: str) -> list[Path]:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Literal, get_args
 
 from avlmaps.core.errors import BackendError
+from avlmaps.core.files import user_path
 from avlmaps.core.registry import forget_loaded
 
 Precision = Literal["auto", "float32", "float16", "bfloat16"]
@@ -55,7 +56,7 @@ def from_environment() -> ModelSettings:
         raise BackendError(f"AVLMAPS_BATCH is {batch!r}; set a whole number, 0 for automatic.")
     folder = os.environ.get("AVLMAPS_MODELS")
     return ModelSettings(
-        folder=Path(folder).expanduser() if folder else None,
+        folder=user_path(folder) if folder else None,
         device=os.environ.get("AVLMAPS_DEVICE") or "auto",
         precision=os.environ.get("AVLMAPS_PRECISION") or "auto",  # pyright: ignore[reportArgumentType] - checked there
         batch=int(batch),

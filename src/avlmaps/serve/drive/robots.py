@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 import msgspec
 
 from avlmaps.core.errors import NavigationError
+from avlmaps.core.files import user_path
 from avlmaps.core.motion import GroundPose
 from avlmaps.navigate.bodies import SHAPES, BodyShape
 from avlmaps.navigate.costmap import obstacles_for
@@ -183,7 +184,7 @@ class RosMachine:
 
         self._frames, self._settings, content = None, RosSettings(), b""
         if read.ros_frames is not None:
-            file = folder / Path(read.ros_frames).expanduser()
+            file = folder / user_path(read.ros_frames)
             self._frames, self._settings = Frames.read(file), RosSettings.read(file)
             content = file.read_bytes()
         self.name, self.identity = f"{read.robot} robot", _identity(read, content)

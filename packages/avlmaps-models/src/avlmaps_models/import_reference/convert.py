@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Int, Int32
 
 from avlmaps.core.errors import MapError
+from avlmaps.core.files import user_path
 from avlmaps.core.progress import progress as shown
 from avlmaps.core.progress import say, silence_progress
 from avlmaps.core.version import __version__
@@ -97,12 +98,12 @@ def import_reference_map(
         MapError: a file is missing, damaged or of another kind, or the folder holds something else.
         BackendError: h5py is not installed.
     """
-    begin, path = perf_counter(), Path(path)
+    begin, path = perf_counter(), user_path(path)
     if not is_map_or_free(path):
         raise MapError(
             f"{path} is there already and is not a map; give another {option('out')}, nothing in it was touched."
         )
-    scene = find_scene(Path(source), areas, poses)
+    scene = find_scene(user_path(source), areas, poses)
     with silence_progress(not progress), open_hdf5(scene.voxels) as file:
         voxels = ReferenceVoxels(file)
         settings = _with_own_cell_size(settings, voxels)

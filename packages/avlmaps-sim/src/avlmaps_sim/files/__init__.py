@@ -6,6 +6,7 @@ scene = load_scene(Path("house.glb"))
 from pathlib import Path
 
 from avlmaps.core.errors import SceneError
+from avlmaps.core.files import user_path
 from avlmaps_sim.files.gltf import Axis, load_gltf
 from avlmaps_sim.files.habitat import ENDING, load_habitat
 from avlmaps_sim.files.hm3d import annotation_of, load_hm3d
@@ -29,7 +30,7 @@ def load_scene(path: Path | str, up_axis: Axis = "auto") -> Scene:
     Raises:
         SceneError: a file is missing, truncated, or of no layout that is known.
     """
-    path = Path(path)
+    path = user_path(path)
     if not path.exists():
         raise SceneError(f"there is no {path}")
     if path.name.endswith(ENDING):

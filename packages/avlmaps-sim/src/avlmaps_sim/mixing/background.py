@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float, Float32
 
 from avlmaps.core.errors import AudioError
+from avlmaps.core.files import user_path
 from avlmaps.recordings.audio import AudioTrack, Sound, resample
 
 KINDS = ("white", "pink", "room")
@@ -34,9 +35,9 @@ def background(
         AudioError: there is no such kind or file, or the file is silent.
     """
     if isinstance(kind, Path) or kind not in KINDS:
-        if not Path(kind).is_file():
+        if not (path := user_path(kind)).is_file():
             raise AudioError(f"There is no background {str(kind)!r}; give {', '.join(KINDS)} or a sound file.")
-        return _recorded(Path(kind), level_db, rate_hz)
+        return _recorded(path, level_db, rate_hz)
     return _made(kind, 10.0 ** (level_db / 20.0), rate_hz, rng)
 
 

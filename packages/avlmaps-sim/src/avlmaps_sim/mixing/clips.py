@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float32
 
 from avlmaps.core.errors import AudioError
+from avlmaps.core.files import user_path
 from avlmaps.recordings.audio import AudioTrack, Sound, resample
 
 SUFFIXES = {".wav", ".flac", ".ogg", ".oga", ".opus", ".mp3", ".m4a"}
@@ -48,7 +49,7 @@ def find_clips(folder: Path, categories: Sequence[str] | None = None) -> tuple[C
     Raises:
         AudioError: no such folder, no clips, an index without those columns, or an unknown category.
     """
-    folder = Path(folder)
+    folder = user_path(folder)
     if not folder.is_dir():
         raise AudioError(f"There is no folder of clips at {folder}; give one with a subfolder for each category.")
     index = folder / "index.csv"
