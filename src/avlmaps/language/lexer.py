@@ -35,6 +35,7 @@ _TOKEN = re.compile(
   | (?P<image>"[^"]+{_IMAGES}"|'[^']+{_IMAGES}'|[^\s"',;:!?()<>{{}}]+{_IMAGES}(?![\w/]))
   | (?P<clip>"[^"]+{_CLIPS}"|'[^']+{_CLIPS}'|[^\s"',;:!?()<>{{}}]+{_CLIPS}(?![\w/]))
   | (?P<model>\d[dD]\b)
+  | (?P<run_on>\d+(?:[.,]\d+){{2,}}|\d+(?:[.,]\d+)?(?:[_'-]\d+(?:[.,]\d+)?)+|\d{{1,3}},\d{{3}}(?!\d))
   | (?P<number>\d+(?:[.,]\d+)?(?:/\d+)?)
   | (?P<clock>o['\s]?clock\b)
   | (?P<word>[^\W\d_]+(?:['’][^\W\d_]+)*)
@@ -118,7 +119,7 @@ def tokenise(sentence: str) -> list[Token]:
             tokens += [Token("{", "{", "punct", found.start(), found.start() + 1), *inner] if media else inner
         elif kind in ("image", "clip"):
             tokens.append(Token(raw.strip("\"'"), raw, kind, found.start(), found.end()))
-        elif kind == "model":
+        elif kind in ("model", "run_on"):
             tokens.append(Token(raw.lower(), raw, "word", found.start(), found.end()))
         elif kind == "word" and raw.lower() == "till" and tokens and tokens[-1].text in _BEFORE_NOUNS:
             tokens.append(Token("till", raw, "word", found.start(), found.end()))  # "the till" is no "until"
@@ -285,6 +286,16 @@ def _and_smaller(
 def is_unit(tokens: Sequence[Token], at: int) -> bool:
     """Return whether a unit stands at a token."""
     return at < len(tokens) and any(_unit(list(tokens), at, units) for units in (LENGTHS, _ANGLES, _TIMES))
+
+
+def is_run_on(token: Token) -> bool:
+    """Return whether a token is figures that are no one number: "1.2.3", "1-2", "1,000"."""
+    return token.kind == "word" and token.text[:1].isdigit() and token.text[-1:].isdigit()
+
+
+def is_measure(tokens: list[Token], at: int) -> bool:
+    """Return whether a distance, an angle or a time begins at a token."""
+    return any(read(tokens, at) for read in (length_at, angle_at, duration_at))
 
 
 def is_amount(tokens: Sequence[Token], at: int) -> bool:

@@ -114,7 +114,7 @@ def behind_remark(tokens: Sequence[Token]) -> int | None:
             continue
         first = next((i for i in range(at + 1, len(tokens)) if tokens[i].text not in _ASKED_FOR), len(tokens))
         rest = [token.text for token in tokens[first:]]
-        if rest[:1] and rest[0] in _orders():
+        if rest[:1] and rest[0] in order_words():
             own = _POINTING.isdisjoint(rest) and any(map(is_entry, rest))
             return tokens[first].start if own else None
     return None
@@ -124,8 +124,9 @@ def _joined(tokens: Sequence[Token]) -> list[Token]:
     """Return tokens with "counter clockwise" as one word, "sleep(5)" as a wait, and "right 0.5 turn" in degrees."""
     found: list[Token] = []
     for token in tokens:
-        if token.text in _ROUNDS and len(found) > 1 and "." in found[-1].text and found[-2].text in _TURNED:
-            found[-1] = _word(found[-1], f"{360 * float(found[-1].text):g}", "number")
+        decimal = len(found) > 1 and found[-1].kind == "number" and not {".", ","}.isdisjoint(found[-1].text)
+        if token.text in _ROUNDS and decimal and found[-2].text in _TURNED:
+            found[-1] = _word(found[-1], f"{360 * lexer.number_at(found, len(found) - 1)[0][1]:g}", "number")
             token = _word(token, "degrees")
         if token.raw in ("->", "=>"):  # "sofa -> table": one after the other
             token = _word(token, ",", "punct")
@@ -168,7 +169,7 @@ def _robot(tokens: Sequence[Token], at: int) -> int:
 
 
 @cache
-def _orders() -> frozenset[str]:
+def order_words() -> frozenset[str]:
     """Return the words that begin an order to the robot."""
     classes = load_word_classes().words
     names = ("GO", "TURN", "FACE", "WAIT", "CIRCLE", "RETURN", "BACK_UP")
@@ -221,7 +222,7 @@ def _told(tokens: list[Token], at: int, end: int, *, robot: bool) -> tuple[int, 
             return at, []
         end += 1
     follows = tokens[end].text if end < len(tokens) else ""
-    return (end, []) if follows in _orders() or (robot and tells and follows) else (at, [])
+    return (end, []) if follows in order_words() or (robot and tells and follows) else (at, [])
 
 
 @dataclass(frozen=True, slots=True)
@@ -248,7 +249,7 @@ def _waiting_first(tokens: list[Token], notes: list[str]) -> list[Token]:
         ahead = _ahead(tokens, at, found[start:])
         if ahead is None:
             ends = tokens[at].kind == "punct" or tokens[at].text in _CUTS
-            if ends or (tokens[at].text == "and" and tokens[at + 1 : at + 2] and tokens[at + 1].text in _orders()):
+            if ends or (tokens[at].text == "and" and tokens[at + 1 : at + 2] and tokens[at + 1].text in order_words()):
                 start = len(found) + 1
             found.append(tokens[at])
             at += 1

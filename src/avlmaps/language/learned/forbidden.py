@@ -16,6 +16,9 @@ _DRIVES = frozenset({
 })  # fmt: skip
 _ROUND = frozenset({"left", "right", "clockwise", "counterclockwise", "anticlockwise", "cw", "ccw"})
 _FAST_AS = {("fast", "as"), ("quick", "as"), ("quickly", "as"), ("hard", "as")}
+_SHARES = frozenset(
+    {"part", "some", "most", "third", "thirds", "quarter", "quarters", "fifth", "fifths", "percent", "%"}
+)
 _TAKES_SIGN = TURNS | {
     "move", "translate", "forward", "forwards", "back", "drive", "go", "by", "advance", "x", "y", "=", "(", "left",
     "right",
@@ -38,7 +41,7 @@ def forbidden(tokens: Sequence[Token]) -> Clarify | Refuse | None:
         return Refuse(Reason.CONDITION)
     if said.spans("risks") or said.spans("questions"):
         return Refuse(Reason.QUESTION)
-    return circumstance(said) or _timed(said) or _signed(said) or _scaled(said)
+    return circumstance(said) or _timed(said) or _signed(said) or _run_on(said) or _scaled(said)
 
 
 def is_stop(tokens: Sequence[Token]) -> bool:
@@ -132,6 +135,19 @@ def _signed(said: Said) -> Clarify | None:
     return None
 
 
+def _run_on(said: Said) -> Clarify | None:
+    """Return the question for figures that are no one number: "1.2.3 m", "1-2 m", "1,000 m", "1 to 2 m"."""
+    tokens = list(said.tokens)
+    for at, token in enumerate(tokens):
+        if lexer.is_run_on(token):
+            return Clarify(f"Which number is '{token.raw}'? Say one, without other marks than a point.")
+        for end, _ in lexer.number_at(tokens, at):
+            if said.texts[end : end + 1] == ("to",) and lexer.is_measure(tokens, end + 1):
+                phrase = " ".join(said.texts[at : amount_end(tokens, end + 1)])
+                return Clarify(f"How much is '{phrase}'? Say one number.")
+    return None
+
+
 def _scaled(said: Said) -> Clarify | None:
     """Return the question for what another number or side is meant by: "half of 90 degrees", "your other left"."""
     tokens = list(said.tokens)
@@ -144,6 +160,11 @@ def _scaled(said: Said) -> Clarify | None:
         if not vague and lexer.number_at(tokens, end):
             phrase = " ".join(said.texts[start : amount_end(tokens, end)])
             return Clarify(f"How much is '{phrase}'? Say the number alone.")
+    for at in range(1, len(said.texts) - 2):
+        part, after = said.texts[at - 1], set(said.texts[at + 3 : at + 4])
+        if said.texts[at : at + 3] == ("of", "the", "way") and part in _SHARES and not after & {"round", "around"}:
+            phrase = " ".join(said.texts[at - 1 : at + 3])
+            return Clarify(f"How far is '{phrase}'? Say a distance, such as: go 1 m towards the sofa.")
     for before, side in pairwise(said.texts):
         if before in ("other", "wrong") and side in ("left", "right"):
             return Clarify(f"Is '{before} {side}' left or right?", ("left", "right"))

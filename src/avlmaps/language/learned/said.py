@@ -60,6 +60,7 @@ def words() -> Words:
         "unsafe",
         "risks",
         "questions",
+        "reports",
         "times",
         "signals",
         "quantities",

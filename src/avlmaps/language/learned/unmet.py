@@ -31,6 +31,7 @@ from avlmaps.language.intents import (
 from avlmaps.language.learned.accounted import unaccounted
 from avlmaps.language.learned.answerable import unanswerable
 from avlmaps.language.learned.linear import amount_end
+from avlmaps.language.learned.reported import reported
 from avlmaps.language.learned.said import BREAKS, DETERMINERS, HEARD, LOOKS, PREPOSITIONS, Claimed, Said, words
 from avlmaps.language.learned.ways import directions
 from avlmaps.language.lexer import Token
@@ -362,7 +363,7 @@ def _amounts(said: Claimed) -> Clarify | None:
     for at, token in enumerate(tokens):
         if at in read or (token.kind != "number" and token.text in _VAGUE):
             continue
-        if not _has_unit(tokens, at) and not _is_count(tokens, at):
+        if not lexer.is_measure(tokens, at) and not _is_count(tokens, at):
             continue
         phrase = " ".join(said.texts[at : amount_end(tokens, at)])
         return Clarify(f"What is '{phrase}' for? Say each step with its own distance, angle or time.")
@@ -414,13 +415,9 @@ def _is_count(tokens: list[Token], at: int) -> bool:
     return False
 
 
-def _has_unit(tokens: list[Token], at: int) -> bool:
-    return any(read(tokens, at) for read in (lexer.length_at, lexer.angle_at, lexer.duration_at))
-
-
 _RULES: tuple[Callable[[Claimed], Clarify | Refuse | None], ...] = (
     _away, _picked, _leaving, _outside, _through, _edges, _no_thing, _excluded, _changed, _ways, _superlatives,
-    _nameless, _unread, _unheard, _amounts, _sides, unaccounted,
+    _nameless, _unread, _unheard, _amounts, _sides, unaccounted, reported,
 )  # fmt: skip
 
 
