@@ -22,7 +22,9 @@ def cut_segments(corners, low_m, high_m):  # pragma: no cover - compiled
         z0, z1, z2 = corners[t, 0, 2], corners[t, 1, 2], corners[t, 2, 2]
         if max(z0, z1, z2) < low_m or min(z0, z1, z2) > high_m:
             continue
-        first[:3] = corners[t]
+        for k in range(3):
+            for axis in range(3):
+                first[k, axis] = corners[t, k, axis]
         count = _clip(first, 3, 2, low_m, 1.0, second)
         count = _clip(second, count, 2, high_m, -1.0, first)
         for a in range(count):

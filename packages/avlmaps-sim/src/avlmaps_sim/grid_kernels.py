@@ -1,4 +1,7 @@
-"""Compiled loops over the floor grid: triangles into cells, lines of sight, a path pulled smooth."""
+"""Compiled loops over the floor grid: triangles into cells, lines of sight, a path pulled smooth.
+
+Single numbers are assigned, where a row would do: numba takes two seconds to compile the check of two rows' shapes.
+"""
 
 import numpy as np
 from numba import njit
@@ -13,11 +16,13 @@ def _clip(polygon, count, axis, limit, sign, clipped):  # pragma: no cover - com
         a = sign * (polygon[i, axis] - limit)
         b = sign * (polygon[j, axis] - limit)
         if a >= 0.0:
-            clipped[kept] = polygon[i]
+            for k in range(3):
+                clipped[kept, k] = polygon[i, k]
             kept += 1
         if (a > 0.0 and b < 0.0) or (a < 0.0 and b > 0.0):
             part = a / (a - b)
-            clipped[kept] = polygon[i] + part * (polygon[j] - polygon[i])
+            for k in range(3):
+                clipped[kept, k] = polygon[i, k] + part * (polygon[j, k] - polygon[i, k])
             kept += 1
     return kept
 
@@ -39,8 +44,9 @@ def mark_slab(corners, low_m, high_m, origin, cell_m, grid):  # pragma: no cover
         count = _clip(second, count, 2, high_m, -1.0, first)
         if count == 0:
             continue
-        x_low = first[:count, 0].min()
-        x_high = first[:count, 0].max()
+        x_low, x_high = first[0, 0], first[0, 0]
+        for k in range(1, count):
+            x_low, x_high = min(x_low, first[k, 0]), max(x_high, first[k, 0])
         i_low = max(int(np.floor((x_low - origin[0]) / cell_m)), 0)
         i_high = min(int(np.floor((x_high - origin[0]) / cell_m)), nx - 1)
         for i in range(i_low, i_high + 1):

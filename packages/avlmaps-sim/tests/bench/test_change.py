@@ -68,7 +68,7 @@ def test_an_empty_list_is_not_stale() -> None:
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
     out = tmp_path_factory.mktemp("change")
-    settings = SceneSettings(scenes=("house:7",), profile="synthetic", frames=40, sources=1, ambiguous=0, jobs=1)
+    settings = SceneSettings(scenes=("house:7",), profile="synthetic", frames=24, sources=1, ambiguous=0, jobs=1)
     return out, run_change(settings, 2, out)
 
 

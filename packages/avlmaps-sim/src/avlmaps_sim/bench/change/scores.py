@@ -181,7 +181,7 @@ def stands_there(
         off = np.maximum(np.maximum(low - at, at - high), 0.0)
         near = (np.hypot(off[:, 0], off[:, 1]) <= 0.15) & (off[:, 2] <= 0.3)
         if named:
-            near &= np.array([same_thing(stay.name, thing.category) for thing in things], bool)
+            near[near] = [same_thing(stay.name, things[row].category) for row in np.flatnonzero(near).tolist()]
         out[number] = near
     return out
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from avlmaps.maps.grid import GridSpec
+from avlmaps.maps.grid import GridSpec, index_ends
 from avlmaps_sim.free_space import STRUCTURE
 from avlmaps_sim.scene import NOTHING, Scene
 
@@ -31,15 +31,23 @@ class TrueVoxels:
     @classmethod
     def of(cls, scene: Scene, grid: GridSpec) -> "TrueVoxels":
         """Spread points over all triangles and let each voxel belong to the thing with most points in it."""
-        keys, instances = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
-        corners = scene.mesh.corners()
+        corners = np.asarray(scene.mesh.corners(), np.float64)
+        if not len(corners):
+            return cls(np.zeros(0, np.int64), np.zeros(0, np.int64))
+        low, high = index_ends(grid.index_of(corners.reshape(-1, 3)))
+        first, shape = low - 1, high - low + 3  # a point may be rounded out of its triangle
+        weight = np.array([1.0 if thing.category in STRUCTURE else _FOR_THINGS for thing in scene.objects])
+        pairs = list[np.ndarray]()  # voxel and thing of each point, as one number, since one array is sorted quickly
         for start in range(0, len(corners), _TRIANGLES):
             part = slice(start, start + _TRIANGLES)
-            points, triangle = _spread(np.asarray(corners[part], np.float64), _SPACING_M)
-            keys.append(_packed(grid.index_of(points)))
-            instances.append(np.asarray(scene.instance[part], np.int64)[triangle])
-        weight = np.array([1.0 if thing.category in STRUCTURE else _FOR_THINGS for thing in scene.objects])
-        return cls(*_most(np.concatenate(keys), np.concatenate(instances), weight))
+            points, triangle = _spread(corners[part], _SPACING_M)
+            voxel = np.ravel_multi_index(tuple((grid.index_of(points) - first).T), tuple(shape))
+            pairs.append(voxel * len(weight) + scene.instance[part][triangle])
+        pair, count = np.unique(np.concatenate(pairs), return_counts=True)
+        voxel, instance = np.divmod(pair, len(weight))
+        order = np.lexsort((-count * weight[instance], voxel))
+        most = order[np.flatnonzero(np.diff(voxel[order], prepend=-1))]
+        return cls(_packed(np.stack(np.unravel_index(voxel[most], tuple(shape)), axis=1) + first), instance[most])
 
     def label(self, index: Int[np.ndarray, "n 3"]) -> Int[np.ndarray, " n"]:
         """Return the thing of each voxel of a map, -1 for none; a voxel beside a surface counts as on it."""
@@ -84,15 +92,3 @@ def _spread(corners: Float[np.ndarray, "t 3 3"], spacing_m: float) -> tuple[np.n
     folded = u + v > 1.0
     u, v = np.where(folded, 1.0 - u, u)[:, None], np.where(folded, 1.0 - v, v)[:, None]
     return a[owner] + u * (b - a)[owner] + v * (c - a)[owner], owner
-
-
-def _most(
-    key: Int[np.ndarray, " n"], instance: Int[np.ndarray, " n"], weight: Float[np.ndarray, " i"]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return each voxel once, with the instance of most weight in it."""
-    voxels, row = np.unique(key, return_inverse=True)
-    pair, count = np.unique(row.reshape(-1) * len(weight) + instance, return_counts=True)
-    row, instance = pair // max(len(weight), 1), pair % max(len(weight), 1)
-    order = np.lexsort((-count * weight[instance], row))
-    first = order[np.flatnonzero(np.diff(row[order], prepend=-1))]
-    return voxels, instance[first]
