@@ -8,6 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from avlmaps.cli import usage
+from avlmaps.cli.output import UsageError
+from avlmaps.cli.usage import read_verb
 from avlmaps.cli.verb import Verb
 from avlmaps.cli.verbs import VERBS
 from avlmaps.core import errors
@@ -87,14 +90,34 @@ def test_every_verb_is_among_them() -> None:
 def test_a_command_line_that_cannot_be_read_says_what_is_wrong(run) -> None:
     for words, told in (
         (("query", "MAP", "--tpo", "3"), "Unrecognized options: --tpo, 3"),
-        (("query",), "Missing from avlmaps query: MAP Map folder (NAME.avlmap). (required)"),
-        (("build", "x", "--out", "y", "--voxel-size-m", "abc"), "could not convert string to float: 'abc'"),
+        (("query",), "query needs MAP."),
+        (("merge", "A"), "merge needs OTHER and --out MAP."),
+        (("edit", "MAP", "--undo"), "--undo needs a value: ID."),
+        (("go", "MAP", "x", "--language"), "--language needs a value: learned|rules|chat."),
+        (("go", "MAP", "x", "--language", "x"), "--language takes learned, rules, chat; not 'x'."),
+        (("build", "x", "--out", "y", "--voxel-size-m", "abc"), "--voxel-size-m takes a number, not 'abc'."),
+        (("query", "MAP", "x", "--top", "1.5"), "--top takes a whole number, not '1.5'."),
+        ((), "a verb comes first: demo"),
         (("nonsense",), "nonsense"),
     ):
         code, out, err = run(*words, "--json")
         assert code == 2
-        assert told in json.loads(out)["error"]["message"]
-        assert "--help" in err
+        message = json.loads(out)["error"]["message"]
+        assert told in message and err.splitlines()[0] == f"avlmaps: {message}"
+        assert err.splitlines()[1].startswith("For all of it: avlmaps ") and err.count("\n") == 2
+
+
+@pytest.mark.parametrize("name", VERBS)
+def test_what_a_verb_lacks_is_one_sentence(name: str) -> None:
+    verb = VERBS[name]
+    options = {option: value for option, value in usage._options(verb).items() if value}
+    if name not in ("demo", "profiles"):
+        with pytest.raises(UsageError, match=rf"^{name} needs [^│]*\.$"):
+            read_verb(verb, [], name)
+    for option in list(options)[-1:]:
+        with pytest.raises(UsageError) as told:
+            read_verb(verb, [option], name)
+        assert str(told.value).startswith((f"{option} needs a value: {options[option]}.", f"{name} needs "))
 
 
 def test_help_and_what_stands_behind_two_dashes_are_no_errors(run) -> None:

@@ -91,18 +91,15 @@ def _usage(words: Sequence[str]) -> Iterator[None]:
         with redirect_stderr(complaints):
             yield
     except SystemExit as stop:
-        printed = complaints.getvalue()
         if stop.code in (0, None):
-            sys.stderr.write(printed)
+            sys.stderr.write(complaints.getvalue())
             raise
         from avlmaps.cli.usage import meant
         from avlmaps.cli.verbs import VERBS
 
-        sentence = meant(words, printed, VERBS)
-        if "did you mean" in sentence or "there is no verb" in sentence:
-            verb = f"{words[0]} " if words[0] in VERBS else ""
-            printed = f"avlmaps: {printable(sentence)}\nFor all of it: avlmaps {verb}--help\n"
-        sys.stderr.write(printed)
+        sentence = meant(words, complaints.getvalue(), VERBS)
+        verb = f"{words[0]} " if words and words[0] in VERBS else ""
+        sys.stderr.write(f"avlmaps: {printable(sentence)}\nFor all of it: avlmaps {verb}--help\n")
         if _wants_json(words):
             _emit_error("usage", sentence)
         raise

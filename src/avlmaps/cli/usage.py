@@ -5,7 +5,7 @@ import io
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import redirect_stderr
-from typing import Any, TypeVar, get_type_hints
+from typing import Any, TypeVar, get_args, get_type_hints
 
 import tyro
 
@@ -15,15 +15,26 @@ from avlmaps.core.suggestions import did_you_mean, nearest
 
 CONFIG = (tyro.conf.OmitArgPrefixes, tyro.conf.FlagCreatePairsOff, tyro.conf.HelptextFromCommentsOff)
 V = TypeVar("V", bound=Verb)
-_CHOICE = re.compile(r"invalid choice '(?P<given>[^']*)' for argument .*Expected one of \((?P<known>[^)]*)\)")
+_CHOICE = re.compile(
+    r"invalid choice '(?P<given>[^']*)' for argument '(?P<name>[^']*)'. Expected one of \((?P<known>[^)]*)\)"
+)
+_NO_VALUE = re.compile(r"Missing value for argument '(?P<name>[^']*)'")
+_NO_NUMBER = re.compile(
+    r"Error parsing (?P<name>--[\w-]+).*?: (?:could not convert|invalid literal).*?: (?P<given>'.*?')"
+)
 
 
 def usage_sentence(printed: str) -> str:
     """Return the fault in the words, out of the frame that the parser prints."""
-    # a title, a rule, what is wrong, a rule, and help; in a box the title lies in its upper edge
+    return " ".join(" ".join(_framed(printed)).split())
+
+
+def _framed(printed: str) -> list[str]:
+    """Return the lines of what is wrong: after a title and a rule, until the rule before help."""
+    # in a box the title lies in its upper edge
     printed = re.sub(r"^╭─ [^\n]*╮$", "title\n────", printed.lstrip(), count=1, flags=re.MULTILINE)
     parts = re.split(r"\n *[-─]{3,} *\n", re.sub("[╭╮╰╯│]", " ", printed))
-    return " ".join(parts[min(1, len(parts) - 1)].split())
+    return parts[min(1, len(parts) - 1)].splitlines()
 
 
 def meant(words: Sequence[str], printed: str, verbs: Mapping[str, type[Verb]]) -> str:
@@ -36,39 +47,63 @@ def meant(words: Sequence[str], printed: str, verbs: Mapping[str, type[Verb]]) -
     """
     sentence = usage_sentence(printed)
     name = words[0] if words else ""
-    if name and not name.startswith("-") and name not in verbs:
+    if not name or name.startswith("-"):
+        return f"a verb comes first: {', '.join(verbs)}."
+    if name not in verbs:
         return f"there is no verb {name[:60]!r}{did_you_mean(name, verbs)} The verbs: {', '.join(verbs)}."
-    choice = _CHOICE.search(sentence)
-    if choice is not None:
-        return sentence.rstrip(".") + did_you_mean(choice["given"], re.findall(r"'([^']*)'", choice["known"]))
-    known = option_names(verbs[name]) if name in verbs else ()
+    options = _options(verbs[name])
+    if found := _CHOICE.search(sentence):
+        known = [word for word in re.findall(r"'([^']*)'", found["known"]) if word != "None"]
+        return f"{found['name']} takes {', '.join(known)}; not {found['given']!r}{did_you_mean(found['given'], known)}"
     given = [word.partition("=")[0] for word in _before_dashes(words[1:]) if re.match("--[a-z]", word)]
-    unknown = [word for word in given if word.replace("_", "-") not in known]
-    close = nearest(unknown[0].replace("_", "-"), known) if unknown and known else None
-    if close is None:
-        return sentence
-    said = f"Unrecognized options: {unknown[0]}" if "Unrecognized" not in sentence else sentence
-    said = said.partition(" Perhaps you meant")[0]
-    return f"{said.rstrip('.')}; did you mean {close}?"
+    unknown = [word for word in given if word.replace("_", "-") not in options]
+    close = nearest(unknown[0].replace("_", "-"), tuple(options)) if unknown else None
+    if close is not None:
+        said = f"Unrecognized options: {unknown[0]}" if "Unrecognized" not in sentence else sentence
+        return f"{said.partition(' Perhaps you meant')[0].rstrip('.')}; did you mean {close}?"
+    if sentence.startswith("Missing from"):
+        return f"{name} needs {' and '.join(_missing(_framed(printed)[1:]))}."
+    if found := _NO_VALUE.search(sentence):
+        return f"{found['name']} needs a value: {options.get(found['name']) or 'see its help'}."
+    if found := _NO_NUMBER.search(sentence):
+        kind = "a whole number" if "int()" in sentence else "a number"
+        return f"{found['name']} takes {kind}, not {found['given']}."
+    return sentence
+
+
+def _missing(lines: Sequence[str]) -> list[str]:
+    """Return the names out of a list of names, each with its help further to the right."""
+    margins = [len(line) - len(line.lstrip()) for line in lines]
+    names: list[str] = []
+    for line, margin in zip(lines, margins, strict=True):
+        if line.strip() and margin == min(margins):
+            if names and names[-1].endswith(","):  # a long one continues
+                names[-1] += line.strip()
+            else:
+                names.append(line.strip())
+    return names
 
 
 def _before_dashes(words: Sequence[str]) -> Sequence[str]:
     return words[: words.index("--")] if "--" in words else words
 
 
-def option_names(verb: type[Any]) -> tuple[str, ...]:
-    """Return the options of a verb as they are typed, those of its groups among them."""
-    names: list[str] = ["--help"]
+def _options(verb: type[Any]) -> dict[str, str]:
+    """Return the options of a verb as they are typed, those of its groups among them, and what each takes."""
+    options: dict[str, str] = {"--help": ""}
     for field in dataclasses.fields(verb):
         kind = get_type_hints(verb, include_extras=True)[field.name]
         notes = getattr(kind, "__metadata__", ())
         bare = kind.__origin__ if notes else kind
         if dataclasses.is_dataclass(bare):
-            names += option_names(bare if isinstance(bare, type) else type(bare))
+            options |= _options(bare if isinstance(bare, type) else type(bare))
         elif tyro.conf.Positional not in notes and "Positional" not in str(notes):
-            names.append("--" + field.name.replace("_", "-"))
-            names += [alias for note in notes for alias in getattr(note, "aliases", None) or ()]
-    return tuple(names)
+            takes = next((note.metavar for note in notes if getattr(note, "metavar", None)), "")
+            takes = takes or "|".join(map(str, get_args(bare)))
+            own = next((note.name for note in notes if getattr(note, "name", None)), field.name.replace("_", "-"))
+            for name in (f"--{own}", *(alias for note in notes for alias in getattr(note, "aliases", None) or ())):
+                options[name] = takes
+    return options
 
 
 def read_verb(verb: type[V], words: Sequence[str], name: str) -> V:
