@@ -1,5 +1,6 @@
 """`avlmaps go`: a sentence in, a drive out; what can go wrong is one sentence each."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -62,8 +63,6 @@ def test_the_program_and_the_trace_are_told_as_it_drives(run, built: Path, in_ro
 
 
 def test_what_cannot_be_obeyed_is_told_with_status_1_and_json_all_the_same(run, built: Path, in_room: None) -> None:
-    import json
-
     status, out, err = run("go", built, "go to the purple elephant near the sound of thunder", "--scene", "x", "--json")
     assert status == 1
     assert err.splitlines()[-1].startswith("avlmaps: ")
@@ -171,3 +170,22 @@ def test_a_real_robot_is_driven_over_rosbridge_and_let_go_at_the_end(
     assert said["ok"] is True
     assert asked == [("nav2", "ws://robot:9090", True, True), ("closed",)]
     assert said["subgoals"][0]["goal"][:2] == pytest.approx([4.4, 4.2])
+
+
+@pytest.mark.parametrize(
+    "sentence",
+    [
+        "go to the purple elephant",
+        "go to where the beeping comes from",
+        "go to the red thing near the sound of barking",
+        "go to the kitchen",
+        "go to the red thing, then turn left",
+    ],
+)
+def test_a_dry_run_says_of_the_map_what_the_drive_says(run, built: Path, in_room: None, sentence: str) -> None:
+    dry, drive = (json.loads(run("go", built, sentence, *how)[1]) for how in (
+        ("--dry-run", "--json"), ("--scene", "room", "--json"),
+    ))  # fmt: skip
+    assert dry["program"] == drive["program"] and dry["ok"] and dry["path_m"] == 0.0
+    told = [*drive["notes"], *([drive["error"]["message"]] if drive["error"] else [])]
+    assert dry["notes"] == [one for one in told if "could stop" not in one and one != "the program moved nothing"]

@@ -9,6 +9,7 @@ from tyro.conf import OmitArgPrefixes, Positional, arg
 
 from avlmaps.cli.output import AnsweredError, UsageError, emit, error_answer, kind_named, table_lines
 from avlmaps.cli.verb import MapVerb
+from avlmaps.core.files import user_path
 from avlmaps.core.progress import say
 from avlmaps.core.wording import place_text
 
@@ -80,7 +81,7 @@ class Go(MapVerb):
     explain: bool = False
     """Print the readings of the sentence with their probabilities; the likeliest one counts."""
     dry_run: bool = False
-    """Print the program without driving; neither the map nor a scene is opened."""
+    """Print the program without driving, and what the map lacks for it; a map that is not there is not needed."""
     plot: Annotated[Path | None, arg(metavar="FILE")] = None
     """Draw the path over the map into this picture: start, goals, stops, contacts."""
 
@@ -133,14 +134,8 @@ def go(verb: "Go") -> dict[str, Any]:
     if verb.robot != "simulated" and (verb.scene or start):
         raise UsageError(f"--scene and --start belong to a simulated robot; --robot {verb.robot} is where it is.")
     settings = _query_settings(verb)
-    translator = translator_for(verb)
-    if verb.explain and verb.dry_run:
-        from avlmaps.language.learned_translator import explanation
-
-        for line in explanation(translator, verb.sentence):
-            say(line)
     if verb.dry_run:
-        return plan_answer(_read(verb, translator))
+        return _planned(verb, settings)
     from avlmaps.navigate.interrupts import raised_signals
 
     with raised_signals():
@@ -156,18 +151,36 @@ def _query_settings(verb: "Go") -> "QuerySettings":
 
 def _read(verb: "Go", translator: "Translator") -> "Translation":
     """Return the program of the sentence; a place that was chosen for its sounds is said to be idle without one."""
+    if verb.explain:
+        from avlmaps.language.learned_translator import explanation
+
+        for line in explanation(translator, verb.sentence):
+            say(line)
     translation = translator.program_for(verb.sentence)
     if verb.at is None or "sound=" in translation.program:
         return translation
     return replace(translation, notes=(*translation.notes, f"--at {verb.at} has no effect: no sound is named."))
 
 
-def plan_answer(translation: "Translation") -> dict[str, Any]:
-    """Return the answer for a command that is read and not obeyed."""
+def _planned(verb: "Go", settings: "QuerySettings") -> dict[str, Any]:
+    from avlmaps.query.avlmap import AVLMap
+
+    avlmap = AVLMap.open(verb.map, settings) if user_path(verb.map).exists() else None
+    return plan_answer(verb, _read(verb, translator_for(verb, avlmap)), avlmap)
+
+
+def plan_answer(verb: "Go", translation: "Translation", avlmap: "AVLMap | None") -> dict[str, Any]:
+    """Return the answer for a command that is read and not obeyed, with what a drive would report of its map."""
+    told: tuple[str, ...] = ()
+    if avlmap is not None:
+        from avlmaps.navigate.rehearsal import told_by_map
+
+        told = told_by_map(translation.program, avlmap, verb.sentence, guess=verb.guess)
     return {
         "plan": translation.plan,
         "program": translation.program, "steps": [], "actions": [], "subgoals": [], "ok": True, "error": None,
-        "notes": list(translation.notes), "path_m": 0.0, "elapsed_s": 0.0, "frame": "recording",
+        "notes": list(dict.fromkeys((*translation.notes, *told))), "path_m": 0.0, "elapsed_s": 0.0,
+        "frame": "recording",
     }  # fmt: skip
 
 
@@ -176,11 +189,6 @@ def _driven(verb: "Go", start: "GroundPose | None", settings: "QuerySettings") -
 
     avlmap = AVLMap.open(verb.map, settings)
     translator = translator_for(verb, avlmap)
-    if verb.explain:
-        from avlmaps.language.learned_translator import explanation
-
-        for line in explanation(translator, verb.sentence):
-            say(line)
     # A sentence that is not understood fails here, before a scene is made.
     translation = _read(verb, translator)
     robot = simulated_robot(verb, avlmap, start) if verb.robot == "simulated" else _real(verb, avlmap)

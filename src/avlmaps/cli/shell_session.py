@@ -253,7 +253,7 @@ class Session:
         avlmap = self.opened
         translator = going.translator_for(command, avlmap)
         translation = translator.program_for(command.sentence)
-        plan = going.plan_answer(translation)
+        plan = going.plan_answer(command, translation, avlmap)
         if given.scene is None:
             return Reply(plan, [*going.go_lines(plan), "planned only; --scene of avlmaps shell lets a robot drive"])
         for text in going.go_lines(plan):

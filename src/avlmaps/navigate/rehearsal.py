@@ -5,16 +5,17 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Float
 
+from avlmaps.core.errors import ProgramError
 from avlmaps.core.motion import Action, GroundPose, Moved
 from avlmaps.language.learned_translator import LearnedTranslator
-from avlmaps.language.program import Budget
+from avlmaps.language.program import Budget, parse_program, run_program
 from avlmaps.language.translator import Translation
 from avlmaps.maps.obstacles import Obstacles
 from avlmaps.navigate.bodies import BASE, BodyShape
-from avlmaps.navigate.driver import MapDriver
-from avlmaps.navigate.file_access import Readable
+from avlmaps.navigate.driver import Arrival, MapDriver
+from avlmaps.navigate.file_access import Readable, offered_by
 from avlmaps.navigate.instruct import Outcome, instruct
-from avlmaps.navigate.skills import RobotSettings
+from avlmaps.navigate.skills import Robot, RobotSettings
 from avlmaps.query.avlmap import AVLMap
 
 NO_FILES = Readable((), ())
@@ -37,6 +38,39 @@ class FreeBody:
         """Drive along an arc for a while."""
         self.pose = self.pose.driven(speed_m_s, turn_rad_s, duration_s)
         return Moved(self.pose)
+
+
+class _StandingDriver:
+    """Says of every movement that it is done, and moves nothing: what the map knows is queried without a robot."""
+
+    pose = GroundPose(0.0, 0.0)
+
+    def go_to(self, place: Float[np.ndarray, "3"], *, face: Float[np.ndarray, "3"] | None = None) -> Arrival:
+        return self.stop()
+
+    def turn(self, angle_rad: float) -> Arrival:
+        return self.stop()
+
+    def forward(self, distance_m: float) -> Arrival:
+        return self.stop()
+
+    def stop(self) -> Arrival:
+        return Arrival(True, self.pose, (), np.zeros((1, 2)))
+
+
+def told_by_map(program: str, avlmap: AVLMap, command: str = "", *, guess: bool = False) -> tuple[str, ...]:
+    """Return what a drive would report of the map: its doubts, what it lacks, what is not found, how words are taken.
+
+    Args:
+        program: that the drive would run; it queries the map, and nothing moves.
+        avlmap: the map.
+        command: its words, which may name files.
+        guess: as of ``RobotSettings``.
+    """
+    robot = Robot(avlmap, _StandingDriver(), RobotSettings(guess), offered_by(command), pause=lambda _: None)
+    trace = run_program(parse_program(program), robot)
+    missing = [] if trace.error is None or trace.error_type == ProgramError.__name__ else [trace.error]
+    return (*avlmap.stored.info.doubts, *robot.seeker.notes, *missing)
 
 
 def rehearse(
