@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import QueryError
+from avlmaps.language.commands import read_command
 from avlmaps.language.list_questions import said_alternatives
 from avlmaps.language.questions import read_question
 from avlmaps.language.sentence import Given
@@ -140,3 +141,19 @@ def test_an_amount_is_no_number_of_things(stuff: str, room: str) -> None:
 def test_a_spoken_mark_changes_nothing(thing: str, room: str) -> None:
     asked = f"is there a {thing} in the {room}"
     assert read_question(f"{asked} question mark") == read_question(asked)
+
+
+@settings(max_examples=8, deadline=None)
+@given(thing=THINGS, other=THINGS, room=ROOMS)
+def test_a_count_of_something_else_than_is_sought_is_refused(thing: str, other: str, room: str) -> None:
+    assert is_refused(f"how many rooms have a {thing}?")
+    assert thing == other or is_refused(f"how many {thing}s and {other}s are there?")
+    assert not is_refused(f"how many {thing}s are in the {room}?")
+    assert not is_refused(f"how many {room}s are there?")
+
+
+@settings(max_examples=8, deadline=None)
+@given(thing=THINGS, side=st.sampled_from(["left", "right", "leftmost", "middle", "upper", "opposite"]))
+def test_what_is_chosen_by_its_position_is_asked_back(thing: str, side: str) -> None:
+    assert is_refused(f"the {side} {thing}")
+    assert read_command(f"go to the {side} {thing}").stops is not None

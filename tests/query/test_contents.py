@@ -110,6 +110,17 @@ def test_sounds_have_names_times_and_the_robots_positions(furnished: AVLMap) -> 
     assert sound.track.shape == (2, 3)
 
 
+@pytest.mark.parametrize("places", [[0.0, 0.4, 0.8, 1.6, 2.4], [0.0, 0.4, 0.8, 9.0, 9.4], [0.0, 1.2, 2.4, 12.0, 13.2]])
+def test_a_count_of_rooms_counts_each_once_however_often_it_was_seen(places: list[float]) -> None:
+    view = np.tile(np.array([1.0, 0], np.float32), (len(places), 1))
+    where = np.array([[x, 0.0, 1.0] for x in places])
+    stored = furnished_map(views=FakeViews(), keyframes=keyframes_at(where, view))
+    stored.info.models = {"pixels": None, "views": None}
+    avlmap = AVLMap(stored)
+    answer = avlmap.ask("how many kitchens are there?")
+    assert answer.count == len([room for room in avlmap.rooms() if room.name == "kitchen"])
+
+
 def test_rooms_are_keyframes_side_by_side_with_one_name() -> None:
     places = np.array([[0.0, 0, 1], [0.4, 0, 1], [0.8, 0, 1], [9.0, 0, 1], [9.4, 0, 1], [20.0, 0, 1]])
     view = np.array([[1.0, 0], [1, 0], [1, 0], [1, 0], [1, 0], [1, 0]], np.float32)

@@ -246,7 +246,8 @@ def said_number(text: str) -> tuple[int, str] | None:
     """Return how many of what a phrase names: "two chairs in the kitchen" is 2 and "chairs in the kitchen"."""
     plain = _WHERE.sub("", _plain(text)).removeprefix("the ")
     found = re.fullmatch(rf"({'|'.join(NUMBERS)}|[2-9]|[1-9]\d) ([a-z][^.?!]*)", plain)
-    if found is None or lexicon().head(_TAIL.sub("", found[2]).strip(), EntryKind.THING) is None:
+    name = "" if found is None else _TAIL.sub("", found[2]).strip()
+    if found is None or all(lexicon().head(name, kind) is None for kind in (EntryKind.THING, EntryKind.ROOM)):
         return None
     return NUMBERS.get(found[1]) or int(found[1]), found[2]
 

@@ -18,8 +18,9 @@ from avlmaps.core.question import HeardAt, Modality, Part, Question, Role
 from avlmaps.perception.protocols import NamedPixelEncoder
 from avlmaps.query.answer import Alternative, Answer, PartAnswer
 from avlmaps.query.factors import Factor, NearAnchors, NearThings
+from avlmaps.query.goals import Goal
 from avlmaps.query.heatmap import Heatmap, product
-from avlmaps.query.wording import absent_text, found_text
+from avlmaps.query.wording import UNDERSTOOD_ONLY, absent_text, found_text
 
 if TYPE_CHECKING:
     from avlmaps.core.camera import Pinhole
@@ -214,7 +215,7 @@ def answer_question(avlmap: "Queryable", question: Question, top: int = 3, files
     question = Question(tuple(said))
     parts = tuple(_part_answer(*both, heat) for both in zip(question.parts, heat.factors, strict=True))
     alone = () if found or len(heats) == 1 else (_alone(question, heats),)
-    text = found_text(question.parts, goals[0]) if found else absent_text(parts, goals, next(iter(alone), None))
+    text = found_text(parts, goals[0]) if found else absent_text(parts, goals, next(iter(alone), None))
     elapsed_ms = 1e3 * (time.perf_counter() - begin)
     named = {kind: [part.query for part in question.parts if part.modality is kind] for kind in Modality}
     places = [goal.position for goal in goals] if found else []
@@ -228,7 +229,7 @@ def _part_answer(part: Part, factor: Factor, whole: Heatmap) -> PartAnswer:
     own = _probability(factor)
     if not whole.found or factor.found:
         return PartAnswer(part, _peak(factor), factor.found, factor.understood, factor.note, own)
-    kept = [one for one in factor.note.split("; ") if part.is_file or one.startswith("understood only")]
+    kept = [one for one in factor.note.split("; ") if part.is_file or one.startswith(UNDERSTOOD_ONLY)]
     return PartAnswer(part, _peak(factor), True, factor.understood, "; ".join(kept), max(own, whole.probability))
 
 
@@ -315,6 +316,8 @@ def _answer_read(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
     answers.sort(key=lambda one: (one[1].found, one[1].probability), reverse=True)
     best, others = answers[0][1], answers[1:]
     alternatives = tuple(Alternative(question, one.probability, one.found, one.goals[:1]) for question, one in others)
+    if counted and any(one.part.role is Role.PRIMARY and one.part.modality is Modality.AREA for one in best.parts):
+        best = replace(best, goals=_one_a_room(avlmap, best.goals))
     count = sum(goal.probability >= avlmap.settings.found_at for goal in best.goals) if counted else None
     return replace(
         best,
@@ -322,8 +325,17 @@ def _answer_read(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
         count=count,
         notes=(*notes, *best.notes),
         alternatives=(*best.alternatives, *alternatives),
-        text=found_text([one.part for one in best.parts], best.goals[0], count) if best.found else best.text,
+        text=found_text(best.parts, best.goals[0], count) if best.found else best.text,
     )
+
+
+def _one_a_room(avlmap: "Queryable", goals: Sequence[Goal]) -> tuple[Goal, ...]:
+    """Return the first goal in each room: a room has goals where it was seen from several sides, and counts once."""
+    from avlmaps.query.whereabouts import NOWHERE, Whereabouts
+
+    rooms: list[int] = Whereabouts.of(avlmap).rooms_of(np.array([goal.position for goal in goals])).tolist()
+    first = {room: at for at, room in reversed(list(enumerate(rooms)))}
+    return tuple(goal for at, goal in enumerate(goals) if rooms[at] == NOWHERE or first[rooms[at]] == at)
 
 
 def _placed(question: Question, at: HeardAt | None) -> Question:

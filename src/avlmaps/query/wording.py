@@ -9,6 +9,7 @@ from avlmaps.core.wording import place_text
 from avlmaps.query.answer import Alternative, PartAnswer
 from avlmaps.query.goals import Goal
 
+UNDERSTOOD_ONLY = "understood only"
 _PHOTO, _CLIP = "the place of the photo", "a sound like the clip"
 
 
@@ -18,11 +19,14 @@ def in_words(parts: Sequence[Part]) -> str:
     return " ".join([_named(lead), *(_context_words(part) for part in parts if part is not lead)])
 
 
-def found_text(parts: Sequence[Part], goal: Goal, count: int | None = None) -> str:
-    """Return where the first goal of an answer that is found is, and how many there are for a count."""
+def found_text(parts: Sequence[PartAnswer], goal: Goal, count: int | None = None) -> str:
+    """Return where the first goal of an answer that is found is, how many there are, and which words were no help."""
     if count is not None:
-        return f"Counted: {count}. The most likely is at {_likely(goal)}."
-    return _sentence(f"{in_words(parts)} is most likely at {_likely(goal)}")
+        text = f"Counted: {count}. The most likely is at {_likely(goal)}."
+    else:
+        text = _sentence(f"{in_words([one.part for one in parts])} is most likely at {_likely(goal)}")
+    halves = (one.note.split("; ")[0] for one in parts if one.note.startswith(UNDERSTOOD_ONLY))
+    return " ".join([text, *map(_sentence, halves)])
 
 
 def placed(text: str, goal: Goal) -> str:

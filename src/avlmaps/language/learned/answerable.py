@@ -45,7 +45,19 @@ _NUMBERED = frozenset({"pair", "floor", "storey", "story", "level", "hand"})
 
 def unanswerable(said: Claimed, inquiry: Inquiry) -> str | None:
     """Return the refusal for a question about what a map does not hold; None where it holds it."""
-    rules = (_measured, _compared, _quantity, _not_placed, _unserved, _soundless, _past, _either, _unsought, _done)
+    rules = (
+        _measured,
+        _compared,
+        _counted,
+        _quantity,
+        _not_placed,
+        _unserved,
+        _soundless,
+        _past,
+        _either,
+        _unsought,
+        _done,
+    )
     for rule in rules:
         phrase = rule(said, inquiry)
         if phrase is not None:
@@ -102,6 +114,21 @@ def _compared(said: Claimed, inquiry: Inquiry) -> str | None:
             return " ".join(said.texts[at : at + 2])
         if inquiry.ask is Ask.HOW_MANY and (text == "per" or (text == "more" and said.texts[at - 1] == "many")):
             return f"{text} {' '.join(said.texts[at + 1 : at + 2])}".strip()
+    return None
+
+
+def _counted(said: Claimed, inquiry: Inquiry) -> str | None:
+    """Return the words for what is counted and not sought: "how many rooms have a window", "how many cups and jugs"."""
+    if inquiry.ask is not Ask.HOW_MANY:
+        return None
+    sought = {word for target in inquiry.of for word in target.name.split()}
+    of_rooms = any(target.kind is TargetKind.AREA and target.name != "rooms" for target in inquiry.of)
+    for at in range(len(said.texts) - 2):
+        if said.texts[at : at + 3] == ("how", "many", "rooms") and not of_rooms:
+            return "how many rooms"
+    for at, text in enumerate(said.texts[1:-1], 1):
+        if text == "and" and {at - 1, at + 1} <= said.used and said.texts[at - 1] in sought:
+            return " ".join(said.texts[at - 1 : at + 2])
     return None
 
 

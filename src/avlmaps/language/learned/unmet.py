@@ -248,6 +248,10 @@ def _superlatives(said: Claimed) -> Clarify | None:
                 return Clarify(f"I cannot choose the {' '.join(name)} from the map. Say what it is near.")
             if len(name) > 1 and name[0] in _ORDINALS and name[1] not in _NUMBERED and not _is_entry(" ".join(name)):
                 return Clarify(f"I cannot choose the {' '.join(name)} from the map. Say what it is near.")
+    for at, (side, noun) in enumerate(pairwise(said.texts)):
+        placed = side in words().lists["positions"] and at + 1 in said.named and not _is_entry(f"{side} {noun}")
+        if placed and at and said.texts[at - 1] in DETERMINERS:
+            return Clarify(f"I cannot choose the {side} {noun} from the map. Say what it is near.")
     for at, text in enumerate(said.texts):
         if at in said.named and (is_superlative(text) or said.texts[max(0, at - 2) : at] == ("the", "most")):
             return Clarify(f"I cannot choose the {text} from the map. Say what it is near.")
