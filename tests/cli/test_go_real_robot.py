@@ -3,7 +3,6 @@
 import json
 import signal
 import socket
-import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -21,33 +20,28 @@ from ros_bridge import FakeRobot
 from avlmaps.cli.go import Go, drive
 from avlmaps.core.motion import GroundPose
 from avlmaps.navigate.interrupts import Halt, Interrupted
+from helpers.forked import Forked
 
 pytestmark = [pytest.mark.timeout(500), pytest.mark.slow]
 
 SIGNALS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
-# Where a test's own process ignores a signal (a shell in the background, nohup), this one heeds it all the same.
-_HEEDING = (
-    "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
-    "; signal.signal(signal.SIGHUP, signal.SIG_DFL); from avlmaps.cli import main; main()"
-)
 # No test uses this patience up, though the machine may stand still beneath it.
 PATIENT = {"answer_timeout_s": 30.0, "cancel_timeout_s": 10.0, "pose_max_age_s": 20.0, "stall_s": 30.0}
 # A program starts in 5 s alone, and took more than a minute beside a suite of higher priority.
 START_S = 240.0
-Started = Callable[..., "subprocess.Popen[str]"]
+Started = Callable[..., Forked]
 
 
 @pytest.fixture
 def go(built: Path, tmp_path: Path) -> Iterator[Started]:
     """Start `avlmaps go` in the background."""
-    begun: list[subprocess.Popen[str]] = []
+    begun: list[Forked] = []
 
-    def start(url: str, sentence: str, kind: str = "nav2", **settings: Any) -> "subprocess.Popen[str]":
+    def start(url: str, sentence: str, kind: str = "nav2", **settings: Any) -> Forked:
         file = tmp_path / "robot.json"
         file.write_text(json.dumps({"settings": PATIENT | settings}))
         words = ["go", str(built), sentence, "--robot", kind, "--ros", url, "--ros-frames", str(file), "--json"]
-        command = [sys.executable, "-c", _HEEDING, *words]
-        begun.append(subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True))
+        begun.append(Forked(*words))
         return begun[-1]
 
     yield start

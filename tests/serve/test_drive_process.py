@@ -1,9 +1,7 @@
 """`avlmaps serve --drive` in its own process, with a robot behind a rosbridge: every end of it stops the robot."""
 
 import json
-import os
 import signal
-import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -18,42 +16,28 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "navigate"))
 from ros_bridge import FakeRobot
 
 from avlmaps.core.motion import GroundPose
+from helpers.forked import Forked
 
 pytestmark = [pytest.mark.timeout(280), pytest.mark.slow]
 
 TOKEN = "a token of the tests"
 # No test uses this patience up, though the machine may stand still beneath it.
 PATIENT = {"answer_timeout_s": 30.0, "cancel_timeout_s": 10.0, "pose_max_age_s": 20.0, "stall_s": 30.0}
-_HEEDING = "import signal; signal.signal(signal.SIGHUP, signal.SIG_DFL); from avlmaps.cli import main; main()"
-Started = Callable[..., "tuple[subprocess.Popen[str], httpx.Client]"]
+Started = Callable[..., tuple[Forked, httpx.Client]]
 
 
 @pytest.fixture
 def serve(room: Path, tmp_path: Path) -> Iterator[Started]:
     """Start the server in the background; return it and a client of it."""
-    begun: list[subprocess.Popen[str]] = []
+    begun: list[Forked] = []
 
-    def start(url: str, **settings: Any) -> "tuple[subprocess.Popen[str], httpx.Client]":
+    def start(url: str, **settings: Any) -> tuple[Forked, httpx.Client]:
         (tmp_path / "frames.json").write_text(json.dumps({"settings": PATIENT | settings}))
         file = tmp_path / "robot.json"
         file.write_text(json.dumps({"robot": "nav2", "ros": url, "ros_frames": "frames.json"}))
-        words = [
-            "serve",
-            str(room),
-            "--drive",
-            str(file),
-            "--drive-log",
-            str(tmp_path / "log"),
-            "--port",
-            "0",
-            "--json",
-        ]
-        process = subprocess.Popen(
-            [sys.executable, "-c", _HEEDING, *words],
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ, "AVLMAPS_TOKEN": TOKEN},
-        )  # fmt: skip
+        words = ["serve", room, "--drive", file, "--drive-log", tmp_path / "log", "--port", "0", "--json"]
+        process = Forked(*words, env={"AVLMAPS_TOKEN": TOKEN})
         begun.append(process)
-        assert process.stdout is not None
         line = process.stdout.readline()
         assert line, process.communicate()[1]
         client = httpx.Client(
@@ -111,10 +95,8 @@ def test_every_end_of_the_server_leaves_no_goal(serve: Started, number: signal.S
 def test_a_robot_that_cannot_be_reached_starts_no_server(room: Path, tmp_path: Path) -> None:
     file = tmp_path / "robot.json"
     file.write_text('{"robot": "nav2", "ros": "ws://127.0.0.1:9"}')
-    words = ["serve", str(room), "--drive", str(file), "--drive-log", str(tmp_path / "log"), "--port", "0"]
-    command = [sys.executable, "-c", _HEEDING, *words]
+    words = ["serve", room, "--drive", file, "--drive-log", tmp_path / "log", "--port", "0"]
     for token, sentence in ((TOKEN, "No rosbridge answers"), ("", "needs a token")):
-        done = subprocess.run(
-            command, capture_output=True, text=True, check=False, env={**os.environ, "AVLMAPS_TOKEN": token}
-        )
-        assert done.returncode == 1 and sentence in done.stderr and "Traceback" not in done.stderr
+        done = Forked(*words, env={"AVLMAPS_TOKEN": token})
+        _, err = done.communicate()
+        assert done.returncode == 1 and sentence in err and "Traceback" not in err
