@@ -62,6 +62,15 @@ def test_the_program_and_the_trace_are_told_as_it_drives(run, built: Path, in_ro
     assert "heading 180°" in err
 
 
+def test_nothing_moves_where_a_later_goal_is_not_in_the_map(run, built: Path, in_room: None) -> None:
+    status, out, err = run("go", built, "go to the red thing, then to the piano", "--scene", "room", "--json")
+    said = json.loads(out)
+    assert status == 1 and "I will go to" in err
+    assert said["error"]["kind"] in ("goal-not-found", "query")
+    assert "The robot was not moved." in said["error"]["message"]
+    assert (said["steps"], said["actions"], said["path_m"]) == ([], [], 0.0)
+
+
 def test_what_cannot_be_obeyed_is_told_with_status_1_and_json_all_the_same(run, built: Path, in_room: None) -> None:
     status, out, err = run("go", built, "go to the purple elephant near the sound of thunder", "--scene", "x", "--json")
     assert status == 1

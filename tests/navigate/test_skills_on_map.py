@@ -17,6 +17,7 @@ from avlmaps.language.program.vocabulary import Picture, Place
 from avlmaps.maps.grid import GridSpec
 from avlmaps.navigate.file_access import Readable, named_files, offered_by
 from avlmaps.navigate.footprint import Outline, middle_between
+from avlmaps.navigate.instances import Thing, nearest
 from avlmaps.navigate.skills import Robot, RobotSettings
 from avlmaps.query.avlmap import AVLMap, QuerySettings
 from avlmaps.query.voxel_space import Space
@@ -294,3 +295,17 @@ def test_the_floor_is_sought_among_the_voxels_that_count() -> None:
         storeys=None,
     )
     assert Robot(asked, KinematicDriver(GroundPose(0.0, 0.0))).floor_m == pytest.approx(robot.floor_m)
+
+
+@given(st.lists(st.tuples(st.floats(0.0, 9.0), st.floats(0.0, 1.0)), min_size=1, max_size=6), st.floats(0.0, 1.0))
+def test_no_thing_is_nearest_that_is_less_than_half_as_likely_as_the_best(
+    placed: list[tuple[float, float]], found_at: float
+) -> None:
+    things = [
+        Thing("chair", Outline.at(np.array([x, 0.0])), np.array([x, 0.0, 0.5]), likely, found=likely >= found_at)
+        for x, likely in sorted(placed, key=lambda one: -one[1])
+    ]
+    chosen = nearest(things, np.zeros(2))
+    assert 2.0 * chosen.probability >= things[0].probability
+    near = [one for one in things if one.found and 2.0 * one.probability >= things[0].probability]
+    assert all(chosen.place[0] <= one.place[0] for one in near)

@@ -217,6 +217,13 @@ def test_the_limit_of_found_is_a_setting(found_at: float) -> None:
     assert answer.found == all(part.found for part in answer.parts) or not answer.found
 
 
+@pytest.mark.parametrize("found_at", [0.0, 1e-9, 0.5])
+def test_where_there_is_no_goal_nothing_is_found_at_any_limit(found_at: float) -> None:
+    m = AVLMap(furnished_map(sounds=sounds_of([], [])), QuerySettings(found_at=found_at))
+    answer = m.ask(Question.of([Part(Modality.SOUND, "dog")]))
+    assert not answer.goals and not answer.found and answer.text == "No sound of dog is found."
+
+
 def test_a_limit_outside_of_probabilities_is_refused() -> None:
     with pytest.raises(QueryError, match="between 0 and 1"):
         QuerySettings(found_at=1.5)

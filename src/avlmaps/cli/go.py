@@ -232,10 +232,16 @@ def _obeyed(
 ) -> "Outcome":
     from avlmaps.navigate.instruct import instruct
     from avlmaps.navigate.interrupts import Interrupted
+    from avlmaps.navigate.rehearsal import unfound
     from avlmaps.navigate.skills import RobotSettings
 
     settings = RobotSettings(guess=verb.guess)
     try:
+        if verb.language != "chat":  # a chat model's program may decide while it drives
+            missing = unfound(verb.sentence, translation, avlmap, robot.start, guess=verb.guess)
+            if missing is not None:
+                say(translation.plan)
+                return missing
         return instruct(
             verb.sentence, avlmap, robot.driver, translator, settings=settings, translation=translation, tell=say
         )

@@ -91,8 +91,11 @@ def _guesses(heat: Heatmap) -> Iterator[Heatmap]:
 
 
 def nearest(things: Sequence[Thing], xy: Float[np.ndarray, "2"]) -> Thing:
-    """Return the thing nearest to a place, of those that are found; the best where none is."""
-    found = [thing for thing in things if thing.found]
+    """Return the thing nearest to a place, of those that are found; the best where none is.
+
+    One that is less than half as likely as the best is no choice: it counts as found only where the limit is low.
+    """
+    found = [thing for thing in things if thing.found and 2.0 * thing.probability >= things[0].probability]
     return min(found, key=lambda thing: thing.outline.distance_m(xy)) if found else things[0]
 
 

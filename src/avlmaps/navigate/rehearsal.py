@@ -5,10 +5,10 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.core.errors import ProgramError
+from avlmaps.core.errors import GoalNotFoundError, ProgramError, QueryError
 from avlmaps.core.motion import Action, GroundPose, Moved
 from avlmaps.language.learned_translator import LearnedTranslator
-from avlmaps.language.program import Budget, parse_program, run_program
+from avlmaps.language.program import Budget, Trace, parse_program, run_program
 from avlmaps.language.translator import Translation
 from avlmaps.maps.obstacles import Obstacles
 from avlmaps.navigate.bodies import BASE, BodyShape
@@ -18,6 +18,7 @@ from avlmaps.navigate.instruct import Outcome, instruct
 from avlmaps.navigate.skills import Robot, RobotSettings
 from avlmaps.query.avlmap import AVLMap
 
+_ABSENT = (GoalNotFoundError.__name__, QueryError.__name__)
 NO_FILES = Readable((), ())
 """A program may load no file."""
 
@@ -43,7 +44,8 @@ class FreeBody:
 class _StandingDriver:
     """Says of every movement that it is done, and moves nothing: what the map knows is queried without a robot."""
 
-    pose = GroundPose(0.0, 0.0)
+    def __init__(self, pose: GroundPose) -> None:
+        self.pose = pose
 
     def go_to(self, place: Float[np.ndarray, "3"], *, face: Float[np.ndarray, "3"] | None = None) -> Arrival:
         return self.stop()
@@ -67,10 +69,35 @@ def told_by_map(program: str, avlmap: AVLMap, command: str = "", *, guess: bool 
         command: its words, which may name files.
         guess: as of ``RobotSettings``.
     """
-    robot = Robot(avlmap, _StandingDriver(), RobotSettings(guess), offered_by(command), pause=lambda _: None)
-    trace = run_program(parse_program(program), robot)
+    robot, trace = _asked_of(program, avlmap, command, GroundPose(0.0, 0.0), guess)
     missing = [] if trace.error is None or trace.error_type == ProgramError.__name__ else [trace.error]
     return (*avlmap.stored.info.doubts, *robot.seeker.notes, *missing)
+
+
+def unfound(
+    words: str, translation: Translation, avlmap: AVLMap, start: GroundPose, *, guess: bool = False
+) -> Outcome | None:
+    """Return the outcome of a program that would drive and then ask for what the map lacks; None for any other.
+
+    Args:
+        words: the command; it may name files.
+        translation: its program, whose steps depend on nothing that a drive would find out.
+        avlmap: the map.
+        start: where the robot stands, level frame.
+        guess: as of ``RobotSettings``.
+    """
+    robot, trace = _asked_of(translation.program, avlmap, words, start, guess)
+    if trace.error is None or trace.error_type not in _ABSENT or not robot.moves:
+        return None
+    notes = (*avlmap.stored.info.doubts, *translation.notes, *robot.seeker.notes)
+    error = f"{trace.error.rstrip('.')}. The robot was not moved."
+    return Outcome(words, (translation.program,), notes, (), (), error, trace.error_type, 0.0)
+
+
+def _asked_of(program: str, avlmap: AVLMap, command: str, start: GroundPose, guess: bool) -> "tuple[Robot, Trace]":
+    """Run a program with a robot that stays where it is, so that all its goals are looked up and nothing moves."""
+    robot = Robot(avlmap, _StandingDriver(start), RobotSettings(guess), offered_by(command), pause=lambda _: None)
+    return robot, run_program(parse_program(program), robot)
 
 
 def rehearse(

@@ -141,8 +141,8 @@ class Heatmap(Heat):
 
     @property
     def found(self) -> bool:
-        """Whether the first goal is likely enough to be right."""
-        return self.probability >= self.found_at
+        """Whether the first goal is likely enough to be right; where there is none, nothing is found at any limit."""
+        return self.probability >= self.found_at and self.probability > 0.0
 
     def goals(self, top: int = 3) -> list[Goal]:
         """Return the best distinct places, best first; fewer where there are fewer, none where there is no heat."""
