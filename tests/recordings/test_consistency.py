@@ -191,10 +191,11 @@ def test_frames_that_see_nothing_in_common_are_not_called_fine(tmp_path: Path) -
 
 SPOTS = {
     "stands and turns evenly": (RoomWalk("turn", seed=57, frames=30, round_rad_s=0.0, even=True),
-                                {"scale of", "clock of"}),
+                                {"twice as far", "clock of"}),
     "hardly moves": (RoomWalk("still", seed=58, frames=30, round_rad_s=0.02, turn_rad_s=0.02, noise=0.0019, even=True),
-                     {"scale of", "clock of", "focal"}),
-    "walks": (RoomWalk("walk", seed=51, frames=30), set[str]()),
+                     {"twice as far", "clock of", "focal"}),
+    "mostly turns": (RoomWalk("walk", seed=51, frames=30), {"15% or 0.3 m too large"}),
+    "walks": (RoomWalk("turn", seed=57, frames=30, round_rad_s=0.5), set[str]()),
 }  # fmt: skip
 
 
@@ -204,7 +205,34 @@ def test_what_would_not_show_is_said(name: str, tmp_path: Path) -> None:
     found = verdict(walk.draft(CAMERA), tmp_path)
     assert found.grade is Grade.FINE and not found.sentences()
     said = " ".join(found.unchecked)
-    assert {spot for spot in ("scale of", "clock of", "focal", "the ray") if spot in said} == spots
+    every = ("twice as far", "15% or 0.3 m too large", "clock of", "focal", "the ray")
+    assert {spot for spot in every if spot in said} == spots
+
+
+@pytest.mark.parametrize(
+    ("round_rad_s", "times", "farther_m", "said"),
+    [
+        (0.5, 1.15, 0.0, "The depth looks 1.15 times too large, or the positions 1.15 times too small"),
+        (0.5, 0.87, 0.0, "The depth looks 1.15 times too small, or the positions 1.15 times too large"),
+        (0.0, 1.0, 0.3, "The depth looks 0.3 m too large everywhere: write the depth from the camera's centre (-0.3"),
+    ],
+)
+def test_depth_that_is_a_little_off_is_named(
+    round_rad_s: float, times: float, farther_m: float, said: str, tmp_path: Path
+) -> None:
+    walk = RoomWalk("turn", seed=57, frames=30, round_rad_s=round_rad_s).draft(CAMERA)
+    farther = farther_m * walk.units_per_m
+    depth = tuple(np.where(one > 0, one * times + farther, 0).astype(one.dtype) for one in walk.depth)
+    found = verdict(replace(walk, depth=depth), tmp_path)
+    assert found.grade is Grade.SUSPICIOUS and said in " ".join(found.sentences())
+
+
+@pytest.mark.parametrize(("level", "is_dark"), [(15, True), (30, False)])
+def test_dark_pictures_are_doubted(level: int, is_dark: bool, right: Draft, tmp_path: Path) -> None:
+    share = level / float(np.median(np.stack(right.rgb)))
+    dark = replace(right, rgb=tuple((rgb * share).round().astype(np.uint8) for rgb in right.rgb))
+    said = " ".join(verdict(dark, tmp_path).sentences())
+    assert ("The colour pictures are dark: the middle brightness is" in said) == is_dark
 
 
 @pytest.fixture(scope="module")

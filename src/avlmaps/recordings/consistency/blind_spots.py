@@ -15,6 +15,8 @@ from avlmaps.recordings.types import Recording
 
 # Mistakes that are made to see whether they would show: twice, half, a moment.
 _FACTOR, _FOCAL, _DELAY_S = 2.0, 1.25, 0.3
+# Smaller ones of the depth, which shows where the camera moves among what it sees.
+_SLIGHT, _FARTHER_M = 1.15, 0.3
 _BESIDE, _ROLLED_DEG = 0.08, 6.0
 # A step that turns the camera by more than this share of its view leaves nothing that both frames see.
 _NO_OVERLAP = 0.9
@@ -58,6 +60,12 @@ def _spots(recording: Recording, trials: Trials, edges: Edges) -> Iterator[str]:
             "The scale of positions against depth cannot be checked here, because the camera moved within "
             f"{across_m:.2g} m, and between frames that see the same place hardly: positions twice as far apart would "
             "not show."
+        )
+    elif not shows(Suspect(scale=_SLIGHT), Suspect(scale=1.0 / _SLIGHT), Suspect(farther_m=_FARTHER_M)):
+        yield (
+            "The scale of positions against depth cannot be checked closely here, because between frames that see the "
+            f"same place the camera turns more than it moves: depths that are {_SLIGHT - 1.0:.0%} or {_FARTHER_M:g} m "
+            "too large would not show."
         )
     late, early = (Suspect(Corrections(pose_delay_s=s)) for s in (_DELAY_S, -_DELAY_S))
     if not shows(late, early):

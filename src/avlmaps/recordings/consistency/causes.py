@@ -8,6 +8,8 @@ from avlmaps.recordings.corrections import Corrections, GivenCamera, PoseKind
 # A camera in a building looks at this much, in the middle of what it sees.
 USUAL_DEPTH_M = (0.4, 7.0)
 _CLOSE = 0.06
+# Depth cameras that are not calibrated are off by this factor; more is another unit, or positions without a scale.
+_SLIGHT = 1.2
 _KINDS = {
     PoseKind.WXYZ: "the quaternions look written w first (wxyz)",
     PoseKind.CAMERA_FROM_WORLD: "the poses look like camera_from_world",
@@ -59,9 +61,19 @@ def _looks(suspect: Suspect, rig: Rig, median_m: float) -> list[str]:
         said.append(f"the principal point looks {by} off, or the camera turned by as many in its mount")
     if suspect.rolled_deg:
         said.append(f"the camera looks turned by {suspect.rolled_deg:+.0f} degrees about its own axis in its mount")
+    return (
+        said + _measured_otherwise(suspect) + _of_two_worlds(suspect) + _turned(suspect.turn_colour, suspect.turn_depth)
+    )
+
+
+def _measured_otherwise(suspect: Suspect) -> list[str]:
+    said: list[str] = []
+    if suspect.farther_m:
+        large = "large" if suspect.farther_m < 0.0 else "small"
+        said.append(f"the depth looks {abs(suspect.farther_m):.2g} m too {large} everywhere")
     if suspect.along_ray:
         said.append("the depth looks like the distance along the ray, not along the camera's axis")
-    return said + _of_two_worlds(suspect) + _turned(suspect.turn_colour, suspect.turn_depth)
+    return said
 
 
 def _of_two_worlds(suspect: Suspect) -> list[str]:
@@ -110,7 +122,9 @@ def _is_depth(scale: float, median_m: float) -> bool:
 
 
 def _is_positions(scale: float, median_m: float) -> bool:
-    return not _is_unit(scale) or (_usual(median_m) and not _usual(scale * median_m))
+    return (not _is_unit(scale) and max(scale, 1.0 / scale) > _SLIGHT) or (
+        _usual(median_m) and not _usual(scale * median_m)
+    )
 
 
 def _options(suspect: Suspect, rig: Rig, stored_unit_m: float, median_m: float) -> Corrections:
@@ -150,6 +164,8 @@ def _by_hand(suspect: Suspect, median_m: float) -> str:
         todo.append("turn the depth pictures as the colour is")
     if suspect.rolled_deg:
         todo.append("correct the transform from what the poses are of to the camera")
+    if suspect.farther_m:
+        todo.append(f"write the depth from the camera's centre ({suspect.farther_m:+.2g} m)")
     if suspect.along_ray:
         todo.append("write the depth along the camera's axis (z)")
     if suspect.turned_back:

@@ -22,8 +22,8 @@ LEAST_SMOOTH, IMPOSSIBLE_SMOOTH = 0.3, 0.1
 FEWEST_COLUMNS = 64
 LEAST_COLOURED = 0.6
 IMPOSSIBLE_COLOURED = 0.05
-# Dark to the eye, and nothing at all.
-DARK, FLAT = 8.0, 1.5
+# Of a camera that sees nothing; dark to the eye, of 255; and nothing at all.
+BLACK, DARK, FLAT = 8.0, 20.0, 1.5
 # More frames than this that are black are no camera that begins.
 MOST_BLACK = 0.1
 # Share of the depths that are exactly the largest one, in the middle of the frames: those of a wall differ.
@@ -168,7 +168,7 @@ def of_colour(sample: Sample, surfaces: Surfaces) -> Iterator[Finding]:
     spread = sample.grey.std(axis=(1, 2))
     level = float(np.median(sample.grey))
     flat = float((spread < FLAT).mean())
-    black = (spread < FLAT) & (sample.grey.mean(axis=(1, 2)) < DARK)
+    black = (spread < FLAT) & (sample.grey.mean(axis=(1, 2)) < BLACK)
     if MOST_BLACK < float(black.mean()) <= 0.5:
         which = np.flatnonzero(black)
         sentence = (
@@ -178,7 +178,7 @@ def of_colour(sample: Sample, surfaces: Surfaces) -> Iterator[Finding]:
         remedy = "Nothing is recognised in them; check the camera, or leave these frames out."
         yield Finding(Reason.COLOUR, Grade.SUSPICIOUS, sentence, remedy)
     if flat > 0.5:
-        shade = "black" if level < DARK else "of one colour"
+        shade = "black" if level < BLACK else "of one colour"
         sentence = f"{flat:.0%} of the {len(sample)} colour pictures that were looked at are {shade}."
         yield Finding(Reason.COLOUR, Grade.SUSPICIOUS, sentence, "Nothing can be recognised in them; check the camera.")
     elif level < DARK:

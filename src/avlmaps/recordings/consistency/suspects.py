@@ -18,8 +18,9 @@ PoseAt = Callable[[float], Float[np.ndarray, "f 4 4"] | None]
 # A frame of usual size has its depths compared with `SAME_M`; of a scene of another size it is this share.
 _FLOOR_SHARE, _APART_FLOOR_SHARE = SAME_M / 2.5, APART_SAME_M / 2.5
 UNITS = (0.5, 2.0, 0.25, 4.0, 0.2, 5.0, 0.1, 10.0, 0.01, 100.0, 0.001, 1000.0)
-_SCALES = (0.8, 1.25, 0.63, 1.6, 0.4, 2.5, *UNITS)
+_SCALES = (0.87, 1.15, 0.8, 1.25, 0.63, 1.6, 0.4, 2.5, *UNITS)
 _TWICE_SCALES = UNITS[:8]
+_FARTHER_M = (-0.3, -0.15, 0.15, 0.3)
 _ROLLED_DEG = (-8.0, -4.0, 4.0, 8.0)
 _OFF_CENTRE, _BESIDE_CENTRE = (-0.12, -0.06, 0.06, 0.12), (-0.03, 0.0, 0.03)
 _FOCAL = (0.5, 0.67, 0.8, 0.9, 1.12, 1.25, 1.5, 2.0)
@@ -91,6 +92,7 @@ class Suspect:
         turn_colour: how colour pictures are turned.
         turn_depth: how depth pictures are turned.
         along_ray: whether the depth is the distance along the ray.
+        farther_m: what is added to the depth before it is scaled.
         turned_back: whether the rotations alone are those of camera_from_world.
         places: which axes of the positions are x, y and z of the rotations, counted from 1, negative where they point
             the other way; None where they are the same.
@@ -106,6 +108,7 @@ class Suspect:
     turn_colour: Turn | None = None
     turn_depth: Turn | None = None
     along_ray: bool = False
+    farther_m: float = 0.0
     turned_back: bool = False
     places: tuple[int, int, int] | None = None
 
@@ -144,7 +147,7 @@ class Trials:
         """
         few = [_some(np.flatnonzero(kind)) for kind in (sample.follows, ~sample.follows)]
         self.sample, self._pose_at, self.given = sample.only(np.concatenate(few)), pose_at, given
-        self._depth: dict[tuple[Turn | None, bool], tuple[np.ndarray, Surfaces]] = {}
+        self._depth: dict[tuple[Turn | None, bool, float], tuple[np.ndarray, Surfaces]] = {}
         self._delayed: dict[float, np.ndarray | None] = {}
         usual = sample.depth_m[sample.depth_m > 0.0]
         self._median_m = float(np.median(usual)) if len(usual) else 1.0
@@ -181,7 +184,7 @@ class Trials:
 
     def _measured(self, suspect: Suspect) -> tuple[np.ndarray, Surfaces]:
         """Return the depth pictures of a suspect before they are scaled, and their surfaces."""
-        key = (suspect.turn_depth, suspect.along_ray)
+        key = (suspect.turn_depth, suspect.along_ray, suspect.farther_m)
         if key not in self._depth:
             depth_m = self.sample.depth_m
             if suspect.turn_depth is not None:
@@ -189,6 +192,8 @@ class Trials:
             if suspect.along_ray:
                 length = np.linalg.norm(self.sample.rig.depth.rays(), axis=2)
                 depth_m = (depth_m / length).astype(np.float32)
+            if suspect.farther_m:
+                depth_m = np.where(depth_m > 0.0, depth_m + np.float32(suspect.farther_m), depth_m)
             self._depth[key] = depth_m, Surfaces.of(depth_m, _POINTS)
         return self._depth[key]
 
@@ -247,7 +252,7 @@ def suspected_rig(rig: Rig, suspect: Suspect) -> Rig | None:
 
 
 def find_closer(trials: Trials) -> Trial | None:
-    """Return the scale, delay or focal length with which depths differ clearly less, None where there is none.
+    """Return the scale, offset, delay or focal length with which depths differ clearly less; None without one.
 
     With a slow camera, points stay within the tolerance of a surface in spite of such a mistake; their differences show
     it, and people who walk by do not change that.
@@ -255,7 +260,7 @@ def find_closer(trials: Trials) -> Trial | None:
     as_it_is = trials.run(Suspect())
     if not _LEAST_OFF < as_it_is.off < float("inf"):
         return None
-    tried = map(trials.run, (*_scales(), *_delays(), *_focal(), *_mounts()))
+    tried = map(trials.run, (*_scales(), *_farther(), *_delays(), *_focal(), *_mounts()))
     closer = [trial for trial in tried if _is_less_off(trial, as_it_is)]
     if not closer:
         return None
@@ -356,6 +361,10 @@ def _scales() -> Iterator[Suspect]:
     yield from (Suspect(scale=scale) for scale in _SCALES)
 
 
+def _farther() -> Iterator[Suspect]:
+    yield from (Suspect(farther_m=by_m) for by_m in _FARTHER_M)
+
+
 def _delays() -> Iterator[Suspect]:
     yield from (Suspect(Corrections(pose_delay_s=delay_s)) for delay_s in _DELAYS_S)
 
@@ -390,6 +399,7 @@ def _with(a: Suspect, b: Suspect) -> Suspect:
         turn_colour=a.turn_colour,
         turn_depth=a.turn_depth,
         along_ray=a.along_ray,
+        farther_m=a.farther_m,
         turned_back=a.turned_back,
         places=a.places,
     )
@@ -406,6 +416,8 @@ def _refined(trials: Trials, best: Trial) -> Trial:
         tried = [replace(suspect, scale=float(scale)) for scale in (*_SCALES, *fine.tolist())]
     elif suspect.focal is not None:
         tried = [replace(suspect, focal=float(suspect.focal * factor)) for factor in np.geomspace(0.88, 1.14, 9)]
+    elif suspect.farther_m:
+        tried = [replace(suspect, farther_m=suspect.farther_m + by_m) for by_m in (-0.1, -0.05, 0.05, 0.1)]
     elif suspect.rolled_deg:
         tried = [
             replace(suspect, rolled_deg=suspect.rolled_deg + degrees) for degrees in (-3.0, -2.0, -1.0, 1.0, 2.0, 3.0)
