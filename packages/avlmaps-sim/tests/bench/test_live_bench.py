@@ -1,5 +1,6 @@
 """`avlmaps bench live`: a short walk is driven, built and killed."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 
 import avlmaps
 from avlmaps_sim.bench.live.killed import lost_s
-from avlmaps_sim.bench.live.suite import LiveBench, run_live
+from avlmaps_sim.bench.live.suite import LiveBench, _code, run_live
 from avlmaps_sim.bench.output import BenchError
 from helpers.walked_room import write_walk
 
@@ -45,6 +46,26 @@ def test_kills_that_are_stored_are_not_made_again(tmp_path: Path, monkeypatch: p
     assert len(killed) == 5 and table["rows"] == [[4, 4, 3.0, 5.0, 0]]
     again = run_live([walk], used, "colours", LiveBench(laps=0, kills=2), 0, tmp_path / "out")
     assert len(killed) == 5 and again["kills at random moments"]["rows"] == [[2, 2, 1.5, 2.0, 0]]
+    other = shutil.copytree(walk, tmp_path / "other" / "rec")  # of the same name
+    first, second = sorted((other / "rgb").iterdir())[:2]
+    shutil.copyfile(second, first)
+    run_live([other], used, "colours", LiveBench(laps=0, kills=1), 0, tmp_path / "out")
+    assert len(killed) == 6
+
+
+def test_what_a_killed_process_runs_decides_whether_kills_are_made_again(tmp_path: Path) -> None:
+    module, weights = tmp_path / "package" / "maps" / "growing.py", tmp_path / "package" / "weights" / "eyes.npy"
+    for file in (module, weights):
+        file.parent.mkdir(parents=True)
+        file.write_text("one")
+    before = _code(tmp_path / "package")
+    (module.parent / "__pycache__").mkdir()
+    (module.parent / "__pycache__" / "growing.pyc").write_text("made")
+    assert _code(tmp_path / "package") == before
+    for file in (module, weights):
+        file.write_text("other")
+        assert _code(tmp_path / "package") != before
+        file.write_text("one")
 
 
 @pytest.mark.slow

@@ -9,11 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
+import avlmaps
 from avlmaps.core.files import write_bytes_atomically
 from avlmaps.core.progress import say
-from avlmaps.core.version import __version__
 from avlmaps.core.wording import option
-from avlmaps.live import live_map
 from avlmaps.live.settings import LiveSettings
 from avlmaps.maps.build import build_map
 from avlmaps.maps.store.reader import StoredMap
@@ -21,12 +20,14 @@ from avlmaps.perception.encoders import Encoders
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Recording
+from avlmaps_sim.bench.live import killed
 from avlmaps_sim.bench.live.killed import lost_s
 from avlmaps_sim.bench.live.played import Played, play
 from avlmaps_sim.bench.output import BenchError, Table
 
 _VOXEL_M = 0.05
 _SHOWN_LAPS = 12  # of an hour
+_KILLED = Path(killed.__file__)
 _Rows = list[list[object]]
 
 
@@ -36,7 +37,7 @@ class LiveBench:
 
     Attributes:
         laps: how often each recording is driven at its own pace; 0 measures kills alone.
-        kills: how many processes are killed; those that a folder of work holds, of the same code, are not repeated.
+        kills: how many processes are killed; those that a folder of work holds, of the same package, are not repeated.
         rate: how many times faster than it was recorded a recording is driven.
         ends: whether its end is compared with the build, and it is also driven as fast as the map takes it.
     """
@@ -143,8 +144,7 @@ def _processor(found: Played) -> list[float]:
 
 def _kills(recording: Path, path: Path, profile: str, kills: int, seed: int, work: Path) -> list[float]:
     """Return how much each kill lost; those of before are read from the folder of work, and each new one is added."""
-    code = [file.read_bytes() for file in sorted(Path(live_map.__file__).parent.glob("*.py"))]
-    facts = recording.resolve().name, profile, seed, __version__, sha256(b"".join(code)).hexdigest()
+    facts = open_recording(recording).fingerprint, profile, seed, _code(Path(avlmaps.__file__).parent, _KILLED)
     stored = work / f"live-kills-{sha256(repr(facts).encode()).hexdigest()[:12]}.json"
     lost: list[float] = json.loads(stored.read_bytes())[:kills] if stored.is_file() else []
     if lost:
@@ -155,6 +155,16 @@ def _kills(recording: Path, path: Path, profile: str, kills: int, seed: int, wor
         write_bytes_atomically(stored, json.dumps(lost).encode())
         say(f"live: kill {number + 1} of {kills} lost {lost[-1]:.1f} s")
     return lost
+
+
+def _code(*places: Path) -> str:
+    """Return a hash of what a process that is killed runs: the whole package, its weights among it, and the bench."""
+    digest = sha256()
+    for place in places:
+        for file in sorted(place.rglob("*")) if place.is_dir() else [place]:
+            if file.is_file() and "__pycache__" not in file.parts:
+                digest.update(str(file.relative_to(place)).encode() + b"\0" + sha256(file.read_bytes()).digest())
+    return digest.hexdigest()
 
 
 def _killed(lost: list[float]) -> list[list[object]]:
