@@ -247,6 +247,27 @@ def test_one_order_at_a_time_and_a_stop_at_any_time(client: TestClient, drive: D
     assert "stop" in drive.events
 
 
+def test_an_area_that_is_forbidden_while_it_drives_stops_the_robot(
+    client: TestClient, drive: Driven, service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    known: dict[str, str] = {}
+    monkeypatch.setattr("avlmaps.serve.drive.orders._WATCH_S", 0.01)
+    monkeypatch.setattr("avlmaps.serve.drive.orders._forbidden", lambda now: dict(known))
+    token = plan(client, "wait 500 seconds, then turn left")["token"]
+    assert client.post("/drive/confirm", json={"token": token}).status_code == 202
+    from avlmaps.serve.shelf import ServedMap
+
+    monkeypatch.setattr(ServedMap, "version", property(lambda self: "renamed"))
+    sleep(0.1)
+    assert client.get("/drive/status").json()["state"] == "driving", "another edit stops nothing"
+    known["7f"] = "the wet floor"
+    monkeypatch.setattr(ServedMap, "version", property(lambda self: "forbidden"))
+    last = idle(client)["last"]
+    assert last["stopped"] is True and last["outcome"]["ok"] is False
+    assert drive.machine.motions == 0 and drive.machine.stops == 1 and "stop" in drive.events
+    assert last["note"] == "the wet floor was forbidden while the robot drove; plan again."
+
+
 def test_a_stop_ends_a_wait_and_what_comes_after_it(client: TestClient, drive: Driven) -> None:
     token = plan(client, "wait 500 seconds, then turn left")["token"]
     assert client.post("/drive/confirm", json={"token": token}).status_code == 202

@@ -36,6 +36,7 @@ log = logging.getLogger("avlmaps.serve.drive")
 _REHEARSAL = Budget(seconds=20.0)
 _MOVED_M, _MOVED_RAD = 0.5, 0.35  # a robot that stands elsewhere than its plan begins is not driven by it
 _LONGEST_STOP_S, _STOP_AGAIN_S = 15.0, 0.5
+_WATCH_S = 0.5
 _MOST_LINES, _LONGEST_LINE = 50, 500
 _KINDS = {"GoalNotFoundError": "goal-not-found", "NavigationError": "navigation", "ProgramError": "program"}
 
@@ -49,6 +50,8 @@ class Order:
     brake: Brake = field(default_factory=Brake)
     lines: deque[str] = field(default_factory=lambda: deque(maxlen=_MOST_LINES))
     thread: threading.Thread | None = None
+    over: threading.Event = field(default_factory=threading.Event)
+    why: str = ""
 
 
 class Dispatcher:
@@ -256,6 +259,8 @@ class Dispatcher:
     def _run(self, order: Order, who: Who) -> None:
         outcome: Outcome | None = None
         error = "The order ended by a fault of avlmaps; the server's log has the details."
+        watch = copy_context().run
+        threading.Thread(target=watch, args=(self._watch, order), name="avlmaps-watch", daemon=True).start()
         try:
             outcome = instruct(
                 order.plan.words, order.now.avlmap, self._machine.driver(order.brake), LearnedTranslator(),
@@ -267,17 +272,36 @@ class Dispatcher:
             log.exception("order %s", order.plan.order)
             order.brake.pull()
             self._halt()
+        order.over.set()
         answer = {"ok": False, "error": error} if outcome is None else outcome.to_json()
         ended = {
             "order": order.plan.order,
             "words": order.plan.words,
             "stopped": order.brake.pulled,
             "outcome": answer,
+            **({"note": order.why} if order.why else {}),
         }
         self._note("ended", {"who": who.to_json(), **ended})
         with self._lock:
             self._running, self._last = None, ended
         self._changed()
+
+    def _watch(self, order: Order) -> None:
+        """Stop the robot when a person forbids an area while it drives: the order knows the map as it was."""
+        known = _forbidden(order.now)
+        while not order.over.wait(_WATCH_S):
+            try:
+                now = self._current()
+                added = {} if now.version == order.now.version else _forbidden(now)
+            except Exception:  # a map that is being written, or that was taken away, forbids nothing new
+                log.debug("the map of order %s cannot be read", order.plan.order, exc_info=True)
+                continue
+            names = [name for edit, name in added.items() if edit not in known]
+            if names and not order.over.is_set():
+                order.why = printable(f"{', '.join(names)} was forbidden while the robot drove; plan again.")
+                self._tell(order, order.why)
+                self.stop(Who("server", "edit"))
+                return
 
     def _tell(self, order: Order, line: str) -> None:
         order.lines.append(printable(line, _LONGEST_LINE))
@@ -395,6 +419,11 @@ class _Standing:
         raise NavigationError("This robot only stands.")
 
     go_to = turn = forward = stop = _refused
+
+
+def _forbidden(now: MapNow) -> dict[str, str]:
+    """Return the areas of a map that no robot enters: their names by the ids of their edits."""
+    return {edit.id: edit.name for edit in now.avlmap.edited.edits if edit.does == "forbid"}
 
 
 def _refusal(error: AvlmapsError) -> DriveError:
