@@ -133,10 +133,48 @@ def test_a_dry_run_prints_the_program_and_opens_nothing(answer) -> None:
 def test_a_place_of_sounds_is_said_to_be_idle_where_no_sound_is_named(answer, at: str) -> None:
     given = ("--dry-run", "--at", at)
     assert answer("go", "nowhere.avlmap", "go to the chair", *given)["notes"] == [
-        f"--at {at} has no effect: no sound is named."
+        "--at has no effect: no sound is named."
     ]
     assert answer("go", "nowhere.avlmap", "go to the barking", *given)["notes"] == []
     assert answer("go", "nowhere.avlmap", "go to the chair", "--dry-run")["notes"] == []
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "why"),
+    [
+        ("--image", "x.png", "the sentence speaks of no photo"),
+        ("--sound-clip", "x.wav", "the sentence speaks of no recording"),
+        ("--ros", "ws://robot:9090", "the robot is simulated"),
+        ("--ros-frames", "frames.json", "the robot is simulated"),
+        ("--chat-model", "m", "--language is learned"),
+        ("--plot", "way.png", "nothing is driven"),
+    ],
+)
+def test_an_option_without_effect_is_said(answer, option: str, value: str, why: str) -> None:
+    said = answer("go", "nowhere.avlmap", "go to the chair", "--dry-run", option, value)
+    assert said["notes"] == [f"{option} has no effect: {why}."]
+
+
+@pytest.mark.parametrize(
+    ("sentence", "option", "file"),
+    [
+        ("go to where this photo was taken", "--image", "x.png"),
+        ("go to the sound of this recording", "--sound-clip", "x.wav"),
+    ],
+)
+def test_a_file_that_the_sentence_speaks_of_has_an_effect(answer, sentence: str, option: str, file: str) -> None:
+    assert answer("go", "nowhere.avlmap", sentence, "--dry-run", option, file)["notes"] == []
+
+
+def test_a_query_says_which_options_have_no_effect(answer, built: Path, tmp_path: Path) -> None:
+    plot = tmp_path / "heat.png"
+    said = answer("query", built, "how many sounds are there?", "--plot", plot, "--at", "robot")
+    assert said["notes"][-2:] == [
+        "--at has no effect: no sound is named.", "--plot has no effect: the answer has no heat to draw.",
+    ]  # fmt: skip
+    assert not plot.exists()
+    said = answer("query", built, "the red thing", "--plot", plot)
+    assert plot.exists() and not [note for note in said.get("notes", ()) if "effect" in note]
 
 
 def test_a_chat_model_without_its_extra_says_how_to_get_it(run, built: Path, monkeypatch: pytest.MonkeyPatch) -> None:

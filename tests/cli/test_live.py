@@ -90,6 +90,18 @@ def test_options_that_contradict_are_refused(
     assert not (tmp_path / "no.avlmap").exists()
 
 
+def test_what_has_no_effect_on_a_recording_that_is_written_is_said(run, walk: Path, tmp_path: Path) -> None:
+    growing = shutil.copytree(walk, tmp_path / "growing")
+    (growing / DESCRIPTION).rename(growing / UNFINISHED)
+    words = ("live", growing, "--out", tmp_path / "m.avlmap", "--profile", "colours", "--give-up-s", "0.1")
+    code, _, err = run(*words, "--depth-unit", "0.01")
+    assert code == 2 and "leave them out, or play it when it is finished" in err
+    code, _, err = run(*words, "--rate", "2", "--port", "1")
+    assert code == 0, err
+    assert "--rate has no effect: the recording is being written." in err
+    assert "--port has no effect: neither --serve nor --view is given." in err
+
+
 def test_a_device_that_is_not_known_or_not_recorded_is_refused(run, walk: Path, built: Path, tmp_path: Path) -> None:
     code, _, err = run("live", walk, "--out", tmp_path / "no.avlmap", "--same-device", built)
     assert code == 1 and "has no directions that a device said" in err

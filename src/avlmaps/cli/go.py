@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from tyro.conf import OmitArgPrefixes, Positional, arg
 
 from avlmaps.cli.output import AnsweredError, UsageError, emit, error_answer, kind_named, table_lines
-from avlmaps.cli.verb import MapVerb
+from avlmaps.cli.verb import MapVerb, idle
 from avlmaps.core.files import user_path
 from avlmaps.core.progress import say
 from avlmaps.core.wording import place_text
@@ -150,16 +150,30 @@ def _query_settings(verb: "Go") -> "QuerySettings":
 
 
 def _read(verb: "Go", translator: "Translator") -> "Translation":
-    """Return the program of the sentence; a place that was chosen for its sounds is said to be idle without one."""
+    """Return the program of the sentence, with a note for each option that has no effect on it."""
     if verb.explain:
         from avlmaps.language.learned_translator import explanation
 
         for line in explanation(translator, verb.sentence):
             say(line)
     translation = translator.program_for(verb.sentence)
-    if verb.at is None or "sound=" in translation.program:
-        return translation
-    return replace(translation, notes=(*translation.notes, f"--at {verb.at} has no effect: no sound is named."))
+    return replace(translation, notes=(*translation.notes, *_idle(verb, translation.program)))
+
+
+def _idle(verb: "Go", program: str) -> list[str]:
+    """Return which options have no effect, and why."""
+    notes: list[str] = []
+    if "sound=" not in program:
+        notes += idle(verb, ["at"], "no sound is named")
+    if "load_image(" not in program:
+        notes += idle(verb, ["image"], "the sentence speaks of no photo")
+    if "load_sound(" not in program:
+        notes += idle(verb, ["sound_clip"], "the sentence speaks of no recording")
+    if verb.robot == "simulated":
+        notes += idle(verb, ["ros", "ros_frames"], "the robot is simulated")
+    if verb.language != "chat":
+        notes += idle(verb.chat, ["chat_model", "chat_url", "chat_replay"], f"--language is {verb.language}")
+    return [*notes, *(idle(verb, ["plot"], "nothing is driven") if verb.dry_run else ())]
 
 
 def _planned(verb: "Go", settings: "QuerySettings") -> dict[str, Any]:

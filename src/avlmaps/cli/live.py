@@ -11,7 +11,7 @@ from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 from avlmaps.cli.info import describe_map, info_lines
 from avlmaps.cli.output import UsageError, emit
 from avlmaps.cli.reading_options import Reading, topics_of
-from avlmaps.cli.verb import ModelVerb
+from avlmaps.cli.verb import ModelVerb, idle
 from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
@@ -106,6 +106,8 @@ def _live(verb: Live) -> dict[str, Any]:
         raise UsageError("--rate and --as-fast-as-possible do not go together; choose one of them.")
     if not verb.give_up_s > 0.0:
         raise UsageError(f"--give-up-s is {verb.give_up_s:g}; choose a positive number of seconds.")
+    for note in [] if verb.serve or verb.view else idle(verb, ["port"], "neither --serve nor --view is given"):
+        say(f"note: {note}")
     first = _days_before(verb)
     used = choose_models(verb.profile, [word for words in verb.model for word in words])
     source = _robot(verb) if verb.source == "ros2" else _recording(verb)
@@ -169,6 +171,13 @@ def _recording(verb: Live) -> _Source:
     if path is None:
         raise UsageError("live needs a recording, REC, or --source ros2.")
     if is_being_written(path):
+        if verb.reading != Reading():
+            raise UsageError(
+                "--depth-unit, --intrinsics and the like are of a finished recording, and this one is being written; "
+                "leave them out, or play it when it is finished."
+            )
+        for note in idle(verb, ["rate", "as_fast_as_possible", "format", "topics"], "the recording is being written"):
+            say(f"note: {note}")
         up_in_world = decode_description(path / UNFINISHED).up_in_world
         return _Source(
             up_in_world,
@@ -176,6 +185,8 @@ def _recording(verb: Live) -> _Source:
             microphones,
             lambda live, over: follow(path, live, verb.give_up_s, over=over, microphones=microphones),
         )
+    for note in idle(verb, ["give_up_s"], "the recording is finished"):
+        say(f"note: {note}")
     recording = open_recording(
         path,
         format=verb.format,

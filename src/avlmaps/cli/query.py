@@ -8,7 +8,7 @@ from tyro.conf import Positional, arg
 from avlmaps.cli.address_space import require_address_space
 from avlmaps.cli.locate import numbers_of
 from avlmaps.cli.output import emit, query_lines
-from avlmaps.cli.verb import MapVerb, OptionalPath, OptionalText
+from avlmaps.cli.verb import MapVerb, OptionalPath, OptionalText, idle
 from avlmaps.core.frames import FrameName
 
 if TYPE_CHECKING:
@@ -93,7 +93,13 @@ def ask(verb: "Query", opened: "AVLMap | None" = None) -> dict[str, Any]:
         "image": verb.image,
         "clip": verb.sound_clip,
     }
-    return answered(
+    told = answered(
         lambda: opened or AVLMap.open(verb.map, settings), verb.sentence, verb.top, primary=primary,
         intrinsics=numbers, plot=verb.plot, frame=FrameName(verb.frame), **given,
     )  # fmt: skip
+    notes: list[str] = []
+    if not any(part["modality"] == Modality.SOUND for part in told["parts"]):
+        notes += idle(verb, ["at"], "no sound is named")
+    if "plot" not in told:
+        notes += idle(verb, ["plot"], "the answer has no heat to draw")
+    return {**told, "notes": [*told.get("notes", ()), *notes]} if notes else told

@@ -1,10 +1,14 @@
 """The options of every verb, and of every verb that runs models."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal, Optional
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Optional
 
 from tyro.conf import Positional, arg
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 # The parser checks the default of a `str | None` with a package that takes longer to load than a question to answer;
 # it knows these itself.
@@ -25,6 +29,19 @@ class Verb:
     def run(self) -> None:
         """Do it."""
         raise NotImplementedError
+
+
+def idle(options: "DataclassInstance", names: Sequence[str], why: str) -> list[str]:
+    """Return a note for each option that was given and has no effect.
+
+    Args:
+        options: a verb, or a group of its options.
+        names: of fields.
+        why: the reason, the same for all.
+    """
+    defaults = {each.name: each.default for each in fields(options)}
+    given = [name for name in names if getattr(options, name) != defaults[name]]
+    return [f"--{name.replace('_', '-')} has no effect: {why}." for name in given]
 
 
 @dataclass(frozen=True, kw_only=True)
