@@ -82,6 +82,7 @@ _NONE = np.zeros(0, np.int64)
 NOTHING = Agreement(_NONE, _NONE, _NONE, _NONE, np.zeros(0), 0.0, float("nan"), np.zeros(0), 0, 0.0)
 
 
+@np.errstate(divide="ignore", invalid="ignore", over="ignore")  # of points beside and behind a camera
 def compare(
     sample: Sample, surfaces: Surfaces, world_from_camera: Float[np.ndarray, "f 4 4"], rig: Rig | None = None,
     scale: float = 1.0, floor_m: float = SAME_M,
@@ -107,11 +108,10 @@ def compare(
     y = (row + 0.5 - camera.cy) / camera.fy * z
     points = np.stack([x, y, z], axis=-1)
     b_from_a = poses.inverse(world_from_camera[b]) @ world_from_camera[a]
-    moved = np.einsum("pij,pmj->pmi", b_from_a[:, :3, :3], points) + b_from_a[:, None, :3, 3]
+    moved = points @ np.swapaxes(b_from_a[:, :3, :3], 1, 2) + b_from_a[:, None, :3, 3]
     far = moved[..., 2]
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        u = camera.fx * moved[..., 0] / far + camera.cx
-        v = camera.fy * moved[..., 1] / far + camera.cy
+    u = camera.fx * moved[..., 0] / far + camera.cx
+    v = camera.fy * moved[..., 1] / far + camera.cy
     inside = there & (far > _LEAST_DEPTH_M) & (u >= 0.0) & (v >= 0.0) & (u < camera.width) & (v < camera.height)
     at_u, at_v = np.where(inside, u, 0.0).astype(int), np.where(inside, v, 0.0).astype(int)
     near = surfaces.near_m[b[:, None], at_v, at_u] * scale
@@ -150,14 +150,13 @@ def without_occluded(found: Agreement, sample: Sample, surfaces: Surfaces) -> Ag
 
 
 def _off(measured: Float[np.ndarray, "p m"], expected: Float[np.ndarray, "p m"], seen: np.ndarray) -> np.ndarray:
+    """Return the median difference of each pair; NaN where too few points are seen."""
     usable = seen & (measured > 0.0)
-    usable &= (usable.sum(axis=1) >= FEWEST_POINTS)[:, None]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        share = np.where(usable, np.abs(measured - expected) / expected, np.nan)
-    off = np.full(len(share), np.nan)
-    rows = usable.any(axis=1)
-    off[rows] = np.nanmedian(share[rows], axis=1)
-    return off
+    count = usable.sum(axis=1)
+    share = np.sort(np.where(usable, np.abs(measured - expected) / expected, np.inf), axis=1)
+    row = np.arange(len(share))
+    median = 0.5 * (share[row, np.maximum(count - 1, 0) // 2] + share[row, np.minimum(count // 2, share.shape[1] - 1)])
+    return np.where(count >= FEWEST_POINTS, median, np.nan)
 
 
 def _likeness(
@@ -192,9 +191,8 @@ def _looked_up(
 ) -> tuple[np.ndarray, np.ndarray]:
     camera = rig.rgb
     seen = points @ rig.rgb_from_depth[:3, :3].T + rig.rgb_from_depth[:3, 3]
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        u = camera.fx * seen[..., 0] / seen[..., 2] + camera.cx
-        v = camera.fy * seen[..., 1] / seen[..., 2] + camera.cy
+    u = camera.fx * seen[..., 0] / seen[..., 2] + camera.cx
+    v = camera.fy * seen[..., 1] / seen[..., 2] + camera.cy
     ok = (seen[..., 2] > _LEAST_DEPTH_M) & (u >= 0.0) & (v >= 0.0) & (u < camera.width) & (v < camera.height)
     at_u, at_v = np.where(ok, u, 0.0).astype(int), np.where(ok, v, 0.0).astype(int)
     return sample.grey[frames[:, None], at_v, at_u].astype(np.float64), ok

@@ -148,6 +148,7 @@ class Trials:
         few = [_some(np.flatnonzero(kind)) for kind in (sample.follows, ~sample.follows)]
         self.sample, self._pose_at, self.given = sample.only(np.concatenate(few)), pose_at, given
         self._depth: dict[tuple[Turn | None, bool, float], tuple[np.ndarray, Surfaces]] = {}
+        self._kinds: dict[tuple[Turn | None, Turn | None, bool, float], tuple[Sample, Sample]] = {}
         self._delayed: dict[float, np.ndarray | None] = {}
         usual = sample.depth_m[sample.depth_m > 0.0]
         self._median_m = float(np.median(usual)) if len(usual) else 1.0
@@ -158,24 +159,20 @@ class Trials:
 
     def run(self, suspect: Suspect) -> Trial:
         """Return how well the sample agrees with a suspect; a score of 0 where it cannot be tried."""
-        sample, given = self.sample, suspect.given.over(self.given)
+        given = suspect.given.over(self.given)
         delay_s = given.pose_delay_s or 0.0
         if delay_s not in self._delayed:
             self._delayed[delay_s] = self._pose_at(delay_s)
         pose = self._delayed[delay_s]
-        depth_m, surfaces = self._measured(suspect)
-        grey = sample.grey if suspect.turn_colour is None else suspect.turn_colour(sample.grey)
-        rig = suspected_rig(sample.rig, suspect)
+        rig = suspected_rig(self.sample.rig, suspect)
         if rig is None or pose is None:
             return Trial(suspect, NOTHING, NOTHING, 0.0)
-        sample = replace(sample, depth_m=depth_m, grey=grey)
-        median_m, scale, pose = (
-            self._median_m * suspect.scale,
-            suspect.scale,
-            _replaced(reread_poses(pose, given), suspect) @ _rolled(suspect.rolled_deg),
+        pose = _replaced(reread_poses(pose, given), suspect) @ _rolled(suspect.rolled_deg)
+        surfaces, median_m = self._measured(suspect)[1], self._median_m * suspect.scale
+        after, apart = (
+            compare(kind, surfaces, pose, rig, suspect.scale, floor * median_m)
+            for kind, floor in zip(self._turned(suspect), (_FLOOR_SHARE, _APART_FLOOR_SHARE), strict=True)
         )
-        after = compare(sample.only(sample.follows), surfaces, pose, rig, scale, _FLOOR_SHARE * median_m)
-        apart = compare(sample.only(~sample.follows), surfaces, pose, rig, scale, _APART_FLOOR_SHARE * median_m)
         return Trial(suspect, after, apart, self._score(after, apart))
 
     @staticmethod
@@ -196,6 +193,15 @@ class Trials:
                 depth_m = np.where(depth_m > 0.0, depth_m + np.float32(suspect.farther_m), depth_m)
             self._depth[key] = depth_m, Surfaces.of(depth_m, _POINTS)
         return self._depth[key]
+
+    def _turned(self, suspect: Suspect) -> tuple[Sample, Sample]:
+        """Return the sample with a suspect's pictures: pairs that follow one another, and those from apart."""
+        key = (suspect.turn_colour, suspect.turn_depth, suspect.along_ray, suspect.farther_m)
+        if key not in self._kinds:
+            grey = self.sample.grey if suspect.turn_colour is None else suspect.turn_colour(self.sample.grey)
+            sample = replace(self.sample, depth_m=self._measured(suspect)[0], grey=grey)
+            self._kinds[key] = sample.only(sample.follows), sample.only(~sample.follows)
+        return self._kinds[key]
 
     def _score(self, found: Agreement, apart: Agreement) -> float:
         """Return the share of points on one surface, times the likeness of their colour as far as that varies."""
