@@ -17,6 +17,7 @@ ORIGIN = (
     "from where did the doorbell ring?", "where do you hear the barking from?", "what made that noise?",
     "which room does the barking come from?", "where is the source of the alarm?",
     "the chair near where the bark came from", "what is making the noise?", "where is the thing that rings?",
+    "where is the ringing device?", "the chair near the beeping thing",
     "where is the phone that is ringing?", "what is beeping?", "who was laughing?", "the origin of the dripping",
     "where is the device responsible for the beeping?",
 )  # fmt: skip
@@ -78,6 +79,28 @@ def test_a_command_may_mean_the_source(command: str) -> None:
 def test_a_look_alike_means_where_it_was_heard(command: str) -> None:
     assert places(command) == [None]
     assert "at=" not in LearnedTranslator(WORDS).program_for(command).program
+
+
+@pytest.mark.parametrize(
+    "named",
+    [
+        "the thing that beeps", "the beeping thing", "the beeping device", "whatever is beeping", "what is beeping",
+        "the machine that beeps", "the device that is beeping", "something that beeps",
+    ],
+)  # fmt: skip
+def test_a_thing_is_named_by_its_sound_alone(named: str) -> None:
+    beeping = 'robot.get_major_map(sound="beeping", at="source")'
+    translator = LearnedTranslator(WORDS)
+    assert translator.program_for(f"go to {named}").program == f"robot.move_to(robot.get_max_pos_3d({beeping}))\n"
+    between = translator.program_for(f"go between {named} and the thing that rings").program
+    assert between == f'robot.move_in_between({beeping}, robot.get_major_map(sound="ringing", at="source"))\n'
+    near = translator.program_for(f"go to the chair near {named}").program
+    assert near.startswith('heat1 = robot.get_major_map(obj="chair") * robot.get_map(sound="beeping", at="source")\n')
+
+
+@pytest.mark.parametrize("name", ["washing machine", "sewing machine", "running machine"])
+def test_a_machine_that_is_called_by_what_it_does_is_a_thing(name: str) -> None:
+    assert LearnedTranslator(WORDS).program_for(f"go to the {name}").program == f'robot.move_to_object("{name}")\n'
 
 
 @pytest.mark.parametrize("command", ["go back to where you came from", "go to the sofa", "go to the kitchen"])

@@ -5,7 +5,7 @@ Five forms are rewritten, token by token, before a command is read:
 - what another person should make the robot do: "send the robot to the lab", "tell it to turn left";
 - a time before an order: "in five minutes go to the door", "go to the door in five minutes";
 - a loop as programs have it: "for i in range(3): go to the door";
-- what a thing does by which it is found: "the thing that rings" is "the thing that is ringing";
+- what a thing does by which it is found: "the thing that rings", "the ringing device" are "whatever is ringing";
 - a label as data sets have it: "the object of class lamp", "the sound labelled glass breaking".
 """
 
@@ -15,7 +15,7 @@ from functools import cache
 
 from avlmaps.language import lexer
 from avlmaps.language.lexer import Token
-from avlmaps.language.names import is_entry, sounding_forms, third_forms
+from avlmaps.language.names import NAMELESS, describes, is_entry, sounding_forms, sounding_thing, third_forms
 from avlmaps.language.word_classes import load_word_classes
 
 _ROBOTS = frozenset({"robot", "bot", "machine", "rover", "droid", "vehicle", "unit", "roomba", "turtlebot", "agent"})
@@ -141,16 +141,34 @@ def _joined(tokens: Sequence[Token]) -> list[Token]:
 
 
 def _sounding(tokens: Sequence[Token]) -> list[Token]:
-    """Return tokens with "the thing that rings" as "the thing that is ringing": rings are things, too."""
+    """Return tokens with "the thing that rings" as "whatever is ringing": rings are things, too."""
     found: list[Token] = []
     for token in tokens:
         before = [one.text for one in found[-2:]]
         relates = before[-1:] and (before[-1] in _WHATEVER or (before[-1] in _RELATIVE and before[0] in _GENERIC))
+        relates = relates or (before[-1:] and before[-1] in _RELATIVE and before[0] in NAMELESS)
         if relates and token.text in third_forms():
             found += [_word(token, "is"), _word(token, sounding_forms()[token.text])]
         else:
             found.append(token)
+        found = _nameless(found)
     return found
+
+
+def _nameless(tokens: list[Token]) -> list[Token]:
+    """Return tokens at the end of which "the beeping device", "the thing that is beeping" are "whatever is beeping"."""
+    last = [token.text for token in tokens[-4:]]
+    if sounding_thing(*last[-2:]):
+        begin, sound = len(tokens) - 2, tokens[-2]
+    elif last[1:2] and last[1] in _RELATIVE and last[2:3] == ["is"] and sounding_thing(last[-1], last[0]):
+        begin, sound = len(tokens) - 4, tokens[-1]
+    else:
+        return tokens
+    before = tokens[begin - 1].text if begin else ""
+    if describes(before):  # "the blue beeping thing"
+        return tokens
+    begin -= before in _ARTICLES | {"an", "some", "any"}
+    return [*tokens[:begin], _word(sound, "whatever"), _word(sound, "is"), sound]
 
 
 def _word(like: Token, text: str, kind: str = "word") -> Token:

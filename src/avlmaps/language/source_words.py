@@ -6,9 +6,10 @@ each of its parts has its own place; so have several sounds of a question that s
 
 import re
 from collections.abc import Collection, Iterator, Sequence
+from itertools import pairwise
 
 from avlmaps.language.lexer import Token
-from avlmaps.language.names import past_forms, sounding_words, sounds_like, third_forms
+from avlmaps.language.names import SILENT, past_forms, sounding_thing, sounding_words, sounds_like, third_forms
 
 # Whose way it is, and no sound's: "go back to where you came from".
 _WHO = ("you", "we", "i", "they", "he", "she", "robot")
@@ -29,13 +30,6 @@ _ITSELF = re.compile(
 )
 _HEARD = re.compile(r"\b(?:hear|hears|heard|hearing|listened)\b")
 _SOUND_OF = re.compile(r"\b(?:sounds?|noises?) of\b")
-# Verbs that sound, and are said of much that does not: "the chair that goes with it", "the boy who is running".
-_SILENT = frozenset({
-    "goes", "going", "went", "falls", "falling", "fell", "runs", "running", "ran", "steps", "stepping", "stepped",
-    "plays", "playing", "played", "calls", "calling", "called", "brushes", "brushing", "brushed",
-    "sweeps", "sweeping", "swept",
-    "stirs", "stirring", "stirred", "cooks", "cooking", "cooked", "fries", "frying", "fried", "stomps", "breathes",
-})  # fmt: skip
 _BREAKS = frozenset({"then", "finally", "and", "but", "or"})
 _RECORDINGS = frozenset({"recording", "clip", "audio", "tape", "sound", "noise"})
 _REFERS = frozenset({"it", "its", "that", "this", "they", "them", "their"})
@@ -60,10 +54,12 @@ def asks_for_source(text: str, sound: Collection[str] = ()) -> bool:
 
 
 def _sounds_itself(text: str, sound: Collection[str]) -> bool:
-    """Return whether a thing is named by the sound that it makes: "the phone that is ringing", "whatever beeps"."""
+    """Return whether a thing is named by the sound that it makes: "the phone that is ringing", "the beeping device"."""
+    if any(sounding_thing(*pair) for pair in pairwise(re.findall(r"[\w-]+", text))):
+        return True
     for found in _ITSELF.finditer(text):
         verb = found[2]
-        if verb not in sound if sound else verb in _SILENT:
+        if verb not in sound if sound else verb in SILENT:
             continue
         if found[1] and (sounds_like(verb) or verb in sounding_words()):
             return True
