@@ -234,5 +234,6 @@ def test_a_dry_run_says_of_the_map_what_the_drive_says(run, built: Path, in_room
         ("--dry-run", "--json"), ("--scene", "room", "--json"),
     ))  # fmt: skip
     assert dry["program"] == drive["program"] and dry["ok"] and dry["path_m"] == 0.0
+    assert dry["missing"] == drive["error"]
     told = [*drive["notes"], *([drive["error"]["message"]] if drive["error"] else [])]
     assert dry["notes"] == [one for one in told if "could stop" not in one and one != "the program moved nothing"]

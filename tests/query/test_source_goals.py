@@ -77,12 +77,12 @@ def test_a_wide_region_is_not_found_and_said() -> None:
 
 def test_a_goal_at_a_source_says_where_the_sound_comes_from() -> None:
     heat = heat_of([0.9], [Spread(0.9, 0.2, 0.5)])
-    said = found_text([heat.lead.part], heat.goals()[0])
+    said = found_text([PartAnswer(heat.lead.part, 0.9, True)], heat.goals()[0])
     assert said.startswith("Where the sound of smoke alarm comes from is most likely at (0.50, 2.00, 0.40) m")
     assert "probability 0.81" in said and "within 0.20 m" in said
-    chair = Part(Modality.OBJECT, "chair", Role.PRIMARY)
-    context = Part(Modality.SOUND, "barking", at="source")
-    assert "near where the sound of barking comes from" in found_text([chair, context], heat.goals()[0])
+    both = Part(Modality.OBJECT, "chair", Role.PRIMARY), Part(Modality.SOUND, "barking", at="source")
+    said = found_text([PartAnswer(part, 0.9, True) for part in both], heat.goals()[0])
+    assert "near where the sound of barking comes from" in said
 
 
 def test_a_sound_that_is_not_located_yet_is_not_called_unheard() -> None:

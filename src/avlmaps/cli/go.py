@@ -185,16 +185,18 @@ def _planned(verb: "Go", settings: "QuerySettings") -> dict[str, Any]:
 
 def plan_answer(verb: "Go", translation: "Translation", avlmap: "AVLMap | None") -> dict[str, Any]:
     """Return the answer for a command that is read and not obeyed, with what a drive would report of its map."""
-    told: tuple[str, ...] = ()
+    told, missing = (), None
     if avlmap is not None:
         from avlmaps.navigate.rehearsal import told_by_map
 
-        told = told_by_map(translation.program, avlmap, verb.sentence, guess=verb.guess)
+        told, run = told_by_map(translation.program, avlmap, verb.sentence, guess=verb.guess)
+        if run is not None and run.error is not None and run.error_type is not None:
+            missing = error_answer(kind_named(run.error_type), run.error)
     return {
         "plan": translation.plan,
         "program": translation.program, "steps": [], "actions": [], "subgoals": [], "ok": True, "error": None,
         "notes": list(dict.fromkeys((*translation.notes, *told))), "path_m": 0.0, "elapsed_s": 0.0,
-        "frame": "recording",
+        "frame": "recording", "missing": missing,
     }  # fmt: skip
 
 

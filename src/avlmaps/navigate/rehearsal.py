@@ -60,8 +60,12 @@ class _StandingDriver:
         return Arrival(True, self.pose, (), np.zeros((1, 2)))
 
 
-def told_by_map(program: str, avlmap: AVLMap, command: str = "", *, guess: bool = False) -> tuple[str, ...]:
-    """Return what a drive would report of the map: its doubts, what it lacks, what is not found, how words are taken.
+def told_by_map(
+    program: str, avlmap: AVLMap, command: str = "", *, guess: bool = False
+) -> tuple[tuple[str, ...], Trace | None]:
+    """Return what a drive would report of the map, and the run that ends early by what the map lacks, if it does.
+
+    Reported are the map's doubts, how words are taken, what is only a guess, and last of all why it ends early.
 
     Args:
         program: that the drive would run; it queries the map, and nothing moves.
@@ -70,8 +74,9 @@ def told_by_map(program: str, avlmap: AVLMap, command: str = "", *, guess: bool 
         guess: as of ``RobotSettings``.
     """
     robot, trace = _asked_of(program, avlmap, command, GroundPose(0.0, 0.0), guess)
-    missing = [] if trace.error is None or trace.error_type == ProgramError.__name__ else [trace.error]
-    return (*avlmap.stored.info.doubts, *robot.seeker.notes, *missing)
+    missing = None if trace.error is None or trace.error_type == ProgramError.__name__ else trace
+    why = () if missing is None or missing.error is None else (missing.error,)
+    return (*avlmap.stored.info.doubts, *robot.seeker.notes, *why), missing
 
 
 def unfound(
