@@ -1,5 +1,7 @@
 """Bags of both ROSes and MCAP open in place: topics by type, poses by /tf or odometry, sound, and plain sentences."""
 
+import gc
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -191,6 +193,18 @@ def test_the_sound_of_a_bag_is_on_the_clock_of_its_frames(tmp_path: Path) -> Non
     assert recording.audio.rate_hz == RATE_HZ
     assert recording.audio.duration_s == pytest.approx(1.0)
     assert recording.audio.start_s == pytest.approx(-0.05, abs=0.005)
+
+
+def test_the_file_of_its_sound_goes_with_a_bag_and_warns_nobody(tmp_path: Path) -> None:
+    recording = open_rosbag(write_bag(tmp_path, "ros2", sound=True))
+    assert recording.audio is not None
+    file = recording.audio.path
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always", ResourceWarning)
+        assert file.is_file()
+        del recording
+        gc.collect()
+    assert not file.exists() and [str(one.message) for one in said if one.category is ResourceWarning] == []
 
 
 def test_a_second_thread_reads_the_same_frames(tmp_path: Path) -> None:

@@ -8,7 +8,9 @@ clouds of a LiDAR are projected into the colour camera.
 """
 
 import hashlib
+import shutil
 import tempfile
+import weakref
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from functools import cached_property
@@ -207,10 +209,10 @@ class RosbagRecording(Recording):
             raise RecordingError(f"{self.path} has no sound topic {found[0]!r} (it has: {has}); name one of them.")
         self.topics = {**self.topics, "audio": found[0]}
         # The bag's sound goes to a file of its own for as long as this recording is open: a track is read by pieces.
-        self._folder = tempfile.TemporaryDirectory(prefix="avlmaps-rosbag-")
+        folder = Path(tempfile.mkdtemp(prefix="avlmaps-rosbag-"))
+        weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
         infos = self._bag.topics_of(_AUDIO_INFO_TYPES)
         info = next((message for topic in infos for _, message in self._bag.messages(topic)), None)
-        folder = Path(self._folder.name)
         sound = SoundTopic(found[0], lambda: self._bag.messages(found[0]), clock)
         return extract_audio(sound, info, folder, pcm)
 
