@@ -85,7 +85,7 @@ def test_scores_that_do_not_follow_the_picture_would_fail(home: Views) -> None:
 def test_real_frames_of_nyu_are_recognised(shared_data: Path, weights: str, least: float) -> None:
     folder = LabelledFolder(_shared(shared_data / "data" / "nyuv2"))
     folder.names = HELD_OUT
-    figures = measure(EmbeddedPixels(load_network(weights)), folder)[ONCE]
+    figures = measure(EmbeddedPixels(load_network(weights)), folder, (ONCE,))[ONCE]
     assert figures.accuracy > least
     assert np.nanmean(figures.recall) > least / 2.5
 

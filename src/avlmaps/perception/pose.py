@@ -114,9 +114,9 @@ def refine_focal(
         front = points[:, 2] > 0.05
         residual, jacobian = _reprojection(xy[front], points[front], focal * np.exp(log_factor), (camera.cx, camera.cy))
         weight = 1.0 / (1.0 + (residual**2).sum(axis=1) / tolerance_px**2)
-        weighted = jacobian * weight[:, None, None]
-        normal = np.einsum("nri,nrj->ij", weighted, jacobian) + 1e-9 * np.eye(7)
-        step = np.linalg.solve(normal, -np.einsum("nri,nr->i", weighted, residual))
+        weighted = (jacobian * weight[:, None, None]).reshape(-1, 7).T
+        normal = weighted @ jacobian.reshape(-1, 7) + 1e-9 * np.eye(7)
+        step = np.linalg.solve(normal, -weighted @ residual.reshape(-1))
         camera_from_world = _small_motion(step[:6]) @ camera_from_world
         log_factor = float(np.clip(log_factor + step[6], -0.5, 0.5))
     factor = float(np.exp(log_factor))

@@ -339,8 +339,8 @@ class _Fit:
         return place, 1e-3 * self.basis @ solution[3 * count : 4 * count]
 
     def _ears(self, place: Float[np.ndarray, "m 3"]) -> Float[np.ndarray, "f m 3"]:
-        turned = np.einsum("fij,mj->fmi", self.world_from_robot[:, :3, :3], place)
-        return turned + self.world_from_robot[:, None, :3, 3]
+        turned = (self.world_from_robot[:, :3, :3].reshape(-1, 3) @ place.T).reshape(-1, 3, len(place))
+        return np.swapaxes(turned, 1, 2) + self.world_from_robot[:, None, :3, 3]
 
     def _predicted_s(self, solution: Float[np.ndarray, " n"]) -> Float[np.ndarray, "f p"]:
         place, late_s = self._split(solution)

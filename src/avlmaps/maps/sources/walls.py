@@ -46,21 +46,18 @@ class Walls:
         filled[cell[:, 0], cell[:, 1], layer] = True
         return cls(filled.mean(axis=2) >= _FILLED, np.asarray(origin, np.float64))
 
-    def _cells(self, xy: Float[np.ndarray, "*n 2"]) -> tuple[Int[np.ndarray, "*n"], Int[np.ndarray, "*n"]]:
-        cell = np.floor((xy - self.origin_m) / _CELL_M).astype(np.int64)
-        high = np.array(self.solid.shape) - 1
-        return np.clip(cell[..., 0], 0, high[0]), np.clip(cell[..., 1], 0, high[1])
-
     def behind(self, ear_xy: Float[np.ndarray, "2"], place_xy: Float[np.ndarray, "c 2"]) -> Bool[np.ndarray, " c"]:
         """Return which places have a wall between them and an ear."""
         away = np.linalg.norm(place_xy - ear_xy, axis=1)
-        blocked = np.zeros(len(place_xy), bool)
+        begin, along = (ear_xy - self.origin_m) / _CELL_M, (place_xy - ear_xy) / _CELL_M
+        last, blocked = np.array(self.solid.shape) - 1, np.zeros(len(place_xy), bool)
         for at_m in np.arange(0.2, float(away.max(initial=0.0)), _STEP_M):
             there = np.flatnonzero((away - _AT_CANDIDATE_M > at_m) & ~blocked)
             if not len(there):
                 continue
-            point = ear_xy + (place_xy[there] - ear_xy) * (at_m / away[there])[:, None]
-            blocked[there] = self.solid[self._cells(point)]
+            cell = (begin + along[there] * (at_m / away[there])[:, None]).astype(np.int64)
+            column, row = np.minimum(np.maximum(cell, 0), last).T
+            blocked[there] = self.solid[column, row]
         return blocked
 
     def seen_through(

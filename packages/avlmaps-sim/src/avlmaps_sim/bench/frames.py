@@ -92,9 +92,11 @@ def class_probabilities(
     return np.asarray(cv2.resize(summed, size[::-1], interpolation=cv2.INTER_LINEAR), np.float32)
 
 
-def measure(encoder: EmbeddedPixels, folder: LabelledFolder) -> dict[str, FrameFigures]:
-    """Score every frame of a folder, seen once and at several scales."""
-    modes = {ONCE: encoder.see, SEVERAL: encoder.see_multi_scale}
+def measure(
+    encoder: EmbeddedPixels, folder: LabelledFolder, seen: Sequence[str] = (ONCE, SEVERAL)
+) -> dict[str, FrameFigures]:
+    """Score every frame of a folder, seen once and at several scales, or in one of these ways."""
+    modes = {mode: {ONCE: encoder.see, SEVERAL: encoder.see_multi_scale}[mode] for mode in seen}
     counts: dict[str, list[Int[np.ndarray, "37 37"]]] = {mode: [] for mode in modes}
     labelled = 0
     for number in progress(range(len(folder)), "frames"):
