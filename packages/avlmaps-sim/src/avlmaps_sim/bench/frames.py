@@ -95,7 +95,7 @@ def class_probabilities(
 def measure(
     encoder: EmbeddedPixels, folder: LabelledFolder, seen: Sequence[str] = (ONCE, SEVERAL)
 ) -> dict[str, FrameFigures]:
-    """Score every frame of a folder, seen once and at several scales, or in one of these ways."""
+    """Score every frame of a folder, by default as seen once and as seen at several scales."""
     modes = {mode: {ONCE: encoder.see, SEVERAL: encoder.see_multi_scale}[mode] for mode in seen}
     counts: dict[str, list[Int[np.ndarray, "37 37"]]] = {mode: [] for mode in modes}
     labelled = 0
