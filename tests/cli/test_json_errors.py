@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 
 from avlmaps.cli import usage
+from avlmaps.cli.build import Build
+from avlmaps.cli.go import Go
 from avlmaps.cli.output import UsageError
 from avlmaps.cli.usage import read_verb
 from avlmaps.cli.verb import Verb
@@ -202,3 +204,13 @@ def test_a_misspelt_map_or_recording_is_answered_with_the_one_beside(built: Path
     assert code == 1 and f"avlmaps query {built} 'the red thing'" in err
     assert "avlmaps go" in run("go", "turn left", built, "--scene", "house:1")[2]
     assert "Did you mean colours?" in run("build", walk, "--out", walk.parent / "o.avlmap", "--profile", "colors")[2]
+
+
+def test_the_tilde_of_every_path_is_the_users_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("USERPROFILE", str(tmp_path))
+    go = read_verb(Go, ["~/m.avlmap", "~ is no path", "--plot=~/way.png", "--chat-replay=~/said.jsonl"], "go")
+    assert (go.map, go.plot, go.chat.chat_replay) == tuple(tmp_path / n for n in ("m.avlmap", "way.png", "said.jsonl"))
+    assert go.sentence == "~ is no path"
+    made = read_verb(Build, ["~/a", "~/b", "--out=~/m.avlmap"], "build")
+    assert (made.recording, made.more) == (tmp_path / "a", (tmp_path / "b",)) and made.out == tmp_path / "m.avlmap"

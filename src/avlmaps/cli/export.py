@@ -1,6 +1,6 @@
 """`avlmaps export`: write a map for other programs."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -8,7 +8,6 @@ from tyro.conf import arg
 
 from avlmaps.cli.output import UsageError, emit, size_of
 from avlmaps.cli.verb import MapVerb
-from avlmaps.core.files import user_path
 from avlmaps.core.frames import FrameName
 
 if TYPE_CHECKING:
@@ -82,7 +81,6 @@ def export(verb: Export, opened: "AVLMap | None" = None) -> dict[str, Any]:
     from avlmaps.query.export import write_table
     from avlmaps.query.frames import answer_in
 
-    verb = replace(verb, out=user_path(verb.out))  # a shell leaves the ~ of --out=~/x
     kind = verb.out.suffix.lower()
     _require_sense(verb, kind)
     frame = FrameName(verb.frame or ("level" if kind in _LEVEL else "recording"))

@@ -9,7 +9,6 @@ from tyro.conf import OmitArgPrefixes, Positional, arg
 
 from avlmaps.cli.output import AnsweredError, UsageError, emit, error_answer, kind_named, table_lines
 from avlmaps.cli.verb import MapVerb, idle
-from avlmaps.core.files import user_path
 from avlmaps.core.progress import say
 from avlmaps.core.wording import place_text
 
@@ -179,7 +178,7 @@ def _idle(verb: "Go", program: str) -> list[str]:
 def _planned(verb: "Go", settings: "QuerySettings") -> dict[str, Any]:
     from avlmaps.query.avlmap import AVLMap
 
-    avlmap = AVLMap.open(verb.map, settings) if user_path(verb.map).exists() else None
+    avlmap = AVLMap.open(verb.map, settings) if verb.map.exists() else None
     return plan_answer(verb, _read(verb, translator_for(verb, avlmap)), avlmap)
 
 

@@ -19,11 +19,10 @@ def models_in_force(verb: object) -> Iterator[None]:
     if not given:
         yield
         return
-    from avlmaps.core.files import user_path
     from avlmaps.perception.models.settings import environment_of, model_settings, using_models
 
     if "folder" in given:
-        given["folder"] = user_path(given["folder"]).absolute()
+        given["folder"] = given["folder"].absolute()
     settings = replace(model_settings(), **given)
     variables = environment_of(settings)
     before = {name: os.environ.get(name) for name in variables}

@@ -205,7 +205,7 @@ class Session:
     def locate(self, rest: str) -> Reply:
         """Locate a photo."""
         verb = read_verb(locating.Locate, [str(self.given.map), *_split(rest)], "locate")
-        answer = locating.locate_photo(verb.map, user_path(verb.image), verb.intrinsics, self.opened)
+        answer = locating.locate_photo(verb.map, verb.image, verb.intrinsics, self.opened)
         return Reply(answer, locating.locate_lines(answer))
 
     def plot(self, rest: str) -> Reply:

@@ -5,6 +5,7 @@ import io
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import redirect_stderr
+from pathlib import Path
 from typing import Any, TypeVar, get_args, get_type_hints
 
 import tyro
@@ -14,7 +15,7 @@ from avlmaps.cli.verb import Verb
 from avlmaps.core.suggestions import did_you_mean, nearest
 
 CONFIG = (tyro.conf.OmitArgPrefixes, tyro.conf.FlagCreatePairsOff, tyro.conf.HelptextFromCommentsOff)
-V = TypeVar("V", bound=Verb)
+V = TypeVar("V")
 _CHOICE = re.compile(
     r"invalid choice '(?P<given>[^']*)' for argument '(?P<name>[^']*)'. Expected one of \((?P<known>[^)]*)\)"
 )
@@ -106,6 +107,25 @@ def _options(verb: type[Any]) -> dict[str, str]:
     return options
 
 
+def at_home(given: V) -> V:
+    """Return a verb, or a group of its options, with the ~ of its paths as the user's home: shells leave --out=~/x."""
+    changed: dict[str, Any] = {}
+    for each in dataclasses.fields(given):  # pyright: ignore[reportArgumentType] - a dataclass
+        value = getattr(given, each.name)
+        found = tuple(map(_at_home, value)) if isinstance(value, tuple) else _at_home(value)
+        if found != value:
+            changed[each.name] = found
+    return dataclasses.replace(given, **changed) if changed else given  # pyright: ignore[reportArgumentType]
+
+
+def _at_home(value: Any) -> Any:
+    if isinstance(value, Path) and str(value).startswith("~"):
+        from avlmaps.core.files import user_path
+
+        return user_path(value)
+    return at_home(value) if dataclasses.is_dataclass(value) else value
+
+
 def read_verb(verb: type[V], words: Sequence[str], name: str) -> V:
     """Read the words of one verb.
 
@@ -116,7 +136,7 @@ def read_verb(verb: type[V], words: Sequence[str], name: str) -> V:
     printed = io.StringIO()
     try:
         with redirect_stderr(printed):
-            return tyro.cli(verb, prog=name, args=list(words), config=CONFIG)
+            return at_home(tyro.cli(verb, prog=name, args=list(words), config=CONFIG))
     except SystemExit as stop:
         if stop.code in (0, None):
             raise

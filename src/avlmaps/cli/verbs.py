@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Union
 
 import tyro
 
-from avlmaps.cli.usage import CONFIG
+from avlmaps.cli.usage import CONFIG, at_home
 from avlmaps.cli.verb import Verb
 from avlmaps.core.distributions import OTHERS, how_to_get
 from avlmaps.core.errors import BackendError
@@ -95,7 +95,7 @@ def read_command(words: Sequence[str]) -> Verb:
             every = _any_verb(verbs, shortly=not words or name.startswith("-"))
             return tyro.cli(every, prog="avlmaps", description=_DESCRIPTION, args=words, config=CONFIG)
     verb = _own(name) if name in _OWN else installed()[0][name]
-    return tyro.cli(verb, prog=f"avlmaps {name}", args=words[1:], config=CONFIG)
+    return at_home(tyro.cli(verb, prog=f"avlmaps {name}", args=words[1:], config=CONFIG))
 
 
 def _any_verb(verbs: dict[str, type[Verb]], shortly: bool) -> Any:

@@ -20,6 +20,7 @@ from typing import Literal
 import numpy as np
 
 from avlmaps.core.errors import BackendError
+from avlmaps.core.files import user_path
 from avlmaps.core.progress import say
 from avlmaps.core.registry import Kind
 from avlmaps.core.wording import option
@@ -65,7 +66,7 @@ class FeatureStore:
 
     def __init__(self, folder: Path, limit_bytes: float = 20 * _GB) -> None:
         """Use a folder, which is made when the first feature is stored."""
-        self.folder, self.limit_bytes = folder, limit_bytes
+        self.folder, self.limit_bytes = user_path(folder), limit_bytes
         self.found: dict[Kind, int] = {}
         self._opened_s = time.time()
         self._total: float | None = None
