@@ -474,6 +474,20 @@ def test_the_editor_makes_the_edits_and_the_map_knows_them_at_once(tmp_path: Pat
     assert [edit.does for edit in read_edits(tmp_path)] == ["rename", "split", "merge", "pin", "undo"]
 
 
+def test_areas_of_one_name_all_hold_and_a_pin_of_one_name_is_the_last(tmp_path: Path) -> None:
+    m = editable(tmp_path)
+    boxes = [(2.5, 1.0, 3.5, 2.0), (0.5, 0.5, 1.0, 1.0), (4.0, 2.0, 4.5, 3.0)]
+    for one in boxes:
+        m.edit.forbid("the wet floor", box=one)
+    lows = sorted(tuple(area.corners.min(axis=0).round(3)) for area in m.edited.forbidden)
+    assert lows == sorted(one[:2] for one in boxes)
+    m.edit.pin("my dock", (1.0, 1.0))
+    m.edit.pin("the dock", (3.0, 1.0))
+    assert [one["state"] for one in m.edit.history()["edits"]] == ["applied"] * 3 + ["moved", "applied"]
+    m.edit.undo()
+    assert [one["state"] for one in m.edit.history()["edits"]][3:5] == ["applied", "undone"]
+
+
 def test_a_forbidden_area_is_occupied_and_its_goals_are_refused(tmp_path: Path) -> None:
     from avlmaps.maps.obstacles import CellState
     from avlmaps.navigate.costmap import obstacles_for

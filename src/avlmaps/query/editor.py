@@ -14,7 +14,7 @@ from avlmaps.core.wording import place_text
 from avlmaps.maps.store.edits import LONGEST_NAME, Does, Edit, Spot, World, append_edit, in_force, read_edits
 from avlmaps.query.edit_spots import SeenMap
 from avlmaps.query.edits import Edited, apply, means
-from avlmaps.query.found_edits import said
+from avlmaps.query.found_edits import plain_name, said
 from avlmaps.query.given_places import is_place, place_given, place_of
 from avlmaps.query.queryable import Queryable
 
@@ -214,7 +214,9 @@ class Editor:
         counting = {edit.id for edit in in_force(log)}
         lost = {one.edit.id: one.why for one in self._after().lost}
         rows = list({edit.id: edit for edit in log}.values())
-        return {"map": self._map.stored.path.name, "edits": [_row(edit, counting, lost) for edit in rows]}
+        pins = {plain_name(edit.name): edit.id for edit in in_force(log) if edit.does == "pin"}
+        moved = {edit.id for edit in rows if edit.does == "pin"} - set(pins.values()) - set(lost)
+        return {"map": self._map.stored.path.name, "edits": [_row(edit, counting, lost, moved) for edit in rows]}
 
     def _thing(self, name: str | None, at: Place | None) -> "Thing":
         """Return the one thing that is meant."""
@@ -337,7 +339,7 @@ class Editor:
         return apply((*self._log(), *more), self._map)
 
 
-def _row(edit: Edit, counting: set[str], lost: dict[str, str]) -> "EditAnswer":
+def _row(edit: Edit, counting: set[str], lost: dict[str, str], moved: set[str]) -> "EditAnswer":
     state = (
         "undo"
         if edit.does == "undo"
@@ -345,6 +347,8 @@ def _row(edit: Edit, counting: set[str], lost: dict[str, str]) -> "EditAnswer":
         if edit.id not in counting
         else "lost"
         if edit.id in lost
+        else "moved"
+        if edit.id in moved
         else "applied"
     )
     row: EditAnswer = {

@@ -189,17 +189,17 @@ class FoundEdits:
 
     @cached_property
     def forbidden(self) -> "tuple[ForbiddenArea, ...]":
-        """The areas that no robot enters; of one name the last."""
+        """The areas that no robot enters; several may have one name, as each wet floor has."""
         from avlmaps.maps.obstacles import ForbiddenArea
 
-        areas: dict[str, ForbiddenArea] = {}
+        areas: list[ForbiddenArea] = []
         storeys = self._map.storeys
         for edit in self._of("forbid"):
             corners = np.array(edit.at[0].now(self._map.stored.keyframes).corners, np.float64)
             storey = 0 if storeys is None else int(storeys.of_places(corners.mean(axis=0))[0])
             level = self._map.space.level(corners)[:, :2]
-            areas[plain_name(edit.name)] = ForbiddenArea(edit.name, said(edit), level, storey)
-        return tuple(areas.values())
+            areas.append(ForbiddenArea(edit.name, said(edit), level, storey))
+        return tuple(areas)
 
     @property
     def lost(self) -> tuple[LostEdit, ...]:

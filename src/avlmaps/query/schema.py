@@ -196,7 +196,10 @@ class EditAnswer(TypedDict):
     position: Annotated[Position | None, Meta(description="of what it is about, as it was then")]
     by: Annotated[str, Meta(description="who made it; empty where nobody said")]
     made: Annotated[str, Meta(description="when, ISO 8601, UTC")]
-    state: Annotated[str, Meta(description="applied, undone, undo, or lost: it finds nothing to apply to")]
+    state: Annotated[
+        str,
+        Meta(description="applied, moved (a pin by a later one), undone, undo, or lost: it finds nothing to apply to"),
+    ]
     why: NotRequired[Annotated[str, Meta(description="it finds nothing to apply to")]]
 
 
