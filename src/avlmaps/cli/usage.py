@@ -15,7 +15,8 @@ from avlmaps.cli.verb import Verb
 from avlmaps.core.suggestions import did_you_mean, nearest
 
 CONFIG = (tyro.conf.OmitArgPrefixes, tyro.conf.FlagCreatePairsOff, tyro.conf.HelptextFromCommentsOff)
-V = TypeVar("V")
+V = TypeVar("V", bound=Verb)
+Options = TypeVar("Options")
 _CHOICE = re.compile(
     r"invalid choice '(?P<given>[^']*)' for argument '(?P<name>[^']*)'. Expected one of \((?P<known>[^)]*)\)"
 )
@@ -107,7 +108,7 @@ def _options(verb: type[Any]) -> dict[str, str]:
     return options
 
 
-def at_home(given: V) -> V:
+def at_home(given: Options) -> Options:
     """Return a verb, or a group of its options, with the ~ of its paths as the user's home: shells leave --out=~/x."""
     changed: dict[str, Any] = {}
     for each in dataclasses.fields(given):  # pyright: ignore[reportArgumentType] - a dataclass
