@@ -12,12 +12,15 @@ from avlmaps.language.learned_translator import LearnedTranslator
 from avlmaps.language.program import Budget
 from avlmaps.language.sentence import Given
 from avlmaps.language.translator import Translation
+from avlmaps.maps.store.edits import Edit, Spot, World
 from avlmaps.navigate.driver import Arrival
 from avlmaps.navigate.instruct import Outcome, instruct
 from avlmaps.navigate.trace_plot import draw_path, plot_path
 from avlmaps.query.avlmap import AVLMap
 from helpers.kinematic import KinematicDriver
 from query.query_fakes import furnished_map, sounds_of
+
+OTHER = World(name="other", fingerprint="another")
 
 
 class Scripted:
@@ -69,6 +72,16 @@ def test_a_translator_that_knows_no_map_is_given_this_one() -> None:
     assert "I will go to where dog was heard." in lines
     fixed, _ = told(said, LearnedTranslator(Given(at="robot")))
     assert fixed.ok and fixed.notes == () and fixed.program == outcome.program
+
+
+def test_a_forbidden_area_that_the_map_does_not_know_is_told_before_the_robot_moves() -> None:
+    corners = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0))
+    area = Edit.new("forbid", [Spot(middle=corners[0], corners=corners)], name="the stairs", world=OTHER)
+    m = AVLMap(furnished_map(), edits=[area])
+    outcome = instruct("turn left", m, KinematicDriver(GroundPose(3.0, 2.0)), LearnedTranslator())
+    assert outcome.notes == (
+        "The robot may enter the stairs, which was forbidden: it was made in a map of another recording, other.",
+    )
 
 
 def test_the_outcome_is_the_contract_of_the_command_line() -> None:

@@ -202,6 +202,13 @@ class FoundEdits:
         return tuple(areas)
 
     @property
+    def unheeded(self) -> tuple[str, ...]:
+        """A sentence for each area that was forbidden and that this map does not know, so that a robot may enter it."""
+        _ = self.forbidden
+        lost = (self._lost[edit.id] for edit in self.edits if edit.does == "forbid" and edit.id in self._lost)
+        return tuple(f"The robot may enter {one.edit.name}, which was forbidden: {one.why}." for one in lost)
+
+    @property
     def lost(self) -> tuple[LostEdit, ...]:
         """The edits that find nothing to apply to; finding that out looks for what each is about."""
         _ = self.claims, self.rooms, self.pins, self.forbidden
