@@ -61,7 +61,7 @@ def test_the_first_steps_of_the_readme_run_as_written_and_find_what_they_query(
     said = {}
     for command in commands:
         words = shlex.split(command)
-        smaller = ["--max-frames", "58"] if words[0] == "record" else []
+        smaller = ["--max-frames", "36"] if words[0] == "record" else []
         with pytest.raises(SystemExit) as stop:
             main([*words, *smaller, "--json"])
         told = capsys.readouterr()

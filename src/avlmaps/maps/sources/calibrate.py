@@ -30,6 +30,7 @@ _GRID_M, _ROUND_M, _HEIGHTS_M = 0.3, 4.0, (-1.0, -0.5, 0.0, 0.5)
 _SMOOTHING = 5.0
 _WINDOWS_S = (250e-6, 150e-6, 80e-6, 60e-6, 60e-6)  # round the predicted delay, one solution after the other
 _LEAST_PEAK = 0.3  # of the greatest possible correlation
+_MOST_TRIES = 200  # of the unknowns: drives that determine them take 110 at most, others never settle
 _SPREAD_S = 15e-6  # usual error of a peak
 _FEWEST = 60  # frames with measured delays
 # What the walk must leave of doubt at most, one standard deviation, and how badly the result may fit.
@@ -270,7 +271,8 @@ class _Fit:
             whole[chosen] = values
             return self.residual_s(whole, measured) / _SPREAD_S
 
-        whole[chosen] = least_squares(residual, solution[chosen], loss="cauchy", x_scale="jac").x
+        found = least_squares(residual, solution[chosen], loss="cauchy", x_scale="jac", max_nfev=_MOST_TRIES)
+        whole[chosen] = found.x
         return whole
 
     def covariance(
