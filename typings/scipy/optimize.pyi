@@ -13,6 +13,7 @@ def least_squares(
     *,
     loss: Literal["linear", "soft_l1", "huber", "cauchy", "arctan"] = "linear",
     x_scale: float | Literal["jac"] = 1.0,
+    max_nfev: int | None = None,
 ) -> OptimizeResult: ...
 def approx_fprime(
     xk: NDArray[np.float64], f: Callable[[NDArray[np.float64]], NDArray[Any]], epsilon: float = ...
