@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 
 from avlmaps.language.commands import read_command
 from avlmaps.language.intents import Clarify, Turn
+from avlmaps.language.sentence import Given
 from avlmaps.language.verbalise import verbalise
 
 FEW = settings(max_examples=10, deadline=None)
@@ -59,3 +60,15 @@ def test_a_turn_may_follow_the_end_of_a_sentence(end: str, side: str) -> None:
 
 def test_decimals_of_turns_have_either_point() -> None:
     assert read_command("turn left 1,5 turns").intents == read_command("turn left 1.5 turns").intents == (Turn(-540.0),)
+
+
+@pytest.mark.parametrize("own", ["stop", "left", "halt", "it", "5 m", "go"])
+def test_no_name_of_a_map_changes_an_order(own: str) -> None:
+    for command in ("stop", "halt", "go left 5 m", "turn left", "go to it", "move forward 5 m"):
+        assert read_command(command, Given(own=((own, False),))).intents == read_command(command).intents
+
+
+def test_a_question_back_has_the_names_of_the_map() -> None:
+    read = read_command("go to the workbench or the gizmo", Given(own=(("workbench", False), ("gizmo", False))))
+    said = verbalise(read.intents)
+    assert "lamp" not in said and "clock" not in said

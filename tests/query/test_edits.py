@@ -474,6 +474,23 @@ def test_the_editor_makes_the_edits_and_the_map_knows_them_at_once(tmp_path: Pat
     assert [edit.does for edit in read_edits(tmp_path)] == ["rename", "split", "merge", "pin", "undo"]
 
 
+@pytest.mark.parametrize(
+    "name", ["stop", "Halt!", "left", "the left", "5 m", "near the bed", "go to", "it", "not here"]
+)
+def test_words_of_orders_are_no_names(name: str, tmp_path: Path) -> None:
+    m = editable(tmp_path)
+    with pytest.raises(QueryError, match="a word of orders to a robot"):
+        m.edit.pin(name, (1.0, 1.0))
+    assert not read_edits(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["home", "left shelf", "point A", "bus stop", "Anna's place", "start", "room 5"])
+def test_other_names_are_names(name: str, tmp_path: Path) -> None:
+    m = editable(tmp_path)
+    m.edit.pin(name, (1.0, 1.0))
+    assert m.ask(f"where is my {name}?").found
+
+
 def test_areas_of_one_name_all_hold_and_a_pin_of_one_name_is_the_last(tmp_path: Path) -> None:
     m = editable(tmp_path)
     boxes = [(2.5, 1.0, 3.5, 2.0), (0.5, 0.5, 1.0, 1.0), (4.0, 2.0, 4.5, 3.0)]

@@ -26,7 +26,7 @@ from avlmaps.language.learned.name_resolver import EXAMPLE, REFUSALS, NameResolv
 from avlmaps.language.learned.parts import by_parts
 from avlmaps.language.learned.reader import LearnedReader, learned_reader
 from avlmaps.language.lexer import Token, tokenise
-from avlmaps.language.own_names import stand_ins
+from avlmaps.language.own_names import StandIns, stand_ins
 from avlmaps.language.rephrase import behind_remark
 from avlmaps.language.sentence import Given, Sentence
 from avlmaps.language.storey_words import SaidStorey, said_storeys
@@ -79,7 +79,7 @@ def read_command(text: str, given: Given | None = None) -> Command:
     stand = stand_ins(text, () if given is None else given.own)
     if stand.own and given is not None:
         read = read_command(stand.text, replace(given, own=()))
-        intents = tuple(on_targets(one, stand.target) for one in read.intents)
+        intents = tuple(_back(on_targets(one, stand.target), stand) for one in read.intents)
         return replace(read, intents=intents, notes=tuple(map(stand.back, read.notes)))
     language = language_of(text)
     tokens = tokenise(text)
@@ -113,6 +113,13 @@ def read_command(text: str, given: Given | None = None) -> Command:
     answer = answered(sentence, readings, reader, reader.limits)
     notes = (*sentence.notes, *_without_effect(sentence), *answer.notes, *_lost_sides(answer.intents, sentence))
     return Command(answer.intents, tuple(dict.fromkeys(notes)), readings, answer.why)
+
+
+def _back(intent: Intent, stand: StandIns) -> Intent:
+    """Return a question to the person with the map's own names in it."""
+    if not isinstance(intent, Clarify):
+        return intent
+    return Clarify(stand.back(intent.question), tuple(map(stand.back, intent.choices)))
 
 
 def _on_storey(text: str, storeys: Sequence[SaidStorey], given: Given | None) -> Command | None:

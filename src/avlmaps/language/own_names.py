@@ -10,6 +10,8 @@ from dataclasses import dataclass, field, replace
 
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.language.intents import Target
+from avlmaps.language.learned.said import DETERMINERS, words
+from avlmaps.language.lexer import WORDS, tokenise
 
 OwnName = tuple[str, bool]
 """A name without its article, in lower case, and whether it is that of a room."""
@@ -40,11 +42,20 @@ class StandIns:
         return replace(target, name=self.own.get(target.name, target.name), near=tuple(map(self.target, target.near)))
 
 
+def is_reserved(name: str) -> bool:
+    """Return whether a name would take a word of orders: "stop", "left", "5 m", "near the bed"."""
+    said = [token.text for token in tokenise(name) if token.kind != "punct"]
+    said = said[1:] if said[:1] and said[0] in DETERMINERS and len(said) > 1 else said
+    lists = words().lists
+    taken = lists["reserved"] | lists["stops"] | WORDS
+    return bool(said) and (said[0] in lists["leading"] or all(word in taken or word[0].isdigit() for word in said))
+
+
 def stand_ins(text: str, names: Sequence[OwnName]) -> StandIns:
     """Return a sentence with a known word for each own name in it that the lexicon does not have."""
     out, own = text, dict[str, str]()
     for name, is_room in sorted(names, key=lambda one: -len(one[0])):
-        if lexicon().find(name, EntryKind.ROOM if is_room else EntryKind.THING) is not None:
+        if is_reserved(name) or lexicon().find(name, EntryKind.ROOM if is_room else EntryKind.THING) is not None:
             continue
         said = re.compile(rf"(?<![\w-])(?:(?:the|a|an|my|your|our) )?{re.escape(name)}(?![\w-])", re.IGNORECASE)
         if not said.search(out):

@@ -65,7 +65,7 @@ class Editor:
             QueryError: there is no such thing, or there are several, or the name is none.
             MapError: the map lies in memory alone, or cannot be written.
         """
-        found, to = self._thing(thing, at), _name(to)
+        found, to = self._thing(thing, at), _own_name(to)
         if found.name == to:
             raise QueryError(f"The {to} at {place_text(found.position)} is called so already.")
         return self._add("rename", [self._map.edited.spot_of(found.name, found.rows)], name=to, by=by)
@@ -82,7 +82,7 @@ class Editor:
             QueryError: there is no such room, or there are several.
             MapError: see ``rename``.
         """
-        return self._add("rename room", [self._room(room)], name=_name(to), by=by)
+        return self._add("rename room", [self._room(room)], name=_own_name(to), by=by)
 
     def merge(self, *things: Place, to: str = "", by: str = "") -> Edit:
         """Make one thing of several that the map takes apart.
@@ -110,7 +110,7 @@ class Editor:
                 )
             joined.append(one)
         spots = [self._map.edited.spot_of(one.name, one.rows) for one in found]
-        return self._add("merge", spots, name=_name(to) if to else "", by=by)
+        return self._add("merge", spots, name=_own_name(to) if to else "", by=by)
 
     def split(
         self,
@@ -187,7 +187,7 @@ class Editor:
         self._require_here(self._level(at)[None], "The place")
         place = numbers if len(numbers) == 3 else self._map.space.world(np.append(numbers, self._floor_m()))
         return self._add(
-            "pin", [Spot(middle=plain_point(place)).anchored(self._map.stored.keyframes)], name=_name(name), by=by
+            "pin", [Spot(middle=plain_point(place)).anchored(self._map.stored.keyframes)], name=_own_name(name), by=by
         )
 
     def undo(self, which: str = "", *, by: str = "") -> Edit:
@@ -397,6 +397,16 @@ def _name(name: str) -> str:
     word = " ".join(name.split())
     if not word or len(word) > LONGEST_NAME or not any(letter.isalnum() for letter in word) or not word.isprintable():
         raise QueryError(f"{name[:40]!r} is no name; give one to {LONGEST_NAME} characters, a letter among them.")
+    return word
+
+
+def _own_name(name: str) -> str:
+    """Return a name by which things, rooms and places are meant in sentences."""
+    from avlmaps.language.own_names import is_reserved
+
+    word = _name(name)
+    if is_reserved(word):
+        raise QueryError(f"{word!r} is a word of orders to a robot, and would be taken for a place; give another name.")
     return word
 
 
