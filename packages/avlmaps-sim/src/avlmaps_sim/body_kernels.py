@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from avlmaps_sim.grid_kernels import _clip
+from avlmaps_sim.grid_kernels import clip_to_band
 
 SUBSTEP_M = 0.005  # near something the disc moves by this at once
 _TOUCH_M = 1e-6
@@ -19,14 +19,7 @@ def cut_segments(corners, low_m, high_m):  # pragma: no cover - compiled
     segments = np.empty((8 * corners.shape[0], 4))
     total = 0
     for t in range(corners.shape[0]):
-        z0, z1, z2 = corners[t, 0, 2], corners[t, 1, 2], corners[t, 2, 2]
-        if max(z0, z1, z2) < low_m or min(z0, z1, z2) > high_m:
-            continue
-        for k in range(3):
-            for axis in range(3):
-                first[k, axis] = corners[t, k, axis]
-        count = _clip(first, 3, 2, low_m, 1.0, second)
-        count = _clip(second, count, 2, high_m, -1.0, first)
+        count = clip_to_band(corners, t, low_m, high_m, first, second)
         for a in range(count):
             b = (a + 1) % count
             segments[total, 0], segments[total, 1] = first[a, 0], first[a, 1]

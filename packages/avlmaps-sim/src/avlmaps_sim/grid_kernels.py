@@ -28,20 +28,26 @@ def _clip(polygon, count, axis, limit, sign, clipped):  # pragma: no cover - com
 
 
 @njit(cache=True)
+def clip_to_band(corners, t, low_m, high_m, first, second):  # pragma: no cover - compiled
+    """Write the part of triangle t between two heights into first; return how many corners it has."""
+    z0, z1, z2 = corners[t, 0, 2], corners[t, 1, 2], corners[t, 2, 2]
+    if max(z0, z1, z2) < low_m or min(z0, z1, z2) > high_m:
+        return 0
+    for k in range(3):
+        for axis in range(3):
+            first[k, axis] = corners[t, k, axis]
+    count = _clip(first, 3, 2, low_m, 1.0, second)
+    return _clip(second, count, 2, high_m, -1.0, first)
+
+
+@njit(cache=True)
 def mark_slab(corners, low_m, high_m, origin, cell_m, grid):  # pragma: no cover - compiled
     """Mark every cell over which a triangle has a point between two heights; cells off the grid are left out."""
     first = np.empty((8, 3))
     second = np.empty((8, 3))
     nx, ny = grid.shape
     for t in range(corners.shape[0]):
-        z0, z1, z2 = corners[t, 0, 2], corners[t, 1, 2], corners[t, 2, 2]
-        if max(z0, z1, z2) < low_m or min(z0, z1, z2) > high_m:
-            continue
-        for k in range(3):
-            for axis in range(3):
-                first[k, axis] = corners[t, k, axis]
-        count = _clip(first, 3, 2, low_m, 1.0, second)
-        count = _clip(second, count, 2, high_m, -1.0, first)
+        count = clip_to_band(corners, t, low_m, high_m, first, second)
         if count == 0:
             continue
         x_low, x_high = first[0, 0], first[0, 0]

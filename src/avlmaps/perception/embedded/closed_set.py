@@ -1,7 +1,7 @@
 """Parts that the embedded pixel and view encoders share: names, their codes, and which of them a phrase means."""
 
 from functools import cached_property
-from typing import cast
+from typing import ClassVar, cast
 
 import numpy as np
 
@@ -10,27 +10,37 @@ from avlmaps.core.arrays import Float32
 from avlmaps.core.registry import Kind, load
 from avlmaps.perception.embedded.codes import word_codes
 from avlmaps.perception.embedded.meanings import Meanings
-from avlmaps.perception.embedded.paired_networks import PairedNetworks
-from avlmaps.perception.embedded.scene_network import SceneNetwork
-from avlmaps.perception.protocols import WordEncoder
+from avlmaps.perception.embedded.paired_networks import PairedNetworks, load_pair
+from avlmaps.perception.embedded.scene_network import Notes, SceneNetwork
+from avlmaps.perception.protocols import ModelCard, WordEncoder
 
 
 class NamedEncoder:
     """An encoder that distinguishes a closed set of names.
 
     Args:
-        names: the names that it distinguishes; ``categories`` or ``rooms`` of the network's notes.
-        network: which.
+        network: which; the two that ship, together, if None.
         words: the word encoder whose space the features live in; the embedded one if None.
+        licence: of the networks.
     """
 
     reads_ground = True
+    _names: ClassVar[str]  # ``categories`` or ``rooms`` of the network's notes
 
-    def __init__(self, names: str, network: SceneNetwork | PairedNetworks, words: WordEncoder | None) -> None:
-        self._network = network
+    def __init__(
+        self,
+        network: SceneNetwork | PairedNetworks | None = None,
+        words: WordEncoder | None = None,
+        licence: str = "MIT",
+    ) -> None:
+        self._network = load_pair() if network is None else network
         self._words = cast(WordEncoder, load(Kind.WORDS, "embedded")) if words is None else words
-        self.names: tuple[str, ...] = getattr(self._network.notes, names)
+        self.names: tuple[str, ...] = getattr(self._network.notes, self._names)
         self.codes = word_codes(self.names, self._words)
+        self.card = self._card(self._network.notes, self._network.checksum, licence)
+
+    def _card(self, notes: Notes, checksum: str, licence: str) -> ModelCard:
+        return ModelCard(id=notes.id, dim=self.codes.shape[1], licence=licence, checksum=checksum, note=notes.note)
 
     @cached_property
     def meanings(self) -> Meanings:

@@ -8,9 +8,7 @@ import numpy as np
 from avlmaps.core.arrays import Float, Float32
 from avlmaps.perception.embedded.closed_set import NamedEncoder
 from avlmaps.perception.embedded.codes import features_of
-from avlmaps.perception.embedded.paired_networks import PairedNetworks, load_pair
-from avlmaps.perception.embedded.scene_network import SYNTHETIC_WEIGHTS, SceneNetwork, Seen, load_network
-from avlmaps.perception.protocols import ModelCard, WordEncoder
+from avlmaps.perception.embedded.scene_network import SYNTHETIC_WEIGHTS, Seen, load_network
 from avlmaps.perception.room_contents import RoomContents, read_room_contents
 from avlmaps.recordings.types import Frame
 
@@ -19,25 +17,9 @@ SMALLEST_LOG_AREA, LARGEST_LOG_AREA = -4.0, 0.7
 
 
 class EmbeddedPixels(NamedEncoder):
-    """Distinguishes some hundred things of homes and offices by their shape, helped a little by colour.
+    """Distinguishes some hundred things of homes and offices by their shape, helped a little by colour."""
 
-    Args:
-        network: which; the two that ship, together, if None.
-        words: the word encoder whose space the features live in; the embedded one if None.
-        licence: of the networks.
-    """
-
-    def __init__(
-        self,
-        network: SceneNetwork | PairedNetworks | None = None,
-        words: WordEncoder | None = None,
-        licence: str = "MIT",
-    ) -> None:
-        super().__init__("categories", load_pair() if network is None else network, words)
-        notes = self._network.notes
-        self.card = ModelCard(
-            id=notes.id, dim=self.codes.shape[1], licence=licence, checksum=self._network.checksum, note=notes.note
-        )
+    _names = "categories"
 
     @property
     def vocabulary(self) -> tuple[str, ...]:

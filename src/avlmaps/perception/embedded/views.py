@@ -1,42 +1,26 @@
 """The embedded view encoder: what kind of room a picture shows, in the space of words (see ``codes``)."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from avlmaps.core.arrays import Float32
 from avlmaps.perception.embedded.closed_set import NamedEncoder
 from avlmaps.perception.embedded.codes import features_of
-from avlmaps.perception.embedded.paired_networks import PairedNetworks, load_pair
-from avlmaps.perception.embedded.scene_network import SYNTHETIC_WEIGHTS, SceneNetwork, load_network
-from avlmaps.perception.protocols import ModelCard, WordEncoder
+from avlmaps.perception.embedded.scene_network import SYNTHETIC_WEIGHTS, Notes, load_network
+from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.types import Frame
 
 
 class EmbeddedViews(NamedEncoder):
-    """Distinguishes kinds of room by the things in them.
+    """Distinguishes kinds of room by the things in them."""
 
-    Args:
-        network: which; the two that ship, together, if None.
-        words: the word encoder whose space the features live in; the embedded one if None.
-        licence: of the networks.
-    """
+    _names = "rooms"
 
-    def __init__(
-        self,
-        network: SceneNetwork | PairedNetworks | None = None,
-        words: WordEncoder | None = None,
-        licence: str = "MIT",
-    ) -> None:
-        super().__init__("rooms", load_pair() if network is None else network, words)
-        notes = self._network.notes
-        self.card = ModelCard(
-            id=notes.id.replace("pixels", "views"),
-            dim=self.codes.shape[1],
-            licence=licence,
-            checksum=self._network.checksum,
-            note=f"Knows these kinds of room: {', '.join(self.names)}.",
-        )
+    def _card(self, notes: Notes, checksum: str, licence: str) -> ModelCard:
+        note = f"Knows these kinds of room: {', '.join(self.names)}."
+        return replace(super()._card(notes, checksum, licence), id=notes.id.replace("pixels", "views"), note=note)
 
     def encode(self, frames: Sequence[Frame]) -> Float32[np.ndarray, "n d"]:
         """Return a unit vector for each frame."""

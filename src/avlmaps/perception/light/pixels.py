@@ -1,6 +1,7 @@
 """Dense features of TIPSv2 by onnxruntime: what `foundation/tipsv2.py` gives, in int8 and at 336 pixels."""
 
 from collections.abc import Sequence
+from typing import ClassVar, Literal
 
 import numpy as np
 from jaxtyping import Float32
@@ -13,8 +14,8 @@ from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.types import Frame
 
 
-class LightPixels:
-    """A feature for every patch of the working size, in the space of TIPSv2's text encoder.
+class LightPictures:
+    """Pictures in the space of TIPSv2's text encoder.
 
     Args:
         model: name or folder of the files.
@@ -23,15 +24,28 @@ class LightPixels:
         BackendError: they are not here, or damaged.
     """
 
+    _module: ClassVar[Literal["pixels", "views"]]
+    _limit: ClassVar[str]
+
     def __init__(self, model: str = MODEL) -> None:
         bundle = open_bundle(model)
         note = bundle.manifest.pictures
         self.logit_scale = note.logit_scale
-        self.card = card_of(
-            bundle, "pixels", note.prompts, "a thing smaller than a patch is mixed with what is round it"
-        )
+        prompts = note.prompts if self._module == "pixels" else note.view_prompts
+        self.card = card_of(bundle, self._module, prompts, self._limit)
         self.text = TextTower(bundle, PICTURE_WORDS, PICTURE_TOKENS, note.most_tokens)
-        self._tower, self._words = tower_of(bundle), LightWords(bundle, "pixels", self.text, self.card)
+        self._tower, self._words = tower_of(bundle), LightWords(bundle, self._module, self.text, self.card)
+
+    def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
+        """Return a unit vector for each phrase, the mean over the card's sentences; all zero for a blank one."""
+        return self._words.encode(words)
+
+
+class LightPixels(LightPictures):
+    """A feature for every patch of the working size."""
+
+    _module = "pixels"
+    _limit = "a thing smaller than a patch is mixed with what is round it"
 
     @property
     def vocabulary(self) -> tuple[str, ...]:
@@ -41,10 +55,6 @@ class LightPixels:
     def encode(self, frame: Frame) -> Float32[np.ndarray, "hf wf d"]:
         """Return a feature for each cell of the grid, of unit length."""
         return self._tower.patches(frame.rgb)
-
-    def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
-        """Return a unit vector for each phrase, the mean over the card's sentences; all zero for a blank one."""
-        return self._words.encode(words)
 
     def understood(self, word: str) -> str:
         """Return the phrase: any word is taken."""
