@@ -41,6 +41,9 @@ class Options:
 
     network: tuple[Path, ...] = (Path("build/pixels/network.pt"),)
     """Checkpoint of the training; of several the mean of their probabilities is written, as one network."""
+    by: tuple[Path, ...] = ()
+    """Checkpoints of the same recipe, in the same order, that held the real frames out: the constants and figures are
+    theirs. Without them the networks themselves must have held these frames out."""
     frames: Path = Path("build/pixels/held-out")
     """Rendered frames of held-out homes."""
     real: Path | None = None
@@ -157,6 +160,11 @@ def figures(scores: Scores, bias: np.ndarray, temperature: float) -> dict[str, f
     return told
 
 
+def _together(networks: list[RoomNetwork], temperatures: list[float]) -> RoomNetwork | MeanOf:
+    """Return one network of several; each one's scores are divided by its temperature first."""
+    return networks[0] if len(networks) == 1 else MeanOf(networks, temperatures)
+
+
 def _replaced_id(notes: Path) -> str:
     """Return the name and version that the notes which are written again bear; ``OWN`` where there are none."""
     return msgspec.json.decode(notes.read_bytes(), type=Notes).id if notes.is_file() else OWN
@@ -169,14 +177,16 @@ def calibrate(options: Options) -> None:
     if options.real is not None:
         chosen.append(Shards(options.real).every())
 
+    if options.by and len(options.by) != len(options.network):
+        raise SystemExit(f"--by names {len(options.by)} checkpoint(s) for {len(options.network)} of --network")
+
     def parts_of(network: RoomNetwork | MeanOf) -> list[Scores]:
         return [scores_of(network, frames, options.seed) for frames in chosen]
 
     networks = [load_network(path, options.weights) for path in options.network]
-    network: RoomNetwork | MeanOf = networks[0]
-    if len(networks) > 1:
-        network = MeanOf(networks, [fit_scores(parts_of(each))[1] for each in networks])
-    parts = parts_of(network)
+    judged = [load_network(path, options.weights) for path in options.by] or networks
+    temperatures = [fit_scores(parts_of(each))[1] for each in judged] if len(judged) > 1 else []
+    network, parts = _together(networks, temperatures), parts_of(_together(judged, temperatures))
     bias, temperature = fit_scores(parts)
     bias = PRIOR_SHARE * bias
     known = set(CATEGORIES) | set(ROOMS)

@@ -192,7 +192,7 @@ class Run:
         point: dict[str, object] = {
             "minutes": round(minutes, 1), "steps": self.step, "frames": self.step * self.options.batch,
         }  # fmt: skip
-        if self.options.real:
+        if self.options.real and (self.options.real / "development").is_dir():
             point["real"] = real_figures(network, Shards(self.options.real / "development"))
         if self.options.held_out.is_dir():
             point["rendered"] = rendered_figures(network, Shards(self.options.held_out))

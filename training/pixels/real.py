@@ -40,6 +40,8 @@ class Options:
     """Folder of the shards: ``training`` and ``development`` in it."""
     pack: Path | None = None
     """Write the frames, half their size and compressed, into this one file (about 30 MB) instead."""
+    whole: bool = False
+    """Let the frames of the development split teach as well, once a recipe was measured without them."""
 
 
 def blocks(names: tuple[str, ...]) -> list[list[int]]:
@@ -133,13 +135,15 @@ def read_pack(path: Path) -> tuple[list[Real], tuple[str, ...]]:
         return frames, tuple(str(name) for name in arrays["names"])
 
 
-def write_shards(frames: list[Real], names: tuple[str, ...], out: Path) -> None:
-    """Write the two splits as shards."""
-    held_out = set(held_out_rows(names))
+def write_shards(frames: list[Real], names: tuple[str, ...], out: Path, whole: bool = False) -> None:
+    """Write the two splits as shards; ``whole``: all frames as the first, and no second."""
+    held_out = set() if whole else set(held_out_rows(names))
     for split, rows in (
         ("training", [row for row in range(len(names)) if row not in held_out]),
         ("development", sorted(held_out)),
     ):
+        if not rows:
+            continue
         folder = out / split / "0000000-0000"
         folder.mkdir(parents=True, exist_ok=True)
         chosen = [frames[row] for row in rows]
@@ -164,7 +168,7 @@ def main(options: Options) -> None:
     if options.pack is not None:
         write_pack(frames, names, options.pack)
     else:
-        write_shards(frames, names, options.out)
+        write_shards(frames, names, options.out, options.whole)
 
 
 if __name__ == "__main__":
