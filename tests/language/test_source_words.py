@@ -2,12 +2,14 @@
 
 import pytest
 
+from avlmaps.core.errors import QueryError
 from avlmaps.core.question import HeardAt
 from avlmaps.language.commands import read_command
 from avlmaps.language.intents import TargetKind, targets_of
 from avlmaps.language.learned_translator import LearnedTranslator
 from avlmaps.language.list_questions import Listed, read_list
 from avlmaps.language.program import parse_program
+from avlmaps.language.questions import read_question
 from avlmaps.language.sentence import Given
 from avlmaps.language.source_words import asks_for_source
 
@@ -96,6 +98,26 @@ def test_a_thing_is_named_by_its_sound_alone(named: str) -> None:
     assert between == f'robot.move_in_between({beeping}, robot.get_major_map(sound="ringing", at="source"))\n'
     near = translator.program_for(f"go to the chair near {named}").program
     assert near.startswith('heat1 = robot.get_major_map(obj="chair") * robot.get_map(sound="beeping", at="source")\n')
+
+
+@pytest.mark.parametrize(
+    "question",
+    [
+        "what is ringing?", "what's ringing", "what rings?", "which thing is ringing", "what is making the ringing?",
+        "what is making that ringing noise?", "Who was ringing?",
+    ],
+)  # fmt: skip
+def test_what_sounds_is_a_question_for_its_place(question: str) -> None:
+    (part,) = read_question(question).inquiry.of
+    assert (part.kind, part.name) == (TargetKind.SOUND, "ringing")
+    here = read_question(question.rstrip("?") + " in the kitchen").inquiry.of
+    assert [one.name for one in (here[0], *here[0].near)] == ["ringing", "kitchen"]
+
+
+@pytest.mark.parametrize("question", ["what is cooking?", "what is running?", "what is making?"])
+def test_what_does_something_else_is_none(question: str) -> None:
+    with pytest.raises(QueryError):
+        read_question(question)
 
 
 @pytest.mark.parametrize("name", ["washing machine", "sewing machine", "running machine"])

@@ -16,7 +16,7 @@ from avlmaps.language.learned.name_resolver import NameResolver, kind_of
 from avlmaps.language.learned.reader import Read, learned_reader
 from avlmaps.language.learned.unmet import unmet_by
 from avlmaps.language.list_questions import SUPPORTED
-from avlmaps.language.names import is_entry, is_known, sounds_like
+from avlmaps.language.names import SILENT, is_entry, is_known, sounding_forms, sounds_like, third_forms
 from avlmaps.language.own_names import stand_ins
 from avlmaps.language.sentence import Given, Sentence
 from avlmaps.language.word_classes import load_word_classes
@@ -49,6 +49,11 @@ _DESCRIBED = re.compile(
     r"(?:you|we|i|one|people|they) (?!saw|see|hear|heard|ha[ds]|have|put|left|found|know|want|mean|pass)"
     r"(?:can |could |would |might )?[a-z]+(?: [a-z]+){0,3}? (?:with|in|on|from|for|by|at)"
     r"(?=[ ?.!]*$| (?:near|in|by|next|at|on|beside|behind|around)\b)|for [a-z]{3,}ing [a-z]+(?=[ ?.!]*$))"
+)
+# What is named by its sound alone: "what is ringing?", "who laughs?", "what is making that ringing noise in the hall?".
+_WHAT_SOUNDS = re.compile(
+    r"\W*(?:what|who|which (?:thing|one|device|machine|person))(?P<is> ?'s| is| was)?(?: making (?:the|that|this))? "
+    r"(?P<verb>[a-z]+)(?: noise| sound)?(?P<rest>[ ?.!]*| (?:in|near|by|next to) .*)$"
 )
 _LONGEST_ACTOR = 3  # words of who does it: "an old lady"
 _ARTICLES = frozenset({"the", "a", "an"})
@@ -110,12 +115,22 @@ def read_question(text: str, given: Given | None = None) -> AskedSentence:
     language = language_of(text)
     if language is not None:
         raise QueryError(ASK.format(language=language))
-    sentence = Sentence(text, given)
+    sentence = Sentence(_where_it_sounds(text), given)
     named = by_name(sentence)
     if named is not None:
         return named
     reader = learned_reader()
     return asked(sentence, reader.question(sentence.tokens), reader.limits)
+
+
+def _where_it_sounds(text: str) -> str:
+    """Return a question for the place of what sounds ("what is ringing?"); other questions as they are."""
+    found = _WHAT_SOUNDS.match(text.lower())
+    if found is None or found["verb"] in SILENT or found["verb"] not in sounding_forms():
+        return text
+    if not found["is"] and found["verb"] not in third_forms():
+        return text
+    return f"where is what is {sounding_forms()[found['verb']]}{found['rest']}"
 
 
 def by_name(sentence: Sentence) -> AskedSentence | None:
