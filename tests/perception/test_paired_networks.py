@@ -1,5 +1,7 @@
 """Two networks together: the second counts where they agree, and not where they do not."""
 
+from dataclasses import replace
+
 import msgspec
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.perception.embedded.codes import features_of
 from avlmaps.perception.embedded.paired_networks import (
     NO_SAY,
     SAME_SAY,
@@ -17,8 +20,9 @@ from avlmaps.perception.embedded.paired_networks import (
     share_of_second,
 )
 from avlmaps.perception.embedded.pixels import EmbeddedPixels, synthetic_pixels
-from avlmaps.perception.embedded.scene_network import SYNTHETIC_WEIGHTS, SceneNetwork, load_network
-from avlmaps.recordings.types import Frame
+from avlmaps.perception.embedded.scene_network import SYNTHETIC_WEIGHTS, SceneNetwork, Seen, load_network
+from avlmaps.perception.embedded.views import EmbeddedViews
+from avlmaps.recordings.types import Frame, Ground
 
 ALL = np.ones((2, 3), bool)
 CAMERA = Pinhole(260.0, 260.0, 160.0, 120.0, 320, 240)
@@ -109,6 +113,28 @@ def test_rooms_are_mixed_by_the_same_share(frame: Frame):
     first, second = load_network().see(frame), load_network(SYNTHETIC_WEIGHTS).see(frame)
     share = share_of_second(first.category, second.category, first.known)
     np.testing.assert_allclose(load_pair().see(frame).room, mixed(first.room, second.room, share), atol=1e-6)
+
+
+def test_the_view_of_a_frame_whose_pixels_were_seen_needs_no_second_look(
+    frame: Frame, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pixels, views, looks = EmbeddedPixels(), EmbeddedViews(), list[Frame]()
+    see = PairedNetworks.see
+
+    def counted(network: PairedNetworks, one: Frame) -> Seen:
+        looks.append(one)
+        return see(network, one)
+
+    monkeypatch.setattr(PairedNetworks, "see", counted)
+    darker = replace(frame, rgb=frame.rgb // 2)
+    pixels.encode(darker)
+    (found,) = views.encode([darker])
+    assert len(looks) == 1
+    np.testing.assert_allclose(found, features_of(see(load_pair(), darker).room, views.codes), atol=1e-6)
+    up = Ground(np.array([0.0, 0.0, 1.0]), np.zeros(1), np.array([-1.0]))
+    for change in ({"depth_m": frame.depth_m / 2}, {"ground": up}, {"rgb": frame.rgb // 3}):
+        views.encode([replace(darker, **change)])
+    assert len(looks) == 4, "another depth, ground or picture is another view"
 
 
 def without_weights(**changes: tuple[str, ...]) -> SceneNetwork:

@@ -11,8 +11,12 @@ from avlmaps.core.registry import Kind, load
 from avlmaps.perception.embedded.codes import word_codes
 from avlmaps.perception.embedded.meanings import Meanings
 from avlmaps.perception.embedded.paired_networks import PairedNetworks, load_pair
-from avlmaps.perception.embedded.scene_network import Notes, SceneNetwork
+from avlmaps.perception.embedded.scene_network import Notes, SceneNetwork, Seen
+from avlmaps.perception.models.remembered import Remembered, key_of
 from avlmaps.perception.protocols import ModelCard, WordEncoder
+from avlmaps.recordings.types import Frame
+
+_ROOMS = Remembered()  # by network and frame
 
 
 class NamedEncoder:
@@ -41,6 +45,23 @@ class NamedEncoder:
 
     def _card(self, notes: Notes, checksum: str, licence: str) -> ModelCard:
         return ModelCard(id=notes.id, dim=self.codes.shape[1], licence=licence, checksum=checksum, note=notes.note)
+
+    def see(self, frame: Frame) -> Seen:
+        """Return the probabilities of things on the grid of ``encode``, and of kinds of room, which are remembered."""
+        seen = self._network.see(frame)
+        _ROOMS.put(self._key(frame), seen.room)
+        return seen
+
+    def room(self, frame: Frame) -> Float32[np.ndarray, " r"]:
+        """Return the probability of each kind of room; what pixels were seen of needs no second look."""
+        known = _ROOMS.get(self._key(frame))
+        return self.see(frame).room if known is None else known
+
+    def _key(self, frame: Frame) -> bytes:
+        rig, ground = frame.rig, frame.ground
+        levels = () if ground is None else (ground.up_in_world, ground.camera_m, ground.floor_m)
+        seen_by = (rig.rgb, rig.depth, rig.rgb_from_depth, frame.world_from_camera)
+        return key_of(self._network.checksum, frame.rgb, frame.depth_m, *seen_by, *levels)
 
     @cached_property
     def meanings(self) -> Meanings:

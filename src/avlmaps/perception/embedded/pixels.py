@@ -36,10 +36,6 @@ class EmbeddedPixels(NamedEncoder):
         seen = self.see(frame)
         return np.where(seen.known[..., None], features_of(seen.category, self.codes), np.float32(0.0))
 
-    def see(self, frame: Frame) -> Seen:
-        """Return the probabilities themselves, of ``names`` on the grid of ``encode``."""
-        return self._network.see(frame)
-
     def see_multi_scale(self, frame: Frame) -> Seen:
         """Return better probabilities of a frame by itself, ten times slower; a map gains nothing from them."""
         from avlmaps.perception.embedded.multi_scale import see_multi_scale

@@ -24,7 +24,7 @@ class EmbeddedViews(NamedEncoder):
 
     def encode(self, frames: Sequence[Frame]) -> Float32[np.ndarray, "n d"]:
         """Return a unit vector for each frame."""
-        rooms = [self._network.see(frame).room for frame in frames]
+        rooms = [self.room(frame) for frame in frames]
         return features_of(np.stack(rooms), self.codes) if rooms else np.zeros((0, self.card.dim), np.float32)
 
     def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:

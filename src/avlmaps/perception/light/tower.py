@@ -1,12 +1,5 @@
-"""The tower of pictures: one run gives the features of all patches and that of the whole view.
+"""The tower of pictures: one run gives the features of all patches and that of the whole view, which is remembered."""
 
-A build encodes a keyframe's patches first and its view later, so the features of views are remembered by the picture's
-content (``_VIEWS`` of them, 3 kB each): the second encoder finds them and runs nothing.
-"""
-
-import hashlib
-import threading
-from collections import OrderedDict
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -15,8 +8,7 @@ from jaxtyping import Float32, UInt8
 
 from avlmaps.perception.light.bundle import PICTURES, Bundle
 from avlmaps.perception.models.picture_sizes import working_size
-
-_VIEWS = 4096
+from avlmaps.perception.models.remembered import Remembered, key_of
 
 
 class PictureTower:
@@ -28,8 +20,7 @@ class PictureTower:
 
     def __init__(self, bundle: Bundle) -> None:
         self._bundle, self._note = bundle, bundle.manifest.pictures
-        self._views: OrderedDict[bytes, Float32[np.ndarray, " d"]] = OrderedDict()
-        self._lock = threading.Lock()
+        self._views = Remembered()
 
     def patches(self, rgb: UInt8[np.ndarray, "h w 3"]) -> Float32[np.ndarray, "hf wf d"]:
         """Return a unit vector for each patch of the working size."""
@@ -37,8 +28,7 @@ class PictureTower:
 
     def view(self, rgb: UInt8[np.ndarray, "h w 3"]) -> Float32[np.ndarray, " d"]:
         """Return a unit vector of the whole picture."""
-        with self._lock:
-            known = self._views.get(_key(rgb))
+        known = self._views.get(key_of(rgb))
         return self._run(rgb)[1] if known is None else known
 
     def _run(self, rgb: UInt8[np.ndarray, "h w 3"]) -> tuple[np.ndarray, np.ndarray]:
@@ -51,10 +41,7 @@ class PictureTower:
             "columns": interpolation(note.grid, columns),
         }
         patches, view = self._network.run(["patches", "view"], given)
-        with self._lock:
-            self._views[_key(rgb)] = view
-            while len(self._views) > _VIEWS:
-                self._views.popitem(last=False)
+        self._views.put(key_of(rgb), view)
         return patches.reshape(rows, columns, -1), view
 
     @cached_property
@@ -95,9 +82,3 @@ def interpolation(given: int, wanted: int) -> Float32[np.ndarray, "wanted given"
     last = np.minimum((middle + reach + 0.5).astype(np.int64), given)
     weight = np.maximum(1.0 - np.abs(cell - middle + 0.5) / reach, 0.0) * ((cell >= first) & (cell < last))
     return (weight / weight.sum(axis=1, keepdims=True)).astype(np.float32)
-
-
-def _key(rgb: UInt8[np.ndarray, "h w 3"]) -> bytes:
-    return hashlib.blake2b(
-        np.ascontiguousarray(rgb).data, digest_size=16, person=repr(rgb.shape)[:16].encode()
-    ).digest()
