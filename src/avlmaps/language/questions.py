@@ -50,9 +50,9 @@ _DESCRIBED = re.compile(
     r"(?:can |could |would |might )?[a-z]+(?: [a-z]+){0,3}? (?:with|in|on|from|for|by|at)"
     r"(?=[ ?.!]*$| (?:near|in|by|next|at|on|beside|behind|around)\b)|for [a-z]{3,}ing [a-z]+(?=[ ?.!]*$))"
 )
-# What is named by its sound alone: "what is ringing?", "who laughs?", "what is making that ringing noise in the hall?".
+# What is named by its sound alone: "what is ringing?", "what is making that ringing noise?". Who it is no map says.
 _WHAT_SOUNDS = re.compile(
-    r"\W*(?:what|who|which (?:thing|one|device|machine|person))(?P<is> ?'s| is| was)?(?: making (?:the|that|this))? "
+    r"\W*(?:what|which (?:thing|one|device|machine))(?P<is> ?'s| is| was)?(?: making (?:the|that|this))? "
     r"(?P<verb>[a-z]+)(?: noise| sound)?(?P<rest>[ ?.!]*| (?:in|near|by|next to) .*)$"
 )
 _LONGEST_ACTOR = 3  # words of who does it: "an old lady"
