@@ -15,11 +15,13 @@ from avlmaps.cli.usage import CONFIG
 from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.wording import Spelling, options_as
+from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.camera_axes import opencv_from_axes
 from avlmaps.recordings.consistency.causes import cause_of
 from avlmaps.recordings.consistency.check import check_recording, pose_at
 from avlmaps.recordings.consistency.edges import find_edges, shift_of
 from avlmaps.recordings.consistency.sample import Sample, choose_pairs, draw_sample
+from avlmaps.recordings.consistency.single_frames import of_sound
 from avlmaps.recordings.consistency.suspects import Suspect, Trials
 from avlmaps.recordings.consistency.verdict import Grade, Reason, Verdict
 from avlmaps.recordings.corrections import Corrections
@@ -175,11 +177,38 @@ def test_one_frame_and_none_that_overlaps_say_nothing(right: Draft, tmp_path: Pa
     assert not found.sentences() and "there is one frame" in found.unchecked[0]
 
 
-@pytest.mark.parametrize(("kept", "said"), [(12, "Only 40% of the frames have a pose"), (16, "")])
+@pytest.mark.parametrize(("kept", "said"), [(12, "Only 40% of the frames have a pose"), (24, "")])
 def test_a_drive_most_of_which_has_no_pose_is_doubted(kept: int, said: str, right: Draft, tmp_path: Path) -> None:
     found = verdict(replace(right, poses=right.poses[:kept], pose_stamps_s=right.pose_stamps_s[:kept]), tmp_path)
     assert (found.grade is Grade.SUSPICIOUS) == bool(said)
     assert [one.startswith(said) for one in found.sentences()] == [True] * bool(said)
+
+
+def test_a_clock_that_is_set_back_in_the_middle_is_doubted(right: Draft, tmp_path: Path) -> None:
+    stamps_s = right.stamps_s - np.where(np.arange(len(right.stamps_s)) < 16, 0.0, 40.0)
+    found = verdict(replace(right, stamps_s=stamps_s, pose_stamps_s=stamps_s.copy(), poses=right.poses), tmp_path)
+    assert found.sentences()[0].startswith("Only 53% of the frames have a pose on one clock")
+
+
+LENGTHS = {
+    "as long": (16_000, 1.0, 0.0, ""), "begins before, ends after": (16_000, 1.3, -2.0, ""),
+    "twice the rate": (8_000, 2.0, 0.0, "16000 samples a second were called 8000"),
+    "half the rate": (16_000, 0.5, 0.0, "8000 samples a second were called 16000"),
+    "48 for 16 kHz": (16_000, 3.0, 0.05, "48000 samples a second were called 16000"),
+    "44.1 for 48 kHz": (48_000, 44.1 / 48.0, 0.0, ""), "goes on": (16_000, 2.0, -8.0, ""),
+    "two of fifteen": (16_000, 2.0 / 15.0, 3.0, "of the drive has sound"),
+    "another clock": (16_000, 1.0, 500.0, "0% of the drive has sound"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", LENGTHS)
+def test_a_track_of_another_rate_or_clock_is_doubted(case: str, right: Draft, tmp_path: Path) -> None:
+    rate_hz, longer, start_s, said = LENGTHS[case]
+    right.write(tmp_path / "walk")
+    recording = open_recording(tmp_path / "walk")
+    recording.audio = AudioTrack(tmp_path / "sound.wav", rate_hz, longer * recording.duration_s, start_s)
+    found = list(of_sound(recording))
+    assert [said in str(one) and one.reason is Reason.SOUND for one in found] == [True] * bool(said)
 
 
 def test_frames_that_see_nothing_in_common_are_not_called_fine(tmp_path: Path) -> None:

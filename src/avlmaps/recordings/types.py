@@ -122,7 +122,7 @@ class Recording(ABC):
         trajectory: the poses at their own rate on the frames' clock, where the reader interpolated them; None where
             each frame has its own.
         begins_s: what the clock of its files said at time 0, seconds: since 1970 where their stamps are dates.
-        posed: share of the frames that have a pose; the others are left out.
+        posed: share of the frames that are used: with a pose, on one clock; the others are left out.
     """
 
     path: Path

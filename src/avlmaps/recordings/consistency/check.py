@@ -18,7 +18,14 @@ from avlmaps.recordings.consistency.causes import cause_of
 from avlmaps.recordings.consistency.edges import Edges, Shift, find_edges, shift_of
 from avlmaps.recordings.consistency.jumps import find_exchanged, find_jump
 from avlmaps.recordings.consistency.sample import Sample, Surfaces, draw_sample, steps_between_all
-from avlmaps.recordings.consistency.single_frames import of_colour, of_depth, of_intrinsics, of_motion, of_poses
+from avlmaps.recordings.consistency.single_frames import (
+    of_colour,
+    of_depth,
+    of_intrinsics,
+    of_motion,
+    of_poses,
+    of_sound,
+)
 from avlmaps.recordings.consistency.suspects import PoseAt, Trial, Trials, find_cause, find_closer
 from avlmaps.recordings.consistency.verdict import Finding, Grade, Reason, Verdict
 from avlmaps.recordings.corrections import NONE, CorrectedRecording, uncorrected
@@ -50,6 +57,7 @@ def check_recording(recording: Recording) -> Verdict:
         *of_depth(sample, surfaces, median_m),
         *of_colour(sample, surfaces),
         *of_poses(recording),
+        *of_sound(recording),
         *of_motion(recording, after, limits.can_be_judged(after)),
         *_of_agreement(recording, sample, found, median_m),
     ]

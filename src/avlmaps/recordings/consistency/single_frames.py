@@ -36,8 +36,14 @@ MOST_SPEED_M_S = 4.0
 # Beyond that pace by as much, one step alone is a jump.
 LEAST_JUMP_M = 0.5
 _NEAR_IN_TIME_S = 1.0
-# With poses of fewer frames most of the drive is not in the map.
-LEAST_POSED = 0.5
+# With poses of fewer frames, or on several clocks, much of the drive is not in the map.
+LEAST_POSED = 0.75
+# Share of the drive that its sound lasts, and rates of sound that are written for one another.
+LEAST_HEARD = 0.5
+_RATES_HZ = (8_000, 11_025, 16_000, 22_050, 24_000, 32_000, 44_100, 48_000, 96_000)
+# How far a ratio of lengths may be off one of rates; lengths within a fifth say nothing of it.
+_AS_LONG, _LIKE_ONE = 0.02, 0.8
+_SHORTEST_DRIVE_S = 1.0
 _CENTRE_MARGIN = 0.2
 _FOCAL_RANGE = (0.25, 4.0)
 _MOST_ASPECT = 1.15
@@ -209,11 +215,33 @@ def of_colour(sample: Sample, surfaces: Surfaces) -> Iterator[Finding]:
 
 
 def of_poses(recording: Recording) -> Iterator[Finding]:
-    """Find a drive most of which has no pose."""
+    """Find a drive much of which has no pose, or another clock."""
     if recording.posed < LEAST_POSED:
-        sentence = f"Only {recording.posed:.0%} of the frames have a pose; the others are left out."
+        sentence = f"Only {recording.posed:.0%} of the frames have a pose on one clock; the others are left out."
         remedy = "What they show is not in the map: check that pictures and poses are of one drive and one clock."
         yield Finding(Reason.MOTION, Grade.SUSPICIOUS, sentence, remedy)
+
+
+def of_sound(recording: Recording) -> Iterator[Finding]:
+    """Find a track that lasts as long as the drive only at another rate, and one that misses most of the drive."""
+    track, drive_s = recording.audio, recording.duration_s
+    if track is None or drive_s < _SHORTEST_DRIVE_S:
+        return
+    begin_s, end_s = track.start_s, track.start_s + track.duration_s
+    first_s, last_s = float(recording.stamps_s[0]), float(recording.stamps_s[-1])
+    spans = f"The sound lasts from {begin_s:.1f} to {end_s:.1f} s and the drive from {first_s:.1f} to {last_s:.1f} s"
+    longer = track.duration_s / drive_s
+    meant = [hz for hz in _RATES_HZ if hz != track.rate_hz and abs(longer * track.rate_hz / hz - 1.0) < _AS_LONG]
+    if meant and abs(begin_s - first_s) < _AS_LONG * drive_s and not _LIKE_ONE < longer < 1.0 / _LIKE_ONE:
+        sentence = (
+            f"{spans}: {longer:.3g} times as long, as if {meant[0]} samples a second were called {track.rate_hz}."
+        )
+        remedy = f"If so, write {track.path.name} again with its true rate; else its sounds lie at wrong places."
+        yield Finding(Reason.SOUND, Grade.SUSPICIOUS, sentence, remedy)
+    elif (heard := max(0.0, min(end_s, last_s) - max(begin_s, first_s)) / drive_s) < LEAST_HEARD:
+        sentence = f"{spans}: {heard:.0%} of the drive has sound."
+        remedy = "Check that both are of one drive and one clock."
+        yield Finding(Reason.SOUND, Grade.SUSPICIOUS, sentence, remedy)
 
 
 def of_motion(recording: Recording, found: Agreement, judged: bool) -> Iterator[Finding]:

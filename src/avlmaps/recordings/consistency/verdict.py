@@ -25,6 +25,7 @@ class Reason(StrEnum):
     MOTION = "motion"
     UP = "up"
     MICROPHONES = "microphones"
+    SOUND = "sound"
 
 
 @dataclass(frozen=True, slots=True)

@@ -68,11 +68,6 @@ class Shots:
         )
 
 
-def share_posed(world_from_camera: Float[np.ndarray, "n 4 4"]) -> float:
-    """Return the share of poses that are none of a lost camera (NaN, infinity)."""
-    return float(np.isfinite(world_from_camera).all(axis=(1, 2)).mean()) if len(world_from_camera) else 1.0
-
-
 def settle(
     path: Path, shots: Shots, report: Report, pose_file: Callable[[int], Path] | None
 ) -> tuple[Shots, tuple[str, ...]]:
@@ -198,8 +193,9 @@ class ShotsRecording(Recording):
 
         ``more`` may say of how many frames these are those with a pose (``posed``).
         """
-        more["posed"] = more.get("posed", 1.0) * share_posed(shots.world_from_camera)
+        found = len(shots.names)
         shots, settled = settle(path, shots, report, pose_file)
+        more["posed"] = more.get("posed", 1.0) * (len(shots.names) / found if found else 1.0)
         more.setdefault("audio", open_audio(path))
         told = tuple(dict.fromkeys((*notices, *settled)))  # of frames and of their poses the same may be said
         return cls(path=path, format=format, rig=rig, shots=shots, notices=told, **more)

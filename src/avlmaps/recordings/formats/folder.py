@@ -18,7 +18,7 @@ from avlmaps.recordings.corrections import corrected
 from avlmaps.recordings.directions import DIRECTIONS, read_directions
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
 from avlmaps.recordings.formats.columns import NAMED_FILE, POSE, named_order, split_header
-from avlmaps.recordings.formats.file_recording import FileRecording, Shots, find_audio, list_names, settle, share_posed
+from avlmaps.recordings.formats.file_recording import FileRecording, Shots, find_audio, list_names, settle
 from avlmaps.recordings.formats.tables import read_table, text_lines
 from avlmaps.recordings.images import file_turn, first_picture_size
 from avlmaps.recordings.layout import Description
@@ -55,7 +55,6 @@ def open_folder(path: Path, report: Report = stop_at_first) -> Recording:
     _check_sizes(path, description, found)
     _check_clocks(path, description, found, known)
     shots, notices, start_s, trajectory = _pose_pictures(found, known)
-    posed = share_posed(shots.world_from_camera) * len(shots.names) / max(len(found.names), 1)
     shots, more = settle(path, shots, report, pose_file=None)
     first_s = 0.0 if found.stamps_s is None else float(found.stamps_s[0]) - start_s
     audio_start_s = description.audio_start_s - (start_s if description.audio_start_s > _DATE_S else 0.0)
@@ -75,7 +74,7 @@ def open_folder(path: Path, report: Report = stop_at_first) -> Recording:
         trajectory=trajectory,
         begins_s=start_s + (description.begins_s or 0.0),
         base_height=description.base_height or None,
-        posed=posed,
+        posed=len(shots.names) / max(len(found.names), 1),
     )
     return corrected(recording, description.corrections())
 

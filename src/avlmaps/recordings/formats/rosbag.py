@@ -123,7 +123,7 @@ class RosbagRecording(Recording):
             notices.append(
                 f"{int((~known).sum())} of {len(known)} frames lie outside of the known poses and are left out."
             )
-        self.posed = float(known.mean())
+        self.posed = float(known.mean()) * min(len(rgb) / len(rgb_s), len(depth) / len(depth_s))
         rows = np.flatnonzero(known)
         walk = plausible_walk(stamps_s[rows], poses[rows, :3, 3], [f"{i:06d}" for i in range(len(rows))])
         if walk.fault:
