@@ -28,6 +28,26 @@ def test_what_tells_of_a_drive_orders_none(form: str, place: str) -> None:
 
 
 @pytest.mark.parametrize("form", [
+    "go to the {} later", "later on, go to the {}", "go to the {} yesterday", "go to the {} soon",
+    "some day go to the {}", "almost go to the {}", "go almost to the {}", "nearly go to the {}",
+    "go to every second {}", "go to each other {}",
+])  # fmt: skip
+def test_what_is_put_off_or_half_meant_is_not_driven(form: str) -> None:
+    assert read_command(form.format("window")).stops is not None
+
+
+@pytest.mark.parametrize("mark", ["!", ".", "!!", " !", ";"])
+def test_a_mark_between_two_orders_ends_the_first(mark: str) -> None:
+    turns = read_command("turn left, then turn right 90 degrees").intents
+    assert len(turns) == 2 and read_command(f"turn left{mark} turn right 90 degrees").intents == turns
+
+
+def test_later_between_two_steps_is_their_order() -> None:
+    for order in ("go to the window, and later to the sofa", "wait ten seconds and later go to the sofa"):
+        assert read_command(order).stops is None
+
+
+@pytest.mark.parametrize("form", [
     "can you go to the {}?", "will you go to the {}?", "I would rather you went to the {}", "you have to go to the {}",
     "did you hear that? Go to the {}", "he was at the {}, go there", "I think it is time you went to the {}",
     "you had better go to the {}", "how about you go to the {}?",

@@ -131,9 +131,17 @@ def tokenise(sentence: str) -> list[Token]:
             tokens.append(Token("not", raw, "word", found.start(), found.end()))  # as programs have it: "!kitchen"
         elif raw not in ("-", '"', "'", "`", "*", "_") or _stands_alone(plain, found.start(), raw):
             word = "word" if kind == "clock" or raw == "°" else kind
-            text = {"@": "at", "->": ">", "=>": ">", "\n": "."}.get(raw, "." if raw.startswith(".") else raw.lower())
+            text = _MARKS.get(raw, "." if _ends_an_order(plain, found.end(), raw) else raw.lower())
             tokens.append(Token("o'clock" if kind == "clock" else text, raw, word, found.start(), found.end()))
     return tokens
+
+
+def _ends_an_order(text: str, end: int, raw: str) -> bool:
+    """Return whether a mark is a full stop: "turn left! turn right" are two orders, and "stop!" is one."""
+    return raw.startswith(".") or (raw == "!" and bool(text[end:].strip(" !.?")))
+
+
+_MARKS = {"@": "at", "->": ">", "=>": ">", "\n": "."}
 
 
 def without_spoken_end(text: str) -> str:

@@ -41,6 +41,8 @@ _BY_CLOCK = frozenset({"at", "by", "before", "after", "until", "till", "from"})
 _CLOCK = frozenset({"hours", "o'clock", "am", "pm", "a.m", "p.m", "sharp"})
 _WAYS_OUT = frozenset({"leave", "exit", "enter", "escape", "out", "in", "inside", "outside"})
 
+_LATER = frozenset({"later", "soon", "sometime"})
+
 
 def runs_down(said: Said) -> bool:
     """Return whether the robot should drive over, into or at what is alive, or use a window as a door."""
@@ -66,7 +68,7 @@ def runs_down(said: Said) -> bool:
 def circumstance(said: Said) -> Refuse | None:
     """Return the refusal for an order that holds at a time or at a sign alone: "at noon", "on my signal"."""
     tokens = list(said.tokens)
-    if said.spans("signals") or said.spans("times"):
+    if said.spans("signals") or said.spans("times") or _is_put_off(said.tokens):
         return Refuse(Reason.CONDITION)
     for at, text in enumerate(said.texts):
         # "two metres at 2 o'clock" is a direction
@@ -81,6 +83,12 @@ def circumstance(said: Said) -> Refuse | None:
         if text == "sure" and _is_to_be_so(said.texts[at + 1 : at + 8]):
             return Refuse(Reason.CONDITION)
     return None
+
+
+def _is_put_off(tokens: Sequence[Token]) -> bool:
+    """Return whether all is to be done later: "go to the sofa later"; "..., later to the bed" is an order of steps."""
+    spoken = [token for token in tokens if token.kind != "punct"]
+    return bool(spoken) and (spoken[-1].text in _LATER or (spoken[0].text in _LATER and spoken[0].start == 0))
 
 
 def _is_to_be_so(after: Sequence[str]) -> bool:
