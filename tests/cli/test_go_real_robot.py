@@ -187,8 +187,9 @@ def test_a_signal_after_the_program_does_not_say_that_no_goal_was_sent(
 
     unseen = Halt(False, "no goal was active, but the robot is not seen to stand")
     usual = {"halt": lambda: unseen, "close": lambda: None, "owes": lambda: False, "contacts": lambda: None}
-    robot: Any = SimpleNamespace(**usual | {when: stop}, driver=None)
+    robot: Any = SimpleNamespace(**usual | {when: stop}, driver=None, start=None)
     monkeypatch.setattr("avlmaps.navigate.instruct.instruct", lambda *_, **__: None)
+    monkeypatch.setattr("avlmaps.navigate.rehearsal.unfound", lambda *_, **__: None)
     nothing: Any = None
     with pytest.raises(Interrupted) as stopped:
         drive(Go(map=Path("room.avlmap"), sentence="turn left"), nothing, robot, nothing, nothing)

@@ -91,7 +91,7 @@ class Build(ModelVerb):
     """Height of the depth camera over the floor in the first frame, metres. Default: found from the frames; give it
     where `build` reports the floor with a low confidence."""
     allow: Annotated[
-        tuple[Literal["geometry", "colour", "depth", "intrinsics", "motion", "up", "microphones"], ...],
+        tuple[Literal["geometry", "colour", "depth", "intrinsics", "motion", "up", "microphones", "sound"], ...],
         arg(metavar="REASON ..."),
     ] = ()
     """Build a map although the recording contradicts itself, for these reasons; the error names its reason."""
