@@ -109,6 +109,10 @@ class LocateSettings:
     """Tolerances of the pose."""
 
 
+# A larger error is not printed as a figure: noise and pictures of a few pixels have tens of metres, or infinity.
+_PRINTED_M = 2.0
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class Located:
     """The answer.
@@ -157,9 +161,12 @@ class Located:
         focal = f"{self.camera.fx:.0f} ± {self.uncertainty.focal * self.camera.fx:.0f} pixels"
         where = f"{100 * self.uncertainty.place_m:.1f} cm and {np.rad2deg(self.uncertainty.angle_rad):.1f} degrees"
         if self.world_from_camera is None:
+            fix = f"fix it only to {focal}, the place to {where}"
+            if not self.uncertainty.place_m <= _PRINTED_M:  # NaN and infinity too
+                fix = "do not fix it"
             return (
-                f"The focal length of the photo's camera is not known, and its {self.inliers} points fix it only to "
-                f"{focal}, the place to {where}; give it ({option('intrinsics', 'fx,fy,cx,cy')}).",
+                f"The focal length of the photo's camera is not known, and its {self.inliers} points {fix}; give it "
+                f"({option('intrinsics', 'fx,fy,cx,cy')}).",
             )
         known = f"The focal length was found with the pose: {focal}; by it the pose is known to {where}."
         if not self.centred:
