@@ -38,7 +38,7 @@ REFUSALS = {
     Reason.HARM: "The robot does not do what could hurt someone or break something.",
     Reason.FLYING: "The robot stays on its floor; it cannot fly, jump or climb stairs.",
     Reason.CONDITION: "The robot cannot wait for a condition; say what to do now.",
-    Reason.NEGATION: "Say only what to do, not what to avoid.",
+    Reason.NEGATION: "Say only what to do: nothing to avoid, no choice between two.",
     Reason.CHAT: "The robot does not talk; say where it should go.",
     Reason.QUESTION: 'This is a question; ask the map: avlmaps query MAP "QUESTION".',
     Reason.UNKNOWN: f"This is not understood; say it like: {EXAMPLE}.",
