@@ -771,6 +771,7 @@ def test_ctrl_c_while_it_ends_leaves_out_what_waits(tmp_path: Path, monkeypatch:
         return items
 
     monkeypatch.setattr(live_map, "progress", bar)
+    monkeypatch.setattr(live_map, "_CALM_S", 600.0)  # what waits is not looked at before the end
     live = LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP, live=LATER)
     for number in range(14):
         add(live, frame(number, step_m=0.005))
