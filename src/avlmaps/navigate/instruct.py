@@ -176,7 +176,7 @@ def instruct(
     translation = translation or translator.program_for(command)
     robot = Robot(avlmap, driver, settings, readable or offered_by(command), lambda line: tell(f"  {line}"), pause)
     run = _Run(command, translator, robot, budget, tell)
-    for doubt in (*avlmap.stored.info.doubts, *avlmap.edited.unheeded):
+    for doubt in avlmap.doubts_of_drives:
         run.note(doubt)
     run.through(translation)
     run.judge()

@@ -76,7 +76,7 @@ def told_by_map(
     robot, trace = _asked_of(program, avlmap, command, GroundPose(0.0, 0.0), guess)
     missing = None if trace.error is None or trace.error_type == ProgramError.__name__ else trace
     why = () if missing is None or missing.error is None else (missing.error,)
-    return (*avlmap.stored.info.doubts, *avlmap.edited.unheeded, *robot.seeker.notes, *why), missing
+    return (*avlmap.doubts_of_drives, *robot.seeker.notes, *why), missing
 
 
 def unfound(
@@ -94,7 +94,7 @@ def unfound(
     robot, trace = _asked_of(translation.program, avlmap, words, start, guess)
     if trace.error is None or trace.error_type not in _ABSENT or not robot.moves:
         return None
-    notes = (*avlmap.stored.info.doubts, *avlmap.edited.unheeded, *translation.notes, *robot.seeker.notes)
+    notes = (*avlmap.doubts_of_drives, *translation.notes, *robot.seeker.notes)
     error = f"{trace.error.rstrip('.')}. The robot was not moved."
     return Outcome(words, (translation.program,), notes, (), (), error, trace.error_type, 0.0)
 

@@ -412,6 +412,11 @@ class AVLMap:
         return Contents(things, self.sounds(), rooms, self.doubts_of_things, self.storeys)
 
     @property
+    def doubts_of_drives(self) -> tuple[str, ...]:
+        """What is doubtful about the map for a robot: why it may be wrong, and areas that it no longer forbids."""
+        return (*self.stored.info.doubts, *self.edited.unheeded)
+
+    @property
     def doubts_of_things(self) -> tuple[str, ...]:
         """Why a list of its things may be wrong, one sentence each."""
         doubts = self.stored.info.doubts

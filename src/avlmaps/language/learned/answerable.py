@@ -46,18 +46,8 @@ _NUMBERED = frozenset({"pair", "floor", "storey", "story", "level", "hand"})
 def unanswerable(said: Claimed, inquiry: Inquiry) -> str | None:
     """Return the refusal for a question about what a map does not hold; None where it holds it."""
     rules = (
-        _measured,
-        _compared,
-        _counted,
-        _quantity,
-        _not_placed,
-        _unserved,
-        _soundless,
-        _past,
-        _either,
-        _unsought,
-        _done,
-    )
+        _measured, _compared, _counted, _quantity, _not_placed, _unserved, _soundless, _past, _either, _unsought, _done,
+    )  # fmt: skip
     for rule in rules:
         phrase = rule(said, inquiry)
         if phrase is not None:
