@@ -1,12 +1,18 @@
 """`avlmaps go`: a sentence in, a drive out; what can go wrong is one sentence each."""
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from avlmaps.core.extras import install_command
+from avlmaps.core.motion import Action, Moved
+from avlmaps.core.question import Part
+from avlmaps.query.avlmap import AVLMap
+from avlmaps.query.factors import NearThings
+from avlmaps_sim.body import SimulatedBody
 from avlmaps_sim.materials import material
 from avlmaps_sim.scene import Scene, SceneBuilder
 from avlmaps_sim.shapes import slab
@@ -69,6 +75,50 @@ def test_nothing_moves_where_a_later_goal_is_not_in_the_map(run, built: Path, in
     assert said["error"]["kind"] in ("goal-not-found", "query")
     assert "The robot was not moved." in said["error"]["message"]
     assert (said["steps"], said["actions"], said["path_m"]) == ([], [], 0.0)
+
+
+def test_a_drive_looks_up_each_goal_once(run, built: Path, in_room: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[str] = []
+    seen = AVLMap._seen_object
+
+    def counted(self: AVLMap, part: Part, vocabulary: None) -> NearThings:
+        asked.append(part.query)
+        return seen(self, part, vocabulary)
+
+    monkeypatch.setattr(AVLMap, "_seen_object", counted)
+    status, _, err = run("go", built, "go to the red thing, then turn left", "--scene", "room")
+    assert status == 0, err
+    assert asked == ["red thing"]
+
+
+@pytest.mark.parametrize(
+    ("does", "stops"),
+    [(("--forbid", "the wet floor", "--box", "1,1,1.5,1.5"), True), (("--pin", "my dock", "--at", "4.4,3.2"), False)],
+)
+def test_an_area_that_is_forbidden_while_it_drives_stops_the_robot(
+    run, built: Path, tmp_path: Path, in_room: None, monkeypatch: pytest.MonkeyPatch, does: tuple[str, ...], stops: bool
+) -> None:
+    home = tmp_path / "home.avlmap"
+    shutil.copytree(built, home)
+    taken: list[Action] = []
+    act = SimulatedBody.act
+
+    def act_and_edit(body: SimulatedBody, action: Action) -> Moved:
+        taken.append(action)
+        if len(taken) == 5:
+            assert run("edit", home, *does)[0] == 0
+        return act(body, action)
+
+    monkeypatch.setattr(SimulatedBody, "act", act_and_edit)
+    status, out, err = run("go", home, "go to the red thing", "--scene", "room", "--json")
+    said = json.loads(out.splitlines()[-1])
+    if not stops:
+        assert status == 0 and len(taken) > 6, err
+        return
+    assert status == 1 and taken[5:] in ([], [Action.STOP])
+    assert "the wet floor was forbidden meanwhile" in err.splitlines()[-1]
+    assert said["error"]["message"] in err and said["error"]["kind"] == "navigation"
+    assert said["path_m"] > 0.0 or len(said["actions"]) >= 5
 
 
 def test_what_cannot_be_obeyed_is_told_with_status_1_and_json_all_the_same(run, built: Path, in_room: None) -> None:
@@ -233,7 +283,7 @@ def test_a_dry_run_says_of_the_map_what_the_drive_says(run, built: Path, in_room
     dry, drive = (json.loads(run("go", built, sentence, *how)[1]) for how in (
         ("--dry-run", "--json"), ("--scene", "room", "--json"),
     ))  # fmt: skip
-    assert dry["program"] == drive["program"] and dry["ok"] and dry["path_m"] == 0.0
-    assert dry["missing"] == drive["error"]
+    assert dry["program"] == drive["program"] and dry["path_m"] == 0.0
+    assert dry["missing"] == dry["error"] == drive["error"] and dry["ok"] is drive["ok"]
     told = [*drive["notes"], *([drive["error"]["message"]] if drive["error"] else [])]
     assert dry["notes"] == [one for one in told if "could stop" not in one and one != "the program moved nothing"]

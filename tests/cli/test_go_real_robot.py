@@ -178,6 +178,25 @@ def test_a_signal_between_two_goals_leaves_no_goal(go: Started, later_s: float) 
     assert "robot stands at" in err.splitlines()[-1]
 
 
+@pytest.mark.parametrize(("ros", "kind"), [(2, "nav2"), (1, "move_base")])
+def test_an_area_that_is_forbidden_while_it_drives_stops_the_robot(
+    go: Started, run, built: Path, ros: int, kind: str
+) -> None:
+    with robot_here(ros) as robot:
+        process = go(robot.url, "move forward 50 metres", kind)
+        assert robot.soon(lambda: bool(robot.goals), START_S)
+        robot.moves_on = True
+        try:
+            assert run("edit", built, "--forbid", "the wet floor", "--box", "1,1,1.5,1.5")[0] == 0
+            out, err = process.communicate(timeout=START_S)
+        finally:
+            (built / "edits.jsonl").unlink(missing_ok=True)
+        assert ended(robot) and not robot.moves_on
+    assert process.returncode == 1, err
+    assert "the wet floor was forbidden meanwhile" in err.splitlines()[-1]
+    assert json.loads(out)["error"]["message"] in err
+
+
 @pytest.mark.parametrize("when", ["close", "owes"])
 def test_a_signal_after_the_program_does_not_say_that_no_goal_was_sent(
     monkeypatch: pytest.MonkeyPatch, when: str

@@ -10,12 +10,12 @@ import numpy as np
 from avlmaps.core.motion import GroundPose
 from avlmaps.maps.obstacles import Obstacles
 from avlmaps.navigate.bodies import BASE
+from avlmaps.navigate.brake import Brake, BrakedDriver
 from avlmaps.navigate.costmap import obstacles_for
 from avlmaps.navigate.driver import Arrival, Driver
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.serve.drive.agents import drive_agent_app
 from avlmaps.serve.drive.app import DriveService, drive_app
-from avlmaps.serve.drive.brake import Brake, BrakedDriver
 from avlmaps.serve.drive.order_log import OrderLog
 from avlmaps.serve.drive.orders import Dispatcher
 from avlmaps.serve.drive.plans import MapNow

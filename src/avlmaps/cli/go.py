@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from avlmaps.navigate.instruct import Outcome
     from avlmaps.navigate.interrupts import Halt
     from avlmaps.query.avlmap import AVLMap, QuerySettings
+    from avlmaps.query.heatmap import Heatmap
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -184,18 +185,19 @@ def _planned(verb: "Go", settings: "QuerySettings") -> dict[str, Any]:
 
 def plan_answer(verb: "Go", translation: "Translation", avlmap: "AVLMap | None") -> dict[str, Any]:
     """Return the answer for a command that is read and not obeyed, with what a drive would report of its map."""
-    told, missing = (), None
+    told, error, error_type = (), None, None
     if avlmap is not None:
         from avlmaps.navigate.rehearsal import told_by_map
 
         told, run = told_by_map(translation.program, avlmap, verb.sentence, guess=verb.guess)
-        if run is not None and run.error is not None and run.error_type is not None:
-            missing = error_answer(kind_named(run.error_type), run.error)
+        if run is not None:
+            error, error_type = run.error, run.error_type
     return {
         "plan": translation.plan,
-        "program": translation.program, "steps": [], "actions": [], "subgoals": [], "ok": True, "error": None,
-        "notes": list(dict.fromkeys((*translation.notes, *told))), "path_m": 0.0, "elapsed_s": 0.0,
-        "frame": "recording", "missing": missing,
+        "program": translation.program, "steps": [], "actions": [], "subgoals": [], "ok": error is None,
+        "error": error, "error_type": error_type, "notes": list(dict.fromkeys((*translation.notes, *told))),
+        "path_m": 0.0, "elapsed_s": 0.0, "frame": "recording",
+        "missing": None if error is None or error_type is None else error_answer(kind_named(error_type), error),
     }  # fmt: skip
 
 
@@ -250,16 +252,17 @@ def _obeyed(
     from avlmaps.navigate.rehearsal import unfound
     from avlmaps.navigate.skills import RobotSettings
 
-    settings = RobotSettings(guess=verb.guess)
+    settings, heats = RobotSettings(guess=verb.guess), dict[tuple[object, ...], "Heatmap"]()
     try:
         if verb.language != "chat":  # a chat model's program may decide while it drives
-            missing = unfound(verb.sentence, translation, avlmap, robot.start, guess=verb.guess)
+            missing = unfound(verb.sentence, translation, avlmap, robot.start, heats, guess=verb.guess)
             if missing is not None:
                 say(translation.plan)
                 return missing
         return instruct(
-            verb.sentence, avlmap, robot.driver, translator, settings=settings, translation=translation, tell=say
-        )
+            verb.sentence, avlmap, robot.driver, translator, settings=settings, translation=translation, tell=say,
+            heats=heats,
+        )  # fmt: skip
     except Interrupted as stop:
         stop.halt = robot.halt()
         raise

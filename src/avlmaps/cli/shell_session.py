@@ -254,6 +254,9 @@ class Session:
         translator = going.translator_for(command, avlmap)
         translation = translator.program_for(command.sentence)
         plan = going.plan_answer(command, translation, avlmap)
+        if (missing := going.failure(plan)) is not None:
+            sys.stderr.write(f"avlmaps: {printable(missing['message'])}\n")
+            return Reply({**plan, "error": missing}, going.go_lines(plan), False)
         if given.scene is None:
             return Reply(plan, [*going.go_lines(plan), "planned only; --scene of avlmaps shell lets a robot drive"])
         for text in going.go_lines(plan):

@@ -1,5 +1,6 @@
 """Driving to a place: what every driver offers, and the one that plans on a map and follows its way itself."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import pi
 from typing import Literal, Protocol, runtime_checkable
@@ -89,6 +90,14 @@ class Driver(Protocol):
         ...
 
 
+@runtime_checkable
+class Holdable(Protocol):
+    """A driver whose movement under way can be ended."""
+
+    held: Callable[[], str]
+    """Returns why the movement must end, in part of a sentence; "" where it need not. Called all along."""
+
+
 @dataclass(frozen=True, slots=True)
 class DriveSettings:
     """How a `MapDriver` drives."""
@@ -131,6 +140,7 @@ class MapDriver:
         shape: of the body; radius and height must be those that the obstacles were found for.
         settings: how it drives.
         contacts: what the body touched and the map does not know.
+        held: see `Holdable`.
     """
 
     def __init__(
@@ -140,6 +150,7 @@ class MapDriver:
         self.settings = settings or DriveSettings()
         self.contacts = ContactMap(obstacles, shape.radius_m)
         self.contacts.mark_free(body.pose)
+        self.held: Callable[[], str] = lambda: ""
         self._planner: Planner | None = None  # of the obstacles known by now; None where one came since
 
     @property
@@ -190,7 +201,7 @@ class MapDriver:
             return self._arrival(trip, False, f"{angle_rad} rad is not an angle to turn by")
         left_rad = self._turned(angle_rad, trip)
         if abs(left_rad) > _TURNED_RAD:
-            return self._arrival(trip, False, f"the turn ended {np.rad2deg(abs(left_rad)):.0f}° off")
+            return self._arrival(trip, False, trip.fault or f"the turn ended {np.rad2deg(abs(left_rad)):.0f}° off")
         small = self.settings.mode == "actions" and not trip.actions and abs(angle_rad) > 0.01
         return self._arrival(trip, True, "it turns by 5° at a time, so that it did not turn" if small else "")
 
@@ -200,7 +211,7 @@ class MapDriver:
         if not abs(distance_m) <= _MOST_M:
             return self._arrival(trip, False, f"{distance_m} m is not a distance to drive")
         if distance_m < 0.0 and abs(self._turned(pi, trip)) > _TURNED_RAD:
-            return self._arrival(trip, False, "it could not turn round")
+            return self._arrival(trip, False, trip.fault or "it could not turn round")
         start, distance_m = self.pose, abs(distance_m)
         if self.settings.mode == "velocity":
             known_m = self._known_m(distance_m)
@@ -351,6 +362,8 @@ class MapDriver:
         controller = VelocityController(np.array([self._xy]), self.settings.velocities)
         planned, most = turns_for(angle_rad), trip.movements + self._most_turns(angle_rad)
         while trip.movements < most and idle * self.settings.velocities.tick_s <= _PATIENCE_S:
+            if self._is_held(trip):
+                break
             before = self.pose
             if self.settings.mode == "actions":
                 # Those that were planned first, so that an exact body takes no other; then what is still off.
@@ -378,6 +391,8 @@ class MapDriver:
 
     def _take(self, action: Action, trip: _Trip) -> bool:
         """Take an action; return False where something stopped it."""
+        if action is not Action.STOP and self._is_held(trip):
+            return False
         before = self.pose
         moved = self.body.act(action)
         trip.actions.append(action)
@@ -386,10 +401,18 @@ class MapDriver:
 
     def _drive(self, speed_m_s: float, turn_rad_s: float, trip: _Trip) -> bool:
         """Drive for a tick; return False where something stopped it."""
+        if self._is_held(trip):
+            return False
         tick_s, before = self.settings.velocities.tick_s, self.pose
         moved = self.body.drive(speed_m_s, turn_rad_s, tick_s)
         planned = before.turned(0.5 * turn_rad_s * tick_s).ahead(speed_m_s * tick_s)
         return self._noted(trip, before, planned, moved)
+
+    def _is_held(self, trip: _Trip) -> bool:
+        """Return whether the movement must end, which is then its fault."""
+        why = self.held()
+        trip.fault = why or trip.fault
+        return bool(why)
 
     def _noted(self, trip: _Trip, before: GroundPose, planned: GroundPose, moved: Moved) -> bool:
         trip.movements += 1

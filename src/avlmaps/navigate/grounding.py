@@ -14,6 +14,7 @@ from avlmaps.core.question import HeardAt
 from avlmaps.core.wording import place_text
 from avlmaps.language.program.vocabulary import Clip, Picture, Place, Target
 from avlmaps.language.storey_words import said_storeys
+from avlmaps.maps.store.integrity import stamp
 from avlmaps.maps.storeys import said_storeys as storeys_in_words
 from avlmaps.navigate.file_access import Readable
 from avlmaps.navigate.footprint import Outline
@@ -47,6 +48,10 @@ def kind_of(value: object) -> str:
     return f"a {type(value).__name__.lower()}"
 
 
+Heats = dict[tuple[object, ...], Heatmap]
+"""The answers of one map, as it was opened, by the query."""
+
+
 class Seeker:
     """Finds in a map what a program means.
 
@@ -55,13 +60,20 @@ class Seeker:
         guess: whether to take the best guess where nothing is found.
         readable: which files a program may load.
         notes: what a person should know: words half understood, guesses.
+        heats: what the map answered; another seeker on the same map need not ask again.
     """
 
     def __init__(
-        self, avlmap: AVLMap, guess: bool, readable: Readable, tell: Callable[[str], None], storey: int = 0
+        self,
+        avlmap: AVLMap,
+        guess: bool,
+        readable: Readable,
+        tell: Callable[[str], None],
+        storey: int = 0,
+        heats: Heats | None = None,
     ) -> None:
-        """Take a map, a function that is called with each note, and the storey that the robot is on."""
-        self._storey = storey
+        """Take a map, a function for each note, the storey that the robot is on, and what the map answered before."""
+        self._storey, self.heats = storey, {} if heats is None else heats
         self.avlmap = avlmap
         self.guess = guess
         self.readable = readable
@@ -98,17 +110,27 @@ class Seeker:
         if img is not None:
             if not isinstance(img, Picture):
                 raise ProgramError(f"{skill} takes as img what load_image returns, not {kind_of(img)}.")
-            heat = self.avlmap.image(self.readable.find(img.path, "picture"), primary=primary)
+            file = self.readable.find(img.path, "picture")
+            heat = self._known((img, stamp(file), primary), lambda: self.avlmap.image(file, primary=primary))
         elif isinstance(sound, Clip):
-            heat = self.avlmap.sound_clip(self.readable.find(sound.path, "clip"), primary=primary, at=place)
+            clip = self.readable.find(sound.path, "clip")
+            key = sound, stamp(clip), primary, place
+            heat = self._known(key, lambda: self.avlmap.sound_clip(clip, primary=primary, at=place))
         elif sound is not None:
-            heat = self._named(text_of(sound, skill), lambda name: self.avlmap.sound(name, primary, at=place))
+            words = text_of(sound, skill)
+            heat = self._named("sound", words, primary, lambda name: self.avlmap.sound(name, primary, at=place), place)
         elif area is not None:
-            heat = self._named(text_of(area, skill), lambda name: self.avlmap.area(name, primary))
+            heat = self._named("area", text_of(area, skill), primary, lambda name: self.avlmap.area(name, primary))
         else:
-            heat = self._named(text_of(obj, skill), lambda name: self.avlmap.object(name, primary))
+            heat = self._named("object", text_of(obj, skill), primary, lambda name: self.avlmap.object(name, primary))
         self._note(heat)
         return heat
+
+    def _known(self, key: tuple[object, ...], heat_of: Callable[[], Heatmap]) -> Heatmap:
+        """Return what the map answers, asking it once."""
+        if key not in self.heats:
+            self.heats[key] = heat_of()
+        return self.heats[key]
 
     def _place(self, skill: str, at: object, sound: object) -> HeardAt | None:
         """Return the place of a sound that a program means: where the map does not know its source, the robot's."""
@@ -122,7 +144,9 @@ class Seeker:
         self.note(why)
         return None if why else "source"
 
-    def _named(self, name: str, heat_of: Callable[[str], Heatmap]) -> Heatmap:
+    def _named(
+        self, kind: str, name: str, primary: bool, heat_of: Callable[[str], Heatmap], at: HeardAt | None = None
+    ) -> Heatmap:
         """Return the heat of a name; where it names a storey ("bed upstairs"), with the goals on that one alone.
 
         Raises:
@@ -130,13 +154,13 @@ class Seeker:
         """
         said = said_storeys(name)
         if len(said) != 1 or not said[0].said or not said[0].rest:
-            return heat_of(name)
+            return self._known((kind, name, primary, at), lambda: heat_of(name))
         storeys, word = self.avlmap.storeys, said[0]
         numbers, note = storeys_meant(word, 1 if storeys is None else len(storeys))
         self.note(note)
         if not numbers:
             raise GoalNotFoundError(f"{name!r} is not found: the map {storeys_in_words(storeys).removeprefix('it ')}.")
-        heat = heat_of(word.rest)
+        heat = self._known((kind, word.rest, primary, at), lambda: heat_of(word.rest))
         if storeys is None:
             return heat
         only = heat.only(lambda places: np.isin(storeys.of_places(places), numbers))
@@ -198,7 +222,7 @@ class Seeker:
             return [known if target in self._instances else replace(known, outline=Outline.at(level[:2]))], True
         heat = target
         if isinstance(target, str):
-            heat = self._named(target, lambda name: self.avlmap.object(name, primary=True))
+            heat = self._named("object", target, True, lambda name: self.avlmap.object(name, primary=True))
         if not isinstance(heat, Heatmap):
             raise ProgramError(f"A skill takes a phrase, a place or a heatmap to go to, not {kind_of(target)}.")
         things = things_in(heat, self.guess)

@@ -18,8 +18,10 @@ from avlmaps.language.learned_translator import LearnedTranslator
 from avlmaps.language.program import Budget, Step, Trace, parse_program, run_program
 from avlmaps.language.sentence import Given
 from avlmaps.language.translator import Translation, Translator
+from avlmaps.navigate.brake import Brake, EditBrake, braked
 from avlmaps.navigate.driver import Driver
 from avlmaps.navigate.file_access import Readable, offered_by
+from avlmaps.navigate.grounding import Heats
 from avlmaps.navigate.motion_log import Move
 from avlmaps.navigate.skills import Robot, RobotSettings
 from avlmaps.query.avlmap import AVLMap
@@ -151,8 +153,9 @@ def instruct(
     translation: Translation | None = None,
     tell: Callable[[str], None] = _silent,
     pause: Callable[[float], None] = sleep,
+    heats: Heats | None = None,
 ) -> Outcome:
-    """Do what a command says.
+    """Do what a command says. An area that is forbidden meanwhile ends it.
 
     Args:
         command: what a person says, such as ``go to the chair near the sound of glass breaking``.
@@ -166,6 +169,7 @@ def instruct(
         translation: the translator's answer to the command, if it exists already.
         tell: called with each line: the program, what is found, each step.
         pause: waits for some seconds, for the skill ``wait``.
+        heats: what this map answered before, so that it is not queried again.
 
     Raises:
         LanguageError: the command was not understood. All later faults are in the outcome.
@@ -174,11 +178,14 @@ def instruct(
     if translation is None and isinstance(translator, LearnedTranslator) and not translator.knows_map:
         translator = LearnedTranslator(given_by(avlmap))
     translation = translation or translator.program_for(command)
-    robot = Robot(avlmap, driver, settings, readable or offered_by(command), lambda line: tell(f"  {line}"), pause)
-    run = _Run(command, translator, robot, budget, tell)
-    for doubt in avlmap.doubts_of_drives:
-        run.note(doubt)
-    run.through(translation)
+    brake = EditBrake(avlmap)
+    with braked(driver, brake) as held:
+        files = readable or offered_by(command)
+        robot = Robot(avlmap, held, settings, files, lambda line: tell(f"  {line}"), pause, heats)
+        run = _Run(command, translator, robot, budget, brake, tell)
+        for doubt in avlmap.doubts_of_drives:
+            run.note(doubt)
+        run.through(translation)
     run.judge()
     error, error_type = (None, None) if run.last is None else (run.last.error, run.last.error_type)
     return Outcome(
@@ -191,12 +198,18 @@ class _Run:
     """The programs of one command, one after the other until one runs to its end."""
 
     def __init__(
-        self, command: str, translator: Translator, robot: Robot, budget: Budget | None, tell: Callable[[str], None]
+        self,
+        command: str,
+        translator: Translator,
+        robot: Robot,
+        budget: Budget | None,
+        brake: Brake,
+        tell: Callable[[str], None],
     ) -> None:
         self.command = command
         self.translator = translator
         self.robot = robot
-        self.budget = budget
+        self.budget, self.brake = budget, brake
         self.tell = tell
         self.programs: list[str] = []
         self.notes: list[str] = []
@@ -213,7 +226,7 @@ class _Run:
             for line in translation.program.splitlines():
                 self.tell(f"> {line}")
             self.last = self.ran(translation.program)
-            if self.last.error is None or len(self.programs) == _MOST_PROGRAMS:
+            if self.last.error is None or len(self.programs) == _MOST_PROGRAMS or self.brake.pulled:
                 return
             self.tell(f"failed: {self.last.error}")
             translation = self.repaired(translation.program, self.last)

@@ -14,6 +14,7 @@ from avlmaps.maps.obstacles import Obstacles
 from avlmaps.navigate.bodies import BASE, BodyShape
 from avlmaps.navigate.driver import Arrival, MapDriver
 from avlmaps.navigate.file_access import Readable, offered_by
+from avlmaps.navigate.grounding import Heats
 from avlmaps.navigate.instruct import Outcome, instruct
 from avlmaps.navigate.skills import Robot, RobotSettings
 from avlmaps.query.avlmap import AVLMap
@@ -80,7 +81,7 @@ def told_by_map(
 
 
 def unfound(
-    words: str, translation: Translation, avlmap: AVLMap, start: GroundPose, *, guess: bool = False
+    words: str, translation: Translation, avlmap: AVLMap, start: GroundPose, heats: Heats, *, guess: bool = False
 ) -> Outcome | None:
     """Return the outcome of a program that would drive and then ask for what the map lacks; None for any other.
 
@@ -89,9 +90,10 @@ def unfound(
         translation: its program, whose steps depend on nothing that a drive would find out.
         avlmap: the map.
         start: where the robot stands, level frame.
+        heats: takes what the map answers, for the drive.
         guess: as of ``RobotSettings``.
     """
-    robot, trace = _asked_of(translation.program, avlmap, words, start, guess)
+    robot, trace = _asked_of(translation.program, avlmap, words, start, guess, heats)
     if trace.error is None or trace.error_type not in _ABSENT or not robot.moves:
         return None
     notes = (*avlmap.doubts_of_drives, *translation.notes, *robot.seeker.notes)
@@ -99,9 +101,12 @@ def unfound(
     return Outcome(words, (translation.program,), notes, (), (), error, trace.error_type, 0.0)
 
 
-def _asked_of(program: str, avlmap: AVLMap, command: str, start: GroundPose, guess: bool) -> "tuple[Robot, Trace]":
+def _asked_of(
+    program: str, avlmap: AVLMap, command: str, start: GroundPose, guess: bool, heats: Heats | None = None
+) -> tuple[Robot, Trace]:
     """Run a program with a robot that stays where it is, so that all its goals are looked up and nothing moves."""
-    robot = Robot(avlmap, _StandingDriver(start), RobotSettings(guess), offered_by(command), pause=lambda _: None)
+    standing, settings, files = _StandingDriver(start), RobotSettings(guess), offered_by(command)
+    robot = Robot(avlmap, standing, settings, files, pause=lambda _: None, heats=heats)
     return robot, run_program(parse_program(program), robot)
 
 

@@ -22,7 +22,7 @@ from avlmaps.navigate.costmap import storey_of_walk
 from avlmaps.navigate.driver import Arrival, Driver
 from avlmaps.navigate.file_access import Readable
 from avlmaps.navigate.footprint import Outline, bearing_rad, middle_between, to_the_left
-from avlmaps.navigate.grounding import Seeker, kind_of, number_of, text_of
+from avlmaps.navigate.grounding import Heats, Seeker, kind_of, number_of, text_of
 from avlmaps.navigate.instances import Thing
 from avlmaps.navigate.motion_log import Move, Triple, concat_motions
 from avlmaps.query.avlmap import AVLMap
@@ -71,6 +71,7 @@ class Robot:
         readable: Readable | None = None,
         tell: Callable[[str], None] = _silent,
         pause: Callable[[float], None] = sleep,
+        heats: Heats | None = None,
     ) -> None:
         """Make a robot.
 
@@ -81,12 +82,13 @@ class Robot:
             readable: which files a program may load; those in the working directory by default.
             tell: is given a line for each thing found, as it happens.
             pause: waits for some seconds; a rehearsal does not wait, and a stop ends the wait.
+            heats: what this map answered before.
         """
         self.asked = asked
         self.driver = driver
         self._pause = pause
         self.settings = settings or RobotSettings()
-        self.seeker = Seeker(asked, self.settings.guess, readable or Readable(), tell, storey_of_walk(asked))
+        self.seeker = Seeker(asked, self.settings.guess, readable or Readable(), tell, storey_of_walk(asked), heats)
         self.moves: list[Move] = []
 
     def load_image(self, path: str) -> Picture:

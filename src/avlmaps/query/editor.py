@@ -379,8 +379,8 @@ def edit_text(edit: Edit) -> str:
         case "split":
             what = f"The {before} is split"
         case "forbid":
-            drives = "a drive of `avlmaps serve` ends, one of `avlmaps go` that is under way does not know it"
-            return f"No drive that begins from now on enters {edit.name} ({said(edit)}, edit {edit.id}); {drives}."
+            named = f"{edit.name} ({said(edit)}, edit {edit.id})"
+            return f"No drive that begins from now on enters {named}; a robot that drives now is stopped."
         case _:
             what = f"{edit.name} is at {place_text(edit.at[0].middle)}"
     return f"{what} from now on ({said(edit)}, edit {edit.id})."

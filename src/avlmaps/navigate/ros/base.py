@@ -43,6 +43,7 @@ class RosDriver:
         settings: names, patience, tolerances.
         guard: a second process that cancels when this one dies; None where nobody started one.
         elsewhere: returns why a place of another storey is not driven to, ``""`` for others; None for a map of one.
+        held: see `Holdable`.
     """
 
     def __init__(
@@ -78,6 +79,7 @@ class RosDriver:
         self._clock = clock
         self.guard: GoalGuard | None = None
         self.elsewhere: Callable[[Float[np.ndarray, 3]], str] | None = None
+        self.held: Callable[[], str] = lambda: ""
         self._absent: set[str] = set()
         self._mute: set[str] = set()
         self._contact = Contact(opener, self.frames, self.settings, clock)
@@ -360,6 +362,8 @@ class RosDriver:
             return contact.loss()
         if self._halted.is_set():
             return "The robot was stopped"
+        if why := self.held():
+            return why
         if contact.is_unseen_for(settings.pose_max_age_s):
             return f"Where the robot is is not known any more: {contact.unseen()}"
         if silent_s > settings.server_max_age_s:

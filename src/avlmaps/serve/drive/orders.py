@@ -24,10 +24,10 @@ from avlmaps.core.printable import printable
 from avlmaps.language.learned_translator import LearnedTranslator, UnclearError
 from avlmaps.language.program import Budget, parse_program
 from avlmaps.language.translator import Translation
+from avlmaps.navigate.brake import Brake
 from avlmaps.navigate.instruct import Outcome, given_by, instruct
 from avlmaps.navigate.rehearsal import NO_FILES, path_in_world, rehearse
 from avlmaps.navigate.skills import Robot, RobotSettings
-from avlmaps.serve.drive.brake import Brake
 from avlmaps.serve.drive.order_log import OrderLog
 from avlmaps.serve.drive.plans import DriveError, MapNow, OrderPlan, PlanBook, Who
 from avlmaps.serve.drive.robots import Machine

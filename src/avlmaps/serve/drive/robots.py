@@ -11,11 +11,11 @@ from avlmaps.core.errors import NavigationError
 from avlmaps.core.files import user_path
 from avlmaps.core.motion import GroundPose
 from avlmaps.navigate.bodies import SHAPES, BodyShape
+from avlmaps.navigate.brake import Brake, BrakedBody, BrakedDriver
 from avlmaps.navigate.costmap import obstacles_for
 from avlmaps.navigate.driver import Driver, MapDriver
 from avlmaps.navigate.scenes import open_robot_scene
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.serve.drive.brake import Brake, BrakedBody, BrakedDriver
 
 if TYPE_CHECKING:
     from avlmaps.maps.obstacles import Obstacles
