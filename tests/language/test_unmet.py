@@ -399,3 +399,85 @@ def test_a_label_of_a_sound_is_a_sound() -> None:
 def test_what_a_map_does_not_hold_is_not_answered(said: str) -> None:
     with pytest.raises(QueryError):
         read_question(said, Given(knows=lambda _: True))
+
+
+SIXTEENTHS = ("north", "north north east", "north east", "east north east", "east", "east south east", "south east")
+POINTS = (*SIXTEENTHS, "south south east", "south", "south southwest", "south-west", "wsw", "west", "west-northwest")
+
+
+@pytest.mark.parametrize("verb", ["turn to the {}", "face {}"])
+def test_sixteen_points_of_the_compass_are_read(verb: str) -> None:
+    for at, point in enumerate((*POINTS, "northwest", "north-northwest")):
+        read = intents(verb.format(point))
+        assert read == (Turn(heading=22.5 * at),), point
+    assert intents("go two metres south south west") == (Turn(heading=202.5), Move(2.0))
+
+
+@pytest.mark.parametrize(
+    ("command", "degrees"),
+    [
+        ("turn 1.5 times", 540.0), ("turn one and a half times", 540.0), ("do one and a half turns", 540.0),
+        ("one and a half turns to the left", -540.0), ("a turn and a half", 540.0), ("turn two full circles", 720.0),
+        ("turn round two and a half times clockwise", 900.0), ("turn left 1.5 turns", -540.0),
+        ("make a half turn", 180.0), ("quarter turn left", -90.0), ("three quarters of a turn to the left", -270.0),
+        ("rotate clockwise by one and one quarter turns", 450.0), ("turn to two o'clock", 60.0),
+    ],
+)  # fmt: skip
+def test_parts_of_turns_are_degrees(command: str, degrees: float) -> None:
+    assert intents(command) == (Turn(degrees=degrees),)
+
+
+@given(things, st.sampled_from(["one", "{}"]), st.sampled_from(["beside", "next to", "by", "close to", "nearest to"]))
+@FEW
+def test_one_beside_the_one_before_is_another(thing: str, name: str, beside: str) -> None:
+    read = read_command(f"go to the {thing} and then to the {name.format(thing)} {beside} it")
+    one = Target(TargetKind.OBJECT, thing)
+    assert read.intents == (Go(one), Go(Target(TargetKind.OBJECT, thing, pick=Pick.OTHER)))
+    assert any("the other one" in note for note in read.notes)
+
+
+def test_another_thing_beside_it_is_that_thing() -> None:
+    sofa = Target(TargetKind.OBJECT, "sofa")
+    assert intents("go to the sofa and then to the lamp beside it")[1] == Go(
+        Target(TargetKind.OBJECT, "lamp", near=(sofa,))
+    )
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "go to the lamp beside the one in the kitchen", "go to the chair next to the one by the window",
+        "go to the window and the one beside the sofa", "go to the nearest lamp but one", "go north, east 2 m",
+        "turn left 30 degrees 30 minutes", "move forward 1 m 5", "step forward 30 cm and left 1 m 5", "go 2 m 3 steps",
+        "go two metres, then one to the left", "look at half past two o'clock", "turn to quarter past 3 o'clock",
+        "go to the second nearest chair", "go to the chair but not the one near the door",
+        "visit every lamp except the one in the kitchen", "go between the two chairs",
+    ],
+)  # fmt: skip
+def test_what_is_left_out_asks_back(command: str) -> None:
+    stops(command)
+
+
+@pytest.mark.parametrize(
+    ("command", "wanted"),
+    [
+        ("go forward 1 m 20", (Move(1.2),)), ("drive 5 feet 3", (Move(1.6002),)),
+        ("go back two feet six", (Move(-0.762),)),
+        ("turn left 30 degrees 2 times", (Repeat(2, (Turn(degrees=-30.0),)),)),
+        ("turn left 30 degrees 3 m forward", (Turn(degrees=-30.0), Move(3.0))),
+        ("go 1 m north 2 m east", (Turn(heading=0.0), Move(1.0), Turn(heading=90.0), Move(2.0))),
+        ("go to the armchair, the one by the sofa",
+         (Go(Target(TargetKind.OBJECT, "armchair", near=(Target(TargetKind.OBJECT, "sofa"),))),)),
+        ("move forward one and three quarter metres", (Move(1.75),)),
+    ],
+)  # fmt: skip
+def test_what_is_said_whole_drives(command: str, wanted: tuple[object, ...]) -> None:
+    assert intents(command) == wanted
+
+
+@pytest.mark.parametrize(
+    "question", ["the nearest window", "where is the closest chair to me", "which lamp is nearest"]
+)
+def test_a_question_says_that_it_comes_from_no_place(question: str) -> None:
+    assert any("No position is known" in note for note in read_question(question).notes)
+    assert not read_question("the lamp nearest to the sofa").notes

@@ -121,6 +121,7 @@ def test_a_wrong_option_is_found_out(right: Draft, tmp_path: Path) -> None:
         ("two neighbours exchanged", Reason.GEOMETRY),
         ("principal point off by a sixteenth", Reason.GEOMETRY),
         ("half of the pictures BGR", Reason.COLOUR),
+        ("all pictures BGR", Reason.COLOUR),
         ("colour camera 0.3 m beside", Reason.COLOUR),
         ("colour shifted by a sixteenth", Reason.COLOUR),
         ("poses jump by 2.5 m", Reason.MOTION),
@@ -145,6 +146,15 @@ def test_its_very_cause_is_said(name: str, said: str, right: Draft, tmp_path: Pa
     situation = next(one for one in situations() if one.name == name)
     found = verdict(situation.change(right, right, np.random.default_rng(0)), tmp_path)
     assert said in " ".join(found.sentences())
+
+
+def test_grey_pictures_have_no_order_of_channels(right: Draft, tmp_path: Path) -> None:
+    grey = replace(
+        right, rgb=tuple(np.repeat(c.mean(axis=2, keepdims=True), 3, axis=2).astype(np.uint8) for c in right.rgb)
+    )
+    found = verdict(grey, tmp_path)
+    assert not found.sentences()
+    assert any("order of the colour channels" in one for one in found.unchecked)
 
 
 def test_rotations_and_positions_of_two_conventions_are_read_as_they_were() -> None:

@@ -70,6 +70,7 @@ _TENS = {
     "ninety": 90,
 }  # fmt: skip
 _PARTS = {"half": 0.5, "quarter": 0.25, "quarters": 0.25, "third": 1 / 3}
+_COUNTED_PARTS = {"quarter": 0.25, "quarters": 0.25, "third": 1 / 3, "thirds": 1 / 3}
 _VAGUE = {("a", "couple"): 2, ("a", "few"): 3, ("couple",): 2, ("few",): 3, ("several",): 3, ("a", "pair"): 2,
           ("a", "dozen"): 12, ("some",): 3}  # fmt: skip
 _BEGIN_NUMBERS = frozenset({*_SMALL, *_TENS, *_PARTS, *(words[0] for words in _VAGUE), "an"})
@@ -209,9 +210,9 @@ def number_at(tokens: list[Token], i: int) -> list[tuple[int, float]]:
     spelled = _spelled(tokens, i)
     if spelled is not None:
         end, value = spelled
-        if tokens[end : end + 1] and tokens[end].text == "quarters":
+        if tokens[end : end + 1] and tokens[end].text in ("quarters", "thirds"):
             is_of = end + 1 < len(tokens) and tokens[end + 1].text == "of"
-            found.append((end + 1 + is_of, value * 0.25))
+            found.append((end + 1 + is_of, value * _COUNTED_PARTS[tokens[end].text]))
         found += _with_part(tokens, end, value)
     return found
 
@@ -224,8 +225,8 @@ def _with_part(tokens: list[Token], end: int, value: float) -> list[tuple[int, f
         found.insert(0, (end + 3, value + _PARTS[words[2]]))
     elif words[:1] == ["and"] and words[1:2] and words[1] in _PARTS:
         found.insert(0, (end + 2, value + _PARTS[words[1]]))
-    elif words[:1] == ["and"] and words[1:2] and words[1] in _SMALL and words[2:] == ["quarters"]:
-        found.insert(0, (end + 3, value + _SMALL[words[1]] * 0.25))
+    elif words[:1] == ["and"] and words[1:2] and words[1] in _SMALL and words[2:] and words[2] in _COUNTED_PARTS:
+        found.insert(0, (end + 3, value + _SMALL[words[1]] * _COUNTED_PARTS[words[2]]))
     elif words[:1] in (["point"], ["decimal"]) and words[1:2] and words[1] in _SMALL:
         found.insert(0, (end + 2, value + _SMALL[words[1]] / 10))
     return found
@@ -286,7 +287,7 @@ def _and_smaller(
         if bare and (ends or not joined) and 10 <= value < parts and value == int(value):
             return [(end, round(amount + value * unit / parts, 4))]
         smaller = _unit(tokens, end, units) if end < len(tokens) else None
-        if smaller is not None and smaller < unit:
+        if smaller is not None and smaller < unit and tokens[end].text not in _NO_PARTS:
             return [(end + 1, round(amount + value * smaller, 4))]
     return []
 
@@ -321,6 +322,7 @@ def _unit(tokens: list[Token], at: int, units: dict[str, float]) -> float | None
     return units.get(word) or (units.get(word.removesuffix("s")) if len(word) > 2 else None)
 
 
+_NO_PARTS = frozenset({"step", "steps", "pace", "paces", "tile", "tiles"})
 _COUNTED = frozenset({"times", "x", "laps", "rounds", "o'clock", ".", ")"})
 _AFTER_IN = frozenset({"the", "a", "front", "between", "total", "my", "your", "this", "that", "here", "there", "from"})
 

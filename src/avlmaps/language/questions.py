@@ -14,6 +14,7 @@ from avlmaps.language.learned.decision import is_doubtful
 from avlmaps.language.learned.limits import Limits
 from avlmaps.language.learned.name_resolver import NameResolver, kind_of
 from avlmaps.language.learned.reader import Read, learned_reader
+from avlmaps.language.learned.said import Said
 from avlmaps.language.learned.unmet import unmet_by
 from avlmaps.language.list_questions import SUPPORTED
 from avlmaps.language.names import SILENT, is_entry, is_known, sounding_forms, sounds_like, third_forms
@@ -288,6 +289,17 @@ def _resolved(inquiry: Inquiry, sentence: Sentence) -> AskedSentence:
         if one.pick in (Pick.FARTHEST, Pick.OTHER):
             raise QueryError(f"A map cannot choose '{one.pick} {one.name}'; say what it is near.")
     sides = sentence.side_notes if any(target.near for target in targets) else ()
-    return AskedSentence(
-        Inquiry(inquiry.ask, targets), tuple(dict.fromkeys((*sentence.notes, *resolver.notes, *sides)))
+    notes = (*sentence.notes, *resolver.notes, *sides, *_from_nowhere(sentence, targets))
+    return AskedSentence(Inquiry(inquiry.ask, targets), tuple(dict.fromkeys(notes)))
+
+
+def _from_nowhere(sentence: Sentence, targets: Sequence[Target]) -> tuple[str, ...]:
+    """Return a note for "the nearest window": a question comes from no place, so that none is the nearest."""
+    said = Said(sentence.tokens)
+    if any(near.kind is not TargetKind.AREA for target in targets for near in target.near):
+        return ()
+    return tuple(
+        f"No position is known to count '{' '.join(said.texts[begin:end])}' from: the likeliest comes first. Say what "
+        "it is near."
+        for begin, end in said.spans("nearest")
     )

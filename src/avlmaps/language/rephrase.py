@@ -1,12 +1,15 @@
 """Words of a command in the order and the person that the networks know: what is said of the robot is said to it.
 
-Five forms are rewritten, token by token, before a command is read:
+Eight forms are rewritten, token by token, before a command is read:
 
 - what another person should make the robot do: "send the robot to the lab", "tell it to turn left";
 - a time before an order: "in five minutes go to the door", "go to the door in five minutes";
 - a loop as programs have it: "for i in range(3): go to the door";
 - what a thing does by which it is found: "the thing that rings", "the ringing device" are "whatever is ringing";
-- a label as data sets have it: "the object of class lamp", "the sound labelled glass breaking".
+- a label as data sets have it: "the object of class lamp", "the sound labelled glass breaking";
+- a point of the compass between the eight: "north north east" is "compass bearing 22.5";
+- parts of turns: "turn one and a half times" is "turn 540 degrees";
+- one beside the one before: "the lamp and then the one beside it" is "the lamp and then the other one".
 """
 
 from collections.abc import Sequence
@@ -32,7 +35,24 @@ _SAME = frozenset({
 _WANT = frozenset({"want", "need", "like"})
 _PLACED = frozenset({"by", "at", "in", "near", "beside", "behind", "next", "over", "inside"})
 _TURNED = frozenset({"turn", "rotate", "yaw", "spin", "pivot", "left", "right", "by", "clockwise", "counterclockwise"})
-_ROUNDS = frozenset({"turn", "turns", "revolution", "revolutions", "rev", "revs", "rotation", "rotations"})
+_ROUNDS = frozenset({
+    "turn", "turns", "revolution", "revolutions", "rev", "revs", "rotation", "rotations", "spin", "spins", "circle",
+    "circles",
+})  # fmt: skip
+_WHOLE = frozenset({"full", "complete", "whole", "more", "entire"})
+_SPINS = frozenset({"turn", "rotate", "spin", "pivot", "swivel", "yaw"})
+_MAKES = frozenset({"do", "make", "take", "perform"})
+# These the networks read as words: "a quarter turn", "half a turn", "three quarters of a turn".
+_READ_AS_WORDS = (0.25, 0.5, 0.75)
+_POINTS = {
+    "north": 0, "northeast": 45, "east": 90, "southeast": 135, "south": 180, "southwest": 225, "west": 270,
+    "northwest": 315,
+}  # fmt: skip
+_SHORT_POINTS = {
+    "nne": 22.5, "ene": 67.5, "ese": 112.5, "sse": 157.5, "ssw": 202.5, "wsw": 247.5, "wnw": 292.5, "nnw": 337.5,
+}  # fmt: skip
+_A_POINT = 11.25  # degrees: a 32nd of the compass
+_BESIDE = frozenset({"beside", "by", "near", "nearest", "closest", "alongside"})
 _TELL = frozenset({"tell", "ask", "order", "command", "instruct"})
 _LET = frozenset({"have", "let", "make"})
 _BEFORE = frozenset({"and", "then", "please", "now", "next", "finally", "also", "first", "ok", "just", "you", "to"})
@@ -93,8 +113,8 @@ _ASKED_FOR = _BEFORE | {"can", "could", "would", "will", "so", "kindly", "robot"
 def rephrased(tokens: Sequence[Token]) -> tuple[list[Token], list[str]]:
     """Return tokens with these forms rewritten, and one sentence for each that a person should know of."""
     notes: list[str] = []
-    found = _unlabelled(_looped(_sounding(_joined(tokens))))
-    found = _said_to_it(found)
+    found = _unlabelled(_looped(_sounding(_in_degrees(_on_compass(_joined(tokens))))))
+    found = _said_to_it(_other(found, notes))
     return _waiting_first(found, notes), notes
 
 
@@ -121,13 +141,9 @@ def behind_remark(tokens: Sequence[Token]) -> int | None:
 
 
 def _joined(tokens: Sequence[Token]) -> list[Token]:
-    """Return tokens with "counter clockwise" as one word, "sleep(5)" as a wait, and "right 0.5 turn" in degrees."""
+    """Return tokens with "counter clockwise" as one word, and "sleep(5)" as a wait."""
     found: list[Token] = []
     for token in tokens:
-        decimal = len(found) > 1 and found[-1].kind == "number" and not {".", ","}.isdisjoint(found[-1].text)
-        if token.text in _ROUNDS and decimal and found[-2].text in _TURNED:
-            found[-1] = _word(found[-1], f"{360 * lexer.number_at(found, len(found) - 1)[0][1]:g}", "number")
-            token = _word(token, "degrees")
         if token.raw in ("->", "=>"):  # "sofa -> table": one after the other
             token = _word(token, ",", "punct")
         if token.text == "wise" and found and found[-1].text == "clock":
@@ -138,6 +154,142 @@ def _joined(tokens: Sequence[Token]) -> list[Token]:
             found[-1] = _word(found[-1], "wait")
         found.append(token)
     return found
+
+
+def _on_compass(tokens: list[Token]) -> list[Token]:
+    """Return tokens with points between the eight, and degrees "on the compass", as "compass bearing 22.5"."""
+    found: list[Token] = []
+    at = 0
+    while at < len(tokens):
+        end, bearing = _bearing(tokens, at)
+        if bearing is None:
+            found.append(tokens[at])
+            at += 1
+            continue
+        if found and found[-1].text == "the":
+            found.pop()
+        found += [_word(tokens[at], "compass"), _word(tokens[at], "bearing")]
+        found.append(_word(tokens[at], f"{bearing % 360:g}", "number"))
+        at = end
+    return found
+
+
+def _bearing(tokens: list[Token], at: int) -> tuple[int, float | None]:
+    """Return where a bearing ends that begins at a token, and its degrees; None where none does."""
+    texts = [token.text for token in tokens[at : at + 5]]
+    for end, degrees in lexer.angle_at(tokens, at):
+        if [token.text for token in tokens[end : end + 3]] == ["on", "the", "compass"]:
+            return end + 3, degrees
+    if texts[0] in _SHORT_POINTS:
+        return at + 1, _SHORT_POINTS[texts[0]]
+    main = compass_point(texts[:1] if compass_point(texts[1:3])[0] == 2 else texts[:2])
+    size = main[0]
+    by = texts[size : size + 1] == ["by"]
+    more, second = compass_point(texts[size + by : size + by + 2])
+    first = main[1]
+    if first is None or second is None or (not by and (first % 90 or not second % 90)):
+        return at, None
+    off = (second - first + 180) % 360 - 180
+    if not 0 < abs(off) <= 90:
+        return at, None
+    return at + size + by + more, first + (_A_POINT * (1 if off > 0 else -1) if by else 0.5 * off)
+
+
+def compass_point(texts: Sequence[str]) -> tuple[int, float | None]:
+    """Return how many words name one of eight points, and its degrees clockwise from north; 1 and None for others."""
+    joined = "".join(texts[:2])
+    if len(texts) > 1 and texts[0] in _POINTS and joined in _POINTS:
+        return 2, _POINTS[joined]
+    return 1, _POINTS.get(texts[0]) if texts else None
+
+
+def _in_degrees(tokens: list[Token]) -> list[Token]:
+    """Return tokens with turns in degrees where they are no whole number, or circles of the robot itself."""
+    found: list[Token] = []
+    at = 0
+    while at < len(tokens):
+        end, turns = _turns(tokens, at, found)
+        if turns is None:
+            found.append(tokens[at])
+            at += 1
+            continue
+        while found and found[-1].text in ("around", "round", "by"):
+            found.pop()
+        if found and found[-1].text in _MAKES:
+            found[-1] = _word(found[-1], "turn")
+        elif not found or found[-1].text not in _TURNED | _SPINS:
+            found.append(_word(tokens[at], "turn"))
+        found += [_word(tokens[at], f"{360.0 * turns:g}", "number"), _word(tokens[at], "degrees")]
+        at = end
+    return found
+
+
+def _turns(tokens: list[Token], at: int, before: list[Token]) -> tuple[int, float | None]:
+    """Return where an amount of turns ends that begins at a token, and how many; None where none does.
+
+    Args:
+        tokens: the sentence.
+        at: the token.
+        before: the tokens before it, as they are read.
+    """
+    words = [token.text for token in before if token.text not in ("around", "round", "by")]
+    spins, makes = words[-1:] and words[-1] in _SPINS | _TURNED, words[-1:] and words[-1] in _MAKES
+    begins = _begins([*before, tokens[at]], len(before)) or spins or makes
+    if not begins:
+        return at, None
+    numbers = lexer.number_at(tokens, at) or [(at + 1, 1.0)] * (tokens[at].text in ("a", "an", "another"))
+    for end, turns in sorted(numbers, reverse=True):
+        while end < len(tokens) and tokens[end].text in _WHOLE:
+            end += 1
+        unit = tokens[end].text if end < len(tokens) else ""
+        circles, times = unit in ("circle", "circles"), unit == "times"
+        if circles and [token.text for token in tokens[end + 1 : end + 2]] in (["around"], ["round"]):
+            continue  # a thing
+        if (unit not in _ROUNDS and not times) or ((circles or times) and not (spins or (circles and makes))):
+            continue
+        end += 1
+        if [token.text for token in tokens[end : end + 3]] == ["and", "a", "half"]:  # "a turn and a half"
+            end, turns = end + 3, turns + 0.5
+        decimal = tokens[at].kind == "number" and "." in tokens[at].text.replace(",", ".")
+        whole = turns == int(turns) and not (circles and spins and turns > 1)
+        if whole or (turns in _READ_AS_WORDS and not decimal):
+            return at, None
+        return end, turns
+    return at, None
+
+
+def _other(tokens: list[Token], notes: list[str]) -> list[Token]:
+    """Return tokens with "to the lamp, then to the one beside it" as "to the lamp, then to the other one"."""
+    found: list[Token] = []
+    at = 0
+    while at < len(tokens):
+        texts = [token.text for token in tokens[at : at + 6]]
+        before = _named_before(found)
+        again = texts[:1] == ["the"] and bool(before) and texts[1:2] in (["one"], before[:1])
+        size = 3 if texts[2:3] and texts[2] in _BESIDE else 4 if texts[2:4] in _NEXT_TO else 0
+        size += texts[size : size + 1] == ["to"] and size == 3
+        if not (again and size and texts[size : size + 1] == ["it"]):
+            found.append(tokens[at])
+            at += 1
+            continue
+        notes.append(f"'{' '.join(texts[: size + 1])}' is read as: the other one, the nearest to it.")
+        found += [tokens[at], _word(tokens[at], "other"), tokens[at + 1]]
+        at += size + 1
+    return found
+
+
+def _named_before(tokens: Sequence[Token]) -> list[str]:
+    """Return the names of things in the order before, the one that it goes to first."""
+    end = len(tokens)
+    while end and not is_entry(tokens[end - 1].text):
+        end -= 1
+    start = end
+    while start and tokens[start - 1].kind != "punct" and tokens[start - 1].text not in ("then", "and"):
+        start -= 1
+    return [token.text for token in tokens[start:end] if is_entry(token.text)]
+
+
+_NEXT_TO = (["next", "to"], ["close", "to"], ["right", "beside"], ["adjacent", "to"])
 
 
 def _sounding(tokens: Sequence[Token]) -> list[Token]:

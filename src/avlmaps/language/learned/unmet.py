@@ -36,6 +36,7 @@ from avlmaps.language.learned.said import BREAKS, DETERMINERS, HEARD, LOOKS, PRE
 from avlmaps.language.learned.ways import directions
 from avlmaps.language.lexer import Token
 from avlmaps.language.names import past_forms, sounding_forms
+from avlmaps.language.rephrase import compass_point
 from avlmaps.perception.embedded.words import is_word
 
 _MOTIONS = frozenset({"go", "drive", "head", "move", "turn", "face", "visit", "come", "do"})
@@ -56,6 +57,15 @@ _HAND_NOUNS = frozenset({"side", "rail", "wash", "basin", "dryer", "towel"})
 _AHEAD = frozenset({"forward", "forwards", "ahead", "straight"})
 _BACKWARDS = frozenset({"backward", "backwards", "reverse", "reversing"})
 _VAGUE = frozenset({"a", "an", "one", "another"})
+_COUNTED_ON = frozenset({"nearest", "closest", "farthest", "furthest", "next", "last", "first"})
+_FAR_BACK = 4
+_BESIDE = frozenset({
+    "beside", "by", "near", "next", "close", "opposite", "behind", "alongside", "nearest", "closest",
+})  # fmt: skip
+_ONES = (("the", "one"), ("the", "ones"))
+_ONE_TO_A_SIDE = tuple(("then", "one", "to", "the", side) for side in ("left", "right"))
+_OF_SIDES = (("of",), ("side",), ("from",))
+_PARTS_OF_HOURS = frozenset({"half", "quarter", "past"})
 _COUNTED = frozenset({"times", "turns", "revolutions", "rotations", "spins", "laps", "rounds", "circles", "loops"})
 
 
@@ -94,6 +104,10 @@ def _picked(said: Claimed) -> Clarify | None:
         if start and said.texts[start - 1] in words().lists["ordinals"]:
             phrase = " ".join(said.texts[start - 1 : end])
             return Clarify(f"I cannot choose the {phrase} from the map. Say what it is near.")
+    for at in (at for at, pair in enumerate(pairwise(said.texts)) if pair == ("but", "one")):
+        phrase = next((said.texts[i:] for i in range(max(0, at - _FAR_BACK), at) if said.texts[i] in _COUNTED_ON), ())
+        if phrase and (at + 2 == len(said.texts) or said.tokens[at + 2].kind == "punct"):  # "the nearest lamp but one"
+            return Clarify(f"I cannot choose the {phrase[0]} but one from the map. Say what it is near.")
     if not far and far_picks and not {"far", "most", "farther", "further"} & set(said.texts):
         return Clarify("Which one of them? Say what it is near.")
     for _, end in far:
@@ -105,6 +119,39 @@ def _picked(said: Claimed) -> Clarify | None:
                 return Clarify("The farthest is counted from the robot. Say what it is near, or its room.")
         if not far_picks:
             return Clarify("The farthest of what? Say it like: go to the farthest chair.")
+    return None
+
+
+def _beside_one(said: Claimed) -> Clarify | None:
+    """Return the question for "beside the one in the kitchen": a thing that has no name, and is no goal of its own."""
+    for at, pair in enumerate(pairwise(said.texts)):
+        begin = at - 1 - (said.texts[at - 1 : at] == ("to",))
+        another = pair in _ONES and said.texts[at - 1 : at] in (("and",), ("then",)) and _is_place(said, at + 2)
+        if another and len({target for target in said.targets if target.kind is TargetKind.OBJECT}) < 2:
+            return Clarify(f"'{said.said(at, said.scope(at))}': say its name again, such as: and the chair there.")
+        if pair in _ONES and at and said.texts[begin] in _BESIDE:
+            scope = said.scope(at + 2)
+            if scope:
+                return Clarify(f"'{said.said(begin, scope)}': 'one' is no name there; name the thing, or its room.")
+    return None
+
+
+def _is_place(said: Claimed, at: int) -> bool:
+    return at < len(said.texts) and said.texts[at] in _BESIDE | PREPOSITIONS
+
+
+def _compass(said: Claimed) -> Clarify | None:
+    """Return the question for a point of the compass that no step turns to: "go north, east 2 m"."""
+    headings = {one.heading for one in said.steps if isinstance(one, Turn) and one.heading is not None}
+    if not headings:
+        return None
+    at = 0
+    while at < len(said.texts):
+        size, degrees = compass_point(said.texts[at : at + 2])
+        after = said.texts[at + size : at + size + 1]
+        if degrees is not None and degrees not in headings and at not in said.named and after not in _OF_SIDES:
+            return Clarify("Which way? Say one direction and one distance in each step.")
+        at += size
     return None
 
 
@@ -365,13 +412,36 @@ def _amounts(said: Claimed) -> Clarify | None:
         return None
     read = {at for start in said.used for at in range(start, max(start + 1, amount_end(tokens, start)))}
     for at, token in enumerate(tokens):
-        if at in read or (token.kind != "number" and token.text in _VAGUE):
+        if lexer.clock_at(tokens, at) and _PARTS_OF_HOURS & set(said.texts[max(0, at - 2) : at]):
+            return Clarify("Which way? Say a whole hour, such as: turn to your 2 o'clock, or degrees.")
+        again = at > 0 and _goes_on(tokens, at)
+        if said.texts[max(0, at - 1) : at + 4] in _ONE_TO_A_SIDE:
+            return Clarify(f"'{' '.join(said.texts[at : at + 4])}': how far? Say it with its unit.")
+        if (at in read and not again) or (token.kind != "number" and token.text in _VAGUE):
             continue
-        if not lexer.is_measure(tokens, at) and not _is_count(tokens, at):
+        if not (again or lexer.is_measure(tokens, at) or _is_count(tokens, at)):
             continue
         phrase = " ".join(said.texts[at : amount_end(tokens, at)])
         return Clarify(f"What is '{phrase}' for? Say each step with its own distance, angle or time.")
     return None
+
+
+def _goes_on(tokens: list[Token], at: int) -> bool:
+    """Return whether a number follows a distance or an angle and nothing says what for: "1 m 5", "30 degrees 30 min".
+
+    What the lexer reads as one amount ("1 m 20", "5 feet 3") is one.
+    """
+    ends = {
+        max(end for end, _ in found)
+        for start in range(max(0, at - _FAR_BACK), at)
+        for read in (lexer.length_at, lexer.angle_at)
+        if (found := read(tokens, start))
+    }
+    if at not in ends or not lexer.number_at(tokens, at) or tokens[at].text in _VAGUE:
+        return False
+    end = max(end for end, _ in lexer.number_at(tokens, at))
+    bare = end == len(tokens) or tokens[end].kind == "punct" or tokens[end].text in ("and", "then")
+    return bare or (bool(lexer.duration_at(tokens, at)) and bool(lexer.angle_at(tokens, at - 2)))
 
 
 def _sides(said: Claimed) -> Clarify | None:
@@ -420,13 +490,13 @@ def _is_count(tokens: list[Token], at: int) -> bool:
 
 
 _RULES: tuple[Callable[[Claimed], Clarify | Refuse | None], ...] = (
-    _away, _picked, _leaving, _outside, _through, _edges, _no_thing, _excluded, _changed, _ways, _superlatives,
-    _nameless, _unread, _unheard, _amounts, _sides, unaccounted, reported,
+    _away, _picked, _beside_one, _compass, _leaving, _outside, _through, _edges, _no_thing, _excluded, _changed, _ways,
+    _superlatives, _nameless, _unread, _unheard, _amounts, _sides, unaccounted, reported,
 )  # fmt: skip
 
 
 _ASKED: tuple[Callable[[Claimed], Clarify | Refuse | None], ...] = (
-    _picked, _excluded, _changed, _superlatives, _nameless, _unread, _unheard, _amounts, _qualities,
+    _picked, _beside_one, _excluded, _changed, _superlatives, _nameless, _unread, _unheard, _amounts, _qualities,
 )  # fmt: skip
 
 

@@ -9,6 +9,7 @@ from avlmaps.core.poses import rotation_angle_rad
 from avlmaps.recordings.consistency.agreement import Agreement
 from avlmaps.recordings.consistency.edges import Edges
 from avlmaps.recordings.consistency.limits import apart_agrees, can_be_judged, geometry_agrees
+from avlmaps.recordings.consistency.single_frames import LEAST_WARMTH
 from avlmaps.recordings.consistency.suspects import Suspect, Trial, Trials, is_closer
 from avlmaps.recordings.corrections import Corrections
 from avlmaps.recordings.types import Recording
@@ -22,7 +23,7 @@ _BESIDE, _ROLLED_DEG = 0.08, 6.0
 _NO_OVERLAP = 0.9
 
 
-def blind_spots(recording: Recording, found: Agreement, trials: Trials, edges: Edges) -> tuple[str, ...]:
+def blind_spots(recording: Recording, found: Agreement, trials: Trials, edges: Edges, warmth: float) -> tuple[str, ...]:
     """Return what cannot be checked in a recording of which nothing is wrong, and why, one sentence each.
 
     Args:
@@ -30,10 +31,11 @@ def blind_spots(recording: Recording, found: Agreement, trials: Trials, edges: E
         found: pairs of its frames that follow one another.
         trials: of its sample.
         edges: of its colour and depth.
+        warmth: of its pictures.
     """
     if not can_be_judged(found):
         return (_nothing(recording, found),)
-    return tuple(_spots(recording, trials, edges))
+    return (*_spots(recording, trials, edges), *_of_channels(warmth))
 
 
 def _nothing(recording: Recording, found: Agreement) -> str:
@@ -96,6 +98,14 @@ def _spots(recording: Recording, trials: Trials, edges: Edges) -> Iterator[str]:
             "lies a sixteenth of the picture beside would not show."
         )
     yield from _of_gaps(recording)
+
+
+def _of_channels(warmth: float) -> Iterator[str]:
+    if warmth < LEAST_WARMTH:
+        yield (
+            "The order of the colour channels cannot be checked here, because red outweighs blue as little as blue "
+            "does red: red and blue that are exchanged in all pictures would not show."
+        )
 
 
 def _would_show(as_it_is: Trial, wrong: Trial) -> bool:

@@ -19,6 +19,7 @@ from avlmaps.recordings.consistency.edges import Edges, Shift, find_edges, shift
 from avlmaps.recordings.consistency.jumps import find_exchanged, find_jump
 from avlmaps.recordings.consistency.sample import Sample, Surfaces, draw_sample, steps_between_all
 from avlmaps.recordings.consistency.single_frames import (
+    FEWEST_FOR_WARMTH,
     of_colour,
     of_depth,
     of_intrinsics,
@@ -62,6 +63,7 @@ def check_recording(recording: Recording) -> Verdict:
         *_of_agreement(recording, sample, found, median_m),
     ]
     checked = limits.can_be_judged(after)
+    warmth = float(sample.warmth.mean()) if len(sample) >= FEWEST_FOR_WARMTH else 0.0
     return Verdict(
         frames=len(sample),
         pairs=after.pairs,
@@ -71,7 +73,7 @@ def check_recording(recording: Recording) -> Verdict:
         median_depth_m=median_m,
         findings=tuple(findings),
         unread=sample.unread,
-        unchecked=blind_spots(recording, after, _trials(recording, sample), found.edges) if not findings else (),
+        unchecked=() if findings else blind_spots(recording, after, _trials(recording, sample), found.edges, warmth),
     )
 
 

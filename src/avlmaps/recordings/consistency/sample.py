@@ -23,6 +23,8 @@ APART_M, APART_RAD = 0.7, np.radians(25.0)
 JUMPS = 4
 # A step this many times the usual one is a jump that is looked at.
 JUMP_RATIO = 4.0
+# Red differs from blue by more than this share of the brightest of the three, or of this brightness (of 255).
+_COLOURED, _DIM = 0.15, 30.0
 # A neighbourhood whose depths differ by more is an edge, of which no point is taken.
 _SMOOTH = 0.06
 # Of a pixel and its neighbours, with a depth.
@@ -42,6 +44,7 @@ class Sample:
         depth_m: (f, h, w) z-depth, 0 where there is none.
         grey: (f, hc, wc) brightness, 0 to 255.
         redness: (f, hc, wc) red less blue, -255 to 255.
+        warmth: (f,) share of pixels that are redder than blue less the share that are bluer than red.
         rig: the cameras at these sizes.
         pairs: (p, 2) rows of frames that should see the same place, the earlier first.
         follows: (p,) whether the frames of a pair follow one another; the others look at one place from apart.
@@ -54,6 +57,7 @@ class Sample:
     depth_m: Float32[np.ndarray, "f h w"]
     grey: Float32[np.ndarray, "f hc wc"]
     redness: Float32[np.ndarray, "f hc wc"]
+    warmth: Float[np.ndarray, " f"]
     rig: Rig
     pairs: Int[np.ndarray, "p 2"]
     follows: Bool[np.ndarray, " p"]
@@ -97,6 +101,7 @@ def draw_pairs(recording: Recording, pairs: Int[np.ndarray, "p 2"], follows: Boo
     depth: list[np.ndarray] = []
     grey: list[np.ndarray] = []
     redness: list[np.ndarray] = []
+    warmth: list[float] = []
     fault: RecordingError | None = None
     for number in index.tolist():
         try:
@@ -106,9 +111,10 @@ def draw_pairs(recording: Recording, pairs: Int[np.ndarray, "p 2"], follows: Boo
             continue
         read.append(number)
         depth.append(_nearest(frame.depth_m, rig.depth))
-        bright, red = _colour(frame.rgb, rig.rgb)
+        bright, red, warm = _colour(frame.rgb, rig.rgb)
         grey.append(bright)
         redness.append(red)
+        warmth.append(warm)
     if not read:
         raise fault or RecordingError(f"{recording.path} has no frame; there is nothing to check.")
     kept = np.isin(pairs, read).all(axis=1)
@@ -119,6 +125,7 @@ def draw_pairs(recording: Recording, pairs: Int[np.ndarray, "p 2"], follows: Boo
         depth_m=np.stack(depth),
         grey=np.stack(grey),
         redness=np.stack(redness),
+        warmth=np.array(warmth),
         rig=rig,
         pairs=np.searchsorted(np.array(read), pairs[kept]),
         follows=follows[kept],
@@ -212,13 +219,18 @@ def _nearest(depth_m: Float32[np.ndarray, "h w"], camera: Pinhole) -> Float32[np
     return depth_m[row[:, None], column]
 
 
-def _colour(rgb: np.ndarray, camera: Pinhole) -> tuple[Float32[np.ndarray, "hs ws"], Float32[np.ndarray, "hs ws"]]:
-    """Return the brightness of a picture, and its red less its blue."""
+def _colour(
+    rgb: np.ndarray, camera: Pinhole
+) -> tuple[Float32[np.ndarray, "hs ws"], Float32[np.ndarray, "hs ws"], float]:
+    """Return the brightness of a picture, its red less its blue, and its warmth."""
     import cv2
 
     small = cv2.resize(rgb, (camera.width, camera.height), interpolation=cv2.INTER_AREA)
     colours = small.astype(np.float32)
-    return cv2.cvtColor(small, cv2.COLOR_RGB2GRAY).astype(np.float32), colours[..., 0] - colours[..., 2]
+    redness = colours[..., 0] - colours[..., 2]
+    hue = redness / np.maximum(colours.max(axis=2), _DIM)
+    warmth = float((hue > _COLOURED).mean() - (hue < -_COLOURED).mean())
+    return cv2.cvtColor(small, cv2.COLOR_RGB2GRAY).astype(np.float32), redness, warmth
 
 
 @dataclass(frozen=True, slots=True)

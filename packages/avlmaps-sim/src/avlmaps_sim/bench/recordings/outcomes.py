@@ -31,7 +31,7 @@ _UNCHECKED = {
     "poses": r"Poses|clock of the poses|Jumps of the poses|sits in its mount",
     "scale": r"Poses|scale of positions",
     "depth": r"Poses|measured along|colour lies on depth",
-    "colour": r"Poses|colour lies on depth",
+    "colour": r"Poses|colour lies on depth|colour channels",
     "pictures": r"Poses",
     "intrinsics": r"Poses|focal length|principal point|colour lies on depth",
     "clock": r"Poses|clock of the poses",
