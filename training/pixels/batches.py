@@ -11,10 +11,6 @@ import torch
 from torch.utils.data import DataLoader, IterableDataset, get_worker_info
 from training.pixels.faults import degraded, mistaken
 from training.pixels.labels import CATEGORIES, FIRST_COARSE, UNLABELLED
-from training.pixels.network import MULTIPLE
-
-from avlmaps.core.camera import Pinhole
-from avlmaps.perception.embedded.geometry import channels
 
 # A frame shows a category with at least this many of its 320x240 pixels.
 FEWEST_PIXELS = 160
@@ -62,16 +58,18 @@ class Batch(NamedTuple, Generic[Array]):
     """Arrays for the network, or tensors.
 
     Attributes:
-        geometry: (n, 8, h, w).
-        rgb: (n, h, w, 3) of 8 bit, times the fineness and without the margin of the geometry.
+        depth: (n, h, w) metres, 0 for none; ``shape.channels_of`` makes the geometry of it.
+        camera: (n, 8) fx, fy, cx, cy, up and the height over the floor, as a map assumes them.
+        rgb: (n, h, w, 3) of 8 bit, times the fineness.
         kept: (n,) whether the picture has a colour and it is not withheld.
-        label: (n, h/2, w/2) fine and coarse.
+        label: (n, h/2, w/2) of 8 bit, fine and coarse.
         weight: (n, h/2, w/2) of each pixel in the loss.
         room: (n, rooms) share of the view in each kind.
         floor: (n,) height of the true floor over the one that the geometry was made with; NaN where it is unknown.
     """
 
-    geometry: Array
+    depth: Array
+    camera: Array
     rgb: Array
     kept: Array
     label: Array
@@ -88,7 +86,8 @@ class Shards:
         self.folder = folder
         self._open: dict[str, tuple[int, Frames]] = {}
         self._shown: dict[str, tuple[int, dict[int, list[int]]]] = {}
-        self._showing: dict[int, list[tuple[Frames, int]]] = {}
+        self._showing: list[tuple[int, list[tuple[Frames, int]]]] = []
+        self._upto = np.empty(0)
         self.refresh()
 
     def refresh(self) -> int:
@@ -108,7 +107,8 @@ class Shards:
         for name, (_, frames) in found.items():
             for category, indices in self._shown[name][1].items():
                 showing.setdefault(category, []).extend((frames, index) for index in indices)
-        self._open, self._showing = found, showing
+        share = np.array([len(frames) for frames in showing.values()]) ** EVENNESS
+        self._open, self._showing, self._upto = found, list(showing.items()), np.cumsum(share)
         return sum(len(frames.depth) for _, frames in found.values())
 
     def every(self) -> list[tuple[Frames, int]]:
@@ -125,13 +125,11 @@ class Shards:
 
         Three quarters of what a camera sees is walls and floors; a network that sees the world as it is learns those.
         """
-        showing = self._showing
-        if not showing or rng.random() < ANY_FRAME:
+        if not self._showing or rng.random() < ANY_FRAME:
             return *self.draw(rng), -1
-        names = list(showing)
-        share = np.array([len(showing[name]) for name in names]) ** EVENNESS
-        category = names[int(rng.choice(len(names), p=share / share.sum()))]
-        return *showing[category][int(rng.integers(len(showing[category])))], category
+        at = np.searchsorted(self._upto, rng.uniform(0.0, self._upto[-1]), side="right")
+        category, frames = self._showing[min(int(at), len(self._showing) - 1)]
+        return *frames[int(rng.integers(len(frames)))], category
 
 
 def _shown(frames: Frames) -> dict[int, list[int]]:
@@ -151,7 +149,7 @@ class View:
     """How large the pictures of a batch are, and how they are drawn.
 
     Attributes:
-        width: columns; a multiple of ``MULTIPLE`` after padding, as the rows.
+        width: columns.
         height: rows.
         colour_kept: share of pictures with colour that keep it.
         fineness: how many times as wide and high the colour is as the geometry.
@@ -234,6 +232,9 @@ def _sample(frames: Frames, index: int, category: int, view: View, rng: np.rando
     mirrored = rng.random() < 0.5
     cos, sin = np.cos(turn), np.sin(turn)
     linear = np.array([[cos, -sin], [sin, cos]]) * scale
+    up = np.array([cos * up[0] - sin * up[1], sin * up[0] + cos * up[1], up[2]])
+    if mirrored:
+        linear[0], up = -linear[0], up * (-1, 1, 1)
     move = np.array([view.width, view.height]) / 2 - linear @ (x, y)
     cx, cy = linear @ (cx, cy) + move
     # cv2 counts from the middle of the first pixel.
@@ -245,36 +246,19 @@ def _sample(frames: Frames, index: int, category: int, view: View, rng: np.rando
 
     depth = warped(frames.depth[index], cv2.INTER_NEAREST, 0).astype(np.float32) / 1000.0
     label = warped(frames.label[index], cv2.INTER_NEAREST, UNLABELLED)
-    up = np.array([cos * up[0] - sin * up[1], sin * up[0] + cos * up[1], up[2]])
     rgb, kept = _drawn_colour(frames, int(frames.rgb_row[index]), matrix, view, rng)
-    if mirrored:
-        depth, label, rgb = depth[:, ::-1], label[:, ::-1], rgb[:, ::-1]
-        up, cx = up * (-1, 1, 1), view.width - cx
     known = frames.height_is_known(index)
-    depth = degraded(
-        np.ascontiguousarray(depth), real=label.max() >= FIRST_COARSE and frames.camera.shape[1] > 8, rng=rng
-    )
+    depth = degraded(depth, real=label.max() >= FIRST_COARSE and frames.is_real, rng=rng)
     stretch = np.exp(rng.normal(0.0, 0.07))  # things come larger and smaller than the recipes make them
     depth, height = depth * np.float32(stretch), height * stretch
     believed_up, off = mistaken(up, known, rng)
-    camera = Pinhole(fx * scale, fy * scale, cx, cy, view.width, view.height)
-    geometry = channels(depth, camera, believed_up, height + off)
+    camera = np.array([fx * scale, fy * scale, cx, cy, *believed_up, height + off], np.float32)
     i, j = rng.integers(2, size=2)  # a cell of the output stands for four pixels
     label, z = np.array(label[i::2, j::2]), depth[i::2, j::2]
     label[z == 0.0] = UNLABELLED
     weight = np.minimum(1.0, 3.0 / np.maximum(z, 0.5)).astype(np.float32)
     floor = np.float32(off if known else np.nan)
-    pad = [(0, -size % MULTIPLE) for size in (view.height, view.width)]
-    half = [(0, p[1] // 2) for p in pad]
-    return (
-        np.pad(geometry, [(0, 0), *pad]),
-        np.ascontiguousarray(rgb),
-        np.float32(kept),
-        np.pad(label, half, constant_values=UNLABELLED).astype(np.int64),
-        np.pad(weight, half),
-        np.array(frames.room[index]),
-        floor,
-    )
+    return depth, camera, rgb, np.float32(kept), label, weight, np.array(frames.room[index]), floor
 
 
 def _drawn_colour(

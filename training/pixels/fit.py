@@ -26,6 +26,7 @@ from training.pixels.losses import Losses, coarse_weights, fine_weights
 from training.pixels.measure import real_figures, rendered_figures
 from training.pixels.muon import Muon
 from training.pixels.network import MULTIPLE, WIDTHS, RoomNetwork, begin_with
+from training.pixels.shape import channels_of
 from training.pixels.tower import imagenet_weights
 from training.pixels.unfold import has_tower, unfolded
 
@@ -68,6 +69,8 @@ class Options:
     """Continue from the checkpoint, with its last weights."""
     start: Path | None = None
     """Begin with these weights: a file that ships (``.onnx``), or a checkpoint, its mean."""
+    start_number: int = 0
+    """Which network of a file that ships several, as ``scene_encoder.onnx`` does."""
     widths: tuple[int, int, int, int, int] = WIDTHS
     """Channels at 1/2, 1/4, 1/8, 1/16 and 1/32 of the picture's size."""
     dropout: tuple[float, float] = (0.1, 0.1)
@@ -126,12 +129,12 @@ def _shipped(options: Options, sources: list[tuple[Shards, int]]) -> dict[str, T
     drawn = (draw_batch(sources, replace(options.view, fineness=fineness), rng) for _ in range(_LOOKED_AT))
     looked_at = (
         (
-            torch.from_numpy(b.geometry),
+            channels_of(torch.from_numpy(b.depth), torch.from_numpy(b.camera), MULTIPLE),
             in_other_light(torch.from_numpy(b.rgb), torch.from_numpy(b.kept), fineness * MULTIPLE),
         )
         for b in drawn
     )
-    return unfolded(options.start, len(CATEGORIES), len(ROOMS), looked_at).state_dict()
+    return unfolded(options.start, len(CATEGORIES), len(ROOMS), looked_at, options.start_number).state_dict()
 
 
 def _mean_of(checkpoint: Path) -> dict[str, Tensor]:

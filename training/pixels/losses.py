@@ -7,6 +7,7 @@ from training.pixels.batches import Batch, Shards, View, draw_batch
 from training.pixels.labels import CATEGORIES, FIRST_COARSE, UNLABELLED
 from training.pixels.light import in_other_light
 from training.pixels.network import MULTIPLE, has_bfloat16
+from training.pixels.shape import channels_of
 
 from avlmaps_sim.bench.nyu import CLASSES, SCORED, class_of_kinds
 
@@ -68,8 +69,11 @@ class Losses(nn.Module):
     def forward(self, network: nn.Module, batch: Batch[Tensor], fineness: int) -> tuple[Tensor, dict[str, Tensor]]:
         """Return the loss and its parts, those of real frames by themselves."""
         device = self.groups.device
-        geometry, rgb, kept, label, near, room, floor = (x.to(device, non_blocking=True) for x in batch)
-        colour = in_other_light(rgb, kept, fineness * MULTIPLE)
+        depth, camera, rgb, kept, label, near, room, floor = (x.to(device, non_blocking=True) for x in batch)
+        geometry, colour = channels_of(depth, camera, MULTIPLE), in_other_light(rgb, kept, fineness * MULTIPLE)
+        margin = [pad for size in depth.shape[:0:-1] for pad in (0, -size % MULTIPLE // 2)]
+        label = nn.functional.pad(label, margin, value=UNLABELLED).long()
+        near = nn.functional.pad(near, margin)
         geometry, colour = (x.to(memory_format=torch.channels_last) for x in (geometry, colour))
         with torch.autocast(device.type, torch.bfloat16, enabled=has_bfloat16(device)):
             score, rooms, offset = network(geometry, colour)

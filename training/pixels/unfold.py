@@ -27,22 +27,24 @@ _NORM = {
     "_conv_stem": "_bn0", "_expand_conv": "_bn0", "_depthwise_conv": "_bn1", "_project_conv": "_bn2",
 }  # fmt: skip
 _TOWER = "tower."
-_FIRST = "/networks.0/"  # of several that answer together
 
 
-def unfolded(path: Path, categories: int, rooms: int, batches: Iterable[tuple[Tensor, Tensor]]) -> RoomNetwork:
-    """Return the network of an ONNX file that ``write_onnx`` wrote; of several that answer together the first.
+def unfolded(
+    path: Path, categories: int, rooms: int, batches: Iterable[tuple[Tensor, Tensor]], number: int = 0
+) -> RoomNetwork:
+    """Return the network of an ONNX file that ``write_onnx`` wrote.
 
     Args:
         path: the file.
         categories: how many the network scores.
         rooms: how many kinds of room.
         batches: geometry and colour of some frames, to take the statistics from; each is looked at once.
+        number: which, of several that answer together.
 
     Raises:
         ValueError: the file holds another network.
     """
-    arrays, convolutions = _read(path)
+    arrays, convolutions = _read(path, number)
     widths = tuple(
         len(arrays[convolutions[name][1]]) for name in ("stem.0.0", "down2.0.0", "down3.0.0", "down4.0.0", "down5.0.0")
     )
@@ -82,8 +84,8 @@ def has_tower(path: Path) -> bool:
     return any(name.startswith(_TOWER) for name in _read(path)[1])
 
 
-def _read(path: Path) -> tuple[dict[str, np.ndarray], dict[str, tuple[str, str]]]:
-    """Return the arrays of a file, and for each convolution by its name those of its weight and bias."""
+def _read(path: Path, number: int = 0) -> tuple[dict[str, np.ndarray], dict[str, tuple[str, str]]]:
+    """Return the arrays of one network of a file, and for each convolution by its name those of its weight and bias."""
     graph = onnx.load(path).graph
     arrays = {each.name: np.array(numpy_helper.to_array(each), np.float32) for each in graph.initializer}
     for node in graph.node:
@@ -93,16 +95,18 @@ def _read(path: Path) -> tuple[dict[str, np.ndarray], dict[str, tuple[str, str]]
             elif node.op_type == "Mul":
                 arrays[node.output[0]] = arrays[node.input[0]] * arrays[node.input[1]]
     nodes = [node for node in graph.node if node.op_type == "Conv"]
-    first = [node for node in nodes if node.name.startswith(_FIRST)]
+    of_one = [node for node in nodes if node.name.startswith(f"/networks.{number}/")]
+    if number and not of_one:
+        raise ValueError(f"{path} holds no network number {number}.")
+
+    def own(array: str) -> str:
+        return array.removeprefix(f"networks.{number}.")
+
     convolutions = {
-        _module_name(node.name.removeprefix(_FIRST)): (_of_first(node.input[1]), _of_first(node.input[2]))
-        for node in first or nodes
+        _module_name(node.name.removeprefix(f"/networks.{number}/")): (own(node.input[1]), own(node.input[2]))
+        for node in of_one or nodes
     }
-    return {_of_first(name): value for name, value in arrays.items()}, convolutions
-
-
-def _of_first(array: str) -> str:
-    return array.removeprefix("networks.0.")
+    return {own(name): value for name, value in arrays.items()}, convolutions
 
 
 def _module_name(node: str) -> str:

@@ -1,5 +1,6 @@
 """The weights that ship, taken apart for training: the same scores, and normalisations that learn on."""
 
+from copy import deepcopy
 from pathlib import Path
 
 import numpy as np
@@ -44,14 +45,20 @@ def test_it_scores_as_the_file_does(shipped: tuple[Path, RoomNetwork]) -> None:
                 np.testing.assert_allclose(one.numpy(), other.numpy(), rtol=0.02, atol=0.05)  # 8 bit in the file
 
 
-def test_of_several_networks_in_a_file_the_first_is_taken(shipped: tuple[Path, RoomNetwork], tmp_path: Path) -> None:
-    _, network = shipped
-    write_onnx(MeanOf([network, RoomNetwork(CATEGORIES, ROOMS, WIDTHS).eval()], [0.9, 1.2]), tmp_path / "both.onnx")
-    again = unfolded(tmp_path / "both.onnx", CATEGORIES, ROOMS, pictures(3, 2)).eval()
-    geometry, colour = pictures(1, 3)[0]
+def test_of_several_networks_in_a_file_each_can_be_taken(shipped: tuple[Path, RoomNetwork], tmp_path: Path) -> None:
+    pair = [shipped[1], deepcopy(shipped[1])]
     with torch.no_grad():
-        one, other = network(geometry, colour)[0], again(geometry, colour)[0]
-    np.testing.assert_allclose(one.numpy(), other.numpy(), rtol=0.05, atol=0.05)  # 8 bit in the file
+        for array in pair[1].parameters():
+            array *= 1.0 + 0.2 * torch.randn_like(array)
+    write_onnx(MeanOf(pair, [0.9, 1.2]), tmp_path / "both.onnx")
+    geometry, colour = pictures(1, 3)[0]
+    for number, network in enumerate(pair):
+        again = unfolded(tmp_path / "both.onnx", CATEGORIES, ROOMS, pictures(3, 2), number).eval()
+        with torch.no_grad():
+            one, other = network(geometry, colour)[0], again(geometry, colour)[0]
+        np.testing.assert_allclose(one.numpy(), other.numpy(), rtol=0.05, atol=0.05)  # 8 bit in the file
+    with pytest.raises(ValueError, match="no network number 2"):
+        unfolded(tmp_path / "both.onnx", CATEGORIES, ROOMS, pictures(1, 2), 2)
 
 
 def test_networks_that_answer_together_give_the_mean_of_their_probabilities(tmp_path: Path) -> None:
