@@ -15,6 +15,7 @@ from avlmaps.maps.obstacles import CellState, Obstacles
 from avlmaps.navigate.bodies import BodyShape
 from avlmaps.navigate.controller import bearing
 from avlmaps.navigate.driver import Driver, DriveSettings, MapDriver
+from avlmaps.navigate.rehearsal import FreeBody
 from avlmaps_sim.body import Building, MotionNoise, SimulatedBody
 from avlmaps_sim.scenes import open_scene
 from helpers.floors import hall, seen
@@ -373,3 +374,71 @@ def test_just_beside_a_place_with_no_way_in_it_says_why():
     driver = MapDriver(of_plan(states), Free(GroundPose(1.0, 1.5)), BodyShape(radius_m=0.1))
     arrival = driver.go_to(place(3.25, 1.5))
     assert "no path leads" in arrival.note
+
+
+class Odd(FreeBody):
+    """A body that does or says something else than it should, from its fourth movement on."""
+
+    def __init__(self, odd: str) -> None:
+        super().__init__(START)
+        self.odd, self.count, self.stops = odd, 0, 0
+
+    def act(self, action):
+        self.stops += action is Action.STOP
+        return self._done(super().act(action))
+
+    def drive(self, speed_m_s, turn_rad_s, duration_s):
+        return self._done(super().drive(speed_m_s, turn_rad_s, duration_s))
+
+    def _done(self, moved):
+        self.count += 1
+        if self.count < 4:
+            return moved
+        x, y, heading = moved.pose.x_m, moved.pose.y_m, moved.pose.heading_rad
+        match self.odd:
+            case "nan":
+                return Moved(GroundPose(float("nan"), y, heading))
+            case "nothing":
+                return Moved(None)  # pyright: ignore[reportArgumentType]
+            case "gone":
+                raise OSError("connection reset")
+            case "jumps":
+                self.pose = GroundPose(x + 2.5, y + 2.0, heading)
+            case "creeps":
+                self.pose = GroundPose(x, y + 0.12, heading)
+        return Moved(self.pose)
+
+
+@MODES
+@pytest.mark.parametrize(
+    ("odd", "says"),
+    [
+        ("nan", "failed to move (ValueError"),
+        ("nothing", "failed to move (TypeError"),
+        ("gone", "failed to move (OSError: connection reset)"),
+        ("jumps", "the body moved by 3.2"),
+    ],
+)
+def test_a_body_that_fails_or_does_something_else_is_stopped(drive, odd, says):
+    for move in (lambda d: d.go_to(place(3.0, 3.2)), lambda d: d.forward(0.9), lambda d: d.turn(pi / 2)):
+        body = Odd(odd)
+        arrival = move(MapDriver(MAP, body, settings=drive))
+        assert not arrival.reached and says in arrival.note
+        assert np.isfinite(arrival.path).all() and body.count <= 6
+        assert odd == "jumps" or body.stops
+
+
+def test_what_ends_elsewhere_than_it_should_is_not_reached():
+    assert "turn on the spot" in MapDriver(MAP, Odd("creeps")).turn(pi / 2).note
+    assert "from where 0.60 m ahead is" in MapDriver(MAP, Odd("creeps")).forward(0.6).note
+
+
+@MODES
+def test_a_driver_that_is_held_moves_no_further(drive):
+    for move in (lambda d: d.go_to(place(3.0, 3.2)), lambda d: d.forward(-0.9), lambda d: d.turn(pi / 2)):
+        body = Odd("")
+        driver = MapDriver(MAP, body, settings=drive)
+        driver.held = lambda body=body: "the floor is wet" if body.count >= 4 else ""
+        arrival = move(driver)
+        assert not arrival.reached and "the floor is wet" in arrival.note
+        assert body.count - body.stops == 4 and len(arrival.path) >= 5

@@ -302,6 +302,20 @@ def test_a_lost_pose_cancels_after_the_age_that_is_set_and_not_before(robot):
     assert cancels(robot) > 0
 
 
+def test_a_pose_that_jumps_ends_the_drive(robot):
+    robot.does[""] = "drive on"
+    with driven_by(robot, Clock(), stall_s=60.0) as driver:
+        thread, results = in_thread(lambda: driver.go_to(PLACE))
+        assert robot.soon(lambda: bool(goals(robot)))
+        sleep(0.3)
+        assert not results
+        robot.pose = GroundPose(5.0, 3.0, 0.0)
+        thread.join(20.0)
+        (arrival,) = results
+    assert not arrival.reached and "Its pose jumped by 5.8 m" in arrival.note
+    assert cancels(robot) > 0
+
+
 def test_a_loop_that_stood_still_cancels_its_goal(robot):
     robot.does[""] = "drive on"
     clock = Clock()

@@ -100,8 +100,8 @@ def braked(driver: Driver, brake: Brake) -> Iterator[Driver]:
         driver.held = before
 
 
-class _PulledError(Exception):
-    """The brake was pulled within a movement of a simulated body."""
+class _PulledError(BaseException):
+    """The brake was pulled within a movement of a simulated body, which is no fault of the body."""
 
 
 class BrakedBody:

@@ -1,14 +1,17 @@
 """Driving to a place: what every driver offers, and the one that plans on a map and follows its way itself."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from math import pi
-from typing import Literal, Protocol, runtime_checkable
+from typing import Literal, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
 
+from avlmaps.core.errors import NavigationError
 from avlmaps.core.motion import FORWARD_M, TURN_RAD, Action, GroundPose, Moved, wrap_angle
+from avlmaps.core.printable import printable
 from avlmaps.maps.obstacles import Obstacles
 from avlmaps.navigate import grid_kernels
 from avlmaps.navigate.bodies import BASE, Body, BodyShape
@@ -32,6 +35,12 @@ _TURNED_RAD = 0.5 * TURN_RAD + 0.01  # a turn that is off by no more is done
 _EXTRA_TURNS = 36  # actions that a turn may take beyond its angle
 _PATIENCE_S = 5.0  # time for which a body may stand still against its commands
 _MOST_M, _MOST_RAD = 1e6, 1e3
+_BEYOND_M = 0.3  # a body that moves by more than this beyond its command does not follow it, or its pose jumped
+_OFF_M, _OFF_SHARE = (
+    0.25,
+    0.2,
+)  # a straight drive that ends farther from its end, in metres or of its length, is not done
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -149,14 +158,20 @@ class MapDriver:
         self.obstacles, self.body, self.shape = obstacles, body, shape
         self.settings = settings or DriveSettings()
         self.contacts = ContactMap(obstacles, shape.radius_m)
-        self.contacts.mark_free(body.pose)
+        self._last = self._of_body("say where it is", lambda: _posed(body.pose))
+        self.contacts.mark_free(self._last)
         self.held: Callable[[], str] = lambda: ""
         self._planner: Planner | None = None  # of the obstacles known by now; None where one came since
 
     @property
     def pose(self) -> GroundPose:
-        """Where the body is."""
-        return self.body.pose
+        """Where the body is.
+
+        Raises:
+            NavigationError: it fails to say so.
+        """
+        self._last = self._of_body("say where it is", lambda: _posed(self.body.pose))
+        return self._last
 
     @property
     def planner(self) -> Planner:
@@ -174,8 +189,10 @@ class MapDriver:
             place: in the world, metres; its height says only which storey it is on.
             face: a place in the world to look at once there.
         """
+        return self._moved_by(lambda trip: self._gone_to(place, face, trip))
+
+    def _gone_to(self, place: Float[np.ndarray, "3"], face: Float[np.ndarray, "3"] | None, trip: _Trip) -> Arrival:
         goal = self._level(place)
-        trip = self._trip()
         if elsewhere := self.obstacles.elsewhere(place):
             return self._arrival(trip, False, elsewhere)
         stop, note = None, f"it gave up after {self.settings.most_plans} plans"
@@ -196,18 +213,22 @@ class MapDriver:
 
     def turn(self, angle_rad: float) -> Arrival:
         """Turn on the spot, to the left by a positive angle; by actions as nearly as 5 degrees allow."""
-        trip = self._trip()
+        return self._moved_by(lambda trip: self._turned_by(angle_rad, trip))
+
+    def _turned_by(self, angle_rad: float, trip: _Trip) -> Arrival:
         if not abs(angle_rad) <= _MOST_RAD:
             return self._arrival(trip, False, f"{angle_rad} rad is not an angle to turn by")
         left_rad = self._turned(angle_rad, trip)
-        if abs(left_rad) > _TURNED_RAD:
+        if trip.fault or abs(left_rad) > _TURNED_RAD:
             return self._arrival(trip, False, trip.fault or f"the turn ended {np.rad2deg(abs(left_rad)):.0f}° off")
         small = self.settings.mode == "actions" and not trip.actions and abs(angle_rad) > 0.01
         return self._arrival(trip, True, "it turns by 5° at a time, so that it did not turn" if small else "")
 
     def forward(self, distance_m: float) -> Arrival:
         """Drive straight ahead until an obstacle; for a negative distance it turns round first."""
-        trip = self._trip()
+        return self._moved_by(lambda trip: self._gone_ahead(distance_m, trip))
+
+    def _gone_ahead(self, distance_m: float, trip: _Trip) -> Arrival:
         if not abs(distance_m) <= _MOST_M:
             return self._arrival(trip, False, f"{distance_m} m is not a distance to drive")
         if distance_m < 0.0 and abs(self._turned(pi, trip)) > _TURNED_RAD:
@@ -225,14 +246,46 @@ class MapDriver:
             known = self._known_m(1.5 * FORWARD_M) >= 1.5 * FORWARD_M
             why = trip.fault or ("an obstacle is ahead" if known else "the floor ahead is not known")
             return self._arrival(trip, False, f"{why} after {gone_m:.2f} m")
+        off_m = start.ahead(distance_m).distance_m(self.pose)
+        if off_m > max(_OFF_M, _OFF_SHARE * distance_m):
+            return self._arrival(
+                trip, False, f"the body stands {off_m:.2f} m from where {distance_m:.2f} m ahead is (check its pose)"
+            )
         small = self.settings.mode == "actions" and not trip.actions and distance_m > 0.01
         return self._arrival(trip, True, "it drives 0.1 m at a time, so that it did not move" if small else "")
 
     def stop(self) -> Arrival:
         """Stand still."""
-        trip = self._trip()
-        self._take(Action.STOP, trip)
-        return self._arrival(trip, True)
+
+        def stopped(trip: _Trip) -> Arrival:
+            self._take(Action.STOP, trip)
+            return self._arrival(trip, not trip.fault, trip.fault)
+
+        return self._moved_by(stopped)
+
+    def _moved_by(self, movement: Callable[[_Trip], Arrival]) -> Arrival:
+        """Return the result of a movement; a body that fails is stopped, and is where it was seen last."""
+        trip = _Trip([(self._last.x_m, self._last.y_m)])
+        try:
+            trip.path[0] = self.pose.x_m, self.pose.y_m
+            return movement(trip)
+        except NavigationError as fault:
+            with suppress(Exception):
+                self.body.act(Action.STOP)
+            why = str(fault).rstrip(".")
+            return Arrival(False, self._last, tuple(trip.actions), np.array(trip.path), why, trip.contacts)
+
+    def _of_body(self, do: str, call: Callable[[], T]) -> T:
+        """Return what the body does.
+
+        Raises:
+            NavigationError: it fails to.
+        """
+        try:
+            return call()
+        except Exception as fault:
+            why = f"{type(fault).__name__}: {printable(fault, 200)}"
+            raise NavigationError(f"The body failed to {do} ({why}); it may still move: use its own stop.") from fault
 
     @property
     def _xy(self) -> Float[np.ndarray, "2"]:
@@ -241,9 +294,6 @@ class MapDriver:
     def _level(self, place: Float[np.ndarray, "3"]) -> Float[np.ndarray, "2"]:
         with np.errstate(invalid="ignore"):  # NaN lies off the map
             return np.asarray(place, np.float64) @ self.obstacles.level_from_world[:2].T
-
-    def _trip(self) -> _Trip:
-        return _Trip([(self.pose.x_m, self.pose.y_m)])
 
     def _arrival(self, trip: _Trip, reached: bool, note: str = "") -> Arrival:
         return Arrival(reached, self.pose, tuple(trip.actions), np.array(trip.path), note, trip.contacts)
@@ -358,13 +408,15 @@ class MapDriver:
 
     def _turned(self, angle_rad: float, trip: _Trip) -> float:
         """Turn, and return by how much it is still off."""
-        left_rad, heading_rad, idle = angle_rad, self.pose.heading_rad, 0
+        start, left_rad, heading_rad, idle = self.pose, angle_rad, self.pose.heading_rad, 0
         controller = VelocityController(np.array([self._xy]), self.settings.velocities)
         planned, most = turns_for(angle_rad), trip.movements + self._most_turns(angle_rad)
         while trip.movements < most and idle * self.settings.velocities.tick_s <= _PATIENCE_S:
-            if self._is_held(trip):
-                break
             before = self.pose
+            if (gone_m := start.distance_m(before)) > _BEYOND_M:
+                trip.fault = f"the body moved by {gone_m:.2f} m where it was to turn on the spot (check its pose)"
+            if self._is_held(trip) or trip.fault:
+                break
             if self.settings.mode == "actions":
                 # Those that were planned first, so that an exact body takes no other; then what is still off.
                 if not planned and abs(left_rad) > _TURNED_RAD:
@@ -394,7 +446,7 @@ class MapDriver:
         if action is not Action.STOP and self._is_held(trip):
             return False
         before = self.pose
-        moved = self.body.act(action)
+        moved = self._of_body("move", lambda: _moved(self.body.act(action)))
         trip.actions.append(action)
         planned = before.ahead(FORWARD_M) if action is Action.FORWARD else before
         return self._noted(trip, before, planned, moved)
@@ -404,7 +456,7 @@ class MapDriver:
         if self._is_held(trip):
             return False
         tick_s, before = self.settings.velocities.tick_s, self.pose
-        moved = self.body.drive(speed_m_s, turn_rad_s, tick_s)
+        moved = self._of_body("move", lambda: _moved(self.body.drive(speed_m_s, turn_rad_s, tick_s)))
         planned = before.turned(0.5 * turn_rad_s * tick_s).ahead(speed_m_s * tick_s)
         return self._noted(trip, before, planned, moved)
 
@@ -417,8 +469,11 @@ class MapDriver:
     def _noted(self, trip: _Trip, before: GroundPose, planned: GroundPose, moved: Moved) -> bool:
         trip.movements += 1
         trip.path.append((moved.pose.x_m, moved.pose.y_m))
-        planned_m = before.distance_m(planned)
-        stopped = moved.contact or (planned_m > 2 * _STILL_M and before.distance_m(moved.pose) < _STILL_M)
+        planned_m, moved_m = before.distance_m(planned), before.distance_m(moved.pose)
+        if moved_m > planned_m + _BEYOND_M:
+            trip.fault = f"the body moved by {moved_m:.2f} m where it was to move by {planned_m:.2f} m (check its pose)"
+            return False
+        stopped = moved.contact or (planned_m > 2 * _STILL_M and moved_m < _STILL_M)
         if planned_m:
             self.contacts.mark_free(moved.pose)
         if not stopped:
@@ -428,3 +483,16 @@ class MapDriver:
         if planned_m and self.contacts.mark_contact(before, planned, moved.pose):
             self._planner = None
         return False
+
+
+def _posed(pose: GroundPose) -> GroundPose:
+    """Return what a body said, if it is a pose."""
+    if not isinstance(pose, GroundPose):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise TypeError(f"{type(pose).__name__} is no GroundPose")
+    return pose
+
+
+def _moved(moved: Moved) -> Moved:
+    """Return the same of what it did."""
+    _posed(moved.pose)
+    return moved

@@ -25,11 +25,13 @@ from avlmaps.navigate.ros.goals import End, Goal, MovementPlan, Stopwatch, Task,
 from avlmaps.navigate.ros.guard import GoalGuard
 from avlmaps.navigate.ros.plans import LEAST_M, LONGEST_M, Standing, ahead_of, place_to_stand, plan_turn
 from avlmaps.navigate.ros.session import AGAIN_S, Opener, call_off, ended_within
+from avlmaps.navigate.ros.tree import Sighting
 
 _LOOK_EVERY_S = 0.1
 _ASK_S = 1.5
 _REGULAR = 3
 _NEXT_LIST_S = 0.5
+_LEAP_M, _FASTEST_M_S = 0.5, 2.0  # a pose that moves by more than a robot drives has jumped
 _ASK_AFTER = 0.4  # of the time for which a server may be silent
 _IDLE = Halt(True, "no goal was active")
 _UNCONFIRMED = "the robot did not confirm that it gave up its goal"
@@ -331,6 +333,7 @@ class RosDriver:
         """Wait for a goal's end; else return why it is to be given up, and whether nobody is there to take it."""
         watch, settings, session = Stopwatch(), self.settings, self._contact.session
         sent_s = looked_s = beaten_s = asked_s = self._clock()
+        before, jump = self._contact.sighting(), ""
         while not ended_within(goal, session, _LOOK_EVERY_S):
             now_s = self._clock()
             stood_s, looked_s = now_s - looked_s, now_s
@@ -340,6 +343,10 @@ class RosDriver:
                 beaten_s = now_s
                 self._beat(goal)
             track.passed(self.pose)
+            if jump:  # and the goal did not end at that
+                return jump, False
+            now = self._contact.sighting()
+            before, jump = now or before, _jump(before, now)
             silent_s = self._silent_s(goal, sent_s, now_s)
             if why := self._lost_sight(goal, silent_s):
                 return why, False
@@ -448,3 +455,13 @@ class RosDriver:
         track.passed(pose)
         ended = note.endswith((".", "?", ")"))
         return Arrival(reached, pose, (), track.places, note if ended or not note else f"{note}.")
+
+
+def _jump(before: Sighting | None, now: Sighting | None) -> str:
+    """Return that a pose jumped from one sighting to the next; "" where a robot could have driven that distance."""
+    if before is None or now is None:
+        return ""
+    moved_m, took_s = now.pose.distance_m(before.pose), now.heard_s - before.taken_s
+    if moved_m <= _LEAP_M + _FASTEST_M_S * took_s:
+        return ""
+    return f"Its pose jumped by {moved_m:.1f} m within {took_s:.1f} s; check its localisation"
