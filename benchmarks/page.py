@@ -221,9 +221,9 @@ README_FIGURES = (
 )  # fmt: skip
 
 
-def read_figures(path: Path = FIGURES) -> dict[str, Any]:
+def read_figures() -> dict[str, Any]:
     """Return the measurements, by the name of the entry."""
-    return json.loads(path.read_text(encoding="utf-8"))
+    return json.loads(FIGURES.read_text(encoding="utf-8"))
 
 
 INTRODUCTION = """# Benchmarks

@@ -64,9 +64,9 @@ def combination(evidence: Evidence) -> str:
     return f"{evidence.lead} near {' and '.join(kinds)}" if kinds else str(evidence.lead)
 
 
-def write_rows(rows: Iterable[Row], path: Path = ROWS) -> None:
+def write_rows(rows: Iterable[Row]) -> None:
     """Write rows as CSV."""
-    with path.open("w", newline="", encoding="utf-8") as file:
+    with ROWS.open("w", newline="", encoding="utf-8") as file:
         out = csv.writer(file, lineterminator="\n")
         out.writerow(_COLUMNS)
         for row in rows:
@@ -74,9 +74,9 @@ def write_rows(rows: Iterable[Row], path: Path = ROWS) -> None:
             out.writerow([*facts, *row.numbers, row.first_alone])
 
 
-def read_rows(path: Path = ROWS) -> list[Row]:
+def read_rows() -> list[Row]:
     """Read rows that ``write_rows`` wrote."""
-    with path.open(newline="", encoding="utf-8") as file:
+    with ROWS.open(newline="", encoding="utf-8") as file:
         return [
             Row(
                 one["scene"], one["kind"], one["words"], one["answerable"] == "1", one["right"] == "1",

@@ -13,7 +13,7 @@ WIDTH, HEIGHT = 160, 120
 
 
 def whole_frame(
-    frames: Frames, index: int, with_colour: bool, mirrored: bool = False, fineness: int = 1
+    frames: Frames, index: int, with_colour: bool, fineness: int = 1
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return geometry (1, 8, h, w) and colour (1, 3, h, w) times its fineness, padded; depth and label as they are."""
     h, w = frames.depth[index].shape
@@ -28,9 +28,6 @@ def whole_frame(
     if with_colour and rgb_row >= 0:
         rgb = cv2.resize(np.ascontiguousarray(frames.rgb[rgb_row]), (wide, high), interpolation=cv2.INTER_AREA)
         colour = rgb.transpose(2, 0, 1).astype(np.float32) / 127.5 - 1.0
-    if mirrored:
-        depth, label, colour = depth[:, ::-1], label[:, ::-1], colour[:, :, ::-1]
-        cx, up = w - cx, [-up[0], up[1], up[2]]
     camera = Pinhole(fx, fy, cx, cy, w, h).resized(WIDTH, HEIGHT)
     geometry = channels(np.ascontiguousarray(depth), camera, np.array(up), height)
     more = (-HEIGHT % MULTIPLE, -WIDTH % MULTIPLE)

@@ -44,12 +44,12 @@ def phrases_without_sound() -> list[str]:
     return [p for part in parts for p in ([part] if len(part.split()) <= 2 else part.split())]
 
 
-def fit_logistic(x: np.ndarray, y: np.ndarray, weights: np.ndarray | None = None, ridge: float = 1e-2) -> np.ndarray:
+def fit_logistic(x: np.ndarray, y: np.ndarray, weights: np.ndarray | None = None) -> np.ndarray:
     """Return (bias, slopes) of a logistic regression by Newton's method."""
     design = np.hstack([np.ones((len(x), 1)), x.reshape(len(x), -1)])
     w = np.ones(len(x)) if weights is None else weights
     beta = np.zeros(design.shape[1])
-    penalty = ridge * np.eye(len(beta))
+    penalty = 1e-2 * np.eye(len(beta))
     penalty[0, 0] = 1e-6
     for _ in range(50):
         p = 1.0 / (1.0 + np.exp(-design @ beta))

@@ -86,9 +86,9 @@ class Listener:
         return np.ones((1, 1), np.float32)
 
 
-def as_a_map_cuts(sounds: Sequence[Sound], work: Path, seed: int = 0) -> tuple[list[Sound], np.ndarray]:
+def as_a_map_cuts(sounds: Sequence[Sound], work: Path) -> tuple[list[Sound], np.ndarray]:
     """Put one to three seconds of each sound into a track of pink noise; return what a map cuts out, and of which."""
-    rng, rate_hz = np.random.default_rng(seed), logmel.RATE_HZ
+    rng, rate_hz = np.random.default_rng(0), logmel.RATE_HZ
     parts, spans, at = [np.zeros(int(PAUSE_S * rate_hz), np.float32)], [], PAUSE_S
     for sound in sounds:
         samples = resample(sound, rate_hz).samples

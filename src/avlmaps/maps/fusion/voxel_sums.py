@@ -226,11 +226,11 @@ def sorted_rows(index: Int32[np.ndarray, "n 3"]) -> Int64[np.ndarray, " n"]:
     return np.argsort((i * span[1] + j) * span[2] + k)
 
 
-def with_rows(array: np.ndarray, rows: int, fill: int = 0) -> np.ndarray:
-    """Return an array with at least as many rows, the new ones filled with a number."""
+def with_rows(array: np.ndarray, rows: int) -> np.ndarray:
+    """Return an array with at least as many rows, the new ones of zeros."""
     if len(array) >= rows:
         return array
-    return np.concatenate([array, np.full((rows - len(array), *array.shape[1:]), fill, array.dtype)])
+    return np.concatenate([array, np.zeros((rows - len(array), *array.shape[1:]), array.dtype)])
 
 
 def blocks(count: int, dim: int) -> list[slice]:

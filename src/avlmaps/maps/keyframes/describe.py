@@ -1,6 +1,6 @@
 """Keyframes: which frames stand for the walk, and what the map stores of them."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -135,7 +135,6 @@ def perceive_keyframes(
     indices: Sequence[int] | Int[np.ndarray, " k"],
     encoders: Encoders,
     rng: "np.random.Generator",
-    progress: Callable[..., Iterable[int]] = progress,
     settings: KeyframeSettings = KeyframeSettings(),
 ) -> tuple[Keyframes, dict[str, np.ndarray]]:
     """Encode the chosen frames: local, place and view features, 3D points, thumbnails.
@@ -145,7 +144,6 @@ def perceive_keyframes(
         indices: which frames, rising.
         encoders: the encoders.
         rng: for what the place encoder learns.
-        progress: shows how far it is; called as ``avlmaps.core.progress.progress`` is.
         settings: how far keypoints get a 3D point, size of thumbnails.
 
     Returns:
@@ -298,9 +296,7 @@ MAX_SPREAD = 0.03
 """Depths in a keypoint's patch may differ by this part of the depth; at an edge it is unknown which side it is on."""
 
 
-def lift_keypoints(
-    xy: Float32[np.ndarray, "n 2"], frame: Frame, max_depth_m: float, max_spread: float = MAX_SPREAD
-) -> Float32[np.ndarray, "n 3"]:
+def lift_keypoints(xy: Float32[np.ndarray, "n 2"], frame: Frame, max_depth_m: float) -> Float32[np.ndarray, "n 3"]:
     """Return the world points that keypoints of the colour picture show.
 
     A keypoint's depth is the median of the patch around it; it has none where half of the patch has none, where the
@@ -310,15 +306,13 @@ def lift_keypoints(
         xy: pixels of the colour picture.
         frame: its depth, cameras and pose.
         max_depth_m: the limit.
-        max_spread: the largest difference in a patch, as a part of its depth, for depths between the 10th and the
-            90th percentile.
 
     Returns:
         Metres, world; NaN where there is no trustworthy depth.
     """
     camera, depth_m = depth_in_colour(frame.depth_m, frame.rig)
     scale = np.array([camera.width / frame.rig.rgb.width, camera.height / frame.rig.rgb.height])
-    z_m = _patch_depth(xy * scale, depth_m, max_spread)
+    z_m = _patch_depth(xy * scale, depth_m)
     z_m = np.where(z_m <= max_depth_m, z_m, np.nan)
     colour = frame.rig.rgb
     points = np.empty((len(xy), 3))
@@ -343,9 +337,7 @@ def middle_of_view(frame: Frame, stride_px: int = 8) -> Float32[np.ndarray, "3"]
     return np.median(world, axis=0).astype(np.float32)
 
 
-def _patch_depth(
-    xy: Float[np.ndarray, "n 2"], depth_m: Float32[np.ndarray, "h w"], max_spread: float
-) -> Float[np.ndarray, " n"]:
+def _patch_depth(xy: Float[np.ndarray, "n 2"], depth_m: Float32[np.ndarray, "h w"]) -> Float[np.ndarray, " n"]:
     """Return the median depth of the patch around each point, NaN where it cannot be trusted."""
     if not len(xy):
         return np.zeros(0)
@@ -360,5 +352,5 @@ def _patch_depth(
     low, middle, high = (
         patch[rows, np.minimum(size - valid + (valid * q).astype(int), size - 1)] for q in (0.1, 0.5, 0.9)
     )
-    trusted = (valid * 2 > size) & (high - low <= max_spread * middle)
+    trusted = (valid * 2 > size) & (high - low <= MAX_SPREAD * middle)
     return np.where(trusted, middle, np.nan)

@@ -132,10 +132,10 @@ def load_checkpoint(folder: Path, facts: type[F], key: str | None = None, *, ver
     return Checkpoint(folder, done.key, said, arrays, others)
 
 
-def find_checkpoint(folder: Path, facts: type[F], key: str, *, verify: bool = True) -> Checkpoint[F] | None:
+def find_checkpoint(folder: Path, facts: type[F], key: str) -> Checkpoint[F] | None:
     """Return a finished stage, or None where there is none that can be used; what is left of one is removed."""
     try:
-        return load_checkpoint(folder, facts, key, verify=verify)
+        return load_checkpoint(folder, facts, key)
     except MapError:
         shutil.rmtree(folder, ignore_errors=True)
         return None

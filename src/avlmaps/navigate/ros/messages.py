@@ -264,13 +264,13 @@ def duration(seconds: float) -> dict[str, int]:
     return {"sec": whole, "nanosec": int((seconds - whole) * 1e9)}
 
 
-def text_in(raw: msgspec.Raw, most: int = 200) -> str:
+def text_in(raw: msgspec.Raw) -> str:
     """Return the text of a value, fit to be shown in one sentence; empty where it is none."""
     try:
         text = msgspec.json.decode(raw, type=str)
     except ValueError:
         return ""
-    return sanitize_line(text, most)
+    return sanitize_line(text, 200)
 
 
 def sanitize_line(text: str, most: int = 200) -> str:

@@ -54,7 +54,7 @@ class Vlad:
 
 
 def learned_words(
-    descriptors: Float32[np.ndarray, "n d"], rng: np.random.Generator, words: int = WORDS, rounds: int = ROUNDS
+    descriptors: Float32[np.ndarray, "n d"], rng: np.random.Generator, words: int = WORDS
 ) -> Float32[np.ndarray, "words d"]:
     """Return the centres of k-means (Lloyd), started from descriptors drawn at random.
 
@@ -63,7 +63,7 @@ def learned_words(
     if not len(descriptors):
         return np.zeros((words, descriptors.shape[1]), np.float32)
     centres = descriptors[rng.choice(len(descriptors), words, replace=len(descriptors) < words)].copy()
-    for _ in range(rounds):
+    for _ in range(ROUNDS):
         word = _nearest_word(descriptors, centres)
         count = np.bincount(word, minlength=words)
         by_word = descriptors[np.argsort(word, kind="stable")]

@@ -101,24 +101,23 @@ class SoundTopic:
 
 
 def silences(
-    times_s: Float[np.ndarray, " n"], lengths_s: Float[np.ndarray, " n"], least_s: float = GAP_S
+    times_s: Float[np.ndarray, " n"], lengths_s: Float[np.ndarray, " n"]
 ) -> tuple[float, Float[np.ndarray, " n"]]:
     """Return when the first message sounds, and how much silence belongs before each.
 
     Messages arrive late now and then and the next ones catch up; only what none of the later ones catches up is missing
-    sound. Less than ``least_s`` is left: clocks differ a little.
+    sound. Less than ``GAP_S`` is left: clocks differ a little.
 
     Args:
         times_s: when each message seems to sound.
         lengths_s: how long each message is.
-        least_s: shortest silence.
     """
     before_s = np.concatenate([[0.0], np.cumsum(lengths_s)[:-1]])
     behind_s = np.minimum.accumulate((times_s - before_s)[::-1])[::-1]
     silence_s = np.zeros(len(times_s))
     filled_s = behind_s[0]
     for at in np.flatnonzero(np.diff(behind_s, prepend=behind_s[0]) > 0.0).tolist():
-        if behind_s[at] - filled_s >= least_s:
+        if behind_s[at] - filled_s >= GAP_S:
             silence_s[at] = behind_s[at] - filled_s
             filled_s = behind_s[at]
     return float(behind_s[0]), silence_s

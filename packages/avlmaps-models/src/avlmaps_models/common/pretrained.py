@@ -39,7 +39,6 @@ def load_pretrained(
     model: str,
     device: torch.device,
     precision: torch.dtype,
-    ignored: Collection[str] = (),
 ) -> T:
     """Return a model of transformers, ready for inference on a device, every weight from the checkpoint.
 
@@ -51,7 +50,6 @@ def load_pretrained(
         model: what it is called, for the error.
         device: where it shall run.
         precision: of its weights.
-        ignored: beginnings of names in the checkpoint that this use of the model has no need of.
 
     Raises:
         BackendError: the checkpoint is of another model, damaged, or not whole.
@@ -68,7 +66,7 @@ def load_pretrained(
             f"with: hf download {model}"
         ) from fault
     missing = _uncomputed(loading["missing_keys"])
-    unknown = [name for name in _uncomputed(loading["unexpected_keys"]) if not name.startswith(tuple(ignored))]
+    unknown = _uncomputed(loading["unexpected_keys"])
     sizes = [str(name) for name, *_ in loading.get("mismatched_keys", ())]
     if faults := differences(missing, unknown, sizes):
         raise BackendError(f"{folder} is not a whole {kind.__name__}: {faults}. Get it again with: hf download {model}")

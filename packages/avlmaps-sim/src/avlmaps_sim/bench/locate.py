@@ -117,16 +117,11 @@ def run(
     return {"columns": list(COLUMNS), "rows": rows}
 
 
-def map_of(
-    recording: Recording,
-    used: Encoders,
-    rng: np.random.Generator,
-    settings: KeyframeSettings = _KEYFRAMES,
-) -> MapOfPictures:
+def map_of(recording: Recording, used: Encoders, rng: np.random.Generator) -> MapOfPictures:
     """Return the pictures of a map of a recording, without its voxels, its sounds and the features of its views."""
     used = used.without(Kind.VIEWS)
     keyframes, place_state = perceive_keyframes(
-        recording, select_keyframes(recording, settings), used, rng, settings=settings
+        recording, select_keyframes(recording, _KEYFRAMES), used, rng, settings=_KEYFRAMES
     )
     return MapOfPictures(keyframes, place_state, used, recording.rig)
 

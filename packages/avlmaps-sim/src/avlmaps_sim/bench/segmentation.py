@@ -130,7 +130,7 @@ def run(sounds_folder: Path, seed: int = 0, settings: SegmentationSettings | Non
     return {"columns": list(COLUMNS), "rows": rows}
 
 
-def clips_to_test(sounds_folder: Path, folds: Sequence[str] = _TEST_FOLDS) -> dict[str, list[Clip]]:
+def clips_to_test(sounds_folder: Path) -> dict[str, list[Clip]]:
     """Return the clips to test with: those of the folds, and those of no fold."""
     fold_of: dict[str, str] = {}
     index = sounds_folder / "index.csv"
@@ -139,7 +139,7 @@ def clips_to_test(sounds_folder: Path, folds: Sequence[str] = _TEST_FOLDS) -> di
             fold_of = {row["path"]: row.get("fold") or "" for row in csv.DictReader(stream)}
     clips = find_clips(sounds_folder)
     sets = {
-        f"folds {' and '.join(folds)}": [clip for clip in clips if fold_of.get(clip.name) in folds],
+        f"folds {' and '.join(_TEST_FOLDS)}": [clip for clip in clips if fold_of.get(clip.name) in _TEST_FOLDS],
         "other": [clip for clip in clips if not fold_of.get(clip.name)],
     }
     return {name: chosen for name, chosen in sets.items() if chosen}

@@ -60,15 +60,14 @@ def bed_look(rng: np.random.Generator) -> Material:
     return material(pick(rng, ("wood", "wood", "wood", "white", "painted", "black")), rng)
 
 
-def bedclothes(rng: np.random.Generator, plan: BedPlan, pillows: bool = True) -> list[Mesh]:
+def bedclothes(rng: np.random.Generator, plan: BedPlan) -> list[Mesh]:
     """Return a mattress and what lies on it: made neatly, rumpled, turned back or in a heap."""
     bed = plan.bedding
     linen = material("fabric", rng, (0.93, 0.92, 0.9)) if chance(rng, 0.5) else material("fabric", rng)
     cover = material("fabric", rng)
     parts = [mattress(bed, linen)]
-    if pillows:
-        number = plan.sleepers * (2 if chance(rng, 0.2) else 1)
-        parts += head_pillows(rng, bed, min(number, 3), linen if chance(rng, 0.7) else material("fabric", rng))
+    number = plan.sleepers * (2 if chance(rng, 0.2) else 1)
+    parts += head_pillows(rng, bed, min(number, 3), linen if chance(rng, 0.7) else material("fabric", rng))
     state = pick(rng, ("neat", "neat", "neat", "rumpled", "rumpled", "heap", "bare"))
     hang = draw(rng, 0.05, min(0.4, plan.top - 0.06))
     if state == "neat":

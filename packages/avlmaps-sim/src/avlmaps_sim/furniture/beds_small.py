@@ -133,12 +133,12 @@ def travel_cot(rng: np.random.Generator) -> Piece:
     return finished(parts)
 
 
-def _ladder(rng: np.random.Generator, x: float, y: float, top: float, look: Material, wide: float = 0.36) -> list[Mesh]:
+def _ladder(rng: np.random.Generator, x: float, y: float, top: float, look: Material) -> list[Mesh]:
     """Return a ladder with flat steps at (x, y), its foot standing out along y."""
     lean = draw(rng, 0.0, 0.25)
-    parts = [tube([(x + s * wide / 2, y + lean, 0.0), (x + s * wide / 2, y, top)], 0.018, look, 4) for s in (1, -1)]
+    parts = [tube([(x + s * 0.18, y + lean, 0.0), (x + s * 0.18, y, top)], 0.018, look, 4) for s in (1, -1)]
     steps = np.arange(0.25, top - 0.05, 0.27).tolist()
-    return [*parts, *(slab(x, y + lean * (1 - z / top), z, wide, 0.05, 0.025, look) for z in steps)]
+    return [*parts, *(slab(x, y + lean * (1 - z / top), z, 0.36, 0.05, 0.025, look) for z in steps)]
 
 
 def _bunk(rng: np.random.Generator, lower: bool) -> Piece:

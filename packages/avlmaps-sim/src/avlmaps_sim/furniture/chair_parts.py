@@ -40,9 +40,9 @@ class ChairFrame:
         return -self.depth / 2 + 0.02 - self.rake * max(z - self.seat, 0.0) / (self.top - self.seat)
 
 
-def chair_frame(rng: np.random.Generator, seat: float = 0.0, back: float = 0.0) -> ChairFrame:
-    """Draw a dining chair's measures; the seat's height or the back's above it may be given, metres."""
-    seat = seat or draw(rng, 0.41, 0.49)
+def chair_frame(rng: np.random.Generator, back: float = 0.0) -> ChairFrame:
+    """Draw a dining chair's measures; the back's height above the seat may be given, metres."""
+    seat = draw(rng, 0.41, 0.49)
     front = draw(rng, 0.38, 0.52)
     back = back or draw(rng, 0.34, 0.62)
     depth = draw(rng, 0.37, 0.48)
@@ -120,11 +120,11 @@ def rear_posts(frame: ChairFrame, style: LegStyle, look: Material, finial: float
     return joined(parts)
 
 
-def front_legs(frame: ChairFrame, style: LegStyle, look: Material, splay: float = 0.0, drop: float = 0.02) -> Mesh:
-    """Return the two front legs, their tops ``drop`` under the top of the seat."""
+def front_legs(frame: ChairFrame, style: LegStyle, look: Material) -> Mesh:
+    """Return the two front legs, their tops 2 cm under the top of the seat."""
     half = style.thickness_m / 2 + 0.005
     x, y = frame.depth / 2 - half, frame.front / 2 - half
-    return joined([leg((x + splay, s * (y + splay), 0.0), (x, s * y, frame.seat - drop), style, look) for s in (1, -1)])
+    return joined([leg((x, s * y, 0.0), (x, s * y, frame.seat - 0.02), style, look) for s in (1, -1)])
 
 
 def side_rails(

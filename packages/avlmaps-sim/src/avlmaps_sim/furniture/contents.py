@@ -22,9 +22,9 @@ def _half_box(low: Triple, high: Triple, look: Material) -> Mesh:
     return triangles_of(corner, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]), look)
 
 
-def book_looks(rng: np.random.Generator, number: int = 7) -> list[Material]:
+def book_looks(rng: np.random.Generator) -> list[Material]:
     """Draw covers of books."""
-    return [material("paper", rng, pick(rng, _BOOKS)) for _ in range(number)]
+    return [material("paper", rng, pick(rng, _BOOKS)) for _ in range(7)]
 
 
 def books(rng: np.random.Generator, room: Room, looks: list[Material], fill: float, thick: float = 0.038) -> list[Mesh]:

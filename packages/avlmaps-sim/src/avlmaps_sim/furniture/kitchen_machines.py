@@ -171,11 +171,11 @@ def _dish_small(rng: np.random.Generator) -> Piece:
     return finished(parts)
 
 
-def _duct(rng: np.random.Generator, size: Pair, z: float, top: float, look: Material, x0: float = 0.0) -> list[Mesh]:
+def _duct(rng: np.random.Generator, size: Pair, z: float, top: float, look: Material) -> list[Mesh]:
     (deep, wide) = size
     cut = z + (top - z) * draw(rng, 0.4, 0.7)
-    return [box((x0, -wide / 2, z), (x0 + deep, wide / 2, cut), look),
-            box((x0, -wide / 2 + 0.006, cut), (x0 + deep - 0.006, wide / 2 - 0.006, top), look)]  # fmt: skip
+    return [box((0.0, -wide / 2, z), (deep, wide / 2, cut), look),
+            box((0.0, -wide / 2 + 0.006, cut), (deep - 0.006, wide / 2 - 0.006, top), look)]  # fmt: skip
 
 
 def _buttons(rng: np.random.Generator, x: float, z: float) -> list[Mesh]:

@@ -118,7 +118,7 @@ def apron(depth: float, width: float, low: float, high: float, thickness: float,
     )
 
 
-def sled(depth: float, width: float, height: float, radius: float, look: Material, sides: int = 6) -> Mesh:
+def sled(depth: float, width: float, height: float, radius: float, look: Material) -> Mesh:
     """Return two bent runners, one at either side, that carry at ``height``."""
     x, r = depth / 2, radius
     bend = min(0.04, depth / 6, height / 6)
@@ -132,7 +132,7 @@ def sled(depth: float, width: float, height: float, radius: float, look: Materia
             (-x, y, r + bend),
             (-x, y, height),
         ]
-        parts.append(tube(path, radius, look, sides))
+        parts.append(tube(path, radius, look, 6))
     return joined(parts)
 
 

@@ -11,10 +11,10 @@ from avlmaps_sim.mesh import Material, Mesh
 from avlmaps_sim.shapes import box, loft, rounded_box, slab, tube
 
 
-def _swivel(rng: np.random.Generator, seat: float, arms: int = 5) -> list[Mesh]:
+def _swivel(rng: np.random.Generator, seat: float) -> list[Mesh]:
     """Return a foot on castors with a gas lift up to the seat."""
     look = material(pick(rng, ("black", "black", "metal", "white")), rng)
-    return [star_base(arms, draw(rng, 0.27, 0.34), seat - 0.08, look, draw(rng, 0.022, 0.032), True),
+    return [star_base(5, draw(rng, 0.27, 0.34), seat - 0.08, look, draw(rng, 0.022, 0.032), True),
             slab(0.0, 0.0, seat - 0.1, 0.2, 0.16, 0.05, material("black", rng))]  # fmt: skip
 
 

@@ -107,7 +107,7 @@ def _dials(rng: np.random.Generator, x: float, low: Pair, high: Pair, look: Mate
     return parts
 
 
-def _range(rng: np.random.Generator, wide: float, kind: str, back: float, drawer: bool = True) -> Piece:
+def _range(rng: np.random.Generator, wide: float, kind: str, back: float) -> Piece:
     """Return a stove that stands on the floor: oven below, hob above, dials before it or on a raised back."""
     deep, z = draw(rng, 0.54, 0.66), draw(rng, 0.85, 0.94)
     look, half = enamel(rng), wide / 2
@@ -124,7 +124,7 @@ def _range(rng: np.random.Generator, wide: float, kind: str, back: float, drawer
         parts += [box((deep, -half, z - 0.03 - strip), (deep + 0.025, half, z - 0.03),
                       look if chance(rng, 0.5) else steel(rng)),
                   *_dials(rng, deep + 0.025, (-half, z - 0.03 - strip), (half, z - 0.03), knobs)]  # fmt: skip
-    low = lift + (draw(rng, 0.12, 0.2) if drawer and chance(rng, 0.7) else 0.01)
+    low = lift + (draw(rng, 0.12, 0.2) if chance(rng, 0.7) else 0.01)
     if low > lift + 0.05:
         parts += [rounded_box((deep, -half + 0.004, lift), (deep + 0.028, half - 0.004, low - 0.006), 0.005, look, 2)]
     parts += _oven(rng, deep, (-half + 0.004, low), (half - 0.004, z - 0.04 - strip), look)

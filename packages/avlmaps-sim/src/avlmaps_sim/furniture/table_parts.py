@@ -49,10 +49,10 @@ def table_top(
     return loft([np.column_stack([ring, np.full(len(ring), z)]) for ring, z in rings], look)
 
 
-def top_support(kind: Outline, depth: float, width: float, z: float, clear: float = 1.0) -> Support:
+def top_support(kind: Outline, depth: float, width: float, z: float) -> Support:
     """Return the rectangle on a top where things may stand."""
     share = 0.47 if kind in ("rectangle", "rounded") else 0.34
-    return Support((-depth * share, -width * share), (depth * share, width * share), z, clear)
+    return Support((-depth * share, -width * share), (depth * share, width * share), z, 1.0)
 
 
 def table_look(rng: np.random.Generator, stone: float = 0.06) -> Material:

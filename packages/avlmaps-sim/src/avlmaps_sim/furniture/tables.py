@@ -28,10 +28,10 @@ def _metal(rng: np.random.Generator) -> Material:
     return material(pick(rng, ("metal", "black", "black", "white")), rng)
 
 
-def _dining(rng: np.random.Generator, square: float = 0.2) -> tuple[float, float, float]:
+def _dining(rng: np.random.Generator) -> tuple[float, float, float]:
     """Draw depth, width and height of a dining table, metres."""
     depth = draw(rng, 0.7, 1.1)
-    width = depth * draw(rng, 1.0, 1.1) if chance(rng, square) else draw(rng, 1.15, 2.3)
+    width = depth * draw(rng, 1.0, 1.1) if chance(rng, 0.2) else draw(rng, 1.15, 2.3)
     return depth, width, draw(rng, 0.71, 0.78)
 
 

@@ -59,7 +59,7 @@ _LYING = (
 )
 
 
-def things_on(f: Furnisher, anchor: PlacedPiece, wanted: Sequence[str], turn_rad: float | None = None) -> int:
+def things_on(f: Furnisher, anchor: PlacedPiece, wanted: Sequence[str]) -> int:
     """Stand small things on the tops of a piece, meeting nothing there; return how many found a place."""
     tops = [top for top in anchor.piece.supports if min(np.subtract(top.high, top.low)) > 0.06]
     done = 0
@@ -68,8 +68,7 @@ def things_on(f: Furnisher, anchor: PlacedPiece, wanted: Sequence[str], turn_rad
         piece = _small_enough(f, category, tops[number])
         if piece is None:
             continue
-        limit = np.pi if turn_rad is None else turn_rad
-        heading = f.rng.uniform(-limit, limit, 5) if chance(f.rng, 0.6) else f.rng.normal(0.0, 0.05, 5)
+        heading = f.rng.uniform(-np.pi, np.pi, 5) if chance(f.rng, 0.6) else f.rng.normal(0.0, 0.05, 5)
         centre = f.rng.uniform(tops[number].low, tops[number].high, (5, 2))
         done += _set(f, anchor, tops[number], piece, centre, heading)
     return done
@@ -167,10 +166,10 @@ def dress(f: Furnisher) -> None:
         things_on(f, stood, [pick(f.rng, ON_TOP[category]) for _ in range(number)])
 
 
-def litter(f: Furnisher, wanted: Sequence[str] = _LYING) -> None:
+def litter(f: Furnisher) -> None:
     """Let things lie about on the floor, more in a messy room."""
     for _ in range(min(int(f.rng.poisson(0.5 + 6.0 * f.mess**2)), 12)):
-        piece = f.new(pick(f.rng, wanted), floor_standing)
+        piece = f.new(pick(f.rng, _LYING), floor_standing)
         if piece is None or float(piece.mesh.size[:2].max()) > 0.9:
             continue
         if chance(f.rng, 0.6):

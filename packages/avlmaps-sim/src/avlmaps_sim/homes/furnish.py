@@ -239,29 +239,24 @@ class Furnisher:
         return self.try_at(piece, centre, np.array([heading]), front_m=front_m, zones=zones, solid=solid)
 
     def somewhere(
-        self, piece: Piece, front_m: float = 0.0, tries: int = 24, square: float = 0.5, z: float = 0.0,
-        near: Float[np.ndarray, "2"] | None = None, solid: bool = True,
-    ) -> PlacedPiece | None:  # fmt: skip
+        self, piece: Piece, *, tries: int = 24, square: float = 0.5, solid: bool = True
+    ) -> PlacedPiece | None:
         """Stand a piece anywhere on the floor, turned at random or square to a wall."""
         low, high = self.ground.polygon.min(axis=0), self.ground.polygon.max(axis=0)
         centre = self.rng.uniform(low, high, (tries, 2))
-        if near is not None:
-            centre = near + self.rng.normal(0.0, 0.7, (tries, 2))
         heading = self.rng.uniform(-np.pi, np.pi, tries)
         if self.rng.random() < square:
             base = self.ground.sides[0].heading_rad
             heading = base + np.pi / 2 * self.rng.integers(0, 4, tries)
-        return self.try_at(piece, centre, heading, z, front_m, solid)
+        return self.try_at(piece, centre, heading, solid=solid)
 
-    def in_middle(
-        self, piece: Piece, spread: float = 0.15, front_m: float = 0.0, tries: int = 16
-    ) -> PlacedPiece | None:
+    def in_middle(self, piece: Piece, spread: float = 0.15) -> PlacedPiece | None:
         """Stand a piece about the middle of the room, square to its longest wall."""
         span = np.ptp(self.ground.polygon, axis=0)
-        centre = middle(self.ground.polygon) + self.rng.normal(0.0, spread, (tries, 2)) * span
+        centre = middle(self.ground.polygon) + self.rng.normal(0.0, spread, (16, 2)) * span
         side = max(self.ground.sides, key=lambda s: s.length_m)
-        heading = side.heading_rad + np.pi / 2 * self.rng.integers(0, 4, tries)
-        return self.try_at(piece, centre, heading, front_m=front_m)
+        heading = side.heading_rad + np.pi / 2 * self.rng.integers(0, 4, 16)
+        return self.try_at(piece, centre, heading)
 
     def hang(
         self, piece: Piece, low_m: tuple[float, float], sides: Sequence[Side] | None = None, tries: int = 10,

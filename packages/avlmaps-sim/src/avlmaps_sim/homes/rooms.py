@@ -203,10 +203,10 @@ def childrens_room(f: Furnisher) -> None:
             f.somewhere(toy, square=0.0, tries=6)
 
 
-def desk_place(f: Furnisher, computer: float = 0.75, front_m: float = 0.75) -> PlacedPiece | None:
+def desk_place(f: Furnisher, computer: float = 0.75) -> PlacedPiece | None:
     """Stand a desk against a wall, with a chair before it and what one works with on it."""
     rng = f.rng
-    stood = f.insist("desk", front_m, 0.35, tries=2)
+    stood = f.insist("desk", 0.75, 0.35, tries=2)
     if stood is not None:
         seat = f.new("office chair" if chance(rng, 0.7) else "chair")
         if seat is not None:

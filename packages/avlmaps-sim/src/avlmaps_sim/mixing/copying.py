@@ -12,7 +12,6 @@ def write_recording(
     recording: Recording,
     out: Path,
     audio: Path | Sound | AudioTrack | None = None,
-    audio_start_s: float = 0.0,
     link: bool = True,
     origin: str = "",
 ) -> Path:
@@ -27,7 +26,6 @@ def write_recording(
         recording: what to copy.
         out: the folder to make.
         audio: another sound track; by default the recording's own goes along, if it has one.
-        audio_start_s: the recording's time at which that other track begins.
         link: whether hard links will do where the file system can.
         origin: what makes the copy, for its description.
 
@@ -51,7 +49,7 @@ def write_recording(
         if recording.format == "folder":
             _take_truth(recording, out, keep_events=audio is None, link=link)
         if audio is not None:
-            writer.set_audio(audio, audio_start_s)
+            writer.set_audio(audio)
         elif recording.audio is not None:
             writer.set_audio(recording.audio)
     return out

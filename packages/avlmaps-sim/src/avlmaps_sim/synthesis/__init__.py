@@ -9,13 +9,12 @@ from avlmaps_sim.synthesis.blocks import MAKERS, RATE_HZ
 __all__ = ["MAKERS", "RATE_HZ", "animals", "home", "outdoors", "people", "synthesise"]
 
 
-def synthesise(category: str, rng: np.random.Generator, peak: float = 0.5) -> Float32[np.ndarray, " n"]:
+def synthesise(category: str, rng: np.random.Generator) -> Float32[np.ndarray, " n"]:
     """Return about five seconds of a kind of sound, mono at ``RATE_HZ``; another draw is another one of its kind.
 
     Args:
         category: a key of ``MAKERS``.
         rng: what is drawn at random.
-        peak: the largest sample.
 
     Raises:
         ValueError: no sound of that name is made here.
@@ -23,4 +22,4 @@ def synthesise(category: str, rng: np.random.Generator, peak: float = 0.5) -> Fl
     if category not in MAKERS:
         raise ValueError(f"there is no rule for the sound of {category!r}; there are: {', '.join(MAKERS)}")
     samples = MAKERS[category](rng)
-    return (peak * samples / max(float(np.abs(samples).max()), 1e-9)).astype(np.float32)
+    return (0.5 * samples / max(float(np.abs(samples).max()), 1e-9)).astype(np.float32)

@@ -141,12 +141,12 @@ def place(pieces: Iterable[tuple[float, np.ndarray]], seconds: float = SECONDS) 
     return total
 
 
-def regular(rng: Rng, period_s: float, jitter: float, first_s: float | None = None, count: int = 10_000) -> np.ndarray:
+def regular(rng: Rng, period_s: float, jitter: float, first_s: float | None = None) -> np.ndarray:
     """Return onsets of a repeated thing until the end of the clip."""
     start = rng.uniform(0.0, min(period_s, 1.0)) if first_s is None else first_s
-    steps = period_s * np.exp(jitter * rng.standard_normal(min(count, int(SECONDS / period_s * 2) + 2)))
+    steps = period_s * np.exp(jitter * rng.standard_normal(int(SECONDS / period_s * 2) + 2))
     onsets = start + np.concatenate([[0.0], np.cumsum(steps)])
-    return onsets[onsets < SECONDS][:count]
+    return onsets[onsets < SECONDS]
 
 
 def at_random(rng: Rng, rate_hz: float, seconds: float = SECONDS) -> np.ndarray:

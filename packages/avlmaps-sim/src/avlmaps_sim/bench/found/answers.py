@@ -1,6 +1,6 @@
 """Asking a scene its labelled queries: for each the first goal's probability, its evidence, and whether it is right."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,7 +15,6 @@ from avlmaps_sim.bench.found.queries import LabelledQuery, labelled_queries
 from avlmaps_sim.bench.harness.workplace import SceneJob, Workplace, scene_jobs
 from avlmaps_sim.bench.indexing.runs import IndexingSettings, scene_tasks
 from avlmaps_sim.bench.indexing.tasks import Task
-from avlmaps_sim.scene import Scene
 from avlmaps_sim.scenes import open_scene
 
 REACH_M = 0.5  # a goal within this of a right place is right
@@ -44,24 +43,21 @@ class Judged:
     evidence: Evidence | None = None
 
 
-def judged_scene(
-    settings: IndexingSettings, spec: str, work: Path, open_spec: Callable[[str], Scene] = open_scene
-) -> list[Judged]:
+def judged_scene(settings: IndexingSettings, spec: str, work: Path) -> list[Judged]:
     """Return the answers of a scene's map to its labelled queries; it is recorded and mapped if need be.
 
     Args:
         settings: how.
         spec: the scene's name.
         work: folder of recordings, maps and tasks, shared with the suite ``indexing``.
-        open_spec: makes a scene of its name.
     """
     (job,) = scene_jobs(settings, settings.recorded, (spec,), work)
-    return judged_job(job, settings.tasks_a_scene, open_spec)
+    return judged_job(job, settings.tasks_a_scene)
 
 
-def judged_job(job: SceneJob, most: int, open_spec: Callable[[str], Scene]) -> list[Judged]:
+def judged_job(job: SceneJob, most: int) -> list[Judged]:
     """Return the same for a job, with up to ``most`` tasks of each table."""
-    return judged(Workplace(job, open_spec), scene_tasks(job, open_spec, most))
+    return judged(Workplace(job, open_scene), scene_tasks(job, open_scene, most))
 
 
 def judged(place: Workplace, tasks: Sequence[Task]) -> list[Judged]:

@@ -1,6 +1,6 @@
 """The suite ``avlmaps bench found``: Brier scores, what is reported as found, and a reliability diagram."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -22,8 +22,6 @@ from avlmaps_sim.bench.indexing.runs import IndexingSettings
 from avlmaps_sim.bench.indexing.tables import TITLE
 from avlmaps_sim.bench.indexing.tasks import TaskKind
 from avlmaps_sim.bench.output import Table, markdown, write_answer
-from avlmaps_sim.scene import Scene
-from avlmaps_sim.scenes import open_scene
 
 NOTE = (
     "A first goal is right within 0.5 m of a right place, horizontally. Queries that have no right answer stand beside "
@@ -36,12 +34,12 @@ _DRAWS = 2000
 _BINS = np.linspace(0.0, 1.0, 11)
 
 
-def run_found(settings: IndexingSettings | None, out: Path, open_spec: Callable[[str], Scene] = open_scene) -> Any:
+def run_found(settings: IndexingSettings | None, out: Path) -> Any:
     """Query scenes, whose maps are those of the suite ``indexing`` in the same folder; write tables and a picture."""
     settings = settings or IndexingSettings()
     weights = settings.checked()
     todo = scene_jobs(settings, settings.recorded, settings.scenes, out / "work")
-    judge = partial(judged_job, most=settings.tasks_a_scene, open_spec=open_spec)
+    judge = partial(judged_job, most=settings.tasks_a_scene)
     answers = [
         one for scene in side_by_side(judge, todo, settings.jobs, "found", lambda one: one.spec) for one in scene
     ]

@@ -1,7 +1,6 @@
 """The suite ``avlmaps bench rooms``: the rooms of a map against those of its scene, before and after."""
 
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +15,6 @@ from avlmaps_sim.bench.indexing.runs import IndexingSettings
 from avlmaps_sim.bench.output import Table, draw, markdown, write_answer
 from avlmaps_sim.bench.rooms.scores import Judged, Listed, Matched, judged
 from avlmaps_sim.bench.rooms.truth import Floor, floors_of
-from avlmaps_sim.scene import Scene
 from avlmaps_sim.scenes import open_scene
 
 if TYPE_CHECKING:
@@ -34,12 +32,12 @@ TABLES = {"rooms": True, "areas": False}
 _SEEN_VIEWS, _FEWEST_VIEWS = 0.1, 2
 
 
-def run_rooms(settings: IndexingSettings | None, out: Path, open_spec: Callable[[str], Scene] = open_scene) -> Any:
+def run_rooms(settings: IndexingSettings | None, out: Path) -> Any:
     """List the rooms of scenes, whose maps are those of the suite ``indexing`` in the same folder; write tables."""
     settings = settings or IndexingSettings()
     weights = settings.checked()
     todo = scene_jobs(settings, settings.recorded, settings.scenes, out / "work")
-    found = side_by_side(partial(_scene, open_spec=open_spec), todo, settings.jobs, "rooms", lambda one: one.spec)
+    found = side_by_side(_scene, todo, settings.jobs, "rooms", lambda one: one.spec)
     tables: dict[str, Table] = {}
     for name in TABLES:
         ways = {way: [one[name, way] for one in found] for way in (BEFORE, AFTER)}
@@ -57,8 +55,8 @@ def run_rooms(settings: IndexingSettings | None, out: Path, open_spec: Callable[
     return written
 
 
-def _scene(job: SceneJob, open_spec: Callable[[str], Scene]) -> dict[tuple[str, str], Judged]:
-    place = Workplace(job, open_spec)
+def _scene(job: SceneJob) -> dict[tuple[str, str], Judged]:
+    place = Workplace(job, open_scene)
     avlmap, truth = place.avlmap, place.truth
     cameras = np.asarray(avlmap.stored.keyframes.world_from_camera, np.float64)[:, :3, 3]
     out: dict[tuple[str, str], Judged] = {}
