@@ -55,7 +55,9 @@ class Speller:
         of: dict[str, str] = {}
         for spelling in spellings:
             of.setdefault(squeezed(spelling), spelling)
-        self._known = [(key, spelling, frozenset(key)) for key, spelling in of.items()]
+        self._of_length: dict[int, list[tuple[str, str, frozenset[str]]]] = {}
+        for key, spelling in of.items():
+            self._of_length.setdefault(len(key), []).append((key, spelling, frozenset(key)))
 
     def suggest(self, word: str, most: int = 3) -> tuple[tuple[str, float], ...]:
         """Return the nearest spellings with how alike they are (1 is equal), the nearest first.
@@ -67,14 +69,16 @@ class Speller:
             return ()
         letters = frozenset(key)
         found: list[tuple[float, bool, str]] = []
-        for other, spelling, others in self._known:
-            longest = max(len(key), len(other))
+        for length, known in self._of_length.items():
+            longest = max(len(key), length)
             limit = _MOST_CHANGED * longest
-            # Each letter that only one of them has costs a change of its own.
-            fewest = max(len(letters - others), len(others - letters))
-            if len(other) > 2 and max(fewest, abs(len(key) - len(other))) <= limit:
-                away = distance(key, other, limit)
-                if away <= limit:
-                    found.append((away / longest, other[0] != key[0], spelling))
+            if length < 3 or abs(len(key) - length) > limit:
+                continue
+            for other, spelling, others in known:
+                # Each letter that only one of them has costs a change of its own.
+                if max(len(letters - others), len(others - letters)) <= limit:
+                    away = distance(key, other, limit)
+                    if away <= limit:
+                        found.append((away / longest, other[0] != key[0], spelling))
         found.sort()
         return tuple((spelling, 1.0 - away) for away, _, spelling in found[:most])
