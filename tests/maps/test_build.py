@@ -24,7 +24,7 @@ from avlmaps.maps.pipeline.parts import load_part
 from avlmaps.maps.pipeline.plan import audio_key, plan_spans
 from avlmaps.maps.settings import BuildSettings, FrameSettings
 from avlmaps.maps.store.array_validation import array_fields
-from avlmaps.maps.store.reader import StoredMap, open_stored, verify_stored
+from avlmaps.maps.store.reader import StoredMap, open_stored
 from avlmaps.maps.types import Keyframes
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.open import open_recording
@@ -92,7 +92,7 @@ def test_a_damaged_map_can_be_overwritten(tmp_path: Path) -> None:
     (path / "map.json").write_bytes(b"\xff")
     with pytest.raises(MapError, match="is not JSON in UTF-8"):
         build(Walk(6), path)
-    assert verify_stored(build(Walk(6), path, overwrite=True).path).info.counts.frames == 6
+    assert open_stored(build(Walk(6), path, overwrite=True).path, verify=True).info.counts.frames == 6
 
 
 def test_an_opened_map_stays_readable_when_it_is_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -24,7 +24,7 @@ from avlmaps.maps.store.array_files import SMALL_BYTES, read_array, sync_files, 
 from avlmaps.maps.store.array_validation import array_fields, check_order, validate_arrays
 from avlmaps.maps.store.checkpoints import DONE, save_checkpoint
 from avlmaps.maps.store.lock import is_locked, lock_folder
-from avlmaps.maps.store.reader import has_unfinished_build, open_stored, verify_stored
+from avlmaps.maps.store.reader import has_unfinished_build, open_stored
 from avlmaps.maps.types import HeardSounds, Voxels
 
 PROFILE = register_fakes()
@@ -137,7 +137,7 @@ def test_what_is_put_on_the_disk_is_every_file_before_its_manifest(
 
 
 def test_a_map_comes_back_with_all_that_it_is_of(built: Path) -> None:
-    stored = verify_stored(built)
+    stored = open_stored(built, verify=True)
     assert len(stored.voxels) == stored.info.counts.voxels > 100
     assert stored.voxels.feature.shape == (len(stored.voxels), 4)
     assert stored.place_state["centres"].shape == (2, 3)
@@ -430,7 +430,7 @@ def test_an_array_of_another_type_than_the_map_says_is_damaged(tmp_path: Path) -
 
 def test_a_map_written_before_there_were_scores_opens_without_them(copied: Path) -> None:
     edit(copied, lambda content: content["files"].pop("keyframes/score"))
-    stored = verify_stored(copied)
+    stored = open_stored(copied, verify=True)
     assert stored.keyframes.score.shape == (0,) and stored.keyframes.score.dtype == np.float16
     assert len(stored.keyframes.xy) > 0
 

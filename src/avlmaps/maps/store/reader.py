@@ -230,11 +230,6 @@ def open_stored(path: Path | str, *, verify: bool = False) -> StoredMap:
             content = newer
 
 
-def verify_stored(path: Path | str) -> StoredMap:
-    """Open a map and compare every file with its checksum; see ``open_stored``."""
-    return open_stored(path, verify=True)
-
-
 def has_unfinished_build(path: Path | str) -> bool:
     """Return whether a build in this folder is not finished, so that building again resumes it."""
     parts = user_path(path) / PARTS
