@@ -11,7 +11,6 @@ from typing import Any
 import pytest
 
 from avlmaps.cli.output import fault_sentence, is_short_of_memory, json_line, kind_of
-from avlmaps.cli.verbs import VERBS
 from avlmaps.core.errors import RecordingError
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="a POSIX shell closes the streams")
@@ -34,8 +33,8 @@ def test_an_answer_to_a_closed_output_is_lost_and_that_is_an_error(built: Path) 
         assert "Traceback" not in said
 
 
-@pytest.mark.parametrize("verb", VERBS)
-def test_every_verb_survives_closed_streams(verb: str) -> None:
+@pytest.mark.parametrize("verb", ["build", "view", "bench", "import-map"])
+def test_a_verb_of_each_distribution_survives_closed_streams(verb: str) -> None:
     """With nothing to print to, the help of a verb is a sentence or nothing; no file takes a stream's number."""
     status, _, said = ran(verb, "--help", redirect="<&- >&-")
     assert status == 1 and said.startswith("avlmaps: standard output is closed"), said

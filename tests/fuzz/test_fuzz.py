@@ -13,8 +13,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 from campaign import report, run_case, seeds_in
 from mistakes import run_mistake
 
-CASES = 80
-BLOCKS = 4
+CASES = 48
+BLOCKS = 3
 MISTAKES = 6
 
 

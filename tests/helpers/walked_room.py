@@ -1,5 +1,6 @@
 """A short walk in the analytic room with one real-looking sound, as a recording on the disk."""
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.types import Frame
 from avlmaps.recordings.writer import RecordingWriter
-from helpers.raycast import render
+from helpers.raycast import View, render
 from helpers.room import Room
 
 CAMERA = Pinhole(160.0, 160.0, 120.0, 90.0, 240, 180)
@@ -21,15 +22,20 @@ def beeps(seconds: float = 2.0, pitch_hz: float = 2000.0) -> np.ndarray:
     return (0.3 * np.sin(2 * np.pi * pitch_hz * t) * ((t % 0.75) < 0.5)).astype(np.float32)
 
 
+@cache
+def _seen() -> list[tuple[np.ndarray, View]]:
+    """Return the poses of the walk, each with what is seen from it."""
+    room = Room()
+    return [(pose, render(room.scene, CAMERA, pose)) for pose in room.walk()[100:196:4]]
+
+
 def write_walk(path: Path) -> Path:
     """Write a recording of 24 frames (6 s) with a sound from 2 to 4 s."""
-    room, rig = Room(), Rig(CAMERA, CAMERA)
-    poses = room.walk()[100:196:4]
+    rig = Rig(CAMERA, CAMERA)
     samples = 0.0005 * np.random.default_rng(0).standard_normal(6 * RATE_HZ).astype(np.float32)
     samples[2 * RATE_HZ : 4 * RATE_HZ] += beeps()
     with RecordingWriter(path, rig, up_in_world=np.array([0.0, 0.0, 1.0])) as writer:
-        for index, pose in enumerate(poses):
-            view = render(room.scene, CAMERA, pose)
+        for index, (pose, view) in enumerate(_seen()):
             writer.add(Frame(index, f"{index:06d}", index / 4.0, view.rgb, view.depth_m, pose, rig))
         writer.set_audio(Sound(samples, RATE_HZ))
     return path

@@ -12,20 +12,13 @@ import pytest
 SOURCE = Path(__file__).parent / "example_backend"
 USED = """
 import json, sys
-import numpy as np
-from pathlib import Path
 from avlmaps.core.registry import Kind, find, load
-from avlmaps.maps.build import build_map
 from avlmaps.maps.store.reader import open_stored
 from avlmaps.perception.conformance import check
-from avlmaps.perception.profiles import profile
-from avlmaps.recordings.open import open_recording
 
 backend = load(Kind.PLACE, "thumbnail")
 check(Kind.PLACE, backend)
-used = profile("colours").choosing({Kind.PLACE: "thumbnail"})
-build_map(open_recording(sys.argv[1]), sys.argv[2], used, progress=False)
-stored = open_stored(sys.argv[2])
+stored = open_stored(sys.argv[1])
 stored.require_model(Kind.PLACE)
 print(json.dumps({
     "target": find(Kind.PLACE, "thumbnail").target,
@@ -48,6 +41,17 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "site"
 
 
+@pytest.fixture(scope="module")
+def mapped(installed: Path) -> tuple[Path, Path]:
+    """Return a recording, and the map that the command line builds of it with the package's backend."""
+    recording, out = installed.with_name("rec"), installed.with_name("map")
+    _write_recording(recording)
+    words = ["-m", "avlmaps", "build", recording, "--out", out, "--profile", "colours", "--model", "place=thumbnail"]
+    done = _run(installed, *words)
+    assert done.returncode == 0, done.stderr
+    return recording, out
+
+
 def _run(installed: Path, *words: object) -> subprocess.CompletedProcess[str]:
     there = {**os.environ, "PYTHONPATH": str(installed)}
     command = [sys.executable, *map(str, words)]
@@ -58,10 +62,10 @@ def test_the_example_is_as_short_as_is_said() -> None:
     assert len((SOURCE / "thumbnail_places.py").read_text().splitlines()) <= 30
 
 
-def test_it_is_found_held_to_its_protocol_and_makes_a_map_that_remembers_it(installed: Path, tmp_path: Path) -> None:
-    recording = tmp_path / "rec"
-    _write_recording(recording)
-    done = _run(installed, "-c", USED, recording, tmp_path / "map")
+def test_it_is_found_held_to_its_protocol_and_makes_a_map_that_remembers_it(
+    installed: Path, mapped: tuple[Path, Path]
+) -> None:
+    done = _run(installed, "-c", USED, mapped[1])
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout)
     assert told["target"] == "thumbnail_places:ThumbnailPlaces"
@@ -71,14 +75,13 @@ def test_it_is_found_held_to_its_protocol_and_makes_a_map_that_remembers_it(inst
 
 
 @pytest.mark.slow
-def test_the_command_line_lists_it_and_a_map_without_it_is_told_plainly(installed: Path, tmp_path: Path) -> None:
+def test_the_command_line_lists_it_and_a_map_without_it_is_told_plainly(
+    installed: Path, mapped: tuple[Path, Path], tmp_path: Path
+) -> None:
+    recording, out = mapped
     listed = json.loads(_run(installed, "-m", "avlmaps", "profiles", "--json").stdout)
     (mine,) = [entry for entry in listed["other_backends"] if entry["name"] == "thumbnail"]
     assert (mine["state"], mine["model"], mine["dim"]) == ("ready", "example/thumbnail-1", 144)
-    recording, out = tmp_path / "rec", tmp_path / "map"
-    _write_recording(recording)
-    words = ["-m", "avlmaps", "build", recording, "--out", out, "--profile", "colours", "--model", "place=thumbnail"]
-    assert _run(installed, *words).returncode == 0
     without = tmp_path / "empty"
     without.mkdir()
     assert _run(without, "-m", "avlmaps", "info", out).returncode == 0, "what is in a map is told without its models"

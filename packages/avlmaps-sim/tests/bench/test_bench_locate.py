@@ -6,7 +6,8 @@ import pytest
 from avlmaps.perception.encoders import Encoders
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.subset import Subset
-from avlmaps_sim.bench.locate import COLUMNS, errors_of, foreign_errors, map_of, run
+from avlmaps.recordings.types import Recording
+from avlmaps_sim.bench.locate import COLUMNS, MapOfPictures, errors_of, foreign_errors, map_of, run
 from helpers.picture_room import RoomWalk
 
 
@@ -31,12 +32,20 @@ def test_photos_of_other_places_can_be_given() -> None:
     assert table["rows"][1][2:5] == [3, "no", 0.0]
 
 
+@pytest.fixture(scope="module")
+def red_kitchen(shared_data: Path) -> tuple[Recording, MapOfPictures]:
+    """Return a walk, and the map of every other frame of its first part."""
+    recording = open_recording(shared_data / "data" / "redkitchen")
+    return recording, map_of(
+        Subset(recording, np.arange(0, 150, 2)), Encoders.named("embedded"), np.random.default_rng(0)
+    )
+
+
 @pytest.mark.slow
 @pytest.mark.shared
-def test_half_of_the_red_kitchen_locates_the_other_half(shared_data: Path) -> None:
+def test_half_of_the_red_kitchen_locates_the_other_half(red_kitchen: tuple[Recording, MapOfPictures]) -> None:
     """The issue's figures, in the first part of the walk; `avlmaps bench locate` asks everywhere."""
-    recording = open_recording(shared_data / "data" / "redkitchen")
-    stored = map_of(Subset(recording, np.arange(0, 150, 2)), Encoders.named("embedded"), np.random.default_rng(0))
+    recording, stored = red_kitchen
     asked = np.arange(1, 150, 12)
     errors = errors_of(stored, recording, asked, 0)
     assert np.median(errors.cm) <= 1.0
@@ -46,10 +55,12 @@ def test_half_of_the_red_kitchen_locates_the_other_half(shared_data: Path) -> No
     assert np.isinf(foreign_errors(stored, mirrored, 0).cm).all()
 
 
+@pytest.mark.slow
 @pytest.mark.shared
-def test_the_depth_cameras_intrinsics_do_not_spoil_the_red_kitchen(shared_data: Path) -> None:
-    recording = open_recording(shared_data / "data" / "redkitchen")
-    stored = map_of(Subset(recording, np.arange(100, 200, 2)), Encoders.named("embedded"), np.random.default_rng(0))
-    errors = errors_of(stored, recording, np.arange(105, 196, 10), 0, camera=recording.rig.depth)
+def test_the_depth_cameras_intrinsics_do_not_spoil_the_red_kitchen(
+    red_kitchen: tuple[Recording, MapOfPictures],
+) -> None:
+    recording, stored = red_kitchen
+    errors = errors_of(stored, recording, np.arange(105, 150, 5), 0, camera=recording.rig.depth)
     assert np.median(errors.cm) <= 1.5
     assert (errors.cm <= 5.0).all()

@@ -200,7 +200,7 @@ def test_true_senses_put_sounds_photos_and_things_where_they_are(known: KnownSce
 
 def small_settings(**changes: object) -> NavigationSettings:
     plain = NavigationSettings(
-        scenes=("small",), series=(Series.IMAGES, Series.COMMANDS, Series.SPATIAL), profile="colours", frames=60,
+        scenes=("small",), series=(Series.IMAGES, Series.COMMANDS, Series.SPATIAL), profile="colours", frames=40,
         sources=3, ambiguous=0, sequences=1, jobs=1,
     )  # fmt: skip
     return replace(plain, **changes)  # pyright: ignore[reportArgumentType]
