@@ -3,6 +3,7 @@
 import re
 import runpy
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -226,12 +227,26 @@ def frame(folder: Path) -> avlmaps.Frame:
     return avlmaps.open_recording(folder / "rec").frame(0)
 
 
+UPRIGHT = np.broadcast_to(np.float32([1, 0, 0]), (40, 30, 3))  # of pictures of 160x120
 FAR_AWAY = np.eye(4)
 FAR_AWAY[:3, 3] = 500_000.0, 4_649_776.0, 30.0  # metres of UTM
+
+
+class OnAnotherDevice:
+    """An array that numpy cannot read, as a tensor of a GPU."""
+
+    def __array__(self, dtype: object = None, copy: object = None) -> np.ndarray:
+        raise TypeError("can't convert cuda:0 device type tensor to numpy")
+
 
 BAD_FRAMES = {
     "rgb of floats": (dict(rgb=np.zeros((120, 160, 3))), r"rgb .* must be uint8 of shape \(h, w, 3\), not float64"),
     "rgb without channels": (dict(rgb=np.zeros((120, 160), np.uint8)), r"not uint8 of \(120, 160\)"),
+    "channels first": (dict(rgb=np.zeros((3, 120, 160), np.uint8)), r"channels last: rgb.transpose\(1, 2, 0\)"),
+    "a tensor of a GPU": (dict(depth_m=OnAnotherDevice()), "depth_m .* not OnAnotherDevice .*cuda:0"),
+    "a pose in two parts": (dict(world_from_camera=([0, 0, 0], [0, 0, 0, 1])), "world_from_camera .* not tuple"),
+    "features on their side": (dict(features=UPRIGHT), "40 rows and 30 columns .* look exchanged"),
+    "features of a GPU": (dict(features=OnAnotherDevice()), "no array but OnAnotherDevice"),
     "rgba": (dict(rgb=np.zeros((120, 160, 4), np.uint8)), "leave the fourth channel out"),
     "millimetres": (dict(depth_m=np.full((120, 160), 1200.0)), r"must be in metres; its median is 1,200"),
     "centimetres": (dict(depth_m=np.full((120, 160), 250.0)), "looks like centimetres"),
@@ -277,6 +292,19 @@ def test_bad_input_gets_a_sentence_and_costs_nothing(frame: avlmaps.Frame, kind:
     assert len(live) == 2
 
 
+def test_depths_that_are_masked_are_none(frame: avlmaps.Frame) -> None:
+    live, near = avlmaps.VoxelMap(0.1, avlmaps.Encoders()), avlmaps.VoxelMap(0.1, avlmaps.Encoders())
+    add(live, replace(frame, depth_m=np.ma.masked_where(frame.depth_m > 2.0, frame.depth_m)))
+    add(near, replace(frame, depth_m=np.where(frame.depth_m > 2.0, 0.0, frame.depth_m)))
+    np.testing.assert_array_equal(live.voxel_index, near.voxel_index)
+
+
+@pytest.mark.parametrize("name", ["settings", "query"])
+def test_settings_of_another_kind_are_refused_at_once(name: str) -> None:
+    with pytest.raises(MapError, match=rf"{name} must be an avlmaps\.\w+Settings, not dict"):
+        avlmaps.VoxelMap(**{name: {}})
+
+
 @given(
     rgb=some.arrays(
         st.sampled_from([np.uint8, np.float32, np.int64]), some.array_shapes(min_dims=1, max_dims=4, max_side=4)
@@ -314,6 +342,14 @@ def test_frames_that_contradict_one_another_are_said_with_every_answer(kind: str
     assert any(re.search(said, doubt) for doubt in live.doubts), live.doubts
     assert set(live.doubts) <= set(live.ask("red").notes)
     assert set(live.doubts) <= set(live.save(tmp_path / "m").stored.info.doubts)
+
+
+def test_stamps_in_milliseconds_are_doubted() -> None:
+    truth = example_truth(frames=6)
+    live = avlmaps.VoxelMap(0.1, avlmaps.Encoders())
+    for index, pose in enumerate(truth.world_from_camera):
+        live.add(truth.rgb[index], truth.depth_m[index], truth.rig.rgb, pose, 100.0 * index)
+    assert any("100 s apart, so their stamps look like milliseconds" in doubt for doubt in live.doubts), live.doubts
 
 
 def test_frames_that_agree_are_not_doubted() -> None:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from avlmaps.cli.reading_options import Reading
 from avlmaps.cli.usage import CONFIG
 from avlmaps.core import poses
-from avlmaps.core.camera import Pinhole
+from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.wording import Spelling, options_as
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.camera_axes import opencv_from_axes
@@ -22,13 +22,13 @@ from avlmaps.recordings.consistency.check import check_recording, pose_at
 from avlmaps.recordings.consistency.edges import find_edges, shift_of
 from avlmaps.recordings.consistency.sample import Sample, choose_pairs, draw_sample
 from avlmaps.recordings.consistency.single_frames import of_sound
-from avlmaps.recordings.consistency.suspects import Suspect, Trials
+from avlmaps.recordings.consistency.suspects import Suspect, Trials, suspected_rig
 from avlmaps.recordings.consistency.verdict import Grade, Reason, Verdict
 from avlmaps.recordings.corrections import Corrections
 from avlmaps.recordings.example_room import example_truth
 from avlmaps.recordings.memory import MemoryRecording
 from avlmaps.recordings.open import open_recording
-from avlmaps.recordings.types import Frame
+from avlmaps.recordings.types import Frame, Recording
 from avlmaps_sim.bench.recordings.drafts import Draft, RoomWalk
 from avlmaps_sim.bench.recordings.outcomes import Judge, Outcome
 from avlmaps_sim.bench.recordings.situations import situations
@@ -311,3 +311,42 @@ def test_the_bench_knows_a_right_map_from_a_wrong_one(right: Draft) -> None:
     same = replace(moved, change=lambda d, o, g: replace(d, poses=turn @ d.poses))
     outcomes = [case.outcome for one in (same, moved) if (case := judge.judge(one, right, 0))]
     assert outcomes == [Outcome.RIGHT, Outcome.REFUSED]
+
+
+@pytest.mark.parametrize(
+    ("degrees", "by_m", "said"),
+    [(0, 0.0, ""), (0, 0.8, "origins|jump"), (90, 0.0, "origins|do not agree"), (180, 0.0, "origins|do not agree")],
+)
+def test_a_second_part_with_another_origin_is_doubted(
+    degrees: int, by_m: float, said: str, right: Draft, tmp_path: Path
+) -> None:
+    right.write(tmp_path / "walk")
+    recording = open_recording(tmp_path / "walk")
+    middle, turn = recording.world_from_camera[:, :3, 3].mean(axis=0), np.eye(4)
+    turn[:2, :2] = np.round([[np.cos(a := np.radians(degrees)), -np.sin(a)], [np.sin(a), np.cos(a)]])
+    turn[:3, 3] = middle - turn[:3, :3] @ middle + (by_m, by_m, 0.0)
+    sentences = check_recording(_parted(recording, turn)).sentences()
+    assert any(re.search(said, one) for one in sentences) if said else not sentences
+
+
+def test_a_second_part_that_sees_nothing_of_the_first_is_said_to_be_unchecked(right: Draft, tmp_path: Path) -> None:
+    right.write(tmp_path / "walk")
+    away = np.eye(4)
+    away[0, 3] = 40.0
+    found = check_recording(_parted(open_recording(tmp_path / "walk"), away))
+    assert any("one origin before and after the gap of 600 s between 000014 and 000015" in it for it in found.unchecked)
+
+
+def _parted(recording: Recording, moved: np.ndarray) -> Recording:
+    """Return a recording whose second half begins ten minutes later, elsewhere."""
+    late = [
+        replace(frame, stamp_s=frame.stamp_s + 600.0, world_from_camera=moved @ frame.world_from_camera)
+        for frame in recording
+    ]
+    return MemoryRecording([*list(recording)[:15], *late[15:]])
+
+
+def test_intrinsics_that_fit_already_are_no_cause() -> None:
+    rig = Rig(CAMERA, CAMERA)
+    assert suspected_rig(rig, Suspect(centred=True)) is None
+    assert suspected_rig(rig, Suspect(focal=1.25)) is not None

@@ -1,6 +1,7 @@
 """Pinhole cameras: OpenCV axes (x right, y down, z forward), the centre of pixel (u, v) at (u + 0.5, v + 0.5)."""
 
 from dataclasses import dataclass, field
+from numbers import Real
 
 import numpy as np
 
@@ -32,7 +33,10 @@ class Pinhole:
     height: int
 
     def __post_init__(self) -> None:
-        numbers = tuple(float(number) for number in (self.fx, self.fy, self.cx, self.cy))
+        given = (self.fx, self.fy, self.cx, self.cy)
+        if not all(isinstance(number, Real) for number in (*given, self.width, self.height)):
+            raise ValueError(f"a camera needs numbers for fx, fy, cx, cy, width and height, not {given}")
+        numbers = tuple(float(number) for number in given)
         if not np.isfinite(numbers).all() or self.fx <= 0 or self.fy <= 0:
             raise ValueError(f"a camera needs finite numbers and positive focal lengths, not {numbers}")
         if self.width < 1 or self.height < 1:

@@ -56,7 +56,7 @@ from avlmaps.recordings.directions import DirectionTrack
 from avlmaps.recordings.growing_track import LONGEST_GAP_S, GrowingTrack
 from avlmaps.recordings.memory import next_of
 from avlmaps.recordings.microphones import Microphones
-from avlmaps.recordings.plausible import date_fault, plausible_walk
+from avlmaps.recordings.plausible import date_fault, pace_fault, plausible_walk
 from avlmaps.recordings.types import Frame, Ground, Recording
 
 # Features of waiting frames take no more memory than this.
@@ -516,7 +516,7 @@ class GrowingMap:
         self._checked_frames, motion = count, self._walk.motion()
         names = [f"{stamp_s:.2f} s" for stamp_s in motion.stamps_s.tolist()]
         found = plausible_walk(motion.stamps_s, motion.world_from_camera[:, :3, 3], names, strays_are="check the poses")
-        odd = *found.notices, found.fault, *judge(self._walk.held()).sentences()
+        odd = *found.notices, found.fault, pace_fault(motion.stamps_s, "frames"), *judge(self._walk.held()).sentences()
         self._found = tuple(sentence for sentence in odd if sentence)
 
     def freeze(self) -> "FrozenSums":

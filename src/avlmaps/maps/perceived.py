@@ -56,11 +56,21 @@ def as_grid(features: Any, dim: int | None, who: str, frame: Frame) -> np.ndarra
     Raises:
         BackendError: they have another form.
     """
-    array = np.asarray(features)
     wanted = f"float32 of (rows, columns, {'d' if dim is None else dim})"
+    try:
+        array = np.asarray(features)
+    except (ValueError, TypeError, RuntimeError) as fault:  # rows of several lengths, or a tensor of a GPU
+        came = type(features).__name__
+        raise BackendError(f"{who} no array but {came} for {frame.name} ({fault}); features are {wanted}.") from None
     wrong = array.dtype.kind != "f" or array.ndim != 3 or 0 in array.shape
     if wrong or (dim is not None and array.shape[2] != dim):
         raise BackendError(f"{who} {array.dtype} of {array.shape} for {frame.name}; features are {wanted}.")
+    (rows, columns), (height, width) = array.shape[:2], frame.rgb.shape[:2]
+    if (rows - columns) * (height - width) < 0 and abs(rows * height - columns * width) <= max(width, height):
+        raise BackendError(
+            f"{who} {rows} rows and {columns} columns for {frame.name}, whose picture has {height} rows and {width} "
+            "columns: they look exchanged; features.swapaxes(0, 1) puts them right."
+        )
     return array
 
 

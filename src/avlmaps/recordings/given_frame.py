@@ -68,7 +68,12 @@ def _is_finite(given: object) -> bool:
 
 
 def _numbers(name: str, what: str, given: Any) -> np.ndarray:
-    array = np.asarray(given)
+    try:
+        array = np.ma.filled(given, 0) if np.ma.isMaskedArray(given) else np.asarray(given)
+    except (ValueError, TypeError, RuntimeError) as fault:  # rows of several lengths, or a tensor of a GPU
+        raise RecordingError(
+            f"{what} of {name} must be an array of numbers, not {type(given).__name__} ({fault})."
+        ) from None
     if array.dtype.kind not in "fiu":
         raise RecordingError(
             f"{what} of {name} must be an array of numbers, not {type(given).__name__} ({array.dtype})."
@@ -77,10 +82,11 @@ def _numbers(name: str, what: str, given: Any) -> np.ndarray:
 
 
 def _colours(name: str, given: Any) -> UInt8[np.ndarray, "h w 3"]:
-    rgb = np.asarray(given)
+    rgb = _numbers(name, "rgb", given)
     if rgb.ndim != 3 or rgb.shape[2] != 3 or 0 in rgb.shape or rgb.dtype != np.uint8:
         hint = "; colours from 0 to 1 times 255" if rgb.dtype.kind == "f" else ""
         hint = "; leave the fourth channel out" if rgb.ndim == 3 and rgb.shape[2] == 4 else hint
+        hint = "; put the channels last: rgb.transpose(1, 2, 0)" if rgb.ndim == 3 and rgb.shape[0] == 3 else hint
         raise RecordingError(f"rgb of {name} must be uint8 of shape (h, w, 3), not {rgb.dtype} of {rgb.shape}{hint}.")
     return np.array(rgb, order="C")
 

@@ -11,7 +11,7 @@ from avlmaps.core.progress import say
 from avlmaps.core.timeline import Trajectory
 from avlmaps.core.wording import option
 from avlmaps.maps.audio.segmentation import segment
-from avlmaps.maps.gravity.up import some_frames, up_doubts
+from avlmaps.maps.gravity.up import some_frames, tilted_parts, up_doubts
 from avlmaps.maps.pipeline.plan import BUILD_VERSION, BuildPlan, audio_key, strip_folder
 from avlmaps.maps.sources.wiring import check_wiring
 from avlmaps.maps.store.checkpoints import Computed, key_of, load_or_compute
@@ -85,7 +85,8 @@ def judge(recording: Recording, useless: Sequence[str] | None = None) -> Verdict
     verdict = check_recording(recording)
     if verdict.refused(()) is not None:  # with such poses nothing is level
         return verdict
-    tilted = up_doubts(recording, some_frames(recording), np.random.default_rng(0))
+    rng = np.random.default_rng(0)
+    tilted = up_doubts(recording, some_frames(recording), rng) or tilted_parts(recording, rng)
     array = _array_of(recording)
     wired, unsure = ([], []) if array is None else _of_microphones(array, recording.walk, useless)
     findings = (*verdict.findings, *tilted, *wired)

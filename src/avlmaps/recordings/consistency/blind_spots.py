@@ -8,7 +8,9 @@ from avlmaps.core.arrays import Bool
 from avlmaps.core.poses import rotation_angle_rad
 from avlmaps.recordings.consistency.agreement import Agreement
 from avlmaps.recordings.consistency.edges import Edges
+from avlmaps.recordings.consistency.jumps import gaps
 from avlmaps.recordings.consistency.limits import apart_agrees, can_be_judged, geometry_agrees
+from avlmaps.recordings.consistency.sample import pairs_across
 from avlmaps.recordings.consistency.single_frames import LEAST_WARMTH
 from avlmaps.recordings.consistency.suspects import Suspect, Trial, Trials, is_closer
 from avlmaps.recordings.corrections import Corrections
@@ -98,6 +100,7 @@ def _spots(recording: Recording, trials: Trials, edges: Edges) -> Iterator[str]:
             "lies a sixteenth of the picture beside would not show."
         )
     yield from _of_gaps(recording)
+    yield from _of_parts(recording)
 
 
 def _of_channels(warmth: float) -> Iterator[str]:
@@ -127,6 +130,18 @@ def _of_gaps(recording: Recording) -> Iterator[str]:
         f"Jumps of the poses cannot be checked at {int(blind.sum())} of {len(blind)} steps, because the camera turns "
         f"there by more than it sees, as between {recording.name(at)} and {recording.name(at + 1)}."
     )
+
+
+def _of_parts(recording: Recording) -> Iterator[str]:
+    """Yield a sentence for gaps after which nothing is seen again, so that the poses may have two origins."""
+    for at in gaps(recording):
+        if not len(pairs_across(recording.world_from_camera, at)):
+            apart_s = float(recording.stamps_s[at + 1] - recording.stamps_s[at])
+            yield (
+                f"Whether the poses have one origin before and after the gap of {apart_s:.3g} s between "
+                f"{recording.name(at)} and {recording.name(at + 1)} cannot be checked here, because no place is seen "
+                "in both."
+            )
 
 
 def _steps_without_overlap(recording: Recording) -> Bool[np.ndarray, " m"]:

@@ -16,7 +16,7 @@ from avlmaps.recordings.consistency.agreement import APART_SAME_M, FEWEST_POINTS
 from avlmaps.recordings.consistency.blind_spots import blind_spots
 from avlmaps.recordings.consistency.causes import cause_of
 from avlmaps.recordings.consistency.edges import Edges, Shift, find_edges, shift_of
-from avlmaps.recordings.consistency.jumps import find_exchanged, find_jump
+from avlmaps.recordings.consistency.jumps import find_exchanged, find_jump, find_parts
 from avlmaps.recordings.consistency.sample import Sample, Surfaces, draw_sample, steps_between_all
 from avlmaps.recordings.consistency.single_frames import (
     FEWEST_FOR_WARMTH,
@@ -118,7 +118,9 @@ def _of_agreement(recording: Recording, sample: Sample, found: _Found, median_m:
             "recording is read in another way."
         )
         yield Finding(Reason.GEOMETRY, Grade.SUSPICIOUS, sentence, _words(recording, closer, median_m, ""))
-    elif misplaced := find_exchanged(recording, sample, after) or find_jump(recording, sample, after):
+    elif misplaced := (
+        find_exchanged(recording, sample, after) or find_jump(recording, sample, after) or find_parts(recording)
+    ):
         yield misplaced
     elif differing := _most_unlike(after, apart):
         grade = Grade.IMPOSSIBLE if after.likeness < limits.IMPOSSIBLE_LIKENESS else Grade.SUSPICIOUS

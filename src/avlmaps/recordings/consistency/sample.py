@@ -21,6 +21,8 @@ STEPS = (0.5, 1.2)
 APART = 12
 APART_M, APART_RAD = 0.7, np.radians(25.0)
 JUMPS = 4
+# Of pairs across a place where a recording is parted: a point this far ahead of each camera lies in the other's view.
+ACROSS, AHEAD_M, VIEW_RAD, ACROSS_RAD = 8, 2.0, np.radians(22.0), np.radians(70.0)
 # A step this many times the usual one is a jump that is looked at.
 JUMP_RATIO = 4.0
 # Red differs from blue by more than this share of the brightest of the three, or of this brightness (of 255).
@@ -190,6 +192,28 @@ def _apart(pose: Float[np.ndarray, "n 4 4"]) -> list[tuple[int, int]]:
         found.append((int(rows[a]), int(rows[b])))
         off[max(0, a - near) : a + near + 1] = np.inf
     return found
+
+
+def pairs_across(pose: Float[np.ndarray, "n 4 4"], at: int) -> Int[np.ndarray, "p 2"]:
+    """Return pairs of a frame up to ``at`` and a later one that look at one place, as far as poses say so."""
+    rows = [np.unique(np.linspace(*ends, min(ends[1] - ends[0] + 1, 120)).round().astype(int)) for ends in
+            ((0, at), (at + 1, len(pose) - 1))]  # fmt: skip
+    (place, ahead), (others, others_ahead) = ((pose[some, :3, 3], pose[some, :3, 2]) for some in rows)
+    spot, others_spot = place + AHEAD_M * ahead, others + AHEAD_M * others_ahead
+    off_m = np.linalg.norm(spot[:, None] - others_spot[None], axis=-1)
+    to_other, to_one = others_spot[None] - place[:, None], spot[:, None] - others[None]
+    seen = np.einsum("abi,ai->ab", to_other, ahead) >= np.cos(VIEW_RAD) * np.linalg.norm(to_other, axis=-1)
+    seen &= np.einsum("abi,bi->ab", to_one, others_ahead) >= np.cos(VIEW_RAD) * np.linalg.norm(to_one, axis=-1)
+    off_m[~seen | (ahead @ others_ahead.T < np.cos(ACROSS_RAD))] = np.inf
+    near = [max(1, len(some) // (2 * ACROSS)) for some in rows]
+    found: list[tuple[int, int]] = []
+    while len(found) < ACROSS and off_m.size:
+        a, b = (int(i) for i in np.unravel_index(int(np.argmin(off_m)), off_m.shape))
+        if not np.isfinite(off_m[a, b]):
+            break
+        found.append((int(rows[0][a]), int(rows[1][b])))
+        off_m[max(0, a - near[0]) : a + near[0] + 1, max(0, b - near[1]) : b + near[1] + 1] = np.inf
+    return np.array(found, np.int64).reshape(-1, 2)
 
 
 def steps_between(one: Float[np.ndarray, "4 4"], others: Float[np.ndarray, "n 4 4"]) -> Float[np.ndarray, " n"]:

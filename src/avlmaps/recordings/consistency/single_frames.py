@@ -75,7 +75,7 @@ def _of_camera(camera: Pinhole, where: str) -> Iterator[Finding]:
         looks = ""
         if max(off) > 0.5 and min(camera.cx, camera.cy) > 0.0:
             looks = f"They look like those of a {2 * camera.cx:.0f}x{2 * camera.cy:.0f} picture: "
-        yield Finding(Reason.INTRINSICS, grade, sentence, f"{looks}{fit if looks else fit.capitalize()}")
+        yield Finding(Reason.INTRINSICS, grade, sentence, f"{looks}{fit if looks else fit[:1].upper() + fit[1:]}")
     w, h = camera.width, camera.height
     if abs(w - h) > 0.1 * w and max(abs(camera.cx - h / 2), abs(camera.cy - w / 2)) < _AS_IF_EXCHANGED * w:
         sentence = f"The principal point {where} ({camera.cx:.6g}, {camera.cy:.6g}) is the middle of a {h}x{w} picture."

@@ -252,7 +252,8 @@ def suspected_rig(rig: Rig, suspect: Suspect) -> Rig | None:
         return Pinhole(fx * factor, fy * factor, cx, cy, camera.width, camera.height)
 
     try:
-        return Rig(other(rig.rgb), other(rig.depth), rig.rgb_from_depth)
+        there = Rig(other(rig.rgb), other(rig.depth), rig.rgb_from_depth)
+        return None if (there.rgb, there.depth) == (rig.rgb, rig.depth) else there  # what is there already is no cause
     except (ValueError, ZeroDivisionError):
         return None
 
