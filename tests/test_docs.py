@@ -89,3 +89,19 @@ def test_the_makefile_names_tests_that_are_there() -> None:
     assert len(named) > 20
     for one in named:
         assert (ROOT / one).exists(), one
+
+
+def test_the_forges_workflow_calls_what_is_there() -> None:
+    """Nobody runs it before a push: its targets, files, marks and Pythons are those of the project."""
+    flow = (ROOT / ".github/workflows/tests.yml").read_text(encoding="utf-8")
+    project = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    steps = re.findall(r"run: (.+)", flow)
+    called = re.findall(r"\bmake (?:--\S+ )*([\w-]+)", "\n".join([*steps, (ROOT / ".ci/run").read_text("utf-8")]))
+    targets = re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
+    assert len(called) > 5 and set(called) <= set(targets)
+    files = re.findall(r" -[re] (\S+)|^(\.\S+)", "\n".join(steps), re.MULTILINE)
+    assert len(files) > 3 and all((ROOT / (one or other)).exists() for one, other in files)
+    (chosen,) = re.findall(r'-m "(not .+)"', flow)
+    assert all(f'"{mark}: ' in project for mark in re.findall(r"not (\w+)", chosen))
+    pythons = re.findall(r"Python :: (3\.\d+)", project)
+    assert re.findall(r"python: \[(.+)\]", flow) == [", ".join(f'"{one}"' for one in pythons)] * 2
