@@ -7,7 +7,7 @@ from audio_fakes import RATE_HZ, quiet, tone
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps.maps.audio.denoise import NoiseProfile, denoise, denoise_blocks, noise_profile
+from avlmaps.maps.audio.denoise import NoiseProfile, denoise, denoise_blocks, is_swell, noise_profile
 from avlmaps.recordings.audio import Sound
 from avlmaps_sim.mixing.background import background
 from avlmaps_sim.mixing.clips import amplify, audible_part, find_clips, loudness_db
@@ -83,3 +83,15 @@ def test_real_sounds_in_noise_come_out_clearer(shared_data: Path) -> None:
         gained.append(snr_db(clean, denoise(Sound(noisy, RATE_HZ), profile()).samples) - snr_db(clean, noisy))
     assert min(gained) > -1.0
     assert np.mean(gained) > 2.5
+
+
+@pytest.mark.parametrize("kind", ["white", "pink", "room"])
+@pytest.mark.parametrize("seconds", [0.1, 0.3, 2.0])
+def test_a_background_that_swells_is_no_other_sound(kind: str, seconds: float) -> None:
+    count, around = round(seconds * RATE_HZ), [Sound(noise(2, kind), RATE_HZ), Sound(noise(2, kind, seed=1), RATE_HZ)]
+    swell = 3.0 * noise(2, kind, seed=2)[:count]
+    assert is_swell(Sound(swell, RATE_HZ), around)
+    assert not is_swell(Sound(noise(2, kind, seed=2)[:count] + tone(seconds, level=0.05)[:count], RATE_HZ), around)
+    other = "white" if kind != "white" else "pink"
+    assert not is_swell(Sound(swell + 10.0 * noise(2, other, seed=3)[:count], RATE_HZ), around)
+    assert not is_swell(Sound(swell, RATE_HZ), [])

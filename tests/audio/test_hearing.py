@@ -118,3 +118,15 @@ def test_the_same_segments_are_heard_as_segmented(tmp_path: Path) -> None:
     heard = detect_events(straight_walk(4.0, 0.5, track), FakeEncoder(), chosen, tmp_path / "clips")
     expected = segment(track, chosen.segmentation)
     np.testing.assert_array_equal(heard.onset_s, [one.onset_s for one in expected])
+
+
+def test_a_swell_of_the_background_is_encoded_as_it_was_heard(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    noise = (0.02 * rng.standard_normal(12 * RATE_HZ)).astype(np.float32)
+    noise[5 * RATE_HZ : 6 * RATE_HZ] *= 4.0
+    encoder = FakeEncoder()
+    track = track_of(tmp_path / "a.flac", noise)
+    heard = detect_events(straight_walk(12.0, 0.5, track), encoder, PLAIN, tmp_path / "clips")
+    assert len(heard) == 1
+    as_heard = track.read(float(heard.onset_s[0]), float(heard.offset_s[0]))
+    np.testing.assert_array_equal(encoder.heard[0].samples, as_heard.samples)

@@ -15,7 +15,7 @@ from avlmaps.cli.usage import CONFIG
 from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.wording import Spelling, options_as
-from avlmaps.recordings.audio import AudioTrack
+from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
 from avlmaps.recordings.camera_axes import opencv_from_axes
 from avlmaps.recordings.consistency.causes import cause_of
 from avlmaps.recordings.consistency.check import check_recording, pose_at
@@ -219,6 +219,17 @@ def test_a_track_of_another_rate_or_clock_is_doubted(case: str, right: Draft, tm
     recording.audio = AudioTrack(tmp_path / "sound.wav", rate_hz, longer * recording.duration_s, start_s)
     found = list(of_sound(recording))
     assert [said in str(one) and one.reason is Reason.SOUND for one in found] == [True] * bool(said)
+
+
+@pytest.mark.parametrize(("gain", "doubted"), [(0.5, False), (1.0, False), (4.0, True)])
+def test_a_clipped_track_is_doubted(gain: float, doubted: bool, right: Draft, tmp_path: Path) -> None:
+    sound = np.sin(np.arange(round(16_000 * float(right.stamps_s[-1]))) * 0.2).astype(np.float32)
+    sound[: len(sound) // 2] *= 0.1
+    right.write(tmp_path / "walk")
+    write_flac(tmp_path / "walk" / "audio.flac", Sound(np.clip(gain * sound, -1.0, 1.0), 16_000))
+    found = check_recording(open_recording(tmp_path / "walk"))
+    assert [one.reason for one in found.findings] == [Reason.SOUND] * doubted
+    assert all("is clipped in" in one and "audio.flac" in one for one in found.sentences())
 
 
 def test_frames_that_see_nothing_in_common_are_not_called_fine(tmp_path: Path) -> None:

@@ -148,6 +148,11 @@ def channel_faults(track: AudioTrack) -> list[str]:
     ]  # fmt: skip
 
 
+def clipping(track: AudioTrack) -> list[str]:
+    """Return a sentence for each channel of a track that is clipped: its loud sounds are like others."""
+    return _clipped(_looked_at(track), track)
+
+
 def useless_channels(track: AudioTrack, name: str = "") -> list[str]:
     """Return those of the faults with which an array shows no direction: a channel that is dead, or another's copy.
 

@@ -6,12 +6,13 @@ frequency before it is compared with the noise, so that single bins do not flick
 only quieter. Where the noise is silent the gain is one: a clean sound comes out as it went in.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from avlmaps.core.arrays import Complex64, Float32
+from avlmaps.maps.audio.filterbank import band_powers
 from avlmaps.recordings.audio import Sound
 
 _WINDOW_S = 0.032
@@ -19,6 +20,9 @@ _OVERLAP = 4
 _SMOOTH_FRAMES, _SMOOTH_BINS = 5, 3
 _STEEPNESS = 1.5  # noise is assumed to be louder than its average by this factor, since single frames exceed it
 _CHUNK_S = 10.0
+# Spread over the bands of a sound's power over its background's: of 73 swells of steady sounds 95 % have less than 3.7
+# dB, of 75 other sounds on a background 95 % more than 3.2; in between, no filter names more of the others.
+_LEAST_COLOUR_DB = 4.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +60,20 @@ def noise_profile(quiet: Iterable[Sound]) -> NoiseProfile | None:
     if frames * _WINDOW_S / _OVERLAP < 0.2:
         return None
     return NoiseProfile((np.median(np.concatenate(powers), axis=0) / np.log(2.0)).astype(np.float32), rate_hz)
+
+
+def is_swell(sound: Sound, quiet: Sequence[Sound]) -> bool:
+    """Return whether a sound is its background, louder: rain that beats down, a vacuum cleaner that comes nearer.
+
+    It then has the background's colour: its power over that of the background is nearly the same in every band. What a
+    filter would leave of it is like another sound.
+    """
+    over, below = ([power for one in sounds for power in band_powers([one])] for sounds in ([sound], quiet))
+    if not over or not below:
+        return False
+    loud, soft = np.concatenate(over).mean(axis=0), np.concatenate(below).mean(axis=0)
+    both = (loud > 0.0) & (soft > 0.0)
+    return bool(both.any()) and float(np.std(10.0 * np.log10(loud[both] / soft[both]))) < _LEAST_COLOUR_DB
 
 
 def denoise(sound: Sound, profile: NoiseProfile, reduction_db: float = 12.0) -> Sound:

@@ -12,7 +12,7 @@ from avlmaps.core.arrays import Float, Float32
 from avlmaps.core.errors import BackendError
 from avlmaps.core.progress import progress, say
 from avlmaps.maps.audio.change_points import frames_of_track, split_at_changes
-from avlmaps.maps.audio.denoise import denoise, noise_profile
+from avlmaps.maps.audio.denoise import denoise, is_swell, noise_profile
 from avlmaps.maps.audio.segmentation import Segment, segment
 from avlmaps.maps.audio.settings import ChangeSettings, HearingSettings
 from avlmaps.maps.types import HeardSounds
@@ -158,11 +158,14 @@ class Heard:
 
 
 def _cleaned(sound: Sound, track: AudioTrack, found: Sequence[Segment], index: int, settings: HearingSettings) -> Sound:
-    """Return the sound with less of the background that plays before and after it."""
+    """Return the sound with less of the background that plays before and after it, unless it is that background."""
     if settings.noise_reduction_db == 0.0 or settings.quiet_s == 0.0:
         return sound
-    profile = noise_profile(_quiet_around(track, found, index, settings.quiet_s))
-    return sound if profile is None else denoise(sound, profile, settings.noise_reduction_db)
+    quiet = list(_quiet_around(track, found, index, settings.quiet_s))
+    profile = noise_profile(quiet)
+    if profile is None or is_swell(sound, quiet):
+        return sound
+    return denoise(sound, profile, settings.noise_reduction_db)
 
 
 def _quiet_around(track: AudioTrack, found: Sequence[Segment], index: int, quiet_s: float) -> Iterator[Sound]:

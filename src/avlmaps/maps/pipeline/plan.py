@@ -24,7 +24,7 @@ from avlmaps.perception.protocols import PixelEncoder
 from avlmaps.recordings.content import LARGEST_BUDGET_BYTES
 from avlmaps.recordings.types import Recording
 
-BUILD_VERSION = 5  # raise it when a stage comes to compute something else, so that no old checkpoint is taken for new
+BUILD_VERSION = 6  # raise it when a stage comes to compute something else, so that no old checkpoint is taken for new
 
 Span = tuple[int, int, int]  # (first, last + 1, step) of frames
 

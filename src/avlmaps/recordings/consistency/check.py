@@ -20,6 +20,7 @@ from avlmaps.recordings.consistency.jumps import find_exchanged, find_jump, find
 from avlmaps.recordings.consistency.sample import Sample, Surfaces, draw_sample, steps_between_all
 from avlmaps.recordings.consistency.single_frames import (
     FEWEST_FOR_WARMTH,
+    of_clipping,
     of_colour,
     of_depth,
     of_intrinsics,
@@ -59,6 +60,7 @@ def check_recording(recording: Recording) -> Verdict:
         *of_colour(sample, surfaces),
         *of_poses(recording),
         *of_sound(recording),
+        *of_clipping(recording),
         *of_motion(recording, after, limits.can_be_judged(after)),
         *_of_agreement(recording, sample, found, median_m),
     ]

@@ -5,7 +5,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from avlmaps.core.camera import Pinhole
+from avlmaps.core.errors import AudioError
 from avlmaps.core.wording import option
+from avlmaps.recordings.channels import clipping
 from avlmaps.recordings.consistency.agreement import Agreement
 from avlmaps.recordings.consistency.sample import Sample, Surfaces, steps_between_all
 from avlmaps.recordings.consistency.verdict import Finding, Grade, Reason
@@ -260,6 +262,19 @@ def of_sound(recording: Recording) -> Iterator[Finding]:
     elif (heard := max(0.0, min(end_s, last_s) - max(begin_s, first_s)) / drive_s) < LEAST_HEARD:
         sentence = f"{spans}: {heard:.0%} of the drive has sound."
         remedy = "Check that both are of one drive and one clock."
+        yield Finding(Reason.SOUND, Grade.SUSPICIOUS, sentence, remedy)
+
+
+def of_clipping(recording: Recording) -> Iterator[Finding]:
+    """Find a track that is clipped; `info` says it of the channels of an array."""
+    if recording.audio is None or recording.audio.microphones is not None:
+        return
+    try:
+        clipped = clipping(recording.audio)
+    except AudioError:  # hearing says why
+        return
+    for sentence in clipped:
+        remedy = "What is loud may be taken for another sound."
         yield Finding(Reason.SOUND, Grade.SUSPICIOUS, sentence, remedy)
 
 
