@@ -148,6 +148,15 @@ def test_its_very_cause_is_said(name: str, said: str, right: Draft, tmp_path: Pa
     assert said in " ".join(found.sentences())
 
 
+@pytest.mark.parametrize(("seed", "late"), [(15, -3), (15, 0), (15, 3), (23, -3), (23, 0), (23, 3)])
+def test_late_colour_shows_where_the_camera_turns_evenly(seed: int, late: int, tmp_path: Path) -> None:
+    draft = RoomWalk("even", seed=seed, round_rad_s=0.0, even=True).draft()
+    order = np.clip(np.arange(len(draft)) + late, 0, len(draft) - 1)
+    found = verdict(replace(draft, rgb=tuple(draft.rgb[i] for i in order)), tmp_path)
+    assert [one.reason for one in found.findings] == [Reason.COLOUR] * bool(late), found.sentences()
+    assert all("do not lie on those of depth" in one for one in found.sentences())
+
+
 def test_grey_pictures_have_no_order_of_channels(right: Draft, tmp_path: Path) -> None:
     grey = replace(
         right, rgb=tuple(np.repeat(c.mean(axis=2, keepdims=True), 3, axis=2).astype(np.uint8) for c in right.rgb)

@@ -24,6 +24,12 @@ _FEWEST_FRAMES, _FEWEST_EDGES = 5, 400
 # recordings: up to 0.9 times, but for 1.2 times and 0.4 of the spread where a camera hardly moves (11 of a Kinect, 32
 # times 25 frames of NYU, 18 drawn).
 _LEAST_RATIO, _LEAST_GAIN, _LEAST_GRADIENT = 1.25, 0.7, 0.3
+# Shifts that are tried beyond, of colour that is late while the camera turns: up to half of the picture, hardly up or
+# down. There more may look alike by chance. Colour 0.6 s late or early: 2.0 to 5.5 times that around none, and 2.9 to
+# 3.7 times the spread over the mean (7 of 8 walks that turn evenly). Right recordings: the most is around none, but for
+# one of 11 of a Kinect, which hardly moves (1.6 times, 1.7).
+_FAR_COLUMNS, _FAR_ROWS = np.arange(-64.0, 65.0, _STEP), np.arange(-6.0, 7.0, 3.0)
+_LEAST_FAR_RATIO, _LEAST_FAR_SPREADS = 1.8, 2.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,6 +39,7 @@ class Edges:
     Attributes:
         shifted: (k, k) its mean at each shift, rows by y; in standard deviations of a picture's gradient.
         parallax: (k, k) the same with shifts in inverse proportion to depth, as of a camera that is elsewhere.
+        far: (r, c) the same with large shifts to the sides.
         frames: number of frames with edges.
         count: number of edges.
         depth_m: middle of their depths.
@@ -40,6 +47,7 @@ class Edges:
 
     shifted: Float[np.ndarray, "k k"]
     parallax: Float[np.ndarray, "k k"]
+    far: Float[np.ndarray, "r c"]
     frames: int
     count: int
     depth_m: float
@@ -87,12 +95,13 @@ def find_edges(sample: Sample) -> Edges:
     import cv2
 
     rig, camera = sample.rig, sample.rig.rgb
-    shifts = _SHIFTS * camera.width / WIDTH
+    px = camera.width / WIDTH
     rows = np.unique(np.linspace(0, len(sample) - 1, min(_FRAMES, len(sample))).round().astype(int))
     found = [_edge_pixels(sample.depth_m[row]) for row in rows]
     depths = [sample.depth_m[row][v, u] for row, (v, u) in zip(rows, found, strict=True)]
     middle_m = float(np.median(np.concatenate(depths))) if any(map(len, depths)) else float("nan")
     sums = np.zeros((2, len(_SHIFTS), len(_SHIFTS)))
+    far, inside_far = np.zeros((2, len(_FAR_ROWS), len(_FAR_COLUMNS)))
     frames = count = 0
     for row, (v, u), z in zip(rows, found, depths, strict=True):
         if len(z) < _FEWEST_EACH:
@@ -105,20 +114,38 @@ def find_edges(sample: Sample) -> Edges:
         gradient = cv2.GaussianBlur(_gradient(sample.grey[row]), (0, 0), 1.0)
         gradient = (gradient - gradient.mean()) / max(float(gradient.std()), 1e-6)
         for kind, by in enumerate((np.ones(len(near)), middle_m / near)):
-            columns, lines = (np.floor(at[:, None] + shifts * by[:, None]).astype(int) for at in (x, y))
-            inside = ((lines >= 0) & (lines < camera.height))[:, :, None]
-            inside = inside & ((columns >= 0) & (columns < camera.width))[:, None, :]
-            lines, columns = np.clip(lines, 0, camera.height - 1), np.clip(columns, 0, camera.width - 1)
-            sums[kind] += np.where(inside, gradient[lines[:, :, None], columns[:, None, :]], 0.0).sum(axis=0)
+            sums[kind] += _shifted(gradient, x, y, _SHIFTS * px * by[:, None], _SHIFTS * px * by[:, None])[0]
+        one, inside = _shifted(gradient, x, y, _FAR_COLUMNS * px, _FAR_ROWS * px)
+        far, inside_far = far + one, inside_far + inside
         frames, count = frames + 1, count + len(near)
-    return Edges(sums[0] / max(count, 1), sums[1] / max(count, 1), frames, count, middle_m)
+    return Edges(*(sums / max(count, 1)), far / np.maximum(inside_far, 1), frames, count, middle_m)
+
+
+def _shifted(
+    gradient: Float32[np.ndarray, "h w"], x: np.ndarray, y: np.ndarray, columns: np.ndarray, rows: np.ndarray
+) -> tuple[Float[np.ndarray, "r c"], Float[np.ndarray, "r c"]]:
+    """Return the sum of the gradient at points that are shifted, and how many lie in the picture then."""
+    height, width = gradient.shape
+    u, v = np.floor(x[:, None] + columns).astype(int), np.floor(y[:, None] + rows).astype(int)
+    inside = ((v >= 0) & (v < height))[:, :, None] & ((u >= 0) & (u < width))[:, None, :]
+    found = gradient[np.clip(v, 0, height - 1)[:, :, None], np.clip(u, 0, width - 1)[:, None, :]]
+    return np.where(inside, found, 0.0).sum(axis=0), inside.sum(axis=0).astype(np.float64)
 
 
 def shift_of(edges: Edges, sample: Sample) -> Shift | None:
     """Return where edges of colour lie, None where they lie on those of depth or nothing shows it."""
     none = _near(0.0, 0.0)
     kinds = [one for one in (edges.shifted, edges.parallax) if _stands_out(one, none)]
-    if not edges.enough or not kinds:
+    if not edges.enough:
+        return None
+    here = max(float(edges.shifted[none].max()), 0.0)
+    most = float(edges.far.max())
+    beyond = most - float(edges.far.mean()) >= _LEAST_FAR_SPREADS * float(edges.far.std())
+    if beyond and most >= max(_LEAST_FAR_RATIO * here, _LEAST_GRADIENT):
+        at_y, at_x = np.unravel_index(int(edges.far.argmax()), edges.far.shape)
+        if abs(_FAR_COLUMNS[at_x]) > _MOST:
+            return Shift(float(_FAR_COLUMNS[at_x]) / WIDTH, float(_FAR_ROWS[at_y]) / WIDTH, most, here, None)
+    if not kinds:
         return None
     best = max(kinds, key=lambda one: float(one.max()))
     at_y, at_x = np.unravel_index(int(np.where(none, -np.inf, best).argmax()), best.shape)
