@@ -884,17 +884,31 @@ def test_kept_frames_give_the_disk_back_when_the_map_is_closed(tmp_path: Path) -
 
 def test_poses_that_stop_fitting_the_pictures_are_in_doubt_within_three_seconds() -> None:
     check = PoseCheck()
-    assert all(check.add(frame(number)) is None for number in range(40))
+    assert not any(check.add(frame(number)) for number in range(40))
     slipping = [check.add(frame(number, seen_m=2.0 + 0.1 * (number - 40))) for number in range(40, 80)]
     said = [(number, sentence) for number, sentence in enumerate(slipping) if sentence]
     assert len(said) == 1 and 0.1 * said[0][0] <= 3.0
-    assert "The poses do not fit the pictures from" in said[0][1]
+    assert "The poses do not fit the pictures from" in said[0][1][0]
 
 
 def test_a_pose_that_jumps_is_said_at_once() -> None:
     check = PoseCheck()
-    assert all(check.add(frame(number)) is None for number in range(10))
+    assert not any(check.add(frame(number)) for number in range(10))
     assert "The pose jumps at 1.00 s: 4" in str(check.add(replace(frame(90), stamp_s=1.0)))
+    assert "Stamps jump by 3600 s, from 1.0 to 3601.0 s" in str(check.add(replace(frame(90), stamp_s=3601.0)))
+
+
+def test_a_sensor_that_stops_while_frames_come_is_a_doubt_of_the_map(tmp_path: Path) -> None:
+    with LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP) as live:
+        for number in range(150):
+            one = frame(number % 10)
+            blind = np.full_like(one.depth_m, np.nan if number % 2 else 0.0) if number >= 20 else one.depth_m
+            add(live, replace(one, depth_m=blind, stamp_s=0.1 * number))
+            if number < 5:
+                live.add_audio(avlmaps.Sound(np.zeros(1600, np.float32), 16_000), 0.1 * number)
+    (depth, sound) = live.doubts
+    assert depth.startswith("Frames have no depth since 1.9 s") and sound.startswith("No sound came since 0.5 s")
+    assert {depth, sound} <= set(open_stored(tmp_path / "map").info.doubts)
 
 
 @pytest.mark.slow

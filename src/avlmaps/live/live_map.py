@@ -537,7 +537,8 @@ class LiveMap:
     def _fuse(self, frame: Frame, arrived_s: float) -> None:
         growing, number = self._growing, self._growing.next_index
         try:
-            if (doubt := self._check.add(frame)) is not None:
+            track = growing.sound_track
+            for doubt in self._check.add(frame, None if track is None else track.end_s):
                 self._doubt(doubt)
                 growing.doubt(doubt)
             reason = self._gates.reason_against(frame, growing.sums) if self.settings.gates else None

@@ -1,4 +1,4 @@
-"""Whether a robot's poses fit its pictures, as it drives: the check of a recording, on the last few frames.
+"""Whether what a robot sends fits together, as it drives: poses and pictures, stamps, depth and sound.
 
 Frames of the last seconds are compared in pairs: the points of one must lie on the surface that the other sees. Two
 checks in a row that find otherwise are a doubt, so that one person who walks by is none.
@@ -12,6 +12,7 @@ from avlmaps.core.poses import rotation_angle_rad
 from avlmaps.recordings.consistency.agreement import compare, without_occluded
 from avlmaps.recordings.consistency.limits import LEAST_AGREEING, can_be_judged, geometry_agrees
 from avlmaps.recordings.consistency.sample import Surfaces, draw_pairs
+from avlmaps.recordings.growing_track import LONGEST_GAP_S
 from avlmaps.recordings.memory import MemoryRecording
 from avlmaps.recordings.types import Frame
 
@@ -22,6 +23,8 @@ _IN_A_ROW = 2
 _LEAST_AGREEING = 0.85
 # A robot is slower; a pose that is not has jumped.
 MOST_M_S, MOST_RAD_S = 5.0, np.radians(540.0)
+_LEAST_MEASURED = 0.01  # of the pixels of a frame; where fewer have a depth, nothing of it comes into the map
+_WITHOUT_DEPTH_S, _WITHOUT_SOUND_S = 2.0, 10.0
 
 
 class PoseCheck:
@@ -32,9 +35,41 @@ class PoseCheck:
         self._held: list[Frame] = []
         self._last: Frame | None = None
         self._bad, self._in_doubt = 0, False
+        self._depth_s: float | None = None  # when a frame last had a depth; None before, and where its lack was said
+        self._is_mute = False  # that the sound stopped was said
 
-    def add(self, frame: Frame) -> str | None:
-        """Take the next frame, and return a sentence where its pose is in doubt and the ones before were not."""
+    def add(self, frame: Frame, heard_s: float | None = None) -> tuple[str, ...]:
+        """Take the next frame, and return a sentence for each thing that is in doubt from it on.
+
+        Args:
+            frame: the frame.
+            heard_s: the end of the sound that came; None where none did.
+        """
+        found = self._depth_of(frame), self._sound_at(frame.stamp_s, heard_s), self._pose_of(frame)
+        return tuple(doubt for doubt in found if doubt is not None)
+
+    def _depth_of(self, frame: Frame) -> str | None:
+        some = frame.depth_m[::4, ::4]
+        if np.mean((some > 0.0) & np.isfinite(some)) >= _LEAST_MEASURED:
+            self._depth_s = frame.stamp_s
+        elif self._depth_s is not None and frame.stamp_s - self._depth_s >= _WITHOUT_DEPTH_S:
+            since_s, self._depth_s = self._depth_s, None
+            return (
+                f"Frames have no depth since {since_s:.1f} s, and bring nothing to the map. Check the depth camera, or "
+                "whether its lens is covered."
+            )
+        return None
+
+    def _sound_at(self, stamp_s: float, heard_s: float | None) -> str | None:
+        if heard_s is None or stamp_s - heard_s < _WITHOUT_SOUND_S:
+            self._is_mute = False
+            return None
+        was_mute, self._is_mute = self._is_mute, True
+        if was_mute:
+            return None
+        return f"No sound came since {heard_s:.1f} s, while frames came to {stamp_s:.1f} s. Check the microphone."
+
+    def _pose_of(self, frame: Frame) -> str | None:
         jump = self._jump_to(frame)
         self._last = frame
         if jump is not None:
@@ -52,6 +87,11 @@ class PoseCheck:
         moved_m = float(np.linalg.norm(frame.world_from_camera[:3, 3] - last.world_from_camera[:3, 3]))
         turned_rad = float(rotation_angle_rad(frame.world_from_camera[None], last.world_from_camera[None])[0])
         took_s = frame.stamp_s - last.stamp_s
+        if took_s > LONGEST_GAP_S:
+            return (
+                f"Stamps jump by {took_s:.0f} s, from {last.stamp_s:.1f} to {frame.stamp_s:.1f} s. Where the robot did "
+                "not pause, its clock was set: sounds and days that are looked up by time are wrong."
+            )
         if moved_m <= MOST_M_S * took_s + 0.1 and turned_rad <= MOST_RAD_S * took_s + 0.1:
             return None
         return (
