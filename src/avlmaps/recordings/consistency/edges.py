@@ -118,7 +118,8 @@ def find_edges(sample: Sample) -> Edges:
         one, inside = _shifted(gradient, x, y, _FAR_COLUMNS * px, _FAR_ROWS * px)
         far, inside_far = far + one, inside_far + inside
         frames, count = frames + 1, count + len(near)
-    return Edges(*(sums / max(count, 1)), far / np.maximum(inside_far, 1), frames, count, middle_m)
+    shifted, parallax = sums / max(count, 1)
+    return Edges(shifted, parallax, far / np.maximum(inside_far, 1), frames, count, middle_m)
 
 
 def _shifted(
