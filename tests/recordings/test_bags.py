@@ -194,3 +194,14 @@ def test_messages_in_another_coding_are_refused_by_its_name(tmp_path: Path) -> N
         file.add(topic, (f"foxglove.{kind}", "flatbuffer", b"x"), "flatbuffer", START_S, b"y")
     with pytest.raises(RecordingError, match=r"are coded as 'flatbuffer', which is not read; ROS 1, CDR"):
         open_recording(file.save(tmp_path / "walk"))
+
+
+@pytest.mark.parametrize("kind", ["ROS 1", "ROS 2", "ROS 2, MCAP", "MCAP of ROS 1", "Foxglove, protobuf"])
+def test_a_bag_that_is_cut_off_anywhere_is_refused(tmp_path: Path, kind: str) -> None:
+    path = BAGS[kind](tmp_path / "bag", example_truth())
+    files = [path] if path.is_file() else [one for one in path.iterdir() if one.suffix in (".db3", ".mcap")]
+    whole = files[0].read_bytes()
+    for share in (0.0, 0.001, 0.3, 0.6, 0.99):
+        files[0].write_bytes(whole[: int(share * len(whole))])
+        with pytest.raises(RecordingError, match=r"reindex|recover|copy it again"):
+            list(open_recording(path))
