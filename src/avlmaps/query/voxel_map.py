@@ -60,10 +60,10 @@ class VoxelMap:
             MapError: the voxel size or up is none.
             BackendError: there is no such profile.
         """
-        if not isinstance(voxel_size_m, Real) or isinstance(voxel_size_m, bool):
+        if isinstance(voxel_size_m, bool) or not isinstance(voxel_size_m, Real):
             raise MapError(f"voxel_size_m must be a number of metres, not {voxel_size_m!r}.")
         for name, given, kind in (("settings", settings, BuildSettings), ("query", query, QuerySettings)):
-            if given is not None and not isinstance(given, kind):
+            if given is not None and not isinstance(given, kind):  # pyright: ignore[reportUnnecessaryIsInstance]
                 raise MapError(f"{name} must be an avlmaps.{kind.__name__}, not {type(given).__name__}.")
         chosen = replace(settings or BuildSettings(), voxel_size_m=float(voxel_size_m))
         used = encoders_of("embedded" if encoders is None else encoders)
