@@ -259,7 +259,7 @@ def test_a_fault_of_ours_ends_the_waiting_and_is_raised(tmp_path: Path) -> None:
         for number in range(3):
             add(live, frame(number))
         wait_for(lambda: len(live) == 3)
-        live._check.add = lambda frame: 1 // 0  # type: ignore[method-assign]
+        live._check.add = lambda *_: 1 // 0  # type: ignore[method-assign]
         with pytest.raises(ZeroDivisionError):
             for number in range(3, 30):
                 add(live, frame(number))
@@ -638,11 +638,11 @@ def while_busy(live: LiveMap, numbers: range, pause_s: float = 0.0) -> None:
     """Add frames that nobody takes, as the thread that fuses is at another; the first is that one."""
     begun, go_on, check = threading.Event(), threading.Event(), live._check.add
 
-    def slow(one: avlmaps.Frame) -> str | None:
+    def slow(one: avlmaps.Frame, heard_s: float | None = None) -> tuple[str, ...]:
         begun.set()
         assert go_on.wait(60.0)
         live._check.add = check  # type: ignore[method-assign]
-        return check(one)
+        return check(one, heard_s)
 
     live._check.add = slow  # type: ignore[method-assign]
     for number in numbers:
