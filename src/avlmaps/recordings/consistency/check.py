@@ -19,7 +19,6 @@ from avlmaps.recordings.consistency.edges import Edges, Shift, find_edges, shift
 from avlmaps.recordings.consistency.jumps import find_exchanged, find_jump, find_parts
 from avlmaps.recordings.consistency.sample import Sample, Surfaces, draw_sample, steps_between_all
 from avlmaps.recordings.consistency.single_frames import (
-    FEWEST_FOR_WARMTH,
     of_clipping,
     of_colour,
     of_depth,
@@ -27,6 +26,7 @@ from avlmaps.recordings.consistency.single_frames import (
     of_motion,
     of_poses,
     of_sound,
+    warmth_of,
 )
 from avlmaps.recordings.consistency.suspects import PoseAt, Trial, Trials, find_cause, find_closer
 from avlmaps.recordings.consistency.verdict import Finding, Grade, Reason, Verdict
@@ -64,8 +64,9 @@ def check_recording(recording: Recording) -> Verdict:
         *of_motion(recording, after, limits.can_be_judged(after)),
         *_of_agreement(recording, sample, found, median_m),
     ]
-    checked = limits.can_be_judged(after)
-    warmth = float(sample.warmth.mean()) if len(sample) >= FEWEST_FOR_WARMTH else 0.0
+    checked, unchecked = limits.can_be_judged(after), ()
+    if not findings:
+        unchecked = blind_spots(recording, after, _trials(recording, sample), found.edges, warmth_of(sample))
     return Verdict(
         frames=len(sample),
         pairs=after.pairs,
@@ -75,7 +76,7 @@ def check_recording(recording: Recording) -> Verdict:
         median_depth_m=median_m,
         findings=tuple(findings),
         unread=sample.unread,
-        unchecked=() if findings else blind_spots(recording, after, _trials(recording, sample), found.edges, warmth),
+        unchecked=unchecked,
     )
 
 

@@ -28,7 +28,7 @@ IMPOSSIBLE_COLOURED = 0.05
 BLACK, DARK, FLAT = 8.0, 20.0, 1.5
 # Of right frames: the means of 3 that follow one another in NYU Depth V2 are over -0.05 (265 of 265) and over 0.12
 # (255); those of the kitchen over 0.13, of 6 drawn rooms over 0.4, of 12 rendered homes over 0.08.
-LEAST_WARMTH, FEWEST_FOR_WARMTH = 0.12, 3
+LEAST_WARMTH, _FEWEST_FOR_WARMTH = 0.12, 3
 # More frames than this that are black are no camera that begins.
 MOST_BLACK = 0.1
 # Share of the depths that are exactly the largest one, in the middle of the frames: those of a wall differ.
@@ -220,10 +220,15 @@ def of_colour(sample: Sample, surfaces: Surfaces) -> Iterator[Finding]:
         yield Finding(Reason.INTRINSICS, grade, sentence, remedy)
 
 
+def warmth_of(sample: Sample) -> float:
+    """Return how much more of the pictures is redder than blue than the other way round; 0 for too few frames."""
+    return float(sample.warmth.mean()) if len(sample) >= _FEWEST_FOR_WARMTH else 0.0
+
+
 def _as_if_bgr(sample: Sample) -> Iterator[Finding]:
     """Find pictures in which blue outweighs red as in no room: wood, skin and lamps are redder than blue."""
-    warmth = float(sample.warmth.mean())
-    if len(sample) >= FEWEST_FOR_WARMTH and warmth < -LEAST_WARMTH:
+    warmth = warmth_of(sample)
+    if warmth < -LEAST_WARMTH:
         sentence = (
             f"Blue outweighs red: of the pixels {-warmth:.0%} more are bluer than red than redder than blue, in the "
             f"mean of {len(sample)} frames, where rooms have more that are redder."

@@ -34,7 +34,7 @@ class Situation:
 def situations() -> tuple[Situation, ...]:
     """Return all of them."""
     first = (*_of_poses(), *_of_scale(), *_of_depth(), *_of_colour(), *_of_pictures(), *_of_intrinsics(), *_of_clocks())
-    return (*first, *_slight())
+    return (*first, *_of_channels())
 
 
 def _on_poses(change: Callable[[np.ndarray], np.ndarray]) -> Change:
@@ -387,6 +387,6 @@ def _of_clocks() -> Iterator[Situation]:
         yield Situation(f"poses {delay_s:+g} s off", "clock", change, "late|early")
 
 
-def _slight() -> Iterator[Situation]:
-    """Yield what one camera that hardly moves does not show; at the end, so that the others keep their seeds."""
+def _of_channels() -> Iterator[Situation]:
+    """Yield red and blue exchanged throughout; at the end, so that the others keep their seeds."""
     yield Situation("all pictures BGR", "colour", _bgr(lambda i, n, g: True), "BGR")
