@@ -36,10 +36,7 @@ _EXTRA_TURNS = 36  # actions that a turn may take beyond its angle
 _PATIENCE_S = 5.0  # time for which a body may stand still against its commands
 _MOST_M, _MOST_RAD = 1e6, 1e3
 _BEYOND_M = 0.3  # a body that moves by more than this beyond its command does not follow it, or its pose jumped
-_OFF_M, _OFF_SHARE = (
-    0.25,
-    0.2,
-)  # a straight drive that ends farther from its end, in metres or of its length, is not done
+_OFF_M, _OFF_SHARE = 0.25, 0.2  # a straight drive that ends farther off, in metres and of its length, is not done
 T = TypeVar("T")
 
 
