@@ -16,3 +16,11 @@ def test_a_date_in_another_unit_is_refused(stamp: float, unit: str) -> None:
     assert given_frame(0, rgb, depth_m, CAMERA, np.eye(4), 1.7e9).stamp_s == 1.7e9
     with pytest.raises(RecordingError, match=unit):
         given_frame(0, rgb, depth_m, CAMERA, np.eye(4), stamp)
+
+
+@pytest.mark.parametrize("stamp", [True, np.True_, "1.0", np.array([1.0]), np.ma.masked, np.nan])
+def test_a_stamp_that_is_no_number_is_refused(stamp: object) -> None:
+    rgb, depth_m = np.zeros((24, 32, 3), np.uint8), np.ones((24, 32), np.float32)
+    assert given_frame(0, rgb, depth_m, CAMERA, np.eye(4), np.array(1.5)).stamp_s == 1.5
+    with pytest.raises(RecordingError, match="stamp_s of frame 0 must be a finite number of seconds"):
+        given_frame(0, rgb, depth_m, CAMERA, np.eye(4), stamp)

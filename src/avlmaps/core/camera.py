@@ -1,11 +1,11 @@
 """Pinhole cameras: OpenCV axes (x right, y down, z forward), the centre of pixel (u, v) at (u + 0.5, v + 0.5)."""
 
 from dataclasses import dataclass, field
-from numbers import Real
 
 import numpy as np
 
 from avlmaps.core.arrays import Float
+from avlmaps.core.numbers import as_number, as_whole
 
 # Focal lengths and principal points beyond this many image sizes are mistakes, and would overflow further on.
 _MOST_SIZES = 1e6
@@ -33,10 +33,14 @@ class Pinhole:
     height: int
 
     def __post_init__(self) -> None:
-        given = (self.fx, self.fy, self.cx, self.cy)
-        if not all(isinstance(number, Real) for number in (*given, self.width, self.height)):
-            raise ValueError(f"a camera needs numbers for fx, fy, cx, cy, width and height, not {given}")
-        numbers = tuple(float(number) for number in given)
+        given = (self.fx, self.fy, self.cx, self.cy, self.width, self.height)
+        held = (*(as_number(number) for number in given[:4]), *(as_whole(number) for number in given[4:]))
+        for name, number in zip(("fx", "fy", "cx", "cy", "width", "height"), held, strict=True):
+            if number is None:
+                what = "a whole number of pixels" if name in ("width", "height") else "a number"
+                raise ValueError(f"a camera needs {what} for {name}, not {getattr(self, name)!r}")
+            object.__setattr__(self, name, number)
+        numbers = (self.fx, self.fy, self.cx, self.cy)
         if not np.isfinite(numbers).all() or self.fx <= 0 or self.fy <= 0:
             raise ValueError(f"a camera needs finite numbers and positive focal lengths, not {numbers}")
         if self.width < 1 or self.height < 1:

@@ -14,7 +14,6 @@ from concurrent.futures import Future
 from dataclasses import replace
 from functools import partial
 from math import isfinite
-from numbers import Real
 from pathlib import Path
 from threading import Condition, Event, Lock, Thread
 from types import TracebackType
@@ -24,6 +23,7 @@ import numpy as np
 
 from avlmaps.core.errors import AudioError, AvlmapsError, BackendError, MapError, RecordingError
 from avlmaps.core.files import user_path
+from avlmaps.core.numbers import as_number
 from avlmaps.core.progress import progress
 from avlmaps.live.gates import LATER_SHARE, EncodingGate, Gates
 from avlmaps.live.kept_back import KeptBack
@@ -94,7 +94,7 @@ class LiveMap:
         live: LiveSettings | None = None,
         query: QuerySettings | None = None,
         overwrite: bool = False,
-        begins_s: float = 0.0,
+        begins_s: Any = 0.0,
         microphones: Microphones | str | Path | None = None,
         same_device: str | Path | None = None,
     ) -> None:
@@ -122,9 +122,10 @@ class LiveMap:
             BackendError: there is no such profile.
         """
         self.path, self.settings, self._query = user_path(path), live or LiveSettings(), query
-        if not isinstance(begins_s, Real) or not isfinite(begins_s):
+        began_s = as_number(begins_s)
+        if began_s is None or not isfinite(began_s):
             raise MapError(f"begins_s is {begins_s!r}, which is no time; give seconds since 1970, or leave it out.")
-        if fault := date_fault(np.array([begins_s]), "begins_s"):
+        if fault := date_fault(np.array([began_s]), "begins_s"):
             raise MapError(fault)
         used = encoders_of("embedded" if encoders is None else encoders)
         array = microphones_named(str(microphones)) if isinstance(microphones, str | Path) else microphones
@@ -134,7 +135,7 @@ class LiveMap:
         self._held.enter_context(lock_folder(self.path))
         chosen = settings or (SPARSE if self.settings.gates else BuildSettings())
         wait = self.settings.first_frames if self.settings.gates else None
-        self._growing = GrowingMap(chosen, used, direction(up_in_world), wait=wait, looks_later=True, begins_s=begins_s)
+        self._growing = GrowingMap(chosen, used, direction(up_in_world), wait=wait, looks_later=True, begins_s=began_s)
         if array is not None:
             self._growing.place_microphones(array)
         if known_rad is not None:

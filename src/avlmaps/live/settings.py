@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from avlmaps.core.errors import MapError
+from avlmaps.core.numbers import hold_numbers
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +46,7 @@ class LiveSettings:
     """Seconds from one save to the next, at least."""
 
     def __post_init__(self) -> None:
+        hold_numbers(self, MapError)
         for name in ("most_waiting", "known_views", "looks", "later_looks", "first_frames"):
             if not getattr(self, name) >= 1:
                 raise MapError(f"{name} of a live map is {getattr(self, name)}; choose 1 or more.")

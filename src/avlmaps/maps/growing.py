@@ -7,7 +7,6 @@ is that of a build. Of a longer one they are found again each time it has double
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from math import isfinite
-from numbers import Real
 from pathlib import Path
 from threading import RLock
 from time import perf_counter
@@ -18,6 +17,7 @@ from msgspec import structs
 
 from avlmaps.core.arrays import Float
 from avlmaps.core.errors import AudioError, BackendError, MapError
+from avlmaps.core.numbers import as_number
 from avlmaps.core.progress import silence_progress
 from avlmaps.core.registry import Kind
 from avlmaps.core.timeline import Trajectory
@@ -279,13 +279,13 @@ class GrowingMap:
 
     def _require_clock_of_frames(self, stamp_s: Any) -> None:
         """Raise ``AudioError`` where the first piece of sound is of another clock than the frames before it."""
-        came_s = self._walk.motion().stamps_s
-        if not isinstance(stamp_s, Real) or not isfinite(float(stamp_s)):
+        came_s, at_s = self._walk.motion().stamps_s, as_number(stamp_s)
+        if at_s is None or not isfinite(at_s):
             return  # None, or refused with what it is
-        fault = date_fault(np.array([float(stamp_s)]), "pieces of sound")
-        if not fault and len(came_s) and not -LONGEST_GAP_S < stamp_s - came_s[0] < np.ptp(came_s) + LONGEST_GAP_S:
+        fault = date_fault(np.array([at_s]), "pieces of sound")
+        if not fault and len(came_s) and not -LONGEST_GAP_S < at_s - came_s[0] < np.ptp(came_s) + LONGEST_GAP_S:
             fault = (
-                f"The first piece of sound is of {stamp_s:.6g} s, more than {LONGEST_GAP_S:.0f} s from the frames "
+                f"The first piece of sound is of {at_s:.6g} s, more than {LONGEST_GAP_S:.0f} s from the frames "
                 f"({came_s[0]:.6g} to {came_s[-1]:.6g} s); give stamps of the frames' clock."
             )
         if fault:

@@ -81,11 +81,12 @@ def moved_frame(frame: Frame, step: PoseCorrection) -> Frame:
 
 def _checked(stamps_s: Any, poses: Any) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, "k 4 4"]]:
     try:
-        stamps, given = np.asarray(stamps_s, np.float64), np.asarray(poses, np.float64)
-    except (TypeError, ValueError):
-        raise MapError(
-            "The corrected poses are no numbers; give stamps (k,) in seconds and poses (k, 4, 4) in metres."
-        ) from None
+        came = np.asarray(stamps_s), np.asarray(poses)
+    except (TypeError, ValueError, RuntimeError):  # rows of several lengths, or a tensor of a GPU
+        came = ()
+    if not came or any(array.dtype.kind not in "fiu" for array in came):
+        raise MapError("The corrected poses are no numbers; give stamps (k,) in seconds and poses (k, 4, 4) in metres.")
+    stamps, given = (array.astype(np.float64) for array in came)
     if stamps.ndim != 1 or given.shape != (len(stamps), 4, 4):
         raise MapError(
             f"There are stamps of {stamps.shape} and corrected poses of {given.shape}; give (k,) and (k, 4, 4)."

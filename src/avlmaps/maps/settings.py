@@ -4,6 +4,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from avlmaps.core.errors import MapError
+from avlmaps.core.numbers import hold_numbers
 from avlmaps.maps.audio.settings import HearingSettings
 from avlmaps.maps.fusion.sensor import FusionSettings
 from avlmaps.maps.keyframes.describe import KeyframeSettings
@@ -33,6 +34,7 @@ class FrameSettings:
         return self.per_submap or self.per_part
 
     def __post_init__(self) -> None:
+        hold_numbers(self, MapError)
         _require(self.step >= 1, f"frames.step is {self.step}", "1 or more")
         _require(self.per_part >= 1, f"frames.per_part is {self.per_part}", "1 or more")
         _require(self.per_submap >= 0, f"frames.per_submap is {self.per_submap}", "0 (none) or more")
@@ -49,6 +51,7 @@ class GravitySettings:
     """Height of the depth camera over the floor in the first frame, metres. Default: found from the frames."""
 
     def __post_init__(self) -> None:
+        hold_numbers(self, MapError)
         _require(self.frames >= 1, f"gravity.frames is {self.frames}", "1 or more")
         height_m = self.camera_height_m
         _require(
@@ -78,6 +81,7 @@ class BuildSettings:
     """Seed of what is drawn at random (visual words, RANSAC)."""
 
     def __post_init__(self) -> None:
+        hold_numbers(self, MapError)
         _require(0.001 <= self.voxel_size_m <= 10.0, f"The voxel size is {self.voxel_size_m} m", "between 0.001 and 10")
         _require(self.seed >= 0, f"seed is {self.seed}", "0 or more")
 

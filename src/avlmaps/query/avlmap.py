@@ -15,6 +15,7 @@ from avlmaps.core.arrays import Float, Float16, Int, Int32, UInt8
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import BackendError, MapError, QueryError
 from avlmaps.core.files import user_path
+from avlmaps.core.numbers import hold_numbers
 from avlmaps.core.question import HeardAt, Modality, Part, Question, Role
 from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder, SurveyedEncoder
@@ -84,6 +85,7 @@ class QuerySettings:
     """Seed of what is drawn at random when a picture is located."""
 
     def __post_init__(self) -> None:
+        hold_numbers(self, QueryError)
         if not 0.0 <= self.found_at <= 1.0:
             raise QueryError(f"A query cannot be found at a probability of {self.found_at:g}; it lies between 0 and 1.")
 

@@ -1,7 +1,6 @@
 """A map in memory that takes one frame after the other and can be queried at any time."""
 
 from dataclasses import replace
-from numbers import Real
 from pathlib import Path
 from threading import RLock
 from typing import TYPE_CHECKING, Any
@@ -12,6 +11,7 @@ from avlmaps.core.arrays import Float, Float16, Int32, UInt8
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import MapError
 from avlmaps.core.files import user_path
+from avlmaps.core.numbers import as_number
 from avlmaps.maps.growing import GrowingMap
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.perception.encoders import Encoders, encoders_of
@@ -60,12 +60,13 @@ class VoxelMap:
             MapError: the voxel size or up is none.
             BackendError: there is no such profile.
         """
-        if isinstance(voxel_size_m, bool) or not isinstance(voxel_size_m, Real):
+        edge_m = as_number(voxel_size_m)
+        if edge_m is None:
             raise MapError(f"voxel_size_m must be a number of metres, not {voxel_size_m!r}.")
         for name, given, kind in (("settings", settings, BuildSettings), ("query", query, QuerySettings)):
             if given is not None and not isinstance(given, kind):  # pyright: ignore[reportUnnecessaryIsInstance]
                 raise MapError(f"{name} must be an avlmaps.{kind.__name__}, not {type(given).__name__}.")
-        chosen = replace(settings or BuildSettings(), voxel_size_m=float(voxel_size_m))
+        chosen = replace(settings or BuildSettings(), voxel_size_m=edge_m)
         used = encoders_of("embedded" if encoders is None else encoders)
         self._growing = GrowingMap(chosen, used, direction(up_in_world))
         self._query = query

@@ -10,6 +10,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Float
 from avlmaps.core.errors import AudioError
+from avlmaps.core.numbers import as_whole
 from avlmaps.recordings.directions import DirectionTrack
 from avlmaps.recordings.microphones import Microphones
 
@@ -36,13 +37,24 @@ class Sound:
                 f"samples are {self.samples.dtype} of {self.samples.shape}; they must be float32 of (n,) in [-1, 1]: "
                 "of several channels the first, of 16 bits divided by 32768"
             )
-        if self.rate_hz < 1:
-            raise ValueError(f"rate_hz is {self.rate_hz}; it must be positive")
+        object.__setattr__(self, "rate_hz", require_rate(self.rate_hz))
 
     @property
     def duration_s(self) -> float:
         """Length in seconds."""
         return len(self.samples) / self.rate_hz
+
+
+def require_rate(rate_hz: Any) -> int:
+    """Return how many samples a second has, as a number of Python.
+
+    Raises:
+        ValueError: it is no positive whole number.
+    """
+    rate = as_whole(rate_hz)
+    if rate is None or rate < 1:
+        raise ValueError(f"rate_hz is {rate_hz!r}; it must be a positive whole number of samples a second")
+    return rate
 
 
 @dataclass(frozen=True, slots=True)

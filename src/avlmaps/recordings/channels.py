@@ -8,7 +8,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Float
 from avlmaps.core.errors import AudioError, RecordingError
-from avlmaps.recordings.audio import AudioTrack, Sound
+from avlmaps.recordings.audio import AudioTrack, Sound, require_rate
 from avlmaps.recordings.microphones import MicrophoneNumbers, Microphones
 
 _LOOKS, _LOOK_S = 24, 0.5
@@ -33,6 +33,7 @@ class ChannelSound:
     def __post_init__(self) -> None:
         if self.samples.ndim != 2 or self.samples.dtype != np.float32:
             raise ValueError(f"samples are {self.samples.dtype} of {self.samples.shape}; they must be float32 (m, n)")
+        object.__setattr__(self, "rate_hz", require_rate(self.rate_hz))
 
     @property
     def duration_s(self) -> float:

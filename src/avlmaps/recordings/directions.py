@@ -137,8 +137,9 @@ def given_directions(stamp_s: Any, azimuth_rad: Any, elevation_rad: Any, confide
         if given is None and name in names[2:]:
             continue
         try:
-            column[name] = np.atleast_1d(np.asarray(given, np.float64))
-            fits = column[name].ndim == 1 and column[name].shape == column["stamp_s"].shape
+            array = np.atleast_1d(np.asarray(given))
+            column[name] = array.astype(np.float64)
+            fits = array.dtype.kind in "fiu" and array.ndim == 1 and column[name].shape == column["stamp_s"].shape
         except (TypeError, ValueError):
             fits = False
         if not fits:

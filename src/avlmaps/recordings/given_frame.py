@@ -1,6 +1,6 @@
 """A frame out of a program's arrays: what does not fit is refused in a sentence with what is wanted and what came."""
 
-from numbers import Real
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -8,6 +8,7 @@ import numpy as np
 from avlmaps.core.arrays import Float, UInt8
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
+from avlmaps.core.numbers import as_number
 from avlmaps.core.poses import orthonormalize
 from avlmaps.recordings.plausible import MAX_FROM_ORIGIN_M, date_fault
 from avlmaps.recordings.types import Frame
@@ -56,15 +57,12 @@ def given_frame(
         )
     if np.abs(pose - given).max() < _EXACT:  # that of a recording's frame stays bit by bit what it was
         pose = given
-    if not _is_finite(stamp_s):
+    at_s = as_number(stamp_s)
+    if at_s is None or not isfinite(at_s):
         raise RecordingError(f"stamp_s of {name} must be a finite number of seconds, not {stamp_s!r}.")
-    if fault := date_fault(np.array([float(stamp_s)]), "frames"):
+    if fault := date_fault(np.array([at_s]), "frames"):
         raise RecordingError(fault)
-    return Frame(index, name, float(stamp_s), colours, depths, pose, rig)
-
-
-def _is_finite(given: object) -> bool:
-    return isinstance(given, Real) and bool(np.isfinite(float(given)))
+    return Frame(index, name, at_s, colours, depths, pose, rig)
 
 
 def _numbers(name: str, what: str, given: Any) -> np.ndarray:

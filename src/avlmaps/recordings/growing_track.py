@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from numbers import Real
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Float32
 from avlmaps.core.errors import AudioError
+from avlmaps.core.numbers import as_number
 from avlmaps.recordings.audio import LOWEST_RATE_HZ, AudioTrack, Sound
 from avlmaps.recordings.channels import ChannelSound
 
@@ -105,7 +106,8 @@ class GrowingTrack:
             AudioError: it is no sound, has another rate or other channels, repeats what came, or is of another clock.
         """
         sound = _checked(chunk, self._rate_hz, self.channels)
-        if stamp_s is not None and not (isinstance(stamp_s, Real) and np.isfinite(float(stamp_s))):
+        at_s = None if stamp_s is None else as_number(stamp_s)
+        if stamp_s is not None and (at_s is None or not isfinite(at_s)):
             raise AudioError(f"stamp_s of a piece of sound must be a finite number of seconds, not {stamp_s!r}.")
         channels, count = sound.samples.shape
         if not count:
@@ -113,12 +115,12 @@ class GrowingTrack:
         end_s = self.end_s
         if end_s is None:
             self._rate_hz, self.channels = sound.rate_hz, channels
-            self._start_s = 0.0 if stamp_s is None else float(stamp_s)
+            self._start_s = 0.0 if at_s is None else at_s
             return self._append([sound])
-        late_s = 0.0 if stamp_s is None else float(stamp_s) - end_s
+        late_s = 0.0 if at_s is None else at_s - end_s
         if late_s > LONGEST_GAP_S:
             raise AudioError(
-                f"A piece of sound at {stamp_s:.3f} s comes {late_s:.0f} s after the sound before it ended "
+                f"A piece of sound at {at_s:.3f} s comes {late_s:.0f} s after the sound before it ended "
                 f"({end_s:.3f} s), more than {LONGEST_GAP_S:.0f} s; give stamps of the frames' clock."
             )
         if late_s >= GAP_S:

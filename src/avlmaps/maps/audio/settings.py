@@ -6,6 +6,7 @@ from typing import Literal
 import numpy as np
 
 from avlmaps.core.errors import AudioError
+from avlmaps.core.numbers import hold_numbers
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +41,7 @@ class SegmentationSettings:
     """Of method silence: a pause of this length divides two sounds."""
 
     def __post_init__(self) -> None:
+        hold_numbers(self, AudioError)
         positive = ("smoothing_s", "background_window_s", "range_db", "tail_db", "max_length_s", "silence_s")
         for name in (*positive, "merge_gap_s", "min_length_s", "padding_s", "silence_threshold", "release_db"):
             value = getattr(self, name)
@@ -62,6 +64,7 @@ class ChangeSettings:
     """A stretch that lasts longer is cut where that costs least: the robot moves on, and its places with it."""
 
     def __post_init__(self) -> None:
+        hold_numbers(self, AudioError)
         for name in ("change_s", "max_length_s"):
             value = getattr(self, name)
             if not np.isfinite(value) or value <= 0.0:
@@ -90,6 +93,7 @@ class HearingSettings:
     """Dividing the track where what sounds changes."""
 
     def __post_init__(self) -> None:
+        hold_numbers(self, AudioError)
         for name in ("noise_reduction_db", "quiet_s"):
             value = getattr(self, name)
             if not np.isfinite(value) or value < 0.0:

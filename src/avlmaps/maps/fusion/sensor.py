@@ -17,6 +17,7 @@ from typing import Literal
 import numpy as np
 
 from avlmaps.core.errors import MapError
+from avlmaps.core.numbers import hold_numbers
 from avlmaps.recordings.types import Frame
 
 SensorName = Literal["auto", "kinect", "realsense", "perfect", "none"]
@@ -49,6 +50,7 @@ class SensorModel:
     """Remove groups of up to this many voxels that stand alone and that no more than 2 frames hit."""
 
     def __post_init__(self) -> None:
+        hold_numbers(self, MapError)
         finite = np.isfinite([self.noise_m, self.noise_per_m, self.clear_sigmas, self.smear_sigmas]).all()
         limits = self.worst_voxels, self.edge_sigmas, self.steepest_deg, self.smear_ratio
         positive = all(limit > 0.0 for limit in limits if limit is not None)
@@ -123,6 +125,7 @@ class FusionSettings:
     paper."""
 
     def __post_init__(self) -> None:
+        hold_numbers(self, MapError)
         if not 0.0 < self.min_depth_m < self.max_depth_m < np.inf:
             raise MapError(
                 f"Depths from {self.min_depth_m} to {self.max_depth_m} m are no range; "

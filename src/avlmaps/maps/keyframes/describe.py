@@ -7,6 +7,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from avlmaps.core.arrays import Float, Float16, Float32, Int, Int64, UInt8
+from avlmaps.core.numbers import hold_numbers
 from avlmaps.core.poses import apply, inverse, rotation_angle_rad
 from avlmaps.core.progress import progress
 from avlmaps.core.registry import Kind
@@ -40,6 +41,7 @@ class KeyframeSettings:
     """Keypoints farther away get no 3D point: the depth of most sensors is poor out there."""
 
     def __post_init__(self) -> None:
+        hold_numbers(self, ValueError)
         for name in ("translation_m", "rotation_deg", "max_gap_s", "thumbnail_width_px", "max_depth_m"):
             if not getattr(self, name) > 0:
                 raise ValueError(f"{name} is {getattr(self, name)}; it must be positive")
