@@ -2,7 +2,7 @@
 
 import json
 import re
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 from hypothesis import given
@@ -11,7 +11,6 @@ from program_equality import same_program
 
 from avlmaps.core.errors import LanguageError
 from avlmaps.language.chat.answer import Answer, program_text
-from avlmaps.language.chat.examples import EXAMPLES, Example
 from avlmaps.language.chat.prompt import (
     MOST_COMMAND_CHARACTERS,
     command_message,
@@ -24,6 +23,14 @@ from avlmaps.language.chat.translator import check_files
 from avlmaps.language.program import SKILLS, parse_program, run_program
 from avlmaps.language.program.vocabulary import Clip, Picture, Place
 
+
+class Example(NamedTuple):
+    command: str
+    program: str
+
+
+_SHOWN = re.findall(r"^Command: ([^\n]*)\n```python\n(.*?)\n```$", system_prompt(), re.MULTILINE | re.DOTALL)
+EXAMPLES = [Example(json.loads(command), program) for command, program in _SHOWN]
 PROGRAMS = [each for each in EXAMPLES if not each.program.startswith("# cannot:")]
 
 
