@@ -1,6 +1,6 @@
 """Triangles with materials: what furniture, walls and whole scenes are made of. Metres, z up."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -135,7 +135,10 @@ class Mesh:
         return self.moved(-x, -y, -z)
 
 
-def joined(meshes: Sequence[Mesh]) -> Mesh:
+Meshes = Iterable[Mesh]
+
+
+def joined(meshes: Meshes) -> Mesh:
     """Return all the meshes as one; materials that are the same object are stored once."""
     meshes = [mesh for mesh in meshes if len(mesh.triangle)]
     if not meshes:

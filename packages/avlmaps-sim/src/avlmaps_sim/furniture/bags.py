@@ -4,11 +4,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from avlmaps_sim.furniture.catalogue import Piece, family
+from avlmaps_sim.furniture.catalogue import Parts, family
 from avlmaps_sim.furniture.containers import cardboard, tub
-from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, finished, pick, strut
+from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, pick, strut
 from avlmaps_sim.materials import material
-from avlmaps_sim.mesh import Material, Mesh, joined
+from avlmaps_sim.mesh import Material, Mesh, Meshes, joined
 from avlmaps_sim.shapes import (
     box,
     cylinder,
@@ -31,7 +31,7 @@ def _arch(x: float, y: float, z: float, reach: float, rise: float, look: Materia
 
 
 @family("bag", "tote")
-def _tote(rng: np.random.Generator) -> Piece:
+def _tote(rng: np.random.Generator) -> Parts:
     width, tall, thick = draw(rng, 0.26, 0.42), draw(rng, 0.22, 0.4), draw(rng, 0.08, 0.18)
     look = material(pick(rng, ("fabric", "leather", "paper", "plastic")), rng)
     rings, bent = [], draw(rng, -0.03, 0.03)
@@ -45,15 +45,13 @@ def _tote(rng: np.random.Generator) -> Piece:
     ):
         ring = rounded_rectangle(thick * flat, width * size, 0.03, 3)
         rings.append(np.column_stack([ring[:, 0] + bent * z, ring[:, 1], np.full(len(ring), z * tall)]))
-    parts = [loft(rings, look)]
+    yield loft(rings, look)
     rise = draw(rng, 0.08, 0.2)
-    return finished(
-        [*parts, *(_arch(bent + s * thick * 0.15, 0.0, tall - 0.02, width * 0.22, rise, look) for s in (-1, 1))]
-    )
+    yield from (_arch(bent + s * thick * 0.15, 0.0, tall - 0.02, width * 0.22, rise, look) for s in (-1, 1))
 
 
 @family("bag", "backpack")
-def _backpack(rng: np.random.Generator) -> Piece:
+def _backpack(rng: np.random.Generator) -> Parts:
     width, tall, thick = draw(rng, 0.26, 0.36), draw(rng, 0.36, 0.52), draw(rng, 0.13, 0.22)
     look, other = (
         material(pick(rng, ("fabric", "fabric", "leather", "plastic")), rng),
@@ -74,41 +72,39 @@ def _backpack(rng: np.random.Generator) -> Piece:
             (-thick * 0.45, s * width * 0.35, tall * 0.08),
         ]
         parts.append(_strap(path, other, 0.05))
-    return finished([part.tilted("y", draw(rng, -0.15, 0.0)) for part in [joined(parts)]])
+    return [part.tilted("y", draw(rng, -0.15, 0.0)) for part in [joined(parts)]]
 
 
 @family("bag", "handbag")
-def _handbag(rng: np.random.Generator) -> Piece:
+def _handbag(rng: np.random.Generator) -> Parts:
     width, tall, thick = draw(rng, 0.2, 0.36), draw(rng, 0.14, 0.26), draw(rng, 0.07, 0.14)
     look, metal = material(pick(rng, ("leather", "leather", "fabric")), rng), material("metal", rng)
     rings = []
     for size, flat, z in ((0.95, 1.0, 0.0), (1.0, 1.0, 0.15), (0.9, 0.6, 0.8), (0.8, 0.2, 1.0)):
         ring = rounded_rectangle(thick * flat, width * size, 0.02, 2)
         rings.append(np.column_stack([ring, np.full(len(ring), z * tall)]))
-    parts = [loft(rings, look), _arch(0.0, 0.0, tall - 0.01, width * 0.25, draw(rng, 0.06, 0.2), look)]
-    return finished([*parts, slab(thick * 0.38, 0.0, tall * 0.6, 0.02, 0.04, 0.03, metal)])
+    yield from (loft(rings, look), _arch(0.0, 0.0, tall - 0.01, width * 0.25, draw(rng, 0.06, 0.2), look))
+    yield slab(thick * 0.38, 0.0, tall * 0.6, 0.02, 0.04, 0.03, metal)
 
 
 @family("bag", "suitcase")
-def _suitcase(rng: np.random.Generator) -> Piece:
+def _suitcase(rng: np.random.Generator) -> Parts:
     width, tall, thick = draw(rng, 0.34, 0.5), draw(rng, 0.48, 0.72), draw(rng, 0.18, 0.3)
     look, black = material(pick(rng, ("plastic", "fabric", "metal", "painted")), rng), material("black", rng)
-    parts = [rounded_box((-thick / 2, -width / 2, 0.05), (thick / 2, width / 2, tall), 0.05, look)]
-    parts += [
-        slab(thick * 0.5, y, 0.12, 0.012, 0.02, tall - 0.2, look)
-        for y in np.linspace(-width * 0.35, width * 0.35, count(rng, 2, 6)).tolist()
+    yield rounded_box((-thick / 2, -width / 2, 0.05), (thick / 2, width / 2, tall), 0.05, look)
+    for y in np.linspace(-width * 0.35, width * 0.35, count(rng, 2, 6)).tolist():
+        yield slab(thick * 0.5, y, 0.12, 0.012, 0.02, tall - 0.2, look)
+    yield from [
+        cylinder(x * thick * 0.32, y * width * 0.4, 0.0, 0.025, 0.06, black, 8) for x in (-1, 1) for y in (-1, 1)
     ]
-    parts += [cylinder(x * thick * 0.32, y * width * 0.4, 0.0, 0.025, 0.06, black, 8) for x in (-1, 1) for y in (-1, 1)]
     up = draw(rng, 0.02, 0.4)
-    parts += [
-        slab(-thick * 0.35, s * width * 0.2, tall - 0.03, 0.012, 0.012, up + 0.03, material("metal", rng))
-        for s in (-1, 1)
-    ]
-    return finished([*parts, slab(-thick * 0.35, 0.0, tall + up, 0.025, width * 0.45, 0.025, black)])
+    for s in (-1, 1):
+        yield slab(-thick * 0.35, s * width * 0.2, tall - 0.03, 0.012, 0.012, up + 0.03, material("metal", rng))
+    yield slab(-thick * 0.35, 0.0, tall + up, 0.025, width * 0.45, 0.025, black)
 
 
 @family("bag", "duffel", held_out=True)
-def _duffel(rng: np.random.Generator) -> Piece:
+def _duffel(rng: np.random.Generator) -> Parts:
     radius, long, look = (
         draw(rng, 0.12, 0.2),
         draw(rng, 0.4, 0.7),
@@ -123,41 +119,38 @@ def _duffel(rng: np.random.Generator) -> Piece:
     ]
     body = lathe(rows, look, sides=16).tilted("x", np.pi / 2).moved(0.0, long / 2, radius).scaled(1.0, 1.0, 0.85)
     strap = material(pick(rng, ("black", "fabric")), rng)
-    return finished([body, *(_arch(s * 0.05, 0.0, radius * 1.65, long * 0.22, 0.13, strap) for s in (-1, 1))])
+    return [body, *(_arch(s * 0.05, 0.0, radius * 1.65, long * 0.22, 0.13, strap) for s in (-1, 1))]
 
 
 @family("bag", "paper bag")
-def _paper_bag(rng: np.random.Generator) -> Piece:
+def _paper_bag(rng: np.random.Generator) -> Parts:
     width, tall, thick = draw(rng, 0.18, 0.36), draw(rng, 0.22, 0.44), draw(rng, 0.08, 0.16)
     look = cardboard(rng) if chance(rng, 0.5) else material(pick(rng, ("paper", "plastic", "painted")), rng)
-    parts = [tub(thick, width, tall, 1.0, 0.003, look, 0.002)]
+    yield tub(thick, width, tall, 1.0, 0.003, look, 0.002)
     if chance(rng, 0.4):
-        parts.append(
-            box(
-                (thick / 2, -width * 0.25, tall * 0.35),
-                (thick / 2 + 0.001, width * 0.25, tall * 0.65),
-                material("painted", rng),
-            )
+        yield box(
+            (thick / 2, -width * 0.25, tall * 0.35),
+            (thick / 2 + 0.001, width * 0.25, tall * 0.65),
+            material("painted", rng),
         )
-    return finished([*parts, *(_arch(s * thick * 0.48, 0.0, tall - 0.01, width * 0.2, 0.09, look) for s in (-1, 1))])
+    yield from (_arch(s * thick * 0.48, 0.0, tall - 0.01, width * 0.2, 0.09, look) for s in (-1, 1))
 
 
 @family("laundry basket", "slotted")
-def _slotted_laundry(rng: np.random.Generator) -> Piece:
+def _slotted_laundry(rng: np.random.Generator) -> Parts:
     length, width, tall = draw(rng, 0.33, 0.45), draw(rng, 0.45, 0.65), draw(rng, 0.22, 0.4)
     look, dark = material(pick(rng, ("plastic", "white")), rng), material("black", rng)
     taper = draw(rng, 0.75, 0.9)
-    parts = [tub(length, width, tall, taper, 0.09, look)]
+    yield tub(length, width, tall, taper, 0.09, look)
     for y in np.linspace(-0.34, 0.34, 8).tolist():
         for z in (0.3, 0.6):
             out = (taper + (1 - taper) * (z + 0.08)) * length / 2
-            parts += [slab(s * out, y * width, z * tall, 0.012, 0.02, tall * 0.2, dark) for s in (-1, 1)]
-    return finished([*parts, *_clothes(rng, length * 0.42, width * 0.42, tall)])
+            yield from [slab(s * out, y * width, z * tall, 0.012, 0.02, tall * 0.2, dark) for s in (-1, 1)]
+    yield from _clothes(rng, length * 0.42, width * 0.42, tall)
 
 
-def _clothes(rng: np.random.Generator, x: float, y: float, z: float) -> list[Mesh]:
+def _clothes(rng: np.random.Generator, x: float, y: float, z: float) -> Meshes:
     """Return some crumpled clothes that fill an opening up to about z."""
-    parts = []
     for _ in range(count(rng, 0, 4)):
         n = 6
         grid = np.stack(np.meshgrid(np.linspace(-1, 1, n), np.linspace(-1, 1, n), indexing="ij"), axis=-1)
@@ -166,12 +159,11 @@ def _clothes(rng: np.random.Generator, x: float, y: float, z: float) -> list[Mes
         flat = (grid * size + shift) * (x, y)
         bulge = (1 - grid[..., 0] ** 2) * (1 - grid[..., 1] ** 2)
         high = z - 0.05 + 0.12 * bulge + rng.uniform(-0.015, 0.015, (n, n))
-        parts.append(cloth(np.concatenate([flat, high[..., None]], axis=-1), material("fabric", rng)))
-    return parts
+        yield cloth(np.concatenate([flat, high[..., None]], axis=-1), material("fabric", rng))
 
 
 @family("laundry basket", "hamper")
-def _hamper(rng: np.random.Generator) -> Piece:
+def _hamper(rng: np.random.Generator) -> Parts:
     radius, tall, look = (
         draw(rng, 0.17, 0.26),
         draw(rng, 0.48, 0.7),
@@ -187,19 +179,17 @@ def _hamper(rng: np.random.Generator) -> Piece:
         lid = rounded_box(
             (-radius * 0.83, -radius * 1.03, tall), (radius * 0.83, radius * 1.03, tall + 0.04), 0.01, look
         )
-    return finished([body, lid] if chance(rng, 0.55) else [body, *_clothes(rng, radius * 0.65, radius * 0.7, tall)])
+    return [body, lid] if chance(rng, 0.55) else [body, *_clothes(rng, radius * 0.65, radius * 0.7, tall)]
 
 
 @family("laundry basket", "bag on a frame", held_out=True)
-def _laundry_sorter(rng: np.random.Generator) -> Piece:
+def _laundry_sorter(rng: np.random.Generator) -> Parts:
     width, length, tall = draw(rng, 0.35, 0.7), draw(rng, 0.32, 0.42), draw(rng, 0.55, 0.8)
     look, bar = material("fabric", rng), material(pick(rng, ("metal", "wood", "white")), rng)
-    parts = [tub(length * 0.8, width * 0.9, tall * 0.82, 0.9, 0.04, look).moved(z=tall * 0.16)]
+    yield tub(length * 0.8, width * 0.9, tall * 0.82, 0.9, 0.04, look).moved(z=tall * 0.16)
     for s in (-1, 1):
         y = s * width / 2
-        parts += [
-            strut((-length / 2, y, 0.0), (length / 2, y, tall), 0.018, 0.018, bar),
-            strut((length / 2, y, 0.0), (-length / 2, y, tall), 0.018, 0.018, bar),
-        ]
-        parts.append(strut((s * length / 2, -width / 2, tall), (s * length / 2, width / 2, tall), 0.018, 0.018, bar))
-    return finished([*parts, *_clothes(rng, length * 0.35, width * 0.4, tall)])
+        yield strut((-length / 2, y, 0.0), (length / 2, y, tall), 0.018, 0.018, bar)
+        yield strut((length / 2, y, 0.0), (-length / 2, y, tall), 0.018, 0.018, bar)
+        yield strut((s * length / 2, -width / 2, tall), (s * length / 2, width / 2, tall), 0.018, 0.018, bar)
+    yield from _clothes(rng, length * 0.35, width * 0.4, tall)

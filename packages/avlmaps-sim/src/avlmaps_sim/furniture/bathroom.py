@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from avlmaps_sim.furniture.catalogue import Piece, family
+from avlmaps_sim.furniture.catalogue import Parts, family
 from avlmaps_sim.furniture.fittings import (
     china,
     chrome,
     outline,
     shell,
 )  # fmt: skip
-from avlmaps_sim.furniture.recipe_helpers import chance, draw, finished, pick, pictured
+from avlmaps_sim.furniture.recipe_helpers import chance, draw, pick, pictured
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh
 from avlmaps_sim.shapes import box, cylinder, ellipsoid, rounded_box, slab, tube
@@ -103,36 +103,34 @@ def _sizes(rng: np.random.Generator) -> tuple[float, float, float, float]:
 
 
 @family("toilet", "close-coupled")
-def _close_coupled(rng: np.random.Generator) -> Piece:
+def _close_coupled(rng: np.random.Generator) -> Parts:
     (length, wide, rim_z, power), look, metal = _sizes(rng), china(rng), chrome(rng)
     deep, across, top = draw(rng, 0.15, 0.21), draw(rng, 0.34, 0.48), rim_z + draw(rng, 0.32, 0.42)
     foot = (draw(rng, 0.32, 0.48), draw(rng, 0.2, 0.27), deep + draw(rng, 0.16, 0.24))
     seat = look if chance(rng, 0.7) else material(pick(rng, ("wood", "plastic", "black")), rng)
-    parts = [_bowl(rng, length, wide, power, (0.0, rim_z), deep + 0.01, foot, look),
-             slab(deep * 0.75, 0.0, rim_z - 0.09, deep * 1.4, min(across, 0.24), 0.085, look),
-             *_tank(rng, deep, across, (rim_z - 0.01, top), look, metal),
-             *_seat(rng, length, wide * 1.01, power, rim_z + 0.003, deep + 0.015, seat)]  # fmt: skip
-    return finished(parts)
+    return [_bowl(rng, length, wide, power, (0.0, rim_z), deep + 0.01, foot, look),
+            slab(deep * 0.75, 0.0, rim_z - 0.09, deep * 1.4, min(across, 0.24), 0.085, look),
+            *_tank(rng, deep, across, (rim_z - 0.01, top), look, metal),
+            *_seat(rng, length, wide * 1.01, power, rim_z + 0.003, deep + 0.015, seat)]  # fmt: skip
 
 
 @family("toilet", "hung on a casing")
-def _on_casing(rng: np.random.Generator) -> Piece:
+def _on_casing(rng: np.random.Generator) -> Parts:
     (length, wide, rim_z, power), look = _sizes(rng), china(rng)
     case_deep, case_wide, top = draw(rng, 0.1, 0.2), draw(rng, 0.5, 1.1), draw(rng, 0.95, 1.25)
     clad = pictured(pick(rng, ("tile", "plaster", "marble", "wood")), rng, "ceramic")
     foot = (length * 0.8, wide * 0.75, case_deep + length * 0.42)
     x = case_deep + 0.03
-    parts = [box((0.0, -case_wide / 2, 0.0), (case_deep, case_wide / 2, top), clad),
-             _bowl(rng, length, wide, power, (rim_z - draw(rng, 0.26, 0.34), rim_z), x, foot, look),
-             slab(case_deep + 0.06, 0.0, rim_z - 0.28, 0.12, wide * 0.8, 0.26, look),
-             box((case_deep, -0.12, 0.86), (case_deep + 0.012, 0.12, 0.94),
-                 material(pick(rng, ("white", "metal", "black")), rng)),
-             *_seat(rng, length, wide * 1.01, power, rim_z + 0.003, x + 0.005, look)]  # fmt: skip
-    return finished(parts)
+    return [box((0.0, -case_wide / 2, 0.0), (case_deep, case_wide / 2, top), clad),
+            _bowl(rng, length, wide, power, (rim_z - draw(rng, 0.26, 0.34), rim_z), x, foot, look),
+            slab(case_deep + 0.06, 0.0, rim_z - 0.28, 0.12, wide * 0.8, 0.26, look),
+            box((case_deep, -0.12, 0.86), (case_deep + 0.012, 0.12, 0.94),
+                material(pick(rng, ("white", "metal", "black")), rng)),
+            *_seat(rng, length, wide * 1.01, power, rim_z + 0.003, x + 0.005, look)]  # fmt: skip
 
 
 @family("toilet", "back to wall")
-def _back_to_wall(rng: np.random.Generator) -> Piece:
+def _back_to_wall(rng: np.random.Generator) -> Parts:
     (length, wide, rim_z, power), look, metal = _sizes(rng), china(rng), chrome(rng)
     deep, across, top = draw(rng, 0.14, 0.2), draw(rng, 0.36, 0.42), rim_z + draw(rng, 0.3, 0.4)
     skirt = (length + deep * 0.6, wide * 0.86, deep + length * 0.42)
@@ -144,14 +142,13 @@ def _back_to_wall(rng: np.random.Generator) -> Piece:
              (outline(length, wide, power, 20, 0.12, middle), rim_z),
              (outline(length * 0.72, wide * 0.66, 2.0, 20, 0.1, middle), rim_z),
              (outline(length * 0.4, wide * 0.35, 2.0, 20, 0.1, middle), rim_z - 0.17)]  # fmt: skip
-    parts = [shell(bowl, look), slab(deep / 2, 0.0, 0.0, deep, wide * 0.8, rim_z, look),
-             *_tank(rng, deep, across, (rim_z - 0.02, top), look, metal),
-             *_seat(rng, length, wide * 1.01, power, rim_z + 0.003, deep + 0.01, look)]  # fmt: skip
-    return finished(parts)
+    return [shell(bowl, look), slab(deep / 2, 0.0, 0.0, deep, wide * 0.8, rim_z, look),
+            *_tank(rng, deep, across, (rim_z - 0.02, top), look, metal),
+            *_seat(rng, length, wide * 1.01, power, rim_z + 0.003, deep + 0.01, look)]  # fmt: skip
 
 
 @family("toilet", "one piece")
-def _one_piece(rng: np.random.Generator) -> Piece:
+def _one_piece(rng: np.random.Generator) -> Parts:
     (length, wide, rim_z, power), look, metal = _sizes(rng), china(rng), chrome(rng)
     deep, top = draw(rng, 0.18, 0.24), rim_z + draw(rng, 0.16, 0.3)
     across = wide * draw(rng, 0.98, 1.1)
@@ -159,31 +156,29 @@ def _one_piece(rng: np.random.Generator) -> Piece:
     tank = [(outline(deep * s, across * w, 5.0, 20, 0.0, (deep * s / 2, 0.0)), z) for s, w,
             z in ((1.5, 0.8, rim_z - 0.12), (1.25, 0.95, rim_z), (1.0, 1.0, rim_z + 0.08), (0.95, 1.0, top - 0.02),
                   (0.85, 0.92, top))]  # fmt: skip
-    parts = [_bowl(rng, length, wide, power, (0.0, rim_z), deep, foot, look), shell(tank, look),
-             _button(deep * 0.42, 0.0, top, metal), box((0.0, -wide * 0.3, 0.0), (deep + 0.1, wide * 0.3, rim_z - 0.1),
-                                                        look), *_seat(rng, length, wide * 1.01, power, rim_z + 0.003,
-                                                                      deep + 0.01, look)]  # fmt: skip
-    return finished(parts)
+    return [_bowl(rng, length, wide, power, (0.0, rim_z), deep, foot, look), shell(tank, look),
+            _button(deep * 0.42, 0.0, top, metal),
+            box((0.0, -wide * 0.3, 0.0), (deep + 0.1, wide * 0.3, rim_z - 0.1), look),
+            *_seat(rng, length, wide * 1.01, power, rim_z + 0.003, deep + 0.01, look)]  # fmt: skip
 
 
 @family("toilet", "washing seat", held_out=True)
-def _washing_seat(rng: np.random.Generator) -> Piece:
+def _washing_seat(rng: np.random.Generator) -> Parts:
     (length, wide, rim_z, _), look = _sizes(rng), china(rng)
     total, power = length + draw(rng, 0.12, 0.2), draw(rng, 3.0, 5.0)
     levels = [(outline(total * a, wide * b, power, 22, 0.07, (total / 2 - total * (1 - a) / 2, 0.0)), z) for a, b,
               z in ((0.86, 0.8, 0.0), (0.9, 0.82, 0.3 * rim_z), (1.0, 0.98, 0.8 * rim_z),
                     (1.0, 1.0, rim_z))]  # fmt: skip
     back = draw(rng, 0.12, 0.2)
-    parts = [shell(levels, look), rounded_box((0.0, -wide / 2, rim_z - 0.01),
-                                              (back, wide / 2, rim_z + draw(rng, 0.08, 0.14)), 0.03, look),
-             *_seat(rng, total - back - 0.01, wide, power, rim_z + 0.003, back, look)]  # fmt: skip
+    yield shell(levels, look)
+    yield rounded_box((0.0, -wide / 2, rim_z - 0.01), (back, wide / 2, rim_z + draw(rng, 0.08, 0.14)), 0.03, look)
+    yield from _seat(rng, total - back - 0.01, wide, power, rim_z + 0.003, back, look)
     if chance(rng, 0.5):
-        parts.append(slab(back + 0.16, wide / 2 + 0.03, rim_z - 0.01, 0.22, 0.06, 0.05, look))
-    return finished(parts)
+        yield slab(back + 0.16, wide / 2 + 0.03, rim_z - 0.01, 0.22, 0.06, 0.05, look)
 
 
 @family("toilet", "high tank", held_out=True)
-def _high_tank(rng: np.random.Generator) -> Piece:
+def _high_tank(rng: np.random.Generator) -> Parts:
     (length, wide, rim_z, _), look, metal = _sizes(rng), china(rng), chrome(rng)
     wood = material("wood", rng)
     low = draw(rng, 0.85, 1.75)
@@ -191,13 +186,11 @@ def _high_tank(rng: np.random.Generator) -> Piece:
     tank = wood if chance(rng, 0.3) else look
     x = draw(rng, 0.16, 0.2)
     foot = (draw(rng, 0.36, 0.48), draw(rng, 0.22, 0.28), x + 0.2)
-    parts = [_bowl(rng, length, wide, 2.0, (0.0, rim_z), x, foot, look),
-             *_seat(rng, length, wide * 1.01, 2.0, rim_z + 0.003, x + 0.005, wood),
-             rounded_box((0.0, -across / 2, low), (deep, across / 2, low + tall), 0.02, tank),
-             slab(deep / 2, 0.0, low + tall, deep + 0.02, across + 0.02, 0.02, tank),
-             tube([(0.06, 0.0, low), (0.06, 0.0, rim_z + 0.02), (0.1, 0.0, rim_z - 0.06),
-                   (x + 0.08, 0.0, rim_z - 0.07)], 0.022, metal, 8),
-             tube([(deep / 2, across * 0.4, low), (deep / 2, across * 0.42, low - min(0.6, low * 0.4))], 0.003, metal,
-                  4), ellipsoid((deep / 2, across * 0.42, low - min(0.6, low * 0.4)), (0.015, 0.015, 0.03), wood, 7,
-                                4)]  # fmt: skip
-    return finished(parts)
+    yield _bowl(rng, length, wide, 2.0, (0.0, rim_z), x, foot, look)
+    yield from _seat(rng, length, wide * 1.01, 2.0, rim_z + 0.003, x + 0.005, wood)
+    yield rounded_box((0.0, -across / 2, low), (deep, across / 2, low + tall), 0.02, tank)
+    yield slab(deep / 2, 0.0, low + tall, deep + 0.02, across + 0.02, 0.02, tank)
+    yield tube([(0.06, 0.0, low), (0.06, 0.0, rim_z + 0.02), (0.1, 0.0, rim_z - 0.06), (x + 0.08, 0.0, rim_z - 0.07)],
+               0.022, metal, 8)  # fmt: skip
+    yield tube([(deep / 2, across * 0.4, low), (deep / 2, across * 0.42, low - min(0.6, low * 0.4))], 0.003, metal, 4)
+    yield ellipsoid((deep / 2, across * 0.42, low - min(0.6, low * 0.4)), (0.015, 0.015, 0.03), wood, 7, 4)

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from avlmaps_sim.furniture.carcass import Room, drawers, front_style, split
-from avlmaps_sim.furniture.catalogue import Piece, family
+from avlmaps_sim.furniture.catalogue import Parts, family
 from avlmaps_sim.furniture.legs import LegStyle, four_legs, leg, leg_style, named_leg
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, finished, pick, rim
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick, rim
 from avlmaps_sim.furniture.upholstery import (
     Bedding,
     blanket,
@@ -19,7 +19,7 @@ from avlmaps_sim.furniture.upholstery import (
     throw,
 )
 from avlmaps_sim.materials import material
-from avlmaps_sim.mesh import Material, Mesh
+from avlmaps_sim.mesh import Material, Mesh, Meshes
 from avlmaps_sim.shapes import box, cylinder, loft, rounded_box, sheet, tube
 
 
@@ -60,31 +60,30 @@ def bed_look(rng: np.random.Generator) -> Material:
     return material(pick(rng, ("wood", "wood", "wood", "white", "painted", "black")), rng)
 
 
-def bedclothes(rng: np.random.Generator, plan: BedPlan) -> list[Mesh]:
+def bedclothes(rng: np.random.Generator, plan: BedPlan) -> Meshes:
     """Return a mattress and what lies on it: made neatly, rumpled, turned back or in a heap."""
     bed = plan.bedding
     linen = material("fabric", rng, (0.93, 0.92, 0.9)) if chance(rng, 0.5) else material("fabric", rng)
     cover = material("fabric", rng)
-    parts = [mattress(bed, linen)]
+    yield mattress(bed, linen)
     number = plan.sleepers * (2 if chance(rng, 0.2) else 1)
-    parts += head_pillows(rng, bed, min(number, 3), linen if chance(rng, 0.7) else material("fabric", rng))
+    yield from head_pillows(rng, bed, min(number, 3), linen if chance(rng, 0.7) else material("fabric", rng))
     state = pick(rng, ("neat", "neat", "neat", "rumpled", "rumpled", "heap", "bare"))
     hang = draw(rng, 0.05, min(0.4, plan.top - 0.06))
     if state == "neat":
-        parts.append(blanket(rng, bed, cover, draw(rng, 0.0, 0.36), draw(rng, 0.004, 0.02), hang, chance(rng, 0.7)))
+        yield blanket(rng, bed, cover, draw(rng, 0.0, 0.36), draw(rng, 0.004, 0.02), hang, chance(rng, 0.7))
     elif state == "rumpled":
-        parts.append(blanket(rng, bed, cover, draw(rng, 0.2, 0.55), draw(rng, 0.03, 0.08), hang, chance(rng, 0.6)))
+        yield blanket(rng, bed, cover, draw(rng, 0.2, 0.55), draw(rng, 0.03, 0.08), hang, chance(rng, 0.6))
     elif state == "heap":
         place = (plan.length * draw(rng, 0.45, 0.75), plan.width * draw(rng, -0.2, 0.2), plan.top)
-        parts.append(heap(rng, place, min(plan.width * 0.48, draw(rng, 0.35, 0.7)), cover))
+        yield heap(rng, place, min(plan.width * 0.48, draw(rng, 0.35, 0.7)), cover)
     if state in ("neat", "rumpled") and chance(rng, 0.3):
-        parts.append(_runner(rng, plan, hang))
+        yield _runner(rng, plan, hang)
     if chance(rng, 0.25):
         side = draw(rng, 0.34, 0.48)
         look = material("fabric", rng)
         for y in np.linspace(-0.25, 0.25, plan.sleepers).tolist():
-            parts.append(leaning_pillow(rng, (0.55, y * plan.width, plan.top + 0.03), side, look, 0.8))
-    return parts
+            yield leaning_pillow(rng, (0.55, y * plan.width, plan.top + 0.03), side, look, 0.8)
 
 
 def _runner(rng: np.random.Generator, plan: BedPlan, hang: float) -> Mesh:
@@ -104,14 +103,13 @@ def _runner(rng: np.random.Generator, plan: BedPlan, hang: float) -> Mesh:
     return mesh.turned(np.pi / 2).moved(x=x)
 
 
-def _rails(plan: BedPlan, look: Material, tall: float, thick: float = 0.025) -> list[Mesh]:
+def _rails(plan: BedPlan, look: Material, tall: float, thick: float = 0.025) -> Meshes:
     """Return the boards along the sides and the slatted ground, seen as one board."""
     y, z = plan.width / 2, plan.base + 0.03
     low = max(z - tall, 0.02)
-    sides = [
-        box((0.0, s * y + min(s, 0) * thick, low), (plan.length, s * y + max(s, 0) * thick, z), look) for s in (1, -1)
-    ]
-    return [*sides, box((0.0, -y, plan.base - 0.025), (plan.length, y, plan.base), look)]
+    for s in (1, -1):
+        yield box((0.0, s * y + min(s, 0) * thick, low), (plan.length, s * y + max(s, 0) * thick, z), look)
+    yield box((0.0, -y, plan.base - 0.025), (plan.length, y, plan.base), look)
 
 
 def _end_board(rng: np.random.Generator, plan: BedPlan, x: float, top: float, look: Material, style: str) -> list[Mesh]:
@@ -153,143 +151,123 @@ def _end_board(rng: np.random.Generator, plan: BedPlan, x: float, top: float, lo
 
 
 @family("bed", "bedstead")
-def bedstead(rng: np.random.Generator) -> Piece:
+def bedstead(rng: np.random.Generator) -> Parts:
     """Return a wooden bed between a headboard and a lower footboard, or with a headboard only."""
     plan, look = bed_plan(rng), bed_look(rng)
     style = pick(rng, ("panel", "panel", "planks", "bars", "arch"))
     head = plan.top + draw(rng, 0.3, 0.75)
-    parts = [*bedclothes(rng, plan), *_rails(plan, look, draw(rng, 0.1, 0.22))]
-    parts += _end_board(rng, plan, -0.03, head, look, style)
+    yield from (*bedclothes(rng, plan), *_rails(plan, look, draw(rng, 0.1, 0.22)))
+    yield from _end_board(rng, plan, -0.03, head, look, style)
     if chance(rng, 0.55):
-        parts += _end_board(rng, plan, plan.length + 0.03, plan.top + draw(rng, -0.05, 0.3), look, style)
+        yield from _end_board(rng, plan, plan.length + 0.03, plan.top + draw(rng, -0.05, 0.3), look, style)
     else:
         legs = four_legs(plan.length, plan.width + 0.04, plan.base, leg_style(rng, 0.05, 0.07, True), look)
-        parts.append(legs.moved(x=plan.length / 2))
-        parts.append(
-            box(
-                (plan.length, -plan.width / 2 - 0.02, plan.base - 0.1),
-                (plan.length + 0.025, plan.width / 2 + 0.02, plan.base + 0.03),
-                look,
-            )
+        yield legs.moved(x=plan.length / 2)
+        yield box(
+            (plan.length, -plan.width / 2 - 0.02, plan.base - 0.1),
+            (plan.length + 0.025, plan.width / 2 + 0.02, plan.base + 0.03),
+            look,
         )
-    return finished(parts)
 
 
 @family("bed", "metal")
-def metal_bed(rng: np.random.Generator) -> Piece:
+def metal_bed(rng: np.random.Generator) -> Parts:
     """Return a bed of metal tubes with bars or an arch at both ends."""
     plan, look = bed_plan(rng, (0.28, 0.42)), material(pick(rng, ("metal", "black", "black", "white")), rng)
     head, foot = plan.top + draw(rng, 0.35, 0.75), plan.top + draw(rng, 0.05, 0.3)
-    parts = [*bedclothes(rng, plan), *_rails(plan, look, 0.05, 0.02)]
+    yield from (*bedclothes(rng, plan), *_rails(plan, look, 0.05, 0.02))
     bend = chance(rng, 0.5)
     for x, top in ((-0.03, head), (plan.length + 0.03, foot)):
         y, low = plan.width / 2 + 0.02, plan.base + 0.02
         curve = [(x, y * float(np.cos(a)), top - 0.22 + 0.22 * float(np.sin(a))) for a in np.linspace(0.0, np.pi, 9)]
         path = [(x, y, 0.0), *(curve if bend else [(x, y, top), (x, -y, top)]), (x, -y, 0.0)]
-        parts += [
-            tube(path, draw(rng, 0.014, 0.022), look, 6),
-            box((x - 0.01, -y, low), (x + 0.01, y, low + 0.02), look),
-        ]
+        yield tube(path, draw(rng, 0.014, 0.022), look, 6)
+        yield box((x - 0.01, -y, low), (x + 0.01, y, low + 0.02), look)
         for t in np.linspace(-0.85, 0.85, count(rng, 4, 9)).tolist():
             z = top - 0.22 + 0.22 * float(np.sqrt(1 - t * t)) if bend else top
-            parts.append(cylinder(x, t * y, low, 0.007, z - low, look, 5))
-    return finished(parts)
+            yield cylinder(x, t * y, low, 0.007, z - low, look, 5)
 
 
 @family("bed", "upholstered")
-def upholstered_bed(rng: np.random.Generator) -> Piece:
+def upholstered_bed(rng: np.random.Generator) -> Parts:
     """Return a bed whose box and headboard are covered with cloth or leather; the board may be tufted or winged."""
     plan, look = bed_plan(rng, (0.22, 0.34), 0.75), covering(rng, 0.3)
     y, thick, head = plan.width / 2 + 0.03, draw(rng, 0.06, 0.14), plan.top + draw(rng, 0.4, 0.8)
     low = pick(rng, (0.0, 0.04, 0.12))
-    parts = [
-        *bedclothes(rng, plan),
-        rounded_box((-0.02, -y, low), (plan.length + 0.03, y, plan.base + 0.04), 0.02, look, 2),
-    ]
+    yield from bedclothes(rng, plan)
+    yield rounded_box((-0.02, -y, low), (plan.length + 0.03, y, plan.base + 0.04), 0.02, look, 2)
     style = pick(rng, ("plain", "columns", "squares", "wings"))
     if style in ("plain", "wings"):
-        parts.append(rounded_box((-thick, -y, 0.0), (0.0, y, head), 0.03, look, 3))
+        yield rounded_box((-thick, -y, 0.0), (0.0, y, head), 0.03, look, 3)
     else:
-        parts.append(box((-thick, -y, 0.0), (-thick / 2, y, head), look))
+        yield box((-thick, -y, 0.0), (-thick / 2, y, head), look)
         rows = 1 if style == "columns" else count(rng, 2, 3)
         for y0, y1 in split(-y, y, [1.0] * count(rng, 2, 6)):
             for z0, z1 in split(plan.base, head, [1.0] * rows):
-                parts.append(rounded_box((-thick / 2 - 0.01, y0, z0), (0.0, y1, z1), 0.025, look, 2))
+                yield rounded_box((-thick / 2 - 0.01, y0, z0), (0.0, y1, z1), 0.025, look, 2)
     if style == "wings":
-        parts += [
-            box((-thick, min(s * y, s * (y + 0.05)), 0.0), (0.18, max(s * y, s * (y + 0.05)), head), look)
-            for s in (1, -1)
-        ]
+        for s in (1, -1):
+            yield box((-thick, min(s * y, s * (y + 0.05)), 0.0), (0.18, max(s * y, s * (y + 0.05)), head), look)
     if low > 0:
-        parts.append(
-            four_legs(plan.length - 0.1, 2 * y - 0.1, low + 0.01, named_leg("tapered", 8, 0.06), bed_look(rng)).moved(
-                x=plan.length / 2
-            )
+        yield four_legs(plan.length - 0.1, 2 * y - 0.1, low + 0.01, named_leg("tapered", 8, 0.06), bed_look(rng)).moved(
+            x=plan.length / 2
         )
-    return finished(parts)
 
 
 @family("bed", "platform")
-def platform_bed(rng: np.random.Generator) -> Piece:
+def platform_bed(rng: np.random.Generator) -> Parts:
     """Return a low bed on a wide board without, or with a low, headboard; its foot stands back."""
     plan, look = bed_plan(rng, (0.12, 0.28)), bed_look(rng)
     rim_m = draw(rng, 0.03, 0.2)
     y = plan.width / 2 + rim_m
-    parts = [
-        *bedclothes(rng, plan),
-        box((-0.03, -y, plan.base - draw(rng, 0.03, 0.09)), (plan.length + rim_m, y, plan.base), look),
-    ]
+    yield from bedclothes(rng, plan)
+    yield box((-0.03, -y, plan.base - draw(rng, 0.03, 0.09)), (plan.length + rim_m, y, plan.base), look)
     inset = draw(rng, 0.05, 0.3)
-    parts.append(box((inset, -y + inset, 0.0), (plan.length - inset, y - inset, plan.base - 0.02), look))
+    yield box((inset, -y + inset, 0.0), (plan.length - inset, y - inset, plan.base - 0.02), look)
     if chance(rng, 0.6):
         tall = plan.top + draw(rng, 0.1, 0.5)
         side = y + (draw(rng, 0.15, 0.35) if chance(rng, 0.3) else 0.0)
-        parts.append(box((-0.08, -side, plan.base * 0.5), (-0.03, side, tall), look))
-    return finished(parts)
+        yield box((-0.08, -side, plan.base * 0.5), (-0.03, side, tall), look)
 
 
 @family("bed", "box spring")
-def box_spring(rng: np.random.Generator) -> Piece:
+def box_spring(rng: np.random.Generator) -> Parts:
     """Return a mattress on a second one on short feet, with no bedstead at all."""
     plan = bed_plan(rng, (0.3, 0.42))
     look = material("fabric", rng)
     low = draw(rng, 0.04, 0.14)
     base = rounded_box((0.0, -plan.width / 2, low), (plan.length, plan.width / 2, plan.base), 0.03, look, 3)
     feet = four_legs(plan.length - 0.1, plan.width - 0.1, low + 0.01, named_leg("straight", 8, 0.06), bed_look(rng))
-    parts = [*bedclothes(rng, plan), base, feet.moved(x=plan.length / 2)]
+    yield from (*bedclothes(rng, plan), base, feet.moved(x=plan.length / 2))
     if chance(rng, 0.3):
-        parts.append(
-            rounded_box(
-                (-0.09, -plan.width / 2, 0.1), (0.0, plan.width / 2, plan.top + draw(rng, 0.25, 0.6)), 0.03, look, 3
-            )
+        yield rounded_box(
+            (-0.09, -plan.width / 2, 0.1), (0.0, plan.width / 2, plan.top + draw(rng, 0.25, 0.6)), 0.03, look, 3
         )
-    return finished(parts)
 
 
 @family("bed", "with drawers")
-def drawer_bed(rng: np.random.Generator) -> Piece:
+def drawer_bed(rng: np.random.Generator) -> Parts:
     """Return a bed on a box with drawers at its sides, or a day bed with a back along one side."""
     plan, look = bed_plan(rng, (0.32, 0.46), 0.45), bed_look(rng)
     style = front_style(rng, look, ("flat", "framed"))
     y = plan.width / 2 + 0.02
-    parts = [*bedclothes(rng, plan), box((-0.02, -y, 0.03), (plan.length + 0.02, y, plan.base + 0.02), look)]
+    yield from (*bedclothes(rng, plan), box((-0.02, -y, 0.03), (plan.length + 0.02, y, plan.base + 0.02), look))
     for side in (1, -1):
         for x0, x1 in split(0.05, plan.length - 0.05, [1.0] * count(rng, 2, 3)):
             front = drawers(rng, style, Room((-0.3, x0, 0.06), (0.0, x1, plan.base - 0.02)), [1.0])
             # A piece made to look along +x is laid along the bed's side, mirrored at its right.
             along = np.array([[0.0, 1.0, 0.0], [side, 0.0, 0.0], [0.0, 0.0, 1.0]])
-            parts += [mesh.mapped(along).moved(y=side * y) for mesh in front]
+            yield from [mesh.mapped(along).moved(y=side * y) for mesh in front]
     head = plan.top + draw(rng, 0.2, 0.6)
     if chance(rng, 0.5):
-        parts.append(box((-0.06, -y, 0.0), (-0.02, y, head), look))
+        yield box((-0.06, -y, 0.0), (-0.02, y, head), look)
     if plan.sleepers == 1 and chance(rng, 0.6):
-        parts.append(box((-0.06, y, 0.0), (plan.length + 0.02, y + 0.03, head), look))
-        parts.append(box((plan.length + 0.02, -y, 0.0), (plan.length + 0.05, y + 0.03, head), look))
-    return finished(parts)
+        yield box((-0.06, y, 0.0), (plan.length + 0.02, y + 0.03, head), look)
+        yield box((plan.length + 0.02, -y, 0.0), (plan.length + 0.05, y + 0.03, head), look)
 
 
 @family("bed", "four-poster", held_out=True)
-def four_poster(rng: np.random.Generator) -> Piece:
+def four_poster(rng: np.random.Generator) -> Parts:
     """Return a bed whose posts carry a frame over it, perhaps with a cloth roof or drawn curtains."""
     plan, look = bed_plan(rng, (0.28, 0.42), 0.9), material(pick(rng, ("wood", "wood", "black", "metal")), rng)
     height, y = draw(rng, 1.85, 2.2), plan.width / 2 + 0.04
@@ -300,25 +278,24 @@ def four_poster(rng: np.random.Generator) -> Piece:
     x0, x1 = -0.05, plan.length + 0.05
     frame = [box((x0, s * y - t, high - 0.05), (x1, s * y + t, high), look) for s in (1, -1)]
     frame += [box((x - t, -y, high - 0.05), (x + t, y, high), look) for x in (x0, x1)]
-    parts = [*bedclothes(rng, plan), posts, *frame, *_rails(plan, look, 0.18)]
-    parts += _end_board(rng, plan, -0.03, plan.top + draw(rng, 0.3, 0.7), look, pick(rng, ("panel", "bars")))
+    yield from (*bedclothes(rng, plan), posts, *frame, *_rails(plan, look, 0.18))
+    yield from _end_board(rng, plan, -0.03, plan.top + draw(rng, 0.3, 0.7), look, pick(rng, ("panel", "bars")))
     veil = material("curtain", rng)
     if chance(rng, 0.4):
-        parts.append(sheet((x0, -y, high), (x1 - x0, 0.0, 0.0), (0.0, 2 * y, 0.0), veil))
+        yield sheet((x0, -y, high), (x1 - x0, 0.0, 0.0), (0.0, 2 * y, 0.0), veil)
     if chance(rng, 0.5):
         across = np.array([(0.07, 0.0), (0.0, 0.05), (-0.07, 0.0), (0.0, -0.05)])
         for corner in [(x, s * y) for x in (x0, x1) for s in (1, -1)]:
             rings = [np.column_stack([across + corner, np.full(4, z)]) for z in (0.05, high - 0.05)]
-            parts.append(loft(rings, veil))
-    return finished(parts)
+            yield loft(rings, veil)
 
 
 @family("bed", "sleigh", held_out=True)
-def sleigh_bed(rng: np.random.Generator) -> Piece:
+def sleigh_bed(rng: np.random.Generator) -> Parts:
     """Return a wooden bed whose head and foot roll outwards like a sleigh's."""
     plan, look = bed_plan(rng, (0.26, 0.36), 0.8), material("wood", rng)
     y, thick = plan.width / 2 + 0.03, 0.035
-    parts = [*bedclothes(rng, plan), *_rails(plan, look, 0.25, 0.03)]
+    yield from (*bedclothes(rng, plan), *_rails(plan, look, 0.25, 0.03))
     for end, rise in ((-1, draw(rng, 0.45, 0.7)), (1, draw(rng, 0.2, 0.4))):
         x, top = (0.0, plan.top + rise) if end < 0 else (plan.length, plan.top + rise)
         share = np.linspace(0.0, 1.0, 9)
@@ -328,17 +305,14 @@ def sleigh_bed(rng: np.random.Generator) -> Piece:
         rings = []
         for px, pz in face.tolist():
             rings.append(np.array([(px, -y, pz), (px, y, pz), (px + end * thick, y, pz), (px + end * thick, -y, pz)]))
-        parts.append(loft(rings, look))
+        yield loft(rings, look)
         last = face[-1]
-        parts.append(
-            tube(
-                [
-                    (float(last[0]) + end * 0.02, -y - 0.01, float(last[1])),
-                    (float(last[0]) + end * 0.02, y + 0.01, float(last[1])),
-                ],
-                0.04,
-                look,
-                8,
-            )
+        yield tube(
+            [
+                (float(last[0]) + end * 0.02, -y - 0.01, float(last[1])),
+                (float(last[0]) + end * 0.02, y + 0.01, float(last[1])),
+            ],
+            0.04,
+            look,
+            8,
         )
-    return finished(parts)

@@ -1,18 +1,18 @@
-"""The register of recipes. A recipe is a function of a random generator; a module of recipes registers its own.
+"""The register of recipes. A recipe yields or returns the parts of a piece; a module of recipes registers its own.
 
 A piece stands on z = 0 with the middle of its footprint at x = y = 0 and its front looks along +x (heading 0), so
 its depth runs along x and its width along y. What hangs (a picture, a mirror, a range hood) touches the wall behind
 it with its lowest x; the rules of the home choose its height.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Literal
 
 import numpy as np
 
-from avlmaps_sim.mesh import Mesh, Triple
+from avlmaps_sim.mesh import Mesh, Triple, joined
 
 Families = Literal["training", "held-out", "all"]
 
@@ -63,7 +63,9 @@ class Piece:
     family: str = ""
 
 
-Recipe = Callable[[np.random.Generator], Piece]
+# What a recipe makes: meshes, tops where clutter may stand, and places that shine, all in one frame of its own choice.
+Parts = Iterable[Mesh | Support | Triple]
+Recipe = Callable[[np.random.Generator], Parts]
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,5 +129,19 @@ def make(category: str, rng: np.random.Generator, which: Families = "all", name:
         if not choice:
             raise KeyError(f"{category} has no family {name!r}; it has {', '.join(f.name for f in known)}")
     chosen = choice[int(rng.integers(len(choice)))]
-    piece = chosen.recipe(rng)
-    return Piece(piece.mesh, piece.supports, piece.light, category, chosen.name)
+    return finished(chosen.recipe(rng), category, chosen.name)
+
+
+def finished(parts: Parts, category: str = "", family: str = "") -> Piece:
+    """Join parts into a piece that stands on z = 0 about the origin; its lights and tops move with it."""
+    parts = tuple(parts)
+    whole = joined([part for part in parts if isinstance(part, Mesh)])
+    x, y = ((whole.low + whole.high) / 2)[:2].tolist()
+    z = float(whole.low[2])
+    tops = tuple(
+        Support((s.low[0] - x, s.low[1] - y), (s.high[0] - x, s.high[1] - y), s.z - z, s.clearance_m)
+        for s in parts
+        if isinstance(s, Support)
+    )
+    light = tuple((part[0] - x, part[1] - y, part[2] - z) for part in parts if isinstance(part, tuple))
+    return Piece(whole.moved(-x, -y, -z), tops, light, category, family)

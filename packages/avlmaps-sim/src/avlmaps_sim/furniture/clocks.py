@@ -4,23 +4,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from avlmaps_sim.furniture.catalogue import Piece, family
+from avlmaps_sim.furniture.catalogue import Parts, family
 from avlmaps_sim.furniture.fittings import body, chrome, face, spindle
-from avlmaps_sim.furniture.recipe_helpers import chance, draw, finished, pick, pictured, rim, strut
+from avlmaps_sim.furniture.recipe_helpers import chance, draw, pick, pictured, rim, strut
 from avlmaps_sim.materials import material
-from avlmaps_sim.mesh import Material, Mesh, triangles_of
+from avlmaps_sim.mesh import Material, Mesh, Meshes, triangles_of
 from avlmaps_sim.shapes import box, circle, cylinder, ellipsoid, loft, rounded_box, slab, tube
 
 
-def _hands(rng: np.random.Generator, x: float, z: float, radius: float, look: Material) -> list[Mesh]:
+def _hands(rng: np.random.Generator, x: float, z: float, radius: float, look: Material) -> Meshes:
     """Return a clock's two hands round (y = 0, z)."""
-    parts = []
     for share, wide in ((0.5, 0.05), (0.78, 0.035)):
         a = draw(rng, 0.0, 2 * np.pi)
-        parts.append(strut((x, -0.1 * radius * float(np.cos(a)), z - 0.1 * radius * float(np.sin(a))),
-                           (x, share * radius * float(np.cos(a)), z + share * radius * float(np.sin(a))),
-                           max(0.002, wide * radius), 0.0015, look))  # fmt: skip
-    return [*parts, spindle([(0.05 * radius, x), (0.04 * radius, x + 0.003)], look, 0.0, z, 8)]
+        yield strut((x, -0.1 * radius * float(np.cos(a)), z - 0.1 * radius * float(np.sin(a))),
+                    (x, share * radius * float(np.cos(a)), z + share * radius * float(np.sin(a))),
+                    max(0.002, wide * radius), 0.0015, look)  # fmt: skip
+    yield spindle([(0.05 * radius, x), (0.04 * radius, x + 0.003)], look, 0.0, z, 8)
 
 
 def _dial_face(rng: np.random.Generator, x: float, z: float, radius: float) -> list[Mesh]:
@@ -48,62 +47,57 @@ def _dial_face(rng: np.random.Generator, x: float, z: float, radius: float) -> l
 
 
 @family("clock", "wall round")
-def _wall_round(rng: np.random.Generator) -> Piece:
+def _wall_round(rng: np.random.Generator) -> Parts:
     radius, deep, bar = draw(rng, 0.1, 0.35), draw(rng, 0.02, 0.06), draw(rng, 0.05, 0.16)
     look = material(pick(rng, ("black", "metal", "wood", "white", "plastic")), rng)
-    parts = [spindle([(radius, 0.0), (radius, deep), (radius * (1 - bar), deep), (radius * (1 - bar), deep * 0.5)],
-                     look, 0.0, radius, 26, capped=False),
-             *_dial_face(rng, deep * 0.5, radius, radius * (1 - bar * 0.9))]  # fmt: skip
-    return finished(parts)
+    return [spindle([(radius, 0.0), (radius, deep), (radius * (1 - bar), deep), (radius * (1 - bar), deep * 0.5)], look,
+                    0.0, radius, 26, capped=False),
+            *_dial_face(rng, deep * 0.5, radius, radius * (1 - bar * 0.9))]  # fmt: skip
 
 
 @family("clock", "wall square")
-def _wall_square(rng: np.random.Generator) -> Piece:
+def _wall_square(rng: np.random.Generator) -> Parts:
     size, deep, look = draw(rng, 0.2, 0.5), draw(rng, 0.02,
                                                  0.05), material(pick(rng, ("wood", "black", "white", "metal",
                                                                             "plastic")), rng)  # fmt: skip
     tall = size * pick(rng, (1.0, draw(rng, 1.1, 1.5)))
-    parts = [rounded_box((0.0, -size / 2, 0.0), (deep, size / 2, tall), draw(rng, 0.003, 0.02), look, 2),
-             *_dial_face(rng, deep + 0.001, tall - size / 2, size * 0.42)]  # fmt: skip
-    return finished(parts)
+    return [rounded_box((0.0, -size / 2, 0.0), (deep, size / 2, tall), draw(rng, 0.003, 0.02), look, 2),
+            *_dial_face(rng, deep + 0.001, tall - size / 2, size * 0.42)]  # fmt: skip
 
 
 @family("clock", "wall with pendulum")
-def _wall_pendulum(rng: np.random.Generator) -> Piece:
+def _wall_pendulum(rng: np.random.Generator) -> Parts:
     wide, high, deep, wood = draw(rng, 0.2, 0.34), draw(rng, 0.5, 0.95), draw(rng, 0.1, 0.16), material("wood", rng)
     half, gold = wide / 2, material("metal", rng, (0.75, 0.6, 0.3))
-    parts = [rim((-half, 0.0), (half, high), 0.035, (0.0, deep), wood),
-             box((0.0, -half, 0.0), (0.012, half, high), wood),
-             box((0.0, -half, high - wide), (deep - 0.03, half, high), wood),
-             *_dial_face(rng, deep - 0.028, high - half, half - 0.04),
-             tube([(deep * 0.5, 0.0, high - wide), (deep * 0.5, 0.01, 0.14)], 0.004, gold, 4),
-             spindle([(0.045, deep * 0.5 - 0.006), (0.045, deep * 0.5 + 0.006)], gold, 0.01, 0.13, 16),
-             rounded_box((0.0, -half - 0.02, high), (deep + 0.02, half + 0.02, high + 0.025), 0.008, wood,
-                         2)]  # fmt: skip
+    yield rim((-half, 0.0), (half, high), 0.035, (0.0, deep), wood)
+    yield box((0.0, -half, 0.0), (0.012, half, high), wood)
+    yield box((0.0, -half, high - wide), (deep - 0.03, half, high), wood)
+    yield from _dial_face(rng, deep - 0.028, high - half, half - 0.04)
+    yield tube([(deep * 0.5, 0.0, high - wide), (deep * 0.5, 0.01, 0.14)], 0.004, gold, 4)
+    yield spindle([(0.045, deep * 0.5 - 0.006), (0.045, deep * 0.5 + 0.006)], gold, 0.01, 0.13, 16)
+    yield rounded_box((0.0, -half - 0.02, high), (deep + 0.02, half + 0.02, high + 0.025), 0.008, wood, 2)
     if chance(rng, 0.6):
         gable = np.array([(-half - 0.02, high + 0.02), (half + 0.02, high + 0.02), (0.0, high + draw(rng, 0.08, 0.16))])
-        parts.append(loft([np.column_stack([np.full(3, x), gable]) for x in (0.0, deep * 0.6)], wood))
-    return finished(parts)
+        yield loft([np.column_stack([np.full(3, x), gable]) for x in (0.0, deep * 0.6)], wood)
 
 
 @family("clock", "alarm with bells")
-def _alarm(rng: np.random.Generator) -> Piece:
+def _alarm(rng: np.random.Generator) -> Parts:
     radius, deep = draw(rng, 0.035, 0.065), draw(rng, 0.03, 0.05)
     look, metal = material(pick(rng, ("metal", "painted", "black", "plastic")), rng), chrome(rng)
     z = radius + 0.02
-    parts = [spindle([(radius, 0.0), (radius, deep), (radius * 0.88, deep)], look, 0.0, z, 22),
-             *_dial_face(rng, deep + 0.001, z, radius * 0.88)]  # fmt: skip
-    parts += [tube([(deep / 2, s * radius * 0.5, z - radius * 0.7), (deep / 2, s * radius * 0.85, 0.0)], 0.005, metal,
-                   5) for s in (-1, 1)]  # fmt: skip
-    parts += [ellipsoid((deep / 2, s * radius * 0.55, z + radius * 1.12), (0.45 * radius, 0.45 * radius, 0.3 * radius),
-                        metal, 10, 5) for s in (-1, 1)]  # fmt: skip
-    parts.append(tube([(deep / 2, -radius * 0.4, z + radius * 1.35), (deep / 2, 0.0, z + radius * 1.65),
-                       (deep / 2, radius * 0.4, z + radius * 1.35)], 0.004, metal, 5))  # fmt: skip
-    return finished(parts)
+    yield spindle([(radius, 0.0), (radius, deep), (radius * 0.88, deep)], look, 0.0, z, 22)
+    yield from _dial_face(rng, deep + 0.001, z, radius * 0.88)
+    yield from [tube([(deep / 2, s * radius * 0.5, z - radius * 0.7), (deep / 2, s * radius * 0.85, 0.0)], 0.005, metal,
+                     5) for s in (-1, 1)]  # fmt: skip
+    yield from [ellipsoid((deep / 2, s * radius * 0.55, z + radius * 1.12),
+                          (0.45 * radius, 0.45 * radius, 0.3 * radius), metal, 10, 5) for s in (-1, 1)]  # fmt: skip
+    yield tube([(deep / 2, -radius * 0.4, z + radius * 1.35), (deep / 2, 0.0, z + radius * 1.65),
+                (deep / 2, radius * 0.4, z + radius * 1.35)], 0.004, metal, 5)  # fmt: skip
 
 
 @family("clock", "digital")
-def _digital(rng: np.random.Generator) -> Piece:
+def _digital(rng: np.random.Generator) -> Parts:
     wide, high, deep, look = draw(rng, 0.12,
                                   0.26), draw(rng, 0.05,
                                               0.1), draw(rng, 0.04,
@@ -113,9 +107,8 @@ def _digital(rng: np.random.Generator) -> Piece:
     glow = replace(material("plastic", rng,
                             pick(rng, ((0.95, 0.15, 0.1), (0.2, 0.9, 0.4), (0.3, 0.7, 0.95), (0.95, 0.95, 0.95)))),
                    emission=0.9)  # fmt: skip
-    parts = [body(rng, (0.0, -wide / 2, 0.0), (deep, wide / 2, high), look, draw(rng, 0.003, 0.015)),
-             face(deep + 0.001, (-wide * 0.44, high * 0.14), (wide * 0.44, high * 0.88),
-                  material("black", rng))]  # fmt: skip
+    yield body(rng, (0.0, -wide / 2, 0.0), (deep, wide / 2, high), look, draw(rng, 0.003, 0.015))
+    yield face(deep + 0.001, (-wide * 0.44, high * 0.14), (wide * 0.44, high * 0.88), material("black", rng))
     for k, y in enumerate((-0.33, -0.15, 0.1, 0.28)):  # seven bars a figure
         figure = int(rng.integers(0 if k else 1, 10 if k % 2 else 6))
         lit = ("abcdef", "bc", "abdeg", "abcdg", "bcfg", "acdfg", "acdefg", "abc", "abcdefg", "abcdfg")[figure]
@@ -123,37 +116,35 @@ def _digital(rng: np.random.Generator) -> Piece:
         left = y * wide
         bars = {"a": (0, h, w, t), "b": (w - t, h / 2, t, h / 2), "c": (w - t, 0, t, h / 2), "d": (0, 0, w, t),
                 "e": (0, 0, t, h / 2), "f": (0, h / 2, t, h / 2), "g": (0, h / 2 - t / 2, w, t)}  # fmt: skip
-        parts += [face(deep + 0.002, (left + a, low + b), (left + a + c, low + b + d), glow) for a, b, c,
-                  d in (bars[s] for s in lit)]  # fmt: skip
-    return finished(parts)
+        yield from [face(deep + 0.002, (left + a, low + b), (left + a + c, low + b + d), glow) for a, b, c,
+                    d in (bars[s] for s in lit)]  # fmt: skip
 
 
 @family("clock", "grandfather", held_out=True)
-def _grandfather(rng: np.random.Generator) -> Piece:
+def _grandfather(rng: np.random.Generator) -> Parts:
     wide, high, deep, wood = draw(rng, 0.42, 0.58), draw(rng, 1.8, 2.25), draw(rng, 0.24, 0.34), material("wood", rng)
     half, waist, gold = wide / 2, draw(rng, 0.62, 0.8), material("metal", rng, (0.75, 0.6, 0.3))
     base, head = high * 0.24, high * 0.72
     w = half * waist
-    parts = [box((0.0, -half, 0.0), (deep, half, base), wood),
-             rim((-w, base), (w, head), 0.05, (0.02, deep * 0.85), wood), box((0.0, -w, base), (0.02, w, head), wood),
-             box((0.0, -half, head), (deep, half, high - 0.06), wood),
-             *_dial_face(rng, deep + 0.002, head + (high - 0.06 - head) * 0.5,
-                         min(half * 0.8, (high - 0.06 - head) * 0.45)),
-             tube([(deep * 0.4, 0.0, head), (deep * 0.4, 0.02, base + 0.25)], 0.006, gold, 4),
-             spindle([(0.08, deep * 0.4 - 0.01), (0.08, deep * 0.4 + 0.01)], gold, 0.02, base + 0.22, 18),
-             *[cylinder(deep * 0.5, y, base + draw(rng, 0.3, 0.6), 0.025, 0.18, gold, 10) for y in (-0.08, 0.08)],
-             rounded_box((-0.01, -half - 0.025, base), (deep + 0.02, half + 0.025, base + 0.03), 0.01, wood, 2),
-             rounded_box((-0.01, -half - 0.03, high - 0.07), (deep + 0.03, half + 0.03, high - 0.03), 0.01, wood,
-                         2)]  # fmt: skip
+    yield box((0.0, -half, 0.0), (deep, half, base), wood)
+    yield rim((-w, base), (w, head), 0.05, (0.02, deep * 0.85), wood)
+    yield box((0.0, -w, base), (0.02, w, head), wood)
+    yield box((0.0, -half, head), (deep, half, high - 0.06), wood)
+    yield from _dial_face(rng, deep + 0.002, head + (high - 0.06 - head) * 0.5,
+                          min(half * 0.8, (high - 0.06 - head) * 0.45))  # fmt: skip
+    yield tube([(deep * 0.4, 0.0, head), (deep * 0.4, 0.02, base + 0.25)], 0.006, gold, 4)
+    yield spindle([(0.08, deep * 0.4 - 0.01), (0.08, deep * 0.4 + 0.01)], gold, 0.02, base + 0.22, 18)
+    yield from [cylinder(deep * 0.5, y, base + draw(rng, 0.3, 0.6), 0.025, 0.18, gold, 10) for y in (-0.08, 0.08)]
+    yield rounded_box((-0.01, -half - 0.025, base), (deep + 0.02, half + 0.025, base + 0.03), 0.01, wood, 2)
+    yield rounded_box((-0.01, -half - 0.03, high - 0.07), (deep + 0.03, half + 0.03, high - 0.03), 0.01, wood, 2)
     if chance(rng, 0.6):
         arc = np.linspace(0.0, np.pi, 9)
         crown = np.column_stack([half * np.cos(arc), high - 0.03 + draw(rng, 0.06, 0.14) * np.sin(arc)])
-        parts.append(loft([np.column_stack([np.full(9, x), crown]) for x in (0.0, deep)], wood))
-    return finished(parts)
+        yield loft([np.column_stack([np.full(9, x), crown]) for x in (0.0, deep)], wood)
 
 
 @family("clock", "mantel", held_out=True)
-def _mantel(rng: np.random.Generator) -> Piece:
+def _mantel(rng: np.random.Generator) -> Parts:
     wide, high, deep, look = draw(rng, 0.2,
                                   0.42), draw(rng, 0.18,
                                               0.28), draw(rng, 0.08,
@@ -166,6 +157,5 @@ def _mantel(rng: np.random.Generator) -> Piece:
     radius = min(0.36 * high, bell * wide / 2 * 0.85)
     rings = [np.array([(0.0, v * wide / 2, 0.02), (deep, v * wide / 2, 0.02), (deep, v * wide / 2, top),
                        (0.0, v * wide / 2, top)]) for v, top in zip(y, crown, strict=True)]  # fmt: skip
-    parts = [loft(rings, look), slab(deep / 2, 0.0, 0.0, deep + 0.02, wide + 0.03, 0.022, look),
-             *_dial_face(rng, deep + 0.001, high * 0.56, radius)]  # fmt: skip
-    return finished(parts)
+    return [loft(rings, look), slab(deep / 2, 0.0, 0.0, deep + 0.02, wide + 0.03, 0.022, look),
+            *_dial_face(rng, deep + 0.001, high * 0.56, radius)]  # fmt: skip

@@ -5,8 +5,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from avlmaps_sim.furniture.catalogue import Piece, family
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, finished, pick
+from avlmaps_sim.furniture.catalogue import Parts, family, finished
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, joined
 from avlmaps_sim.shapes import box, cylinder, ellipsoid, lathe, loft, rounded_box, sheet, slab, tube
@@ -31,45 +31,42 @@ def _book_size(rng: np.random.Generator) -> tuple[float, float, float]:
 
 
 @family("book", "lying")
-def _lying_books(rng: np.random.Generator) -> Piece:
-    parts, z = [], 0.0
+def _lying_books(rng: np.random.Generator) -> Parts:
+    z = 0.0
     for _ in range(count(rng, 1, 5)):
         size = _book_size(rng)
-        parts.append(_book(rng, *size).turned(draw(rng, -0.3, 0.3) + np.pi * int(rng.integers(2))).moved(z=z))
+        yield _book(rng, *size).turned(draw(rng, -0.3, 0.3) + np.pi * int(rng.integers(2))).moved(z=z)
         z += size[2]
-    return finished(parts)
 
 
 @family("book", "row")
-def _book_row(rng: np.random.Generator) -> Piece:
-    parts, y = [], 0.0
+def _book_row(rng: np.random.Generator) -> Parts:
+    y = 0.0
     tall = draw(rng, 0.18, 0.3)
     for _ in range(count(rng, 3, 12)):
         high, thick = tall * draw(rng, 0.8, 1.05), draw(rng, 0.012, 0.045)
         one = _book(rng, high, high * draw(rng, 0.62, 0.78), thick).tilted("x", np.pi / 2)
-        parts.append(one.moved(-float(one.high[0]) + 0.1, y - float(one.low[1]), -float(one.low[2])))
+        yield one.moved(-float(one.high[0]) + 0.1, y - float(one.low[1]), -float(one.low[2]))
         y += thick + 0.001
     if chance(rng, 0.5):  # the last one leans
         lean = draw(rng, 0.15, 0.4)
         one = _book(rng, tall * 0.9, tall * 0.65, 0.025).tilted("x", np.pi / 2 + lean)
-        parts.append(one.moved(-float(one.high[0]) + 0.1, y - float(one.low[1]), -float(one.low[2])))
-    return finished(parts)
+        yield one.moved(-float(one.high[0]) + 0.1, y - float(one.low[1]), -float(one.low[2]))
 
 
 @family("book", "open", held_out=True)
-def _open_book(rng: np.random.Generator) -> Piece:
+def _open_book(rng: np.random.Generator) -> Parts:
     tall, deep, rise = draw(rng, 0.18, 0.32), draw(rng, 0.13, 0.22), draw(rng, 0.01, 0.03)
     paper, cover = material("paper", rng), material("painted", rng)
-    parts = [slab(0.0, 0.0, 0.0, tall, 2 * deep + 0.01, 0.003, cover)]
+    yield slab(0.0, 0.0, 0.0, tall, 2 * deep + 0.01, 0.003, cover)
     for s in (-1, 1):
         line = [(0.0, rise * 0.4), (0.15, rise), (0.6, rise * 0.8), (1.0, 0.004)]
         for (a, h), (b, g) in pairwise(line):
-            parts.append(sheet((tall / 2, s * a * deep, h), (-tall, 0.0, 0.0), (0.0, s * (b - a) * deep, g - h), paper))
-    return finished(parts)
+            yield sheet((tall / 2, s * a * deep, h), (-tall, 0.0, 0.0), (0.0, s * (b - a) * deep, g - h), paper)
 
 
 @family("bottle", "turned")
-def _bottle(rng: np.random.Generator) -> Piece:
+def _bottle(rng: np.random.Generator) -> Parts:
     kind = pick(rng, ("wine", "beer", "water", "spray", "jar", "oil"))
     tint = pick(rng, ((0.1, 0.25, 0.12), (0.3, 0.15, 0.05), (0.75, 0.85, 0.88), (0.85, 0.9, 0.92)))
     dark = sum(tint) < 1.5  # green and brown glass lets little through
@@ -105,18 +102,17 @@ def _bottle(rng: np.random.Generator) -> Piece:
     else:
         top = rows[-1][0] * wide * 1.1
         parts.append(cylinder(0.0, 0.0, tall, top, 0.015, cap, 8))
-    return finished(parts)
+    return parts
 
 
 @family("bottle", "group")
-def _bottles(rng: np.random.Generator) -> Piece:
-    return finished(
-        [_bottle(rng).mesh.moved(draw(rng, -0.03, 0.03), i * draw(rng, 0.09, 0.12)) for i in range(count(rng, 2, 3))]
-    )
+def _bottles(rng: np.random.Generator) -> Parts:
+    for i in range(count(rng, 2, 3)):
+        yield finished(_bottle(rng)).mesh.moved(draw(rng, -0.03, 0.03), i * draw(rng, 0.09, 0.12))
 
 
 @family("bottle", "pump", held_out=True)
-def _pump_bottle(rng: np.random.Generator) -> Piece:
+def _pump_bottle(rng: np.random.Generator) -> Parts:
     tall, wide, look = (
         draw(rng, 0.11, 0.2),
         draw(rng, 0.027, 0.042),
@@ -124,106 +120,87 @@ def _pump_bottle(rng: np.random.Generator) -> Piece:
     )
     pump = material(pick(rng, ("metal", "white", "black")), rng)
     if chance(rng, 0.5):
-        parts = [rounded_box((-wide * 0.8, -wide, 0.0), (wide * 0.8, wide, tall), 0.012, look)]
+        yield rounded_box((-wide * 0.8, -wide, 0.0), (wide * 0.8, wide, tall), 0.012, look)
     else:
-        parts = [lathe([(wide, 0.0), (wide, tall * 0.85), (wide * 0.5, tall)], look, sides=10)]
-    return finished(
-        [
-            *parts,
-            cylinder(0.0, 0.0, tall, 0.01, 0.035, pump, 6),
-            box((-0.008, -0.008, tall + 0.035), (0.045, 0.008, tall + 0.047), pump),
-        ]
-    )
+        yield lathe([(wide, 0.0), (wide, tall * 0.85), (wide * 0.5, tall)], look, sides=10)
+    yield cylinder(0.0, 0.0, tall, 0.01, 0.035, pump, 6)
+    yield box((-0.008, -0.008, tall + 0.035), (0.045, 0.008, tall + 0.047), pump)
 
 
 @family("toy", "building blocks")
-def _blocks(rng: np.random.Generator) -> Piece:
-    size, parts = draw(rng, 0.03, 0.06), []
+def _blocks(rng: np.random.Generator) -> Parts:
+    size = draw(rng, 0.03, 0.06)
     for level in range(count(rng, 1, 4)):
         for _ in range(max(3 - level, 1)):
             x, y = (rng.uniform(-1, 1, 2) * size * (2.5 if level == 0 else 0.3)).tolist()
             block = slab(0.0, 0.0, 0.0, size, size * pick(rng, (1.0, 1.0, 2.0)), size, material("plastic", rng))
-            parts.append(block.turned(draw(rng, 0.0, 1.5)).moved(x, y, level * size))
-    return finished(parts)
+            yield block.turned(draw(rng, 0.0, 1.5)).moved(x, y, level * size)
 
 
 @family("toy", "bear")
-def _bear(rng: np.random.Generator) -> Piece:
+def _bear(rng: np.random.Generator) -> Parts:
     s, fur, dark = draw(rng, 0.05, 0.17), material("fabric", rng), material("black", rng)
-    parts = [
-        ellipsoid((0.0, 0.0, s * 0.9), (s * 0.6, s * 0.65, s * 0.85), fur, 7, 5),
-        ellipsoid((0.05 * s, 0.0, s * 2.0), (s * 0.55, s * 0.6, s * 0.55), fur, 7, 5),
-    ]
+    yield ellipsoid((0.0, 0.0, s * 0.9), (s * 0.6, s * 0.65, s * 0.85), fur, 7, 5)
+    yield ellipsoid((0.05 * s, 0.0, s * 2.0), (s * 0.55, s * 0.6, s * 0.55), fur, 7, 5)
     for side in (-1, 1):
-        parts.append(ellipsoid((0.0, side * s * 0.45, s * 2.5), (s * 0.12, s * 0.2, s * 0.2), fur, 5, 3))
-        parts.append(ellipsoid((s * 0.2, side * s * 0.7, s * 1.1), (s * 0.25, s * 0.25, s * 0.5), fur, 5, 3))
-        parts.append(ellipsoid((s * 0.7, side * s * 0.45, s * 0.25), (s * 0.55, s * 0.25, s * 0.25), fur, 5, 3))
-        parts.append(ellipsoid((s * 0.55, side * s * 0.2, s * 2.1), (s * 0.05, s * 0.06, s * 0.06), dark, 4, 2))
-    return finished([*parts, ellipsoid((s * 0.6, 0.0, s * 1.9), (s * 0.15, s * 0.2, s * 0.15), dark, 6, 4)])
+        yield ellipsoid((0.0, side * s * 0.45, s * 2.5), (s * 0.12, s * 0.2, s * 0.2), fur, 5, 3)
+        yield ellipsoid((s * 0.2, side * s * 0.7, s * 1.1), (s * 0.25, s * 0.25, s * 0.5), fur, 5, 3)
+        yield ellipsoid((s * 0.7, side * s * 0.45, s * 0.25), (s * 0.55, s * 0.25, s * 0.25), fur, 5, 3)
+        yield ellipsoid((s * 0.55, side * s * 0.2, s * 2.1), (s * 0.05, s * 0.06, s * 0.06), dark, 4, 2)
+    yield ellipsoid((s * 0.6, 0.0, s * 1.9), (s * 0.15, s * 0.2, s * 0.15), dark, 6, 4)
 
 
 @family("toy", "truck")
-def _truck(rng: np.random.Generator) -> Piece:
+def _truck(rng: np.random.Generator) -> Parts:
     long, body, black = draw(rng, 0.1, 0.4), material("plastic", rng), material("black", rng)
     wide, wheel = long * draw(rng, 0.35, 0.5), long * draw(rng, 0.1, 0.14)
-    parts = [slab(0.0, 0.0, wheel, long, wide, long * 0.1, body)]
+    yield slab(0.0, 0.0, wheel, long, wide, long * 0.1, body)
     cab = long * draw(rng, 0.25, 0.4)
-    parts.append(
-        rounded_box(
-            (long / 2 - cab, -wide / 2, wheel),
-            (long / 2, wide / 2, wheel + long * 0.38),
-            long * 0.04,
-            material("plastic", rng),
-        )
+    yield rounded_box(
+        (long / 2 - cab, -wide / 2, wheel),
+        (long / 2, wide / 2, wheel + long * 0.38),
+        long * 0.04,
+        material("plastic", rng),
     )
     if chance(rng, 0.7):
-        parts.append(
-            box(
-                (-long / 2, -wide / 2, wheel + long * 0.1),
-                (long / 2 - cab - 0.01, wide / 2, wheel + long * draw(rng, 0.2, 0.45)),
-                body,
-            )
+        yield box(
+            (-long / 2, -wide / 2, wheel + long * 0.1),
+            (long / 2 - cab - 0.01, wide / 2, wheel + long * draw(rng, 0.2, 0.45)),
+            body,
         )
     for x in (-0.32, 0.32):
-        parts += [
-            tube([(x * long, s * wide * 0.42, wheel), (x * long, s * wide * 0.54, wheel)], wheel, black, 10)
-            for s in (-1, 1)
-        ]
-    return finished(parts)
+        for s in (-1, 1):
+            yield tube([(x * long, s * wide * 0.42, wheel), (x * long, s * wide * 0.54, wheel)], wheel, black, 10)
 
 
 @family("toy", "doll's house", held_out=True)
-def _dolls_house(rng: np.random.Generator) -> Piece:
+def _dolls_house(rng: np.random.Generator) -> Parts:
     wide, deep, tall, floors = draw(rng, 0.4, 0.8), draw(rng, 0.22, 0.35), draw(rng, 0.4, 0.7), count(rng, 2, 3)
     wall, roof = material(pick(rng, ("wood", "painted", "white")), rng), material("plastic", rng)
-    parts = [box((-deep, 0.0, 0.0), (-deep + 0.008, wide, tall), wall)]
-    parts += [
+    yield box((-deep, 0.0, 0.0), (-deep + 0.008, wide, tall), wall)
+    yield from [
         box((-deep, y, 0.0), (0.0, y + 0.01, tall), wall) for y in (0.0, wide * draw(rng, 0.35, 0.6), wide - 0.01)
     ]
-    parts += [
-        box((-deep, 0.0, tall * i / floors), (0.0, wide, tall * i / floors + 0.01), wall) for i in range(floors + 1)
-    ]
+    for i in range(floors + 1):
+        yield box((-deep, 0.0, tall * i / floors), (0.0, wide, tall * i / floors + 0.01), wall)
     peak = (-deep, wide / 2, tall + wide * 0.3)
     for y in (-0.03, wide + 0.03):
-        parts.append(sheet((-deep, y, tall), (deep + 0.03, 0.0, 0.0), (0.0, peak[1] - y, peak[2] - tall), roof))
+        yield sheet((-deep, y, tall), (deep + 0.03, 0.0, 0.0), (0.0, peak[1] - y, peak[2] - tall), roof)
     for _ in range(4):
         x, y = -draw(rng, 0.05, deep * 0.8), draw(rng, 0.08, 0.9) * wide
         level = tall * int(rng.integers(floors)) / floors + 0.01
-        parts.append(slab(x, y, level, 0.05, 0.06, 0.05, material("plastic", rng)))
-    return finished(parts)
+        yield slab(x, y, level, 0.05, 0.06, 0.05, material("plastic", rng))
 
 
 @family("toy", "stacking rings")
-def _rings(rng: np.random.Generator) -> Piece:
+def _rings(rng: np.random.Generator) -> Parts:
     radius, rings, z = draw(rng, 0.05, 0.09), count(rng, 4, 6), 0.015
-    parts = [cylinder(0.0, 0.0, 0.0, radius * 1.05, 0.015, material("wood", rng), 12)]
+    yield cylinder(0.0, 0.0, 0.0, radius * 1.05, 0.015, material("wood", rng), 12)
     for number in range(rings):
         size = radius * (1 - 0.11 * number)
-        parts.append(
-            lathe([(size * 0.8, z), (size, z + 0.012), (size * 0.8, z + 0.024)], material("plastic", rng), sides=10)
-        )
+        yield lathe([(size * 0.8, z), (size, z + 0.012), (size * 0.8, z + 0.024)], material("plastic", rng), sides=10)
         z += 0.024
-    return finished([*parts, ellipsoid((0.0, 0.0, z + 0.02), (0.02, 0.02, 0.025), material("plastic", rng), 6, 4)])
+    yield ellipsoid((0.0, 0.0, z + 0.02), (0.02, 0.02, 0.025), material("plastic", rng), 6, 4)
 
 
 def _shoe(rng: np.random.Generator, long: float, kind: str, look: Material, sole: Material) -> Mesh:
@@ -255,17 +232,15 @@ def _shoe(rng: np.random.Generator, long: float, kind: str, look: Material, sole
 
 def _register_shoes(kind: str, held_out: bool) -> None:
     @family("shoes", kind, held_out)
-    def recipe(rng: np.random.Generator) -> Piece:
+    def recipe(rng: np.random.Generator) -> Parts:
         long = draw(rng, 0.2, 0.31)
         look = material(pick(rng, ("leather", "fabric", "black", "white", "plastic")), rng)
         sole = material(pick(rng, ("white", "black", "leather")), rng)
         shoe = _shoe(rng, long, kind, look, sole)
-        return finished(
-            [
-                shoe.turned(draw(rng, -0.2, 0.2)).moved(draw(rng, -0.04, 0.04), s * long * draw(rng, 0.24, 0.36))
-                for s in (-1, 1)
-            ]
-        )
+        return [
+            shoe.turned(draw(rng, -0.2, 0.2)).moved(draw(rng, -0.04, 0.04), s * long * draw(rng, 0.24, 0.36))
+            for s in (-1, 1)
+        ]
 
 
 for _kind, _held in (("sneaker", False), ("boot", False), ("slipper", False), ("pump", True)):

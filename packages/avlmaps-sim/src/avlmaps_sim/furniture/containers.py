@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from avlmaps_sim.furniture.catalogue import Piece, Support, family
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, finished, pick, strut, turned_ring
+from avlmaps_sim.furniture.catalogue import Parts, Support, family
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick, strut, turned_ring
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, joined
 from avlmaps_sim.shapes import (
@@ -39,7 +39,7 @@ def tub(
 
 
 @family("box", "cardboard")
-def _cardboard_box(rng: np.random.Generator) -> Piece:
+def _cardboard_box(rng: np.random.Generator) -> Parts:
     length, width, tall = draw(rng, 0.2, 0.6), draw(rng, 0.2, 0.6), draw(rng, 0.12, 0.5)
     look, tape = cardboard(rng), material("paper", rng, (0.75, 0.65, 0.45))
     if chance(rng, 0.6):
@@ -48,7 +48,7 @@ def _cardboard_box(rng: np.random.Generator) -> Piece:
             parts.append(
                 box((length / 2, -0.05, tall * 0.4), (length / 2 + 0.002, 0.06, tall * 0.7), material("white", rng))
             )
-        return finished(parts, supports=[Support((-length / 2, -width / 2), (length / 2, width / 2), tall)])
+        return [*parts, Support((-length / 2, -width / 2), (length / 2, width / 2), tall)]
     parts = [tub(length, width, tall, 1.0, 0.004, look, 0.006)]  # flaps stand open
     for side in (-1, 1):
         a, b = draw(rng, 0.3, 2.6), draw(rng, 0.3, 2.6)
@@ -65,60 +65,51 @@ def _cardboard_box(rng: np.random.Generator) -> Piece:
                 (-length / 2, side * width / 2, tall), (length, 0.0, 0.0), (0.0, out[0], max(out[1], -tall * 0.8)), look
             )
         )
-    return finished(parts)
+    return parts
 
 
 @family("box", "stack")
-def _box_stack(rng: np.random.Generator) -> Piece:
-    parts, z, wide = [], 0.0, draw(rng, 0.3, 0.6)
+def _box_stack(rng: np.random.Generator) -> Parts:
+    z, wide = 0.0, draw(rng, 0.3, 0.6)
     for _ in range(count(rng, 2, 4)):
         size, tall = wide * draw(rng, 0.75, 1.0), draw(rng, 0.12, 0.36)
         one = [slab(0.0, 0.0, 0.0, size, wide * draw(rng, 0.7, 1.0), tall, cardboard(rng))]
         one.append(slab(0.0, 0.0, tall, size, 0.05, 0.002, material("paper", rng)))
-        parts.append(
-            joined(one).turned(draw(rng, -0.25, 0.25)).moved(draw(rng, -0.04, 0.04), draw(rng, -0.04, 0.04), z)
-        )
+        yield joined(one).turned(draw(rng, -0.25, 0.25)).moved(draw(rng, -0.04, 0.04), draw(rng, -0.04, 0.04), z)
         z += tall
-    return finished(parts)
 
 
 @family("box", "storage bin")
-def _storage_bin(rng: np.random.Generator) -> Piece:
+def _storage_bin(rng: np.random.Generator) -> Parts:
     length, width, tall = draw(rng, 0.25, 0.45), draw(rng, 0.3, 0.65), draw(rng, 0.12, 0.42)
     look = material(pick(rng, ("plastic", "glass", "white", "painted")), rng)
     lid = look if chance(rng, 0.4) else material("plastic", rng)
     corner = draw(rng, 0.01, 0.05)
-    parts = [tub(length, width, tall, draw(rng, 0.85, 0.97), corner, look)]
+    yield tub(length, width, tall, draw(rng, 0.85, 0.97), corner, look)
     if chance(rng, 0.7):
-        parts.append(
-            rounded_box(
-                (-length * 0.52, -width * 0.52, tall - 0.005), (length * 0.52, width * 0.52, tall + 0.02), 0.01, lid
-            )
+        yield rounded_box(
+            (-length * 0.52, -width * 0.52, tall - 0.005), (length * 0.52, width * 0.52, tall + 0.02), 0.01, lid
         )
-    parts += [slab(0.0, s * width * 0.5, tall * 0.7, length * 0.3, 0.03, 0.05, lid) for s in (-1, 1)]
-    return finished(parts)
+    yield from [slab(0.0, s * width * 0.5, tall * 0.7, length * 0.3, 0.03, 0.05, lid) for s in (-1, 1)]
 
 
 @family("box", "wooden crate")
-def _crate(rng: np.random.Generator) -> Piece:
+def _crate(rng: np.random.Generator) -> Parts:
     length, width, tall, t = draw(rng, 0.25, 0.42), draw(rng, 0.35, 0.65), draw(rng, 0.18, 0.36), 0.012
     look, rows = material("wood", rng), count(rng, 2, 4)
     step = tall / rows
-    parts = [slab(0.0, 0.0, 0.0, length, width, t, look)]
+    yield slab(0.0, 0.0, 0.0, length, width, t, look)
     for row in range(rows):
         z = row * step + 0.004
-        parts += [slab(s * (length - t) / 2, 0.0, z, t, width, step * 0.78, look) for s in (-1, 1)]
-        parts += [slab(0.0, s * (width - t) / 2, z, length, t, step * 0.78, look) for s in (-1, 1)]
-    parts += [
-        slab(x * (length / 2 - 0.025), y * (width / 2 - 0.025), 0.0, 0.025, 0.025, tall, look)
-        for x in (-1, 1)
-        for y in (-1, 1)
-    ]
-    return finished(parts)
+        yield from [slab(s * (length - t) / 2, 0.0, z, t, width, step * 0.78, look) for s in (-1, 1)]
+        yield from [slab(0.0, s * (width - t) / 2, z, length, t, step * 0.78, look) for s in (-1, 1)]
+    for x in (-1, 1):
+        for y in (-1, 1):
+            yield slab(x * (length / 2 - 0.025), y * (width / 2 - 0.025), 0.0, 0.025, 0.025, tall, look)
 
 
 @family("box", "chest", held_out=True)
-def _chest(rng: np.random.Generator) -> Piece:
+def _chest(rng: np.random.Generator) -> Parts:
     length, width, tall = draw(rng, 0.2, 0.5), draw(rng, 0.35, 1.0), draw(rng, 0.2, 0.4)
     look, metal, bulge = (
         material(pick(rng, ("wood", "leather", "painted")), rng),
@@ -130,19 +121,17 @@ def _chest(rng: np.random.Generator) -> Piece:
         np.stack([(length / 2 * np.cos(a), y, tall + bulge * length / 2 * np.sin(a)) for a in angle])
         for y in (-width / 2, width / 2)
     ]
-    parts = [slab(0.0, 0.0, 0.0, length, width, tall, look), loft(rings, look)]
+    yield from (slab(0.0, 0.0, 0.0, length, width, tall, look), loft(rings, look))
     for y in (-width * 0.38, width * 0.38):
-        parts.append(slab(0.0, y, 0.0, length + 0.01, 0.035, tall, metal))
-        parts.append(
-            loft(
-                [
-                    (r * (1.02, 0.0, 1.01)) + (0.0, y + s * 0.018, 0.0)
-                    for r, s in zip((rings[0], rings[0]), (-1, 1), strict=True)
-                ],
-                metal,
-            )
+        yield slab(0.0, y, 0.0, length + 0.01, 0.035, tall, metal)
+        yield loft(
+            [
+                (r * (1.02, 0.0, 1.01)) + (0.0, y + s * 0.018, 0.0)
+                for r, s in zip((rings[0], rings[0]), (-1, 1), strict=True)
+            ],
+            metal,
         )
-    return finished([*parts, slab(length / 2, 0.0, tall - 0.05, 0.02, 0.06, 0.08, metal)])
+    yield slab(length / 2, 0.0, tall - 0.05, 0.02, 0.06, 0.08, metal)
 
 
 def _woven(rng: np.random.Generator) -> Material:
@@ -150,81 +139,76 @@ def _woven(rng: np.random.Generator) -> Material:
 
 
 @family("basket", "round")
-def _round_basket(rng: np.random.Generator) -> Piece:
+def _round_basket(rng: np.random.Generator) -> Parts:
     radius, look = draw(rng, 0.12, 0.27), _woven(rng)
     tall, belly, low = radius * draw(rng, 0.8, 1.9), draw(rng, 1.0, 1.2), draw(rng, 0.7, 1.0)
     rows = [(low * radius, 0.0), (belly * radius, tall * 0.4), (radius, tall), (radius * 0.93, tall),
             (belly * radius * 0.94, tall * 0.4),
             (low * radius * 0.9, 0.02)]  # fmt: skip
-    parts = [lathe(rows, look, sides=18)]
+    yield lathe(rows, look, sides=18)
     if chance(rng, 0.6):
         angle, z = np.linspace(0.0, np.pi, 7), tall
         for side in (-1, 1):
             path = [(0.06 * float(np.cos(a)), side * radius * 0.98, z + 0.06 * float(np.sin(a)) - 0.01) for a in angle]
-            parts.append(tube(path, 0.01, look, 5))
+            yield tube(path, 0.01, look, 5)
     if chance(rng, 0.35):  # a blanket in it
         throw = material("fabric", rng)
-        parts.append(ellipsoid((0.0, 0.0, tall * 0.85), (radius * 0.88, radius * 0.88, tall * 0.25), throw, 12, 6))
-    return finished(parts)
+        yield ellipsoid((0.0, 0.0, tall * 0.85), (radius * 0.88, radius * 0.88, tall * 0.25), throw, 12, 6)
 
 
 @family("basket", "rectangular")
-def _rect_basket(rng: np.random.Generator) -> Piece:
+def _rect_basket(rng: np.random.Generator) -> Parts:
     length, width, tall = draw(rng, 0.2, 0.4), draw(rng, 0.25, 0.55), draw(rng, 0.1, 0.32)
     look, cloth_look = _woven(rng), material("fabric", rng)
-    parts = [tub(length, width, tall, draw(rng, 0.8, 1.0), draw(rng, 0.01, 0.06), look, 0.014)]
+    yield tub(length, width, tall, draw(rng, 0.8, 1.0), draw(rng, 0.01, 0.06), look, 0.014)
     if chance(rng, 0.4):
-        parts.append(tub(length * 1.02, width * 1.02, tall * 0.25, 1.0, 0.04, cloth_look).moved(z=tall * 0.78))
-    return finished(
-        [*parts, *(slab(0.0, s * width * 0.505, tall * 0.65, 0.1, 0.008, 0.05, cloth_look) for s in (-1, 1))]
-    )
+        yield tub(length * 1.02, width * 1.02, tall * 0.25, 1.0, 0.04, cloth_look).moved(z=tall * 0.78)
+    yield from (slab(0.0, s * width * 0.505, tall * 0.65, 0.1, 0.008, 0.05, cloth_look) for s in (-1, 1))
 
 
 @family("basket", "wire")
-def _wire_basket(rng: np.random.Generator) -> Piece:
+def _wire_basket(rng: np.random.Generator) -> Parts:
     radius, look = draw(rng, 0.1, 0.22), material(pick(rng, ("metal", "black", "white")), rng)
     tall, low, wires = radius * draw(rng, 0.8, 1.5), draw(rng, 0.6, 0.9), count(rng, 10, 14)
-    parts = [tube([(x * low, y * low, 0.0), (x, y, tall)], 0.003, look, 3) for x, y in circle(radius, wires).tolist()]
+    for x, y in circle(radius, wires).tolist():
+        yield tube([(x * low, y * low, 0.0), (x, y, tall)], 0.003, look, 3)
     for z in np.linspace(0.0, tall, count(rng, 3, 4)).tolist():
         size = radius * (low + (1 - low) * z / tall)
-        parts.append(tube([(*p, z) for p in circle(size, 12).tolist()], 0.004, look, 3, closed=True))
-    return finished([*parts, cylinder(0.0, 0.0, 0.0, radius * low, 0.003, look, 12)])
+        yield tube([(*p, z) for p in circle(size, 12).tolist()], 0.004, look, 3, closed=True)
+    yield cylinder(0.0, 0.0, 0.0, radius * low, 0.003, look, 12)
 
 
 @family("basket", "with handle", held_out=True)
-def _handle_basket(rng: np.random.Generator) -> Piece:
+def _handle_basket(rng: np.random.Generator) -> Parts:
     length, width, tall, look = draw(rng, 0.18, 0.28), draw(rng, 0.28, 0.45), draw(rng, 0.12, 0.2), _woven(rng)
     rise = draw(rng, 0.12, 0.25)
     path = [
         (0.0, width / 2 * 0.97 * float(np.cos(a)), tall * 0.8 + rise * float(np.sin(a)))
         for a in np.linspace(0.0, np.pi, 10)
     ]
-    return finished([tub(length, width, tall, 0.85, 0.09, look, 0.014), tube(path, 0.011, look, 5)])
+    return [tub(length, width, tall, 0.85, 0.09, look, 0.014), tube(path, 0.011, look, 5)]
 
 
 @family("trash can", "open tub")
-def _open_bin(rng: np.random.Generator) -> Piece:
+def _open_bin(rng: np.random.Generator) -> Parts:
     radius, look = draw(rng, 0.1, 0.19), material(pick(rng, ("plastic", "metal", "black", "white", "painted")), rng)
     tall, low = radius * draw(rng, 1.8, 2.8), draw(rng, 0.7, 0.95)
     if chance(rng, 0.35):
-        parts = [tub(radius * 1.6, radius * 2.4, tall, low, 0.03, look)]
+        yield tub(radius * 1.6, radius * 2.4, tall, low, 0.03, look)
     else:
         rows = [(low * radius, 0.0), (radius, tall), (radius * 0.94, tall), (low * radius * 0.93, 0.01)]
-        parts = [lathe(rows, look, sides=20)]
+        yield lathe(rows, look, sides=20)
     if chance(rng, 0.4):  # its bag hangs over the rim
         bag = material(pick(rng, ("white", "black", "plastic")), rng)
-        parts.append(
-            turned_ring(
-                [(radius * 1.04, tall * draw(rng, 0.72, 0.9)), (radius * 1.03, tall + 0.01), (radius * 0.9, tall)],
-                bag,
-                sides=14,
-            )
+        yield turned_ring(
+            [(radius * 1.04, tall * draw(rng, 0.72, 0.9)), (radius * 1.03, tall + 0.01), (radius * 0.9, tall)],
+            bag,
+            sides=14,
         )
-    return finished(parts)
 
 
 @family("trash can", "pedal")
-def _pedal_bin(rng: np.random.Generator) -> Piece:
+def _pedal_bin(rng: np.random.Generator) -> Parts:
     radius, tall = draw(rng, 0.1, 0.2), draw(rng, 0.26, 0.7)
     look, black = material(pick(rng, ("metal", "metal", "white", "painted", "black")), rng), material("black", rng)
     if chance(rng, 0.6):
@@ -235,20 +219,18 @@ def _pedal_bin(rng: np.random.Generator) -> Piece:
             (radius * 0.6, tall + 0.02 + radius * draw(rng, 0.1, 0.4)),
             (0.01, tall + radius * 0.45),
         ]
-        parts = [lathe(rows, look, sides=20), cylinder(0.0, 0.0, 0.0, radius * 1.02, 0.03, black, 20)]
+        yield from (lathe(rows, look, sides=20), cylinder(0.0, 0.0, 0.0, radius * 1.02, 0.03, black, 20))
     else:
-        parts = [rounded_box((-radius, -radius * 1.2, 0.02), (radius, radius * 1.2, tall), 0.03, look)]
-        parts.append(
-            rounded_box(
-                (-radius * 1.03, -radius * 1.23, tall), (radius * 1.03, radius * 1.23, tall + 0.045), 0.02, look
-            )
+        yield rounded_box((-radius, -radius * 1.2, 0.02), (radius, radius * 1.2, tall), 0.03, look)
+        yield rounded_box(
+            (-radius * 1.03, -radius * 1.23, tall), (radius * 1.03, radius * 1.23, tall + 0.045), 0.02, look
         )
-        parts.append(slab(0.0, 0.0, 0.0, 1.9 * radius, 2.3 * radius, 0.025, black))
-    return finished([*parts, slab(radius + 0.02, 0.0, 0.01, 0.06, 0.08, 0.015, black)])
+        yield slab(0.0, 0.0, 0.0, 1.9 * radius, 2.3 * radius, 0.025, black)
+    yield slab(radius + 0.02, 0.0, 0.01, 0.06, 0.08, 0.015, black)
 
 
 @family("trash can", "swing lid")
-def _swing_bin(rng: np.random.Generator) -> Piece:
+def _swing_bin(rng: np.random.Generator) -> Parts:
     length, width, tall = draw(rng, 0.2, 0.32), draw(rng, 0.24, 0.42), draw(rng, 0.4, 0.75)
     look, lid = material("plastic", rng), material(pick(rng, ("plastic", "black", "white")), rng)
     rise = draw(rng, 0.08, 0.16)
@@ -256,62 +238,56 @@ def _swing_bin(rng: np.random.Generator) -> Piece:
     for size, z in ((1.02, tall), (1.02, tall + 0.03), (0.95, tall + rise * 0.6), (0.6, tall + rise)):
         flat = rounded_rectangle(length * size, width * max(size, 0.9), 0.03, 3)
         rings.append(np.column_stack([flat, np.full(len(flat), z)]))
-    parts = [tub(length, width, tall, draw(rng, 0.75, 0.92), 0.04, look), loft(rings, lid)]
+    yield from (tub(length, width, tall, draw(rng, 0.75, 0.92), 0.04, look), loft(rings, lid))
     flap = slab(0.0, 0.0, 0.0, 0.012, width * 0.75, rise * 0.7, material("black", rng))
-    return finished([*parts, flap.tilted("y", -0.5).moved(length * 0.45, 0.0, tall + rise * 0.25)])
+    yield flap.tilted("y", -0.5).moved(length * 0.45, 0.0, tall + rise * 0.25)
 
 
 @family("trash can", "wheelie", held_out=True)
-def _wheelie_bin(rng: np.random.Generator) -> Piece:
+def _wheelie_bin(rng: np.random.Generator) -> Parts:
     length, width, tall = draw(rng, 0.45, 0.6), draw(rng, 0.4, 0.58), draw(rng, 0.75, 1.05)
     look, lid = material("plastic", rng), material(pick(rng, ("plastic", "black")), rng)
-    parts = [tub(length, width, tall, 0.8, 0.04, look).moved(z=0.04)]
-    parts.append(
-        rounded_box((-length * 0.52, -width * 0.52, tall + 0.03), (length * 0.55, width * 0.52, tall + 0.09), 0.02, lid)
+    yield tub(length, width, tall, 0.8, 0.04, look).moved(z=0.04)
+    yield rounded_box(
+        (-length * 0.52, -width * 0.52, tall + 0.03), (length * 0.55, width * 0.52, tall + 0.09), 0.02, lid
     )
-    parts += [
-        tube(
+    for s in (-1, 1):
+        yield tube(
             [(-length * 0.42, s * width * 0.4, 0.1), (-length * 0.42, s * width * 0.52, 0.1)],
             0.1,
             material("black", rng),
             12,
         )
-        for s in (-1, 1)
-    ]
-    return finished(
-        [*parts, tube([(-length * 0.6, -width * 0.4, tall), (-length * 0.6, width * 0.4, tall)], 0.015, lid, 6)]
-    )
+    yield tube([(-length * 0.6, -width * 0.4, tall), (-length * 0.6, width * 0.4, tall)], 0.015, lid, 6)
 
 
 @family("trash can", "mesh")
-def _mesh_bin(rng: np.random.Generator) -> Piece:
+def _mesh_bin(rng: np.random.Generator) -> Parts:
     radius, tall, look = draw(rng, 0.12, 0.16), draw(rng, 0.25, 0.36), material(pick(rng, ("black", "metal")), rng)
     low, rods = draw(rng, 0.75, 0.95), 20
-    parts = [strut((x * low, y * low, 0.0), (x, y, tall), 0.008, 0.003, look) for x, y in circle(radius, rods).tolist()]
+    yield from [
+        strut((x * low, y * low, 0.0), (x, y, tall), 0.008, 0.003, look) for x, y in circle(radius, rods).tolist()
+    ]
     for z in (0.0, tall * 0.5, tall):
         size = radius * (low + (1 - low) * z / tall)
-        parts.append(turned_ring([(size, z), (size, z + 0.015)], look))
+        yield turned_ring([(size, z), (size, z + 0.015)], look)
     paper = material("paper", rng)
     for _ in range(count(rng, 0, 4)):
         x, y = (rng.uniform(-0.5, 0.5, 2) * radius).tolist()
-        parts.append(ellipsoid((x, y, draw(rng, 0.05, 0.6) * tall), (0.045, 0.04, 0.04), paper, 6, 4))
-    return finished(parts)
+        yield ellipsoid((x, y, draw(rng, 0.05, 0.6) * tall), (0.045, 0.04, 0.04), paper, 6, 4)
 
 
 @family("trash can", "sorting station")
-def _sorting_bins(rng: np.random.Generator) -> Piece:
+def _sorting_bins(rng: np.random.Generator) -> Parts:
     number, width, length, tall = count(rng, 2, 3), draw(rng, 0.2, 0.34), draw(rng, 0.28, 0.4), draw(rng, 0.45, 0.85)
-    body, parts = material(pick(rng, ("metal", "white", "black", "painted")), rng), []
+    body = material(pick(rng, ("metal", "white", "black", "painted")), rng)
     for i in range(number):
         y = (i - (number - 1) / 2) * width * 1.03
-        parts.append(slab(0.0, y, 0.0, length, width, tall, body))
-        parts.append(slab(0.0, y, tall, length * 0.98, width * 0.95, 0.03, material("plastic", rng)))
-        parts.append(slab(0.0, y, tall + 0.03, length * 0.5, width * 0.35, 0.002, material("black", rng)))
-        parts.append(
-            box(
-                (length / 2, y - width * 0.2, tall * 0.6),
-                (length / 2 + 0.003, y + width * 0.2, tall * 0.75),
-                material("white", rng),
-            )
+        yield slab(0.0, y, 0.0, length, width, tall, body)
+        yield slab(0.0, y, tall, length * 0.98, width * 0.95, 0.03, material("plastic", rng))
+        yield slab(0.0, y, tall + 0.03, length * 0.5, width * 0.35, 0.002, material("black", rng))
+        yield box(
+            (length / 2, y - width * 0.2, tall * 0.6),
+            (length / 2 + 0.003, y + width * 0.2, tall * 0.75),
+            material("white", rng),
         )
-    return finished(parts)

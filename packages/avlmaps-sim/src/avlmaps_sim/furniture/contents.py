@@ -5,7 +5,7 @@ import numpy as np
 from avlmaps_sim.furniture.carcass import Room
 from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick
 from avlmaps_sim.materials import material
-from avlmaps_sim.mesh import Material, Mesh, Triple, triangles_of
+from avlmaps_sim.mesh import Material, Mesh, Meshes, Triple, triangles_of
 from avlmaps_sim.shapes import box, lathe, loft, rounded_rectangle, tube
 
 _BOOKS: tuple[Triple, ...] = (
@@ -105,10 +105,9 @@ def shelf_things(rng: np.random.Generator, room: Room, looks: list[Material], fu
     return [ornament(rng, x + draw(rng, -0.02, 0.03), y + draw(rng, -0.02, 0.02), c, tall) for y in places]
 
 
-def folded(rng: np.random.Generator, room: Room, looks: list[Material]) -> list[Mesh]:
+def folded(rng: np.random.Generator, room: Room, looks: list[Material]) -> Meshes:
     """Return piles of folded clothes on a shelf."""
     (a, b, c), (d, e, f) = room.low, room.high
-    parts = []
     for y in np.arange(b + 0.18, e - 0.16, 0.36).tolist():
         z = c
         for _ in range(count(rng, 0, 4)):
@@ -118,18 +117,15 @@ def folded(rng: np.random.Generator, room: Room, looks: list[Material]) -> list[
             deep, wide = min(0.32, (d - a) * 0.8), draw(rng, 0.24, 0.32)
             middle = np.array([(a + d) / 2, y + draw(rng, -0.015, 0.015)])
             flat = middle + rounded_rectangle(deep, wide, 0.04, 2)
-            parts.append(
-                loft([np.column_stack([flat, np.full(len(flat), h)]) for h in (z, z + high)], pick(rng, looks))
-            )
+            yield loft([np.column_stack([flat, np.full(len(flat), h)]) for h in (z, z + high)], pick(rng, looks))
             z += high
-    return parts
 
 
-def hanging(rng: np.random.Generator, room: Room, looks: list[Material], full: float = 0.7) -> list[Mesh]:
+def hanging(rng: np.random.Generator, room: Room, looks: list[Material], full: float = 0.7) -> Meshes:
     """Return clothes on hangers under a rail that runs along y near the top of a room."""
     (a, b, c), (d, e, f) = room.low, room.high
     x, z = (a + d) / 2, f - 0.06
-    parts = [tube([(x, b, z), (x, e, z)], 0.012, material("metal", rng), 6)]
+    yield tube([(x, b, z), (x, e, z)], 0.012, material("metal", rng), 6)
     y = b + 0.05
     while y < e - 0.05:
         if chance(rng, full):
@@ -141,9 +137,8 @@ def hanging(rng: np.random.Generator, room: Room, looks: list[Material], full: f
                 rings.append(
                     np.array([(x - w, y, z + dz), (x, y - thick, z + dz), (x + w, y, z + dz), (x, y + thick, z + dz)])
                 )
-            parts.append(loft(rings, pick(rng, looks)))
+            yield loft(rings, pick(rng, looks))
         y += draw(rng, 0.035, 0.09)
-    return parts
 
 
 def cloth_looks(rng: np.random.Generator, number: int = 6) -> list[Material]:

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from avlmaps_sim.furniture.catalogue import Piece, family
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, finished, pick
+from avlmaps_sim.furniture.catalogue import Parts, family
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, joined
 from avlmaps_sim.shapes import circle, cylinder, ellipsoid, lathe, slab, tube
@@ -34,23 +34,23 @@ def _cup(rng: np.random.Generator, handle: bool) -> Mesh:
 
 
 @family("cup", "mug")
-def _mug(rng: np.random.Generator) -> Piece:
-    return finished([_cup(rng, handle=True)])
+def _mug(rng: np.random.Generator) -> Parts:
+    return [_cup(rng, handle=True)]
 
 
 @family("cup", "with saucer")
-def _saucer_cup(rng: np.random.Generator) -> Piece:
+def _saucer_cup(rng: np.random.Generator) -> Parts:
     saucer = lathe([(0.03, 0.0), (0.045, 0.004), (0.075, 0.016), (0.04, 0.01)], material("ceramic", rng), sides=12)
-    return finished([saucer, _cup(rng, handle=True).moved(z=0.008)])
+    return [saucer, _cup(rng, handle=True).moved(z=0.008)]
 
 
 @family("cup", "tumbler")
-def _tumbler(rng: np.random.Generator) -> Piece:
-    return finished([_cup(rng, handle=False)])
+def _tumbler(rng: np.random.Generator) -> Parts:
+    return [_cup(rng, handle=False)]
 
 
 @family("cup", "wine glass", held_out=True)
-def _wine_glass(rng: np.random.Generator) -> Piece:
+def _wine_glass(rng: np.random.Generator) -> Parts:
     tall, wide, glass = draw(rng, 0.14, 0.24), draw(rng, 0.028, 0.045), material("glass", rng)
     rows = [
         (0.034, 0.0),
@@ -60,7 +60,7 @@ def _wine_glass(rng: np.random.Generator) -> Piece:
         (wide, tall * 0.72),
         (wide * 0.75, tall),
     ]
-    return finished([lathe(rows, glass, sides=10)])
+    return [lathe(rows, glass, sides=10)]
 
 
 def _hollow(rng: np.random.Generator, radius: float, tall: float, look: Material, foot: float = 0.45) -> Mesh:
@@ -81,13 +81,13 @@ def _bowl_look(rng: np.random.Generator) -> Material:
 
 
 @family("bowl", "empty")
-def _bowl(rng: np.random.Generator) -> Piece:
+def _bowl(rng: np.random.Generator) -> Parts:
     radius = draw(rng, 0.06, 0.17)
-    return finished([_hollow(rng, radius, radius * draw(rng, 0.4, 0.9), _bowl_look(rng), draw(rng, 0.35, 0.65))])
+    return [_hollow(rng, radius, radius * draw(rng, 0.4, 0.9), _bowl_look(rng), draw(rng, 0.35, 0.65))]
 
 
 @family("bowl", "of fruit")
-def _fruit_bowl(rng: np.random.Generator) -> Piece:
+def _fruit_bowl(rng: np.random.Generator) -> Parts:
     radius = draw(rng, 0.11, 0.18)
     tall, parts = radius * draw(rng, 0.35, 0.6), []
     hues = ((0.75, 0.15, 0.1), (0.9, 0.55, 0.1), (0.55, 0.7, 0.2), (0.9, 0.8, 0.25))
@@ -102,11 +102,11 @@ def _fruit_bowl(rng: np.random.Generator) -> Piece:
                 5,
             )
         )
-    return finished([_hollow(rng, radius, tall, _bowl_look(rng)), *parts])
+    return [_hollow(rng, radius, tall, _bowl_look(rng)), *parts]
 
 
 @family("bowl", "footed", held_out=True)
-def _footed_bowl(rng: np.random.Generator) -> Piece:
+def _footed_bowl(rng: np.random.Generator) -> Parts:
     radius, rise, look = draw(rng, 0.09, 0.16), draw(rng, 0.04, 0.12), _bowl_look(rng)
     rows = [
         (radius * 0.5, 0.0),
@@ -117,7 +117,7 @@ def _footed_bowl(rng: np.random.Generator) -> Piece:
         (radius * 0.9, rise + 0.065),
         (radius * 0.3, rise + 0.02),
     ]
-    return finished([lathe(rows, look, sides=12)])
+    return [lathe(rows, look, sides=12)]
 
 
 def _lid(radius: float, z: float, look: Material, knob: Material) -> list[Mesh]:
@@ -126,7 +126,7 @@ def _lid(radius: float, z: float, look: Material, knob: Material) -> list[Mesh]:
 
 
 @family("pot", "saucepan")
-def _saucepan(rng: np.random.Generator) -> Piece:
+def _saucepan(rng: np.random.Generator) -> Parts:
     radius, tall = draw(rng, 0.07, 0.13), draw(rng, 0.06, 0.15)
     look, grip = (
         material(pick(rng, ("metal", "black", "painted")), rng),
@@ -140,11 +140,11 @@ def _saucepan(rng: np.random.Generator) -> Piece:
         5,
     )
     parts.append(handle.turned(draw(rng, 0.0, 6.28)))
-    return finished([*parts, *_lid(radius, tall, look, grip)] if chance(rng, 0.4) else parts)
+    return [*parts, *_lid(radius, tall, look, grip)] if chance(rng, 0.4) else parts
 
 
 @family("pot", "stockpot")
-def _stockpot(rng: np.random.Generator) -> Piece:
+def _stockpot(rng: np.random.Generator) -> Parts:
     radius, tall = draw(rng, 0.09, 0.16), draw(rng, 0.09, 0.24)
     look, grip = (
         material(pick(rng, ("metal", "painted", "black", "ceramic")), rng),
@@ -165,20 +165,18 @@ def _stockpot(rng: np.random.Generator) -> Piece:
             (0.035, s * radius, tall * 0.75),
         ]
         parts.append(tube(path, 0.006, grip, 4))
-    return finished([*parts, *_lid(radius, tall, look, grip)] if chance(rng, 0.65) else parts)
+    return [*parts, *_lid(radius, tall, look, grip)] if chance(rng, 0.65) else parts
 
 
 @family("pot", "frying pan", held_out=True)
-def _frying_pan(rng: np.random.Generator) -> Piece:
+def _frying_pan(rng: np.random.Generator) -> Parts:
     radius, look, grip = (
         draw(rng, 0.1, 0.16),
         material(pick(rng, ("black", "metal")), rng),
         material(pick(rng, ("black", "wood")), rng),
     )
     rows = [(radius * 0.78, 0.0), (radius, 0.045), (radius * 0.97, 0.045), (radius * 0.75, 0.006)]
-    return finished(
-        [lathe(rows, look, sides=16), tube([(radius * 0.95, 0.0, 0.04), (radius + 0.18, 0.0, 0.075)], 0.01, grip, 5)]
-    )
+    return [lathe(rows, look, sides=16), tube([(radius * 0.95, 0.0, 0.04), (radius + 0.18, 0.0, 0.075)], 0.01, grip, 5)]
 
 
 def _cutlery(rng: np.random.Generator, y: float, look: Material) -> Mesh:
@@ -189,91 +187,81 @@ def _cutlery(rng: np.random.Generator, y: float, look: Material) -> Mesh:
 
 
 @family("tableware", "place setting")
-def _setting(rng: np.random.Generator) -> Piece:
+def _setting(rng: np.random.Generator) -> Parts:
     radius, look, metal = (
         draw(rng, 0.1, 0.15),
         material(pick(rng, ("ceramic", "ceramic", "painted", "stone")), rng),
         material("metal", rng),
     )
-    parts = [lathe([(radius * 0.55, 0.003), (radius, 0.022), (radius * 0.62, 0.01)], look, sides=16)]
+    yield lathe([(radius * 0.55, 0.003), (radius, 0.022), (radius * 0.62, 0.01)], look, sides=16)
     if chance(rng, 0.5):
-        parts.append(lathe([(radius * 0.4, 0.012), (radius * 0.72, 0.03), (radius * 0.45, 0.02)], look, sides=14))
-    parts += [_cutlery(rng, s * (radius + 0.025), metal) for s in (-1, 1)]
+        yield lathe([(radius * 0.4, 0.012), (radius * 0.72, 0.03), (radius * 0.45, 0.02)], look, sides=14)
+    yield from [_cutlery(rng, s * (radius + 0.025), metal) for s in (-1, 1)]
     if chance(rng, 0.5):
-        parts.append(slab(0.0, 0.0, 0.0, 0.3, 0.44, 0.003, material("fabric", rng)))
-    return finished(parts)
+        yield slab(0.0, 0.0, 0.0, 0.3, 0.44, 0.003, material("fabric", rng))
 
 
 @family("tableware", "stack of plates")
-def _plates(rng: np.random.Generator) -> Piece:
+def _plates(rng: np.random.Generator) -> Parts:
     radius, look, step = (
         draw(rng, 0.08, 0.145),
         material(pick(rng, ("ceramic", "painted", "stone")), rng),
         draw(rng, 0.008, 0.014),
     )
-    parts = [
+    return [
         lathe([(radius * 0.55, i * step), (radius, i * step + 0.016), (radius * 0.5, i * step + 0.008)], look, sides=12)
         for i in range(count(rng, 1, 5))
     ]
-    return finished(parts)
 
 
 @family("tableware", "cutlery jar")
-def _cutlery_jar(rng: np.random.Generator) -> Piece:
+def _cutlery_jar(rng: np.random.Generator) -> Parts:
     radius, tall = draw(rng, 0.04, 0.07), draw(rng, 0.1, 0.17)
     look = material(pick(rng, ("ceramic", "metal", "wood", "painted")), rng)
-    parts = [lathe([(radius, 0.0), (radius, tall), (radius * 0.9, tall), (radius * 0.88, 0.01)], look, sides=10)]
+    yield lathe([(radius, 0.0), (radius, tall), (radius * 0.9, tall), (radius * 0.88, 0.01)], look, sides=10)
     for _ in range(count(rng, 3, 6)):
         x, y = (rng.uniform(-1, 1, 2) * radius * 0.9).tolist()
         stick = material(pick(rng, ("wood", "metal", "plastic", "black")), rng)
         top = tall + draw(rng, 0.06, 0.16)
-        parts.append(tube([(-x * 0.4, -y * 0.4, 0.02), (x, y, top)], 0.004, stick, 3))
-        parts.append(ellipsoid((x * 1.1, y * 1.1, top), (0.008, 0.022, 0.035), stick, 5, 3))
-    return finished(parts)
+        yield tube([(-x * 0.4, -y * 0.4, 0.02), (x, y, top)], 0.004, stick, 3)
+        yield ellipsoid((x * 1.1, y * 1.1, top), (0.008, 0.022, 0.035), stick, 5, 3)
 
 
 @family("tableware", "teapot", held_out=True)
-def _teapot(rng: np.random.Generator) -> Piece:
+def _teapot(rng: np.random.Generator) -> Parts:
     r, look = draw(rng, 0.06, 0.09), _bowl_look(rng)
     tall = r * draw(rng, 1.2, 1.8)
-    parts = [
-        lathe(
-            [(r * 0.6, 0.0), (r, tall * 0.4), (r * 0.85, tall * 0.75), (r * 0.45, tall), (0.01, tall * 1.08)],
-            look,
-            sides=12,
-        )
-    ]
-    parts.append(
-        tube([(r * 0.9, 0.0, tall * 0.35), (r * 1.4, 0.0, tall * 0.6), (r * 1.7, 0.0, tall * 0.95)], r * 0.13, look, 5)
+    yield lathe(
+        [(r * 0.6, 0.0), (r, tall * 0.4), (r * 0.85, tall * 0.75), (r * 0.45, tall), (0.01, tall * 1.08)],
+        look,
+        sides=12,
     )
-    parts.append(
-        tube(
-            [
-                (-r * 0.85, 0.0, tall * 0.8),
-                (-r * 1.5, 0.0, tall * 0.8),
-                (-r * 1.5, 0.0, tall * 0.35),
-                (-r * 0.95, 0.0, tall * 0.3),
-            ],
-            r * 0.09,
-            look,
-            4,
-        )
+    yield tube(
+        [(r * 0.9, 0.0, tall * 0.35), (r * 1.4, 0.0, tall * 0.6), (r * 1.7, 0.0, tall * 0.95)], r * 0.13, look, 5
     )
-    return finished([*parts, ellipsoid((0.0, 0.0, tall * 1.12), (0.012, 0.012, 0.012), look, 6, 4)])
+    yield tube(
+        [
+            (-r * 0.85, 0.0, tall * 0.8),
+            (-r * 1.5, 0.0, tall * 0.8),
+            (-r * 1.5, 0.0, tall * 0.35),
+            (-r * 0.95, 0.0, tall * 0.3),
+        ],
+        r * 0.09,
+        look,
+        4,
+    )
+    yield ellipsoid((0.0, 0.0, tall * 1.12), (0.012, 0.012, 0.012), look, 6, 4)
 
 
 @family("tableware", "tray")
-def _tray(rng: np.random.Generator) -> Piece:
+def _tray(rng: np.random.Generator) -> Parts:
     long, wide, look = (
         draw(rng, 0.25, 0.36),
         draw(rng, 0.32, 0.5),
         material(pick(rng, ("wood", "metal", "painted", "plastic")), rng),
     )
-    parts = [slab(0.0, 0.0, 0.0, long, wide, 0.008, look)]
-    parts += [slab(s * long / 2, 0.0, 0.0, 0.01, wide, 0.04, look) for s in (-1, 1)]
-    parts += [slab(0.0, s * wide / 2, 0.0, long, 0.01, 0.045, look) for s in (-1, 1)]
+    yield slab(0.0, 0.0, 0.0, long, wide, 0.008, look)
+    yield from [slab(s * long / 2, 0.0, 0.0, 0.01, wide, 0.04, look) for s in (-1, 1)]
+    yield from [slab(0.0, s * wide / 2, 0.0, long, 0.01, 0.045, look) for s in (-1, 1)]
     for _ in range(count(rng, 1, 3)):
-        parts.append(
-            _cup(rng, chance(rng, 0.5)).moved(draw(rng, -0.3, 0.3) * long, draw(rng, -0.35, 0.35) * wide, 0.008)
-        )
-    return finished(parts)
+        yield _cup(rng, chance(rng, 0.5)).moved(draw(rng, -0.3, 0.3) * long, draw(rng, -0.35, 0.35) * wide, 0.008)

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from avlmaps_sim.furniture.catalogue import Families, Piece, family
-from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, finished, pick, rim
+from avlmaps_sim.furniture.catalogue import Families, Parts, Piece, family
+from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, pick, rim
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, joined, triangles_of
 from avlmaps_sim.shapes import circle, lathe, loft, prism, rounded_rectangle, sheet, slab, tube
@@ -53,35 +53,34 @@ def _frame_look(rng: np.random.Generator) -> Material:
 
 
 @family("picture", "wall framed")
-def _wall_framed(rng: np.random.Generator) -> Piece:
-    return finished([_framed(rng, *_format(rng, 0.22, 1.3), _frame_look(rng))])
+def _wall_framed(rng: np.random.Generator) -> Parts:
+    return [_framed(rng, *_format(rng, 0.22, 1.3), _frame_look(rng))]
 
 
 @family("picture", "wall ornate")
-def _wall_ornate(rng: np.random.Generator) -> Piece:
+def _wall_ornate(rng: np.random.Generator) -> Parts:
     gold = (draw(rng, 0.6, 0.8), draw(rng, 0.45, 0.6), draw(rng, 0.2, 0.35))
     look = material("metal", rng, gold) if chance(rng, 0.6) else material("wood", rng)
-    return finished([_framed(rng, *_format(rng, 0.4, 1.5), look, ornate=True)])
+    return [_framed(rng, *_format(rng, 0.4, 1.5), look, ornate=True)]
 
 
 @family("picture", "wall canvas")
-def _wall_canvas(rng: np.random.Generator) -> Piece:
+def _wall_canvas(rng: np.random.Generator) -> Parts:
     width, height = _format(rng, 0.3, 1.6)
     panels, gap, deep = pick(rng, (1, 1, 1, 2, 3, 3, 5)), draw(rng, 0.015, 0.06), draw(rng, 0.015, 0.04)
     if panels > 1:
         width, height = max(width, height) * draw(rng, 0.9, 1.3), min(width, height)
-    edge, step, parts = material("white", rng), width / panels, []
+    edge, step = material("white", rng), width / panels
     stagger = draw(rng, 0.0, 0.12) if panels > 1 else 0.0
     art = _art(rng)
     for number in range(panels):
         y, z = -width / 2 + number * step, stagger * (number % 2) * height
-        parts.append(slab(deep / 2, y + (step - gap) / 2, z, deep, step - gap, height, edge))
-        parts.append(_face(deep + 0.001, y, z, y + step - gap, z + height, art if chance(rng, 0.5) else _art(rng)))
-    return finished(parts)
+        yield slab(deep / 2, y + (step - gap) / 2, z, deep, step - gap, height, edge)
+        yield _face(deep + 0.001, y, z, y + step - gap, z + height, art if chance(rng, 0.5) else _art(rng))
 
 
 @family("picture", "wall poster")
-def _wall_poster(rng: np.random.Generator) -> Piece:
+def _wall_poster(rng: np.random.Generator) -> Parts:
     width = draw(rng, 0.28, 0.85)
     height, curl = width * pick(rng, (1.414, 1.5, 0.707, 1.33)), draw(rng, 0.0, 0.02)
     rows = np.linspace(0.0, 1.0, 4)
@@ -89,33 +88,30 @@ def _wall_poster(rng: np.random.Generator) -> Piece:
         np.stack([np.array([0.002 + curl * (2 * v - 1) ** 4, (u - 0.5) * width, v * height]) for v in rows])
         for u in (0.0, 1.0)
     ])  # fmt: skip
-    parts = [cloth(points, material("poster", rng), fill=True)]
+    yield cloth(points, material("poster", rng), fill=True)
     if chance(rng, 0.35):  # hangs between two bars
         bar = material(pick(rng, ("wood", "black")), rng)
-        parts += [slab(0.009, 0.0, z, 0.018, width + 0.01, 0.022, bar) for z in (-0.01, height - 0.012)]
-        parts.append(tube([(0.008, -width * 0.4, height), (0.004, 0.0, height + width * 0.25),
-                           (0.008, width * 0.4, height)], 0.002, bar, 4))  # fmt: skip
-    return finished(parts)
+        yield from [slab(0.009, 0.0, z, 0.018, width + 0.01, 0.022, bar) for z in (-0.01, height - 0.012)]
+        yield tube([(0.008, -width * 0.4, height), (0.004, 0.0, height + width * 0.25), (0.008, width * 0.4, height)],
+                   0.002, bar, 4)  # fmt: skip
 
 
 @family("picture", "wall set")
-def _wall_set(rng: np.random.Generator) -> Piece:
+def _wall_set(rng: np.random.Generator) -> Parts:
     look, same = _frame_look(rng), chance(rng, 0.6)
     columns, rows = count(rng, 1, 4), count(rng, 1, 3)
     rows = 2 if columns == 1 and rows == 1 else rows
     wide, tall, gap = draw(rng, 0.18, 0.42), draw(rng, 0.18, 0.5), draw(rng, 0.03, 0.1)
-    parts = []
     for column in range(columns):
         for row in range(rows):
             share = (1.0, 1.0) if same else (draw(rng, 0.55, 1.0), draw(rng, 0.55, 1.0))
             one = _framed(rng, wide * share[0], tall * share[1], look if same else _frame_look(rng))
             slack = (draw(rng, -0.5, 0.5) * wide * (1 - share[0]), draw(rng, 0.0, 1.0) * tall * (1 - share[1]))
-            parts.append(one.moved(0.0, column * (wide + gap) + slack[0], row * (tall + gap) + slack[1]))
-    return finished(parts)
+            yield one.moved(0.0, column * (wide + gap) + slack[0], row * (tall + gap) + slack[1])
 
 
 @family("picture", "wall oval", held_out=True)
-def _wall_oval(rng: np.random.Generator) -> Piece:
+def _wall_oval(rng: np.random.Generator) -> Parts:
     wide = draw(rng, 0.1, 0.35)
     tall, bar, look = wide * draw(rng, 1.0, 1.4), draw(rng, 0.02, 0.06), _frame_look(rng)
     sides = 28
@@ -127,11 +123,11 @@ def _wall_oval(rng: np.random.Generator) -> Piece:
     vertex = np.column_stack([np.full(sides, 0.01), flat * (wide, tall)])
     fan = np.stack([np.zeros(sides - 2, int), np.arange(1, sides - 1), np.arange(2, sides)], axis=1)
     uv = (flat * (0.5, -0.5) + 0.5)[fan]
-    return finished([loft(rings, look, capped=False), triangles_of(vertex, fan, _art(rng), uv)])
+    return [loft(rings, look, capped=False), triangles_of(vertex, fan, _art(rng), uv)]
 
 
 @family("picture", "wall hanging")
-def _wall_hanging(rng: np.random.Generator) -> Piece:
+def _wall_hanging(rng: np.random.Generator) -> Parts:
     width, height = draw(rng, 0.3, 1.3), draw(rng, 0.5, 1.6)
     rod, look = material(pick(rng, ("wood", "metal")), rng), material(pick(rng, ("rug", "painting")), rng)
     wave, phase = draw(rng, 0.003, 0.02), draw(rng, 0.0, 6.0)
@@ -141,34 +137,33 @@ def _wall_hanging(rng: np.random.Generator) -> Piece:
           height * v + pointed * (1 - v) * abs(2 * u - 1)) for v in np.linspace(0.0, 1.0, 4)]
         for u in np.linspace(0.0, 1.0, 9)
     ])  # fmt: skip
-    parts = [cloth(points, look, fill=True)]
-    parts.append(tube([(0.03, -width * 0.54, height), (0.03, width * 0.54, height)], 0.012, rod, 8))
+    yield cloth(points, look, fill=True)
+    yield tube([(0.03, -width * 0.54, height), (0.03, width * 0.54, height)], 0.012, rod, 8)
     if chance(rng, 0.6):
         for y in np.linspace(-0.48, 0.48, 14).tolist():
             low = pointed * abs(2 * y)
-            parts.append(slab(0.03, y * width, low - 0.1, 0.006, width * 0.03, 0.1, look))
-    return finished([*parts, *(slab(0.015, s * width * 0.5, height - 0.01, 0.03, 0.01, 0.02, rod) for s in (-1, 1))])
+            yield slab(0.03, y * width, low - 0.1, 0.006, width * 0.03, 0.1, look)
+    yield from (slab(0.015, s * width * 0.5, height - 0.01, 0.03, 0.01, 0.02, rod) for s in (-1, 1))
 
 
 @family("picture", "leaning")
-def _leaning(rng: np.random.Generator) -> Piece:
-    number, parts, x = count(rng, 1, 3), [], 0.0
+def _leaning(rng: np.random.Generator) -> Parts:
+    number, x = count(rng, 1, 3), 0.0
     for _ in range(number):
         lean = draw(rng, 0.08, 0.25)
         width, height = _format(rng, 0.35, 1.2)
         one = _framed(rng, width, height, _frame_look(rng), ornate=chance(rng, 0.2))
-        parts.append(one.tilted("y", -lean).moved(x + float(np.sin(lean)) * height, draw(rng, -0.3, 0.3)))
+        yield one.tilted("y", -lean).moved(x + float(np.sin(lean)) * height, draw(rng, -0.3, 0.3))
         x += 0.06
-    return finished(parts)
 
 
 @family("picture", "photo frame")
-def _photo_frame(rng: np.random.Generator) -> Piece:
+def _photo_frame(rng: np.random.Generator) -> Parts:
     width, height = _format(rng, 0.1, 0.3)
     lean, look = draw(rng, 0.12, 0.3), _frame_look(rng)
     front = _framed(rng, width, height, look).tilted("y", -lean)
     prop = slab(0.0, 0.0, 0.0, 0.005, width * 0.3, height * 0.8, material("black", rng)).tilted("y", lean * 0.9)
-    return finished([front.moved(z=-float(front.low[2])), prop.moved(-float(np.sin(lean)) * height * 1.55)])
+    return [front.moved(z=-float(front.low[2])), prop.moved(-float(np.sin(lean)) * height * 1.55)]
 
 
 def _pile(outline: np.ndarray, thick: float, look: Material) -> list[Mesh]:
@@ -222,7 +217,7 @@ def carpet(rng: np.random.Generator, length_m: float, width_m: float, shape: str
 
 def _register_carpet(shape: str, held_out: bool) -> None:
     @family("carpet", shape, held_out)
-    def recipe(rng: np.random.Generator) -> Piece:
+    def recipe(rng: np.random.Generator) -> Parts:
         length = draw(rng, 1.2, 3.4)
         width = length * draw(rng, 0.5, 0.85)
         if shape in ("round", "hide"):
@@ -231,7 +226,7 @@ def _register_carpet(shape: str, held_out: bool) -> None:
             length, width = draw(rng, 1.6, 4.0), draw(rng, 0.5, 0.9)
         elif shape == "doormat":
             length, width = draw(rng, 0.35, 0.55), draw(rng, 0.55, 1.0)
-        return finished([carpet(rng, length, width, shape).mesh])
+        return [carpet(rng, length, width, shape).mesh]
 
 
 for _which, _names in CARPET_SHAPES.items():
@@ -261,35 +256,34 @@ def _pillow(
 
 
 @family("cushion", "square")
-def _square_cushion(rng: np.random.Generator) -> Piece:
+def _square_cushion(rng: np.random.Generator) -> Parts:
     side, kind = draw(rng, 0.35, 0.65), pick(rng, ("fabric", "fabric", "fabric", "rug", "leather"))
     other = side * pick(rng, (1.0, 1.0, draw(rng, 0.55, 0.8)))
     look, corner = material(kind, rng), draw(rng, 3.0, 7.0)
     one = _pillow(other, side, draw(rng, 0.09, 0.2), look, corner, draw(rng, 0.0, 0.5), fill=kind == "rug")
     lean = draw(rng, 0.9, 1.4) if chance(rng, 0.5) else 0.0  # upright against a back, or lying
-    return finished([one.tilted("y", lean)])
+    return [one.tilted("y", lean)]
 
 
 @family("cushion", "round")
-def _round_cushion(rng: np.random.Generator) -> Piece:
+def _round_cushion(rng: np.random.Generator) -> Parts:
     side = draw(rng, 0.3, 0.55)
     look = material(pick(rng, ("fabric", "leather")), rng)
-    return finished([_pillow(side, side, draw(rng, 0.08, 0.18), look, 2.0, draw(rng, 0.0, 0.7))])
+    return [_pillow(side, side, draw(rng, 0.08, 0.18), look, 2.0, draw(rng, 0.0, 0.7))]
 
 
 @family("cushion", "bolster", held_out=True)
-def _bolster(rng: np.random.Generator) -> Piece:
+def _bolster(rng: np.random.Generator) -> Parts:
     radius, long, look = draw(rng, 0.07, 0.12), draw(rng, 0.35, 0.9), material("fabric", rng)
     rows = [(radius * 0.5, -0.01), (radius * 0.95, 0.0), (radius, 0.03), (radius, long - 0.03),
             (radius * 0.95, long), (radius * 0.5, long + 0.01)]  # fmt: skip
-    return finished([lathe(rows, look, sides=14).tilted("x", np.pi / 2)])
+    return [lathe(rows, look, sides=14).tilted("x", np.pi / 2)]
 
 
 @family("cushion", "stack")
-def _cushion_stack(rng: np.random.Generator) -> Piece:
-    side, thick, parts, z = draw(rng, 0.38, 0.6), draw(rng, 0.08, 0.16), [], 0.0
+def _cushion_stack(rng: np.random.Generator) -> Parts:
+    side, thick, z = draw(rng, 0.38, 0.6), draw(rng, 0.08, 0.16), 0.0
     for _ in range(count(rng, 2, 3)):
         one = _pillow(side, side * draw(rng, 0.8, 1.0), thick, material("fabric", rng), draw(rng, 3.5, 7.0))
-        parts.append(one.turned(draw(rng, -0.3, 0.3)).moved(z=z))
+        yield one.turned(draw(rng, -0.3, 0.3)).moved(z=z)
         z += thick * 0.8
-    return finished(parts)

@@ -3,8 +3,8 @@
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps_sim.furniture.catalogue import Families, Piece, family
-from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, finished, pick
+from avlmaps_sim.furniture.catalogue import Families, Parts, Piece, family
+from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, pick
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, joined
 from avlmaps_sim.shapes import box, ellipsoid, rounded_box, sheet, slab, tube
@@ -140,11 +140,11 @@ def curtain(rng: np.random.Generator, width_m: float, height_m: float, which: Fa
 
 def _register_curtain(style: str, held_out: bool) -> None:
     @family("curtain", style, held_out)
-    def recipe(rng: np.random.Generator) -> Piece:
+    def recipe(rng: np.random.Generator) -> Parts:
         short = style == "wall cafe" or chance(rng, 0.25)
         height = draw(rng, 0.7, 1.6) if short else draw(rng, 2.0, 2.7)
         width = draw(rng, 0.6, 1.4) if style == "wall one side" else draw(rng, 0.9, 3.2)
-        return finished([curtain(rng, width, height, style=style).mesh])
+        return [curtain(rng, width, height, style=style).mesh]
 
 
 for _which, _names in CURTAIN_STYLES.items():
@@ -158,7 +158,7 @@ def _measures(rng: np.random.Generator) -> tuple[float, float]:
 
 
 @family("blinds", "wall venetian")
-def _venetian(rng: np.random.Generator) -> Piece:
+def _venetian(rng: np.random.Generator) -> Parts:
     width, height = _measures(rng)
     look, deep = material(pick(rng, ("white", "white", "wood", "metal", "painted")), rng), draw(rng, 0.025, 0.05)
     tilt, shut = draw(rng, -1.2, 1.2), draw(rng, 0.3, 1.0)
@@ -167,40 +167,36 @@ def _venetian(rng: np.random.Generator) -> Piece:
     low = height - slats * step
     across, rise = deep * float(np.cos(tilt)), deep * float(np.sin(tilt))
     x = deep / 2 + 0.015
-    parts = [
-        sheet(
+    for i in range(slats):
+        yield sheet(
             (x - across / 2, -width / 2, low + (i + 0.5) * step - rise / 2),
             (0.0, width, 0.0),
             (across, 0.0, rise),
             look,
         )
-        for i in range(slats)
-    ]
-    parts.append(box((0.0, -width / 2, height), (2 * x, width / 2, height + 0.05), look))
-    parts.append(slab(x, 0.0, low - 0.015, deep, width, 0.02, look))
-    parts += [slab(x, s * width * 0.36, low, 0.004, 0.012, height - low, look) for s in (-1, 1)]
-    return finished(parts)
+    yield box((0.0, -width / 2, height), (2 * x, width / 2, height + 0.05), look)
+    yield slab(x, 0.0, low - 0.015, deep, width, 0.02, look)
+    yield from [slab(x, s * width * 0.36, low, 0.004, 0.012, height - low, look) for s in (-1, 1)]
 
 
 @family("blinds", "wall roller")
-def _roller(rng: np.random.Generator) -> Piece:
+def _roller(rng: np.random.Generator) -> Parts:
     width, height = _measures(rng)
     look = material(pick(rng, ("fabric", "curtain", "paper", "white")), rng)
     radius, shut = draw(rng, 0.018, 0.035), draw(rng, 0.25, 1.0)
     hung = height * shut
     x = radius + 0.01
-    parts = [tube([(x, -width / 2, 0.0), (x, width / 2, 0.0)], radius, look, 10)]
-    parts.append(sheet((x + radius, -width / 2, -hung), (0.0, width, 0.0), (0.0, 0.0, hung), look))
-    parts.append(slab(x + radius, 0.0, -hung - 0.015, 0.012, width, 0.025, material("white", rng)))
+    yield tube([(x, -width / 2, 0.0), (x, width / 2, 0.0)], radius, look, 10)
+    yield sheet((x + radius, -width / 2, -hung), (0.0, width, 0.0), (0.0, 0.0, hung), look)
+    yield slab(x + radius, 0.0, -hung - 0.015, 0.012, width, 0.025, material("white", rng))
     cord = material("white", rng)
-    parts.append(slab(x, width / 2 + 0.01, -hung * 0.7, 0.004, 0.008, hung * 0.7, cord))
-    parts += [box((0.0, s * (width / 2 + 0.008) - 0.006, -0.04), (2 * x, s * (width / 2 + 0.008) + 0.006, 0.04), cord)
-              for s in (-1, 1)]  # fmt: skip
-    return finished(parts)
+    yield slab(x, width / 2 + 0.01, -hung * 0.7, 0.004, 0.008, hung * 0.7, cord)
+    yield from [box((0.0, s * (width / 2 + 0.008) - 0.006, -0.04), (2 * x, s * (width / 2 + 0.008) + 0.006, 0.04), cord)
+                for s in (-1, 1)]  # fmt: skip
 
 
 @family("blinds", "wall roman")
-def _roman(rng: np.random.Generator) -> Piece:
+def _roman(rng: np.random.Generator) -> Parts:
     width, height = _measures(rng)
     look, folds = _textile(rng), count(rng, 3, 7)
     shut = draw(rng, 0.35, 1.0)
@@ -211,13 +207,14 @@ def _roman(rng: np.random.Generator) -> Piece:
         rows += [(0.02, base), (0.02 + sag, base + step * 0.12), (0.02 + sag * 0.8, base + step * 0.35)]
     rows.append((0.02, folds * step))
     points = np.array([[(x, y, z) for x, z in rows] for y in (-width / 2, width / 2)])
-    return finished(
-        [cloth(points, look), box((0.0, -width / 2, folds * step - 0.02), (0.04, width / 2, folds * step + 0.03), look)]
-    )
+    return [
+        cloth(points, look),
+        box((0.0, -width / 2, folds * step - 0.02), (0.04, width / 2, folds * step + 0.03), look),
+    ]
 
 
 @family("blinds", "wall vertical", held_out=True)
-def _vertical(rng: np.random.Generator) -> Piece:
+def _vertical(rng: np.random.Generator) -> Parts:
     width, height = draw(rng, 0.9, 2.4), draw(rng, 1.2, 2.4)
     look, wide, tilt = (
         material(pick(rng, ("white", "fabric", "paper")), rng),
@@ -226,20 +223,21 @@ def _vertical(rng: np.random.Generator) -> Piece:
     )
     slats = int(width / (wide * 0.9))
     along, across = wide * float(np.cos(tilt)), wide * float(np.sin(tilt))
-    parts = [
+    yield from [
         sheet((0.07 - across / 2, -width / 2 + i * wide * 0.9, 0.0), (across, along, 0.0), (0.0, 0.0, height), look)
         for i in range(slats)
     ]
-    return finished([*parts, box((0.0, -width / 2, height), (0.09, width / 2, height + 0.05), material("white", rng))])
+    yield box((0.0, -width / 2, height), (0.09, width / 2, height + 0.05), material("white", rng))
 
 
 @family("blinds", "wall pleated")
-def _pleated(rng: np.random.Generator) -> Piece:
+def _pleated(rng: np.random.Generator) -> Parts:
     width, height = _measures(rng)
     look, folds = material("fabric", rng), count(rng, 14, 40)
     hung = height * draw(rng, 0.3, 1.0)
     rows = [(0.015 + 0.018 * (i % 2), hung * i / folds) for i in range(folds + 1)]
     points = np.array([[(x, y, z) for x, z in rows] for y in (-width / 2, width / 2)])
     frame = material("white", rng)
-    parts = [cloth(points, look), rounded_box((0.0, -width / 2, hung), (0.045, width / 2, hung + 0.03), 0.005, frame)]
-    return finished([*parts, slab(0.024, 0.0, -0.012, 0.03, width, 0.014, frame)])
+    yield cloth(points, look)
+    yield rounded_box((0.0, -width / 2, hung), (0.045, width / 2, hung + 0.03), 0.005, frame)
+    yield slab(0.024, 0.0, -0.012, 0.03, width, 0.014, frame)

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from avlmaps_sim.furniture.catalogue import Piece, family
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, finished, pick, strut
+from avlmaps_sim.furniture.catalogue import Parts, family
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick, strut
 from avlmaps_sim.furniture.sports import barbell, crank, hoop
 from avlmaps_sim.materials import material
-from avlmaps_sim.mesh import Material, Mesh, joined
+from avlmaps_sim.mesh import Material, Mesh, Meshes, joined
 from avlmaps_sim.shapes import box, cylinder, ellipsoid, lathe, rounded_box, slab, tube
 
 
@@ -30,32 +30,27 @@ def _console(rng: np.random.Generator, x: float, z: float, look: Material) -> li
 
 
 @family("fitness equipment", "treadmill")
-def _treadmill(rng: np.random.Generator) -> Piece:
+def _treadmill(rng: np.random.Generator) -> Parts:
     frame, pad, accent = _looks(rng)
     long, wide, deck = draw(rng, 1.35, 2.0), draw(rng, 0.6, 0.85), draw(rng, 0.1, 0.22)
     tall, lean, belt = draw(rng, 1.05, 1.4), draw(rng, 0.0, 0.35), wide * draw(rng, 0.6, 0.72)
     front = -long / 2 + draw(rng, 0.1, 0.3)  # the runner looks along -x; one sees the belt from +x
-    parts = [slab(0.05, 0.0, deck * 0.35, long - 0.1, belt, deck * 0.62, pad)]
-    parts += [slab(0.0, s * (belt + wide) / 4, 0.02, long, (wide - belt) / 2, deck, frame) for s in (-1, 1)]
+    yield slab(0.05, 0.0, deck * 0.35, long - 0.1, belt, deck * 0.62, pad)
+    yield from [slab(0.0, s * (belt + wide) / 4, 0.02, long, (wide - belt) / 2, deck, frame) for s in (-1, 1)]
     hood = rounded_box(
         (-long / 2 - 0.05, -wide / 2, 0.02), (front + 0.1, wide / 2, deck * draw(rng, 1.5, 2.2)), 0.04, accent
     )
-    parts.append(hood)
+    yield hood
     top = front + lean * 0.4
     for s in (-1, 1):
         y = s * (wide / 2 - 0.03)
-        parts.append(strut((front, y, 0.05), (top, y, tall), 0.05, draw(rng, 0.06, 0.1), frame))
+        yield strut((front, y, 0.05), (top, y, tall), 0.05, draw(rng, 0.06, 0.1), frame)
         reach = draw(rng, 0.3, 0.7)
-        parts.append(
-            tube(
-                [(top, y, tall - 0.12), (top + reach, y, tall - 0.16), (top + reach + 0.03, y, tall - 0.2)],
-                0.02,
-                pad,
-                6,
-            )
+        yield tube(
+            [(top, y, tall - 0.12), (top + reach, y, tall - 0.16), (top + reach + 0.03, y, tall - 0.2)], 0.02, pad, 6
         )
-    parts.append(box((top - 0.04, -wide / 2, tall - 0.14), (top + 0.03, wide / 2, tall - 0.04), frame))
-    return finished([*parts, *_console(rng, top, tall - 0.05, accent)])
+    yield box((top - 0.04, -wide / 2, tall - 0.14), (top + 0.03, wide / 2, tall - 0.04), frame)
+    yield from _console(rng, top, tall - 0.05, accent)
 
 
 def _seat(rng: np.random.Generator, x: float, z: float, pad: Material) -> Mesh:
@@ -69,80 +64,72 @@ def _seat(rng: np.random.Generator, x: float, z: float, pad: Material) -> Mesh:
 
 
 @family("fitness equipment", "exercise bike")
-def _exercise_bike(rng: np.random.Generator) -> Piece:
+def _exercise_bike(rng: np.random.Generator) -> Parts:
     frame, pad, accent = _looks(rng)
     long, seat, bar = draw(rng, 0.8, 1.15), draw(rng, 0.8, 1.05), draw(rng, 0.95, 1.25)
     spin, wheel = chance(rng, 0.5), draw(rng, 0.17, 0.25)
     wx, wz = long * 0.28, wheel + 0.1
-    parts = [slab(s * long / 2, 0.0, 0.0, 0.07, draw(rng, 0.42, 0.55), 0.06, frame) for s in (-1, 1)]
-    parts.append(strut((-long / 2, 0.0, 0.05), (long / 2, 0.0, 0.07), 0.06, 0.06, frame))
+    yield from [slab(s * long / 2, 0.0, 0.0, 0.07, draw(rng, 0.42, 0.55), 0.06, frame) for s in (-1, 1)]
+    yield strut((-long / 2, 0.0, 0.05), (long / 2, 0.0, 0.07), 0.06, 0.06, frame)
     axle = (0.02, 0.0, draw(rng, 0.3, 0.36))
-    parts.append(strut((axle[0], 0.0, 0.06), (-long * 0.22, 0.0, seat - 0.05), 0.05, 0.05, frame))
-    parts.append(strut((axle[0], 0.0, axle[2]), (wx * 1.05, 0.0, bar - 0.1), 0.06, 0.06, frame))
+    yield strut((axle[0], 0.0, 0.06), (-long * 0.22, 0.0, seat - 0.05), 0.05, 0.05, frame)
+    yield strut((axle[0], 0.0, axle[2]), (wx * 1.05, 0.0, bar - 0.1), 0.06, 0.06, frame)
     if spin:
         disc = cylinder(0.0, 0.0, -0.02, wheel, 0.04, material("metal", rng), 20).tilted("x", np.pi / 2)
-        parts += [
-            disc.moved(wx, 0.0, wz),
-            strut((wx, 0.05, wz), (wx, 0.05, bar - 0.2), 0.03, 0.04, frame),
-            hoop((wx, 0.0, wz), wheel, 0.014, pad),
-        ]
+        yield disc.moved(wx, 0.0, wz)
+        yield strut((wx, 0.05, wz), (wx, 0.05, bar - 0.2), 0.03, 0.04, frame)
+        yield hoop((wx, 0.0, wz), wheel, 0.014, pad)
     else:
         hull = rounded_box((-0.12, -0.1, 0.1), (wx + wheel, 0.1, 0.1 + wheel * draw(rng, 1.8, 2.5)), 0.08, accent)
-        parts.append(hull)
-    parts += crank(axle[0], axle[2], 0.17, draw(rng, 0.0, 6.28), 0.12, material("metal", rng), pad)
-    parts.append(_seat(rng, -long * 0.22, seat, pad))
+        yield hull
+    yield from crank(axle[0], axle[2], 0.17, draw(rng, 0.0, 6.28), 0.12, material("metal", rng), pad)
+    yield _seat(rng, -long * 0.22, seat, pad)
     top = (wx * 1.05, 0.0, bar - 0.1)
     for s in (-1, 1):
-        parts.append(
-            tube([top, (top[0], s * 0.2, bar - 0.05), (top[0] - draw(rng, -0.2, 0.22), s * 0.24, bar)], 0.016, pad, 6)
-        )
-    return finished([*parts, *_console(rng, top[0], bar - 0.05, accent)])
+        yield tube([top, (top[0], s * 0.2, bar - 0.05), (top[0] - draw(rng, -0.2, 0.22), s * 0.24, bar)], 0.016, pad, 6)
+    yield from _console(rng, top[0], bar - 0.05, accent)
 
 
 @family("fitness equipment", "recumbent bike", held_out=True)
-def _recumbent(rng: np.random.Generator) -> Piece:
+def _recumbent(rng: np.random.Generator) -> Parts:
     frame, pad, accent = _looks(rng)
     long, seat = draw(rng, 1.35, 1.65), draw(rng, 0.45, 0.6)
-    parts = [strut((-long / 2, 0.0, 0.07), (long / 2, 0.0, 0.07), 0.1, 0.08, frame)]
-    parts += [slab(s * long / 2, 0.0, 0.0, 0.08, 0.55, 0.07, frame) for s in (-1, 1)]
+    yield strut((-long / 2, 0.0, 0.07), (long / 2, 0.0, 0.07), 0.1, 0.08, frame)
+    yield from [slab(s * long / 2, 0.0, 0.0, 0.08, 0.55, 0.07, frame) for s in (-1, 1)]
     x = -long * 0.3
-    parts += [
-        slab(x, 0.0, 0.1, 0.12, 0.12, seat - 0.1, frame),
-        rounded_box((x - 0.2, -0.22, seat), (x + 0.25, 0.22, seat + 0.09), 0.04, pad),
-    ]
-    parts.append(
+    yield slab(x, 0.0, 0.1, 0.12, 0.12, seat - 0.1, frame)
+    yield rounded_box((x - 0.2, -0.22, seat), (x + 0.25, 0.22, seat + 0.09), 0.04, pad)
+    yield (
         rounded_box((-0.05, -0.21, 0.0), (0.05, 0.21, 0.55), 0.04, pad)
         .tilted("y", -0.25)
         .moved(x - 0.24, 0.0, seat + 0.08)
     )
-    parts.append(rounded_box((long * 0.14, -0.12, 0.1), (long * 0.48, 0.12, 0.62), 0.09, accent))
-    parts += crank(long * 0.28, 0.42, 0.16, draw(rng, 0.0, 6.28), 0.15, material("metal", rng), pad)
-    parts.append(strut((long * 0.35, 0.0, 0.6), (long * 0.2, 0.0, 1.15), 0.06, 0.06, frame))
-    parts += [
-        tube(
+    yield rounded_box((long * 0.14, -0.12, 0.1), (long * 0.48, 0.12, 0.62), 0.09, accent)
+    yield from crank(long * 0.28, 0.42, 0.16, draw(rng, 0.0, 6.28), 0.15, material("metal", rng), pad)
+    yield strut((long * 0.35, 0.0, 0.6), (long * 0.2, 0.0, 1.15), 0.06, 0.06, frame)
+    for s in (-1, 1):
+        yield tube(
             [(x + 0.05, s * 0.24, seat + 0.02), (x + 0.2, s * 0.3, seat + 0.2), (x + 0.26, s * 0.3, seat + 0.24)],
             0.016,
             pad,
             5,
         )
-        for s in (-1, 1)
-    ]
     console = [part.turned(np.pi) for part in _console(rng, 0.0, 0.0, accent)]
-    return finished([*parts, *(part.moved(long * 0.2, 0.0, 1.12) for part in console)])
+    yield from (part.moved(long * 0.2, 0.0, 1.12) for part in console)
 
 
 @family("fitness equipment", "elliptical")
-def _elliptical(rng: np.random.Generator) -> Piece:
+def _elliptical(rng: np.random.Generator) -> Parts:
     frame, pad, accent = _looks(rng)
     long, tall, wheel = draw(rng, 1.2, 1.8), draw(rng, 1.45, 1.75), draw(rng, 0.22, 0.32)
     rear = chance(rng, 0.5)
     mast = long * 0.22
     wx = -long * 0.3 if rear else long * 0.35
-    parts = [slab(s * long / 2, 0.0, 0.0, 0.08, 0.55, 0.06, frame) for s in (-1, 1)]
-    parts.append(strut((-long / 2, 0.0, 0.05), (long / 2, 0.0, 0.06), 0.08, 0.06, frame))
+    yield from [slab(s * long / 2, 0.0, 0.0, 0.08, 0.55, 0.06, frame) for s in (-1, 1)]
+    yield strut((-long / 2, 0.0, 0.05), (long / 2, 0.0, 0.06), 0.08, 0.06, frame)
     hull = lathe([(wheel * 0.9, -0.09), (wheel, -0.05), (wheel, 0.05), (wheel * 0.9, 0.09)], accent, sides=20)
-    parts.append(hull.tilted("x", np.pi / 2).moved(wx, 0.0, wheel + 0.08))
-    parts.append(strut((mast, 0.0, 0.05), (mast - 0.06, 0.0, tall - 0.35), 0.07, 0.08, frame))
+    yield hull.tilted("x", np.pi / 2).moved(wx, 0.0, wheel + 0.08)
+    yield strut((mast, 0.0, 0.05), (mast - 0.06, 0.0, tall - 0.35), 0.07, 0.08, frame)
     turn = draw(rng, 0.0, 6.28)
     for s in (-1, 1):
         y, lift = s * 0.17, s * 0.13 * float(np.sin(turn))
@@ -153,161 +140,139 @@ def _elliptical(rng: np.random.Generator) -> Piece:
             (mast + swing, y + s * 0.05, 0.3 + lift * 0.3),
             (mast - 0.12 - swing, s * 0.26, tall),
         )
-        parts += [tube([low, pivot, (mast - 0.05 - swing * 0.5, s * 0.24, tall * 0.8), grip], 0.018, frame, 6)]
-        parts.append(tube([(mast - 0.05 - swing * 0.7, s * 0.25, tall * 0.88), grip], 0.024, pad, 6))
-        parts.append(strut(crank, low, 0.04, 0.05, frame))
+        yield tube([low, pivot, (mast - 0.05 - swing * 0.5, s * 0.24, tall * 0.8), grip], 0.018, frame, 6)
+        yield tube([(mast - 0.05 - swing * 0.7, s * 0.25, tall * 0.88), grip], 0.024, pad, 6)
+        yield strut(crank, low, 0.04, 0.05, frame)
         middle = tuple((a + b) / 2 for a, b in zip(crank, low, strict=True))
-        parts.append(slab(middle[0], y, middle[2] + 0.03, draw(rng, 0.32, 0.4), 0.14, 0.045, pad))
-    parts.append(tube([(mast, -0.2, tall * 0.58), (mast, 0.2, tall * 0.58)], 0.02, frame, 6))
-    return finished([*parts, *_console(rng, mast - 0.07, tall - 0.36, accent)])
+        yield slab(middle[0], y, middle[2] + 0.03, draw(rng, 0.32, 0.4), 0.14, 0.045, pad)
+    yield tube([(mast, -0.2, tall * 0.58), (mast, 0.2, tall * 0.58)], 0.02, frame, 6)
+    yield from _console(rng, mast - 0.07, tall - 0.36, accent)
 
 
 @family("fitness equipment", "weight bench")
-def _weight_bench(rng: np.random.Generator) -> Piece:
+def _weight_bench(rng: np.random.Generator) -> Parts:
     frame, pad, _ = _looks(rng)
     long, seat = draw(rng, 1.05, 1.35), draw(rng, 0.4, 0.5)
     incline = draw(rng, 0.3, 1.1) if chance(rng, 0.5) else 0.0
     rack = chance(rng, 0.65)
-    parts = [strut((-long / 2, 0.0, seat - 0.06), (long / 2, 0.0, seat - 0.06), 0.06, 0.05, frame)]
+    yield strut((-long / 2, 0.0, seat - 0.06), (long / 2, 0.0, seat - 0.06), 0.06, 0.05, frame)
     for x in (-long * 0.42, long * 0.42):
-        parts += [
-            slab(x, 0.0, 0.0, 0.06, draw(rng, 0.35, 0.55), 0.05, frame),
-            slab(x, 0.0, 0.0, 0.06, 0.06, seat - 0.05, frame),
-        ]
+        yield slab(x, 0.0, 0.0, 0.06, draw(rng, 0.35, 0.55), 0.05, frame)
+        yield slab(x, 0.0, 0.0, 0.06, 0.06, seat - 0.05, frame)
     back = rounded_box((-long * 0.62, -0.14, 0.0), (0.0, 0.14, 0.07), 0.025, pad).tilted("y", incline)
-    parts += [
-        back.moved(long * 0.12, 0.0, seat - 0.02),
-        rounded_box((long * 0.14, -0.16, seat - 0.03), (long / 2, 0.16, seat + 0.04), 0.025, pad),
-    ]
+    yield back.moved(long * 0.12, 0.0, seat - 0.02)
+    yield rounded_box((long * 0.14, -0.16, seat - 0.03), (long / 2, 0.16, seat + 0.04), 0.025, pad)
     if rack:
         height, x = draw(rng, 0.9, 1.25), -long * 0.45
         for s in (-1, 1):
             y = s * draw(rng, 0.3, 0.55)
-            parts += [
-                slab(x, y, 0.0, 0.06, 0.06, height, frame),
-                slab(x, y, 0.0, 0.5, 0.06, 0.05, frame),
-                slab(x + 0.06, y, height - 0.08, 0.08, 0.06, 0.03, frame),
-            ]
-        parts.append(strut((x, -0.4, 0.12), (x, 0.4, 0.12), 0.05, 0.05, frame))
-        parts += barbell(rng, draw(rng, 1.3, 2.0), height - 0.03, x + 0.06)
+            yield slab(x, y, 0.0, 0.06, 0.06, height, frame)
+            yield slab(x, y, 0.0, 0.5, 0.06, 0.05, frame)
+            yield slab(x + 0.06, y, height - 0.08, 0.08, 0.06, 0.03, frame)
+        yield strut((x, -0.4, 0.12), (x, 0.4, 0.12), 0.05, 0.05, frame)
+        yield from barbell(rng, draw(rng, 1.3, 2.0), height - 0.03, x + 0.06)
     elif chance(rng, 0.5):  # rolls that hold the legs
         for z in (0.15, 0.35):
-            parts.append(tube([(long * 0.56, -0.2, z), (long * 0.56, 0.2, z)], 0.045, pad, 8))
-        parts.append(strut((long / 2, 0.0, seat - 0.05), (long * 0.56, 0.0, 0.12), 0.04, 0.04, frame))
-    return finished(parts)
+            yield tube([(long * 0.56, -0.2, z), (long * 0.56, 0.2, z)], 0.045, pad, 8)
+        yield strut((long / 2, 0.0, seat - 0.05), (long * 0.56, 0.0, 0.12), 0.04, 0.04, frame)
 
 
 @family("fitness equipment", "power rack")
-def _power_rack(rng: np.random.Generator) -> Piece:
+def _power_rack(rng: np.random.Generator) -> Parts:
     frame, pad, _ = _looks(rng)
     long, wide, tall, t = draw(rng, 0.7, 1.3), draw(rng, 1.05, 1.25), draw(rng, 1.95, 2.25), draw(rng, 0.05, 0.08)
     corners = [(x * long / 2, y * wide / 2) for x in (-1, 1) for y in (-1, 1)]
-    parts = [slab(x, y, 0.0, t, t, tall, frame) for x, y in corners]
+    yield from [slab(x, y, 0.0, t, t, tall, frame) for x, y in corners]
     for s in (-1, 1):
-        parts += [
-            strut((-long / 2, s * wide / 2, z), (long / 2, s * wide / 2, z), t, t, frame)
-            for z in (t / 2, tall * draw(rng, 0.3, 0.5), tall - t / 2)
-        ]
-        parts.append(
-            strut((s * long / 2, -wide / 2, tall - t / 2), (s * long / 2, wide / 2, tall - t / 2), 0.04, 0.04, frame)
-        )
+        for z in (t / 2, tall * draw(rng, 0.3, 0.5), tall - t / 2):
+            yield strut((-long / 2, s * wide / 2, z), (long / 2, s * wide / 2, z), t, t, frame)
+        yield strut((s * long / 2, -wide / 2, tall - t / 2), (s * long / 2, wide / 2, tall - t / 2), 0.04, 0.04, frame)
     if chance(rng, 0.8):
-        parts += barbell(rng, draw(rng, 1.7, 2.2), tall * draw(rng, 0.45, 0.65), long / 2 + 0.06)
+        yield from barbell(rng, draw(rng, 1.7, 2.2), tall * draw(rng, 0.45, 0.65), long / 2 + 0.06)
     if chance(rng, 0.5):
-        parts += [
-            rounded_box((-0.55, -0.14, 0.38), (0.6, 0.14, 0.45), 0.025, pad),
-            slab(-0.4, 0.0, 0.0, 0.06, 0.4, 0.4, frame),
-            slab(0.45, 0.0, 0.0, 0.06, 0.4, 0.4, frame),
-        ]
-    return finished(parts)
+        yield rounded_box((-0.55, -0.14, 0.38), (0.6, 0.14, 0.45), 0.025, pad)
+        yield slab(-0.4, 0.0, 0.0, 0.06, 0.4, 0.4, frame)
+        yield slab(0.45, 0.0, 0.0, 0.06, 0.4, 0.4, frame)
 
 
-def _pulls(rng: np.random.Generator, back: float, tall: float, frame: Material, steel: Material) -> list[Mesh]:
+def _pulls(rng: np.random.Generator, back: float, tall: float, frame: Material, steel: Material) -> Meshes:
     """Return a multi-gym's press arms and the bar that hangs from its cable."""
-    parts, reach = [], back + 0.85
+    reach = back + 0.85
     for s in (-1, 1):
         y = s * draw(rng, 0.3, 0.45)
         arm = [(back + 0.45, s * 0.06, tall * 0.8), (back + 0.55, y, tall * 0.78)]
         arm += [(back + 0.6, y, tall * 0.5), (reach, y, tall * 0.48)]
-        parts.append(tube(arm, 0.022, frame, 6))
+        yield tube(arm, 0.022, frame, 6)
     low, high = tall - 0.25, tall - 0.2
     bar = [(reach, -0.5, low), (reach, -0.25, high), (reach, 0.25, high), (reach, 0.5, low)]
-    parts.append(tube(bar, 0.014, steel, 6))
-    return [*parts, tube([(reach, 0.0, tall - 0.06), (reach, 0.0, high)], 0.004, steel, 4)]
+    yield tube(bar, 0.014, steel, 6)
+    yield tube([(reach, 0.0, tall - 0.06), (reach, 0.0, high)], 0.004, steel, 4)
 
 
 @family("fitness equipment", "multi-gym")
-def _multi_gym(rng: np.random.Generator) -> Piece:
+def _multi_gym(rng: np.random.Generator) -> Parts:
     frame, pad, steel = _looks(rng)
     tall, long, wide = draw(rng, 1.9, 2.2), draw(rng, 1.2, 1.8), draw(rng, 0.9, 1.3)
-    parts = [strut((-long / 2, 0.0, 0.04), (long / 2, 0.0, 0.04), 0.08, 0.07, frame)]
-    parts += [slab(x, 0.0, 0.0, 0.07, wide * 0.8, 0.06, frame) for x in (-long / 2, long * 0.3)]
+    yield strut((-long / 2, 0.0, 0.04), (long / 2, 0.0, 0.04), 0.08, 0.07, frame)
+    yield from [slab(x, 0.0, 0.0, 0.07, wide * 0.8, 0.06, frame) for x in (-long / 2, long * 0.3)]
     back = -long / 2 + 0.1
-    parts += [slab(back, 0.0, 0.0, 0.07, 0.07, tall, frame), slab(back + 0.45, 0.0, 0.0, 0.06, 0.06, tall, frame)]
-    parts.append(strut((back, 0.0, tall), (back + 0.85, 0.0, tall - 0.05), 0.06, 0.06, frame))
+    yield from (slab(back, 0.0, 0.0, 0.07, 0.07, tall, frame), slab(back + 0.45, 0.0, 0.0, 0.06, 0.06, tall, frame))
+    yield strut((back, 0.0, tall), (back + 0.85, 0.0, tall - 0.05), 0.06, 0.06, frame)
     plates, stack = count(rng, 6, 12), material(pick(rng, ("black", "metal")), rng)
     for i in range(plates):
-        parts.append(slab(back + 0.2, 0.0, 0.1 + i * 0.06, 0.2, 0.32, 0.05, stack))
-    parts += [cylinder(back + 0.2, s * 0.11, 0.05, 0.01, tall - 0.1, material("metal", rng), 5) for s in (-1, 1)]
+        yield slab(back + 0.2, 0.0, 0.1 + i * 0.06, 0.2, 0.32, 0.05, stack)
+    yield from [cylinder(back + 0.2, s * 0.11, 0.05, 0.01, tall - 0.1, material("metal", rng), 5) for s in (-1, 1)]
     seat = draw(rng, 0.42, 0.55)
     x = back + 0.62
-    parts += [
-        rounded_box((x, -0.17, seat), (x + 0.42, 0.17, seat + 0.07), 0.03, pad),
-        rounded_box((back + 0.48, -0.14, seat + 0.12), (back + 0.55, 0.14, seat + 0.75), 0.03, pad),
-    ]
-    parts.append(slab(x + 0.3, 0.0, 0.0, 0.06, 0.06, seat, frame))
-    parts += _pulls(rng, back, tall, frame, steel)
-    parts += [tube([(x + 0.45, -0.22, z), (x + 0.45, 0.22, z)], 0.05, pad, 8) for z in (0.18, seat - 0.05)]
-    return finished(parts)
+    yield rounded_box((x, -0.17, seat), (x + 0.42, 0.17, seat + 0.07), 0.03, pad)
+    yield rounded_box((back + 0.48, -0.14, seat + 0.12), (back + 0.55, 0.14, seat + 0.75), 0.03, pad)
+    yield slab(x + 0.3, 0.0, 0.0, 0.06, 0.06, seat, frame)
+    yield from _pulls(rng, back, tall, frame, steel)
+    yield from [tube([(x + 0.45, -0.22, z), (x + 0.45, 0.22, z)], 0.05, pad, 8) for z in (0.18, seat - 0.05)]
 
 
 @family("fitness equipment", "rowing machine")
-def _rower(rng: np.random.Generator) -> Piece:
+def _rower(rng: np.random.Generator) -> Parts:
     frame, pad, accent = _looks(rng)
     long, rail, wheel = draw(rng, 1.7, 2.4), draw(rng, 0.2, 0.45), draw(rng, 0.2, 0.28)
     front = -long / 2 + wheel
-    parts = [strut((front, 0.0, rail * 0.9), (long / 2, 0.0, rail), 0.08, 0.05, frame)]
+    yield strut((front, 0.0, rail * 0.9), (long / 2, 0.0, rail), 0.08, 0.05, frame)
     drum = lathe([(wheel * 0.8, -0.1), (wheel, -0.06), (wheel, 0.06), (wheel * 0.8, 0.1)], accent, sides=20)
-    parts.append(drum.tilted("x", np.pi / 2).moved(front, 0.0, wheel + 0.08))
-    parts += [slab(x, 0.0, 0.0, 0.07, draw(rng, 0.4, 0.6), 0.05, frame) for x in (front, long / 2 - 0.08)]
-    parts += [slab(x, 0.0, 0.0, 0.06, 0.06, rail, frame) for x in (front, long / 2 - 0.08)]
+    yield drum.tilted("x", np.pi / 2).moved(front, 0.0, wheel + 0.08)
+    yield from [slab(x, 0.0, 0.0, 0.07, draw(rng, 0.4, 0.6), 0.05, frame) for x in (front, long / 2 - 0.08)]
+    yield from [slab(x, 0.0, 0.0, 0.06, 0.06, rail, frame) for x in (front, long / 2 - 0.08)]
     x = draw(rng, -0.05, 0.35) * long
-    parts.append(rounded_box((x - 0.13, -0.17, rail + 0.05), (x + 0.13, 0.17, rail + 0.11), 0.03, pad))
+    yield rounded_box((x - 0.13, -0.17, rail + 0.05), (x + 0.13, 0.17, rail + 0.11), 0.03, pad)
     grip = front + wheel + 0.08
-    parts += [
-        slab(0.0, 0.0, 0.0, 0.03, 0.12, 0.32, pad).tilted("y", -0.7).moved(grip + 0.18, s * 0.13, rail - 0.12)
-        for s in (-1, 1)
-    ]
-    parts.append(tube([(grip, -0.25, rail + 0.22), (grip, 0.25, rail + 0.22)], 0.016, pad, 6))
-    parts.append(tube([(front, 0.0, rail + 0.18), (grip, 0.0, rail + 0.22)], 0.005, frame, 4))
-    parts.append(strut((front, 0.0, rail), (front + 0.15, 0.0, draw(rng, 0.75, 1.05)), 0.04, 0.04, frame))
-    return finished([*parts, *_console(rng, front + 0.15, 0.75, accent)])
+    for s in (-1, 1):
+        yield slab(0.0, 0.0, 0.0, 0.03, 0.12, 0.32, pad).tilted("y", -0.7).moved(grip + 0.18, s * 0.13, rail - 0.12)
+    yield tube([(grip, -0.25, rail + 0.22), (grip, 0.25, rail + 0.22)], 0.016, pad, 6)
+    yield tube([(front, 0.0, rail + 0.18), (grip, 0.0, rail + 0.22)], 0.005, frame, 4)
+    yield strut((front, 0.0, rail), (front + 0.15, 0.0, draw(rng, 0.75, 1.05)), 0.04, 0.04, frame)
+    yield from _console(rng, front + 0.15, 0.75, accent)
 
 
 @family("fitness equipment", "dumbbell rack")
-def _dumbbell_rack(rng: np.random.Generator) -> Piece:
+def _dumbbell_rack(rng: np.random.Generator) -> Parts:
     frame, black, steel = _looks(rng)
     wide, rows, deep = draw(rng, 0.8, 2.0), count(rng, 2, 3), draw(rng, 0.35, 0.55)
-    parts, tall = [], 0.25 + 0.33 * rows
+    tall = 0.25 + 0.33 * rows
     for s in (-1, 1):
-        parts += [
-            slab(0.0, s * wide / 2, 0.0, deep, 0.05, 0.05, frame),
-            strut((deep * 0.3, s * wide / 2, 0.0), (-deep * 0.35, s * wide / 2, tall), 0.05, 0.06, frame),
-        ]
+        yield slab(0.0, s * wide / 2, 0.0, deep, 0.05, 0.05, frame)
+        yield strut((deep * 0.3, s * wide / 2, 0.0), (-deep * 0.35, s * wide / 2, tall), 0.05, 0.06, frame)
     for row in range(rows):
         z = 0.25 + row * 0.33
         x = deep * (0.25 - 0.22 * row)
-        parts += [slab(x + d, 0.0, z, 0.05, wide, 0.04, frame) for d in (-0.09, 0.09)]
+        yield from [slab(x + d, 0.0, z, 0.05, wide, 0.04, frame) for d in (-0.09, 0.09)]
         number = int(wide / draw(rng, 0.17, 0.26))
         for y in np.linspace(-wide * 0.44, wide * 0.44, number).tolist():
             size = draw(rng, 0.035, 0.065)
-            parts += [slab(x + d, y, z + 0.04, 0.08, 2 * size, 2 * size, black) for d in (-0.085, 0.085)]
-            parts.append(slab(x, y, z + 0.04 + size * 0.8, 0.1, 0.025, 0.025, steel))
-    return finished(parts)
+            yield from [slab(x + d, y, z + 0.04, 0.08, 2 * size, 2 * size, black) for d in (-0.085, 0.085)]
+            yield slab(x, y, z + 0.04 + size * 0.8, 0.1, 0.025, 0.025, steel)
 
 
 @family("fitness equipment", "punch bag stand", held_out=True)
-def _punch_bag(rng: np.random.Generator) -> Piece:
+def _punch_bag(rng: np.random.Generator) -> Parts:
     frame, _, _ = _looks(rng)
     skin, tall = material(pick(rng, ("leather", "black", "painted")), rng), draw(rng, 1.6, 2.1)
     radius = draw(rng, 0.14, 0.19)
@@ -317,7 +282,7 @@ def _punch_bag(rng: np.random.Generator) -> Piece:
             lathe(rows, frame),
             lathe([(0.05, 0.4), (radius, 0.5), (radius, tall - 0.1), (radius * 0.6, tall)], skin),
         ]
-        return finished(parts)
+        return parts
     reach = 0.75
     parts = [slab(0.0, s * 0.35, 0.0, 1.1, 0.07, 0.06, frame).turned(0.0) for s in (-1, 1)]
     parts += [slab(-0.5, 0.0, 0.0, 0.08, 0.8, 0.06, frame), slab(-0.5, 0.0, 0.0, 0.08, 0.08, tall + 0.2, frame)]
@@ -330,4 +295,4 @@ def _punch_bag(rng: np.random.Generator) -> Piece:
         lathe(bag, skin, -0.5 + reach),
         cylinder(-0.5 + reach, 0.0, tall - 0.1, 0.01, 0.25, material("metal", rng), 5),
     ]
-    return finished(parts)
+    return parts

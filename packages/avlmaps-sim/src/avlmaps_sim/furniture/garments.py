@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from avlmaps_sim.furniture.catalogue import Piece, family
-from avlmaps_sim.furniture.recipe_helpers import cloth, count, draw, finished, pick
+from avlmaps_sim.furniture.catalogue import Parts, family
+from avlmaps_sim.furniture.recipe_helpers import cloth, count, draw, pick
 from avlmaps_sim.materials import material
-from avlmaps_sim.mesh import Material, Mesh, joined
+from avlmaps_sim.mesh import Material, Mesh, Meshes, joined
 from avlmaps_sim.shapes import ellipsoid, loft, rounded_box, tube
 
 _CLOTHS = ("fabric", "fabric", "fabric", "curtain", "leather")
@@ -72,72 +72,67 @@ def _hanging(rng: np.random.Generator, look: Material, shoulders: float, long: f
     return loft(rings, look)
 
 
-def _sleeves(rng: np.random.Generator, look: Material, shoulders: float, long: float) -> list[Mesh]:
-    parts = []
+def _sleeves(rng: np.random.Generator, look: Material, shoulders: float, long: float) -> Meshes:
     for side in (-1, 1):
         y, out = side * shoulders * 0.44, side * draw(rng, 0.02, 0.1)
         line = [(0.0, y, -0.06), (0.01, y + 0.6 * out, -0.3 * long), (0.02, y + out, -0.62 * long)]
-        parts.append(tube(line, draw(rng, 0.045, 0.065), look, 8))
-    return parts
+        yield tube(line, draw(rng, 0.045, 0.065), look, 8)
 
 
 @family("clothing", "heap")
-def _heap(rng: np.random.Generator) -> Piece:
+def _heap(rng: np.random.Generator) -> Parts:
     long = draw(rng, 0.25, 0.75)
-    return finished([heap(rng, long, long * draw(rng, 0.5, 1.0), draw(rng, 0.04, 0.16), fabric(rng))])
+    return [heap(rng, long, long * draw(rng, 0.5, 1.0), draw(rng, 0.04, 0.16), fabric(rng))]
 
 
 @family("clothing", "several in a heap")
-def _pile(rng: np.random.Generator) -> Piece:
-    parts, z = [], 0.0
+def _pile(rng: np.random.Generator) -> Parts:
+    z = 0.0
     for _ in range(count(rng, 2, 5)):
         long, high = draw(rng, 0.3, 0.6), draw(rng, 0.04, 0.12)
         one = heap(rng, long, long * draw(rng, 0.5, 0.9), high, fabric(rng)).turned(draw(rng, 0, 6.3))
-        parts.append(one.moved(draw(rng, -0.12, 0.12), draw(rng, -0.12, 0.12), z))
+        yield one.moved(draw(rng, -0.12, 0.12), draw(rng, -0.12, 0.12), z)
         z += 0.55 * high
-    return finished(parts)
 
 
 @family("clothing", "folded stack")
-def _stack(rng: np.random.Generator) -> Piece:
-    parts, z = [], 0.0
+def _stack(rng: np.random.Generator) -> Parts:
+    z = 0.0
     long, wide = draw(rng, 0.25, 0.4), draw(rng, 0.2, 0.32)
     for _ in range(count(rng, 1, 7)):
         high = draw(rng, 0.012, 0.045)
         a, b = long / 2 * draw(rng, 0.85, 1.0), wide / 2 * draw(rng, 0.85, 1.0)
         one = rounded_box((-a, -b, 0.0), (a, b, high), 0.012, fabric(rng), soft_top=0.005)
-        parts.append(one.turned(draw(rng, -0.12, 0.12)).moved(z=z))
+        yield one.turned(draw(rng, -0.12, 0.12)).moved(z=z)
         z += high
-    return finished(parts)
 
 
 @family("clothing", "wall hook")
-def _on_hook(rng: np.random.Generator) -> Piece:
+def _on_hook(rng: np.random.Generator) -> Parts:
     look, long, shoulders = fabric(rng), draw(rng, 0.6, 1.15), draw(rng, 0.3, 0.45)
-    garment = [_hanging(rng, look, shoulders, long, draw(rng, 0.1, 0.18)), *_sleeves(rng, look, shoulders, long)]
+    yield from (_hanging(rng, look, shoulders, long, draw(rng, 0.1, 0.18)), *_sleeves(rng, look, shoulders, long))
     hook = tube([(-0.09, 0.0, 0.02), (0.0, 0.0, 0.0), (0.02, 0.0, 0.03)], 0.008, material("metal", rng), 6)
-    return finished([*garment, hook])
+    yield hook
 
 
 @family("clothing", "trousers laid out", held_out=True)
-def _trousers(rng: np.random.Generator) -> Piece:
+def _trousers(rng: np.random.Generator) -> Parts:
     look, long, wide = fabric(rng), draw(rng, 0.7, 1.05), draw(rng, 0.13, 0.2)
-    parts = []
     for side in (-1, 1):
         apart = draw(rng, 0.5, 1.4) * side
         line = [(0.0, side * wide * 0.45, 0.02), (long * 0.5, apart * wide * 0.8, 0.024), (long, apart * wide, 0.016)]
         leg = tube(line, wide * 0.5, look, 10)
-        parts.append(leg.scaled(1.0, 1.0, 0.28))
-    return finished([*parts, ellipsoid((0.0, 0.0, 0.014), (0.09, wide * 0.95, 0.022), look)])
+        yield leg.scaled(1.0, 1.0, 0.28)
+    yield ellipsoid((0.0, 0.0, 0.014), (0.09, wide * 0.95, 0.022), look)
 
 
 @family("clothing", "on hangers", held_out=True)
-def _on_hangers(rng: np.random.Generator) -> Piece:
-    parts, x = [], 0.0
+def _on_hangers(rng: np.random.Generator) -> Parts:
+    x = 0.0
     for _ in range(count(rng, 3, 8)):
         look, long, shoulders = fabric(rng), draw(rng, 0.6, 1.1), draw(rng, 0.36, 0.46)
         one = joined([_hanging(rng, look, shoulders, long, 0.06), *_sleeves(rng, look, shoulders, long)])
-        parts.append(one.turned(draw(rng, -0.15, 0.15)).moved(x))
+        yield one.turned(draw(rng, -0.15, 0.15)).moved(x)
         x += draw(rng, 0.05, 0.1)
     rod = tube([(-0.1, 0.0, 0.05), (x + 0.1, 0.0, 0.05)], 0.014, material("metal", rng), 8)
-    return finished([*parts, rod])
+    yield rod

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from avlmaps_sim.furniture.catalogue import Piece, Support, family
+from avlmaps_sim.furniture.catalogue import Parts, Support, family
 from avlmaps_sim.furniture.fittings import body, chrome, dial, enamel, face, outline, spindle
-from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, finished, pick, pictured, rim, strut
+from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, pick, pictured, rim, strut
 from avlmaps_sim.materials import material
-from avlmaps_sim.mesh import Material, Mesh, joined
+from avlmaps_sim.mesh import Material, Mesh, Meshes, joined
 from avlmaps_sim.shapes import box, cylinder, ellipsoid, lathe, loft, rounded_box, slab, tube
 
 
@@ -25,93 +25,93 @@ def _valve(rng: np.random.Generator, x: float, y: float, z: float) -> list[Mesh]
 
 
 @family("radiator", "panel")
-def _panel_radiator(rng: np.random.Generator) -> Piece:
+def _panel_radiator(rng: np.random.Generator) -> Parts:
     wide, high, look = draw(rng, 0.5, 1.9), draw(rng, 0.3, 0.75), _paint(rng)
     lift, deep, gap, half = draw(rng, 0.1, 0.18), draw(rng, 0.05, 0.14), draw(rng, 0.03, 0.05), wide / 2
     x = gap + deep
-    parts = [box((gap, -half, lift), (x - 0.012, half, lift + high), look),
-             *[slab(gap / 2, s * 0.6 * half, lift + 0.1, gap, 0.04, high - 0.2, look) for s in (-1, 1)]]  # fmt: skip
+    yield box((gap, -half, lift), (x - 0.012, half, lift + high), look)
+    yield from [slab(gap / 2, s * 0.6 * half, lift + 0.1, gap, 0.04, high - 0.2, look) for s in (-1, 1)]
     n = round(wide / draw(rng, 0.035, 0.07)) if chance(rng, 0.75) else 0
     step = wide / max(n, 1)
     for i in range(n):  # pressed waves
         y = -half + (i + 0.5) * step
-        parts.append(loft([np.array([(x - 0.012, y - 0.45 * step, z), (x, y - 0.25 * step, z), (x, y + 0.25 * step, z),
-                                     (x - 0.012, y + 0.45 * step, z)]) for z in (lift + 0.03, lift + high - 0.03)],
-                          look))  # fmt: skip
+        yield loft([np.array([(x - 0.012, y - 0.45 * step, z), (x, y - 0.25 * step, z), (x, y + 0.25 * step, z),
+                              (x - 0.012, y + 0.45 * step, z)]) for z in (lift + 0.03, lift + high - 0.03)],
+                   look)  # fmt: skip
     if n == 0:
-        parts.append(rounded_box((x - 0.014, -half, lift), (x, half, lift + high), 0.005, look, 2))
+        yield rounded_box((x - 0.014, -half, lift), (x, half, lift + high), 0.005, look, 2)
     dark = material("black", rng)
-    parts += [box((gap + 0.008, -half + 0.02 + 0.03 * i, lift + high),
-                  (x - 0.018, -half + 0.035 + 0.03 * i, lift + high + 0.002), dark)
-              for i in range(int((wide - 0.04) / 0.03))]  # fmt: skip
-    return finished([*parts, *_valve(rng, x - deep / 2, pick(rng, (-1.0, 1.0)) * (half + 0.03), lift + 0.05)])
+    yield from [box((gap + 0.008, -half + 0.02 + 0.03 * i, lift + high),
+                    (x - 0.018, -half + 0.035 + 0.03 * i, lift + high + 0.002), dark)
+                for i in range(int((wide - 0.04) / 0.03))]  # fmt: skip
+    yield from _valve(rng, x - deep / 2, pick(rng, (-1.0, 1.0)) * (half + 0.03), lift + 0.05)
 
 
 @family("radiator", "columns")
-def _column_radiator(rng: np.random.Generator) -> Piece:
+def _column_radiator(rng: np.random.Generator) -> Parts:
     n, pitch, high = count(rng, 5, 20), draw(rng, 0.045, 0.075), draw(rng, 0.45, 0.95)
     deep, look, lift, columns = draw(rng, 0.1, 0.24), _paint(rng), draw(rng, 0.04, 0.12), count(rng, 2, 4)
     thick = pitch * draw(rng, 0.3, 0.42)
-    parts: list[Mesh] = []
     sides = 4 if n * columns > 40 else 5
     for i in range(n):
         y = (i - (n - 1) / 2) * pitch
         places = np.linspace(thick, deep - thick, columns).tolist()
-        parts += [cylinder(x + 0.03, y, lift + 0.03, thick, high - 0.06, look, sides) for x in places]
-        parts += [rounded_box((0.03, y - 0.46 * pitch, z), (deep + 0.03, y + 0.46 * pitch, z + 0.06), 0.015, look,
-                              2) if n < 9 else box((0.03, y - 0.46 * pitch, z),
-                                                   (deep + 0.03, y + 0.46 * pitch, z + 0.055), look)
-                  for z in (lift, lift + high - 0.06)]  # fmt: skip
+        yield from [cylinder(x + 0.03, y, lift + 0.03, thick, high - 0.06, look, sides) for x in places]
+        yield from [
+            rounded_box((0.03, y - 0.46 * pitch, z), (deep + 0.03, y + 0.46 * pitch, z + 0.06), 0.015, look, 2)
+            if n < 9
+            else box((0.03, y - 0.46 * pitch, z), (deep + 0.03, y + 0.46 * pitch, z + 0.055), look)
+            for z in (lift, lift + high - 0.06)
+        ]
     for i in (0, n - 1):
         y = (i - (n - 1) / 2) * pitch
-        parts += [slab(x, y, 0.0, 0.03, 0.03, lift + 0.02, look) for x in (0.03 + thick, deep + 0.03 - thick)]
-    return finished([*parts, *_valve(rng, deep / 2 + 0.03, pick(rng, (-1.0, 1.0)) * (n * pitch / 2 + 0.04),
-                                     lift + 0.05)])  # fmt: skip
+        yield from [slab(x, y, 0.0, 0.03, 0.03, lift + 0.02, look) for x in (0.03 + thick, deep + 0.03 - thick)]
+    yield from _valve(rng, deep / 2 + 0.03, pick(rng, (-1.0, 1.0)) * (n * pitch / 2 + 0.04), lift + 0.05)
 
 
 @family("radiator", "towel ladder")
-def _ladder(rng: np.random.Generator) -> Piece:
+def _ladder(rng: np.random.Generator) -> Parts:
     wide, high, lift = draw(rng, 0.4, 0.65), draw(rng, 0.7, 1.6), draw(rng, 0.2, 0.5)
     look = chrome(rng) if chance(rng, 0.5) else _paint(rng)
     bow, half, out = draw(rng, 0.0, 0.06), wide / 2, 0.05
-    parts: list[Mesh] = [tube([(out, s * half, lift), (out, s * half, lift + high)], 0.016, look, 7) for s in (-1, 1)]
+    yield from [tube([(out, s * half, lift), (out, s * half, lift + high)], 0.016, look, 7) for s in (-1, 1)]
     z, group = lift + 0.06, count(rng, 3, 6)
     k = 0
     while z < lift + high - 0.03 and k < 26:
-        parts.append(tube([(out, -half, z), (out + bow, -half * 0.4, z), (out + bow, half * 0.4, z), (out, half, z)],
-                          0.01, look, 5))  # fmt: skip
+        yield tube([(out, -half, z), (out + bow, -half * 0.4, z), (out + bow, half * 0.4, z), (out, half, z)], 0.01,
+                   look, 5)  # fmt: skip
         k += 1
         z += 0.045 if k % group else 0.13
-    parts += [tube([(0.0, s * half, lift + h * high), (out, s * half, lift + h * high)], 0.012, look, 6)
-              for s in (-1, 1) for h in (0.1, 0.9)]  # fmt: skip
+    yield from [tube([(0.0, s * half, lift + h * high), (out, s * half, lift + h * high)], 0.012, look, 6)
+                for s in (-1, 1) for h in (0.1, 0.9)]  # fmt: skip
     if chance(rng, 0.35):  # a towel hangs on it
         fabric, top = material("fabric", rng), lift + high * draw(rng, 0.55, 0.9)
         front = out + bow + 0.02
         y = np.linspace(-0.3, 0.3, 6) * wide
         rows = [(front, top - draw(rng, 0.3, 0.5)), (front, top - 0.1), (front - 0.012, top + 0.012),
                 (out - 0.02, top - 0.02), (out - 0.025, top - 0.25)]  # fmt: skip
-        parts.append(cloth(np.stack([np.column_stack([np.full(6, x), y, np.full(6, h)]) for x, h in rows]), fabric))
-    return finished([*parts, *_valve(rng, out, half, lift)])
+        yield cloth(np.stack([np.column_stack([np.full(6, x), y, np.full(6, h)]) for x, h in rows]), fabric)
+    yield from _valve(rng, out, half, lift)
 
 
 @family("radiator", "tall tubes", held_out=True)
-def _tall_tubes(rng: np.random.Generator) -> Piece:
+def _tall_tubes(rng: np.random.Generator) -> Parts:
     n, pitch, high, look = count(rng, 4, 12), draw(rng, 0.04, 0.08), draw(rng, 1.4, 2.0), _paint(rng)
     flat, lift = chance(rng, 0.5), 0.08
-    parts: list[Mesh] = []
     for i in range(n):
         y = (i - (n - 1) / 2) * pitch
-        parts.append(slab(0.065, y, lift, 0.012, pitch * 0.85, high,
-                          look) if flat else cylinder(0.065, y, lift, pitch * 0.33, high, look, 8))  # fmt: skip
+        yield slab(0.065, y, lift, 0.012, pitch * 0.85, high, look) if flat else cylinder(0.065, y, lift, pitch * 0.33,
+                                                                                          high, look, 8)  # fmt: skip
     wide = n * pitch
-    parts += [box((0.035, -wide / 2, z), (0.055, wide / 2, z + 0.04), look) for z in (lift + 0.08, lift + high - 0.12)]
-    parts += [slab(0.02, s * wide * 0.3, lift + h, 0.04, 0.03, 0.04, look) for s in (-1, 1)
-              for h in (0.08, high - 0.12)]  # fmt: skip
-    return finished([*parts, *_valve(rng, 0.05, -wide * 0.3, lift + 0.05), *_valve(rng, 0.05, wide * 0.3, lift + 0.05)])
+    for z in (lift + 0.08, lift + high - 0.12):
+        yield box((0.035, -wide / 2, z), (0.055, wide / 2, z + 0.04), look)
+    yield from [slab(0.02, s * wide * 0.3, lift + h, 0.04, 0.03, 0.04, look) for s in (-1, 1)
+                for h in (0.08, high - 0.12)]  # fmt: skip
+    yield from (*_valve(rng, 0.05, -wide * 0.3, lift + 0.05), *_valve(rng, 0.05, wide * 0.3, lift + 0.05))
 
 
 @family("radiator", "oil filled on wheels")
-def _oil_filled(rng: np.random.Generator) -> Piece:
+def _oil_filled(rng: np.random.Generator) -> Parts:
     n, pitch, high, deep = count(rng, 5, 11), draw(rng, 0.045, 0.06), draw(rng, 0.5, 0.62), draw(rng, 0.14, 0.18)
     look, dark, lift = _paint(rng), material("black", rng), 0.06
     long = n * pitch
@@ -130,65 +130,63 @@ def _oil_filled(rng: np.random.Generator) -> Piece:
               for s in (-1, 1)]  # fmt: skip
     parts += [ellipsoid((x * deep * 0.7, y * long * 0.35, 0.03), (0.03, 0.012, 0.03), dark, 8, 4) for x in (-1, 1)
               for y in (-1, 1)]  # fmt: skip
-    return finished([joined(parts).turned(pick(rng, (0.0, np.pi / 2)))])
+    return [joined(parts).turned(pick(rng, (0.0, np.pi / 2)))]
 
 
 @family("radiator", "behind a cover")
-def _covered(rng: np.random.Generator) -> Piece:
+def _covered(rng: np.random.Generator) -> Parts:
     wide, high, deep, look = draw(rng, 0.8,
                                   1.8), draw(rng, 0.75,
                                              0.95), draw(rng, 0.17,
                                                          0.25), material(pick(rng, ("white", "wood", "painted")),
                                                                          rng)  # fmt: skip
     half, panels = wide / 2, max(1, round(wide / draw(rng, 0.45, 0.8)))
-    parts = [box((-0.0, -half - 0.02, high - 0.025), (deep + 0.025, half + 0.02, high), look),
-             box((0.0, -half, 0.0), (0.012, half, high - 0.03), look)]  # fmt: skip
-    parts += [box((0.0, s * half - (0.02 if s > 0 else 0.0), 0.0),
-                  (deep, s * half + (0.02 if s < 0 else 0.0), high - 0.02), look) for s in (-1, 1)]  # fmt: skip
+    yield box((-0.0, -half - 0.02, high - 0.025), (deep + 0.025, half + 0.02, high), look)
+    yield box((0.0, -half, 0.0), (0.012, half, high - 0.03), look)
+    yield from [box((0.0, s * half - (0.02 if s > 0 else 0.0), 0.0),
+                    (deep, s * half + (0.02 if s < 0 else 0.0), high - 0.02), look) for s in (-1, 1)]  # fmt: skip
     step, upright = wide / panels, chance(rng, 0.6)
     dark = material("black", rng)
-    parts.append(slab(deep - 0.03, 0.0, 0.08, 0.004, wide - 0.05, high - 0.14, dark))
+    yield slab(deep - 0.03, 0.0, 0.08, 0.004, wide - 0.05, high - 0.14, dark)
     for i in range(panels):
         a, b = -half + i * step, -half + (i + 1) * step
-        parts.append(rim((a, 0.0), (b, high - 0.025), 0.07, (deep - 0.02, deep), look))
+        yield rim((a, 0.0), (b, high - 0.025), 0.07, (deep - 0.02, deep), look)
         if upright:
-            parts += [box((deep - 0.016, float(y) - 0.007, 0.06), (deep - 0.004, float(y) + 0.007, high - 0.09), look)
-                      for y in np.arange(a + 0.09, b - 0.07, 0.032)]  # fmt: skip
+            yield from [box((deep - 0.016, float(y) - 0.007, 0.06), (deep - 0.004, float(y) + 0.007, high - 0.09), look)
+                        for y in np.arange(a + 0.09, b - 0.07, 0.032)]  # fmt: skip
         else:
-            parts += [box((deep - 0.016, a + 0.06, float(z)), (deep - 0.004, b - 0.06, float(z) + 0.016), look)
-                      for z in np.arange(0.09, high - 0.1, 0.035)]  # fmt: skip
-    return finished(parts, supports=[Support((0.0, -half), (deep, half), high, 0.5)])
+            yield from [box((deep - 0.016, a + 0.06, float(z)), (deep - 0.004, b - 0.06, float(z) + 0.016), look)
+                        for z in np.arange(0.09, high - 0.1, 0.035)]  # fmt: skip
+    yield Support((0.0, -half), (deep, half), high, 0.5)
 
 
 @family("radiator", "low convector", held_out=True)
-def _convector(rng: np.random.Generator) -> Piece:
+def _convector(rng: np.random.Generator) -> Parts:
     wide, high, deep, look = draw(rng, 0.5, 1.1), draw(rng, 0.28, 0.5), draw(rng, 0.06, 0.12), _paint(rng)
     lift, half, dark = draw(rng, 0.06, 0.12), wide / 2, material("black", rng)
-    parts = [rounded_box((0.0, -half, lift), (deep, half, lift + high), draw(rng, 0.008, 0.03), look, 3)]
+    yield rounded_box((0.0, -half, lift), (deep, half, lift + high), draw(rng, 0.008, 0.03), look, 3)
     slots = count(rng, 4, 9)
-    parts += [box((deep - 0.004, -half * 0.85, lift + high * (0.62 + 0.3 * i / slots)),
-                  (deep + 0.002, half * 0.85, lift + high * (0.62 + 0.3 * i / slots) + 0.007), dark)
-              for i in range(slots)]  # fmt: skip
-    parts += [strut((-0.08, s * half * 0.7, 0.01), (deep + 0.08, s * half * 0.7, 0.01), 0.03, 0.02, dark)
-              for s in (-1, 1)]  # fmt: skip
-    parts += [slab(deep / 2, s * half * 0.7, 0.0, 0.03, 0.03, lift + 0.01, dark) for s in (-1, 1)]
-    parts.append(dial(deep, half * 0.8, lift + 0.3 * high, 0.022, dark))
-    return finished(parts)
+    yield from [box((deep - 0.004, -half * 0.85, lift + high * (0.62 + 0.3 * i / slots)),
+                    (deep + 0.002, half * 0.85, lift + high * (0.62 + 0.3 * i / slots) + 0.007), dark)
+                for i in range(slots)]  # fmt: skip
+    yield from [strut((-0.08, s * half * 0.7, 0.01), (deep + 0.08, s * half * 0.7, 0.01), 0.03, 0.02, dark)
+                for s in (-1, 1)]  # fmt: skip
+    yield from [slab(deep / 2, s * half * 0.7, 0.0, 0.03, 0.03, lift + 0.01, dark) for s in (-1, 1)]
+    yield dial(deep, half * 0.8, lift + 0.3 * high, 0.022, dark)
 
 
-def _fire(rng: np.random.Generator, x: float, wide: float, z: float) -> list[Mesh]:
+def _fire(rng: np.random.Generator, x: float, wide: float, z: float) -> Meshes:
     """Return logs, and flames over them in some cases."""
     wood = material("wood", rng, (0.25, 0.16, 0.1))
-    parts: list[Mesh] = [tube([(x + draw(rng, -0.05, 0.05), -wide * draw(rng, 0.2, 0.35), z + 0.04 + 0.06 * k),
-                               (x + draw(rng, -0.06, 0.06), wide * draw(rng, 0.2, 0.35), z + 0.05 + 0.07 * k)],
-                              draw(rng, 0.03, 0.05), wood, 7) for k in range(count(rng, 2, 3))]  # fmt: skip
+    yield from [tube([(x + draw(rng, -0.05, 0.05), -wide * draw(rng, 0.2, 0.35), z + 0.04 + 0.06 * k),
+                      (x + draw(rng, -0.06, 0.06), wide * draw(rng, 0.2, 0.35), z + 0.05 + 0.07 * k)],
+                     draw(rng, 0.03, 0.05), wood, 7) for k in range(count(rng, 2, 3))]  # fmt: skip
     if chance(rng, 0.5):
         glow = replace(material("plastic", rng, (1.0, draw(rng, 0.45, 0.65), 0.15)), emission=0.9)
         for y in np.linspace(-0.25, 0.25, count(rng, 3, 6)) * wide:
             tall = draw(rng, 0.08, 0.3)
-            parts.append(lathe([(0.02, z + 0.1), (0.045, z + 0.1 + 0.3 * tall), (0.004, z + 0.1 + tall)], glow, x,
-                               float(y), 6, 1.2))  # fmt: skip
-    return parts
+            yield lathe([(0.02, z + 0.1), (0.045, z + 0.1 + 0.3 * tall), (0.004, z + 0.1 + tall)], glow, x, float(y), 6,
+                        1.2)  # fmt: skip
 
 
 def _hearth(rng: np.random.Generator, wide: float, high: float, deep: float, hole: tuple[float, float],
@@ -202,148 +200,153 @@ def _hearth(rng: np.random.Generator, wide: float, high: float, deep: float, hol
 
 
 @family("fireplace", "mantelpiece")
-def _mantel(rng: np.random.Generator) -> Piece:
+def _mantel(rng: np.random.Generator) -> Parts:
     wide, high, deep = draw(rng, 1.1, 1.75), draw(rng, 1.0, 1.3), draw(rng, 0.22, 0.45)
     hole = (wide * draw(rng, 0.42, 0.62), high * draw(rng, 0.52, 0.68))
     look = pictured(pick(rng, ("brick", "stone", "marble")), rng, "stone")
     frame = pictured(pick(rng, ("wood", "white", "marble", "stone", "painted")), rng, "stone")
     shelf, leg, half = draw(rng, 0.04, 0.09), draw(rng, 0.12, 0.22), wide / 2
-    parts = _hearth(rng, wide - 0.06, high - shelf, deep, hole, look)
-    parts += [box((deep - 0.01, s * half - (leg if s > 0 else 0.0), 0.0),
-                  (deep + 0.05, s * half + (leg if s < 0 else 0.0), high - shelf), frame) for s in (-1, 1)]  # fmt: skip
-    parts += [box((deep - 0.01, -half, hole[1] + 0.08), (deep + 0.045, half, high - shelf), frame),
-              rounded_box((0.0, -half - 0.06, high - shelf), (deep + draw(rng, 0.1, 0.18), half + 0.06, high), 0.012,
-                          frame, 2), slab(deep + 0.1, 0.0, 0.0, draw(rng, 0.4, 0.7), wide + 0.1, draw(rng, 0.015, 0.06),
-                                          pictured(pick(rng, ("stone", "tile", "marble")), rng, "stone"))]  # fmt: skip
+    yield from _hearth(rng, wide - 0.06, high - shelf, deep, hole, look)
+    yield from [box((deep - 0.01, s * half - (leg if s > 0 else 0.0), 0.0),
+                    (deep + 0.05, s * half + (leg if s < 0 else 0.0), high - shelf), frame)
+                for s in (-1, 1)]  # fmt: skip
+    yield box((deep - 0.01, -half, hole[1] + 0.08), (deep + 0.045, half, high - shelf), frame)
+    yield rounded_box((0.0, -half - 0.06, high - shelf), (deep + draw(rng, 0.1, 0.18), half + 0.06, high), 0.012, frame,
+                      2)  # fmt: skip
+    yield slab(deep + 0.1, 0.0, 0.0, draw(rng, 0.4, 0.7), wide + 0.1, draw(rng, 0.015, 0.06),
+               pictured(pick(rng, ("stone", "tile", "marble")), rng, "stone"))  # fmt: skip
     if chance(rng, 0.4):
-        parts += [box((deep + 0.05, s * (half - leg / 2) - 0.3 * leg, 0.15),
-                      (deep + 0.065, s * (half - leg / 2) + 0.3 * leg, high - shelf - 0.15), frame)
-                  for s in (-1, 1)]  # fmt: skip
-    return finished(parts, supports=[Support((0.02, -half), (deep + 0.08, half), high, 0.6)])
+        yield from [box((deep + 0.05, s * (half - leg / 2) - 0.3 * leg, 0.15),
+                        (deep + 0.065, s * (half - leg / 2) + 0.3 * leg, high - shelf - 0.15), frame)
+                    for s in (-1, 1)]  # fmt: skip
+    yield Support((0.02, -half), (deep + 0.08, half), high, 0.6)
 
 
 @family("fireplace", "chimney breast")
-def _chimney(rng: np.random.Generator) -> Piece:
+def _chimney(rng: np.random.Generator) -> Parts:
     wide, high, deep = draw(rng, 1.1, 2.0), draw(rng, 2.1, 2.4), draw(rng, 0.35, 0.6)
     hole = (wide * draw(rng, 0.4, 0.65), draw(rng, 0.55, 0.9))
     look = pictured(pick(rng, ("brick", "brick", "stone", "plaster")), rng, "stone")
     beam = draw(rng, 1.05, 1.35)
-    parts = _hearth(rng, wide, beam, deep, hole, look)
+    yield from _hearth(rng, wide, beam, deep, hole, look)
     top = wide * draw(rng, 0.5, 1.0)
     rings = [np.array([(0.0, -w / 2, z), (d, -w / 2, z), (d, w / 2, z), (0.0, w / 2, z)]) for w, d,
              z in ((wide, deep, beam), (top, deep * draw(rng, 0.6, 1.0), high))]  # fmt: skip
-    parts += [loft(rings, look), box((0.0, -wide / 2 - 0.05, beam - 0.06),
-                                     (deep + draw(rng, 0.06, 0.16), wide / 2 + 0.05, beam + 0.03),
-                                     material(pick(rng, ("wood", "wood", "stone")), rng)),
-              slab(deep + 0.12, 0.0, 0.0, 0.5, wide, draw(rng, 0.03, 0.3) if chance(rng, 0.3) else 0.04,
-                   pictured("stone", rng, "stone"))]  # fmt: skip
-    return finished(parts)
+    yield loft(rings, look)
+    yield box((0.0, -wide / 2 - 0.05, beam - 0.06), (deep + draw(rng, 0.06, 0.16), wide / 2 + 0.05, beam + 0.03),
+              material(pick(rng, ("wood", "wood", "stone")), rng))  # fmt: skip
+    yield slab(deep + 0.12, 0.0, 0.0, 0.5, wide, draw(rng, 0.03, 0.3) if chance(rng, 0.3) else 0.04,
+               pictured("stone", rng, "stone"))  # fmt: skip
 
 
 @family("fireplace", "iron stove")
-def _iron_stove(rng: np.random.Generator) -> Piece:
+def _iron_stove(rng: np.random.Generator) -> Parts:
     wide, deep, high = draw(rng, 0.4, 0.7), draw(rng, 0.35, 0.5), draw(rng, 0.5, 0.85)
     look, lift, half = material("metal", rng,
                                 pick(rng, ((0.1, 0.1, 0.1), (0.25, 0.25, 0.26), (0.2, 0.28, 0.22),
                                            (0.35, 0.18, 0.14)))), draw(rng, 0.1, 0.2), wide / 2  # fmt: skip
-    parts = [rounded_box((0.0, -half, lift), (deep, half, lift + high), draw(rng, 0.008, 0.05), look, 3),
-             slab(deep / 2, 0.0, lift + high, deep + 0.05, wide + 0.05, 0.025, look)]  # fmt: skip
-    parts += [strut((x, y, lift + 0.02), (x * 1.05 - 0.01, y * 1.1, 0.0), 0.04, 0.04, look) for x in (0.05, deep - 0.05)
-              for y in (-half + 0.05, half - 0.05)]  # fmt: skip
+    yield rounded_box((0.0, -half, lift), (deep, half, lift + high), draw(rng, 0.008, 0.05), look, 3)
+    yield slab(deep / 2, 0.0, lift + high, deep + 0.05, wide + 0.05, 0.025, look)
+    yield from [strut((x, y, lift + 0.02), (x * 1.05 - 0.01, y * 1.1, 0.0), 0.04, 0.04, look)
+                for x in (0.05, deep - 0.05) for y in (-half + 0.05, half - 0.05)]  # fmt: skip
     low, top, edge = lift + 0.08, lift + high - 0.06, 0.05
     glow = replace(material("black", rng, (0.9, 0.45, 0.15)),
                    emission=0.7) if chance(rng, 0.4) else material("black", rng)  # fmt: skip
-    parts += [rim((-half + 0.04, low), (half - 0.04, top), edge, (deep, deep + 0.03), look),
-              face(deep + 0.01, (-half + 0.04 + edge, low + edge), (half - 0.04 - edge, top - edge), glow),
-              tube([(deep + 0.03, half - 0.06, (low + top) / 2), (deep + 0.07, half - 0.06, (low + top) / 2 + 0.01),
-                    (deep + 0.07, half - 0.06, (low + top) / 2 - 0.1)], 0.008, chrome(rng), 5)]  # fmt: skip
+    yield rim((-half + 0.04, low), (half - 0.04, top), edge, (deep, deep + 0.03), look)
+    yield face(deep + 0.01, (-half + 0.04 + edge, low + edge), (half - 0.04 - edge, top - edge), glow)
+    yield tube([(deep + 0.03, half - 0.06, (low + top) / 2), (deep + 0.07, half - 0.06, (low + top) / 2 + 0.01),
+                (deep + 0.07, half - 0.06, (low + top) / 2 - 0.1)], 0.008, chrome(rng), 5)  # fmt: skip
     pipe = draw(rng, 0.055, 0.08)
-    parts.append(tube([(deep * 0.35, 0.0, lift + high), (deep * 0.35, 0.0, draw(rng, 1.9, 2.35))], pipe, look,
-                      12) if chance(rng,
-                                    0.6) else tube([(deep * 0.35, 0.0, lift + high),
-                                                    (deep * 0.35, 0.0, lift + high + 0.5),
-                                                    (deep * 0.3, 0.0, lift + high + 0.58),
-                                                    (-0.12, 0.0, lift + high + 0.6)], pipe, look, 12))  # fmt: skip
+    yield (
+        tube([(deep * 0.35, 0.0, lift + high), (deep * 0.35, 0.0, draw(rng, 1.9, 2.35))], pipe, look, 12)
+        if chance(rng, 0.6)
+        else tube(
+            [
+                (deep * 0.35, 0.0, lift + high),
+                (deep * 0.35, 0.0, lift + high + 0.5),
+                (deep * 0.3, 0.0, lift + high + 0.58),
+                (-0.12, 0.0, lift + high + 0.6),
+            ],
+            pipe,
+            look,
+            12,
+        )
+    )
     if chance(rng, 0.5):
-        parts.append(slab(deep / 2 + 0.1, 0.0, -0.012, deep + 0.5, wide + 0.3, 0.012,
-                          pictured(pick(rng, ("glass", "stone", "tile")), rng, "stone")))  # fmt: skip
-    return finished(parts)
+        yield slab(deep / 2 + 0.1, 0.0, -0.012, deep + 0.5, wide + 0.3, 0.012,
+                   pictured(pick(rng, ("glass", "stone", "tile")), rng, "stone"))  # fmt: skip
 
 
 @family("fireplace", "electric with glass", held_out=True)
-def _electric_fire(rng: np.random.Generator) -> Piece:
+def _electric_fire(rng: np.random.Generator) -> Parts:
     wide, high, deep = draw(rng, 0.8, 1.6), draw(rng, 0.4, 0.65), draw(rng, 0.14, 0.3)
     look, half = material(pick(rng, ("black", "white", "wood", "metal")), rng), wide / 2
     base = draw(rng, 0.0, 0.35)
-    parts = [rim((-half, base), (half, base + high), draw(rng, 0.05, 0.12), (0.0, deep), look),
-             box((0.0, -half + 0.02, base + 0.02), (0.02, half - 0.02, base + high - 0.02), material("black", rng)),
-             *_fire(rng, deep * 0.5, wide * 1.2, base + 0.1)]  # fmt: skip
-    parts.append(box((deep - 0.02, -half + 0.06, base + 0.06), (deep - 0.015, half - 0.06, base + high - 0.06),
-                     material("glass", rng)))  # fmt: skip
+    yield rim((-half, base), (half, base + high), draw(rng, 0.05, 0.12), (0.0, deep), look)
+    yield box((0.0, -half + 0.02, base + 0.02), (0.02, half - 0.02, base + high - 0.02), material("black", rng))
+    yield from _fire(rng, deep * 0.5, wide * 1.2, base + 0.1)
+    yield box((deep - 0.02, -half + 0.06, base + 0.06), (deep - 0.015, half - 0.06, base + high - 0.06),
+              material("glass", rng))  # fmt: skip
     if base > 0.05:
-        parts.append(box((0.0, -half, 0.0), (deep, half, base), look))
-    return finished(parts, supports=[Support((0.0, -half), (deep, half), base + high, 0.5)])
+        yield box((0.0, -half, 0.0), (deep, half, base), look)
+    yield Support((0.0, -half), (deep, half), base + high, 0.5)
 
 
 @family("water heater", "wall cylinder")
-def _wall_cylinder(rng: np.random.Generator) -> Piece:
+def _wall_cylinder(rng: np.random.Generator) -> Parts:
     radius, high, look = draw(rng, 0.18,
                               0.27), draw(rng, 0.5,
                                           1.2), material("white", rng) if chance(rng, 0.8) else enamel(rng)  # fmt: skip
     dome = draw(rng, 0.03, 0.08)
     x = radius + 0.02
     drop = draw(rng, 0.1, 0.3)
-    parts = [lathe([(radius * 0.6, 0.0), (radius, dome), (radius, high - dome), (radius * 0.6, high)], look, x, 0.0,
-                   22), slab(0.01, 0.0, high * 0.7, 0.04, radius, 0.05, material("metal", rng))]  # fmt: skip
+    yield lathe([(radius * 0.6, 0.0), (radius, dome), (radius, high - dome), (radius * 0.6, high)], look, x, 0.0, 22)
+    yield slab(0.01, 0.0, high * 0.7, 0.04, radius, 0.05, material("metal", rng))
     metal = chrome(rng)
-    parts += [tube([(x, s * 0.07, 0.01), (x, s * 0.07, -drop)], 0.01, metal, 6) for s in (-1, 1)]
-    parts += [spindle([(0.035, 2 * radius - 0.005), (0.03, 2 * radius + 0.01)],
-                      material(pick(rng, ("black", "white", "metal")), rng), 0.0, high * 0.25,
-                      12).moved(x=0.02)]  # fmt: skip
-    return finished(parts)
+    yield from [tube([(x, s * 0.07, 0.01), (x, s * 0.07, -drop)], 0.01, metal, 6) for s in (-1, 1)]
+    yield spindle([(0.035, 2 * radius - 0.005), (0.03, 2 * radius + 0.01)],
+                  material(pick(rng, ("black", "white", "metal")), rng), 0.0, high * 0.25,
+                  12).moved(x=0.02)  # fmt: skip
 
 
 @family("water heater", "wall box")
-def _wall_box(rng: np.random.Generator) -> Piece:
+def _wall_box(rng: np.random.Generator) -> Parts:
     wide, high, deep = draw(rng, 0.3, 0.5), draw(rng, 0.5, 0.85), draw(rng, 0.18, 0.36)
     look, dark, half = material("white", rng) if chance(rng, 0.75) else enamel(rng), material("black", rng), wide / 2
-    parts = [body(rng, (0.0, -half, 0.0), (deep, half, high), look),
-             face(deep + 0.001, (-half * 0.4, 0.1 * high), (half * 0.4, 0.1 * high + 0.05), dark)]  # fmt: skip
-    parts += [dial(deep, y * wide, 0.1 * high, 0.022, material(pick(rng, ("black", "metal", "white")), rng))
-              for y in ((-0.33, 0.33) if chance(rng, 0.6) else ())]  # fmt: skip
+    yield body(rng, (0.0, -half, 0.0), (deep, half, high), look)
+    yield face(deep + 0.001, (-half * 0.4, 0.1 * high), (half * 0.4, 0.1 * high + 0.05), dark)
+    yield from [dial(deep, y * wide, 0.1 * high, 0.022, material(pick(rng, ("black", "metal", "white")), rng))
+                for y in ((-0.33, 0.33) if chance(rng, 0.6) else ())]  # fmt: skip
     metal = material("metal", rng, (0.72, 0.45, 0.3)) if chance(rng, 0.5) else chrome(rng)
-    parts += [tube([(deep * 0.5, y * wide, 0.0), (deep * 0.5, y * wide, -draw(rng, 0.1, 0.3))], 0.009, metal, 6)
-              for y in np.linspace(-0.35, 0.35, count(rng, 2, 5))]  # fmt: skip
+    yield from [tube([(deep * 0.5, y * wide, 0.0), (deep * 0.5, y * wide, -draw(rng, 0.1, 0.3))], 0.009, metal, 6)
+                for y in np.linspace(-0.35, 0.35, count(rng, 2, 5))]  # fmt: skip
     if chance(rng, 0.5):
-        parts.append(tube([(deep * 0.5, 0.0, high), (deep * 0.5, 0.0, high + 0.12), (deep * 0.3, 0.0, high + 0.18),
-                           (0.0, 0.0, high + 0.2)], 0.045, look, 9))  # fmt: skip
-    return finished(parts)
+        yield tube([(deep * 0.5, 0.0, high), (deep * 0.5, 0.0, high + 0.12), (deep * 0.3, 0.0, high + 0.18),
+                    (0.0, 0.0, high + 0.2)], 0.045, look, 9)  # fmt: skip
 
 
 @family("water heater", "standing tank")
-def _standing_tank(rng: np.random.Generator) -> Piece:
+def _standing_tank(rng: np.random.Generator) -> Parts:
     radius, high, look = draw(rng, 0.22, 0.32), draw(rng, 1.1, 1.65), enamel(rng)
     lift, metal = draw(rng, 0.04, 0.12), material("metal", rng, (0.7, 0.45, 0.32))
-    parts = [lathe([(radius, lift), (radius, high - 0.04), (radius * 0.85, high)], look, sides=24),
-             cylinder(0.0, 0.0, 0.0, radius * 0.8, lift, material("black", rng), 14)]  # fmt: skip
-    parts += [tube([(0.0, s * radius * 0.45, high - 0.01), (0.0, s * radius * 0.45, high + 0.12),
-                    (-radius - 0.03, s * radius * 0.45, high + 0.2)], 0.012, metal, 6) for s in (-1, 1)]  # fmt: skip
-    parts += [box((radius - 0.02, -0.07, z), (radius + 0.03, 0.07, z + 0.14),
-                  material(pick(rng, ("black", "metal", "white")), rng))
-              for z in ((0.25 * high,) if chance(rng, 0.5) else (0.25 * high, 0.65 * high))]  # fmt: skip
+    yield lathe([(radius, lift), (radius, high - 0.04), (radius * 0.85, high)], look, sides=24)
+    yield cylinder(0.0, 0.0, 0.0, radius * 0.8, lift, material("black", rng), 14)
+    yield from [tube([(0.0, s * radius * 0.45, high - 0.01), (0.0, s * radius * 0.45, high + 0.12),
+                      (-radius - 0.03, s * radius * 0.45, high + 0.2)], 0.012, metal, 6) for s in (-1, 1)]  # fmt: skip
+    yield from [box((radius - 0.02, -0.07, z), (radius + 0.03, 0.07, z + 0.14),
+                    material(pick(rng, ("black", "metal", "white")), rng))
+                for z in ((0.25 * high,) if chance(rng, 0.5) else (0.25 * high, 0.65 * high))]  # fmt: skip
     if chance(rng, 0.4):
-        parts.append(cylinder(0.0, 0.0, high, 0.05, 0.35, material("metal", rng), 10))
-    return finished(parts)
+        yield cylinder(0.0, 0.0, high, 0.05, 0.35, material("metal", rng), 10)
 
 
 @family("water heater", "wall lying cylinder", held_out=True)
-def _lying(rng: np.random.Generator) -> Piece:
+def _lying(rng: np.random.Generator) -> Parts:
     radius, long, look = draw(rng, 0.18, 0.26), draw(rng, 0.6, 1.1), material("white", rng)
     upright = lathe([(radius * 0.6, -long / 2), (radius, -long / 2 + 0.05), (radius, long / 2 - 0.05),
                      (radius * 0.6, long / 2)], look, sides=22)  # fmt: skip
     metal = chrome(rng)
-    parts = [upright.tilted("x", np.pi / 2).moved(x=radius + 0.02, z=radius),
-             *[tube([(radius, y * long, 0.02), (radius, y * long, -0.18)], 0.01, metal, 6) for y in (-0.15, 0.15)],
-             *[slab(0.015, s * long * 0.3, radius * 0.8, 0.05, 0.06, radius, material("metal", rng)) for s in (-1, 1)],
-             dial(2 * radius + 0.01, long * 0.35, radius, 0.03, material("black", rng))]  # fmt: skip
-    return finished(parts)
+    return [upright.tilted("x", np.pi / 2).moved(x=radius + 0.02, z=radius),
+            *[tube([(radius, y * long, 0.02), (radius, y * long, -0.18)], 0.01, metal, 6) for y in (-0.15, 0.15)],
+            *[slab(0.015, s * long * 0.3, radius * 0.8, 0.05, 0.06, radius, material("metal", rng)) for s in (-1, 1)],
+            dial(2 * radius + 0.01, long * 0.35, radius, 0.03, material("black", rng))]  # fmt: skip

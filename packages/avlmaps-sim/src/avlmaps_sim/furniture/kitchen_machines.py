@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from avlmaps_sim.furniture.catalogue import Piece, Support, family
+from avlmaps_sim.furniture.catalogue import Parts, Support, family
 from avlmaps_sim.furniture.fittings import (
     Pair,
     bar_handle,
@@ -15,77 +15,74 @@ from avlmaps_sim.furniture.fittings import (
     spindle,
     steel,
 )  # fmt: skip
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, finished, pick
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick
 from avlmaps_sim.materials import material
-from avlmaps_sim.mesh import Material, Mesh, joined
+from avlmaps_sim.mesh import Material, Mesh, Meshes, joined
 from avlmaps_sim.shapes import box, loft, rounded_box, rounded_rectangle, slab, tube
 
 
-def _keypad(rng: np.random.Generator, x: float, low: Pair, high: Pair) -> list[Mesh]:
+def _keypad(rng: np.random.Generator, x: float, low: Pair, high: Pair) -> Meshes:
     """Return a display over a field of keys between two corners (y, z)."""
     dark, pale = material("black", rng), material(pick(rng, ("metal", "white", "plastic")), rng)
     (a, b), (c, d) = low, high
-    parts = [face(x + 0.001, (a + 0.1 * (c - a), d - 0.2 * (d - b)), (c - 0.1 * (c - a), d - 0.06 * (d - b)), dark)]
+    yield face(x + 0.001, (a + 0.1 * (c - a), d - 0.2 * (d - b)), (c - 0.1 * (c - a), d - 0.06 * (d - b)), dark)
     rows, columns = count(rng, 3, 5), 3
     for r in range(rows):
         for k in range(columns):
             y, z = a + (c - a) * (0.12 + 0.27 * k), b + (d - b) * (0.08 + 0.62 * r / rows)
-            parts.append(face(x + 0.0015, (y, z), (y + 0.22 * (c - a), z + 0.45 * (d - b) / rows), pale))
-    return parts
+            yield face(x + 0.0015, (y, z), (y + 0.22 * (c - a), z + 0.45 * (d - b) / rows), pale)
 
 
 def _oven_box(rng: np.random.Generator, wide: float, deep: float, high: float, look: Material,
-              panel: float) -> list[Mesh]:  # fmt: skip
+              panel: float) -> Meshes:  # fmt: skip
     """Return a table oven: box, dark window, and a control panel of width ``panel`` at its right."""
     half, dark = wide / 2, material("black", rng)
-    parts = [body(rng, (0.0, -half, 0.012), (deep, half, high), look, draw(rng, 0.004, 0.02)),
-             *feet((0.0, -half), (deep, half), 0.012, dark)]  # fmt: skip
+    yield body(rng, (0.0, -half, 0.012), (deep, half, high), look, draw(rng, 0.004, 0.02))
+    yield from feet((0.0, -half), (deep, half), 0.012, dark)
     shut = dark if chance(rng, 0.5) else look
     edge = half - panel
-    parts += [rounded_box((deep - 0.004, -half + 0.004, 0.016), (deep + 0.018, edge, high - 0.004), 0.004, shut, 2),
-              face(deep + 0.0195, (-half + draw(rng, 0.02, 0.05), 0.016 + draw(rng, 0.02, 0.05)),
-                   (edge - draw(rng, 0.02, 0.06), high - draw(rng, 0.025, 0.06)), material("black", rng))]  # fmt: skip
-    return parts
+    yield rounded_box((deep - 0.004, -half + 0.004, 0.016), (deep + 0.018, edge, high - 0.004), 0.004, shut, 2)
+    yield face(deep + 0.0195, (-half + draw(rng, 0.02, 0.05), 0.016 + draw(rng, 0.02, 0.05)),
+               (edge - draw(rng, 0.02, 0.06), high - draw(rng, 0.025, 0.06)), material("black", rng))  # fmt: skip
 
 
 @family("microwave", "with keypad")
-def _microwave_keys(rng: np.random.Generator) -> Piece:
+def _microwave_keys(rng: np.random.Generator) -> Parts:
     wide, deep, high, look = draw(rng, 0.43, 0.6), draw(rng, 0.3, 0.44), draw(rng, 0.24, 0.34), enamel(rng)
     panel = wide * draw(rng, 0.18, 0.28)
-    parts = _oven_box(rng, wide, deep, high, look, panel)
-    parts += [box((deep - 0.004, wide / 2 - panel + 0.004, 0.016), (deep + 0.014, wide / 2 - 0.004, high - 0.004),
-                  material(pick(rng, ("black", "metal", "white")), rng)),
-              *_keypad(rng, deep + 0.014, (wide / 2 - panel + 0.01, 0.03), (wide / 2 - 0.01, high - 0.02))]  # fmt: skip
+    yield from _oven_box(rng, wide, deep, high, look, panel)
+    yield box((deep - 0.004, wide / 2 - panel + 0.004, 0.016), (deep + 0.014, wide / 2 - 0.004, high - 0.004),
+              material(pick(rng, ("black", "metal", "white")), rng))  # fmt: skip
+    yield from _keypad(rng, deep + 0.014, (wide / 2 - panel + 0.01, 0.03), (wide / 2 - 0.01, high - 0.02))
     if chance(rng, 0.55):
-        parts.append(bar_handle((deep + 0.016, wide / 2 - panel - 0.025, 0.18 * high), 0.64 * high, True, chrome(rng),
-                                0.03, 0.007))  # fmt: skip
-    return finished(parts, supports=[Support((0.0, -wide / 2), (deep, wide / 2), high, 0.3)])
+        yield bar_handle((deep + 0.016, wide / 2 - panel - 0.025, 0.18 * high), 0.64 * high, True, chrome(rng), 0.03,
+                         0.007)  # fmt: skip
+    yield Support((0.0, -wide / 2), (deep, wide / 2), high, 0.3)
 
 
 @family("microwave", "with dials")
-def _microwave_dials(rng: np.random.Generator) -> Piece:
+def _microwave_dials(rng: np.random.Generator) -> Parts:
     wide, deep, high = draw(rng, 0.42, 0.52), draw(rng, 0.3, 0.38), draw(rng, 0.23, 0.3)
     look, panel = enamel(rng), draw(rng, 0.09, 0.13)
-    parts = _oven_box(rng, wide, deep, high, look, panel)
+    yield from _oven_box(rng, wide, deep, high, look, panel)
     knobs, y = material(pick(rng, ("black", "metal", "white", "plastic")), rng), wide / 2 - panel / 2
-    parts += [dial(deep, y, high * h, min(0.027, 0.3 * panel), knobs, 0.018) for h in (0.4, 0.72)]
-    parts.append(box((deep, y - 0.035, 0.03), (deep + 0.012, y + 0.035, 0.06), knobs))
-    return finished(parts, supports=[Support((0.0, -wide / 2), (deep, wide / 2), high, 0.3)])
+    yield from [dial(deep, y, high * h, min(0.027, 0.3 * panel), knobs, 0.018) for h in (0.4, 0.72)]
+    yield box((deep, y - 0.035, 0.03), (deep + 0.012, y + 0.035, 0.06), knobs)
+    yield Support((0.0, -wide / 2), (deep, wide / 2), high, 0.3)
 
 
 @family("microwave", "wall over the range", held_out=True)
-def _microwave_hung(rng: np.random.Generator) -> Piece:
+def _microwave_hung(rng: np.random.Generator) -> Parts:
     wide, deep, high, look = draw(rng, 0.7, 0.78), draw(rng, 0.36, 0.44), draw(rng, 0.38, 0.45), enamel(rng)
     panel, half = draw(rng, 0.13, 0.18), wide / 2
-    parts = [box((0.0, -half, 0.0), (deep, half, high), look),
-             face(deep + 0.002, (-half + 0.04, 0.06), (half - panel - 0.07, high - 0.1), material("black", rng)),
-             box((deep, half - panel, 0.02), (deep + 0.006, half - 0.01, high - 0.06), material("black", rng)),
-             *_keypad(rng, deep + 0.006, (half - panel + 0.01, 0.04), (half - 0.02, high - 0.08)),
-             bar_handle((deep, half - panel - 0.03, 0.06), high - 0.18, True, chrome(rng), 0.04, 0.009)]  # fmt: skip
-    parts += [box((deep - 0.01, -half + 0.05, high - 0.04 + 0.013 * i),
-                  (deep + 0.004, half - 0.05, high - 0.035 + 0.013 * i), material("black", rng))
-              for i in range(2)]  # fmt: skip
-    return finished(parts)
+    yield box((0.0, -half, 0.0), (deep, half, high), look)
+    yield face(deep + 0.002, (-half + 0.04, 0.06), (half - panel - 0.07, high - 0.1), material("black", rng))
+    yield box((deep, half - panel, 0.02), (deep + 0.006, half - 0.01, high - 0.06), material("black", rng))
+    yield from _keypad(rng, deep + 0.006, (half - panel + 0.01, 0.04), (half - 0.02, high - 0.08))
+    yield bar_handle((deep, half - panel - 0.03, 0.06), high - 0.18, True, chrome(rng), 0.04, 0.009)
+    yield from [box((deep - 0.01, -half + 0.05, high - 0.04 + 0.013 * i),
+                    (deep + 0.004, half - 0.05, high - 0.035 + 0.013 * i), material("black", rng))
+                for i in range(2)]  # fmt: skip
 
 
 def _dish_body(rng: np.random.Generator, wide: float, deep: float, high: float, look: Material) -> list[Mesh]:
@@ -95,80 +92,76 @@ def _dish_body(rng: np.random.Generator, wide: float, deep: float, high: float, 
 
 
 @family("dishwasher", "with control strip")
-def _dish_strip(rng: np.random.Generator) -> Piece:
+def _dish_strip(rng: np.random.Generator) -> Parts:
     wide, deep, high, look = pick(rng,
                                   (draw(rng, 0.44, 0.46),
                                    draw(rng, 0.59, 0.61))), draw(rng, 0.54,
                                                                  0.6), draw(rng, 0.81, 0.88), enamel(rng)  # fmt: skip
     strip, half = draw(rng, 0.08, 0.14), wide / 2
     other = look if chance(rng, 0.5) else material(pick(rng, ("black", "metal")), rng)
-    parts = [*_dish_body(rng, wide, deep - 0.03, high, look),
-             rounded_box((deep - 0.03, -half + 0.002, 0.1), (deep, half - 0.002, high - strip - 0.004), 0.006, look, 2),
-             rounded_box((deep - 0.03, -half + 0.002, high - strip), (deep + 0.004, half - 0.002, high - 0.002), 0.008,
-                         other, 2)]  # fmt: skip
+    yield from _dish_body(rng, wide, deep - 0.03, high, look)
+    yield rounded_box((deep - 0.03, -half + 0.002, 0.1), (deep, half - 0.002, high - strip - 0.004), 0.006, look, 2)
+    yield rounded_box((deep - 0.03, -half + 0.002, high - strip), (deep + 0.004, half - 0.002, high - 0.002), 0.008,
+                      other, 2)  # fmt: skip
     if chance(rng, 0.5):
-        parts.append(box((deep - 0.01, -0.1, high - strip + 0.02), (deep + 0.006, 0.1, high - 0.03),
-                         material("black", rng)))  # fmt: skip
-    parts += [spindle([(0.008, deep + 0.004), (0.007, deep + 0.009)], chrome(rng), float(y), high - strip / 2, 7)
-              for y in np.linspace(0.15, 0.4, count(rng, 2, 5)) * wide]  # fmt: skip
+        yield box((deep - 0.01, -0.1, high - strip + 0.02), (deep + 0.006, 0.1, high - 0.03), material("black", rng))
+    yield from [spindle([(0.008, deep + 0.004), (0.007, deep + 0.009)], chrome(rng), float(y), high - strip / 2, 7)
+                for y in np.linspace(0.15, 0.4, count(rng, 2, 5)) * wide]  # fmt: skip
     if chance(rng, 0.4):
-        parts.append(bar_handle((deep, -half * 0.75, high - strip - 0.05), wide * 0.75, False, chrome(rng)))
+        yield bar_handle((deep, -half * 0.75, high - strip - 0.05), wide * 0.75, False, chrome(rng))
     if chance(rng, 0.5):
-        parts.append(rounded_box((0.0, -half, high), (deep + 0.01, half, high + 0.025), 0.006,
-                                 material(pick(rng, ("white", "wood", "metal")), rng), 2))  # fmt: skip
-    return finished(parts)
+        yield rounded_box((0.0, -half, high), (deep + 0.01, half, high + 0.025), 0.006,
+                          material(pick(rng, ("white", "wood", "metal")), rng), 2)  # fmt: skip
 
 
 @family("dishwasher", "plain steel")
-def _dish_plain(rng: np.random.Generator) -> Piece:
+def _dish_plain(rng: np.random.Generator) -> Parts:
     wide, deep, high = draw(rng, 0.59, 0.61), draw(rng, 0.54, 0.6), draw(rng, 0.81, 0.88)
     look, half = enamel(rng), wide / 2
-    parts = [*_dish_body(rng, wide, deep - 0.03, high, look),
-             rounded_box((deep - 0.03, -half + 0.002, 0.1), (deep, half - 0.002, high - 0.002), 0.008, look,
-                         2)]  # fmt: skip
+    yield from _dish_body(rng, wide, deep - 0.03, high, look)
+    yield rounded_box((deep - 0.03, -half + 0.002, 0.1), (deep, half - 0.002, high - 0.002), 0.008, look, 2)
     if chance(rng, 0.6):
-        parts.append(bar_handle((deep, -half * 0.8, high - draw(rng, 0.06, 0.12)), wide * 0.8, False, chrome(rng),
-                                0.045, draw(rng, 0.008, 0.014)))  # fmt: skip
+        yield bar_handle((deep, -half * 0.8, high - draw(rng, 0.06, 0.12)), wide * 0.8, False, chrome(rng), 0.045,
+                         draw(rng, 0.008, 0.014))  # fmt: skip
     else:
-        parts.append(box((deep - 0.001, -0.12, high - 0.1), (deep + 0.002, 0.12, high - 0.06), material("black", rng)))
-    return finished(parts)
+        yield box((deep - 0.001, -0.12, high - 0.1), (deep + 0.002, 0.12, high - 0.06), material("black", rng))
 
 
 @family("dishwasher", "open door")
-def _dish_open(rng: np.random.Generator) -> Piece:
+def _dish_open(rng: np.random.Generator) -> Parts:
     wide, deep, high, look = draw(rng, 0.45, 0.61), draw(rng, 0.54, 0.6), draw(rng, 0.81, 0.87), enamel(rng)
     half, inside, swing = wide / 2, steel(rng), draw(rng, 0.5, 1.55)
-    parts = [box((0.0, -half, 0.0), (0.02, half, high), look),
-             *[box((0.0, s * half - (0.03 if s > 0 else 0.0), 0.0), (deep, s * half + (0.03 if s < 0 else 0.0), high),
-                   look) for s in (-1, 1)], box((0.0, -half, high - 0.04), (deep, half, high), look),
-             box((0.0, -half, 0.08), (deep, half, 0.13), inside),
-             slab(0.022, 0.0, 0.1, 0.004, wide - 0.06, high - 0.15, inside)]  # fmt: skip
+    yield box((0.0, -half, 0.0), (0.02, half, high), look)
+    yield from [box((0.0, s * half - (0.03 if s > 0 else 0.0), 0.0), (deep, s * half + (0.03 if s < 0 else 0.0), high),
+                    look) for s in (-1, 1)]  # fmt: skip
+    yield box((0.0, -half, high - 0.04), (deep, half, high), look)
+    yield box((0.0, -half, 0.08), (deep, half, 0.13), inside)
+    yield slab(0.022, 0.0, 0.1, 0.004, wide - 0.06, high - 0.15, inside)
     door = joined([rounded_box((0.0, -half, 0.0), (0.05, half, high - 0.12), 0.006, look, 2),
                    face(-0.002, (-half + 0.04, 0.04), (half - 0.04, high - 0.17), inside)])  # fmt: skip
-    parts.append(door.tilted("y", swing).moved(x=deep - 0.05 * float(np.cos(swing)),
-                                               z=0.1 + 0.05 * float(np.sin(swing))))  # fmt: skip
+    yield door.tilted("y", swing).moved(x=deep - 0.05 * float(np.cos(swing)), z=0.1 + 0.05 * float(np.sin(swing)))
     wire = material(pick(rng, ("metal", "white", "black")), rng)
     for z in (0.2, 0.5):
         out = draw(rng, 0.0, 0.3)
-        parts += [tube([(0.05 + out, y, z), (deep - 0.05 + out, y, z)], 0.004, wire, 4)
-                  for y in np.linspace(-half + 0.06, half - 0.06, 6)]  # fmt: skip
-        parts += [tube([(x + out, -half + 0.05, z + h), (x + out, half - 0.05, z + h)], 0.004, wire, 4)
-                  for x in (0.06, deep - 0.06) for h in (0.0, 0.1)]  # fmt: skip
-        parts += [spindle([(0.11, 0.0), (0.07, 0.012)], material("ceramic", rng), draw(rng, -0.1, 0.1), z + 0.12,
-                          12).moved(x=0.12 + 0.07 * k + out) for k in range(count(rng, 0, 4))]  # fmt: skip
-    return finished(parts)
+        yield from [tube([(0.05 + out, y, z), (deep - 0.05 + out, y, z)], 0.004, wire, 4)
+                    for y in np.linspace(-half + 0.06, half - 0.06, 6)]  # fmt: skip
+        yield from [tube([(x + out, -half + 0.05, z + h), (x + out, half - 0.05, z + h)], 0.004, wire, 4)
+                    for x in (0.06, deep - 0.06) for h in (0.0, 0.1)]  # fmt: skip
+        for k in range(count(rng, 0, 4)):
+            yield spindle(
+                [(0.11, 0.0), (0.07, 0.012)], material("ceramic", rng), draw(rng, -0.1, 0.1), z + 0.12, 12
+            ).moved(x=0.12 + 0.07 * k + out)
 
 
 @family("dishwasher", "table top", held_out=True)
-def _dish_small(rng: np.random.Generator) -> Piece:
+def _dish_small(rng: np.random.Generator) -> Parts:
     wide, deep, high, look = draw(rng, 0.42, 0.56), draw(rng, 0.4, 0.5), draw(rng, 0.42, 0.48), enamel(rng)
     half = wide / 2
-    parts = [body(rng, (0.0, -half, 0.015), (deep, half, high), look),
-             box((deep - 0.002, -half + 0.03, 0.08), (deep + 0.012, half - 0.03, high - 0.09),
-                 material(pick(rng, ("black", "white", "metal")), rng)), *feet((0.0, -half), (deep, half), 0.015, look),
-             bar_handle((deep, -0.12, high - 0.08), 0.24, False, chrome(rng), 0.025),
-             dial(deep, half * 0.75, high - 0.045, 0.02, chrome(rng))]  # fmt: skip
-    return finished(parts)
+    return [body(rng, (0.0, -half, 0.015), (deep, half, high), look),
+            box((deep - 0.002, -half + 0.03, 0.08), (deep + 0.012, half - 0.03, high - 0.09),
+                material(pick(rng, ("black", "white", "metal")), rng)), *feet((0.0, -half), (deep, half), 0.015, look),
+            bar_handle((deep, -0.12, high - 0.08), 0.24, False, chrome(rng), 0.025),
+            dial(deep, half * 0.75, high - 0.045, 0.02, chrome(rng))]  # fmt: skip
 
 
 def _duct(rng: np.random.Generator, size: Pair, z: float, top: float, look: Material) -> list[Mesh]:
@@ -184,55 +177,50 @@ def _buttons(rng: np.random.Generator, x: float, z: float) -> list[Mesh]:
 
 
 @family("range hood", "wall chimney")
-def _hood_chimney(rng: np.random.Generator) -> Piece:
+def _hood_chimney(rng: np.random.Generator) -> Parts:
     wide, deep, rim_high = draw(rng, 0.55, 1.0), draw(rng, 0.42, 0.52), draw(rng, 0.03, 0.09)
     look, slope, top = enamel(rng), draw(rng, 0.06, 0.28), draw(rng, 0.6, 1.1)
     duct = (draw(rng, 0.22, 0.3), draw(rng, 0.22, 0.34))
     rings = [np.column_stack([rounded_rectangle(d, w, 0.005, 2) + np.array((d / 2, 0.0)), np.full(8, z)]) for d, w,
              z in ((deep, wide, 0.0), (deep, wide, rim_high), (duct[0], duct[1], rim_high + slope))]  # fmt: skip
-    parts = [loft(rings, look), *_duct(rng, duct, rim_high + slope, max(top, rim_high + slope + 0.2), look),
-             *_buttons(rng, deep, rim_high / 2), slab(deep / 2, 0.0, -0.004, deep - 0.08, wide - 0.1, 0.004,
-                                                      material("metal", rng))]  # fmt: skip
-    return finished(parts)
+    return [loft(rings, look), *_duct(rng, duct, rim_high + slope, max(top, rim_high + slope + 0.2), look),
+            *_buttons(rng, deep, rim_high / 2),
+            slab(deep / 2, 0.0, -0.004, deep - 0.08, wide - 0.1, 0.004, material("metal", rng))]  # fmt: skip
 
 
 @family("range hood", "wall flat T")
-def _hood_flat(rng: np.random.Generator) -> Piece:
+def _hood_flat(rng: np.random.Generator) -> Parts:
     wide, deep, thick, look = draw(rng, 0.55, 1.0), draw(rng, 0.42, 0.52), draw(rng, 0.03, 0.08), enamel(rng)
     duct = (draw(rng, 0.22, 0.32), draw(rng, 0.22, 0.4))
-    parts = [box((0.0, -wide / 2, 0.0), (deep, wide / 2, thick), look),
-             *_duct(rng, duct, thick, draw(rng, 0.55, 1.1), look), *_buttons(rng, deep, thick / 2)]  # fmt: skip
-    return finished(parts)
+    return [box((0.0, -wide / 2, 0.0), (deep, wide / 2, thick), look),
+            *_duct(rng, duct, thick, draw(rng, 0.55, 1.1), look), *_buttons(rng, deep, thick / 2)]  # fmt: skip
 
 
 @family("range hood", "wall slanted glass")
-def _hood_slanted(rng: np.random.Generator) -> Piece:
+def _hood_slanted(rng: np.random.Generator) -> Parts:
     wide, high, deep = draw(rng, 0.55, 0.95), draw(rng, 0.35, 0.6), draw(rng, 0.32, 0.45)
     look, glass = enamel(rng), material(pick(rng, ("black", "black", "white", "glass")), rng)
     side = np.array([(0.0, 0.0), (0.12, 0.0), (deep, high * 0.7), (deep - 0.1, high), (0.0, high)])
-    parts = [loft([np.column_stack([side[:, 0], np.full(5, y), side[:, 1]]) for y in (-wide * 0.42, wide * 0.42)],
-                  look)]  # fmt: skip
+    yield loft([np.column_stack([side[:, 0], np.full(5, y), side[:, 1]]) for y in (-wide * 0.42, wide * 0.42)], look)
     pane = np.array([(0.125, 0.0), (deep + 0.015, high * 0.72), (deep, high * 0.74), (0.11, 0.012)])
-    parts.append(loft([np.column_stack([pane[:, 0], np.full(4, y), pane[:, 1]]) for y in (-wide / 2, wide / 2)], glass))
+    yield loft([np.column_stack([pane[:, 0], np.full(4, y), pane[:, 1]]) for y in (-wide / 2, wide / 2)], glass)
     if chance(rng, 0.6):
-        parts += _duct(rng, (0.24, 0.26), high, high + draw(rng, 0.2, 0.6), look)
-    return finished(parts)
+        yield from _duct(rng, (0.24, 0.26), high, high + draw(rng, 0.2, 0.6), look)
 
 
 @family("range hood", "wall slim")
-def _hood_slim(rng: np.random.Generator) -> Piece:
+def _hood_slim(rng: np.random.Generator) -> Parts:
     """Return a hood that fits under a wall cabinet."""
     wide, deep, high, look = draw(rng, 0.55, 0.95), draw(rng, 0.28, 0.5), draw(rng, 0.1, 0.2), enamel(rng)
     nose = draw(rng, 0.25, 0.8) * high
     side = np.array([(0.0, 0.0), (deep, 0.0), (deep, nose), (deep * draw(rng, 0.6, 0.95), high), (0.0, high)])
-    parts = [loft([np.column_stack([side[:, 0], np.full(5, y), side[:, 1]]) for y in (-wide / 2, wide / 2)], look),
-             *_buttons(rng, deep, nose / 2), slab(deep / 2, 0.0, -0.004, deep - 0.06, wide - 0.06, 0.005,
-                                                  material("metal", rng))]  # fmt: skip
-    return finished(parts)
+    return [loft([np.column_stack([side[:, 0], np.full(5, y), side[:, 1]]) for y in (-wide / 2, wide / 2)], look),
+            *_buttons(rng, deep, nose / 2),
+            slab(deep / 2, 0.0, -0.004, deep - 0.06, wide - 0.06, 0.005, material("metal", rng))]  # fmt: skip
 
 
 @family("range hood", "wall curved glass")
-def _hood_curved(rng: np.random.Generator) -> Piece:
+def _hood_curved(rng: np.random.Generator) -> Parts:
     wide, deep, look = draw(rng, 0.58, 0.95), draw(rng, 0.44, 0.52), steel(rng)
     y = np.linspace(-1.0, 1.0, 11)
     drop = draw(rng, 0.04, 0.14)
@@ -243,13 +231,12 @@ def _hood_curved(rng: np.random.Generator) -> Piece:
                                (deep * (1 - 0.12 * s * s), s * wide / 2, z + 0.007),
                                (0.03, s * wide / 2, z + 0.007)]))  # fmt: skip
     duct = (0.25, draw(rng, 0.22, 0.32))
-    parts = [loft(rings, material("glass", rng)), box((0.0, -0.28, 0.07), (deep * 0.8, 0.28, 0.145), look),
-             *_duct(rng, duct, 0.14, draw(rng, 0.6, 1.05), look), *_buttons(rng, deep * 0.8, 0.1)]  # fmt: skip
-    return finished(parts)
+    return [loft(rings, material("glass", rng)), box((0.0, -0.28, 0.07), (deep * 0.8, 0.28, 0.145), look),
+            *_duct(rng, duct, 0.14, draw(rng, 0.6, 1.05), look), *_buttons(rng, deep * 0.8, 0.1)]  # fmt: skip
 
 
 @family("range hood", "wall mantle", held_out=True)
-def _hood_mantle(rng: np.random.Generator) -> Piece:
+def _hood_mantle(rng: np.random.Generator) -> Parts:
     """Return a plastered country hood with a wooden beam."""
     wide, deep, high = draw(rng, 0.8, 1.3), draw(rng, 0.45, 0.6), draw(rng, 0.7, 1.1)
     look, wood = material(pick(rng, ("white", "painted", "stone")), rng), material("wood", rng)
@@ -259,5 +246,4 @@ def _hood_mantle(rng: np.random.Generator) -> Piece:
         s = 1 - (1 - draw(rng, 0.5, 0.51)) * t**bend
         rings.append(np.column_stack([rounded_rectangle(deep * s, wide * s, 0.01, 2) + np.array((deep * s / 2, 0.0)),
                                       np.full(8, beam + (high - beam) * t)]))  # fmt: skip
-    parts = [loft(rings, look), box((0.0, -wide / 2 - 0.02, 0.0), (deep + 0.03, wide / 2 + 0.02, beam), wood)]
-    return finished(parts)
+    return [loft(rings, look), box((0.0, -wide / 2 - 0.02, 0.0), (deep + 0.03, wide / 2 + 0.02, beam), wood)]

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from avlmaps_sim.furniture.catalogue import Piece, family
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, finished, pick, strut, turned_ring
+from avlmaps_sim.furniture.catalogue import Parts, family
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick, strut, turned_ring
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Triple, joined
 from avlmaps_sim.shapes import circle, cylinder, ellipsoid, lathe, loft, rounded_box, slab, tube
@@ -77,36 +77,34 @@ def _foot(rng: np.random.Generator, radius: float, look: Material) -> Mesh:
 
 
 @family("lamp", "shade on pole")
-def _shade_on_pole(rng: np.random.Generator) -> Piece:
+def _shade_on_pole(rng: np.random.Generator) -> Parts:
     tall, radius, metal = draw(rng, 1.2, 1.75), draw(rng, 0.13, 0.29), _metal(rng)
     pole = material("wood", rng) if chance(rng, 0.3) else metal
     rise = radius * 0.9
-    parts = [_foot(rng, draw(rng, 0.11, 0.19), metal)]
-    parts.append(cylinder(0.0, 0.0, 0.0, draw(rng, 0.008, 0.024), tall - rise * 0.5, pole, 10))
-    parts.append(_any_shade(rng, (0.0, 0.0, tall - rise), radius))
+    yield _foot(rng, draw(rng, 0.11, 0.19), metal)
+    yield cylinder(0.0, 0.0, 0.0, draw(rng, 0.008, 0.024), tall - rise * 0.5, pole, 10)
+    yield _any_shade(rng, (0.0, 0.0, tall - rise), radius)
     if chance(rng, 0.2):
-        parts.append(cylinder(0.0, 0.0, tall * draw(rng, 0.35, 0.45), draw(rng, 0.16, 0.24), 0.018, pole, 20))
-    return finished(parts, [(0.0, 0.0, tall - rise / 2)])
+        yield cylinder(0.0, 0.0, tall * draw(rng, 0.35, 0.45), draw(rng, 0.16, 0.24), 0.018, pole, 20)
+    yield (0.0, 0.0, tall - rise / 2)
 
 
 @family("lamp", "tripod")
-def _tripod(rng: np.random.Generator) -> Piece:
+def _tripod(rng: np.random.Generator) -> Parts:
     table = chance(rng, 0.25)
     tall = draw(rng, 0.3, 0.5) if table else draw(rng, 1.05, 1.4)
     spread, wood = tall * draw(rng, 0.2, 0.3), material(pick(rng, ("wood", "wood", "metal", "black")), rng)
     thick = draw(rng, 0.014, 0.035) * (0.5 if table else 1.0)
-    parts = [
-        strut((float(x), float(y), 0.0), (-float(x) * 0.12, -float(y) * 0.12, tall), thick, thick, wood)
-        for x, y in circle(spread, 3)
-    ]
+    for x, y in circle(spread, 3):
+        yield strut((float(x), float(y), 0.0), (-float(x) * 0.12, -float(y) * 0.12, tall), thick, thick, wood)
     if chance(rng, 0.5):
-        parts.append(tube([(*p, tall * 0.45) for p in circle(spread * 0.55, 3).tolist()], 0.006, wood, 5, closed=True))
-    parts.append(_any_shade(rng, (0.0, 0.0, tall - 0.03), spread * draw(rng, 0.75, 1.1)))
-    return finished(parts, [(0.0, 0.0, tall + 0.1)])
+        yield tube([(*p, tall * 0.45) for p in circle(spread * 0.55, 3).tolist()], 0.006, wood, 5, closed=True)
+    yield _any_shade(rng, (0.0, 0.0, tall - 0.03), spread * draw(rng, 0.75, 1.1))
+    yield (0.0, 0.0, tall + 0.1)
 
 
 @family("lamp", "arc")
-def _arc(rng: np.random.Generator) -> Piece:
+def _arc(rng: np.random.Generator) -> Parts:
     tall, reach, metal = draw(rng, 1.6, 2.15), draw(rng, 0.7, 1.4), _metal(rng)
     radius, drop = draw(rng, 0.12, 0.24), draw(rng, 0.2, 0.6)
     angle = np.linspace(0.0, np.pi, 14)
@@ -117,33 +115,34 @@ def _arc(rng: np.random.Generator) -> Piece:
     end = (reach / 2, 0.0, rise * 0.6)
     base = material(pick(rng, ("stone", "metal", "black")), rng)
     foot = draw(rng, 0.14, 0.2)
-    parts = [tube(path, draw(rng, 0.01, 0.018), metal, 7)]
+    yield tube(path, draw(rng, 0.01, 0.018), metal, 7)
     if chance(rng, 0.6):
-        parts.append(cylinder(-reach / 2, 0.0, 0.0, foot, draw(rng, 0.03, 0.08), base, 20))
+        yield cylinder(-reach / 2, 0.0, 0.0, foot, draw(rng, 0.03, 0.08), base, 20)
     else:
-        parts.append(slab(-reach / 2, 0.0, 0.0, 1.6 * foot, 1.8 * foot, draw(rng, 0.08, 0.25), base))
+        yield slab(-reach / 2, 0.0, 0.0, 1.6 * foot, 1.8 * foot, draw(rng, 0.08, 0.25), base)
     if chance(rng, 0.6):
-        parts.append(_dome(end[0], 0.0, end[2] - radius, radius, metal))
+        yield _dome(end[0], 0.0, end[2] - radius, radius, metal)
     else:
-        parts.append(shade((end[0], 0.0, end[2] - radius), radius, radius * 0.9, radius, _shade_material(rng)))
-    parts.append(ellipsoid((end[0], 0.0, end[2] - radius * 0.5), (0.04, 0.04, 0.05), shining(rng), 8, 5))
-    return finished(parts, [(end[0], 0.0, end[2] - radius * 0.6)])
+        yield shade((end[0], 0.0, end[2] - radius), radius, radius * 0.9, radius, _shade_material(rng))
+    yield ellipsoid((end[0], 0.0, end[2] - radius * 0.5), (0.04, 0.04, 0.05), shining(rng), 8, 5)
+    yield (end[0], 0.0, end[2] - radius * 0.6)
 
 
 @family("lamp", "torchiere")
-def _torchiere(rng: np.random.Generator) -> Piece:
+def _torchiere(rng: np.random.Generator) -> Parts:
     tall, radius, metal = draw(rng, 1.55, 1.9), draw(rng, 0.12, 0.22), _metal(rng)
     bowl = [(0.02, tall - radius * 0.6), (radius * 0.6, tall - radius * 0.4), (radius * 0.93, tall - radius * 0.15),
             (radius, tall), (radius * 0.9, tall - radius * 0.1), (0.01, tall - radius * 0.3)]  # fmt: skip
-    parts = [_foot(rng, draw(rng, 0.12, 0.17), metal), cylinder(0.0, 0.0, 0.0, 0.013, tall - radius * 0.55, metal, 8)]
-    parts.append(lathe(bowl, metal if chance(rng, 0.4) else _shade_material(rng), sides=20))
+    yield _foot(rng, draw(rng, 0.12, 0.17), metal)
+    yield cylinder(0.0, 0.0, 0.0, 0.013, tall - radius * 0.55, metal, 8)
+    yield lathe(bowl, metal if chance(rng, 0.4) else _shade_material(rng), sides=20)
     light = [(0.0, 0.0, tall)]
     if chance(rng, 0.4):  # a reading arm beside it
         side, high = draw(rng, 0.2, 0.35), tall * draw(rng, 0.6, 0.75)
         path = [(0.0, 0.0, high * 0.9), (side * 0.5, 0.0, high * 1.02), (side, 0.0, high)]
-        parts += [tube(path, 0.008, metal, 6), _dome(side, 0.0, high - 0.1, 0.06, metal, 1.6)]
+        yield from (tube(path, 0.008, metal, 6), _dome(side, 0.0, high - 0.1, 0.06, metal, 1.6))
         light.append((side, 0.0, high - 0.1))
-    return finished(parts, light)
+    yield from light
 
 
 def _body(rng: np.random.Generator, tall: float, wide: float) -> list[Mesh]:
@@ -174,96 +173,96 @@ def _body(rng: np.random.Generator, tall: float, wide: float) -> list[Mesh]:
 
 
 @family("lamp", "table lamp")
-def _table_lamp(rng: np.random.Generator) -> Piece:
+def _table_lamp(rng: np.random.Generator) -> Parts:
     tall, wide = draw(rng, 0.16, 0.4), draw(rng, 0.05, 0.13)
     radius = max(wide * draw(rng, 1.2, 2.0), tall * 0.35)
     cap = _any_shade(rng, (0.0, 0.0, tall * draw(rng, 0.92, 1.0)), radius)
-    return finished([*_body(rng, tall, wide), cap], [(0.0, 0.0, tall + radius * 0.5)])
+    return [*_body(rng, tall, wide), cap, (0.0, 0.0, tall + radius * 0.5)]
 
 
 @family("lamp", "desk arm")
-def _desk_arm(rng: np.random.Generator) -> Piece:
+def _desk_arm(rng: np.random.Generator) -> Parts:
     look, metal = material(pick(rng, ("painted", "metal", "black", "white", "plastic")), rng), material("metal", rng)
     lower, upper, scale = draw(rng, 0.22, 0.42), draw(rng, 0.2, 0.4), pick(rng, (1.0, 1.0, 1.0, 2.6))
     lean, fall = draw(rng, 0.1, 0.6), draw(rng, 0.2, 1.2)
     elbow = (-lower * np.sin(lean) * scale, 0.0, 0.03 + lower * np.cos(lean) * scale)
     head = (elbow[0] + upper * np.sin(fall + 0.5) * scale, 0.0, elbow[2] + upper * np.cos(fall + 0.5) * scale)
     radius, gap = draw(rng, 0.05, 0.1) * (1.3 if scale > 1 else 1.0), pick(rng, (0.0, 0.0, 0.018))
-    parts = [cylinder(0.0, 0.0, 0.0, draw(rng, 0.07, 0.11) * (1.4 if scale > 1 else 1), 0.03, look, 18)]
+    yield cylinder(0.0, 0.0, 0.0, draw(rng, 0.07, 0.11) * (1.4 if scale > 1 else 1), 0.03, look, 18)
     for y in (-gap, gap) if gap else (0.0,):
-        parts.append(tube([(0.0, y, 0.03), (elbow[0], y, elbow[2])], 0.008, metal, 5))
-        parts.append(tube([(elbow[0], y, elbow[2]), (head[0], y, head[2])], 0.008, metal, 5))
-    parts.append(ellipsoid((float(elbow[0]), 0.0, float(elbow[2])), (0.02, 0.025, 0.02), look, 8, 4))
+        yield tube([(0.0, y, 0.03), (elbow[0], y, elbow[2])], 0.008, metal, 5)
+        yield tube([(elbow[0], y, elbow[2]), (head[0], y, head[2])], 0.008, metal, 5)
+    yield ellipsoid((float(elbow[0]), 0.0, float(elbow[2])), (0.02, 0.025, 0.02), look, 8, 4)
     if chance(rng, 0.3):  # a flat bar of light
         bar = rounded_box((-0.03, -0.22, -0.012), (0.06, 0.22, 0.012), 0.01, look)
-        parts.append(bar.moved(*(float(c) for c in head)))
+        yield bar.moved(*(float(c) for c in head))
     else:
         profile = [(radius, -radius * 1.3), (radius * 0.8, -radius * 0.5), (radius * 0.35, 0.0), (0.01, 0.02)]
         hood = turned_ring(profile, look, sides=14)
-        parts.append(hood.tilted("y", -draw(rng, 0.1, 0.7)).moved(*(float(c) for c in head)))
-    return finished(parts, [(float(head[0]) + 0.02, 0.0, float(head[2]) - radius * 1.3)])
+        yield hood.tilted("y", -draw(rng, 0.1, 0.7)).moved(*(float(c) for c in head))
+    yield (float(head[0]) + 0.02, 0.0, float(head[2]) - radius * 1.3)
 
 
 @family("lamp", "globe and mushroom")
-def _globe_lamp(rng: np.random.Generator) -> Piece:
+def _globe_lamp(rng: np.random.Generator) -> Parts:
     radius, look = draw(rng, 0.07, 0.18), shining(rng)
     stem = draw(rng, 0.03, 0.25) if chance(rng, 0.75) else draw(rng, 0.9, 1.3)
     base = material(pick(rng, ("wood", "metal", "stone", "ceramic", "black")), rng)
     foot = max(radius * draw(rng, 0.45, 0.7), 0.12 if stem > 0.5 else 0.0)
-    parts = [cylinder(0.0, 0.0, 0.0, foot, 0.02, base, 18)]
-    parts.append(cylinder(0.0, 0.0, 0.0, max(radius * draw(rng, 0.1, 0.25), 0.012), stem, base, 10))
+    yield cylinder(0.0, 0.0, 0.0, foot, 0.02, base, 18)
+    yield cylinder(0.0, 0.0, 0.0, max(radius * draw(rng, 0.1, 0.25), 0.012), stem, base, 10)
     if chance(rng, 0.4):
         cap = [(radius * 0.2, stem), (radius, stem), (radius * 0.92, stem + radius * 0.35),
                (radius * 0.6, stem + radius * 0.7), (0.01, stem + radius * 0.85)]  # fmt: skip
-        parts.append(lathe(cap, look, sides=18))
+        yield lathe(cap, look, sides=18)
     else:
-        parts.append(ellipsoid((0.0, 0.0, stem + radius * 0.95), (radius, radius, radius), look, 16, 10))
-    return finished(parts, [(0.0, 0.0, stem + radius)])
+        yield ellipsoid((0.0, 0.0, stem + radius * 0.95), (radius, radius, radius), look, 16, 10)
+    yield (0.0, 0.0, stem + radius)
 
 
 @family("lamp", "paper column", held_out=True)
-def _paper_column(rng: np.random.Generator) -> Piece:
+def _paper_column(rng: np.random.Generator) -> Parts:
     tall, wide = draw(rng, 0.35, 1.5), draw(rng, 0.09, 0.17)
     look, wood = shining(rng), material(pick(rng, ("wood", "black")), rng)
-    parts = [slab(0.0, 0.0, 0.05, 2 * wide, 2 * wide, tall - 0.05, look)]
+    yield slab(0.0, 0.0, 0.05, 2 * wide, 2 * wide, tall - 0.05, look)
     posts = [(x * wide, y * wide) for x in (-1, 1) for y in (-1, 1)]
-    parts += [slab(x, y, 0.0, 0.02, 0.02, tall + 0.01, wood) for x, y in posts]
+    yield from [slab(x, y, 0.0, 0.02, 0.02, tall + 0.01, wood) for x, y in posts]
     for z in np.linspace(0.06, tall, count(rng, 2, 6)).tolist():
         for x, y in ((1, 0), (-1, 0), (0, 1), (0, -1)):
             size = (0.022, 2 * wide) if x else (2 * wide, 0.022)
-            parts.append(slab(x * wide, y * wide, z - 0.008, *size, 0.015, wood))
-    return finished(parts, [(0.0, 0.0, tall * 0.6)])
+            yield slab(x * wide, y * wide, z - 0.008, *size, 0.015, wood)
+    yield (0.0, 0.0, tall * 0.6)
 
 
 @family("lamp", "many heads", held_out=True)
-def _many_heads(rng: np.random.Generator) -> Piece:
+def _many_heads(rng: np.random.Generator) -> Parts:
     tall, metal, heads = draw(rng, 1.4, 1.8), _metal(rng), count(rng, 3, 5)
-    parts = [_foot(rng, draw(rng, 0.12, 0.17), metal), cylinder(0.0, 0.0, 0.0, 0.012, tall, metal, 8)]
+    yield from (_foot(rng, draw(rng, 0.12, 0.17), metal), cylinder(0.0, 0.0, 0.0, 0.012, tall, metal, 8))
     light, cup = [], _shade_material(rng)
     for number in range(heads):
         turn, z = draw(rng, 0.0, 2 * np.pi), tall * (1 - 0.1 * number)
         reach = draw(rng, 0.1, 0.28)
         x, y = reach * float(np.cos(turn)), reach * float(np.sin(turn))
-        parts.append(tube([(0.0, 0.0, z - 0.06), (x * 0.7, y * 0.7, z + 0.02), (x, y, z)], 0.007, metal, 5))
+        yield tube([(0.0, 0.0, z - 0.06), (x * 0.7, y * 0.7, z + 0.02), (x, y, z)], 0.007, metal, 5)
         hood = shade((0.0, 0.0, -0.13), 0.06, 0.03, 0.13, cup, 12).tilted("y", draw(rng, -1.2, 1.2)).turned(turn)
-        parts.append(hood.moved(x, y, z))
+        yield hood.moved(x, y, z)
         light.append((x, y, z - 0.08))
-    return finished(parts, light)
+    yield from light
 
 
 @family("lamp", "banker")
-def _banker(rng: np.random.Generator) -> Piece:
+def _banker(rng: np.random.Generator) -> Parts:
     metal, wide, tall = material("metal", rng), draw(rng, 0.11, 0.17), draw(rng, 0.26, 0.36)
     hood = shining(rng, pick(rng, ("plant", "painted", "white")))
     angle = np.linspace(0.0, np.pi, 8)
     rings = [np.stack([(0.075 * np.cos(a), y, tall + 0.06 * np.sin(a)) for a in angle]) for y in (-wide, wide)]
-    parts = [rounded_box((-0.07, -wide * 0.7, 0.0), (0.07, wide * 0.7, 0.03), 0.02, metal)]
-    parts += [cylinder(0.0, 0.0, 0.0, 0.01, tall + 0.03, metal, 8), loft(rings, hood)]
-    return finished(parts, [(0.0, 0.0, tall)])
+    yield rounded_box((-0.07, -wide * 0.7, 0.0), (0.07, wide * 0.7, 0.03), 0.02, metal)
+    yield from (cylinder(0.0, 0.0, 0.0, 0.01, tall + 0.03, metal, 8), loft(rings, hood))
+    yield (0.0, 0.0, tall)
 
 
 @family("lamp", "wall sconce")
-def _sconce(rng: np.random.Generator) -> Piece:
+def _sconce(rng: np.random.Generator) -> Parts:
     metal, reach, tall = _metal(rng), draw(rng, 0.08, 0.22), draw(rng, 0.12, 0.35)
     radius = draw(rng, 0.05, 0.1)
     kind = pick(rng, ("shade", "half", "globe", "candles"))
@@ -271,7 +270,7 @@ def _sconce(rng: np.random.Generator) -> Piece:
         flat = circle(1.0, 24)
         flat = flat[flat[:, 0] > -0.01] * (radius * 1.2, radius * 1.8)
         rings = [np.column_stack([flat, np.full(len(flat), z)]) for z in (0.0, tall)]
-        return finished([loft(rings, _shade_material(rng), capped=False)], [(radius * 0.5, 0.0, tall / 2)])
+        return [loft(rings, _shade_material(rng), capped=False), (radius * 0.5, 0.0, tall / 2)]
     parts = [rounded_box((0.0, -0.05, 0.0), (0.02, 0.05, draw(rng, 0.1, 0.25)), 0.008, metal)]
     sides = (-0.13, 0.13) if kind == "candles" else (0.0,)
     light = []
@@ -285,4 +284,4 @@ def _sconce(rng: np.random.Generator) -> Piece:
             parts.append(ellipsoid((reach, y, 0.2), (0.014, 0.014, 0.025), shining(rng), 8, 5))
         else:
             parts.append(_any_shade(rng, (reach, y, 0.1), radius))
-    return finished(parts, light)
+    return [*parts, *light]

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from avlmaps_sim.furniture.catalogue import Piece, family
+from avlmaps_sim.furniture.catalogue import Parts, family
 from avlmaps_sim.furniture.containers import tub
-from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, finished, pick, strut
+from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, pick, strut
 from avlmaps_sim.furniture.sports import wheel
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, joined
@@ -26,7 +26,7 @@ from avlmaps_sim.shapes import (
 
 
 @family("rocking horse", "wooden")
-def _rocking_horse(rng: np.random.Generator) -> Piece:
+def _rocking_horse(rng: np.random.Generator) -> Parts:
     s, look, other = (
         draw(rng, 0.7, 1.1),
         material(pick(rng, ("wood", "painted", "white")), rng),
@@ -53,11 +53,11 @@ def _rocking_horse(rng: np.random.Generator) -> Piece:
         tube([(0.38, -0.14, 0.76), (0.38, 0.14, 0.76)], 0.013, other, 5),
         rounded_box((-0.13, -0.13, 0.6), (0.1, 0.13, 0.66), 0.02, other),
     ]
-    return finished([joined(parts).scaled(s, s, s)])
+    return [joined(parts).scaled(s, s, s)]
 
 
 @family("rocking horse", "flat panels", held_out=True)
-def _flat_horse(rng: np.random.Generator) -> Piece:
+def _flat_horse(rng: np.random.Generator) -> Parts:
     s, look, seat = (
         draw(rng, 0.7, 1.05),
         material(pick(rng, ("painted", "wood", "plastic")), rng),
@@ -83,7 +83,7 @@ def _flat_horse(rng: np.random.Generator) -> Piece:
         tube([(0.36, -0.22, 0.62), (0.36, 0.22, 0.62)], 0.014, seat, 6),
         box((-0.3, -0.14, 0.06), (0.3, 0.14, 0.08), seat),
     ]
-    return finished([joined(parts).scaled(s, s, s)])
+    return [joined(parts).scaled(s, s, s)]
 
 
 def _hood(x: float, z: float, radius: float, wide: float, low: float, high: float, look: Material) -> Mesh:
@@ -97,7 +97,7 @@ def _hood(x: float, z: float, radius: float, wide: float, low: float, high: floa
 
 
 @family("baby stroller", "pram")
-def _pram(rng: np.random.Generator) -> Piece:
+def _pram(rng: np.random.Generator) -> Parts:
     look, metal, black = (
         material(pick(rng, ("fabric", "leather", "black")), rng),
         material("metal", rng),
@@ -105,55 +105,42 @@ def _pram(rng: np.random.Generator) -> Piece:
     )
     long, wide, base = draw(rng, 0.75, 0.9), draw(rng, 0.36, 0.45), draw(rng, 0.48, 0.62)
     tray = tub(long, wide, 0.28, 0.85, 0.15, look).moved(z=base)
-    parts = [tray, _hood(-long * 0.2, base + 0.2, long * 0.36, wide, 1.2, 3.2, look)]
+    yield from (tray, _hood(-long * 0.2, base + 0.2, long * 0.36, wide, 1.2, 3.2, look))
     size = draw(rng, 0.12, 0.2)
     for x in (-long * 0.36, long * 0.36):
         for y in (-wide / 2 - 0.04, wide / 2 + 0.04):
-            parts += wheel(x, y, size, 6, black, metal)
+            yield from wheel(x, y, size, 6, black, metal)
     for y in (-wide / 2, wide / 2):
-        parts += [
-            strut((s * long * 0.36, y, size), (-s * long * 0.3, y, base + 0.05), 0.022, 0.022, metal) for s in (-1, 1)
-        ]
-        parts.append(
-            tube(
-                [(-long * 0.3, y, base + 0.1), (long * 0.55, y, base + 0.25), (long * 0.72, y, base + 0.45)],
-                0.013,
-                metal,
-                5,
-            )
+        for s in (-1, 1):
+            yield strut((s * long * 0.36, y, size), (-s * long * 0.3, y, base + 0.05), 0.022, 0.022, metal)
+        yield tube(
+            [(-long * 0.3, y, base + 0.1), (long * 0.55, y, base + 0.25), (long * 0.72, y, base + 0.45)],
+            0.013,
+            metal,
+            5,
         )
-    parts.append(tube([(long * 0.72, -wide / 2, base + 0.45), (long * 0.72, wide / 2, base + 0.45)], 0.016, black, 6))
-    return finished(parts)
+    yield tube([(long * 0.72, -wide / 2, base + 0.45), (long * 0.72, wide / 2, base + 0.45)], 0.016, black, 6)
 
 
 @family("baby stroller", "buggy")
-def _buggy(rng: np.random.Generator) -> Piece:
+def _buggy(rng: np.random.Generator) -> Parts:
     look, metal, black = material("fabric", rng), material(pick(rng, ("metal", "black")), rng), material("black", rng)
     wide, size, three = draw(rng, 0.38, 0.5), draw(rng, 0.08, 0.15), chance(rng, 0.4)
-    parts = []
     for y in (-wide / 2, wide / 2):
-        parts.append(
-            tube(
-                [(0.42, y * (0.2 if three else 1), size), (0.05, y, 0.5), (-0.4, y, 1.0), (-0.5, y, 1.04)],
-                0.013,
-                metal,
-                6,
-            )
+        yield tube(
+            [(0.42, y * (0.2 if three else 1), size), (0.05, y, 0.5), (-0.4, y, 1.0), (-0.5, y, 1.04)], 0.013, metal, 6
         )
-        parts.append(tube([(-0.32, y, size), (0.02, y, 0.52)], 0.013, metal, 6))
-        parts.append(_disc(-0.32, y * 1.08, size * (1.3 if three else 1.0), black, metal))
-        parts.append(_disc(0.42, 0.0 if three else y * 1.08, size, black, metal))
-    parts.append(tube([(-0.5, -wide / 2, 1.04), (-0.5, wide / 2, 1.04)], 0.018, black, 6))
-    parts.append(slab(0.0, 0.0, 0.42, 0.3, wide * 0.92, 0.05, look))
+        yield tube([(-0.32, y, size), (0.02, y, 0.52)], 0.013, metal, 6)
+        yield _disc(-0.32, y * 1.08, size * (1.3 if three else 1.0), black, metal)
+        yield _disc(0.42, 0.0 if three else y * 1.08, size, black, metal)
+    yield tube([(-0.5, -wide / 2, 1.04), (-0.5, wide / 2, 1.04)], 0.018, black, 6)
+    yield slab(0.0, 0.0, 0.42, 0.3, wide * 0.92, 0.05, look)
     lean = draw(rng, 0.25, 0.7)
-    parts.append(slab(0.0, 0.0, 0.0, 0.04, wide * 0.9, 0.52, look).tilted("y", -lean).moved(-0.13, 0.0, 0.44))
-    parts.append(slab(0.0, 0.0, 0.0, 0.02, wide * 0.7, 0.3, look).tilted("y", 2.6).moved(0.15, 0.0, 0.45))
-    parts.append(_hood(-0.22, 0.72, 0.3, wide, draw(rng, 0.5, 1.3), 2.6, look))
-    parts += [
-        tube([(0.12, -wide / 2, 0.62), (0.18, 0.0, 0.64), (0.12, wide / 2, 0.62)], 0.014, black, 5),
-        slab(-0.15, 0.0, 0.15, 0.34, wide * 0.8, 0.12, look),
-    ]
-    return finished(parts)
+    yield slab(0.0, 0.0, 0.0, 0.04, wide * 0.9, 0.52, look).tilted("y", -lean).moved(-0.13, 0.0, 0.44)
+    yield slab(0.0, 0.0, 0.0, 0.02, wide * 0.7, 0.3, look).tilted("y", 2.6).moved(0.15, 0.0, 0.45)
+    yield _hood(-0.22, 0.72, 0.3, wide, draw(rng, 0.5, 1.3), 2.6, look)
+    yield tube([(0.12, -wide / 2, 0.62), (0.18, 0.0, 0.64), (0.12, wide / 2, 0.62)], 0.014, black, 5)
+    yield slab(-0.15, 0.0, 0.15, 0.34, wide * 0.8, 0.12, look)
 
 
 def _disc(x: float, y: float, radius: float, tyre: Material, metal: Material) -> Mesh:
@@ -163,133 +150,110 @@ def _disc(x: float, y: float, radius: float, tyre: Material, metal: Material) ->
 
 
 @family("baby stroller", "bouncer", held_out=True)
-def _walker(rng: np.random.Generator) -> Piece:
+def _walker(rng: np.random.Generator) -> Parts:
     look, frame = material("fabric", rng), material("plastic", rng)
     size = draw(rng, 0.3, 0.36)
-    parts = [tube([(*p, 0.06) for p in circle(size, 18).tolist()], 0.03, frame, 6, closed=True)]
-    parts += [tube([(*p, 0.42) for p in circle(size * 0.85, 18).tolist()], 0.035, frame, 6, closed=True)]
-    parts += [strut((x, y, 0.06), (x * 0.85, y * 0.85, 0.42), 0.025, 0.025, frame) for x, y in circle(size, 4).tolist()]
-    parts += [
-        ellipsoid((x, y, 0.025), (0.025, 0.025, 0.025), material("black", rng), 6, 4)
-        for x, y in circle(size, 6).tolist()
-    ]
-    parts += [
-        lathe([(0.12, 0.26), (0.19, 0.42)], look, sides=12),
-        rounded_box((-0.24, -0.14, 0.4), (-0.19, 0.14, 0.6), 0.02, look),
-    ]
-    return finished([*parts, slab(0.24, 0.0, 0.42, 0.14, 0.3, 0.05, material("plastic", rng))])
+    yield tube([(*p, 0.06) for p in circle(size, 18).tolist()], 0.03, frame, 6, closed=True)
+    yield tube([(*p, 0.42) for p in circle(size * 0.85, 18).tolist()], 0.035, frame, 6, closed=True)
+    for x, y in circle(size, 4).tolist():
+        yield strut((x, y, 0.06), (x * 0.85, y * 0.85, 0.42), 0.025, 0.025, frame)
+    for x, y in circle(size, 6).tolist():
+        yield ellipsoid((x, y, 0.025), (0.025, 0.025, 0.025), material("black", rng), 6, 4)
+    yield lathe([(0.12, 0.26), (0.19, 0.42)], look, sides=12)
+    yield rounded_box((-0.24, -0.14, 0.4), (-0.19, 0.14, 0.6), 0.02, look)
+    yield slab(0.24, 0.0, 0.42, 0.14, 0.3, 0.05, material("plastic", rng))
 
 
 @family("mat", "flat")
-def _mat(rng: np.random.Generator) -> Piece:
+def _mat(rng: np.random.Generator) -> Parts:
     long, wide, look = (
         draw(rng, 1.65, 1.9),
         draw(rng, 0.55, 0.85),
         material(pick(rng, ("plastic", "fabric", "painted")), rng),
     )
     flat, thick = rounded_rectangle(wide, long, 0.01, 2), draw(rng, 0.004, 0.015)
-    parts = [prism(flat.tolist(), 0.0, thick, look)]
+    yield prism(flat.tolist(), 0.0, thick, look)
     if chance(rng, 0.35):  # one end is rolled up
         radius = draw(rng, 0.03, 0.06)
-        parts.append(tube([(-wide / 2, long / 2, radius), (wide / 2, long / 2, radius)], radius, look, 10))
-    return finished(parts)
+        yield tube([(-wide / 2, long / 2, radius), (wide / 2, long / 2, radius)], radius, look, 10)
 
 
 @family("mat", "puzzle tiles")
-def _puzzle_mat(rng: np.random.Generator) -> Piece:
+def _puzzle_mat(rng: np.random.Generator) -> Parts:
     side, columns, rows, thick = draw(rng, 0.28, 0.6), count(rng, 2, 4), count(rng, 2, 5), draw(rng, 0.008, 0.02)
     looks = [material("plastic", rng) for _ in range(count(rng, 2, 4))]
-    parts = [
-        slab(i * side, j * side, 0.0, side * 0.985, side * 0.985, thick, pick(rng, looks))
-        for i in range(columns)
-        for j in range(rows)
-    ]
-    return finished(parts)
+    for i in range(columns):
+        for j in range(rows):
+            yield slab(i * side, j * side, 0.0, side * 0.985, side * 0.985, thick, pick(rng, looks))
 
 
 @family("mat", "folding", held_out=True)
-def _folding_mat(rng: np.random.Generator) -> Piece:
+def _folding_mat(rng: np.random.Generator) -> Parts:
     wide, panel, panels, thick = draw(rng, 0.6, 1.2), draw(rng, 0.5, 0.62), count(rng, 2, 4), draw(rng, 0.03, 0.06)
     looks = [material("plastic", rng) for _ in range(2)]
-    parts = [slab(0.0, i * panel, 0.0, wide, panel * 0.985, thick, looks[i % 2]) for i in range(panels)]
+    yield from [slab(0.0, i * panel, 0.0, wide, panel * 0.985, thick, looks[i % 2]) for i in range(panels)]
     if chance(rng, 0.4):
-        parts.append(slab(0.0, (panels - 1) * panel, thick, wide, panel * 0.97, thick, looks[0]))
-    return finished(parts)
+        yield slab(0.0, (panels - 1) * panel, thick, wide, panel * 0.97, thick, looks[0])
 
 
 @family("play tent", "tepee")
-def _tepee(rng: np.random.Generator) -> Piece:
+def _tepee(rng: np.random.Generator) -> Parts:
     wide, tall, sides = draw(rng, 0.5, 0.75), draw(rng, 1.25, 1.75), pick(rng, (4, 4, 5, 6))
     look, pole = material("fabric", rng), material("wood", rng)
     foot = circle(wide, sides) @ np.array(
         [[np.cos(np.pi / sides), np.sin(np.pi / sides)], [-np.sin(np.pi / sides), np.cos(np.pi / sides)]]
     )
-    apex, cut, parts = np.array([0.0, 0.0, tall * 0.86]), 0.9, []
+    apex, cut = np.array([0.0, 0.0, tall * 0.86]), 0.9
     corner = np.column_stack([foot, np.zeros(sides)])
     for i in range(sides):
         a, b = corner[i], corner[(i + 1) % sides]
-        parts.append(
-            tube([tuple(a.tolist()), tuple((a + (apex - a) * (tall / float(apex[2]))).tolist())], 0.012, pole, 5)
-        )
+        yield tube([tuple(a.tolist()), tuple((a + (apex - a) * (tall / float(apex[2]))).tolist())], 0.012, pole, 5)
         top_a, top_b = a + (apex - a) * cut, b + (apex - b) * cut
         if i == sides - 1:  # the door: two flaps held open
             middle, share = (a + b) / 2, draw(rng, 0.15, 0.4)
             high = (top_a + top_b) / 2
             for start, top in ((a, top_a), (b, top_b)):
                 edge = start + (middle - start) * (1 - share)
-                parts.append(cloth(np.array([[start, top], [edge, high]]), look))
+                yield cloth(np.array([[start, top], [edge, high]]), look)
             continue
-        parts.append(cloth(np.array([[a, top_a], [b, top_b]]), look))
-    parts.append(prism(foot.tolist(), 0.0, 0.01, material("fabric", rng)))
-    return finished(parts)
+        yield cloth(np.array([[a, top_a], [b, top_b]]), look)
+    yield prism(foot.tolist(), 0.0, 0.01, material("fabric", rng))
 
 
 @family("play tent", "house")
-def _tent_house(rng: np.random.Generator) -> Piece:
+def _tent_house(rng: np.random.Generator) -> Parts:
     long, wide, wall = draw(rng, 0.8, 1.2), draw(rng, 0.8, 1.2), draw(rng, 0.6, 0.95)
     peak, look, roof = wall + draw(rng, 0.3, 0.5), material("fabric", rng), material("fabric", rng)
     x, y, trim = long / 2, wide / 2, material("plastic", rng)
     door = y * draw(rng, 0.35, 0.6)
-    parts = [sheet((-x, s * y, 0.0), (long, 0.0, 0.0), (0.0, 0.0, wall), look) for s in (-1, 1)]
-    parts += [sheet((-x, -y, 0.0), (0.0, wide, 0.0), (0.0, 0.0, wall), look)]
-    parts += [sheet((x, s * y, 0.0), (0.0, -s * (y - door), 0.0), (0.0, 0.0, wall), look) for s in (-1, 1)]
-    parts += [polygon(np.array([(s * x, -y, wall), (s * x, y, wall), (s * x, 0.0, peak)]), look) for s in (-1, 1)]
-    parts += [
-        sheet(
+    yield from [sheet((-x, s * y, 0.0), (long, 0.0, 0.0), (0.0, 0.0, wall), look) for s in (-1, 1)]
+    yield sheet((-x, -y, 0.0), (0.0, wide, 0.0), (0.0, 0.0, wall), look)
+    yield from [sheet((x, s * y, 0.0), (0.0, -s * (y - door), 0.0), (0.0, 0.0, wall), look) for s in (-1, 1)]
+    yield from [polygon(np.array([(s * x, -y, wall), (s * x, y, wall), (s * x, 0.0, peak)]), look) for s in (-1, 1)]
+    for s in (-1, 1):
+        yield sheet(
             (-x * 1.05, s * y * 1.08, wall - 0.03),
             (long * 1.05, 0.0, 0.0),
             (0.0, -s * y * 1.08, peak - wall + 0.03),
             roof,
         )
-        for s in (-1, 1)
-    ]
-    parts += [
-        box((x, s * y * 0.75 - 0.09, wall * 0.5), (x + 0.004, s * y * 0.75 + 0.09, wall * 0.75), trim)
-        for s in (-1, 1)
-        if door < y * 0.5
-    ]
-    return finished(
-        [
-            *parts,
-            *(
-                tube([(sx * x, sy * y, 0.0), (sx * x, sy * y, wall)], 0.012, trim, 5)
-                for sx in (-1, 1)
-                for sy in (-1, 1)
-            ),
-        ]
+    for s in (-1, 1):
+        if door < y * 0.5:
+            yield box((x, s * y * 0.75 - 0.09, wall * 0.5), (x + 0.004, s * y * 0.75 + 0.09, wall * 0.75), trim)
+    yield from (
+        tube([(sx * x, sy * y, 0.0), (sx * x, sy * y, wall)], 0.012, trim, 5) for sx in (-1, 1) for sy in (-1, 1)
     )
 
 
 @family("play tent", "dome", held_out=True)
-def _dome_tent(rng: np.random.Generator) -> Piece:
+def _dome_tent(rng: np.random.Generator) -> Parts:
     radius, tall, looks = draw(rng, 0.5, 0.75), draw(rng, 0.8, 1.2), [material("fabric", rng) for _ in range(2)]
     angle, turn = np.linspace(0.0, np.pi / 2, 7), np.linspace(0.0, 2 * np.pi, 9)
-    parts = []
     for i in range(8):
         first = 2 if i in (0, 7) else 0  # the opening looks along +x
         points = np.array([
             [(radius * np.cos(a) * np.cos(t), radius * np.cos(a) * np.sin(t), tall * np.sin(a)) for a in angle[first:]]
             for t in np.linspace(turn[i], turn[i + 1], 3)
         ])  # fmt: skip
-        parts.append(cloth(points, looks[i % 2]))
-    return finished([*parts, cylinder(0.0, 0.0, 0.0, radius * 0.98, 0.01, looks[0], 16)])
+        yield cloth(points, looks[i % 2])
+    yield cylinder(0.0, 0.0, 0.0, radius * 0.98, 0.01, looks[0], 16)

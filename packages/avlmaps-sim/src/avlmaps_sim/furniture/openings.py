@@ -8,9 +8,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from avlmaps_sim.furniture.catalogue import Families, Piece, family
+from avlmaps_sim.furniture.catalogue import Families, Parts, Piece, family
 from avlmaps_sim.furniture.leaves import door_leaf, opaque
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, finished, pick, rim
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick, rim
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, joined
 from avlmaps_sim.shapes import box, sheet
@@ -231,22 +231,22 @@ def _wall(rng: np.random.Generator) -> float:
 
 def _register_door(style: str, held_out: bool) -> None:
     @family("door", style, held_out)
-    def recipe(rng: np.random.Generator) -> Piece:
-        return finished([door(rng, draw(rng, 0.68, 1.05), draw(rng, 1.95, 2.3), _wall(rng), 0.0, style=style).mesh])
+    def recipe(rng: np.random.Generator) -> Parts:
+        return [door(rng, draw(rng, 0.68, 1.05), draw(rng, 1.95, 2.3), _wall(rng), 0.0, style=style).mesh]
 
 
 def _register_window(style: str, held_out: bool) -> None:
     @family("window", style, held_out)
-    def recipe(rng: np.random.Generator) -> Piece:
+    def recipe(rng: np.random.Generator) -> Parts:
         width = draw(rng, 1.0, 2.4) if style in ("sliding", "french") else draw(rng, 0.5, 2.2)
         height = draw(rng, 1.95, 2.4) if style == "french" else draw(rng, 0.6, 1.7)
-        return finished([window(rng, width, height, _wall(rng), style=style).mesh])
+        return [window(rng, width, height, _wall(rng), style=style).mesh]
 
 
 def _register_folding_door(style: str, held_out: bool) -> None:
     @family("folding door", style, held_out)
-    def recipe(rng: np.random.Generator) -> Piece:
-        return finished([folding_door(rng, draw(rng, 0.7, 2.8), draw(rng, 1.95, 2.4), _wall(rng), style=style).mesh])
+    def recipe(rng: np.random.Generator) -> Parts:
+        return [folding_door(rng, draw(rng, 0.7, 2.8), draw(rng, 1.95, 2.4), _wall(rng), style=style).mesh]
 
 
 for _known, _register in (
@@ -258,13 +258,13 @@ for _known, _register in (
 
 
 @family("door", "ajar")
-def _ajar(rng: np.random.Generator) -> Piece:
+def _ajar(rng: np.random.Generator) -> Parts:
     wide, tall = draw(rng, 0.7, 1.0), draw(rng, 1.95, 2.25)
-    return finished([door(rng, wide, tall, _wall(rng), draw(rng, 0.3, 1.9), which="training").mesh])
+    return [door(rng, wide, tall, _wall(rng), draw(rng, 0.3, 1.9), which="training").mesh]
 
 
 @family("door", "double")
-def _double(rng: np.random.Generator) -> Piece:
+def _double(rng: np.random.Generator) -> Parts:
     wide, tall = draw(rng, 1.3, 2.0), draw(rng, 2.0, 2.5)
     open_rad = draw(rng, 0.2, 1.6) if chance(rng, 0.4) else 0.0
-    return finished([door(rng, wide, tall, _wall(rng), open_rad, which="training").mesh])
+    return [door(rng, wide, tall, _wall(rng), open_rad, which="training").mesh]

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps_sim.furniture.catalogue import Piece, family
-from avlmaps_sim.furniture.recipe_helpers import chance, draw, finished, pick
+from avlmaps_sim.furniture.catalogue import Parts, family
+from avlmaps_sim.furniture.recipe_helpers import chance, draw, pick
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Triple, joined
 from avlmaps_sim.shapes import circle, ellipsoid, loft, rounded_box
@@ -190,41 +190,41 @@ def seated(rng: np.random.Generator, seat_m: float) -> Mesh:
 
 
 @family("person", "standing")
-def _standing(rng: np.random.Generator) -> Piece:
+def _standing(rng: np.random.Generator) -> Parts:
     shoulders, elbows = _arms(rng)
     bend = draw(rng, 0.0, 0.15)
     pose = Pose(draw(rng, -0.05, 0.3), (bend, draw(rng, 0.0, 0.15)), (bend, draw(rng, 0.0, 0.3)), draw(rng, 0.02, 0.15),
                 shoulders, draw(rng, 0.05, 0.3), elbows)  # fmt: skip
-    return finished([body(pose, _tall(rng), _looks(rng))])
+    return [body(pose, _tall(rng), _looks(rng))]
 
 
 @family("person", "walking", held_out=True)
-def _walking(rng: np.random.Generator) -> Piece:
+def _walking(rng: np.random.Generator) -> Parts:
     step, side = draw(rng, 0.25, 0.55), pick(rng, (1.0, -1.0))
     hip = (side * step, -side * step)
     ahead, behind = draw(rng, 0.05, 0.3), draw(rng, 0.3, 0.7)
     knee = (ahead, behind) if side > 0 else (behind, ahead)
     pose = Pose(draw(rng, 0.0, 0.15), hip, knee, 0.04, (-hip[0], -hip[1]), 0.1,
                 (draw(rng, 0.2, 0.9), draw(rng, 0.2, 0.9)))  # fmt: skip
-    return finished([body(pose, _tall(rng), _looks(rng))])
+    return [body(pose, _tall(rng), _looks(rng))]
 
 
 @family("person", "sitting")
-def _sitting(rng: np.random.Generator) -> Piece:
-    return finished([seated(rng, draw(rng, 0.38, 0.5))])
+def _sitting(rng: np.random.Generator) -> Parts:
+    return [seated(rng, draw(rng, 0.38, 0.5))]
 
 
 @family("person", "lying", held_out=True)
-def _lying(rng: np.random.Generator) -> Piece:
+def _lying(rng: np.random.Generator) -> Parts:
     shoulders, elbows = _arms(rng)
     bend = draw(rng, 0.0, 0.8)
     pose = Pose(0.0, (bend, draw(rng, 0.0, 0.5)), (bend * 1.5, 0.3), 0.1, shoulders, 0.2, elbows)
-    return finished([body(pose, _tall(rng), _looks(rng)).tilted("y", -np.pi / 2)])
+    return [body(pose, _tall(rng), _looks(rng)).tilted("y", -np.pi / 2)]
 
 
 @family("person", "crouching")
-def _crouching(rng: np.random.Generator) -> Piece:
+def _crouching(rng: np.random.Generator) -> Parts:
     hip = draw(rng, 1.6, 2.1)
     pose = Pose(draw(rng, 0.2, 0.7), (hip, hip - draw(rng, 0.0, 0.5)), (hip + 0.5, hip + 0.3), 0.15,
                 (draw(rng, 0.3, 0.9), draw(rng, 0.3, 0.9)), 0.15, (0.5, 0.5))  # fmt: skip
-    return finished([body(pose, _tall(rng), _looks(rng))])
+    return [body(pose, _tall(rng), _looks(rng))]

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from avlmaps_sim.furniture.catalogue import Piece, family
-from avlmaps_sim.furniture.recipe_helpers import blade, chance, count, draw, finished, pick
+from avlmaps_sim.furniture.catalogue import Parts, family
+from avlmaps_sim.furniture.recipe_helpers import blade, chance, count, draw, pick
 from avlmaps_sim.furniture.vases import flowers
 from avlmaps_sim.materials import material
-from avlmaps_sim.mesh import Material, Mesh
+from avlmaps_sim.mesh import Material, Mesh, Meshes
 from avlmaps_sim.shapes import box, circle, cylinder, ellipsoid, lathe, loft, rounded_rectangle, slab, tube
 
 
@@ -66,7 +66,7 @@ def _pot_for(rng: np.random.Generator, height: float) -> tuple[list[Mesh], float
 
 
 @family("plant", "palm")
-def _palm(rng: np.random.Generator) -> Piece:
+def _palm(rng: np.random.Generator) -> Parts:
     height = draw(rng, 0.8, 2.2)
     parts, radius, earth = _pot_for(rng, height)
     green, bark, trunks = _greens(rng), material("wood", rng), count(rng, 1, 4)
@@ -81,11 +81,11 @@ def _palm(rng: np.random.Generator) -> Piece:
             droop = rise * draw(rng, 0.5, 1.3)
             wide = draw(rng, 0.03, 0.06) if trunks > 1 else draw(rng, 0.05, 0.12)
             parts.append(frond(rng, (x * 1.4, y * 1.4, top), turn, out, rise, droop, wide, pick(rng, green), 5))
-    return finished(parts)
+    return parts
 
 
 @family("plant", "feather palm")
-def _feather_palm(rng: np.random.Generator) -> Piece:
+def _feather_palm(rng: np.random.Generator) -> Parts:
     height = draw(rng, 0.9, 2.0)
     parts, _, earth = _pot_for(rng, height)
     green, stems = _greens(rng), count(rng, 5, 8)
@@ -102,11 +102,11 @@ def _feather_palm(rng: np.random.Generator) -> Piece:
             for side in (-1, 1):
                 long = height * 0.16 * (1.3 - s)
                 parts.append(frond(rng, at, turn + side * 1.0, long + 0.05, 0.02, 0.09, 0.02, look, 2))  # type: ignore[arg-type]
-    return finished(parts)
+    return parts
 
 
 @family("plant", "bush")
-def _bush(rng: np.random.Generator) -> Piece:
+def _bush(rng: np.random.Generator) -> Parts:
     height = draw(rng, 0.25, 0.9)
     parts, _, earth = _pot_for(rng, height * 1.4)
     green, leaves = _greens(rng), count(rng, 55, 90)
@@ -121,11 +121,11 @@ def _bush(rng: np.random.Generator) -> Piece:
         )
     for x, y in circle(spread * 0.3, 5).tolist():
         parts.append(tube([(0.0, 0.0, earth), (x, y, earth + height * 0.7)], 0.006, green[0], 3))
-    return finished(parts)
+    return parts
 
 
 @family("plant", "fern")
-def _fern(rng: np.random.Generator) -> Piece:
+def _fern(rng: np.random.Generator) -> Parts:
     height = draw(rng, 0.2, 0.7)
     parts, _, earth = _pot_for(rng, height * 1.3)
     green, fronds, wide = _greens(rng), count(rng, 18, 34), draw(rng, 0.012, 0.06)
@@ -134,11 +134,11 @@ def _fern(rng: np.random.Generator) -> Piece:
         droop = rise * draw(rng, 0.7, 1.25)
         droop = min(droop, rise + earth * 0.7)
         parts.append(frond(rng, (0.0, 0.0, earth), number * 2.4, out, rise, droop, wide, pick(rng, green), 6))
-    return finished(parts)
+    return parts
 
 
 @family("plant", "cactus")
-def _cactus(rng: np.random.Generator) -> Piece:
+def _cactus(rng: np.random.Generator) -> Parts:
     height = draw(rng, 0.12, 1.3)
     parts, radius, earth = _pot_for(rng, height)
     look, ribs = material("plant", rng), count(rng, 7, 11)
@@ -165,11 +165,11 @@ def _cactus(rng: np.random.Generator) -> Piece:
         x, y = 2.1 * wide * float(np.cos(turn)), 2.1 * wide * float(np.sin(turn))
         parts.append(tube([(0.0, 0.0, start), (x * 0.8, y * 0.8, start), (x, y, start + wide)], wide * 0.5, look, 7))
         parts.append(column(x, y, start + wide * 0.4, start + height * draw(rng, 0.2, 0.4) + wide, wide * 0.6))
-    return finished(parts)
+    return parts
 
 
 @family("plant", "snake plant")
-def _snake_plant(rng: np.random.Generator) -> Piece:
+def _snake_plant(rng: np.random.Generator) -> Parts:
     height = draw(rng, 0.25, 1.1)
     parts, radius, earth = _pot_for(rng, height * 1.1)
     green, wide = [*_greens(rng), material("plant", rng, (0.55, 0.6, 0.3))], min(height * draw(rng, 0.07, 0.13), 0.09)
@@ -182,11 +182,11 @@ def _snake_plant(rng: np.random.Generator) -> Piece:
         side = draw(rng, 0, 6.28)
         aside = (float(np.cos(side)), float(np.sin(side)), 0.0)
         parts.append(blade(path, [wide * 0.7, wide, wide * 0.8, 0.004], aside, pick(rng, green)))
-    return finished(parts)
+    return parts
 
 
 @family("plant", "small pot")
-def _small_pot(rng: np.random.Generator) -> Piece:
+def _small_pot(rng: np.random.Generator) -> Parts:
     radius = draw(rng, 0.035, 0.08)
     tall = radius * draw(rng, 1.0, 1.9)
     parts, green, earth = pot(rng, radius, tall), _greens(rng), tall * 0.88
@@ -206,11 +206,11 @@ def _small_pot(rng: np.random.Generator) -> Piece:
             lift = earth + (high * draw(rng, 0.2, 0.8) if kind == "herb" else 0.0)
             at = (out * 0.5 * float(np.cos(turn)), out * 0.5 * float(np.sin(turn)), lift)
             parts.append(frond(rng, at, turn, out, high * draw(rng, 0.3, 1.0), high * 0.25, wide, pick(rng, green), 2))
-    return finished(parts)
+    return parts
 
 
 @family("plant", "tree")
-def _tree(rng: np.random.Generator) -> Piece:
+def _tree(rng: np.random.Generator) -> Parts:
     height = draw(rng, 0.9, 1.9)
     parts, _, earth = _pot_for(rng, height * 0.9)
     green, bark = _greens(rng), material("wood", rng, (draw(rng, 0.25, 0.5), draw(rng, 0.2, 0.35), 0.18))
@@ -228,11 +228,11 @@ def _tree(rng: np.random.Generator) -> Piece:
             place = (float(at[0]), float(at[1]), float(at[2]))
             leaf = frond(rng, place, draw(rng, 0, 6.28), size, size * 0.2, size * 0.6, size * 0.5, pick(rng, green), 2)
             parts.append(leaf)
-    return finished(parts)
+    return parts
 
 
 @family("plant", "big leaves", held_out=True)
-def _big_leaves(rng: np.random.Generator) -> Piece:
+def _big_leaves(rng: np.random.Generator) -> Parts:
     height = draw(rng, 0.5, 1.7)
     parts, _, earth = _pot_for(rng, height)
     green, size = _greens(rng), height * draw(rng, 0.22, 0.36)
@@ -245,26 +245,26 @@ def _big_leaves(rng: np.random.Generator) -> Piece:
         parts.append(
             frond(rng, (x, y, high), turn, size, size * 0.15, size * draw(rng, 0.4, 0.9), size * 0.75, look, 5)
         )
-    return finished(parts)
+    return parts
 
 
 @family("plant", "trailing")
-def _trailing(rng: np.random.Generator) -> Piece:
+def _trailing(rng: np.random.Generator) -> Parts:
     stand, radius = draw(rng, 0.35, 1.0), draw(rng, 0.08, 0.16)
     look, tall = material(pick(rng, ("wood", "metal", "black")), rng), radius * draw(rng, 1.0, 1.5)
-    parts = [part.moved(z=stand) for part in pot(rng, radius, tall)]
+    yield from [part.moved(z=stand) for part in pot(rng, radius, tall)]
     if chance(rng, 0.7):
-        parts += [tube([(x * 1.2, y * 1.2, 0.0), (x * 0.9, y * 0.9, stand)], 0.012, look, 5)
-                  for x, y in circle(radius, count(rng, 3, 4)).tolist()]  # fmt: skip
-        parts.append(cylinder(0.0, 0.0, stand - 0.02, radius * 1.05, 0.02, look, 14))
+        yield from [tube([(x * 1.2, y * 1.2, 0.0), (x * 0.9, y * 0.9, stand)], 0.012, look, 5) for x,
+                    y in circle(radius, count(rng, 3, 4)).tolist()]  # fmt: skip
+        yield cylinder(0.0, 0.0, stand - 0.02, radius * 1.05, 0.02, look, 14)
     else:
-        parts.append(box((-radius, -radius, 0.0), (radius, radius, stand), look))
-    return finished([*parts, *_vines(rng, radius, stand + tall * 0.95, stand)])
+        yield box((-radius, -radius, 0.0), (radius, radius, stand), look)
+    yield from _vines(rng, radius, stand + tall * 0.95, stand)
 
 
-def _vines(rng: np.random.Generator, radius: float, top: float, room: float) -> list[Mesh]:
+def _vines(rng: np.random.Generator, radius: float, top: float, room: float) -> Meshes:
     """Return stems with leaves that hang over a pot's edge, at most ``room`` below its foot."""
-    green, parts, size = _greens(rng), [], draw(rng, 0.04, 0.09)
+    green, size = _greens(rng), draw(rng, 0.04, 0.09)
     for number in range(count(rng, 6, 11)):
         turn, long = number * 2.4, draw(rng, 0.15, 0.75)
         low, out = max(top - long * 1.2, top - room * 0.95), radius * draw(rng, 1.1, 1.5)
@@ -274,32 +274,28 @@ def _vines(rng: np.random.Generator, radius: float, top: float, room: float) -> 
             (c * out, d * out, top + 0.03),
             (c * out * 1.1, d * out * 1.1, low),
         ]
-        parts.append(tube(path, 0.003, green[0], 3))
+        yield tube(path, 0.003, green[0], 3)
         for s in np.linspace(0.0, 1.0, 7).tolist():
             at = (c * out * (1 + 0.1 * s), d * out * (1 + 0.1 * s), top + (low - top) * s)
-            parts.append(
-                frond(
-                    rng, at, turn + draw(rng, -1.2, 1.2), size, size * 0.3, size * 0.9, size * 0.7, pick(rng, green), 2
-                )
+            yield frond(
+                rng, at, turn + draw(rng, -1.2, 1.2), size, size * 0.3, size * 0.9, size * 0.7, pick(rng, green), 2
             )
-    return parts
 
 
 @family("plant", "wall trailing")
-def _wall_trailing(rng: np.random.Generator) -> Piece:
+def _wall_trailing(rng: np.random.Generator) -> Parts:
     radius = draw(rng, 0.06, 0.11)
     room, look, x = draw(rng, 0.3, 0.8), material(pick(rng, ("metal", "wood", "black")), rng), radius * 2.4
     tall = radius * 1.3
     parts = [*pot(rng, radius, tall), *_vines(rng, radius, tall * 0.95, room)]
     inside = [part.moved(x=x) for part in parts]
     reach = x + radius
-    return finished([*(m for m in inside if float(m.low[0]) > 0.0),
-                     box((0.0, -0.012, -0.02), (reach, 0.012, 0.0), look),
-                     box((0.0, -0.015, -0.12), (0.01, 0.015, 0.04), look)])  # fmt: skip
+    return [*(m for m in inside if float(m.low[0]) > 0.0), box((0.0, -0.012, -0.02), (reach, 0.012, 0.0), look),
+            box((0.0, -0.015, -0.12), (0.01, 0.015, 0.04), look)]  # fmt: skip
 
 
 @family("plant", "flowering")
-def _flowering(rng: np.random.Generator) -> Piece:
+def _flowering(rng: np.random.Generator) -> Parts:
     radius = draw(rng, 0.06, 0.14)
     tall = radius * draw(rng, 1.1, 1.7)
     parts, green, size = pot(rng, radius, tall), _greens(rng), radius * draw(rng, 1.0, 1.8)
@@ -308,11 +304,11 @@ def _flowering(rng: np.random.Generator) -> Piece:
             rng, (0.0, 0.0, tall * 0.88), number * 2.4, size, size * 0.7, size * 0.8, size * 0.35, pick(rng, green), 3
         )
         parts.append(leaf)
-    return finished([*parts, *flowers(rng, tall * 0.9, radius * draw(rng, 0.8, 1.5), radius * draw(rng, 1.5, 4.0))])
+    return [*parts, *flowers(rng, tall * 0.9, radius * draw(rng, 0.8, 1.5), radius * draw(rng, 1.5, 4.0))]
 
 
 @family("plant", "clipped", held_out=True)
-def _clipped(rng: np.random.Generator) -> Piece:
+def _clipped(rng: np.random.Generator) -> Parts:
     height, look, bark = draw(rng, 0.4, 1.5), material("plant", rng), material("wood", rng)
     parts, radius, earth = _pot_for(rng, height)
     kind, wide = pick(rng, ("ball", "cone", "balls")), max(radius * draw(rng, 1.1, 1.6), 0.1)
@@ -321,7 +317,7 @@ def _clipped(rng: np.random.Generator) -> Piece:
         parts.append(
             lathe([(wide * 0.6, earth), (wide, earth + 0.1), (wide * 0.5, earth + height * 0.6), (0.01, top)], look)
         )
-        return finished(parts)
+        return parts
     levels = (
         [(top - wide, wide)]
         if kind == "ball"
@@ -333,4 +329,4 @@ def _clipped(rng: np.random.Generator) -> Piece:
         rough = 1 + rng.uniform(-0.06, 0.06, (len(ball.vertex), 1))
         vertex = ((ball.vertex - (0.0, 0.0, z)) * rough + (0.0, 0.0, z)).astype(np.float32)
         parts.append(type(ball)(vertex, ball.triangle, ball.uv, ball.material, ball.materials))
-    return finished(parts)
+    return parts

@@ -1,4 +1,4 @@
-"""Parts that many recipes share: drawing measures, frames, bars between two points, cloth, and finishing a piece."""
+"""Parts that many recipes share: drawing measures, frames, bars between two points, cloth."""
 
 from collections.abc import Sequence
 from typing import TypeVar
@@ -6,7 +6,6 @@ from typing import TypeVar
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps_sim.furniture.catalogue import Piece, Support
 from avlmaps_sim.materials import KINDS, material
 from avlmaps_sim.mesh import Material, Mesh, Triple, joined, triangles_of
 from avlmaps_sim.shapes import box, circle, loft
@@ -88,17 +87,6 @@ def blade(path: Sequence[Triple], widths: Sequence[float], aside: Triple, materi
     line, half = np.asarray(path, np.float64), np.asarray(widths, np.float64)[:, None] / 2
     across = np.asarray(aside, np.float64) / max(float(np.linalg.norm(aside)), 1e-9)
     return cloth(np.stack([line - half * across, line + half * across], axis=1), material)
-
-
-def finished(meshes: Sequence[Mesh], light: Sequence[Triple] = (), supports: Sequence[Support] = ()) -> Piece:
-    """Join parts into a piece that stands on z = 0 about the origin; its lights and tops move with it."""
-    whole = joined(meshes)
-    x, y = ((whole.low + whole.high) / 2)[:2].tolist()
-    z = float(whole.low[2])
-    tops = tuple(
-        Support((s.low[0] - x, s.low[1] - y), (s.high[0] - x, s.high[1] - y), s.z - z, s.clearance_m) for s in supports
-    )
-    return Piece(whole.moved(-x, -y, -z), tops, tuple((a - x, b - y, c - z) for a, b, c in light))
 
 
 def turned_ring(

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from avlmaps_sim.furniture.catalogue import Piece, family
+from avlmaps_sim.furniture.catalogue import Parts, family
 from avlmaps_sim.furniture.chair_parts import (
     ChairFrame,
     bent_rail,
@@ -21,7 +21,7 @@ from avlmaps_sim.furniture.chair_parts import (
     upright_slats,
 )
 from avlmaps_sim.furniture.legs import LegStyle, leg, leg_style, named_leg, stretchers
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, finished, pick, strut
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick, strut
 from avlmaps_sim.furniture.upholstery import covering
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, joined
@@ -49,16 +49,16 @@ def _wooden(rng: np.random.Generator, frame: ChairFrame, look: Material, seat: s
 
 
 @family("chair", "rail back")
-def rail_back(rng: np.random.Generator) -> Piece:
+def rail_back(rng: np.random.Generator) -> Parts:
     """Return a chair with one to three broad rails across its back."""
     frame, look = chair_frame(rng), _frame_look(rng)
     number = count(rng, 1, 3)
     tall = draw(rng, 0.05, 0.3 / number)
-    return finished([_wooden(rng, frame, look), horizontal_slats(rng, frame, look, number, tall)])
+    return [_wooden(rng, frame, look), horizontal_slats(rng, frame, look, number, tall)]
 
 
 @family("chair", "ladder back")
-def ladder_back(rng: np.random.Generator) -> Piece:
+def ladder_back(rng: np.random.Generator) -> Parts:
     """Return a tall chair with many thin rails between posts with knobs, its seat woven."""
     frame = chair_frame(rng, back=draw(rng, 0.5, 0.72))
     look = _frame_look(rng)
@@ -66,20 +66,20 @@ def ladder_back(rng: np.random.Generator) -> Piece:
     tall = draw(rng, 0.03, 0.06)
     seat = pick(rng, ("cushion", "padded", "board"))
     body = _wooden(rng, frame, look, seat, draw(rng, 0.03, 0.08))
-    return finished([body, horizontal_slats(rng, frame, look, number, tall)])
+    return [body, horizontal_slats(rng, frame, look, number, tall)]
 
 
 @family("chair", "slat back")
-def slat_back(rng: np.random.Generator) -> Piece:
+def slat_back(rng: np.random.Generator) -> Parts:
     """Return a chair with upright slats or rods between two rails."""
     frame, look = chair_frame(rng), _frame_look(rng)
     number = count(rng, 3, 8)
     wide = draw(rng, 0.012, 0.6 * frame.rear / number)
-    return finished([_wooden(rng, frame, look), upright_slats(rng, frame, look, number, wide)])
+    return [_wooden(rng, frame, look), upright_slats(rng, frame, look, number, wide)]
 
 
 @family("chair", "splat back")
-def splat_back(rng: np.random.Generator) -> Piece:
+def splat_back(rng: np.random.Generator) -> Parts:
     """Return a chair with one shaped board in the middle of its back, under a curved crest."""
     frame = chair_frame(rng, back=draw(rng, 0.45, 0.62))
     look = _frame_look(rng)
@@ -91,11 +91,11 @@ def splat_back(rng: np.random.Generator) -> Piece:
     z = frame.top - crest - arch / 2
     rail = bent_rail((frame.back_x(z), 0.0, z), frame.rear + draw(rng, 0.0, 0.08), crest, 0.025, 0.01, look, arch)
     seat = pick(rng, ("padded", "padded", "board"))
-    return finished([_wooden(rng, frame, look, seat), splat(frame, frame.seat - 0.01, z + 0.02, widths, look), rail])
+    return [_wooden(rng, frame, look, seat), splat(frame, frame.seat - 0.01, z + 0.02, widths, look), rail]
 
 
 @family("chair", "solid back")
-def solid_back(rng: np.random.Generator) -> Piece:
+def solid_back(rng: np.random.Generator) -> Parts:
     """Return a chair with a board or a pad as its back."""
     frame, look = chair_frame(rng), _frame_look(rng)
     low = frame.seat + draw(rng, 0.02, 0.2)
@@ -110,11 +110,11 @@ def solid_back(rng: np.random.Generator) -> Piece:
     else:
         board = bent_rail((0.0, 0.0, 0.0), wide, tall, min(thick, 0.025), draw(rng, 0.0, 0.05), cover)
     back = board.tilted("y", -lean).moved(x + 0.5 * tall * float(np.sin(lean)), 0.0, low)
-    return finished([_wooden(rng, frame, look, "padded" if padded else ""), back])
+    return [_wooden(rng, frame, look, "padded" if padded else ""), back]
 
 
 @family("chair", "windsor")
-def windsor(rng: np.random.Generator) -> Piece:
+def windsor(rng: np.random.Generator) -> Parts:
     """Return a chair with a thick shaped seat, splayed turned legs and rods under a bent hoop or a comb."""
     frame = chair_frame(rng, back=draw(rng, 0.42, 0.68))
     look = _frame_look(rng)
@@ -125,32 +125,31 @@ def windsor(rng: np.random.Generator) -> Piece:
     x, y = frame.depth / 2 - 0.06, frame.rear / 2 - 0.06
     corners = [(sx, sy) for sx in (1, -1) for sy in (1, -1)]
     feet = [((sx * (x + splay), sy * (y + splay), 0.0), (sx * x, sy * y, under)) for sx, sy in corners]
-    parts = [seat, *(leg(foot, top, style, look) for foot, top in feet)]
+    yield from (seat, *(leg(foot, top, style, look) for foot, top in feet))
     low = draw(rng, 0.14, 0.2)
     out = splay * (1 - low / under)
-    parts.append(stretchers(rng, 2 * (x + out), 2 * (y + out), low, 0.018, look))
+    yield stretchers(rng, 2 * (x + out), 2 * (y + out), low, 0.018, look)
     # The back stands a little within the edge of the seat, whose corners are round.
     back, wide = replace(frame, depth=frame.depth - 0.08), frame.rear * 0.86
     number = count(rng, 5, 9)
     if chance(rng, 0.55):
         power = draw(rng, 2.0, 3.2)
-        parts.append(hoop(back, back.seat - 0.01, wide, 0.012, look, power))
+        yield hoop(back, back.seat - 0.01, wide, 0.012, look, power)
         shares = np.linspace(-0.8, 0.8, number)
         tops = (1 - np.abs(shares) ** power) ** (1 / power)
         ends = [back.seat + float(t) * (back.top - 0.02 - back.seat) for t in tops]
     else:
         crest = draw(rng, 0.05, 0.1)
         place = (back.back_x(back.top - crest), 0.0, back.top - crest)
-        parts.append(bent_rail(place, frame.rear * 1.04, crest, 0.02, draw(rng, 0.0, 0.05), look, draw(rng, 0.0, 0.03)))
+        yield bent_rail(place, frame.rear * 1.04, crest, 0.02, draw(rng, 0.0, 0.05), look, draw(rng, 0.0, 0.03))
         shares, ends = np.linspace(-0.95, 0.95, number), [back.top - crest + 0.01] * number
     for share, end in zip(shares.tolist(), ends, strict=True):
         side, foot = share * wide / 2, (back.back_x(0.0), share * wide * 0.43, back.seat - 0.01)
-        parts.append(tube([foot, (back.back_x(end), side, end)], 0.007, look, 4))
-    return finished(parts)
+        yield tube([foot, (back.back_x(end), side, end)], 0.007, look, 4)
 
 
 @family("chair", "cross back", held_out=True)
-def cross_back(rng: np.random.Generator) -> Piece:
+def cross_back(rng: np.random.Generator) -> Parts:
     """Return a chair whose back is two crossed bars under a rail or a hoop."""
     frame, look = chair_frame(rng, back=draw(rng, 0.4, 0.5)), _frame_look(rng)
     low, top = frame.seat + draw(rng, 0.04, 0.1), frame.top - 0.04
@@ -158,11 +157,11 @@ def cross_back(rng: np.random.Generator) -> Piece:
     xl, xt = frame.back_x(low), frame.back_x(top)
     bars = [strut((xl, s * y, low), (xt, -s * y, top), 0.014, draw(rng, 0.02, 0.04), look) for s in (1, -1)]
     rail = bent_rail((frame.back_x(top), 0.0, top - 0.02), frame.rear, 0.06, 0.022, 0.0, look, draw(rng, 0.0, 0.05))
-    return finished([_wooden(rng, frame, look), *bars, rail])
+    return [_wooden(rng, frame, look), *bars, rail]
 
 
 @family("chair", "bentwood")
-def bentwood(rng: np.random.Generator) -> Piece:
+def bentwood(rng: np.random.Generator) -> Parts:
     """Return a café chair: round seat, rods bent into rear legs and a hoop for a back, another hoop inside it."""
     wide = draw(rng, 0.38, 0.44)
     seat, top = draw(rng, 0.44, 0.48), draw(rng, 0.83, 0.95)
@@ -171,32 +170,27 @@ def bentwood(rng: np.random.Generator) -> Piece:
     look = material(pick(rng, ("wood", "wood", "black", "painted")), rng)
     rod, z = draw(rng, 0.011, 0.016), seat - 0.03
     cover = covering(rng) if chance(rng, 0.4) else look
-    parts = [
-        cylinder(0.0, 0.0, z, wide / 2, 0.022, look, 16),
-        cylinder(0.0, 0.0, z + 0.02, wide * 0.46, 0.012, cover, 16),
-    ]
-    parts.append(hoop(frame, z, frame.rear, rod, look, draw(rng, 1.9, 2.6)))
+    yield cylinder(0.0, 0.0, z, wide / 2, 0.022, look, 16)
+    yield cylinder(0.0, 0.0, z + 0.02, wide * 0.46, 0.012, cover, 16)
+    yield hoop(frame, z, frame.rear, rod, look, draw(rng, 1.9, 2.6))
     within = replace(frame, top=seat + (top - seat) * draw(rng, 0.7, 0.9), rake=frame.rake * 0.8)
-    parts.append(hoop(within, z, frame.rear * draw(rng, 0.45, 0.75), rod * 0.8, look))
+    yield hoop(within, z, frame.rear * draw(rng, 0.45, 0.75), rod * 0.8, look)
     splay, style = draw(rng, 0.02, 0.05), named_leg(pick(rng, ("slim", "tapered")), 8, rod * 2.4)
     for s in (1, -1):
         x, y = wide * 0.36, s * wide * 0.36
-        parts.append(leg((x + splay, y + s * splay, 0.0), (x, y, z), style, look))
+        yield leg((x + splay, y + s * splay, 0.0), (x, y, z), style, look)
         rear = (frame.back_x(0.0), s * frame.rear / 2, z)
-        parts.append(
-            leg((rear[0] - splay - 0.04, rear[1] + s * 0.01, 0.0), rear, named_leg("slim", 8, rod * 2.6), look)
-        )
+        yield leg((rear[0] - splay - 0.04, rear[1] + s * 0.01, 0.0), rear, named_leg("slim", 8, rod * 2.6), look)
     ring = [(wide * 0.38 * float(np.cos(a)), wide * 0.38 * float(np.sin(a)), 0.24) for a in np.linspace(0, 6.283, 13)]
-    parts.append(tube(ring, rod * 0.6, look, 4))
-    return finished(parts)
+    yield tube(ring, rod * 0.6, look, 4)
 
 
 @family("chair", "scandinavian")
-def scandinavian(rng: np.random.Generator) -> Piece:
+def scandinavian(rng: np.random.Generator) -> Parts:
     """Return a chair with a low curved back rail that goes round the sides, on splayed round legs."""
     frame = chair_frame(rng, back=draw(rng, 0.27, 0.36))
     look = material("wood", rng)
-    parts = [seat_board(rng, frame, look, pick(rng, ("padded", "board")))]
+    yield seat_board(rng, frame, look, pick(rng, ("padded", "board")))
     style = named_leg(pick(rng, ("tapered", "bulged", "slim")), 8, draw(rng, 0.03, 0.042))
     splay = draw(rng, 0.02, 0.06)
     y, reach = frame.front / 2 + 0.01, draw(rng, -0.1, 0.12)
@@ -204,9 +198,9 @@ def scandinavian(rng: np.random.Generator) -> Piece:
     arms = reach > 0.04
     for s in (1, -1):
         front_top = (x_front, s * (y if arms else y - 0.04), frame.top - 0.05 if arms else frame.seat - 0.02)
-        parts.append(leg((x_front + splay, s * (y - 0.04 + splay), 0.0), front_top, style, look))
+        yield leg((x_front + splay, s * (y - 0.04 + splay), 0.0), front_top, style, look)
         top = (x_back - 0.03, s * (y - 0.02), frame.top - 0.03)
-        parts.append(leg((x_back - splay, s * (y - 0.04 + splay), 0.0), top, style, look))
+        yield leg((x_back - splay, s * (y - 0.04 + splay), 0.0), top, style, look)
     tall, lean = draw(rng, 0.04, 0.12), draw(rng, 0.0, 0.12)
     path = []
     for a in np.linspace(-np.pi / 2, np.pi / 2, 9):
@@ -215,8 +209,8 @@ def scandinavian(rng: np.random.Generator) -> Piece:
     ends = [(x_front, s * y, frame.top - 0.06 if arms else frame.top - tall / 2) for s in (-1, 1)]
     path = [ends[0], *path, ends[1]] if arms else path
     flat = tube([(p[0], p[1], 0.0) for p in path], 0.016, look, 6)
-    parts.append(flat.scaled(1.0, 1.0, tall / 0.032).moved(z=frame.top - tall / 2))
+    yield flat.scaled(1.0, 1.0, tall / 0.032).moved(z=frame.top - tall / 2)
     z = frame.seat - 0.045
     sides = [((x_back - 0.02, s * (y - 0.035), z), (x_front, s * (y - 0.035), z)) for s in (1, -1)]
     ends = [((x, -y + 0.04, z), (x, y - 0.04, z)) for x in (x_back, x_front - 0.01)]
-    return finished([*parts, *(strut(start, end, 0.02, 0.04, look) for start, end in (*sides, *ends))])
+    yield from (strut(start, end, 0.02, 0.04, look) for start, end in (*sides, *ends))

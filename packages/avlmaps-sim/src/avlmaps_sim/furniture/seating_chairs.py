@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from avlmaps_sim.furniture.catalogue import Piece, family
+from avlmaps_sim.furniture.catalogue import Parts, family
 from avlmaps_sim.furniture.chair_parts import bent_rail, chair_frame
 from avlmaps_sim.furniture.legs import four_legs, leg, leg_style, named_leg, sled, star_base
-from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, finished, pick, strut
+from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, pick, strut
 from avlmaps_sim.furniture.upholstery import covering, cushion
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, joined
@@ -97,141 +97,125 @@ def shell_base(rng: np.random.Generator, width: float, depth: float, seat: float
 
 
 @family("chair", "shell")
-def shell_chair(rng: np.random.Generator) -> Piece:
+def shell_chair(rng: np.random.Generator) -> Parts:
     """Return a moulded seat of plastic, plywood or cloth on dowels, tubes, runners, a star or a tulip foot."""
     width, depth, seat = draw(rng, 0.42, 0.52), draw(rng, 0.4, 0.47), draw(rng, 0.42, 0.47)
     look = material(pick(rng, ("plastic", "plastic", "white", "black", "fabric", "wood")), rng)
     wrap = draw(rng, 0.02, 0.14)
-    parts = [shell(rng, width, depth, seat, draw(rng, 0.33, 0.44), look, wrap, draw(rng, 0.008, 0.03))]
-    parts += shell_base(
+    yield shell(rng, width, depth, seat, draw(rng, 0.33, 0.44), look, wrap, draw(rng, 0.008, 0.03))
+    yield from shell_base(
         rng, width, depth, seat, pick(rng, ("dowels", "dowels", "tubes", "tubes", "sled", "star", "tulip"))
     )
     if chance(rng, 0.3):
         cover = material(pick(rng, ("fabric", "leather")), rng)
-        parts.append(
-            cushion(
-                (-depth * 0.35, -width * 0.38, seat - 0.01), (depth * 0.4, width * 0.38, seat + 0.03), cover, 0.02, 0.01
-            )
+        yield cushion(
+            (-depth * 0.35, -width * 0.38, seat - 0.01), (depth * 0.4, width * 0.38, seat + 0.03), cover, 0.02, 0.01
         )
-    return finished(parts)
 
 
 @family("chair", "parsons")
-def parsons_chair(rng: np.random.Generator) -> Piece:
+def parsons_chair(rng: np.random.Generator) -> Parts:
     """Return a chair covered with cloth or leather all over, its back straight, on short wooden legs."""
     frame = chair_frame(rng, back=draw(rng, 0.42, 0.65))
     look, thick = covering(rng, 0.35), draw(rng, 0.05, 0.1)
     low = pick(rng, (frame.seat - draw(rng, 0.1, 0.18), 0.04))
     x, y = frame.depth / 2, frame.front / 2
-    parts = [rounded_box((-x, -y, low), (x, y, frame.seat - 0.015), 0.02, look, 2, 0.015)]
+    yield rounded_box((-x, -y, low), (x, y, frame.seat - 0.015), 0.02, look, 2, 0.015)
     tall = frame.top - low
     back = rounded_box((-thick, -y, 0.0), (0.0, y, tall), draw(rng, 0.012, 0.04), look, 3)
     vertex = back.vertex.copy()
     vertex[:, 0] -= frame.rake * np.clip((vertex[:, 2] - (frame.seat - low)) / (frame.top - frame.seat), 0.0, 1.0)
     back = Mesh(vertex, back.triangle, back.uv, back.material, back.materials)
-    parts.append(back.moved(x=-x + 0.02, z=low))
+    yield back.moved(x=-x + 0.02, z=low)
     legs = material(pick(rng, ("wood", "wood", "black")), rng)
     style = leg_style(rng, 0.032, 0.048)
-    parts.append(
-        four_legs(
-            frame.depth + thick - 0.03, frame.front - 0.02, low + 0.01, style, legs, 0.0, draw(rng, 0.0, 0.05)
-        ).moved(x=-thick / 2)
-    )
-    return finished(parts)
+    yield four_legs(
+        frame.depth + thick - 0.03, frame.front - 0.02, low + 0.01, style, legs, 0.0, draw(rng, 0.0, 0.05)
+    ).moved(x=-thick / 2)
 
 
 @family("chair", "tube and pads")
-def tube_chair(rng: np.random.Generator) -> Piece:
+def tube_chair(rng: np.random.Generator) -> Parts:
     """Return a stacking chair: a frame of bent tubes carries a pad or plywood for the seat and one for the back."""
     frame = chair_frame(rng, back=draw(rng, 0.32, 0.46))
     metal = material(pick(rng, ("metal", "black", "painted")), rng)
     look = material(pick(rng, ("fabric", "wood", "plastic", "leather")), rng)
     r, y = draw(rng, 0.009, 0.014), frame.rear / 2
-    half, foot, under, parts = frame.depth / 2, draw(rng, 0.0, 0.03), frame.seat - 0.04, []
+    half, foot, under = frame.depth / 2, draw(rng, 0.0, 0.03), frame.seat - 0.04
     arms, arm = chance(rng, 0.25), frame.seat + 0.2
     for s in (1, -1):
         side = s * y
         post = [(half + foot, side, 0.0), (half - 0.03, side, under), (0.04 - half, side, under)]
-        parts.append(tube([*post, (frame.back_x(frame.top), side, frame.top)], r, metal, 6))
-        parts.append(tube([(0.05 - half, side, under), (-half - frame.kick, side, 0.0)], r, metal, 6))
+        yield tube([*post, (frame.back_x(frame.top), side, frame.top)], r, metal, 6)
+        yield tube([(0.05 - half, side, under), (-half - frame.kick, side, 0.0)], r, metal, 6)
         if arms:
             rest = [(frame.back_x(arm), side, arm), (half - 0.05, s * (y + 0.03), arm), (half, side, 0.0)]
-            parts.append(tube(rest, r, metal, 6))
-    parts.append(tube([(0.0, -y, under), (0.0, y, under)], r, metal, 5))
+            yield tube(rest, r, metal, 6)
+    yield tube([(0.0, -y, under), (0.0, y, under)], r, metal, 5)
     thick, low = draw(rng, 0.012, 0.05), frame.seat - 0.025
-    parts.append(cushion((-half, -y + 0.01, low), (half, y - 0.01, low + thick), look, 0.02, 0.008))
+    yield cushion((-half, -y + 0.01, low), (half, y - 0.01, low + thick), look, 0.02, 0.008)
     tall = draw(rng, 0.12, 0.28)
     z = frame.top - tall
     x = frame.back_x(z + tall / 2)
-    parts.append(bent_rail((x + 0.01, 0.0, z), 2 * y + 0.01, tall, max(0.012, thick * 0.7), draw(rng, 0.0, 0.05), look))
-    return finished(parts)
+    yield bent_rail((x + 0.01, 0.0, z), 2 * y + 0.01, tall, max(0.012, thick * 0.7), draw(rng, 0.0, 0.05), look)
 
 
 @family("chair", "folding")
-def folding_chair(rng: np.random.Generator) -> Piece:
+def folding_chair(rng: np.random.Generator) -> Parts:
     """Return a folding chair: crossed legs of tube or wood, a thin seat, a narrow back."""
     width, seat, top = draw(rng, 0.4, 0.48), draw(rng, 0.42, 0.47), draw(rng, 0.75, 0.88)
     frame = material(pick(rng, ("metal", "black", "wood", "white")), rng)
     look = frame if chance(rng, 0.4) else material(pick(rng, ("plastic", "fabric", "wood", "leather")), rng)
     front, rear, r = draw(rng, 0.18, 0.24), draw(rng, 0.2, 0.28), draw(rng, 0.009, 0.016)
     high = -draw(rng, 0.18, 0.26)
-    parts = []
     for s in (1, -1):
         y, inner = s * (width / 2), s * (width / 2 - 2.5 * r)
-        parts.append(tube([(front, y, 0.0), (high, y, top)], r, frame, 6))
-        parts.append(tube([(-rear, inner, 0.0), (front * 0.6, inner, seat)], r, frame, 6))
-    parts += [
-        tube([(front, -width / 2, 0.05), (front, width / 2, 0.05)], r * 0.7, frame, 4),
-        tube([(-rear * 0.9, -width / 2, 0.04), (-rear * 0.9, width / 2, 0.04)], r * 0.7, frame, 4),
-    ]
+        yield tube([(front, y, 0.0), (high, y, top)], r, frame, 6)
+        yield tube([(-rear, inner, 0.0), (front * 0.6, inner, seat)], r, frame, 6)
+    yield tube([(front, -width / 2, 0.05), (front, width / 2, 0.05)], r * 0.7, frame, 4)
+    yield tube([(-rear * 0.9, -width / 2, 0.04), (-rear * 0.9, width / 2, 0.04)], r * 0.7, frame, 4)
     if chance(rng, 0.5):
         for x in np.linspace(-0.17, 0.15, 5).tolist():
-            parts.append(box((x, -width / 2 + 0.02, seat), (x + 0.05, width / 2 - 0.02, seat + 0.015), look))
+            yield box((x, -width / 2 + 0.02, seat), (x + 0.05, width / 2 - 0.02, seat + 0.015), look)
     else:
-        parts.append(
-            cushion(
-                (-0.19, -width / 2 + 0.02, seat - 0.01),
-                (0.21, width / 2 - 0.02, seat + draw(rng, 0.015, 0.04)),
-                look,
-                0.02,
-                0.008,
-            )
+        yield cushion(
+            (-0.19, -width / 2 + 0.02, seat - 0.01),
+            (0.21, width / 2 - 0.02, seat + draw(rng, 0.015, 0.04)),
+            look,
+            0.02,
+            0.008,
         )
     slope = (high - front) / top
     for z in np.linspace(top - draw(rng, 0.06, 0.18), top - 0.22, count(rng, 1, 2)).tolist():
-        parts.append(bent_rail((front + slope * z, 0.0, z), width, draw(rng, 0.06, 0.16), 0.014, 0.02, look))
-    return finished(parts)
+        yield bent_rail((front + slope * z, 0.0, z), width, draw(rng, 0.06, 0.16), 0.014, 0.02, look)
 
 
 @family("chair", "monobloc")
-def monobloc(rng: np.random.Generator) -> Piece:
+def monobloc(rng: np.random.Generator) -> Parts:
     """Return a plastic garden chair: splayed legs, arms in one sweep with a slotted back."""
     width, seat, top = draw(rng, 0.46, 0.54), draw(rng, 0.4, 0.45), draw(rng, 0.76, 0.9)
     look = material(pick(rng, ("white", "white", "plastic")), rng)
     depth, arm = draw(rng, 0.4, 0.46), seat + draw(rng, 0.2, 0.25)
     arms = chance(rng, 0.75)
-    parts = [rounded_box((-depth / 2, -width / 2, seat - 0.03), (depth / 2, width / 2, seat), 0.012, look, 2)]
+    yield rounded_box((-depth / 2, -width / 2, seat - 0.03), (depth / 2, width / 2, seat), 0.012, look, 2)
     style = named_leg("straight", 4, draw(rng, 0.035, 0.05))
     for s in (1, -1):
         y, out = s * width / 2, s * (width / 2 + 0.03)
         front_top = (depth / 2 - 0.02, out, arm) if arms else (depth / 2 - 0.04, y * 0.9, seat - 0.02)
-        parts.append(leg((depth / 2 + 0.05, out, 0.0), front_top, style, look))
-        parts.append(leg((-depth / 2 - 0.06, out, 0.0), (-depth / 2 + 0.02, y * 0.92, seat), style, look))
+        yield leg((depth / 2 + 0.05, out, 0.0), front_top, style, look)
+        yield leg((-depth / 2 - 0.06, out, 0.0), (-depth / 2 + 0.02, y * 0.92, seat), style, look)
         if arms:
-            parts.append(
-                strut((depth / 2 + 0.02, out, arm), (-depth / 2 - 0.08, y * 0.9, arm + 0.06), 0.055, 0.025, look)
-            )
+            yield strut((depth / 2 + 0.02, out, arm), (-depth / 2 - 0.08, y * 0.9, arm + 0.06), 0.055, 0.025, look)
     slots = count(rng, 4, 7)
     lean = 0.28 * (top - seat)
     low, high, wide = (0.02 - depth / 2, seat - 0.01), (-depth / 2 - lean, top - 0.05), 0.75 * width / slots
     for y in (np.linspace(-0.42, 0.42, slots) * width).tolist():
-        parts += [strut((low[0], y, low[1]), (high[0], y, high[1]), 0.012, wide, look)]
-    parts.append(bent_rail((-depth / 2 - lean, 0.0, top - 0.09), width, 0.06, 0.025, 0.02, look, 0.03))
-    return finished(parts)
+        yield strut((low[0], y, low[1]), (high[0], y, high[1]), 0.012, wide, look)
+    yield bent_rail((-depth / 2 - lean, 0.0, top - 0.09), width, 0.06, 0.025, 0.02, look, 0.03)
 
 
 @family("chair", "cantilever", held_out=True)
-def cantilever(rng: np.random.Generator) -> Piece:
+def cantilever(rng: np.random.Generator) -> Parts:
     """Return a chair on two bent tubes without rear legs: the seat hangs in front of nothing."""
     width, depth, seat, top = draw(rng, 0.42, 0.5), draw(rng, 0.42, 0.5), draw(rng, 0.43, 0.47), draw(rng, 0.78, 0.98)
     metal = material(pick(rng, ("metal", "metal", "black")), rng)
@@ -246,24 +230,18 @@ def cantilever(rng: np.random.Generator) -> Piece:
         (back, seat - 0.02),
         (back - 0.1, top),
     ]
-    parts = [tube([(x, s * y, z) for x, z in side], r, metal, 7) for s in (1, -1)]
-    parts += [
-        tube([(back - 0.02, -y, r), (back - 0.02, y, r)], r, metal, 6),
-        tube([(back - 0.1, -y, top), (back - 0.1, y, top)], r, metal, 6),
-    ]
+    yield from [tube([(x, s * y, z) for x, z in side], r, metal, 7) for s in (1, -1)]
+    yield tube([(back - 0.02, -y, r), (back - 0.02, y, r)], r, metal, 6)
+    yield tube([(back - 0.1, -y, top), (back - 0.1, y, top)], r, metal, 6)
     thick = draw(rng, 0.015, 0.05)
-    parts.append(
-        cushion((back + 0.02, -y + 0.01, seat - 0.01), (front - 0.03, y - 0.01, seat + thick), look, 0.015, 0.008)
-    )
+    yield cushion((back + 0.02, -y + 0.01, seat - 0.01), (front - 0.03, y - 0.01, seat + thick), look, 0.015, 0.008)
     low = seat + draw(rng, 0.08, 0.2)
     lean = float(np.arctan2(0.1, top - seat))
     board = rounded_box((0.0, -y + 0.01, 0.0), (max(thick, 0.02), y - 0.01, top - low - 0.01), 0.01, look, 2).tilted(
         "y", -lean
     )
-    parts.append(board.moved(x=back - 0.1 * (low - seat) / (top - seat), z=low))
+    yield board.moved(x=back - 0.1 * (low - seat) / (top - seat), z=low)
     if chance(rng, 0.35):
         arm = seat + 0.22
-        parts += [
-            box((back - 0.06, s * y - 0.02, arm), (front - 0.08, s * y + 0.02, arm + 0.025), metal) for s in (1, -1)
-        ]
-    return finished(parts)
+        for s in (1, -1):
+            yield box((back - 0.06, s * y - 0.02, arm), (front - 0.08, s * y + 0.02, arm + 0.025), metal)

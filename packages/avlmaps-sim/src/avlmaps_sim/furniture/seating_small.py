@@ -5,10 +5,10 @@ import itertools
 import numpy as np
 
 from avlmaps_sim.furniture.carcass import board_look
-from avlmaps_sim.furniture.catalogue import Piece, family
+from avlmaps_sim.furniture.catalogue import Parts, family
 from avlmaps_sim.furniture.chair_parts import bent_rail
 from avlmaps_sim.furniture.legs import four_legs, leg, leg_style, named_leg, stretchers
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, finished, pick, strut
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick, strut
 from avlmaps_sim.furniture.table_parts import hairpins, trestles
 from avlmaps_sim.furniture.upholstery import covering, cushion, throw
 from avlmaps_sim.materials import material
@@ -17,7 +17,7 @@ from avlmaps_sim.shapes import box, cylinder, ellipsoid, lathe, rounded_box, sla
 
 
 @family("stool", "wooden legs")
-def wooden_stool(rng: np.random.Generator) -> Piece:
+def wooden_stool(rng: np.random.Generator) -> Parts:
     """Return a round, square or saddle seat on three or four legs, low or as high as a bar."""
     seat = draw(rng, 0.42, 0.5) if chance(rng, 0.45) else draw(rng, 0.6, 0.8)
     size = draw(rng, 0.28, 0.4)
@@ -27,38 +27,31 @@ def wooden_stool(rng: np.random.Generator) -> Piece:
     round_seat = legs == 3 or chance(rng, 0.6)
     thick = draw(rng, 0.025, 0.07)
     if round_seat:
-        parts = [
-            lathe(
-                [(size / 2 * 0.96, seat - thick), (size / 2, seat - thick * 0.5), (size / 2 * 0.97, seat)],
-                cover,
-                sides=18,
-            )
-        ]
+        yield lathe(
+            [(size / 2 * 0.96, seat - thick), (size / 2, seat - thick * 0.5), (size / 2 * 0.97, seat)], cover, sides=18
+        )
     else:
-        parts = [cushion((-size * 0.42, -size / 2, seat - thick), (size * 0.42, size / 2, seat), cover, 0.02, 0.01)]
+        yield cushion((-size * 0.42, -size / 2, seat - thick), (size * 0.42, size / 2, seat), cover, 0.02, 0.01)
     style, out = leg_style(rng, 0.026, 0.042), draw(rng, 0.0, 0.13) * seat / 0.6
     reach = size * 0.34
     ring = []
     for a in (np.linspace(0.0, 2 * np.pi, legs, endpoint=False) + np.pi / 4).tolist():
         c, s = float(np.cos(a)), float(np.sin(a))
         k = 1.0 if round_seat else 1.2
-        parts.append(
-            leg(
-                (k * (reach + out) * c, k * (reach + out) * s, 0.0),
-                (k * reach * c, k * reach * s, seat - thick * 0.8),
-                style,
-                look,
-            )
+        yield leg(
+            (k * (reach + out) * c, k * (reach + out) * s, 0.0),
+            (k * reach * c, k * reach * s, seat - thick * 0.8),
+            style,
+            look,
         )
         low = seat * 0.32
         ring.append((k * (reach + out * (1 - low / seat)) * c, k * (reach + out * (1 - low / seat)) * s, low))
     if seat > 0.55 or chance(rng, 0.4):
-        parts += [tube([ring[i], ring[(i + 1) % legs]], 0.01, look, 5) for i in range(legs)]
-    return finished(parts)
+        yield from [tube([ring[i], ring[(i + 1) % legs]], 0.01, look, 5) for i in range(legs)]
 
 
 @family("stool", "bar with a foot")
-def pedestal_stool(rng: np.random.Generator) -> Piece:
+def pedestal_stool(rng: np.random.Generator) -> Parts:
     """Return a bar stool on one foot with a foot rest: round pad, low back or a shell."""
     seat, size = draw(rng, 0.58, 0.82), draw(rng, 0.32, 0.44)
     metal = material(pick(rng, ("metal", "metal", "black")), rng)
@@ -66,72 +59,64 @@ def pedestal_stool(rng: np.random.Generator) -> Piece:
     r, rest = draw(rng, 0.18, 0.23), seat * 0.38
     foot = [(r, 0.0), (r * 0.95, 0.015), (0.04, 0.04), (0.025, 0.08), (0.025, seat - 0.06), (0.08, seat - 0.04)]
     ring = [(0.02, -0.02), (0.17, -0.12), (0.2, 0.0), (0.17, 0.12), (0.02, 0.02)]
-    parts = [lathe(foot, metal, sides=18), tube([(x, y, rest) for x, y in ring], 0.009, metal, 5)]
+    yield from (lathe(foot, metal, sides=18), tube([(x, y, rest) for x, y in ring], 0.009, metal, 5))
     kind = pick(rng, ("pad", "low back", "square"))
     if kind == "square":
-        parts.append(cushion((-size / 2, -size / 2, seat - 0.06), (size / 2, size / 2, seat), look, 0.03, 0.012))
+        yield cushion((-size / 2, -size / 2, seat - 0.06), (size / 2, size / 2, seat), look, 0.03, 0.012)
     else:
-        parts.append(lathe([(size * 0.48, seat - 0.06), (size / 2, seat - 0.03), (size * 0.46, seat)], look, sides=18))
+        yield lathe([(size * 0.48, seat - 0.06), (size / 2, seat - 0.03), (size * 0.46, seat)], look, sides=18)
     if kind != "pad":
         place, tall = (0.07 - size / 2, 0.0, seat - 0.04), draw(rng, 0.14, 0.36)
-        parts.append(bent_rail(place, size * 0.9, tall, 0.025, 0.07, look, draw(rng, 0.0, 0.05)))
-    return finished(parts)
+        yield bent_rail(place, size * 0.9, tall, 0.025, 0.07, look, draw(rng, 0.0, 0.05))
 
 
 @family("stool", "metal")
-def metal_stool(rng: np.random.Generator) -> Piece:
+def metal_stool(rng: np.random.Generator) -> Parts:
     """Return a stool of sheet metal or tubes, low or high, some with a low back."""
     seat = draw(rng, 0.44, 0.5) if chance(rng, 0.4) else draw(rng, 0.62, 0.78)
     size, look = draw(rng, 0.3, 0.38), material(pick(rng, ("metal", "black", "painted", "white")), rng)
     top = look if chance(rng, 0.5) else material(pick(rng, ("wood", "leather")), rng)
     out = draw(rng, 0.03, 0.07)
-    parts = [rounded_box((-size / 2, -size / 2, seat - 0.03), (size / 2, size / 2, seat), 0.012, top, 3)]
-    parts.append(
-        four_legs(
-            size - 0.02,
-            size - 0.02,
-            seat - 0.02,
-            named_leg(pick(rng, ("straight", "tapered")), 4, draw(rng, 0.02, 0.045)),
-            look,
-            out,
-        )
+    yield rounded_box((-size / 2, -size / 2, seat - 0.03), (size / 2, size / 2, seat), 0.012, top, 3)
+    yield four_legs(
+        size - 0.02,
+        size - 0.02,
+        seat - 0.02,
+        named_leg(pick(rng, ("straight", "tapered")), 4, draw(rng, 0.02, 0.045)),
+        look,
+        out,
     )
     low, half = seat * draw(rng, 0.25, 0.4), size / 2 + out * 0.6 - 0.02
-    parts += [slab(0.0, s * half, low, 2 * half, 0.015, 0.02, look) for s in (1, -1)]
-    parts += [slab(s * half, 0.0, low, 0.015, 2 * half, 0.02, look) for s in (1, -1)]
+    yield from [slab(0.0, s * half, low, 2 * half, 0.015, 0.02, look) for s in (1, -1)]
+    yield from [slab(s * half, 0.0, low, 0.015, 2 * half, 0.02, look) for s in (1, -1)]
     if chance(rng, 0.3):
         x, high = -size / 2 + 0.01, seat + draw(rng, 0.15, 0.35)
-        parts.append(
-            tube(
-                [
-                    (x, -size * 0.4, seat - 0.02),
-                    (x - 0.04, -size * 0.38, high),
-                    (x - 0.04, size * 0.38, high),
-                    (x, size * 0.4, seat - 0.02),
-                ],
-                0.01,
-                look,
-                5,
-            )
+        yield tube(
+            [
+                (x, -size * 0.4, seat - 0.02),
+                (x - 0.04, -size * 0.38, high),
+                (x - 0.04, size * 0.38, high),
+                (x, size * 0.4, seat - 0.02),
+            ],
+            0.01,
+            look,
+            5,
         )
-        parts.append(bent_rail((x - 0.04, 0.0, high - 0.09), size * 0.76, 0.08, 0.01, 0.0, top))
-    return finished(parts)
+        yield bent_rail((x - 0.04, 0.0, high - 0.09), size * 0.76, 0.08, 0.01, 0.0, top)
 
 
 @family("stool", "step", held_out=True)
-def step_stool(rng: np.random.Generator) -> Piece:
+def step_stool(rng: np.random.Generator) -> Parts:
     """Return a stool with one or two steps between board sides."""
     steps, width = count(rng, 1, 2), draw(rng, 0.34, 0.45)
     rise, tread, look = draw(rng, 0.2, 0.25), draw(rng, 0.18, 0.24), board_look(rng)
-    parts = []
     for i in range(steps + (steps == 1)):
         x0, z = -i * tread, (i + 1) * rise
-        parts.append(box((x0 - tread, -width / 2, z - 0.025), (x0 + 0.02, width / 2, z), look))
-        parts += [
+        yield box((x0 - tread, -width / 2, z - 0.025), (x0 + 0.02, width / 2, z), look)
+        yield from [
             box((x0 - tread, s * (width / 2 - 0.04) - 0.012, 0.0), (x0, s * (width / 2 - 0.04) + 0.012, z - 0.02), look)
             for s in (1, -1)
         ]
-    return finished(parts)
 
 
 def _bench(rng: np.random.Generator) -> tuple[float, float, float]:
@@ -140,7 +125,7 @@ def _bench(rng: np.random.Generator) -> tuple[float, float, float]:
 
 
 @family("bench", "board")
-def board_bench(rng: np.random.Generator) -> Piece:
+def board_bench(rng: np.random.Generator) -> Parts:
     """Return a plain board or slats on legs, slabs, trestles or bent wires, perhaps with a cushion."""
     depth, width, high = _bench(rng)
     look = material(pick(rng, ("wood", "wood", "wood", "painted", "white")), rng)
@@ -148,86 +133,72 @@ def board_bench(rng: np.random.Generator) -> Piece:
     boards = count(rng, 3, 6) if chance(rng, 0.3) else 1
     wide = depth / boards
     gap = 0.01 if boards > 1 else 0.0
-    parts = [
-        slab((i + 0.5) * wide - depth / 2, 0.0, high - thick, wide - gap, width, thick, look) for i in range(boards)
-    ]
+    for i in range(boards):
+        yield slab((i + 0.5) * wide - depth / 2, 0.0, high - thick, wide - gap, width, thick, look)
     base, under = pick(rng, ("legs", "slabs", "trestles", "wires")), high - thick
     if base == "legs":
         style = leg_style(rng, 0.035, 0.06)
-        parts.append(four_legs(depth - 0.02, width * 0.92, under, style, look, draw(rng, 0.0, 0.03)))
+        yield four_legs(depth - 0.02, width * 0.92, under, style, look, draw(rng, 0.0, 0.03))
         if chance(rng, 0.4):
-            parts.append(stretchers(rng, depth - 0.06, width * 0.9, 0.12, 0.03, look))
+            yield stretchers(rng, depth - 0.06, width * 0.9, 0.12, 0.03, look)
     elif base == "slabs":
-        parts += [slab(0.0, s * width * 0.42, 0.0, depth * 0.9, 0.035, under, look) for s in (1, -1)]
-        parts.append(slab(0.0, 0.0, high * 0.45, 0.025, width * 0.82, 0.08, look))
+        yield from [slab(0.0, s * width * 0.42, 0.0, depth * 0.9, 0.035, under, look) for s in (1, -1)]
+        yield slab(0.0, 0.0, high * 0.45, 0.025, width * 0.82, 0.08, look)
     elif base == "wires":
-        parts += hairpins(depth * 0.9, width * 0.88, under, material("black", rng))
+        yield from hairpins(depth * 0.9, width * 0.88, under, material("black", rng))
     else:
         stand = look if chance(rng, 0.6) else material("black", rng)
-        parts += trestles(rng, depth * 0.95, width * 0.75, under, stand)
+        yield from trestles(rng, depth * 0.95, width * 0.75, under, stand)
     if chance(rng, 0.25):
         low, top = (-depth * 0.47, -width * 0.47, high), (depth * 0.47, width * 0.47, high + 0.05)
-        parts.append(cushion(low, top, material("fabric", rng), 0.03, 0.012))
-    return finished(parts)
+        yield cushion(low, top, material("fabric", rng), 0.03, 0.012)
 
 
 @family("bench", "upholstered")
-def padded_bench(rng: np.random.Generator) -> Piece:
+def padded_bench(rng: np.random.Generator) -> Parts:
     """Return a long pad on legs for the foot of a bed, some with low rolled ends or a throw."""
     depth, width, high = _bench(rng)
     look, legs = covering(rng, 0.3), material(pick(rng, ("wood", "wood", "black", "metal")), rng)
     thick = draw(rng, 0.08, 0.2)
-    parts = [cushion((-depth / 2, -width / 2, high - thick), (depth / 2, width / 2, high), look, 0.03, 0.02)]
-    parts.append(
-        four_legs(
-            depth - 0.03, width - 0.06, high - thick + 0.01, leg_style(rng, 0.03, 0.055), legs, draw(rng, 0.0, 0.03)
-        )
+    yield cushion((-depth / 2, -width / 2, high - thick), (depth / 2, width / 2, high), look, 0.03, 0.02)
+    yield four_legs(
+        depth - 0.03, width - 0.06, high - thick + 0.01, leg_style(rng, 0.03, 0.055), legs, draw(rng, 0.0, 0.03)
     )
     if chance(rng, 0.3):
         for s in (1, -1):
             roll = cylinder(0.0, 0.0, -depth / 2, 0.07, depth, look, 10).tilted("y", np.pi / 2)
-            parts.append(roll.moved(0.0, s * (width / 2 - 0.05), high + 0.1))
-            parts.append(
-                box(
-                    (-depth / 2, s * (width / 2 - 0.04) - 0.03, high - 0.05),
-                    (depth / 2, s * (width / 2 - 0.04) + 0.03, high + 0.1),
-                    look,
-                )
+            yield roll.moved(0.0, s * (width / 2 - 0.05), high + 0.1)
+            yield box(
+                (-depth / 2, s * (width / 2 - 0.04) - 0.03, high - 0.05),
+                (depth / 2, s * (width / 2 - 0.04) + 0.03, high + 0.1),
+                look,
             )
     elif chance(rng, 0.3):
         x = depth / 2 + 0.02
         profile = [(x, high - 0.15), (x, high + 0.01), (0.0, high + 0.03), (-x, high + 0.01), (-x, high - 0.12)]
-        parts.append(throw(rng, profile, draw(rng, -0.2, 0.2) * width, draw(rng, 0.3, 0.5), material("fabric", rng)))
-    return finished(parts)
+        yield throw(rng, profile, draw(rng, -0.2, 0.2) * width, draw(rng, 0.3, 0.5), material("fabric", rng))
 
 
 @family("bench", "with back")
-def backed_bench(rng: np.random.Generator) -> Piece:
+def backed_bench(rng: np.random.Generator) -> Parts:
     """Return a bench with a slatted or boarded back and arms, as in a garden or a hall."""
     depth, width, high = draw(rng, 0.4, 0.52), draw(rng, 1.0, 1.7), draw(rng, 0.4, 0.46)
     look, top = material(pick(rng, ("wood", "wood", "white", "painted", "black")), rng), draw(rng, 0.78, 0.98)
     y, x, rake = width / 2 - 0.03, depth / 2, draw(rng, 0.04, 0.14)
     style, arm = named_leg("straight", 4, draw(rng, 0.04, 0.06)), high + 0.2
-    parts = [
-        slab((i + 0.5) / 5 * depth - x, 0.0, high - 0.025, depth / 5 - 0.012, width, 0.025, look) for i in range(5)
-    ]
+    for i in range(5):
+        yield slab((i + 0.5) / 5 * depth - x, 0.0, high - 0.025, depth / 5 - 0.012, width, 0.025, look)
     for s in (1, -1):
-        parts += [
-            leg((x - 0.03, s * y, 0.0), (x - 0.03, s * y, arm), style, look),
-            leg((-x - 0.04, s * y, 0.0), (-x + 0.02, s * y, high), style, look),
-        ]
-        parts += [
-            leg((-x + 0.02, s * y, high), (-x - rake, s * y, top), style, look),
-            strut((-x - 0.04, s * y, arm + 0.01), (x + 0.02, s * y, arm + 0.01), 0.06, 0.025, look),
-        ]
+        yield leg((x - 0.03, s * y, 0.0), (x - 0.03, s * y, arm), style, look)
+        yield leg((-x - 0.04, s * y, 0.0), (-x + 0.02, s * y, high), style, look)
+        yield leg((-x + 0.02, s * y, high), (-x - rake, s * y, top), style, look)
+        yield strut((-x - 0.04, s * y, arm + 0.01), (x + 0.02, s * y, arm + 0.01), 0.06, 0.025, look)
     kind = pick(rng, ("upright", "level", "board"))
     if kind == "upright":
-        parts += [
-            slab(-x + 0.01, 0.0, high + 0.06, 0.03, width, 0.04, look),
-            slab(-x - rake + 0.005, 0.0, top - 0.06, 0.03, width, 0.06, look),
-        ]
+        yield slab(-x + 0.01, 0.0, high + 0.06, 0.03, width, 0.04, look)
+        yield slab(-x - rake + 0.005, 0.0, top - 0.06, 0.03, width, 0.06, look)
         for t in np.linspace(-y, y, count(rng, 9, 17))[1:-1].tolist():
-            parts.append(strut((-x + 0.01, t, high + 0.08), (-x - rake + 0.01, t, top - 0.05), 0.012, 0.035, look))
+            yield strut((-x + 0.01, t, high + 0.08), (-x - rake + 0.01, t, top - 0.05), 0.012, 0.035, look)
     else:
         n = count(rng, 2, 4) if kind == "level" else 1
         for z0, z1 in zip(
@@ -236,58 +207,50 @@ def backed_bench(rng: np.random.Generator) -> Piece:
             strict=True,
         ):
             at = -x + 0.02 - rake * ((z0 + z1) / 2 - high) / (top - high)
-            parts.append(slab(at, 0.0, z0, 0.02, 2 * y, (z1 - z0) * (0.75 if n > 1 else 1.0), look))
-    return finished(parts)
+            yield slab(at, 0.0, z0, 0.02, 2 * y, (z1 - z0) * (0.75 if n > 1 else 1.0), look)
 
 
 @family("bench", "storage", held_out=True)
-def storage_bench(rng: np.random.Generator) -> Piece:
+def storage_bench(rng: np.random.Generator) -> Parts:
     """Return a box to sit on with a lid and panels, or with open bays and baskets."""
     depth, width, high = draw(rng, 0.36, 0.5), draw(rng, 0.8, 1.4), draw(rng, 0.42, 0.52)
     look = board_look(rng)
     x, y = depth / 2, width / 2
-    parts = [box((-x, -y, high - 0.03), (x + 0.015, y, high), look)]
+    yield box((-x, -y, high - 0.03), (x + 0.015, y, high), look)
     if chance(rng, 0.5):
-        parts.append(box((-x, -y, 0.03), (x - 0.012, y, high - 0.036), look))
-        parts += [
-            box((x - 0.014, max(edge - 0.035, -y), 0.0), (x, min(edge + 0.035, y), high - 0.036), look)
-            for edge in np.linspace(-y, y, count(rng, 2, 4) + 1).tolist()
-        ]
-        parts += [box((x - 0.014, -y, z), (x, y, z + 0.06), look) for z in (0.03, high - 0.1)]
+        yield box((-x, -y, 0.03), (x - 0.012, y, high - 0.036), look)
+        for edge in np.linspace(-y, y, count(rng, 2, 4) + 1).tolist():
+            yield box((x - 0.014, max(edge - 0.035, -y), 0.0), (x, min(edge + 0.035, y), high - 0.036), look)
+        yield from [box((x - 0.014, -y, z), (x, y, z + 0.06), look) for z in (0.03, high - 0.1)]
     else:
         bays = count(rng, 2, 3)
         bins = material(pick(rng, ("wicker", "fabric")), rng)
-        parts += [box((-x, -y, 0.0), (-x + 0.01, y, high), look), box((-x, -y, 0.02), (x, y, 0.04), look)]
+        yield from (box((-x, -y, 0.0), (-x + 0.01, y, high), look), box((-x, -y, 0.02), (x, y, 0.04), look))
         edges = np.linspace(-y, y, bays + 1).tolist()
-        parts += [slab(0.0, min(max(edge, 0.01 - y), y - 0.01), 0.0, depth, 0.02, high - 0.03, look) for edge in edges]
-        parts += [
-            box((-x + 0.03, a + 0.025, 0.04), (x - 0.02, b - 0.025, high - 0.09), bins)
-            for a, b in itertools.pairwise(edges)
-        ]
+        for edge in edges:
+            yield slab(0.0, min(max(edge, 0.01 - y), y - 0.01), 0.0, depth, 0.02, high - 0.03, look)
+        for a, b in itertools.pairwise(edges):
+            yield box((-x + 0.03, a + 0.025, 0.04), (x - 0.02, b - 0.025, high - 0.09), bins)
     if chance(rng, 0.5):
-        parts.append(cushion((-x, -y, high), (x, y, high + 0.06), material("fabric", rng), 0.03, 0.015))
-    return finished(parts)
+        yield cushion((-x, -y, high), (x, y, high + 0.06), material("fabric", rng), 0.03, 0.015)
 
 
 @family("ottoman", "square")
-def square_ottoman(rng: np.random.Generator) -> Piece:
+def square_ottoman(rng: np.random.Generator) -> Parts:
     """Return a square or oblong pad, a full box or one on legs."""
     depth, high = draw(rng, 0.4, 0.75), draw(rng, 0.33, 0.47)
     width = depth * draw(rng, 1.0, 1.7)
     look = covering(rng, 0.35)
     low = pick(rng, (0.02, draw(rng, 0.08, 0.2)))
-    parts = [
-        rounded_box(
-            (-depth / 2, -width / 2, low), (depth / 2, width / 2, high - 0.02), draw(rng, 0.015, 0.06), look, 3, 0.02
-        )
-    ]
+    yield rounded_box(
+        (-depth / 2, -width / 2, low), (depth / 2, width / 2, high - 0.02), draw(rng, 0.015, 0.06), look, 3, 0.02
+    )
     legs = material(pick(rng, ("wood", "black", "metal")), rng)
-    parts.append(four_legs(depth - 0.06, width - 0.06, low + 0.01, leg_style(rng, 0.03, 0.055), legs))
-    return finished(parts)
+    yield four_legs(depth - 0.06, width - 0.06, low + 0.01, leg_style(rng, 0.03, 0.055), legs)
 
 
 @family("ottoman", "pouf")
-def pouf(rng: np.random.Generator) -> Piece:
+def pouf(rng: np.random.Generator) -> Parts:
     """Return a round pouf: a drum, a flattened ball, or a pleated cushion."""
     r, high = draw(rng, 0.2, 0.36), draw(rng, 0.28, 0.45)
     look = pick(rng, (covering(rng, 0.3), material("wicker", rng), material("fabric", rng)))
@@ -306,32 +269,27 @@ def pouf(rng: np.random.Generator) -> Piece:
         angle = np.arctan2(vertex[:, 1], vertex[:, 0])
         vertex[:, :2] *= (1 + 0.05 * np.cos(10 * angle))[:, None]
         body = Mesh(vertex.astype(np.float32), body.triangle, body.uv, body.material, body.materials)
-    return finished([body])
+    return [body]
 
 
 @family("ottoman", "round legged")
-def round_ottoman(rng: np.random.Generator) -> Piece:
+def round_ottoman(rng: np.random.Generator) -> Parts:
     """Return a round pad on three or four short legs."""
     r, high, thick = draw(rng, 0.2, 0.42), draw(rng, 0.38, 0.47), draw(rng, 0.1, 0.24)
     look, legs = covering(rng, 0.3), material(pick(rng, ("wood", "metal", "black")), rng)
-    parts = [
-        lathe(
-            [(r * 0.97, high - thick), (r, high - thick * 0.6), (r, high - 0.05), (r * 0.8, high - 0.01), (0.02, high)],
-            look,
-            sides=20,
-        )
-    ]
+    yield lathe(
+        [(r * 0.97, high - thick), (r, high - thick * 0.6), (r, high - 0.05), (r * 0.8, high - 0.01), (0.02, high)],
+        look,
+        sides=20,
+    )
     style, number = leg_style(rng, 0.028, 0.05), count(rng, 3, 4)
     for a in np.linspace(0.0, 2 * np.pi, number, endpoint=False).tolist():
         c, s = float(np.cos(a)), float(np.sin(a))
-        parts.append(
-            leg((0.85 * r * c, 0.85 * r * s, 0.0), (0.7 * r * c, 0.7 * r * s, high - thick + 0.01), style, legs)
-        )
-    return finished(parts)
+        yield leg((0.85 * r * c, 0.85 * r * s, 0.0), (0.7 * r * c, 0.7 * r * s, high - thick + 0.01), style, legs)
 
 
 @family("ottoman", "bean bag", held_out=True)
-def bean_bag(rng: np.random.Generator) -> Piece:
+def bean_bag(rng: np.random.Generator) -> Parts:
     """Return a slack bag with a hollow where one sits."""
     r, high = draw(rng, 0.35, 0.52), draw(rng, 0.4, 0.7)
     look = material("fabric", rng) if chance(rng, 0.7) else material("leather", rng)
@@ -342,4 +300,4 @@ def bean_bag(rng: np.random.Generator) -> Piece:
     vertex[:, :2] *= (1 + 0.05 * np.sin(3 * angle + draw(rng, 0.0, 6.0)))[:, None]
     hollow = np.exp(-((vertex[:, 0] - 0.35 * r) ** 2 + vertex[:, 1] ** 2) / (0.3 * r * r)) * (vertex[:, 2] > high * 0.3)
     vertex[:, 2] -= draw(rng, 0.15, 0.45) * high * hollow
-    return finished([Mesh(vertex.astype(np.float32), body.triangle, body.uv, body.material, body.materials)])
+    return [Mesh(vertex.astype(np.float32), body.triangle, body.uv, body.material, body.materials)]

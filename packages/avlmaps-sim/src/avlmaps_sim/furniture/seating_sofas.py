@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from avlmaps_sim.furniture.catalogue import Piece, family
+from avlmaps_sim.furniture.catalogue import Parts, family
 from avlmaps_sim.furniture.legs import LegStyle, four_legs, sled
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, finished, pick
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick
 from avlmaps_sim.furniture.sofa_parts import (
     body_back,
     box_arms,
@@ -27,54 +27,54 @@ from avlmaps_sim.shapes import box, loft, rounded_box, tube
 
 
 @family("sofa", "block")
-def block_sofa(rng: np.random.Generator) -> Piece:
+def block_sofa(rng: np.random.Generator) -> Parts:
     """Return a sofa of plain blocks: square or soft arms, cushions for two to four."""
     seats = count(rng, 2, 4)
     plan = sofa_plan(rng, seats)
-    return finished(couch(rng, plan, seats, pick(rng, ("square", "soft", "slope", "pad"))))
+    return couch(rng, plan, seats, pick(rng, ("square", "soft", "slope", "pad")))
 
 
 @family("sofa", "rolled arms")
-def rolled_sofa(rng: np.random.Generator) -> Piece:
+def rolled_sofa(rng: np.random.Generator) -> Parts:
     """Return a sofa whose arms roll outwards."""
     seats = count(rng, 2, 3)
     plan = sofa_plan(rng, seats, (0.15, 0.28))
-    return finished(couch(rng, plan, seats, "rolled"))
+    return couch(rng, plan, seats, "rolled")
 
 
 @family("sofa", "loveseat")
-def loveseat(rng: np.random.Generator) -> Piece:
+def loveseat(rng: np.random.Generator) -> Parts:
     """Return a small sofa on high legs with one seat cushion and a fixed back."""
     plan = replace(sofa_plan(rng, 2, (0.05, 0.14)), clear=draw(rng, 0.12, 0.2), back=draw(rng, 0.1, 0.16))
     plan = replace(plan, width=draw(rng, 0.95, 1.3), top=draw(rng, 0.7, 0.85))
     look = covering(rng)
     thick = draw(rng, 0.08, 0.13)
-    parts = [lower_body(plan, look, thick), body_back(rng, plan, look, True), *sofa_feet(rng, plan)]
-    parts += [*box_arms(rng, plan, look), *seat_cushions(rng, plan, pick(rng, (1, 2)), thick, look)]
-    return finished([*parts, *strewn(rng, plan, 2)])
+    yield from (lower_body(plan, look, thick), body_back(rng, plan, look, True), *sofa_feet(rng, plan))
+    yield from (*box_arms(rng, plan, look), *seat_cushions(rng, plan, pick(rng, (1, 2)), thick, look))
+    yield from strewn(rng, plan, 2)
 
 
 @family("sofa", "chesterfield")
-def chesterfield(rng: np.random.Generator) -> Piece:
+def chesterfield(rng: np.random.Generator) -> Parts:
     """Return a sofa whose rolled back and arms are of one height, on low feet."""
     seats = count(rng, 2, 3)
     plan = sofa_plan(rng, seats, (0.18, 0.26))
     top = draw(rng, 0.66, 0.8)
     plan = replace(plan, top=top, arm_top=top, back=plan.arm, lean=0.0, clear=draw(rng, 0.03, 0.1))
     look = covering(rng, 0.7)
-    parts = [*box_arms(rng, plan, look, "rolled"), lower_body(plan, look, 0.14), *sofa_feet(rng, plan)]
+    yield from (*box_arms(rng, plan, look, "rolled"), lower_body(plan, look, 0.14), *sofa_feet(rng, plan))
     r = plan.arm / 2
     angle = np.linspace(-0.35 * np.pi, np.pi, 8)
     scroll = np.column_stack([-0.55 * plan.arm - r * np.cos(angle), top - r + r * np.sin(angle)])
     flat = np.concatenate([[(0.0, plan.clear), (-0.7 * plan.arm, plan.clear), (-0.7 * plan.arm, top - 2 * r)], scroll])
     half = plan.outer / 2 - 0.02
-    parts.append(loft([np.column_stack([flat[:, 0], np.full(len(flat), y), flat[:, 1]]) for y in (-half, half)], look))
-    parts += seat_cushions(rng, plan, pick(rng, (1, seats)), 0.14, look)
-    return finished([*parts, *strewn(rng, plan, seats)])
+    yield loft([np.column_stack([flat[:, 0], np.full(len(flat), y), flat[:, 1]]) for y in (-half, half)], look)
+    yield from seat_cushions(rng, plan, pick(rng, (1, seats)), 0.14, look)
+    yield from strewn(rng, plan, seats)
 
 
 @family("sofa", "corner")
-def corner_sofa(rng: np.random.Generator) -> Piece:
+def corner_sofa(rng: np.random.Generator) -> Parts:
     """Return an L of two runs of seats that share a corner, to the left or to the right."""
     seats = count(rng, 2, 3)
     plan = replace(sofa_plan(rng, seats, (0.1, 0.24)), lean=0.0)
@@ -102,11 +102,11 @@ def corner_sofa(rng: np.random.Generator) -> Piece:
     if chance(rng, 0.6):
         parts += scattered_pillows(rng, 0.2, plan.seat + 0.02, main, count(rng, 1, 3), 0.4)
     body = joined([*parts, *sofa_feet(rng, plan)])
-    return finished([body if chance(rng, 0.5) else mirrored(body)])
+    return [body if chance(rng, 0.5) else mirrored(body)]
 
 
 @family("sofa", "chaise")
-def chaise_sofa(rng: np.random.Generator) -> Piece:
+def chaise_sofa(rng: np.random.Generator) -> Parts:
     """Return a sofa one of whose seats is drawn out for the legs, at the left or at the right."""
     seats = count(rng, 2, 4)
     plan = sofa_plan(rng, seats, (0.08, 0.22))
@@ -124,44 +124,44 @@ def chaise_sofa(rng: np.random.Generator) -> Piece:
     )
     parts += loose_back(rng, plan, seats, look, draw(rng, -0.1, 0.06), draw(rng, 0.1, 0.18))
     body = joined([*parts, *sofa_feet(rng, plan), *strewn(rng, plan, seats)])
-    return finished([body if chance(rng, 0.5) else mirrored(body)])
+    return [body if chance(rng, 0.5) else mirrored(body)]
 
 
 @family("sofa", "armless")
-def armless_sofa(rng: np.random.Generator) -> Piece:
+def armless_sofa(rng: np.random.Generator) -> Parts:
     """Return a low sofa without arms, of one to three blocks side by side."""
     seats = count(rng, 2, 3)
     plan = replace(sofa_plan(rng, seats, (0.0, 0.0)), top=draw(rng, 0.62, 0.8), depth=draw(rng, 0.6, 0.85))
-    return finished(couch(rng, plan, seats))
+    return couch(rng, plan, seats)
 
 
 @family("sofa", "wooden frame", held_out=True)
-def framed_sofa(rng: np.random.Generator) -> Piece:
+def framed_sofa(rng: np.random.Generator) -> Parts:
     """Return loose cushions in an open wooden frame whose legs carry the arms."""
     seats = count(rng, 2, 3)
     plan = replace(sofa_plan(rng, seats, (0.06, 0.1)), back=0.06, lean=draw(rng, 0.08, 0.2))
     wood, look = material("wood", rng), covering(rng, 0.15)
     thick = draw(rng, 0.09, 0.14)
     half = plan.width / 2
-    parts = [*frame_arms(rng, plan, wood), *seat_cushions(rng, plan, seats, thick, look)]
-    parts.append(box((-0.04, -half, plan.seat - thick - 0.03), (plan.depth - 0.02, half, plan.seat - thick), wood))
-    parts += loose_back(rng, plan, seats, look, 0.02, draw(rng, 0.09, 0.14))
+    yield from (*frame_arms(rng, plan, wood), *seat_cushions(rng, plan, seats, thick, look))
+    yield box((-0.04, -half, plan.seat - thick - 0.03), (plan.depth - 0.02, half, plan.seat - thick), wood)
+    yield from loose_back(rng, plan, seats, look, 0.02, draw(rng, 0.09, 0.14))
     for z in np.linspace(plan.seat + 0.08, plan.top - 0.08, 3).tolist():
         x = 0.01 - float(np.tan(plan.lean)) * (z - plan.seat) * 0.3
-        parts.append(box((x - 0.02, -half - plan.arm / 2, z), (x, half + plan.arm / 2, z + 0.05), wood))
-    return finished([*parts, *strewn(rng, plan, seats)])
+        yield box((x - 0.02, -half - plan.arm / 2, z), (x, half + plan.arm / 2, z + 0.05), wood)
+    yield from strewn(rng, plan, seats)
 
 
 @family("sofa", "futon")
-def futon(rng: np.random.Generator) -> Piece:
+def futon(rng: np.random.Generator) -> Parts:
     """Return a folded mattress on a slatted or a tube frame."""
     width, deep, seat = draw(rng, 1.6, 2.1), draw(rng, 0.6, 0.75), draw(rng, 0.36, 0.44)
     thick, rise, lean = draw(rng, 0.12, 0.2), draw(rng, 0.42, 0.58), draw(rng, 0.2, 0.42)
     frame, look = material(pick(rng, ("wood", "metal", "black")), rng), material("fabric", rng)
     half = width / 2
-    parts = [cushion((0.0, -half, seat - thick), (deep, half, seat), look, 0.06, 0.02)]
+    yield cushion((0.0, -half, seat - thick), (deep, half, seat), look, 0.06, 0.02)
     back = cushion((-rise, -half, 0.0), (0.0, half, thick), look, 0.06, 0.02).tilted("y", np.pi / 2 - lean)
-    parts.append(back.moved(x=0.02, z=seat - 0.03))
+    yield back.moved(x=0.02, z=seat - 0.03)
     rail = box((-0.1, -half, seat - thick - 0.04), (deep + 0.02, half, seat - thick), frame)
     if chance(rng, 0.5):
         top = seat + draw(rng, 0.12, 0.24)
@@ -172,19 +172,19 @@ def futon(rng: np.random.Generator) -> Piece:
         ]
         style = LegStyle(((0.0, 1.0), (1.0, 1.0)), 4, 0.06)
         legs = four_legs(deep + 0.3, width + 0.12, top, style, frame).moved(x=(deep - 0.2) / 2)
-        parts += [*sides, legs]
+        yield from (*sides, legs)
     else:
-        parts.append(sled(deep, width * 0.9, seat - thick, 0.018, frame).moved(x=deep / 2 - 0.05))
+        yield sled(deep, width * 0.9, seat - thick, 0.018, frame).moved(x=deep / 2 - 0.05)
         z = seat + rise * float(np.cos(lean)) * 0.7
         x = -rise * float(np.sin(lean)) * 0.7 - 0.02
-        parts += [tube([(0.0, y, seat - thick), (x, y, z)], 0.016, frame, 6) for y in (-half * 0.7, half * 0.7)]
+        yield from [tube([(0.0, y, seat - thick), (x, y, z)], 0.016, frame, 6) for y in (-half * 0.7, half * 0.7)]
     if chance(rng, 0.4):
-        parts += scattered_pillows(rng, 0.2, seat + 0.01, (-half, half), count(rng, 1, 3), lean + 0.15)
-    return finished([*parts, rail])
+        yield from scattered_pillows(rng, 0.2, seat + 0.01, (-half, half), count(rng, 1, 3), lean + 0.15)
+    yield rail
 
 
 @family("sofa", "camel back", held_out=True)
-def camel_back(rng: np.random.Generator) -> Piece:
+def camel_back(rng: np.random.Generator) -> Parts:
     """Return an old-fashioned sofa: the top of its back swings up in one or two humps, slender turned legs."""
     seats = count(rng, 2, 3)
     plan = replace(sofa_plan(rng, seats, (0.14, 0.2)), clear=draw(rng, 0.14, 0.22), back=draw(rng, 0.1, 0.14))
@@ -198,11 +198,9 @@ def camel_back(rng: np.random.Generator) -> Piece:
         rings.append(
             np.array([(0.0, y, plan.clear), (-0.03, y, top), (-plan.back - 0.02, y, top), (-plan.back, y, plan.clear)])
         )
-    parts = [
-        lower_body(plan, look, 0.1),
-        loft(rings, look),
-        *box_arms(rng, plan, look, "rolled"),
-        *sofa_feet(rng, plan),
-    ]
-    parts += seat_cushions(rng, plan, pick(rng, (1, seats)), 0.1, look)
-    return finished([*parts, *strewn(rng, plan, seats)])
+    yield lower_body(plan, look, 0.1)
+    yield loft(rings, look)
+    yield from box_arms(rng, plan, look, "rolled")
+    yield from sofa_feet(rng, plan)
+    yield from seat_cushions(rng, plan, pick(rng, (1, seats)), 0.1, look)
+    yield from strewn(rng, plan, seats)

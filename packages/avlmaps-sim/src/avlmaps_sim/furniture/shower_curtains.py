@@ -3,10 +3,10 @@
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps_sim.furniture.catalogue import Piece, family
-from avlmaps_sim.furniture.recipe_helpers import chance, cloth, draw, finished, pick
+from avlmaps_sim.furniture.catalogue import Parts, family
+from avlmaps_sim.furniture.recipe_helpers import chance, cloth, draw, pick
 from avlmaps_sim.materials import material
-from avlmaps_sim.mesh import Material, Mesh, Triple, joined
+from avlmaps_sim.mesh import Material, Mesh, Triple
 from avlmaps_sim.shapes import tube
 
 
@@ -34,12 +34,12 @@ def _hung(rng: np.random.Generator, rail: Float[np.ndarray, "n 2"], high: float,
     return cloth(np.stack(columns, axis=1), look)
 
 
-def _with_rail(rng: np.random.Generator, whole: list[Triple], cloths: list[Mesh]) -> Piece:
-    return finished([joined(cloths), tube(whole, draw(rng, 0.01, 0.016), material("metal", rng), 8)])
+def _with_rail(rng: np.random.Generator, whole: list[Triple], cloths: list[Mesh]) -> Parts:
+    return [*cloths, tube(whole, draw(rng, 0.01, 0.016), material("metal", rng), 8)]
 
 
 @family("shower curtain", "drawn")
-def _drawn(rng: np.random.Generator) -> Piece:
+def _drawn(rng: np.random.Generator) -> Parts:
     long, high = draw(rng, 0.8, 1.9), draw(rng, 1.6, 1.95)
     reach = long * draw(rng, 0.75, 1.0)
     rail = np.array([[0.0, -long / 2], [0.0, -long / 2 + reach]])
@@ -48,7 +48,7 @@ def _drawn(rng: np.random.Generator) -> Piece:
 
 
 @family("shower curtain", "pushed aside")
-def _pushed(rng: np.random.Generator) -> Piece:
+def _pushed(rng: np.random.Generator) -> Parts:
     long, high, top = draw(rng, 0.8, 1.9), draw(rng, 1.6, 1.95), 0.03
     reach, look = long * draw(rng, 0.2, 0.45), _look(rng)
     rail = np.array([[0.0, -long / 2], [0.0, -long / 2 + reach]])
@@ -57,7 +57,7 @@ def _pushed(rng: np.random.Generator) -> Piece:
 
 
 @family("shower curtain", "round a corner", held_out=True)
-def _cornered(rng: np.random.Generator) -> Piece:
+def _cornered(rng: np.random.Generator) -> Parts:
     wide, long, high = draw(rng, 0.7, 0.9), draw(rng, 0.7, 1.0), draw(rng, 1.7, 1.95)
     bend = [(wide - 0.15 * (1 - np.cos(a)), long - 0.15 * (1 - np.sin(a))) for a in np.linspace(0.0, np.pi / 2, 5)]
     rail = np.array([(wide, 0.0), *bend[:-1], (wide - 0.15, long), (0.0, long)])

@@ -4,50 +4,47 @@ from itertools import pairwise
 
 import numpy as np
 
-from avlmaps_sim.furniture.catalogue import Piece, family
+from avlmaps_sim.furniture.catalogue import Parts, family
 from avlmaps_sim.furniture.fittings import (
     china,
     chrome,
     outline,
     shell,
 )  # fmt: skip
-from avlmaps_sim.furniture.recipe_helpers import chance, cloth, draw, finished, pick, pictured
+from avlmaps_sim.furniture.recipe_helpers import chance, cloth, draw, pick, pictured
 from avlmaps_sim.materials import material
-from avlmaps_sim.mesh import Material, Mesh, joined
+from avlmaps_sim.mesh import Material, Mesh, Meshes, joined
 from avlmaps_sim.shapes import box, cylinder, ellipsoid, slab, tube
 
 
-def _rail(rng: np.random.Generator, x: float, y: float, tall: float, metal: Material) -> list[Mesh]:
+def _rail(rng: np.random.Generator, x: float, y: float, tall: float, metal: Material) -> Meshes:
     """Return a shower's rail on the wall behind (x is the wall): hand shower or rain head, mixer, hose."""
     top = tall - draw(rng, 0.0, 0.15)
-    parts = [box((x, y - 0.13, 1.05), (x + 0.06, y + 0.13, 1.1), metal)]
+    yield box((x, y - 0.13, 1.05), (x + 0.06, y + 0.13, 1.1), metal)
     if chance(rng, 0.5):
         out, size = draw(rng, 0.28, 0.42), draw(rng, 0.08, 0.15)
-        parts += [tube([(x + 0.04, y, 1.1), (x + 0.04, y, top), (x + out, y, top + 0.01)], 0.011, metal, 6)]
+        yield tube([(x + 0.04, y, 1.1), (x + 0.04, y, top), (x + out, y, top + 0.01)], 0.011, metal, 6)
         head = (
             cylinder(x + out, y, top - 0.03, size, 0.02, metal, 14)
             if chance(rng, 0.6)
             else slab(x + out, y, top - 0.03, 2 * size, 2 * size, 0.015, metal)
         )
-        parts.append(head)
+        yield head
     else:
-        parts += [tube([(x + 0.04, y, 1.15), (x + 0.04, y, top)], 0.01, metal, 6),
-                  tube([(x + 0.04, y, top - 0.1), (x + 0.16, y, top - 0.02)], 0.013, metal, 6),
-                  ellipsoid((x + 0.18, y, top - 0.03), (0.05, 0.05, 0.02), metal, 10, 4)]  # fmt: skip
-    parts.append(
-        tube(
-            [
-                (x + 0.05, y + 0.03, 1.06),
-                (x + 0.08, y + 0.1, 0.8),
-                (x + 0.09, y + 0.12, 1.0),
-                (x + 0.07, y + 0.03, top - 0.12),
-            ],
-            0.006,
-            metal,
-            5,
-        )
+        yield tube([(x + 0.04, y, 1.15), (x + 0.04, y, top)], 0.01, metal, 6)
+        yield tube([(x + 0.04, y, top - 0.1), (x + 0.16, y, top - 0.02)], 0.013, metal, 6)
+        yield ellipsoid((x + 0.18, y, top - 0.03), (0.05, 0.05, 0.02), metal, 10, 4)
+    yield tube(
+        [
+            (x + 0.05, y + 0.03, 1.06),
+            (x + 0.08, y + 0.1, 0.8),
+            (x + 0.09, y + 0.12, 1.0),
+            (x + 0.07, y + 0.03, top - 0.12),
+        ],
+        0.006,
+        metal,
+        5,
     )
-    return parts
 
 
 def _tray(rng: np.random.Generator, wide: float, deep: float, look: Material) -> list[Mesh]:
@@ -63,10 +60,10 @@ def _tray(rng: np.random.Generator, wide: float, deep: float, look: Material) ->
 
 def _pane(
     a: tuple[float, float], b: tuple[float, float], z: tuple[float, float], glass: Material, metal: Material | None
-) -> list[Mesh]:
+) -> Meshes:
     """Return an upright pane between two places (x, y), with a frame if it has a metal."""
     (x0, y0), (x1, y1) = a, b
-    parts = [cloth(np.array([[(x0, y0, z[0]), (x0, y0, z[1])], [(x1, y1, z[0]), (x1, y1, z[1])]]), glass)]
+    yield cloth(np.array([[(x0, y0, z[0]), (x0, y0, z[1])], [(x1, y1, z[0]), (x1, y1, z[1])]]), glass)
     if metal is not None:
         bars = [
             ((x0, y0, z[0]), (x0, y0, z[1])),
@@ -74,8 +71,7 @@ def _pane(
             ((x0, y0, z[1]), (x1, y1, z[1])),
             ((x0, y0, z[0]), (x1, y1, z[0])),
         ]
-        parts += [tube(bar, 0.014, metal, 4) for bar in bars]
-    return parts
+        yield from [tube(bar, 0.014, metal, 4) for bar in bars]
 
 
 def _shower_size(rng: np.random.Generator) -> tuple[float, float, float]:
@@ -83,18 +79,18 @@ def _shower_size(rng: np.random.Generator) -> tuple[float, float, float]:
 
 
 @family("shower", "corner cabin")
-def _corner_cabin(rng: np.random.Generator) -> Piece:
+def _corner_cabin(rng: np.random.Generator) -> Parts:
     wide, deep, tall = _shower_size(rng)
     metal, glass, z = chrome(rng), material("glass", rng), 0.05
     side = pick(rng, (-1.0, 1.0)) * wide / 2
     cut = draw(rng, -0.1, 0.2) * wide * np.sign(side)
     frame = metal if chance(rng, 0.7) else None
-    parts = [*_tray(rng, wide, deep, china(rng)), *_pane((0.01, side), (deep, side), (z, tall), glass, frame),
-             *_pane((deep, side), (deep, float(cut)), (z, tall), glass, frame)]  # fmt: skip
+    yield from (*_tray(rng, wide, deep, china(rng)), *_pane((0.01, side), (deep, side), (z, tall), glass, frame),
+                *_pane((deep, side), (deep, float(cut)), (z, tall), glass, frame))  # fmt: skip
     if chance(rng, 0.7):  # the door: shut or half open
         swing = draw(rng, 0.0, 0.7) if chance(rng, 0.3) else 0.0
         far = float(-side - cut)
-        parts += _pane(
+        yield from _pane(
             (deep + 0.01, float(cut)),
             (deep + 0.01 + abs(far) * np.sin(swing), float(cut + far * np.cos(swing))),
             (z, tall),
@@ -102,24 +98,22 @@ def _corner_cabin(rng: np.random.Generator) -> Piece:
             frame,
         )
         if swing == 0.0:
-            parts.append(
-                tube(
-                    [
-                        (deep + 0.01, cut + 0.06, 0.95),
-                        (deep + 0.05, cut + 0.06, 0.95),
-                        (deep + 0.05, cut + 0.06, 1.2),
-                        (deep + 0.01, cut + 0.06, 1.2),
-                    ],
-                    0.008,
-                    metal,
-                    5,
-                )
+            yield tube(
+                [
+                    (deep + 0.01, cut + 0.06, 0.95),
+                    (deep + 0.05, cut + 0.06, 0.95),
+                    (deep + 0.05, cut + 0.06, 1.2),
+                    (deep + 0.01, cut + 0.06, 1.2),
+                ],
+                0.008,
+                metal,
+                5,
             )
-    return finished([*parts, *_rail(rng, 0.0, 0.0, tall, metal)])
+    yield from _rail(rng, 0.0, 0.0, tall, metal)
 
 
 @family("shower", "quarter round")
-def _quarter_round(rng: np.random.Generator) -> Piece:
+def _quarter_round(rng: np.random.Generator) -> Parts:
     size, tall = draw(rng, 0.8, 1.05), draw(rng, 1.85, 2.1)
     look, metal, glass = china(rng), chrome(rng), material("glass", rng)
     cut = draw(rng, 0.3, 0.5) * size
@@ -146,32 +140,30 @@ def _quarter_round(rng: np.random.Generator) -> Piece:
     parts += [tube([(x, y, z) for x, y in places], 0.016, metal, 5) for z in (high + 0.01, tall)]
     parts += [tube([(x, y, high), (x, y, tall)], 0.014, metal, 5) for x, y in (places[k] for k in (0, 3, 7, -1))]
     whole = joined(parts).moved(y=-size / 2)
-    return finished([whole, *_rail(rng, 0.0, draw(rng, -0.2, 0.2) * size, tall, metal)])
+    return [whole, *_rail(rng, 0.0, draw(rng, -0.2, 0.2) * size, tall, metal)]
 
 
 @family("shower", "walk in")
-def _walk_in(rng: np.random.Generator) -> Piece:
+def _walk_in(rng: np.random.Generator) -> Parts:
     wide, deep, tall = draw(rng, 0.9, 1.6), draw(rng, 0.8, 1.1), draw(rng, 1.9, 2.1)
     metal, glass = chrome(rng), material("glass", rng)
     side = pick(rng, (-1.0, 1.0)) * wide / 2
     share = draw(rng, 0.5, 0.8)
     far = side - np.sign(side) * share * wide
-    parts = [box((0.0, -wide / 2, 0.0), (deep, wide / 2, draw(rng, 0.01, 0.04)), pictured("tile", rng, "stone")),
-             *_pane((deep, float(side)), (deep, float(far)), (0.03, tall), glass, metal if chance(rng, 0.5) else None),
-             tube([(deep, float(far), tall - 0.03), (0.0, float(far), tall - 0.03)], 0.01, metal, 5)]  # fmt: skip
+    yield box((0.0, -wide / 2, 0.0), (deep, wide / 2, draw(rng, 0.01, 0.04)), pictured("tile", rng, "stone"))
+    yield from _pane((deep, float(side)), (deep, float(far)), (0.03, tall), glass, metal if chance(rng, 0.5) else None)
+    yield tube([(deep, float(far), tall - 0.03), (0.0, float(far), tall - 0.03)], 0.01, metal, 5)
     if chance(rng, 0.4):  # black bars divide the pane
-        parts += [
-            tube([(deep, float(side), z), (deep, float(far), z)], 0.008, metal, 4)
-            for z in np.linspace(0.4, tall - 0.3, 4)
-        ]
-    return finished([*parts, *_rail(rng, 0.0, float(side * 0.2), tall, metal)])
+        for z in np.linspace(0.4, tall - 0.3, 4):
+            yield tube([(deep, float(side), z), (deep, float(far), z)], 0.008, metal, 4)
+    yield from _rail(rng, 0.0, float(side * 0.2), tall, metal)
 
 
 @family("shower", "behind a curtain")
-def _curtained_shower(rng: np.random.Generator) -> Piece:
+def _curtained_shower(rng: np.random.Generator) -> Parts:
     wide, deep, tall = _shower_size(rng)
     metal, rail, n = chrome(rng), draw(rng, 1.9, 2.05), 40
-    parts = [*_tray(rng, wide, deep, china(rng)), *_rail(rng, 0.0, 0.0, tall, metal)]
+    yield from (*_tray(rng, wide, deep, china(rng)), *_rail(rng, 0.0, 0.0, tall, metal))
     bend = 0.15
     path = [
         (0.0, wide / 2),
@@ -180,7 +172,7 @@ def _curtained_shower(rng: np.random.Generator) -> Piece:
         (deep, wide / 2 - bend),
         (deep, -wide / 2),
     ]
-    parts.append(tube([(x, y, rail) for x, y in path], 0.012, metal, 6))
+    yield tube([(x, y, rail) for x, y in path], 0.012, metal, 6)
     along = np.linspace(draw(rng, 0.2, 0.6), 0.99, n) * (deep + wide)
     wave = draw(rng, 0.02, 0.035) * np.sin(np.arange(n) * 1.6)
     on_side = along < deep
@@ -189,22 +181,22 @@ def _curtained_shower(rng: np.random.Generator) -> Piece:
         np.where(on_side, wide / 2 + wave, wide / 2 - (along - deep)),
     )
     points = np.stack([np.column_stack([x, y, np.full(n, z)]) for z in (draw(rng, 0.08, 0.25), rail - 0.02)], axis=1)
-    return finished([*parts, cloth(points, pictured("curtain", rng, "fabric"))])
+    yield cloth(points, pictured("curtain", rng, "fabric"))
 
 
 @family("shower", "five-sided", held_out=True)
-def _five_sided(rng: np.random.Generator) -> Piece:
+def _five_sided(rng: np.random.Generator) -> Parts:
     size, tall, high = draw(rng, 0.85, 1.1), draw(rng, 1.85, 2.05), draw(rng, 0.05, 0.15)
     cut, metal, glass = draw(rng, 0.35, 0.55) * size, chrome(rng), material("glass", rng)
     floor = np.array([(0.0, 0.0), (size, 0.0), (size, cut), (cut, size), (0.0, size)])
     parts = [shell([(floor, 0.0), (floor, high)], china(rng))]
     for a, b in pairwise(floor[1:]):
         parts += _pane((float(a[0]), float(a[1])), (float(b[0]), float(b[1])), (high, tall), glass, metal)
-    return finished([joined(parts).moved(y=-size / 2), *_rail(rng, 0.0, -0.1 * size, tall, metal)])
+    return [joined(parts).moved(y=-size / 2), *_rail(rng, 0.0, -0.1 * size, tall, metal)]
 
 
 @family("shower", "wall rail")
-def _wall_rail(rng: np.random.Generator) -> Piece:
+def _wall_rail(rng: np.random.Generator) -> Parts:
     metal = chrome(rng)
     rail = joined(_rail(rng, 0.0, 0.0, draw(rng, 1.9, 2.1), metal))
-    return finished([rail])
+    return [rail]

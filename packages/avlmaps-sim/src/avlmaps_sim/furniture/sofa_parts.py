@@ -8,7 +8,7 @@ from avlmaps_sim.furniture.legs import LegStyle, four_legs, named_leg
 from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick
 from avlmaps_sim.furniture.upholstery import back_cushions, covering, cushion_row, scattered_pillows, throw
 from avlmaps_sim.materials import material
-from avlmaps_sim.mesh import Material, Mesh, joined
+from avlmaps_sim.mesh import Material, Mesh, Meshes, joined
 from avlmaps_sim.shapes import box, loft, rounded_box, rounded_rectangle, slab
 
 
@@ -163,13 +163,12 @@ def loose_back(
     return [part.moved(x=shift) for part in back_cushions(low, high, number, look, lean, 0.05, draw(rng, 0.03, 0.08))]
 
 
-def strewn(rng: np.random.Generator, plan: SofaPlan, seats: int) -> list[Mesh]:
+def strewn(rng: np.random.Generator, plan: SofaPlan, seats: int) -> Meshes:
     """Return the things that people leave on a sofa: pillows against the back, a throw over it, or nothing."""
-    parts = []
     if chance(rng, 0.5):
         half = plan.width / 2
         number = count(rng, 1, max(1, min(4, seats + 1)))
-        parts += scattered_pillows(
+        yield from scattered_pillows(
             rng, draw(rng, 0.12, 0.24), plan.seat + 0.02, (-half, half), number, plan.lean + 0.25
         )
     if chance(rng, 0.2):
@@ -180,8 +179,7 @@ def strewn(rng: np.random.Generator, plan: SofaPlan, seats: int) -> list[Mesh]:
         profile += [(rear - 0.03, high), (rear - 0.06, plan.top - draw(rng, 0.15, 0.4))]
         wide = min(draw(rng, 0.4, 0.8), plan.width * 0.8)
         side = draw(rng, -0.5, 0.5) * (plan.width - wide)
-        parts.append(throw(rng, profile, side, wide, material("fabric", rng)))
-    return parts
+        yield throw(rng, profile, side, wide, material("fabric", rng))
 
 
 def frame_arms(rng: np.random.Generator, plan: SofaPlan, look: Material) -> list[Mesh]:
@@ -204,17 +202,15 @@ def frame_arms(rng: np.random.Generator, plan: SofaPlan, look: Material) -> list
     return [legs, *rests, *rails, *cross]
 
 
-def couch(
-    rng: np.random.Generator, plan: SofaPlan, seats: int, arms: str = "", look: Material | None = None
-) -> list[Mesh]:
+def couch(rng: np.random.Generator, plan: SofaPlan, seats: int, arms: str = "", look: Material | None = None) -> Meshes:
     """Return an upholstered sofa or armchair with arms of a style and loose or fixed cushions."""
     look = look or covering(rng)
     thick = draw(rng, 0.1, 0.2)
     number = seats if chance(rng, 0.7) else max(1, seats - 1)
     seat_look = look if chance(rng, 0.85) else covering(rng)
-    parts = [lower_body(plan, look, thick), body_back(rng, plan, look, chance(rng, 0.5)), *sofa_feet(rng, plan)]
-    parts += box_arms(rng, plan, look, arms)
-    parts += seat_cushions(rng, plan, number, thick, seat_look)
+    yield from (lower_body(plan, look, thick), body_back(rng, plan, look, chance(rng, 0.5)), *sofa_feet(rng, plan))
+    yield from box_arms(rng, plan, look, arms)
+    yield from seat_cushions(rng, plan, number, thick, seat_look)
     if chance(rng, 0.75):
-        parts += loose_back(rng, plan, number, seat_look, draw(rng, -0.1, 0.06), draw(rng, 0.1, 0.2))
-    return [*parts, *strewn(rng, plan, seats)]
+        yield from loose_back(rng, plan, number, seat_look, draw(rng, -0.1, 0.06), draw(rng, 0.1, 0.2))
+    yield from strewn(rng, plan, seats)

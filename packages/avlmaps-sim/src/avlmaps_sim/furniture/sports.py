@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from avlmaps_sim.furniture.catalogue import Piece, family
-from avlmaps_sim.furniture.recipe_helpers import blade, chance, count, draw, finished, pick, strut
+from avlmaps_sim.furniture.catalogue import Parts, family, finished
+from avlmaps_sim.furniture.recipe_helpers import blade, chance, count, draw, pick, strut
 from avlmaps_sim.materials import material
-from avlmaps_sim.mesh import Material, Mesh, Triple, joined
+from avlmaps_sim.mesh import Material, Mesh, Meshes, Triple, joined
 from avlmaps_sim.shapes import circle, cylinder, ellipsoid, lathe, slab, tube
 
 
@@ -25,15 +25,14 @@ def crank(x: float, z: float, long: float, turn: float, wide: float, look: Mater
     return parts
 
 
-def barbell(rng: np.random.Generator, long: float, z: float, x: float) -> list[Mesh]:
+def barbell(rng: np.random.Generator, long: float, z: float, x: float) -> Meshes:
     """Return a bar with plates along y."""
-    steel, rubber, parts = material("metal", rng), material(pick(rng, ("black", "black", "plastic")), rng), []
-    parts.append(tube([(x, -long / 2, z), (x, long / 2, z)], 0.013, steel, 7))
+    steel, rubber = material("metal", rng), material(pick(rng, ("black", "black", "plastic")), rng)
+    yield tube([(x, -long / 2, z), (x, long / 2, z)], 0.013, steel, 7)
     radius = draw(rng, 0.11, 0.22)
     for number in range(count(rng, 1, 3)):
         disc = cylinder(0.0, 0.0, -0.018, radius * 0.85**number, 0.036, rubber, 18).tilted("x", np.pi / 2)
-        parts += [disc.moved(x, s * (long * 0.36 + number * 0.042), z) for s in (-1, 1)]
-    return parts
+        yield from [disc.moved(x, s * (long * 0.36 + number * 0.042), z) for s in (-1, 1)]
 
 
 def _weight(rng: np.random.Generator, long: float, size: float, sides: int, look: Material) -> Mesh:
@@ -46,32 +45,29 @@ def _weight(rng: np.random.Generator, long: float, size: float, sides: int, look
 
 
 @family("dumbbell", "hexagonal")
-def _hex_dumbbells(rng: np.random.Generator) -> Piece:
+def _hex_dumbbells(rng: np.random.Generator) -> Parts:
     size, look = draw(rng, 0.035, 0.075), material(pick(rng, ("black", "black", "plastic")), rng)
     long = size * draw(rng, 3.2, 5.0) + 0.06
-    parts = [
-        _weight(rng, long, size, 6, look).moved(draw(rng, -0.04, 0.04), i * size * 2.6) for i in range(count(rng, 1, 2))
-    ]
-    return finished(parts)
+    for i in range(count(rng, 1, 2)):
+        yield _weight(rng, long, size, 6, look).moved(draw(rng, -0.04, 0.04), i * size * 2.6)
 
 
 @family("dumbbell", "round plates")
-def _plate_dumbbells(rng: np.random.Generator) -> Piece:
+def _plate_dumbbells(rng: np.random.Generator) -> Parts:
     radius, plates, look = (
         draw(rng, 0.05, 0.1),
         count(rng, 1, 3),
         material(pick(rng, ("black", "metal", "plastic")), rng),
     )
     long = draw(rng, 0.3, 0.42)
-    parts = [tube([(-long / 2, 0.0, 0.0), (long / 2, 0.0, 0.0)], 0.014, material("metal", rng), 6)]
+    yield tube([(-long / 2, 0.0, 0.0), (long / 2, 0.0, 0.0)], 0.014, material("metal", rng), 6)
     for number in range(plates):
         disc = cylinder(0.0, 0.0, -0.012, radius * 0.88**number, 0.024, look, 14).tilted("y", np.pi / 2)
-        parts += [disc.moved(s * (0.08 + number * 0.027)) for s in (-1, 1)]
-    return finished(parts)
+        yield from [disc.moved(s * (0.08 + number * 0.027)) for s in (-1, 1)]
 
 
 @family("dumbbell", "kettlebell", held_out=True)
-def _kettlebell(rng: np.random.Generator) -> Piece:
+def _kettlebell(rng: np.random.Generator) -> Parts:
     radius, look = draw(rng, 0.07, 0.11), material(pick(rng, ("black", "plastic", "painted")), rng)
     loop = [
         (0.0, -radius * 0.45, radius * 1.5),
@@ -79,39 +75,37 @@ def _kettlebell(rng: np.random.Generator) -> Piece:
         (0.0, radius * 0.75, radius * 2.3),
         (0.0, radius * 0.45, radius * 1.5),
     ]
-    return finished(
-        [
-            ellipsoid((0.0, 0.0, radius * 0.9), (radius, radius, radius * 0.9), look, 12, 7),
-            tube(loop, radius * 0.17, look, 6),
-        ]
-    )
+    return [
+        ellipsoid((0.0, 0.0, radius * 0.9), (radius, radius, radius * 0.9), look, 12, 7),
+        tube(loop, radius * 0.17, look, 6),
+    ]
 
 
 @family("dumbbell", "barbell")
-def _floor_barbell(rng: np.random.Generator) -> Piece:
-    return finished(barbell(rng, draw(rng, 1.2, 2.2), 0.2, 0.0))
+def _floor_barbell(rng: np.random.Generator) -> Parts:
+    return barbell(rng, draw(rng, 1.2, 2.2), 0.2, 0.0)
 
 
 @family("ball", "plain")
-def _ball(rng: np.random.Generator) -> Piece:
+def _ball(rng: np.random.Generator) -> Parts:
     radius = draw(rng, 0.05, 0.13)
     looks = [material(pick(rng, ("plastic", "leather", "painted", "white")), rng) for _ in range(2)]
     ball = ellipsoid((0.0, 0.0, radius), (radius, radius, radius), looks[0], 14, 9)
     if chance(rng, 0.6):  # patches or stripes
         striped = (np.arange(len(ball.triangle)) // pick(rng, (2, 7, 14)) % 2).astype(np.int32)
         ball = type(ball)(ball.vertex, ball.triangle, ball.uv, striped, (looks[0], looks[1]))
-    return finished([ball])
+    return [ball]
 
 
 @family("ball", "gymnastic")
-def _gym_ball(rng: np.random.Generator) -> Piece:
+def _gym_ball(rng: np.random.Generator) -> Parts:
     radius, look = draw(rng, 0.25, 0.4), material("plastic", rng)
-    return finished([ellipsoid((0.0, 0.0, radius * 0.95), (radius, radius, radius * 0.95), look, 20, 13)])
+    return [ellipsoid((0.0, 0.0, radius * 0.95), (radius, radius, radius * 0.95), look, 20, 13)]
 
 
 @family("ball", "group", held_out=True)
-def _balls(rng: np.random.Generator) -> Piece:
-    return finished([_ball(rng).mesh.moved(draw(rng, -0.15, 0.15), i * 0.28) for i in range(count(rng, 2, 3))])
+def _balls(rng: np.random.Generator) -> Parts:
+    return [finished(_ball(rng)).mesh.moved(draw(rng, -0.15, 0.15), i * 0.28) for i in range(count(rng, 2, 3))]
 
 
 def wheel(x: float, y: float, radius: float, spokes: int, tyre: Material, metal: Material) -> list[Mesh]:
@@ -125,15 +119,14 @@ def wheel(x: float, y: float, radius: float, spokes: int, tyre: Material, metal:
     return parts
 
 
-def _handlebar(rng: np.random.Generator, x: float, z: float, drop: bool, look: Material) -> list[Mesh]:
+def _handlebar(rng: np.random.Generator, x: float, z: float, drop: bool, look: Material) -> Meshes:
     """Return the two halves of a handlebar, flat or dropped, from its clamp at (x, z)."""
-    parts, bar = [], draw(rng, 0.2, 0.32)
+    bar = draw(rng, 0.2, 0.32)
     for s in (-1, 1):
         path = [(x, 0.0, z), (x + 0.03, s * bar * 0.7, z + 0.02), (x - draw(rng, 0.02, 0.18), s * bar, z + 0.02)]
         if drop:
             path = [(x, 0.0, z), (x + 0.02, s * 0.2, z), (x + 0.13, s * 0.21, z - 0.03), (x + 0.06, s * 0.21, z - 0.13)]
-        parts.append(tube(path, 0.012, look, 5))
-    return parts
+        yield tube(path, 0.012, look, 5)
 
 
 def _cycle(rng: np.random.Generator, radius: float, step_through: bool, drop: bool) -> list[Mesh]:
@@ -164,12 +157,12 @@ def _cycle(rng: np.random.Generator, radius: float, step_through: bool, drop: bo
 
 
 @family("bicycle", "diamond frame")
-def _bicycle(rng: np.random.Generator) -> Piece:
-    return finished(_cycle(rng, draw(rng, 0.31, 0.36), False, chance(rng, 0.35)))
+def _bicycle(rng: np.random.Generator) -> Parts:
+    return _cycle(rng, draw(rng, 0.31, 0.36), False, chance(rng, 0.35))
 
 
 @family("bicycle", "step-through")
-def _city_bicycle(rng: np.random.Generator) -> Piece:
+def _city_bicycle(rng: np.random.Generator) -> Parts:
     radius = draw(rng, 0.3, 0.35)
     parts, black = _cycle(rng, radius, True, False), material("black", rng)
     base = radius * 3.1
@@ -183,11 +176,11 @@ def _city_bicycle(rng: np.random.Generator) -> Piece:
             (x - (radius + 0.03) * float(np.cos(a)), 0.0, radius + (radius + 0.03) * float(np.sin(a))) for a in angle
         ]
         parts.append(tube(path, 0.02, black, 4))
-    return finished(parts)
+    return parts
 
 
 @family("bicycle", "child's", held_out=True)
-def _child_bicycle(rng: np.random.Generator) -> Piece:
+def _child_bicycle(rng: np.random.Generator) -> Parts:
     radius = draw(rng, 0.16, 0.22)
     parts, black = _cycle(rng, radius, chance(rng, 0.5), False), material("black", rng)
     for s in (-1, 1):
@@ -196,4 +189,4 @@ def _child_bicycle(rng: np.random.Generator) -> Piece:
             for part in wheel(-radius * 1.55, 0.0, radius * 0.4, 6, black, material("plastic", rng))
         ]
         parts.append(tube([(-radius * 1.55, 0.0, radius), (-radius * 1.55, s * 0.16, radius * 0.5)], 0.008, black, 4))
-    return finished(parts)
+    return parts

@@ -13,10 +13,10 @@ from avlmaps_sim.furniture.carcass import (
     shelf_boards,
     split,
 )
-from avlmaps_sim.furniture.catalogue import Piece, family
+from avlmaps_sim.furniture.catalogue import Parts, family
 from avlmaps_sim.furniture.contents import cloth_looks, folded, hanging
 from avlmaps_sim.furniture.legs import cabinet_base
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, finished, pick
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh
 from avlmaps_sim.shapes import box, sheet, slab, tube
@@ -52,7 +52,7 @@ def _on_top(rng: np.random.Generator, room: Room) -> list[Mesh]:
 
 
 @family("wardrobe", "hinged")
-def hinged_wardrobe(rng: np.random.Generator) -> Piece:
+def hinged_wardrobe(rng: np.random.Generator) -> Parts:
     """Return a wardrobe with one to four hinged doors; one may stand open on clothes."""
     number = count(rng, 1, 4)
     look = board_look(rng)
@@ -60,14 +60,14 @@ def hinged_wardrobe(rng: np.random.Generator) -> Piece:
     base, lift = cabinet_base(rng, room.high[0] - room.low[0], room.high[1] - room.low[1], look)
     room = Room((*room.low[:2], lift), room.high)
     style = front_style(rng, look)
-    parts = [base, carcass(room, 0.02, look), *_cornice(rng, room, look), *_on_top(rng, room)]
+    yield from (base, carcass(room, 0.02, look), *_cornice(rng, room, look), *_on_top(rng, room))
     ajar = 0.12
     leaves = doors(rng, style, room, number, ajar)
-    return finished([*parts, *leaves, *hanging(rng, inside(room, 0.02), cloth_looks(rng), 0.35)])
+    yield from (*leaves, *hanging(rng, inside(room, 0.02), cloth_looks(rng), 0.35))
 
 
 @family("wardrobe", "doors over drawers")
-def drawer_wardrobe(rng: np.random.Generator) -> Piece:
+def drawer_wardrobe(rng: np.random.Generator) -> Parts:
     """Return a wardrobe with drawers below its doors, or with small doors above them."""
     number = count(rng, 2, 3)
     look = board_look(rng)
@@ -75,25 +75,24 @@ def drawer_wardrobe(rng: np.random.Generator) -> Piece:
     (a, b, c), (d, e, f) = room.low, room.high
     style = front_style(rng, look)
     cut, upper = c + draw(rng, 0.25, 0.55), f
-    parts = [carcass(room, 0.02, look), *_cornice(rng, room, look), box((a, b, 0.0), (d - 0.03, e, c), look)]
+    yield from (carcass(room, 0.02, look), *_cornice(rng, room, look), box((a, b, 0.0), (d - 0.03, e, c), look))
     for y0, y1 in split(b, e, [1.0] * count(rng, 1, number)):
-        parts += drawers(rng, style, Room((a, y0, c), (d, y1, cut)), [1.0] * (1 if cut - c < 0.35 else 2))
+        yield from drawers(rng, style, Room((a, y0, c), (d, y1, cut)), [1.0] * (1 if cut - c < 0.35 else 2))
     if chance(rng, 0.35):
         upper = f - draw(rng, 0.3, 0.45)
-        parts += doors(rng, style, Room((a, b, upper), (d, e, f)), number, 0.0)
-    parts += doors(rng, style, Room((a, b, cut), (d, e, upper)), number, 0.08)
-    return finished(parts)
+        yield from doors(rng, style, Room((a, b, upper), (d, e, f)), number, 0.0)
+    yield from doors(rng, style, Room((a, b, cut), (d, e, upper)), number, 0.08)
 
 
 @family("wardrobe", "sliding")
-def sliding_wardrobe(rng: np.random.Generator) -> Piece:
+def sliding_wardrobe(rng: np.random.Generator) -> Parts:
     """Return a wide wardrobe with two or three sliding doors, plain, banded or mirrored."""
     number = count(rng, 2, 3)
     look = board_look(rng)
     room = _wardrobe_room(rng, (0.62 * number, 0.95 * number), 0.0)
     (a, b, c), (d, e, f) = room.low, room.high
     track = 0.03
-    parts = [carcass(Room((a, b, c), (d + 0.06, e, f)), 0.022, look), box((a, b, 0.0), (d + 0.06, e, 0.05), look)]
+    yield from (carcass(Room((a, b, c), (d + 0.06, e, f)), 0.022, look), box((a, b, 0.0), (d + 0.06, e, 0.05), look))
     metal = material(pick(rng, ("metal", "black", "white")), rng)
     kinds = [pick(rng, ("plain", "mirror", "banded", "glass")) for _ in range(number)]
     kinds = kinds if chance(rng, 0.4) else [kinds[0]] * number
@@ -104,52 +103,48 @@ def sliding_wardrobe(rng: np.random.Generator) -> Piece:
         top = f - 0.022
         fill = material("mirror" if kinds[index] == "mirror" else "white", rng) if kinds[index] != "plain" else fronts
         fill = fronts if kinds[index] == "banded" else fill
-        parts.append(box((x, y0, 0.06), (x + 0.02, y1, top), fronts if kinds[index] == "mirror" else fill))
+        yield box((x, y0, 0.06), (x + 0.02, y1, top), fronts if kinds[index] == "mirror" else fill)
         if kinds[index] == "mirror":
-            parts.append(
-                sheet((x + 0.021, y0 + 0.02, 0.08), (0.0, y1 - y0 - 0.04, 0.0), (0.0, 0.0, top - 0.1), fill, True)
-            )
-        parts += [box((x + 0.015, y, 0.06), (x + 0.028, y + 0.02, top), metal) for y in (y0, y1 - 0.02)]
+            yield sheet((x + 0.021, y0 + 0.02, 0.08), (0.0, y1 - y0 - 0.04, 0.0), (0.0, 0.0, top - 0.1), fill, True)
+        yield from [box((x + 0.015, y, 0.06), (x + 0.028, y + 0.02, top), metal) for y in (y0, y1 - 0.02)]
         if kinds[index] == "banded":
             bands = np.linspace(0.06, top, count(rng, 3, 5))[1:-1].tolist()
-            parts += [box((x + 0.015, y0, z), (x + 0.026, y1, z + 0.02), metal) for z in bands]
-    return finished(parts)
+            yield from [box((x + 0.015, y0, z), (x + 0.026, y1, z + 0.02), metal) for z in bands]
 
 
 @family("wardrobe", "mirror doors")
-def mirror_wardrobe(rng: np.random.Generator) -> Piece:
+def mirror_wardrobe(rng: np.random.Generator) -> Parts:
     """Return a wardrobe one or all of whose hinged doors carry mirrors."""
     number = count(rng, 2, 4)
     look = board_look(rng)
     room = _wardrobe_room(rng, (0.42 * number, 0.55 * number), draw(rng, 0.04, 0.1))
     (a, b, c), (d, e, f) = room.low, room.high
     style = front_style(rng, look, ("flat", "framed", "raised"))
-    parts = [carcass(room, 0.02, look), *_cornice(rng, room, look), box((a, b, 0.0), (d - 0.03, e, c), look)]
+    yield from (carcass(room, 0.02, look), *_cornice(rng, room, look), box((a, b, 0.0), (d - 0.03, e, c), look))
     every = chance(rng, 0.4)
     middle = (number - 1) / 2
     for index, (y0, y1) in enumerate(split(b, e, [1.0] * number)):
         mirrored = every or abs(index - middle) < 0.9
-        parts += doors(rng, style, Room((a, y0, c), (d, y1, f)), 1, 0.05, "mirror" if mirrored else None)
-    return finished(parts)
+        yield from doors(rng, style, Room((a, y0, c), (d, y1, f)), 1, 0.05, "mirror" if mirrored else None)
 
 
 @family("wardrobe", "open")
-def open_wardrobe(rng: np.random.Generator) -> Piece:
+def open_wardrobe(rng: np.random.Generator) -> Parts:
     """Return a wardrobe without doors: bays with hanging clothes, shelves with folded ones, drawers."""
     number = count(rng, 2, 3)
     look = board_look(rng)
     room = _wardrobe_room(rng, (0.55 * number, 0.9 * number), draw(rng, 0.03, 0.08))
     (a, b, c), (d, e, f) = room.low, room.high
     looks, style = cloth_looks(rng), front_style(rng, look)
-    parts = [carcass(room, 0.02, look), box((a, b, 0.0), (d - 0.03, e, c), look)]
+    yield from (carcass(room, 0.02, look), box((a, b, 0.0), (d - 0.03, e, c), look))
     for index, (y0, y1) in enumerate(split(b + 0.01, e - 0.01, [draw(rng, 0.7, 1.3) for _ in range(number)])):
         if index:
-            parts.append(box((a, y0 - 0.01, c), (d, y0 + 0.01, f), look))
+            yield box((a, y0 - 0.01, c), (d, y0 + 0.01, f), look)
         bay = Room((a + 0.01, y0 + 0.012, c + 0.02), (d, y1 - 0.012, f - 0.02))
         cut = c + draw(rng, 0.35, 0.7) if chance(rng, 0.6) else c + 0.02
         if cut > c + 0.1:
-            parts.append(box((a, y0 + 0.01, cut - 0.02), (d, y1 - 0.01, cut), look))
-            parts += drawers(
+            yield box((a, y0 + 0.01, cut - 0.02), (d, y1 - 0.01, cut), look)
+            yield from drawers(
                 rng,
                 style,
                 Room((a, y0 + 0.012, c + 0.02), (d - 0.02, y1 - 0.012, cut - 0.02)),
@@ -157,56 +152,50 @@ def open_wardrobe(rng: np.random.Generator) -> Piece:
             )
         upper = Room((bay.low[0], bay.low[1], cut), bay.high)
         if index == 0 or chance(rng, 0.5):
-            parts += hanging(rng, upper, looks, 0.7)
+            yield from hanging(rng, upper, looks, 0.7)
         else:
             boards, bays = shelf_boards(upper, count(rng, 2, 4), 0.018, look)
-            parts += boards
+            yield from boards
             for low, high in bays:
-                parts += folded(rng, Room((a, y0, low), (d, y1, high)), looks)
-    return finished(parts)
+                yield from folded(rng, Room((a, y0, low), (d, y1, high)), looks)
 
 
 @family("wardrobe", "garment rack", held_out=True)
-def garment_rack(rng: np.random.Generator) -> Piece:
+def garment_rack(rng: np.random.Generator) -> Parts:
     """Return clothes on a free-standing frame of metal or wood with a shelf below."""
     depth, width, height = draw(rng, 0.4, 0.5), draw(rng, 0.8, 1.5), draw(rng, 1.4, 1.75)
     look = material(pick(rng, ("metal", "black", "wood", "white")), rng)
     r, half, t = draw(rng, 0.01, 0.018), width / 2, depth / 2
-    parts = []
     for s in (1, -1):
         y = s * half
         if chance(rng, 0.5):
-            parts.append(tube([(t, y, 0.02), (0.0, y, height), (-t, y, 0.02)], r, look, 6))
+            yield tube([(t, y, 0.02), (0.0, y, height), (-t, y, 0.02)], r, look, 6)
         else:
-            parts += [
-                tube([(t, y, 0.02), (-t, y, 0.02)], r, look, 6),
-                tube([(0.0, y, 0.02), (0.0, y, height)], r, look, 6),
-            ]
+            yield tube([(t, y, 0.02), (-t, y, 0.02)], r, look, 6)
+            yield tube([(0.0, y, 0.02), (0.0, y, height)], r, look, 6)
     shelf = draw(rng, 0.1, 0.25)
-    parts.append(box((-t * 0.8, -half, shelf), (t * 0.8, half, shelf + 0.02), look))
+    yield box((-t * 0.8, -half, shelf), (t * 0.8, half, shelf + 0.02), look)
     looks = cloth_looks(rng)
-    parts += hanging(rng, Room((-t, -half, shelf), (t, half, height + 0.05)), looks, 0.8)
-    parts += folded(rng, Room((-t, -half, shelf + 0.02), (t, half, shelf + 0.35)), looks)
-    return finished(parts)
+    yield from hanging(rng, Room((-t, -half, shelf), (t, half, height + 0.05)), looks, 0.8)
+    yield from folded(rng, Room((-t, -half, shelf + 0.02), (t, half, shelf + 0.35)), looks)
 
 
 @family("wardrobe", "armoire", held_out=True)
-def armoire(rng: np.random.Generator) -> Piece:
+def armoire(rng: np.random.Generator) -> Parts:
     """Return an old two-door wardrobe of dark wood: arched crest, corner posts, feet, panelled doors."""
     look = material("wood", rng)
     room = _wardrobe_room(rng, (1.05, 1.4), draw(rng, 0.12, 0.2))
     (a, b, c), (d, e, f) = room.low, room.high
     style = front_style(rng, look, ("raised", "framed"))
-    parts = [carcass(room, 0.03, look)]
-    parts += [box((d - 0.03, y, 0.0), (d + 0.03, y + 0.07, f + 0.02), look) for y in (b - 0.02, e - 0.05)]
-    parts += [box((a, y, 0.0), (a + 0.07, y + 0.05, c), look) for y in (b, e - 0.05)]
+    yield carcass(room, 0.03, look)
+    yield from [box((d - 0.03, y, 0.0), (d + 0.03, y + 0.07, f + 0.02), look) for y in (b - 0.02, e - 0.05)]
+    yield from [box((a, y, 0.0), (a + 0.07, y + 0.05, c), look) for y in (b, e - 0.05)]
     cut = c + draw(rng, 0.2, 0.34)
-    parts += drawers(rng, style, Room((a, b + 0.05, c), (d, e - 0.05, cut)), [1.0], 0.0)
-    parts += doors(rng, style, Room((a, b + 0.05, cut), (d, e - 0.05, f)), 2, 0.1)
+    yield from drawers(rng, style, Room((a, b + 0.05, c), (d, e - 0.05, cut)), [1.0], 0.0)
+    yield from doors(rng, style, Room((a, b + 0.05, cut), (d, e - 0.05, f)), 2, 0.1)
     rise = draw(rng, 0.1, 0.22)
     for share in np.linspace(-0.9, 0.9, 9).tolist():
         y = share * (e - b) / 2
         tall = 0.05 + rise * (1 - share**2)
-        parts.append(box((d - 0.04, y - 0.12 * (e - b) / 2, f), (d + 0.01, y + 0.12 * (e - b) / 2, f + tall), look))
-    parts.append(box((a - 0.01, b - 0.04, f), (d + 0.05, e + 0.04, f + 0.05), look))
-    return finished(parts)
+        yield box((d - 0.04, y - 0.12 * (e - b) / 2, f), (d + 0.01, y + 0.12 * (e - b) / 2, f + tall), look)
+    yield box((a - 0.01, b - 0.04, f), (d + 0.05, e + 0.04, f + 0.05), look)

@@ -13,13 +13,13 @@ from avlmaps_sim.furniture.carcass import (
     inside,
     split,
 )
-from avlmaps_sim.furniture.catalogue import Piece, Support, family
+from avlmaps_sim.furniture.catalogue import Parts, Support, family
 from avlmaps_sim.furniture.contents import ornament
 from avlmaps_sim.furniture.legs import cabinet_base, four_legs, leg_style
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, finished, pick
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick
 from avlmaps_sim.furniture.storage_shelves import filled
 from avlmaps_sim.materials import material
-from avlmaps_sim.mesh import Material, Mesh
+from avlmaps_sim.mesh import Material, Mesh, Meshes
 from avlmaps_sim.shapes import box, prism, slab
 
 
@@ -36,44 +36,40 @@ def _body(
     return [base, carcass(room, 0.02, look), lid], room, f + 0.025
 
 
-def _bays(
-    rng: np.random.Generator, room: Room, kinds: list[str], panels: tuple[Panel, ...], look: Material
-) -> list[Mesh]:
+def _bays(rng: np.random.Generator, room: Room, kinds: list[str], panels: tuple[Panel, ...], look: Material) -> Meshes:
     """Return bays side by side in a carcass: closed by doors or drawers, open with shelves, or glazed."""
     style = front_style(rng, look, panels)
     (a, b, c), (d, e, f) = room.low, room.high
-    parts: list[Mesh] = []
     shares = [draw(rng, 0.8, 1.25) for _ in kinds]
     for kind, (y0, y1) in zip(kinds, split(b, e, shares), strict=True):
         bay = Room((a, y0, c), (d, y1, f))
         if y0 > b:
-            parts.append(box((a, y0 - 0.009, c), (d, y0 + 0.009, f), look))
+            yield box((a, y0 - 0.009, c), (d, y0 + 0.009, f), look)
         if kind == "drawers":
-            parts += drawers(rng, style, bay, [1.0] * max(1, round((f - c) / draw(rng, 0.16, 0.24))))
+            yield from drawers(rng, style, bay, [1.0] * max(1, round((f - c) / draw(rng, 0.16, 0.24))))
         elif kind == "doors":
-            parts += doors(rng, style, bay, 2 if y1 - y0 > 0.62 else 1, 0.07)
+            yield from doors(rng, style, bay, 2 if y1 - y0 > 0.62 else 1, 0.07)
         else:
             free = Room((a + 0.01, y0 + 0.02, c + 0.02), (d - 0.01, y1 - 0.02, f - 0.02))
             more, _ = filled(rng, free, max(0, round((f - c) / 0.35) - 1), look, draw(rng, 0.2, 0.8))
-            parts += more
+            yield from more
             if kind == "glass":
-                parts += doors(rng, style, bay, 2 if y1 - y0 > 0.62 else 1, 0.05, "glass")
-    return parts
+                yield from doors(rng, style, bay, 2 if y1 - y0 > 0.62 else 1, 0.05, "glass")
 
 
 @family("cabinet", "sideboard")
-def sideboard(rng: np.random.Generator) -> Piece:
+def sideboard(rng: np.random.Generator) -> Parts:
     """Return a broad low cabinet of doors, drawers and open bays."""
     depth, width, height = draw(rng, 0.36, 0.52), draw(rng, 1.1, 2.2), draw(rng, 0.65, 0.95)
     look = board_look(rng)
     parts, room, z = _body(rng, depth, width, height, look)
     kinds = [pick(rng, ("doors", "doors", "drawers", "open")) for _ in range(count(rng, 2, 4))]
     parts += _bays(rng, room, kinds, (), look)
-    return finished(parts, supports=[Support((-depth / 2, -width / 2), (depth / 2, width / 2), z)])
+    return [*parts, Support((-depth / 2, -width / 2), (depth / 2, width / 2), z)]
 
 
 @family("cabinet", "display")
-def display_cabinet(rng: np.random.Generator) -> Piece:
+def display_cabinet(rng: np.random.Generator) -> Parts:
     """Return a tall case with glass doors and things behind them, perhaps closed below."""
     depth, width, height = draw(rng, 0.33, 0.48), draw(rng, 0.5, 1.3), draw(rng, 1.4, 2.15)
     look = board_look(rng)
@@ -90,11 +86,11 @@ def display_cabinet(rng: np.random.Generator) -> Piece:
     free = Room((a + 0.01, b + 0.02, cut + 0.02), (d - 0.02, e - 0.02, f - 0.02))
     more, _ = filled(rng, free, count(rng, 2, 4), look, draw(rng, 0.3, 0.7), 0.012)
     parts += [*more, *doors(rng, style, Room((a, b, cut), (d, e, f)), leaves, 0.06, "glass")]
-    return finished(parts)
+    return parts
 
 
 @family("cabinet", "cupboard")
-def cupboard(rng: np.random.Generator) -> Piece:
+def cupboard(rng: np.random.Generator) -> Parts:
     """Return a plain upright cupboard of one or two doors, breast-high or taller."""
     depth, leaves, height = draw(rng, 0.3, 0.48), count(rng, 1, 2), draw(rng, 0.8, 1.75)
     width = draw(rng, 0.35, 0.55) * leaves
@@ -107,11 +103,11 @@ def cupboard(rng: np.random.Generator) -> Piece:
     if cut < f:
         for y0, y1 in split(b, e, [1.0] * leaves):
             parts += drawers(rng, style, Room((a, y0, cut), (d, y1, f)), [1.0])
-    return finished(parts, supports=[Support((a, b), (d, e), z)])
+    return [*parts, Support((a, b), (d, e), z)]
 
 
 @family("cabinet", "hutch")
-def hutch(rng: np.random.Generator) -> Piece:
+def hutch(rng: np.random.Generator) -> Parts:
     """Return a dresser: a deep cabinet with drawers and doors under a shallower one of shelves or glass."""
     depth, width, cut = draw(rng, 0.42, 0.55), draw(rng, 0.9, 1.6), draw(rng, 0.78, 0.95)
     look = board_look(rng)
@@ -132,96 +128,89 @@ def hutch(rng: np.random.Generator) -> Piece:
     parts += more
     if chance(rng, 0.5):
         parts += doors(rng, style, upper, number, 0.05, "glass")
-    return finished(parts, supports=[Support((upper.high[0] + 0.02, b), (d, e), z)])
+    return [*parts, Support((upper.high[0] + 0.02, b), (d, e), z)]
 
 
 @family("cabinet", "bar", held_out=True)
-def corner_cabinet(rng: np.random.Generator) -> Piece:
+def corner_cabinet(rng: np.random.Generator) -> Parts:
     """Return a small cabinet on high legs or a hoop of metal with two slatted doors."""
     depth, width = draw(rng, 0.35, 0.45), draw(rng, 0.6, 0.95)
     low, height = draw(rng, 0.35, 0.6), draw(rng, 1.05, 1.45)
     look = board_look(rng)
     legs = look if chance(rng, 0.4) else material(pick(rng, ("metal", "black")), rng)
     room = Room((-depth / 2, -width / 2, low), (depth / 2, width / 2, height))
-    parts = [
-        carcass(room, 0.022, look),
-        *doors(rng, front_style(rng, look, ("slatted", "raised", "flat")), room, 2, 0.15),
-    ]
-    parts.append(four_legs(depth, width, low + 0.01, leg_style(rng, 0.02, 0.045), legs, draw(rng, 0.0, 0.04)))
-    parts += [ornament(rng, 0.0, y, height, 0.3) for y in (-0.2, 0.2) if chance(rng, 0.4)]
-    return finished(parts, supports=[Support((-depth / 2, -width / 2), (depth / 2, width / 2), height)])
+    yield carcass(room, 0.022, look)
+    yield from doors(rng, front_style(rng, look, ("slatted", "raised", "flat")), room, 2, 0.15)
+    yield four_legs(depth, width, low + 0.01, leg_style(rng, 0.02, 0.045), legs, draw(rng, 0.0, 0.04))
+    yield from [ornament(rng, 0.0, y, height, 0.3) for y in (-0.2, 0.2) if chance(rng, 0.4)]
+    yield Support((-depth / 2, -width / 2), (depth / 2, width / 2), height)
 
 
 @family("cabinet", "glass column", held_out=True)
-def glass_column(rng: np.random.Generator) -> Piece:
+def glass_column(rng: np.random.Generator) -> Parts:
     """Return a show case of glass on all sides between slender corner posts."""
     depth, width, height = draw(rng, 0.33, 0.45), draw(rng, 0.4, 0.95), draw(rng, 1.3, 1.9)
     look, glass = board_look(rng), material("glass", rng)
     (a, b), (d, e) = (-depth / 2, -width / 2), (depth / 2, width / 2)
     low = draw(rng, 0.06, 0.3)
-    parts = [box((a, b, 0.0), (d, e, low), look), box((a, b, height - 0.04), (d, e, height), look)]
-    parts.append(four_legs(depth, width, height - 0.02, leg_style(rng, 0.018, 0.03, True), look))
+    yield from (box((a, b, 0.0), (d, e, low), look), box((a, b, height - 0.04), (d, e, height), look))
+    yield four_legs(depth, width, height - 0.02, leg_style(rng, 0.018, 0.03, True), look)
     more, _ = filled(
         rng, Room((a + 0.02, b + 0.03, low), (d - 0.02, e - 0.03, height - 0.04)), count(rng, 2, 4), glass, 0.5, 0.008
     )
-    parts += [*more, *(box((a + 0.01, y, low), (d - 0.01, y + 0.004, height), glass) for y in (b + 0.01, e - 0.014))]
-    parts.append(box((d - 0.014, b + 0.01, low), (d - 0.01, e - 0.01, height), glass))
-    return finished(parts)
+    yield from (*more, *(box((a + 0.01, y, low), (d - 0.01, y + 0.004, height), glass) for y in (b + 0.01, e - 0.014)))
+    yield box((d - 0.014, b + 0.01, low), (d - 0.01, e - 0.01, height), glass)
 
 
 @family("tv cabinet", "low bench")
-def tv_bench(rng: np.random.Generator) -> Piece:
+def tv_bench(rng: np.random.Generator) -> Parts:
     """Return a long low bench of open bays, drawers and doors."""
     depth, width, height = draw(rng, 0.35, 0.5), draw(rng, 1.0, 2.2), draw(rng, 0.35, 0.58)
     look = board_look(rng)
     parts, room, z = _body(rng, depth, width, height, look)
     kinds = [pick(rng, ("open", "open", "drawers", "doors")) for _ in range(count(rng, 2, 4))]
     parts += _bays(rng, room, kinds, (), look)
-    return finished(parts, supports=[Support((-depth / 2, -width / 2), (depth / 2, width / 2), z)])
+    return [*parts, Support((-depth / 2, -width / 2), (depth / 2, width / 2), z)]
 
 
 @family("tv cabinet", "open tiers")
-def tv_tiers(rng: np.random.Generator) -> Piece:
+def tv_tiers(rng: np.random.Generator) -> Parts:
     """Return two or three boards or glass sheets between posts, for the set and its boxes."""
     depth, width, height = draw(rng, 0.35, 0.5), draw(rng, 0.8, 1.6), draw(rng, 0.36, 0.62)
     look = material("glass", rng) if chance(rng, 0.4) else board_look(rng)
     frame = material(pick(rng, ("metal", "black", "wood")), rng)
     tiers = count(rng, 2, 3)
     levels = np.linspace(0.06, height - 0.02, tiers).tolist()
-    parts = [slab(0.0, 0.0, z, depth, width, 0.02, look) for z in levels]
-    parts.append(
-        four_legs(
-            depth, width * draw(rng, 0.7, 1.0), height - 0.02, leg_style(rng, 0.03, 0.06, True), frame, inset=0.02
-        )
+    yield from [slab(0.0, 0.0, z, depth, width, 0.02, look) for z in levels]
+    yield four_legs(
+        depth, width * draw(rng, 0.7, 1.0), height - 0.02, leg_style(rng, 0.03, 0.06, True), frame, inset=0.02
     )
     box_look = material("black", rng)
     for z in [level for level in levels[:-1] if chance(rng, 0.6)]:
         size = (0.25, draw(rng, 0.25, 0.42), draw(rng, 0.04, 0.08))
-        parts += [slab(0.0, draw(rng, -0.2, 0.2) * width, z + 0.02, *size, box_look)]
-    return finished(parts, supports=[Support((-depth * 0.48, -width * 0.48), (depth * 0.48, width * 0.48), height)])
+        yield slab(0.0, draw(rng, -0.2, 0.2) * width, z + 0.02, *size, box_look)
+    yield Support((-depth * 0.48, -width * 0.48), (depth * 0.48, width * 0.48), height)
 
 
 @family("tv cabinet", "legged")
-def tv_sideboard(rng: np.random.Generator) -> Piece:
+def tv_sideboard(rng: np.random.Generator) -> Parts:
     """Return a box with sliding or hinged doors round an open bay, on slender splayed legs."""
     depth, width = draw(rng, 0.36, 0.46), draw(rng, 1.1, 1.9)
     low, height = draw(rng, 0.12, 0.22), draw(rng, 0.44, 0.62)
     look = material(pick(rng, ("wood", "wood", "white")), rng)
     legs = look if chance(rng, 0.5) else material(pick(rng, ("wood", "black", "metal")), rng)
     room = Room((-depth / 2, -width / 2, low), (depth / 2, width / 2, height))
-    parts = [
-        carcass(room, 0.022, look),
-        four_legs(depth * 0.8, width * 0.85, low, leg_style(rng, 0.03, 0.045), legs, 0.04),
-    ]
+    yield carcass(room, 0.022, look)
+    yield four_legs(depth * 0.8, width * 0.85, low, leg_style(rng, 0.03, 0.045), legs, 0.04)
     kinds = pick(
         rng, (["doors", "open", "doors"], ["open", "doors"], ["drawers", "open"], ["doors", "open", "drawers"])
     )
-    parts += _bays(rng, room, kinds, ("flat", "slatted", "framed"), look)
-    return finished(parts, supports=[Support((-depth / 2, -width / 2), (depth / 2, width / 2), height)])
+    yield from _bays(rng, room, kinds, ("flat", "slatted", "framed"), look)
+    yield Support((-depth / 2, -width / 2), (depth / 2, width / 2), height)
 
 
 @family("tv cabinet", "media wall")
-def media_wall(rng: np.random.Generator) -> Piece:
+def media_wall(rng: np.random.Generator) -> Parts:
     """Return a bench with towers of shelves at one or both sides, free in the middle."""
     depth, width, height = draw(rng, 0.35, 0.45), draw(rng, 1.9, 2.8), draw(rng, 0.4, 0.55)
     look, tall = board_look(rng), draw(rng, 1.4, 2.1)
@@ -239,11 +228,11 @@ def media_wall(rng: np.random.Generator) -> Piece:
     if len(sides) == 2 and chance(rng, 0.5):
         parts.append(box((a, b + wide, tall - 0.25), (d - 0.1, e - wide, tall - 0.23), look))
     free = (b + wide + 0.02, e - wide - 0.02 if len(sides) == 2 else e)
-    return finished(parts, supports=[Support((a, free[0]), (d, free[1]), z)])
+    return [*parts, Support((a, free[0]), (d, free[1]), z)]
 
 
 @family("tv cabinet", "corner stand", held_out=True)
-def corner_stand(rng: np.random.Generator) -> Piece:
+def corner_stand(rng: np.random.Generator) -> Parts:
     """Return a stand for the corner of a room: its sides draw in towards the back."""
     width, back, depth = draw(rng, 0.9, 1.25), draw(rng, 0.35, 0.55), draw(rng, 0.45, 0.55)
     height, look = draw(rng, 0.45, 0.6), board_look(rng)
@@ -257,17 +246,15 @@ def corner_stand(rng: np.random.Generator) -> Piece:
         (-depth / 6, -width / 2),
     ]
     levels = np.linspace(0.04, height - 0.025, count(rng, 2, 3)).tolist()
-    parts = [prism(flat, z, 0.025, look) for z in levels]
-    parts += [
-        box(
+    yield from [prism(flat, z, 0.025, look) for z in levels]
+    for s in (1, -1):
+        yield box(
             (-depth / 6, s * (width / 2 - 0.012) - 0.012, 0.0),
             (depth / 2, s * (width / 2 - 0.012) + 0.012, height - 0.02),
             look,
         )
-        for s in (1, -1)
-    ]
-    parts.append(box((-depth / 2, -back / 2, 0.0), (-depth / 2 + 0.02, back / 2, height - 0.02), look))
+    yield box((-depth / 2, -back / 2, 0.0), (-depth / 2 + 0.02, back / 2, height - 0.02), look)
     if chance(rng, 0.5):
         room = Room((0.0, -width / 2 + 0.02, 0.06), (depth / 2 - 0.03, width / 2 - 0.02, height - 0.03))
-        parts += doors(rng, front_style(rng, look), room, 2, 0.05, pick(rng, ("glass", "flat")))
-    return finished(parts, supports=[Support((-depth * 0.15, -width * 0.46), (depth * 0.48, width * 0.46), height)])
+        yield from doors(rng, front_style(rng, look), room, 2, 0.05, pick(rng, ("glass", "flat")))
+    yield Support((-depth * 0.15, -width * 0.46), (depth * 0.48, width * 0.46), height)

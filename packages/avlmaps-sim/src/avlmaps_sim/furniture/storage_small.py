@@ -3,12 +3,12 @@
 import numpy as np
 
 from avlmaps_sim.furniture.carcass import Room, board_look, carcass, doors, drawers, front_style, grip, inside, split
-from avlmaps_sim.furniture.catalogue import Piece, Support, family
+from avlmaps_sim.furniture.catalogue import Parts, Support, family
 from avlmaps_sim.furniture.contents import book_looks, cloth_looks, ornament, shelf_things
 from avlmaps_sim.furniture.legs import four_legs, leg_style, star_base
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, finished, pick, strut
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick, strut
 from avlmaps_sim.materials import material
-from avlmaps_sim.mesh import Material, Mesh, joined
+from avlmaps_sim.mesh import Material, Mesh, Meshes, joined
 from avlmaps_sim.shapes import box, cylinder, ellipsoid, lathe, loft, rounded_box, rounded_rectangle, slab, tube
 
 
@@ -30,39 +30,34 @@ def shoe(rng: np.random.Generator, look: Material) -> Mesh:
     return loft(rings, look)
 
 
-def _shoes(rng: np.random.Generator, y: tuple[float, float], x: float, z: float, full: float) -> list[Mesh]:
+def _shoes(rng: np.random.Generator, y: tuple[float, float], x: float, z: float, full: float) -> Meshes:
     """Return pairs of shoes side by side along y."""
     looks = [material(pick(rng, ("leather", "fabric", "plastic", "white", "black")), rng) for _ in range(4)]
-    parts = []
     for at in np.arange(y[0] + 0.12, y[1] - 0.1, 0.24).tolist():
         if chance(rng, full):
             one, turn = shoe(rng, pick(rng, looks)), draw(rng, -0.1, 0.1)
-            parts += [one.turned(turn).moved(x + draw(rng, -0.02, 0.02), at + s * 0.052, z) for s in (1, -1)]
-    return parts
+            yield from [one.turned(turn).moved(x + draw(rng, -0.02, 0.02), at + s * 0.052, z) for s in (1, -1)]
 
 
 @family("shoe rack", "open tiers")
-def shoe_tiers(rng: np.random.Generator) -> Piece:
+def shoe_tiers(rng: np.random.Generator) -> Parts:
     """Return open tiers of boards or rods between side frames, with shoes on them."""
     depth, width, tiers = draw(rng, 0.26, 0.36), draw(rng, 0.5, 1.0), count(rng, 2, 5)
     high = 0.06 + 0.2 * tiers
     frame, look = material(pick(rng, ("metal", "black", "wood", "white")), rng), board_look(rng)
     rods, full = chance(rng, 0.5), draw(rng, 0.2, 0.8) / max(1, tiers / 3)
-    parts = [four_legs(depth, width, high, leg_style(rng, 0.015, 0.03, True), frame)]
+    yield four_legs(depth, width, high, leg_style(rng, 0.015, 0.03, True), frame)
     for z in np.linspace(0.08, high - 0.02, tiers).tolist():
         if rods:
-            parts += [
-                tube([(x, -width / 2, z), (x, width / 2, z)], 0.007, frame, 4)
-                for x in np.linspace(-0.42, 0.42, 4) * depth
-            ]
+            for x in np.linspace(-0.42, 0.42, 4) * depth:
+                yield tube([(x, -width / 2, z), (x, width / 2, z)], 0.007, frame, 4)
         else:
-            parts.append(slab(0.0, 0.0, z - 0.015, depth, width, 0.018, look))
-        parts += _shoes(rng, (-width / 2, width / 2), 0.0, z + 0.005, full)
-    return finished(parts)
+            yield slab(0.0, 0.0, z - 0.015, depth, width, 0.018, look)
+        yield from _shoes(rng, (-width / 2, width / 2), 0.0, z + 0.005, full)
 
 
 @family("shoe rack", "tilting cabinet")
-def shoe_cabinet(rng: np.random.Generator) -> Piece:
+def shoe_cabinet(rng: np.random.Generator) -> Parts:
     """Return a flat cabinet with broad flaps that tilt out, one or more of them ajar."""
     depth, width, rows = draw(rng, 0.17, 0.3), draw(rng, 0.5, 1.0), count(rng, 2, 4)
     height = 0.1 + rows * draw(rng, 0.3, 0.4)
@@ -70,44 +65,37 @@ def shoe_cabinet(rng: np.random.Generator) -> Piece:
     style = front_style(rng, look)
     low = draw(rng, 0.04, 0.12)
     room = Room((-depth / 2, -width / 2, low), (depth / 2, width / 2, height))
-    parts = [carcass(room, 0.018, look), four_legs(depth, width, low, leg_style(rng, 0.02, 0.04, True), look)]
+    yield from (carcass(room, 0.018, look), four_legs(depth, width, low, leg_style(rng, 0.02, 0.04, True), look))
     for z0, z1 in split(low, height, [1.0] * rows):
         flap = drawers(rng, style, Room((-depth / 2, -width / 2, z0), (depth / 2, width / 2, z1)), [1.0], 0.0)
         lean = draw(rng, 0.2, 0.5) if chance(rng, 0.15) else 0.0
-        parts += [m.moved(-depth / 2, 0.0, -z0).tilted("y", lean).moved(depth / 2, 0.0, z0) for m in flap]
-    parts.append(
-        box((-depth / 2, -width / 2 - 0.01, height), (depth / 2 + 0.03, width / 2 + 0.01, height + 0.02), look)
-    )
-    return finished(parts, supports=[Support((-depth / 2, -width / 2), (depth / 2, width / 2), height + 0.02)])
+        yield from [m.moved(-depth / 2, 0.0, -z0).tilted("y", lean).moved(depth / 2, 0.0, z0) for m in flap]
+    yield box((-depth / 2, -width / 2 - 0.01, height), (depth / 2 + 0.03, width / 2 + 0.01, height + 0.02), look)
+    yield Support((-depth / 2, -width / 2), (depth / 2, width / 2), height + 0.02)
 
 
 @family("shoe rack", "bench")
-def shoe_bench(rng: np.random.Generator) -> Piece:
+def shoe_bench(rng: np.random.Generator) -> Parts:
     """Return a low bench to sit on with bays for shoes below."""
     depth, width, height = draw(rng, 0.3, 0.4), draw(rng, 0.6, 1.1), draw(rng, 0.42, 0.52)
     look = board_look(rng)
     room = Room((-depth / 2, -width / 2, 0.0), (depth / 2, width / 2, height - 0.05))
-    parts = [carcass(room, 0.02, look)]
+    yield carcass(room, 0.02, look)
     free = inside(room, 0.02)
     mid = (free.low[2] + free.high[2]) / 2
-    parts.append(box((free.low[0], free.low[1], mid - 0.009), (free.high[0], free.high[1], mid + 0.009), look))
+    yield box((free.low[0], free.low[1], mid - 0.009), (free.high[0], free.high[1], mid + 0.009), look)
     for z in (free.low[2], mid + 0.009):
-        parts += _shoes(rng, (free.low[1], free.high[1]), 0.0, z, 0.5)
+        yield from _shoes(rng, (free.low[1], free.high[1]), 0.0, z, 0.5)
     top = rounded_box(
         (-depth / 2, -width / 2, height - 0.05), (depth / 2, width / 2, height), 0.02, material("fabric", rng), 2
     )
-    return finished(
-        [
-            *parts,
-            top
-            if chance(rng, 0.6)
-            else box((-depth / 2, -width / 2, height - 0.05), (depth / 2, width / 2, height), look),
-        ]
+    yield (
+        top if chance(rng, 0.6) else box((-depth / 2, -width / 2, height - 0.05), (depth / 2, width / 2, height), look)
     )
 
 
 @family("wall shelf", "boards")
-def wall_boards(rng: np.random.Generator) -> Piece:
+def wall_boards(rng: np.random.Generator) -> Parts:
     """Return one to three boards on brackets or without, with books and things on them."""
     depth, width, number = draw(rng, 0.15, 0.28), draw(rng, 0.4, 1.3), pick(rng, (1, 1, 2, 2, 3))
     look = board_look(rng)
@@ -128,87 +116,85 @@ def wall_boards(rng: np.random.Generator) -> Piece:
             rng, Room((-depth / 2, y0 + 0.02, top), (depth / 2, y1 - 0.02, top + step - 0.04)), books, full
         )
         supports.append(Support((-depth / 2, y0), (depth / 2, y1), top, step - 0.05))
-    return finished(parts, supports=supports if not full else [])
+    return [*parts, *(supports if not full else [])]
 
 
 @family("wall shelf", "boxes")
-def wall_boxes(rng: np.random.Generator) -> Piece:
+def wall_boxes(rng: np.random.Generator) -> Parts:
     """Return open boxes hung on a wall in a row or in steps."""
     depth, look, books = draw(rng, 0.15, 0.25), board_look(rng), book_looks(rng)
-    parts, y = [], 0.0
+    y = 0.0
     for _ in range(count(rng, 1, 3)):
         wide, tall, z = draw(rng, 0.25, 0.6), draw(rng, 0.25, 0.4), draw(rng, 0.0, 0.3)
         room = Room((-depth / 2, y, z), (depth / 2, y + wide, z + tall))
-        parts += [carcass(room, 0.018, look), *shelf_things(rng, inside(room, 0.018), books, 0.6)]
+        yield from (carcass(room, 0.018, look), *shelf_things(rng, inside(room, 0.018), books, 0.6))
         y += wide + draw(rng, 0.0, 0.2)
-    return finished(parts)
 
 
 @family("wall shelf", "bracketed rails")
-def rail_shelf(rng: np.random.Generator) -> Piece:
+def rail_shelf(rng: np.random.Generator) -> Parts:
     """Return boards on two upright rails screwed to the wall."""
     depth, width, height = draw(rng, 0.2, 0.3), draw(rng, 0.6, 1.2), draw(rng, 0.8, 1.6)
     look, metal, books = board_look(rng), material(pick(rng, ("metal", "white", "black")), rng), book_looks(rng)
     a = -depth / 2
     rails = (-width * 0.3, width * 0.3)
-    parts = [box((a, y - 0.012, 0.0), (a + 0.015, y + 0.012, height), metal) for y in rails]
+    yield from [box((a, y - 0.012, 0.0), (a + 0.015, y + 0.012, height), metal) for y in rails]
     levels = np.linspace(0.1, height - 0.15, count(rng, 2, 4)).tolist()
     for i, z in enumerate(levels):
-        parts.append(box((a + 0.015, -width / 2, z), (depth / 2, width / 2, z + 0.02), look))
-        parts += [strut((a + 0.01, y, z - 0.06), (depth / 2 - 0.02, y, z), 0.01, 0.025, metal) for y in rails]
+        yield box((a + 0.015, -width / 2, z), (depth / 2, width / 2, z + 0.02), look)
+        yield from [strut((a + 0.01, y, z - 0.06), (depth / 2 - 0.02, y, z), 0.01, 0.025, metal) for y in rails]
         top = levels[i + 1] - 0.05 if i + 1 < len(levels) else z + 0.3
-        parts += shelf_things(rng, Room((a + 0.015, -width / 2, z + 0.02), (depth / 2, width / 2, top)), books, 0.6)
-    return finished(parts)
+        yield from shelf_things(rng, Room((a + 0.015, -width / 2, z + 0.02), (depth / 2, width / 2, top)), books, 0.6)
 
 
 @family("filing cabinet", "vertical")
-def filing_cabinet(rng: np.random.Generator) -> Piece:
+def filing_cabinet(rng: np.random.Generator) -> Parts:
     """Return a steel cabinet of two to four deep drawers with label frames and wide handles."""
     depth, width, rows = draw(rng, 0.45, 0.7), draw(rng, 0.38, 0.5), count(rng, 2, 4)
     height = 0.04 + rows * draw(rng, 0.29, 0.33)
     look = material(pick(rng, ("metal", "white", "black", "painted")), rng)
     style = front_style(rng, look, ("flat",))
     room = Room((-depth / 2, -width / 2, 0.03), (depth / 2, width / 2, height))
-    parts = [carcass(room, 0.012, look), box((-depth / 2, -width / 2, 0.0), (depth / 2 - 0.03, width / 2, 0.03), look)]
-    parts += drawers(rng, style, room, [1.0] * rows, 0.1)
+    yield carcass(room, 0.012, look)
+    yield box((-depth / 2, -width / 2, 0.0), (depth / 2 - 0.03, width / 2, 0.03), look)
+    yield from drawers(rng, style, room, [1.0] * rows, 0.1)
     label = material("paper", rng)
     for _, z in split(0.03, height, [1.0] * rows):
-        parts.append(slab(depth / 2 + style.thick, 0.0, z - 0.1, 0.006, 0.09, 0.04, label))
-    return finished(parts, supports=[Support((-depth / 2, -width / 2), (depth / 2, width / 2), height)])
+        yield slab(depth / 2 + style.thick, 0.0, z - 0.1, 0.006, 0.09, 0.04, label)
+    yield Support((-depth / 2, -width / 2), (depth / 2, width / 2), height)
 
 
 @family("filing cabinet", "lateral")
-def lateral_file(rng: np.random.Generator) -> Piece:
+def lateral_file(rng: np.random.Generator) -> Parts:
     """Return a broad filing cabinet of drawers, or with roller doors."""
     depth, width, rows = draw(rng, 0.42, 0.5), draw(rng, 0.75, 1.2), count(rng, 2, 4)
     height = 0.06 + rows * draw(rng, 0.3, 0.36)
     look = material(pick(rng, ("metal", "white", "painted", "wood")), rng)
     style = front_style(rng, look, ("flat",))
     room = Room((-depth / 2, -width / 2, 0.05), (depth / 2, width / 2, height))
-    parts = [carcass(room, 0.014, look), box((-depth / 2, -width / 2, 0.0), (depth / 2 - 0.03, width / 2, 0.05), look)]
+    yield carcass(room, 0.014, look)
+    yield box((-depth / 2, -width / 2, 0.0), (depth / 2 - 0.03, width / 2, 0.05), look)
     if chance(rng, 0.7):
-        parts += drawers(rng, style, room, [1.0] * rows, 0.06)
+        yield from drawers(rng, style, room, [1.0] * rows, 0.06)
     else:
         for y0, y1 in split(-width / 2 + 0.02, width / 2 - 0.02, [1.0] * 18):
-            parts.append(
-                box((depth / 2 - 0.015, y0, 0.07), (depth / 2 + 0.004 * (y0 > 0), y1 - 0.004, height - 0.02), look)
-            )
-        parts += [grip(style, depth / 2, s * 0.04, height / 2, True, 0.15) for s in (1, -1)]
-    return finished(parts, supports=[Support((-depth / 2, -width / 2), (depth / 2, width / 2), height)])
+            yield box((depth / 2 - 0.015, y0, 0.07), (depth / 2 + 0.004 * (y0 > 0), y1 - 0.004, height - 0.02), look)
+        yield from [grip(style, depth / 2, s * 0.04, height / 2, True, 0.15) for s in (1, -1)]
+    yield Support((-depth / 2, -width / 2), (depth / 2, width / 2), height)
 
 
 @family("filing cabinet", "rolling")
-def rolling_file(rng: np.random.Generator) -> Piece:
+def rolling_file(rng: np.random.Generator) -> Parts:
     """Return a low block of drawers on castors, to go under a desk."""
     depth, width, height = draw(rng, 0.45, 0.6), draw(rng, 0.36, 0.44), draw(rng, 0.5, 0.64)
     look = material(pick(rng, ("metal", "white", "black", "wood", "painted")), rng)
     room = Room((-depth / 2, -width / 2, 0.05), (depth / 2, width / 2, height))
     shares = pick(rng, ([1.0, 1.0, 1.0], [2.0, 1.0, 1.0], [2.0, 1.0], [2.0, 2.0, 0.6]))
-    parts = [carcass(room, 0.014, look), *drawers(rng, front_style(rng, look, ("flat",)), room, shares, 0.08)]
+    yield from (carcass(room, 0.014, look), *drawers(rng, front_style(rng, look, ("flat",)), room, shares, 0.08))
     dark = material("black", rng)
     wheel = cylinder(0.0, 0.0, -0.012, 0.025, 0.024, dark, 8).tilted("x", np.pi / 2).moved(z=0.025)
-    parts += [wheel.moved(sx * (depth / 2 - 0.05), sy * (width / 2 - 0.05)) for sx in (1, -1) for sy in (1, -1)]
-    return finished(parts, supports=[Support((-depth / 2, -width / 2), (depth / 2, width / 2), height)])
+    yield from [wheel.moved(sx * (depth / 2 - 0.05), sy * (width / 2 - 0.05)) for sx in (1, -1) for sy in (1, -1)]
+    yield Support((-depth / 2, -width / 2), (depth / 2, width / 2), height)
 
 
 def _coat(rng: np.random.Generator, x: float, y: float, z: float, look: Material, heading: float) -> Mesh:
@@ -222,7 +208,7 @@ def _coat(rng: np.random.Generator, x: float, y: float, z: float, look: Material
 
 
 @family("coat rack", "tree")
-def coat_tree(rng: np.random.Generator) -> Piece:
+def coat_tree(rng: np.random.Generator) -> Parts:
     """Return a stand in the middle of a floor with hooks round its top, and coats, bags or a hat on them."""
     height = draw(rng, 1.6, 1.9)
     look = material(pick(rng, ("wood", "wood", "black", "metal", "white")), rng)
@@ -231,47 +217,41 @@ def coat_tree(rng: np.random.Generator) -> Piece:
     foot = star_base(legs, reach, 0.25, look, 0.02)
     if chance(rng, 0.4):
         foot = lathe([(reach * 0.85, 0.0), (reach * 0.8, 0.025), (0.03, 0.04)], look, sides=16)
-    parts = [foot, cylinder(0.0, 0.0, 0.02, draw(rng, 0.015, 0.028), height - 0.02, look, 8)]
-    parts.append(ellipsoid((0.0, 0.0, height), (0.03, 0.03, 0.03), look, 8, 5))
+    yield from (foot, cylinder(0.0, 0.0, 0.02, draw(rng, 0.015, 0.028), height - 0.02, look, 8))
+    yield ellipsoid((0.0, 0.0, height), (0.03, 0.03, 0.03), look, 8, 5)
     looks, full = cloth_looks(rng, 3), draw(rng, 0.0, 0.6)
     for i, a in enumerate(np.linspace(0.0, 2 * np.pi, count(rng, 4, 8), endpoint=False).tolist()):
         z = height - (0.08 if i % 2 else draw(rng, 0.1, 0.35))
         c, s = float(np.cos(a)), float(np.sin(a))
-        parts.append(
-            tube(
-                [(0.02 * c, 0.02 * s, z - 0.03), (0.1 * c, 0.1 * s, z - 0.02), (0.15 * c, 0.15 * s, z + 0.06)],
-                0.009,
-                look,
-                5,
-            )
+        yield tube(
+            [(0.02 * c, 0.02 * s, z - 0.03), (0.1 * c, 0.1 * s, z - 0.02), (0.15 * c, 0.15 * s, z + 0.06)],
+            0.009,
+            look,
+            5,
         )
         if chance(rng, full):
-            parts.append(_coat(rng, 0.1 * c, 0.1 * s, z, pick(rng, looks), a))
-    return finished(parts)
+            yield _coat(rng, 0.1 * c, 0.1 * s, z, pick(rng, looks), a)
 
 
 @family("coat rack", "wall board")
-def coat_board(rng: np.random.Generator) -> Piece:
+def coat_board(rng: np.random.Generator) -> Parts:
     """Return a board with hooks for a wall, with a hat shelf or without, and coats on it."""
     width, look = draw(rng, 0.5, 1.2), board_look(rng)
     metal, looks, full = material(pick(rng, ("metal", "black")), rng), cloth_looks(rng, 3), draw(rng, 0.0, 0.7)
     tall = draw(rng, 0.08, 0.25)
-    parts = [box((0.0, -width / 2, 0.0), (0.02, width / 2, tall), look)]
+    yield box((0.0, -width / 2, 0.0), (0.02, width / 2, tall), look)
     for y in np.linspace(-width * 0.42, width * 0.42, count(rng, 3, 7)).tolist():
-        parts.append(
-            tube([(0.02, y, tall * 0.4), (0.07, y, tall * 0.35), (0.08, y, tall * 0.5 + 0.03)], 0.006, metal, 5)
-        )
+        yield tube([(0.02, y, tall * 0.4), (0.07, y, tall * 0.35), (0.08, y, tall * 0.5 + 0.03)], 0.006, metal, 5)
         if chance(rng, full):
-            parts.append(_coat(rng, 0.03, y, tall * 0.5, pick(rng, looks), 0.0))
+            yield _coat(rng, 0.03, y, tall * 0.5, pick(rng, looks), 0.0)
     if chance(rng, 0.5):
-        parts.append(box((0.0, -width / 2, tall), (draw(rng, 0.18, 0.28), width / 2, tall + 0.02), look))
+        yield box((0.0, -width / 2, tall), (draw(rng, 0.18, 0.28), width / 2, tall + 0.02), look)
         if chance(rng, 0.6):
-            parts.append(ornament(rng, 0.1, draw(rng, -0.3, 0.3) * width, tall + 0.02, 0.25))
-    return finished(parts)
+            yield ornament(rng, 0.1, draw(rng, -0.3, 0.3) * width, tall + 0.02, 0.25)
 
 
 @family("coat rack", "hall stand", held_out=True)
-def hall_stand(rng: np.random.Generator) -> Piece:
+def hall_stand(rng: np.random.Generator) -> Parts:
     """Return a hall stand: a bench below, a panelled back with hooks, a shelf above."""
     depth, width, height = draw(rng, 0.32, 0.42), draw(rng, 0.65, 1.1), draw(rng, 1.65, 2.0)
     look, looks = board_look(rng), cloth_looks(rng, 3)
@@ -297,4 +277,4 @@ def hall_stand(rng: np.random.Generator) -> Piece:
         )
         if chance(rng, 0.4):
             parts.append(_coat(rng, a + 0.04, y, height - 0.22, pick(rng, looks), 0.0))
-    return finished([joined(parts)])
+    return [joined(parts)]

@@ -8,7 +8,7 @@ from avlmaps_sim.furniture.catalogue import Support
 from avlmaps_sim.furniture.legs import four_legs, leg, leg_style, named_leg, star_base
 from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, pick, rim, strut
 from avlmaps_sim.materials import material
-from avlmaps_sim.mesh import Material, Mesh, joined
+from avlmaps_sim.mesh import Material, Mesh, Meshes, joined
 from avlmaps_sim.shapes import box, circle, cylinder, lathe, loft, prism, rounded_rectangle, slab, tube
 
 Outline = Literal["rectangle", "rounded", "oval", "octagon", "boat", "stadium"]
@@ -103,63 +103,56 @@ def pedestal(rng: np.random.Generator, high: float, reach: float, look: Material
     return joined([pole, *cross, *(bar.turned(np.pi / 2) for bar in cross)])
 
 
-def trestles(rng: np.random.Generator, depth: float, span: float, high: float, look: Material) -> list[Mesh]:
+def trestles(rng: np.random.Generator, depth: float, span: float, high: float, look: Material) -> Meshes:
     """Return two stands ``span`` apart along y: A-shaped, H-shaped, X-shaped, framed or of a board."""
     style = pick(rng, ("A", "H", "X", "frame", "board", "V"))
     half, t = depth / 2, draw(rng, 0.03, 0.08)
-    parts = []
     for s in (1, -1):
         y = s * span / 2
         if style == "A":
-            parts += [strut((e * half, y, 0.0), (e * half * 0.25, y, high), t, t, look) for e in (1, -1)]
-            parts.append(strut((-half * 0.75, y, high * 0.3), (half * 0.75, y, high * 0.3), t * 0.7, t * 0.7, look))
+            yield from [strut((e * half, y, 0.0), (e * half * 0.25, y, high), t, t, look) for e in (1, -1)]
+            yield strut((-half * 0.75, y, high * 0.3), (half * 0.75, y, high * 0.3), t * 0.7, t * 0.7, look)
         elif style == "H":
-            parts += [
-                slab(0.0, y, 0.0, depth, t * 1.2, 0.06, look),
-                slab(0.0, y, high - 0.05, depth * 0.85, t, 0.05, look),
-            ]
-            parts += [slab(e, y, 0.05, t * 1.4, t, high - 0.09, look) for e in pick(rng, ((0.0,), (-0.1, 0.1)))]
+            yield slab(0.0, y, 0.0, depth, t * 1.2, 0.06, look)
+            yield slab(0.0, y, high - 0.05, depth * 0.85, t, 0.05, look)
+            yield from [slab(e, y, 0.05, t * 1.4, t, high - 0.09, look) for e in pick(rng, ((0.0,), (-0.1, 0.1)))]
         elif style == "X":
-            parts += [strut((e * half, y, 0.02), (-e * half * 0.85, y, high - 0.02), t, t, look) for e in (1, -1)]
-            parts.append(slab(0.0, y, high - 0.03, depth * 0.9, t, 0.03, look))
+            yield from [strut((e * half, y, 0.02), (-e * half * 0.85, y, high - 0.02), t, t, look) for e in (1, -1)]
+            yield slab(0.0, y, high - 0.03, depth * 0.9, t, 0.03, look)
         elif style == "V":
-            parts += [strut((0.0, y, 0.02), (e * half * 0.8, y, high), t, t, look) for e in (1, -1)]
-            parts.append(slab(0.0, y, 0.0, depth * 0.8, t, 0.03, look))
+            yield from [strut((0.0, y, 0.02), (e * half * 0.8, y, high), t, t, look) for e in (1, -1)]
+            yield slab(0.0, y, 0.0, depth * 0.8, t, 0.03, look)
         elif style == "frame":
-            parts.append(rim((-half, 0.0), (half, high), t, (y - t / 2, y + t / 2), look).turned(0.0).mapped(
-                np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])))  # fmt: skip
+            yield (
+                rim((-half, 0.0), (half, high), t, (y - t / 2, y + t / 2), look)
+                .turned(0.0)
+                .mapped(np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]))
+            )
         else:
-            parts.append(slab(0.0, y, 0.0, depth * 0.9, t * 0.8, high, look))
+            yield slab(0.0, y, 0.0, depth * 0.9, t * 0.8, high, look)
     if style in ("A", "H", "X", "board") and chance(rng, 0.7):
         z = high * draw(rng, 0.25, 0.8)
-        parts.append(slab(0.0, 0.0, z, 0.03, span, draw(rng, 0.04, 0.12), look))
-    return parts
+        yield slab(0.0, 0.0, z, 0.03, span, draw(rng, 0.04, 0.12), look)
 
 
-def hairpins(depth: float, width: float, high: float, look: Material) -> list[Mesh]:
+def hairpins(depth: float, width: float, high: float, look: Material) -> Meshes:
     """Return four legs of bent wire under the corners of a top."""
-    parts = []
     for sx in (1, -1):
         for sy in (1, -1):
             x, y = sx * depth / 2, sy * width / 2
             for dx, dy in ((-0.11, 0.0), (0.0, -0.11)):
-                parts.append(
-                    tube([(x, y, 0.0), (x - 0.07 * sx + sx * dx, y - 0.07 * sy + sy * dy, high)], 0.006, look, 4)
-                )
-    return parts
+                yield tube([(x, y, 0.0), (x - 0.07 * sx + sx * dx, y - 0.07 * sy + sy * dy, high)], 0.006, look, 4)
 
 
 def splayed_legs(
     rng: np.random.Generator, depth: float, width: float, high: float, look: Material, number: int = 4
-) -> list[Mesh]:
+) -> Meshes:
     """Return legs that stand apart towards the floor, round an oval or under corners."""
     style, spread = leg_style(rng, 0.03, 0.065), draw(rng, 0.7, 0.95)
-    parts = []
     for a in np.linspace(0.0, 2 * np.pi, number, endpoint=False) + np.pi / number:
         c, s = float(np.cos(a)), float(np.sin(a))
         foot, head = (depth / 2 * spread * c, width / 2 * spread * s, 0.0), (depth * 0.29 * c, width * 0.29 * s, high)
-        parts.append(leg(foot, head, style, look))
-    return parts
+        yield leg(foot, head, style, look)
 
 
 def tablecloth(rng: np.random.Generator, depth: float, width: float, high: float, round_top: bool) -> Mesh:
@@ -195,19 +188,18 @@ def tablecloth(rng: np.random.Generator, depth: float, width: float, high: float
     return cloth(np.stack(np.broadcast_arrays(np.asarray(x)[:, None], np.asarray(y)[None, :], z), axis=-1), look)
 
 
-def metal_frame(rng: np.random.Generator, depth: float, width: float, high: float, look: Material) -> list[Mesh]:
+def metal_frame(rng: np.random.Generator, depth: float, width: float, high: float, look: Material) -> Meshes:
     """Return a frame of square bars: four uprights joined above, some below too."""
     t = draw(rng, 0.015, 0.04)
     style = named_leg("straight", 4, t)
-    parts = [four_legs(depth, width, high, style, look)]
+    yield four_legs(depth, width, high, style, look)
     levels = [high - t] + ([draw(rng, 0.0, 0.08)] if chance(rng, 0.5) else [])
     for z in levels:
-        parts += [
+        yield from [
             box((-depth / 2, s * (width - t) / 2 - t / 2, z), (depth / 2, s * (width - t) / 2 + t / 2, z + t), look)
             for s in (1, -1)
         ]
-        parts += [
+        yield from [
             box((s * (depth - t) / 2 - t / 2, -width / 2, z), (s * (depth - t) / 2 + t / 2, width / 2, z + t), look)
             for s in (1, -1)
         ]
-    return parts

@@ -3,10 +3,10 @@
 import numpy as np
 
 from avlmaps_sim.furniture.carcass import FrontStyle, Room, board_look, carcass, doors, drawers, front_style, inside
-from avlmaps_sim.furniture.catalogue import Piece, Support, family
+from avlmaps_sim.furniture.catalogue import Parts, Support, family
 from avlmaps_sim.furniture.contents import book_looks, shelf_things
 from avlmaps_sim.furniture.legs import apron, four_legs, leg_style, named_leg, stretchers
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, finished, pick
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick
 from avlmaps_sim.furniture.table_parts import (
     Outline,
     hairpins,
@@ -36,7 +36,7 @@ def _dining(rng: np.random.Generator) -> tuple[float, float, float]:
 
 
 @family("dining table", "four legs")
-def legged_table(rng: np.random.Generator) -> Piece:
+def legged_table(rng: np.random.Generator) -> Parts:
     """Return a rectangular table: a top on an apron and four legs at the corners."""
     depth, width, high = _dining(rng)
     look = table_look(rng)
@@ -45,20 +45,18 @@ def legged_table(rng: np.random.Generator) -> Piece:
     thick, inset = draw(rng, 0.02, 0.05), draw(rng, 0.0, 0.08)
     style = leg_style(rng, 0.05, 0.1)
     frame = (depth - 2 * inset - 0.02, width - 2 * inset - 0.02)
-    parts = [table_top(kind, depth, width, high, thick, look), four_legs(*frame, high - thick, style, legs)]
+    yield from (table_top(kind, depth, width, high, thick, look), four_legs(*frame, high - thick, style, legs))
     side = style.thickness_m * 0.5
-    parts.append(
-        apron(frame[0] - side, frame[1] - side, high - thick - draw(rng, 0.06, 0.12), high - thick, 0.02, legs)
-    )
+    yield apron(frame[0] - side, frame[1] - side, high - thick - draw(rng, 0.06, 0.12), high - thick, 0.02, legs)
     if chance(rng, 0.15):
-        parts.append(stretchers(rng, frame[0] - side, frame[1] - side, draw(rng, 0.1, 0.2), 0.04, legs))
+        yield stretchers(rng, frame[0] - side, frame[1] - side, draw(rng, 0.1, 0.2), 0.04, legs)
     if chance(rng, 0.18):
-        parts.append(tablecloth(rng, depth, width, high, False))
-    return finished(parts, supports=[top_support(kind, depth, width, high)])
+        yield tablecloth(rng, depth, width, high, False)
+    yield top_support(kind, depth, width, high)
 
 
 @family("dining table", "round pedestal")
-def pedestal_table(rng: np.random.Generator) -> Piece:
+def pedestal_table(rng: np.random.Generator) -> Parts:
     """Return a round, oval or eight-sided top on one foot in the middle."""
     depth = draw(rng, 0.75, 1.35)
     width = depth * (draw(rng, 1.15, 1.5) if chance(rng, 0.3) else 1.0)
@@ -66,15 +64,15 @@ def pedestal_table(rng: np.random.Generator) -> Piece:
     kind: Outline = pick(rng, ("oval", "oval", "oval", "octagon", "rounded"))
     look = table_look(rng, 0.15)
     foot = look if chance(rng, 0.6) else table_look(rng, 0.0)
-    parts = [table_top(kind, depth, width, high, thick, look, pick(rng, (0.0, 0.03)))]
-    parts.append(pedestal(rng, high - thick, depth * draw(rng, 0.26, 0.38), foot))
+    yield table_top(kind, depth, width, high, thick, look, pick(rng, (0.0, 0.03)))
+    yield pedestal(rng, high - thick, depth * draw(rng, 0.26, 0.38), foot)
     if chance(rng, 0.2):
-        parts.append(tablecloth(rng, depth, width, high, kind in ("oval", "octagon", "stadium")))
-    return finished(parts, supports=[top_support(kind, depth, width, high)])
+        yield tablecloth(rng, depth, width, high, kind in ("oval", "octagon", "stadium"))
+    yield top_support(kind, depth, width, high)
 
 
 @family("dining table", "round legged")
-def round_table(rng: np.random.Generator) -> Piece:
+def round_table(rng: np.random.Generator) -> Parts:
     """Return a round or oval top on three or four legs that stand apart or straight."""
     depth = draw(rng, 0.8, 1.35)
     width = depth * (draw(rng, 1.2, 1.8) if chance(rng, 0.4) else 1.0)
@@ -82,107 +80,103 @@ def round_table(rng: np.random.Generator) -> Piece:
     look = table_look(rng, 0.1)
     legs = look if chance(rng, 0.5) else material(pick(rng, ("wood", "black", "metal")), rng)
     kind: Outline = "oval" if chance(rng, 0.75) else "stadium"
-    parts = [table_top(kind, depth, width, high, thick, look, pick(rng, (0.0, 0.02)))]
+    yield table_top(kind, depth, width, high, thick, look, pick(rng, (0.0, 0.02)))
     if chance(rng, 0.5):
-        parts += splayed_legs(rng, depth, width, high - thick, legs, pick(rng, (3, 4, 4)))
+        yield from splayed_legs(rng, depth, width, high - thick, legs, pick(rng, (3, 4, 4)))
     else:
         frame = (depth * 0.66, width * 0.66)
-        parts.append(four_legs(*frame, high - thick, leg_style(rng, 0.045, 0.075), legs))
-        parts.append(apron(frame[0] - 0.03, frame[1] - 0.03, high - thick - 0.08, high - thick, 0.02, legs))
+        yield four_legs(*frame, high - thick, leg_style(rng, 0.045, 0.075), legs)
+        yield apron(frame[0] - 0.03, frame[1] - 0.03, high - thick - 0.08, high - thick, 0.02, legs)
     if chance(rng, 0.15):
-        parts.append(tablecloth(rng, depth, width, high, kind in ("oval", "octagon", "stadium")))
-    return finished(parts, supports=[top_support(kind, depth, width, high)])
+        yield tablecloth(rng, depth, width, high, kind in ("oval", "octagon", "stadium"))
+    yield top_support(kind, depth, width, high)
 
 
 @family("dining table", "trestle")
-def trestle_table(rng: np.random.Generator) -> Piece:
+def trestle_table(rng: np.random.Generator) -> Parts:
     """Return a long top on two trestles, frames or boards."""
     depth, width, high = draw(rng, 0.75, 1.05), draw(rng, 1.4, 2.5), draw(rng, 0.72, 0.78)
     look = table_look(rng)
     stand = look if chance(rng, 0.5) else _metal(rng)
     thick = draw(rng, 0.025, 0.06)
     kind: Outline = pick(rng, ("rectangle", "rectangle", "boat", "rounded"))
-    parts = [table_top(kind, depth, width, high, thick, look)]
-    parts += trestles(rng, depth * draw(rng, 0.7, 0.92), width * draw(rng, 0.55, 0.88), high - thick, stand)
-    return finished(parts, supports=[top_support(kind, depth, width, high)])
+    yield table_top(kind, depth, width, high, thick, look)
+    yield from trestles(rng, depth * draw(rng, 0.7, 0.92), width * draw(rng, 0.55, 0.88), high - thick, stand)
+    yield top_support(kind, depth, width, high)
 
 
 @family("dining table", "glass top")
-def glass_table(rng: np.random.Generator) -> Piece:
+def glass_table(rng: np.random.Generator) -> Parts:
     """Return a glass sheet on a metal frame, on blocks or on a foot in the middle."""
     depth, width, high = _dining(rng)
     kind: Outline = pick(rng, ("rectangle", "rounded", "oval"))
     glass = material("glass", rng)
-    parts = [table_top(kind, depth, width, high, draw(rng, 0.008, 0.015), glass)]
+    yield table_top(kind, depth, width, high, draw(rng, 0.008, 0.015), glass)
     stand = pick(rng, ("frame", "legs", "foot", "boards"))
     look = _metal(rng) if stand != "boards" else table_look(rng)
     if stand == "foot" or kind == "oval":
-        parts.append(pedestal(rng, high - 0.01, depth * 0.35, look))
+        yield pedestal(rng, high - 0.01, depth * 0.35, look)
     elif stand == "frame":
-        parts += metal_frame(rng, depth * 0.94, width * 0.94, high - 0.01, look)
+        yield from metal_frame(rng, depth * 0.94, width * 0.94, high - 0.01, look)
     elif stand == "legs":
-        parts.append(four_legs(depth * 0.95, width * 0.95, high - 0.01, leg_style(rng, 0.04, 0.07, True), look))
+        yield four_legs(depth * 0.95, width * 0.95, high - 0.01, leg_style(rng, 0.04, 0.07, True), look)
     else:
-        parts += trestles(rng, depth * 0.8, width * 0.5, high - 0.01, look)
-    return finished(parts, supports=[top_support(kind, depth, width, high)])
+        yield from trestles(rng, depth * 0.8, width * 0.5, high - 0.01, look)
+    yield top_support(kind, depth, width, high)
 
 
 @family("dining table", "metal frame")
-def framed_table(rng: np.random.Generator) -> Piece:
+def framed_table(rng: np.random.Generator) -> Parts:
     """Return a board on a frame of square steel bars or on bent wires."""
     depth, width, high = _dining(rng)
     look, frame = table_look(rng), _metal(rng)
     thick = draw(rng, 0.02, 0.05)
     kind: Outline = pick(rng, ("rectangle", "rectangle", "rounded"))
-    parts = [table_top(kind, depth, width, high, thick, look)]
+    yield table_top(kind, depth, width, high, thick, look)
     inset = draw(rng, 0.02, 0.12)
     size = (depth - 2 * inset, width - 2 * inset, high - thick)
-    parts += hairpins(*size, frame) if chance(rng, 0.3) else metal_frame(rng, *size, frame)
-    return finished(parts, supports=[top_support(kind, depth, width, high)])
+    yield from hairpins(*size, frame) if chance(rng, 0.3) else metal_frame(rng, *size, frame)
+    yield top_support(kind, depth, width, high)
 
 
 @family("dining table", "drop leaf", held_out=True)
-def drop_leaf(rng: np.random.Generator) -> Piece:
+def drop_leaf(rng: np.random.Generator) -> Parts:
     """Return a table whose sides hang down on hinges, one or both."""
     depth, core, leaf = draw(rng, 0.75, 0.95), draw(rng, 0.3, 0.6), draw(rng, 0.3, 0.5)
     high, look = draw(rng, 0.72, 0.77), table_look(rng, 0.0)
-    parts = [table_top("rectangle", depth, core, high, 0.025, look)]
+    yield table_top("rectangle", depth, core, high, 0.025, look)
     reach = [core / 2, core / 2]
     down = pick(rng, ((True, True), (True, False)))
     for index, s in enumerate((1, -1)):
         edge = s * core / 2
         if down[index]:
-            parts.append(
-                box(
-                    (-depth / 2, edge + min(s, 0) * 0.024, high - leaf),
-                    (depth / 2, edge + max(s, 0) * 0.024, high - 0.01),
-                    look,
-                )
+            yield box(
+                (-depth / 2, edge + min(s, 0) * 0.024, high - leaf),
+                (depth / 2, edge + max(s, 0) * 0.024, high - 0.01),
+                look,
             )
         else:
             reach[index] += leaf
-            parts.append(
-                box(
-                    (-depth / 2, min(edge, edge + s * leaf), high - 0.025),
-                    (depth / 2, max(edge, edge + s * leaf), high),
-                    look,
-                )
+            yield box(
+                (-depth / 2, min(edge, edge + s * leaf), high - 0.025),
+                (depth / 2, max(edge, edge + s * leaf), high),
+                look,
             )
-    parts.append(four_legs(depth * 0.85, core * 0.92, high - 0.02, leg_style(rng, 0.045, 0.07), look))
-    parts.append(apron(depth * 0.8, core * 0.85, high - 0.13, high - 0.02, 0.02, look))
-    return finished(parts, supports=[Support((-depth * 0.46, -reach[1] + 0.03), (depth * 0.46, reach[0] - 0.03), high)])
+    yield four_legs(depth * 0.85, core * 0.92, high - 0.02, leg_style(rng, 0.045, 0.07), look)
+    yield apron(depth * 0.8, core * 0.85, high - 0.13, high - 0.02, 0.02, look)
+    yield Support((-depth * 0.46, -reach[1] + 0.03), (depth * 0.46, reach[0] - 0.03), high)
 
 
 @family("dining table", "double pedestal", held_out=True)
-def double_pedestal(rng: np.random.Generator) -> Piece:
+def double_pedestal(rng: np.random.Generator) -> Parts:
     """Return a long oval or rounded top on two columns with claws."""
     depth, width, high = draw(rng, 0.9, 1.15), draw(rng, 1.7, 2.4), draw(rng, 0.73, 0.78)
     look = material("wood", rng)
     kind: Outline = pick(rng, ("oval", "rounded", "stadium"))
-    parts = [table_top(kind, depth, width, high, 0.035, look, 0.03)]
+    yield table_top(kind, depth, width, high, 0.035, look, 0.03)
     foot = pedestal(rng, high - 0.03, depth * 0.34, look)
-    parts += [foot.moved(y=s * width * 0.23) for s in (1, -1)]
-    return finished(parts, supports=[top_support(kind, depth, width, high)])
+    yield from [foot.moved(y=s * width * 0.23) for s in (1, -1)]
+    yield top_support(kind, depth, width, high)
 
 
 def _desk(rng: np.random.Generator) -> tuple[float, float, float, float]:
@@ -207,7 +201,7 @@ def _drawer_stack(
 
 
 @family("desk", "writing table")
-def writing_desk(rng: np.random.Generator) -> Piece:
+def writing_desk(rng: np.random.Generator) -> Parts:
     """Return a table on four legs, often with a row of flat drawers under its top."""
     depth, width, high, thick = _desk(rng)
     look = board_look(rng)
@@ -215,25 +209,23 @@ def writing_desk(rng: np.random.Generator) -> Piece:
     style = leg_style(rng, 0.035, 0.065)
     under, tall = high - thick, draw(rng, 0.08, 0.15)
     splay = draw(rng, 0.01, 0.05) if chance(rng, 0.4) else 0.0
-    parts = [table_top("rectangle", depth, width, high, thick, top)]
-    parts.append(four_legs(depth - 2 * splay, width - 2 * splay, under, style, look, splay))
+    yield table_top("rectangle", depth, width, high, thick, top)
+    yield four_legs(depth - 2 * splay, width - 2 * splay, under, style, look, splay)
     if chance(rng, 0.75):
         fronts = front_style(rng, look)
-        parts.append(
-            box((0.03 - depth / 2, 0.04 - width / 2, under - tall), (depth / 2 - 0.03, width / 2 - 0.04, under), look)
-        )
+        yield box((0.03 - depth / 2, 0.04 - width / 2, under - tall), (depth / 2 - 0.03, width / 2 - 0.04, under), look)
         for y0, y1 in [
             (-width / 2 + 0.06 + i * (width - 0.12) / 2, -width / 2 + 0.06 + (i + 1) * (width - 0.12) / 2)
             for i in range(2)
         ]:
-            parts += drawers(rng, fronts, Room((0.0, y0, under - tall), (depth / 2 - 0.03, y1, under)), [1.0])
+            yield from drawers(rng, fronts, Room((0.0, y0, under - tall), (depth / 2 - 0.03, y1, under)), [1.0])
     else:
-        parts.append(apron(depth - 0.06, width - 0.06, under - 0.07, under, 0.02, look))
-    return finished(parts, supports=[top_support("rectangle", depth, width, high)])
+        yield apron(depth - 0.06, width - 0.06, under - 0.07, under, 0.02, look)
+    yield top_support("rectangle", depth, width, high)
 
 
 @family("desk", "one block")
-def block_desk(rng: np.random.Generator) -> Piece:
+def block_desk(rng: np.random.Generator) -> Parts:
     """Return a desk with a block of drawers at one side and legs, a board or a frame at the other."""
     depth, width, high, thick = _desk(rng)
     look = board_look(rng)
@@ -242,97 +234,94 @@ def block_desk(rng: np.random.Generator) -> Piece:
     side = pick(rng, (1, -1))
     y = sorted((side * (width / 2 - 0.01), side * (width / 2 - wide)))
     low = pick(rng, (0.0, draw(rng, 0.06, 0.12), draw(rng, 0.3, 0.45)))
-    parts = [table_top("rectangle", depth, width, high, thick, look if chance(rng, 0.7) else table_look(rng, 0.0))]
-    parts += _drawer_stack(rng, depth - 0.06, (y[0], y[1]), (low, under), depth / 2 - 0.02, (look, style))
+    yield table_top("rectangle", depth, width, high, thick, look if chance(rng, 0.7) else table_look(rng, 0.0))
+    yield from _drawer_stack(rng, depth - 0.06, (y[0], y[1]), (low, under), depth / 2 - 0.02, (look, style))
     rest = look if chance(rng, 0.5) else _metal(rng)
     legs = four_legs(
         depth - 0.04, width - 0.02, under, named_leg("straight", pick(rng, (4, 8)), draw(rng, 0.025, 0.05)), rest
     )
     if low > 0 or chance(rng, 0.4):
-        parts.append(legs)
+        yield legs
     else:
         edge = -side * (width / 2 - 0.012)
-        parts.append(slab(0.0, edge, 0.0, depth - 0.04, 0.022, under, look))
+        yield slab(0.0, edge, 0.0, depth - 0.04, 0.022, under, look)
     if chance(rng, 0.5):
-        parts.append(
-            box((0.04 - depth / 2, -width / 2 + 0.02, under - 0.35), (0.06 - depth / 2, width / 2 - 0.02, under), look)
+        yield box(
+            (0.04 - depth / 2, -width / 2 + 0.02, under - 0.35), (0.06 - depth / 2, width / 2 - 0.02, under), look
         )
-    return finished(parts, supports=[top_support("rectangle", depth, width, high)])
+    yield top_support("rectangle", depth, width, high)
 
 
 @family("desk", "two blocks")
-def executive_desk(rng: np.random.Generator) -> Piece:
+def executive_desk(rng: np.random.Generator) -> Parts:
     """Return a heavy desk: drawers at both sides of the knees, a board behind, a row of drawers above."""
     depth, width, high = draw(rng, 0.6, 0.9), draw(rng, 1.3, 1.9), draw(rng, 0.73, 0.78)
     look = material(pick(rng, ("wood", "wood", "wood", "white", "painted")), rng)
     style = front_style(rng, look, ("flat", "framed", "raised"))
     under, wide, low = high - 0.03, draw(rng, 0.36, 0.48), draw(rng, 0.0, 0.12)
-    parts = [table_top("rectangle", depth, width, high, 0.03, look)]
+    yield table_top("rectangle", depth, width, high, 0.03, look)
     for s in (1, -1):
         y = sorted((s * (width / 2 - 0.03), s * (width / 2 - wide)))
-        parts += _drawer_stack(rng, depth - 0.06, (y[0], y[1]), (low, under), depth / 2 - 0.02, (look, style))
+        yield from _drawer_stack(rng, depth - 0.06, (y[0], y[1]), (low, under), depth / 2 - 0.02, (look, style))
         if low > 0.02:
-            parts.append(slab(0.0, s * (width / 2 - wide / 2 - 0.015), 0.0, depth - 0.12, wide - 0.08, low, look))
-    parts += drawers(
+            yield slab(0.0, s * (width / 2 - wide / 2 - 0.015), 0.0, depth - 0.12, wide - 0.08, low, look)
+    yield from drawers(
         rng, style, Room((0.0, wide - width / 2, under - 0.1), (depth / 2 - 0.02, width / 2 - wide, under)), [1.0]
     )
-    parts.append(box((0.05 - depth / 2, wide - width / 2, 0.15), (0.07 - depth / 2, width / 2 - wide, under), look))
-    return finished(parts, supports=[top_support("rectangle", depth, width, high)])
+    yield box((0.05 - depth / 2, wide - width / 2, 0.15), (0.07 - depth / 2, width / 2 - wide, under), look)
+    yield top_support("rectangle", depth, width, high)
 
 
 @family("desk", "trestles")
-def trestle_desk(rng: np.random.Generator) -> Piece:
+def trestle_desk(rng: np.random.Generator) -> Parts:
     """Return a board on two trestles or steel frames, perhaps with a shelf for the monitor."""
     depth, width, high, thick = _desk(rng)
     look = table_look(rng, 0.0)
     kind: Outline = pick(rng, ("rectangle", "rectangle", "rounded"))
-    parts = [table_top(kind, depth, width, high, thick, look)]
+    yield table_top(kind, depth, width, high, thick, look)
     frame = _metal(rng) if chance(rng, 0.7) else look
     if chance(rng, 0.6):
-        parts += trestles(rng, depth * 0.85, width * draw(rng, 0.65, 0.92), high - thick, frame)
+        yield from trestles(rng, depth * 0.85, width * draw(rng, 0.65, 0.92), high - thick, frame)
     else:
-        parts += metal_frame(rng, depth * 0.94, width * 0.96, high - thick, frame)
+        yield from metal_frame(rng, depth * 0.94, width * 0.96, high - thick, frame)
     if chance(rng, 0.3):
         x, y = -depth / 2 + 0.12, width * draw(rng, 0.25, 0.46)
-        parts += [
-            slab(x, 0.0, high + 0.1, 0.22, 2 * y, 0.018, look),
-            *(slab(x, s * (y - 0.01), high, 0.2, 0.018, 0.1, look) for s in (1, -1)),
-        ]
-    return finished(parts, supports=[Support((-depth * 0.1, -width * 0.46), (depth * 0.46, width * 0.46), high)])
+        yield slab(x, 0.0, high + 0.1, 0.22, 2 * y, 0.018, look)
+        yield from (slab(x, s * (y - 0.01), high, 0.2, 0.018, 0.1, look) for s in (1, -1))
+    yield Support((-depth * 0.1, -width * 0.46), (depth * 0.46, width * 0.46), high)
 
 
 @family("desk", "standing")
-def standing_desk(rng: np.random.Generator) -> Piece:
+def standing_desk(rng: np.random.Generator) -> Parts:
     """Return a desk on two telescopes with long feet, low or raised to stand at."""
     depth, width, _, thick = _desk(rng)
     high = draw(rng, 0.7, 0.78) if chance(rng, 0.65) else draw(rng, 0.95, 1.18)
     look, frame = table_look(rng, 0.0), _metal(rng)
-    parts = [table_top(pick(rng, ("rectangle", "rounded")), depth, width, high, thick, look)]
+    yield table_top(pick(rng, ("rectangle", "rounded")), depth, width, high, thick, look)
     under, t = high - thick, draw(rng, 0.05, 0.08)
     x, apart = draw(rng, -0.15, 0.0) * depth, width * draw(rng, 0.33, 0.42)
     for s in (1, -1):
         y = s * apart
-        parts += [slab(0.0, y, 0.0, depth * 0.92, 0.07, 0.03, frame), slab(x, y, 0.03, t, t * 1.3, under * 0.6, frame)]
-        parts += [
-            slab(x, y, under * 0.5, t * 0.75, t, under * 0.5, frame),
-            slab(0.0, y, under - 0.03, depth * 0.8, 0.05, 0.03, frame),
-        ]
-    parts.append(slab(x, 0.0, under - 0.06, 0.04, width * 0.7, 0.04, frame))
-    return finished(parts, supports=[top_support("rectangle", depth, width, high)])
+        yield slab(0.0, y, 0.0, depth * 0.92, 0.07, 0.03, frame)
+        yield slab(x, y, 0.03, t, t * 1.3, under * 0.6, frame)
+        yield slab(x, y, under * 0.5, t * 0.75, t, under * 0.5, frame)
+        yield slab(0.0, y, under - 0.03, depth * 0.8, 0.05, 0.03, frame)
+    yield slab(x, 0.0, under - 0.06, 0.04, width * 0.7, 0.04, frame)
+    yield top_support("rectangle", depth, width, high)
 
 
 @family("desk", "with hutch")
-def hutch_desk(rng: np.random.Generator) -> Piece:
+def hutch_desk(rng: np.random.Generator) -> Parts:
     """Return a desk of boards with shelves above its rear edge, filled with books and things."""
     depth, width, high, thick = _desk(rng)
     look = board_look(rng)
     style = front_style(rng, look)
     under = high - thick
-    parts = [table_top("rectangle", depth, width, high, thick, look)]
-    parts += [slab(0.0, s * (width / 2 - 0.012), 0.0, depth, 0.024, under, look) for s in (1, -1)]
-    parts.append(box((0.02 - depth / 2, -width / 2, draw(rng, 0.15, 0.4)), (0.035 - depth / 2, width / 2, under), look))
+    yield table_top("rectangle", depth, width, high, thick, look)
+    yield from [slab(0.0, s * (width / 2 - 0.012), 0.0, depth, 0.024, under, look) for s in (1, -1)]
+    yield box((0.02 - depth / 2, -width / 2, draw(rng, 0.15, 0.4)), (0.035 - depth / 2, width / 2, under), look)
     if chance(rng, 0.6):
-        parts += _drawer_stack(
+        yield from _drawer_stack(
             rng,
             depth * 0.9,
             (width / 2 - 0.42, width / 2 - 0.025),
@@ -342,42 +331,40 @@ def hutch_desk(rng: np.random.Generator) -> Piece:
         )
     top, back = high + draw(rng, 0.35, 0.8), -depth / 2
     room = Room((back, -width / 2, high + draw(rng, 0.0, 0.3)), (back + draw(rng, 0.2, 0.3), width / 2, top))
-    parts += [carcass(room, 0.018, look)]
-    parts += [
-        slab(back + 0.12, s * (width / 2 - 0.009), high, 0.22, 0.018, room.low[2] - high + 0.01, look) for s in (1, -1)
-    ]
+    yield carcass(room, 0.018, look)
+    for s in (1, -1):
+        yield slab(back + 0.12, s * (width / 2 - 0.009), high, 0.22, 0.018, room.low[2] - high + 0.01, look)
     free = inside(room, 0.018)
     middle = (free.low[1] + free.high[1]) / 2
-    parts.append(box((back, middle - 0.009, free.low[2]), (free.high[0], middle + 0.009, free.high[2]), look))
+    yield box((back, middle - 0.009, free.low[2]), (free.high[0], middle + 0.009, free.high[2]), look)
     looks = book_looks(rng)
     for y0, y1 in ((free.low[1], middle - 0.01), (middle + 0.01, free.high[1])):
-        parts += shelf_things(rng, Room((free.low[0], y0, free.low[2]), (free.high[0], y1, free.high[2])), looks, 0.6)
-    return finished(parts, supports=[Support((back + 0.32, -width * 0.46), (depth * 0.46, width * 0.46), high)])
+        yield from shelf_things(rng, Room((free.low[0], y0, free.low[2]), (free.high[0], y1, free.high[2])), looks, 0.6)
+    yield Support((back + 0.32, -width * 0.46), (depth * 0.46, width * 0.46), high)
 
 
 @family("desk", "corner", held_out=True)
-def corner_desk(rng: np.random.Generator) -> Piece:
+def corner_desk(rng: np.random.Generator) -> Parts:
     """Return an L of two tops that meet in a corner."""
     depth, width, high, thick = _desk(rng)
     look, frame = table_look(rng, 0.0), _metal(rng)
     width, run, side = max(width, 1.3), draw(rng, 0.5, 1.0), pick(rng, (1, -1))
     wing = draw(rng, 0.45, 0.6)
-    parts = [table_top("rectangle", depth, width, high, thick, look)]
+    yield table_top("rectangle", depth, width, high, thick, look)
     x0, x1 = depth / 2, depth / 2 + run
     y = sorted((side * width / 2, side * (width / 2 - wing)))
-    parts.append(box((x0, y[0], high - thick), (x1, y[1], high), look))
+    yield box((x0, y[0], high - thick), (x1, y[1], high), look)
     style = named_leg("straight", pick(rng, (4, 8)), draw(rng, 0.03, 0.06))
     legs = [(-depth / 2 + 0.05, s * (width / 2 - 0.05)) for s in (1, -1)]
     legs += [(x1 - 0.05, y[0] + 0.05), (x1 - 0.05, y[1] - 0.05), (depth / 2 - 0.05, -side * (width / 2 - 0.05))]
-    parts += [
-        four_legs(0.001, 0.001, high - thick, style, frame, inset=-style.thickness_m / 2).moved(a, b) for a, b in legs
-    ]
-    parts.append(box((-depth / 2 + 0.02, -width / 2, high - 0.4), (-depth / 2 + 0.035, width / 2, high - thick), look))
-    return finished(parts, supports=[Support((-depth * 0.46, -width * 0.46), (depth * 0.46, width * 0.46), high)])
+    for a, b in legs:
+        yield four_legs(0.001, 0.001, high - thick, style, frame, inset=-style.thickness_m / 2).moved(a, b)
+    yield box((-depth / 2 + 0.02, -width / 2, high - 0.4), (-depth / 2 + 0.035, width / 2, high - thick), look)
+    yield Support((-depth * 0.46, -width * 0.46), (depth * 0.46, width * 0.46), high)
 
 
 @family("desk", "secretary", held_out=True)
-def secretary(rng: np.random.Generator) -> Piece:
+def secretary(rng: np.random.Generator) -> Parts:
     """Return a chest of drawers whose sloping lid is let down to write on."""
     depth, width = draw(rng, 0.4, 0.5), draw(rng, 0.75, 1.05)
     look = material("wood", rng)
@@ -387,13 +374,13 @@ def secretary(rng: np.random.Generator) -> Piece:
     legged = chance(rng, 0.5)
     low = high - draw(rng, 0.12, 0.2) if legged else draw(rng, 0.05, 0.1)
     room = Room((a, b, low), (d, e, high))
-    parts = [carcass(room, 0.02, look), *drawers(rng, style, room, [1.0] * (1 if legged else 3))]
-    parts.append(four_legs(depth, width, low, leg_style(rng, 0.04, 0.06), look))
-    parts += [box((a, y, high), (0.0, y + 0.02, top), look) for y in (b, e - 0.02)]
-    parts += [box((a, b, top), (0.02, e, top + 0.02), look), box((a, b, high), (a + 0.01, e, top), look)]
+    yield from (carcass(room, 0.02, look), *drawers(rng, style, room, [1.0] * (1 if legged else 3)))
+    yield four_legs(depth, width, low, leg_style(rng, 0.04, 0.06), look)
+    yield from [box((a, y, high), (0.0, y + 0.02, top), look) for y in (b, e - 0.02)]
+    yield from (box((a, b, top), (0.02, e, top + 0.02), look), box((a, b, high), (a + 0.01, e, top), look))
     shelves = np.linspace(b + 0.02, e - 0.02, count(rng, 3, 6) + 1)[1:-1].tolist()
-    parts += [box((a, y, high), (-0.05, y + 0.012, top), look) for y in shelves]
-    parts.append(box((a, b + 0.02, (high + top) / 2), (-0.05, e - 0.02, (high + top) / 2 + 0.012), look))
+    yield from [box((a, y, high), (-0.05, y + 0.012, top), look) for y in shelves]
+    yield box((a, b + 0.02, (high + top) / 2), (-0.05, e - 0.02, (high + top) / 2 + 0.012), look)
     reach = draw(rng, 0.2, 0.3)
-    parts.append(box((d - 0.02, b + 0.02, high), (d + reach, e - 0.02, high + 0.02), look))
-    return finished(parts, supports=[Support((0.0, b + 0.04), (d + reach - 0.02, e - 0.04), high + 0.02)])
+    yield box((d - 0.02, b + 0.02, high), (d + reach, e - 0.02, high + 0.02), look)
+    yield Support((0.0, b + 0.04), (d + reach - 0.02, e - 0.04), high + 0.02)

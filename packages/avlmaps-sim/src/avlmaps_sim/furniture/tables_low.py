@@ -3,9 +3,9 @@
 import numpy as np
 
 from avlmaps_sim.furniture.carcass import Room, board_look, drawers, front_style, split
-from avlmaps_sim.furniture.catalogue import Piece, Support, family
+from avlmaps_sim.furniture.catalogue import Parts, Support, family
 from avlmaps_sim.furniture.legs import apron, cabinet_base, four_legs, leg_style, sled
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, finished, pick, strut
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick, strut
 from avlmaps_sim.furniture.table_parts import (
     Outline,
     hairpins,
@@ -33,7 +33,7 @@ def _coffee(rng: np.random.Generator) -> tuple[float, float, float]:
 
 
 @family("coffee table", "four legs")
-def legged_coffee(rng: np.random.Generator) -> Piece:
+def legged_coffee(rng: np.random.Generator) -> Parts:
     """Return a low rectangular table on four legs, often with a shelf or a drawer below."""
     depth, width, high = _coffee(rng)
     look = table_look(rng)
@@ -41,22 +41,22 @@ def legged_coffee(rng: np.random.Generator) -> Piece:
     kind: Outline = pick(rng, ("rectangle", "rectangle", "rounded"))
     thick = draw(rng, 0.015, 0.05)
     style, splay = leg_style(rng, 0.03, 0.08), draw(rng, 0.02, 0.08) if chance(rng, 0.35) else 0.0
-    parts = [table_top(kind, depth, width, high, thick, look)]
-    parts.append(four_legs(depth - 0.04 - 2 * splay, width - 0.04 - 2 * splay, high - thick, style, legs, splay))
+    yield table_top(kind, depth, width, high, thick, look)
+    yield four_legs(depth - 0.04 - 2 * splay, width - 0.04 - 2 * splay, high - thick, style, legs, splay)
     supports = [top_support(kind, depth, width, high)]
     if not splay and chance(rng, 0.5):
-        parts.append(apron(depth - 0.07, width - 0.07, high - thick - 0.07, high - thick, 0.02, legs))
+        yield apron(depth - 0.07, width - 0.07, high - thick - 0.07, high - thick, 0.02, legs)
     if not splay and chance(rng, 0.45):
         z = draw(rng, 0.08, high * 0.45)
-        parts.append(slab(0.0, 0.0, z, depth - 0.06, width - 0.06, 0.018, look))
+        yield slab(0.0, 0.0, z, depth - 0.06, width - 0.06, 0.018, look)
         supports.append(
             Support((-depth * 0.36, -width * 0.4), (depth * 0.36, width * 0.4), z + 0.018, high - thick - z - 0.1)
         )
-    return finished(parts, supports=supports)
+    yield from supports
 
 
 @family("coffee table", "round")
-def round_coffee(rng: np.random.Generator) -> Piece:
+def round_coffee(rng: np.random.Generator) -> Parts:
     """Return a low round, oval or eight-sided table on splayed legs, a ring of rods or one foot."""
     depth = draw(rng, 0.5, 0.95)
     width = depth * (draw(rng, 1.2, 1.8) if chance(rng, 0.35) else 1.0)
@@ -64,50 +64,48 @@ def round_coffee(rng: np.random.Generator) -> Piece:
     look = material("glass", rng) if chance(rng, 0.15) else table_look(rng, 0.15)
     legs = table_look(rng, 0.0) if chance(rng, 0.5) else _metal(rng)
     kind: Outline = pick(rng, ("oval", "oval", "octagon", "stadium"))
-    parts = [table_top(kind, depth, width, high, thick, look, pick(rng, (0.0, 0.015)))]
+    yield table_top(kind, depth, width, high, thick, look, pick(rng, (0.0, 0.015)))
     base = pick(rng, ("legs", "legs", "rods", "foot"))
     if base == "legs":
-        parts += splayed_legs(rng, depth, width, high - thick, legs, pick(rng, (3, 4)))
+        yield from splayed_legs(rng, depth, width, high - thick, legs, pick(rng, (3, 4)))
     elif base == "rods":
         for z in (0.008, high - thick - 0.008):
             ring = [
                 (0.42 * depth * float(np.cos(a)), 0.42 * width * float(np.sin(a)), z)
                 for a in np.linspace(0, 2 * np.pi, 15)
             ]
-            parts.append(tube(ring, 0.008, legs, 4))
+            yield tube(ring, 0.008, legs, 4)
         for a in np.linspace(0, 2 * np.pi, count(rng, 4, 10), endpoint=False).tolist():
-            parts.append(
-                cylinder(
-                    0.42 * depth * float(np.cos(a)), 0.42 * width * float(np.sin(a)), 0.0, 0.008, high - thick, legs, 5
-                )
+            yield cylinder(
+                0.42 * depth * float(np.cos(a)), 0.42 * width * float(np.sin(a)), 0.0, 0.008, high - thick, legs, 5
             )
     else:
-        parts.append(pedestal(rng, high - thick, depth * 0.34, legs))
-    return finished(parts, supports=[top_support(kind, depth, width, high)])
+        yield pedestal(rng, high - thick, depth * 0.34, legs)
+    yield top_support(kind, depth, width, high)
 
 
 @family("coffee table", "glass and metal")
-def glass_coffee(rng: np.random.Generator) -> Piece:
+def glass_coffee(rng: np.random.Generator) -> Parts:
     """Return a glass sheet on a metal frame, runners or wooden trestles, perhaps with a shelf."""
     depth, width, high = _coffee(rng)
     kind: Outline = pick(rng, ("rectangle", "rectangle", "rounded"))
-    parts = [table_top(kind, depth, width, high, 0.01, material("glass", rng))]
+    yield table_top(kind, depth, width, high, 0.01, material("glass", rng))
     frame = _metal(rng) if chance(rng, 0.7) else table_look(rng, 0.0)
     base = pick(rng, ("frame", "frame", "sled", "trestles"))
     if base == "frame":
-        parts += metal_frame(rng, depth * 0.97, width * 0.97, high - 0.01, frame)
+        yield from metal_frame(rng, depth * 0.97, width * 0.97, high - 0.01, frame)
     elif base == "sled":
-        parts.append(sled(width * 0.9, depth * 0.9, high - 0.01, draw(rng, 0.01, 0.02), frame).turned(np.pi / 2))
+        yield sled(width * 0.9, depth * 0.9, high - 0.01, draw(rng, 0.01, 0.02), frame).turned(np.pi / 2)
     else:
-        parts += trestles(rng, depth * 0.8, width * 0.55, high - 0.01, frame)
+        yield from trestles(rng, depth * 0.8, width * 0.55, high - 0.01, frame)
     if base == "frame" and chance(rng, 0.5):
         shelf = material("glass", rng) if chance(rng, 0.5) else table_look(rng)
-        parts.append(slab(0.0, 0.0, high * 0.35, depth * 0.93, width * 0.93, 0.01, shelf))
-    return finished(parts, supports=[top_support(kind, depth, width, high)])
+        yield slab(0.0, 0.0, high * 0.35, depth * 0.93, width * 0.93, 0.01, shelf)
+    yield top_support(kind, depth, width, high)
 
 
 @family("coffee table", "block")
-def block_coffee(rng: np.random.Generator) -> Piece:
+def block_coffee(rng: np.random.Generator) -> Parts:
     """Return a solid block, an open box or one with drawers and bays, low on the floor."""
     depth, width, high = _coffee(rng)
     look = board_look(rng)
@@ -115,7 +113,7 @@ def block_coffee(rng: np.random.Generator) -> Piece:
     if style == "solid":
         foot = slab(0.0, 0.0, 0.0, depth - 0.1, width - 0.1, 0.05, look)
         body = rounded_box((-depth / 2, -width / 2, 0.04), (depth / 2, width / 2, high), draw(rng, 0.01, 0.05), look, 2)
-        return finished([foot, body], supports=[top_support("rectangle", depth, width, high)])
+        return [foot, body, top_support("rectangle", depth, width, high)]
     base, lift = cabinet_base(rng, depth, width, look)
     room = Room((-depth / 2, -width / 2, lift), (depth / 2, width / 2, max(high, lift + 0.2)))
     t = draw(rng, 0.02, 0.05)
@@ -128,31 +126,31 @@ def block_coffee(rng: np.random.Generator) -> Piece:
             parts.append(box((a, y1 - 0.01, c), (d, y1, f), look))
             if index == 0 or chance(rng, 0.5):
                 parts += drawers(rng, front_style(rng, look), Room((a, y0, c), (d, y1, f)), [1.0])
-    return finished(parts, supports=[Support((a, b), (d, e), f)])
+    return [*parts, Support((a, b), (d, e), f)]
 
 
 @family("coffee table", "runners")
-def runner_coffee(rng: np.random.Generator) -> Piece:
+def runner_coffee(rng: np.random.Generator) -> Parts:
     """Return a board on bent wires, steel runners, X-shaped or slab ends."""
     depth, width, high = _coffee(rng)
     look = table_look(rng)
     kind: Outline = pick(rng, ("rectangle", "rounded", "boat"))
     thick = draw(rng, 0.02, 0.07)
-    parts = [table_top(kind, depth, width, high, thick, look)]
+    yield table_top(kind, depth, width, high, thick, look)
     base = pick(rng, ("hairpins", "sled", "trestles", "frame"))
     if base == "hairpins":
-        parts += hairpins(depth * 0.85, width * 0.85, high - thick, _metal(rng))
+        yield from hairpins(depth * 0.85, width * 0.85, high - thick, _metal(rng))
     elif base == "sled":
-        parts.append(sled(depth * 0.85, width * 0.8, high - thick, draw(rng, 0.01, 0.02), _metal(rng)))
+        yield sled(depth * 0.85, width * 0.8, high - thick, draw(rng, 0.01, 0.02), _metal(rng))
     elif base == "frame":
-        parts += metal_frame(rng, depth * 0.9, width * 0.9, high - thick, _metal(rng))
+        yield from metal_frame(rng, depth * 0.9, width * 0.9, high - thick, _metal(rng))
     else:
-        parts += trestles(rng, depth * 0.85, width * draw(rng, 0.5, 0.85), high - thick, look)
-    return finished(parts, supports=[top_support(kind, depth, width, high)])
+        yield from trestles(rng, depth * 0.85, width * draw(rng, 0.5, 0.85), high - thick, look)
+    yield top_support(kind, depth, width, high)
 
 
 @family("coffee table", "trunk", held_out=True)
-def trunk(rng: np.random.Generator) -> Piece:
+def trunk(rng: np.random.Generator) -> Parts:
     """Return a chest with a lid, bands and a lock, used as a table."""
     depth, width, high = draw(rng, 0.42, 0.6), draw(rng, 0.8, 1.15), draw(rng, 0.4, 0.5)
     look, band = (
@@ -161,38 +159,36 @@ def trunk(rng: np.random.Generator) -> Piece:
     )
     lid = high - draw(rng, 0.06, 0.12)
     (x, y) = (depth / 2, width / 2)
-    parts = [
-        box((-x, -y, 0.0), (x, y, lid - 0.006), look),
-        box((-x - 0.006, -y - 0.006, lid), (x + 0.006, y + 0.006, high), look),
-    ]
+    yield box((-x, -y, 0.0), (x, y, lid - 0.006), look)
+    yield box((-x - 0.006, -y - 0.006, lid), (x + 0.006, y + 0.006, high), look)
     bands = np.linspace(-y * 0.72, y * 0.72, count(rng, 2, 4)).tolist()
-    parts += [box((-x - 0.01, at - 0.025, 0.0), (x + 0.01, at + 0.025, high + 0.003), band) for at in bands]
-    parts.append(slab(x, 0.0, lid - 0.06, 0.03, 0.06, 0.09, band))
-    return finished(parts, supports=[top_support("rectangle", depth, width, high)])
+    yield from [box((-x - 0.01, at - 0.025, 0.0), (x + 0.01, at + 0.025, high + 0.003), band) for at in bands]
+    yield slab(x, 0.0, lid - 0.06, 0.03, 0.06, 0.09, band)
+    yield top_support("rectangle", depth, width, high)
 
 
 @family("coffee table", "nested", held_out=True)
-def nested_tables(rng: np.random.Generator) -> Piece:
+def nested_tables(rng: np.random.Generator) -> Parts:
     """Return two or three tables of falling size, pushed partly under each other."""
     look, legs = table_look(rng), _metal(rng) if chance(rng, 0.5) else table_look(rng, 0.0)
     kind: Outline = pick(rng, ("rectangle", "rounded", "oval"))
     depth, width, high = draw(rng, 0.5, 0.7), draw(rng, 0.6, 0.9), draw(rng, 0.42, 0.52)
-    parts, supports, x, y = [], [], 0.0, 0.0
+    supports, x, y = [], 0.0, 0.0
     for _ in range(count(rng, 2, 3)):
         own = [
             table_top(kind, depth, width, high, 0.02, look),
             four_legs(depth * 0.7, width * 0.7, high - 0.02, leg_style(rng, 0.02, 0.035, True), legs),
         ]
-        parts += [mesh.moved(x, y) for mesh in own]
+        yield from [mesh.moved(x, y) for mesh in own]
         top = top_support(kind, depth, width, high)
         supports.append(Support((top.low[0] + x, top.low[1] + y), (top.high[0] + x, top.high[1] + y), high))
         x, y = x + depth * draw(rng, 0.35, 0.6), y + width * draw(rng, -0.5, 0.5)
         depth, width, high = depth * 0.8, width * 0.8, high - draw(rng, 0.05, 0.09)
-    return finished(parts, supports=supports[:1])
+    yield from supports[:1]
 
 
 @family("coffee table", "drum")
-def drum_table(rng: np.random.Generator) -> Piece:
+def drum_table(rng: np.random.Generator) -> Parts:
     """Return a round drum: straight, waisted or swelling, or a bowl under a flat top."""
     r, high = draw(rng, 0.28, 0.48), draw(rng, 0.3, 0.46)
     look = material(pick(rng, ("wood", "metal", "stone", "painted", "wicker")), rng)
@@ -204,23 +200,24 @@ def drum_table(rng: np.random.Generator) -> Piece:
         (r * (1 + waist) / 2, high * 0.75),
         (r, high - 0.02),
     ]
-    parts = [lathe(profile, look, sides=20), cylinder(0.0, 0.0, high - 0.02, r * 1.03, 0.02, table_look(rng, 0.2), 20)]
-    return finished(parts, supports=[Support((-0.65 * r, -0.65 * r), (0.65 * r, 0.65 * r), high)])
+    yield lathe(profile, look, sides=20)
+    yield cylinder(0.0, 0.0, high - 0.02, r * 1.03, 0.02, table_look(rng, 0.2), 20)
+    yield Support((-0.65 * r, -0.65 * r), (0.65 * r, 0.65 * r), high)
 
 
 @family("side table", "one foot")
-def foot_side(rng: np.random.Generator) -> Piece:
+def foot_side(rng: np.random.Generator) -> Parts:
     """Return a small round or square table on one foot."""
     size, high = draw(rng, 0.3, 0.55), draw(rng, 0.45, 0.7)
     kind: Outline = pick(rng, ("oval", "oval", "rounded", "octagon"))
     look = table_look(rng, 0.15)
-    parts = [table_top(kind, size, size, high, draw(rng, 0.012, 0.03), look)]
-    parts.append(pedestal(rng, high - 0.012, size * 0.42, look if chance(rng, 0.5) else _metal(rng)))
-    return finished(parts, supports=[top_support(kind, size, size, high)])
+    yield table_top(kind, size, size, high, draw(rng, 0.012, 0.03), look)
+    yield pedestal(rng, high - 0.012, size * 0.42, look if chance(rng, 0.5) else _metal(rng))
+    yield top_support(kind, size, size, high)
 
 
 @family("side table", "legs")
-def legged_side(rng: np.random.Generator) -> Piece:
+def legged_side(rng: np.random.Generator) -> Parts:
     """Return a small table on three or four legs, with a shelf or a drawer or neither."""
     depth, high = draw(rng, 0.32, 0.55), draw(rng, 0.42, 0.68)
     width = depth * draw(rng, 0.9, 1.4)
@@ -230,7 +227,7 @@ def legged_side(rng: np.random.Generator) -> Piece:
     supports = [top_support(kind, depth, width, high)]
     if kind == "oval":
         parts += splayed_legs(rng, depth * 1.1, width * 1.1, high - 0.012, look, pick(rng, (3, 4)))
-        return finished(parts, supports=supports)
+        return [*parts, *supports]
     parts.append(four_legs(depth - 0.03, width - 0.03, high - 0.012, leg_style(rng, 0.022, 0.045), look))
     if chance(rng, 0.5):
         parts.append(apron(depth - 0.05, width - 0.05, high - 0.1, high - 0.012, 0.016, look))
@@ -240,15 +237,15 @@ def legged_side(rng: np.random.Generator) -> Piece:
         supports.append(
             Support((-depth * 0.35, -width * 0.35), (depth * 0.35, width * 0.35), z + 0.015, high - z - 0.13)
         )
-    return finished(parts, supports=supports)
+    return [*parts, *supports]
 
 
 @family("side table", "C-shaped")
-def c_table(rng: np.random.Generator) -> Piece:
+def c_table(rng: np.random.Generator) -> Parts:
     """Return a table whose foot and post stand at one side, to push over a sofa."""
     depth, width, high = draw(rng, 0.28, 0.4), draw(rng, 0.4, 0.55), draw(rng, 0.5, 0.68)
     look, frame, t = table_look(rng), _metal(rng), draw(rng, 0.015, 0.03)
-    parts = [table_top("rectangle", depth, width, high, 0.02, look)]
+    yield table_top("rectangle", depth, width, high, 0.02, look)
     for s in (1, -1):
         y = s * (width / 2 - t)
         path = [
@@ -257,28 +254,24 @@ def c_table(rng: np.random.Generator) -> Piece:
             (-depth / 2 + t / 2, y, high - 0.02),
             (depth / 2, y, high - 0.02),
         ]
-        parts += [strut(path[i], path[i + 1], t, t, frame) for i in range(3)]
-    parts.append(slab(-depth / 2 + t / 2, 0.0, 0.0, t, width - t, t, frame))
-    return finished(parts, supports=[top_support("rectangle", depth, width, high)])
+        yield from [strut(path[i], path[i + 1], t, t, frame) for i in range(3)]
+    yield slab(-depth / 2 + t / 2, 0.0, 0.0, t, width - t, t, frame)
+    yield top_support("rectangle", depth, width, high)
 
 
 @family("side table", "tray", held_out=True)
-def tray_table(rng: np.random.Generator) -> Piece:
+def tray_table(rng: np.random.Generator) -> Parts:
     """Return a tray with a rim on crossed or bent legs."""
     r, high = draw(rng, 0.2, 0.3), draw(rng, 0.45, 0.6)
     look, frame = material(pick(rng, ("metal", "wood", "black", "white")), rng), _metal(rng)
-    parts = [
-        lathe(
-            [(r, high - 0.03), (r * 1.02, high + 0.02), (r * 0.98, high + 0.02), (r * 0.96, high - 0.02)],
-            look,
-            sides=20,
-        )
-    ]
+    yield lathe(
+        [(r, high - 0.03), (r * 1.02, high + 0.02), (r * 0.98, high + 0.02), (r * 0.96, high - 0.02)], look, sides=20
+    )
     for a in np.linspace(0.0, np.pi, count(rng, 2, 3), endpoint=False).tolist():
         c, s = r * 0.85 * float(np.cos(a)), r * 0.85 * float(np.sin(a))
-        parts.append(tube([(c, s, 0.0), (-c, -s, high - 0.03)], 0.009, frame, 5))
-        parts.append(tube([(-c, -s, 0.0), (c, s, high - 0.03)], 0.009, frame, 5))
-    return finished(parts, supports=[Support((-0.6 * r, -0.6 * r), (0.6 * r, 0.6 * r), high - 0.02)])
+        yield tube([(c, s, 0.0), (-c, -s, high - 0.03)], 0.009, frame, 5)
+        yield tube([(-c, -s, 0.0), (c, s, high - 0.03)], 0.009, frame, 5)
+    yield Support((-0.6 * r, -0.6 * r), (0.6 * r, 0.6 * r), high - 0.02)
 
 
 def _console(rng: np.random.Generator) -> tuple[float, float, float]:
@@ -287,75 +280,68 @@ def _console(rng: np.random.Generator) -> tuple[float, float, float]:
 
 
 @family("console table", "legs and drawers")
-def drawer_console(rng: np.random.Generator) -> Piece:
+def drawer_console(rng: np.random.Generator) -> Parts:
     """Return a narrow table on four legs with drawers under its top, perhaps a shelf near the floor."""
     depth, width, high = _console(rng)
     look = board_look(rng)
     tall = draw(rng, 0.1, 0.18)
     (a, b), (d, e) = (-depth / 2, -width / 2), (depth / 2, width / 2)
     under = high - 0.022
-    parts = [
-        box((a, b - 0.015, under), (d + 0.03, e + 0.015, high), look),
-        box((a, b, under - tall), (d, e, under), look),
-    ]
+    yield box((a, b - 0.015, under), (d + 0.03, e + 0.015, high), look)
+    yield box((a, b, under - tall), (d, e, under), look)
     style = front_style(rng, look)
     for y0, y1 in split(b + 0.03, e - 0.03, [1.0] * count(rng, 1, 3)):
-        parts += drawers(rng, style, Room((a, y0, under - tall), (d, y1, under)), [1.0])
-    parts.append(four_legs(depth, width, under - tall + 0.01, leg_style(rng, 0.03, 0.055), look))
+        yield from drawers(rng, style, Room((a, y0, under - tall), (d, y1, under)), [1.0])
+    yield four_legs(depth, width, under - tall + 0.01, leg_style(rng, 0.03, 0.055), look)
     supports = [Support((a, b), (d, e), high)]
     if chance(rng, 0.5):
         z = draw(rng, 0.1, 0.25)
-        parts.append(box((a + 0.01, b + 0.01, z), (d - 0.01, e - 0.01, z + 0.02), look))
+        yield box((a + 0.01, b + 0.01, z), (d - 0.01, e - 0.01, z + 0.02), look)
         supports.append(Support((a + 0.04, b + 0.05), (d - 0.04, e - 0.05), z + 0.02, under - tall - z - 0.05))
-    return finished(parts, supports=supports)
+    yield from supports
 
 
 @family("console table", "metal frame")
-def framed_console(rng: np.random.Generator) -> Piece:
+def framed_console(rng: np.random.Generator) -> Parts:
     """Return a narrow board or glass sheet on a metal frame or runners, with one or two shelves."""
     depth, width, high = _console(rng)
     look = material("glass", rng) if chance(rng, 0.25) else table_look(rng, 0.12)
     frame = _metal(rng)
-    parts = [
-        slab(0.0, 0.0, high - 0.025, depth, width, 0.025, look),
-        *metal_frame(rng, depth, width, high - 0.025, frame),
-    ]
+    yield slab(0.0, 0.0, high - 0.025, depth, width, 0.025, look)
+    yield from metal_frame(rng, depth, width, high - 0.025, frame)
     levels = [z for z in np.linspace(0.12, high * 0.55, count(rng, 1, 2)).tolist() if chance(rng, 0.7)]
-    parts += [slab(0.0, 0.0, z, depth - 0.03, width - 0.03, 0.02, look) for z in levels]
-    return finished(parts, supports=[top_support("rectangle", depth, width, high)])
+    yield from [slab(0.0, 0.0, z, depth - 0.03, width - 0.03, 0.02, look) for z in levels]
+    yield top_support("rectangle", depth, width, high)
 
 
 @family("console table", "waterfall")
-def waterfall_console(rng: np.random.Generator) -> Piece:
+def waterfall_console(rng: np.random.Generator) -> Parts:
     """Return one thick board that turns down at both ends, or two trestles under it."""
     depth, width, high = _console(rng)
     look, t = table_look(rng, 0.15), draw(rng, 0.03, 0.07)
-    parts = [slab(0.0, 0.0, high - t, depth, width, t, look)]
+    yield slab(0.0, 0.0, high - t, depth, width, t, look)
     if chance(rng, 0.6):
-        parts += [slab(0.0, s * (width - t) / 2, 0.0, depth, t, high - t, look) for s in (1, -1)]
+        yield from [slab(0.0, s * (width - t) / 2, 0.0, depth, t, high - t, look) for s in (1, -1)]
     else:
-        parts += trestles(rng, depth * 0.9, width * 0.75, high - t, look)
-    return finished(parts, supports=[top_support("rectangle", depth, width, high)])
+        yield from trestles(rng, depth * 0.9, width * 0.75, high - t, look)
+    yield top_support("rectangle", depth, width, high)
 
 
 @family("console table", "half-moon", held_out=True)
-def half_moon(rng: np.random.Generator) -> Piece:
+def half_moon(rng: np.random.Generator) -> Parts:
     """Return a half-round table for a wall on three or four turned legs."""
     width, high = draw(rng, 0.75, 1.2), draw(rng, 0.74, 0.85)
     depth, look = draw(rng, 0.32, 0.45), material(pick(rng, ("wood", "white", "painted")), rng)
     angle = np.linspace(-np.pi / 2, np.pi / 2, 13)
     flat = np.column_stack([depth * np.cos(angle), width / 2 * np.sin(angle)])
     for_z = [(flat, high - 0.022), (flat, high)]
-    parts = [loft([np.column_stack([ring, np.full(len(ring), z)]) for ring, z in for_z], look)]
+    yield loft([np.column_stack([ring, np.full(len(ring), z)]) for ring, z in for_z], look)
     inner = flat * 0.88
-    parts.append(
-        loft(
-            [np.column_stack([inner, np.full(len(inner), z)]) for z in (high - draw(rng, 0.09, 0.14), high - 0.02)],
-            look,
-        )
+    yield loft(
+        [np.column_stack([inner, np.full(len(inner), z)]) for z in (high - draw(rng, 0.09, 0.14), high - 0.02)], look
     )
     style = leg_style(rng, 0.03, 0.05)
     for a in np.linspace(-1.35, 1.35, count(rng, 3, 4)).tolist():
         x, y = depth * 0.82 * float(np.cos(a)), width * 0.42 * float(np.sin(a))
-        parts.append(four_legs(0.001, 0.001, high - 0.02, style, look, inset=-style.thickness_m / 2).moved(x, y))
-    return finished(parts, supports=[Support((0.0, -width * 0.3), (depth * 0.6, width * 0.3), high)])
+        yield four_legs(0.001, 0.001, high - 0.02, style, look, inset=-style.thickness_m / 2).moved(x, y)
+    yield Support((0.0, -width * 0.3), (depth * 0.6, width * 0.3), high)

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from avlmaps_sim.furniture.catalogue import Piece, family
+from avlmaps_sim.furniture.catalogue import Parts, family
 from avlmaps_sim.furniture.fittings import chrome, face, knob, outline, spindle
-from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, finished, pick, rim
+from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, pick, rim
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, joined
 from avlmaps_sim.shapes import box, circle, cylinder, loft, polygon, rounded_box, tube
@@ -15,33 +15,31 @@ def _frame_look(rng: np.random.Generator) -> Material:
 
 
 @family("mirror", "wall framed")
-def _framed(rng: np.random.Generator) -> Piece:
+def _framed(rng: np.random.Generator) -> Parts:
     wide, high, bar = draw(rng, 0.3, 1.2), draw(rng, 0.4, 1.3), draw(rng, 0.012, 0.11)
     deep, look = draw(rng, 0.015, 0.05), _frame_look(rng)
     bar = min(bar, 0.2 * wide)
-    parts = [rim((-wide / 2, 0.0), (wide / 2, high), bar, (0.0, deep), look),
-             box((0.0, -wide / 2 + 0.005, 0.005), (0.008, wide / 2 - 0.005, high - 0.005), material("black", rng)),
-             face(0.012, (-wide / 2 + bar * 0.9, bar * 0.9), (wide / 2 - bar * 0.9, high - bar * 0.9),
-                  material("mirror", rng))]  # fmt: skip
+    yield rim((-wide / 2, 0.0), (wide / 2, high), bar, (0.0, deep), look)
+    yield box((0.0, -wide / 2 + 0.005, 0.005), (0.008, wide / 2 - 0.005, high - 0.005), material("black", rng))
+    yield face(0.012, (-wide / 2 + bar * 0.9, bar * 0.9), (wide / 2 - bar * 0.9, high - bar * 0.9),
+               material("mirror", rng))  # fmt: skip
     if bar > 0.05:
-        parts.append(rim((-wide / 2 + 0.25 * bar, 0.25 * bar), (wide / 2 - 0.25 * bar, high - 0.25 * bar), 0.3 * bar,
-                         (deep, deep + 0.012), look))  # fmt: skip
-    return finished(parts)
+        yield rim((-wide / 2 + 0.25 * bar, 0.25 * bar), (wide / 2 - 0.25 * bar, high - 0.25 * bar), 0.3 * bar,
+                  (deep, deep + 0.012), look)  # fmt: skip
 
 
 @family("mirror", "wall bare sheet")
-def _bare(rng: np.random.Generator) -> Piece:
+def _bare(rng: np.random.Generator) -> Parts:
     wide, high, off = draw(rng, 0.4, 2.2), draw(rng, 0.5, 1.4), draw(rng, 0.003, 0.03)
-    parts = [box((0.0, -wide / 2 + 0.03, 0.03), (off, wide / 2 - 0.03, high - 0.03), material("white", rng)),
-             box((off, -wide / 2, 0.0), (off + 0.005, wide / 2, high), material("mirror", rng))]  # fmt: skip
+    yield box((0.0, -wide / 2 + 0.03, 0.03), (off, wide / 2 - 0.03, high - 0.03), material("white", rng))
+    yield box((off, -wide / 2, 0.0), (off + 0.005, wide / 2, high), material("mirror", rng))
     if chance(rng, 0.3):
         look = material("white", rng)
-        parts += [box((0.0, -wide * 0.25, high + 0.03), (0.06, wide * 0.25, high + 0.07), chrome(rng)),
-                  box((0.06, -wide * 0.25, high + 0.03), (0.085, wide * 0.25, high + 0.055), look)]  # fmt: skip
+        yield box((0.0, -wide * 0.25, high + 0.03), (0.06, wide * 0.25, high + 0.07), chrome(rng))
+        yield box((0.06, -wide * 0.25, high + 0.03), (0.085, wide * 0.25, high + 0.055), look)
     if chance(rng, 0.3):
-        parts.append(box((0.0, -wide / 2, -0.05), (draw(rng, 0.08, 0.14), wide / 2, -0.035),
-                         material(pick(rng, ("glass", "wood", "white")), rng)))  # fmt: skip
-    return finished(parts)
+        yield box((0.0, -wide / 2, -0.05), (draw(rng, 0.08, 0.14), wide / 2, -0.035),
+                  material(pick(rng, ("glass", "wood", "white")), rng))  # fmt: skip
 
 
 def _round_mirror(rng: np.random.Generator, flat: np.ndarray, bar: float, deep: float, look: Material) -> list[Mesh]:
@@ -57,55 +55,52 @@ def _round_mirror(rng: np.random.Generator, flat: np.ndarray, bar: float, deep: 
 
 
 @family("mirror", "wall round")
-def _round(rng: np.random.Generator) -> Piece:
+def _round(rng: np.random.Generator) -> Parts:
     size = draw(rng, 0.15, 0.5)
     flat = circle(size, 28, size * pick(rng, (1.0, 1.0, draw(rng, 1.2, 1.6))))
-    return finished(_round_mirror(rng, flat, draw(rng, 0.008, 0.07), draw(rng, 0.015, 0.05), _frame_look(rng)))
+    return _round_mirror(rng, flat, draw(rng, 0.008, 0.07), draw(rng, 0.015, 0.05), _frame_look(rng))
 
 
 @family("mirror", "wall arch")
-def _arch(rng: np.random.Generator) -> Piece:
+def _arch(rng: np.random.Generator) -> Parts:
     wide, high = draw(rng, 0.4, 0.9), draw(rng, 0.7, 1.6)
     rise = pick(rng, (wide / 2, draw(rng, 0.1, 0.3) * wide))
     arc = np.linspace(0.0, np.pi, 17)
     top = np.column_stack([wide / 2 * np.cos(arc), high / 2 - rise + rise * np.sin(arc)])
     flat = np.concatenate([top, [(-wide / 2, -high / 2), (wide / 2, -high / 2)]])
-    return finished(_round_mirror(rng, flat, draw(rng, 0.01, 0.07), draw(rng, 0.015, 0.045), _frame_look(rng)))
+    return _round_mirror(rng, flat, draw(rng, 0.01, 0.07), draw(rng, 0.015, 0.045), _frame_look(rng))
 
 
 @family("mirror", "wall sunburst", held_out=True)
-def _sunburst(rng: np.random.Generator) -> Piece:
+def _sunburst(rng: np.random.Generator) -> Parts:
     size, rays = draw(rng, 0.14, 0.26), count(rng, 12, 30)
     gold = material("metal", rng, (0.75, 0.6, 0.3)) if chance(rng, 0.6) else _frame_look(rng)
-    parts = _round_mirror(rng, circle(size, 24), 0.02, 0.03, gold)
+    yield from _round_mirror(rng, circle(size, 24), 0.02, 0.03, gold)
     for i in range(rays):
         a = 2 * np.pi * i / rays
         reach = size * (draw(rng, 1.6, 2.0) if i % 2 else 1.45)
         y, z = float(np.cos(a)), float(np.sin(a))
-        parts.append(tube([(0.015, size * 0.95 * y, size * 0.95 * z), (0.012, reach * y, reach * z)], 0.007, gold, 4))
-    return finished(parts)
+        yield tube([(0.015, size * 0.95 * y, size * 0.95 * z), (0.012, reach * y, reach * z)], 0.007, gold, 4)
 
 
 @family("mirror", "wall cabinet")
-def _mirror_cabinet(rng: np.random.Generator) -> Piece:
+def _mirror_cabinet(rng: np.random.Generator) -> Parts:
     wide, high, deep, doors = draw(rng, 0.35, 1.2), draw(rng, 0.5, 0.8), draw(rng, 0.11, 0.18), count(rng, 1, 3)
     look = material(pick(rng, ("white", "white", "wood", "metal")), rng)
     doors = max(1, min(doors, int(wide / 0.25)))
-    parts = [box((0.0, -wide / 2, 0.0), (deep, wide / 2, high), look)]
+    yield box((0.0, -wide / 2, 0.0), (deep, wide / 2, high), look)
     step = wide / doors
     for i in range(doors):
         a = -wide / 2 + i * step
-        parts += [box((deep, a + 0.003, 0.003), (deep + 0.016, a + step - 0.003, high - 0.003), look),
-                  face(deep + 0.0175, (a + 0.006, 0.006), (a + step - 0.006, high - 0.006),
-                       material("mirror", rng))]  # fmt: skip
+        yield box((deep, a + 0.003, 0.003), (deep + 0.016, a + step - 0.003, high - 0.003), look)
+        yield face(deep + 0.0175, (a + 0.006, 0.006), (a + step - 0.006, high - 0.006), material("mirror", rng))
     if chance(rng, 0.4):
         metal = chrome(rng)
-        parts += [knob(deep + 0.017, -wide / 2 + (i + 1) * step - 0.03, 0.08, 0.01, metal) for i in range(doors)]
-    return finished(parts)
+        yield from [knob(deep + 0.017, -wide / 2 + (i + 1) * step - 0.03, 0.08, 0.01, metal) for i in range(doors)]
 
 
 @family("mirror", "standing in a frame")
-def _cheval(rng: np.random.Generator) -> Piece:
+def _cheval(rng: np.random.Generator) -> Parts:
     wide, high, lift = draw(rng, 0.35, 0.6), draw(rng, 1.1, 1.5), draw(rng, 0.1, 0.22)
     look, lean = _frame_look(rng), draw(rng, 0.02, 0.2)
     if chance(rng, 0.5):
@@ -116,33 +111,31 @@ def _cheval(rng: np.random.Generator) -> Piece:
                             material("black", rng)),
                         face(0.014, (-wide / 2 + 0.02, -high / 2 + 0.02), (wide / 2 - 0.02, high / 2 - 0.02),
                              material("mirror", rng))])  # fmt: skip
-    parts = [panel.tilted("y", -lean).moved(z=lift + high / 2)]
+    yield panel.tilted("y", -lean).moved(z=lift + high / 2)
     reach = max(0.2, 0.5 * high * float(np.sin(lean)) + 0.1)
     for s in (-1, 1):
         y = s * (wide / 2 + 0.03)
-        parts += [tube([(0.0, y, 0.03), (0.0, y, lift + draw(rng, 0.5, 0.62) * high)], 0.016, look, 7),
-                  tube([(-reach, y, 0.015), (0.0, y, 0.05), (reach, y, 0.015)], 0.016, look, 6)]  # fmt: skip
-    parts.append(tube([(0.0, -wide / 2 - 0.03, 0.06), (0.0, wide / 2 + 0.03, 0.06)], 0.012, look, 6))
-    return finished(parts)
+        yield tube([(0.0, y, 0.03), (0.0, y, lift + draw(rng, 0.5, 0.62) * high)], 0.016, look, 7)
+        yield tube([(-reach, y, 0.015), (0.0, y, 0.05), (reach, y, 0.015)], 0.016, look, 6)
+    yield tube([(0.0, -wide / 2 - 0.03, 0.06), (0.0, wide / 2 + 0.03, 0.06)], 0.012, look, 6)
 
 
 @family("mirror", "leaning on a wall")
-def _leaning(rng: np.random.Generator) -> Piece:
+def _leaning(rng: np.random.Generator) -> Parts:
     wide, high, bar, look = draw(rng, 0.45, 1.0), draw(rng, 1.4, 2.0), draw(rng, 0.02, 0.12), _frame_look(rng)
     panel = joined([rim((-wide / 2, 0.0), (wide / 2, high), bar, (0.0, 0.035), look),
                     box((0.0, -wide / 2 + 0.01, 0.01), (0.01, wide / 2 - 0.01, high - 0.01), look),
                     face(0.014, (-wide / 2 + bar * 0.9, bar * 0.9), (wide / 2 - bar * 0.9, high - bar * 0.9),
                          material("mirror", rng))])  # fmt: skip
-    return finished([panel.tilted("y", -draw(rng, 0.06, 0.16))])
+    return [panel.tilted("y", -draw(rng, 0.06, 0.16))]
 
 
 @family("mirror", "counter make-up", held_out=True)
-def _make_up(rng: np.random.Generator) -> Piece:
+def _make_up(rng: np.random.Generator) -> Parts:
     size, lift, metal = draw(rng, 0.07, 0.2), draw(rng, 0.06, 0.2), chrome(rng)
     panel = joined(_round_mirror(rng, circle(size, 24), 0.012, 0.02, metal)).tilted("y", -draw(rng, 0.0, 0.3))
-    parts = [panel.moved(z=lift + size), cylinder(0.0, 0.0, 0.0, draw(rng, 0.06, 0.09), 0.012, metal, 16),
-             cylinder(-0.005, 0.0, 0.0, 0.008, lift + 0.02, metal, 7)]  # fmt: skip
-    return finished(parts)
+    return [panel.moved(z=lift + size), cylinder(0.0, 0.0, 0.0, draw(rng, 0.06, 0.09), 0.012, metal, 16),
+            cylinder(-0.005, 0.0, 0.0, 0.008, lift + 0.02, metal, 7)]  # fmt: skip
 
 
 def _towel(rng: np.random.Generator) -> Material:
@@ -167,7 +160,7 @@ def _draped(rng: np.random.Generator, x: float, y: float, z: float, wide: float,
 
 
 @family("towel", "wall bar")
-def _on_bar(rng: np.random.Generator) -> Piece:
+def _on_bar(rng: np.random.Generator) -> Parts:
     long, out, metal, bars = draw(rng, 0.35, 0.8), draw(rng, 0.06, 0.1), chrome(rng), count(rng, 1, 2)
     parts: list[Mesh] = []
     for k in range(bars):
@@ -182,23 +175,21 @@ def _on_bar(rng: np.random.Generator) -> Piece:
             left += wide
     if len(parts) == bars:
         parts.append(_draped(rng, out, 0.0, 0.0, long * 0.8, 0.5, _towel(rng), 0.022))
-    return finished(parts)
+    return parts
 
 
 @family("towel", "wall ring")
-def _on_ring(rng: np.random.Generator) -> Piece:
+def _on_ring(rng: np.random.Generator) -> Parts:
     metal, size = chrome(rng), draw(rng, 0.07, 0.1)
     angle = np.linspace(0.0, 2 * np.pi, 14, endpoint=False)
     circle_path = [(0.05, float(size * np.cos(a)), float(size * np.sin(a))) for a in angle]
-    parts = [tube(circle_path, 0.005, metal, 5, closed=True),
-             tube([(0.0, 0.0, size), (0.05, 0.0, size)], 0.012, metal, 7),
-             _draped(rng, 0.05, 0.0, -size, draw(rng, 0.14, 0.26), draw(rng, 0.2, 0.45), _towel(rng),
-                     0.025)]  # fmt: skip
-    return finished(parts)
+    yield tube(circle_path, 0.005, metal, 5, closed=True)
+    yield tube([(0.0, 0.0, size), (0.05, 0.0, size)], 0.012, metal, 7)
+    yield _draped(rng, 0.05, 0.0, -size, draw(rng, 0.14, 0.26), draw(rng, 0.2, 0.45), _towel(rng), 0.025)
 
 
 @family("towel", "wall hook")
-def _on_hook(rng: np.random.Generator) -> Piece:
+def _on_hook(rng: np.random.Generator) -> Parts:
     high, metal, look = draw(rng, 0.5, 0.95), chrome(rng), _towel(rng)
     n, folds = 18, count(rng, 2, 4)
     angle = np.linspace(0.0, 2 * np.pi, n, endpoint=False)
@@ -210,29 +201,27 @@ def _on_hook(rng: np.random.Generator) -> Piece:
                                       wide * wave * np.sin(angle), np.full(n, -high * share)]))  # fmt: skip
     cone = loft(rings, look, capped=False)
     cone = cone.moved(x=max(0.0, 0.003 - float(cone.low[0])))
-    return finished([cone, tube([(0.0, 0.0, 0.0), (0.05, 0.0, -0.01), (0.065, 0.0, 0.025)], 0.008, metal, 6)])
+    return [cone, tube([(0.0, 0.0, 0.0), (0.05, 0.0, -0.01), (0.065, 0.0, 0.025)], 0.008, metal, 6)]
 
 
 @family("towel", "folded pile")
-def _folded(rng: np.random.Generator) -> Piece:
+def _folded(rng: np.random.Generator) -> Parts:
     deep, wide, z = draw(rng, 0.2, 0.36), draw(rng, 0.26, 0.45), 0.0
-    parts = []
     same = _towel(rng) if chance(rng, 0.4) else None
     for _ in range(count(rng, 1, 5)):
         thick = draw(rng, 0.03, 0.07)
         d, w = deep * draw(rng, 0.9, 1.0), wide * draw(rng, 0.9, 1.0)
         look = same or _towel(rng)
         half = rounded_box((-d / 2, -w / 2, z), (d / 2, w / 2, z + thick / 2 + 0.004), thick * 0.24, look, 2)
-        parts += [half, rounded_box((-d / 2 + 0.004, -w / 2 + 0.004, z + thick / 2), (d / 2, w / 2 - 0.002, z + thick),
-                                    thick * 0.24, look, 2, 0.004)]  # fmt: skip
+        yield half
+        yield rounded_box((-d / 2 + 0.004, -w / 2 + 0.004, z + thick / 2), (d / 2, w / 2 - 0.002, z + thick),
+                          thick * 0.24, look, 2, 0.004)  # fmt: skip
         z += thick * 0.97
-    return finished(parts)
 
 
 @family("towel", "rolled", held_out=True)
-def _rolled(rng: np.random.Generator) -> Piece:
+def _rolled(rng: np.random.Generator) -> Parts:
     radius, long, n = draw(rng, 0.04, 0.07), draw(rng, 0.22, 0.4), count(rng, 1, 4)
-    parts = []
     for i in range(n):
         look = _towel(rng)
         y = (i % 3 - min(n, 3) / 2 + 0.5) * 2 * radius + (radius if i == 3 else 0.0)
@@ -240,23 +229,19 @@ def _rolled(rng: np.random.Generator) -> Piece:
         turn = np.linspace(0.0, 5 * np.pi, 26)
         r = radius * (0.25 + 0.75 * turn / turn[-1])
         spiral = np.column_stack([y + r * np.cos(turn), z + r * np.sin(turn)])
-        parts.append(cloth(np.stack([np.column_stack([np.full(26, x), spiral]) for x in (-long / 2, long / 2)], axis=1),
-                           look))  # fmt: skip
-        parts += [spindle([(radius * 0.9, x), (radius * 0.2, x * 0.98)], look, y, z, 12, capped=False)
-                  for x in (-long / 2, long / 2)]  # fmt: skip
-    return finished(parts)
+        yield cloth(np.stack([np.column_stack([np.full(26, x), spiral]) for x in (-long / 2, long / 2)], axis=1), look)
+        yield from [spindle([(radius * 0.9, x), (radius * 0.2, x * 0.98)], look, y, z, 12, capped=False)
+                    for x in (-long / 2, long / 2)]  # fmt: skip
 
 
 @family("towel", "on a stand", held_out=True)
-def _on_stand(rng: np.random.Generator) -> Piece:
+def _on_stand(rng: np.random.Generator) -> Parts:
     wide, high, look = draw(rng, 0.45, 0.7), draw(rng, 0.8, 1.1), material(pick(rng, ("wood", "metal", "black")), rng)
-    parts = [tube([(0.0, s * wide / 2, 0.0), (0.0, s * wide / 2, high)], 0.012, look, 6) for s in (-1, 1)]
-    parts += [tube([(-0.14, s * wide / 2, 0.012), (0.14, s * wide / 2, 0.012)], 0.012, look, 6) for s in (-1, 1)]
+    yield from [tube([(0.0, s * wide / 2, 0.0), (0.0, s * wide / 2, high)], 0.012, look, 6) for s in (-1, 1)]
+    yield from [tube([(-0.14, s * wide / 2, 0.012), (0.14, s * wide / 2, 0.012)], 0.012, look, 6) for s in (-1, 1)]
     for k in range(count(rng, 2, 3)):
         z = high - 0.01 - 0.22 * k
-        parts.append(tube([(0.0, -wide / 2, z), (0.0, wide / 2, z)], 0.01, look, 6))
+        yield tube([(0.0, -wide / 2, z), (0.0, wide / 2, z)], 0.01, look, 6)
         if chance(rng, 0.75) or k == 0:
             cover = draw(rng, 0.4, 0.85) * wide
-            parts.append(_draped(rng, 0.0, draw(rng, -0.5, 0.5) * (wide - cover), z, cover, draw(rng, 0.3, 0.6),
-                                 _towel(rng)))  # fmt: skip
-    return finished(parts)
+            yield _draped(rng, 0.0, draw(rng, -0.5, 0.5) * (wide - cover), z, cover, draw(rng, 0.3, 0.6), _towel(rng))

@@ -7,7 +7,7 @@ import numpy as np
 
 from avlmaps_sim.furniture.recipe_helpers import chance, cloth, draw, pick
 from avlmaps_sim.materials import material
-from avlmaps_sim.mesh import Material, Mesh, Triple, joined
+from avlmaps_sim.mesh import Material, Mesh, Meshes, Triple, joined
 from avlmaps_sim.shapes import rounded_box
 
 
@@ -40,19 +40,15 @@ def leaning_pillow(
 
 def scattered_pillows(
     rng: np.random.Generator, x: float, z: float, ys: tuple[float, float], number: int, lean: float
-) -> list[Mesh]:
+) -> Meshes:
     """Return pillows that lean against a back along y, their lower edges at x and z, metres."""
     looks = [material("fabric", rng) for _ in range(2)]
     side = draw(rng, 0.34, 0.48)
     room = max(ys[1] - ys[0] - side, 0.0)
-    out = []
     for _ in range(number):
         y = ys[0] + side / 2 + (pick(rng, (0.05, 0.95, draw(rng, 0.0, 1.0))) + draw(rng, -0.05, 0.05)) * room
         place = (x + draw(rng, 0.0, 0.06), y, z)
-        out.append(
-            leaning_pillow(rng, place, side, pick(rng, looks), lean + draw(rng, -0.1, 0.15), draw(rng, -0.3, 0.3))
-        )
-    return out
+        yield leaning_pillow(rng, place, side, pick(rng, looks), lean + draw(rng, -0.1, 0.15), draw(rng, -0.3, 0.3))
 
 
 def cushion(low: Triple, high: Triple, look: Material, radius: float = 0.04, crown: float = 0.025) -> Mesh:
@@ -172,21 +168,19 @@ def throw(rng: np.random.Generator, profile: list[tuple[float, float]], y: float
     return cloth(grid, look)
 
 
-def head_pillows(rng: np.random.Generator, bed: Bedding, number: int, look: Material) -> list[Mesh]:
+def head_pillows(rng: np.random.Generator, bed: Bedding, number: int, look: Material) -> Meshes:
     """Return pillows at the head of a bed: lying, or propped up against the headboard."""
     (a, b, _), (_, e, top) = bed.low, bed.high
     each = (e - b) / number
     wide, deep = min(each * draw(rng, 0.75, 0.95), 0.85), draw(rng, 0.38, 0.55)
     propped = chance(rng, 0.35)
-    out = []
     for i in range(number):
         y = b + each * (i + 0.5) + draw(rng, -0.03, 0.03)
         mesh = pillow(rng, wide, deep, draw(rng, 0.13, 0.2), look)
         if propped:
             lean = draw(rng, 0.45, 0.9)
             mesh = mesh.moved(x=-deep / 2).tilted("y", np.pi / 2 - lean)
-            out.append(mesh.moved(a + 0.1 + deep * float(np.sin(lean)), y, top))
+            yield mesh.moved(a + 0.1 + deep * float(np.sin(lean)), y, top)
         else:
             tilt = draw(rng, -0.15, 0.15)
-            out.append(mesh.turned(tilt).moved(a + 0.06 + deep / 2, y, top + 0.055))
-    return out
+            yield mesh.turned(tilt).moved(a + 0.06 + deep / 2, y, top + 0.055)

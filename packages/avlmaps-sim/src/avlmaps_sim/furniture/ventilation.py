@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from avlmaps_sim.furniture.catalogue import Piece, family
+from avlmaps_sim.furniture.catalogue import Parts, family
 from avlmaps_sim.furniture.fittings import (
     chrome,
     dial,
@@ -14,38 +14,35 @@ from avlmaps_sim.furniture.fittings import (
     shell,
     spindle,
 )  # fmt: skip
-from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, finished, pick, strut
+from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, pick, strut
 from avlmaps_sim.materials import material
-from avlmaps_sim.mesh import Material, Mesh, joined
+from avlmaps_sim.mesh import Material, Mesh, Meshes, joined
 from avlmaps_sim.shapes import box, circle, cylinder, lathe, loft, rounded_box, slab, tube
 
 
-def _rotor(rng: np.random.Generator, radius: float, x: float, z: float, look: Material) -> list[Mesh]:
+def _rotor(rng: np.random.Generator, radius: float, x: float, z: float, look: Material) -> Meshes:
     n, twist = count(rng, 3, 6), 0.03
-    parts = [spindle([(radius * 0.2, x - 0.02), (radius * 0.18, x + 0.03)], look, 0.0, z, 10)]
+    yield spindle([(radius * 0.2, x - 0.02), (radius * 0.18, x + 0.03)], look, 0.0, z, 10)
     for i in range(n):
         a = 2 * np.pi * i / n + 0.3
         points = np.array([[(x + twist * s, radius * r * np.cos(a + s * w), z + radius * r * np.sin(a + s * w)) for s,
                             w in ((-1, 0.18), (1, 0.35 + 0.2 * r))] for r in (0.15, 0.5, 0.88)])  # fmt: skip
-        parts.append(cloth(points, look))
-    return parts
+        yield cloth(points, look)
 
 
-def _cage(radius: float, x: float, z: float, depth: float, wires: int, look: Material) -> list[Mesh]:
+def _cage(radius: float, x: float, z: float, depth: float, wires: int, look: Material) -> Meshes:
     """Return a fan's wire cage: rings at front and back joined by bent wires."""
-    parts: list[Mesh] = []
     for r, at in ((radius, x), (radius * 0.6, x + depth * 0.8), (radius * 0.6, x - depth * 0.8)):
         ring = [(at, float(p[0]), float(p[1]) + z) for p in circle(r, 20)]
-        parts.append(tube(ring, 0.005 if r == radius else 0.0025, look, 4, closed=True))
+        yield tube(ring, 0.005 if r == radius else 0.0025, look, 4, closed=True)
     for i in range(wires):
         a = 2 * np.pi * i / wires
         y, h = float(np.cos(a)), float(np.sin(a))
         for s in (-1, 1):
             line = [(x, radius * y, z + radius * h), (x + s * depth * 0.7, radius * 0.8 * y, z + radius * 0.8 * h),
                     (x + s * depth, radius * 0.15 * y, z + radius * 0.15 * h)]  # fmt: skip
-            parts.append(tube(line, 0.0022, look, 3))
-    parts.append(spindle([(radius * 0.17, x + depth - 0.004), (radius * 0.12, x + depth + 0.008)], look, 0.0, z, 12))
-    return parts
+            yield tube(line, 0.0022, look, 3)
+    yield spindle([(radius * 0.17, x + depth - 0.004), (radius * 0.12, x + depth + 0.008)], look, 0.0, z, 12)
 
 
 def _fan_head(rng: np.random.Generator, radius: float, look: Material, metal: Material) -> Mesh:
@@ -63,68 +60,64 @@ def _fan_looks(rng: np.random.Generator) -> tuple[Material, Material]:
 
 
 @family("fan", "standing")
-def _standing_fan(rng: np.random.Generator) -> Piece:
+def _standing_fan(rng: np.random.Generator) -> Parts:
     (look, metal), radius, z = _fan_looks(rng), draw(rng, 0.18, 0.26), draw(rng, 0.9, 1.35)
-    parts = [_fan_head(rng, radius, look, metal).tilted("y", draw(rng, -0.3, 0.15)).moved(x=0.12, z=z),
-             tube([(0.0, 0.0, 0.0), (0.0, 0.0, z)], 0.014, metal, 8),
-             cylinder(0.0, 0.0, 0.0, 0.024, z * 0.55, look, 8)]  # fmt: skip
+    yield _fan_head(rng, radius, look, metal).tilted("y", draw(rng, -0.3, 0.15)).moved(x=0.12, z=z)
+    yield tube([(0.0, 0.0, 0.0), (0.0, 0.0, z)], 0.014, metal, 8)
+    yield cylinder(0.0, 0.0, 0.0, 0.024, z * 0.55, look, 8)
     if chance(rng, 0.6):
-        parts.append(lathe([(draw(rng, 0.17, 0.24), 0.0), (0.17, 0.02), (0.05, 0.04), (0.03, 0.08)], look, sides=20))
+        yield lathe([(draw(rng, 0.17, 0.24), 0.0), (0.17, 0.02), (0.05, 0.04), (0.03, 0.08)], look, sides=20)
     else:
-        parts += [strut((-0.25 * c, -0.25 * s, 0.015), (0.25 * c, 0.25 * s, 0.015), 0.04, 0.025, look) for c,
-                  s in ((0.71, 0.71), (0.71, -0.71))]  # fmt: skip
-    parts.append(box((-0.03, -0.035, z * 0.55), (0.035, 0.035, z * 0.55 + 0.1), look))
-    return finished(parts)
+        yield from [strut((-0.25 * c, -0.25 * s, 0.015), (0.25 * c, 0.25 * s, 0.015), 0.04, 0.025, look) for c,
+                    s in ((0.71, 0.71), (0.71, -0.71))]  # fmt: skip
+    yield box((-0.03, -0.035, z * 0.55), (0.035, 0.035, z * 0.55 + 0.1), look)
 
 
 @family("fan", "desk")
-def _desk_fan(rng: np.random.Generator) -> Piece:
+def _desk_fan(rng: np.random.Generator) -> Parts:
     (look, metal), radius = _fan_looks(rng), draw(rng, 0.09, 0.2)
     z = radius + draw(rng, 0.05, 0.2)
-    parts = [_fan_head(rng, radius, look, metal).tilted("y", -draw(rng, 0.0, 0.3)).moved(x=0.06, z=z + 0.02),
-             cylinder(0.0, 0.0, 0.0, 0.018, z, look, 8),
-             lathe([(radius * 0.75, 0.0), (radius * 0.7, 0.02), (0.03, 0.04)], look, sides=18)]  # fmt: skip
-    return finished(parts)
+    return [_fan_head(rng, radius, look, metal).tilted("y", -draw(rng, 0.0, 0.3)).moved(x=0.06, z=z + 0.02),
+            cylinder(0.0, 0.0, 0.0, 0.018, z, look, 8),
+            lathe([(radius * 0.75, 0.0), (radius * 0.7, 0.02), (0.03, 0.04)], look, sides=18)]  # fmt: skip
 
 
 @family("fan", "tower")
-def _tower_fan(rng: np.random.Generator) -> Piece:
+def _tower_fan(rng: np.random.Generator) -> Parts:
     radius, high, look = draw(rng, 0.07, 0.13), draw(rng, 0.75,
                                                      1.15), material(pick(rng, ("black", "black", "white", "metal")),
                                                                      rng)  # fmt: skip
     power, taper = pick(rng, (2.0, 4.0, 6.0)), draw(rng, 0.7, 1.0)
     flat = outline(2 * radius, 2 * radius, power, 18)
-    parts = [cylinder(0.0, 0.0, 0.0, radius * draw(rng, 1.15, 1.6), 0.025, look, 22),
-             shell([(flat * taper, 0.02), (flat, 0.2), (flat, high - 0.05), (flat * 0.9, high)], look)]  # fmt: skip
+    yield cylinder(0.0, 0.0, 0.0, radius * draw(rng, 1.15, 1.6), 0.025, look, 22)
+    yield shell([(flat * taper, 0.02), (flat, 0.2), (flat, high - 0.05), (flat * 0.9, high)], look)
     dark = material(pick(rng, ("black", "metal", "white")), rng)
     n = count(rng, 10, 22)
-    parts += [box((radius * 0.7, -radius * 0.6, float(z)), (radius * 1.03, radius * 0.6, float(z) + 0.008), dark)
-              for z in np.linspace(0.22, high - 0.16, n)]  # fmt: skip
-    return finished(parts)
+    yield from [box((radius * 0.7, -radius * 0.6, float(z)), (radius * 1.03, radius * 0.6, float(z) + 0.008), dark)
+                for z in np.linspace(0.22, high - 0.16, n)]  # fmt: skip
 
 
 @family("fan", "box", held_out=True)
-def _box_fan(rng: np.random.Generator) -> Piece:
+def _box_fan(rng: np.random.Generator) -> Parts:
     size, deep = draw(rng, 0.35, 0.56), draw(rng, 0.1, 0.16)
     look, metal = material(pick(rng, ("white", "black", "plastic")),
                            rng), material(pick(rng, ("metal", "white", "black")), rng)  # fmt: skip
     z = size / 2 + 0.03
-    parts = [box((0.0, s * size / 2 - 0.01, 0.03), (deep, s * size / 2 + 0.01, size + 0.03), look) for s in (-1, 1)]
-    parts += [box((0.0, -size / 2, h), (deep, size / 2, h + 0.02), look)
-              for h in (0.02, size + 0.02)] + feet((0.0, -size / 2), (deep, size / 2), 0.03, look, 0.05,
-                                                   0.025)  # fmt: skip
-    parts += _rotor(rng, size * 0.46, deep / 2, z, material(pick(rng, ("plastic", "white", "metal")), rng))
+    yield from [box((0.0, s * size / 2 - 0.01, 0.03), (deep, s * size / 2 + 0.01, size + 0.03), look) for s in (-1, 1)]
+    yield from [box((0.0, -size / 2, h), (deep, size / 2, h + 0.02), look) for h in (0.02, size + 0.02)] + feet(
+        (0.0, -size / 2), (deep, size / 2), 0.03, look, 0.05, 0.025
+    )
+    yield from _rotor(rng, size * 0.46, deep / 2, z, material(pick(rng, ("plastic", "white", "metal")), rng))
     for x in (0.004, deep - 0.004):
         for k in range(1, 6):
             ring = [(x, float(p[0]), float(p[1]) + z) for p in circle(size * 0.08 * k, 14)]
-            parts.append(tube(ring, 0.003, metal, 3, closed=True))
-        parts += [tube([(x, -size / 2, z), (x, size / 2, z)], 0.003, metal, 3),
-                  tube([(x, 0.0, 0.03), (x, 0.0, size + 0.03)], 0.003, metal, 3)]  # fmt: skip
-    return finished(parts)
+            yield tube(ring, 0.003, metal, 3, closed=True)
+        yield tube([(x, -size / 2, z), (x, size / 2, z)], 0.003, metal, 3)
+        yield tube([(x, 0.0, 0.03), (x, 0.0, size + 0.03)], 0.003, metal, 3)
 
 
 @family("fan", "without blades")
-def _bladeless(rng: np.random.Generator) -> Piece:
+def _bladeless(rng: np.random.Generator) -> Parts:
     wide, high, foot = draw(rng, 0.1, 0.16), draw(rng, 0.16, 0.32), draw(rng, 0.18, 0.4)
     look, base = material(pick(rng, ("white", "metal", "black")),
                           rng), material(pick(rng, ("white", "metal", "black", "painted")), rng)  # fmt: skip
@@ -136,8 +129,7 @@ def _bladeless(rng: np.random.Generator) -> Piece:
 
     hoop = loft([ring(-0.05, 1.0), ring(0.06, 1.06), ring(0.06, 0.86), ring(-0.05, 0.8), ring(-0.05, 1.0)], look,
                 capped=False)  # fmt: skip
-    parts = [hoop, lathe([(0.085, 0.0), (0.085, foot * 0.3), (0.06, foot * 0.35), (0.06, foot)], base, sides=18)]
-    return finished(parts)
+    return [hoop, lathe([(0.085, 0.0), (0.085, foot * 0.3), (0.06, foot * 0.35), (0.06, foot)], base, sides=18)]
 
 
 def _split_profile(rng: np.random.Generator, deep: float, high: float) -> np.ndarray:
@@ -154,107 +146,101 @@ def _split_profile(rng: np.random.Generator, deep: float, high: float) -> np.nda
 
 
 @family("air conditioner", "wall split")
-def _split(rng: np.random.Generator) -> Piece:
+def _split(rng: np.random.Generator) -> Parts:
     wide, high, deep = draw(rng, 0.68, 1.15), draw(rng, 0.25, 0.34), draw(rng, 0.17, 0.26)
     look = material("white", rng) if chance(rng, 0.8) else material(pick(rng, ("black", "metal", "painted")), rng)
     side, dark, half = _split_profile(rng, deep, high), material("black", rng), wide / 2
     rings = [np.column_stack([side[:, 0] * s, np.full(len(side), y), side[:, 1] * s + high * (1 - s) / 2]) for s,
              y in ((0.94, -half), (1.0, -half + 0.015), (1.0, half - 0.015), (0.94, half))]  # fmt: skip
     x, z = side[2] * (1.0, 1.0)
-    parts = [loft(rings, look)]
+    yield loft(rings, look)
     mouth, flap = draw(rng, 0.75, 0.94) * half, chance(rng, 0.4)
-    parts.append(strut((float(side[1, 0]) + 0.01, -mouth, 0.005), (float(side[1, 0]) + 0.01, mouth, 0.005),
-                       float(x - side[1, 0]) * 0.9, 0.014, dark))  # fmt: skip
+    yield strut((float(side[1, 0]) + 0.01, -mouth, 0.005), (float(side[1, 0]) + 0.01, mouth, 0.005),
+                float(x - side[1, 0]) * 0.9, 0.014, dark)  # fmt: skip
     if flap:  # open: it blows
-        parts.append(cloth(np.array([[(x, y, z + 0.005), (x + 0.04, y, z - 0.05)] for y in (-mouth, mouth)]), look))
+        yield cloth(np.array([[(x, y, z + 0.005), (x + 0.04, y, z - 0.05)] for y in (-mouth, mouth)]), look)
     if chance(rng, 0.6):
         z_line = float(side[3, 1]) + 0.02
-        parts.append(box((float(side[3, 0]) - 0.004, -half + 0.02, z_line),
-                         (float(side[3, 0]) + 0.0025, half - 0.02, z_line + 0.004), dark))  # fmt: skip
+        yield box((float(side[3, 0]) - 0.004, -half + 0.02, z_line),
+                  (float(side[3, 0]) + 0.0025, half - 0.02, z_line + 0.004), dark)  # fmt: skip
     if chance(rng, 0.5):
-        parts.append(face(float(side[3, 0]) + 0.003, (half * 0.7, float(side[3, 1]) + 0.03),
-                          (half * 0.8, float(side[3, 1]) + 0.045),
-                          replace(material("plastic", rng), emission=0.5)))  # fmt: skip
+        yield face(float(side[3, 0]) + 0.003, (half * 0.7, float(side[3, 1]) + 0.03),
+                   (half * 0.8, float(side[3, 1]) + 0.045),
+                   replace(material("plastic", rng), emission=0.5))  # fmt: skip
     if chance(rng, 0.4):
-        parts += [box((0.02, -half * 0.9 + 0.08 * i, high - 0.002),
-                      (deep * 0.8, -half * 0.9 + 0.08 * i + 0.04, high + 0.002), dark)
-                  for i in range(int(1.8 * half / 0.08))]  # fmt: skip
-    return finished(parts)
+        yield from [box((0.02, -half * 0.9 + 0.08 * i, high - 0.002),
+                        (deep * 0.8, -half * 0.9 + 0.08 * i + 0.04, high + 0.002), dark)
+                    for i in range(int(1.8 * half / 0.08))]  # fmt: skip
 
 
 @family("air conditioner", "portable")
-def _portable(rng: np.random.Generator) -> Piece:
+def _portable(rng: np.random.Generator) -> Parts:
     wide, deep, high = draw(rng, 0.32, 0.48), draw(rng, 0.3, 0.42), draw(rng, 0.62, 0.85)
     look, dark, half = material(pick(rng, ("white", "white", "plastic", "black")),
                                 rng), material("black", rng), wide / 2  # fmt: skip
-    parts = [rounded_box((0.0, -half, 0.05), (deep, half, high), draw(rng, 0.02, 0.08), look, 4),
-             *feet((0.0, -half), (deep, half), 0.06, dark, 0.04, 0.06)]  # fmt: skip
+    yield rounded_box((0.0, -half, 0.05), (deep, half, high), draw(rng, 0.02, 0.08), look, 4)
+    yield from feet((0.0, -half), (deep, half), 0.06, dark, 0.04, 0.06)
     n, low = count(rng, 5, 12), draw(rng, 0.5, 0.7) * high
     if chance(rng, 0.6):
-        parts += [box((deep - 0.006, -half * 0.75, low + 0.016 * i),
-                      (deep + 0.004, half * 0.75, low + 0.016 * i + 0.007), dark)
-                  for i in range(n) if low + 0.016 * i < high - 0.06]  # fmt: skip
+        yield from [box((deep - 0.006, -half * 0.75, low + 0.016 * i),
+                        (deep + 0.004, half * 0.75, low + 0.016 * i + 0.007), dark)
+                    for i in range(n) if low + 0.016 * i < high - 0.06]  # fmt: skip
     else:
-        parts.append(box((deep * 0.2, -half * 0.75, high - 0.004), (deep * 0.75, half * 0.75, high + 0.006), dark))
-        parts.append(strut((deep * 0.75, 0.0, high), (deep * 0.85, 0.0, high + 0.06), half * 1.5, 0.008, look))
-    parts.append(box((deep * 0.2, half * 0.3, high), (deep * 0.6, half * 0.7, high + 0.004), dark))
+        yield box((deep * 0.2, -half * 0.75, high - 0.004), (deep * 0.75, half * 0.75, high + 0.006), dark)
+        yield strut((deep * 0.75, 0.0, high), (deep * 0.85, 0.0, high + 0.06), half * 1.5, 0.008, look)
+    yield box((deep * 0.2, half * 0.3, high), (deep * 0.6, half * 0.7, high + 0.004), dark)
     if chance(rng, 0.6):  # the hose for the warm air
         bend = [(0.0, 0.0, 0.55 * high), (-0.12, 0.0, 0.58 * high), (-0.2, draw(rng, -0.15, 0.15), 0.8 * high),
                 (-0.22, draw(rng, -0.2, 0.2), draw(rng, 1.0, 1.3))]  # fmt: skip
-        parts.append(tube(bend, 0.065, material(pick(rng, ("white", "plastic")), rng, (0.85, 0.85, 0.84)), 10))
-    return finished(parts)
+        yield tube(bend, 0.065, material(pick(rng, ("white", "plastic")), rng, (0.85, 0.85, 0.84)), 10)
 
 
 @family("air conditioner", "wall window box")
-def _window_box(rng: np.random.Generator) -> Piece:
+def _window_box(rng: np.random.Generator) -> Parts:
     wide, high, deep = draw(rng, 0.45, 0.7), draw(rng, 0.32, 0.46), draw(rng, 0.2, 0.45)
     look, dark, half = material("plastic", rng,
                                 pick(rng, ((0.9, 0.89, 0.84), (0.75, 0.72, 0.64),
                                            (0.6, 0.6, 0.6)))), material("black", rng), wide / 2  # fmt: skip
-    parts = [box((0.0, -half + 0.01, 0.01), (deep - 0.04, half - 0.01, high - 0.01), material("metal", rng)),
-             rounded_box((deep - 0.05, -half, 0.0), (deep, half, high), 0.015, look, 2)]  # fmt: skip
+    yield box((0.0, -half + 0.01, 0.01), (deep - 0.04, half - 0.01, high - 0.01), material("metal", rng))
+    yield rounded_box((deep - 0.05, -half, 0.0), (deep, half, high), 0.015, look, 2)
     split = draw(rng, 0.1, 0.45) * half
     n = count(rng, 8, 16)
-    parts += [box((deep - 0.006, -half + 0.03, 0.04 + (high * 0.62) * i / n),
-                  (deep + 0.003, split, 0.04 + high * 0.62 * i / n + 0.008), dark) for i in range(n)]  # fmt: skip
-    parts += [box((deep - 0.006, -half + 0.03 + 0.045 * i, high * 0.76),
-                  (deep + 0.004, -half + 0.06 + 0.045 * i, high - 0.03), dark)
-              for i in range(int((split + half - 0.03) / 0.045))]  # fmt: skip
-    parts += [face(deep + 0.002, (split + 0.03, 0.05), (half - 0.02, high - 0.05), material("metal", rng)),
-              *[dial(deep, (split + half) / 2, high * h, 0.024, dark) for h in (0.35, 0.6)]]  # fmt: skip
-    return finished(parts)
+    yield from [box((deep - 0.006, -half + 0.03, 0.04 + (high * 0.62) * i / n),
+                    (deep + 0.003, split, 0.04 + high * 0.62 * i / n + 0.008), dark) for i in range(n)]  # fmt: skip
+    yield from [box((deep - 0.006, -half + 0.03 + 0.045 * i, high * 0.76),
+                    (deep + 0.004, -half + 0.06 + 0.045 * i, high - 0.03), dark)
+                for i in range(int((split + half - 0.03) / 0.045))]  # fmt: skip
+    yield face(deep + 0.002, (split + 0.03, 0.05), (half - 0.02, high - 0.05), material("metal", rng))
+    yield from [dial(deep, (split + half) / 2, high * h, 0.024, dark) for h in (0.35, 0.6)]
 
 
 @family("air conditioner", "floor console", held_out=True)
-def _console(rng: np.random.Generator) -> Piece:
+def _console(rng: np.random.Generator) -> Parts:
     wide, high, deep, look = draw(rng, 0.7,
                                   1.3), draw(rng, 0.5,
                                              0.7), draw(rng, 0.2,
                                                         0.26), material(pick(rng, ("white", "plastic", "painted")),
                                                                         rng)  # fmt: skip
     half, dark = wide / 2, material("black", rng)
-    parts = [rounded_box((0.0, -half, 0.06), (deep, half, high), 0.02, look, 3),
-             box((0.0, -half + 0.03, 0.0), (deep - 0.02, half - 0.03, 0.06), dark),
-             box((deep * 0.25, -half + 0.05, high - 0.003), (deep * 0.8, half - 0.05, high + 0.003), dark)]  # fmt: skip
-    parts += [box((deep * 0.25, -half + 0.05 + 0.04 * i, high), (deep * 0.8, -half + 0.065 + 0.04 * i, high + 0.007),
-                  look) for i in range(int((wide - 0.1) / 0.04))]  # fmt: skip
-    parts += [box((deep - 0.004, -half + 0.06, 0.12 + 0.025 * i), (deep + 0.003, half - 0.06, 0.132 + 0.025 * i), dark)
-              for i in range(count(rng, 2, 6))]  # fmt: skip
-    return finished(parts)
+    yield rounded_box((0.0, -half, 0.06), (deep, half, high), 0.02, look, 3)
+    yield box((0.0, -half + 0.03, 0.0), (deep - 0.02, half - 0.03, 0.06), dark)
+    yield box((deep * 0.25, -half + 0.05, high - 0.003), (deep * 0.8, half - 0.05, high + 0.003), dark)
+    yield from [box((deep * 0.25, -half + 0.05 + 0.04 * i, high), (deep * 0.8, -half + 0.065 + 0.04 * i, high + 0.007),
+                    look) for i in range(int((wide - 0.1) / 0.04))]  # fmt: skip
+    yield from [box((deep - 0.004, -half + 0.06, 0.12 + 0.025 * i), (deep + 0.003, half - 0.06, 0.132 + 0.025 * i),
+                    dark) for i in range(count(rng, 2, 6))]  # fmt: skip
 
 
 @family("air conditioner", "cabinet tower", held_out=True)
-def _cabinet_tower(rng: np.random.Generator) -> Piece:
+def _cabinet_tower(rng: np.random.Generator) -> Parts:
     wide, deep, high = draw(rng, 0.34, 0.55), draw(rng, 0.28, 0.42), draw(rng, 1.6, 1.9)
     look, dark, half = material(pick(rng, ("white", "white", "metal", "plastic")),
                                 rng), material("black", rng), wide / 2  # fmt: skip
-    parts = [shell([(outline(deep, wide, pick(rng, (2.4, 6.0, 10.0)), 22), z) for z in (0.03, high)], look),
-             slab(0.0, 0.0, 0.0, deep * 0.85, wide * 0.85, 0.04, dark)]  # fmt: skip
+    yield shell([(outline(deep, wide, pick(rng, (2.4, 6.0, 10.0)), 22), z) for z in (0.03, high)], look)
+    yield slab(0.0, 0.0, 0.0, deep * 0.85, wide * 0.85, 0.04, dark)
     n = count(rng, 4, 9)
-    parts += [box((deep * 0.36, -half * 0.62, high * 0.72 + 0.035 * i),
-                  (deep / 2 + 0.006, half * 0.62, high * 0.72 + 0.035 * i + 0.016), dark)
-              for i in range(n)]  # fmt: skip
-    parts += [box((deep * 0.36, -half * 0.62, 0.15), (deep / 2 + 0.004, half * 0.62, 0.45 * high),
-                  material("metal", rng)), box((deep * 0.4, -0.06, high * 0.6), (deep / 2 + 0.008, 0.06, high * 0.64),
-                                               dark)]  # fmt: skip
-    return finished(parts)
+    yield from [box((deep * 0.36, -half * 0.62, high * 0.72 + 0.035 * i),
+                    (deep / 2 + 0.006, half * 0.62, high * 0.72 + 0.035 * i + 0.016), dark)
+                for i in range(n)]  # fmt: skip
+    yield box((deep * 0.36, -half * 0.62, 0.15), (deep / 2 + 0.004, half * 0.62, 0.45 * high), material("metal", rng))
+    yield box((deep * 0.4, -0.06, high * 0.6), (deep / 2 + 0.008, 0.06, high * 0.64), dark)

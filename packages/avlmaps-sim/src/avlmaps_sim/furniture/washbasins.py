@@ -4,11 +4,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from avlmaps_sim.furniture.catalogue import Piece, Support, family
+from avlmaps_sim.furniture.catalogue import Parts, Support, family
 from avlmaps_sim.furniture.fittings import china, chrome, front, front_style, outline, shell, steel, tap
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, finished, pick, pictured
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick, pictured
 from avlmaps_sim.materials import material
-from avlmaps_sim.mesh import Material, Mesh, joined
+from avlmaps_sim.mesh import Material, Mesh, Meshes, joined
 from avlmaps_sim.shapes import box, cylinder, lathe, rounded_box, slab, tube
 
 Pair = tuple[float, float]
@@ -55,25 +55,24 @@ def _bathroom_tap(rng: np.random.Generator, x: float, y: float, z: float, reach:
 
 
 @family("sink", "pedestal")
-def _pedestal(rng: np.random.Generator) -> Piece:
+def _pedestal(rng: np.random.Generator) -> Parts:
     look, z = china(rng), draw(rng, 0.8, 0.9)
     deep, wide = draw(rng, 0.38, 0.52), draw(rng, 0.45, 0.7)
     power = pick(rng, (2.2, 3.0, 5.0, 8.0))
     foot, waist, tall = draw(rng, 0.09, 0.13), draw(rng, 0.055, 0.085), z - 0.14
     profile = [(foot, 0.0), (foot * 0.92, 0.05), (waist, 0.3 * tall), (waist * 1.05, 0.7 * tall), (foot * 1.1, tall)]
-    parts = [*_basin((deep, wide), (deep / 2, 0.0), z, draw(rng, 0.15, 0.19), power, 0.03, look, 0.09),
-             lathe(profile, look, deep * 0.42, 0.0, 12, draw(rng, 0.9, 1.3)),
-             *_bathroom_tap(rng, 0.07, 0.0, z, draw(rng, 0.1, 0.15))]  # fmt: skip
+    yield from _basin((deep, wide), (deep / 2, 0.0), z, draw(rng, 0.15, 0.19), power, 0.03, look, 0.09)
+    yield lathe(profile, look, deep * 0.42, 0.0, 12, draw(rng, 0.9, 1.3))
+    yield from _bathroom_tap(rng, 0.07, 0.0, z, draw(rng, 0.1, 0.15))
     if chance(rng, 0.3):
-        parts.append(rounded_box((0.0, -wide / 2, z), (0.03, wide / 2, z + draw(rng, 0.04, 0.09)), 0.01, look, 2))
-    return finished(parts)
+        yield rounded_box((0.0, -wide / 2, z), (0.03, wide / 2, z + draw(rng, 0.04, 0.09)), 0.01, look, 2)
 
 
-def _cabinet(rng: np.random.Generator, deep: float, wide: float, z: Pair) -> list[Mesh]:
+def _cabinet(rng: np.random.Generator, deep: float, wide: float, z: Pair) -> Meshes:
     """Return a vanity's body with doors or drawers between two heights."""
     style = front_style(rng)
     half, columns = wide / 2, max(1, round(wide / draw(rng, 0.35, 0.6)))
-    parts = [box((0.0, -half, z[0]), (deep, half, z[1]), style.look)]
+    yield box((0.0, -half, z[0]), (deep, half, z[1]), style.look)
     cuts = np.linspace(-half, half, columns + 1)
     drawers = chance(rng, 0.5)
     for i, (a, b) in enumerate(pairwise(cuts)):
@@ -81,8 +80,7 @@ def _cabinet(rng: np.random.Generator, deep: float, wide: float, z: Pair) -> lis
         for k in range(rows):
             low, high = z[0] + k * (z[1] - z[0]) / rows, z[0] + (k + 1) * (z[1] - z[0]) / rows
             opens = "drawer" if drawers else ("left" if i % 2 == 0 else "right")
-            parts += front(style, deep, (float(a), low), (float(b), high), opens, "top")
-    return parts
+            yield from front(style, deep, (float(a), low), (float(b), high), opens, "top")
 
 
 def _plate_with_bowls(deep: float, wide: float, z: float, thick: float, bowls: list[float], bowl: Pair, power: float,
@@ -124,78 +122,76 @@ def _plate_with_bowls(deep: float, wide: float, z: float, thick: float, bowls: l
 
 
 @family("sink", "vanity with cabinet")
-def _vanity(rng: np.random.Generator) -> Piece:
+def _vanity(rng: np.random.Generator) -> Parts:
     deep, wide, z = draw(rng, 0.4, 0.56), draw(rng, 0.5, 1.5), draw(rng, 0.78, 0.92)
     lift, look = (draw(rng, 0.2, 0.4) if chance(rng, 0.35) else draw(rng, 0.0, 0.12)), china(rng)
     plate = look if chance(rng, 0.55) else pictured(pick(rng, ("stone", "marble", "wood")), rng, "stone")
     two = wide > 1.1 and chance(rng, 0.6)
     bowls = [-wide / 4, wide / 4] if two else [0.0]
     bowl = (deep - draw(rng, 0.14, 0.18), draw(rng, 0.36, min(0.6, 0.85 * wide / len(bowls))))
-    parts = _plate_with_bowls(deep, wide, z, 0.03, bowls, bowl, pick(rng, (2.2, 4.0, 8.0)), draw(rng, 0.1, 0.15), plate,
-                              look, 0.04)  # fmt: skip
-    parts += _cabinet(rng, deep - 0.02, wide - 0.02, (lift, z - 0.17))
-    parts.append(box((0.0, -wide / 2 + 0.01, z - 0.17), (0.01, wide / 2 - 0.01, z - 0.03), plate))
-    parts += [box((0.0, -wide / 2 + 0.01, z - 0.17), (deep - 0.02, wide / 2 - 0.01, z - 0.165), plate),
-              box((deep - 0.035, -wide / 2 + 0.01, z - 0.17), (deep - 0.02, wide / 2 - 0.01, z - 0.03),
-                  plate)]  # fmt: skip
-    parts += [box((0.0, s * (wide / 2 - 0.02) - 0.01, z - 0.17), (deep - 0.02, s * (wide / 2 - 0.02) + 0.01, z - 0.03),
-                  plate) for s in (-1, 1)]  # fmt: skip
+    yield from _plate_with_bowls(deep, wide, z, 0.03, bowls, bowl, pick(rng, (2.2, 4.0, 8.0)), draw(rng, 0.1, 0.15),
+                                 plate, look, 0.04)  # fmt: skip
+    yield from _cabinet(rng, deep - 0.02, wide - 0.02, (lift, z - 0.17))
+    yield box((0.0, -wide / 2 + 0.01, z - 0.17), (0.01, wide / 2 - 0.01, z - 0.03), plate)
+    yield box((0.0, -wide / 2 + 0.01, z - 0.17), (deep - 0.02, wide / 2 - 0.01, z - 0.165), plate)
+    yield box((deep - 0.035, -wide / 2 + 0.01, z - 0.17), (deep - 0.02, wide / 2 - 0.01, z - 0.03), plate)
+    yield from [box((0.0, s * (wide / 2 - 0.02) - 0.01, z - 0.17),
+                    (deep - 0.02, s * (wide / 2 - 0.02) + 0.01, z - 0.03), plate) for s in (-1, 1)]  # fmt: skip
     if lift > 0.15 and chance(rng, 0.5):
         leg = material(pick(rng, ("wood", "metal", "black")), rng)
-        parts += [slab(x, y, 0.0, 0.035, 0.035, lift, leg) for x in (0.03, deep - 0.05)
-                  for y in (-wide / 2 + 0.04, wide / 2 - 0.04)]  # fmt: skip
+        yield from [slab(x, y, 0.0, 0.035, 0.035, lift, leg) for x in (0.03, deep - 0.05)
+                    for y in (-wide / 2 + 0.04, wide / 2 - 0.04)]  # fmt: skip
     elif lift > 0.15:  # hung: only the pipe reaches the floor
-        parts.append(tube([(0.1, 0.0, lift), (0.1, 0.0, 0.0)], 0.018, chrome(rng), 6))
+        yield tube([(0.1, 0.0, lift), (0.1, 0.0, 0.0)], 0.018, chrome(rng), 6)
     for y in bowls:
-        parts += _bathroom_tap(rng, 0.045, y, z, draw(rng, 0.1, 0.16))
-    return finished(parts, supports=[Support((0.01, -wide / 2), (deep - bowl[0] - 0.06, wide / 2), z, 0.4)])
+        yield from _bathroom_tap(rng, 0.045, y, z, draw(rng, 0.1, 0.16))
+    yield Support((0.01, -wide / 2), (deep - bowl[0] - 0.06, wide / 2), z, 0.4)
 
 
 @family("sink", "hung on the wall")
-def _hung(rng: np.random.Generator) -> Piece:
+def _hung(rng: np.random.Generator) -> Parts:
     look, z, metal = china(rng), draw(rng, 0.8, 0.9), chrome(rng)
     deep, wide = draw(rng, 0.26, 0.5), draw(rng, 0.32, 0.75)
     hollow = draw(rng, 0.11, 0.17)
-    parts = [*_basin((deep, wide), (deep / 2, 0.0), z, hollow, pick(rng, (2.4, 4.0, 10.0)), 0.025, look, 0.07,
-                     draw(rng, 0.45, 0.95)), box((0.0, -wide * 0.3, z - hollow), (0.06, wide * 0.3, z - 0.01), look),
-             *_bathroom_tap(rng, 0.055, 0.0, z, draw(rng, 0.09, 0.14))]  # fmt: skip
+    yield from (*_basin((deep, wide), (deep / 2, 0.0), z, hollow, pick(rng, (2.4, 4.0, 10.0)), 0.025, look, 0.07,
+                        draw(rng, 0.45, 0.95)), box((0.0, -wide * 0.3, z - hollow), (0.06, wide * 0.3, z - 0.01), look),
+                *_bathroom_tap(rng, 0.055, 0.0, z, draw(rng, 0.09, 0.14)))  # fmt: skip
     trap = z - hollow
-    parts.append(tube([(deep / 2, 0.0, trap), (deep / 2, 0.0, trap - 0.14), (deep / 2 - 0.05, 0.0, trap - 0.17),
-                       (deep / 2 - 0.09, 0.0, trap - 0.1), (0.0, 0.0, trap - 0.1)], 0.017, metal, 7))  # fmt: skip
-    parts.append(tube([(0.03, 0.05, 0.0), (0.03, 0.05, trap)], 0.008, metal, 5))  # the pipe comes up from the floor
-    return finished(parts)
+    yield tube([(deep / 2, 0.0, trap), (deep / 2, 0.0, trap - 0.14), (deep / 2 - 0.05, 0.0, trap - 0.17),
+                (deep / 2 - 0.09, 0.0, trap - 0.1), (0.0, 0.0, trap - 0.1)], 0.017, metal, 7)  # fmt: skip
+    yield tube([(0.03, 0.05, 0.0), (0.03, 0.05, trap)], 0.008, metal, 5)  # the pipe comes up from the floor
 
 
 @family("sink", "bowl on a wash stand")
-def _wash_stand(rng: np.random.Generator) -> Piece:
+def _wash_stand(rng: np.random.Generator) -> Parts:
     deep, wide, z = draw(rng, 0.42, 0.55), draw(rng, 0.6, 1.4), draw(rng, 0.7, 0.82)
     wood, look, open_base = material(pick(rng, ("wood", "wood", "stone", "metal")), rng), china(rng), chance(rng, 0.5)
-    parts: list[Mesh] = [slab(deep / 2, 0.0, z - 0.04, deep, wide, 0.04, wood)]
+    yield slab(deep / 2, 0.0, z - 0.04, deep, wide, 0.04, wood)
     if open_base:
-        parts += [slab(x, y, 0.0, 0.045, 0.045, z - 0.04, wood) for x in (0.03, deep - 0.03)
-                  for y in (-wide / 2 + 0.03, wide / 2 - 0.03)]  # fmt: skip
-        parts.append(slab(deep / 2, 0.0, draw(rng, 0.12, 0.3), deep, wide - 0.02, 0.025, wood))
+        yield from [slab(x, y, 0.0, 0.045, 0.045, z - 0.04, wood) for x in (0.03, deep - 0.03)
+                    for y in (-wide / 2 + 0.03, wide / 2 - 0.03)]  # fmt: skip
+        yield slab(deep / 2, 0.0, draw(rng, 0.12, 0.3), deep, wide - 0.02, 0.025, wood)
     else:
-        parts += _cabinet(rng, deep - 0.02, wide - 0.02, (draw(rng, 0.0, 0.25), z - 0.04))
+        yield from _cabinet(rng, deep - 0.02, wide - 0.02, (draw(rng, 0.0, 0.25), z - 0.04))
     two = wide > 1.15 and chance(rng, 0.6)
     for y in [-wide / 4, wide / 4] if two else [draw(rng, -0.1, 0.1) * wide]:
-        parts += _vessel(rng, deep * 0.56, y, z, look)
-    return finished(parts, supports=[Support((0.02, wide / 2 - 0.16), (deep, wide / 2), z, 0.4)])
+        yield from _vessel(rng, deep * 0.56, y, z, look)
+    yield Support((0.02, wide / 2 - 0.16), (deep, wide / 2), z, 0.4)
 
 
-def _vessel(rng: np.random.Generator, x: float, y: float, z: float, look: Material) -> list[Mesh]:
+def _vessel(rng: np.random.Generator, x: float, y: float, z: float, look: Material) -> Meshes:
     """Return a bowl that stands on a top at ``z``, with a tall tap behind it."""
     size, high = draw(rng, 0.34, 0.42), draw(rng, 0.1, 0.17)
     long = size * draw(rng, 1.0, 1.35)
     look = look if chance(rng, 0.7) else material(pick(rng, ("stone", "glass", "metal")), rng)
-    parts = _basin((size, long), (x, y), z + high, high, pick(rng, (2.0, 2.0, 3.0, 8.0)), 0.012, look, 0.0,
-                   draw(rng, 0.45, 0.95))  # fmt: skip
-    return [*parts, *tap(rng, (x - size / 2 - 0.035, y, z), size * 0.45, high + draw(rng, 0.12, 0.2), chrome(rng))]
+    return [*_basin((size, long), (x, y), z + high, high, pick(rng, (2.0, 2.0, 3.0, 8.0)), 0.012, look, 0.0,
+                    draw(rng, 0.45, 0.95)),
+            *tap(rng, (x - size / 2 - 0.035, y, z), size * 0.45, high + draw(rng, 0.12, 0.2), chrome(rng))]  # fmt: skip
 
 
 @family("sink", "counter vessel")
-def _counter_vessel(rng: np.random.Generator) -> Piece:
-    return finished(_vessel(rng, 0.0, 0.0, 0.0, china(rng)))
+def _counter_vessel(rng: np.random.Generator) -> Parts:
+    return _vessel(rng, 0.0, 0.0, 0.0, china(rng))
 
 
 def _kitchen_bowls(rng: np.random.Generator, look: Material, bowls: int, board: bool, deep: float) -> list[Mesh]:
@@ -232,17 +228,17 @@ def _kitchen_look(rng: np.random.Generator) -> Material:
 
 
 @family("sink", "counter single bowl")
-def _counter_single(rng: np.random.Generator) -> Piece:
-    return finished(_kitchen_bowls(rng, _kitchen_look(rng), 1, chance(rng, 0.6), draw(rng, 0.1, 0.14)))
+def _counter_single(rng: np.random.Generator) -> Parts:
+    return _kitchen_bowls(rng, _kitchen_look(rng), 1, chance(rng, 0.6), draw(rng, 0.1, 0.14))
 
 
 @family("sink", "counter double bowl")
-def _counter_double(rng: np.random.Generator) -> Piece:
-    return finished(_kitchen_bowls(rng, _kitchen_look(rng), 2, chance(rng, 0.4), draw(rng, 0.1, 0.14)))
+def _counter_double(rng: np.random.Generator) -> Parts:
+    return _kitchen_bowls(rng, _kitchen_look(rng), 2, chance(rng, 0.4), draw(rng, 0.1, 0.14))
 
 
 @family("sink", "kitchen sink cabinet")
-def _sink_cabinet(rng: np.random.Generator) -> Piece:
+def _sink_cabinet(rng: np.random.Generator) -> Parts:
     deep, z = draw(rng, 0.55, 0.64), draw(rng, 0.84, 0.94)
     bowls, look = count(rng, 1, 2), _kitchen_look(rng)
     size, one = draw(rng, 0.34, 0.42), draw(rng, 0.34, 0.45)
@@ -251,54 +247,52 @@ def _sink_cabinet(rng: np.random.Generator) -> Piece:
     middles = [start + i * (one + 0.04) for i in range(bowls)]
     plate = look if chance(rng, 0.5) else pictured(pick(rng, ("stone", "wood", "marble")), rng, "stone")
     style, hollow = front_style(rng), draw(rng, 0.14, 0.22)
-    parts = _plate_with_bowls(deep, wide, z, 0.035, middles, (size, one), pick(rng, (4.0, 8.0, 14.0)), hollow, plate,
-                              look)  # fmt: skip
+    yield from _plate_with_bowls(deep, wide, z, 0.035, middles, (size, one), pick(rng, (4.0, 8.0, 14.0)), hollow, plate,
+                                 look)  # fmt: skip
     half, columns = wide / 2, max(1, round(wide / 0.5))
-    parts += [box((0.0, -half, 0.1), (deep - 0.03, -half + 0.018, z - 0.035), style.look),
-              box((0.0, half - 0.018, 0.1), (deep - 0.03, half, z - 0.035), style.look),
-              box((0.0, -half, 0.0), (deep - 0.08, half, 0.1), material("black", rng)),
-              box((0.0, -half, 0.1), (deep - 0.03, half, 0.12), style.look)]  # fmt: skip
-    parts.append(box((0.0, -half, 0.1), (0.008, half, z - 0.035), style.look))
+    yield box((0.0, -half, 0.1), (deep - 0.03, -half + 0.018, z - 0.035), style.look)
+    yield box((0.0, half - 0.018, 0.1), (deep - 0.03, half, z - 0.035), style.look)
+    yield box((0.0, -half, 0.0), (deep - 0.08, half, 0.1), material("black", rng))
+    yield box((0.0, -half, 0.1), (deep - 0.03, half, 0.12), style.look)
+    yield box((0.0, -half, 0.1), (0.008, half, z - 0.035), style.look)
     cuts = np.linspace(-half, half, columns + 1)
     for i in range(columns):
-        parts += front(style, deep - 0.03, (float(cuts[i]), 0.1), (float(cuts[i + 1]), z - 0.035),
-                       "left" if i % 2 == 0 else "right", "top")  # fmt: skip
-    parts += tap(rng, (0.06, middles[0] if bowls == 1 else middles[0] + one / 2 + 0.02, z), draw(rng, 0.16, 0.22),
-                 draw(rng, 0.15, 0.4), chrome(rng))  # fmt: skip
+        yield from front(style, deep - 0.03, (float(cuts[i]), 0.1), (float(cuts[i + 1]), z - 0.035),
+                         "left" if i % 2 == 0 else "right", "top")  # fmt: skip
+    yield from tap(rng, (0.06, middles[0] if bowls == 1 else middles[0] + one / 2 + 0.02, z), draw(rng, 0.16, 0.22),
+                   draw(rng, 0.15, 0.4), chrome(rng))  # fmt: skip
     free = middles[-1] + one / 2 + 0.03
-    return finished(parts, supports=[Support((0.03, free), (deep, half), z, 0.5)] if half - free > 0.12 else [])
+    yield from [Support((0.03, free), (deep, half), z, 0.5)] if half - free > 0.12 else []
 
 
 @family("sink", "trough", held_out=True)
-def _trough(rng: np.random.Generator) -> Piece:
+def _trough(rng: np.random.Generator) -> Parts:
     """Return a utility sink: one deep box on legs, a wall or a stand."""
     deep, wide, z, hollow = draw(rng, 0.45, 0.6), draw(rng, 0.5, 1.1), draw(rng, 0.8, 0.9), draw(rng, 0.22, 0.32)
     look = material(pick(rng, ("ceramic", "plastic", "stone", "metal")), rng)
     outer, inner = outline(deep, wide, 24.0, 24, middle=(deep / 2, 0.0)), outline(deep - 0.08, wide - 0.08, 10.0, 24,
                                                                                   middle=(deep / 2, 0.0))  # fmt: skip
     lower = outline(deep - 0.16, wide - 0.16, 8.0, 24, middle=(deep / 2, 0.0))
-    parts = [shell([(outer, z - hollow), (outer, z), (inner, z), (lower, z - hollow + 0.03)], look)]
+    yield shell([(outer, z - hollow), (outer, z), (inner, z), (lower, z - hollow + 0.03)], look)
     leg = material(pick(rng, ("metal", "wood", "white")), rng)
-    parts += [slab(x, y, 0.0, 0.05, 0.05, z - hollow, leg) for x in (0.06, deep - 0.06)
-              for y in (-wide / 2 + 0.06, wide / 2 - 0.06)]  # fmt: skip
-    parts += [box((0.0, -wide / 2, z), (0.03, wide / 2, z + 0.1), look),
-              *tap(rng, (0.03, 0.0, z + 0.06), 0.18, 0.16, chrome(rng))]  # fmt: skip
-    return finished(parts)
+    yield from [slab(x, y, 0.0, 0.05, 0.05, z - hollow, leg) for x in (0.06, deep - 0.06)
+                for y in (-wide / 2 + 0.06, wide / 2 - 0.06)]  # fmt: skip
+    yield box((0.0, -wide / 2, z), (0.03, wide / 2, z + 0.1), look)
+    yield from tap(rng, (0.03, 0.0, z + 0.06), 0.18, 0.16, chrome(rng))
 
 
 @family("sink", "steel work table", held_out=True)
-def _steel_table(rng: np.random.Generator) -> Piece:
+def _steel_table(rng: np.random.Generator) -> Parts:
     deep, z, look, bowls = draw(rng, 0.5, 0.65), draw(rng, 0.84, 0.92), steel(rng), count(rng, 1, 3)
     one = draw(rng, 0.35, 0.45)
     wide = bowls * (one + 0.06) + draw(rng, 0.05, 0.7)
     middles = [-wide / 2 + 0.05 + one / 2 + i * (one + 0.05) for i in range(bowls)]
     hollow = draw(rng, 0.2, 0.28)
-    parts = _plate_with_bowls(deep, wide, z, 0.03, middles, (deep - 0.16, one), 10.0, hollow, look, look, 0.05)
-    parts += [box((deep - 0.048 - (deep - 0.16), y - one / 2, z - hollow),
-                  (deep - 0.052, y + one / 2, z - hollow + 0.002), look) for y in middles]  # fmt: skip
-    parts += [cylinder(x, y, 0.0, 0.02, z - 0.02, look, 8) for x in (0.04, deep - 0.04)
-              for y in (-wide / 2 + 0.04, wide / 2 - 0.04)]  # fmt: skip
-    parts += [slab(deep / 2, 0.0, draw(rng, 0.1, 0.25), deep - 0.06, wide - 0.06, 0.02, look),
-              box((0.0, -wide / 2, z), (0.012, wide / 2, z + 0.1), look),
-              *tap(rng, (0.06, middles[0], z), 0.2, draw(rng, 0.25, 0.45), look)]  # fmt: skip
-    return finished(parts)
+    yield from _plate_with_bowls(deep, wide, z, 0.03, middles, (deep - 0.16, one), 10.0, hollow, look, look, 0.05)
+    yield from [box((deep - 0.048 - (deep - 0.16), y - one / 2, z - hollow),
+                    (deep - 0.052, y + one / 2, z - hollow + 0.002), look) for y in middles]  # fmt: skip
+    yield from [cylinder(x, y, 0.0, 0.02, z - 0.02, look, 8) for x in (0.04, deep - 0.04)
+                for y in (-wide / 2 + 0.04, wide / 2 - 0.04)]  # fmt: skip
+    yield slab(deep / 2, 0.0, draw(rng, 0.1, 0.25), deep - 0.06, wide - 0.06, 0.02, look)
+    yield box((0.0, -wide / 2, z), (0.012, wide / 2, z + 0.1), look)
+    yield from tap(rng, (0.06, middles[0], z), 0.2, draw(rng, 0.25, 0.45), look)
