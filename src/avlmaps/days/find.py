@@ -11,13 +11,7 @@ from avlmaps.core.arrays import Float, Int
 from avlmaps.core.errors import MapError
 from avlmaps.core.poses import apply
 from avlmaps.core.timeline import is_in_future
-from avlmaps.days.align import (
-    NotTheSamePlaceError,
-    consensus,
-    gather_votes,
-    require_alike,
-    require_upright,
-)
+from avlmaps.days.align import NotTheSamePlaceError, consensus, gather_votes, require_alike, require_upright
 from avlmaps.days.evidence import DayViews
 from avlmaps.days.settings import MergeSettings
 from avlmaps.days.surfaces import Occupied, refine

@@ -21,15 +21,7 @@ from avlmaps.core.version import __version__
 from avlmaps.core.wording import option
 from avlmaps.days import life as lives
 from avlmaps.days.evidence import Day, DayViews
-from avlmaps.days.find import (
-    DEFAULTS,
-    clock_s,
-    find_other,
-    require_another_drive,
-    views_of,
-    visit_of_stamps,
-    visits_of,
-)
+from avlmaps.days.find import DEFAULTS, clock_s, find_other, require_another_drive, views_of, visit_of_stamps, visits_of
 from avlmaps.days.join import NO_SOURCES, joined_keyframes, joined_sounds, joined_sources, joined_voxels
 from avlmaps.days.settings import MergeSettings
 from avlmaps.days.surfaces import Occupied, resampled

@@ -33,11 +33,7 @@ class PoseCorrection:
 
     @classmethod
     def of(
-        cls,
-        stamps_s: Any,
-        poses: Any,
-        known_s: Float[np.ndarray, " f"],
-        known: Float[np.ndarray, "f 4 4"],
+        cls, stamps_s: Any, poses: Any, known_s: Float[np.ndarray, " f"], known: Float[np.ndarray, "f 4 4"]
     ) -> "PoseCorrection":
         """Return what corrected poses mean for the frames of a map.
 

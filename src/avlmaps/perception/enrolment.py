@@ -177,13 +177,7 @@ def _read(notes_file: Path) -> TaughtSound:
         features = np.load(notes_file.with_name("features.npy"), allow_pickle=False)
         if features.ndim != 2 or features.dtype != np.float32 or not np.isfinite(features).all():
             raise ValueError(f"features are {features.dtype} of {features.shape}")
-        return TaughtSound(
-            str(notes["name"]),
-            features,
-            tuple(notes["clips"]),
-            notes["model"],
-            notes["checksum"],
-        )
+        return TaughtSound(str(notes["name"]), features, tuple(notes["clips"]), notes["model"], notes["checksum"])
     except (OSError, ValueError, KeyError, TypeError, EOFError) as error:
         raise BackendError(
             f"The taught sound in {notes_file.parent} is damaged ({error}); delete it and teach it again."

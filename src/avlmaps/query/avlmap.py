@@ -28,13 +28,7 @@ from avlmaps.query.known_words import KnownClosestWords
 from avlmaps.query.modalities.area import AreaSettings, area_anchors, area_factor, area_names, name_shares
 from avlmaps.query.modalities.image import image_factor, read_picture, require_fitting
 from avlmaps.query.modalities.object import object_factor
-from avlmaps.query.modalities.sound import (
-    SoundSettings,
-    read_clip,
-    require_audible,
-    sound_factor,
-    sound_features,
-)
+from avlmaps.query.modalities.sound import SoundSettings, read_clip, require_audible, sound_factor, sound_features
 from avlmaps.query.object_settings import ObjectSettings
 from avlmaps.query.queryable import Attachment, Photo
 from avlmaps.query.room_regions import RoomRegions
@@ -767,10 +761,7 @@ class AVLMap:
         return locate(self.stored, rgb, intrinsics, rng, settings, focal_35mm)
 
     def heat(
-        self,
-        part: Part,
-        intrinsics: Pinhole | None = None,
-        attachments: "Mapping[str, Attachment] | None" = None,
+        self, part: Part, intrinsics: Pinhole | None = None, attachments: "Mapping[str, Attachment] | None" = None
     ) -> Heatmap:
         """Return the heat of one part of a question; see ``ask``."""
         primary = part.role is Role.PRIMARY

@@ -230,9 +230,7 @@ def _as_rows(wall: Bool[np.ndarray, "r c"]) -> Bool[np.ndarray, "r c"]:
     return bridged(dilated(wall, 3, 1), 5)
 
 
-def _runs(
-    cells: Bool[np.ndarray, "r c"],
-) -> tuple[Int[np.ndarray, " q"], Int[np.ndarray, " q"], Int[np.ndarray, " q"]]:
+def _runs(cells: Bool[np.ndarray, "r c"]) -> tuple[Int[np.ndarray, " q"], Int[np.ndarray, " q"], Int[np.ndarray, " q"]]:
     """Return row, start and end (exclusive) of each run of cells along the rows."""
     change = np.diff(np.pad(cells, ((0, 0), (1, 1))).astype(np.int8), axis=1)
     row, start = np.nonzero(change == 1)

@@ -42,12 +42,7 @@ class Evidence:
     first_alone: float = 1.0
 
 
-def evidence_of(
-    factors: Sequence[Factor],
-    instance: int,
-    position: Float[np.ndarray, "3"],
-    peak: float,
-) -> Evidence:
+def evidence_of(factors: Sequence[Factor], instance: int, position: Float[np.ndarray, "3"], peak: float) -> Evidence:
     """Return the evidence for a goal.
 
     Args:

@@ -118,10 +118,7 @@ class Queryable(Protocol):
         ...
 
     def heat(
-        self,
-        part: Part,
-        intrinsics: Pinhole | None = None,
-        attachments: Mapping[str, Attachment] | None = None,
+        self, part: Part, intrinsics: Pinhole | None = None, attachments: Mapping[str, Attachment] | None = None
     ) -> Heatmap:
         """Return the heat of one part of a question."""
         ...

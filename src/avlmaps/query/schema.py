@@ -328,8 +328,7 @@ class LocateAnswer(TypedDict):
     ]
     focal_from: Annotated[str, Meta(description="source of the focal length: map, given, exif, assumed or photo")]
     position_error_m: Annotated[
-        float | None,
-        Meta(description="three standard deviations of the place, if the focal length was found with it"),
+        float | None, Meta(description="three standard deviations of the place, if the focal length was found with it")
     ]
     elapsed_ms: float
     notes: NotRequired[Notes]

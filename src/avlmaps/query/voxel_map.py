@@ -74,14 +74,7 @@ class VoxelMap:
         self._lock = RLock()
 
     def add(
-        self,
-        rgb: Any,
-        depth_m: Any,
-        camera: Any,
-        world_from_camera: Any,
-        stamp_s: Any = None,
-        *,
-        features: Any = None,
+        self, rgb: Any, depth_m: Any, camera: Any, world_from_camera: Any, stamp_s: Any = None, *, features: Any = None
     ) -> None:
         """Add a frame. What is refused leaves the map as it was.
 

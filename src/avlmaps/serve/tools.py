@@ -14,13 +14,7 @@ from avlmaps.navigate.paths import goals_near
 from avlmaps.query.given_places import place_given
 from avlmaps.query.places import last_seen
 from avlmaps.serve import agent_lists, work
-from avlmaps.serve.agent_lists import (
-    ListRoomsQuery,
-    ListSoundsQuery,
-    ListThingsQuery,
-    MapQuery,
-    Place,
-)
+from avlmaps.serve.agent_lists import ListRoomsQuery, ListSoundsQuery, ListThingsQuery, MapQuery, Place
 from avlmaps.serve.errors import RequestError
 from avlmaps.serve.pictures import small_picture
 from avlmaps.serve.requests import AskQuery, LocateQuery, PlaceQuery, Short, Words

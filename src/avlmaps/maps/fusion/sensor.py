@@ -97,12 +97,7 @@ REALSENSE = SensorModel(
 )
 NONE = SensorModel(carve=False)
 
-MODELS: dict[SensorName, SensorModel] = {
-    "kinect": KINECT,
-    "realsense": REALSENSE,
-    "perfect": PERFECT,
-    "none": NONE,
-}
+MODELS: dict[SensorName, SensorModel] = {"kinect": KINECT, "realsense": REALSENSE, "perfect": PERFECT, "none": NONE}
 
 
 PAPERS_VARIANCE_M2 = 0.6

@@ -160,10 +160,7 @@ def perceive_keyframes(
 
 
 def learn_places(
-    recording: Recording,
-    indices: Sequence[int] | Int[np.ndarray, " k"],
-    encoders: Encoders,
-    rng: "np.random.Generator",
+    recording: Recording, indices: Sequence[int] | Int[np.ndarray, " k"], encoders: Encoders, rng: "np.random.Generator"
 ) -> tuple[dict[str, np.ndarray], dict[int, LocalFeatures]]:
     """Let the place encoder learn from keyframes spread over the walk.
 

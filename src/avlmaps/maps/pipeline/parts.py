@@ -132,12 +132,7 @@ def sum_parts(parts: Sequence[MapPart], grid: GridSpec) -> VoxelAccumulator:
 
 
 def save_part(
-    folder: Path,
-    key: str,
-    info: PartInfo,
-    sums: VoxelSums,
-    views: FreeViews,
-    submap: SubmapFrames | None = None,
+    folder: Path, key: str, info: PartInfo, sums: VoxelSums, views: FreeViews, submap: SubmapFrames | None = None
 ) -> None:
     """Store a part; a kill at any instant leaves all of it or none."""
     stored = (sums, views) if submap is None else (sums, views, submap)

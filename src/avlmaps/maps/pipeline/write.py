@@ -161,10 +161,7 @@ def manifest_of(
         seed=plan.settings.seed,
         recording=_recording_info(plan.recording),
         counts=manifest.Counts(
-            frames=fused,
-            keyframes=len(content.keyframes),
-            voxels=len(content.voxels),
-            sounds=len(content.sounds),
+            frames=fused, keyframes=len(content.keyframes), voxels=len(content.voxels), sounds=len(content.sounds)
         ),
         bounding_box_m=manifest.Box.of(content.voxels.index, plan.settings.voxel_size_m),
         bad_frames=tuple(bad),

@@ -58,18 +58,14 @@ def loudest_of_sound(
 
 
 def steer(
-    found: Correlations,
-    ear_m: Float[np.ndarray, "f m 3"],
-    place_m: Float[np.ndarray, "c 3"],
+    found: Correlations, ear_m: Float[np.ndarray, "f m 3"], place_m: Float[np.ndarray, "c 3"]
 ) -> Float[np.ndarray, " c"]:
     """Return the sum over frames and pairs of the correlation at the delays of each place; see ``steer_pairs``."""
     return steer_pairs(found, ear_m, place_m).sum(axis=0)
 
 
 def steer_pairs(
-    found: Correlations,
-    ear_m: Float[np.ndarray, "f m 3"],
-    place_m: Float[np.ndarray, "c 3"],
+    found: Correlations, ear_m: Float[np.ndarray, "f m 3"], place_m: Float[np.ndarray, "c 3"]
 ) -> Float[np.ndarray, "p c"]:
     """Return for each pair the sum over frames of the correlation at the delays of each place.
 

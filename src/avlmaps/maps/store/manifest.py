@@ -147,10 +147,7 @@ class UpInfo(msgspec.Struct, frozen=True, kw_only=True):
 
     @classmethod
     def of(
-        cls,
-        direction: Float[np.ndarray, "3"],
-        known_from: Literal["recording", "planes", "camera"],
-        support: float,
+        cls, direction: Float[np.ndarray, "3"], known_from: Literal["recording", "planes", "camera"], support: float
     ) -> "UpInfo":
         """Return the entry for a direction of any length but zero."""
         x, y, z = (float(value) for value in direction / np.linalg.norm(direction))

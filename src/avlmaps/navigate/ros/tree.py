@@ -78,9 +78,7 @@ class LiveTree:
     """
 
     def __init__(
-        self,
-        clock: Callable[[], float] = monotonic,
-        sent_before: Callable[[float], float | None] = _never,
+        self, clock: Callable[[], float] = monotonic, sent_before: Callable[[float], float | None] = _never
     ) -> None:
         """Begin with no frames.
 

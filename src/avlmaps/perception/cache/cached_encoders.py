@@ -16,12 +16,7 @@ from avlmaps.core.version import __version__
 from avlmaps.perception.cache.feature_store import CacheSettings, FeatureStore, key_of
 from avlmaps.perception.encoders import Encoders, Source
 from avlmaps.perception.models.settings import precision_in_force
-from avlmaps.perception.protocols import (
-    BatchPixelEncoder,
-    FrameSoundEncoder,
-    LocalFeatures,
-    PixelEncoder,
-)
+from avlmaps.perception.protocols import BatchPixelEncoder, FrameSoundEncoder, LocalFeatures, PixelEncoder
 from avlmaps.perception.user_folder import cache_folder
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.types import Frame
@@ -284,12 +279,7 @@ class CachedKeypoints(_Remembering):
         return local
 
 
-_CACHED = {
-    Kind.VIEWS: CachedViews,
-    Kind.SOUNDS: CachedSounds,
-    Kind.LOCAL: CachedKeypoints,
-    Kind.PLACE: CachedPlaces,
-}
+_CACHED = {Kind.VIEWS: CachedViews, Kind.SOUNDS: CachedSounds, Kind.LOCAL: CachedKeypoints, Kind.PLACE: CachedPlaces}
 
 
 def encode_batch(encoder: PixelEncoder, frames: Sequence[Frame]) -> list[Float32[np.ndarray, "hf wf d"]]:
