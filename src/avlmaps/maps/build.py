@@ -17,7 +17,7 @@ from avlmaps.maps.pipeline.plan import claim, fusion_key, make_plan, require_unc
 from avlmaps.maps.pipeline.sounds import detect_sounds
 from avlmaps.maps.pipeline.sources import locate_sources
 from avlmaps.maps.pipeline.workers import ALONE, Workers
-from avlmaps.maps.pipeline.write import merge, write
+from avlmaps.maps.pipeline.write import surfaces, write
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
 from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.reader import StoredMap, describe, open_stored
@@ -78,7 +78,8 @@ def build_map(
             fused = encode_and_fuse(plan, parts, sensor, workers.fuse)
             keyframes = describe_keyframes(plan, fused, workers.describe)  # their keypoints, places and views
             sounds = detect_sounds(plan)
-            merged = merge(plan, fused, sensor, workers.add_up)  # late, because it fills the memory
+            views = [part.views() for part in fused]
+            merged = surfaces(plan, workers.add_up(plan, fused), views, sensor)  # late: the sums fill the memory
             grid = GridSpec(plan.settings.voxel_size_m)
             sources = locate_sources(plan.recording, up.up.vector(), sounds.sounds, merged.voxels, grid)
             require_unchanged(plan, stamp)

@@ -34,6 +34,7 @@ from avlmaps.maps.pipeline.encode_fuse import Tolerance
 from avlmaps.maps.pipeline.keyframes import KeyframeLots
 from avlmaps.maps.pipeline.parts import MapPart, load_part, sum_parts
 from avlmaps.maps.pipeline.plan import BuildPlan, Span
+from avlmaps.maps.pipeline.workers import Workers
 from avlmaps.maps.store.checkpoints import find_checkpoint, key_of, load_checkpoint
 from avlmaps.maps.store.manifest import BadFrame
 from avlmaps.perception.cache.feature_store import DEFAULT_CACHE, CacheSettings
@@ -57,7 +58,7 @@ class Pool(Protocol):
         ...
 
 
-class Spread:
+class Spread(Workers):
     """Gives a build's jobs to a pool of workers."""
 
     def __init__(

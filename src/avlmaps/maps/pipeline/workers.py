@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Protocol
 
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
 from avlmaps.maps.fusion.sensor import SensorModel
@@ -14,8 +13,8 @@ from avlmaps.maps.pipeline.plan import BuildPlan, Span
 from avlmaps.maps.store.manifest import BadFrame
 
 
-class Workers(Protocol):
-    """The three kinds of jobs. The files that they leave hold the same bits, on any number of workers."""
+class Workers:
+    """Does the three kinds of jobs here, one after the other. Who does them elsewhere leaves files of the same bits."""
 
     def fuse(
         self,
@@ -26,38 +25,15 @@ class Workers(Protocol):
         done: int,
     ) -> None:
         """Fuse stretches of frames, each into a part of its own; see ``fuse_spans``."""
-        ...
-
-    def describe(self, plan: BuildPlan, work: KeyframeLots) -> None:
-        """Describe lots of keyframes, each into a folder of its own."""
-        ...
-
-    def add_up(self, plan: BuildPlan, parts: Sequence[MapPart]) -> VoxelAccumulator:
-        """Add the parts up, in the order given."""
-        ...
-
-
-class Alone:
-    """This process does all of it, one job after the other."""
-
-    def fuse(
-        self,
-        plan: BuildPlan,
-        jobs: Sequence[tuple[Span, Path]],
-        sensor: SensorModel,
-        known_bad: Sequence[BadFrame],
-        done: int,
-    ) -> None:
-        """Fuse here."""
         fuse_spans(plan.recording, jobs, plan.encoders, plan.settings, sensor, known_bad, done)
 
     def describe(self, plan: BuildPlan, work: KeyframeLots) -> None:
-        """Describe here."""
+        """Describe lots of keyframes, each into a folder of its own."""
         describe_lots(plan, work)
 
     def add_up(self, plan: BuildPlan, parts: Sequence[MapPart]) -> VoxelAccumulator:
-        """Add up here; only the total is in memory."""
+        """Add the parts up, in the order given; only the total is in memory."""
         return sum_parts(parts, GridSpec(plan.settings.voxel_size_m))
 
 
-ALONE = Alone()
+ALONE = Workers()

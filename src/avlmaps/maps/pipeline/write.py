@@ -1,6 +1,6 @@
 """The last stages: the parts become the voxels of the map, and all of it is written."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
@@ -38,16 +38,6 @@ class Merged:
     sensor: manifest.SensorInfo
     removed: manifest.Removed
     elapsed_s: float
-
-
-def merge(
-    plan: BuildPlan,
-    parts: Sequence[MapPart],
-    sensor: manifest.SensorInfo,
-    add_up: Callable[[BuildPlan, Sequence[MapPart]], VoxelAccumulator],
-) -> Merged:
-    """Add the parts up to the voxels of the map, and remove those that are no surface."""
-    return surfaces(plan, add_up(plan, parts), [part.views() for part in parts], sensor)
 
 
 def surfaces(
