@@ -10,23 +10,7 @@ from dataclasses import dataclass
 from math import degrees
 from unicodedata import normalize
 
-_CHARACTERS = str.maketrans(
-    {
-        "‘": "'",
-        "’": "'",
-        "“": '"',
-        "”": '"',
-        "–": "-",
-        "—": "-",
-        "−": "-",
-        "‐": "-",
-        "‑": "-",
-        "﹣": "-",
-        "－": "-",
-        "…": ".",
-        "º": "°",
-    }
-)
+_CHARACTERS = str.maketrans("‘’“”–—−‐‑﹣－…º", "''\"\"-------.°")
 _IMAGES = r"\.(?:png|jpe?g|bmp|webp|tiff?|gif)"
 _CLIPS = r"\.(?:wav|flac|ogg|mp3|m4a|aac)"
 _TOKEN = re.compile(

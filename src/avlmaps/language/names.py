@@ -12,17 +12,6 @@ _ALIKE, _APART = 0.78, 0.08  # least likeness of a misspelt word to its neighbou
 _SHORTEST_NOUN, _SHORTEST_PART = 3, 4  # letters of an English word, and of each half of "footstool"
 _ONLY_ROOMS = frozenset({"room", "area", "zone", "hall", "corner"})
 _UNNAMEABLE = frozenset({"the", "a", "an", "my", "your", "to", "is", "are", "it", "i", "you", "me"})
-# Verbs that sound, and are said of much that does not: "the chair that goes with it", "the boy who is running".
-SILENT = frozenset({
-    "goes", "going", "went", "falls", "falling", "fell", "runs", "running", "ran", "steps", "stepping", "stepped",
-    "plays", "playing", "played", "calls", "calling", "called", "brushes", "brushing", "brushed",
-    "sweeps", "sweeping", "swept",
-    "stirs", "stirring", "stirred", "cooks", "cooking", "cooked", "fries", "frying", "fried", "stomps", "breathes",
-})  # fmt: skip
-# Things that only their sound identifies.
-NAMELESS = frozenset({
-    "thing", "object", "item", "device", "machine", "appliance", "gadget", "equipment", "something", "anything",
-})  # fmt: skip
 
 
 def is_known(name: str) -> bool:
@@ -181,8 +170,8 @@ def sounds_like(word: str) -> bool:
 
 def sounding_thing(word: str = "", noun: str = "") -> bool:
     """Return whether words name a thing by its sound alone: "beeping device"; not "sewing machine", "ringing phone"."""
-    sounds = word.endswith("ing") and word in _forms() and word not in SILENT
-    return sounds and noun in NAMELESS and not _is_name(f"{word} {noun}")
+    sounds = word.endswith("ing") and word in _forms() and word not in listed("silent")
+    return sounds and noun in listed("nameless") and not _is_name(f"{word} {noun}")
 
 
 def sounding_words() -> frozenset[str]:

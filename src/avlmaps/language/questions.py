@@ -17,10 +17,10 @@ from avlmaps.language.learned.reader import Read, learned_reader
 from avlmaps.language.learned.said import Said
 from avlmaps.language.learned.unmet import unmet_by
 from avlmaps.language.list_questions import SUPPORTED
-from avlmaps.language.names import SILENT, is_entry, is_known, sounding_forms, sounds_like, third_forms
+from avlmaps.language.names import is_entry, is_known, sounding_forms, sounds_like, third_forms
 from avlmaps.language.own_names import stand_ins
 from avlmaps.language.sentence import Given, Sentence
-from avlmaps.language.word_classes import load_word_classes
+from avlmaps.language.word_classes import listed, load_word_classes
 
 _EXAMPLE = "the chair near the sound of glass breaking, or: the table in the kitchen"
 _NO_USE = f"What serves that purpose is not known; name the thing, like: {_EXAMPLE}."
@@ -127,7 +127,7 @@ def read_question(text: str, given: Given | None = None) -> AskedSentence:
 def _where_it_sounds(text: str) -> str:
     """Return a question for the place of what sounds ("what is ringing?"); other questions as they are."""
     found = _WHAT_SOUNDS.match(text.lower())
-    if found is None or found["verb"] in SILENT or found["verb"] not in sounding_forms():
+    if found is None or found["verb"] in listed("silent") or found["verb"] not in sounding_forms():
         return text
     if not found["is"] and found["verb"] not in third_forms():
         return text

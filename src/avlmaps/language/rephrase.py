@@ -18,27 +18,15 @@ from functools import cache
 
 from avlmaps.language import lexer
 from avlmaps.language.lexer import Token
-from avlmaps.language.names import NAMELESS, describes, is_entry, sounding_forms, sounding_thing, third_forms
-from avlmaps.language.word_classes import load_word_classes
+from avlmaps.language.names import describes, is_entry, sounding_forms, sounding_thing, third_forms
+from avlmaps.language.word_classes import listed, load_word_classes
 
 _ROBOTS = frozenset({"robot", "bot", "machine", "rover", "droid", "vehicle", "unit", "roomba", "turtlebot", "agent"})
 _ARTICLES = frozenset({"the", "my", "your", "our", "this", "that", "a"})
 _PRONOUNS = frozenset({"it", "him", "her"})
-_SEND = frozenset({
-    "send", "bring", "take", "put", "dispatch", "direct", "route", "deploy", "get", "position", "place", "guide",
-    "steer",
-})  # fmt: skip
-_SAME = frozenset({
-    "move", "drive", "navigate", "park", "turn", "rotate", "spin", "stop", "halt", "pause", "back", "reverse", "point",
-    "face",
-})  # fmt: skip
 _WANT = frozenset({"want", "need", "like"})
 _PLACED = frozenset({"by", "at", "in", "near", "beside", "behind", "next", "over", "inside"})
 _TURNED = frozenset({"turn", "rotate", "yaw", "spin", "pivot", "left", "right", "by", "clockwise", "counterclockwise"})
-_ROUNDS = frozenset({
-    "turn", "turns", "revolution", "revolutions", "rev", "revs", "rotation", "rotations", "spin", "spins", "circle",
-    "circles",
-})  # fmt: skip
 _WHOLE = frozenset({"full", "complete", "whole", "more", "entire"})
 _SPINS = frozenset({"turn", "rotate", "spin", "pivot", "swivel", "yaw"})
 _MAKES = frozenset({"do", "make", "take", "perform"})
@@ -56,15 +44,6 @@ _BESIDE = frozenset({"beside", "by", "near", "nearest", "closest", "alongside"})
 _TELL = frozenset({"tell", "ask", "order", "command", "instruct"})
 _LET = frozenset({"have", "let", "make"})
 _BEFORE = frozenset({"and", "then", "please", "now", "next", "finally", "also", "first", "ok", "just", "you", "to"})
-_ASKING = frozenset({
-    "someone", "somebody", "anyone", "anybody", "can", "could", "would", "will", "us", "we", "should", "must", "i",
-    "kindly", "better", "want",
-})  # fmt: skip
-_AFTER_SEND = frozenset({
-    "to", "into", "over", "down", "up", "towards", "toward", "through", "next", "near", "beside", "behind", "in", "by",
-    "at", "back", "out", "onto", "there", "here", "home", "between", "left", "right", "away", "off", "on", "along",
-    "round", "around", "from", "forward", "ahead", "across", "past", "inside", "where",
-})  # fmt: skip
 _NO_CLAUSE_END = frozenset(
     {"wait", "waiting", "stay", "heard", "was", "were", "rang", "barked", "pause", "hold", "count"}
 )
@@ -72,41 +51,12 @@ _LABELLED = frozenset({"labelled", "labeled", "tagged", "named", "called", "titl
 _LABELS = frozenset({"class", "type", "label", "category", "tag", "name"})
 _SOUNDS = frozenset({"sound", "noise"})
 _ANY = frozenset({"anything", "something", "one"})
-_GENERIC = (
-    frozenset(
-        {
-            "thing",
-            "object",
-            "item",
-            "instance",
-            "room",
-            "place",
-            "area",
-            "location",
-            "goal",
-            "target",
-            "destination",
-            "waypoint",
-            "landmark",
-        }
-    )
-    | _ANY
-    | _SOUNDS
-)
 _WHATEVER = frozenset({"what", "whatever", "whoever"})
 _RELATIVE = frozenset({"that", "which", "who"})
 _CUTS = frozenset({"then", "finally"})
 # Who says what they heard, saw or think, and how: "I think I heard the kettle; go to the kitchen".
 _SPEAKERS = frozenset({"i", "we", "he", "she", "they", "someone", "somebody", "everyone", "everybody"})
-_REMARKS = frozenset({
-    "think", "thought", "believe", "believed", "reckon", "guess", "suppose", "swear", "know", "knew", "remember",
-    "heard", "hear", "hearing", "saw", "see", "seen", "seeing", "smell", "smelled", "smelt", "notice", "noticed",
-    "spotted", "felt", "feel", "fear", "bet",
-})  # fmt: skip
 _FAR = 4  # words from who speaks to what they do: "my wife must have heard"
-_POINTING = frozenset({
-    "it", "there", "that", "this", "these", "those", "them", "him", "her", "one", "its", "where", "same",
-})  # fmt: skip
 _ASKED_FOR = _BEFORE | {"can", "could", "would", "will", "so", "kindly", "robot", "maybe", "perhaps", "dear", ","}
 
 
@@ -126,7 +76,9 @@ def behind_remark(tokens: Sequence[Token]) -> int | None:
     begin = next((at for at, token in enumerate(tokens) if token.text not in _BEFORE | {"well", ",", "robot"}), 0)
     if begin >= len(tokens) or tokens[begin].text not in _SPEAKERS:
         begin = begin + 1 if [token.text for token in tokens[begin : begin + 1]] == ["my"] else len(tokens)
-    told = next((at for at in range(begin, min(begin + _FAR, len(tokens))) if tokens[at].text in _REMARKS), None)
+    told = next(
+        (at for at in range(begin, min(begin + _FAR, len(tokens))) if tokens[at].text in listed("remarks")), None
+    )
     if told is None:
         return None
     for at in range(told + 1, len(tokens)):
@@ -135,7 +87,7 @@ def behind_remark(tokens: Sequence[Token]) -> int | None:
         first = next((i for i in range(at + 1, len(tokens)) if tokens[i].text not in _ASKED_FOR), len(tokens))
         rest = [token.text for token in tokens[first:]]
         if rest[:1] and rest[0] in order_words():
-            own = _POINTING.isdisjoint(rest) and any(map(is_entry, rest))
+            own = listed("pointing").isdisjoint(rest) and any(map(is_entry, rest))
             return tokens[first].start if own else None
     return None
 
@@ -245,7 +197,7 @@ def _turns(tokens: list[Token], at: int, before: list[Token]) -> tuple[int, floa
         circles, times = unit in ("circle", "circles"), unit == "times"
         if circles and [token.text for token in tokens[end + 1 : end + 2]] in (["around"], ["round"]):
             continue  # a thing
-        if (unit not in _ROUNDS and not times) or ((circles or times) and not (spins or (circles and makes))):
+        if (unit not in listed("rounds") and not times) or ((circles or times) and not (spins or (circles and makes))):
             continue
         end += 1
         if [token.text for token in tokens[end : end + 3]] == ["and", "a", "half"]:  # "a turn and a half"
@@ -297,8 +249,10 @@ def _sounding(tokens: Sequence[Token]) -> list[Token]:
     found: list[Token] = []
     for token in tokens:
         before = [one.text for one in found[-2:]]
-        relates = before[-1:] and (before[-1] in _WHATEVER or (before[-1] in _RELATIVE and before[0] in _GENERIC))
-        relates = relates or (before[-1:] and before[-1] in _RELATIVE and before[0] in NAMELESS)
+        relates = before[-1:] and (
+            before[-1] in _WHATEVER or (before[-1] in _RELATIVE and before[0] in listed("generic"))
+        )
+        relates = relates or (before[-1:] and before[-1] in _RELATIVE and before[0] in listed("nameless"))
         if relates and token.text in third_forms():
             found += [_word(token, "is"), _word(token, sounding_forms()[token.text])]
         else:
@@ -351,7 +305,7 @@ def _said_to_it(tokens: list[Token]) -> list[Token]:
     found: list[Token] = []
     at = 0
     while at < len(tokens):
-        asks = at > 0 and tokens[at - 1].text in _ASKING
+        asks = at > 0 and tokens[at - 1].text in listed("before_orders")
         end, kept = _third(tokens, at) if _begins(tokens, at) or asks else (at, [])
         if end > at:
             found += kept
@@ -368,14 +322,14 @@ def _third(tokens: list[Token], at: int) -> tuple[int, list[Token]]:
     end = _robot(tokens, at + 1)
     robot = end > at + 1
     follows = tokens[end].text if end < len(tokens) else ""
-    if verb in _SEND and robot and follows in _AFTER_SEND:
+    if verb in listed("sent") and robot and follows in listed("behind_sent"):
         return end, [_word(tokens[at], "go")]
     if verb in _WANT and robot and follows in _PLACED:
         return end, [_word(tokens[at], word) for word in ("want", "you", "to", "go")]
     if verb == "send" and tokens[at + 1 : at + 2] and tokens[at + 1].text in _PRONOUNS:
         after = tokens[at + 2].text if at + 2 < len(tokens) else ""
-        return (at + 2, [_word(tokens[at], "go")]) if after in _AFTER_SEND else (at, [])
-    if verb in _SAME and robot:
+        return (at + 2, [_word(tokens[at], "go")]) if after in listed("behind_sent") else (at, [])
+    if verb in listed("driven") and robot:
         return end, [tokens[at]]
     return _told(tokens, at, end, robot=robot) if verb in _TELL | _LET else (at, [])
 
@@ -495,7 +449,7 @@ def _unlabelled(tokens: list[Token]) -> list[Token]:
     found: list[Token] = []
     at = 0
     while at < len(tokens):
-        end = _label_end(tokens, at) if tokens[at].text in _GENERIC else at
+        end = _label_end(tokens, at) if tokens[at].text in listed("generic") else at
         if end == at or end >= len(tokens) or tokens[end].kind != "word":
             found.append(tokens[at])
             at += 1

@@ -9,7 +9,8 @@ from collections.abc import Collection, Iterator, Sequence
 from itertools import pairwise
 
 from avlmaps.language.lexer import Token
-from avlmaps.language.names import SILENT, past_forms, sounding_thing, sounding_words, sounds_like, third_forms
+from avlmaps.language.names import past_forms, sounding_thing, sounding_words, sounds_like, third_forms
+from avlmaps.language.word_classes import listed
 
 # Whose way it is, and no sound's: "go back to where you came from".
 _WHO = ("you", "we", "i", "they", "he", "she", "robot")
@@ -59,7 +60,7 @@ def _sounds_itself(text: str, sound: Collection[str]) -> bool:
         return True
     for found in _ITSELF.finditer(text):
         verb = found[2]
-        if verb not in sound if sound else verb in SILENT:
+        if verb not in sound if sound else verb in listed("silent"):
             continue
         if found[1] and (sounds_like(verb) or verb in sounding_words()):
             return True

@@ -15,25 +15,8 @@ from avlmaps.language.lexer import Token
 from avlmaps.language.names import class_words
 
 _CLAUSES = frozenset({"then", "and", "so", "because", "but", "as", "for"})
-# What follows these is part of the order, or changes it.
-_TELLING = frozenset({
-    "over", "through", "thru", "via", "across", "beneath", "without", "despite", "notwithstanding", "during", "amid",
-    "among", "amongst", "lest", "minus", "until", "till", "unless", "pending", "barring", "throughout", "excluding",
-})  # fmt: skip
 _EVENTS = frozenset({"before", "after", "when", "whenever", "once", "while", "whilst", "until", "till"})
-# Who or what does something, and is not the robot.
-_OTHERS = frozenset({
-    "i", "he", "she", "they", "we", "someone", "somebody", "anyone", "anybody", "everyone", "everybody", "nobody",
-})  # fmt: skip
-_EMPTY = DETERMINERS | {
-    "there", "here", "it", "you", "me", "him", "them", "us", "all", "again", "please", "is", "are", "arrive", "get",
-    "clock", "direction", "delay", "haste", "fail", "fuss", "hurry", "stopping", "done", "reach",
-}  # fmt: skip
 _STAYS = frozenset({"wait", "stay", "remain", "hold", "stand", "still", "put", "pause", "rest"})
-_RUNS = frozenset({
-    "drive", "driving", "run", "running", "race", "rush", "roll", "speed", "charge", "go", "move", "head", "dash",
-    "zoom", "straight", "right", "directly", "up",
-})  # fmt: skip
 _OVER = frozenset({"over", "across", "onto", "under", "beneath", "underneath", "against", "through", "into", "via"})
 _IS = frozenset({"is", "are", "was", "were", "lies", "sits", "stands", "hides"})
 _BELOW = frozenset({"under", "beneath", "underneath"})
@@ -55,7 +38,7 @@ def runs_down(said: Said) -> bool:
             continue
         if text in _OVER and noun[-1] in (living | vehicles if text in _BELOW else living):
             return True
-        if text == "at" and before and before[0] in _RUNS and noun[-1] in living:
+        if text == "at" and before and before[0] in words().lists["runs"] and noun[-1] in living:
             return True
         if text == "on" and said.texts[max(0, at - 2) : at] in (("sneak", "up"), ("creep", "up")):
             return noun[-1] in living
@@ -98,13 +81,13 @@ def _is_to_be_so(after: Sequence[str]) -> bool:
 def unaccounted(said: Claimed) -> Clarify | None:
     """Return the question for a part of the order that the reading has nothing of: "via the garden"."""
     for at, text in enumerate(said.texts):
-        if at in said.used or text not in _TELLING | _EVENTS:
+        if at in said.used or text not in words().lists["telling"] | _EVENTS:
             continue
         scope = said.scope(at + 1, (BREAKS - _EVENTS) | PREPOSITIONS)
         about = [said.texts[i] for i in sorted(scope)]
-        if scope & said.used or not set(about) - _EMPTY:
+        if scope & said.used or not set(about) - (DETERMINERS | words().lists["empty"]):
             continue
-        if text in _EVENTS and not (about[0] in _OTHERS and _STAYS.isdisjoint(said.texts[:at])):
+        if text in _EVENTS and not (about[0] in words().lists["doers"] and _STAYS.isdisjoint(said.texts[:at])):
             continue
         phrase = said.said(at, scope)
         return Clarify(f"What is '{phrase}' for? Say where to go, step by step, and nothing else.")

@@ -15,30 +15,13 @@ from avlmaps.language.learned.said import DETERMINERS, PREPOSITIONS, Claimed, wo
 from avlmaps.language.names import describes, is_entry, sounding_words, sounds_like
 
 ANSWERS = "it answers where things and sounds are, how many there are, and whether there is one."
-_AUXILIARIES = frozenset({
-    "is", "are", "was", "were", "am", "did", "do", "does", "has", "have", "had", "can", "could", "will", "would", "may",
-    "might", "should", "must",
-})  # fmt: skip
 _CAN = frozenset({"can", "could", "may", "might"})
 _MAY = frozenset({"can", "could", "may", "might", "should", "must", "will", "would"})
-# Where another clause begins, whose words are no part of the question.
-_CUTS = frozenset({
-    "then", "and", "so", "because", "but", "as", "for", "if", "while", "before", "after", "when", "where", "which",
-    "who", "whether", "or", "than", "like", "since", "until", "what", "how",
-})  # fmt: skip
 _ASKS = frozenset({"where", "which", "what", "how", "who", "why", "whereabouts"})
 _ENDS = frozenset({".", "?", "!", ";"})
 _CORRECTS = frozenset({"no", "sorry", "rather", "forget", "mean", "meant", "er", "scratch", "wait", "pardon", "said"})
-_OPENS = frozenset({
-    "please", "hey", "hi", "hello", "robot", "so", "ok", "um", "uh", "er", "oh", "well", "say", "now", "tell", "me",
-    "know", "you", "yo", "dude", "excuse", "sorry", "pardon", "pray", "quick", "just",
-})  # fmt: skip
 _PUTS = frozenset({"put", "place", "hang", "throw", "chuck", "dump", "toss", "dispose", "pour", "rinse", "set"})
 _SELVES = frozenset({"i", "we", "one"})
-_FINDS = frozenset({
-    "find", "see", "get", "have", "hear", "locate", "spot", "reach", "pick", "grab", "fetch", "look", "expect", "go",
-    "be", "collect", "discover", "come", "leave", "a", "an", "the", "some", "any", "my", "our",
-})  # fmt: skip
 _DID = frozenset({"did", "do", "does", "has", "have", "had"})
 _NUMBERED = frozenset({"pair", "floor", "storey", "story", "level", "hand"})
 
@@ -64,18 +47,18 @@ def _yes_or_no(said: Claimed) -> list[list[int]]:
     """Return the clauses that ask whether something is so, of what the reading names: each as its tokens."""
     clauses: list[list[int]] = [[]]
     for at, token in enumerate(said.tokens):
-        if token.kind == "punct" or token.text in _CUTS:
+        if token.kind == "punct" or token.text in words().lists["cuts"]:
             clauses.append([])
         else:
             clauses[-1].append(at)
     found: list[list[int]] = []
     for clause in clauses:
-        begin = next((at for at, i in enumerate(clause) if said.texts[i] not in _OPENS), len(clause))
+        begin = next((at for at, i in enumerate(clause) if said.texts[i] not in words().lists["openers"]), len(clause))
         body = clause[begin:]
         if (
             body
             and not _is_asked_for(said, body[0])
-            and said.texts[body[0]] in _AUXILIARIES
+            and said.texts[body[0]] in words().lists["auxiliaries"]
             and not said.used.isdisjoint(body)
         ):
             found.append(body)
@@ -151,7 +134,12 @@ def _unserved(said: Claimed, _: Inquiry) -> str | None:
     for at, text in enumerate(said.texts[:-3] if _CORRECTS.isdisjoint(said.texts) else ()):
         asks = text == "where" and said.texts[at + 1] in _CAN and said.texts[at + 2] in _SELVES
         verb = at + 3 + (said.texts[at + 3] in ("best", "please", "now", "possibly", "perhaps"))
-        if asks and verb < len(said.texts) - 1 and verb not in said.used and said.texts[verb] not in _FINDS:
+        if (
+            asks
+            and verb < len(said.texts) - 1
+            and verb not in said.used
+            and said.texts[verb] not in words().lists["finds"]
+        ):
             return " ".join(said.texts[at : verb + 1])
     return None
 
@@ -220,7 +208,7 @@ def _done(said: Claimed, _: Inquiry) -> str | None:
     """Return the words for what is to be done with the thing that is sought: "anything to read"."""
     for at, text in enumerate(said.texts[:-1]):
         whatever = said.texts[max(0, at - 1) : at]
-        if text == "to" and said.texts[at + 1] not in _FINDS and set(whatever) & _WHATEVER:
+        if text == "to" and said.texts[at + 1] not in words().lists["finds"] and set(whatever) & _WHATEVER:
             return " ".join(said.texts[at - 1 : at + 2])
     return None
 

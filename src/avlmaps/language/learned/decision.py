@@ -29,48 +29,12 @@ from avlmaps.language.intents import (
 from avlmaps.language.intents import Move as MoveIntent
 from avlmaps.language.learned.limits import Limits
 from avlmaps.language.learned.linear import amount_end
+from avlmaps.language.learned.said import words
 from avlmaps.language.lexer import Token
 from avlmaps.language.verbalise import verbalise
 
 DANGERS = (Reason.HARM, Reason.FLYING, Reason.ENDLESS, Reason.CONDITION, Reason.NEGATION)
-# Words that can turn a command round.
-MEANING = frozenset({
-    "not", "no", "never", "unless", "if", "without", "except", "or", "nor", "neither", "avoid", "until", "instead",
-    "rather", "skip", "forget", "cancel", "actually", "sorry", "apart", "excluding",
-    "unlike", "mean", "scratch", "correction", "wait", "otherwise", "whenever", "whether",
-    "before", "beforehand", "previously", "again", "same", "more", "other", "both", "mind", "whichever", "half",
-})  # fmt: skip
 _SMALL_WORDS = frozenset({"a", "an", "one", "some", "first", "second", "half", "couple", "few", "several"})
-# Words of the lexicon that mostly say something else in a command.
-_NO_NAMES = frozenset({
-    "way", "place", "spot", "side", "back", "front", "end", "step", "steps", "robot", "turn", "face", "look", "left",
-    "right", "stop", "rest", "point", "light", "top", "bottom", "person", "people", "everyone",
-    "guest", "guests", "man",
-    "woman", "kid", "kids", "child", "children", "mum", "mother", "doctor", "nurse", "room",
-    "area", "home", "house",
-    "floor", "stand", "store", "park", "position", "sound", "noise", "picture", "photo", "image", "recording", "clip",
-    "view", "pass", "block", "range", "board", "trip", "round", "lap", "drive", "corner", "hand", "foot",
-})  # fmt: skip
-_WHO = frozenset(
-    {
-        "playing",
-        "sounding",
-        "going",
-        "off",
-        "noise",
-        "someone",
-        "somebody",
-        "anyone",
-        "anybody",
-        "person",
-        "people",
-        "a",
-        "the",
-        "of",
-        "on",
-        "sound",
-    }
-)
 _WORTH_ASKING = 0.1
 
 
@@ -174,13 +138,13 @@ def _rounded(intent: Intent) -> Intent:
 def _plain(target: Target) -> Target:
     """Return a target that is the same however it is written."""
     near = tuple(sorted({_plain(one) for one in _flat_near(target)}, key=str))
-    words = target.name.lower().replace("-", " ").split()
+    own = target.name.lower().replace("-", " ").split()
     if target.kind is TargetKind.SOUND:
-        name = " ".join(sorted(stem_of(word) for word in words if word not in _WHO))
+        name = " ".join(sorted(stem_of(word) for word in own if word not in words().lists["round_sounds"]))
     elif target.is_file:
         name = target.name
     else:
-        name = " ".join([*words[:-1], next(iter(singulars_of(words[-1])), words[-1])]) if words else ""
+        name = " ".join([*own[:-1], next(iter(singulars_of(own[-1])), own[-1])]) if own else ""
     kind = TargetKind.OBJECT if target.kind is TargetKind.AREA else target.kind
     return Target(kind, name, near, Pick.ANY if target.pick is Pick.NEAREST else target.pick)
 
@@ -197,7 +161,7 @@ def is_doubtful(tokens: Sequence[Token], used: frozenset[int], *, waits: bool = 
         used: the tokens that the reading points at.
         waits: whether the reading has a wait in it, so that the word is no "no, wait".
     """
-    if any(token.text in MEANING and not (waits and token.text == "wait") for token in tokens):
+    if any(token.text in words().lists["turning"] and not (waits and token.text == "wait") for token in tokens):
         return True
     covered = {at for start in used for at in range(start, max(start + 1, amount_end(tokens, start)))}
     said = {tokens[at].text for at in covered}
@@ -208,7 +172,7 @@ def is_doubtful(tokens: Sequence[Token], used: frozenset[int], *, waits: bool = 
 
 def _is_name(token: Token, said: set[str]) -> bool:
     """Return whether a word is the name of a thing or a room that no reading has."""
-    if token.kind != "word" or token.text in said or token.text in _NO_NAMES or len(token.text) < 3:
+    if token.kind != "word" or token.text in said or token.text in words().lists["no_names"] or len(token.text) < 3:
         return False
     return any(lexicon().find(token.text, kind) is not None for kind in (EntryKind.THING, EntryKind.ROOM))
 

@@ -10,19 +10,11 @@ from avlmaps.language.learned.linear import amount_end
 from avlmaps.language.learned.said import BREAKS, HEARD, LOOKS, PREPOSITIONS, TURNS, Said, words
 from avlmaps.language.lexer import Token
 
-_DRIVES = frozenset({
-    "drive", "move", "roll", "forward", "forwards", "ahead", "straight", "backward", "backwards", "reverse", "left",
-    "right", "rotate", "spin", "turn",
-})  # fmt: skip
 _ROUND = frozenset({"left", "right", "clockwise", "counterclockwise", "anticlockwise", "cw", "ccw"})
 _FAST_AS = {("fast", "as"), ("quick", "as"), ("quickly", "as"), ("hard", "as")}
 _SHARES = frozenset(
     {"part", "some", "most", "third", "thirds", "quarter", "quarters", "fifth", "fifths", "percent", "%"}
 )
-_TAKES_SIGN = TURNS | {
-    "move", "translate", "forward", "forwards", "back", "drive", "go", "by", "advance", "x", "y", "=", "(", "left",
-    "right",
-}  # fmt: skip
 _MOTIONS_WITH_SIGN = frozenset({"move", "translate", "forward", "forwards", "back", "drive", "advance"})
 
 
@@ -103,7 +95,7 @@ def _timed(said: Said) -> Clarify | Refuse | None:
             return Clarify(f"'{phrase}': the robot knows no deadline. Say only where to go.")
         if text == "every":
             return Refuse(Reason.ENDLESS)
-        if text == "for" and at and said.texts[at - 1] in _DRIVES:
+        if text == "for" and at and said.texts[at - 1] in words().lists["drives"]:
             return Clarify(f"'{phrase}': say how far to drive or to turn, not how long.")
     return None
 
@@ -119,7 +111,7 @@ def _signed(said: Said) -> Clarify | None:
             return Clarify(f"What does the {text} behind the number mean? Say it without a sign.")
         if text not in ("minus", "negative", "plus", "-", "+", "±") or not _is_number(tokens, at + 1, text):
             continue
-        if text == "-" and not (at and said.texts[at - 1] in _TAKES_SIGN):
+        if text == "-" and not (at and said.texts[at - 1] in (TURNS | words().lists["signed"])):
             continue
         end = amount_end(tokens, at + 1)
         sign = "-" if text in ("minus", "negative", "-") else text.replace("plus", "+")

@@ -8,7 +8,8 @@ of (four places in a row are more than the networks can count), sentences that e
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 
-from avlmaps.language.learned.decision import MEANING, Weighed, is_same
+from avlmaps.language.learned.decision import Weighed, is_same
+from avlmaps.language.learned.said import words
 from avlmaps.language.lexer import Token
 
 _CERTAIN, _LEAST = 0.9, 0.1  # of each part alone, and of the same reading of the whole
@@ -16,18 +17,13 @@ _ALONE = 0.95  # of each part, where the whole has no reading as likely as _LEAS
 _ENDS = frozenset({".", ";", "!", "then", "finally"})
 _LEADS = frozenset({",", "and", *_ENDS})
 _OPENS = "first"  # there it changes no order
-# Words that refer to another sentence, or put its orders in another order.
-_REFERS = frozenset({
-    "it", "there", "that", "them", "this", "its", "they", "those", "one", "ones", "each", "first", "last",
-    "before", "after", "once", "when", "while", "twice", "times", "repeat", "return", "back", "round", "also", "too",
-}) | MEANING  # fmt: skip
 
 
 def parts_of(tokens: Sequence[Token]) -> list[list[Token]]:
     """Return the sentences of a command; none where it has one, or where one refers to another."""
     if tokens and tokens[0].text == _OPENS:
         tokens = tokens[1:]
-    if not _REFERS.isdisjoint(token.text for token in tokens):
+    if not (words().lists["turning"] | words().lists["referring"]).isdisjoint(token.text for token in tokens):
         return []
     cuts = [0, *(at for at, token in enumerate(tokens) if token.text in _ENDS), len(tokens)]
     parts = [_trimmed(tokens[start:end]) for start, end in pairwise(cuts)]

@@ -1,15 +1,10 @@
 """Reports of a drive, and questions about one, which order none: "did you go to the kitchen?", "I went to the sofa"."""
 
 from avlmaps.language.intents import Clarify
-from avlmaps.language.learned.said import Claimed
+from avlmaps.language.learned.said import Claimed, words
 from avlmaps.language.rephrase import order_words
 
 _ENDS = frozenset({".", ";", "?", "!", ":", ",", "but", "so"})
-_OPENS = frozenset({
-    "so", "and", "but", "hey", "hi", "ok", "well", "robot", "please", "then", "yesterday", "today", "earlier", "now",
-    "week", "month", "year", "morning", "evening", "night", "afternoon", "apparently", "maybe", "say", "ago",
-    "the", "anyway", "before",
-})  # fmt: skip
 # What is wished or said of a thing is no report: "if you went", "the chair where you were".
 _RELATES = frozenset({"if", "rather", "wish", "where", "wherever", "that", "which", "whereas", "while", "since"})
 
@@ -17,7 +12,11 @@ _RELATES = frozenset({"if", "rather", "wish", "where", "wherever", "that", "whic
 def reported(said: Claimed) -> Clarify | None:
     """Return the question for a drive that a sentence reports or queries, where the reading holds nothing else."""
     for start, end in said.spans("reports"):
-        opens = start == 0 or said.tokens[start - 1].kind == "punct" or said.texts[start - 1] in _OPENS
+        opens = (
+            start == 0
+            or said.tokens[start - 1].kind == "punct"
+            or said.texts[start - 1] in words().lists["before_reports"]
+        )
         if not opens or not _RELATES.isdisjoint(said.texts[max(0, start - 2) : start]):
             continue
         stop = next((at for at in range(end, len(said.texts)) if said.texts[at] in _ENDS), len(said.texts))

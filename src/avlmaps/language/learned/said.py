@@ -43,29 +43,7 @@ class Words:
 def words() -> Words:
     """Return the phrases and lists that ship."""
     told = tomllib.loads(files("avlmaps.language").joinpath("claims.toml").read_text(encoding="utf-8"))
-    classes = (
-        "away",
-        "farthest",
-        "nearest",
-        "leaving",
-        "excluded",
-        "outside",
-        "bans",
-        "scales",
-        "choosing",
-        "changed",
-        "cancels",
-        "conditions",
-        "ways",
-        "unsafe",
-        "risks",
-        "questions",
-        "reports",
-        "times",
-        "signals",
-        "quantities",
-        "past",
-    )
+    classes = [name for name, text in told.items() if "|" in text]
     phrases: dict[str, dict[str, list[tuple[str, ...]]]] = {name: {} for name in classes}
     for name in classes:
         for phrase in expanded(told[name]):

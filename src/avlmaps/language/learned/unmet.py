@@ -42,14 +42,6 @@ from avlmaps.perception.embedded.words import is_word
 _MOTIONS = frozenset({"go", "drive", "head", "move", "turn", "face", "visit", "come", "do"})
 _ANYTHING = frozenset({"something", "anything", "somewhere", "anywhere", "someplace"})
 _NO_SOUNDS = frozenset({"went", "gone", "going", "snapped", "snapping", "called", "fell", "fallen", "played"})
-_HERE = frozenset({
-    "from", "here", "you", "yourself", "robot", "your", "current", "position", "the", "where", "are", "stand", "now",
-})  # fmt: skip
-_NO_SUPERLATIVES = frozenset({
-    "forest", "interest", "honest", "modest", "request", "harvest", "arrest", "invest", "suggest", "digest", "protest",
-    "contest", "priest", "conquest", "nearest", "closest", "farthest", "furthest", "farest", "latest", "remotest",
-    "guest", "guests", "chest", "crest", "quest", "wrest",
-})  # fmt: skip
 _ONLY_ORDERS = frozenset({("skip",), ("skipping",), ("avoid",), ("avoiding",), ("exclude",), ("bypass",), ("never",)})
 _ORDINALS = frozenset({"second", "third", "fourth", "fifth", "last", "next", "previous"})
 _NUMBERED = frozenset({"floor", "class", "storey", "story", "level", "hand"})
@@ -59,9 +51,6 @@ _BACKWARDS = frozenset({"backward", "backwards", "reverse", "reversing"})
 _VAGUE = frozenset({"a", "an", "one", "another"})
 _COUNTED_ON = frozenset({"nearest", "closest", "farthest", "furthest", "next", "last", "first"})
 _FAR_BACK = 4
-_BESIDE = frozenset({
-    "beside", "by", "near", "next", "close", "opposite", "behind", "alongside", "nearest", "closest",
-})  # fmt: skip
 _ONES = (("the", "one"), ("the", "ones"))
 _ONE_TO_A_SIDE = tuple(("then", "one", "to", "the", side) for side in ("left", "right"))
 _OF_SIDES = (("of",), ("side",), ("from",))
@@ -85,7 +74,7 @@ def _away(said: Claimed) -> Clarify | None:
         about = said.content(scope)
         if "not" in before or "equally" in before or kept:
             continue
-        if set(about[:2]) <= _HERE and (picked or said.texts[end - 1 : end] == ("from",)):
+        if set(about[:2]) <= words().lists["here"] and (picked or said.texts[end - 1 : end] == ("from",)):
             continue
         if picked and "from" not in said.texts[start : end + 1]:
             continue
@@ -115,7 +104,7 @@ def _picked(said: Claimed) -> Clarify | None:
         at = next((at for at, word in enumerate(after) if word in ("from", "to")), None)
         if at is not None and not any(token.kind == "punct" for token in said.tokens[end : end + at]):
             about = said.content(said.scope(end + at + 1))
-            if after[at] == "from" and not set(about[:1]) <= _HERE:
+            if after[at] == "from" and not set(about[:1]) <= words().lists["here"]:
                 return Clarify("The farthest is counted from the robot. Say what it is near, or its room.")
         if not far_picks:
             return Clarify("The farthest of what? Say it like: go to the farthest chair.")
@@ -129,7 +118,7 @@ def _beside_one(said: Claimed) -> Clarify | None:
         another = pair in _ONES and said.texts[at - 1 : at] in (("and",), ("then",)) and _is_place(said, at + 2)
         if another and len({target for target in said.targets if target.kind is TargetKind.OBJECT}) < 2:
             return Clarify(f"'{said.said(at, said.scope(at))}': say its name again, such as: and the chair there.")
-        if pair in _ONES and at and said.texts[begin] in _BESIDE:
+        if pair in _ONES and at and said.texts[begin] in words().lists["beside"]:
             scope = said.scope(at + 2)
             if scope:
                 return Clarify(f"'{said.said(begin, scope)}': 'one' is no name there; name the thing, or its room.")
@@ -137,7 +126,7 @@ def _beside_one(said: Claimed) -> Clarify | None:
 
 
 def _is_place(said: Claimed, at: int) -> bool:
-    return at < len(said.texts) and said.texts[at] in _BESIDE | PREPOSITIONS
+    return at < len(said.texts) and said.texts[at] in words().lists["beside"] | PREPOSITIONS
 
 
 def _compass(said: Claimed) -> Clarify | None:
@@ -331,7 +320,7 @@ def _is_quality(said: Claimed, at: int) -> bool:
 
 def is_superlative(word: str) -> bool:
     """Return whether a word is the highest degree of an adjective: "quietest"."""
-    if not word.endswith("est") or len(word) < 6 or word in _NO_SUPERLATIVES:
+    if not word.endswith("est") or len(word) < 6 or word in words().lists["no_superlatives"]:
         return False
     if any(lexicon().find(word, kind) is not None for kind in (EntryKind.THING, EntryKind.ROOM)):
         return False
