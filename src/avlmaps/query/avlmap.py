@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from avlmaps.core.arrays import Float, Float16, Int, Int32, UInt8
+from avlmaps.core.arrays import Float, Float16, Int32, UInt8
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import BackendError, MapError, QueryError
 from avlmaps.core.files import user_path
@@ -218,7 +218,7 @@ class AVLMap:
         self, encoder: PixelEncoder, rivals: Vocabulary, rgb: UInt8[np.ndarray, "n 3"] | None = None
     ) -> FeatureVoxels:
         feature, settings = self.stored.voxels.feature, self.settings.objects
-        return FeatureVoxels(self.space, feature, encoder, rivals, settings, rgb, _RoomsOnDemand(self))
+        return FeatureVoxels(self.space, feature, encoder, rivals, settings, rgb, lambda: self.things_in_rooms)
 
     def prepare(self) -> "AVLMap":
         """Store beside a large map what its questions need again, as the end of a build does; return the map.
@@ -839,19 +839,6 @@ class AVLMap:
             top=top, at=at,
         )  # fmt: skip
         return ask(self, asked, files)
-
-
-@dataclass(frozen=True, slots=True)
-class _RoomsOnDemand:
-    """What the rooms of a map say about instances; they are found when an instance is scored for the first time."""
-
-    avlmap: AVLMap
-
-    def nats(
-        self, names: tuple[str, ...], rows: Int[np.ndarray, " a"], instance: Int[np.ndarray, " a"], count: int
-    ) -> Float[np.ndarray, " i"] | None:
-        evidence = self.avlmap.things_in_rooms
-        return None if evidence is None else evidence.nats(names, rows, instance, count)
 
 
 def _photo(picture: "str | Path | Photo | UInt8[np.ndarray, 'h w 3']", intrinsics: Pinhole | None) -> "Photo":

@@ -5,6 +5,7 @@ parts over one another are joined, and what is too long for a thing of its name 
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +16,7 @@ from avlmaps.query import oversize
 from avlmaps.query.components import connected, distinct, linked
 from avlmaps.query.object_settings import ObjectSettings
 from avlmaps.query.synonyms import is_open
-from avlmaps.query.things_in_rooms import NO_ROOMS, RoomEvidence, with_rooms
+from avlmaps.query.things_in_rooms import ThingsInRooms, with_rooms
 from avlmaps.query.voxel_space import Space
 from avlmaps.query.words import EncodedWord, Scored, Vocabulary, scorer_of
 
@@ -93,7 +94,7 @@ class FeatureVoxels:
             encoder is one of names and these are all its names: then voxels with little of the word are not compared.
         settings: from a word to instances.
         rgb: their colours, with which an encoder of names is helped out that knows none; None where they do not count.
-        rooms: what the map's rooms say about instances.
+        rooms: finds the map's rooms, when an instance is scored for the first time; None where they say nothing.
     """
 
     space: Space
@@ -102,7 +103,7 @@ class FeatureVoxels:
     rivals: Vocabulary
     settings: ObjectSettings
     rgb: UInt8[np.ndarray, "n 3"] | None = None
-    rooms: RoomEvidence = NO_ROOMS
+    rooms: "Callable[[], ThingsInRooms | None]" = lambda: None
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,8 +208,8 @@ def score(
     if math.isfinite(longest_m):
         length_m = lengths_m(space, found) if length_m is None else length_m
         confidence = oversize.less_likely(confidence, length_m, longest_m)
-    if settings.room_weight > 0.0 and len(confidence):
-        nats = voxels.rooms.nats(word.clear_names(encoder), found.rows, found.instance, len(confidence))
+    if settings.room_weight > 0.0 and len(confidence) and (rooms := voxels.rooms()) is not None:
+        nats = rooms.nats(word.clear_names(encoder), found.rows, found.instance, len(confidence))
         if nats is not None:
             confidence = with_rooms(confidence, settings.room_weight * nats, settings.room_cost).astype(np.float32)
     return replace(found, confidence=confidence)

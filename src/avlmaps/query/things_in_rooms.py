@@ -1,7 +1,5 @@
 """How far the kind of room speaks for a thing that seems to stand in it: a stove in a bedroom is seldom one."""
 
-from typing import Protocol
-
 import numpy as np
 
 from avlmaps.core.arrays import Float, Float32, Int
@@ -12,26 +10,6 @@ from avlmaps.query.rooms import RoomField
 # What one room says about one thing lies between these, in nats. Much may stand in an unusual room, and
 # a thing in its usual room may still be another.
 _LEAST_NATS, _MOST_NATS = -3.0, 1.0
-
-
-class RoomEvidence(Protocol):
-    """What rooms say about the instances in them."""
-
-    def nats(
-        self, names: tuple[str, ...], rows: Int[np.ndarray, " a"], instance: Int[np.ndarray, " a"], count: int
-    ) -> Float[np.ndarray, " i"] | None:
-        """Return the evidence for each instance, nats; None where nothing is known (``ThingsInRooms.nats``)."""
-        ...
-
-
-class _NoRooms:
-    def nats(
-        self, names: tuple[str, ...], rows: Int[np.ndarray, " a"], instance: Int[np.ndarray, " a"], count: int
-    ) -> None:
-        return None
-
-
-NO_ROOMS: RoomEvidence = _NoRooms()
 
 
 class ThingsInRooms:
