@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, Float64, Int
 
 from avlmaps.core.errors import MapError, NavigationError
-from avlmaps.maps.obstacles import Body, CellState, Obstacles, find_obstacles
+from avlmaps.maps.obstacles import Body, CellState, Obstacles, find_obstacles, floor_height
 from avlmaps.maps.storeys import said_storeys
 from avlmaps.navigate.bodies import BASE, BodyShape
 
@@ -164,6 +164,18 @@ def storey_of_walk(avlmap: "AVLMap") -> int:
         return 0
     cameras = np.asarray(avlmap.stored.keyframes.world_from_camera, np.float64)[:1, :3, 3]
     return int(avlmap.storeys.of_places(cameras)[0]) if len(cameras) else 0
+
+
+def floor_of_walk(avlmap: "AVLMap") -> float:
+    """Return the level height of the floor on which the walk of a map began; 0 for a map without voxels."""
+    space = avlmap.space
+    if avlmap.storeys is not None:
+        return avlmap.storeys[storey_of_walk(avlmap)].floor_m
+    if not len(space):
+        return 0.0
+    height_m = space.level(space.centres)[:, 2]
+    sure = np.asarray(avlmap.stored.voxels.hits) >= Body().min_hits  # as where obstacles are sought
+    return floor_height(height_m[sure] if sure.any() else height_m, space.grid.voxel_size_m)
 
 
 def _voxels_called(avlmap: "AVLMap", word: str) -> Bool[np.ndarray, " n"]:

@@ -18,7 +18,7 @@ from jaxtyping import Float
 from avlmaps.core.errors import NavigationError, ProgramError
 from avlmaps.core.motion import Action, wrap_angle
 from avlmaps.language.program.vocabulary import Clip, Heat, Picture, Place, Target
-from avlmaps.navigate.costmap import storey_of_walk
+from avlmaps.navigate.costmap import floor_of_walk, storey_of_walk
 from avlmaps.navigate.driver import Arrival, Driver
 from avlmaps.navigate.file_access import Readable
 from avlmaps.navigate.footprint import Outline, bearing_rad, middle_between, to_the_left
@@ -263,16 +263,7 @@ class Robot:
     @cached_property
     def floor_m(self) -> float:
         """Level height of the floor that the robot is on."""
-        from avlmaps.maps.obstacles import Body, floor_height
-
-        space = self.asked.space
-        if self.asked.storeys is not None:
-            return self.asked.storeys[storey_of_walk(self.asked)].floor_m
-        if not len(space):
-            return 0.0
-        height_m = space.level(space.centres)[:, 2]
-        sure = np.asarray(self.asked.stored.voxels.hits) >= Body().min_hits  # as where obstacles are sought
-        return floor_height(height_m[sure] if sure.any() else height_m, space.grid.voxel_size_m)
+        return floor_of_walk(self.asked)
 
     @property
     def _here(self) -> Float[np.ndarray, "2"]:

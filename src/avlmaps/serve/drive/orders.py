@@ -18,16 +18,17 @@ from typing import Any
 import numpy as np
 
 from avlmaps.core.errors import AvlmapsError, NavigationError
-from avlmaps.core.motion import GroundPose, wrap_angle
+from avlmaps.core.motion import wrap_angle
 from avlmaps.core.poses import FRAME
 from avlmaps.core.printable import printable
 from avlmaps.language.learned_translator import LearnedTranslator, UnclearError
 from avlmaps.language.program import Budget, parse_program
 from avlmaps.language.translator import Translation
 from avlmaps.navigate.brake import Brake
+from avlmaps.navigate.costmap import floor_of_walk
 from avlmaps.navigate.instruct import Outcome, given_by, instruct
 from avlmaps.navigate.rehearsal import NO_FILES, path_in_world, rehearse
-from avlmaps.navigate.skills import Robot, RobotSettings
+from avlmaps.navigate.skills import RobotSettings
 from avlmaps.serve.drive.order_log import OrderLog
 from avlmaps.serve.drive.plans import DriveError, MapNow, OrderPlan, PlanBook, Who
 from avlmaps.serve.drive.robots import Machine
@@ -179,8 +180,7 @@ class Dispatcher:
 
     def _floor_m(self, now: MapNow) -> float:
         if self._floor is None or self._floor[0] != now.version:
-            # A robot that is only queried for the height of its floor.
-            self._floor = now.version, Robot(now.avlmap, _Standing(), self._settings, NO_FILES).floor_m
+            self._floor = now.version, floor_of_walk(now.avlmap)
         return self._floor[1]
 
     # Driving.
@@ -408,17 +408,6 @@ class Dispatcher:
             "position": [round(float(value), 3) for value in place],
             "heading_deg": round(degrees(pose.heading_rad), 1),
         }
-
-
-class _Standing:
-    """A driver that never moves."""
-
-    pose = GroundPose(0.0, 0.0)
-
-    def _refused(self, *_: Any, **__: Any) -> Any:
-        raise NavigationError("This robot only stands.")
-
-    go_to = turn = forward = stop = _refused
 
 
 def _forbidden(now: MapNow) -> dict[str, str]:
