@@ -136,8 +136,8 @@ def also_things() -> frozenset[str]:
 
 
 @cache
-def _forms() -> dict[str, str]:
-    """Return all forms of the verbs that sound, with their -ing form."""
+def sounding_forms() -> dict[str, str]:
+    """Return all forms of the verbs that sound, each with its -ing form."""
     forms = dict(pair.split("=") for pair in load_word_classes().lists["irregular"].split())
     for verb in load_word_classes().lists["verbs"].split():
         ing = forms_of(verb)[1]
@@ -145,16 +145,11 @@ def _forms() -> dict[str, str]:
     return forms
 
 
-def sounding_forms() -> dict[str, str]:
-    """Return all forms of the verbs that sound, each with its -ing form."""
-    return _forms()
-
-
 @cache
 def past_forms() -> frozenset[str]:
     """Return the past forms of the verbs that sound: "barked", "rang"."""
     irregular = (pair.split("=")[0] for pair in load_word_classes().lists["irregular"].split())
-    return frozenset([*irregular, *(form for form in _forms() if form.endswith("ed"))])
+    return frozenset([*irregular, *(form for form in sounding_forms() if form.endswith("ed"))])
 
 
 @cache
@@ -165,18 +160,18 @@ def third_forms() -> frozenset[str]:
 
 def sounds_like(word: str) -> bool:
     """Return whether a word names a sound by itself: "laughter", "barking", "knock"."""
-    return word in listed("noises") or (word in _forms() and word.endswith("ing"))
+    return word in listed("noises") or (word in sounding_forms() and word.endswith("ing"))
 
 
 def sounding_thing(word: str = "", noun: str = "") -> bool:
     """Return whether words name a thing by its sound alone: "beeping device"; not "sewing machine", "ringing phone"."""
-    sounds = word.endswith("ing") and word in _forms() and word not in listed("silent")
+    sounds = word.endswith("ing") and word in sounding_forms() and word not in listed("silent")
     return sounds and noun in listed("nameless") and not _is_name(f"{word} {noun}")
 
 
 def sounding_words() -> frozenset[str]:
     """Return all forms of the verbs that sound."""
-    return frozenset(_forms())
+    return frozenset(sounding_forms())
 
 
 @cache
