@@ -25,6 +25,9 @@ class Tensor:
 
     ndim, shape = 0, ()
 
+    def __repr__(self) -> str:
+        return "Tensor"  # the name of a test: every worker must find the same one
+
     def __init__(self, value: float) -> None:
         self._value = value
 
