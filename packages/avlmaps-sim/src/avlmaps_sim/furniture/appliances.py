@@ -4,18 +4,8 @@ import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Parts, Support, family
 from avlmaps_sim.furniture.computers import face_up
-from avlmaps_sim.furniture.fittings import (
-    chrome,
-    dial,
-    enamel,
-    face,
-    feet,
-    outline,
-    shell,
-    spindle,
-    steel,
-)  # fmt: skip
-from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, pick
+from avlmaps_sim.furniture.fittings import chrome, dial, enamel, face, feet, outline, shell, spindle, steel
+from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, made_of, pick
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes, joined
 from avlmaps_sim.shapes import box, cylinder, ellipsoid, lathe, loft, rounded_box, slab, tube
@@ -23,7 +13,7 @@ from avlmaps_sim.shapes import box, cylinder, ellipsoid, lathe, loft, rounded_bo
 
 def _porthole(rng: np.random.Generator, x: float, y: float, z: float, radius: float, look: Material) -> Meshes:
     """Return a round door: ring, dark glass, a grip at its side."""
-    ring = look if chance(rng, 0.4) else material(pick(rng, ("metal", "black", "white")), rng)
+    ring = look if chance(rng, 0.4) else made_of(rng, "metal", "black", "white")
     glass, inner = material("black", rng), radius * draw(rng, 0.6, 0.8)
     out = draw(rng, 0.015, 0.05)
     yield spindle([(radius, x), (radius, x + 0.4 * out), (radius * 0.92, x + out), (inner, x + 0.7 * out)], ring, y, z,
@@ -37,7 +27,7 @@ def _porthole(rng: np.random.Generator, x: float, y: float, z: float, radius: fl
 def _panel(rng: np.random.Generator, x: float, half: float, low: float, high: float, look: Material) -> Meshes:
     """Return a washing machine's control panel: soap drawer, dial, display, buttons."""
     side, mid = pick(rng, (-1.0, 1.0)), (low + high) / 2
-    dark, metal = material("black", rng), material(pick(rng, ("metal", "white", "plastic")), rng)
+    dark, metal = material("black", rng), made_of(rng, "metal", "white", "plastic")
     yield box((x, -half + 0.003, low), (x + 0.012, half - 0.003, high), look)
     a, b = sorted((-side * (half - 0.02), -side * half * 0.35))
     yield rounded_box((x + 0.01, a, low + 0.015), (x + 0.018, b, high - 0.015), 0.003, look, 2)
@@ -102,7 +92,7 @@ def _top_loader(rng: np.random.Generator) -> Parts:
     metal = chrome(rng)
     n = count(rng, 1, 4)
     yield from [dial(0.11, float(y), high + 0.45 * rise, 0.025, metal) for y in np.linspace(-0.3, 0.3, n) * wide]
-    lid_look = material(pick(rng, ("black", "white", "glass")), rng) if chance(rng, 0.5) else look
+    lid_look = made_of(rng, "black", "white", "glass") if chance(rng, 0.5) else look
     lid = rounded_box((0.0, -half + 0.03, 0.0), (deep - 0.19, half - 0.03, 0.015), 0.005, lid_look, 2)
     if open_lid:
         yield lid.tilted("y", -1.7).moved(x=0.16, z=high)
@@ -114,13 +104,13 @@ def _top_loader(rng: np.random.Generator) -> Parts:
 @family("washing machine", "twin tub", held_out=True)
 def _twin_tub(rng: np.random.Generator) -> Parts:
     wide, deep, high = draw(rng, 0.68, 0.85), draw(rng, 0.4, 0.5), draw(rng, 0.8, 0.95)
-    look, half = material(pick(rng, ("white", "white", "plastic")), rng), wide / 2
-    lids = material(pick(rng, ("plastic", "glass", "white")), rng)
+    look, half = made_of(rng, "white", "white", "plastic"), wide / 2
+    lids = made_of(rng, "plastic", "glass", "white")
     return [rounded_box((0.0, -half, 0.06), (deep, half, high), 0.03, look),
             *feet((0.0, -half), (deep, half), 0.06, material("black", rng)),
             rounded_box((0.12, -half + 0.02, high), (deep - 0.02, half * 0.15, high + 0.02), 0.008, lids, 2),
             cylinder(deep * 0.6, half * 0.58, high, 0.14, 0.025, lids, 18),
-            box((0.0, -half, high), (0.1, half, high + 0.1), material(pick(rng, ("black", "plastic", "white")), rng)),
+            box((0.0, -half, high), (0.1, half, high + 0.1), made_of(rng, "black", "plastic", "white")),
             *[dial(0.1, y * wide, high + 0.05, 0.025, chrome(rng)) for y in (-0.3, 0.0, 0.3)],
             face(deep + 0.001, (-half + 0.05, 0.1), (half - 0.05, 0.5 * high), lids)]  # fmt: skip
 
@@ -140,7 +130,7 @@ def _nozzle(x: float, y: float, wide: float, look: Material) -> Mesh:
 
 @family("vacuum cleaner", "on sled")
 def _canister(rng: np.random.Generator) -> Parts:
-    look, dark = material(pick(rng, ("plastic", "plastic", "metal", "black")), rng), material("black", rng)
+    look, dark = made_of(rng, "plastic", "plastic", "metal", "black"), material("black", rng)
     long, wide, high = draw(rng, 0.36, 0.48), draw(rng, 0.24, 0.3), draw(rng, 0.2, 0.3)
     flat = outline(long, wide, 3.0, 20, 0.1)
     yield shell([(flat * 0.9, 0.03), (flat, 0.09), (flat * 0.95, high * 0.7), (flat * 0.6, high)], look)
@@ -161,14 +151,13 @@ def _canister(rng: np.random.Generator) -> Parts:
 
 @family("vacuum cleaner", "upright")
 def _upright(rng: np.random.Generator) -> Parts:
-    look, dark, lean = material(pick(rng, ("plastic", "plastic", "painted", "metal")),
-                                rng), material("black", rng), draw(rng, 0.1, 0.45)  # fmt: skip
+    look, dark = made_of(rng, "plastic", "plastic", "painted", "metal"), material("black", rng)
+    lean = draw(rng, 0.1, 0.45)
     wide, high = draw(rng, 0.28, 0.36), draw(rng, 1.0, 1.15)
     flat = outline(0.15, 0.17, 2.4, 16)
     mid = draw(rng, 0.55, 0.7)
     trunk = joined([shell([(flat * 0.7, 0.08), (flat, 0.2), (flat, mid), (flat * 0.5, mid + 0.1)], look),
-                    cylinder(0.035, 0.0, 0.25, 0.06, mid - 0.32,
-                             material(pick(rng, ("glass", "plastic", "fabric")), rng), 14),
+                    cylinder(0.035, 0.0, 0.25, 0.06, mid - 0.32, made_of(rng, "glass", "plastic", "fabric"), 14),
                     tube([(0.0, 0.0, mid), (0.0, 0.0, high - 0.1), (-0.05, 0.0, high), (-0.1, 0.0, high - 0.05)], 0.014,
                          dark, 6)])  # fmt: skip
     return [rounded_box((0.0, -wide / 2, 0.0), (draw(rng, 0.24, 0.32), wide / 2, draw(rng, 0.07, 0.11)), 0.03, look),
@@ -177,12 +166,11 @@ def _upright(rng: np.random.Generator) -> Parts:
 
 @family("vacuum cleaner", "stick")
 def _stick(rng: np.random.Generator) -> Parts:
-    look, dark, lean, high = material(pick(rng, ("plastic", "metal")),
-                                      rng), material("black",
-                                                     rng), draw(rng, 0.02, 0.3), draw(rng, 1.0, 1.2)  # fmt: skip
+    look, dark, lean = made_of(rng, "plastic", "metal"), material("black", rng), draw(rng, 0.02, 0.3)
+    high = draw(rng, 1.0, 1.2)
     bin_z = high - 0.25 if chance(rng, 0.6) else 0.3
     pole = joined([tube([(0.0, 0.0, 0.03), (0.0, 0.0, high - 0.1)], 0.018, look, 8),
-                   cylinder(0.03, 0.0, bin_z, 0.055, 0.2, material(pick(rng, ("glass", "plastic")), rng), 14),
+                   cylinder(0.03, 0.0, bin_z, 0.055, 0.2, made_of(rng, "glass", "plastic"), 14),
                    tube([(-0.01, 0.0, high - 0.12), (-0.1, 0.0, high - 0.1), (-0.11, 0.0, high - 0.22),
                          (-0.01, 0.0, high - 0.27)], 0.016, dark, 6),
                    cylinder(0.0, 0.0, high - 0.12, 0.035, 0.08, look, 12)])  # fmt: skip
@@ -191,8 +179,7 @@ def _stick(rng: np.random.Generator) -> Parts:
 
 @family("vacuum cleaner", "robot", held_out=True)
 def _robot(rng: np.random.Generator) -> Parts:
-    radius, high, look = draw(rng, 0.15, 0.18), draw(rng, 0.07, 0.1), material(pick(rng, ("black", "white", "metal")),
-                                                                               rng)  # fmt: skip
+    radius, high, look = draw(rng, 0.15, 0.18), draw(rng, 0.07, 0.1), made_of(rng, "black", "white", "metal")
     square = pick(rng, (2.0, 2.0, 3.0))
     flat = outline(2 * radius, 2 * radius, square, 28)
     yield shell([(flat * 0.97, 0.012), (flat, 0.025), (flat, high - 0.015), (flat * 0.95, high)], look)
@@ -207,13 +194,12 @@ def _robot(rng: np.random.Generator) -> Parts:
 @family("vacuum cleaner", "workshop drum")
 def _drum(rng: np.random.Generator) -> Parts:
     radius, high, dark = draw(rng, 0.15, 0.2), draw(rng, 0.3, 0.45), material("black", rng)
-    look, lid = steel(rng) if chance(rng, 0.5) else material("plastic",
-                                                             rng), material(pick(rng, ("black", "plastic", "plastic")),
-                                                                            rng)  # fmt: skip
+    look = steel(rng) if chance(rng, 0.5) else material("plastic", rng)
+    lid = made_of(rng, "black", "plastic", "plastic")
     yield cylinder(0.0, 0.0, 0.06, radius, high, look, 20)
     yield lathe([(radius * 1.05, high + 0.06), (radius * 1.02, high + 0.13), (radius * 0.5, high + 0.2)], lid, sides=20)
-    yield from [ellipsoid((radius * 1.02 * a, radius * 1.02 * b, 0.03), (0.03, 0.03, 0.03), dark, 8, 4) for a,
-                b in ((0.7, 0.7), (0.7, -0.7), (-0.7, 0.7), (-0.7, -0.7))]  # fmt: skip
+    for a, b in ((0.7, 0.7), (0.7, -0.7), (-0.7, 0.7), (-0.7, -0.7)):
+        yield ellipsoid((radius * 1.02 * a, radius * 1.02 * b, 0.03), (0.03, 0.03, 0.03), dark, 8, 4)
     yield _hose([(radius, 0.0, high * 0.75), (radius + 0.15, 0.05, high * 0.7), (radius + 0.2, 0.1, 0.3),
                  (radius + 0.1, 0.25, 0.05), (radius + 0.25, 0.35, 0.03)], dark, 0.021)  # fmt: skip
     yield tube([(0.0, -0.08, high + 0.18), (0.0, -0.08, high + 0.24), (0.0, 0.08, high + 0.24),
@@ -248,18 +234,15 @@ def _iron(rng: np.random.Generator) -> Mesh:
 
 @family("ironing board", "open")
 def _ironing_open(rng: np.random.Generator) -> Parts:
-    long, wide, z, metal = draw(rng, 1.05,
-                                1.45), draw(rng, 0.3,
-                                            0.45), draw(rng, 0.72,
-                                                        0.98), material(pick(rng, ("metal", "white", "black")),
-                                                                        rng)  # fmt: skip
+    long, wide, z = draw(rng, 1.05, 1.45), draw(rng, 0.3, 0.45), draw(rng, 0.72, 0.98)
+    metal = made_of(rng, "metal", "white", "black")
     reach, foot = long * draw(rng, 0.28, 0.36), wide * draw(rng, 0.4, 0.6)
     yield _board(rng, long, wide).moved(z=z)
     for k in (-1, 1):
         ends = (reach * k, -reach * k * 0.9)
         if chance(rng, 0.5):
-            yield from [tube([(s * foot * 0.8, ends[0], 0.01), (s * foot * 0.4, ends[1], z - 0.03)], 0.011, metal, 6)
-                        for s in (-1, 1)]  # fmt: skip
+            for s in (-1, 1):
+                yield tube([(s * foot * 0.8, ends[0], 0.01), (s * foot * 0.4, ends[1], z - 0.03)], 0.011, metal, 6)
         else:
             yield tube([(0.0, ends[0], 0.01), (0.0, ends[1], z - 0.03)], 0.013, metal, 6)
         yield tube([(-foot, ends[0], 0.012), (foot, ends[0], 0.012)], 0.012, metal, 6)
@@ -271,8 +254,7 @@ def _ironing_open(rng: np.random.Generator) -> Parts:
 
 @family("ironing board", "folded against the wall")
 def _ironing_folded(rng: np.random.Generator) -> Parts:
-    long, wide, metal = draw(rng, 1.1, 1.45), draw(rng, 0.3, 0.42), material(pick(rng, ("metal", "white", "black")),
-                                                                             rng)  # fmt: skip
+    long, wide, metal = draw(rng, 1.1, 1.45), draw(rng, 0.3, 0.42), made_of(rng, "metal", "white", "black")
     flat = joined([_board(rng, long, wide),
                    *[tube([(s * wide * 0.25, -long * 0.4, -0.03), (s * wide * 0.15, long * 0.3, -0.03)], 0.011, metal,
                           6) for s in (-1, 1)],

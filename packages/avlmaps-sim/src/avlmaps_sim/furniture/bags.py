@@ -6,18 +6,10 @@ import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Parts, family
 from avlmaps_sim.furniture.containers import cardboard, tub
-from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, pick, strut
+from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, made_of, strut
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes, joined
-from avlmaps_sim.shapes import (
-    box,
-    cylinder,
-    lathe,
-    loft,
-    rounded_box,
-    rounded_rectangle,
-    slab,
-)
+from avlmaps_sim.shapes import box, cylinder, lathe, loft, rounded_box, rounded_rectangle, slab
 
 
 def _strap(path: list[tuple[float, float, float]], look: Material, wide: float = 0.018) -> Mesh:
@@ -33,7 +25,7 @@ def _arch(x: float, y: float, z: float, reach: float, rise: float, look: Materia
 @family("bag", "tote")
 def _tote(rng: np.random.Generator) -> Parts:
     width, tall, thick = draw(rng, 0.26, 0.42), draw(rng, 0.22, 0.4), draw(rng, 0.08, 0.18)
-    look = material(pick(rng, ("fabric", "leather", "paper", "plastic")), rng)
+    look = made_of(rng, "fabric", "leather", "paper", "plastic")
     rings, bent = [], draw(rng, -0.03, 0.03)
     for size, flat, z in (
         (0.8, 1.0, 0.0),
@@ -53,10 +45,7 @@ def _tote(rng: np.random.Generator) -> Parts:
 @family("bag", "backpack")
 def _backpack(rng: np.random.Generator) -> Parts:
     width, tall, thick = draw(rng, 0.26, 0.36), draw(rng, 0.36, 0.52), draw(rng, 0.13, 0.22)
-    look, other = (
-        material(pick(rng, ("fabric", "fabric", "leather", "plastic")), rng),
-        material(pick(rng, ("fabric", "black")), rng),
-    )
+    look, other = made_of(rng, "fabric", "fabric", "leather", "plastic"), made_of(rng, "fabric", "black")
     rings = []
     for size, z in ((0.85, 0.0), (1.0, 0.06), (1.0, 0.7), (0.85, 0.9), (0.45, 1.0)):
         flat = rounded_rectangle(thick * (0.6 + 0.4 * size), width * size, 0.05, 3)
@@ -78,7 +67,7 @@ def _backpack(rng: np.random.Generator) -> Parts:
 @family("bag", "handbag")
 def _handbag(rng: np.random.Generator) -> Parts:
     width, tall, thick = draw(rng, 0.2, 0.36), draw(rng, 0.14, 0.26), draw(rng, 0.07, 0.14)
-    look, metal = material(pick(rng, ("leather", "leather", "fabric")), rng), material("metal", rng)
+    look, metal = made_of(rng, "leather", "leather", "fabric"), material("metal", rng)
     rings = []
     for size, flat, z in ((0.95, 1.0, 0.0), (1.0, 1.0, 0.15), (0.9, 0.6, 0.8), (0.8, 0.2, 1.0)):
         ring = rounded_rectangle(thick * flat, width * size, 0.02, 2)
@@ -90,7 +79,7 @@ def _handbag(rng: np.random.Generator) -> Parts:
 @family("bag", "suitcase")
 def _suitcase(rng: np.random.Generator) -> Parts:
     width, tall, thick = draw(rng, 0.34, 0.5), draw(rng, 0.48, 0.72), draw(rng, 0.18, 0.3)
-    look, black = material(pick(rng, ("plastic", "fabric", "metal", "painted")), rng), material("black", rng)
+    look, black = made_of(rng, "plastic", "fabric", "metal", "painted"), material("black", rng)
     yield rounded_box((-thick / 2, -width / 2, 0.05), (thick / 2, width / 2, tall), 0.05, look)
     for y in np.linspace(-width * 0.35, width * 0.35, count(rng, 2, 6)).tolist():
         yield slab(thick * 0.5, y, 0.12, 0.012, 0.02, tall - 0.2, look)
@@ -105,11 +94,7 @@ def _suitcase(rng: np.random.Generator) -> Parts:
 
 @family("bag", "duffel", held_out=True)
 def _duffel(rng: np.random.Generator) -> Parts:
-    radius, long, look = (
-        draw(rng, 0.12, 0.2),
-        draw(rng, 0.4, 0.7),
-        material(pick(rng, ("fabric", "leather", "plastic")), rng),
-    )
+    radius, long, look = draw(rng, 0.12, 0.2), draw(rng, 0.4, 0.7), made_of(rng, "fabric", "leather", "plastic")
     rows = [
         (radius * 0.85, 0.0),
         (radius, 0.03),
@@ -118,14 +103,14 @@ def _duffel(rng: np.random.Generator) -> Parts:
         (radius * 0.85, long),
     ]
     body = lathe(rows, look, sides=16).tilted("x", np.pi / 2).moved(0.0, long / 2, radius).scaled(1.0, 1.0, 0.85)
-    strap = material(pick(rng, ("black", "fabric")), rng)
+    strap = made_of(rng, "black", "fabric")
     return [body, *(_arch(s * 0.05, 0.0, radius * 1.65, long * 0.22, 0.13, strap) for s in (-1, 1))]
 
 
 @family("bag", "paper bag")
 def _paper_bag(rng: np.random.Generator) -> Parts:
     width, tall, thick = draw(rng, 0.18, 0.36), draw(rng, 0.22, 0.44), draw(rng, 0.08, 0.16)
-    look = cardboard(rng) if chance(rng, 0.5) else material(pick(rng, ("paper", "plastic", "painted")), rng)
+    look = cardboard(rng) if chance(rng, 0.5) else made_of(rng, "paper", "plastic", "painted")
     yield tub(thick, width, tall, 1.0, 0.003, look, 0.002)
     if chance(rng, 0.4):
         yield box(
@@ -139,7 +124,7 @@ def _paper_bag(rng: np.random.Generator) -> Parts:
 @family("laundry basket", "slotted")
 def _slotted_laundry(rng: np.random.Generator) -> Parts:
     length, width, tall = draw(rng, 0.33, 0.45), draw(rng, 0.45, 0.65), draw(rng, 0.22, 0.4)
-    look, dark = material(pick(rng, ("plastic", "white")), rng), material("black", rng)
+    look, dark = made_of(rng, "plastic", "white"), material("black", rng)
     taper = draw(rng, 0.75, 0.9)
     yield tub(length, width, tall, taper, 0.09, look)
     for y in np.linspace(-0.34, 0.34, 8).tolist():
@@ -164,11 +149,7 @@ def _clothes(rng: np.random.Generator, x: float, y: float, z: float) -> Meshes:
 
 @family("laundry basket", "hamper")
 def _hamper(rng: np.random.Generator) -> Parts:
-    radius, tall, look = (
-        draw(rng, 0.17, 0.26),
-        draw(rng, 0.48, 0.7),
-        material(pick(rng, ("wicker", "fabric")), rng),
-    )
+    radius, tall, look = draw(rng, 0.17, 0.26), draw(rng, 0.48, 0.7), made_of(rng, "wicker", "fabric")
     if chance(rng, 0.5):
         body = lathe(
             [(radius * 0.85, 0.0), (radius, tall), (radius * 0.95, tall), (radius * 0.8, 0.02)], look, sides=18
@@ -185,7 +166,7 @@ def _hamper(rng: np.random.Generator) -> Parts:
 @family("laundry basket", "bag on a frame", held_out=True)
 def _laundry_sorter(rng: np.random.Generator) -> Parts:
     width, length, tall = draw(rng, 0.35, 0.7), draw(rng, 0.32, 0.42), draw(rng, 0.55, 0.8)
-    look, bar = material("fabric", rng), material(pick(rng, ("metal", "wood", "white")), rng)
+    look, bar = material("fabric", rng), made_of(rng, "metal", "wood", "white")
     yield tub(length * 0.8, width * 0.9, tall * 0.82, 0.9, 0.04, look).moved(z=tall * 0.16)
     for s in (-1, 1):
         y = s * width / 2

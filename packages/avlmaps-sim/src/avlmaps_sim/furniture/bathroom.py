@@ -3,13 +3,8 @@
 import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Parts, family
-from avlmaps_sim.furniture.fittings import (
-    china,
-    chrome,
-    outline,
-    shell,
-)  # fmt: skip
-from avlmaps_sim.furniture.recipe_helpers import chance, draw, pick, pictured
+from avlmaps_sim.furniture.fittings import china, chrome, outline, shell
+from avlmaps_sim.furniture.recipe_helpers import chance, draw, made_of, pick, pictured
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh
 from avlmaps_sim.shapes import box, cylinder, ellipsoid, rounded_box, slab, tube
@@ -107,7 +102,7 @@ def _close_coupled(rng: np.random.Generator) -> Parts:
     (length, wide, rim_z, power), look, metal = _sizes(rng), china(rng), chrome(rng)
     deep, across, top = draw(rng, 0.15, 0.21), draw(rng, 0.34, 0.48), rim_z + draw(rng, 0.32, 0.42)
     foot = (draw(rng, 0.32, 0.48), draw(rng, 0.2, 0.27), deep + draw(rng, 0.16, 0.24))
-    seat = look if chance(rng, 0.7) else material(pick(rng, ("wood", "plastic", "black")), rng)
+    seat = look if chance(rng, 0.7) else made_of(rng, "wood", "plastic", "black")
     return [_bowl(rng, length, wide, power, (0.0, rim_z), deep + 0.01, foot, look),
             slab(deep * 0.75, 0.0, rim_z - 0.09, deep * 1.4, min(across, 0.24), 0.085, look),
             *_tank(rng, deep, across, (rim_z - 0.01, top), look, metal),
@@ -124,8 +119,7 @@ def _on_casing(rng: np.random.Generator) -> Parts:
     return [box((0.0, -case_wide / 2, 0.0), (case_deep, case_wide / 2, top), clad),
             _bowl(rng, length, wide, power, (rim_z - draw(rng, 0.26, 0.34), rim_z), x, foot, look),
             slab(case_deep + 0.06, 0.0, rim_z - 0.28, 0.12, wide * 0.8, 0.26, look),
-            box((case_deep, -0.12, 0.86), (case_deep + 0.012, 0.12, 0.94),
-                material(pick(rng, ("white", "metal", "black")), rng)),
+            box((case_deep, -0.12, 0.86), (case_deep + 0.012, 0.12, 0.94), made_of(rng, "white", "metal", "black")),
             *_seat(rng, length, wide * 1.01, power, rim_z + 0.003, x + 0.005, look)]  # fmt: skip
 
 

@@ -3,15 +3,8 @@
 import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Parts, family
-from avlmaps_sim.furniture.fittings import (
-    china,
-    chrome,
-    open_bowl,
-    outline,
-    shell,
-    tap,
-)  # fmt: skip
-from avlmaps_sim.furniture.recipe_helpers import chance, cloth, draw, pick, pictured
+from avlmaps_sim.furniture.fittings import china, chrome, open_bowl, outline, shell, tap
+from avlmaps_sim.furniture.recipe_helpers import chance, cloth, draw, made_of, pick, pictured
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes, Triple, joined
 from avlmaps_sim.shapes import box, cylinder, loft, tube
@@ -117,7 +110,7 @@ def _free_tub(rng: np.random.Generator, wide: float, long: float, z: tuple[float
 @family("bathtub", "freestanding oval")
 def _freestanding(rng: np.random.Generator) -> Parts:
     wide, long, high, look = draw(rng, 0.68, 0.88), draw(rng, 1.45, 1.85), draw(rng, 0.52, 0.66), china(rng)
-    outside = look if chance(rng, 0.65) else material(pick(rng, ("painted", "stone", "metal")), rng)
+    outside = look if chance(rng, 0.65) else made_of(rng, "painted", "stone", "metal")
     yield from _free_tub(
         rng, wide, long, (0.0, high), draw(rng, 0.6, 0.92), pick(rng, (2.0, 2.3, 3.0, 5.0)), outside, look
     )

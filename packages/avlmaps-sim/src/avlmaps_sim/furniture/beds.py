@@ -7,7 +7,7 @@ import numpy as np
 from avlmaps_sim.furniture.carcass import Room, drawers, front_style, split
 from avlmaps_sim.furniture.catalogue import Parts, family
 from avlmaps_sim.furniture.legs import LegStyle, four_legs, leg, leg_style, named_leg
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick, rim
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick, rim
 from avlmaps_sim.furniture.upholstery import (
     Bedding,
     blanket,
@@ -57,7 +57,7 @@ def bed_plan(rng: np.random.Generator, base: tuple[float, float] = (0.2, 0.38), 
 
 def bed_look(rng: np.random.Generator) -> Material:
     """Draw a bedstead's material."""
-    return material(pick(rng, ("wood", "wood", "wood", "white", "painted", "black")), rng)
+    return made_of(rng, "wood", "wood", "wood", "white", "painted", "black")
 
 
 def bedclothes(rng: np.random.Generator, plan: BedPlan) -> Meshes:
@@ -122,11 +122,9 @@ def _end_board(rng: np.random.Generator, plan: BedPlan, x: float, top: float, lo
     parts = [leg((x, s * y, 0.0), (x, s * y, top + over), straight, look) for s in (1, -1)]
     if style == "arch":
         share = np.linspace(-1.0, 1.0, 11)
-        rings = [
-            np.array([(x - 0.015, t * y, low), (x + 0.015, t * y, low), (x + 0.015, t * y, top + arch * (1 - t * t)),
-                      (x - 0.015, t * y, top + arch * (1 - t * t))])
-            for t in share.tolist()
-        ]  # fmt: skip
+        rings = [np.array([(x - 0.015, t * y, low), (x + 0.015, t * y, low),
+                           (x + 0.015, t * y, top + arch * (1 - t * t)), (x - 0.015, t * y, top + arch * (1 - t * t))])
+                 for t in share.tolist()]  # fmt: skip
         return [*parts, loft(rings, look)]
     if style == "panel":
         parts.append(box((x - 0.012, -y, low), (x + 0.012, y, top), look))
@@ -173,7 +171,7 @@ def bedstead(rng: np.random.Generator) -> Parts:
 @family("bed", "metal")
 def metal_bed(rng: np.random.Generator) -> Parts:
     """Return a bed of metal tubes with bars or an arch at both ends."""
-    plan, look = bed_plan(rng, (0.28, 0.42)), material(pick(rng, ("metal", "black", "black", "white")), rng)
+    plan, look = bed_plan(rng, (0.28, 0.42)), made_of(rng, "metal", "black", "black", "white")
     head, foot = plan.top + draw(rng, 0.35, 0.75), plan.top + draw(rng, 0.05, 0.3)
     yield from (*bedclothes(rng, plan), *_rails(plan, look, 0.05, 0.02))
     bend = chance(rng, 0.5)
@@ -269,7 +267,7 @@ def drawer_bed(rng: np.random.Generator) -> Parts:
 @family("bed", "four-poster", held_out=True)
 def four_poster(rng: np.random.Generator) -> Parts:
     """Return a bed whose posts carry a frame over it, perhaps with a cloth roof or drawn curtains."""
-    plan, look = bed_plan(rng, (0.28, 0.42), 0.9), material(pick(rng, ("wood", "wood", "black", "metal")), rng)
+    plan, look = bed_plan(rng, (0.28, 0.42), 0.9), made_of(rng, "wood", "wood", "black", "metal")
     height, y = draw(rng, 1.85, 2.2), plan.width / 2 + 0.04
     turned = chance(rng, 0.4)
     style = named_leg("baluster" if turned else "straight", 8 if turned else 4, draw(rng, 0.04, 0.09))

@@ -8,7 +8,7 @@ from avlmaps_sim.furniture.beds import BedPlan, bed_look, bedclothes
 from avlmaps_sim.furniture.carcass import Room, board_look, carcass, doors, drawers, front_style
 from avlmaps_sim.furniture.catalogue import Parts, Support, family
 from avlmaps_sim.furniture.legs import cabinet_base, four_legs, leg_style, named_leg
-from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, pick
+from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, made_of, pick
 from avlmaps_sim.furniture.upholstery import Bedding, heap, mattress
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Meshes
@@ -38,7 +38,7 @@ def barred_crib(rng: np.random.Generator) -> Parts:
     """Return a cot with bars on all sides, or with solid ends."""
     length, width = draw(rng, 1.15, 1.45), draw(rng, 0.62, 0.8)
     top, low = draw(rng, 0.8, 1.05), draw(rng, 0.18, 0.42)
-    look, bar = material(pick(rng, ("white", "wood", "wood", "painted")), rng), draw(rng, 0.065, 0.1)
+    look, bar = made_of(rng, "white", "wood", "wood", "painted"), draw(rng, 0.065, 0.1)
     rods = chance(rng, 0.5)
     yield from _cot_bedding(rng, length - 0.06, width - 0.06, low)
     yield slab(0.0, 0.0, low - 0.02, length, width, 0.02, look)
@@ -67,13 +67,13 @@ def bassinet(rng: np.random.Generator) -> Parts:
     """Return a deep oval basket of cloth or wicker on legs, perhaps with a hood."""
     length, width = draw(rng, 0.75, 0.95), draw(rng, 0.42, 0.55)
     low, deep = draw(rng, 0.35, 0.55), draw(rng, 0.2, 0.32)
-    look = material(pick(rng, ("fabric", "wicker", "white")), rng)
+    look = made_of(rng, "fabric", "wicker", "white")
     inner = material("white", rng)
     squash = width / length
     profile = [(length * 0.4, low), (length * 0.5, low + deep), (length * 0.47, low + deep), (length * 0.4, low + 0.08)]
     yield lathe(profile, look, sides=16, squash=squash)
     yield lathe([(length * 0.38, low + 0.05), (length * 0.4, low + 0.12)], inner, sides=16, squash=squash)
-    stand = material(pick(rng, ("wood", "white", "metal")), rng)
+    stand = made_of(rng, "wood", "white", "metal")
     yield four_legs(length * 0.6, width * 0.7, low + 0.02, leg_style(rng, 0.03, 0.04, True), stand, draw(rng, 0.0, 0.1))
     if chance(rng, 0.5):
         rise = draw(rng, 0.2, 0.35)

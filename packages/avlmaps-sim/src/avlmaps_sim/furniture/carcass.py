@@ -5,7 +5,7 @@ from typing import Literal
 
 import numpy as np
 
-from avlmaps_sim.furniture.recipe_helpers import chance, draw, pick, rim
+from avlmaps_sim.furniture.recipe_helpers import chance, draw, made_of, pick, rim
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, joined
 from avlmaps_sim.shapes import box, ellipsoid, sheet, tube
@@ -53,7 +53,7 @@ class FrontStyle:
 
 def board_look(rng: np.random.Generator) -> Material:
     """Draw the materials of a cabinet."""
-    return material(pick(rng, ("wood", "wood", "wood", "white", "white", "painted", "black")), rng)
+    return made_of(rng, "wood", "wood", "wood", "white", "white", "painted", "black")
 
 
 def front_style(rng: np.random.Generator, look: Material, panels: tuple[Panel, ...] = ()) -> FrontStyle:
@@ -61,7 +61,7 @@ def front_style(rng: np.random.Generator, look: Material, panels: tuple[Panel, .
     panel: Panel = pick(rng, panels or ("flat", "flat", "flat", "framed", "raised", "slatted"))
     grip: Grip = pick(rng, ("bar", "knob", "knob", "cup", "bow", "groove", "none"))
     fronts = look if chance(rng, 0.7) else board_look(rng)
-    metal = material(pick(rng, ("metal", "metal", "black", "wood")), rng)
+    metal = made_of(rng, "metal", "metal", "black", "wood")
     return FrontStyle(panel, grip, draw(rng, 0.003, 0.01), draw(rng, 0.015, 0.025), fronts, metal)
 
 
@@ -103,11 +103,9 @@ def grip(style: FrontStyle, x: float, y: float, z: float, upright: bool, length:
             style.metal,
         )
         inner = 0.8
-        feet = [
-            box((x, y + s * inner * along[1] - 0.004, z + s * inner * along[2] - 0.004),
-                (x + 0.024, y + s * inner * along[1] + 0.004, z + s * inner * along[2] + 0.004), style.metal)
-            for s in (1, -1)
-        ]  # fmt: skip
+        feet = [box((x, y + s * inner * along[1] - 0.004, z + s * inner * along[2] - 0.004),
+                    (x + 0.024, y + s * inner * along[1] + 0.004, z + s * inner * along[2] + 0.004), style.metal)
+                for s in (1, -1)]  # fmt: skip
         return joined([bar, *feet])
     half_path = [(x, y0, z0), (x + 0.028, y0 * 0.8 + y1 * 0.2, z0 * 0.8 + z1 * 0.2),
                  (x + 0.028, y0 * 0.2 + y1 * 0.8, z0 * 0.2 + z1 * 0.8), (x, y1, z1)]  # fmt: skip
@@ -130,10 +128,8 @@ def _panel(style: FrontStyle, room: Room, panel: Panel, glass: Material) -> Mesh
     parts.append(box((a, *inner_low), (d - 0.008, *inner_high), style.look))
     if panel == "raised":
         inset = min(0.03, 0.2 * (inner_high[0] - inner_low[0]), 0.2 * (inner_high[1] - inner_low[1]))
-        parts.append(
-            box((d - 0.009, inner_low[0] + inset, inner_low[1] + inset),
-                (d - 0.001, inner_high[0] - inset, inner_high[1] - inset), style.look)
-        )  # fmt: skip
+        parts.append(box((d - 0.009, inner_low[0] + inset, inner_low[1] + inset),
+                         (d - 0.001, inner_high[0] - inset, inner_high[1] - inset), style.look))  # fmt: skip
     elif panel == "slatted":
         number = max(int((inner_high[0] - inner_low[0]) / 0.09), 2)
         parts += [

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from avlmaps_sim.furniture.legs import LegStyle, leg
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick, strut
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick, strut
 from avlmaps_sim.furniture.upholstery import cushion
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Triple, joined
@@ -72,7 +72,7 @@ def seat_board(rng: np.random.Generator, frame: ChairFrame, look: Material, styl
     x, y, z = frame.depth / 2, frame.front / 2, frame.seat
     if style == "padded":
         thick = draw(rng, 0.04, 0.09)
-        cover = material(pick(rng, ("fabric", "fabric", "leather")), rng)
+        cover = made_of(rng, "fabric", "fabric", "leather")
         pad = cushion((-x, -y, z - thick), (x, y, z), cover, 0.03, draw(rng, 0.008, 0.025))
         return narrowed(pad, frame)
     if style == "slats":
@@ -135,8 +135,8 @@ def side_rails(
     yf, yb = frame.front / 2 - 0.022, frame.rear / 2 - 0.022
     z = frame.seat - 0.02 - height / 2
     parts = [strut((xb, s * yb, z), (xf, s * yf, z), thickness, height, look) for s in (1, -1)]
-    parts += [box((x - thickness / 2, -y, z - height / 2), (x + thickness / 2, y, z + height / 2), look)
-              for x, y in ((xf, yf), (xb, yb))]  # fmt: skip
+    parts += [box((x - thickness / 2, -y, z - height / 2), (x + thickness / 2, y, z + height / 2), look) for x,
+              y in ((xf, yf), (xb, yb))]  # fmt: skip
     for i in range(rungs):
         low = frame.seat * (0.25 + 0.22 * i)
         behind = xb - frame.kick * (1 - low / frame.seat)

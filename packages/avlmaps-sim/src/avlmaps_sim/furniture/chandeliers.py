@@ -6,14 +6,14 @@ import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Parts, family
 from avlmaps_sim.furniture.lighting import shade, shining
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick, strut, turned_ring
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick, strut, turned_ring
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Triple, joined
 from avlmaps_sim.shapes import circle, cylinder, ellipsoid, lathe, rounded_box, slab, tube
 
 
 def _metal(rng: np.random.Generator) -> Material:
-    return material(pick(rng, ("metal", "metal", "metal", "black", "white", "wood")), rng)
+    return made_of(rng, "metal", "metal", "metal", "black", "white", "wood")
 
 
 def _hung(rng: np.random.Generator, z: float, top: float, look: Material, x: float = 0.0) -> list[Mesh]:
@@ -155,7 +155,7 @@ def _globe(rng: np.random.Generator) -> Parts:
 
 @family("chandelier", "track")
 def _track(rng: np.random.Generator) -> Parts:
-    heads, long, look = count(rng, 2, 6), draw(rng, 0.5, 2.0), material(pick(rng, ("white", "black", "metal")), rng)
+    heads, long, look = count(rng, 2, 6), draw(rng, 0.5, 2.0), made_of(rng, "white", "black", "metal")
     parts, light = [slab(0.0, 0.0, 0.0, 0.035, long, 0.025, look)], []
     if chance(rng, 0.4):
         parts.append(cylinder(0.0, 0.0, 0.0, 0.07, 0.03, look, 14))

@@ -6,7 +6,7 @@ import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Parts, family
 from avlmaps_sim.furniture.fittings import body, chrome, face, spindle
-from avlmaps_sim.furniture.recipe_helpers import chance, draw, pick, pictured, rim, strut
+from avlmaps_sim.furniture.recipe_helpers import chance, draw, made_of, pick, pictured, rim, strut
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes, triangles_of
 from avlmaps_sim.shapes import box, circle, cylinder, ellipsoid, loft, rounded_box, slab, tube
@@ -49,7 +49,7 @@ def _dial_face(rng: np.random.Generator, x: float, z: float, radius: float) -> l
 @family("clock", "wall round")
 def _wall_round(rng: np.random.Generator) -> Parts:
     radius, deep, bar = draw(rng, 0.1, 0.35), draw(rng, 0.02, 0.06), draw(rng, 0.05, 0.16)
-    look = material(pick(rng, ("black", "metal", "wood", "white", "plastic")), rng)
+    look = made_of(rng, "black", "metal", "wood", "white", "plastic")
     return [spindle([(radius, 0.0), (radius, deep), (radius * (1 - bar), deep), (radius * (1 - bar), deep * 0.5)], look,
                     0.0, radius, 26, capped=False),
             *_dial_face(rng, deep * 0.5, radius, radius * (1 - bar * 0.9))]  # fmt: skip
@@ -57,9 +57,8 @@ def _wall_round(rng: np.random.Generator) -> Parts:
 
 @family("clock", "wall square")
 def _wall_square(rng: np.random.Generator) -> Parts:
-    size, deep, look = draw(rng, 0.2, 0.5), draw(rng, 0.02,
-                                                 0.05), material(pick(rng, ("wood", "black", "white", "metal",
-                                                                            "plastic")), rng)  # fmt: skip
+    size, deep = draw(rng, 0.2, 0.5), draw(rng, 0.02, 0.05)
+    look = made_of(rng, "wood", "black", "white", "metal", "plastic")
     tall = size * pick(rng, (1.0, draw(rng, 1.1, 1.5)))
     return [rounded_box((0.0, -size / 2, 0.0), (deep, size / 2, tall), draw(rng, 0.003, 0.02), look, 2),
             *_dial_face(rng, deep + 0.001, tall - size / 2, size * 0.42)]  # fmt: skip
@@ -84,7 +83,7 @@ def _wall_pendulum(rng: np.random.Generator) -> Parts:
 @family("clock", "alarm with bells")
 def _alarm(rng: np.random.Generator) -> Parts:
     radius, deep = draw(rng, 0.035, 0.065), draw(rng, 0.03, 0.05)
-    look, metal = material(pick(rng, ("metal", "painted", "black", "plastic")), rng), chrome(rng)
+    look, metal = made_of(rng, "metal", "painted", "black", "plastic"), chrome(rng)
     z = radius + 0.02
     yield spindle([(radius, 0.0), (radius, deep), (radius * 0.88, deep)], look, 0.0, z, 22)
     yield from _dial_face(rng, deep + 0.001, z, radius * 0.88)
@@ -98,12 +97,8 @@ def _alarm(rng: np.random.Generator) -> Parts:
 
 @family("clock", "digital")
 def _digital(rng: np.random.Generator) -> Parts:
-    wide, high, deep, look = draw(rng, 0.12,
-                                  0.26), draw(rng, 0.05,
-                                              0.1), draw(rng, 0.04,
-                                                         0.1), material(pick(rng,
-                                                                             ("black", "wood", "white", "plastic")),
-                                                                        rng)  # fmt: skip
+    wide, high, deep = draw(rng, 0.12, 0.26), draw(rng, 0.05, 0.1), draw(rng, 0.04, 0.1)
+    look = made_of(rng, "black", "wood", "white", "plastic")
     glow = replace(material("plastic", rng,
                             pick(rng, ((0.95, 0.15, 0.1), (0.2, 0.9, 0.4), (0.3, 0.7, 0.95), (0.95, 0.95, 0.95)))),
                    emission=0.9)  # fmt: skip
@@ -116,8 +111,8 @@ def _digital(rng: np.random.Generator) -> Parts:
         left = y * wide
         bars = {"a": (0, h, w, t), "b": (w - t, h / 2, t, h / 2), "c": (w - t, 0, t, h / 2), "d": (0, 0, w, t),
                 "e": (0, 0, t, h / 2), "f": (0, h / 2, t, h / 2), "g": (0, h / 2 - t / 2, w, t)}  # fmt: skip
-        yield from [face(deep + 0.002, (left + a, low + b), (left + a + c, low + b + d), glow) for a, b, c,
-                    d in (bars[s] for s in lit)]  # fmt: skip
+        for a, b, c, d in (bars[s] for s in lit):
+            yield face(deep + 0.002, (left + a, low + b), (left + a + c, low + b + d), glow)
 
 
 @family("clock", "grandfather", held_out=True)
@@ -145,11 +140,8 @@ def _grandfather(rng: np.random.Generator) -> Parts:
 
 @family("clock", "mantel", held_out=True)
 def _mantel(rng: np.random.Generator) -> Parts:
-    wide, high, deep, look = draw(rng, 0.2,
-                                  0.42), draw(rng, 0.18,
-                                              0.28), draw(rng, 0.08,
-                                                          0.13), material(pick(rng, ("wood", "wood", "stone", "metal")),
-                                                                          rng)  # fmt: skip
+    wide, high, deep = draw(rng, 0.2, 0.42), draw(rng, 0.18, 0.28), draw(rng, 0.08, 0.13)
+    look = made_of(rng, "wood", "wood", "stone", "metal")
     y = np.linspace(-1.0, 1.0, 15)
     bell = draw(rng, 0.25, 0.55)
     crown = np.where(np.abs(y) < bell, np.sqrt(np.maximum(0.0, 1 - (y / bell) ** 2)) * 0.6 + 0.4,

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Parts, family, finished
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, joined
 from avlmaps_sim.shapes import box, cylinder, ellipsoid, lathe, loft, rounded_box, sheet, slab, tube
@@ -14,7 +14,7 @@ from avlmaps_sim.shapes import box, cylinder, ellipsoid, lathe, loft, rounded_bo
 
 def _book(rng: np.random.Generator, tall: float, deep: float, thick: float) -> Mesh:
     """Return a book lying flat with its spine at the greatest x, middle at the origin; height along y."""
-    cover, paper = material(pick(rng, ("painted", "plastic", "leather", "fabric")), rng), material("paper", rng)
+    cover, paper = made_of(rng, "painted", "plastic", "leather", "fabric"), material("paper", rng)
     t = min(0.0025, thick * 0.2)
     x, y = deep / 2, tall / 2
     parts = [box((-x, -y, 0.0), (x, y, t), cover), box((-x, -y, thick - t), (x, y, thick), cover)]
@@ -73,7 +73,7 @@ def _bottle(rng: np.random.Generator) -> Parts:
     glass = (
         replace(material("glass", rng, tint), opacity=0.8 if dark else 0.45)
         if chance(rng, 0.6)
-        else material(pick(rng, ("plastic", "ceramic", "metal")), rng)
+        else made_of(rng, "plastic", "ceramic", "metal")
     )
     rows, tall, wide = {
         "wine": ([(1.0, 0.0), (1.0, 0.58), (0.36, 0.72), (0.34, 0.98), (0.4, 1.0)], draw(rng, 0.27, 0.33), 0.038),
@@ -113,12 +113,8 @@ def _bottles(rng: np.random.Generator) -> Parts:
 
 @family("bottle", "pump", held_out=True)
 def _pump_bottle(rng: np.random.Generator) -> Parts:
-    tall, wide, look = (
-        draw(rng, 0.11, 0.2),
-        draw(rng, 0.027, 0.042),
-        material(pick(rng, ("plastic", "ceramic", "glass")), rng),
-    )
-    pump = material(pick(rng, ("metal", "white", "black")), rng)
+    tall, wide, look = draw(rng, 0.11, 0.2), draw(rng, 0.027, 0.042), made_of(rng, "plastic", "ceramic", "glass")
+    pump = made_of(rng, "metal", "white", "black")
     if chance(rng, 0.5):
         yield rounded_box((-wide * 0.8, -wide, 0.0), (wide * 0.8, wide, tall), 0.012, look)
     else:
@@ -176,7 +172,7 @@ def _truck(rng: np.random.Generator) -> Parts:
 @family("toy", "doll's house", held_out=True)
 def _dolls_house(rng: np.random.Generator) -> Parts:
     wide, deep, tall, floors = draw(rng, 0.4, 0.8), draw(rng, 0.22, 0.35), draw(rng, 0.4, 0.7), count(rng, 2, 3)
-    wall, roof = material(pick(rng, ("wood", "painted", "white")), rng), material("plastic", rng)
+    wall, roof = made_of(rng, "wood", "painted", "white"), material("plastic", rng)
     yield box((-deep, 0.0, 0.0), (-deep + 0.008, wide, tall), wall)
     yield from [
         box((-deep, y, 0.0), (0.0, y + 0.01, tall), wall) for y in (0.0, wide * draw(rng, 0.35, 0.6), wide - 0.01)
@@ -234,8 +230,8 @@ def _register_shoes(kind: str, held_out: bool) -> None:
     @family("shoes", kind, held_out)
     def recipe(rng: np.random.Generator) -> Parts:
         long = draw(rng, 0.2, 0.31)
-        look = material(pick(rng, ("leather", "fabric", "black", "white", "plastic")), rng)
-        sole = material(pick(rng, ("white", "black", "leather")), rng)
+        look = made_of(rng, "leather", "fabric", "black", "white", "plastic")
+        sole = made_of(rng, "white", "black", "leather")
         shoe = _shoe(rng, long, kind, look, sole)
         return [
             shoe.turned(draw(rng, -0.2, 0.2)).moved(draw(rng, -0.04, 0.04), s * long * draw(rng, 0.24, 0.36))

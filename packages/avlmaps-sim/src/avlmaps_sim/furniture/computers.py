@@ -7,7 +7,7 @@ import numpy as np
 from avlmaps_sim.furniture.catalogue import Parts, Support, family
 from avlmaps_sim.furniture.electronics import casing, screen
 from avlmaps_sim.furniture.fittings import Pair, body, face, feet, spindle
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick, pictured
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick, pictured
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes, joined, triangles_of
 from avlmaps_sim.shapes import box, sheet, slab
@@ -60,7 +60,7 @@ def face_up(low: Pair, high: Pair, z: float, look: Material, fill: bool = False)
 def _laptop(rng: np.random.Generator, wide: float, deep: float, thick: float, angle: float, look: Material,
             lid: Material, glow: Material) -> Parts:  # fmt: skip
     """Return an open laptop: base with keys and touch pad, lid ``angle`` radians back from the upright."""
-    dark = material(pick(rng, ("black", "black", "white", "metal")), rng)
+    dark = made_of(rng, "black", "black", "white", "metal")
     yield body(rng, (0.0, -wide / 2, 0.0), (deep, wide / 2, thick), look, min(0.3 * thick, 0.006))
     key_look = dark if chance(rng, 0.8) else look
     yield face_up((0.14 * deep, -0.46 * wide), (0.6 * deep, 0.46 * wide), thick + 0.0006, dark)
@@ -82,7 +82,7 @@ def _laptop(rng: np.random.Generator, wide: float, deep: float, thick: float, an
 @family("laptop", "open thin")
 def _laptop_open(rng: np.random.Generator) -> Parts:
     wide = draw(rng, 0.28, 0.39)
-    look = material(pick(rng, ("metal", "metal", "white", "black", "painted")), rng)
+    look = made_of(rng, "metal", "metal", "white", "black", "painted")
     return _laptop(
         rng,
         wide,
@@ -98,7 +98,7 @@ def _laptop_open(rng: np.random.Generator) -> Parts:
 @family("laptop", "open thick")
 def _laptop_thick(rng: np.random.Generator) -> Parts:
     wide = draw(rng, 0.33, 0.43)
-    look, lid = material("black", rng), material(pick(rng, ("black", "plastic", "metal")), rng)
+    look, lid = material("black", rng), made_of(rng, "black", "plastic", "metal")
     return _laptop(
         rng, wide, wide * draw(rng, 0.68, 0.8), draw(rng, 0.022, 0.04), draw(rng, 0.1, 0.5), look, lid, screen(rng, 0.7)
     )
@@ -107,11 +107,8 @@ def _laptop_thick(rng: np.random.Generator) -> Parts:
 @family("laptop", "closed")
 def _laptop_closed(rng: np.random.Generator) -> Parts:
     wide = draw(rng, 0.28, 0.4)
-    deep, thick, look = (
-        wide * draw(rng, 0.64, 0.76),
-        draw(rng, 0.014, 0.035),
-        material(pick(rng, ("metal", "black", "white", "plastic")), rng),
-    )
+    deep, thick = wide * draw(rng, 0.64, 0.76), draw(rng, 0.014, 0.035)
+    look = made_of(rng, "metal", "black", "white", "plastic")
     return [body(rng, (0.0, -wide / 2, 0.0), (deep, wide / 2, 0.52 * thick), look, 0.003),
             body(rng, (0.003, -wide / 2, 0.56 * thick), (deep, wide / 2, thick), look, 0.004),
             slab(deep / 2, 0.0, 0.4 * thick, deep * 0.97, wide * 0.97, 0.25 * thick, material("black", rng)),
@@ -121,7 +118,7 @@ def _laptop_closed(rng: np.random.Generator) -> Parts:
 @family("laptop", "folded like a tent", held_out=True)
 def _laptop_tent(rng: np.random.Generator) -> Parts:
     wide = draw(rng, 0.26, 0.36)
-    deep, lean, look = wide * draw(rng, 0.62, 0.72), draw(rng, 0.35, 0.6), material(pick(rng, ("metal", "black")), rng)
+    deep, lean, look = wide * draw(rng, 0.62, 0.72), draw(rng, 0.35, 0.6), made_of(rng, "metal", "black")
     leaf = body(rng, (-0.008, -wide / 2, -deep), (0.0, wide / 2, 0.0), look, 0.003)
     shown = joined([leaf, face(0.0005, (-wide / 2 + 0.004, -deep + 0.004), (wide / 2 - 0.004, -0.004),
                                material("black", rng)),
@@ -170,7 +167,7 @@ def _flat_desktop(rng: np.random.Generator) -> Parts:
 @family("computer", "glass side")
 def _glass_side(rng: np.random.Generator) -> Parts:
     wide, deep, high = draw(rng, 0.2, 0.26), draw(rng, 0.4, 0.52), draw(rng, 0.42, 0.55)
-    look, side = material(pick(rng, ("black", "black", "white")), rng), pick(rng, (-1.0, 1.0))
+    look, side = made_of(rng, "black", "black", "white"), pick(rng, (-1.0, 1.0))
     glow = replace(material("plastic", rng, tuple(rng.uniform(0.2, 1.0, 3))), emission=draw(rng, 0.3, 0.9))
     inner = side * (wide / 2 - 0.02)
     yield box((0.0, -wide / 2, 0.02), (deep, -inner * 0.0 + wide / 2, 0.04), look)

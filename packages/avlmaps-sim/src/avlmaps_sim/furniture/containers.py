@@ -3,7 +3,7 @@
 import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Parts, Support, family
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick, strut, turned_ring
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, strut, turned_ring
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, joined
 from avlmaps_sim.shapes import (
@@ -82,7 +82,7 @@ def _box_stack(rng: np.random.Generator) -> Parts:
 @family("box", "storage bin")
 def _storage_bin(rng: np.random.Generator) -> Parts:
     length, width, tall = draw(rng, 0.25, 0.45), draw(rng, 0.3, 0.65), draw(rng, 0.12, 0.42)
-    look = material(pick(rng, ("plastic", "glass", "white", "painted")), rng)
+    look = made_of(rng, "plastic", "glass", "white", "painted")
     lid = look if chance(rng, 0.4) else material("plastic", rng)
     corner = draw(rng, 0.01, 0.05)
     yield tub(length, width, tall, draw(rng, 0.85, 0.97), corner, look)
@@ -111,11 +111,7 @@ def _crate(rng: np.random.Generator) -> Parts:
 @family("box", "chest", held_out=True)
 def _chest(rng: np.random.Generator) -> Parts:
     length, width, tall = draw(rng, 0.2, 0.5), draw(rng, 0.35, 1.0), draw(rng, 0.2, 0.4)
-    look, metal, bulge = (
-        material(pick(rng, ("wood", "leather", "painted")), rng),
-        material("metal", rng),
-        draw(rng, 0.2, 0.6),
-    )
+    look, metal, bulge = made_of(rng, "wood", "leather", "painted"), material("metal", rng), draw(rng, 0.2, 0.6)
     angle = np.linspace(0.0, np.pi, 8)
     rings = [
         np.stack([(length / 2 * np.cos(a), y, tall + bulge * length / 2 * np.sin(a)) for a in angle])
@@ -143,8 +139,7 @@ def _round_basket(rng: np.random.Generator) -> Parts:
     radius, look = draw(rng, 0.12, 0.27), _woven(rng)
     tall, belly, low = radius * draw(rng, 0.8, 1.9), draw(rng, 1.0, 1.2), draw(rng, 0.7, 1.0)
     rows = [(low * radius, 0.0), (belly * radius, tall * 0.4), (radius, tall), (radius * 0.93, tall),
-            (belly * radius * 0.94, tall * 0.4),
-            (low * radius * 0.9, 0.02)]  # fmt: skip
+            (belly * radius * 0.94, tall * 0.4), (low * radius * 0.9, 0.02)]  # fmt: skip
     yield lathe(rows, look, sides=18)
     if chance(rng, 0.6):
         angle, z = np.linspace(0.0, np.pi, 7), tall
@@ -168,7 +163,7 @@ def _rect_basket(rng: np.random.Generator) -> Parts:
 
 @family("basket", "wire")
 def _wire_basket(rng: np.random.Generator) -> Parts:
-    radius, look = draw(rng, 0.1, 0.22), material(pick(rng, ("metal", "black", "white")), rng)
+    radius, look = draw(rng, 0.1, 0.22), made_of(rng, "metal", "black", "white")
     tall, low, wires = radius * draw(rng, 0.8, 1.5), draw(rng, 0.6, 0.9), count(rng, 10, 14)
     for x, y in circle(radius, wires).tolist():
         yield tube([(x * low, y * low, 0.0), (x, y, tall)], 0.003, look, 3)
@@ -191,7 +186,7 @@ def _handle_basket(rng: np.random.Generator) -> Parts:
 
 @family("trash can", "open tub")
 def _open_bin(rng: np.random.Generator) -> Parts:
-    radius, look = draw(rng, 0.1, 0.19), material(pick(rng, ("plastic", "metal", "black", "white", "painted")), rng)
+    radius, look = draw(rng, 0.1, 0.19), made_of(rng, "plastic", "metal", "black", "white", "painted")
     tall, low = radius * draw(rng, 1.8, 2.8), draw(rng, 0.7, 0.95)
     if chance(rng, 0.35):
         yield tub(radius * 1.6, radius * 2.4, tall, low, 0.03, look)
@@ -199,7 +194,7 @@ def _open_bin(rng: np.random.Generator) -> Parts:
         rows = [(low * radius, 0.0), (radius, tall), (radius * 0.94, tall), (low * radius * 0.93, 0.01)]
         yield lathe(rows, look, sides=20)
     if chance(rng, 0.4):  # its bag hangs over the rim
-        bag = material(pick(rng, ("white", "black", "plastic")), rng)
+        bag = made_of(rng, "white", "black", "plastic")
         yield turned_ring(
             [(radius * 1.04, tall * draw(rng, 0.72, 0.9)), (radius * 1.03, tall + 0.01), (radius * 0.9, tall)],
             bag,
@@ -210,7 +205,7 @@ def _open_bin(rng: np.random.Generator) -> Parts:
 @family("trash can", "pedal")
 def _pedal_bin(rng: np.random.Generator) -> Parts:
     radius, tall = draw(rng, 0.1, 0.2), draw(rng, 0.26, 0.7)
-    look, black = material(pick(rng, ("metal", "metal", "white", "painted", "black")), rng), material("black", rng)
+    look, black = made_of(rng, "metal", "metal", "white", "painted", "black"), material("black", rng)
     if chance(rng, 0.6):
         rows = [
             (radius, 0.03),
@@ -232,7 +227,7 @@ def _pedal_bin(rng: np.random.Generator) -> Parts:
 @family("trash can", "swing lid")
 def _swing_bin(rng: np.random.Generator) -> Parts:
     length, width, tall = draw(rng, 0.2, 0.32), draw(rng, 0.24, 0.42), draw(rng, 0.4, 0.75)
-    look, lid = material("plastic", rng), material(pick(rng, ("plastic", "black", "white")), rng)
+    look, lid = material("plastic", rng), made_of(rng, "plastic", "black", "white")
     rise = draw(rng, 0.08, 0.16)
     rings = []
     for size, z in ((1.02, tall), (1.02, tall + 0.03), (0.95, tall + rise * 0.6), (0.6, tall + rise)):
@@ -246,7 +241,7 @@ def _swing_bin(rng: np.random.Generator) -> Parts:
 @family("trash can", "wheelie", held_out=True)
 def _wheelie_bin(rng: np.random.Generator) -> Parts:
     length, width, tall = draw(rng, 0.45, 0.6), draw(rng, 0.4, 0.58), draw(rng, 0.75, 1.05)
-    look, lid = material("plastic", rng), material(pick(rng, ("plastic", "black")), rng)
+    look, lid = material("plastic", rng), made_of(rng, "plastic", "black")
     yield tub(length, width, tall, 0.8, 0.04, look).moved(z=0.04)
     yield rounded_box(
         (-length * 0.52, -width * 0.52, tall + 0.03), (length * 0.55, width * 0.52, tall + 0.09), 0.02, lid
@@ -263,7 +258,7 @@ def _wheelie_bin(rng: np.random.Generator) -> Parts:
 
 @family("trash can", "mesh")
 def _mesh_bin(rng: np.random.Generator) -> Parts:
-    radius, tall, look = draw(rng, 0.12, 0.16), draw(rng, 0.25, 0.36), material(pick(rng, ("black", "metal")), rng)
+    radius, tall, look = draw(rng, 0.12, 0.16), draw(rng, 0.25, 0.36), made_of(rng, "black", "metal")
     low, rods = draw(rng, 0.75, 0.95), 20
     yield from [
         strut((x * low, y * low, 0.0), (x, y, tall), 0.008, 0.003, look) for x, y in circle(radius, rods).tolist()
@@ -280,7 +275,7 @@ def _mesh_bin(rng: np.random.Generator) -> Parts:
 @family("trash can", "sorting station")
 def _sorting_bins(rng: np.random.Generator) -> Parts:
     number, width, length, tall = count(rng, 2, 3), draw(rng, 0.2, 0.34), draw(rng, 0.28, 0.4), draw(rng, 0.45, 0.85)
-    body = material(pick(rng, ("metal", "white", "black", "painted")), rng)
+    body = made_of(rng, "metal", "white", "black", "painted")
     for i in range(number):
         y = (i - (number - 1) / 2) * width * 1.03
         yield slab(0.0, y, 0.0, length, width, tall, body)

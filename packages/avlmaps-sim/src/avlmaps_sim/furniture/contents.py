@@ -3,7 +3,7 @@
 import numpy as np
 
 from avlmaps_sim.furniture.carcass import Room
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes, Triple, triangles_of
 from avlmaps_sim.shapes import box, lathe, loft, rounded_rectangle, tube
@@ -77,9 +77,7 @@ def ornament(rng: np.random.Generator, x: float, y: float, z: float, tall: float
     if kind == "frame":
         wide, h = draw(rng, 0.1, 0.2), tall * draw(rng, 0.5, 0.9)
         return box(
-            (x - 0.01, y - wide / 2, z),
-            (x + 0.01, y + wide / 2, z + h),
-            material(pick(rng, ("wood", "black", "painting")), rng),
+            (x - 0.01, y - wide / 2, z), (x + 0.01, y + wide / 2, z + h), made_of(rng, "wood", "black", "painting")
         )
     look = material("wicker" if kind == "basket" else pick(rng, ("paper", "plastic", "wood")), rng)
     wide, deep, h = draw(rng, 0.14, 0.3), draw(rng, 0.14, 0.22), tall * draw(rng, 0.4, 0.85)

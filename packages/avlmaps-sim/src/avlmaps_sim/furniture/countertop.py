@@ -4,7 +4,7 @@ import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Parts, Support, family
 from avlmaps_sim.furniture.fittings import body, chrome, dial, enamel, face, feet, outline, shell, spindle, steel
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes, joined
 from avlmaps_sim.shapes import box, cylinder, ellipsoid, lathe, rounded_box, slab, tube
@@ -25,7 +25,7 @@ def _any_turn(rng: np.random.Generator, parts: list[Mesh]) -> Parts:
 def _electric_jug(rng: np.random.Generator) -> Parts:
     low, top, high = draw(rng, 0.065, 0.085), draw(rng, 0.048, 0.07), draw(rng, 0.17, 0.24)
     look = pick(rng, (steel(rng), material("plastic", rng), material("glass", rng), material("painted", rng)))
-    dark = material(pick(rng, ("black", "black", "white")), rng)
+    dark = made_of(rng, "black", "black", "white")
     base = 0.025
     parts = [cylinder(0.0, 0.0, 0.0, low * 1.02, base, dark, 18),
              lathe([(low, base), (low * 0.98, base + 0.3 * high), (top, high)], look, sides=18),
@@ -42,7 +42,7 @@ def _stove_kettle(rng: np.random.Generator) -> Parts:
     radius, high = draw(rng, 0.085, 0.12), draw(rng, 0.1, 0.15)
     look = pick(rng, (steel(rng), material("painted", rng), material("black", rng),
                       material("metal", rng, (0.7, 0.42, 0.28))))  # fmt: skip
-    grip = material(pick(rng, ("black", "wood", "metal")), rng)
+    grip = made_of(rng, "black", "wood", "metal")
     belly = draw(rng, 0.9, 1.05)
     arch = [(radius * 0.75 * float(np.cos(a)), 0.0, high * 0.8 + draw(rng, 0.099, 0.1) * float(np.sin(a)))
             for a in np.linspace(np.pi * 0.98, 0.02, 7)]  # fmt: skip
@@ -57,10 +57,10 @@ def _stove_kettle(rng: np.random.Generator) -> Parts:
 @family("kettle", "goose neck", held_out=True)
 def _goose_neck(rng: np.random.Generator) -> Parts:
     radius, high = draw(rng, 0.06, 0.08), draw(rng, 0.1, 0.15)
-    look, dark = material(pick(rng, ("black", "metal", "white")), rng), material(pick(rng, ("black", "wood")), rng)
+    look, dark = made_of(rng, "black", "metal", "white"), made_of(rng, "black", "wood")
     parts = [lathe([(radius * 1.15, 0.0), (radius * 1.15, 0.02), (radius, 0.025), (radius * 0.75, high)], look,
-                   sides=18), lathe([(radius * 0.75, high), (0.02, high + 0.012), (0.012, high + 0.03)], look,
-                                    sides=12),
+                   sides=18),
+             lathe([(radius * 0.75, high), (0.02, high + 0.012), (0.012, high + 0.03)], look, sides=12),
              tube([(radius * 0.9, 0.0, 0.045), (radius * 1.5, 0.0, 0.04), (radius * 1.65, 0.0, high * 0.7),
                    (radius * 2.0, 0.0, high * 1.05), (radius * 2.3, 0.0, high)], 0.007, look, 7),
              tube([(-radius * 0.7, 0.0, high * 0.95), (-radius * 1.7, 0.0, high * 0.95), (-radius * 1.75, 0.0, 0.04)],
@@ -108,10 +108,8 @@ def _long_slot(rng: np.random.Generator) -> Parts:
 
 @family("toaster", "small oven", held_out=True)
 def _small_oven(rng: np.random.Generator) -> Parts:
-    wide, deep, high, look, dark = draw(rng, 0.36,
-                                        0.52), draw(rng, 0.25,
-                                                    0.36), draw(rng, 0.2,
-                                                                0.3), enamel(rng), material("black", rng)  # fmt: skip
+    wide, deep, high, look = draw(rng, 0.36, 0.52), draw(rng, 0.25, 0.36), draw(rng, 0.2, 0.3), enamel(rng)
+    dark = material("black", rng)
     half, panel, knobs = wide / 2, draw(rng, 0.08, 0.12), chrome(rng)
     return [body(rng, (0.0, -half, 0.015), (deep, half, high), look), *feet((0.0, -half), (deep, half), 0.015, dark),
             face(deep + 0.001, (-half + 0.02, 0.04), (half - panel, high - 0.05), dark),
@@ -139,9 +137,8 @@ def _filter(rng: np.random.Generator) -> Parts:
 
 @family("coffee machine", "espresso")
 def _espresso(rng: np.random.Generator) -> Parts:
-    wide, deep, high, look, metal = draw(rng, 0.2,
-                                         0.36), draw(rng, 0.26,
-                                                     0.36), draw(rng, 0.3, 0.4), enamel(rng), steel(rng)  # fmt: skip
+    wide, deep, high, look = draw(rng, 0.2, 0.36), draw(rng, 0.26, 0.36), draw(rng, 0.3, 0.4), enamel(rng)
+    metal = steel(rng)
     half, dark = wide / 2, material("black", rng)
     column, head = deep * draw(rng, 0.5, 0.6), high * draw(rng, 0.62, 0.72)
     yield body(rng, (0.0, -half, 0.015), (column, half, high), look)
@@ -169,7 +166,7 @@ def _espresso(rng: np.random.Generator) -> Parts:
 @family("coffee machine", "capsules")
 def _capsules(rng: np.random.Generator) -> Parts:
     wide, deep, high = draw(rng, 0.1, 0.16), draw(rng, 0.26, 0.34), draw(rng, 0.22, 0.3)
-    look, dark = material(pick(rng, ("plastic", "black", "white", "painted")), rng), material("black", rng)
+    look, dark = made_of(rng, "plastic", "black", "white", "painted"), material("black", rng)
     half, flat = wide / 2, outline(deep * 0.6, wide, 3.0, 18, middle=(deep * 0.3, 0.0))
     return [shell([(flat, 0.0), (flat, high * 0.75), (flat * 0.94, high)], look),
             rounded_box((deep * 0.2, -half * 0.8, high * 0.62), (deep * 0.85, half * 0.8, high * 0.95), 0.02, look),
@@ -184,7 +181,7 @@ def _capsules(rng: np.random.Generator) -> Parts:
 @family("coffee machine", "bean to cup", held_out=True)
 def _bean_to_cup(rng: np.random.Generator) -> Parts:
     wide, deep, high = draw(rng, 0.24, 0.32), draw(rng, 0.36, 0.45), draw(rng, 0.33, 0.42)
-    look, dark = material(pick(rng, ("black", "metal", "white")), rng), material("black", rng)
+    look, dark = made_of(rng, "black", "metal", "white"), material("black", rng)
     half, cut = wide / 2, deep * 0.72
     return [body(rng, (0.0, -half, 0.0), (cut, half, high), look),
             box((cut - 0.01, -half, high * 0.55), (deep * 0.9, half, high), look),
@@ -199,13 +196,13 @@ def _bean_to_cup(rng: np.random.Generator) -> Parts:
 
 @family("coffee machine", "octagonal pot")
 def _moka(rng: np.random.Generator) -> Parts:
-    look = steel(rng) if chance(rng, 0.6) else material(pick(rng, ("painted", "black")), rng)
+    look = steel(rng) if chance(rng, 0.6) else made_of(rng, "painted", "black")
     dark, radius, high = material("black", rng), draw(rng, 0.04, 0.055), draw(rng, 0.16, 0.24)
     parts = [lathe([(radius, 0.0), (radius * 0.95, 0.4 * high), (radius * 0.7, 0.5 * high),
                     (radius * 1.05, 0.92 * high)], look, sides=8),
              lathe([(radius * 1.05, 0.92 * high), (0.012, high)], look, sides=8),
              ellipsoid((0.0, 0.0, high + 0.008), (0.01, 0.01, 0.012), dark, 7, 4),
              tube([(-radius, 0.0, 0.88 * high), (-radius - 0.05, 0.0, 0.9 * high), (-radius - 0.04, 0.0, 0.55 * high)],
-                  0.009, dark, 6), _spout((radius * 0.9, 0.8 * high), (radius * 1.35, 0.93 * high), 0.012,
-                                          look)]  # fmt: skip
+                  0.009, dark, 6),
+             _spout((radius * 0.9, 0.8 * high), (radius * 1.35, 0.93 * high), 0.012, look)]  # fmt: skip
     return _any_turn(rng, parts)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Parts, family
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, joined
 from avlmaps_sim.shapes import circle, cylinder, ellipsoid, lathe, slab, tube
@@ -11,7 +11,7 @@ from avlmaps_sim.shapes import circle, cylinder, ellipsoid, lathe, slab, tube
 
 def _cup(rng: np.random.Generator, handle: bool) -> Mesh:
     radius, tall = draw(rng, 0.03, 0.05), draw(rng, 0.055, 0.12)
-    look, low = material(pick(rng, ("ceramic", "ceramic", "painted", "plastic", "glass")), rng), draw(rng, 0.6, 1.0)
+    look, low = made_of(rng, "ceramic", "ceramic", "painted", "plastic", "glass"), draw(rng, 0.6, 1.0)
     rows = [
         (radius * low, 0.0),
         (radius * (1 + low) / 2 * draw(rng, 0.95, 1.1), tall * 0.5),
@@ -77,7 +77,7 @@ def _hollow(rng: np.random.Generator, radius: float, tall: float, look: Material
 
 
 def _bowl_look(rng: np.random.Generator) -> Material:
-    return material(pick(rng, ("ceramic", "ceramic", "wood", "glass", "metal", "plastic", "painted")), rng)
+    return made_of(rng, "ceramic", "ceramic", "wood", "glass", "metal", "plastic", "painted")
 
 
 @family("bowl", "empty")
@@ -128,10 +128,7 @@ def _lid(radius: float, z: float, look: Material, knob: Material) -> list[Mesh]:
 @family("pot", "saucepan")
 def _saucepan(rng: np.random.Generator) -> Parts:
     radius, tall = draw(rng, 0.07, 0.13), draw(rng, 0.06, 0.15)
-    look, grip = (
-        material(pick(rng, ("metal", "black", "painted")), rng),
-        material(pick(rng, ("black", "wood", "metal")), rng),
-    )
+    look, grip = made_of(rng, "metal", "black", "painted"), made_of(rng, "black", "wood", "metal")
     parts = [lathe([(radius, 0.0), (radius, tall), (radius * 0.96, tall), (radius * 0.94, 0.008)], look, sides=14)]
     handle = tube(
         [(radius, 0.0, tall * 0.85), (radius + 0.06, 0.0, tall * 0.9), (radius + draw(rng, 0.14, 0.2), 0.0, tall)],
@@ -146,10 +143,7 @@ def _saucepan(rng: np.random.Generator) -> Parts:
 @family("pot", "stockpot")
 def _stockpot(rng: np.random.Generator) -> Parts:
     radius, tall = draw(rng, 0.09, 0.16), draw(rng, 0.09, 0.24)
-    look, grip = (
-        material(pick(rng, ("metal", "painted", "black", "ceramic")), rng),
-        material(pick(rng, ("metal", "black")), rng),
-    )
+    look, grip = made_of(rng, "metal", "painted", "black", "ceramic"), made_of(rng, "metal", "black")
     parts = [
         lathe(
             [(radius * 0.97, 0.0), (radius, 0.01), (radius, tall), (radius * 0.94, tall), (radius * 0.92, 0.01)],
@@ -170,11 +164,7 @@ def _stockpot(rng: np.random.Generator) -> Parts:
 
 @family("pot", "frying pan", held_out=True)
 def _frying_pan(rng: np.random.Generator) -> Parts:
-    radius, look, grip = (
-        draw(rng, 0.1, 0.16),
-        material(pick(rng, ("black", "metal")), rng),
-        material(pick(rng, ("black", "wood")), rng),
-    )
+    radius, look, grip = draw(rng, 0.1, 0.16), made_of(rng, "black", "metal"), made_of(rng, "black", "wood")
     rows = [(radius * 0.78, 0.0), (radius, 0.045), (radius * 0.97, 0.045), (radius * 0.75, 0.006)]
     return [lathe(rows, look, sides=16), tube([(radius * 0.95, 0.0, 0.04), (radius + 0.18, 0.0, 0.075)], 0.01, grip, 5)]
 
@@ -188,11 +178,8 @@ def _cutlery(rng: np.random.Generator, y: float, look: Material) -> Mesh:
 
 @family("tableware", "place setting")
 def _setting(rng: np.random.Generator) -> Parts:
-    radius, look, metal = (
-        draw(rng, 0.1, 0.15),
-        material(pick(rng, ("ceramic", "ceramic", "painted", "stone")), rng),
-        material("metal", rng),
-    )
+    radius, look = draw(rng, 0.1, 0.15), made_of(rng, "ceramic", "ceramic", "painted", "stone")
+    metal = material("metal", rng)
     yield lathe([(radius * 0.55, 0.003), (radius, 0.022), (radius * 0.62, 0.01)], look, sides=16)
     if chance(rng, 0.5):
         yield lathe([(radius * 0.4, 0.012), (radius * 0.72, 0.03), (radius * 0.45, 0.02)], look, sides=14)
@@ -203,11 +190,7 @@ def _setting(rng: np.random.Generator) -> Parts:
 
 @family("tableware", "stack of plates")
 def _plates(rng: np.random.Generator) -> Parts:
-    radius, look, step = (
-        draw(rng, 0.08, 0.145),
-        material(pick(rng, ("ceramic", "painted", "stone")), rng),
-        draw(rng, 0.008, 0.014),
-    )
+    radius, look, step = draw(rng, 0.08, 0.145), made_of(rng, "ceramic", "painted", "stone"), draw(rng, 0.008, 0.014)
     return [
         lathe([(radius * 0.55, i * step), (radius, i * step + 0.016), (radius * 0.5, i * step + 0.008)], look, sides=12)
         for i in range(count(rng, 1, 5))
@@ -217,11 +200,11 @@ def _plates(rng: np.random.Generator) -> Parts:
 @family("tableware", "cutlery jar")
 def _cutlery_jar(rng: np.random.Generator) -> Parts:
     radius, tall = draw(rng, 0.04, 0.07), draw(rng, 0.1, 0.17)
-    look = material(pick(rng, ("ceramic", "metal", "wood", "painted")), rng)
+    look = made_of(rng, "ceramic", "metal", "wood", "painted")
     yield lathe([(radius, 0.0), (radius, tall), (radius * 0.9, tall), (radius * 0.88, 0.01)], look, sides=10)
     for _ in range(count(rng, 3, 6)):
         x, y = (rng.uniform(-1, 1, 2) * radius * 0.9).tolist()
-        stick = material(pick(rng, ("wood", "metal", "plastic", "black")), rng)
+        stick = made_of(rng, "wood", "metal", "plastic", "black")
         top = tall + draw(rng, 0.06, 0.16)
         yield tube([(-x * 0.4, -y * 0.4, 0.02), (x, y, top)], 0.004, stick, 3)
         yield ellipsoid((x * 1.1, y * 1.1, top), (0.008, 0.022, 0.035), stick, 5, 3)
@@ -255,11 +238,7 @@ def _teapot(rng: np.random.Generator) -> Parts:
 
 @family("tableware", "tray")
 def _tray(rng: np.random.Generator) -> Parts:
-    long, wide, look = (
-        draw(rng, 0.25, 0.36),
-        draw(rng, 0.32, 0.5),
-        material(pick(rng, ("wood", "metal", "painted", "plastic")), rng),
-    )
+    long, wide, look = draw(rng, 0.25, 0.36), draw(rng, 0.32, 0.5), made_of(rng, "wood", "metal", "painted", "plastic")
     yield slab(0.0, 0.0, 0.0, long, wide, 0.008, look)
     yield from [slab(s * long / 2, 0.0, 0.0, 0.01, wide, 0.04, look) for s in (-1, 1)]
     yield from [slab(0.0, s * wide / 2, 0.0, long, 0.01, 0.045, look) for s in (-1, 1)]

@@ -3,7 +3,7 @@
 import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Families, Parts, Piece, family
-from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, pick, rim
+from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, made_of, pick, rim
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, joined, triangles_of
 from avlmaps_sim.shapes import circle, lathe, loft, prism, rounded_rectangle, sheet, slab, tube
@@ -15,7 +15,7 @@ CARPET_SHAPES: dict[Families, tuple[str, ...]] = {
 
 
 def _art(rng: np.random.Generator) -> Material:
-    return material(pick(rng, ("painting", "painting", "poster")), rng)
+    return made_of(rng, "painting", "painting", "poster")
 
 
 def _format(rng: np.random.Generator, low: float, high: float) -> tuple[float, float]:
@@ -49,7 +49,7 @@ def _face(x: float, y0: float, z0: float, y1: float, z1: float, look: Material) 
 
 
 def _frame_look(rng: np.random.Generator) -> Material:
-    return material(pick(rng, ("wood", "wood", "black", "white", "metal", "painted")), rng)
+    return made_of(rng, "wood", "wood", "black", "white", "metal", "painted")
 
 
 @family("picture", "wall framed")
@@ -84,13 +84,11 @@ def _wall_poster(rng: np.random.Generator) -> Parts:
     width = draw(rng, 0.28, 0.85)
     height, curl = width * pick(rng, (1.414, 1.5, 0.707, 1.33)), draw(rng, 0.0, 0.02)
     rows = np.linspace(0.0, 1.0, 4)
-    points = np.stack([
-        np.stack([np.array([0.002 + curl * (2 * v - 1) ** 4, (u - 0.5) * width, v * height]) for v in rows])
-        for u in (0.0, 1.0)
-    ])  # fmt: skip
+    points = np.stack([np.stack([np.array([0.002 + curl * (2 * v - 1) ** 4, (u - 0.5) * width, v * height])
+                                 for v in rows]) for u in (0.0, 1.0)])  # fmt: skip
     yield cloth(points, material("poster", rng), fill=True)
     if chance(rng, 0.35):  # hangs between two bars
-        bar = material(pick(rng, ("wood", "black")), rng)
+        bar = made_of(rng, "wood", "black")
         yield from [slab(0.009, 0.0, z, 0.018, width + 0.01, 0.022, bar) for z in (-0.01, height - 0.012)]
         yield tube([(0.008, -width * 0.4, height), (0.004, 0.0, height + width * 0.25), (0.008, width * 0.4, height)],
                    0.002, bar, 4)  # fmt: skip
@@ -129,14 +127,12 @@ def _wall_oval(rng: np.random.Generator) -> Parts:
 @family("picture", "wall hanging")
 def _wall_hanging(rng: np.random.Generator) -> Parts:
     width, height = draw(rng, 0.3, 1.3), draw(rng, 0.5, 1.6)
-    rod, look = material(pick(rng, ("wood", "metal")), rng), material(pick(rng, ("rug", "painting")), rng)
+    rod, look = made_of(rng, "wood", "metal"), made_of(rng, "rug", "painting")
     wave, phase = draw(rng, 0.003, 0.02), draw(rng, 0.0, 6.0)
     pointed = draw(rng, 0.1, 0.35) * height if chance(rng, 0.4) else 0.0
-    points = np.array([
-        [(0.03 + wave * np.sin(9 * u + phase) * (1 - v), (u - 0.5) * width,
-          height * v + pointed * (1 - v) * abs(2 * u - 1)) for v in np.linspace(0.0, 1.0, 4)]
-        for u in np.linspace(0.0, 1.0, 9)
-    ])  # fmt: skip
+    points = np.array([[(0.03 + wave * np.sin(9 * u + phase) * (1 - v), (u - 0.5) * width,
+                         height * v + pointed * (1 - v) * abs(2 * u - 1)) for v in np.linspace(0.0, 1.0, 4)]
+                       for u in np.linspace(0.0, 1.0, 9)])  # fmt: skip
     yield cloth(points, look, fill=True)
     yield tube([(0.03, -width * 0.54, height), (0.03, width * 0.54, height)], 0.012, rod, 8)
     if chance(rng, 0.6):
@@ -268,15 +264,15 @@ def _square_cushion(rng: np.random.Generator) -> Parts:
 @family("cushion", "round")
 def _round_cushion(rng: np.random.Generator) -> Parts:
     side = draw(rng, 0.3, 0.55)
-    look = material(pick(rng, ("fabric", "leather")), rng)
+    look = made_of(rng, "fabric", "leather")
     return [_pillow(side, side, draw(rng, 0.08, 0.18), look, 2.0, draw(rng, 0.0, 0.7))]
 
 
 @family("cushion", "bolster", held_out=True)
 def _bolster(rng: np.random.Generator) -> Parts:
     radius, long, look = draw(rng, 0.07, 0.12), draw(rng, 0.35, 0.9), material("fabric", rng)
-    rows = [(radius * 0.5, -0.01), (radius * 0.95, 0.0), (radius, 0.03), (radius, long - 0.03),
-            (radius * 0.95, long), (radius * 0.5, long + 0.01)]  # fmt: skip
+    rows = [(radius * 0.5, -0.01), (radius * 0.95, 0.0), (radius, 0.03), (radius, long - 0.03), (radius * 0.95, long),
+            (radius * 0.5, long + 0.01)]  # fmt: skip
     return [lathe(rows, look, sides=14).tilted("x", np.pi / 2)]
 
 

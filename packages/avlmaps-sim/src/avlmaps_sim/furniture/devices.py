@@ -6,7 +6,7 @@ from avlmaps_sim.furniture.catalogue import Parts, family
 from avlmaps_sim.furniture.computers import face_up, key_field
 from avlmaps_sim.furniture.electronics import screen
 from avlmaps_sim.furniture.fittings import body, chrome, face, feet, outline, shell, spindle
-from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, pick, pictured, strut
+from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, made_of, pick, pictured, strut
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, joined
 from avlmaps_sim.shapes import box, cylinder, ellipsoid, lathe, loft, rounded_box, sheet, slab, tube
@@ -109,7 +109,7 @@ def _box_speaker(rng: np.random.Generator, wide: float, deep: float, z: tuple[fl
                  look: Material) -> list[Mesh]:  # fmt: skip
     """Return a box with cones on its front, or a cloth before them, between two heights."""
     half, (low, high) = wide / 2, z
-    dark, ring = material("black", rng), material(pick(rng, ("black", "black", "metal", "plastic")), rng)
+    dark, ring = material("black", rng), made_of(rng, "black", "black", "metal", "plastic")
     parts = [body(rng, (0.0, -half, low), (deep, half, high), look, draw(rng, 0.003, 0.012))]
     if chance(rng, 0.25):
         parts.append(rounded_box((deep - 0.002, -half * 0.95, low + 0.01), (deep + 0.012, half * 0.95, high - 0.01),
@@ -130,7 +130,7 @@ def _box_speaker(rng: np.random.Generator, wide: float, deep: float, z: tuple[fl
 
 
 def _speaker_look(rng: np.random.Generator) -> Material:
-    return material(pick(rng, ("wood", "wood", "black", "black", "white")), rng)
+    return made_of(rng, "wood", "wood", "black", "black", "white")
 
 
 @family("loudspeaker", "floor standing")
@@ -176,7 +176,7 @@ def _smart(rng: np.random.Generator) -> Parts:
 @family("loudspeaker", "sound bar")
 def _sound_bar(rng: np.random.Generator) -> Parts:
     wide, deep, high = draw(rng, 0.55, 1.2), draw(rng, 0.06, 0.13), draw(rng, 0.05, 0.11)
-    look = material(pick(rng, ("black", "black", "metal", "white")), rng)
+    look = made_of(rng, "black", "black", "metal", "white")
     grille = material("fabric", rng, (g := draw(rng, 0.08, 0.4), g, g))
     return [rounded_box((0.0, -wide / 2, 0.0), (deep, wide / 2, high), draw(rng, 0.005, 0.03), look, 3),
             face(deep + 0.001, (-wide / 2 + 0.03, 0.012), (wide / 2 - 0.03, high - 0.012), grille)]  # fmt: skip
@@ -185,20 +185,18 @@ def _sound_bar(rng: np.random.Generator) -> Parts:
 @family("loudspeaker", "radio", held_out=True)
 def _radio(rng: np.random.Generator) -> Parts:
     wide, deep, high = draw(rng, 0.2, 0.5), draw(rng, 0.1, 0.2), draw(rng, 0.12, 0.26)
-    look, dark, half = material(pick(rng, ("wood", "plastic", "painted", "black")),
-                                rng), material("black", rng), wide / 2  # fmt: skip
+    look, dark, half = made_of(rng, "wood", "plastic", "painted", "black"), material("black", rng), wide / 2
     yield rounded_box((0.0, -half, 0.01), (deep, half, high), draw(rng, 0.006, 0.04), look, 3)
     yield from feet((0.0, -half), (deep, half), 0.012, dark, 0.02)
     if chance(rng, 0.5):
-        yield from [m for s in (-1, 1)
-                    for m in _cone(deep, s * half * 0.62, high * 0.45, min(0.4 * high, 0.3 * half), dark,
-                                   dark)]  # fmt: skip
+        for s in (-1, 1):
+            yield from _cone(deep, s * half * 0.62, high * 0.45, min(0.4 * high, 0.3 * half), dark, dark)
         yield face(deep + 0.001, (-half * 0.25, high * 0.5), (half * 0.25, high * 0.85), material("metal", rng))
     else:
         yield face(deep + 0.001, (-half * 0.9, 0.03), (half * 0.1, high - 0.03), material("fabric", rng))
         yield face(deep + 0.001, (half * 0.2, high * 0.55), (half * 0.9, high * 0.85), material("paper", rng))
-        yield from [spindle([(0.016, deep), (0.014, deep + 0.015)], chrome(rng), half * f, high * 0.3, 10)
-                    for f in (0.35, 0.75)]  # fmt: skip
+        for f in (0.35, 0.75):
+            yield spindle([(0.016, deep), (0.014, deep + 0.015)], chrome(rng), half * f, high * 0.3, 10)
     if chance(rng, 0.6):
         yield tube([(deep / 2, -half * 0.8, high), (deep / 2, -half * 0.8, high + 0.05),
                     (deep / 2, half * 0.8, high + 0.05), (deep / 2, half * 0.8, high)], 0.007, look, 5)  # fmt: skip
@@ -213,7 +211,7 @@ def _subwoofer(rng: np.random.Generator) -> Parts:
     parts = [rounded_box((0.0, -size / 2, 0.03), (size * draw(rng, 0.9, 1.15), size / 2, size), 0.012, look, 2),
              *feet((0.0, -size / 2), (size * 0.9, size / 2), 0.03, dark)]  # fmt: skip
     parts += _cone(float(parts[0].high[0]), 0.0, size / 2 + 0.015, size * 0.4, dark,
-                   material(pick(rng, ("black", "metal", "painted")), rng))  # fmt: skip
+                   made_of(rng, "black", "metal", "painted"))  # fmt: skip
     return parts
 
 
@@ -246,8 +244,8 @@ def _full_keyboard(rng: np.random.Generator) -> Parts:
 @family("keyboard", "small flat")
 def _small_keyboard(rng: np.random.Generator) -> Parts:
     wide, deep, thick = draw(rng, 0.27, 0.32), draw(rng, 0.1, 0.13), draw(rng, 0.007, 0.016)
-    case = material(pick(rng, ("metal", "white", "black")), rng)
-    keys = material(pick(rng, ("white", "black")), rng)
+    case = made_of(rng, "metal", "white", "black")
+    keys = made_of(rng, "white", "black")
     low, high = (-deep / 2 + 0.005, -wide / 2 + 0.006), (deep / 2 - 0.005, wide / 2 - 0.006)
     parts = [rounded_box((-deep / 2, -wide / 2, 0.0), (deep / 2, wide / 2, thick), 0.003, case, 2)]
     if chance(rng, 0.5):
@@ -279,8 +277,8 @@ def _desk_phone(rng: np.random.Generator) -> Parts:
     lean = float(np.arctan2(back - low, deep))
     top = [face_up((deep * 0.45, -half * 0.05), (deep * 0.92, half * 0.85), 0.001, dark),
            *key_field(rng, (deep * 0.47, 0.0), (deep * 0.9, half * 0.8), 0.001, 4, 3, material("white", rng), 0.004,
-                      bar=False), face_up((deep * 0.1, -half * 0.05), (deep * 0.36, half * 0.85), 0.002,
-                                          screen(rng, 0.4))]  # fmt: skip
+                      bar=False),
+           face_up((deep * 0.1, -half * 0.05), (deep * 0.36, half * 0.85), 0.002, screen(rng, 0.4))]  # fmt: skip
     handset = [rounded_box((deep * 0.03, -half * 0.85, 0.025), (deep * 0.97, -half * 0.35, 0.045), 0.01, look, 2),
                *[rounded_box((x, -half * 0.9, 0.0), (x + 0.055, -half * 0.3, 0.035), 0.012, look, 2)
                  for x in (deep * 0.02, deep * 0.98 - 0.055)]]  # fmt: skip
@@ -291,9 +289,9 @@ def _desk_phone(rng: np.random.Generator) -> Parts:
 
 @family("telephone", "rotary", held_out=True)
 def _rotary(rng: np.random.Generator) -> Parts:
-    look = material("plastic", rng,
-                    pick(rng, ((0.06, 0.06, 0.06), (0.9, 0.87, 0.78), (0.6, 0.1, 0.08),
-                               (0.35, 0.45, 0.35))))  # fmt: skip
+    look = material(
+        "plastic", rng, pick(rng, ((0.06, 0.06, 0.06), (0.9, 0.87, 0.78), (0.6, 0.1, 0.08), (0.35, 0.45, 0.35)))
+    )
     deep, wide, high, metal = draw(rng, 0.17, 0.2), draw(rng, 0.16, 0.2), draw(rng, 0.1, 0.13), chrome(rng)
     rings = [(outline(deep, wide, 5.0, 16, middle=(deep / 2, 0.0)), 0.0),
              (outline(deep * 0.95, wide * 0.95, 4.0, 16, middle=(deep * 0.47, 0.0)), 0.02),
@@ -327,7 +325,7 @@ def _cordless(rng: np.random.Generator) -> Parts:
 @family("telephone", "mobile")
 def _mobile(rng: np.random.Generator) -> Parts:
     high, wide, thick = draw(rng, 0.13, 0.17), draw(rng, 0.063, 0.08), draw(rng, 0.007, 0.011)
-    look = material(pick(rng, ("black", "metal", "white", "plastic")), rng)
+    look = made_of(rng, "black", "metal", "white", "plastic")
     flat = joined([rounded_box((-high / 2, -wide / 2, 0.0), (high / 2, wide / 2, thick), 0.003, look, 2),
                    face_up((-high / 2 + 0.005, -wide / 2 + 0.004), (high / 2 - 0.005, wide / 2 - 0.004), thick + 0.0006,
                            screen(rng, 0.5), fill=True)])  # fmt: skip

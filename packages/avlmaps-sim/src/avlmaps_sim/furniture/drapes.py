@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps_sim.furniture.catalogue import Families, Parts, Piece, family
-from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, pick
+from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, made_of, pick
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, joined
 from avlmaps_sim.shapes import box, ellipsoid, rounded_box, sheet, slab, tube
@@ -52,7 +52,7 @@ def _drape(
 
 def _rod(rng: np.random.Generator, width: float, z: float, x: float) -> list[Mesh]:
     """Return a rod with ends and brackets to the wall, or a flat rail; ``width`` between its ends."""
-    look, y = material(pick(rng, ("metal", "black", "wood", "white")), rng), width / 2
+    look, y = made_of(rng, "metal", "black", "wood", "white"), width / 2
     if chance(rng, 0.3):
         return [slab(x / 2 + 0.02, 0.0, z, x + 0.04, width, draw(rng, 0.02, 0.16), look)]
     radius = draw(rng, 0.008, 0.02)
@@ -160,7 +160,7 @@ def _measures(rng: np.random.Generator) -> tuple[float, float]:
 @family("blinds", "wall venetian")
 def _venetian(rng: np.random.Generator) -> Parts:
     width, height = _measures(rng)
-    look, deep = material(pick(rng, ("white", "white", "wood", "metal", "painted")), rng), draw(rng, 0.025, 0.05)
+    look, deep = made_of(rng, "white", "white", "wood", "metal", "painted"), draw(rng, 0.025, 0.05)
     tilt, shut = draw(rng, -1.2, 1.2), draw(rng, 0.3, 1.0)
     step = max(deep * 0.85, height * shut / 60)
     slats = max(int(height * shut / step), 4)
@@ -182,7 +182,7 @@ def _venetian(rng: np.random.Generator) -> Parts:
 @family("blinds", "wall roller")
 def _roller(rng: np.random.Generator) -> Parts:
     width, height = _measures(rng)
-    look = material(pick(rng, ("fabric", "curtain", "paper", "white")), rng)
+    look = made_of(rng, "fabric", "curtain", "paper", "white")
     radius, shut = draw(rng, 0.018, 0.035), draw(rng, 0.25, 1.0)
     hung = height * shut
     x = radius + 0.01
@@ -191,8 +191,8 @@ def _roller(rng: np.random.Generator) -> Parts:
     yield slab(x + radius, 0.0, -hung - 0.015, 0.012, width, 0.025, material("white", rng))
     cord = material("white", rng)
     yield slab(x, width / 2 + 0.01, -hung * 0.7, 0.004, 0.008, hung * 0.7, cord)
-    yield from [box((0.0, s * (width / 2 + 0.008) - 0.006, -0.04), (2 * x, s * (width / 2 + 0.008) + 0.006, 0.04), cord)
-                for s in (-1, 1)]  # fmt: skip
+    for s in (-1, 1):
+        yield box((0.0, s * (width / 2 + 0.008) - 0.006, -0.04), (2 * x, s * (width / 2 + 0.008) + 0.006, 0.04), cord)
 
 
 @family("blinds", "wall roman")
@@ -216,11 +216,7 @@ def _roman(rng: np.random.Generator) -> Parts:
 @family("blinds", "wall vertical", held_out=True)
 def _vertical(rng: np.random.Generator) -> Parts:
     width, height = draw(rng, 0.9, 2.4), draw(rng, 1.2, 2.4)
-    look, wide, tilt = (
-        material(pick(rng, ("white", "fabric", "paper")), rng),
-        draw(rng, 0.09, 0.13),
-        draw(rng, 0.0, 1.4),
-    )
+    look, wide, tilt = made_of(rng, "white", "fabric", "paper"), draw(rng, 0.09, 0.13), draw(rng, 0.0, 1.4)
     slats = int(width / (wide * 0.9))
     along, across = wide * float(np.cos(tilt)), wide * float(np.sin(tilt))
     yield from [

@@ -7,7 +7,7 @@ import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Parts, Support, family
 from avlmaps_sim.furniture.fittings import Pair, body, face, spindle
-from avlmaps_sim.furniture.recipe_helpers import chance, cloth, draw, pick, pictured, rim, strut
+from avlmaps_sim.furniture.recipe_helpers import chance, cloth, draw, made_of, pick, pictured, rim, strut
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Meshes, joined
 from avlmaps_sim.shapes import cylinder, loft, prism, rounded_rectangle, slab, tube
@@ -108,9 +108,9 @@ def _tube_box(rng: np.random.Generator) -> Parts:
     front_x = deep
     taper = 1.0 if wood else draw(rng, 0.5, 0.75)
     mid = deep * draw(rng, 0.5, 0.7)
-    rings = [np.array([(x, -h, z0), (x, h + s, z0), (x, h + s, z1), (x, -h, z1)])
-             for x, h, s, z0, z1 in ((0.0, half * taper, side * taper, 0.06 * (1 - taper), top * (0.3 + 0.7 * taper)),
-                                     (mid, half, side, 0.0, top), (front_x, half, side, 0.0, top))]  # fmt: skip
+    rings = [np.array([(x, -h, z0), (x, h + s, z0), (x, h + s, z1), (x, -h, z1)]) for x, h, s, z0,
+             z1 in ((0.0, half * taper, side * taper, 0.06 * (1 - taper), top * (0.3 + 0.7 * taper)),
+                    (mid, half, side, 0.0, top), (front_x, half, side, 0.0, top))]  # fmt: skip
     yield loft(rings, look)
     y, z = np.meshgrid(np.linspace(-1, 1, 5), np.linspace(0, 1, 5), indexing="ij")
     x = front_x + 0.005 + 0.018 * (1 - y**2) * (1 - (2 * z - 1) ** 2)
@@ -188,8 +188,8 @@ def _monitor_curved(rng: np.random.Generator) -> Parts:
     radius = wide / bend
     x, y = radius * (1 - np.cos(angle)), radius * np.sin(angle)
     thick = draw(rng, 0.02, 0.05)
-    rings = [np.array([(a - thick, b, lift), (a, b, lift), (a, b, lift + high), (a - thick, b, lift + high)])
-             for a, b in zip(x, y, strict=True)]  # fmt: skip
+    rings = [np.array([(a - thick, b, lift), (a, b, lift), (a, b, lift + high), (a - thick, b, lift + high)]) for a,
+             b in zip(x, y, strict=True)]  # fmt: skip
     glow = np.stack([np.stack([x + 0.002, y * 0.985, np.full(11, z)], axis=-1)
                      for z in (lift + 0.012, lift + high - 0.012)], axis=1)  # fmt: skip
     yield loft(rings, look)
@@ -205,9 +205,9 @@ def _monitor_tube(rng: np.random.Generator) -> Parts:
     edge, deep, lift = draw(rng, 0.025, 0.04), draw(rng, 0.36, 0.45), draw(rng, 0.03, 0.07)
     half, top = wide / 2 + edge, lift + high + 2 * edge
     taper, mid = draw(rng, 0.45, 0.7), draw(rng, 0.55, 0.75) * deep
-    rings = [np.array([(x, -h, z0), (x, h, z0), (x, h, z1), (x, -h, z1)])
-             for x, h, z0, z1 in ((0.0, half * taper, lift + 0.04, lift + 0.04 + (high + edge) * taper),
-                                  (mid, half, lift, top), (deep, half, lift, top))]  # fmt: skip
+    rings = [np.array([(x, -h, z0), (x, h, z0), (x, h, z1), (x, -h, z1)]) for x, h, z0,
+             z1 in ((0.0, half * taper, lift + 0.04, lift + 0.04 + (high + edge) * taper), (mid, half, lift, top),
+                    (deep, half, lift, top))]  # fmt: skip
     return [loft(rings, look), rim((-half, lift), (half, top), edge, (deep - 0.001, deep + 0.012), look),
             face(deep + 0.004, (-wide / 2, lift + edge), (wide / 2, top - edge), screen(rng), fill=True),
             cylinder(deep * 0.55, 0.0, 0.0, 0.13, 0.012, look, 14),
@@ -217,7 +217,7 @@ def _monitor_tube(rng: np.random.Generator) -> Parts:
 @family("monitor", "pair on an arm", held_out=True)
 def _monitor_pair(rng: np.random.Generator) -> Parts:
     wide, high = _width(rng, 19, 27)
-    look, z, metal = casing(rng), draw(rng, 0.08, 0.2), material(pick(rng, ("black", "metal")), rng)
+    look, z, metal = casing(rng), draw(rng, 0.08, 0.2), made_of(rng, "black", "metal")
     turn, upright = draw(rng, 0.05, 0.4), chance(rng, 0.3)
     yield cylinder(-0.06, 0.0, 0.0, 0.018, z + 0.75 * high, metal, 8)
     yield slab(-0.06, 0.0, 0.0, 0.14, 0.2, 0.02, metal)
@@ -236,7 +236,7 @@ def _monitor_pair(rng: np.random.Generator) -> Parts:
 @family("monitor", "computer in one")
 def _all_in_one(rng: np.random.Generator) -> Parts:
     wide, high = _width(rng, 21, 27)
-    look = material(pick(rng, ("metal", "white", "black")), rng)
+    look = made_of(rng, "metal", "white", "black")
     chin, lift, thick = draw(rng, 0.06, 0.11), draw(rng, 0.06, 0.12), draw(rng, 0.01, 0.03)
     total = high + chin
     yield body(rng, (0.0, -wide / 2, lift), (thick, wide / 2, lift + total), look, 0.004)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Parts, family
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick, strut
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, strut
 from avlmaps_sim.furniture.sports import barbell, crank, hoop
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes, joined
@@ -12,12 +12,8 @@ from avlmaps_sim.shapes import box, cylinder, ellipsoid, lathe, rounded_box, sla
 
 def _looks(rng: np.random.Generator) -> tuple[Material, Material, Material]:
     """Draw frame, padding and accent."""
-    frame = material(pick(rng, ("black", "metal", "white", "painted")), rng)
-    return (
-        frame,
-        material(pick(rng, ("black", "black", "leather")), rng),
-        material(pick(rng, ("plastic", "metal", "black")), rng),
-    )
+    frame = made_of(rng, "black", "metal", "white", "painted")
+    return (frame, made_of(rng, "black", "black", "leather"), made_of(rng, "plastic", "metal", "black"))
 
 
 def _console(rng: np.random.Generator, x: float, z: float, look: Material) -> list[Mesh]:
@@ -135,11 +131,8 @@ def _elliptical(rng: np.random.Generator) -> Parts:
         y, lift = s * 0.17, s * 0.13 * float(np.sin(turn))
         crank = (wx + s * 0.17 * float(np.cos(turn)), y, wheel + 0.08 + s * 0.17 * float(np.sin(turn)))
         swing = s * 0.13 * float(np.cos(turn))
-        pivot, low, grip = (
-            (mast, y + s * 0.05, tall * 0.58),
-            (mast + swing, y + s * 0.05, 0.3 + lift * 0.3),
-            (mast - 0.12 - swing, s * 0.26, tall),
-        )
+        pivot, low = (mast, y + s * 0.05, tall * 0.58), (mast + swing, y + s * 0.05, 0.3 + lift * 0.3)
+        grip = (mast - 0.12 - swing, s * 0.26, tall)
         yield tube([low, pivot, (mast - 0.05 - swing * 0.5, s * 0.24, tall * 0.8), grip], 0.018, frame, 6)
         yield tube([(mast - 0.05 - swing * 0.7, s * 0.25, tall * 0.88), grip], 0.024, pad, 6)
         yield strut(crank, low, 0.04, 0.05, frame)
@@ -218,7 +211,7 @@ def _multi_gym(rng: np.random.Generator) -> Parts:
     back = -long / 2 + 0.1
     yield from (slab(back, 0.0, 0.0, 0.07, 0.07, tall, frame), slab(back + 0.45, 0.0, 0.0, 0.06, 0.06, tall, frame))
     yield strut((back, 0.0, tall), (back + 0.85, 0.0, tall - 0.05), 0.06, 0.06, frame)
-    plates, stack = count(rng, 6, 12), material(pick(rng, ("black", "metal")), rng)
+    plates, stack = count(rng, 6, 12), made_of(rng, "black", "metal")
     for i in range(plates):
         yield slab(back + 0.2, 0.0, 0.1 + i * 0.06, 0.2, 0.32, 0.05, stack)
     yield from [cylinder(back + 0.2, s * 0.11, 0.05, 0.01, tall - 0.1, material("metal", rng), 5) for s in (-1, 1)]
@@ -274,7 +267,7 @@ def _dumbbell_rack(rng: np.random.Generator) -> Parts:
 @family("fitness equipment", "punch bag stand", held_out=True)
 def _punch_bag(rng: np.random.Generator) -> Parts:
     frame, _, _ = _looks(rng)
-    skin, tall = material(pick(rng, ("leather", "black", "painted")), rng), draw(rng, 1.6, 2.1)
+    skin, tall = made_of(rng, "leather", "black", "painted"), draw(rng, 1.6, 2.1)
     radius = draw(rng, 0.14, 0.19)
     if chance(rng, 0.5):
         rows = [(0.28, 0.0), (0.28, 0.1), (0.22, 0.35), (0.05, 0.42)]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps_sim.furniture.recipe_helpers import chance, draw, pick, rim
+from avlmaps_sim.furniture.recipe_helpers import chance, draw, made_of, pick, rim
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Triple, joined
 from avlmaps_sim.shapes import box, circle, cylinder, ellipsoid, loft, polygon, rounded_box, sheet, tube
@@ -53,9 +53,7 @@ def spindle(
     profile: Sequence[Pair], look: Material, y: float = 0.0, z: float = 0.0, sides: int = 14, capped: bool = True
 ) -> Mesh:
     """Return the solid of a profile of (radius, x), turned round an axis along x through (y, z): dials, drums."""
-    rings = [
-        np.column_stack([np.full(sides, x), circle(max(r, 1e-4), sides) + np.array((y, z))]) for r, x in profile
-    ]  # fmt: skip
+    rings = [np.column_stack([np.full(sides, x), circle(max(r, 1e-4), sides) + np.array((y, z))]) for r, x in profile]
     return loft(rings, look, capped)
 
 
@@ -153,14 +151,11 @@ class FrontStyle:
 
 def front_style(rng: np.random.Generator, profile: str | None = None, handle: str | None = None) -> FrontStyle:
     """Draw how the fronts of a kitchen or of a piece of furniture look."""
-    look = material(pick(rng, ("wood", "wood", "painted", "painted", "white", "plastic")), rng)
+    look = made_of(rng, "wood", "wood", "painted", "painted", "white", "plastic")
     metal = chrome(rng) if chance(rng, 0.8) else material("wood", rng)
-    return FrontStyle(
-        look, metal,
-        handle or pick(rng, ("bar", "bar", "knob", "cup", "strip", "none")),
-        profile or pick(rng, ("flat", "flat", "shaker", "shaker", "panel", "planks")),
-        draw(rng, 0.045, 0.085), draw(rng, 0.003, 0.008), draw(rng, 0.016, 0.024),
-    )  # fmt: skip
+    return FrontStyle(look, metal, handle or pick(rng, ("bar", "bar", "knob", "cup", "strip", "none")),
+                      profile or pick(rng, ("flat", "flat", "shaker", "shaker", "panel", "planks")),
+                      draw(rng, 0.045, 0.085), draw(rng, 0.003, 0.008), draw(rng, 0.016, 0.024))  # fmt: skip
 
 
 def _grip(style: FrontStyle, x: float, low: Pair, high: Pair, opens: str, grip: str) -> list[Mesh]:
@@ -244,8 +239,8 @@ def tap(rng: np.random.Generator, foot: Triple, reach: float, high: float, look:
     parts = [tube(path, bar, look, 6), cylinder(x, y, z, 1.7 * bar, 0.25 * high, look, 8)]
     if kind == "two handles":
         for side in (-0.09, 0.09):
-            parts += [cylinder(x, y + side, z, bar, 0.055, look, 6), ellipsoid((x, y + side, z + 0.06),
-                      (0.024, 0.024, 0.012), look, 6, 4)]  # fmt: skip
+            parts += [cylinder(x, y + side, z, bar, 0.055, look, 6),
+                      ellipsoid((x, y + side, z + 0.06), (0.024, 0.024, 0.012), look, 6, 4)]  # fmt: skip
     else:
         parts.append(tube([(x, y, z + 0.3 * high), (x + 0.01, y + 0.05, z + 0.3 * high + 0.04)], 0.006, look, 4))
     return parts

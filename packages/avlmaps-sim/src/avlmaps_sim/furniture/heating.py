@@ -6,14 +6,14 @@ import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Parts, Support, family
 from avlmaps_sim.furniture.fittings import body, chrome, dial, enamel, face, outline, spindle
-from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, pick, pictured, rim, strut
+from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, made_of, pick, pictured, rim, strut
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes, joined
 from avlmaps_sim.shapes import box, cylinder, ellipsoid, lathe, loft, rounded_box, slab, tube
 
 
 def _paint(rng: np.random.Generator) -> Material:
-    return material("white", rng) if chance(rng, 0.65) else material(pick(rng, ("painted", "metal", "black")), rng)
+    return material("white", rng) if chance(rng, 0.65) else made_of(rng, "painted", "metal", "black")
 
 
 def _valve(rng: np.random.Generator, x: float, y: float, z: float) -> list[Mesh]:
@@ -135,11 +135,8 @@ def _oil_filled(rng: np.random.Generator) -> Parts:
 
 @family("radiator", "behind a cover")
 def _covered(rng: np.random.Generator) -> Parts:
-    wide, high, deep, look = draw(rng, 0.8,
-                                  1.8), draw(rng, 0.75,
-                                             0.95), draw(rng, 0.17,
-                                                         0.25), material(pick(rng, ("white", "wood", "painted")),
-                                                                         rng)  # fmt: skip
+    wide, high, deep = draw(rng, 0.8, 1.8), draw(rng, 0.75, 0.95), draw(rng, 0.17, 0.25)
+    look = made_of(rng, "white", "wood", "painted")
     half, panels = wide / 2, max(1, round(wide / draw(rng, 0.45, 0.8)))
     yield box((-0.0, -half - 0.02, high - 0.025), (deep + 0.025, half + 0.02, high), look)
     yield box((0.0, -half, 0.0), (0.012, half, high - 0.03), look)
@@ -152,11 +149,11 @@ def _covered(rng: np.random.Generator) -> Parts:
         a, b = -half + i * step, -half + (i + 1) * step
         yield rim((a, 0.0), (b, high - 0.025), 0.07, (deep - 0.02, deep), look)
         if upright:
-            yield from [box((deep - 0.016, float(y) - 0.007, 0.06), (deep - 0.004, float(y) + 0.007, high - 0.09), look)
-                        for y in np.arange(a + 0.09, b - 0.07, 0.032)]  # fmt: skip
+            for y in np.arange(a + 0.09, b - 0.07, 0.032):
+                yield box((deep - 0.016, float(y) - 0.007, 0.06), (deep - 0.004, float(y) + 0.007, high - 0.09), look)
         else:
-            yield from [box((deep - 0.016, a + 0.06, float(z)), (deep - 0.004, b - 0.06, float(z) + 0.016), look)
-                        for z in np.arange(0.09, high - 0.1, 0.035)]  # fmt: skip
+            for z in np.arange(0.09, high - 0.1, 0.035):
+                yield box((deep - 0.016, a + 0.06, float(z)), (deep - 0.004, b - 0.06, float(z) + 0.016), look)
     yield Support((0.0, -half), (deep, half), high, 0.5)
 
 
@@ -166,11 +163,11 @@ def _convector(rng: np.random.Generator) -> Parts:
     lift, half, dark = draw(rng, 0.06, 0.12), wide / 2, material("black", rng)
     yield rounded_box((0.0, -half, lift), (deep, half, lift + high), draw(rng, 0.008, 0.03), look, 3)
     slots = count(rng, 4, 9)
-    yield from [box((deep - 0.004, -half * 0.85, lift + high * (0.62 + 0.3 * i / slots)),
-                    (deep + 0.002, half * 0.85, lift + high * (0.62 + 0.3 * i / slots) + 0.007), dark)
-                for i in range(slots)]  # fmt: skip
-    yield from [strut((-0.08, s * half * 0.7, 0.01), (deep + 0.08, s * half * 0.7, 0.01), 0.03, 0.02, dark)
-                for s in (-1, 1)]  # fmt: skip
+    for i in range(slots):
+        yield box((deep - 0.004, -half * 0.85, lift + high * (0.62 + 0.3 * i / slots)),
+                  (deep + 0.002, half * 0.85, lift + high * (0.62 + 0.3 * i / slots) + 0.007), dark)  # fmt: skip
+    for s in (-1, 1):
+        yield strut((-0.08, s * half * 0.7, 0.01), (deep + 0.08, s * half * 0.7, 0.01), 0.03, 0.02, dark)
     yield from [slab(deep / 2, s * half * 0.7, 0.0, 0.03, 0.03, lift + 0.01, dark) for s in (-1, 1)]
     yield dial(deep, half * 0.8, lift + 0.3 * high, 0.022, dark)
 
@@ -207,18 +204,18 @@ def _mantel(rng: np.random.Generator) -> Parts:
     frame = pictured(pick(rng, ("wood", "white", "marble", "stone", "painted")), rng, "stone")
     shelf, leg, half = draw(rng, 0.04, 0.09), draw(rng, 0.12, 0.22), wide / 2
     yield from _hearth(rng, wide - 0.06, high - shelf, deep, hole, look)
-    yield from [box((deep - 0.01, s * half - (leg if s > 0 else 0.0), 0.0),
-                    (deep + 0.05, s * half + (leg if s < 0 else 0.0), high - shelf), frame)
-                for s in (-1, 1)]  # fmt: skip
+    for s in (-1, 1):
+        yield box((deep - 0.01, s * half - (leg if s > 0 else 0.0), 0.0),
+                  (deep + 0.05, s * half + (leg if s < 0 else 0.0), high - shelf), frame)  # fmt: skip
     yield box((deep - 0.01, -half, hole[1] + 0.08), (deep + 0.045, half, high - shelf), frame)
     yield rounded_box((0.0, -half - 0.06, high - shelf), (deep + draw(rng, 0.1, 0.18), half + 0.06, high), 0.012, frame,
                       2)  # fmt: skip
     yield slab(deep + 0.1, 0.0, 0.0, draw(rng, 0.4, 0.7), wide + 0.1, draw(rng, 0.015, 0.06),
                pictured(pick(rng, ("stone", "tile", "marble")), rng, "stone"))  # fmt: skip
     if chance(rng, 0.4):
-        yield from [box((deep + 0.05, s * (half - leg / 2) - 0.3 * leg, 0.15),
-                        (deep + 0.065, s * (half - leg / 2) + 0.3 * leg, high - shelf - 0.15), frame)
-                    for s in (-1, 1)]  # fmt: skip
+        for s in (-1, 1):
+            yield box((deep + 0.05, s * (half - leg / 2) - 0.3 * leg, 0.15),
+                      (deep + 0.065, s * (half - leg / 2) + 0.3 * leg, high - shelf - 0.15), frame)  # fmt: skip
     yield Support((0.02, -half), (deep + 0.08, half), high, 0.6)
 
 
@@ -234,7 +231,7 @@ def _chimney(rng: np.random.Generator) -> Parts:
              z in ((wide, deep, beam), (top, deep * draw(rng, 0.6, 1.0), high))]  # fmt: skip
     yield loft(rings, look)
     yield box((0.0, -wide / 2 - 0.05, beam - 0.06), (deep + draw(rng, 0.06, 0.16), wide / 2 + 0.05, beam + 0.03),
-              material(pick(rng, ("wood", "wood", "stone")), rng))  # fmt: skip
+              made_of(rng, "wood", "wood", "stone"))  # fmt: skip
     yield slab(deep + 0.12, 0.0, 0.0, 0.5, wide, draw(rng, 0.03, 0.3) if chance(rng, 0.3) else 0.04,
                pictured("stone", rng, "stone"))  # fmt: skip
 
@@ -280,7 +277,7 @@ def _iron_stove(rng: np.random.Generator) -> Parts:
 @family("fireplace", "electric with glass", held_out=True)
 def _electric_fire(rng: np.random.Generator) -> Parts:
     wide, high, deep = draw(rng, 0.8, 1.6), draw(rng, 0.4, 0.65), draw(rng, 0.14, 0.3)
-    look, half = material(pick(rng, ("black", "white", "wood", "metal")), rng), wide / 2
+    look, half = made_of(rng, "black", "white", "wood", "metal"), wide / 2
     base = draw(rng, 0.0, 0.35)
     yield rim((-half, base), (half, base + high), draw(rng, 0.05, 0.12), (0.0, deep), look)
     yield box((0.0, -half + 0.02, base + 0.02), (0.02, half - 0.02, base + high - 0.02), material("black", rng))
@@ -294,9 +291,8 @@ def _electric_fire(rng: np.random.Generator) -> Parts:
 
 @family("water heater", "wall cylinder")
 def _wall_cylinder(rng: np.random.Generator) -> Parts:
-    radius, high, look = draw(rng, 0.18,
-                              0.27), draw(rng, 0.5,
-                                          1.2), material("white", rng) if chance(rng, 0.8) else enamel(rng)  # fmt: skip
+    radius, high = draw(rng, 0.18, 0.27), draw(rng, 0.5, 1.2)
+    look = material("white", rng) if chance(rng, 0.8) else enamel(rng)
     dome = draw(rng, 0.03, 0.08)
     x = radius + 0.02
     drop = draw(rng, 0.1, 0.3)
@@ -304,9 +300,8 @@ def _wall_cylinder(rng: np.random.Generator) -> Parts:
     yield slab(0.01, 0.0, high * 0.7, 0.04, radius, 0.05, material("metal", rng))
     metal = chrome(rng)
     yield from [tube([(x, s * 0.07, 0.01), (x, s * 0.07, -drop)], 0.01, metal, 6) for s in (-1, 1)]
-    yield spindle([(0.035, 2 * radius - 0.005), (0.03, 2 * radius + 0.01)],
-                  material(pick(rng, ("black", "white", "metal")), rng), 0.0, high * 0.25,
-                  12).moved(x=0.02)  # fmt: skip
+    yield spindle([(0.035, 2 * radius - 0.005), (0.03, 2 * radius + 0.01)], made_of(rng, "black", "white", "metal"),
+                  0.0, high * 0.25, 12).moved(x=0.02)  # fmt: skip
 
 
 @family("water heater", "wall box")
@@ -315,11 +310,11 @@ def _wall_box(rng: np.random.Generator) -> Parts:
     look, dark, half = material("white", rng) if chance(rng, 0.75) else enamel(rng), material("black", rng), wide / 2
     yield body(rng, (0.0, -half, 0.0), (deep, half, high), look)
     yield face(deep + 0.001, (-half * 0.4, 0.1 * high), (half * 0.4, 0.1 * high + 0.05), dark)
-    yield from [dial(deep, y * wide, 0.1 * high, 0.022, material(pick(rng, ("black", "metal", "white")), rng))
-                for y in ((-0.33, 0.33) if chance(rng, 0.6) else ())]  # fmt: skip
+    for y in (-0.33, 0.33) if chance(rng, 0.6) else ():
+        yield dial(deep, y * wide, 0.1 * high, 0.022, made_of(rng, "black", "metal", "white"))
     metal = material("metal", rng, (0.72, 0.45, 0.3)) if chance(rng, 0.5) else chrome(rng)
-    yield from [tube([(deep * 0.5, y * wide, 0.0), (deep * 0.5, y * wide, -draw(rng, 0.1, 0.3))], 0.009, metal, 6)
-                for y in np.linspace(-0.35, 0.35, count(rng, 2, 5))]  # fmt: skip
+    for y in np.linspace(-0.35, 0.35, count(rng, 2, 5)):
+        yield tube([(deep * 0.5, y * wide, 0.0), (deep * 0.5, y * wide, -draw(rng, 0.1, 0.3))], 0.009, metal, 6)
     if chance(rng, 0.5):
         yield tube([(deep * 0.5, 0.0, high), (deep * 0.5, 0.0, high + 0.12), (deep * 0.3, 0.0, high + 0.18),
                     (0.0, 0.0, high + 0.2)], 0.045, look, 9)  # fmt: skip
@@ -333,9 +328,8 @@ def _standing_tank(rng: np.random.Generator) -> Parts:
     yield cylinder(0.0, 0.0, 0.0, radius * 0.8, lift, material("black", rng), 14)
     yield from [tube([(0.0, s * radius * 0.45, high - 0.01), (0.0, s * radius * 0.45, high + 0.12),
                       (-radius - 0.03, s * radius * 0.45, high + 0.2)], 0.012, metal, 6) for s in (-1, 1)]  # fmt: skip
-    yield from [box((radius - 0.02, -0.07, z), (radius + 0.03, 0.07, z + 0.14),
-                    material(pick(rng, ("black", "metal", "white")), rng))
-                for z in ((0.25 * high,) if chance(rng, 0.5) else (0.25 * high, 0.65 * high))]  # fmt: skip
+    for z in (0.25 * high,) if chance(rng, 0.5) else (0.25 * high, 0.65 * high):
+        yield box((radius - 0.02, -0.07, z), (radius + 0.03, 0.07, z + 0.14), made_of(rng, "black", "metal", "white"))
     if chance(rng, 0.4):
         yield cylinder(0.0, 0.0, high, 0.05, 0.35, material("metal", rng), 10)
 

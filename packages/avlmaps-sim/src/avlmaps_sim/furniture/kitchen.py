@@ -7,7 +7,7 @@ import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Parts, Support, family
 from avlmaps_sim.furniture.fittings import FrontStyle, cabinet_box, chrome, front, front_style, steel
-from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, pick, pictured
+from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, made_of, pick, pictured
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes, joined
 from avlmaps_sim.shapes import box, cylinder, ellipsoid, rounded_box, slab, tube
@@ -30,8 +30,7 @@ def _drawers(rng: np.random.Generator, style: FrontStyle, x: float, y: tuple[flo
     n = count(rng, 2, 4)
     heights = np.sort(rng.uniform(0.6, 1.6, n))[::-1]
     cuts = z[0] + np.concatenate([[0.0], np.cumsum(heights) / heights.sum()]) * (z[1] - z[0])
-    return [m for a, b in pairwise(cuts)
-            for m in front(style, x, (y[0], float(a)), (y[1], float(b)), "drawer")]  # fmt: skip
+    return [m for a, b in pairwise(cuts) for m in front(style, x, (y[0], float(a)), (y[1], float(b)), "drawer")]
 
 
 def _doors(style: FrontStyle, x: float, y: tuple[float, float], z: tuple[float, float], grip: str) -> list[Mesh]:
@@ -70,7 +69,7 @@ def run(rng: np.random.Generator, style: FrontStyle, length: float, depth: float
 
 
 def _plinth(rng: np.random.Generator, style: FrontStyle) -> tuple[float, Material]:
-    return draw(rng, 0.06, 0.16), style.look if chance(rng, 0.5) else material(pick(rng, ("black", "metal")), rng)
+    return draw(rng, 0.06, 0.16), style.look if chance(rng, 0.5) else made_of(rng, "black", "metal")
 
 
 def _measures(rng: np.random.Generator) -> tuple[float, float, float]:
@@ -145,7 +144,7 @@ def _u_shaped(rng: np.random.Generator) -> Parts:
 def _curtained_base(rng: np.random.Generator) -> Parts:
     depth, z, thick = _measures(rng)
     length, wall = draw(rng, 0.9, 2.4), draw(rng, 0.04, 0.12)
-    frame = material(pick(rng, ("painted", "white", "stone", "wood")), rng)
+    frame = made_of(rng, "painted", "white", "stone", "wood")
     thick = max(thick, 0.03)
     yield _top((0.0, -length / 2), (depth, length / 2), z, thick, _worktop(rng))
     yield box((0.0, -length / 2, 0.06), (depth - 0.03, length / 2, 0.09), frame)
@@ -198,9 +197,9 @@ def _waterfall(rng: np.random.Generator) -> Parts:
     yield from run(
         rng, style, length - 2 * thick, depth, z - thick - 0.025, draw(rng, 0.05, 0.12), material("black", rng)
     )
-    yield from [box((0.0, s * (length / 2) - (thick if s > 0 else 0.0), 0.0),
-                    (depth + 0.02, s * (length / 2) + (thick if s < 0 else 0.0), z - thick), stone)
-                for s in (-1, 1)]  # fmt: skip
+    for s in (-1, 1):
+        yield box((0.0, s * (length / 2) - (thick if s > 0 else 0.0), 0.0),
+                  (depth + 0.02, s * (length / 2) + (thick if s < 0 else 0.0), z - thick), stone)  # fmt: skip
     yield box((0.0, -length / 2, z - thick), (depth + 0.02, length / 2, z), stone)
     yield Support((0.02, -length / 2), (depth, length / 2), z, 0.5)
 
@@ -225,9 +224,9 @@ def _wall_row(rng: np.random.Generator) -> Parts:
     depth, high = draw(rng, 0.28, 0.4), draw(rng, 0.5, 1.0)
     yield from _hung(rng, style, length, depth, high)
     if chance(rng, 0.3):  # a cornice, stepped outwards
-        yield from [box((0.0, -length / 2 - 0.02 * i, high + 0.03 * i - 0.03),
-                        (depth + 0.03 + 0.02 * i, length / 2 + 0.02 * i, high + 0.03 * i), style.look)
-                    for i in (1, 2)]  # fmt: skip
+        for i in (1, 2):
+            yield box((0.0, -length / 2 - 0.02 * i, high + 0.03 * i - 0.03),
+                      (depth + 0.03 + 0.02 * i, length / 2 + 0.02 * i, high + 0.03 * i), style.look)  # fmt: skip
 
 
 @family("kitchen cabinet", "wall glass doors")

@@ -3,19 +3,8 @@
 import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Parts, Support, family
-from avlmaps_sim.furniture.fittings import (
-    Pair,
-    bar_handle,
-    body,
-    chrome,
-    dial,
-    enamel,
-    face,
-    feet,
-    spindle,
-    steel,
-)  # fmt: skip
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick
+from avlmaps_sim.furniture.fittings import Pair, bar_handle, body, chrome, dial, enamel, face, feet, spindle, steel
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes, joined
 from avlmaps_sim.shapes import box, loft, rounded_box, rounded_rectangle, slab, tube
@@ -23,7 +12,7 @@ from avlmaps_sim.shapes import box, loft, rounded_box, rounded_rectangle, slab, 
 
 def _keypad(rng: np.random.Generator, x: float, low: Pair, high: Pair) -> Meshes:
     """Return a display over a field of keys between two corners (y, z)."""
-    dark, pale = material("black", rng), material(pick(rng, ("metal", "white", "plastic")), rng)
+    dark, pale = material("black", rng), made_of(rng, "metal", "white", "plastic")
     (a, b), (c, d) = low, high
     yield face(x + 0.001, (a + 0.1 * (c - a), d - 0.2 * (d - b)), (c - 0.1 * (c - a), d - 0.06 * (d - b)), dark)
     rows, columns = count(rng, 3, 5), 3
@@ -52,7 +41,7 @@ def _microwave_keys(rng: np.random.Generator) -> Parts:
     panel = wide * draw(rng, 0.18, 0.28)
     yield from _oven_box(rng, wide, deep, high, look, panel)
     yield box((deep - 0.004, wide / 2 - panel + 0.004, 0.016), (deep + 0.014, wide / 2 - 0.004, high - 0.004),
-              material(pick(rng, ("black", "metal", "white")), rng))  # fmt: skip
+              made_of(rng, "black", "metal", "white"))  # fmt: skip
     yield from _keypad(rng, deep + 0.014, (wide / 2 - panel + 0.01, 0.03), (wide / 2 - 0.01, high - 0.02))
     if chance(rng, 0.55):
         yield bar_handle((deep + 0.016, wide / 2 - panel - 0.025, 0.18 * high), 0.64 * high, True, chrome(rng), 0.03,
@@ -65,7 +54,7 @@ def _microwave_dials(rng: np.random.Generator) -> Parts:
     wide, deep, high = draw(rng, 0.42, 0.52), draw(rng, 0.3, 0.38), draw(rng, 0.23, 0.3)
     look, panel = enamel(rng), draw(rng, 0.09, 0.13)
     yield from _oven_box(rng, wide, deep, high, look, panel)
-    knobs, y = material(pick(rng, ("black", "metal", "white", "plastic")), rng), wide / 2 - panel / 2
+    knobs, y = made_of(rng, "black", "metal", "white", "plastic"), wide / 2 - panel / 2
     yield from [dial(deep, y, high * h, min(0.027, 0.3 * panel), knobs, 0.018) for h in (0.4, 0.72)]
     yield box((deep, y - 0.035, 0.03), (deep + 0.012, y + 0.035, 0.06), knobs)
     yield Support((0.0, -wide / 2), (deep, wide / 2), high, 0.3)
@@ -80,9 +69,9 @@ def _microwave_hung(rng: np.random.Generator) -> Parts:
     yield box((deep, half - panel, 0.02), (deep + 0.006, half - 0.01, high - 0.06), material("black", rng))
     yield from _keypad(rng, deep + 0.006, (half - panel + 0.01, 0.04), (half - 0.02, high - 0.08))
     yield bar_handle((deep, half - panel - 0.03, 0.06), high - 0.18, True, chrome(rng), 0.04, 0.009)
-    yield from [box((deep - 0.01, -half + 0.05, high - 0.04 + 0.013 * i),
-                    (deep + 0.004, half - 0.05, high - 0.035 + 0.013 * i), material("black", rng))
-                for i in range(2)]  # fmt: skip
+    for i in range(2):
+        yield box((deep - 0.01, -half + 0.05, high - 0.04 + 0.013 * i),
+                  (deep + 0.004, half - 0.05, high - 0.035 + 0.013 * i), material("black", rng))  # fmt: skip
 
 
 def _dish_body(rng: np.random.Generator, wide: float, deep: float, high: float, look: Material) -> list[Mesh]:
@@ -93,25 +82,23 @@ def _dish_body(rng: np.random.Generator, wide: float, deep: float, high: float, 
 
 @family("dishwasher", "with control strip")
 def _dish_strip(rng: np.random.Generator) -> Parts:
-    wide, deep, high, look = pick(rng,
-                                  (draw(rng, 0.44, 0.46),
-                                   draw(rng, 0.59, 0.61))), draw(rng, 0.54,
-                                                                 0.6), draw(rng, 0.81, 0.88), enamel(rng)  # fmt: skip
+    wide, deep = pick(rng, (draw(rng, 0.44, 0.46), draw(rng, 0.59, 0.61))), draw(rng, 0.54, 0.6)
+    high, look = draw(rng, 0.81, 0.88), enamel(rng)
     strip, half = draw(rng, 0.08, 0.14), wide / 2
-    other = look if chance(rng, 0.5) else material(pick(rng, ("black", "metal")), rng)
+    other = look if chance(rng, 0.5) else made_of(rng, "black", "metal")
     yield from _dish_body(rng, wide, deep - 0.03, high, look)
     yield rounded_box((deep - 0.03, -half + 0.002, 0.1), (deep, half - 0.002, high - strip - 0.004), 0.006, look, 2)
     yield rounded_box((deep - 0.03, -half + 0.002, high - strip), (deep + 0.004, half - 0.002, high - 0.002), 0.008,
                       other, 2)  # fmt: skip
     if chance(rng, 0.5):
         yield box((deep - 0.01, -0.1, high - strip + 0.02), (deep + 0.006, 0.1, high - 0.03), material("black", rng))
-    yield from [spindle([(0.008, deep + 0.004), (0.007, deep + 0.009)], chrome(rng), float(y), high - strip / 2, 7)
-                for y in np.linspace(0.15, 0.4, count(rng, 2, 5)) * wide]  # fmt: skip
+    for y in np.linspace(0.15, 0.4, count(rng, 2, 5)) * wide:
+        yield spindle([(0.008, deep + 0.004), (0.007, deep + 0.009)], chrome(rng), float(y), high - strip / 2, 7)
     if chance(rng, 0.4):
         yield bar_handle((deep, -half * 0.75, high - strip - 0.05), wide * 0.75, False, chrome(rng))
     if chance(rng, 0.5):
         yield rounded_box((0.0, -half, high), (deep + 0.01, half, high + 0.025), 0.006,
-                          material(pick(rng, ("white", "wood", "metal")), rng), 2)  # fmt: skip
+                          made_of(rng, "white", "wood", "metal"), 2)  # fmt: skip
 
 
 @family("dishwasher", "plain steel")
@@ -140,11 +127,11 @@ def _dish_open(rng: np.random.Generator) -> Parts:
     door = joined([rounded_box((0.0, -half, 0.0), (0.05, half, high - 0.12), 0.006, look, 2),
                    face(-0.002, (-half + 0.04, 0.04), (half - 0.04, high - 0.17), inside)])  # fmt: skip
     yield door.tilted("y", swing).moved(x=deep - 0.05 * float(np.cos(swing)), z=0.1 + 0.05 * float(np.sin(swing)))
-    wire = material(pick(rng, ("metal", "white", "black")), rng)
+    wire = made_of(rng, "metal", "white", "black")
     for z in (0.2, 0.5):
         out = draw(rng, 0.0, 0.3)
-        yield from [tube([(0.05 + out, y, z), (deep - 0.05 + out, y, z)], 0.004, wire, 4)
-                    for y in np.linspace(-half + 0.06, half - 0.06, 6)]  # fmt: skip
+        for y in np.linspace(-half + 0.06, half - 0.06, 6):
+            yield tube([(0.05 + out, y, z), (deep - 0.05 + out, y, z)], 0.004, wire, 4)
         yield from [tube([(x + out, -half + 0.05, z + h), (x + out, half - 0.05, z + h)], 0.004, wire, 4)
                     for x in (0.06, deep - 0.06) for h in (0.0, 0.1)]  # fmt: skip
         for k in range(count(rng, 0, 4)):
@@ -159,7 +146,7 @@ def _dish_small(rng: np.random.Generator) -> Parts:
     half = wide / 2
     return [body(rng, (0.0, -half, 0.015), (deep, half, high), look),
             box((deep - 0.002, -half + 0.03, 0.08), (deep + 0.012, half - 0.03, high - 0.09),
-                material(pick(rng, ("black", "white", "metal")), rng)), *feet((0.0, -half), (deep, half), 0.015, look),
+                made_of(rng, "black", "white", "metal")), *feet((0.0, -half), (deep, half), 0.015, look),
             bar_handle((deep, -0.12, high - 0.08), 0.24, False, chrome(rng), 0.025),
             dial(deep, half * 0.75, high - 0.045, 0.02, chrome(rng))]  # fmt: skip
 
@@ -172,7 +159,7 @@ def _duct(rng: np.random.Generator, size: Pair, z: float, top: float, look: Mate
 
 
 def _buttons(rng: np.random.Generator, x: float, z: float) -> list[Mesh]:
-    look = material(pick(rng, ("black", "metal")), rng)
+    look = made_of(rng, "black", "metal")
     return [face(x + 0.0015, (-0.07 + 0.035 * i, z - 0.008), (-0.05 + 0.035 * i, z + 0.008), look) for i in range(4)]
 
 
@@ -199,7 +186,7 @@ def _hood_flat(rng: np.random.Generator) -> Parts:
 @family("range hood", "wall slanted glass")
 def _hood_slanted(rng: np.random.Generator) -> Parts:
     wide, high, deep = draw(rng, 0.55, 0.95), draw(rng, 0.35, 0.6), draw(rng, 0.32, 0.45)
-    look, glass = enamel(rng), material(pick(rng, ("black", "black", "white", "glass")), rng)
+    look, glass = enamel(rng), made_of(rng, "black", "black", "white", "glass")
     side = np.array([(0.0, 0.0), (0.12, 0.0), (deep, high * 0.7), (deep - 0.1, high), (0.0, high)])
     yield loft([np.column_stack([side[:, 0], np.full(5, y), side[:, 1]]) for y in (-wide * 0.42, wide * 0.42)], look)
     pane = np.array([(0.125, 0.0), (deep + 0.015, high * 0.72), (deep, high * 0.74), (0.11, 0.012)])
@@ -239,7 +226,7 @@ def _hood_curved(rng: np.random.Generator) -> Parts:
 def _hood_mantle(rng: np.random.Generator) -> Parts:
     """Return a plastered country hood with a wooden beam."""
     wide, deep, high = draw(rng, 0.8, 1.3), draw(rng, 0.45, 0.6), draw(rng, 0.7, 1.1)
-    look, wood = material(pick(rng, ("white", "painted", "stone")), rng), material("wood", rng)
+    look, wood = made_of(rng, "white", "painted", "stone"), material("wood", rng)
     beam, bend = draw(rng, 0.07, 0.14), pick(rng, (1.0, 0.5, 2.0))
     rings = []
     for t in np.linspace(0.0, 1.0, 6):

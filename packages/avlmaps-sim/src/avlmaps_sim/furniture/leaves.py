@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick, strut
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick, strut
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, joined
 from avlmaps_sim.shapes import box, ellipsoid, sheet, tube
@@ -107,7 +107,7 @@ def _flat(rng: np.random.Generator, width: float, height: float, thick: float, l
         return joined(parts)
     parts = [box((-thick / 2, 0.0, 0.0), (thick / 2, width, height), look)]
     if style == "grooved":
-        line = material(pick(rng, ("metal", "black", "wood")), rng)
+        line = made_of(rng, "metal", "black", "wood")
         deep, upright = thick / 2 + 0.002, chance(rng, 0.3)
         for at in np.linspace(0.0, 1.0, count(rng, 2, 6) + 2)[1:-1].tolist():
             y, z = (at * width, 0.0) if upright else (0.0, at * height)

@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from avlmaps_sim.furniture.recipe_helpers import chance, draw, pick
-from avlmaps_sim.materials import material
+from avlmaps_sim.furniture.recipe_helpers import chance, draw, made_of, pick
 from avlmaps_sim.mesh import Material, Mesh, Triple, joined
 from avlmaps_sim.shapes import box, circle, cylinder, lathe, loft, slab, tube
 
@@ -165,7 +164,7 @@ def cabinet_base(rng: np.random.Generator, depth: float, width: float, look: Mat
     if style == "legs":
         height = draw(rng, 0.1, 0.24)
         shape = named_leg(pick(rng, ("tapered", "straight", "slim")), pick(rng, (4, 8)), draw(rng, 0.025, 0.05))
-        legs = look if chance(rng, 0.6) else material(pick(rng, ("wood", "metal", "black")), rng)
+        legs = look if chance(rng, 0.6) else made_of(rng, "wood", "metal", "black")
         splay = draw(rng, 0.01, 0.05) if chance(rng, 0.5) else 0.0
         return four_legs(depth - 2 * splay, width - 2 * splay, height, shape, legs, splay), height
     if style == "feet":
@@ -178,7 +177,7 @@ def cabinet_base(rng: np.random.Generator, depth: float, width: float, look: Mat
         return joined([lathe(profile, look, x, y, 8) for x, y in spots]), height
     if style == "sled":
         height = draw(rng, 0.1, 0.22)
-        frame = material(pick(rng, ("metal", "black")), rng)
+        frame = made_of(rng, "metal", "black")
         return sled(depth * 0.9, width * 0.92, height, draw(rng, 0.008, 0.014), frame), height
     height = draw(rng, 0.04, 0.12)
     t = draw(rng, 0.018, 0.03)

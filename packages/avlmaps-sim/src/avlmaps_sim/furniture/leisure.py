@@ -4,7 +4,7 @@ import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Parts, Support, family
 from avlmaps_sim.furniture.plants import frond
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick, strut, turned_ring
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick, strut, turned_ring
 from avlmaps_sim.furniture.sports import hoop
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes, joined
@@ -36,7 +36,7 @@ def _keys(x: float, z: float, wide: float, rng: np.random.Generator) -> list[Mes
 
 
 def _lacquer(rng: np.random.Generator) -> Material:
-    return material(pick(rng, ("black", "black", "wood", "white")), rng)
+    return made_of(rng, "black", "black", "wood", "white")
 
 
 @family("piano", "upright")
@@ -93,7 +93,7 @@ def _digital(rng: np.random.Generator) -> Parts:
     yield slab(0.0, 0.0, keys - 0.09, deep, wide, 0.09, look)
     yield slab(-deep / 2 + 0.07, 0.0, keys, 0.14, wide, 0.05, look)
     if chance(rng, 0.5):
-        metal = material(pick(rng, ("black", "metal")), rng)
+        metal = made_of(rng, "black", "metal")
         for x in (-deep * 0.3, deep * 0.3):
             for s in (-1, 1):
                 yield strut((x, s * wide * 0.4, 0.0), (x, -s * wide * 0.4, keys - 0.09), 0.03, 0.03, metal)
@@ -142,7 +142,7 @@ def _guitar_body(rng: np.random.Generator, kind: str) -> tuple[Mesh, float]:
 @family("guitar", "on a stand")
 def _guitar_on_stand(rng: np.random.Generator) -> Parts:
     mesh, long = _guitar_body(rng, pick(rng, ("acoustic", "acoustic", "electric", "ukulele")))
-    lean, black = draw(rng, 0.12, 0.25), material(pick(rng, ("black", "metal", "wood")), rng)
+    lean, black = draw(rng, 0.12, 0.25), made_of(rng, "black", "metal", "wood")
     yield mesh.tilted("y", -lean).moved(0.0, 0.0, 0.14)
     rise = long * 0.62
     yield strut((-0.04, 0.0, 0.12), (-0.05 - rise * float(np.sin(lean)), 0.0, rise), 0.02, 0.02, black)
@@ -185,7 +185,7 @@ def _pool_top(rng: np.random.Generator, wide: float, long: float, tall: float, w
 
 def _pool_size(rng: np.random.Generator) -> tuple[float, float, float, Material]:
     long = draw(rng, 1.9, 2.8)
-    wood = material(pick(rng, ("wood", "wood", "black", "painted")), rng)
+    wood = made_of(rng, "wood", "wood", "black", "painted")
     return long * draw(rng, 0.52, 0.56), long, draw(rng, 0.75, 0.86), wood
 
 
@@ -241,7 +241,7 @@ def _water(rng: np.random.Generator, long: float, wide: float, tall: float, z: f
 @family("aquarium", "tank")
 def _aquarium(rng: np.random.Generator) -> Parts:
     long, wide, tall = draw(rng, 0.4, 1.3), draw(rng, 0.25, 0.45), draw(rng, 0.28, 0.6)
-    frame = material(pick(rng, ("black", "wood", "white")), rng)
+    frame = made_of(rng, "black", "wood", "white")
     stand = draw(rng, 0.6, 0.8) if chance(rng, 0.6) else 0.0
     yield from _water(rng, long, wide, tall, stand)
     back = material("plastic", rng, (draw(rng, 0.05, 0.2), draw(rng, 0.3, 0.5), draw(rng, 0.5, 0.75)))
@@ -290,7 +290,7 @@ def _ring_bed(rng: np.random.Generator) -> Parts:
 @family("pet bed", "cushion")
 def _cushion_bed(rng: np.random.Generator) -> Parts:
     long, wide, tall = draw(rng, 0.45, 0.8), draw(rng, 0.55, 1.1), draw(rng, 0.08, 0.16)
-    look = material(pick(rng, ("fabric", "leather")), rng)
+    look = made_of(rng, "fabric", "leather")
     parts = [rounded_box((-long / 2, -wide / 2, 0.0), (long / 2, wide / 2, tall), tall * 0.45, look, soft_top=0.02)]
     if chance(rng, 0.6):  # bolsters on three sides
         roll = tall * 0.8
@@ -304,7 +304,7 @@ def _cushion_bed(rng: np.random.Generator) -> Parts:
 
 @family("pet bed", "cave")
 def _cave_bed(rng: np.random.Generator) -> Parts:
-    radius, look = draw(rng, 0.2, 0.32), material(pick(rng, ("fabric", "wicker")), rng)
+    radius, look = draw(rng, 0.2, 0.32), made_of(rng, "fabric", "wicker")
     tall = radius * draw(rng, 1.1, 1.6)
     dome = lathe(
         [(radius * 0.9, 0.0), (radius, tall * 0.35), (radius * 0.8, tall * 0.75), (radius * 0.3, tall)], look, sides=18

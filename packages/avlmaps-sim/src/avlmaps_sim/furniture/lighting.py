@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Parts, family
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick, strut, turned_ring
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick, strut, turned_ring
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Triple, joined
 from avlmaps_sim.shapes import circle, cylinder, ellipsoid, lathe, loft, rounded_box, slab, tube
@@ -27,7 +27,7 @@ def _shade_material(rng: np.random.Generator) -> Material:
 
 
 def _metal(rng: np.random.Generator) -> Material:
-    return material(pick(rng, ("metal", "metal", "black", "white", "painted")), rng)
+    return made_of(rng, "metal", "metal", "black", "white", "painted")
 
 
 def shade(middle: Triple, low_radius: float, top_radius: float, height: float, look: Material,
@@ -93,7 +93,7 @@ def _shade_on_pole(rng: np.random.Generator) -> Parts:
 def _tripod(rng: np.random.Generator) -> Parts:
     table = chance(rng, 0.25)
     tall = draw(rng, 0.3, 0.5) if table else draw(rng, 1.05, 1.4)
-    spread, wood = tall * draw(rng, 0.2, 0.3), material(pick(rng, ("wood", "wood", "metal", "black")), rng)
+    spread, wood = tall * draw(rng, 0.2, 0.3), made_of(rng, "wood", "wood", "metal", "black")
     thick = draw(rng, 0.014, 0.035) * (0.5 if table else 1.0)
     for x, y in circle(spread, 3):
         yield strut((float(x), float(y), 0.0), (-float(x) * 0.12, -float(y) * 0.12, tall), thick, thick, wood)
@@ -113,7 +113,7 @@ def _arc(rng: np.random.Generator) -> Parts:
     bend = rise * 0.4 + drop
     path += [(-reach / 2 * float(np.cos(a)), 0.0, rise * 0.6 + bend * float(np.sin(a))) for a in angle if a > 0.1]
     end = (reach / 2, 0.0, rise * 0.6)
-    base = material(pick(rng, ("stone", "metal", "black")), rng)
+    base = made_of(rng, "stone", "metal", "black")
     foot = draw(rng, 0.14, 0.2)
     yield tube(path, draw(rng, 0.01, 0.018), metal, 7)
     if chance(rng, 0.6):
@@ -147,7 +147,7 @@ def _torchiere(rng: np.random.Generator) -> Parts:
 
 def _body(rng: np.random.Generator, tall: float, wide: float) -> list[Mesh]:
     """Return a table lamp's body of a drawn form."""
-    look = material(pick(rng, ("ceramic", "ceramic", "wood", "metal", "painted", "glass", "stone")), rng)
+    look = made_of(rng, "ceramic", "ceramic", "wood", "metal", "painted", "glass", "stone")
     kind = pick(rng, ("gourd", "vase", "column", "balls", "block", "stick", "ginger jar"))
     if kind == "gourd":
         rows = [(0.6, 0.0), (0.95, 0.15), (1.0, 0.3), (0.55, 0.55), (0.62, 0.7), (0.3, 0.9), (0.12, 1.0)]
@@ -182,7 +182,7 @@ def _table_lamp(rng: np.random.Generator) -> Parts:
 
 @family("lamp", "desk arm")
 def _desk_arm(rng: np.random.Generator) -> Parts:
-    look, metal = material(pick(rng, ("painted", "metal", "black", "white", "plastic")), rng), material("metal", rng)
+    look, metal = made_of(rng, "painted", "metal", "black", "white", "plastic"), material("metal", rng)
     lower, upper, scale = draw(rng, 0.22, 0.42), draw(rng, 0.2, 0.4), pick(rng, (1.0, 1.0, 1.0, 2.6))
     lean, fall = draw(rng, 0.1, 0.6), draw(rng, 0.2, 1.2)
     elbow = (-lower * np.sin(lean) * scale, 0.0, 0.03 + lower * np.cos(lean) * scale)
@@ -207,7 +207,7 @@ def _desk_arm(rng: np.random.Generator) -> Parts:
 def _globe_lamp(rng: np.random.Generator) -> Parts:
     radius, look = draw(rng, 0.07, 0.18), shining(rng)
     stem = draw(rng, 0.03, 0.25) if chance(rng, 0.75) else draw(rng, 0.9, 1.3)
-    base = material(pick(rng, ("wood", "metal", "stone", "ceramic", "black")), rng)
+    base = made_of(rng, "wood", "metal", "stone", "ceramic", "black")
     foot = max(radius * draw(rng, 0.45, 0.7), 0.12 if stem > 0.5 else 0.0)
     yield cylinder(0.0, 0.0, 0.0, foot, 0.02, base, 18)
     yield cylinder(0.0, 0.0, 0.0, max(radius * draw(rng, 0.1, 0.25), 0.012), stem, base, 10)
@@ -223,7 +223,7 @@ def _globe_lamp(rng: np.random.Generator) -> Parts:
 @family("lamp", "paper column", held_out=True)
 def _paper_column(rng: np.random.Generator) -> Parts:
     tall, wide = draw(rng, 0.35, 1.5), draw(rng, 0.09, 0.17)
-    look, wood = shining(rng), material(pick(rng, ("wood", "black")), rng)
+    look, wood = shining(rng), made_of(rng, "wood", "black")
     yield slab(0.0, 0.0, 0.05, 2 * wide, 2 * wide, tall - 0.05, look)
     posts = [(x * wide, y * wide) for x in (-1, 1) for y in (-1, 1)]
     yield from [slab(x, y, 0.0, 0.02, 0.02, tall + 0.01, wood) for x, y in posts]

@@ -4,7 +4,7 @@ import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Parts, family
 from avlmaps_sim.furniture.containers import tub
-from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, pick, strut
+from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, made_of, pick, strut
 from avlmaps_sim.furniture.sports import wheel
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, joined
@@ -27,11 +27,8 @@ from avlmaps_sim.shapes import (
 
 @family("rocking horse", "wooden")
 def _rocking_horse(rng: np.random.Generator) -> Parts:
-    s, look, other = (
-        draw(rng, 0.7, 1.1),
-        material(pick(rng, ("wood", "painted", "white")), rng),
-        material(pick(rng, ("wood", "plastic", "leather")), rng),
-    )
+    s, look = draw(rng, 0.7, 1.1), made_of(rng, "wood", "painted", "white")
+    other = made_of(rng, "wood", "plastic", "leather")
     plush = chance(rng, 0.4)
     look = material("fabric", rng) if plush else look
     angle, parts = np.linspace(-0.75, 0.75, 9), []
@@ -58,11 +55,7 @@ def _rocking_horse(rng: np.random.Generator) -> Parts:
 
 @family("rocking horse", "flat panels", held_out=True)
 def _flat_horse(rng: np.random.Generator) -> Parts:
-    s, look, seat = (
-        draw(rng, 0.7, 1.05),
-        material(pick(rng, ("painted", "wood", "plastic")), rng),
-        material(pick(rng, ("wood", "fabric")), rng),
-    )
+    s, look, seat = draw(rng, 0.7, 1.05), made_of(rng, "painted", "wood", "plastic"), made_of(rng, "wood", "fabric")
     outline = [
         (-0.45, 0.08),
         (-0.25, 0.02),
@@ -88,21 +81,15 @@ def _flat_horse(rng: np.random.Generator) -> Parts:
 
 def _hood(x: float, z: float, radius: float, wide: float, low: float, high: float, look: Material) -> Mesh:
     """Return a folding hood: part of a drum across y, between two angles."""
-    points = np.array([
-        [(x + radius * np.cos(a) * (1 - 0.1 * (v * 2 - 1) ** 2), (v - 0.5) * wide, z + radius * np.sin(a))
-         for v in np.linspace(0, 1, 5)]
-        for a in np.linspace(low, high, 7)
-    ])  # fmt: skip
+    points = np.array([[(x + radius * np.cos(a) * (1 - 0.1 * (v * 2 - 1) ** 2), (v - 0.5) * wide,
+                         z + radius * np.sin(a)) for v in np.linspace(0, 1, 5)]
+                       for a in np.linspace(low, high, 7)])  # fmt: skip
     return cloth(points, look)
 
 
 @family("baby stroller", "pram")
 def _pram(rng: np.random.Generator) -> Parts:
-    look, metal, black = (
-        material(pick(rng, ("fabric", "leather", "black")), rng),
-        material("metal", rng),
-        material("black", rng),
-    )
+    look, metal, black = made_of(rng, "fabric", "leather", "black"), material("metal", rng), material("black", rng)
     long, wide, base = draw(rng, 0.75, 0.9), draw(rng, 0.36, 0.45), draw(rng, 0.48, 0.62)
     tray = tub(long, wide, 0.28, 0.85, 0.15, look).moved(z=base)
     yield from (tray, _hood(-long * 0.2, base + 0.2, long * 0.36, wide, 1.2, 3.2, look))
@@ -124,7 +111,7 @@ def _pram(rng: np.random.Generator) -> Parts:
 
 @family("baby stroller", "buggy")
 def _buggy(rng: np.random.Generator) -> Parts:
-    look, metal, black = material("fabric", rng), material(pick(rng, ("metal", "black")), rng), material("black", rng)
+    look, metal, black = material("fabric", rng), made_of(rng, "metal", "black"), material("black", rng)
     wide, size, three = draw(rng, 0.38, 0.5), draw(rng, 0.08, 0.15), chance(rng, 0.4)
     for y in (-wide / 2, wide / 2):
         yield tube(
@@ -166,11 +153,7 @@ def _walker(rng: np.random.Generator) -> Parts:
 
 @family("mat", "flat")
 def _mat(rng: np.random.Generator) -> Parts:
-    long, wide, look = (
-        draw(rng, 1.65, 1.9),
-        draw(rng, 0.55, 0.85),
-        material(pick(rng, ("plastic", "fabric", "painted")), rng),
-    )
+    long, wide, look = draw(rng, 1.65, 1.9), draw(rng, 0.55, 0.85), made_of(rng, "plastic", "fabric", "painted")
     flat, thick = rounded_rectangle(wide, long, 0.01, 2), draw(rng, 0.004, 0.015)
     yield prism(flat.tolist(), 0.0, thick, look)
     if chance(rng, 0.35):  # one end is rolled up
@@ -251,9 +234,7 @@ def _dome_tent(rng: np.random.Generator) -> Parts:
     angle, turn = np.linspace(0.0, np.pi / 2, 7), np.linspace(0.0, 2 * np.pi, 9)
     for i in range(8):
         first = 2 if i in (0, 7) else 0  # the opening looks along +x
-        points = np.array([
-            [(radius * np.cos(a) * np.cos(t), radius * np.cos(a) * np.sin(t), tall * np.sin(a)) for a in angle[first:]]
-            for t in np.linspace(turn[i], turn[i + 1], 3)
-        ])  # fmt: skip
+        points = np.array([[(radius * np.cos(a) * np.cos(t), radius * np.cos(a) * np.sin(t), tall * np.sin(a))
+                            for a in angle[first:]] for t in np.linspace(turn[i], turn[i + 1], 3)])  # fmt: skip
         yield cloth(points, looks[i % 2])
     yield cylinder(0.0, 0.0, 0.0, radius * 0.98, 0.01, looks[0], 16)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Parts, Support, family
-from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, pick, rim, strut
+from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, made_of, pick, rim, strut
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Meshes, joined
 from avlmaps_sim.shapes import box, cylinder, ellipsoid, lathe, rounded_box, sheet, slab, tube
@@ -13,7 +13,7 @@ def _board(rng: np.random.Generator, width: float, height: float) -> Meshes:
     """Return a board with frame, tray and writing, its back at x = 0 and its lower edge at z = 0."""
     face = pick(rng, ("white", "white", "white", "white", "glass", "black"))
     look = material(face, rng, (0.16, 0.28, 0.22) if face == "black" and chance(rng, 0.5) else None)
-    frame, y = material(pick(rng, ("metal", "wood", "white", "black")), rng), width / 2
+    frame, y = made_of(rng, "metal", "wood", "white", "black"), width / 2
     yield from (box((0.0, -y, 0.0), (0.015, y, height), look), rim((-y, 0.0), (y, height), 0.02, (0.0, 0.02), frame))
     if chance(rng, 0.7):
         tray = draw(rng, 0.2, 1.0) * y
@@ -36,7 +36,7 @@ def _wall_board(rng: np.random.Generator) -> Parts:
 @family("whiteboard", "on wheels")
 def _wheeled_board(rng: np.random.Generator) -> Parts:
     width, height, low = draw(rng, 0.9, 2.0), draw(rng, 0.8, 1.2), draw(rng, 0.55, 0.85)
-    metal, foot, y = material(pick(rng, ("metal", "white", "black")), rng), draw(rng, 0.22, 0.32), width / 2 + 0.03
+    metal, foot, y = made_of(rng, "metal", "white", "black"), draw(rng, 0.22, 0.32), width / 2 + 0.03
     yield from [part.moved(-0.01, 0.0, low) for part in _board(rng, width, height)]
     for side in (-1, 1):
         yield box((-0.02, side * y - 0.02, 0.08), (0.02, side * y + 0.02, low + height * 0.8), metal)
@@ -49,7 +49,7 @@ def _wheeled_board(rng: np.random.Generator) -> Parts:
 @family("whiteboard", "flip chart", held_out=True)
 def _flip_chart(rng: np.random.Generator) -> Parts:
     width, height, top = draw(rng, 0.6, 0.75), draw(rng, 0.85, 1.05), draw(rng, 1.7, 1.95)
-    metal, lean = material(pick(rng, ("metal", "black", "white")), rng), 0.12
+    metal, lean = made_of(rng, "metal", "black", "white"), 0.12
     board = joined(
         [
             *_board(rng, width, height),
@@ -65,10 +65,7 @@ def _flip_chart(rng: np.random.Generator) -> Parts:
 @family("partition", "panels")
 def _partition(rng: np.random.Generator) -> Parts:
     number, each, tall = count(rng, 1, 3), draw(rng, 0.6, 1.2), draw(rng, 1.1, 1.9)
-    look, frame = (
-        material(pick(rng, ("fabric", "fabric", "painted", "white")), rng),
-        material(pick(rng, ("metal", "white", "black")), rng),
-    )
+    look, frame = made_of(rng, "fabric", "fabric", "painted", "white"), made_of(rng, "metal", "white", "black")
     thick, lift, bend, x, y = draw(rng, 0.025, 0.07), draw(rng, 0.0, 0.15), draw(rng, -0.5, 0.5), 0.0, 0.0
     glazed = tall * draw(rng, 0.6, 0.75) if chance(rng, 0.3) else tall
     for panel in range(number):
@@ -87,10 +84,7 @@ def _partition(rng: np.random.Generator) -> Parts:
 @family("partition", "folding screen")
 def _screen(rng: np.random.Generator) -> Parts:
     number, each, tall = count(rng, 3, 5), draw(rng, 0.38, 0.55), draw(rng, 1.5, 1.9)
-    look, frame = (
-        material(pick(rng, ("paper", "fabric", "wood", "white")), rng),
-        material(pick(rng, ("wood", "black", "white")), rng),
-    )
+    look, frame = made_of(rng, "paper", "fabric", "wood", "white"), made_of(rng, "wood", "black", "white")
     bend, columns, rows, x = draw(rng, 0.25, 0.7), count(rng, 1, 3), count(rng, 1, 6), 0.0
     for panel in range(number):
         turn = bend if panel % 2 else -bend
@@ -137,8 +131,8 @@ def _locker_door(
 
 def _lockers(rng: np.random.Generator, columns: int, rows: int, wide: float, tall: float, kind: str) -> Parts:
     deep, foot = draw(rng, 0.35, 0.52), draw(rng, 0.0, 0.15)
-    body = material(pick(rng, ("metal", "painted", "white")), rng)
-    doors = [material(pick(rng, ("metal", "painted", "plastic", "wood")), rng) for _ in range(count(rng, 1, 2))]
+    body = made_of(rng, "metal", "painted", "white")
+    doors = [made_of(rng, "metal", "painted", "plastic", "wood") for _ in range(count(rng, 1, 2))]
     width, sloped = columns * wide, chance(rng, 0.2)
     parts = [box((-deep, 0.0, foot), (0.0, width, foot + tall), body)]
     if foot > 0.03:
@@ -171,7 +165,7 @@ def _box_locker(rng: np.random.Generator) -> Parts:
 @family("locker", "open cubbies", held_out=True)
 def _cubbies(rng: np.random.Generator) -> Parts:
     columns, rows, side = count(rng, 2, 5), count(rng, 2, 4), draw(rng, 0.3, 0.4)
-    deep, look, t = draw(rng, 0.3, 0.45), material(pick(rng, ("wood", "white", "painted")), rng), 0.018
+    deep, look, t = draw(rng, 0.3, 0.45), made_of(rng, "wood", "white", "painted"), 0.018
     width, tall = columns * side, rows * side
     yield from [box((0.0, i * side - t / 2, 0.0), (deep, i * side + t / 2, tall), look) for i in range(columns + 1)]
     yield from [box((0.0, 0.0, i * side), (deep, width, i * side + t), look) for i in range(rows + 1)]
@@ -179,7 +173,7 @@ def _cubbies(rng: np.random.Generator) -> Parts:
     for column in range(columns):
         for row in range(rows):
             if chance(rng, 0.35):
-                fill = material(pick(rng, ("fabric", "plastic", "painted")), rng)
+                fill = made_of(rng, "fabric", "plastic", "painted")
                 low, high = (0.03, column * side + 0.04, row * side + t), (deep - 0.02, (column + 1) * side - 0.04, 0.0)
                 yield rounded_box(low, (*high[:2], low[2] + side * draw(rng, 0.4, 0.85)), 0.02, fill)
     yield Support((0.0, 0.0), (deep, width), tall + t, 0.5)
@@ -188,10 +182,8 @@ def _cubbies(rng: np.random.Generator) -> Parts:
 @family("water dispenser", "bottle on top")
 def _bottle_dispenser(rng: np.random.Generator) -> Parts:
     wide, tall, deep = draw(rng, 0.27, 0.34), draw(rng, 0.85, 1.02), draw(rng, 0.28, 0.36)
-    look, water = (
-        material(pick(rng, ("white", "white", "black", "plastic", "metal")), rng),
-        material("glass", rng, (0.45, 0.65, 0.85)),
-    )
+    look = made_of(rng, "white", "white", "black", "plastic", "metal")
+    water = material("glass", rng, (0.45, 0.65, 0.85))
     yield rounded_box((-deep / 2, -wide / 2, 0.0), (deep / 2, wide / 2, tall), 0.025, look)
     r = wide * 0.43
     rows = [(0.03, tall), (r * 0.7, tall + 0.05), (r, tall + 0.09), (r, tall + 0.19), (r * 0.94, tall + 0.21),
@@ -212,7 +204,7 @@ def _taps(rng: np.random.Generator, x: float, wide: float, z: float) -> Meshes:
 @family("water dispenser", "tower")
 def _tower_dispenser(rng: np.random.Generator) -> Parts:
     wide, tall, deep = draw(rng, 0.26, 0.42), draw(rng, 1.0, 1.4), draw(rng, 0.3, 0.4)
-    look, dark = material(pick(rng, ("white", "metal", "black")), rng), material("black", rng)
+    look, dark = made_of(rng, "white", "metal", "black"), material("black", rng)
     x, z = deep / 2, tall * draw(rng, 0.6, 0.7)
     hollow, deep_in = draw(rng, 0.22, 0.3), 0.14
     yield box((-x, -wide / 2, 0.0), (x, wide / 2, z), look)

@@ -10,7 +10,7 @@ import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Families, Parts, Piece, family
 from avlmaps_sim.furniture.leaves import door_leaf, opaque
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick, rim
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick, rim
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, joined
 from avlmaps_sim.shapes import box, sheet
@@ -150,7 +150,7 @@ def window(rng: np.random.Generator, width_m: float, height_m: float, wall_m: fl
     tall = height_m > 1.75
     known = tuple(s for s in _styles(WINDOW_STYLES, which) if (s != "french") or tall)
     style = pick(rng, known) if style is None else style
-    look = material(pick(rng, ("white", "white", "wood", "painted")), rng)
+    look = made_of(rng, "white", "white", "wood", "painted")
     jamb, x = draw(rng, 0.03, 0.06), draw(rng, -0.35, 0.15) * wall_m
     y = width_m / 2
     parts = [rim((-y, 0.0), (y, height_m), jamb, (x - 0.04, x + 0.04), look)]
@@ -168,7 +168,7 @@ def window(rng: np.random.Generator, width_m: float, height_m: float, wall_m: fl
     if style != "french":
         deep, board = draw(rng, 0.03, 0.2), draw(rng, 0.018, 0.045)
         wide = y + draw(rng, 0.0, 0.12)
-        sill = look if chance(rng, 0.6) else material(pick(rng, ("stone", "wood", "white")), rng)
+        sill = look if chance(rng, 0.6) else made_of(rng, "stone", "wood", "white")
         parts.append(box((x + 0.04, -y, 0.0), (front, y, 0.006), sill))
         parts.append(box((front, -wide, -board + 0.006), (front + deep, wide, 0.006), sill))
     return Piece(joined(parts), category="window", family=style)

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps_sim.furniture.catalogue import Parts, family
-from avlmaps_sim.furniture.recipe_helpers import chance, draw, pick
+from avlmaps_sim.furniture.recipe_helpers import chance, draw, made_of, pick
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Triple, joined
 from avlmaps_sim.shapes import circle, ellipsoid, loft, rounded_box
@@ -65,11 +65,9 @@ class _Looks:
 
 def _looks(rng: np.random.Generator) -> _Looks:
     shirt, trousers = (material("fabric", rng) for _ in range(2))
-    return _Looks(
-        material("plastic", rng, pick(rng, _SKIN)), material("fabric", rng, pick(rng, _HAIR)), shirt,
-        shirt if chance(rng, 0.1) else trousers, material(pick(rng, ("leather", "black", "fabric")), rng),
-        chance(rng, 0.4), chance(rng, 0.15), chance(rng, 0.4), draw(rng, 0.85, 1.3),
-    )  # fmt: skip
+    return _Looks(material("plastic", rng, pick(rng, _SKIN)), material("fabric", rng, pick(rng, _HAIR)), shirt,
+                  shirt if chance(rng, 0.1) else trousers, made_of(rng, "leather", "black", "fabric"), chance(rng, 0.4),
+                  chance(rng, 0.15), chance(rng, 0.4), draw(rng, 0.85, 1.3))  # fmt: skip
 
 
 def _limb(path: Sequence[Float[np.ndarray, "3"]], radii: Sequence[float], look: Material) -> Mesh:

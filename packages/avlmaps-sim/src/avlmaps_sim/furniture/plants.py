@@ -3,7 +3,7 @@
 import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Parts, family
-from avlmaps_sim.furniture.recipe_helpers import blade, chance, count, draw, pick
+from avlmaps_sim.furniture.recipe_helpers import blade, chance, count, draw, made_of, pick
 from avlmaps_sim.furniture.vases import flowers
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes
@@ -13,7 +13,7 @@ from avlmaps_sim.shapes import box, circle, cylinder, ellipsoid, lathe, loft, ro
 def pot(rng: np.random.Generator, radius: float, tall: float) -> list[Mesh]:
     """Return a planter of a drawn form with earth in it, standing at the origin."""
     clay = (draw(rng, 0.6, 0.8), draw(rng, 0.3, 0.45), draw(rng, 0.18, 0.3))
-    plain = material(pick(rng, ("ceramic", "ceramic", "painted", "metal", "stone", "black")), rng)
+    plain = made_of(rng, "ceramic", "ceramic", "painted", "metal", "stone", "black")
     look = material("ceramic", rng, clay) if chance(rng, 0.3) else plain
     earth = material("painted", rng, (0.14, 0.09, 0.06))
     kind = pick(rng, ("tapered", "tapered", "tube", "bowl", "square", "legs", "basket"))
@@ -93,8 +93,7 @@ def _feather_palm(rng: np.random.Generator) -> Parts:
         turn, out = number * 2.4, height * draw(rng, 0.15, 0.35)
         rise = height * draw(rng, 0.7, 1.0)
         c, d = out * float(np.cos(turn)), out * float(np.sin(turn))
-        path = [(c * s * s, d * s * s, earth + rise * (1 - 0.25 * s) * s)
-                for s in (0.0, 0.3, 0.55, 0.75, 0.9, 1.0)]  # fmt: skip
+        path = [(c * s * s, d * s * s, earth + rise * (1 - 0.25 * s) * s) for s in (0.0, 0.3, 0.55, 0.75, 0.9, 1.0)]
         look = pick(rng, green)
         parts.append(tube(path, 0.006, look, 3))
         for s in np.linspace(0.4, 1.0, 7).tolist():
@@ -251,11 +250,11 @@ def _big_leaves(rng: np.random.Generator) -> Parts:
 @family("plant", "trailing")
 def _trailing(rng: np.random.Generator) -> Parts:
     stand, radius = draw(rng, 0.35, 1.0), draw(rng, 0.08, 0.16)
-    look, tall = material(pick(rng, ("wood", "metal", "black")), rng), radius * draw(rng, 1.0, 1.5)
+    look, tall = made_of(rng, "wood", "metal", "black"), radius * draw(rng, 1.0, 1.5)
     yield from [part.moved(z=stand) for part in pot(rng, radius, tall)]
     if chance(rng, 0.7):
-        yield from [tube([(x * 1.2, y * 1.2, 0.0), (x * 0.9, y * 0.9, stand)], 0.012, look, 5) for x,
-                    y in circle(radius, count(rng, 3, 4)).tolist()]  # fmt: skip
+        for x, y in circle(radius, count(rng, 3, 4)).tolist():
+            yield tube([(x * 1.2, y * 1.2, 0.0), (x * 0.9, y * 0.9, stand)], 0.012, look, 5)
         yield cylinder(0.0, 0.0, stand - 0.02, radius * 1.05, 0.02, look, 14)
     else:
         yield box((-radius, -radius, 0.0), (radius, radius, stand), look)
@@ -285,7 +284,7 @@ def _vines(rng: np.random.Generator, radius: float, top: float, room: float) -> 
 @family("plant", "wall trailing")
 def _wall_trailing(rng: np.random.Generator) -> Parts:
     radius = draw(rng, 0.06, 0.11)
-    room, look, x = draw(rng, 0.3, 0.8), material(pick(rng, ("metal", "wood", "black")), rng), radius * 2.4
+    room, look, x = draw(rng, 0.3, 0.8), made_of(rng, "metal", "wood", "black"), radius * 2.4
     tall = radius * 1.3
     parts = [*pot(rng, radius, tall), *_vines(rng, radius, tall * 0.95, room)]
     inside = [part.moved(x=x) for part in parts]

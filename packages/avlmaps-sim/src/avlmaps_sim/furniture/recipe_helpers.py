@@ -33,6 +33,11 @@ def pick(rng: np.random.Generator, options: Sequence[T]) -> T:
     return options[int(rng.integers(len(options)))]
 
 
+def made_of(rng: np.random.Generator, *kinds: str) -> Material:
+    """Draw a material of one of several kinds; a kind named twice comes twice as often."""
+    return material(pick(rng, kinds), rng)
+
+
 def rim(
     low: tuple[float, float], high: tuple[float, float], width: float, x: tuple[float, float], material: Material
 ) -> Mesh:

@@ -18,7 +18,7 @@ from avlmaps_sim.furniture.fittings import (
     outline,
     shell,
 )  # fmt: skip
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh
 from avlmaps_sim.shapes import box, cylinder, rounded_box, slab
@@ -55,7 +55,7 @@ def _stacked(rng: np.random.Generator, parts_of_height: tuple[float, ...]) -> Pa
     """Return a refrigerator of one door's width with doors over each other, as shares of its height from below."""
     wide, deep, high = draw(rng, 0.5, 0.78), draw(rng, 0.5, 0.66), draw(rng, 1.35, 2.02)
     look, metal, soft = enamel(rng), chrome(rng), pick(rng, (0.004, 0.012, 0.03))
-    side = look if chance(rng, 0.6) else material(pick(rng, ("black", "metal", "white")), rng)
+    side = look if chance(rng, 0.6) else made_of(rng, "black", "metal", "white")
     thick, gap, kind = draw(rng, 0.045, 0.08), draw(rng, 0.006, 0.014), pick(rng, ("bar", "bar", "block", "groove", ""))
     yield from _case(rng, deep, wide, high, side)
     edge = pick(rng, (-1.0, 1.0)) * (wide / 2 - draw(rng, 0.035, 0.06))
@@ -75,7 +75,7 @@ def _stacked(rng: np.random.Generator, parts_of_height: tuple[float, ...]) -> Pa
         for _ in range(count(rng, 1, 6)):
             y, z = draw(rng, -0.4, 0.25) * wide, draw(rng, 0.5, 0.85) * high
             yield face(deep + thick + 0.003, (y, z), (y + draw(rng, 0.03, 0.12), z + draw(rng, 0.03, 0.14)),
-                       material(pick(rng, ("paper", "plastic")), rng))  # fmt: skip
+                       made_of(rng, "paper", "plastic"))  # fmt: skip
     yield Support((0.0, -wide / 2), (deep, wide / 2), high, 0.4)
 
 
@@ -145,7 +145,7 @@ def _french_door(rng: np.random.Generator) -> Parts:
 def _under_counter(rng: np.random.Generator) -> Parts:
     wide, deep, high = draw(rng, 0.42, 0.6), draw(rng, 0.42, 0.58), draw(rng, 0.48, 0.9)
     look, thick, top = enamel(rng), draw(rng, 0.035, 0.06), draw(rng, 0.02, 0.045)
-    lid = material(pick(rng, ("wood", "black", "metal")), rng) if chance(rng, 0.3) else look
+    lid = made_of(rng, "wood", "black", "metal") if chance(rng, 0.3) else look
     yield box((0.0, -wide / 2, 0.03), (deep, wide / 2, high - top), look)
     yield body(rng, (0.0, -wide / 2, high - top), (deep + thick, wide / 2, high), lid, 0.008)
     yield _leaf(rng, deep, (-wide / 2, 0.06), (wide / 2, high - top - 0.008), look, thick, 0.01)
@@ -217,10 +217,10 @@ def _glass_door(rng: np.random.Generator) -> Parts:
     for z in np.linspace(0.08, high, shelves + 1)[:-1]:
         for y in np.arange(-wide / 2 + 0.08, wide / 2 - 0.06, draw(rng, 0.085, 0.13)):
             tall = min(draw(rng, 0.1, 0.24), 0.75 * high / shelves)
-            look_of = material(pick(rng, ("plastic", "glass", "metal")), rng)
+            look_of = made_of(rng, "plastic", "glass", "metal")
             yield cylinder(deep * draw(rng, 0.5, 0.75), float(y), float(z), 0.03, tall, look_of, 7)
     x = (deep, deep + 0.04)
-    dark = material(pick(rng, ("black", "metal", "white")), rng)
+    dark = made_of(rng, "black", "metal", "white")
     for low, top in (((-wide / 2, 0.06), (wide / 2, 0.06 + frame)), ((-wide / 2, high - 2 * frame), (wide / 2, high)),
                      ((-wide / 2, 0.06), (-wide / 2 + frame, high)),
                      ((wide / 2 - frame, 0.06), (wide / 2, high))):  # fmt: skip

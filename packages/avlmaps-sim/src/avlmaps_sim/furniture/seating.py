@@ -21,7 +21,7 @@ from avlmaps_sim.furniture.chair_parts import (
     upright_slats,
 )
 from avlmaps_sim.furniture.legs import LegStyle, leg, leg_style, named_leg, stretchers
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick, strut
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick, strut
 from avlmaps_sim.furniture.upholstery import covering
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, joined
@@ -29,7 +29,7 @@ from avlmaps_sim.shapes import cylinder, prism, rounded_box, tube
 
 
 def _frame_look(rng: np.random.Generator) -> Material:
-    return material(pick(rng, ("wood", "wood", "wood", "painted", "white", "black")), rng)
+    return made_of(rng, "wood", "wood", "wood", "painted", "white", "black")
 
 
 def _wooden(rng: np.random.Generator, frame: ChairFrame, look: Material, seat: str = "", finial: float = 0.0) -> Mesh:
@@ -167,7 +167,7 @@ def bentwood(rng: np.random.Generator) -> Parts:
     seat, top = draw(rng, 0.44, 0.48), draw(rng, 0.83, 0.95)
     # The rods pass the round seat where it is narrower than at its middle.
     frame = ChairFrame(wide * 0.66, wide, wide * 0.82, seat, top, draw(rng, 0.06, 0.13), 0.05)
-    look = material(pick(rng, ("wood", "wood", "black", "painted")), rng)
+    look = made_of(rng, "wood", "wood", "black", "painted")
     rod, z = draw(rng, 0.011, 0.016), seat - 0.03
     cover = covering(rng) if chance(rng, 0.4) else look
     yield cylinder(0.0, 0.0, z, wide / 2, 0.022, look, 16)

@@ -7,17 +7,9 @@ import numpy as np
 from avlmaps_sim.furniture.catalogue import Parts, family
 from avlmaps_sim.furniture.chair_parts import bent_rail
 from avlmaps_sim.furniture.legs import four_legs, leg_style, star_base
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick, strut
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick, strut
 from avlmaps_sim.furniture.seating_chairs import shell, shell_base
-from avlmaps_sim.furniture.sofa_parts import (
-    SofaPlan,
-    couch,
-    frame_arms,
-    loose_back,
-    seat_cushions,
-    sofa_plan,
-    strewn,
-)
+from avlmaps_sim.furniture.sofa_parts import SofaPlan, couch, frame_arms, loose_back, seat_cushions, sofa_plan, strewn
 from avlmaps_sim.furniture.upholstery import back_cushions, covering, cushion, scattered_pillows
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, joined
@@ -80,11 +72,10 @@ def _round_wall(
         share = 0.5 - 0.5 * float(np.cos((a - opening) / (np.pi - opening) * np.pi))
         top = tops[0] + (tops[1] - tops[0]) * min(1.0, share * 1.1)
         inner, outer = radius - thick, radius
-        rings.append(
-            np.array([(outer * c, outer * s * squash, bottom), (outer * c, outer * s * squash, top - 0.02),
-                      ((outer - thick / 2) * c, (outer - thick / 2) * s * squash, top),
-                      (inner * c, inner * s * squash, top - 0.02), (inner * c, inner * s * squash, bottom)])
-        )  # fmt: skip
+        rings.append(np.array([(outer * c, outer * s * squash, bottom), (outer * c, outer * s * squash, top - 0.02),
+                               ((outer - thick / 2) * c, (outer - thick / 2) * s * squash, top),
+                               (inner * c, inner * s * squash, top - 0.02),
+                               (inner * c, inner * s * squash, bottom)]))  # fmt: skip
     return loft(rings, look)
 
 
@@ -106,7 +97,7 @@ def tub_chair(rng: np.random.Generator) -> Parts:
         if chance(rng, 0.3):
             yield star_base(4, radius * 0.8, low + 0.02, material("metal", rng))
         else:
-            wood = material(pick(rng, ("wood", "black", "metal")), rng)
+            wood = made_of(rng, "wood", "black", "metal")
             yield four_legs(
                 radius * 1.2, radius * 1.2, low + 0.01, leg_style(rng, 0.03, 0.045), wood, draw(rng, 0.0, 0.04)
             )
@@ -229,7 +220,7 @@ def bent_ply(rng: np.random.Generator) -> Parts:
 def rocker(rng: np.random.Generator) -> Parts:
     """Return a rocking chair: a wooden chair with arms and slats on two curved runners."""
     width, seat, top = draw(rng, 0.46, 0.56), draw(rng, 0.4, 0.45), draw(rng, 0.95, 1.15)
-    look = material(pick(rng, ("wood", "wood", "white", "black")), rng)
+    look = made_of(rng, "wood", "wood", "white", "black")
     y, depth = draw(rng, 0.22, 0.27), draw(rng, 0.44, 0.5)
     front, back, rake = depth / 2, -depth / 2, draw(rng, 0.14, 0.24)
     arm, bend = seat + draw(rng, 0.2, 0.24), draw(rng, 0.28, 0.45)

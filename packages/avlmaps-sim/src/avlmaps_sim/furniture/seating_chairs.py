@@ -5,7 +5,7 @@ import numpy as np
 from avlmaps_sim.furniture.catalogue import Parts, family
 from avlmaps_sim.furniture.chair_parts import bent_rail, chair_frame
 from avlmaps_sim.furniture.legs import four_legs, leg, leg_style, named_leg, sled, star_base
-from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, pick, strut
+from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, made_of, pick, strut
 from avlmaps_sim.furniture.upholstery import covering, cushion
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, joined
@@ -61,7 +61,7 @@ def shell(
 
 def shell_base(rng: np.random.Generator, width: float, depth: float, seat: float, style: str) -> list[Mesh]:
     """Return the support of a shell: dowels, wire, four tubes, runners, a star, a tulip foot."""
-    metal = material(pick(rng, ("metal", "black", "white")), rng)
+    metal = made_of(rng, "metal", "black", "white")
     if style == "dowels":
         wood = material("wood", rng)
         legs = four_legs(
@@ -100,14 +100,14 @@ def shell_base(rng: np.random.Generator, width: float, depth: float, seat: float
 def shell_chair(rng: np.random.Generator) -> Parts:
     """Return a moulded seat of plastic, plywood or cloth on dowels, tubes, runners, a star or a tulip foot."""
     width, depth, seat = draw(rng, 0.42, 0.52), draw(rng, 0.4, 0.47), draw(rng, 0.42, 0.47)
-    look = material(pick(rng, ("plastic", "plastic", "white", "black", "fabric", "wood")), rng)
+    look = made_of(rng, "plastic", "plastic", "white", "black", "fabric", "wood")
     wrap = draw(rng, 0.02, 0.14)
     yield shell(rng, width, depth, seat, draw(rng, 0.33, 0.44), look, wrap, draw(rng, 0.008, 0.03))
     yield from shell_base(
         rng, width, depth, seat, pick(rng, ("dowels", "dowels", "tubes", "tubes", "sled", "star", "tulip"))
     )
     if chance(rng, 0.3):
-        cover = material(pick(rng, ("fabric", "leather")), rng)
+        cover = made_of(rng, "fabric", "leather")
         yield cushion(
             (-depth * 0.35, -width * 0.38, seat - 0.01), (depth * 0.4, width * 0.38, seat + 0.03), cover, 0.02, 0.01
         )
@@ -127,7 +127,7 @@ def parsons_chair(rng: np.random.Generator) -> Parts:
     vertex[:, 0] -= frame.rake * np.clip((vertex[:, 2] - (frame.seat - low)) / (frame.top - frame.seat), 0.0, 1.0)
     back = Mesh(vertex, back.triangle, back.uv, back.material, back.materials)
     yield back.moved(x=-x + 0.02, z=low)
-    legs = material(pick(rng, ("wood", "wood", "black")), rng)
+    legs = made_of(rng, "wood", "wood", "black")
     style = leg_style(rng, 0.032, 0.048)
     yield four_legs(
         frame.depth + thick - 0.03, frame.front - 0.02, low + 0.01, style, legs, 0.0, draw(rng, 0.0, 0.05)
@@ -138,8 +138,8 @@ def parsons_chair(rng: np.random.Generator) -> Parts:
 def tube_chair(rng: np.random.Generator) -> Parts:
     """Return a stacking chair: a frame of bent tubes carries a pad or plywood for the seat and one for the back."""
     frame = chair_frame(rng, back=draw(rng, 0.32, 0.46))
-    metal = material(pick(rng, ("metal", "black", "painted")), rng)
-    look = material(pick(rng, ("fabric", "wood", "plastic", "leather")), rng)
+    metal = made_of(rng, "metal", "black", "painted")
+    look = made_of(rng, "fabric", "wood", "plastic", "leather")
     r, y = draw(rng, 0.009, 0.014), frame.rear / 2
     half, foot, under = frame.depth / 2, draw(rng, 0.0, 0.03), frame.seat - 0.04
     arms, arm = chance(rng, 0.25), frame.seat + 0.2
@@ -164,8 +164,8 @@ def tube_chair(rng: np.random.Generator) -> Parts:
 def folding_chair(rng: np.random.Generator) -> Parts:
     """Return a folding chair: crossed legs of tube or wood, a thin seat, a narrow back."""
     width, seat, top = draw(rng, 0.4, 0.48), draw(rng, 0.42, 0.47), draw(rng, 0.75, 0.88)
-    frame = material(pick(rng, ("metal", "black", "wood", "white")), rng)
-    look = frame if chance(rng, 0.4) else material(pick(rng, ("plastic", "fabric", "wood", "leather")), rng)
+    frame = made_of(rng, "metal", "black", "wood", "white")
+    look = frame if chance(rng, 0.4) else made_of(rng, "plastic", "fabric", "wood", "leather")
     front, rear, r = draw(rng, 0.18, 0.24), draw(rng, 0.2, 0.28), draw(rng, 0.009, 0.016)
     high = -draw(rng, 0.18, 0.26)
     for s in (1, -1):
@@ -194,7 +194,7 @@ def folding_chair(rng: np.random.Generator) -> Parts:
 def monobloc(rng: np.random.Generator) -> Parts:
     """Return a plastic garden chair: splayed legs, arms in one sweep with a slotted back."""
     width, seat, top = draw(rng, 0.46, 0.54), draw(rng, 0.4, 0.45), draw(rng, 0.76, 0.9)
-    look = material(pick(rng, ("white", "white", "plastic")), rng)
+    look = made_of(rng, "white", "white", "plastic")
     depth, arm = draw(rng, 0.4, 0.46), seat + draw(rng, 0.2, 0.25)
     arms = chance(rng, 0.75)
     yield rounded_box((-depth / 2, -width / 2, seat - 0.03), (depth / 2, width / 2, seat), 0.012, look, 2)
@@ -218,8 +218,8 @@ def monobloc(rng: np.random.Generator) -> Parts:
 def cantilever(rng: np.random.Generator) -> Parts:
     """Return a chair on two bent tubes without rear legs: the seat hangs in front of nothing."""
     width, depth, seat, top = draw(rng, 0.42, 0.5), draw(rng, 0.42, 0.5), draw(rng, 0.43, 0.47), draw(rng, 0.78, 0.98)
-    metal = material(pick(rng, ("metal", "metal", "black")), rng)
-    look, r, y = material(pick(rng, ("leather", "fabric", "wicker", "wood")), rng), draw(rng, 0.01, 0.014), width / 2
+    metal = made_of(rng, "metal", "metal", "black")
+    look, r, y = made_of(rng, "leather", "fabric", "wicker", "wood"), draw(rng, 0.01, 0.014), width / 2
     front, back = depth / 2, -depth / 2
     side = [
         (back - 0.02, r),

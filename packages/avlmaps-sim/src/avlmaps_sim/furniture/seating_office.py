@@ -4,7 +4,7 @@ import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Parts, family
 from avlmaps_sim.furniture.legs import star_base
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick, strut
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick, strut
 from avlmaps_sim.furniture.upholstery import covering, cushion
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes
@@ -13,7 +13,7 @@ from avlmaps_sim.shapes import box, loft, rounded_box, slab, tube
 
 def _swivel(rng: np.random.Generator, seat: float) -> list[Mesh]:
     """Return a foot on castors with a gas lift up to the seat."""
-    look = material(pick(rng, ("black", "black", "metal", "white")), rng)
+    look = made_of(rng, "black", "black", "metal", "white")
     return [star_base(5, draw(rng, 0.27, 0.34), seat - 0.08, look, draw(rng, 0.022, 0.032), True),
             slab(0.0, 0.0, seat - 0.1, 0.2, 0.16, 0.05, material("black", rng))]  # fmt: skip
 
@@ -66,7 +66,7 @@ def _curved_back(
 def task_chair(rng: np.random.Generator) -> Parts:
     """Return a desk chair: padded seat and a low or middling back on a bar, with or without arms."""
     seat, width, depth = draw(rng, 0.42, 0.55), draw(rng, 0.44, 0.52), draw(rng, 0.42, 0.5)
-    look = material(pick(rng, ("fabric", "fabric", "black", "leather", "plastic")), rng)
+    look = made_of(rng, "fabric", "fabric", "black", "leather", "plastic")
     yield from _swivel(rng, seat)
     yield cushion((-depth / 2, -width / 2, seat - 0.07), (depth / 2, width / 2, seat), look, 0.035, 0.012)
     low, high = seat + draw(rng, 0.1, 0.2), seat + draw(rng, 0.4, 0.62)
@@ -105,7 +105,7 @@ def executive_chair(rng: np.random.Generator) -> Parts:
 def mesh_chair(rng: np.random.Generator) -> Parts:
     """Return a frame with netting for a back, perhaps with a head rest, and adjustable arms."""
     seat, width, depth = draw(rng, 0.43, 0.54), draw(rng, 0.46, 0.53), draw(rng, 0.43, 0.5)
-    net, frame = material("fabric", rng, (0.12, 0.12, 0.13)), material(pick(rng, ("black", "white", "metal")), rng)
+    net, frame = material("fabric", rng, (0.12, 0.12, 0.13)), made_of(rng, "black", "white", "metal")
     if chance(rng, 0.3):
         net = material("fabric", rng)
     yield from _swivel(rng, seat)

@@ -8,7 +8,7 @@ from avlmaps_sim.furniture.carcass import board_look
 from avlmaps_sim.furniture.catalogue import Parts, family
 from avlmaps_sim.furniture.chair_parts import bent_rail
 from avlmaps_sim.furniture.legs import four_legs, leg, leg_style, named_leg, stretchers
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick, strut
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick, strut
 from avlmaps_sim.furniture.table_parts import hairpins, trestles
 from avlmaps_sim.furniture.upholstery import covering, cushion, throw
 from avlmaps_sim.materials import material
@@ -21,7 +21,7 @@ def wooden_stool(rng: np.random.Generator) -> Parts:
     """Return a round, square or saddle seat on three or four legs, low or as high as a bar."""
     seat = draw(rng, 0.42, 0.5) if chance(rng, 0.45) else draw(rng, 0.6, 0.8)
     size = draw(rng, 0.28, 0.4)
-    look = material(pick(rng, ("wood", "wood", "white", "black", "painted")), rng)
+    look = made_of(rng, "wood", "wood", "white", "black", "painted")
     cover = covering(rng, 0.5) if chance(rng, 0.35) else look
     legs = 3 if chance(rng, 0.25) else 4
     round_seat = legs == 3 or chance(rng, 0.6)
@@ -54,8 +54,8 @@ def wooden_stool(rng: np.random.Generator) -> Parts:
 def pedestal_stool(rng: np.random.Generator) -> Parts:
     """Return a bar stool on one foot with a foot rest: round pad, low back or a shell."""
     seat, size = draw(rng, 0.58, 0.82), draw(rng, 0.32, 0.44)
-    metal = material(pick(rng, ("metal", "metal", "black")), rng)
-    look = material(pick(rng, ("leather", "plastic", "fabric", "wood")), rng)
+    metal = made_of(rng, "metal", "metal", "black")
+    look = made_of(rng, "leather", "plastic", "fabric", "wood")
     r, rest = draw(rng, 0.18, 0.23), seat * 0.38
     foot = [(r, 0.0), (r * 0.95, 0.015), (0.04, 0.04), (0.025, 0.08), (0.025, seat - 0.06), (0.08, seat - 0.04)]
     ring = [(0.02, -0.02), (0.17, -0.12), (0.2, 0.0), (0.17, 0.12), (0.02, 0.02)]
@@ -74,8 +74,8 @@ def pedestal_stool(rng: np.random.Generator) -> Parts:
 def metal_stool(rng: np.random.Generator) -> Parts:
     """Return a stool of sheet metal or tubes, low or high, some with a low back."""
     seat = draw(rng, 0.44, 0.5) if chance(rng, 0.4) else draw(rng, 0.62, 0.78)
-    size, look = draw(rng, 0.3, 0.38), material(pick(rng, ("metal", "black", "painted", "white")), rng)
-    top = look if chance(rng, 0.5) else material(pick(rng, ("wood", "leather")), rng)
+    size, look = draw(rng, 0.3, 0.38), made_of(rng, "metal", "black", "painted", "white")
+    top = look if chance(rng, 0.5) else made_of(rng, "wood", "leather")
     out = draw(rng, 0.03, 0.07)
     yield rounded_box((-size / 2, -size / 2, seat - 0.03), (size / 2, size / 2, seat), 0.012, top, 3)
     yield four_legs(
@@ -128,7 +128,7 @@ def _bench(rng: np.random.Generator) -> tuple[float, float, float]:
 def board_bench(rng: np.random.Generator) -> Parts:
     """Return a plain board or slats on legs, slabs, trestles or bent wires, perhaps with a cushion."""
     depth, width, high = _bench(rng)
-    look = material(pick(rng, ("wood", "wood", "wood", "painted", "white")), rng)
+    look = made_of(rng, "wood", "wood", "wood", "painted", "white")
     thick = draw(rng, 0.025, 0.06)
     boards = count(rng, 3, 6) if chance(rng, 0.3) else 1
     wide = depth / boards
@@ -158,7 +158,7 @@ def board_bench(rng: np.random.Generator) -> Parts:
 def padded_bench(rng: np.random.Generator) -> Parts:
     """Return a long pad on legs for the foot of a bed, some with low rolled ends or a throw."""
     depth, width, high = _bench(rng)
-    look, legs = covering(rng, 0.3), material(pick(rng, ("wood", "wood", "black", "metal")), rng)
+    look, legs = covering(rng, 0.3), made_of(rng, "wood", "wood", "black", "metal")
     thick = draw(rng, 0.08, 0.2)
     yield cushion((-depth / 2, -width / 2, high - thick), (depth / 2, width / 2, high), look, 0.03, 0.02)
     yield four_legs(
@@ -183,7 +183,7 @@ def padded_bench(rng: np.random.Generator) -> Parts:
 def backed_bench(rng: np.random.Generator) -> Parts:
     """Return a bench with a slatted or boarded back and arms, as in a garden or a hall."""
     depth, width, high = draw(rng, 0.4, 0.52), draw(rng, 1.0, 1.7), draw(rng, 0.4, 0.46)
-    look, top = material(pick(rng, ("wood", "wood", "white", "painted", "black")), rng), draw(rng, 0.78, 0.98)
+    look, top = made_of(rng, "wood", "wood", "white", "painted", "black"), draw(rng, 0.78, 0.98)
     y, x, rake = width / 2 - 0.03, depth / 2, draw(rng, 0.04, 0.14)
     style, arm = named_leg("straight", 4, draw(rng, 0.04, 0.06)), high + 0.2
     for i in range(5):
@@ -224,7 +224,7 @@ def storage_bench(rng: np.random.Generator) -> Parts:
         yield from [box((x - 0.014, -y, z), (x, y, z + 0.06), look) for z in (0.03, high - 0.1)]
     else:
         bays = count(rng, 2, 3)
-        bins = material(pick(rng, ("wicker", "fabric")), rng)
+        bins = made_of(rng, "wicker", "fabric")
         yield from (box((-x, -y, 0.0), (-x + 0.01, y, high), look), box((-x, -y, 0.02), (x, y, 0.04), look))
         edges = np.linspace(-y, y, bays + 1).tolist()
         for edge in edges:
@@ -245,7 +245,7 @@ def square_ottoman(rng: np.random.Generator) -> Parts:
     yield rounded_box(
         (-depth / 2, -width / 2, low), (depth / 2, width / 2, high - 0.02), draw(rng, 0.015, 0.06), look, 3, 0.02
     )
-    legs = material(pick(rng, ("wood", "black", "metal")), rng)
+    legs = made_of(rng, "wood", "black", "metal")
     yield four_legs(depth - 0.06, width - 0.06, low + 0.01, leg_style(rng, 0.03, 0.055), legs)
 
 
@@ -276,7 +276,7 @@ def pouf(rng: np.random.Generator) -> Parts:
 def round_ottoman(rng: np.random.Generator) -> Parts:
     """Return a round pad on three or four short legs."""
     r, high, thick = draw(rng, 0.2, 0.42), draw(rng, 0.38, 0.47), draw(rng, 0.1, 0.24)
-    look, legs = covering(rng, 0.3), material(pick(rng, ("wood", "metal", "black")), rng)
+    look, legs = covering(rng, 0.3), made_of(rng, "wood", "metal", "black")
     yield lathe(
         [(r * 0.97, high - thick), (r, high - thick * 0.6), (r, high - 0.05), (r * 0.8, high - 0.01), (0.02, high)],
         look,

@@ -6,7 +6,7 @@ import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Parts, family
 from avlmaps_sim.furniture.legs import LegStyle, four_legs, sled
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick
 from avlmaps_sim.furniture.sofa_parts import (
     body_back,
     box_arms,
@@ -157,7 +157,7 @@ def futon(rng: np.random.Generator) -> Parts:
     """Return a folded mattress on a slatted or a tube frame."""
     width, deep, seat = draw(rng, 1.6, 2.1), draw(rng, 0.6, 0.75), draw(rng, 0.36, 0.44)
     thick, rise, lean = draw(rng, 0.12, 0.2), draw(rng, 0.42, 0.58), draw(rng, 0.2, 0.42)
-    frame, look = material(pick(rng, ("wood", "metal", "black")), rng), material("fabric", rng)
+    frame, look = made_of(rng, "wood", "metal", "black"), material("fabric", rng)
     half = width / 2
     yield cushion((0.0, -half, seat - thick), (deep, half, seat), look, 0.06, 0.02)
     back = cushion((-rise, -half, 0.0), (0.0, half, thick), look, 0.06, 0.02).tilted("y", np.pi / 2 - lean)

@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps_sim.furniture.catalogue import Parts, family
-from avlmaps_sim.furniture.recipe_helpers import chance, cloth, draw, pick
+from avlmaps_sim.furniture.recipe_helpers import chance, cloth, draw, made_of
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Triple
 from avlmaps_sim.shapes import tube
@@ -14,7 +14,7 @@ def _look(rng: np.random.Generator) -> Material:
     if chance(rng, 0.4):
         pale = draw(rng, 0.8, 0.97)
         return material("fabric", rng, (pale, pale, pale))
-    return material(pick(rng, ("curtain", "curtain", "plastic")), rng)
+    return made_of(rng, "curtain", "curtain", "plastic")
 
 
 def _hung(rng: np.random.Generator, rail: Float[np.ndarray, "n 2"], high: float, look: Material) -> Mesh:

@@ -5,12 +5,7 @@ from itertools import pairwise
 import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Parts, family
-from avlmaps_sim.furniture.fittings import (
-    china,
-    chrome,
-    outline,
-    shell,
-)  # fmt: skip
+from avlmaps_sim.furniture.fittings import china, chrome, outline, shell
 from avlmaps_sim.furniture.recipe_helpers import chance, cloth, draw, pick, pictured
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes, joined
@@ -49,10 +44,8 @@ def _rail(rng: np.random.Generator, x: float, y: float, tall: float, metal: Mate
 
 def _tray(rng: np.random.Generator, wide: float, deep: float, look: Material) -> list[Mesh]:
     high = draw(rng, 0.03, 0.16)
-    outer, inner = (
-        outline(deep, wide, 30.0, 24, middle=(deep / 2, 0.0)),
-        outline(deep - 0.1, wide - 0.1, 6.0, 24, middle=(deep / 2, 0.0)),
-    )
+    outer = outline(deep, wide, 30.0, 24, middle=(deep / 2, 0.0))
+    inner = outline(deep - 0.1, wide - 0.1, 6.0, 24, middle=(deep / 2, 0.0))
     floor = outline(deep - 0.2, wide - 0.2, 6.0, 24, middle=(deep / 2, 0.0))
     return [shell([(outer, 0.0), (outer, high), (inner, high), (floor, max(0.012, high - 0.08))], look),
             cylinder(deep / 2, 0.0, max(0.012, high - 0.08), 0.05, 0.004, material("metal", rng), 12)]  # fmt: skip
@@ -176,10 +169,8 @@ def _curtained_shower(rng: np.random.Generator) -> Parts:
     along = np.linspace(draw(rng, 0.2, 0.6), 0.99, n) * (deep + wide)
     wave = draw(rng, 0.02, 0.035) * np.sin(np.arange(n) * 1.6)
     on_side = along < deep
-    x, y = (
-        np.where(on_side, np.minimum(along, deep), deep + wave),
-        np.where(on_side, wide / 2 + wave, wide / 2 - (along - deep)),
-    )
+    x = np.where(on_side, np.minimum(along, deep), deep + wave)
+    y = np.where(on_side, wide / 2 + wave, wide / 2 - (along - deep))
     points = np.stack([np.column_stack([x, y, np.full(n, z)]) for z in (draw(rng, 0.08, 0.25), rail - 0.02)], axis=1)
     yield cloth(points, pictured("curtain", rng, "fabric"))
 

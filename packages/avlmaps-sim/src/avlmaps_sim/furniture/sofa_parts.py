@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from avlmaps_sim.furniture.legs import LegStyle, four_legs, named_leg
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick
 from avlmaps_sim.furniture.upholstery import back_cushions, covering, cushion_row, scattered_pillows, throw
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes, joined
@@ -54,17 +54,15 @@ def sofa_plan(rng: np.random.Generator, seats: int, arm: tuple[float, float] = (
     seat = draw(rng, 0.37, 0.48)
     clear = pick(rng, (0.0, draw(rng, 0.02, 0.06), draw(rng, 0.08, 0.17)))
     arm_top = seat + draw(rng, 0.08, 0.28)
-    return SofaPlan(
-        draw(rng, 0.48, 0.68), each * seats, seat, clear, draw(rng, 0.14, 0.24), draw(rng, 0.68, 1.0),
-        draw(rng, *arm), arm_top, draw(rng, 0.0, 0.14),
-    )  # fmt: skip
+    return SofaPlan(draw(rng, 0.48, 0.68), each * seats, seat, clear, draw(rng, 0.14, 0.24), draw(rng, 0.68, 1.0),
+                    draw(rng, *arm), arm_top, draw(rng, 0.0, 0.14))  # fmt: skip
 
 
 def sofa_feet(rng: np.random.Generator, plan: SofaPlan) -> list[Mesh]:
     """Return the feet that fill the height under the body, or nothing where it stands on the floor."""
     if plan.clear < 0.015:
         return []
-    look = material(pick(rng, ("wood", "wood", "metal", "black")), rng)
+    look = made_of(rng, "wood", "wood", "metal", "black")
     name = pick(rng, ("tapered", "straight", "bulged", "baluster"))
     style = named_leg(name, pick(rng, (4, 8)), draw(rng, 0.035, 0.07))
     depth = plan.depth + plan.back - 0.06

@@ -3,7 +3,7 @@
 import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Parts, family, finished
-from avlmaps_sim.furniture.recipe_helpers import blade, chance, count, draw, pick, strut
+from avlmaps_sim.furniture.recipe_helpers import blade, chance, count, draw, made_of, pick, strut
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes, Triple, joined
 from avlmaps_sim.shapes import circle, cylinder, ellipsoid, lathe, slab, tube
@@ -27,7 +27,7 @@ def crank(x: float, z: float, long: float, turn: float, wide: float, look: Mater
 
 def barbell(rng: np.random.Generator, long: float, z: float, x: float) -> Meshes:
     """Return a bar with plates along y."""
-    steel, rubber = material("metal", rng), material(pick(rng, ("black", "black", "plastic")), rng)
+    steel, rubber = material("metal", rng), made_of(rng, "black", "black", "plastic")
     yield tube([(x, -long / 2, z), (x, long / 2, z)], 0.013, steel, 7)
     radius = draw(rng, 0.11, 0.22)
     for number in range(count(rng, 1, 3)):
@@ -46,7 +46,7 @@ def _weight(rng: np.random.Generator, long: float, size: float, sides: int, look
 
 @family("dumbbell", "hexagonal")
 def _hex_dumbbells(rng: np.random.Generator) -> Parts:
-    size, look = draw(rng, 0.035, 0.075), material(pick(rng, ("black", "black", "plastic")), rng)
+    size, look = draw(rng, 0.035, 0.075), made_of(rng, "black", "black", "plastic")
     long = size * draw(rng, 3.2, 5.0) + 0.06
     for i in range(count(rng, 1, 2)):
         yield _weight(rng, long, size, 6, look).moved(draw(rng, -0.04, 0.04), i * size * 2.6)
@@ -54,11 +54,7 @@ def _hex_dumbbells(rng: np.random.Generator) -> Parts:
 
 @family("dumbbell", "round plates")
 def _plate_dumbbells(rng: np.random.Generator) -> Parts:
-    radius, plates, look = (
-        draw(rng, 0.05, 0.1),
-        count(rng, 1, 3),
-        material(pick(rng, ("black", "metal", "plastic")), rng),
-    )
+    radius, plates, look = draw(rng, 0.05, 0.1), count(rng, 1, 3), made_of(rng, "black", "metal", "plastic")
     long = draw(rng, 0.3, 0.42)
     yield tube([(-long / 2, 0.0, 0.0), (long / 2, 0.0, 0.0)], 0.014, material("metal", rng), 6)
     for number in range(plates):
@@ -68,7 +64,7 @@ def _plate_dumbbells(rng: np.random.Generator) -> Parts:
 
 @family("dumbbell", "kettlebell", held_out=True)
 def _kettlebell(rng: np.random.Generator) -> Parts:
-    radius, look = draw(rng, 0.07, 0.11), material(pick(rng, ("black", "plastic", "painted")), rng)
+    radius, look = draw(rng, 0.07, 0.11), made_of(rng, "black", "plastic", "painted")
     loop = [
         (0.0, -radius * 0.45, radius * 1.5),
         (0.0, -radius * 0.75, radius * 2.3),
@@ -89,7 +85,7 @@ def _floor_barbell(rng: np.random.Generator) -> Parts:
 @family("ball", "plain")
 def _ball(rng: np.random.Generator) -> Parts:
     radius = draw(rng, 0.05, 0.13)
-    looks = [material(pick(rng, ("plastic", "leather", "painted", "white")), rng) for _ in range(2)]
+    looks = [made_of(rng, "plastic", "leather", "painted", "white") for _ in range(2)]
     ball = ellipsoid((0.0, 0.0, radius), (radius, radius, radius), looks[0], 14, 9)
     if chance(rng, 0.6):  # patches or stripes
         striped = (np.arange(len(ball.triangle)) // pick(rng, (2, 7, 14)) % 2).astype(np.int32)
@@ -131,7 +127,7 @@ def _handlebar(rng: np.random.Generator, x: float, z: float, drop: bool, look: M
 
 def _cycle(rng: np.random.Generator, radius: float, step_through: bool, drop: bool) -> list[Mesh]:
     """Return a bicycle along x with wheels of a radius, metres."""
-    look = material(pick(rng, ("painted", "plastic", "metal", "black")), rng)
+    look = made_of(rng, "painted", "plastic", "metal", "black")
     metal, black = material("metal", rng), material("black", rng)
     base = radius * draw(rng, 3.0, 3.3)
     rear, front = (-base / 2, 0.0), (base / 2, 0.0)

@@ -16,7 +16,7 @@ from avlmaps_sim.furniture.carcass import (
 from avlmaps_sim.furniture.catalogue import Parts, family
 from avlmaps_sim.furniture.contents import cloth_looks, folded, hanging
 from avlmaps_sim.furniture.legs import cabinet_base
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh
 from avlmaps_sim.shapes import box, sheet, slab, tube
@@ -46,7 +46,7 @@ def _on_top(rng: np.random.Generator, room: Room) -> list[Mesh]:
     (a, b, _), (d, e, f) = room.low, room.high
     parts = []
     for y in np.arange(b + 0.25, e - 0.2, draw(rng, 0.42, 0.6)).tolist():
-        look = material(pick(rng, ("paper", "wicker", "plastic", "fabric")), rng)
+        look = made_of(rng, "paper", "wicker", "plastic", "fabric")
         parts.append(slab((a + d) / 2, y, f, draw(rng, 0.25, 0.4), draw(rng, 0.25, 0.4), draw(rng, 0.12, 0.28), look))
     return parts
 
@@ -93,7 +93,7 @@ def sliding_wardrobe(rng: np.random.Generator) -> Parts:
     (a, b, c), (d, e, f) = room.low, room.high
     track = 0.03
     yield from (carcass(Room((a, b, c), (d + 0.06, e, f)), 0.022, look), box((a, b, 0.0), (d + 0.06, e, 0.05), look))
-    metal = material(pick(rng, ("metal", "black", "white")), rng)
+    metal = made_of(rng, "metal", "black", "white")
     kinds = [pick(rng, ("plain", "mirror", "banded", "glass")) for _ in range(number)]
     kinds = kinds if chance(rng, 0.4) else [kinds[0]] * number
     fronts = look if chance(rng, 0.5) else board_look(rng)
@@ -164,7 +164,7 @@ def open_wardrobe(rng: np.random.Generator) -> Parts:
 def garment_rack(rng: np.random.Generator) -> Parts:
     """Return clothes on a free-standing frame of metal or wood with a shelf below."""
     depth, width, height = draw(rng, 0.4, 0.5), draw(rng, 0.8, 1.5), draw(rng, 1.4, 1.75)
-    look = material(pick(rng, ("metal", "black", "wood", "white")), rng)
+    look = made_of(rng, "metal", "black", "wood", "white")
     r, half, t = draw(rng, 0.01, 0.018), width / 2, depth / 2
     for s in (1, -1):
         y = s * half

@@ -2,21 +2,11 @@
 
 import numpy as np
 
-from avlmaps_sim.furniture.carcass import (
-    Panel,
-    Room,
-    board_look,
-    carcass,
-    doors,
-    drawers,
-    front_style,
-    inside,
-    split,
-)
+from avlmaps_sim.furniture.carcass import Panel, Room, board_look, carcass, doors, drawers, front_style, inside, split
 from avlmaps_sim.furniture.catalogue import Parts, Support, family
 from avlmaps_sim.furniture.contents import ornament
 from avlmaps_sim.furniture.legs import cabinet_base, four_legs, leg_style
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick
 from avlmaps_sim.furniture.storage_shelves import filled
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes
@@ -30,7 +20,7 @@ def _body(
     base, lift = cabinet_base(rng, depth, width, look)
     room = Room((-depth / 2, -width / 2, lift), (depth / 2, width / 2, max(height, lift + 0.25)))
     out = pick(rng, (0.0, 0.0, draw(rng, 0.005, 0.03)))
-    top = look if chance(rng, 0.75) else material(pick(rng, ("wood", "marble", "white", "glass")), rng)
+    top = look if chance(rng, 0.75) else made_of(rng, "wood", "marble", "white", "glass")
     (a, b, _), (d, e, f) = room.low, room.high
     lid = box((a, b - out, f), (d + 0.02 + out, e + out, f + 0.025), top)
     return [base, carcass(room, 0.02, look), lid], room, f + 0.025
@@ -137,7 +127,7 @@ def corner_cabinet(rng: np.random.Generator) -> Parts:
     depth, width = draw(rng, 0.35, 0.45), draw(rng, 0.6, 0.95)
     low, height = draw(rng, 0.35, 0.6), draw(rng, 1.05, 1.45)
     look = board_look(rng)
-    legs = look if chance(rng, 0.4) else material(pick(rng, ("metal", "black")), rng)
+    legs = look if chance(rng, 0.4) else made_of(rng, "metal", "black")
     room = Room((-depth / 2, -width / 2, low), (depth / 2, width / 2, height))
     yield carcass(room, 0.022, look)
     yield from doors(rng, front_style(rng, look, ("slatted", "raised", "flat")), room, 2, 0.15)
@@ -178,7 +168,7 @@ def tv_tiers(rng: np.random.Generator) -> Parts:
     """Return two or three boards or glass sheets between posts, for the set and its boxes."""
     depth, width, height = draw(rng, 0.35, 0.5), draw(rng, 0.8, 1.6), draw(rng, 0.36, 0.62)
     look = material("glass", rng) if chance(rng, 0.4) else board_look(rng)
-    frame = material(pick(rng, ("metal", "black", "wood")), rng)
+    frame = made_of(rng, "metal", "black", "wood")
     tiers = count(rng, 2, 3)
     levels = np.linspace(0.06, height - 0.02, tiers).tolist()
     yield from [slab(0.0, 0.0, z, depth, width, 0.02, look) for z in levels]
@@ -197,8 +187,8 @@ def tv_sideboard(rng: np.random.Generator) -> Parts:
     """Return a box with sliding or hinged doors round an open bay, on slender splayed legs."""
     depth, width = draw(rng, 0.36, 0.46), draw(rng, 1.1, 1.9)
     low, height = draw(rng, 0.12, 0.22), draw(rng, 0.44, 0.62)
-    look = material(pick(rng, ("wood", "wood", "white")), rng)
-    legs = look if chance(rng, 0.5) else material(pick(rng, ("wood", "black", "metal")), rng)
+    look = made_of(rng, "wood", "wood", "white")
+    legs = look if chance(rng, 0.5) else made_of(rng, "wood", "black", "metal")
     room = Room((-depth / 2, -width / 2, low), (depth / 2, width / 2, height))
     yield carcass(room, 0.022, look)
     yield four_legs(depth * 0.8, width * 0.85, low, leg_style(rng, 0.03, 0.045), legs, 0.04)

@@ -5,7 +5,7 @@ import numpy as np
 from avlmaps_sim.furniture.carcass import Room, board_look, carcass, doors, drawers, front_style, split
 from avlmaps_sim.furniture.catalogue import Parts, Support, family, finished
 from avlmaps_sim.furniture.legs import cabinet_base, four_legs, leg_style
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick, rim
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick, rim
 from avlmaps_sim.furniture.table_parts import metal_frame
 from avlmaps_sim.furniture.upholstery import pillow
 from avlmaps_sim.materials import material
@@ -33,7 +33,7 @@ def _chest(
     parts = [base, carcass(room, 0.02, look)]
     for shares, (y0, y1) in zip(columns, split(b, e, [1.0] * len(columns)), strict=True):
         parts += drawers(rng, style, Room((a, y0, c), (d, y1, f)), shares)
-    board = look if chance(rng, 0.75) else material(pick(rng, ("wood", "marble", "white")), rng)
+    board = look if chance(rng, 0.75) else made_of(rng, "wood", "marble", "white")
     parts.append(box((a, b - top, f), (d + style.thick + top, e + top, f + draw(rng, 0.018, 0.035)), board))
     z = float(parts[-1].high[2])
     return [*parts, Support((a, b), (d, e), z)]
@@ -107,7 +107,7 @@ def stand_chest(rng: np.random.Generator) -> Parts:
     """Return a shallow box of drawers carried by long legs, round rods or a frame of metal."""
     depth, width = draw(rng, 0.38, 0.5), draw(rng, 0.7, 1.3)
     low, tall, look = draw(rng, 0.25, 0.42), draw(rng, 0.35, 0.6), board_look(rng)
-    legs = look if chance(rng, 0.4) else material(pick(rng, ("metal", "black", "wood")), rng)
+    legs = look if chance(rng, 0.4) else made_of(rng, "metal", "black", "wood")
     style = front_style(rng, look)
     room = Room((-depth / 2, -width / 2, low), (depth / 2, width / 2, low + tall))
     (a, b, c), (d, e, f) = room.low, room.high
@@ -128,12 +128,12 @@ def basket_chest(rng: np.random.Generator) -> Parts:
     """Return an open frame of posts or rods with deep boxes, baskets or cloth bins for drawers."""
     depth, width, rows = draw(rng, 0.36, 0.48), draw(rng, 0.36, 0.95), count(rng, 3, 5)
     columns, height = (2 if width > 0.7 else 1), 0.08 + rows * draw(rng, 0.17, 0.23)
-    frame = material(pick(rng, ("wood", "metal", "white", "black")), rng)
-    bins = material(pick(rng, ("wicker", "fabric", "plastic", "wood")), rng)
+    frame = made_of(rng, "wood", "metal", "white", "black")
+    bins = made_of(rng, "wicker", "fabric", "plastic", "wood")
     yield four_legs(depth, width, height, leg_style(rng, 0.018, 0.035, True), frame)
     top = board_look(rng) if chance(rng, 0.7) else frame
     yield box((-depth / 2, -width / 2, height - 0.018), (depth / 2, width / 2, height), top)
-    knob = material(pick(rng, ("metal", "black", "leather")), rng)
+    knob = made_of(rng, "metal", "black", "leather")
     for z0, z1 in split(0.05, height - 0.02, [1.0] * rows):
         for y0, y1 in split(-width / 2 + 0.03, width / 2 - 0.03, [1.0] * columns):
             out = draw(rng, 0.05, 0.2) if chance(rng, 0.08) else 0.0

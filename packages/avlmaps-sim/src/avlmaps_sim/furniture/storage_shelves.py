@@ -2,21 +2,11 @@
 
 import numpy as np
 
-from avlmaps_sim.furniture.carcass import (
-    Room,
-    board_look,
-    carcass,
-    doors,
-    front_style,
-    inside,
-    shelf_boards,
-    split,
-)
+from avlmaps_sim.furniture.carcass import Room, board_look, carcass, doors, front_style, inside, shelf_boards, split
 from avlmaps_sim.furniture.catalogue import Parts, Support, family
 from avlmaps_sim.furniture.contents import book_looks, shelf_things
 from avlmaps_sim.furniture.legs import cabinet_base, four_legs, leg_style
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick, strut
-from avlmaps_sim.materials import material
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick, strut
 from avlmaps_sim.mesh import Material, Mesh
 from avlmaps_sim.shapes import box, slab
 
@@ -47,7 +37,7 @@ def tall_bookshelf(rng: np.random.Generator) -> Parts:
     look, full = board_look(rng), _fullness(rng)
     board, lift = draw(rng, 0.016, 0.03), draw(rng, 0.03, 0.1)
     room = Room((-depth / 2, -width / 2, lift), (depth / 2, width / 2, height))
-    back = look if chance(rng, 0.7) else material(pick(rng, ("white", "black", "wood")), rng)
+    back = look if chance(rng, 0.7) else made_of(rng, "white", "black", "wood")
     yield carcass(room, board, look, back)
     yield box((-depth / 2, -width / 2, 0.0), (depth / 2 - 0.01, width / 2, lift), look)
     free = inside(room, board)
@@ -106,7 +96,7 @@ def cube_shelf(rng: np.random.Generator) -> Parts:
         yield four_legs(depth, width, low, leg_style(rng, 0.03, 0.05, True), look)
     if chance(rng, 0.4):
         yield box((-x, -width / 2, low), (-x + 0.006, width / 2, height), look)
-    books, bins = book_looks(rng), material(pick(rng, ("fabric", "wicker", "plastic")), rng)
+    books, bins = book_looks(rng), made_of(rng, "fabric", "wicker", "plastic")
     style = front_style(rng, look)
     for i in range(columns):
         for j in range(rows):
@@ -153,7 +143,7 @@ def ladder_shelf(rng: np.random.Generator) -> Parts:
 def open_rack(rng: np.random.Generator) -> Parts:
     """Return boards in an open frame of metal or wooden posts without a back."""
     depth, width, height = draw(rng, 0.28, 0.42), draw(rng, 0.6, 1.3), draw(rng, 0.9, 2.0)
-    frame, look = material(pick(rng, ("black", "metal", "wood", "white")), rng), board_look(rng)
+    frame, look = made_of(rng, "black", "metal", "wood", "white"), board_look(rng)
     yield four_legs(depth, width, height, leg_style(rng, 0.018, 0.035, True), frame)
     shelves = count(rng, 3, 5) if height > 1.3 else count(rng, 2, 3)
     levels = np.linspace(draw(rng, 0.06, 0.2), height - 0.03, shelves).tolist()

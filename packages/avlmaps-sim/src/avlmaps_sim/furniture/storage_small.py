@@ -6,7 +6,7 @@ from avlmaps_sim.furniture.carcass import Room, board_look, carcass, doors, draw
 from avlmaps_sim.furniture.catalogue import Parts, Support, family
 from avlmaps_sim.furniture.contents import book_looks, cloth_looks, ornament, shelf_things
 from avlmaps_sim.furniture.legs import four_legs, leg_style, star_base
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick, strut
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick, strut
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes, joined
 from avlmaps_sim.shapes import box, cylinder, ellipsoid, lathe, loft, rounded_box, rounded_rectangle, slab, tube
@@ -32,7 +32,7 @@ def shoe(rng: np.random.Generator, look: Material) -> Mesh:
 
 def _shoes(rng: np.random.Generator, y: tuple[float, float], x: float, z: float, full: float) -> Meshes:
     """Return pairs of shoes side by side along y."""
-    looks = [material(pick(rng, ("leather", "fabric", "plastic", "white", "black")), rng) for _ in range(4)]
+    looks = [made_of(rng, "leather", "fabric", "plastic", "white", "black") for _ in range(4)]
     for at in np.arange(y[0] + 0.12, y[1] - 0.1, 0.24).tolist():
         if chance(rng, full):
             one, turn = shoe(rng, pick(rng, looks)), draw(rng, -0.1, 0.1)
@@ -44,7 +44,7 @@ def shoe_tiers(rng: np.random.Generator) -> Parts:
     """Return open tiers of boards or rods between side frames, with shoes on them."""
     depth, width, tiers = draw(rng, 0.26, 0.36), draw(rng, 0.5, 1.0), count(rng, 2, 5)
     high = 0.06 + 0.2 * tiers
-    frame, look = material(pick(rng, ("metal", "black", "wood", "white")), rng), board_look(rng)
+    frame, look = made_of(rng, "metal", "black", "wood", "white"), board_look(rng)
     rods, full = chance(rng, 0.5), draw(rng, 0.2, 0.8) / max(1, tiers / 3)
     yield four_legs(depth, width, high, leg_style(rng, 0.015, 0.03, True), frame)
     for z in np.linspace(0.08, high - 0.02, tiers).tolist():
@@ -99,7 +99,7 @@ def wall_boards(rng: np.random.Generator) -> Parts:
     """Return one to three boards on brackets or without, with books and things on them."""
     depth, width, number = draw(rng, 0.15, 0.28), draw(rng, 0.4, 1.3), pick(rng, (1, 1, 2, 2, 3))
     look = board_look(rng)
-    metal = material(pick(rng, ("metal", "black", "white")), rng)
+    metal = made_of(rng, "metal", "black", "white")
     brackets, books = chance(rng, 0.6), book_looks(rng)
     step, parts, supports = draw(rng, 0.28, 0.4), [], []
     full = pick(rng, (0.0, 0.5, 0.8))
@@ -135,7 +135,7 @@ def wall_boxes(rng: np.random.Generator) -> Parts:
 def rail_shelf(rng: np.random.Generator) -> Parts:
     """Return boards on two upright rails screwed to the wall."""
     depth, width, height = draw(rng, 0.2, 0.3), draw(rng, 0.6, 1.2), draw(rng, 0.8, 1.6)
-    look, metal, books = board_look(rng), material(pick(rng, ("metal", "white", "black")), rng), book_looks(rng)
+    look, metal, books = board_look(rng), made_of(rng, "metal", "white", "black"), book_looks(rng)
     a = -depth / 2
     rails = (-width * 0.3, width * 0.3)
     yield from [box((a, y - 0.012, 0.0), (a + 0.015, y + 0.012, height), metal) for y in rails]
@@ -152,7 +152,7 @@ def filing_cabinet(rng: np.random.Generator) -> Parts:
     """Return a steel cabinet of two to four deep drawers with label frames and wide handles."""
     depth, width, rows = draw(rng, 0.45, 0.7), draw(rng, 0.38, 0.5), count(rng, 2, 4)
     height = 0.04 + rows * draw(rng, 0.29, 0.33)
-    look = material(pick(rng, ("metal", "white", "black", "painted")), rng)
+    look = made_of(rng, "metal", "white", "black", "painted")
     style = front_style(rng, look, ("flat",))
     room = Room((-depth / 2, -width / 2, 0.03), (depth / 2, width / 2, height))
     yield carcass(room, 0.012, look)
@@ -169,7 +169,7 @@ def lateral_file(rng: np.random.Generator) -> Parts:
     """Return a broad filing cabinet of drawers, or with roller doors."""
     depth, width, rows = draw(rng, 0.42, 0.5), draw(rng, 0.75, 1.2), count(rng, 2, 4)
     height = 0.06 + rows * draw(rng, 0.3, 0.36)
-    look = material(pick(rng, ("metal", "white", "painted", "wood")), rng)
+    look = made_of(rng, "metal", "white", "painted", "wood")
     style = front_style(rng, look, ("flat",))
     room = Room((-depth / 2, -width / 2, 0.05), (depth / 2, width / 2, height))
     yield carcass(room, 0.014, look)
@@ -187,7 +187,7 @@ def lateral_file(rng: np.random.Generator) -> Parts:
 def rolling_file(rng: np.random.Generator) -> Parts:
     """Return a low block of drawers on castors, to go under a desk."""
     depth, width, height = draw(rng, 0.45, 0.6), draw(rng, 0.36, 0.44), draw(rng, 0.5, 0.64)
-    look = material(pick(rng, ("metal", "white", "black", "wood", "painted")), rng)
+    look = made_of(rng, "metal", "white", "black", "wood", "painted")
     room = Room((-depth / 2, -width / 2, 0.05), (depth / 2, width / 2, height))
     shares = pick(rng, ([1.0, 1.0, 1.0], [2.0, 1.0, 1.0], [2.0, 1.0], [2.0, 2.0, 0.6]))
     yield from (carcass(room, 0.014, look), *drawers(rng, front_style(rng, look, ("flat",)), room, shares, 0.08))
@@ -211,7 +211,7 @@ def _coat(rng: np.random.Generator, x: float, y: float, z: float, look: Material
 def coat_tree(rng: np.random.Generator) -> Parts:
     """Return a stand in the middle of a floor with hooks round its top, and coats, bags or a hat on them."""
     height = draw(rng, 1.6, 1.9)
-    look = material(pick(rng, ("wood", "wood", "black", "metal", "white")), rng)
+    look = made_of(rng, "wood", "wood", "black", "metal", "white")
     reach = draw(rng, 0.2, 0.3)
     legs = count(rng, 3, 5)
     foot = star_base(legs, reach, 0.25, look, 0.02)
@@ -237,7 +237,7 @@ def coat_tree(rng: np.random.Generator) -> Parts:
 def coat_board(rng: np.random.Generator) -> Parts:
     """Return a board with hooks for a wall, with a hat shelf or without, and coats on it."""
     width, look = draw(rng, 0.5, 1.2), board_look(rng)
-    metal, looks, full = material(pick(rng, ("metal", "black")), rng), cloth_looks(rng, 3), draw(rng, 0.0, 0.7)
+    metal, looks, full = made_of(rng, "metal", "black"), cloth_looks(rng, 3), draw(rng, 0.0, 0.7)
     tall = draw(rng, 0.08, 0.25)
     yield box((0.0, -width / 2, 0.0), (0.02, width / 2, tall), look)
     for y in np.linspace(-width * 0.42, width * 0.42, count(rng, 3, 7)).tolist():

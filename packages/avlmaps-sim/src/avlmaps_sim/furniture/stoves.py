@@ -18,7 +18,7 @@ from avlmaps_sim.furniture.fittings import (
     shell,
     steel,
 )  # fmt: skip
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes
 from avlmaps_sim.shapes import box, circle, cylinder, rounded_box, slab, tube
@@ -110,7 +110,7 @@ def _range(rng: np.random.Generator, wide: float, kind: str, back: float) -> Par
     deep, z = draw(rng, 0.54, 0.66), draw(rng, 0.85, 0.94)
     look, half = enamel(rng), wide / 2
     dark = material("black", rng)
-    knobs = material(pick(rng, ("black", "metal", "white")), rng)
+    knobs = made_of(rng, "black", "metal", "white")
     lift = draw(rng, 0.02, 0.08)
     yield box((0.0, -half, lift), (deep, half, z - 0.03), look)
     yield rounded_box((-0.003, -half - 0.003, z - 0.03), (deep + 0.03, half + 0.003, z), 0.006, look, 2)
@@ -235,8 +235,8 @@ def _counter_hob(rng: np.random.Generator) -> Parts:
     yield from _hob(rng, (0.0, -wide / 2), (deep - 0.06, wide / 2), 0.012, kind)
     if kind != "glass":
         n = count(rng, 2, 5)
-        yield from [cylinder(deep - 0.04, float(y), 0.012, 0.016, 0.022, material("black", rng), 9)
-                    for y in np.linspace(-0.3, 0.3, n) * wide]  # fmt: skip
+        for y in np.linspace(-0.3, 0.3, n) * wide:
+            yield cylinder(deep - 0.04, float(y), 0.012, 0.016, 0.022, material("black", rng), 9)
 
 
 @family("stove", "counter two burners", held_out=True)

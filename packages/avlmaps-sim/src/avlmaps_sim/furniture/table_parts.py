@@ -6,7 +6,7 @@ import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Support
 from avlmaps_sim.furniture.legs import four_legs, leg, leg_style, named_leg, star_base
-from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, pick, rim, strut
+from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, made_of, pick, rim, strut
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes, joined
 from avlmaps_sim.shapes import box, circle, cylinder, lathe, loft, prism, rounded_rectangle, slab, tube
@@ -58,8 +58,8 @@ def top_support(kind: Outline, depth: float, width: float, z: float) -> Support:
 def table_look(rng: np.random.Generator, stone: float = 0.06) -> Material:
     """Draw the materials of a table."""
     if chance(rng, stone):
-        return material(pick(rng, ("marble", "stone")), rng)
-    return material(pick(rng, ("wood", "wood", "wood", "wood", "white", "painted", "black")), rng)
+        return made_of(rng, "marble", "stone")
+    return made_of(rng, "wood", "wood", "wood", "wood", "white", "painted", "black")
 
 
 def _clawed(rng: np.random.Generator, high: float, reach: float, look: Material) -> Mesh:

@@ -6,7 +6,7 @@ from avlmaps_sim.furniture.carcass import FrontStyle, Room, board_look, carcass,
 from avlmaps_sim.furniture.catalogue import Parts, Support, family
 from avlmaps_sim.furniture.contents import book_looks, shelf_things
 from avlmaps_sim.furniture.legs import apron, four_legs, leg_style, named_leg, stretchers
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick
 from avlmaps_sim.furniture.table_parts import (
     Outline,
     hairpins,
@@ -25,7 +25,7 @@ from avlmaps_sim.shapes import box, slab
 
 
 def _metal(rng: np.random.Generator) -> Material:
-    return material(pick(rng, ("metal", "black", "black", "white")), rng)
+    return made_of(rng, "metal", "black", "black", "white")
 
 
 def _dining(rng: np.random.Generator) -> tuple[float, float, float]:
@@ -78,7 +78,7 @@ def round_table(rng: np.random.Generator) -> Parts:
     width = depth * (draw(rng, 1.2, 1.8) if chance(rng, 0.4) else 1.0)
     high, thick = draw(rng, 0.71, 0.77), draw(rng, 0.018, 0.04)
     look = table_look(rng, 0.1)
-    legs = look if chance(rng, 0.5) else material(pick(rng, ("wood", "black", "metal")), rng)
+    legs = look if chance(rng, 0.5) else made_of(rng, "wood", "black", "metal")
     kind: Outline = "oval" if chance(rng, 0.75) else "stadium"
     yield table_top(kind, depth, width, high, thick, look, pick(rng, (0.0, 0.02)))
     if chance(rng, 0.5):
@@ -256,7 +256,7 @@ def block_desk(rng: np.random.Generator) -> Parts:
 def executive_desk(rng: np.random.Generator) -> Parts:
     """Return a heavy desk: drawers at both sides of the knees, a board behind, a row of drawers above."""
     depth, width, high = draw(rng, 0.6, 0.9), draw(rng, 1.3, 1.9), draw(rng, 0.73, 0.78)
-    look = material(pick(rng, ("wood", "wood", "wood", "white", "painted")), rng)
+    look = made_of(rng, "wood", "wood", "wood", "white", "painted")
     style = front_style(rng, look, ("flat", "framed", "raised"))
     under, wide, low = high - 0.03, draw(rng, 0.36, 0.48), draw(rng, 0.0, 0.12)
     yield table_top("rectangle", depth, width, high, 0.03, look)

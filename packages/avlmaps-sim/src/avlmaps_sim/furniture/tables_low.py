@@ -5,7 +5,7 @@ import numpy as np
 from avlmaps_sim.furniture.carcass import Room, board_look, drawers, front_style, split
 from avlmaps_sim.furniture.catalogue import Parts, Support, family
 from avlmaps_sim.furniture.legs import apron, cabinet_base, four_legs, leg_style, sled
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick, strut
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick, strut
 from avlmaps_sim.furniture.table_parts import (
     Outline,
     hairpins,
@@ -23,7 +23,7 @@ from avlmaps_sim.shapes import box, cylinder, lathe, loft, rounded_box, slab, tu
 
 
 def _metal(rng: np.random.Generator) -> Material:
-    return material(pick(rng, ("metal", "metal", "black", "black", "white")), rng)
+    return made_of(rng, "metal", "metal", "black", "black", "white")
 
 
 def _coffee(rng: np.random.Generator) -> tuple[float, float, float]:
@@ -153,10 +153,7 @@ def runner_coffee(rng: np.random.Generator) -> Parts:
 def trunk(rng: np.random.Generator) -> Parts:
     """Return a chest with a lid, bands and a lock, used as a table."""
     depth, width, high = draw(rng, 0.42, 0.6), draw(rng, 0.8, 1.15), draw(rng, 0.4, 0.5)
-    look, band = (
-        material(pick(rng, ("wood", "leather", "wicker", "painted")), rng),
-        material(pick(rng, ("metal", "leather", "black")), rng),
-    )
+    look, band = made_of(rng, "wood", "leather", "wicker", "painted"), made_of(rng, "metal", "leather", "black")
     lid = high - draw(rng, 0.06, 0.12)
     (x, y) = (depth / 2, width / 2)
     yield box((-x, -y, 0.0), (x, y, lid - 0.006), look)
@@ -191,7 +188,7 @@ def nested_tables(rng: np.random.Generator) -> Parts:
 def drum_table(rng: np.random.Generator) -> Parts:
     """Return a round drum: straight, waisted or swelling, or a bowl under a flat top."""
     r, high = draw(rng, 0.28, 0.48), draw(rng, 0.3, 0.46)
-    look = material(pick(rng, ("wood", "metal", "stone", "painted", "wicker")), rng)
+    look = made_of(rng, "wood", "metal", "stone", "painted", "wicker")
     waist = pick(rng, (1.0, 0.6, 0.75, 1.12))
     profile = [
         (r * 0.95, 0.0),
@@ -263,7 +260,7 @@ def c_table(rng: np.random.Generator) -> Parts:
 def tray_table(rng: np.random.Generator) -> Parts:
     """Return a tray with a rim on crossed or bent legs."""
     r, high = draw(rng, 0.2, 0.3), draw(rng, 0.45, 0.6)
-    look, frame = material(pick(rng, ("metal", "wood", "black", "white")), rng), _metal(rng)
+    look, frame = made_of(rng, "metal", "wood", "black", "white"), _metal(rng)
     yield lathe(
         [(r, high - 0.03), (r * 1.02, high + 0.02), (r * 0.98, high + 0.02), (r * 0.96, high - 0.02)], look, sides=20
     )
@@ -331,7 +328,7 @@ def waterfall_console(rng: np.random.Generator) -> Parts:
 def half_moon(rng: np.random.Generator) -> Parts:
     """Return a half-round table for a wall on three or four turned legs."""
     width, high = draw(rng, 0.75, 1.2), draw(rng, 0.74, 0.85)
-    depth, look = draw(rng, 0.32, 0.45), material(pick(rng, ("wood", "white", "painted")), rng)
+    depth, look = draw(rng, 0.32, 0.45), made_of(rng, "wood", "white", "painted")
     angle = np.linspace(-np.pi / 2, np.pi / 2, 13)
     flat = np.column_stack([depth * np.cos(angle), width / 2 * np.sin(angle)])
     for_z = [(flat, high - 0.022), (flat, high)]

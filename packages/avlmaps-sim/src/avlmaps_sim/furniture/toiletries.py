@@ -4,14 +4,14 @@ import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Parts, family
 from avlmaps_sim.furniture.fittings import chrome, face, knob, outline, spindle
-from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, pick, rim
+from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, made_of, pick, rim
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, joined
 from avlmaps_sim.shapes import box, circle, cylinder, loft, polygon, rounded_box, tube
 
 
 def _frame_look(rng: np.random.Generator) -> Material:
-    return material(pick(rng, ("wood", "wood", "metal", "black", "white", "painted")), rng)
+    return made_of(rng, "wood", "wood", "metal", "black", "white", "painted")
 
 
 @family("mirror", "wall framed")
@@ -39,7 +39,7 @@ def _bare(rng: np.random.Generator) -> Parts:
         yield box((0.06, -wide * 0.25, high + 0.03), (0.085, wide * 0.25, high + 0.055), look)
     if chance(rng, 0.3):
         yield box((0.0, -wide / 2, -0.05), (draw(rng, 0.08, 0.14), wide / 2, -0.035),
-                  material(pick(rng, ("glass", "wood", "white")), rng))  # fmt: skip
+                  made_of(rng, "glass", "wood", "white"))  # fmt: skip
 
 
 def _round_mirror(rng: np.random.Generator, flat: np.ndarray, bar: float, deep: float, look: Material) -> list[Mesh]:
@@ -86,7 +86,7 @@ def _sunburst(rng: np.random.Generator) -> Parts:
 @family("mirror", "wall cabinet")
 def _mirror_cabinet(rng: np.random.Generator) -> Parts:
     wide, high, deep, doors = draw(rng, 0.35, 1.2), draw(rng, 0.5, 0.8), draw(rng, 0.11, 0.18), count(rng, 1, 3)
-    look = material(pick(rng, ("white", "white", "wood", "metal")), rng)
+    look = made_of(rng, "white", "white", "wood", "metal")
     doors = max(1, min(doors, int(wide / 0.25)))
     yield box((0.0, -wide / 2, 0.0), (deep, wide / 2, high), look)
     step = wide / doors
@@ -140,9 +140,9 @@ def _make_up(rng: np.random.Generator) -> Parts:
 
 def _towel(rng: np.random.Generator) -> Material:
     if chance(rng, 0.4):
-        return material("fabric", rng,
-                        pick(rng, ((0.93, 0.92, 0.9), (0.85, 0.8, 0.72), (0.55, 0.65, 0.72),
-                                   (0.75, 0.55, 0.55))))  # fmt: skip
+        return material(
+            "fabric", rng, pick(rng, ((0.93, 0.92, 0.9), (0.85, 0.8, 0.72), (0.55, 0.65, 0.72), (0.75, 0.55, 0.55)))
+        )
     return material("fabric", rng)
 
 
@@ -230,13 +230,13 @@ def _rolled(rng: np.random.Generator) -> Parts:
         r = radius * (0.25 + 0.75 * turn / turn[-1])
         spiral = np.column_stack([y + r * np.cos(turn), z + r * np.sin(turn)])
         yield cloth(np.stack([np.column_stack([np.full(26, x), spiral]) for x in (-long / 2, long / 2)], axis=1), look)
-        yield from [spindle([(radius * 0.9, x), (radius * 0.2, x * 0.98)], look, y, z, 12, capped=False)
-                    for x in (-long / 2, long / 2)]  # fmt: skip
+        for x in (-long / 2, long / 2):
+            yield spindle([(radius * 0.9, x), (radius * 0.2, x * 0.98)], look, y, z, 12, capped=False)
 
 
 @family("towel", "on a stand", held_out=True)
 def _on_stand(rng: np.random.Generator) -> Parts:
-    wide, high, look = draw(rng, 0.45, 0.7), draw(rng, 0.8, 1.1), material(pick(rng, ("wood", "metal", "black")), rng)
+    wide, high, look = draw(rng, 0.45, 0.7), draw(rng, 0.8, 1.1), made_of(rng, "wood", "metal", "black")
     yield from [tube([(0.0, s * wide / 2, 0.0), (0.0, s * wide / 2, high)], 0.012, look, 6) for s in (-1, 1)]
     yield from [tube([(-0.14, s * wide / 2, 0.012), (0.14, s * wide / 2, 0.012)], 0.012, look, 6) for s in (-1, 1)]
     for k in range(count(rng, 2, 3)):

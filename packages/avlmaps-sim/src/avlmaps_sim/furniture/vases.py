@@ -4,7 +4,7 @@ import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Parts, family
 from avlmaps_sim.furniture.lighting import shining
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes, Triple
 from avlmaps_sim.shapes import circle, cylinder, ellipsoid, lathe, loft, rounded_rectangle, slab, tube
@@ -12,14 +12,13 @@ from avlmaps_sim.shapes import circle, cylinder, ellipsoid, lathe, loft, rounded
 
 def _vessel(rng: np.random.Generator, tall: float, wide: float, kind: str, look: Material) -> Mesh:
     """Return a hollow vase of a form, its mouth open."""
-    rows = {
-        "belly": [(0.45, 0.0), (0.85, 0.2), (1.0, 0.42), (0.8, 0.65), (0.42, 0.85), (0.5, 1.0), (0.3, 0.8)],
-        "bottle": [(0.8, 0.0), (1.0, 0.15), (0.95, 0.35), (0.3, 0.55), (0.22, 0.9), (0.32, 1.0), (0.2, 0.97)],
-        "trumpet": [(0.6, 0.0), (0.35, 0.1), (0.4, 0.5), (0.65, 0.85), (1.0, 1.0), (0.9, 0.98), (0.4, 0.6)],
-        "tube": [(0.85, 0.0), (1.0, 0.02), (1.0, 1.0), (0.9, 1.0), (0.88, 0.1)],
-        "tulip": [(0.5, 0.0), (0.9, 0.3), (0.95, 0.6), (0.75, 1.0), (0.68, 0.98), (0.8, 0.5)],
-        "stepped": [(0.7, 0.0), (0.7, 0.3), (1.0, 0.33), (1.0, 0.7), (0.55, 0.73), (0.55, 1.0), (0.45, 0.7)],
-    }[kind]  # fmt: skip
+    rows = {"belly": [(0.45, 0.0), (0.85, 0.2), (1.0, 0.42), (0.8, 0.65), (0.42, 0.85), (0.5, 1.0), (0.3, 0.8)],
+            "bottle": [(0.8, 0.0), (1.0, 0.15), (0.95, 0.35), (0.3, 0.55), (0.22, 0.9), (0.32, 1.0), (0.2, 0.97)],
+            "trumpet": [(0.6, 0.0), (0.35, 0.1), (0.4, 0.5), (0.65, 0.85), (1.0, 1.0), (0.9, 0.98), (0.4, 0.6)],
+            "tube": [(0.85, 0.0), (1.0, 0.02), (1.0, 1.0), (0.9, 1.0), (0.88, 0.1)],
+            "tulip": [(0.5, 0.0), (0.9, 0.3), (0.95, 0.6), (0.75, 1.0), (0.68, 0.98), (0.8, 0.5)],
+            "stepped": [(0.7, 0.0), (0.7, 0.3), (1.0, 0.33), (1.0, 0.7), (0.55, 0.73), (0.55, 1.0),
+                        (0.45, 0.7)]}[kind]  # fmt: skip
     swell = rng.uniform(0.9, 1.1, len(rows))
     return lathe([(r * s * wide, h * tall) for (r, h), s in zip(rows, swell, strict=True)], look, sides=16)
 
@@ -28,9 +27,7 @@ _FORMS = ("belly", "bottle", "trumpet", "tube", "tulip", "stepped")
 
 
 def _clay(rng: np.random.Generator) -> Material:
-    return material(
-        pick(rng, ("ceramic", "ceramic", "ceramic", "glass", "painted", "painted", "metal", "stone", "wood")), rng
-    )
+    return made_of(rng, "ceramic", "ceramic", "ceramic", "glass", "painted", "painted", "metal", "stone", "wood")
 
 
 @family("vase", "turned")
@@ -104,18 +101,14 @@ def _pillars(rng: np.random.Generator) -> Parts:
         tall, radius = draw(rng, 0.06, 0.24), draw(rng, 0.025, 0.045)
         yield from (cylinder(x, y, 0.008, radius, tall, look, 10), _flame(rng, x, y, tall + 0.008))
         light.append((x, y, tall + 0.02))
-    tray = material(pick(rng, ("metal", "wood", "stone", "glass")), rng)
+    tray = made_of(rng, "metal", "wood", "stone", "glass")
     yield cylinder(0.0, 0.0, 0.0, 0.06 if number == 1 else 0.13, 0.01, tray, 16)
     yield from light
 
 
 @family("candle", "stick")
 def _candlestick(rng: np.random.Generator) -> Parts:
-    look, tall, foot = (
-        material(pick(rng, ("metal", "wood", "ceramic", "black")), rng),
-        draw(rng, 0.06, 0.4),
-        draw(rng, 0.035, 0.07),
-    )
+    look, tall, foot = made_of(rng, "metal", "wood", "ceramic", "black"), draw(rng, 0.06, 0.4), draw(rng, 0.035, 0.07)
     rows = [(foot, 0.0), (foot * 0.9, 0.012), (0.012, 0.03), (0.018, tall * 0.5), (0.011, tall * 0.8), (0.024, tall)]
     wax = draw(rng, 0.08, 0.28)
     yield from (lathe(rows, look, sides=10), lathe([(0.011, tall), (0.008, tall + wax)], _wax(rng), sides=8))
@@ -125,7 +118,7 @@ def _candlestick(rng: np.random.Generator) -> Parts:
 
 @family("candle", "lantern")
 def _candle_lantern(rng: np.random.Generator) -> Parts:
-    wide, look = draw(rng, 0.05, 0.12), material(pick(rng, ("black", "metal", "white", "wood")), rng)
+    wide, look = draw(rng, 0.05, 0.12), made_of(rng, "black", "metal", "white", "wood")
     tall, edge = wide * draw(rng, 2.0, 4.0), 0.012
     yield slab(0.0, 0.0, 0.0, 2 * wide, 2 * wide, 0.015, look)
     yield slab(0.0, 0.0, tall, 2 * wide, 2 * wide, 0.015, look)

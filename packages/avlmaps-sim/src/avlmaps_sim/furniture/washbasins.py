@@ -6,7 +6,7 @@ import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Parts, Support, family
 from avlmaps_sim.furniture.fittings import china, chrome, front, front_style, outline, shell, steel, tap
-from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, pick, pictured
+from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick, pictured
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes, joined
 from avlmaps_sim.shapes import box, cylinder, lathe, rounded_box, slab, tube
@@ -138,7 +138,7 @@ def _vanity(rng: np.random.Generator) -> Parts:
     yield from [box((0.0, s * (wide / 2 - 0.02) - 0.01, z - 0.17),
                     (deep - 0.02, s * (wide / 2 - 0.02) + 0.01, z - 0.03), plate) for s in (-1, 1)]  # fmt: skip
     if lift > 0.15 and chance(rng, 0.5):
-        leg = material(pick(rng, ("wood", "metal", "black")), rng)
+        leg = made_of(rng, "wood", "metal", "black")
         yield from [slab(x, y, 0.0, 0.035, 0.035, lift, leg) for x in (0.03, deep - 0.05)
                     for y in (-wide / 2 + 0.04, wide / 2 - 0.04)]  # fmt: skip
     elif lift > 0.15:  # hung: only the pipe reaches the floor
@@ -165,7 +165,7 @@ def _hung(rng: np.random.Generator) -> Parts:
 @family("sink", "bowl on a wash stand")
 def _wash_stand(rng: np.random.Generator) -> Parts:
     deep, wide, z = draw(rng, 0.42, 0.55), draw(rng, 0.6, 1.4), draw(rng, 0.7, 0.82)
-    wood, look, open_base = material(pick(rng, ("wood", "wood", "stone", "metal")), rng), china(rng), chance(rng, 0.5)
+    wood, look, open_base = made_of(rng, "wood", "wood", "stone", "metal"), china(rng), chance(rng, 0.5)
     yield slab(deep / 2, 0.0, z - 0.04, deep, wide, 0.04, wood)
     if open_base:
         yield from [slab(x, y, 0.0, 0.045, 0.045, z - 0.04, wood) for x in (0.03, deep - 0.03)
@@ -183,7 +183,7 @@ def _vessel(rng: np.random.Generator, x: float, y: float, z: float, look: Materi
     """Return a bowl that stands on a top at ``z``, with a tall tap behind it."""
     size, high = draw(rng, 0.34, 0.42), draw(rng, 0.1, 0.17)
     long = size * draw(rng, 1.0, 1.35)
-    look = look if chance(rng, 0.7) else material(pick(rng, ("stone", "glass", "metal")), rng)
+    look = look if chance(rng, 0.7) else made_of(rng, "stone", "glass", "metal")
     return [*_basin((size, long), (x, y), z + high, high, pick(rng, (2.0, 2.0, 3.0, 8.0)), 0.012, look, 0.0,
                     draw(rng, 0.45, 0.95)),
             *tap(rng, (x - size / 2 - 0.035, y, z), size * 0.45, high + draw(rng, 0.12, 0.2), chrome(rng))]  # fmt: skip
@@ -224,7 +224,7 @@ def steel_of_bright(rng: np.random.Generator, look: Material) -> Material:
 
 
 def _kitchen_look(rng: np.random.Generator) -> Material:
-    return steel(rng) if chance(rng, 0.7) else material(pick(rng, ("ceramic", "black", "stone", "white")), rng)
+    return steel(rng) if chance(rng, 0.7) else made_of(rng, "ceramic", "black", "stone", "white")
 
 
 @family("sink", "counter single bowl")
@@ -269,12 +269,12 @@ def _sink_cabinet(rng: np.random.Generator) -> Parts:
 def _trough(rng: np.random.Generator) -> Parts:
     """Return a utility sink: one deep box on legs, a wall or a stand."""
     deep, wide, z, hollow = draw(rng, 0.45, 0.6), draw(rng, 0.5, 1.1), draw(rng, 0.8, 0.9), draw(rng, 0.22, 0.32)
-    look = material(pick(rng, ("ceramic", "plastic", "stone", "metal")), rng)
-    outer, inner = outline(deep, wide, 24.0, 24, middle=(deep / 2, 0.0)), outline(deep - 0.08, wide - 0.08, 10.0, 24,
-                                                                                  middle=(deep / 2, 0.0))  # fmt: skip
+    look = made_of(rng, "ceramic", "plastic", "stone", "metal")
+    outer = outline(deep, wide, 24.0, 24, middle=(deep / 2, 0.0))
+    inner = outline(deep - 0.08, wide - 0.08, 10.0, 24, middle=(deep / 2, 0.0))
     lower = outline(deep - 0.16, wide - 0.16, 8.0, 24, middle=(deep / 2, 0.0))
     yield shell([(outer, z - hollow), (outer, z), (inner, z), (lower, z - hollow + 0.03)], look)
-    leg = material(pick(rng, ("metal", "wood", "white")), rng)
+    leg = made_of(rng, "metal", "wood", "white")
     yield from [slab(x, y, 0.0, 0.05, 0.05, z - hollow, leg) for x in (0.06, deep - 0.06)
                 for y in (-wide / 2 + 0.06, wide / 2 - 0.06)]  # fmt: skip
     yield box((0.0, -wide / 2, z), (0.03, wide / 2, z + 0.1), look)
