@@ -54,12 +54,8 @@ class Building:
     ) -> None:
         """Cut a scene.
 
-        Args:
-            scene: the building.
-            low_m: lower parts over the floor are no obstacles.
-            high_m: higher parts are none either.
-            floor: which floor, counted from the lowest; the one with most to stand on where it is not said.
-            flies: whether the body needs no floor.
+        What is lower than ``low_m`` over the floor, or higher than ``high_m``, is no obstacle. ``floor`` counts from
+        the lowest; None takes the one with most to stand on. A body that flies needs none.
         """
         self.scene = scene
         heights = floor_heights(scene)

@@ -141,14 +141,7 @@ def _last_free(x, y, dx, dy, radius_m, building):  # pragma: no cover - compiled
 def moved(x, y, dx, dy, radius_m, slides, building):  # pragma: no cover - compiled
     """Move a disc straight, as far as it goes.
 
-    Args:
-        x: of its middle, where it is free.
-        y: of its middle.
-        dx: how far it is to move.
-        dy: how far it is to move.
-        radius_m: of the disc.
-        slides: whether it slides along what it touches, rather than stops.
-        building: `avlmaps_sim.body.Building.arrays`.
+    ``building`` is `avlmaps_sim.body.Building.arrays`; ``slides`` says whether it slides along what it touches.
 
     Returns:
         Its place then, and whether it touched something.

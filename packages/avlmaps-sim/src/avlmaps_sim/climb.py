@@ -23,11 +23,7 @@ _STEPS = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)])
 def climb(scene: Scene, below: FreeSpace, above: FreeSpace, height_m: float) -> Float[np.ndarray, "n 3"] | None:
     """Return the path up the stairs of a scene, its first point on the lower floor and its last on the upper one.
 
-    Args:
-        scene: the building; only what is named stairs is climbed.
-        below: where the walker can stand on the lower floor.
-        above: where it can stand on the upper floor, on a grid with the same cells.
-        height_m: of the walker.
+    Only what is named stairs is climbed; both floors are on grids with the same cells.
 
     Returns:
         Points a few centimetres apart, the height of the feet as z; None where no stairs lead up.

@@ -77,14 +77,7 @@ def require_floor(scene: Scene, walk: WalkSettings) -> FreeSpace:
 def floor_coverage(
     scene: Scene, space: FreeSpace, world_from_camera: Float[np.ndarray, "n 4 4"], fov_deg: float
 ) -> FloorCoverage:
-    """Return how much of the floor a walk drove along and saw.
-
-    Args:
-        scene: the building.
-        space: where the robot can stand.
-        world_from_camera: of the frames.
-        fov_deg: horizontal field of view.
-    """
+    """Return how much of the floor a walk drove along and saw."""
     place = world_from_camera[:, :2, 3]
     eye_m = float(world_from_camera[:, 2, 3].mean()) - space.floor_m
     opaque = occupied(scene, space, eye_m - 0.15, eye_m + 0.15)
@@ -108,12 +101,7 @@ def coverage_of_walk(
 ) -> FloorCoverage:
     """Return how much was driven along and seen of all the floors that a walk went through; see ``floor_coverage``.
 
-    Args:
-        scene: the building.
-        space: the floor that is walked in any case.
-        world_from_camera: of the frames.
-        fov_deg: horizontal field of view.
-        walk: which floors are walked, and the heights of the camera.
+    ``space`` is walked in any case.
     """
     if not walk.every_floor:
         return floor_coverage(scene, space, world_from_camera, fov_deg)

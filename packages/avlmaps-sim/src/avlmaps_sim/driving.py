@@ -140,11 +140,7 @@ def drive(
 ) -> tuple[Float[np.ndarray, "n 2"], Float[np.ndarray, " n"]]:
     """Drive along a tour; return the place and the heading at every tick.
 
-    Args:
-        tour: the path and its stops.
-        settings: how the robot is driven.
-        rng: draws how it looks about.
-        heading_rad: at the start; along the path by default.
+    ``heading_rad`` is that at the start, along the path by default.
     """
     robot = _Robot(tour, settings, heading_rad)
     period_s, phase = float(rng.uniform(5.0, 8.0)), float(rng.uniform(0, 2 * np.pi))
@@ -158,12 +154,8 @@ def drive(
 def sweep(headings: Float[np.ndarray, " m"], heading: float, seen_rad: float) -> list[float]:
     """Return where to turn to, one after the other, to have looked along all headings; none if they are in view.
 
-    The turn leaves out the widest gap between the headings, and begins at the end that is nearer.
-
-    Args:
-        headings: where there is something to see.
-        heading: where the camera looks.
-        seen_rad: how far beside its middle the camera shows a thing well.
+    The turn leaves out the widest gap between the headings, and begins at the end that is nearer. ``seen_rad`` is how
+    far beside its middle the camera shows a thing well.
     """
     if not len(headings):
         return []

@@ -180,12 +180,8 @@ def free_space(
 ) -> FreeSpace:
     """Return where a robot can stand: on a floor, with nothing of the scene within its radius and its height.
 
-    Args:
-        scene: the obstacles.
-        radius_m: of the robot.
-        height_m: of the robot; what is lower than 0.1 m it drives over.
-        cell_m: side of a cell of the grid.
-        floor: which floor, counted from the lowest; the one with most to stand on where it is not said.
+    What is lower than 0.1 m the robot drives over. ``floor`` counts from the lowest; None takes the one with most to
+    stand on.
     """
     heights = floor_heights(scene)
     if floor is not None:

@@ -296,9 +296,7 @@ def _around(
 def light_map(scene: Scene, albedo: Float[np.ndarray, "m 3"]) -> LightMap:
     """Work out the light in a scene.
 
-    Args:
-        scene: what is lit; its own lamps, or `default_lights`.
-        albedo: mean linear colour of each material.
+    ``albedo`` is the mean linear colour of each material.
     """
     mesh = scene.mesh
     lights = _merged(scene.lights or default_lights(scene))

@@ -29,13 +29,8 @@ def fresh_processes(
 ) -> ProcessPoolExecutor:
     """Return processes that are started afresh: compiled kernels and threads do not survive a fork.
 
-    They do not run the script that starts them a second time, so that it needs no ``if __name__ == "__main__":``.
-
-    Args:
-        workers: how many.
-        begin: what each does first; a function of a module.
-        arguments: what it is given.
-        import_script: run the script again, because the work needs what it defines.
+    They do not run the script that starts them a second time, so that it needs no ``if __name__ == "__main__":``. Each
+    begins with a function of a module; ``import_script`` runs the script again, because the work needs what it defines.
     """
     context = get_context("spawn") if import_script else _WithoutScript()
     return ProcessPoolExecutor(workers, context, begin, arguments)

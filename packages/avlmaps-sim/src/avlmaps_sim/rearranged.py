@@ -61,13 +61,8 @@ class Change:
 def rearranged(scene: Scene, day: int, which: Families = "all", since: int = 0) -> tuple[Scene, tuple[Change, ...]]:
     """Return a building on a later day, and all changes since the day of the scene in their order.
 
-    The same scene and day give the same building; the changes of day 2 begin with those of day 1.
-
-    Args:
-        scene: on the day ``since``.
-        day: not before that.
-        which: families of shapes of what is brought.
-        since: 0 or more; day 0 is the scene as it was made.
+    The same scene and day give the same building; the changes of day 2 begin with those of day 1. ``since`` is the day
+    of the scene, 0 as it was made.
 
     Raises:
         ValueError: the day is before the first.

@@ -227,13 +227,6 @@ def sound_again(
 ) -> tuple[Sound | ChannelSound | None, list[Sounding]]:
     """Return the track of other sounds along a walk that was recorded, and these; no track for hearing ``none``.
 
-    Args:
-        scene: the building.
-        walk: the camera's true poses.
-        duration_s: of the track.
-        settings: the sounds, and how they reach the microphones.
-        rng: draws kinds, places and noise.
-
     Raises:
         AudioError: the folder of clips cannot be used.
     """

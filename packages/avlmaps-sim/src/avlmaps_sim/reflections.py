@@ -32,12 +32,7 @@ def planes_shown(
 ) -> list[tuple[Int[np.ndarray, " m"], Plane]]:
     """Return the planes of the mirrors that a view shows, the largest first, and each one's pixels.
 
-    Args:
-        shown: the triangle of each pixel, -1 for none.
-        mirror: which triangles are mirrors.
-        corner: their nine world coordinates, metres.
-        normal: their unit normals.
-        origin: where the camera is.
+    ``shown`` is the triangle of each pixel, -1 for none.
     """
     pixels = np.flatnonzero((shown >= 0) & mirror[shown])
     if not len(pixels):

@@ -43,11 +43,8 @@ def open_driven_scene(name: str) -> DrivenScene:
 def robot_in(avlmap: AVLMap, scene: Scene, shape: BodyShape = BASE, start: GroundPose | None = None) -> SimulatedRobot:
     """Put a robot into a scene.
 
-    Args:
-        avlmap: the map of it; by this alone the robot finds its way.
-        scene: what truly stands there; what the body touches.
-        shape: of the body.
-        start: where it stands at first; by default a free place near that where the map's walk began.
+    By the map alone the robot finds its way; the scene is what its body touches. It starts at a free place near that
+    where the map's walk began, if none is given.
 
     Raises:
         SceneError: the scene and the map do not lie in the same frame.

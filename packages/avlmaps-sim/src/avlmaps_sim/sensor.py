@@ -84,11 +84,7 @@ class Sensor:
     ) -> tuple[UInt8[np.ndarray, "h w 3"], Float32[np.ndarray, "h w"]]:
         """Return colour and depth as this camera would have measured them.
 
-        Args:
-            view: what is really there.
-            camera: that saw it.
-            rng: draws the faults.
-            shift: how this frame's colours are off, one of `shifts`; drawn where none is given.
+        ``shift`` is how this frame's colours are off, one of `shifts`; drawn where none is given.
 
         Returns:
             sRGB, and z-depth in metres, 0 where nothing was measured.
@@ -163,13 +159,7 @@ def _blurred(
 def drifted(
     world_from_camera: Float[np.ndarray, "n 4 4"], rng: np.random.Generator, faults: OdometryFaults | None = None
 ) -> Float[np.ndarray, "n 4 4"]:
-    """Return poses as odometry would have summed them: the first is true, each step after it a little wrong.
-
-    Args:
-        world_from_camera: true poses in order, z up.
-        rng: draws the errors.
-        faults: how large they are.
-    """
+    """Return poses as odometry would have summed them: the first is true, each step after it a little wrong."""
     faults = faults or OdometryFaults()
     poses = np.asarray(world_from_camera, np.float64)
     if len(poses) < 2:

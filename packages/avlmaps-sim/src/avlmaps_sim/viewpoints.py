@@ -73,12 +73,7 @@ def viewpoints(
 ) -> Viewpoints:
     """Choose places greedily until all is seen that can be seen from within reach; things from two places.
 
-    Args:
-        scene: whose areas are to be entered.
-        space: where the robot can stand; one connected part.
-        targets: what there is to see.
-        opaque: the cells that a look does not pass.
-        reach_m: from how far a thing counts as seen.
+    A look does not pass the cells that are ``opaque``.
     """
     candidates = _candidates(space)
     seen = targets.in_sight(candidates, reach_m, opaque, space)
@@ -163,12 +158,7 @@ def _greedy(
 ) -> tuple[list[int], list[np.ndarray]]:
     """Take the place that adds most, again and again; say what each added.
 
-    Args:
-        places: where one may stand.
-        covers: which targets each place shows.
-        wanted: from how many places each target should be seen.
-        worth: of each target.
-        comfort: of each place.
+    ``covers`` says which targets each place shows, ``wanted`` from how many places each should be seen.
     """
     covers = covers.copy()
     left = wanted * np.any(covers, axis=0)

@@ -70,13 +70,6 @@ def random_views(
     A share of the views looks towards an object that is in sight; the others anywhere where the next thing ahead is
     0.8 to 6 m away.
 
-    Args:
-        scene: the building.
-        rng: draws everything.
-        n: how many.
-        camera: its field of view says how far beside the middle an object may come to lie.
-        stance: heights, pitches and distances.
-
     Raises:
         ValueError: nowhere is there a free place.
     """

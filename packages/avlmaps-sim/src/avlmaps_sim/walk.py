@@ -25,11 +25,6 @@ def walk_through(
 ) -> Float[np.ndarray, "n 4 4"]:
     """Return the poses ``world_from_camera`` of a walk that sees every area and object of a floor, or of all of them.
 
-    Args:
-        scene: the building.
-        rng: draws the camera's height, the start and the swaying.
-        settings: how it drives.
-
     Raises:
         ValueError: the scene has no floor to stand on.
     """
@@ -65,14 +60,7 @@ def walk_through(
 def joined_floors(
     scene: Scene, space: FreeSpace, settings: WalkSettings, eye_m: float
 ) -> tuple[list[FreeSpace], list[Float[np.ndarray, "n 3"]]]:
-    """Return the floors that a walk goes through, lowest first, and the stairs from each to the next.
-
-    Args:
-        scene: the building.
-        space: the floor that is walked in any case.
-        settings: whether the others are walked as well.
-        eye_m: height of the camera over the feet.
-    """
+    """Return the floors that a walk goes through, lowest first, and the stairs from each to the next."""
     heights = floor_heights(scene) if settings.every_floor else ()
     floors, stairs = [reaching_part(scene, space)], []
     if len(heights) < 2:

@@ -78,13 +78,7 @@ class FrameFigures:
 def class_probabilities(
     probability: Float32[np.ndarray, "hc wc k"], kinds: tuple[str, ...], size: tuple[int, int]
 ) -> Float32[np.ndarray, "h w 37"]:
-    """Return the sums over each scored class's kinds, spread over the picture.
-
-    Args:
-        probability: of each kind, on the encoder's grid.
-        kinds: their names.
-        size: rows and columns of the picture.
-    """
+    """Return the sums over each scored class's kinds, spread over a picture of a size (rows, columns)."""
     number = class_of_kinds(kinds)
     group = np.zeros((len(kinds), len(CLASSES)), np.float32)
     group[np.arange(len(kinds)), number] = 1.0

@@ -84,17 +84,10 @@ def run(
     """Measure on one recording, once for each density of the map.
 
     Frames 0, s, 2s ... are all that the map's recording holds (of which keyframes are chosen as usual); the photos are
-    spread over the other frames, and their own poses are the truth. Photos of another place are tried, too.
-
-    Args:
-        recording: frames with poses.
-        seed: of visual words and RANSAC.
-        steps: the densities s.
-        photos: limit of photos that are located.
-        foreign: photos of another place, as large as the recording's; None takes the photos themselves, mirrored:
-            a place that is not there, through the same camera.
-        used: whose encoders; the embedded ones if None.
-        settings: thresholds.
+    spread over the other frames, and their own poses are the truth. Photos of another place are tried, too. ``foreign``
+    photos are as large as the recording's; None takes the photos themselves, mirrored: a place that is not there,
+    through the same camera. ``photos`` limits how many are located, ``steps`` are the densities s, and encoders are the
+    embedded ones if None.
 
     Returns:
         ``columns`` and ``rows``: for each density one row for the photos of the place and one for the others.

@@ -98,11 +98,7 @@ class ObjectFigures:
 def measure(avlmap: "AVLMap", things: Sequence[SceneObject], same: Mapping[str, str], scene: str) -> ObjectFigures:
     """Query a map for everything that it could hold and compare with the truth.
 
-    Args:
-        avlmap: the map.
-        things: what is truly there.
-        same: category to the one that it counts as (``picture frame`` to ``picture``); others count as themselves.
-        scene: its name, for the tables.
+    ``same`` is category to the one that it counts as (``picture frame`` to ``picture``); others count as themselves.
     """
     centres = avlmap.space.centres
     inside = [_inside(centres, thing) for thing in things]
@@ -174,9 +170,7 @@ def _distance(position: Sequence[float], things: Sequence[SceneObject]) -> float
 def run_objects(settings: "IndexingSettings | None", out: Path) -> dict[str, Any]:
     """Map scenes, or take the maps that the suite ``indexing`` left in the same folder, and measure each.
 
-    Args:
-        settings: which scenes, how they are recorded, with which models they are mapped.
-        out: recordings and maps stay in its folder ``work``.
+    Recordings and maps stay in ``out/work``.
 
     Raises:
         BackendError: a model is missing; nothing is recorded then.

@@ -23,10 +23,7 @@ class BenchError(AvlmapsError):
 def write_answer(answer: Mapping[str, Any], out: Path, markdown_text: str | None = None) -> dict[str, Any]:
     """Write ``SUITE.json``, ``SUITE.md`` and ``SUITE-TABLE.csv`` for each table; return what the JSON file holds.
 
-    Args:
-        answer: with ``suite`` and ``tables``; the release is added.
-        out: folder.
-        markdown_text: of the whole page; the tables alone if None.
+    Without a text the page holds the tables alone.
     """
     suite, tables = answer["suite"], answer["tables"]
     whole = {"avlmaps": __version__, **answer, "tables": {name: dict(table) for name, table in tables.items()}}

@@ -111,12 +111,7 @@ class Tally:
 
 
 def run(sounds_folder: Path, seed: int = 0, settings: SegmentationSettings | None = None) -> dict[str, Any]:
-    """Measure the segmentation.
-
-    Args:
-        sounds_folder: clips with an ``index.csv`` (path, category and, for ESC-10, fold).
-        seed: which clips follow one another, the pauses, and the noise.
-        settings: another segmentation than the default.
+    """Measure the segmentation of the clips of an ``index.csv`` (path, category and, for ESC-10, fold).
 
     Returns:
         ``columns`` and ``rows``, one row for each set of clips, background and signal-to-noise ratio. Intervals are

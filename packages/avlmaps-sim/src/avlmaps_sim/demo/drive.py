@@ -87,15 +87,7 @@ def command_for(asks: Sequence[Ask]) -> tuple[str, tuple[Ask, ...]] | None:
 def drive(
     asks: Sequence[Ask], avlmap: "AVLMap", scene: "Scene", out: Path, tell: Callable[[str], None]
 ) -> Drive | None:
-    """Send a robot in the home to the goals with one command, and draw its path.
-
-    Args:
-        asks: the questions of the demonstration.
-        avlmap: the map, all that the robot knows.
-        scene: the home, in which its body moves.
-        out: the demonstration's folder.
-        tell: is given the program and the steps as they go.
-    """
+    """Send a robot in the home to the goals with one command, and draw its path."""
     from avlmaps.language.learned_translator import LearnedTranslator
     from avlmaps.navigate.instruct import instruct
     from avlmaps.navigate.skills import RobotSettings
@@ -119,13 +111,7 @@ def drive(
 
 
 def drive_card(drive: Drive, sheet: Sheet, scene: str) -> str:
-    """Return the report's part on the drive.
-
-    Args:
-        drive: the commands and movements.
-        sheet: the frame of the drawings; the ground is drawn in the page already.
-        scene: the home's name, as `avlmaps go --scene` takes it.
-    """
+    """Return the report's part on the drive."""
     right = sum(drive.right)
     head = (
         f"<h2>The drive: {right} of {len(drive.asks)} places right</h2><p>The sentence became a program, "

@@ -101,13 +101,7 @@ def strip_of(
     names: Sequence[str],
     size: tuple[int, int],
 ) -> Strip:
-    """Put moments side by side.
-
-    Args:
-        frames: index, colour, depth and category (-1 for none) of each moment.
-        names: of the categories.
-        size: columns and rows of each moment's pictures.
-    """
+    """Put moments side by side: index, colour, depth and category (-1: none) of each; ``size`` is (columns, rows)."""
     import cv2
 
     colours = np.array([colour_of(name, number) for number, name in enumerate(names)] + [(30, 30, 34)], np.uint8)

@@ -52,18 +52,7 @@ def write_report(
     answers: "Sequence[Answer]",
     moments: int,
 ) -> Path:
-    """Write report.html into the demonstration's folder.
-
-    Args:
-        report: the questions and what became of them.
-        scene: the home, for its picture from above.
-        recording: what the robot saw and heard.
-        avlmap: the map.
-        evidence: the truth.
-        photo: where the photo of a question was taken, if there is one.
-        answers: of the questions, with their heat.
-        moments: of the walk that are shown.
-    """
+    """Write report.html into the demonstration's folder."""
     home, ground = from_above(scene), map_from_above(avlmap.space)
     sheet = Sheet.round(home.extent, ground.extent)
     strip = _strip(recording, avlmap, moments)

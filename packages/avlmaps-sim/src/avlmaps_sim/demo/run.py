@@ -55,11 +55,7 @@ def run_demo(
 ) -> DemoReport:
     """Run the whole demonstration into a folder; an earlier one there is replaced, anything else is left alone.
 
-    Args:
-        out: the folder.
-        seed: another seed takes another home, walk, sounds and questions.
-        scene: a building to walk through instead of the home that the seed stands for.
-        settings: how large it is.
+    Another seed takes another home, walk, sounds and questions; a scene is walked through instead of the home.
 
     Raises:
         MapError: the folder holds something that is not a demonstration.

@@ -125,14 +125,7 @@ def wave(
     true: Sequence[tuple[float, float, str]],
     mapped: Sequence[tuple[float, float]],
 ) -> str:
-    """Draw a sound track.
-
-    Args:
-        loudness: of equal pieces of it, in [0, 1].
-        duration_s: of the whole.
-        true: onset, offset and name of each sound that was put in.
-        mapped: onset and offset of each sound that the map detected by itself.
-    """
+    """Draw a sound track: loudness of equal pieces in [0, 1], true sounds by name, and what the map detected."""
     middle, reach = 92.0, 58.0
     scale = WAVE_WIDTH / max(duration_s, 1e-9)
     x = np.linspace(0, WAVE_WIDTH, len(loudness))

@@ -92,10 +92,7 @@ class _DataSet:
 
 
 def load_habitat(path: Path) -> Scene:
-    """Read a scene that is put together from models.
-
-    Args:
-        path: its ``.scene_instance.json``.
+    """Read a scene that is put together from models by its ``.scene_instance.json``.
 
     Raises:
         SceneError: a file is missing, truncated or of another layout.

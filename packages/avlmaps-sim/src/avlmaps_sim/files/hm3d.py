@@ -37,10 +37,7 @@ def annotation_of(path: Path) -> Path | None:
 
 
 def load_hm3d(path: Path) -> Scene:
-    """Read an HM3D building.
-
-    Args:
-        path: any of its files, or the folder that holds them.
+    """Read an HM3D building by any of its files, or by the folder that holds them.
 
     Raises:
         SceneError: a file is missing, truncated or of another layout, or the pictures are packed for graphics cards.

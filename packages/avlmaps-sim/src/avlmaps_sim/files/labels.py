@@ -51,12 +51,7 @@ def labelled_scene(
 ) -> Scene:
     """Return a scene of one mesh whose triangles carry labels.
 
-    Args:
-        name: of the scene.
-        mesh: every triangle.
-        label: of each triangle; what has no meaning becomes one object ``other``.
-        meaning: what each label stands for; labels without a triangle are left out.
-        areas: its rooms.
+    What has no meaning becomes one object ``other``; meanings without a triangle are left out.
     """
     used, first_instance = np.unique(label, return_inverse=True)
     known = np.array([int(value) in meaning for value in used], bool)
@@ -115,13 +110,7 @@ def coloured(
 def passed_on(mesh: Mesh, source: Mesh, label: Int[np.ndarray, " s"]) -> tuple[Mesh, Int[np.ndarray, " t"]]:
     """Give the triangles of one mesh the labels of those of another that lie nearest; both show the same building.
 
-    Args:
-        mesh: what needs labels; its long triangles are cut, so that each may belong to one thing.
-        source: what has labels.
-        label: of each triangle of ``source``.
-
-    Returns:
-        The mesh, cut, and its labels.
+    Long triangles of ``mesh`` are cut, so that each may belong to one thing.
     """
     fine, _ = cut(mesh, _LONGEST_M)
     pieces, origin = cut(source, _LONGEST_M)

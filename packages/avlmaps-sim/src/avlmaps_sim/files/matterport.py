@@ -52,11 +52,9 @@ class House:
 
 
 def load_matterport(path: Path) -> Scene:
-    """Read a Matterport3D building.
+    """Read a Matterport3D building by its ``.house``, its ``_semantic.ply``, its ``.glb``, or the folder of all.
 
-    Args:
-        path: its ``.house``, its ``_semantic.ply``, its ``.glb``, or the folder that holds them. Without a ``.glb``
-            the colours are those of the PLY.
+    Without a ``.glb`` the colours are those of the PLY.
 
     Raises:
         SceneError: a file is missing, truncated or of another layout.

@@ -47,15 +47,8 @@ def _bowl(rng: np.random.Generator, length: float, wide: float, power: float, z:
           foot: tuple[float, float, float], look: Material) -> Mesh:  # fmt: skip
     """Return a toilet's bowl with its hollow, from height to height.
 
-    Args:
-        rng: draws the bulge.
-        length: of the rim, metres.
-        wide: of the rim, metres.
-        power: squareness of the rim.
-        z: of the foot and of the rim.
-        x: where the rim begins.
-        foot: length, width of the foot and x of its middle.
-        look: of the china.
+    ``z`` are the heights of foot and rim, ``power`` squares the rim, which begins at ``x``; ``foot`` has length, width
+    and x of its middle.
     """
     egg, middle, (low, high) = 0.12, (x + length / 2, 0.0), z
     waist = low + (high - low) * draw(rng, 0.3, 0.5)

@@ -148,16 +148,7 @@ def door(
     rng: np.random.Generator, style: FrontStyle, room: Room, hinge: int, open_rad: float = 0.0,
     panel: Panel | None = None,
 ) -> Mesh:  # fmt: skip
-    """Return a door with its handle.
-
-    Args:
-        rng: draws where the handle sits.
-        style: its looks.
-        room: what it fills when shut.
-        hinge: 1 where it turns round its greatest y, -1 round its least.
-        open_rad: how far it stands open.
-        panel: what fills it, if not the style's own.
-    """
+    """Return a door with its handle; ``hinge`` is 1 where it turns round its greatest y, -1 round its least."""
     (_, b, c), (d, e, f) = room.low, room.high
     fill = panel or style.panel
     parts = [_panel(style, room, fill, glazing(rng, fill))]

@@ -17,16 +17,7 @@ def key_field(rng: np.random.Generator, low: Pair, high: Pair, z: float, rows: i
               rise: float = 0.002, bar: bool = True) -> list[Mesh]:  # fmt: skip
     """Return a field of keys between two corners (x, y) on a plane at ``z``.
 
-    Args:
-        rng: draws the gaps.
-        low: corner of least (x, y), metres.
-        high: corner of greatest (x, y).
-        z: of what they stand on.
-        rows: along x.
-        columns: along y.
-        look: of the keys.
-        rise: how far they stand up.
-        bar: whether the nearest row holds a wide space bar.
+    ``rise`` is how far they stand up; ``bar`` asks for a wide space bar in the nearest row.
     """
     deep, wide = (high[0] - low[0]) / rows, (high[1] - low[1]) / columns
     gap = draw(rng, 0.06, 0.13)

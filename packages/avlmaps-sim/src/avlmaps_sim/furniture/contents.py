@@ -87,11 +87,7 @@ def ornament(rng: np.random.Generator, x: float, y: float, z: float, tall: float
 def shelf_things(rng: np.random.Generator, room: Room, looks: list[Material], full: float) -> list[Mesh]:
     """Return the contents of one bay of a shelf: books, things or nothing.
 
-    Args:
-        rng: draws it.
-        room: the bay's free room.
-        looks: covers of the books.
-        full: about how much of the bay is taken, 0 to 1.
+    About a share ``full`` of it is taken.
     """
     (a, b, c), (d, e, f) = room.low, room.high
     if not chance(rng, min(1.0, full * 1.5)) or f - c < 0.08:

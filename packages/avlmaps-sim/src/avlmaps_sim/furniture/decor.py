@@ -174,17 +174,7 @@ def _pile(outline: np.ndarray, thick: float, look: Material) -> list[Mesh]:
 
 
 def carpet(rng: np.random.Generator, length_m: float, width_m: float, shape: str) -> Piece:
-    """Make a carpet that lies on the floor about the origin.
-
-    Args:
-        rng: draws pattern, thickness (5 to 15 mm) and details.
-        length_m: along x, fringes not counted.
-        width_m: along y.
-        shape: one of ``CARPET_SHAPES``.
-
-    Returns:
-        The carpet.
-    """
+    """Make a carpet on the floor about the origin, its length along x without fringes; shapes are ``CARPET_SHAPES``."""
     thick = draw(rng, 0.005, 0.015)
     look = material("rug" if chance(rng, 0.75) else "carpet", rng)
     if shape in ("round", "oval"):

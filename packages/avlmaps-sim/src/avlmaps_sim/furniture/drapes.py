@@ -19,18 +19,9 @@ def _drape(
     rng: np.random.Generator, low_y: float, high_y: float, top: float, look: Material, x: float,
     pinch: Float[np.ndarray, " r"] | None = None, towards: float = 0.0, hem: float = 0.0,
 ) -> Mesh:  # fmt: skip
-    """Return a pleated panel.
+    """Return a pleated panel from ``low_y`` to ``high_y``, from ``hem`` to ``top``, the middle of its depth at ``x``.
 
-    Args:
-        rng: draws its pleats.
-        low_y: where it begins, metres.
-        high_y: where it ends.
-        top: height of its top.
-        look: its cloth.
-        x: depth of its middle.
-        pinch: share of its width that stays, from the hem up; None for all of it.
-        towards: the y to which pinching gathers it.
-        hem: height of its lower edge.
+    ``pinch`` is the share of its width that stays, from the hem up; the rest is gathered ``towards`` a y.
     """
     width = high_y - low_y
     pleats = max(int(width / draw(rng, 0.07, 0.16)), 2)
@@ -115,17 +106,9 @@ def _panels(rng: np.random.Generator, y: float, top: float, x: float, style: str
 
 def curtain(rng: np.random.Generator, width_m: float, height_m: float, which: Families = "all",
             style: str | None = None) -> Piece:  # fmt: skip
-    """Make a curtain with its rod.
+    """Make a curtain with its rod: wall at x = 0, middle at y = 0, hem at z = 0.
 
-    Args:
-        rng: draws style, cloth and pleats.
-        width_m: from end to end of the cloth drawn shut.
-        height_m: from the hem to the rod.
-        which: styles to draw from.
-        style: this style and no other (see ``CURTAIN_STYLES``).
-
-    Returns:
-        The curtain: wall at x = 0, middle at y = 0, hem at z = 0.
+    It is ``width_m`` wide drawn shut, and ``height_m`` from hem to rod; styles are ``CURTAIN_STYLES``.
     """
     known = CURTAIN_STYLES["training"] + CURTAIN_STYLES["held-out"] if which == "all" else CURTAIN_STYLES[which]
     style = pick(rng, known) if style is None else style

@@ -23,13 +23,7 @@ def outline(
 ) -> Float[np.ndarray, "k 2"]:
     """Return a closed curve between an ellipse (power 2) and a rectangle (power 8): basins, tubs, lids.
 
-    Args:
-        length: along x, metres.
-        width: along y, metres.
-        power: how square it is.
-        sides: number of points.
-        egg: share by which it narrows towards +x.
-        middle: of the curve, metres.
+    ``egg`` is the share by which it narrows towards +x.
     """
     angle = np.linspace(0.0, 2 * np.pi, sides, endpoint=False) + np.pi / sides
     c, s = np.cos(angle), np.sin(angle)
@@ -193,13 +187,8 @@ def _long_bar(height: float) -> float:
 def front(style: FrontStyle, x: float, low: Pair, high: Pair, opens: str = "left", grip: str = "top") -> list[Mesh]:
     """Return a door or drawer on a body whose front lies at ``x``, between two corners (y, z).
 
-    Args:
-        style: how it looks.
-        x: plane it is fixed to, metres.
-        low: corner of least (y, z), metres, gap included.
-        high: corner of greatest (y, z), metres, gap included.
-        opens: "left" or "right" (the side of the hinge is low y or high y), or "drawer".
-        grip: where a door's handle sits: "top", "bottom" or "middle".
+    The corners include the gap. It ``opens`` as a "drawer", or its hinge is "left" (low y) or "right"; the ``grip`` of
+    a door sits at its "top", "bottom" or "middle".
     """
     g, t = style.gap_m / 2, style.thick_m
     a, b, c, d = low[0] + g, low[1] + g, high[0] - g, high[1] - g

@@ -69,15 +69,8 @@ def four_legs(
 ) -> Mesh:  # fmt: skip
     """Return legs under the corners of a footprint about the origin, their tops at ``height``.
 
-    Args:
-        depth: of the footprint along x, metres.
-        width: of the footprint along y, metres.
-        height: of their tops, metres.
-        style: their shape.
-        look: their material.
-        splay: how far a foot stands outwards from its top, metres, in x and in y.
-        rear_splay: the same for the rear legs, where it differs.
-        inset: distance of their tops from the edges of the footprint, metres.
+    Feet stand ``splay`` outwards from their tops in x and y (``rear_splay`` behind, where it differs); tops lie
+    ``inset`` within the edges of the footprint.
     """
     half = style.thickness_m / 2 + inset
     parts = []

@@ -54,19 +54,9 @@ def _casing(rng: np.random.Generator, width: float, height: float, wall: float, 
 
 def door(rng: np.random.Generator, width_m: float, height_m: float, wall_m: float, open_rad: float = 0.0,
          which: Families = "all", style: str | None = None) -> Piece:  # fmt: skip
-    """Make a door with its frame for a hole in a wall; wider than 1.2 m it has two leaves.
+    """Make a door with its frame for a hole in a wall, the middle of the hole's lower edge at the origin.
 
-    Args:
-        rng: draws style, materials and details.
-        width_m: of the hole.
-        height_m: of the hole.
-        wall_m: thickness of the wall.
-        open_rad: how far the leaves stand open, towards +x.
-        which: styles to draw from.
-        style: this style and no other (see ``DOOR_STYLES``).
-
-    Returns:
-        The door, the middle of the hole's lower edge at the origin.
+    Wider than 1.2 m it has two leaves, open by ``open_rad`` towards +x. Styles are ``DOOR_STYLES``.
     """
     style = pick(rng, _styles(DOOR_STYLES, which)) if style is None else style
     look = opaque(rng)
@@ -134,18 +124,9 @@ def _sashes(rng: np.random.Generator, width: float, height: float, x: float, sty
 
 def window(rng: np.random.Generator, width_m: float, height_m: float, wall_m: float,
            which: Families = "all", style: str | None = None) -> Piece:  # fmt: skip
-    """Make a window for a hole in a wall, its sill to the room at +x.
+    """Make a window for a hole in a wall, the middle of its lower edge at the origin, its sill to the room at +x.
 
-    Args:
-        rng: draws style, materials and details.
-        width_m: of the hole.
-        height_m: of the hole.
-        wall_m: thickness of the wall.
-        which: styles to draw from.
-        style: this style and no other (see ``WINDOW_STYLES``).
-
-    Returns:
-        The window, the middle of the hole's lower edge at the origin (lift it to its sill's height).
+    Styles are ``WINDOW_STYLES``.
     """
     tall = height_m > 1.75
     known = tuple(s for s in _styles(WINDOW_STYLES, which) if (s != "french") or tall)
@@ -189,16 +170,7 @@ def folding_door(rng: np.random.Generator, width_m: float, height_m: float, wall
                  which: Families = "all", style: str | None = None) -> Piece:  # fmt: skip
     """Make a folding door with its frame for a hole in a wall, closed or drawn aside in part.
 
-    Args:
-        rng: draws style, openness, materials and details.
-        width_m: of the hole.
-        height_m: of the hole.
-        wall_m: thickness of the wall.
-        which: styles to draw from.
-        style: this style and no other (see ``FOLDING_STYLES``).
-
-    Returns:
-        The door, the middle of the hole's lower edge at the origin.
+    The middle of the hole's lower edge is at the origin. Styles are ``FOLDING_STYLES``.
     """
     style = pick(rng, _styles(FOLDING_STYLES, which)) if style is None else style
     look = opaque(rng)

@@ -41,15 +41,7 @@ def made_of(rng: np.random.Generator, *kinds: str) -> Material:
 def rim(
     low: tuple[float, float], high: tuple[float, float], width: float, x: tuple[float, float], material: Material
 ) -> Mesh:
-    """Return a rectangular frame of four bars in a plane across x.
-
-    Args:
-        low: its outer corner of least (y, z), metres.
-        high: its outer corner of greatest (y, z), metres.
-        width: of the bars, inwards, metres.
-        x: from where to where it reaches in depth, metres.
-        material: of the bars.
-    """
+    """Return a rectangular frame of four bars in a plane across x, from an outer corner (y, z) to the other."""
     (a, b), (c, d), (back, front) = low, high, x
     return joined(
         [

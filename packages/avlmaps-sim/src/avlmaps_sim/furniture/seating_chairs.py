@@ -22,17 +22,9 @@ def shell(
     rng: np.random.Generator, width: float, depth: float, seat: float, rise: float, look: Material, wrap: float,
     thick: float,
 ) -> Mesh:  # fmt: skip
-    """Return a seat and a back moulded in one piece.
+    """Return a seat and a back moulded in one piece, the seat's middle over the origin.
 
-    Args:
-        rng: draws its curves.
-        width: at its widest, metres.
-        depth: of the seat, metres; the seat's middle is over the origin.
-        seat: height of the seat, metres.
-        rise: height of the back over the seat, metres.
-        look: its material.
-        wrap: how far its sides bend up and forwards, metres.
-        thick: of the skin, metres.
+    The back rises by ``rise`` over the seat; ``wrap`` is how far the sides bend up and forwards.
     """
     lean = draw(rng, 0.06, 0.2)
     line = _SHELL

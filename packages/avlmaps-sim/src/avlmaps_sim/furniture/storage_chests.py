@@ -16,13 +16,9 @@ from avlmaps_sim.shapes import box, sheet
 def _chest(
     rng: np.random.Generator, size: tuple[float, float, float], columns: list[list[float]], top: float = 0.0
 ) -> Parts:
-    """Return a chest with columns of drawers.
+    """Return a chest of a size (depth, width, height) whose top stands out by ``top``.
 
-    Args:
-        rng: draws its looks.
-        size: depth, width and height, metres.
-        columns: from the right to the left, shares of the heights of a column's drawers from below.
-        top: how far its top stands out, metres.
+    Columns are shares of the heights of drawers from below, columns from the right to the left.
     """
     depth, width, height = size
     look = board_look(rng)

@@ -116,16 +116,9 @@ def _smooth_noise(rng: np.random.Generator, n: int, m: int) -> np.ndarray:
 def blanket(
     rng: np.random.Generator, bed: Bedding, look: Material, start: float, rumple: float, hang: float, foot: bool = True
 ) -> Mesh:
-    """Return a blanket over a mattress that hangs at its sides.
+    """Return a blanket over a mattress that hangs down its sides by ``hang``, and over its foot where ``foot`` says so.
 
-    Args:
-        rng: draws its folds.
-        bed: the mattress.
-        look: its material.
-        start: share of the mattress's length from its head where the blanket begins.
-        rumple: height of its folds, metres.
-        hang: how far it hangs down the sides, metres.
-        foot: whether it hangs over the foot of the bed, too.
+    It begins at the share ``start`` of the length from the head; its folds are ``rumple`` high.
     """
     (a, b, _), (d, e, top) = bed.low, bed.high
     n, inner = 10, 9

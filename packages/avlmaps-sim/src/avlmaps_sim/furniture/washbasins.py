@@ -20,18 +20,10 @@ def _drain(x: float, y: float, z: float, look: Material) -> Mesh:
 
 def _basin(size: Pair, middle: Pair, z: float, deep: float, power: float, wall: float, look: Material,
            back: float = 0.0, body: float = 0.6) -> list[Mesh]:  # fmt: skip
-    """Return a washbasin whose rim lies at ``z``.
+    """Return a washbasin whose rim lies at ``z``; ``deep`` is from there to the lowest point of the outside.
 
-    Args:
-        size: depth (x) and width (y) of the rim, metres.
-        middle: of the rim.
-        z: of the rim.
-        deep: from the rim to the lowest point of the outside, metres; the hollow is a little less deep.
-        power: squareness.
-        wall: width of the rim, metres.
-        look: of the basin.
-        back: how far the hollow is shifted to the front, leaving a ledge for the tap.
-        body: size of the underside as a share of the rim.
+    The hollow is shifted to the front by ``back``, which leaves a ledge for the tap; the underside has a share ``body``
+    of the rim's size.
     """
     (d, w), (x, y) = size, middle
     inner, centre = (d - 2 * wall - back, w - 2 * wall), (x + back / 2, y)
@@ -88,18 +80,8 @@ def _plate_with_bowls(deep: float, wide: float, z: float, thick: float, bowls: l
                       front_x: float = 0.06) -> list[Mesh]:  # fmt: skip
     """Return a worktop with real hollows: strips round them, and bowls whose rims lie flush with it.
 
-    Args:
-        deep: of the worktop, metres.
-        wide: of the worktop, metres.
-        z: of its top.
-        thick: of the worktop.
-        bowls: y of their middles.
-        bowl: depth (x) and width (y) of a bowl.
-        power: squareness of a bowl.
-        hollow: depth of the bowls.
-        plate: of the worktop.
-        inside: of the bowls.
-        front_x: of the strip before the bowls, metres.
+    ``bowls`` are the y of their middles, ``bowl`` is the depth and width of each, and ``front_x`` the strip before
+    them.
     """
     x1 = deep - front_x
     x0 = x1 - bowl[0]

@@ -46,16 +46,8 @@ def acoustic(
 ) -> Sound:
     """Return the recording of one omnidirectional microphone on the robot (see ``impulse`` for the model).
 
-    A track whose peaks would be cut off is made quieter as a whole.
-
-    Args:
-        scene: the building.
-        soundings: what sounds when.
-        stamps_s: when the robot was where.
-        robot: its places: those of the microphone.
-        duration_s: of the track.
-        rng: draws the late reverberation and the noise of the room.
-        settings: how.
+    A track whose peaks would be cut off is made quieter as a whole. ``robot`` holds the places of the microphone at
+    ``stamps_s``.
     """
     settings = settings or AcousticSettings()
     building = Acoustics(scene, settings.rate_hz, settings.rt60_s)

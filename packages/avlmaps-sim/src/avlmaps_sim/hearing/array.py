@@ -57,16 +57,6 @@ def heard_by_array(
     """Return the recording of several microphones on a robot that drives through a building.
 
     A track whose peaks would be cut off is made quieter as a whole.
-
-    Args:
-        scene: the building.
-        soundings: what sounds when.
-        stamps_s: rising seconds.
-        world_from_camera: the camera's poses then.
-        microphones: one for each channel.
-        duration_s: of the track.
-        rng: draws the late field and the noise of the microphones.
-        settings: how.
     """
     settings = settings or AcousticSettings()
     building = Acoustics(scene, settings.rate_hz, settings.rt60_s)
@@ -128,11 +118,7 @@ def responses(
 ) -> tuple[Float[np.ndarray, "k m t"], Float[np.ndarray, "l m u"] | None]:
     """Return the early responses from a source to each microphone, and the late ones at every fourth place.
 
-    Args:
-        building: says what lies between.
-        source: where it sounds; what lies in a wall is moved out of it.
-        ears: where the microphones are, time after time.
-        rng: draws the noise of the late field.
+    A source in a wall is moved out of it; ``ears`` are the places of the microphones, time after time.
 
     Returns:
         In units of the direct sound at 1 m; the late field is None where the source is in no room.

@@ -30,14 +30,8 @@ def said_directions(
 ) -> DirectionTrack:
     """Return the azimuths that a device on the robot says.
 
-    Args:
-        scene: the building.
-        sounds: onset, offset and place of each.
-        stamps_s: rising seconds.
-        world_from_camera: the camera's poses then.
-        rng: draws errors and outliers.
-        offset_rad: by how much all azimuths are too great.
-        outliers: share of the azimuths that are anything.
+    ``sounds`` have onset, offset and place. All azimuths are too great by ``offset_rad``; a share ``outliers`` is
+    anything.
     """
     building, walk = Acoustics(scene, 16_000), Trajectory(stamps_s, world_from_camera)
     at_s: list[float] = []

@@ -69,10 +69,7 @@ class Acoustics:
     ) -> list[Float[np.ndarray, " t"]]:
         """Return the impulse response from a source to each of several places, in the same units.
 
-        Args:
-            source: where it sounds; what lies in a wall is moved out of it.
-            ears: where the microphone is.
-            rng: draws the noise of the late field, the same for all places.
+        A source in a wall is moved out of it. The noise of the late field is the same for all places.
         """
         air, rooms = self.floor_at(float(ears[:, 2].mean()))
         if self.floor_at(float(source[2]))[0] is not air:

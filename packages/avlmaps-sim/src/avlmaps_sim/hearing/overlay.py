@@ -23,15 +23,8 @@ def overlay(
 ) -> Sound:
     """Return the track: every clip whole, with one gain by the distance at its middle, over the room's noise.
 
-    There is no reverberation, and walls do nothing.
-
-    Args:
-        soundings: what sounds when.
-        duration_s: of the track.
-        rng: draws the noise.
-        rate_hz: samples a second.
-        loudness_db: of a sound at 1 m or nearer, RMS of its loud frames in dB relative to full scale.
-        snr_db: how far the room's noise lies below that.
+    There is no reverberation, and walls do nothing. ``loudness_db`` is that of a sound at 1 m or nearer, RMS of its
+    loud frames in dB relative to full scale; the noise lies ``snr_db`` below it.
     """
     samples = room_noise(duration_s, loudness_db - snr_db, rate_hz, rng)
     for sounding in soundings:

@@ -61,20 +61,9 @@ def schedule(
 ) -> list[Sounding]:
     """Let sources sound when the robot is nearest to them, as far as the rule allows; what finds no room is left out.
 
-    Each kind plays once, from the first of its sources for which there is room; ``pairs`` of the kinds play
-    twice, from sources that are far apart, and these come first.
-
-    Args:
-        scene: its rooms; a source in another room than the robot counts as farther away.
-        sources: what may sound, the most wanted first.
-        stamps_s: when the robot was where.
-        robot: its places.
-        rule: the distances between sounds.
-        most: limit of the sounds.
-        pairs: how many kinds play twice, if there is room.
-
-    Returns:
-        In the order of their onsets.
+    Each kind plays once, from the first of its sources for which there is room; ``pairs`` of the kinds play twice, from
+    sources that are far apart, and these come first. The most wanted sources come first; one in another room than the
+    robot counts as farther away.
     """
     planner = _Planner(scene, Walk.along(stamps_s, robot), rule or ScheduleRule())
     most = len(sources) if most is None else most

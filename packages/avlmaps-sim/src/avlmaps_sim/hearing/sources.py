@@ -58,19 +58,11 @@ def place_sources(
     apart_m: float = 2.0,
     twins_apart_m: float = 4.0,
 ) -> list[Source]:
-    """Draw sounds and put each at a thing that makes it, or where such a sound occurs.
+    """Draw at most ``count`` sounds and put each at a thing that makes it, or where such a sound occurs.
 
-    Args:
-        scene: the building.
-        rng: draws kinds, places and clips.
-        count: how many sources; fewer where the scene has no room for more.
-        categories: only these kinds; all that homes make if None.
-        ambiguous: how many of the kinds are to play in two places (of different clips), so that the kind alone
-        does not identify the place.
-        bank: where the clips come from; made by rule if None.
-        walk: where the robot will be: only places that it comes near to are taken.
-        apart_m: least distance between any two sources.
-        twins_apart_m: least distance between two sources of one kind.
+    ``ambiguous`` of the kinds play in two places (of different clips), so that the kind alone does not identify the
+    place. Only places that the ``walk`` comes near to are taken, no two nearer than ``apart_m``, of one kind
+    ``twins_apart_m``.
 
     Raises:
         AudioError: a category that the bank lacks.
@@ -105,13 +97,7 @@ def candidates(
 ) -> list[Source]:
     """Return several places for each of several kinds of sound, to choose from (see ``schedule``).
 
-    Args:
-        scene: the building.
-        rng: draws kinds, places and clips.
-        kinds: how many at most.
-        categories: only these; all that homes make if None.
-        bank: where the clips come from; made by rule if None.
-        walk: where the robot will be: only places that it comes near to are taken.
+    Only places that the ``walk`` comes near to are taken.
     """
     bank = bank or Synthesised()
     names = chosen_categories(bank, tuple(categories) if categories else None)

@@ -130,16 +130,9 @@ def set_at(
     turn_rad: float = 0.0,
     among: Among | None = None,
 ) -> bool:
-    """Stand a thing at a place on the largest top of a piece.
+    """Stand a thing on the largest top of a piece, at shares of its depth (from the back) and width.
 
-    Args:
-        f: furnishes the room.
-        anchor: what it stands on.
-        category: what.
-        depth: where, from 0 at the back to 1 at the front.
-        across: where, from 0 to 1 across.
-        turn_rad: how far it is turned out of the piece's own direction.
-        among: which families will do; any that stand where not said.
+    It is turned by ``turn_rad`` out of the piece's own direction.
     """
     if not anchor.piece.supports or (piece := f.new(category, among or _for_tops)) is None:
         return False

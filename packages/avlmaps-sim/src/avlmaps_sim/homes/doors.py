@@ -35,12 +35,8 @@ def joined_up(
 ) -> list[Wall] | None:
     """Put doors into the walls so that every room can be reached; None where that cannot be.
 
-    Args:
-        rng: draws kinds and places of doors.
-        rooms: of one floor.
-        walls: between them, without holes.
-        open_plan: the probability that rooms of an open plan have no wall between them.
-        patience: how dear the path to a room may be (see `_price`).
+    Rooms of an open plan have no wall between them with a probability ``open_plan``; ``patience`` is how dear the path
+    to a room may be (see `_price`).
     """
     start = min(range(len(rooms)), key=lambda i: (rooms[i].kind not in ("entrance hall", *HUBS), i))
     wanted = _tree(rooms, walls, start, patience)

@@ -101,12 +101,7 @@ def _furnished(rng: np.random.Generator, builder: SceneBuilder, plan: Storey, wh
 
 
 def make_home(seed: int, which: Families = "all") -> Scene:
-    """Make a furnished home.
-
-    Args:
-        seed: another home for each.
-        which: families of shapes of furniture.
-    """
+    """Make a furnished home."""
     rng = np.random.default_rng([seed, 0x40E])
     builder = SceneBuilder(f"house:{seed}")
     upper = None
@@ -125,12 +120,7 @@ def make_home(seed: int, which: Families = "all") -> Scene:
 
 
 def make_office(seed: int, which: Families = "all") -> Scene:
-    """Make a furnished office.
-
-    Args:
-        seed: another office for each.
-        which: families of shapes of furniture.
-    """
+    """Make a furnished office."""
     rng = np.random.default_rng([seed, 0x0FF])
     builder = SceneBuilder(f"office:{seed}")
     _furnished(rng, builder, _plan(rng, office_programme(rng), "corridor"), which)

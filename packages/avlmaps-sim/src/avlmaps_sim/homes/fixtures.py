@@ -14,12 +14,7 @@ _COLUMNS = ("living room", "dining room", "kitchen", "open-plan office", "recept
 
 
 def fit_out(f: Furnisher, wall: Material) -> None:
-    """Build fixtures into a share of the rooms, before furniture comes.
-
-    Args:
-        f: furnishes the room.
-        wall: what its walls look like.
-    """
+    """Build fixtures into a share of the rooms, before furniture comes."""
     rng, size = f.rng, area_m2(f.ground.polygon)
     if f.kind in _COLUMNS and chance(rng, 0.7 if f.kind == "open-plan office" else 0.2):
         _columns(f, wall, count(rng, 1, 4) if size > 35 else 1)

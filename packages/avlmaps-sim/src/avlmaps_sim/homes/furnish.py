@@ -183,16 +183,8 @@ class Furnisher:
     ) -> PlacedPiece | None:  # fmt: skip
         """Stand a piece against a wall, looking into the room.
 
-        Args:
-            piece: what.
-            sides: the walls to try, in this order; all in random order where not said.
-            front_m: how deep a zone before it stays clear.
-            gap_m: between it and the wall.
-            z: height of its origin above the floor.
-            corner: the probability that a corner is tried first.
-            near: places close to this are tried first.
-            tries: places per wall.
-            at_middle: the probability that the middle of the wall is tried first.
+        A zone of ``front_m`` before it stays clear. A corner, or the middle of a wall, is tried first with a
+        probability ``corner`` or ``at_middle``, and places close to ``near`` before others.
         """
         foot = footprint(piece.mesh)
         for side in self.sides(foot.width_m) if sides is None else sides:

@@ -56,12 +56,8 @@ def divided(
 ) -> list[tuple[str, Polygon]]:
     """Divide a convex polygon among a programme.
 
-    Args:
-        rng: chooses where to cut.
-        polygon: what to divide.
-        programme: rooms with their areas; only the proportions count.
-        slant: the probability that a cut is not at right angles to the sides.
-        strict: give up at the first room that is not sound.
+    Only the proportions of the areas count. A cut is not at right angles to the sides with a probability ``slant``;
+    ``strict`` gives up at the first room that is not sound.
     """
     if len(programme) == 1:
         room = (programme[0][0], polygon)
@@ -126,13 +122,7 @@ def _index_of_share(rooms: Programme, share: float) -> int:
 
 
 def outlines(rng: np.random.Generator, size_m2: float, shape: str) -> list[Polygon]:
-    """Return the convex parts of an outline: one rectangle, two of an L or a T; sometimes with a corner cut off.
-
-    Args:
-        rng: draws proportions.
-        size_m2: area of all of it.
-        shape: ``rectangle``, ``L`` or ``T``.
-    """
+    """Return the convex parts of an outline: one rectangle, two of an L or a T; sometimes with a corner cut off."""
     if shape == "rectangle":
         aspect = draw(rng, 1.0, 1.9)
         wide = float(np.sqrt(size_m2 * aspect))
@@ -181,12 +171,8 @@ def floor_of(
 ) -> list[tuple[str, Polygon]]:
     """Lay out a floor: draw an outline and divide it, again until every room is sound.
 
-    Args:
-        rng: draws everything.
-        programme: rooms and their areas, m²; a passage among them is a room like others where no corridor is cut.
-        corridor: what the room of a corridor is called.
-        slanted: share of cuts that are not at right angles.
-        stairs: cut a stairwell off the corridor.
+    A passage in the programme is a room like others where no corridor is cut; a share ``slanted`` of the cuts is not at
+    right angles.
     """
     slant = slanted if chance(rng, 0.4) and not stairs else 0.0
     size = sum(area for _, area in programme)

@@ -66,13 +66,7 @@ class _Filled:
 
 
 def lived_in(scene: Scene, rng: np.random.Generator, which: Families) -> Scene:
-    """Return the home with clothes, papers, shower curtains and people in it.
-
-    Args:
-        scene: a finished home; its objects say which way they look.
-        rng: draws everything.
-        which: families of shapes.
-    """
+    """Return the home with clothes, papers, shower curtains and people in it."""
     scene = with_curtains_apart(scene)
     filled = _Filled(scene, rng, which, SceneBuilder.of(scene))
     corners = scene.mesh.corners().astype(np.float64)

@@ -15,10 +15,7 @@ _NO_CLOTH = ("bathroom", "toilet", "storage", "laundry room", "gym", "copy room"
 def dress_windows(f: Furnisher, cloth: float, style: str | None) -> None:
     """Hang curtains or blinds at windows, and stand radiators under some.
 
-    Args:
-        f: furnishes the room.
-        cloth: the probability that a window has curtains or blinds.
-        style: the curtains' style, drawn again for each where not said.
+    ``cloth`` is the probability that a window has them; the curtains' style is drawn for each where none is given.
     """
     for side in f.ground.sides:
         for start, end, sill, head in side.windows:
@@ -97,9 +94,7 @@ def adorn(f: Furnisher) -> None:
 def light_up(f: Furnisher, by_day: float) -> None:
     """Hang lamps from the ceiling and light the room by them, and by its windows.
 
-    Args:
-        f: furnishes the room.
-        by_day: how strong the light of the windows is, 0 at night.
+    The light of the windows is ``by_day`` strong, 0 at night.
     """
     rng, size = f.rng, area_m2(f.ground.polygon)
     spots = _lamp_places(f, size)

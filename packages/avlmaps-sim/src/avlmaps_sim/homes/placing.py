@@ -119,13 +119,7 @@ class Ground:
     ) -> Bool[np.ndarray, " n"]:  # fmt: skip
         """Return where a piece can stand: within the walls, meeting nothing, and out of the clear zones.
 
-        Args:
-            foot: its box.
-            centre: where the middle of its box would be.
-            heading_rad: where its front would look.
-            z: height of its origin.
-            zones: respect the clear zones before furniture; those before doors are respected always.
-            except_for: number of a piece that it may meet (a chair its table).
+        Zones before doors are respected in any case; ``except_for`` is a piece that it may meet (a chair its table).
         """
         corner = corners_of(centre, np.broadcast_to(foot.half, centre.shape), heading_rad)
         good = np.all(inside(self.polygon, corner, 0.004), axis=1)

@@ -50,12 +50,7 @@ def _seat_places(table: PlacedPiece, width_m: float) -> list[tuple[float, float,
 def seat_round(f: Furnisher, table: PlacedPiece, piece: Piece, number: int, all_sides: bool = True) -> int:
     """Stand chairs of one kind round a table; return how many found a place.
 
-    Args:
-        f: furnishes the room.
-        table: what they look at.
-        piece: the chair; each is the same.
-        number: how many at most.
-        all_sides: round it; else only at its front.
+    They stand ``all_sides`` round it, or only at its front.
     """
     foot = footprint(piece.mesh)
     places = _seat_places(table, foot.width_m)

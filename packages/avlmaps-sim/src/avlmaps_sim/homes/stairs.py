@@ -23,12 +23,7 @@ def mouth_of(plan: Storey) -> Wall:
 def build_stairs(rng: np.random.Generator, builder: SceneBuilder, ground: Storey, upper: Storey, area: int) -> None:
     """Add stairs and railings to a scene.
 
-    Args:
-        rng: draws materials.
-        builder: the scene.
-        ground: the lower floor.
-        upper: the upper floor.
-        area: index of the hall that the stairs start from.
+    ``area`` is the hall that they start from.
     """
     mouth = mouth_of(ground)
     rise = upper.rooms[0].floor_m - ground.rooms[0].floor_m

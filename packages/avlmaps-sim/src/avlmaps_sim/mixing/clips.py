@@ -39,12 +39,9 @@ class Clip:
 def find_clips(folder: Path, categories: Sequence[str] | None = None) -> tuple[Clip, ...]:
     """List the clips of a folder, sorted by category and name.
 
-    Categories come from an ``index.csv`` with the columns path and category, if there is one; else from the names
-    of the subfolders (underscores stand for spaces); else all files are of one category, named as the folder.
-
-    Args:
-        folder: where the clips are.
-        categories: only these, in any case and with spaces or underscores; all if None.
+    Categories come from an ``index.csv`` with the columns path and category, if there is one; else from the names of
+    the subfolders (underscores stand for spaces); else all files are of one category, named as the folder.
+    ``categories`` are taken in any case, with spaces or underscores.
 
     Raises:
         AudioError: no such folder, no clips, an index without those columns, or an unknown category.

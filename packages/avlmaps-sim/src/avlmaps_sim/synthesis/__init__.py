@@ -12,9 +12,7 @@ __all__ = ["MAKERS", "RATE_HZ", "animals", "home", "outdoors", "people", "synthe
 def synthesise(category: str, rng: np.random.Generator) -> Float32[np.ndarray, " n"]:
     """Return about five seconds of a kind of sound, mono at ``RATE_HZ``; another draw is another one of its kind.
 
-    Args:
-        category: a key of ``MAKERS``.
-        rng: what is drawn at random.
+    Categories are the keys of ``MAKERS``.
 
     Raises:
         ValueError: no sound of that name is made here.

@@ -92,13 +92,7 @@ def _laid(
 ) -> tuple[Int[np.ndarray, "s s"], Float32[np.ndarray, "s s"]]:
     """Return the number of each pixel's tile, and from 0 on a joint to 1 on a tile.
 
-    Args:
-        rng: source of how even the joints are.
-        size: edge, pixels.
-        columns: tiles in a row.
-        rows: rows of tiles.
-        offset: shift of every other row, as a fraction of a tile.
-        joint_px: width of the joints.
+    Every other row is shifted by a fraction ``offset`` of a tile.
     """
     x, y = ((place + float(rng.random())) % 1.0 for place in grid(size))  # joints lie anywhere on the picture
     row = np.minimum((y * rows).astype(np.int64), rows - 1)

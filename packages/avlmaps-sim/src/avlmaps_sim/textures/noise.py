@@ -26,13 +26,8 @@ def cloud(
 ) -> Float32[np.ndarray, "s s"]:
     """Return noise of mean 0 and spread 1 whose amplitude falls with the power ``slope`` of the wavenumber.
 
-    Args:
-        rng: source of the phases.
-        size: edge, pixels.
-        slope: 0 for white noise, 2 for soft clouds.
-        stretch: how many times longer its blots are along the rows (x) than across.
-        low: waves of fewer cycles per picture are left out.
-        high: waves of more cycles per picture are left out.
+    Its blots are ``stretch`` times longer along the rows than across; waves of fewer than ``low`` or more than ``high``
+    cycles a picture are left out.
     """
     log_k = _log_wavenumber(size, stretch)
     amplitude = np.exp(log_k * np.float32(-slope))

@@ -36,10 +36,7 @@ def _finished(image: UInt8[np.ndarray, "h w 3"], size_m: Size, emission: float =
 def grey(value: Float[np.ndarray, "h w"], size_m: Size, hue: Float[np.ndarray, "h w"] | None = None) -> Texture:
     """Finish a picture that is to be tinted: scaled so that its brightest places are white.
 
-    Args:
-        value: relative brightness, greater than 0.
-        size_m: metres that columns and rows cover.
-        hue: where above 0 the surface is warmer than its tint, below colder; a few hundredths.
+    Where ``hue`` is above 0 the surface is warmer than its tint, below colder; a few hundredths.
     """
     scaled = value / max(float(np.percentile(value[::2, ::2], 99.0)), 1e-3)
     rgb = np.repeat(scaled[..., None].astype(np.float32), 3, axis=2)

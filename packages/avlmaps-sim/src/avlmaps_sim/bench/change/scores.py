@@ -86,14 +86,7 @@ class Listed:
 def true_changes(
     changes: Sequence[Change], day: int, seen_before: Sequence[str], seen_now: Sequence[str]
 ) -> list[Happened]:
-    """Return what truly happened on a day, of what could be noticed: it was seen before, and is seen now.
-
-    Args:
-        changes: since day 0.
-        day: which.
-        seen_before: names of the things that an earlier day saw.
-        seen_now: of those that this one did.
-    """
+    """Return what truly happened on a day, of what could be noticed: it was seen before, and is seen now."""
     own: list[Happened] = []
     for one in (one for one in changes if one.day == day and one.kind in _TRUE):
         was = one.before is None or one.name in seen_before
@@ -126,12 +119,8 @@ def judged(
 ) -> Counts:
     """Return how many changes are right, wrong and missed; each is matched once.
 
-    Args:
-        said: by the map.
-        true: what happened.
-        neither: places of changes that are neither right nor wrong to name (a door that swung).
-        hidden: likewise, changes that happened where nobody looked; of a move also either end by itself.
-        named: whether the name must fit.
+    Neither right nor wrong to name are ``neither`` (places of a door that swung) and ``hidden``, which happened where
+    nobody looked (of a move either end counts by itself).
     """
     counts = Counts()
     ends = [
@@ -194,11 +183,7 @@ def judged_list(
 ) -> Listed:
     """Return how well a list stands for the last day.
 
-    Args:
-        stays: that the list holds.
-        now: the things of the last day.
-        before: those of all earlier days, wherever they stood.
-        true_names: things of the last day that some day saw.
+    ``before`` are the things of all earlier days, ``true_names`` those of the last day that some day saw.
     """
     there = stands_there(stays, now)
     anything = stands_there(stays, now, named=False).any(axis=1)

@@ -100,11 +100,7 @@ def run_change(
 ) -> dict[str, Any]:
     """Record homes on several days, merge their maps, and write tables.
 
-    Args:
-        settings: the homes, on day 0, and how they are recorded.
-        days: of each, day 0 included.
-        out: folder; its ``work`` stores recordings and maps.
-        open_spec: makes a scene of its name.
+    ``out/work`` stores recordings and maps.
     """
     weights = settings.checked()
     todo = scene_jobs(settings, settings.recorded, settings.scenes, out / "work")
@@ -212,12 +208,7 @@ def _lived(
 
 
 def _noticeable(true: Sequence[Happened], places: Sequence[Workplace]) -> list[Happened]:
-    """Return the changes that depth shows: it goes through where a thing was, or where one appeared before that.
-
-    Args:
-        true: changes of the last of some days.
-        places: the days up to then.
-    """
+    """Return the changes that depth shows: it goes through where a thing was, or where one appeared before that."""
     before = [one.before for one in true]
     after = [one.after if one.kind == "appeared" else None for one in true]
     empty_now = _looked_through(places[-1:], before)

@@ -46,10 +46,7 @@ class Judged:
 def judged_scene(settings: IndexingSettings, spec: str, work: Path) -> list[Judged]:
     """Return the answers of a scene's map to its labelled queries; it is recorded and mapped if need be.
 
-    Args:
-        settings: how.
-        spec: the scene's name.
-        work: folder of recordings, maps and tasks, shared with the suite ``indexing``.
+    ``work`` is shared with the suite ``indexing``.
     """
     (job,) = scene_jobs(settings, settings.recorded, (spec,), work)
     return judged_job(job, settings.tasks_a_scene)

@@ -55,13 +55,7 @@ def labelled_queries(
 ) -> list[LabelledQuery]:  # fmt: skip
     """Return the queries of a scene.
 
-    Args:
-        evidence: what is truly there.
-        tasks: of the scene.
-        names: of things that the map's encoder knows.
-        sounds: of sounds that it knows.
-        rooms: of areas that it knows.
-        rng: draws what replaces a part.
+    Names, sounds and rooms are those that the map's encoders know.
     """
     held = [thing.category for thing in evidence.objects]
     absent = [name for name in names if not _any_is(held, name) and name not in STRUCTURE]

@@ -57,10 +57,6 @@ def _trained(row: dict[str, str]) -> bool:
 def unheard_folder(folder: Path, work: Path) -> Path:
     """Return a folder whose index lists the unheard clips of another one, which stay where they are.
 
-    Args:
-        folder: of clips, with an ``index.csv``.
-        work: where the new folder is written.
-
     Raises:
         AudioError: see ``unheard_rows``.
     """

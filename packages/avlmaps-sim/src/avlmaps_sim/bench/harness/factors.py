@@ -61,12 +61,7 @@ class VoxelHeat(Factor):
 def true_things(space: Space, part: Part, falloff_per_m: float, label: Int[np.ndarray, " n"], own: Sequence[int]):
     """Return the heat of things whose voxels are truly known.
 
-    Args:
-        space: the map's voxels.
-        part: the part of the query.
-        falloff_per_m: how fast heat falls.
-        label: the thing that each voxel is.
-        own: the things that match the query.
+    ``label`` is the thing that each voxel is, ``own`` are those that match the query.
     """
     mask: Bool[np.ndarray, " n"] = np.isin(label, np.array(own, np.int64))
     instance = np.unique(label[mask], return_inverse=True)[1].reshape(-1)
@@ -77,11 +72,7 @@ def true_things(space: Space, part: Part, falloff_per_m: float, label: Int[np.nd
 def true_places(space: Space, part: Part, falloff_per_m: float, places: Sequence[Float[np.ndarray, "k 3"]]):
     """Return the heat around places that are truly known, each with score 1.
 
-    Args:
-        space: the map's voxels.
-        part: the part of the query.
-        falloff_per_m: how fast heat falls.
-        places: for each thing that was heard or seen the places along its track.
+    For each thing that was heard or seen ``places`` are those along its track.
     """
     anchors = np.concatenate([np.zeros((0, 3)), *places])
     which = np.repeat(np.arange(len(places)), [len(track) for track in places])

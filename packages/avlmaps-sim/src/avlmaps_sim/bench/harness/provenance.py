@@ -32,11 +32,7 @@ def shown_scene(spec: str) -> str:
 
 
 def clip_table(clips: Iterable[tuple[str, str]]) -> dict[str, Any]:
-    """Return the table of the clips that were heard: sound, number of times, names of the files.
-
-    Args:
-        clips: sound and clip of every event.
-    """
+    """Return the table of the clips that were heard: sound, number of times, names of the files."""
     named: dict[str, list[str]] = {}
     for sound, clip in clips:
         named.setdefault(sound, []).append(PurePath(clip).name)

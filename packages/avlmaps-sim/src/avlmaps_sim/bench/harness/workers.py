@@ -24,14 +24,7 @@ def side_by_side(
 ) -> list[T]:
     """Return the result of every scene, in their order, and show the progress.
 
-    Args:
-        do: the work, a function of a module.
-        todo: one entry for each scene.
-        jobs: processes at once, at most; 0 for one a core.
-        label: of the progress bar.
-        name: what a scene is called.
-        done: counts the parts that are done, where a scene has several.
-        total: the number of parts.
+    ``do`` is a function of a module; ``jobs`` 0 is one a core; ``done`` counts the parts, where a scene has several.
     """
     workers = min(jobs or os.cpu_count() or 1, len(todo))
     unit = "scene" if done is None else "episode"

@@ -101,14 +101,7 @@ class SceneJob:
 
 
 def scene_jobs(settings: SceneSettings, recorded: Recorded, names: Sequence[str], work: Path) -> list[SceneJob]:
-    """Return one job for each scene.
-
-    Args:
-        settings: the folder of clips, the models and the rules.
-        recorded: how scenes are recorded, which saved tasks may decide.
-        names: of scenes.
-        work: folder of all scenes' work.
-    """
+    """Return one job for each scene."""
     return [
         SceneJob(name, recorded, settings.sounds, settings.profile, work, settings.models, settings.rules)
         for name in names

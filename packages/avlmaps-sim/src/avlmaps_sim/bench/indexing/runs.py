@@ -120,12 +120,7 @@ class _Todo:
 
 
 def run(settings: IndexingSettings, work: Path, open_spec: Callable[[str], Scene] = open_scene) -> Outcome:
-    """Record, map and ask every scene.
-
-    Args:
-        settings: what.
-        work: folder of recordings, maps, tasks and answers; a run that was stopped resumes from there.
-        open_spec: makes a scene of its name (tests give small ones).
+    """Record, map and ask every scene; a run that was stopped resumes from what ``work`` holds.
 
     Raises:
         TaskError: the tasks cannot be read, or no scene yields any.
@@ -181,13 +176,7 @@ def _made(todo: _Todo) -> list[Task]:
 
 
 def scene_tasks(job: SceneJob, open_spec: Callable[[str], Scene], most: int) -> list[Task]:
-    """Record and map a scene, and make its tasks: the same for a seed, whichever are taken.
-
-    Args:
-        job: the scene.
-        open_spec: makes a scene of its name.
-        most: tasks of a table.
-    """
+    """Record and map a scene, and make its tasks: the same for a seed, whichever are taken."""
     place = Workplace(job, open_spec)
     path = job.folder / f"tasks-{_key(job, _MAKING, place.avlmap.stored.info.build_key, most)}.json"
     if not path.exists():

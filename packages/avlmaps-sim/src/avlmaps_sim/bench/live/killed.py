@@ -19,14 +19,7 @@ _LOOK_S = 0.2
 
 
 def lost_s(recording: Path, path: Path, profile: str, rng: np.random.Generator, within_s: float = 10.0) -> float:
-    """Play a recording in another process, kill it at a random moment after its first save, and open what is left.
-
-    Args:
-        recording: what is played.
-        path: of the map.
-        profile: its models.
-        rng: draws the moment.
-        within_s: of the first save, at most.
+    """Play a recording in another process, kill it at most ``within_s`` after its first save, and open what is left.
 
     Returns:
         How many seconds before the kill the first frame came into the map that what is left lacks.

@@ -57,13 +57,7 @@ def play(
 ) -> Played:
     """Play a recording into a map and close it; lap after lap it goes forth and back over the same surface.
 
-    Args:
-        recording: what to play.
-        path: of the map.
-        used: the encoders.
-        rate: how many times faster than it was recorded; None waits for the map.
-        laps: how often.
-        settings: of the live map.
+    A ``rate`` of None waits for the map.
     """
     found, over = Played(), threading.Event()
     track = recording.audio

@@ -51,15 +51,7 @@ class LiveBench:
 def run_live(
     scenes: Sequence[Path], used: Encoders, profile: str, chosen: LiveBench, seed: int, out: Path
 ) -> dict[str, Table]:
-    """Return the tables.
-
-    Args:
-        scenes: recordings with poses.
-        used: the encoders.
-        profile: their profile, for processes that are killed.
-        chosen: laps and kills.
-        seed: of the moments of the kills.
-        out: folder whose ``work`` stores the outcome of each kill.
+    """Return the tables; ``out/work`` stores the outcome of each kill.
 
     Raises:
         BenchError: no recording was given, or one of fewer than two frames.

@@ -68,11 +68,6 @@ class Pilot:
 
         Where a program breaks off, because the map does not know a goal, the robot goes to those that it has not been
         to one by one, from where it stands, so that each counts by itself.
-
-        Args:
-            mission: what to do.
-            configuration: whose senses.
-            key: of the record.
         """
         if len(self.scene.heats) > _MOST_HEATS:
             self.scene.heats.clear()

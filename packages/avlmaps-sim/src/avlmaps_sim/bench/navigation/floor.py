@@ -34,14 +34,7 @@ class Floor:
     def walked(
         cls, scene: Scene, camera: Float[np.ndarray, "n 3"], radius_m: float = 0.2, height_m: float = 1.5
     ) -> "Floor":
-        """Return the floor below a walk, connected with its places.
-
-        Args:
-            scene: the building.
-            camera: the places of the camera, world.
-            radius_m: of the robot.
-            height_m: of the robot.
-        """
+        """Return the floor below a walk, connected with its places."""
         eye_m = float(np.median(camera[:, 2]))
         below = [index for index, height in enumerate(floor_heights(scene)) if height < eye_m]
         number = below[-1] if below else 0

@@ -23,11 +23,7 @@ def path_weight(reached: bool, shortest_m: float, path_m: float) -> float:
     """Return a subgoal's success weighted by path length, S·l / max(p, l), after Anderson et al. (2018).
 
     Paths shorter than one step count as one step, so that standing at the goal already is neither 0 nor undefined.
-
-    Args:
-        reached: whether the stop was right.
-        shortest_m: l, the shortest path in truth; infinite where there is none.
-        path_m: p, what the robot drove.
+    ``shortest_m`` is infinite where truth has no path.
     """
     if not reached:
         return 0.0
@@ -52,10 +48,6 @@ def grouped_interval(groups: Sequence[Sequence[float]], seed: int = 0) -> tuple[
     """Return the 95 % bootstrapped interval of the mean of all values, whole groups being drawn.
 
     Subgoals of one sequence hang together: they are drawn together.
-
-    Args:
-        groups: the values of each sequence.
-        seed: of the resampling.
     """
     total = np.array([sum(group) for group in groups], np.float64)
     count = np.array([len(group) for group in groups], np.float64)

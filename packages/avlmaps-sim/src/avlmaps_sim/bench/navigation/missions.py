@@ -72,9 +72,7 @@ class Mission:
     def sentence(self, files: tuple[str, ...] = (), only: int | None = None) -> str:
         """Return the command as a person would give it.
 
-        Args:
-            files: the photos' files.
-            only: name just this goal (a robot whose program broke off gets the remaining goals one by one).
+        ``only`` names just one goal: a robot whose program broke off gets the remaining goals one by one.
         """
         said = [_named(goal.said, files) for goal in self.goals]
         if only is not None:

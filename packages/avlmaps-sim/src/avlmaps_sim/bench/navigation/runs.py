@@ -84,11 +84,8 @@ class _Todo:
 def run(settings: NavigationSettings, out: Path, open_spec: OpenSpec = open_scene) -> Outcome:
     """Record and map every scene, and send robots on missions in it.
 
-    Args:
-        settings: what.
-        out: folder for ``work`` (recordings and maps, shared with the indexing suite), ``navigation_missions.json``
-            and ``episodes``; a run that was broken off resumes from there.
-        open_spec: makes a scene of its name (tests give small ones).
+    ``out`` gets ``work`` (recordings and maps, shared with the indexing suite), ``navigation_missions.json`` and
+    ``episodes``; a run that was broken off resumes from there.
 
     Raises:
         TaskError: the missions cannot be read, do not fit, or no scene yields any.

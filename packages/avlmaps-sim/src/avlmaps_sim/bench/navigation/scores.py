@@ -64,13 +64,7 @@ class Score:
 
 
 def scored(episodes: Sequence[Episode], length: int, seed: int = 0) -> Score:
-    """Sum up episodes.
-
-    Args:
-        episodes: of one configuration and series.
-        length: of the longest mission, for subgoals in a row.
-        seed: of the intervals' resampling.
-    """
+    """Sum up episodes; ``length`` is that of the longest mission, for subgoals in a row."""
     reached = [episode.reached for episode in episodes]
     rows = [Share(hits, len(reached), wilson(hits, len(reached))) for hits in in_a_row(reached, length)]
     hits, count = independent(reached)

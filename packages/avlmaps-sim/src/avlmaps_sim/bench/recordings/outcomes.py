@@ -76,12 +76,7 @@ class Judge:
     """Judges recordings that were made of one right draft."""
 
     def __init__(self, right: Draft, form: Format = FOLDER) -> None:
-        """Open the right one, to know its usual notices and its surface.
-
-        Args:
-            right: the draft.
-            form: the format that it and its mistakes are written in.
-        """
+        """Open the right one, to know its usual notices and its surface."""
         from scipy.spatial import KDTree
 
         self.right, self.form = right, form

@@ -71,14 +71,7 @@ _A_TASK = 12  # mistakes
 def run(
     scenes: Sequence[Path], out: Path, seed: int = 0, homes: Sequence[tuple[str, SensorName, bool]] = HOMES
 ) -> dict[str, Table]:
-    """Run the suite.
-
-    Args:
-        scenes: recordings of a real camera, with right poses; the first is changed, all are checked as they are.
-        out: folder; rendered homes are stored in it.
-        seed: of the mistakes.
-        homes: scenes, their sensors, and whether their poses drift.
-    """
+    """Change the first recording, check all as they are, and homes: scene, sensor, and whether its poses drift."""
     rendered = [_rendered(out / "homes", *home) for home in homes]
     other = RoomWalk("room, other", seed=12).draft()
     sources = [_Source(RoomWalk("room", seed=11).draft(), other)]

@@ -57,12 +57,7 @@ def floors_of(
 ) -> list[Floor]:
     """Return the storeys on which cameras stood.
 
-    Args:
-        areas: of the scene.
-        walls: points of its walls, metres.
-        seen: middles of the map's voxels.
-        cameras: places of the cameras.
-        join: make one room of areas with an opening between them that is wider than any door.
+    ``join`` makes one room of areas with an opening between them that is wider than any door.
     """
     out: list[Floor] = []
     for floor_m in sorted({round(area.floor_m, 2) for area in areas}):

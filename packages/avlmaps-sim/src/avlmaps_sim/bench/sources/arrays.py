@@ -11,13 +11,7 @@ ARRAYS: dict[str, tuple[int, ...]] = {"square4": (0, 1, 2, 3), "stereo": (0, 1),
 
 
 def track_of(track: AudioTrack, array: str, folder: Path) -> AudioTrack:
-    """Return a track of some of the channels, written into a folder.
-
-    Args:
-        track: of all channels.
-        array: a name of ``ARRAYS``.
-        folder: to write into.
-    """
+    """Return a track of the channels of one of ``ARRAYS``, written into a folder."""
     assert track.microphones is not None
     chosen = ARRAYS[array]
     whole = read_channels(track, track.start_s, track.end_s)

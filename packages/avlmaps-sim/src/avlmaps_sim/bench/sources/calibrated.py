@@ -82,12 +82,7 @@ def calibrated(
 ) -> Calibration:
     """Record the drive with an array that is wrong, and calibrate it by that.
 
-    Args:
-        wrong: the array; its frame is level here.
-        settings: of the room; its rate is not used.
-        rng: draws sound and noise.
-        path: of the track to write.
-        seconds: of the drive.
+    The array's frame is level here, and the rate of the settings is not used.
 
     Raises:
         RecordingError: the drive does not determine the array.

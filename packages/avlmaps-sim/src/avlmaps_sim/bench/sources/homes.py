@@ -378,11 +378,7 @@ def right_thing(
 ) -> bool | None:
     """Return whether one of the listed things is the one that sounded; None where none did, or the map lacks it.
 
-    Args:
-        event: the sound.
-        objects: of the scene.
-        listed: numbers of things of the map.
-        things: of the map.
+    ``listed`` are numbers of things of the map.
     """
     if event.instance < 0:
         return None

@@ -33,14 +33,8 @@ def loudness_known(
 ) -> SourceEvidence:
     """Return the evidence of one microphone, with that of the loudness of one sound.
 
-    Args:
-        track: of the microphone.
-        walk: the camera's poses, world.
-        span_s: onset and offset of the sound.
-        true: where it sounded, by which its loudness at 1 m is known to ``KNOWN_DB``.
-        evidence: without that.
-        number: of the sound in it.
-        rng: draws by how much the loudness is missed.
+    ``true`` is where it sounded, by which its loudness at 1 m is known to ``KNOWN_DB``; ``rng`` draws by how much it is
+    missed.
     """
     assert track.microphones is not None
     begin_s = max(span_s[0] - BEFORE_S, track.start_s)

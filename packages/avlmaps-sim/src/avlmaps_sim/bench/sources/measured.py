@@ -115,11 +115,6 @@ def of_directive(
     Ratios of direct to reverberant sound fall by 20 dB for ten times the distance, and loudspeakers, people and dogs
     send less to their sides and back: by a cosine, of a strength and a direction that nobody knows. Ratio at 1 m,
     cosine and noise are integrated out.
-
-    Args:
-        ratio_db: at each receiver.
-        place_m: of each receiver.
-        grid_m: places.
     """
     away = place_m[:, None] - grid_m[None]
     azimuth = np.arctan2(away[..., 1], away[..., 0])
