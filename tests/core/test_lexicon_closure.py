@@ -16,7 +16,7 @@ from avlmaps_sim.demo import questions
 from avlmaps_sim.furniture import categories
 from avlmaps_sim.hearing import KINDS as SOUND_KINDS
 from avlmaps_sim.homes.furnish import HANGING_M
-from avlmaps_sim.homes.programme import home_programme, office_programme
+from avlmaps_sim.homes.layout import home_programme, office_programme
 
 KNOWN = lexicon()
 NYU40 = (

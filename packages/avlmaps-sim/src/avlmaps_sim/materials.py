@@ -13,7 +13,7 @@ import numpy as np
 
 from avlmaps.core.errors import AvlmapsError
 from avlmaps_sim.mesh import Material, Triple
-from avlmaps_sim.textures import Texture, devices, mineral, outdoors, pictures, plain, rugs, wood, woven
+from avlmaps_sim.textures import Texture, devices, mineral, outdoors, pictures, plain, wood, woven
 
 Maker = Callable[[np.random.Generator], Texture]
 
@@ -136,7 +136,7 @@ _KIND: dict[str, _Kind] = {
     "white": _Kind(((0.94, 0.94, 0.93),), 0.3, plain.enamel, pool=24, drift=0.02),
     "black": _Kind(((0.06, 0.06, 0.07),), 0.3, plain.enamel, pool=24, drift=0.01),
     "mirror": _Kind(((0.62, 0.68, 0.74), (0.7, 0.73, 0.75), (0.5, 0.56, 0.62)), 1.0, plain.mirror, pool=16, drift=0.02),
-    "rug": _Kind((), 0.0, None, rugs.rug, pool=96),
+    "rug": _Kind((), 0.0, None, woven.rug, pool=96),
     "painting": _Kind((), 0.1, None, pictures.painting, pool=96),
     "poster": _Kind((), 0.1, None, pictures.poster, pool=48),
     "screen": _Kind((), 0.6, None, devices.screen),

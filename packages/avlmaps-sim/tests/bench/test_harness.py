@@ -221,7 +221,7 @@ def test_every_tenth_frame_of_ones_own_recording_is_a_photo_and_not_in_the_map(o
 
 
 def test_ones_own_recording_with_boxes_runs_through_the_tables(own: Path, tmp_path: Path, monkeypatch):
-    monkeypatch.setattr("avlmaps_sim.bench.harness.weak_sounds._EXAMPLES", 2)
+    monkeypatch.setattr("avlmaps_sim.bench.harness.baselines._EXAMPLES", 2)
     settings = IndexingSettings(scenes=(str(own),), profile="colours", jobs=1, tasks_a_scene=3, rules="paper")
     outcome = run(settings, tmp_path / "work")
     kinds = {task.kind for task in outcome.tasks.tasks}

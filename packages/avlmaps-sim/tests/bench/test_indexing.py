@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 from avlmaps.core.question import Modality, Part
 from avlmaps.maps.grid import GridSpec
 from avlmaps.query.avlmap import AVLMap
+from avlmaps_sim.bench.harness.baselines import WeakSounds
 from avlmaps_sim.bench.harness.evidence import MARGIN_M, NEAR_M, Box, Event, Evidence, Photo, alone_near
 from avlmaps_sim.bench.harness.factors import near_polygon, true_regions
 from avlmaps_sim.bench.harness.settings import Recorded, TaskError
 from avlmaps_sim.bench.harness.true_voxels import TrueVoxels
-from avlmaps_sim.bench.harness.weak_sounds import WeakSounds
 from avlmaps_sim.bench.indexing.configurations import CONFIGURATIONS, configurations
 from avlmaps_sim.bench.indexing.metrics import LIMITS_M, Answered, bootstrapped_mean, judged, scored
 from avlmaps_sim.bench.indexing.rules import area_tasks, near_sound_tasks, photo_tasks, sound_tasks

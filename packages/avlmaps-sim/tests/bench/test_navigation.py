@@ -20,7 +20,7 @@ from avlmaps_sim.bench.indexing.tasks import TaskKind
 from avlmaps_sim.bench.navigation import Episode, Leg, MissionSet, Outcome, load_missions, save_missions
 from avlmaps_sim.bench.navigation.commands import COMMANDS, SPATIAL, command_missions
 from avlmaps_sim.bench.navigation.configurations import CEILING, CONFIGURATIONS, OURS, configurations
-from avlmaps_sim.bench.navigation.contact_monitor import Foreknowledge, WatchedBody
+from avlmaps_sim.bench.navigation.episode_runner import Foreknowledge, WatchedBody
 from avlmaps_sim.bench.navigation.episodes import Journal
 from avlmaps_sim.bench.navigation.evidence import Ground
 from avlmaps_sim.bench.navigation.floor import Floor
@@ -35,8 +35,7 @@ from avlmaps_sim.bench.navigation.metrics import (
 )
 from avlmaps_sim.bench.navigation.missions import Mission, Series, allocated, joined
 from avlmaps_sim.bench.navigation.phrases import an_object, spoken
-from avlmaps_sim.bench.navigation.ranges import range_of
-from avlmaps_sim.bench.navigation.rules import image_missions, pair_missions, sound_missions
+from avlmaps_sim.bench.navigation.rules import image_missions, pair_missions, range_of, sound_missions
 from avlmaps_sim.bench.navigation.runs import SceneFacts
 from avlmaps_sim.bench.navigation.scores import scored
 from avlmaps_sim.bench.navigation.settings import NavigationSettings

@@ -6,8 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from avlmaps_sim.bench.harness.intervals import median_interval
-from avlmaps_sim.bench.rooms.scores import Listed, judged
-from avlmaps_sim.bench.rooms.truth import CELL_M, Floor, floors_of
+from avlmaps_sim.bench.rooms.scores import CELL_M, Floor, Listed, floors_of, judged
 from avlmaps_sim.scene import Area
 
 KITCHEN = Area("kitchen", np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 3.0], [0.0, 3.0]]))

@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
-from avlmaps_sim.climb import climb
 from avlmaps_sim.free_space import free_space
 from avlmaps_sim.mesh import Material
 from avlmaps_sim.scene import Area, Scene, SceneBuilder
 from avlmaps_sim.shapes import box
-from avlmaps_sim.walk import WalkSettings, walk_through
+from avlmaps_sim.walk import WalkSettings, climb, walk_through
 
 GREY = Material()
 UPPER_M, STEPS, TREAD_M = 2.7, 15, 0.26

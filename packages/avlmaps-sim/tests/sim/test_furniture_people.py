@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps_sim.furniture import families, make
-from avlmaps_sim.furniture.garments import fabric, thrown_over
-from avlmaps_sim.furniture.people import seated
+from avlmaps_sim.furniture.people import fabric, seated, thrown_over
 from avlmaps_sim.homes import make_home
 
 # Category: least and greatest largest extent, greatest height (metres), least number of families.

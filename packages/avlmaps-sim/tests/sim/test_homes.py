@@ -10,10 +10,9 @@ from avlmaps_sim.free_space import free_space
 from avlmaps_sim.furniture import families
 from avlmaps_sim.homes import make_home, make_office
 from avlmaps_sim.homes.doors import _opened  # pyright: ignore[reportPrivateUsage]
-from avlmaps_sim.homes.layout import cut, floor_of
+from avlmaps_sim.homes.layout import cut, floor_of, home_programme
 from avlmaps_sim.homes.plan import OUTSIDE, Room, Wall, walls_between
 from avlmaps_sim.homes.polygons import area_m2, corners_of, half, inside, overlapping, rectangle, shrunk, widths_m
-from avlmaps_sim.homes.programme import home_programme
 from avlmaps_sim.scene import Scene
 from avlmaps_sim.scenes import SceneError, open_scene
 

@@ -155,7 +155,7 @@ def _choose(
     """Choose the questions, and take the photo that one of them asks with."""
     import cv2
 
-    from avlmaps_sim.demo.photos import photo_views
+    from avlmaps_sim.demo.home import photo_views
     from avlmaps_sim.demo.questions import choose_questions
     from avlmaps_sim.render import Renderer
 

@@ -10,14 +10,12 @@ from avlmaps_sim.furniture.recipe_helpers import chance, draw
 from avlmaps_sim.homes import offices, rooms, service
 from avlmaps_sim.homes.clutter import dress, litter
 from avlmaps_sim.homes.doors import joined_up, lit_by_day
-from avlmaps_sim.homes.fixtures import fit_out
+from avlmaps_sim.homes.fixtures import build_stairs, fit_out
 from avlmaps_sim.homes.furnish import Furnisher
-from avlmaps_sim.homes.layout import Programme, floor_of
+from avlmaps_sim.homes.layout import Programme, floor_of, home_programme, office_programme, upstairs
 from avlmaps_sim.homes.on_walls import adorn, dress_windows, light_up
 from avlmaps_sim.homes.placing import Footprint, ground_of
 from avlmaps_sim.homes.plan import WELL, Room, Storey, walls_between
-from avlmaps_sim.homes.programme import home_programme, office_programme, upstairs
-from avlmaps_sim.homes.stairs import build_stairs
 from avlmaps_sim.homes.walls import build_shell, looks_of
 from avlmaps_sim.scene import Area, Light, Scene, SceneBuilder
 

@@ -11,8 +11,7 @@ import numpy as np
 from avlmaps_sim.free_space import floor_heights, free_space
 from avlmaps_sim.furniture import families, make
 from avlmaps_sim.furniture.catalogue import Families
-from avlmaps_sim.furniture.garments import fabric, thrown_over
-from avlmaps_sim.furniture.people import seated
+from avlmaps_sim.furniture.people import fabric, seated, thrown_over
 from avlmaps_sim.mesh import Mesh
 from avlmaps_sim.scene import Scene, SceneBuilder, SceneObject
 

@@ -8,8 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps_sim.bench.harness.evidence import Box
-from avlmaps_sim.bench.harness.settings import Recorded
-from avlmaps_sim.bench.harness.versioned import load_versioned, save_versioned
+from avlmaps_sim.bench.harness.settings import Recorded, load_versioned, save_versioned
 from avlmaps_sim.mesh import Triple
 
 SCHEMA_VERSION = 2

@@ -11,8 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core.motion import GroundPose
-from avlmaps_sim.bench.harness.settings import Recorded
-from avlmaps_sim.bench.harness.versioned import load_versioned, save_versioned
+from avlmaps_sim.bench.harness.settings import Recorded, load_versioned, save_versioned
 from avlmaps_sim.bench.navigation.goals import Goal
 
 SCHEMA_VERSION = 1

@@ -1,4 +1,7 @@
-"""The rules by which sequences of goals are made of a scene: the paper's Tables I, II and VI."""
+"""The rules by which sequences of goals are made of a scene: the paper's Tables I, II and VI.
+
+Sounds come from three ranges, each wider than the one before, as in Table I.
+"""
 
 from collections.abc import Sequence
 
@@ -10,7 +13,7 @@ from avlmaps_sim.bench.navigation.evidence import Ground, camera_of, renumbered
 from avlmaps_sim.bench.navigation.goals import Goal
 from avlmaps_sim.bench.navigation.missions import Mission, Row, Series
 from avlmaps_sim.bench.navigation.phrases import an_image
-from avlmaps_sim.bench.navigation.ranges import range_of
+from avlmaps_sim.hearing.kinds import kind_of
 
 SOUNDS_IN_A_ROW = 4
 OBJECTS_AFTER_AN_IMAGE = 2
@@ -94,3 +97,21 @@ def _spread(pairs: Sequence[tuple[int, int]], rng: np.random.Generator, most: in
         for which, member in zip("ab", pairs[best], strict=True):
             used[which, member] = used.get((which, member), 0) + 1
     return taken
+
+
+# Sounds of people and of animals, by the names of our rules and of ESC-50. All others are of the house itself.
+HUMAN = frozenset({
+    "breathing", "brushing teeth", "children playing", "clapping", "coughing", "crowd cheering", "crying baby",
+    "drinking or sipping", "footsteps", "laughing", "sneezing", "snoring", "talking", "whistling",
+})  # fmt: skip
+ANIMAL = frozenset({"buzzing insects", "cat meowing", "dog bark", "mouse squeaking"})
+WIDEST = 3
+
+
+def range_of(sound: str) -> int:
+    """Return the narrowest range with a sound: 1 domestic, 2 human as well, 3 animals and the outdoors as well."""
+    kind = kind_of(sound)
+    names = {sound, *kind.names}
+    if names & HUMAN:
+        return 2
+    return WIDEST if names & ANIMAL or not kind.indoors else 1

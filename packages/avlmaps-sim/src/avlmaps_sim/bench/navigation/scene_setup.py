@@ -18,8 +18,7 @@ from avlmaps_sim.bench.harness.baselines import WeakHearing
 from avlmaps_sim.bench.harness.workplace import SceneJob, Workplace
 from avlmaps_sim.bench.indexing.rules import area_tasks, near_sound_tasks, photo_tasks
 from avlmaps_sim.bench.navigation.commands import command_missions
-from avlmaps_sim.bench.navigation.contact_monitor import Foreknowledge, WatchedBody
-from avlmaps_sim.bench.navigation.episode_runner import Pilot
+from avlmaps_sim.bench.navigation.episode_runner import Foreknowledge, Pilot, WatchedBody
 from avlmaps_sim.bench.navigation.evidence import Ground
 from avlmaps_sim.bench.navigation.floor import Floor
 from avlmaps_sim.bench.navigation.map_variants import KnownScene

@@ -13,8 +13,7 @@ from avlmaps_sim.bench.harness.workers import side_by_side
 from avlmaps_sim.bench.harness.workplace import SceneJob, Workplace, scene_jobs
 from avlmaps_sim.bench.indexing.runs import IndexingSettings
 from avlmaps_sim.bench.output import Table, draw, markdown, write_answer
-from avlmaps_sim.bench.rooms.scores import Judged, Listed, Matched, judged
-from avlmaps_sim.bench.rooms.truth import Floor, floors_of
+from avlmaps_sim.bench.rooms.scores import Floor, Judged, Listed, Matched, floors_of, judged
 from avlmaps_sim.scenes import open_scene
 
 if TYPE_CHECKING:
