@@ -1,4 +1,4 @@
-"""Numbers that programs give: of Python or NumPy, 0-d arrays, tensors without axes."""
+"""Numbers that programs give: of Python or NumPy, 0-d arrays, tensors without axes; and features with a mask."""
 
 from dataclasses import fields, is_dataclass
 from math import inf
@@ -56,3 +56,15 @@ def hold_numbers(settings: Any, error: type[Exception]) -> None:
         if number is None:
             raise error(f"{name} must be {_OF[kind]}, not {given!r}.")
         object.__setattr__(settings, field.name, number)
+
+
+def unmasked(features: Any) -> Any:
+    """Return features, (..., d), with zero for each that is masked, in part or whole: there is nothing to say there.
+
+    What has no mask is returned as it is.
+    """
+    if not np.ma.isMaskedArray(features):
+        return features
+    held = np.array(features.data)
+    held[np.ma.getmaskarray(features).any(axis=-1)] = 0
+    return held

@@ -337,8 +337,12 @@ class LiveMap:
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """One sentence for each thing that is not as it should be: poses that do not fit, saves that failed."""
-        return (*self._doubts, *self._growing.doubts)
+        """One sentence for each thing that is not as it should be: poses that do not fit, saves that failed.
+
+        Once it is closed, also what the whole map shows.
+        """
+        of_map = () if self._final is None else self._final.stored.info.doubts
+        return tuple(dict.fromkeys((*self._doubts, *self._growing.doubts, *of_map)))
 
     def status(self) -> LiveStatus:
         """Return how the map fares."""

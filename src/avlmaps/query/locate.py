@@ -199,8 +199,8 @@ def locate(
     """
     start_s = time.perf_counter()
     camera, source = _camera_of(rgb, camera, stored.rig.rgb, focal_35mm)
-    local = stored.encoders.local.encode(rgb)
-    place = stored.encoders.place.encode(rgb, local, stored.place_state)
+    local = stored.encoders.local.encode(rgb.copy())  # an encoder may write into what it is given
+    place = stored.encoders.place.encode(rgb.copy(), local, stored.place_state)
     found = locate_features(stored, local, place, camera, rng, settings, source)
     return replace(found, elapsed_ms=1e3 * (time.perf_counter() - start_s))
 

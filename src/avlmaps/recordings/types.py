@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
@@ -86,6 +86,11 @@ class Frame:
             )
         if self.world_from_camera.shape != (4, 4):
             raise ValueError(f"world_from_camera has shape {self.world_from_camera.shape}; it must be (4, 4)")
+
+    def copy(self) -> "Frame":
+        """Return the frame with arrays of its own: an encoder may write into what it is given."""
+        own = self.rgb.copy(), self.depth_m.copy(), self.world_from_camera.copy()
+        return replace(self, rgb=own[0], depth_m=own[1], world_from_camera=own[2])
 
     @property
     def camera(self) -> Pinhole | Rig:

@@ -10,6 +10,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Float, Float32
 from avlmaps.core.errors import BackendError
+from avlmaps.core.numbers import unmasked
 from avlmaps.core.progress import progress, say
 from avlmaps.maps.audio.change_points import frames_of_track, split_at_changes
 from avlmaps.maps.audio.denoise import denoise, is_swell, noise_profile
@@ -187,7 +188,8 @@ def quiet_bounds(
 
 
 def _encoded(encoder: SoundEncoder, sound: Sound) -> Float32[np.ndarray, "windows d"]:
-    feature = np.asarray(encoder.encode(sound), np.float32)
+    given = Sound(sound.samples.copy(), sound.rate_hz)  # an encoder may write into what it is given
+    feature = np.asarray(unmasked(encoder.encode(given)), np.float32)
     if feature.ndim != 2 or len(feature) < 1 or feature.shape[1] != encoder.card.dim or not np.isfinite(feature).all():
         raise BackendError(
             f"The sound model {encoder.card.id} returned features of {feature.shape} for {sound.duration_s:.2f} s; its "

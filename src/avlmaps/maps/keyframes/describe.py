@@ -7,7 +7,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from avlmaps.core.arrays import Float, Float16, Float32, Int, Int64, UInt8
-from avlmaps.core.numbers import hold_numbers
+from avlmaps.core.numbers import hold_numbers, unmasked
 from avlmaps.core.poses import apply, inverse, rotation_angle_rad
 from avlmaps.core.progress import progress
 from avlmaps.core.registry import Kind
@@ -171,7 +171,7 @@ def learn_places(
         return {}, {}
     encoder = encoders.local
     chosen = [int(indices[int(i)]) for i in learn_from(len(indices))]
-    local = {i: encoder.encode(recording.frame(i).rgb) for i in chosen}
+    local = {i: encoder.encode(recording.frame(i).rgb.copy()) for i in chosen}
     return encoders.place.fit(list(local.values()), rng), local
 
 
@@ -222,15 +222,15 @@ def describe_keyframe(
         local: the frame's keypoints where they are known already.
     """
     if local is None:
-        local = encoders.local.encode(frame.rgb) if Kind.LOCAL in encoders else _no_features()
+        local = encoders.local.encode(frame.rgb.copy()) if Kind.LOCAL in encoders else _no_features()
     place = np.zeros(0, np.float32)
     if Kind.LOCAL in encoders and Kind.PLACE in encoders:
-        place = encoders.place.encode(frame.rgb, local, place_state)
+        place = encoders.place.encode(frame.rgb.copy(), local, place_state)
     return DescribedKeyframe(
         stamp_s=frame.stamp_s,
         world_from_camera=frame.world_from_camera,
         centre=middle_of_view(frame),
-        view=encoders.views.encode([frame])[0] if Kind.VIEWS in encoders else np.zeros(0, np.float32),
+        view=unmasked(encoders.views.encode([frame.copy()]))[0] if Kind.VIEWS in encoders else np.zeros(0, np.float32),
         place=place,
         local=local,
         points_world=lift_keypoints(local.xy, frame, settings.max_depth_m),

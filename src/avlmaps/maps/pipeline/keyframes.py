@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Float32, Int
 
 from avlmaps.core.ahead import run_ahead
+from avlmaps.core.numbers import unmasked
 from avlmaps.core.progress import progress
 from avlmaps.core.registry import Kind
 from avlmaps.maps.keyframes.describe import describe_keyframe, learn_places, select_keyframes, stack_keyframes
@@ -149,7 +150,8 @@ def _encoded(
     for length in lengths:
         lot = islice(decoded, length)
         while group := list(islice(lot, size)):
-            views = encoder.encode([frame for _, frame in group]) if encoder else np.zeros((len(group), 0), np.float32)
+            given = [frame.copy() for _, frame in group]
+            views = unmasked(encoder.encode(given)) if encoder else np.zeros((len(group), 0), np.float32)
             yield from ((index, frame, view) for (index, frame), view in zip(group, views, strict=True))
 
 

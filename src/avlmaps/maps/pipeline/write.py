@@ -1,6 +1,6 @@
 """The last stages: the parts become the voxels of the map, and all of it is written."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
@@ -8,7 +8,9 @@ from time import perf_counter
 
 import numpy as np
 
+from avlmaps.core.arrays import Float
 from avlmaps.core.errors import MapError
+from avlmaps.core.registry import Kind
 from avlmaps.core.version import __version__
 from avlmaps.core.wording import option
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
@@ -28,6 +30,10 @@ from avlmaps.recordings.types import Recording
 _GUESS = 0.1
 # Share of the voxels that frames see through: 0 to 1 % in right recordings, 8 % with the drift of wheels.
 MOST_SEEN_THROUGH = 0.15
+# With fewer voxels, or fewer keyframes or sounds, features may be the same by chance.
+_FEWEST_VOXELS, _FEWEST_LOOKS = 100, 4
+_SOME = 100  # that decide for most maps
+_ROUNDING = 1e-3  # of float16
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +141,11 @@ def manifest_of(
     bad: Sequence[manifest.BadFrame] = (),
 ) -> manifest.MapInfo:
     """Return the content of ``map.json`` but for its list of files."""
-    doubts = (*plan.doubts, *carving_doubts(merged.removed, len(content.voxels)))
+    doubts = (
+        *plan.doubts,
+        *carving_doubts(merged.removed, len(content.voxels)),
+        *feature_doubts(content, plan.models),
+    )
     return manifest.MapInfo(
         avlmaps_version=__version__,
         build_key=plan.key,
@@ -198,3 +208,33 @@ def carving_doubts(removed: manifest.Removed, voxels: int) -> Iterator[str]:
             f"{share:.0%} of the voxels were seen through by other frames and removed, where right recordings have up "
             "to 8 %: the poses drift far, or much was moved. Check the poses."
         )
+
+
+def feature_doubts(content: MapContent, models: Mapping[str, manifest.ModelInfo]) -> Iterator[str]:
+    """Yield a sentence for each kind of feature that is zero, or the same, in all of a map.
+
+    Args:
+        content: of the map.
+        models: that made it, by the name of their kind.
+    """
+    voxels = content.voxels
+    speaks = np.asarray(voxels.weight) > 0.0
+    kinds = (
+        (Kind.PIXELS, voxels.feature[speaks] if speaks.any() else voxels.feature, "voxels", _FEWEST_VOXELS),
+        (Kind.VIEWS, content.keyframes.view, "keyframes", _FEWEST_LOOKS),
+        (Kind.SOUNDS, content.sounds.feature, "stretches of sound", _FEWEST_LOOKS),
+    )
+    for kind, rows, what, fewest in kinds:
+        if kind.value in models and len(rows) >= fewest and _are_one(np.asarray(rows)):
+            alike = "the same" if rows[0].any() else "zero"
+            yield (
+                f"The features of {kind.value} by {models[kind.value].id} are {alike} in all {len(rows)} {what}, so "
+                "that no word distinguishes them. Check that the encoder looks at what it is given, and that its "
+                "weights were loaded."
+            )
+
+
+def _are_one(rows: Float[np.ndarray, "n d"]) -> bool:
+    """Return whether all features are the same, within rounding."""
+    some = rows[:: max(1, len(rows) // _SOME)]
+    return all(float(np.abs(part - rows[0]).max(initial=0.0)) <= _ROUNDING for part in (some, rows))

@@ -11,6 +11,7 @@ from typing import Any, cast
 import numpy as np
 from jaxtyping import Float32, UInt8
 
+from avlmaps.core.numbers import unmasked
 from avlmaps.core.registry import Kind
 from avlmaps.core.version import __version__
 from avlmaps.perception.cache.feature_store import CacheSettings, FeatureStore, key_of
@@ -183,7 +184,7 @@ class CachedViews(_Remembering):
         kept = [self._get(key) for key in keys]
         missing = [i for i, features in enumerate(kept) if features is None]
         if missing:
-            for i, row in zip(missing, self._encoder.encode([frames[i] for i in missing]), strict=True):
+            for i, row in zip(missing, unmasked(self._encoder.encode([frames[i] for i in missing])), strict=True):
                 kept[i] = row
                 self._put(keys[i], row)
         rows = [cast(np.ndarray, row) for row in kept]
@@ -204,7 +205,7 @@ class CachedSounds(_Remembering):
         key = self._key(sound.samples, sound.rate_hz)
         kept = self._get(key)
         if kept is None:
-            kept = np.asarray(self._encoder.encode(sound), np.float32)
+            kept = np.asarray(unmasked(self._encoder.encode(sound)), np.float32)
             self._put(key, kept)
         return kept
 
@@ -285,8 +286,10 @@ _CACHED = {Kind.VIEWS: CachedViews, Kind.SOUNDS: CachedSounds, Kind.LOCAL: Cache
 def encode_batch(encoder: PixelEncoder, frames: Sequence[Frame]) -> list[Float32[np.ndarray, "hf wf d"]]:
     """Return the features of each frame, made in one go where the encoder can."""
     if len(frames) > 1 and isinstance(encoder, BatchPixelEncoder):
-        return encoder.encode_batch(frames)
-    return [encoder.encode(frame) for frame in frames]
+        made = encoder.encode_batch([frame.copy() for frame in frames])
+    else:
+        made = [encoder.encode(frame.copy()) for frame in frames]
+    return [unmasked(features) for features in made]
 
 
 def _seen_in(frame: Frame) -> list[np.ndarray | str | float | None]:

@@ -1,0 +1,164 @@
+"""Encoders of one's own that mask features, write into what they are given, or say the same of everything."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from build_fakes import SETTINGS, Corners, Pixels, Places, Walk, _card
+
+from avlmaps.maps.build import build_map
+from avlmaps.maps.growing import GrowingMap
+from avlmaps.maps.pipeline.write import feature_doubts
+from avlmaps.maps.store.writer import MapContent
+from avlmaps.perception.encoders import Encoders
+from avlmaps.recordings.types import Frame
+
+WALK = Walk(4)
+
+
+class Words(Pixels):
+    """The fake pixels, which know a word."""
+
+    def encode_words(self, words: list[str]) -> np.ndarray:
+        """Return a feature for each."""
+        return np.tile(np.float32([0.5, 0.5, 0.5, 0.5]), (len(words), 1))
+
+
+class Masking(Words):
+    """Masks the one number of a cell where its picture is dark."""
+
+    def encode(self, frame: Frame) -> Any:
+        """Return a masked array."""
+        cells = super().encode(frame)
+        gone = np.zeros(cells.shape, bool)
+        gone[:2, :, 1] = True
+        return np.ma.masked_array(cells, gone)
+
+
+class Zeroing(Words):
+    """Has zeros there instead."""
+
+    def encode(self, frame: Frame) -> np.ndarray:
+        """Return features."""
+        cells = super().encode(frame)
+        cells[:2] = 0.0
+        return cells
+
+
+class Writing(Words):
+    """Blackens all that it is given."""
+
+    def encode(self, frame: Frame) -> np.ndarray:
+        """Return features."""
+        made = super().encode(frame)
+        frame.rgb[:], frame.depth_m[:], frame.world_from_camera[:] = 0, 0.0, 0.0
+        return made
+
+
+class WritingCorners(Corners):
+    """Blackens the picture."""
+
+    def encode(self, rgb: np.ndarray) -> Any:
+        """Return keypoints."""
+        found = super().encode(rgb)
+        rgb[:] = 0
+        return found
+
+
+class Constant(Words):
+    """Says the same of everything."""
+
+    def __init__(self, said: float) -> None:
+        self.said = np.float32([said, 0.0, 0.0, 0.0])
+
+    def encode(self, frame: Frame) -> np.ndarray:
+        """Return features."""
+        return np.tile(self.said, (*frame.rgb[::4, ::4].shape[:2], 1))
+
+
+class ConstantViews:
+    """Says the same of every picture."""
+
+    card = _card("views", 3)
+
+    def encode(self, frames: list[Frame]) -> np.ndarray:
+        """Return a feature for each."""
+        return np.tile(np.float32([0.6, 0.8, 0.0]), (len(frames), 1))
+
+    def encode_words(self, words: list[str]) -> np.ndarray:
+        """Return a feature for each."""
+        return np.tile(np.float32([0.6, 0.8, 0.0]), (len(words), 1))
+
+
+def made(pixels: Any = None, features: Any = None, **others: Any) -> Any:
+    growing = GrowingMap(SETTINGS, Encoders("fake", pixels=pixels, **others), WALK.up_in_world)
+    for frame in WALK.frames():
+        growing.add(frame, None if features is None else features(frame))
+    return growing.stored()
+
+
+def require_same_voxels(one: Any, other: Any) -> None:
+    for name in ("index", "feature", "weight", "rgb"):
+        np.testing.assert_array_equal(getattr(one.voxels, name), getattr(other.voxels, name), err_msg=name)
+
+
+def test_a_masked_feature_says_nothing() -> None:
+    wanted = made(Zeroing())
+    assert 0.0 < (np.asarray(wanted.voxels.weight) == 0.0).mean() < 1.0
+    require_same_voxels(made(Masking()), wanted)
+    require_same_voxels(made(features=Masking().encode), made(features=Zeroing().encode))
+
+
+def test_a_masked_view_says_nothing() -> None:
+    class MaskedViews(ConstantViews):
+        def encode(self, frames: list[Frame]) -> Any:
+            return np.ma.masked_array(super().encode(frames), mask=[[True, False, False]] * len(frames))
+
+    assert not np.asarray(made(views=MaskedViews()).keyframes.view).any()
+
+
+def test_what_an_encoder_writes_into_changes_nothing(tmp_path: Path) -> None:
+    careless = {"pixels": Writing(), "local": WritingCorners(), "place": Places()}
+    careful = {"pixels": Words(), "local": Corners(), "place": Places()}
+    one, other = (made(**used) for used in (careless, careful))
+    require_same_voxels(one, other)
+    assert bytes(one.keyframes.thumbnails) == bytes(other.keyframes.thumbnails)
+    built = [
+        build_map(WALK, tmp_path / name, Encoders("fake", **used), SETTINGS, progress=False)
+        for name, used in (("careless", careless), ("careful", careful))
+    ]
+    require_same_voxels(*built)
+
+
+@pytest.mark.parametrize(("said", "word"), [(0.0, "zero"), (1.0, "the same")])
+def test_pixels_that_say_the_same_everywhere_are_a_doubt(said: float, word: str) -> None:
+    (doubt,) = (one for one in made(Constant(said)).info.doubts if "features" in one)
+    assert f"features of pixels by fake/pixels are {word} in all" in doubt
+    (doubt,) = (one for one in made(features=Constant(said).encode).info.doubts if "features" in one)
+    assert f"are {word} in all" in doubt
+    assert not [one for one in made(Words()).info.doubts if "features" in one]
+
+
+def test_views_and_sounds_that_are_all_the_same_are_a_doubt() -> None:
+    stored = made(Words(), views=ConstantViews())
+    content = MapContent(stored.voxels, stored.keyframes, {}, stored.sounds, stored.path)
+    assert not list(feature_doubts(content, stored.info.models))  # of two keyframes nothing is known
+    models = {**stored.info.models, "sounds": replace_id(stored.info.models["views"])}
+    same = np.tile(np.float32([0.6, 0.8, 0.0]), (9, 1))
+    content = replace(
+        content, keyframes=replace(stored.keyframes, view=same), sounds=replace(stored.sounds, feature=same)
+    )
+    views, sounds = feature_doubts(content, models)
+    assert "views by fake/views are the same in all 9 keyframes" in views
+    assert "sounds by fake/ears are the same in all 9 stretches" in sounds
+    same[4, 0] = 0.5
+    assert not list(feature_doubts(content, models))
+
+
+def replace_id(model: Any) -> Any:
+    """Return a model's entry as that of ears."""
+    from msgspec import structs
+
+    return structs.replace(model, id="fake/ears")
