@@ -14,7 +14,7 @@ from avlmaps.cli.reading_options import Reading
 from avlmaps.cli.usage import CONFIG
 from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole, Rig
-from avlmaps.core.wording import Spelling, options_as
+from avlmaps.core.wording import Spelling, asked_as, options_as
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
 from avlmaps.recordings.camera_axes import opencv_from_axes
 from avlmaps.recordings.consistency.causes import cause_of
@@ -24,9 +24,9 @@ from avlmaps.recordings.consistency.sample import Sample, choose_pairs, draw_sam
 from avlmaps.recordings.consistency.single_frames import of_sound
 from avlmaps.recordings.consistency.suspects import Suspect, Trials, suspected_rig
 from avlmaps.recordings.consistency.verdict import Grade, Reason, Verdict
-from avlmaps.recordings.corrections import Corrections
+from avlmaps.recordings.corrections import Corrections, PoseKind
 from avlmaps.recordings.example_room import example_truth
-from avlmaps.recordings.memory import MemoryRecording
+from avlmaps.recordings.memory import MemoryRecording, is_of_program
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Frame, Recording
 from avlmaps_sim.bench.recordings.drafts import Draft, RoomWalk
@@ -183,6 +183,23 @@ def test_rotations_and_positions_of_two_conventions_are_read_as_they_were() -> N
         assert trial.agreement.same_share > 0.99
     words = cause_of(Suspect(places=(2, -3, 1)), walk.rig, 0.001, 2.0, "")
     assert "whose x, y, z they call y, -z, x: write rotations and positions in the axes of one world" in words
+
+
+def test_a_program_is_told_what_to_give_instead() -> None:
+    walk, opengl = example_truth(frames=16), np.diag([1.0, -1.0, -1.0, 1.0])
+    frames = [
+        Frame(i, f"{i:06d}", i / 10.0, walk.rgb[i], walk.depth_m[i], pose @ opengl, walk.rig)
+        for i, pose in enumerate(walk.world_from_camera)
+    ]
+    said = " ".join(check_recording(MemoryRecording(frames)).sentences())
+    matrix = opengl[:3, :3].astype(int).tolist()
+    assert f"give frames with poses of OpenCV's axes, world_from_camera[:3, :3] @ {matrix}" in said
+    assert "Corrections" not in said
+    inverted = Suspect(Corrections(poses=(PoseKind.CAMERA_FROM_WORLD,)), scale=0.001)
+    said = cause_of(inverted, walk.rig, 1.0, 2000.0, "", of_program=True)
+    assert "give frames with the inverse of each pose and depth_m times 0.001." in said
+    with asked_as(Spelling.FLAG):  # of a live map that plays a recording
+        assert not is_of_program(MemoryRecording(frames))
 
 
 def test_one_frame_and_none_that_overlaps_say_nothing(right: Draft, tmp_path: Path) -> None:

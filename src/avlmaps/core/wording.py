@@ -90,6 +90,11 @@ def place_text(point: Iterable[float]) -> str:
     return f"({coordinates(point)}) m"
 
 
+def in_python() -> bool:
+    """Return whether the reader of a sentence writes Python."""
+    return (_asked_as.get() or _spelling) is Spelling.ARGUMENT
+
+
 def flag(name: str, value: str = "") -> str:
     """Return an option as the command line spells it, for any reader."""
     return f"--{name} {value}".rstrip()

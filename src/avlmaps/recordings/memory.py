@@ -11,6 +11,7 @@ import numpy as np
 from avlmaps.core.arrays import Float
 from avlmaps.core.camera import Rig
 from avlmaps.core.errors import RecordingError
+from avlmaps.core.wording import in_python
 from avlmaps.recordings.types import Frame, Recording
 
 
@@ -52,6 +53,11 @@ class MemoryRecording(Recording):
         for frame in self._frames:
             digest.update(frame_digest(frame))
         return digest.hexdigest()
+
+
+def is_of_program(recording: Recording) -> bool:
+    """Return whether the reader's own program gives the frames, so that no option says how files are to be read."""
+    return isinstance(recording, MemoryRecording) and in_python()
 
 
 def frame_digest(frame: Frame) -> bytes:

@@ -15,6 +15,7 @@ from avlmaps.core.errors import RecordingError
 from avlmaps.core.wording import option
 from avlmaps.recordings.consistency.jumps import seams
 from avlmaps.recordings.consistency.verdict import Finding, Grade, Reason
+from avlmaps.recordings.memory import is_of_program
 from avlmaps.recordings.types import Frame, Recording
 
 STEP_PIXELS = 6  # of a picture 640 wide: normals are measured over twice this distance
@@ -161,7 +162,8 @@ def up_doubts(recording: Recording, frames: Iterator[Frame], rng: np.random.Gene
         f"Up is given as {said}, but {found.support:.0%} of the surface in view is level along {is_so}, {apart:.0f} "
         "degrees away, and so was the camera held."
     )
-    return (Finding(Reason.UP, Grade.SUSPICIOUS, sentence, f"Give {option('up', is_so)}, or fix the poses."),)
+    up = f"up_in_world=({is_so})" if is_of_program(recording) else option("up", is_so)
+    return (Finding(Reason.UP, Grade.SUSPICIOUS, sentence, f"Give {up}, or fix the poses."),)
 
 
 def tilted_parts(recording: Recording, rng: np.random.Generator) -> tuple[Finding, ...]:

@@ -44,7 +44,7 @@ class KeyframeSettings:
         hold_numbers(self, ValueError)
         for name in ("translation_m", "rotation_deg", "max_gap_s", "thumbnail_width_px", "max_depth_m"):
             if not getattr(self, name) > 0:
-                raise ValueError(f"{name} is {getattr(self, name)}; it must be positive")
+                raise ValueError(f"{name} is {getattr(self, name):g}; it must be positive")
 
 
 def select_keyframes(recording: Recording, settings: KeyframeSettings = KeyframeSettings()) -> Int[np.ndarray, " k"]:

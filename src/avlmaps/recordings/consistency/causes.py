@@ -1,7 +1,7 @@
 """A suspect in words: what the recording looks like, and how to read it instead."""
 
 from avlmaps.core.camera import Rig
-from avlmaps.recordings.camera_axes import NAMED
+from avlmaps.recordings.camera_axes import NAMED, opencv_from_axes
 from avlmaps.recordings.consistency.suspects import UNITS, Suspect, Turn, suspected_rig
 from avlmaps.recordings.corrections import Corrections, GivenCamera, PoseKind
 
@@ -16,8 +16,16 @@ _KINDS = {
     PoseKind.WORLD_FROM_CAMERA: "the poses look like world_from_camera",
 }
 
+_GIVEN = {
+    PoseKind.WXYZ: "poses of quaternions x, y, z, w",
+    PoseKind.CAMERA_FROM_WORLD: "the inverse of each pose",
+    PoseKind.WORLD_FROM_CAMERA: "each pose as it is",
+}
 
-def cause_of(suspect: Suspect, rig: Rig, stored_unit_m: float, median_m: float, gain: str) -> str:
+
+def cause_of(
+    suspect: Suspect, rig: Rig, stored_unit_m: float, median_m: float, gain: str, *, of_program: bool = False
+) -> str:
     """Return what a recording looks like and what to do about it.
 
     Args:
@@ -26,11 +34,14 @@ def cause_of(suspect: Suspect, rig: Rig, stored_unit_m: float, median_m: float, 
         stored_unit_m: metres of one unit of its depth as it is read.
         median_m: middle of its depths, as they are read.
         gain: how much better the recording agrees, in parentheses, or nothing.
+        of_program: a program gives the frames, so that it has to give others.
     """
     looks = " and ".join(_looks(suspect, rig, median_m))
     options, hands = _options(suspect, rig, stored_unit_m, median_m), _by_hand(suspect, median_m)
     todo: list[str] = []
-    if options:
+    if options and of_program:
+        todo.append(f"give frames with {' and '.join(_in_arrays(options, suspect.scale))}")
+    elif options:
         todo.append(f"build again with {options.words()}")
     if hands:
         todo.append(hands)
@@ -144,6 +155,23 @@ def _options(suspect: Suspect, rig: Rig, stored_unit_m: float, median_m: float) 
         camera_axes=_named(suspect.given.camera_axes),
         pose_delay_s=suspect.given.pose_delay_s,
     )
+
+
+def _in_arrays(options: Corrections, scale: float) -> list[str]:
+    """Return what a program gives instead, where a recording is read with options."""
+    said = [_GIVEN[kind] for kind in options.poses]
+    if options.depth_unit_m is not None:
+        said.append(f"depth_m times {scale:.3g}")
+    if options.intrinsics:
+        words = Corrections(intrinsics=options.intrinsics).words(lambda _, value: value)
+        said.append(f"a camera of fx, fy, cx, cy {words}")
+    if options.camera_axes is not None:
+        turn = opencv_from_axes(options.camera_axes).T.astype(int).tolist()
+        said.append(f"poses of OpenCV's axes, world_from_camera[:3, :3] @ {turn}")
+    if options.pose_delay_s:
+        when = "later" if options.pose_delay_s > 0.0 else "earlier"
+        said.append(f"the pose of {abs(options.pose_delay_s):.2g} s {when}")
+    return said
 
 
 def _named(axes: str | None) -> str | None:

@@ -31,6 +31,7 @@ from avlmaps.recordings.consistency.single_frames import (
 from avlmaps.recordings.consistency.suspects import PoseAt, Trial, Trials, find_cause, find_closer
 from avlmaps.recordings.consistency.verdict import Finding, Grade, Reason, Verdict
 from avlmaps.recordings.corrections import NONE, CorrectedRecording, uncorrected
+from avlmaps.recordings.memory import is_of_program
 from avlmaps.recordings.types import Recording
 
 _STANDS = 0.01  # steps between poses that are one
@@ -52,11 +53,12 @@ def check_recording(recording: Recording) -> Verdict:
     apart = compare(distant, surfaces, sample.world_from_camera, floor_m=APART_SAME_M)
     apart = without_occluded(apart, distant, surfaces)
     found = _Found(after, apart, find_edges(sample), compare(sample.of_redness(), surfaces, sample.world_from_camera))
+    of_program = is_of_program(recording)
     known = sample.depth_m[sample.depth_m > 0.0]
     median_m = float(np.median(known)) if known.size else float("nan")
     findings = [
-        *of_intrinsics(sample, recording),
-        *of_depth(sample, surfaces, median_m),
+        *of_intrinsics(recording, of_program),
+        *of_depth(sample, surfaces, median_m, of_program),
         *of_colour(sample, surfaces),
         *of_poses(recording),
         *of_sound(recording),
@@ -202,7 +204,8 @@ def _trials(recording: Recording, sample: Sample) -> Trials:
 
 
 def _words(recording: Recording, best: Trial, median_m: float, gain: str) -> str:
-    return cause_of(best.suspect, recording.rig, recording.stored_depth_unit_m, median_m, gain)
+    stored_unit_m, of_program = recording.stored_depth_unit_m, is_of_program(recording)
+    return cause_of(best.suspect, recording.rig, stored_unit_m, median_m, gain, of_program=of_program)
 
 
 def _gain(found: _Found, best: Trial) -> str:

@@ -55,21 +55,22 @@ _MOST_ASPECT = 1.15
 _AS_IF_EXCHANGED = 0.04
 
 
-def of_intrinsics(sample: Sample, recording: Recording) -> Iterator[Finding]:
-    """Find cameras that cannot be those of the pictures."""
+def of_intrinsics(recording: Recording, of_program: bool) -> Iterator[Finding]:
+    """Find cameras that cannot be those of the pictures; of a program's frames the program has to give others."""
     rig = recording.rig
     for what, camera in (("colour", rig.rgb), ("depth", rig.depth)):
         if what == "depth" and rig.registered:
             continue
         where = f"of the {what} camera" if not rig.registered else "of the cameras"
-        yield from _of_camera(camera, where)
+        yield from _of_camera(camera, where, of_program)
 
 
-def _of_camera(camera: Pinhole, where: str) -> Iterator[Finding]:
+def _of_camera(camera: Pinhole, where: str, of_program: bool) -> Iterator[Finding]:
     size = f"{camera.width}x{camera.height}"
     off = (abs(camera.cx / camera.width - 0.5), abs(camera.cy / camera.height - 0.5))
     given = option("intrinsics", "fx,fy,cx,cy")
     fit = f"give those of a {size} picture with {given}, or of another size as fx,fy,cx,cy@WxH."
+    fit = f"give the camera of a {size} picture." if of_program else fit
     if max(off) > 0.5 - _CENTRE_MARGIN:
         grade = Grade.IMPOSSIBLE if max(off) > 0.5 else Grade.SUSPICIOUS
         middle = "outside" if max(off) > 0.5 else "near the edge of"
@@ -96,15 +97,16 @@ def _of_camera(camera: Pinhole, where: str) -> Iterator[Finding]:
         yield Finding(Reason.INTRINSICS, Grade.SUSPICIOUS, sentence, f"Pixels are square in usual cameras; {fit}")
 
 
-def of_depth(sample: Sample, surfaces: Surfaces, median_m: float) -> Iterator[Finding]:
-    """Find depth that is missing, of another unit, flat, or frozen."""
+def of_depth(sample: Sample, surfaces: Surfaces, median_m: float, of_program: bool) -> Iterator[Finding]:
+    """Find depth that is missing, of another unit, flat, or frozen; a program's frames have no unit but metres."""
+    unit = "it is in metres" if of_program else option("depth-unit")
     there = sample.depth_m > 0.0
     share = there.mean(axis=(1, 2))
     empty = float((share == 0.0).mean())
     if empty == 1.0:
         yield Finding(
             Reason.DEPTH, Grade.SUSPICIOUS, f"None of the {len(sample)} frames that were looked at has any depth.",
-            f"A map needs depth; check the depth pictures and their unit ({option('depth-unit')}).",
+            f"A map needs depth; check the depth pictures and their unit ({unit}).",
         )  # fmt: skip
         return
     if empty > MOST_EMPTY_FRAMES:
@@ -116,14 +118,15 @@ def of_depth(sample: Sample, surfaces: Surfaces, median_m: float) -> Iterator[Fi
             Reason.DEPTH,
             Grade.SUSPICIOUS,
             sentence,
-            f"Check the depth pictures and their unit ({option('depth-unit')}).",
+            f"Check the depth pictures and their unit ({unit}).",
         )
     low, high = SUSPICIOUS_DEPTH_M
     if not low <= median_m <= high:
         sure = not IMPOSSIBLE_DEPTH_M[0] <= median_m <= IMPOSSIBLE_DEPTH_M[1]
         grade = Grade.IMPOSSIBLE if sure else Grade.SUSPICIOUS
         sentence = f"The depth is {median_m:.3g} m in the middle, where rooms have {low:g} to {high:g} m."
-        remedy = f"Check its unit: {option('depth-unit', 'METRES')} says what one stored unit is (0.001: millimetres)."
+        says = f"{option('depth-unit', 'METRES')} says what one stored unit is (0.001: millimetres)"
+        remedy = f"Check its unit: {'depth_m is in metres' if of_program else says}."
         yield Finding(Reason.DEPTH, grade, sentence, remedy)
     smooth = surfaces.smooth_share
     if smooth < LEAST_SMOOTH and sample.depth_m.shape[2] >= FEWEST_COLUMNS:
