@@ -225,6 +225,10 @@ def test_another_model(copied: Path) -> None:
     assert str(fault.value).startswith(
         f"{copied} was built with fake/ears-0 (checksum 01234567), this avlmaps has fake/ears"
     )
+    assert "build it again from its recording. Its points" in str(fault.value)  # it is of this version
+    edit(copied, lambda content: content.update(avlmaps_version="0.0.1"))
+    with pytest.raises(MapError, match=r"build it again, or use avlmaps 0\.0\.1\. Its points"):
+        open_stored(copied).require_model(Kind.SOUNDS)
     with pytest.raises(MapError, match="was built without a model for views"):
         stored.require_model(Kind.VIEWS)
 

@@ -16,6 +16,7 @@ from avlmaps.core.files import user_path
 from avlmaps.core.poses import FRAME, rotation_to_level
 from avlmaps.core.registry import Kind
 from avlmaps.core.suggestions import near_path
+from avlmaps.core.version import __version__
 from avlmaps.core.wording import option
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.store.array_files import MEND, FileInfo, read_array, verify_file
@@ -195,12 +196,14 @@ class StoredMap:
             return
         # An imported map does not know its weights (checksum ""); what is known of them must still agree.
         if (here, card.dim, card.checksum) != (made_by.id, made_by.dim, made_by.checksum or card.checksum):
-            instead = f"use avlmaps {self.info.avlmaps_version}"
+            older = self.info.avlmaps_version
+            instead = f", or use avlmaps {older}" if older != __version__ else " from its recording"
             if "@" in made_by.backend:
-                instead = f"name the folder that holds {made_by.id} as it was ({option('models', 'DIR')})"
+                instead = f", or name the folder that holds {made_by.id} as it was ({option('models', 'DIR')})"
             raise MapError(
                 f"{self.path} was built with {made_by.id} (checksum {made_by.checksum[:8] or 'unknown'}), this avlmaps "
-                f"has {here} ({card.checksum[:8]}) for {kind.value}; build it again, or {instead}."
+                f"has {here} ({card.checksum[:8]}) for {kind.value}; build it again{instead}. Its "
+                f"points, its colours and all that needs no {kind.value} can be read as it is."
             )
 
 
