@@ -43,6 +43,20 @@ def test_dates_are_seconds() -> None:
     assert not date_fault(np.array([1.7e9, np.nan]), "frames") and not date_fault(np.zeros(0), "frames")
 
 
+@pytest.mark.parametrize("rate_hz", [1.0, 5.0, 30.0, 120.0])
+@pytest.mark.parametrize(("factor", "unit"), [(1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds")])
+def test_the_pace_of_a_camera_tells_the_unit(rate_hz: float, factor: float, unit: str) -> None:
+    stamps_s = np.arange(60) / rate_hz * factor
+    if np.median(np.diff(stamps_s)) > 10.0:
+        assert f"look like {unit};" in pace_fault(stamps_s, "frames")
+        assert f"look like {unit};" in pace_fault(stamps_s, "frames", 1.0 / rate_hz)
+    later = stamps_s + 1e13  # since a robot was started, no date
+    assert f"reach {later[-1]:.6g}, which are {unit}, not seconds" in date_fault(later, "frames")
+    assert "which are another unit, not seconds" in date_fault(later[:1], "frames")
+    dates = stamps_s + 1.7e9 * factor
+    assert f"which are {unit} since 1970, not seconds" in date_fault(dates, "frames")
+
+
 def test_an_even_pace_of_half_a_minute_is_no_walk_unless_the_recording_says_so() -> None:
     assert "look like milliseconds" in pace_fault(FRAMES_S * 1e3, "frames")
     assert not pace_fault(FRAMES_S, "frames") and not pace_fault(FRAMES_S * 1e3, "frames", 33.0)
@@ -106,7 +120,7 @@ def test_a_folder_with_poses_in_milliseconds_is_refused_in_one_sentence(tmp_path
         ):
             open_recording(path)
     (path / "frames.csv").unlink()  # the poses' stamps are the frames' then
-    with pytest.raises(RecordingError, match="apart, so their stamps look like milliseconds or finer"):
+    with pytest.raises(RecordingError, match="apart, so their stamps look like nanoseconds"):
         open_recording(path)
 
 

@@ -25,8 +25,11 @@ MAX_STRAY_SHARE = 0.05
 MAX_STRAYS = 5
 # Seconds since 1970 stay below it until the year 2286.
 _LATEST_DATE_S = 1e10
+# Dates of recordings, 2001 to 2096: in milliseconds, microseconds or nanoseconds they are other numbers.
+_DATES_S = 1e9, 4e9
 # Frames further apart than this, at an even pace, are no walk.
 SLOWEST_PACE_S = 10.0
+_USUAL_PACE_S = 0.1  # cameras take 1 to 120 pictures a second
 _UNITS = ((1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds"))
 # Spans of two clocks in one unit differ by less than this factor, with a unit of 1000 between them by more.
 _ALIKE = 4.0
@@ -40,8 +43,15 @@ def date_fault(stamps_s: Float[np.ndarray, " n"], what: str) -> str:
     latest = float(finite.max(initial=0.0))
     if latest <= _LATEST_DATE_S:
         return ""
-    unit = next((name for factor, name in _UNITS if latest / factor <= _LATEST_DATE_S), "another unit")
-    return f"The stamps of {what} reach {latest:.6g}, which are {unit} since 1970, not seconds; write them in seconds."
+    date = next((name for factor, name in _UNITS if _DATES_S[0] <= latest / factor <= _DATES_S[1]), "")
+    apart = float(np.median(np.diff(finite))) if len(finite) > 2 else 0.0
+    unit = f"{date} since 1970" if date else _unit_of(apart) if apart > 0.0 else "another unit"
+    return f"The stamps of {what} reach {latest:.6g}, which are {unit}, not seconds; write them in seconds."
+
+
+def _unit_of(apart: float, usual_s: float = _USUAL_PACE_S) -> str:
+    """Return the unit in which stamps are this far apart that usually are some seconds apart."""
+    return min(_UNITS, key=lambda unit: abs(np.log(apart / unit[0] / usual_s)))[1]
 
 
 def clock_fault(a_s: Float[np.ndarray, " n"], a: str, b_s: Float[np.ndarray, " m"], b: str) -> str:
@@ -89,11 +99,14 @@ def pace_fault(stamps_s: Float[np.ndarray, " n"], what: str, expected_s: float |
     if expected_s is not None:
         if 1 / 300 < pace_s / expected_s < 300:
             return ""
-        return f"The {what} are {pace_s:.3g} s apart, the recording says {expected_s:.3g} s; are the stamps in seconds?"
+        looks = "are the stamps in seconds?"
+        if pace_s > expected_s:
+            looks = f"their stamps look like {_unit_of(pace_s, expected_s)}; write them in seconds."
+        return f"The {what} are {pace_s:.3g} s apart, the recording says {expected_s:.3g} s; {looks}"
     if pace_s < SLOWEST_PACE_S or float(np.median(np.abs(interval_s - pace_s))) > 0.2 * pace_s:
         return ""
     return (
-        f"The {what} are {pace_s:.4g} s apart, so their stamps look like milliseconds or finer; write them in seconds, "
+        f"The {what} are {pace_s:.4g} s apart, so their stamps look like {_unit_of(pace_s)}; write them in seconds, "
         "or confirm the pace where the format has a rate."
     )
 
