@@ -447,7 +447,7 @@ def test_channels_that_are_not_the_microphones_and_directions_out_of_order_cost_
             ([0.5, 0.4], [1.0, 1.0], "stamps must rise"),
             (0.5, 90.0, "look like degrees"),
             ([0.5, 0.6], [1.0], "as many numbers as there are stamps"),
-            (0.5, None, "azimuth of row 1 is NaN"),
+            (0.5, None, "azimuth_rad is None"),
             (0.5, "left", "azimuth_rad is 'left'"),
         ):
             with pytest.raises(avlmaps.RecordingError, match=said):
@@ -898,6 +898,54 @@ def test_a_pose_that_jumps_is_said_at_once() -> None:
     assert "Stamps jump by 3600 s, from 1.0 to 3601.0 s" in str(check.add(replace(frame(90), stamp_s=3601.0)))
 
 
+def test_stamps_in_microseconds_are_said_once_and_by_their_unit() -> None:
+    check = PoseCheck()
+    said = [check.add(replace(frame(0), stamp_s=1e5 * number)) for number in range(9)]
+    assert "Stamps jump by 100000 s" in str(said[1]) and "their stamps look like microseconds" in str(said[2])
+    assert not any(said[3:])
+
+
+@pytest.mark.parametrize("slow", [1.0, 0.2])  # as the robot drives, and as fast as a recording is read
+@pytest.mark.parametrize("paused", [False, True])
+def test_a_clock_of_frames_that_was_set_is_said(slow: float, paused: bool) -> None:
+    check, passed_s, said = PoseCheck(), 0.0, []
+    for number in range(60):
+        jumped_s = 40.0 if number >= 40 else 0.0
+        passed_s += slow * (0.1 + (40.0 if paused and number == 40 else 0.0))
+        stamp_s = 0.1 * number + jumped_s
+        said += check.add(replace(frame(0), stamp_s=stamp_s), arrived_s=passed_s)
+    if slow < 1.0 or paused:
+        assert not said
+    else:
+        assert "Stamps jump by 40.1 s, from 3.9 to 44.0 s, while 0.1 s passed" in said[0] and len(said) == 1
+
+
+def test_frames_that_were_held_up_on_their_way_are_no_jump_of_the_clock() -> None:
+    check = PoseCheck()
+    for number in range(80):  # one is 9 s late, those until it arrived are lost
+        stamp_s = 0.1 * number + (9.0 if number > 40 else 0.0)
+        late_s = 9.0 if number == 40 else 0.0
+        assert not check.add(replace(frame(0), stamp_s=stamp_s), arrived_s=stamp_s + late_s)
+
+
+@pytest.mark.parametrize(
+    ("frames_s", "sound_s", "said"),
+    [
+        (40.0, 0.0, "The sound is 40 s behind the frames since 44.0 s, though it still comes"),
+        (0.0, 40.0, "The stamps of the sound skip 40 s at 4.0 s of the frames"),
+        (40.0, 40.0, ""),  # the robot paused
+    ],
+)
+def test_one_clock_that_jumps_beside_the_other_is_said(frames_s: float, sound_s: float, said: str) -> None:
+    check, found = PoseCheck(), []
+    for number in range(80):
+        later = number >= 40
+        at_s = 0.1 * number + later * frames_s
+        heard_s = 0.1 * (number + 1) + later * sound_s
+        found += check.add(replace(frame(0), stamp_s=at_s), heard_s, later * sound_s)
+    assert len(found) == bool(said) and all(said in one for one in found)
+
+
 def test_a_sensor_that_stops_while_frames_come_is_a_doubt_of_the_map(tmp_path: Path) -> None:
     with LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP) as live:
         for number in range(150):
@@ -905,7 +953,7 @@ def test_a_sensor_that_stops_while_frames_come_is_a_doubt_of_the_map(tmp_path: P
             blind = np.full_like(one.depth_m, np.nan if number % 2 else 0.0) if number >= 20 else one.depth_m
             add(live, replace(one, depth_m=blind, stamp_s=0.1 * number))
             if number < 5:
-                live.add_audio(avlmaps.Sound(np.zeros(1600, np.float32), 16_000), 0.1 * number)
+                live.add_audio(avlmaps.Sound(np.sin(np.arange(1600, dtype=np.float32)), 16_000), 0.1 * number)
     (depth, sound) = live.doubts
     assert depth.startswith("Frames have no depth since 1.9 s") and sound.startswith("No sound came since 0.5 s")
     assert {depth, sound} <= set(open_stored(tmp_path / "map").info.doubts)

@@ -13,6 +13,7 @@ from avlmaps.maps.growing import GrowingMap
 from avlmaps.maps.pipeline.write import feature_doubts
 from avlmaps.maps.store.writer import MapContent
 from avlmaps.perception.encoders import Encoders
+from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.types import Frame
 
 WALK = Walk(4)
@@ -162,3 +163,16 @@ def replace_id(model: Any) -> Any:
     from msgspec import structs
 
     return structs.replace(model, id="fake/ears")
+
+
+def test_the_end_of_a_growing_map_doubts_features_and_a_silent_microphone() -> None:
+    growing = GrowingMap(SETTINGS, Encoders("fake", pixels=Constant(1.0)), WALK.up_in_world, looks_later=True)
+    for frame in WALK.frames():
+        growing.add(frame)
+        growing.add_audio(Sound(np.zeros(1600, np.float32), 16_000))
+    growing.stored()
+    assert not growing.doubts
+    growing.stored(final=True)
+    silent, features = growing.doubts
+    assert silent.startswith("The sound is silent throughout: every sample is 0. Check the microphone")
+    assert features.startswith("The features of pixels by fake/pixels are the same")

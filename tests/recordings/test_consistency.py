@@ -17,6 +17,7 @@ from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.wording import Spelling, asked_as, options_as
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
 from avlmaps.recordings.camera_axes import opencv_from_axes
+from avlmaps.recordings.channels import level_faults
 from avlmaps.recordings.consistency.causes import cause_of
 from avlmaps.recordings.consistency.check import check_recording, pose_at
 from avlmaps.recordings.consistency.edges import find_edges, shift_of
@@ -256,6 +257,50 @@ def test_a_clipped_track_is_doubted(gain: float, doubted: bool, right: Draft, tm
     found = check_recording(open_recording(tmp_path / "walk"))
     assert [one.reason for one in found.findings] == [Reason.SOUND] * doubted
     assert all("is clipped in" in one and "audio.flac" in one for one in found.sentences())
+
+
+SILENCES = {
+    "all of it": (lambda n: np.zeros(n), "is silent throughout: every sample is 0"),
+    "another number": (lambda n: np.full(n, 0.25), "is silent throughout: every sample is 0.25"),
+    "from the middle on": (lambda n: noise(n) * (np.arange(n) < 0.4 * n), "is silent in one piece from about"),
+    "until the end": (lambda n: noise(n) * (np.arange(n) > 0.7 * n), "is silent in one piece from about 2 to"),
+    "none": (lambda n: noise(n), ""),
+    "quiet": (lambda n: np.round(3.0 * noise(n)) / 32768, ""),
+    "a third": (lambda n: noise(n) * (np.arange(n) < 0.66 * n), ""),
+    "one short sound": (lambda n: noise(n) * (np.abs(np.arange(n) - 0.53 * n) < 0.01 * n), ""),
+    "sounds on silence": (lambda n: noise(n) * (np.arange(n) % (n // 4) < n // 16), ""),
+}
+
+
+def noise(count: int) -> np.ndarray:
+    return np.random.default_rng(3).uniform(-0.5, 0.5, count)
+
+
+@pytest.mark.parametrize("case", SILENCES)
+def test_a_track_that_a_microphone_did_not_record_is_doubted(case: str, tmp_path: Path) -> None:
+    make, said = SILENCES[case]
+    write_flac(tmp_path / "sound.flac", Sound(make(200_000).astype(np.float32), 4_000))
+    silent, clipped = level_faults(AudioTrack.open(tmp_path / "sound.flac", 2.0))
+    assert [said in one for one in silent] == [True] * bool(said) and not clipped
+
+
+@pytest.mark.parametrize(("turned", "doubted"), [(0.0, True), (0.9, False)])
+def test_frames_whose_clock_skips_what_the_sound_does_not_are_doubted(
+    turned: float, doubted: bool, right: Draft, tmp_path: Path
+) -> None:
+    right.write(tmp_path / "walk")
+    recording = open_recording(tmp_path / "walk")
+    recording.audio = AudioTrack(tmp_path / "sound.wav", 16_000, recording.duration_s, 0.0)
+    assert not list(of_sound(recording))
+    recording.stamps_s = recording.stamps_s + 40.0 * (np.arange(len(recording)) >= 20)
+    cos, sin = np.cos(turned), np.sin(turned)
+    turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    recording.world_from_camera = recording.world_from_camera.copy()
+    recording.world_from_camera[20:, :3, :3] = turn @ recording.world_from_camera[20:, :3, :3]
+    found = [str(one) for one in of_sound(recording) if "The clock of the frames looks set there" in str(one)]
+    assert len(found) == doubted and all("ends 40.0 s before the frames do" in one for one in found)
+    recording.audio = replace(recording.audio, duration_s=recording.duration_s)  # the robot waited, and listened on
+    assert not list(of_sound(recording))
 
 
 def test_frames_that_see_nothing_in_common_are_not_called_fine(tmp_path: Path) -> None:

@@ -337,12 +337,8 @@ class LiveMap:
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """One sentence for each thing that is not as it should be: poses that do not fit, saves that failed.
-
-        Once it is closed, also what the whole map shows.
-        """
-        of_map = () if self._final is None else self._final.stored.info.doubts
-        return tuple(dict.fromkeys((*self._doubts, *self._growing.doubts, *of_map)))
+        """One sentence for each thing that is not as it should be: poses that do not fit, saves that failed."""
+        return (*self._doubts, *self._growing.doubts)
 
     def status(self) -> LiveStatus:
         """Return how the map fares."""
@@ -543,7 +539,8 @@ class LiveMap:
         growing, number = self._growing, self._growing.next_index
         try:
             track = growing.sound_track
-            for doubt in self._check.add(frame, None if track is None else track.end_s):
+            heard = (None, 0.0) if track is None else (track.end_s, track.gap_s)
+            for doubt in self._check.add(frame, *heard, arrived_s if self._is_pressed else None):
                 self._doubt(doubt)
                 growing.doubt(doubt)
             reason = self._gates.reason_against(frame, growing.sums) if self.settings.gates else None

@@ -4,6 +4,7 @@ Frames of the last seconds are compared in pairs: the points of one must lie on 
 checks in a row that find otherwise are a doubt, so that one person who walks by is none.
 """
 
+from collections import deque
 from itertools import combinations
 
 import numpy as np
@@ -14,6 +15,7 @@ from avlmaps.recordings.consistency.limits import LEAST_AGREEING, can_be_judged,
 from avlmaps.recordings.consistency.sample import Surfaces, draw_pairs
 from avlmaps.recordings.growing_track import LONGEST_GAP_S
 from avlmaps.recordings.memory import MemoryRecording
+from avlmaps.recordings.plausible import pace_fault
 from avlmaps.recordings.types import Frame
 
 EVERY_S = 0.4
@@ -25,6 +27,11 @@ _LEAST_AGREEING = 0.85
 MOST_M_S, MOST_RAD_S = 5.0, np.radians(540.0)
 _LEAST_MEASURED = 0.01  # of the pixels of a frame; where fewer have a depth, nothing of it comes into the map
 _WITHOUT_DEPTH_S, _WITHOUT_SOUND_S = 2.0, 10.0
+_SURE_S = 1.0  # of frames, until it is plain whether sound that is behind still comes
+# Frames that came at the pace of their stamps for 2 s, within this ratio, come by the clock; one that is 5 s earlier
+# than any of them could be has another.
+_IN_STEP_S, _STEADY, _EARLY_S = 2.0, 1.25, 5.0
+_ARRIVALS = 200
 
 
 class PoseCheck:
@@ -35,18 +42,27 @@ class PoseCheck:
         self._held: list[Frame] = []
         self._last: Frame | None = None
         self._bad, self._in_doubt = 0, False
+        self._skips: list[float] = []  # stamps before jumps of the stamps that follow one another
         self._depth_s: float | None = None  # when a frame last had a depth; None before, and where its lack was said
-        self._is_mute = False  # that the sound stopped was said
+        self._behind: tuple[float, float] | None = None  # frame and sound when that first was far behind
+        self._is_told = False  # that it is, was said
+        self._sounded: tuple[float, float, float] | None = None  # frame, sound and its gaps, the last time
+        self._arrivals: deque[tuple[float, float]] = deque(maxlen=_ARRIVALS)  # stamps, and when they came
 
-    def add(self, frame: Frame, heard_s: float | None = None) -> tuple[str, ...]:
+    def add(
+        self, frame: Frame, heard_s: float | None = None, gap_s: float = 0.0, arrived_s: float | None = None
+    ) -> tuple[str, ...]:
         """Take the next frame, and return a sentence for each thing that is in doubt from it on.
 
         Args:
             frame: the frame.
             heard_s: the end of the sound that came; None where none did.
+            gap_s: how much of that is silence between pieces.
+            arrived_s: when the frame came, by a clock that nobody sets; None where it does not come by the clock.
         """
-        found = self._depth_of(frame), self._sound_at(frame.stamp_s, heard_s), self._pose_of(frame)
-        return tuple(doubt for doubt in found if doubt is not None)
+        at_s = frame.stamp_s
+        found = self._depth_of(frame), self._sound_at(at_s, heard_s, gap_s), self._clock_at(at_s, arrived_s)
+        return tuple(doubt for doubt in (*found, self._pose_of(frame)) if doubt is not None)
 
     def _depth_of(self, frame: Frame) -> str | None:
         some = frame.depth_m[::4, ::4]
@@ -60,14 +76,59 @@ class PoseCheck:
             )
         return None
 
-    def _sound_at(self, stamp_s: float, heard_s: float | None) -> str | None:
-        if heard_s is None or stamp_s - heard_s < _WITHOUT_SOUND_S:
-            self._is_mute = False
+    def _sound_at(self, stamp_s: float, heard_s: float | None, gap_s: float) -> str | None:
+        if heard_s is None:
             return None
-        was_mute, self._is_mute = self._is_mute, True
-        if was_mute:
+        before, self._sounded = self._sounded, (stamp_s, heard_s, gap_s)
+        if stamp_s - heard_s < _WITHOUT_SOUND_S:
+            self._behind, self._is_told = None, False
+            return self._sound_ahead(before, self._sounded)
+        self._behind = self._behind or (stamp_s, heard_s)
+        since_s, then_s = self._behind
+        if self._is_told or stamp_s - since_s < _SURE_S:
             return None
-        return f"No sound came since {heard_s:.1f} s, while frames came to {stamp_s:.1f} s. Check the microphone."
+        self._is_told = True
+        if heard_s == then_s:
+            return f"No sound came since {heard_s:.1f} s, while frames came to {stamp_s:.1f} s. Check the microphone."
+        return (
+            f"The sound is {stamp_s - heard_s:.0f} s behind the frames since {since_s:.1f} s, though it still comes: "
+            "the clock of one of them was set, or the microphone lost sound. Its sounds lie at wrong places from there "
+            "on; give both stamps of one clock."
+        )
+
+    def _sound_ahead(self, before: tuple[float, float, float] | None, now: tuple[float, float, float]) -> str | None:
+        """Find a gap in the sound's stamps with which it, in step until then, is far ahead of the frames."""
+        if before is None or abs(before[1] - before[0]) >= _WITHOUT_SOUND_S:
+            return None
+        stamp_s, heard_s, skipped_s = *now[:2], now[2] - before[2]
+        if heard_s - stamp_s < _WITHOUT_SOUND_S or skipped_s < _WITHOUT_SOUND_S:
+            return None
+        return (
+            f"The stamps of the sound skip {skipped_s:.0f} s at {stamp_s:.1f} s of the frames, which do not: its clock "
+            "was set. Its sounds lie at wrong places from there on; give both stamps of one clock."
+        )
+
+    def _clock_at(self, stamp_s: float, arrived_s: float | None) -> str | None:
+        """Find a frame that is earlier, by its stamp, than any other that came by the clock."""
+        if arrived_s is None:
+            self._arrivals.clear()
+            return None
+        before, came = list(self._arrivals), (stamp_s, arrived_s)
+        self._arrivals.append(came)
+        if len(before) < 2:
+            return None
+        lasted_s, took_s = (b - a for a, b in zip(before[0], before[-1], strict=True))
+        jump_s, passed_s = (b - a for a, b in zip(before[-1], came, strict=True))
+        early_s = min(arrived - stamp for stamp, arrived in before) - (arrived_s - stamp_s)
+        in_step = lasted_s >= _IN_STEP_S and lasted_s / _STEADY < took_s < lasted_s * _STEADY
+        if not in_step or min(early_s, jump_s - passed_s) < _EARLY_S or jump_s > LONGEST_GAP_S:
+            return None
+        self._arrivals.clear()
+        return (
+            f"Stamps jump by {jump_s:.1f} s, from {before[-1][0]:.1f} to {stamp_s:.1f} s, while {passed_s:.1f} s "
+            "passed: the clock of the frames was set. Sounds and days that are "
+            "looked up by time are wrong; let the robot set its clock before it drives."
+        )
 
     def _pose_of(self, frame: Frame) -> str | None:
         jump = self._jump_to(frame)
@@ -87,7 +148,12 @@ class PoseCheck:
         moved_m = float(np.linalg.norm(frame.world_from_camera[:3, 3] - last.world_from_camera[:3, 3]))
         turned_rad = float(rotation_angle_rad(frame.world_from_camera[None], last.world_from_camera[None])[0])
         took_s = frame.stamp_s - last.stamp_s
-        if took_s > LONGEST_GAP_S:
+        self._skips = [*self._skips[-2:], last.stamp_s] if took_s > LONGEST_GAP_S else []
+        if len(self._skips) > 2:
+            return None
+        if len(self._skips) == 2 and (fault := pace_fault(np.array([*self._skips, frame.stamp_s]), "frames")):
+            return fault
+        if self._skips:
             return (
                 f"Stamps jump by {took_s:.0f} s, from {last.stamp_s:.1f} to {frame.stamp_s:.1f} s. Where the robot did "
                 "not pause, its clock was set: sounds and days that are looked up by time are wrong."

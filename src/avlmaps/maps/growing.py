@@ -36,7 +36,7 @@ from avlmaps.maps.pipeline.estimate import estimate_ground, estimate_sensor, est
 from avlmaps.maps.pipeline.keyframes import RANDOMNESS
 from avlmaps.maps.pipeline.plan import BUILD_VERSION, BuildPlan
 from avlmaps.maps.pipeline.sounds import silence
-from avlmaps.maps.pipeline.write import manifest_of, surfaces, with_clear_views
+from avlmaps.maps.pipeline.write import feature_doubts, manifest_of, surfaces, with_clear_views
 from avlmaps.maps.pose_correction import PoseCorrection, moved_frame
 from avlmaps.maps.settings import SUBMAP_FRAMES, BuildSettings
 from avlmaps.maps.sources.growing import AT_ONCE, GrowingSources, require_fit
@@ -51,7 +51,7 @@ from avlmaps.maps.types import HeardSounds, SourceEvidence, Submaps
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.protocols import GroundReader
 from avlmaps.recordings.audio import AudioTrack, Sound
-from avlmaps.recordings.channels import ChannelSound
+from avlmaps.recordings.channels import ChannelSound, level_faults
 from avlmaps.recordings.directions import DirectionTrack
 from avlmaps.recordings.growing_track import LONGEST_GAP_S, GrowingTrack
 from avlmaps.recordings.memory import next_of
@@ -117,7 +117,8 @@ class GrowingMap:
         self._corrections = 0
         self._told: list[str] = []
         self._found: tuple[str, ...] = ()  # by the check of the frames that are held
-        self._of_channels: tuple[str, ...] = ()  # what the end found of the array's
+        self._of_channels: tuple[str, ...] = ()  # what the end found of the sound's
+        self._of_features: tuple[str, ...] = ()  # and of all features
         self._checked_frames = 0
         if self.settings.frames.per_submap and encoders.keyframes_only:
             raise MapError(
@@ -444,7 +445,7 @@ class GrowingMap:
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """What is left out of the evidence of sources, and why; from the end on what is odd about channels as well."""
+        """What is left out of the evidence of sources, and why; from the end on also of channels, features."""
         alone = self._sounds is not None and self._sounds.growing.channels == 1
         microphones = self.microphones
         few = (
@@ -453,11 +454,15 @@ class GrowingMap:
             if alone and microphones is not None and len(microphones) > 1
             else ""
         )
-        return tuple(one for one in (few, self._sources.doubt, *self._of_channels) if one)
+        return tuple(one for one in (few, self._sources.doubt, *self._of_channels, *self._of_features) if one)
 
     def _doubts_of_channels(self) -> tuple[str, ...]:
-        """Check the channels of an array along the whole drive, as a build does."""
-        track, motion = self._placed_track(), self._walk.motion()
+        """Check the sound, and the channels of an array along the whole drive, as a build does."""
+        grown, track, motion = self.sound_track, self._placed_track(), self._walk.motion()
+        if grown is not None and grown.track is not None and not grown.gaps:  # silence fills gaps
+            silent, _ = level_faults(grown.track, "The sound")
+            if silent:
+                return (f"{silent[0]} Check the microphone: nothing that sounded then is in the map.",)
         if track is None or track.microphones is None or len(track.microphones) < 2 or not len(motion.stamps_s):
             return ()
         return doubts_of_channels(track, Trajectory(motion.stamps_s, motion.world_from_camera), "the sound")
@@ -737,6 +742,8 @@ class GrowingMap:
             clips, sounds = self._sounds.clips_folder, self._sounds.heard(came.walk.motion(), final=final)
         keyframes = with_clear_views(keyframes, [stack_views(clear, pose, self._free.shape)])
         content = MapContent(merged.voxels, keyframes, state, sounds, clips)
+        if final:
+            self._of_features = tuple(feature_doubts(content, plan.models))
         finished = datetime.now(UTC).isoformat(timespec="seconds")
         stages_s = {"growing": begin - self._begin_s, "merging": perf_counter() - begin}
         timings = Timings(finished=finished, elapsed_s=sum(stages_s.values()), stages_s=stages_s)

@@ -149,9 +149,18 @@ def channel_faults(track: AudioTrack) -> list[str]:
     ]  # fmt: skip
 
 
-def clipping(track: AudioTrack) -> list[str]:
-    """Return a sentence for each channel of a track that is clipped: its loud sounds are like others."""
-    return _clipped(_looked_at(track), track)
+def level_faults(track: AudioTrack, name: str = "") -> tuple[list[str], list[str]]:
+    """Return what is silent about a track, and which of its channels are clipped: their loud sounds are like others.
+
+    Looks at pieces spread over the track. One in which sounds and silence take turns was put together so.
+
+    Args:
+        track: to look at.
+        name: of the track in the sentences; its path if empty.
+    """
+    samples = _looked_at(track)
+    silent = _silent(samples, track, name)
+    return silent, [] if silent else _clipped(samples, track)
 
 
 def useless_channels(track: AudioTrack, name: str = "") -> list[str]:
@@ -176,6 +185,22 @@ def _looked_at(track: AudioTrack) -> Float[np.ndarray, "k m n"]:
 
 def _named(track: AudioTrack, channel: int, name: str = "") -> str:
     return str(track.files[channel]) if track.files else f"Channel {channel + 1} of {name or track.path}"
+
+
+def _silent(samples: Float[np.ndarray, "k m n"], track: AudioTrack, name: str) -> list[str]:
+    """Find that no sample differs from the others, throughout or in one stretch of half of the track and more."""
+    still = np.ptp(samples, axis=2).max(axis=1) == 0.0
+    if still.all() and not any(np.ptp(block.samples) for block in track.blocks()):
+        return [f"{name or track.path} is silent throughout: every sample is {samples[0, 0, 0]:g}."]
+    where = np.flatnonzero(still)
+    if still.all() or len(where) < len(still) / 2 or where[-1] - where[0] >= len(where):
+        return []
+    edges_s = track.start_s + np.linspace(0.0, track.duration_s, len(still) + 1)
+    from_s, to_s = edges_s[[where[0], where[-1] + 1]].tolist()
+    return [
+        f"{name or track.path} is silent in one piece from about {from_s:.0f} to {to_s:.0f} s "
+        f"({len(where) / len(still):.0%}): every sample is {samples[where[0], 0, 0]:g} there, and not elsewhere."
+    ]
 
 
 def _dead(samples: Float[np.ndarray, "k m n"], track: AudioTrack, name: str = "") -> list[str]:

@@ -19,10 +19,10 @@ from avlmaps.recordings.consistency.edges import Edges, Shift, find_edges, shift
 from avlmaps.recordings.consistency.jumps import find_exchanged, find_jump, find_parts
 from avlmaps.recordings.consistency.sample import Sample, Surfaces, draw_sample, steps_between_all
 from avlmaps.recordings.consistency.single_frames import (
-    of_clipping,
     of_colour,
     of_depth,
     of_intrinsics,
+    of_levels,
     of_motion,
     of_poses,
     of_sound,
@@ -62,7 +62,7 @@ def check_recording(recording: Recording) -> Verdict:
         *of_colour(sample, surfaces),
         *of_poses(recording),
         *of_sound(recording),
-        *of_clipping(recording),
+        *of_levels(recording),
         *of_motion(recording, after, limits.can_be_judged(after)),
         *_of_agreement(recording, sample, found, median_m),
     ]

@@ -6,8 +6,9 @@ import numpy as np
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import AudioError
+from avlmaps.core.poses import rotation_angle_rad
 from avlmaps.core.wording import option
-from avlmaps.recordings.channels import clipping
+from avlmaps.recordings.channels import level_faults
 from avlmaps.recordings.consistency.agreement import Agreement
 from avlmaps.recordings.consistency.sample import Sample, Surfaces, steps_between_all
 from avlmaps.recordings.consistency.verdict import Finding, Grade, Reason
@@ -49,6 +50,8 @@ _RATES_HZ = (8_000, 11_025, 16_000, 22_050, 24_000, 32_000, 44_100, 48_000, 96_0
 # How far a ratio of lengths may be off one of rates; lengths within a fifth say nothing of it.
 _AS_LONG, _LIKE_ONE = 0.02, 0.8
 _SHORTEST_DRIVE_S = 1.0
+# Frames that skip at least 5 s, and the sound that does not: how nearly it ends earlier by as much.
+_SKIP_S, _ALIKE_S, _MOST_TURN_RAD = 5.0, 1.0, np.radians(30.0)
 _CENTRE_MARGIN = 0.2
 _FOCAL_RANGE = (0.25, 4.0)
 _MOST_ASPECT = 1.15
@@ -260,6 +263,15 @@ def of_sound(recording: Recording) -> Iterator[Finding]:
     first_s, last_s = float(recording.stamps_s[0]), float(recording.stamps_s[-1])
     spans = f"The sound lasts from {begin_s:.1f} to {end_s:.1f} s and the drive from {first_s:.1f} to {last_s:.1f} s"
     longer = track.duration_s / drive_s
+    if skipped := _skipped(recording, last_s - end_s):
+        at, apart_s = skipped
+        sentence = (
+            f"{spans}: the sound ends {last_s - end_s:.1f} s before the frames do, and {apart_s:.1f} s lie between "
+            f"{recording.name(at)} and {recording.name(at + 1)}, where the camera stood."
+        )
+        remedy = "The clock of the frames looks set there; take that time out of the later stamps, or cut there."
+        yield Finding(Reason.SOUND, Grade.SUSPICIOUS, sentence, remedy)
+        return
     meant = [hz for hz in _RATES_HZ if hz != track.rate_hz and abs(longer * track.rate_hz / hz - 1.0) < _AS_LONG]
     if meant and abs(begin_s - first_s) < _AS_LONG * drive_s and not _LIKE_ONE < longer < 1.0 / _LIKE_ONE:
         sentence = (
@@ -273,15 +285,32 @@ def of_sound(recording: Recording) -> Iterator[Finding]:
         yield Finding(Reason.SOUND, Grade.SUSPICIOUS, sentence, remedy)
 
 
-def of_clipping(recording: Recording) -> Iterator[Finding]:
-    """Find a track that is clipped; `info` says it of the channels of an array."""
-    if recording.audio is None or recording.audio.microphones is not None:
+def _skipped(recording: Recording, missing_s: float) -> tuple[int, float] | None:
+    """Return the frame before the one long time without any that the sound lacks at its end, and how long that is."""
+    apart_s, pose = np.diff(recording.stamps_s), recording.world_from_camera
+    at = int(np.argmax(apart_s))
+    gap_s = float(apart_s[at] - np.median(apart_s))
+    others_s = np.delete(apart_s, at).max(initial=0.0)
+    moved_m = float(np.linalg.norm(pose[at + 1, :3, 3] - pose[at, :3, 3]))
+    turned_rad = float(rotation_angle_rad(pose[at : at + 1], pose[at + 1 : at + 2])[0])
+    stood = moved_m < LEAST_JUMP_M and turned_rad < _MOST_TURN_RAD
+    if gap_s < _SKIP_S or others_s > gap_s / 2 or abs(missing_s - gap_s) > _ALIKE_S or not stood:
+        return None
+    return at, float(apart_s[at])
+
+
+def of_levels(recording: Recording) -> Iterator[Finding]:
+    """Find a track that is silent or clipped; `info` says the latter of the channels of an array."""
+    if recording.audio is None:
         return
     try:
-        clipped = clipping(recording.audio)
+        silent, clipped = level_faults(recording.audio)
     except AudioError:  # hearing says why
         return
-    for sentence in clipped:
+    for sentence in silent:
+        remedy = "Check the microphone, and which input was recorded: nothing that sounded then is in the map."
+        yield Finding(Reason.SOUND, Grade.SUSPICIOUS, sentence, remedy)
+    for sentence in clipped if recording.audio.microphones is None else ():
         remedy = "What is loud may be taken for another sound."
         yield Finding(Reason.SOUND, Grade.SUSPICIOUS, sentence, remedy)
 
