@@ -638,11 +638,11 @@ def while_busy(live: LiveMap, numbers: range, pause_s: float = 0.0) -> None:
     """Add frames that nobody takes, as the thread that fuses is at another; the first is that one."""
     begun, go_on, check = threading.Event(), threading.Event(), live._check.add
 
-    def slow(one: avlmaps.Frame, heard_s: float | None = None) -> tuple[str, ...]:
+    def slow(one: avlmaps.Frame, *others: object) -> tuple[str, ...]:
         begun.set()
         assert go_on.wait(60.0)
         live._check.add = check  # type: ignore[method-assign]
-        return check(one, heard_s)
+        return check(one, *others)
 
     live._check.add = slow  # type: ignore[method-assign]
     for number in numbers:

@@ -122,6 +122,7 @@ def rehearse(
     budget: Budget | None = None,
     readable: Readable = NO_FILES,
     tell: Callable[[str], None] = lambda _: None,
+    heats: Heats | None = None,
 ) -> Outcome:
     """Run a program on the map alone, with a body that meets no obstacle; waits take no time.
 
@@ -136,11 +137,12 @@ def rehearse(
         budget: of the program.
         readable: which files the program may load.
         tell: called with each line of progress.
+        heats: takes what the map answers, for the drive.
     """
     driver = MapDriver(obstacles, FreeBody(start), shape)
     return instruct(
         words, avlmap, driver, LearnedTranslator(), budget, settings=settings, readable=readable,
-        translation=translation, tell=tell, pause=lambda _: None,
+        translation=translation, tell=tell, pause=lambda _: None, heats=heats,
     )  # fmt: skip
 
 

@@ -142,10 +142,10 @@ class Dispatcher:
         obstacles = self._machine.prepare(now.avlmap, now.version)
         if fault := self._machine.fault():
             raise NavigationError(f"The robot cannot be driven: {fault.rstrip('.')}.")
-        start = self._machine.pose()
+        start, heats = self._machine.pose(), Heats()
         outcome = rehearse(
             words, translation, now.avlmap, obstacles, start, shape=self._machine.shape,
-            settings=self._settings, budget=_REHEARSAL,
+            settings=self._settings, budget=_REHEARSAL, heats=heats,
         )  # fmt: skip
         if outcome.error is not None:
             kind = _KINDS.get(outcome.error_type or "", "refused")
@@ -164,6 +164,8 @@ class Dispatcher:
             map=now.name,
             version=now.version,
             robot=self._machine.identity,
+            heats=heats,
+            of=now.avlmap,
         )
 
     def _read(self, words: str, program: str, now: MapNow) -> Translation:
@@ -267,6 +269,7 @@ class Dispatcher:
                 settings=self._settings, readable=NO_FILES,
                 translation=Translation(order.plan.program, order.plan.notes, order.plan.reading),
                 tell=lambda line: self._tell(order, line), pause=order.brake.pause,
+                heats=order.plan.heats_for(order.now.avlmap),
             )  # fmt: skip
         except Exception:
             log.exception("order %s", order.plan.order)

@@ -78,6 +78,8 @@ class OrderPlan:
         map: which map.
         version: of the map.
         robot: identity of the robot.
+        heats: what the map answered while it was planned; see ``heats_for``.
+        of: that map.
     """
 
     order: str
@@ -92,6 +94,12 @@ class OrderPlan:
     map: str
     version: str
     robot: str
+    heats: Heats = field(default_factory=dict, repr=False, compare=False)
+    of: AVLMap | None = field(default=None, repr=False, compare=False)
+
+    def heats_for(self, avlmap: AVLMap) -> Heats:
+        """Return what the map answered, so that a drive need not query it again; nothing of another object."""
+        return self.heats if avlmap is self.of else {}
 
     def to_json(self) -> dict[str, Any]:
         """Return the plan as clients and the log have it; a token is no part of it."""
