@@ -26,6 +26,7 @@ from avlmaps.language.program import Budget, parse_program
 from avlmaps.language.translator import Translation
 from avlmaps.navigate.brake import Brake
 from avlmaps.navigate.costmap import floor_of_walk
+from avlmaps.navigate.grounding import Heats
 from avlmaps.navigate.instruct import Outcome, given_by, instruct
 from avlmaps.navigate.rehearsal import NO_FILES, path_in_world, rehearse
 from avlmaps.navigate.skills import RobotSettings

@@ -9,6 +9,7 @@ from typing import Any
 from avlmaps.core.errors import AvlmapsError
 from avlmaps.core.motion import GroundPose
 from avlmaps.core.poses import FRAME
+from avlmaps.navigate.grounding import Heats
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.serve.guard import token_digest
 
