@@ -18,6 +18,7 @@ from avlmaps.core.wording import Spelling, asked_as, options_as
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
 from avlmaps.recordings.camera_axes import opencv_from_axes
 from avlmaps.recordings.channels import level_faults
+from avlmaps.recordings.consistency.agreement import NOTHING
 from avlmaps.recordings.consistency.causes import cause_of
 from avlmaps.recordings.consistency.check import check_recording, pose_at
 from avlmaps.recordings.consistency.edges import find_edges, shift_of
@@ -34,6 +35,7 @@ from avlmaps_sim.bench.recordings.drafts import Draft, RoomWalk
 from avlmaps_sim.bench.recordings.outcomes import Judge, Outcome
 from avlmaps_sim.bench.recordings.situations import situations
 
+pytestmark = pytest.mark.filterwarnings("error::RuntimeWarning")  # none reaches a user
 CAMERA = Pinhole(48.0, 48.0, 32.0, 24.0, 64, 48)
 
 
@@ -432,3 +434,8 @@ def test_intrinsics_that_fit_already_are_no_cause() -> None:
     rig = Rig(CAMERA, CAMERA)
     assert suspected_rig(rig, Suspect(centred=True)) is None
     assert suspected_rig(rig, Suspect(focal=1.25)) is not None
+
+
+def test_a_comparison_of_too_few_points_has_no_difference_and_no_warning() -> None:
+    assert np.isnan(replace(NOTHING, off=np.array([np.nan, np.nan])).median_off) and np.isnan(NOTHING.median_off)
+    assert replace(NOTHING, off=np.array([0.25, np.nan, 0.75])).median_off == 0.5

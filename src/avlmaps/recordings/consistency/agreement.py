@@ -68,6 +68,12 @@ class Agreement:
         return float(np.quantile(counts[used] / self.points[used], quantile)) if used.any() else 0.0
 
     @property
+    def median_off(self) -> float:
+        """Middle of ``off`` of the pairs with enough points; NaN where there is none."""
+        known = self.off[np.isfinite(self.off)]
+        return float(np.median(known)) if len(known) else float("nan")
+
+    @property
     def same_share(self) -> float:
         """Share of points on the surface that the other frame sees."""
         return self.share(self.same)

@@ -55,7 +55,7 @@ def find_jump(recording: Recording, sample: Sample, after: Agreement) -> Finding
         )
         few = over.pairs >= limits.FEWEST_PAIRS and over.same_share < limits.HARDLY_ANY
         seen = (limits.can_be_judged(over) or few) and limits.can_be_judged(beside)
-        far_off = over.same_share < limits.BAD_PAIR or np.nanmedian(over.off) > _MISFIT_RATIO * np.nanmedian(beside.off)
+        far_off = over.same_share < limits.BAD_PAIR or over.median_off > _MISFIT_RATIO * beside.median_off
         step = far_off or most[row] == LEAST_ACROSS_STEP
         better = beside.same_share > max(limits.LEAST_AGREEING, over.same_share + 0.1)
         if seen and step and better and over.same_share < most[row]:
