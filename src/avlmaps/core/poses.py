@@ -52,10 +52,7 @@ def orthonormalize(
             f"{np.linalg.det(rotation):.3g}; at most {max_fault} passes for rounding); fix it or leave the frame out."
         )
     u, _, vt = np.linalg.svd(rotation)
-    pose = np.eye(4)
-    pose[:3, :3] = u @ vt
-    pose[:3, 3] = world_from_camera[:3, 3]
-    return pose
+    return from_rotation(u @ vt, world_from_camera[:3, 3])
 
 
 def orthonormalize_all(
@@ -91,6 +88,17 @@ def inverse(b_from_a: Float[np.ndarray, "*batch 4 4"]) -> Float[np.ndarray, "*ba
 def apply(b_from_a: Float[np.ndarray, "4 4"], points_a: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
     """Map points from frame a to frame b."""
     return points_a @ b_from_a[:3, :3].T + b_from_a[:3, 3]
+
+
+def from_rotation(
+    rotation: Float[np.ndarray, "3 3"], translation: Float[np.ndarray, "3"] | None = None
+) -> Float[np.ndarray, "4 4"]:
+    """Build a pose from a rotation and a translation, metres; none about the origin."""
+    pose = np.eye(4)
+    pose[:3, :3] = rotation
+    if translation is not None:
+        pose[:3, 3] = translation
+    return pose
 
 
 def from_quaternion(

@@ -12,7 +12,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Int
 from avlmaps.core.errors import MapError
-from avlmaps.core.poses import inverse, mean_rotation, rotation_angle_rad
+from avlmaps.core.poses import from_rotation, inverse, mean_rotation, rotation_angle_rad
 from avlmaps.core.progress import progress
 from avlmaps.core.registry import Kind
 from avlmaps.days.settings import AlignSettings
@@ -198,10 +198,7 @@ def mean_transform(votes: Float[np.ndarray, "v 4 4"], camera: Float[np.ndarray, 
     rotation = mean_rotation(votes)
     at = camera[:, :3, 3]
     placed = np.einsum("vij,vj->vi", votes[:, :3, :3], at) + votes[:, :3, 3]
-    out = np.eye(4)
-    out[:3, :3] = rotation
-    out[:3, 3] = np.median(placed - at @ rotation.T, axis=0)
-    return out
+    return from_rotation(rotation, np.median(placed - at @ rotation.T, axis=0))
 
 
 def require_upright(

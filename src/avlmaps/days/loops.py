@@ -12,7 +12,7 @@ import numpy as np
 from avlmaps.core.arrays import Float, Int
 from avlmaps.core.camera import Rig
 from avlmaps.core.errors import MapError
-from avlmaps.core.poses import inverse, mean_rotation, rotation_angle_rad, rotation_to_level
+from avlmaps.core.poses import from_rotation, inverse, mean_rotation, rotation_angle_rad, rotation_to_level
 from avlmaps.core.progress import progress
 from avlmaps.core.registry import Kind
 from avlmaps.days.align import local_features, spread_out
@@ -218,10 +218,7 @@ def _upright(
     """Return poses turned about the first one, so that up stays where it was: what was seen again says little of it."""
     tipped = mean_rotation(found @ inverse(before)) @ up
     to_level = rotation_to_level(up).T @ rotation_to_level(rotation_to_level(up) @ tipped) @ rotation_to_level(up)
-    whole = np.eye(4)
-    whole[:3, :3] = to_level
-    whole[:3, 3] = found[0, :3, 3] - to_level @ found[0, :3, 3]
-    return whole @ found
+    return from_rotation(to_level, found[0, :3, 3] - to_level @ found[0, :3, 3]) @ found
 
 
 def _joined(one: Edges, other: Edges) -> Edges:

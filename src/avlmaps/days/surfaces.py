@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from avlmaps.core.arrays import Bool, Float, Int
-from avlmaps.core.poses import apply
+from avlmaps.core.poses import apply, from_rotation
 from avlmaps.maps.grid import GridSpec
 
 _MOST_POINTS, _MOST_MOVING = 60_000, 20_000
@@ -108,10 +108,8 @@ def _step(
     angle = float(np.linalg.norm(turn[:3]))
     axis = turn[:3] / angle if angle > 0.0 else np.array([0.0, 0.0, 1.0])
     cross = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
-    out = np.eye(4)
-    out[:3, :3] = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
-    out[:3, 3] = turn[3:] + middle - out[:3, :3] @ middle
-    return out
+    rotation = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
+    return from_rotation(rotation, turn[3:] + middle - rotation @ middle)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

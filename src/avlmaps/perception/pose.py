@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from avlmaps.core.camera import Pinhole
-from avlmaps.core.poses import apply, inverse
+from avlmaps.core.poses import apply, from_rotation, inverse
 from avlmaps.perception.protocols import Pose
 
 _FEWEST_POINTS = 4
@@ -64,9 +64,7 @@ def estimate_pose(
     inlier = np.array(report["inliers"], bool)
     if inlier.sum() < _FEWEST_POINTS:
         return None
-    camera_from_world = np.eye(4)
-    camera_from_world[:3, :3], camera_from_world[:3, 3] = found.R, found.t
-    return Pose(inverse(camera_from_world), int(inlier.sum())), inlier
+    return Pose(inverse(from_rotation(found.R, found.t)), int(inlier.sum())), inlier
 
 
 def agreement(
@@ -172,9 +170,7 @@ def _reprojection(
 def _small_motion(step: Float[np.ndarray, "6"]) -> Float[np.ndarray, "4 4"]:
     from scipy.spatial.transform import Rotation
 
-    motion = np.eye(4)
-    motion[:3, :3], motion[:3, 3] = Rotation.from_rotvec(step[:3]).as_matrix(), step[3:]
-    return motion
+    return from_rotation(Rotation.from_rotvec(step[:3]).as_matrix(), step[3:])
 
 
 def _as_poselib(camera: Pinhole) -> dict[str, object]:

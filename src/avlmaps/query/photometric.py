@@ -19,6 +19,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, Int32, UInt8
 
 from avlmaps.core.camera import Pinhole
+from avlmaps.core.poses import from_rotation
 from avlmaps.maps.types import Keyframes
 from avlmaps.query.photometric_kernels import compare_panoramas, compare_view, draw_panoramas
 from avlmaps.query.threads import share
@@ -159,8 +160,7 @@ class Panoramas:
             camera: that took it.
             starts: poses to try beside those that are found.
         """
-        most, starting = self.settings.most_inliers, np.eye(4)
-        starting[:3, :3] = self._level_from_world
+        most, starting = self.settings.most_inliers, from_rotation(self._level_from_world)
         found = [_Ranked(pose, 0.0, 0) for pose in self._candidates(rgb, camera)]
         found += [_Ranked(starting @ start.world_from_camera, 0.0, min(start.inliers, most)) for start in starts]
         for rank, (side, steps) in enumerate(_STEPS):
@@ -244,10 +244,7 @@ class Panoramas:
         return [self._pose(eye, heading * heading_of, settings.pitches_rad[pitch]) for eye, pitch, heading in chosen]
 
     def _pose(self, eye: int, heading_rad: float, pitch_rad: float) -> Float[np.ndarray, "4 4"]:
-        pose = np.eye(4)
-        pose[:3, :3] = _level_from_camera(heading_rad, pitch_rad)
-        pose[:3, 3] = self.eyes_level[eye]
-        return pose
+        return from_rotation(_level_from_camera(heading_rad, pitch_rad), self.eyes_level[eye])
 
     def _moved(
         self,
@@ -348,10 +345,9 @@ def _motions(step_m: float, step_rad: float) -> list[Float[np.ndarray, "4 4"]]:
     motions: list[Float[np.ndarray, "4 4"]] = []
     for axis in range(3):
         for sign in (1.0, -1.0):
-            shift, turn = np.eye(4), np.eye(4)
-            shift[axis, 3] = sign * step_m
-            turn[:3, :3] = cv2.Rodrigues(sign * step_rad * np.eye(3)[axis])[0]
-            motions += [shift, turn]
+            along = sign * np.eye(3)[axis]
+            turn = np.asarray(cv2.Rodrigues(step_rad * along)[0], np.float64)
+            motions += [from_rotation(np.eye(3), step_m * along), from_rotation(turn)]
     return motions
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Int
-from avlmaps.core.poses import rotation_to_level
+from avlmaps.core.poses import from_rotation, rotation_to_level
 from avlmaps.maps.grid import GridSpec, index_ends
 
 if TYPE_CHECKING:
@@ -207,9 +207,7 @@ class Space:
     @property
     def level_from_recording(self) -> Float[np.ndarray, "4 4"]:
         """The pose of the recording's world in the level frame: the rotation, about the same origin."""
-        pose = np.eye(4)
-        pose[:3, :3] = self.level_from_world
-        return pose
+        return from_rotation(self.level_from_world)
 
     def level(self, points_world: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
         """Turn points from the world into the level frame."""

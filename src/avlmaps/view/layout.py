@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float, Float32, Int
 
 from avlmaps.core.errors import MapError
-from avlmaps.core.poses import FRAME
+from avlmaps.core.poses import FRAME, from_rotation
 from avlmaps.maps.grid import index_ends
 from avlmaps.maps.store.derived import Derivation
 from avlmaps.query.topdown import camera_path
@@ -69,11 +69,8 @@ class Layout:
     @property
     def level_from_cells(self) -> Float[np.ndarray, "4 4"]:
         """From cells (the corner of the lowest voxel is 0) to the level frame, metres."""
-        space, pose = self.avlmap.space, np.eye(4)
-        voxel_m = space.grid.voxel_size_m
-        pose[:3, :3] = space.level_from_world * voxel_m
-        pose[:3, 3] = space.level_from_world @ (self.low * voxel_m)
-        return pose
+        space, voxel_m = self.avlmap.space, self.avlmap.space.grid.voxel_size_m
+        return from_rotation(space.level_from_world * voxel_m, space.level_from_world @ (self.low * voxel_m))
 
     @cached_property
     def records(self) -> bytes:

@@ -12,7 +12,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Bool, Float
 from avlmaps.core.errors import RecordingError
-from avlmaps.core.poses import apply, inverse, rotation_to_level
+from avlmaps.core.poses import apply, from_rotation, inverse, rotation_to_level
 from avlmaps.core.timeline import Trajectory
 from avlmaps.core.wording import option
 from avlmaps.maps.sources.correlation import SPEED_M_S, Correlations, correlate
@@ -228,8 +228,7 @@ class _Fit:
     def _grid(self) -> tuple[Correlations, Float[np.ndarray, "k m 3"], Float[np.ndarray, "c 3"]]:
         """Return some frames, where the microphones were then, and places round the walk."""
         up = self.world_from_robot[:, :3, 2].mean(axis=0)
-        level = np.eye(4)
-        level[:3, :3] = rotation_to_level(up / np.linalg.norm(up))
+        level = from_rotation(rotation_to_level(up / np.linalg.norm(up)))
         ears = self._ears(self.array.position_m)
         middle = apply(level, ears.mean(axis=1))
         low, high = middle.min(axis=0) - _ROUND_M, middle.max(axis=0) + _ROUND_M

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from avlmaps.core.arrays import Float
-from avlmaps.core.poses import rotation_to_level
+from avlmaps.core.poses import from_rotation, rotation_to_level
 from avlmaps.core.progress import progress, say
 from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.sources.bearings import BearingEvidence, Bearings, evidence_of_bearings, expected_alone
@@ -93,9 +93,7 @@ def find_among(
     if (microphones is None and directions is None) or not len(spans_s) or not len(voxel_m):
         return None
     level = rotation_to_level(up_in_world)
-    turn = np.eye(4)
-    turn[:3, :3] = level
-    walked = Trajectory(walk.stamps_s, turn @ walk.world_from_body)
+    walked = Trajectory(walk.stamps_s, from_rotation(level) @ walk.world_from_body)
     surface = voxel_m @ level.T
     ear = walked.world_from_body[:, :3, 3]
     if microphones is not None:

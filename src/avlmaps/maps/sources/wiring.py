@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from avlmaps.core.arrays import Float
-from avlmaps.core.poses import apply, rotation_to_level
+from avlmaps.core.poses import apply, from_rotation, rotation_to_level
 from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.sources.correlation import SPEED_M_S, Correlations
 from avlmaps.maps.sources.polarity import MOST_MICROPHONES, signs_of
@@ -207,9 +207,7 @@ def _places(ear: Float[np.ndarray, "f m 3"], world_from_robot: Float[np.ndarray,
     azimuth = 2.0 * np.pi * np.arange(_AZIMUTHS) / _AZIMUTHS
     flat = np.stack([np.cos(azimuth), np.sin(azimuth)], axis=1)
     rings = [np.column_stack([flat * away, np.full(_AZIMUTHS, over)]) for away in _AWAY_M for over in _OVER_EAR_M]
-    back = np.eye(4)
-    back[:3, :3] = rotation_to_level(up / np.linalg.norm(up)).T
-    back[:3, 3] = ear.mean(axis=(0, 1))
+    back = from_rotation(rotation_to_level(up / np.linalg.norm(up)).T, ear.mean(axis=(0, 1)))
     return apply(back, np.concatenate(rings))
 
 

@@ -13,7 +13,7 @@ from avlmaps.core.arrays import Float
 from avlmaps.core.camera import Rig
 from avlmaps.core.errors import MapError
 from avlmaps.core.files import user_path
-from avlmaps.core.poses import FRAME, rotation_to_level
+from avlmaps.core.poses import FRAME, from_rotation, rotation_to_level
 from avlmaps.core.registry import Kind
 from avlmaps.core.suggestions import near_path
 from avlmaps.core.version import __version__
@@ -317,8 +317,6 @@ def describe(stored: StoredMap) -> dict[str, Any]:
     """
     info, sounds = stored.info, stored.sounds
     tracks = np.split(np.asarray(sounds.track, np.float64), sounds.track_offsets[1:-1]) if len(sounds) else []
-    level_from_recording = np.eye(4)
-    level_from_recording[:3, :3] = rotation_to_level(info.up.vector())
     return {
         "path": str(stored.path),
         "frames": info.counts.frames,
@@ -357,7 +355,7 @@ def describe(stored: StoredMap) -> dict[str, Any]:
         "seed": info.seed,
         "finished": info.timings.finished,
         "frame": FRAME,
-        "level_from_recording": level_from_recording.tolist(),
+        "level_from_recording": from_rotation(rotation_to_level(info.up.vector())).tolist(),
     }
 
 
