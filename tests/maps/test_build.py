@@ -329,7 +329,7 @@ def test_another_sound_track_is_another_map(tmp_path: Path) -> None:
 def test_finished_keyframes_and_sounds_are_not_made_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     walk = Walk(12, audio=write_beeps(tmp_path / "beeps.flac"))
     with monkeypatch.context() as patch:
-        patch.setattr("avlmaps.maps.build.merge", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+        patch.setattr("avlmaps.maps.build.surfaces", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
         with pytest.raises(KeyboardInterrupt):
             build(walk, tmp_path / "a")
     monkeypatch.setattr("avlmaps.maps.pipeline.keyframes.describe_keyframe", None)
