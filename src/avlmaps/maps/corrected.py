@@ -14,12 +14,11 @@ from avlmaps.core.poses import inverse
 from avlmaps.core.progress import silence_progress
 from avlmaps.core.timeline import Trajectory
 from avlmaps.core.wording import option
-from avlmaps.maps.audio.events import track_of
+from avlmaps.maps.audio.events import Motion, track_of
 from avlmaps.maps.audio.segmentation import Segment
 from avlmaps.maps.fusion.free_space import FreeViews, clean, count_where_it_matters
 from avlmaps.maps.fusion.moved_submaps import MovedSubmaps
 from avlmaps.maps.fusion.sensor import NONE
-from avlmaps.maps.growing_walk import Motion
 from avlmaps.maps.pipeline.sources import locate_sources
 from avlmaps.maps.pipeline.write import carving_doubts
 from avlmaps.maps.pose_correction import PoseCorrection

@@ -568,9 +568,7 @@ class GrowingMap:
             content, info = self._content(plan, came, *self._upright, final, looks_s)
         rig, grid = came.walk.rig, GridSpec(self.settings.voxel_size_m)
         sources, wait = self._known(content.sounds)
-        arrays = MapArrays(
-            content.voxels, content.keyframes, content.place_state, content.sounds, sources, wait
-        )  # fmt: skip
+        arrays = MapArrays(content.voxels, content.keyframes, content.place_state, content.sounds, sources, wait)
         up = self._upright[0].vector()
         return StoredMap(
             content.clips_folder, info, grid, up, arrays, self.encoders, rig, IntegrityCheck(content.clips_folder, {})

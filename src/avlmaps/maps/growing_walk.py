@@ -2,7 +2,6 @@
 
 import hashlib
 from copy import copy
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -10,24 +9,12 @@ import numpy as np
 from avlmaps.core.arrays import Float
 from avlmaps.core.camera import Rig
 from avlmaps.core.errors import RecordingError
+from avlmaps.maps.audio.events import Motion
 from avlmaps.maps.pose_correction import PoseCorrection, moved_frame
 from avlmaps.recordings.memory import MemoryRecording, frame_digest
 from avlmaps.recordings.types import Frame, Recording
 
 HERE = Path("the frames")  # as sentences name what came from no file
-
-
-@dataclass(frozen=True, slots=True)
-class Motion:
-    """Where the robot was, also in frames that were not fused.
-
-    Attributes:
-        stamps_s: rising seconds.
-        world_from_camera: poses then.
-    """
-
-    stamps_s: Float[np.ndarray, " n"]
-    world_from_camera: Float[np.ndarray, "n 4 4"]
 
 
 class _Poses:

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Protocol, cast
+from typing import cast
 
 import numpy as np
 
@@ -54,11 +54,12 @@ def detect_events(
         pieces = by_changes(recording.audio, cast("FrameSoundEncoder", encoder), settings.changes)
     else:
         pieces = _by_energy(recording.audio, encoder, settings)
+    motion = Motion(recording.stamps_s, recording.world_from_camera)
     heard: list[Heard] = []
     for found, sound, feature in pieces:
         clip = f"{found.onset_s:010.3f}.flac"
         write_flac(clips_folder / clip, sound)
-        heard.append(Heard(found, track_of(recording, found), feature, clip))
+        heard.append(Heard(found, track_of(motion, found), feature, clip))
     _tell_outside(recording, [one.segment for one in heard])
     return collect(heard, encoder.card.dim)
 
@@ -119,18 +120,17 @@ def by_changes(track: AudioTrack, encoder: FrameSoundEncoder, settings: ChangeSe
             yield stretch, sound, features[begin:end]
 
 
-class Motion(Protocol):
-    """Where a robot was, and when: a recording, or the frames that came until then."""
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """Where a robot was, also in frames that were not fused; perhaps nowhere yet.
 
-    @property
-    def stamps_s(self) -> Float[np.ndarray, " n"]:
-        """Rising seconds."""
-        ...
+    Attributes:
+        stamps_s: rising seconds.
+        world_from_camera: poses then.
+    """
 
-    @property
-    def world_from_camera(self) -> Float[np.ndarray, "n 4 4"]:
-        """Poses then."""
-        ...
+    stamps_s: Float[np.ndarray, " n"]
+    world_from_camera: Float[np.ndarray, "n 4 4"]
 
 
 def track_of(walk: Motion, heard: Segment) -> Float32[np.ndarray, "places 3"]:

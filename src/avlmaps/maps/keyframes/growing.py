@@ -2,8 +2,9 @@
 
 import tempfile
 import weakref
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from time import perf_counter
 from typing import BinaryIO
 
@@ -37,11 +38,11 @@ _MOST_LEFT = 40
 
 @dataclass(frozen=True, slots=True)
 class PicturedKeyframe:
-    """A keyframe without its place, and where its picture (PNG) lies for that."""
+    """A keyframe without its place, and what reads its picture for that."""
 
     index: int
     keyframe: DescribedKeyframe
-    picture: "_Picture | None"
+    picture: Callable[[], UInt8[np.ndarray, "h w 3"]] | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,7 +178,7 @@ class GrowingKeyframes:
             if one.index not in self._places:
                 with perceiving(f"The place encoder {encoder.card.id}", f"frame {one.index}"):
                     assert one.picture is not None
-                    found = encoder.encode(one.picture.read(), one.keyframe.local, self._state)
+                    found = encoder.encode(one.picture(), one.keyframe.local, self._state)
                 self._places[one.index] = np.asarray(found, np.float32)
         return [self._places[one.index] for one in seen]
 
@@ -226,8 +227,8 @@ class _PictureFile:
         self._file: BinaryIO | None = None
         self._end = 0
 
-    def put(self, rgb: UInt8[np.ndarray, "h w 3"]) -> "_Picture":
-        """Store a picture, without loss.
+    def put(self, rgb: UInt8[np.ndarray, "h w 3"]) -> Callable[[], UInt8[np.ndarray, "h w 3"]]:
+        """Store a picture, without loss, and return what reads it.
 
         Raises:
             MapError: the disk is full.
@@ -245,26 +246,14 @@ class _PictureFile:
                 f"A keyframe's picture cannot be stored in {tempfile.gettempdir()} ({fault.strerror or fault}), and is "
                 "left out; make room there, or name another folder in TMPDIR."
             ) from fault
-        where = _Picture(self, self._end, len(png))
+        read = partial(self._read, self._end, len(png))
         self._end += len(png)
-        return where
+        return read
 
-    def read(self, at: int, size: int) -> UInt8[np.ndarray, "h w 3"]:
+    def _read(self, at: int, size: int) -> UInt8[np.ndarray, "h w 3"]:
         """Return a picture: written of RGB as if it were BGR, and read likewise, which are the same numbers again."""
         assert self._file is not None
         self._file.seek(at)
         picture = cv2.imdecode(np.frombuffer(self._file.read(size), np.uint8), cv2.IMREAD_COLOR)
         assert picture is not None
         return picture
-
-
-@dataclass(frozen=True, slots=True)
-class _Picture:
-    """Where a picture lies."""
-
-    file: _PictureFile
-    at: int
-    size: int
-
-    def read(self) -> UInt8[np.ndarray, "h w 3"]:
-        return self.file.read(self.at, self.size)

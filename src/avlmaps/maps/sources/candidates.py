@@ -97,10 +97,7 @@ def _flattened(surface: Float[np.ndarray, "c 3"]) -> Float[np.ndarray, " c"]:
 def _keys(cell: Int[np.ndarray, "n k"]) -> Int[np.ndarray, " n"]:
     """Return a number for each cell, the same for the same cell, in the order of the cells' rows."""
     low = cell.min(axis=0)
-    key = np.zeros(len(cell), np.int64)
-    for axis, size in enumerate((cell.max(axis=0) - low + 1).tolist()):
-        key = key * size + (cell[:, axis] - low[axis])
-    return key
+    return np.asarray(np.ravel_multi_index(tuple((cell - low).T), tuple(cell.max(axis=0) - low + 1)))
 
 
 def _means(point: Float[np.ndarray, "n 3"], cell: Int[np.ndarray, "n 3"]) -> Float[np.ndarray, "c 3"]:
