@@ -48,5 +48,5 @@ def test_any_line_has_few_completions_each_of_which_replaces_typed_text(line: st
     found = completions(line, VERBS, (), here)
     assert len(found) <= 40
     for one in found:
-        assert one.start <= len(line)
-        assert one.text.startswith(line[len(line) - one.start :].lower())
+        assert -one.start_position <= len(line)
+        assert one.text.startswith(line[len(line) + one.start_position :].lower())

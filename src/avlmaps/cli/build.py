@@ -20,9 +20,13 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Sequence
 
     from avlmaps.maps.pipeline.ray_pool import RayPool
-    from avlmaps.perception.cache.feature_store import CacheSettings
     from avlmaps.perception.encoders import Encoders
     from avlmaps.recordings.types import Recording
+
+
+_OF_ONE_RECORDING = (
+    "audio", "microphones", "same_device", "topics", "submaps", "corrected_poses", "close_loops", "fresh",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,6 +140,7 @@ def build(verb: "Build") -> dict[str, Any]:
     from avlmaps.maps.pipeline.cluster import Spread
     from avlmaps.maps.pipeline.workers import ALONE
     from avlmaps.maps.settings import SUBMAP_FRAMES, BuildSettings, FrameSettings, FusionSettings, GravitySettings
+    from avlmaps.perception.cache.feature_store import CacheSettings
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.rules import build_settings
 
@@ -146,10 +151,9 @@ def build(verb: "Build") -> dict[str, Any]:
         raise UsageError(
             f"The paper's rules use every depth as it is; leave out --sensor {verb.sensor} or --rules paper."
         )
-    used, cache = (
-        choose_models(verb.profile, [word for words in verb.model for word in words]),
-        _cache(verb.feature_cache, verb.feature_cache_gb),
-    )
+    used = choose_models(verb.profile, [word for words in verb.model for word in words])
+    place = verb.feature_cache
+    cache = CacheSettings(place if place in ("auto", "off") else user_path(place), verb.feature_cache_gb)
     openings = _openings(verb)
     recording = openings[0]()
     for notice in recording.notices:
@@ -219,21 +223,10 @@ def _openings(verb: "Build") -> "list[Callable[[], Recording]]":
         audio, microphones = audio and audio.absolute(), microphones and microphones.absolute()
         if Path(topics.get("pose", "")).is_file():
             topics["pose"] = str(Path(topics["pose"]).absolute())
-    if len(groups) > 1:
-        for name in (
-            "audio",
-            "microphones",
-            "same_device",
-            "topics",
-            "submaps",
-            "corrected_poses",
-            "close_loops",
-            "fresh",
-        ):
-            if getattr(verb, name):
-                raise UsageError(
-                    f"--{name.replace('_', '-')} is of one recording; build a map of each, then `avlmaps merge` them."
-                )
+    if len(groups) > 1 and (given := [name for name in _OF_ONE_RECORDING if getattr(verb, name)]):
+        raise UsageError(
+            f"--{given[0].replace('_', '-')} is of one recording; build a map of each, then `avlmaps merge` them."
+        )
     open_one = partial(
         open_recording,
         format=verb.format,
@@ -275,11 +268,3 @@ def choose_models(name: str, words: "Sequence[str]") -> "Encoders":
     except ValueError as problem:
         raise UsageError(f"--model {problem}") from None
     return encoders_of(profile(name).choosing(choices))
-
-
-def _cache(place: str, limit_gb: float) -> "CacheSettings":
-    from avlmaps.perception.cache.feature_store import CacheSettings
-
-    if place in ("auto", "off"):
-        return CacheSettings(place, limit_gb)
-    return CacheSettings(user_path(place), limit_gb)

@@ -1,5 +1,6 @@
 """`avlmaps query`: ask a map for places."""
 
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
@@ -7,7 +8,7 @@ from tyro.conf import Positional, arg
 
 from avlmaps.cli.address_space import require_address_space
 from avlmaps.cli.locate import numbers_of
-from avlmaps.cli.output import emit, query_lines
+from avlmaps.cli.output import UsageError, emit, query_lines
 from avlmaps.cli.verb import MapVerb, OptionalPath, OptionalText, idle
 from avlmaps.core.frames import FrameName
 
@@ -24,7 +25,7 @@ class Query(MapVerb):
     avlmaps query MAP --object "red cabinet" --sound-clip bark.ogg --plot heat.png
     """
 
-    compiles: ClassVar[bool] = False  # `asking` announces loops where the question runs some
+    compiles: ClassVar[bool] = False  # `ask` announces loops where the question runs some
 
     sentence: Annotated[Positional[str], arg(metavar="[SENTENCE]")] = ""
     """Query in words; leave it out to name the parts with options."""
@@ -70,13 +71,17 @@ def ask(verb: "Query", opened: "AVLMap | None" = None) -> dict[str, Any]:
     Args:
         verb: the query.
         opened: the map, where it is open already.
+
+    Raises:
+        UsageError: what is given does not fit together.
     """
-    from avlmaps.cli.asking import answered
+    from avlmaps.core.compiling import announce_compiling
     from avlmaps.core.question import Modality
+    from avlmaps.query.asking import Asked, AskError, Files, thing_alone
+    from avlmaps.query.asking import ask as ask_map
     from avlmaps.query.avlmap import AVLMap, QuerySettings
 
-    primary = None if verb.primary is None else Modality(verb.primary)
-    numbers = None if verb.intrinsics is None else numbers_of(verb.intrinsics)
+    files = Files(None if verb.intrinsics is None else numbers_of(verb.intrinsics))
     settings = QuerySettings(found_at=verb.found_at)
     if verb.rules != "ours":
         from avlmaps.query.rules import query_settings
@@ -86,17 +91,30 @@ def ask(verb: "Query", opened: "AVLMap | None" = None) -> dict[str, Any]:
         settings = replace(settings, sounds=replace(settings.sounds, at=verb.at))
     if opened is not None and opened.settings != settings:
         opened = AVLMap(opened.stored, settings)
-    given = {
-        "object": verb.object,
-        "sound": verb.sound,
-        "area": verb.area,
-        "image": verb.image,
-        "clip": verb.sound_clip,
-    }
-    told = answered(
-        lambda: opened or AVLMap.open(verb.map, settings), verb.sentence, verb.top, primary=primary,
-        intrinsics=numbers, plot=verb.plot, frame=FrameName(verb.frame), **given,
-    )  # fmt: skip
+    if verb.top < 1:
+        raise UsageError(f"--top is {verb.top}; it must be 1 or more.")
+    photo, clip = (None if file is None else str(file) for file in (verb.image, verb.sound_clip))
+    primary = None if verb.primary is None else Modality(verb.primary)
+    try:
+        asked = Asked(
+            sentence=verb.sentence, object=verb.object, sound=verb.sound, area=verb.area, image=photo, clip=clip,
+            primary=primary, top=verb.top,
+        )  # fmt: skip
+        opened = opened or AVLMap.open(verb.map, settings)
+        # A question about one thing runs no loops that are compiled, and loads nothing to announce them.
+        quick = verb.plot is None and thing_alone(asked, opened) is not None
+        with nullcontext() if quick else announce_compiling():
+            answer = ask_map(opened, asked, files)
+            drawn = {}
+            if verb.plot is not None and answer.heat is not None:
+                drawn = {"plot": str(answer.heat.plot(verb.plot, top=verb.top))}
+    except AskError as error:
+        raise UsageError(str(error)) from None
+    told: dict[str, Any] = {**answer.to_dict(), **drawn}
+    if verb.frame != FrameName.RECORDING:
+        from avlmaps.query.frames import answer_in
+
+        told = answer_in(told, FrameName(verb.frame), opened.space.level_from_recording)
     notes: list[str] = []
     if not any(part["modality"] == Modality.SOUND for part in told["parts"]):
         notes += idle(verb, ["at"], "no sound is named")

@@ -2,7 +2,6 @@
 
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import cache
 
 from prompt_toolkit.completion import CompleteEvent, Completer, Completion
@@ -16,22 +15,7 @@ _MOST_WORDS = 4  # of a name that is being typed
 _MOST_SHOWN = 40
 
 
-@dataclass(frozen=True, slots=True)
-class Completed:
-    """One completion.
-
-    Attributes:
-        text: what stands there then.
-        start: how many characters before the cursor it replaces.
-        note: shown beside it.
-    """
-
-    text: str
-    start: int
-    note: str = ""
-
-
-def completions(line: str, verbs: Sequence[str], file_verbs: Sequence[str], here: Iterable[str]) -> list[Completed]:
+def completions(line: str, verbs: Sequence[str], file_verbs: Sequence[str], here: Iterable[str]) -> list[Completion]:
     """Return the completions of a line, at most 40.
 
     Args:
@@ -43,7 +27,8 @@ def completions(line: str, verbs: Sequence[str], file_verbs: Sequence[str], here
     first, blank, rest = line.lstrip().partition(" ")
     if blank and first in file_verbs:
         return list(_files(rest.lstrip()))[:_MOST_SHOWN]
-    found = [] if blank else [Completed(verb, len(first), "verb") for verb in verbs if verb.startswith(first.lower())]
+    begun = [] if blank else [verb for verb in verbs if verb.startswith(first.lower())]
+    found = [Completion(verb, -len(first), display_meta="verb") for verb in begun]
     words = line.split(" ")
     for count in range(min(_MOST_WORDS, len(words)), 0, -1):
         named = list(_named(" ".join(words[-count:]), here))
@@ -53,14 +38,14 @@ def completions(line: str, verbs: Sequence[str], file_verbs: Sequence[str], here
     return found[:_MOST_SHOWN] if line.strip() else []
 
 
-def _named(typed: str, here: Iterable[str]) -> Iterator[Completed]:
+def _named(typed: str, here: Iterable[str]) -> Iterator[Completion]:
     """Yield the names that begin so; those of this map first."""
     if not typed.strip() or typed[0] == " ":
         return
     names = dict.fromkeys(_lexicon_names(), "") | dict.fromkeys(here, "in this map")
     for name in sorted(names, key=lambda one: (not names[one], one)):
         if name.startswith(typed.lower()) and not UNSAFE.search(name):
-            yield Completed(name, len(typed), names[name])
+            yield Completion(name, -len(typed), display_meta=names[name])
 
 
 @cache
@@ -70,7 +55,7 @@ def _lexicon_names() -> tuple[str, ...]:
     return tuple(sorted(names | {*words.colours, *words.materials}))
 
 
-def _files(typed: str) -> Iterator[Completed]:
+def _files(typed: str) -> Iterator[Completion]:
     """Yield the files and folders whose names begin so, written as the shell reads them back."""
     plain = typed.replace("\\ ", " ").strip("'\"")
     folder, _, begin = plain.rpartition("/")
@@ -84,7 +69,7 @@ def _files(typed: str) -> Iterator[Completed]:
         if not name.startswith(begin) or UNSAFE.search(name) or (name.startswith(".") and not begin):
             continue
         whole = f"{folder}/{name}" if "/" in plain else name
-        yield Completed(shlex.quote(whole) + ("/" if entry.is_dir() else ""), len(typed))
+        yield Completion(shlex.quote(whole) + ("/" if entry.is_dir() else ""), -len(typed))
 
 
 class NameCompleter(Completer):
@@ -102,6 +87,4 @@ class NameCompleter(Completer):
 
     def get_completions(self, document: Document, complete_event: CompleteEvent) -> Iterator[Completion]:
         """Yield the completions of what stands before the cursor."""
-        found = completions(document.text_before_cursor, self._verbs, self._file_verbs, tuple(self._here()))
-        for one in found:
-            yield Completion(one.text, -one.start, display_meta=one.note)
+        yield from completions(document.text_before_cursor, self._verbs, self._file_verbs, tuple(self._here()))

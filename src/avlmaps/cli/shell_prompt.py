@@ -55,14 +55,9 @@ class PromptLines:
             return False
 
 
-def history_path() -> Path:
-    """Return the file of the history, in the user's state folder."""
-    return state_file("shell_history")
-
-
 def _history() -> FileHistory | InMemoryHistory:
     """Return the history in its file, which nobody else may read; that of this session where there can be no file."""
-    path = history_path()
+    path = state_file("shell_history")
     try:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         with path.open("ab+") as file:
