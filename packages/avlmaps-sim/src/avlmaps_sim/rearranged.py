@@ -41,13 +41,7 @@ _KEPT_SHARE = 0.9  # of the floor that a robot reached before
 class Change:
     """One change from a day to the next.
 
-    Attributes:
-        day: on which it is there first.
-        kind: what happened.
-        name: of the thing.
-        category: of the thing.
-        before: middle of its box on the day before; None for what was brought.
-        after: middle of its box; None for what was taken away.
+    ``before`` and ``after`` are middles of its box; None for what was brought, or was taken away.
     """
 
     day: int

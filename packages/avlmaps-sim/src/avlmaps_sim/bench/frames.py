@@ -34,11 +34,7 @@ Table = Mapping[str, Any]
 class FrameFigures:
     """Results over all frames.
 
-    Attributes:
-        confusion: pixels of each true class (rows) that were taken for each class.
-        frames: how many frames there were.
-        floors_labelled: in how many the labels gave the floor.
-        right_by_frame: share of right pixels of each frame that has any.
+    Rows of ``confusion`` are true classes; ``floors_labelled`` counts the frames whose labels gave the floor.
     """
 
     confusion: Int[np.ndarray, "37 37"]

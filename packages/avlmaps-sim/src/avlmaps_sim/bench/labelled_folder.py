@@ -39,10 +39,8 @@ _FLOOR = CLASSES.index("floor") + 1
 class LabelledFrame:
     """A frame and its truth.
 
-    Attributes:
-        frame: colour and depth, with its ground.
-        label: (h, w) class 1 to 40, 0 where there is none.
-        floor_is_labelled: the labels gave the camera's height; else ``find_ground`` estimated it from this frame.
+    Labels are classes 1 to 40, 0 where there is none; where these do not give the camera's height, ``find_ground``
+    estimated it from this frame.
     """
 
     frame: Frame
@@ -51,15 +49,7 @@ class LabelledFrame:
 
 
 class LabelledFolder:
-    """The frames of a folder, read one at a time.
-
-    Args:
-        folder: see the module.
-
-    Attributes:
-        names: of the frames, in the order of ``frames.csv``.
-        camera: of all frames.
-    """
+    """The frames of a folder (see the module) in the order of ``frames.csv``, read one at a time."""
 
     def __init__(self, folder: Path) -> None:
         """Read the index and the camera.

@@ -48,13 +48,7 @@ Row = Mapping[str, Any]
 class Judged:
     """One row and what became of it.
 
-    Attributes:
-        say: the sentence.
-        is_question: whether it is for `query`.
-        outcome: one of `OUTCOMES`.
-        got: what the parser made of it, as JSON.
-        wanted: what the list has.
-        danger: whether a wrong motion may hurt, as the list says.
+    ``outcome`` is one of `OUTCOMES`; a wrong motion may hurt where the list says ``danger``.
     """
 
     say: str

@@ -41,14 +41,7 @@ _LOCATING, _KEYFRAMES = LocateSettings(), KeyframeSettings()
 
 @dataclass(frozen=True, slots=True)
 class MapOfPictures:
-    """The parts of a map that locating needs.
-
-    Attributes:
-        keyframes: what was seen.
-        place_state: what the place encoder learned.
-        encoders: what perceives.
-        rig: the cameras.
-    """
+    """The parts of a map that locating needs."""
 
     keyframes: Keyframes
     place_state: dict[str, np.ndarray]
@@ -60,10 +53,7 @@ class MapOfPictures:
 class Errors:
     """Results of some photos.
 
-    Attributes:
-        cm: distance to the true place; infinite where a photo was not located.
-        deg: angle to the true rotation; infinite likewise.
-        elapsed_ms: for each photo.
+    Distances to the true place and angles are infinite where a photo was not located.
     """
 
     cm: Float[np.ndarray, " n"]

@@ -48,10 +48,7 @@ _MOSTLY, _A_QUARTER = 0.5, 0.25
 class Instances:
     """The map's answer for one category.
 
-    Attributes:
-        category: the queried category.
-        confidence: of each instance.
-        is_true: whether most of its voxels lie in boxes of true ones.
+    Most of the voxels of a true one lie in boxes of true things.
     """
 
     category: str
@@ -63,15 +60,9 @@ class Instances:
 class ObjectFigures:
     """The results of one scene.
 
-    Attributes:
-        scene: its name.
-        reached: for each category that is there the distance of the first goal to a true one, metres; inf for none.
-        said: the instances of every category of the vocabulary.
-        true_count: how many true things of some size the walk saw.
-        found_count: how many of them the confident instances hold.
-        best: for every queried category the highest confidence, and whether it is there.
-        voxels: of each thing how many voxels lie in its box alone.
-        named: how many of them have its name as their likeliest.
+    ``reached`` is the distance from the first goal to a true one, metres, inf for none. ``true_count`` counts the
+    things of some size that the walk saw, ``found_count`` those that confident instances hold; ``voxels`` lie in the
+    box of one thing alone, ``named`` of them have its name as their likeliest.
     """
 
     scene: str

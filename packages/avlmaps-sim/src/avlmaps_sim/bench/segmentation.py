@@ -55,14 +55,8 @@ _CONDITIONS: tuple[tuple[str, float | None], ...] = (
 class Tally:
     """The sounds that were found and missed, over many tracks.
 
-    Attributes:
-        sounds: how many there were.
-        found: how many of them a segment of their own overlaps.
-        pieces: how many segments overlap a sound.
-        false_alarms: how many segments overlap none.
-        seconds: how much track was searched.
-        onset_s: for each found sound, how much later it was said to begin than it does.
-        offset_s: the same for its end.
+    A found sound has a segment of its own; ``pieces`` overlap a sound, false alarms none. Onsets and offsets are by how
+    much later than true ones they were said to be, of found sounds.
     """
 
     sounds: int = 0

@@ -39,11 +39,8 @@ _HIGHEST_ORDER = 60
 class NamedClip:
     """A row of the index.
 
-    Attributes:
-        path: of the file.
-        category: what the index calls it.
-        kind: the encoder's kind, or "" for one that it does not know.
-        heard: whether the weights were fitted to the recording that it was cut from.
+    ``kind`` is "" where the encoder knows none; ``heard``: the weights were fitted to the recording that it was cut
+    from.
     """
 
     path: Path

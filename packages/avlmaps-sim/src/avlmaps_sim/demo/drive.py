@@ -28,12 +28,7 @@ _MOST_LEGS = 2
 class Drive:
     """A command, and what became of it.
 
-    Attributes:
-        command: the command to the robot.
-        asks: what each leg goes to, with its truth.
-        start: where it stood; None where it could not be put anywhere.
-        outcome: what it did; None where it could not begin.
-        error: why not, or why it did not end.
+    ``start`` and ``outcome`` are None where it could not begin; ``error`` says why not, or why it did not end.
     """
 
     command: str

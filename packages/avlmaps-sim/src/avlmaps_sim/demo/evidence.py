@@ -19,12 +19,7 @@ LEAST_SHARE, LEAST_FRAMES = 0.006, 2
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """A true place: the box round a thing, or a single point.
-
-    Attributes:
-        low: lowest corner, metres, world.
-        high: highest corner.
-    """
+    """A true place: the box round a thing, or a single point; metres, world."""
 
     low: Triple
     high: Triple
@@ -55,13 +50,7 @@ class Box:
 class Evidence:
     """A home and a walk through it.
 
-    Attributes:
-        objects: every thing that stands there.
-        shown: which of them the walk showed well.
-        areas: the rooms.
-        events: the sounds of the track, in the order of their onsets.
-        stamps_s: when each frame was taken.
-        walk: (n, 3) where the camera was, metres, world.
+    ``shown`` are the things that the walk showed well; events are in the order of their onsets.
     """
 
     objects: tuple[SceneObject, ...]

@@ -13,10 +13,7 @@ from avlmaps_sim.demo.questions import MAP, REACH_M, Ask
 class Step:
     """One question of the demonstration and what became of it.
 
-    Attributes:
-        ask: the question and its truth.
-        answer: what the map said, as `avlmaps query --json` prints it.
-        picture: file name of its plot, in the demonstration's folder.
+    ``answer`` is what `avlmaps query --json` prints.
     """
 
     ask: Ask
@@ -63,14 +60,8 @@ class Step:
 class DemoReport:
     """The products of the demonstration.
 
-    Attributes:
-        out: its folder.
-        scene: the home's name, as `avlmaps record --scene` takes it.
-        steps: the questions.
-        built: what `avlmaps build --json` prints.
-        located: the photo's pose error in cm and degrees, or None where it was not located.
-        seconds: how long each stage took.
-        drive: the drive of the robot; None where there was nothing to go to.
+    ``built`` is what `avlmaps build --json` prints; ``located`` is the photo's pose error in cm and degrees, None where
+    it was not located.
     """
 
     out: Path

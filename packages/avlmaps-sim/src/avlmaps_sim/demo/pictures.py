@@ -30,9 +30,7 @@ _HEAT = np.array([(122, 4, 48), (214, 53, 34), (250, 142, 28), (255, 226, 110)],
 class TopView:
     """A picture seen from straight above.
 
-    Attributes:
-        rgba: the picture; clear where there is nothing.
-        extent: left, right, bottom and top of it, metres.
+    It is clear where there is nothing; the extent is left, right, bottom and top, metres.
     """
 
     rgba: UInt8[np.ndarray, "h w 4"]
@@ -43,12 +41,7 @@ class TopView:
 class Strip:
     """Moments of a walk side by side.
 
-    Attributes:
-        index: the frames.
-        colour: their colour pictures in a row.
-        depth: their depth, near is warm.
-        seen: what the network makes of them, a colour for each category.
-        legend: category, colour and share of all pixels, the most seen first.
+    Near is warm; the legend has category, colour and share of all pixels, the most seen first.
     """
 
     index: tuple[int, ...]

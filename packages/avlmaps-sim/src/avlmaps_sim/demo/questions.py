@@ -73,10 +73,8 @@ class Ask:
 class PhotoView:
     """A picture that the robot did not take.
 
-    Attributes:
-        world_from_camera: where it was taken.
-        share: for each thing the part of the pixels that shows it.
-        away_m: horizontal distance to the nearest place of the walk.
+    ``share`` is for each thing the part of the pixels that shows it; ``away_m`` is the distance from the walk,
+    horizontally.
     """
 
     world_from_camera: Float[np.ndarray, "4 4"]

@@ -45,11 +45,7 @@ _BROKEN = (ValueError, KeyError, IndexError, TypeError, AttributeError, OSError,
 class MeshPart:
     """One mesh of a file, placed in the file's own axes.
 
-    Attributes:
-        category: what it belongs to, ``""`` where nothing says so.
-        instance: which thing it belongs to.
-        mesh: its triangles.
-        vertex_colour: (v, 3) as the file has it, where it has no picture; else None.
+    ``vertex_colour`` is as the file has it, None where there is a picture.
     """
 
     category: str

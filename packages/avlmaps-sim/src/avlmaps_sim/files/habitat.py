@@ -45,12 +45,7 @@ class _Template:
 class _DataSet:
     """The folder a scene belongs to.
 
-    Attributes:
-        root: where its config lies.
-        files: template files by name: configs before models.
-        words: category by semantic id.
-        categories: category by template.
-        meshes: what is read of each model, in its own axes.
+    Configs come before models in ``files``; ``words`` are categories by semantic id, ``categories`` by template.
     """
 
     root: Path

@@ -20,13 +20,7 @@ _FINE = 200_000  # meshes of more triangles than this get one colour for each
 
 @dataclass(frozen=True, slots=True)
 class Label:
-    """The annotation of one thing.
-
-    Attributes:
-        category: what it is.
-        name: what the file calls it.
-        area: index of its area, −1 for none.
-    """
+    """The annotation of one thing."""
 
     category: str
     name: str

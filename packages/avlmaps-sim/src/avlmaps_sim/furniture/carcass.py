@@ -19,12 +19,7 @@ _SHADOW = Material((0.05, 0.045, 0.04), gloss=0.0)
 
 @dataclass(frozen=True, slots=True)
 class Room:
-    """A box in the air that a carcass or its inside fills, metres.
-
-    Attributes:
-        low: least corner.
-        high: greatest corner; the front is at its greatest x.
-    """
+    """A box in the air that a carcass or its inside fills, metres; the front is at its greatest x."""
 
     low: tuple[float, float, float]
     high: tuple[float, float, float]
@@ -34,13 +29,7 @@ class Room:
 class FrontStyle:
     """How the doors and drawers of one piece look.
 
-    Attributes:
-        panel: what fills a door.
-        grip: what one pulls.
-        gap: between two of them, metres.
-        thick: of a front, metres.
-        look: their material.
-        metal: the grips' material.
+    ``gap`` and ``thick`` are in metres; ``metal`` is that of the grips.
     """
 
     panel: Panel

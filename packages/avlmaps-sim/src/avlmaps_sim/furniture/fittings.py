@@ -124,14 +124,8 @@ def dial(x: float, y: float, z: float, radius: float, look: Material, deep: floa
 class FrontStyle:
     """How the doors and drawers of one piece look.
 
-    Attributes:
-        look: of the panels.
-        metal: of the handles.
-        handle: "bar", "knob", "cup", "strip" or "none".
-        profile: "flat", "shaker", "panel", "planks" or "glass".
-        rail_m: width of the frame of a door.
-        gap_m: between two fronts.
-        thick_m: of a front.
+    ``handle`` is "bar", "knob", "cup", "strip" or "none"; ``profile`` is "flat", "shaker", "panel", "planks" or
+    "glass".
     """
 
     look: Material

@@ -50,12 +50,7 @@ class Synthesised:
 
 @dataclass(slots=True)
 class Recorded:
-    """Clips of a folder, laid out as ``avlmaps add-sounds`` reads them.
-
-    Attributes:
-        folder: where they are.
-        rate_hz: samples a second of what is drawn.
-    """
+    """Clips of a folder, laid out as ``avlmaps add-sounds`` reads them."""
 
     folder: Path
     rate_hz: int = 22_050

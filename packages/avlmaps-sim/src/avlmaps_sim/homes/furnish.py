@@ -65,12 +65,7 @@ def hangs(piece: Piece) -> bool:
 class PlacedPiece:
     """A piece that has its place.
 
-    Attributes:
-        piece: what.
-        place: where its origin is.
-        foot: its box.
-        floor_m: height of the floor under it.
-        number: its number on the ground, −1 for what nothing can meet.
+    ``number`` is that on the ground, -1 for what nothing can meet.
     """
 
     piece: Piece
@@ -100,20 +95,8 @@ def footprint(mesh: Mesh) -> Footprint:
 class Furnisher:
     """Furnishes one room.
 
-    Attributes:
-        rng: draws everything.
-        builder: the scene.
-        ground: what of the room is taken.
-        area: the room's index.
-        kind: the room's kind.
-        floor_m: height of its floor.
-        height_m: of its ceiling above the floor.
-        which: families of shapes to use.
-        has_ceiling: there is one to hang lamps from.
-        fill: how much stands in it, 1 for a room that has what it needs.
-        mess: how much lies about, from 0 to 1.
-        stood: the pieces that stand in it already.
-        laid: rectangles taken on tops, by the piece's identity and the top's height in centimetres.
+    ``fill`` is how much stands in it, 1 for a room that has what it needs; ``mess`` how much lies about, from 0 to 1.
+    ``laid`` are rectangles taken on tops, by the piece's identity and the top's height in centimetres.
     """
 
     rng: np.random.Generator

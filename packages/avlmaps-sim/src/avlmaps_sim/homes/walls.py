@@ -24,13 +24,7 @@ _FALLBACK = {"plaster": "painted", "tile": "ceramic", "parquet": "wood", "wallpa
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Looks:
-    """The looks of a room's surfaces.
-
-    Attributes:
-        wall: its walls.
-        floor: its floor.
-        ceiling: its ceiling.
-    """
+    """The looks of a room's surfaces."""
 
     wall: Material
     floor: Material
@@ -188,11 +182,7 @@ def hole_filling(rng: np.random.Generator, hole: Hole, wall_m: float, which: Fam
 class Leaf:
     """The space that a door needs in a room: an oriented box round its leaf, top-down.
 
-    Attributes:
-        centre: its middle.
-        half_m: its half extents, along its heading and across.
-        heading_rad: of the leaf, from its hinge.
-        room: the room.
+    Half extents are along its heading (from its hinge) and across.
     """
 
     centre: Float[np.ndarray, "2"]

@@ -59,14 +59,7 @@ class Spacing:
 
 @dataclass(slots=True)
 class Placer:
-    """Puts sounds of given lengths on a walk, each as early as the rule allows.
-
-    Attributes:
-        walk: the walk.
-        spacing: the rule.
-        onsets_s: where sounds are placed already.
-        lengths_s: how long they are.
-    """
+    """Puts sounds of given lengths on a walk, each as early as the rule allows."""
 
     walk: Walk
     spacing: Spacing

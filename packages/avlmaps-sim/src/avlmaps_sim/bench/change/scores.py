@@ -25,11 +25,7 @@ _TRUE = {"added": "appeared", "removed": "gone", "moved": "moved"}
 class Happened:
     """One change, as it is said or as it is true.
 
-    Attributes:
-        kind: ``appeared``, ``gone`` or ``moved``.
-        name: of the thing.
-        before: where it was; None for what appeared.
-        after: where it is; None for what is gone.
+    ``before`` is None for what appeared, ``after`` for what is gone.
     """
 
     kind: str
@@ -40,13 +36,7 @@ class Happened:
 
 @dataclass
 class Counts:
-    """Right, wrong and missed changes of each kind; adds up over days and homes.
-
-    Attributes:
-        right: by kind.
-        wrong: said and not true.
-        missed: true and not said.
-    """
+    """Right, wrong (said, not true) and missed (true, not said) changes by kind; adds up over days and homes."""
 
     right: dict[str, int] = field(default_factory=lambda: dict.fromkeys(KINDS, 0))
     wrong: dict[str, int] = field(default_factory=lambda: dict.fromkeys(KINDS, 0))
@@ -68,12 +58,8 @@ class Counts:
 class Listed:
     """How well a list of things stands for the last day.
 
-    Attributes:
-        listed: things.
-        stale: of those, what stood there on an earlier day and does so no more.
-        ghosts: of those, what is nothing that stands there.
-        known: true things of the last day that it holds.
-        true: true things of the last day that some day saw.
+    ``stale`` things stood there on an earlier day and do so no more, ``ghosts`` are nothing that stands there; it holds
+    the ``known`` of the ``true`` things that some day saw.
     """
 
     listed: int

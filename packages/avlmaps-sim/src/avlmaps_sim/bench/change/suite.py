@@ -66,19 +66,9 @@ DEFAULTS = (SceneSettings(scenes=SCENES, sources=3, ambiguous=0), DAYS)
 class HomeResult:
     """The results of one home with one perception.
 
-    Attributes:
-        scene: its name.
-        counts: of changes, over the days.
-        unnamed: the same, where names do not count.
-        happened: of each kind, how many changes of things that were seen, also where nobody looked at their place.
-        lists: how well the lists stand for the last day, by how they were made.
-        lost: static things said to be gone.
-        static: static things.
-        area_m2: of its floor.
-        off_m: by how much each day was misplaced, metres.
-        off_deg: and turned.
-        refused: days that were not recognised.
-        merge_s: seconds of each merge.
+    ``unnamed`` are counts where names do not matter, ``happened`` the changes of things that were seen, also where
+    nobody looked at their place. Of the ``static`` things some are ``lost``: said to be gone. Each day was misplaced by
+    ``off_m`` and ``off_deg``.
     """
 
     scene: str

@@ -24,14 +24,7 @@ REACH_M = 0.5  # a goal within this of a right place is right
 class Judged:
     """The answer to one query.
 
-    Attributes:
-        scene: where.
-        kind: of the query; see ``LabelledQuery``.
-        words: the query in a few words.
-        answerable: whether anything is right.
-        right: whether the first goal is.
-        probability: of the first goal; 0 without one.
-        evidence: of it; None without one.
+    ``right`` and the probability are those of the first goal, 0 without one.
     """
 
     scene: str

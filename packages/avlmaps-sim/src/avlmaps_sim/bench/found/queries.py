@@ -27,11 +27,7 @@ _PAIRS = 30  # queries for a thing near a thing, of a scene
 class LabelledQuery:
     """A query and what answers it.
 
-    Attributes:
-        kind: the table, or ``object``, ``sound`` or ``area`` alone.
-        parts: of the query, the sought one first.
-        targets: the boxes that are right; none where nothing is.
-        task: whose photo the query speaks of; None without one.
+    The sought part is the first; ``targets`` are the boxes that are right, none where nothing is.
     """
 
     kind: str

@@ -22,13 +22,7 @@ _SOFTNESS = 6.0  # of the posterior over kinds, in mean squared standard deviati
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WeakSounds:
-    """Kinds of sound by the mean and the spread of their log-mel spectra; four synthesised examples of each.
-
-    Attributes:
-        names: the kinds.
-        mean: (kinds, d) mean feature of each kind.
-        scale: (d,) spread of features within kinds.
-    """
+    """Kinds of sound by the mean and the spread of their log-mel spectra; four synthesised examples of each."""
 
     names: tuple[str, ...]
     mean: Float[np.ndarray, "k d"]
@@ -67,12 +61,7 @@ def _feature(sound: Sound) -> Float32[np.ndarray, " d"]:
 
 
 class WeakHearing:
-    """The sounds of a map, as a weaker sound encoder scores them.
-
-    Args:
-        avlmap: the map.
-        seed: of the ear's examples.
-    """
+    """The sounds of a map, as a weaker sound encoder scores them."""
 
     def __init__(self, avlmap: AVLMap, seed: int) -> None:
         self._avlmap, self._seed = avlmap, seed

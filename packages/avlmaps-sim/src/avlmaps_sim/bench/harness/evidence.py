@@ -37,10 +37,8 @@ class Box:
 class Event:
     """A sound that can be queried.
 
-    Attributes:
-        category: its name.
-        place: where it was heard (overlay) or came from (acoustic), metres, world.
-        track: the robot's places while it was heard (overlay); empty where ``place`` says it all.
+    ``place`` is where it was heard (overlay) or came from (acoustic), metres, world; ``track`` has the robot's places
+    while it was heard (overlay), or none.
     """
 
     category: str
@@ -57,14 +55,8 @@ class Event:
 class Evidence:
     """The things and sounds that are truly in a scene and were recorded.
 
-    Attributes:
-        scene: its name.
-        objects: its things.
-        seen: for each thing how many voxels of the map it fills.
-        areas: its rooms.
-        events: its sounds.
-        storey_m: heights between which lies the storey that was recorded; things of others are neither queried nor
-            rivals, since distances are horizontal.
+    ``seen`` says how many voxels of the map each thing fills. Things of other storeys than that between the heights
+    ``storey_m`` are neither queried nor rivals, since distances are horizontal.
     """
 
     scene: str
@@ -97,9 +89,7 @@ class Evidence:
 class Photo:
     """A picture that a query may use.
 
-    Attributes:
-        world_from_camera: where it was taken.
-        share: for each thing of the scene the part of the pixels that shows it.
+    ``share`` is for each thing of the scene the part of the pixels that shows it.
     """
 
     world_from_camera: Float[np.ndarray, "4 4"]

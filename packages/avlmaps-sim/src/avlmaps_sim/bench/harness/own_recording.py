@@ -40,12 +40,7 @@ def is_recording(spec: str) -> bool:
 
 @dataclass(eq=False)
 class OwnRecording:
-    """A recording and the truth beside it.
-
-    Attributes:
-        whole: all frames.
-        truth: things, and rooms and sounds where they are known.
-    """
+    """A recording and the truth beside it."""
 
     whole: Recording
     truth: Truth

@@ -18,12 +18,7 @@ _STEP_U, _STEP_V = 0.7548776662466927, 0.5698402909980532  # 1/p and 1/p², p³ 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrueVoxels:
-    """The voxels that a scene's surfaces pass through.
-
-    Attributes:
-        key: (m,) packed voxel index, rising.
-        instance: (m,) the thing that fills most of it.
-    """
+    """The voxels that a scene's surfaces pass through: packed indices, rising, and what fills most of each."""
 
     key: Int[np.ndarray, " m"]
     instance: Int[np.ndarray, " m"]

@@ -44,14 +44,7 @@ _RECIPE = 1  # raised when what a folder of work holds is made in another way
 class SceneJob:
     """The settings of the scenes that one process makes ready.
 
-    Attributes:
-        spec: the scene's name.
-        recorded: how it is recorded.
-        sounds: the folder of clips; None for sounds made by rule.
-        profile: the models that map it.
-        work: folder of all scenes' work.
-        models: other backends than the profile's, ``module=backend[@model]``.
-        rules: how it is mapped and queried.
+    Sounds are made by rule where there is no folder of clips; ``work`` holds all scenes' work.
     """
 
     spec: str
@@ -110,12 +103,7 @@ def scene_jobs(settings: SceneSettings, recorded: Recorded, names: Sequence[str]
 
 @dataclass(eq=False)
 class Workplace:
-    """A scene's folder of work; what is there already is not made again.
-
-    Attributes:
-        job: which scene.
-        open_spec: makes a scene of its name.
-    """
+    """A scene's folder of work; what is there already is not made again."""
 
     job: SceneJob
     open_spec: Callable[[str], Scene]

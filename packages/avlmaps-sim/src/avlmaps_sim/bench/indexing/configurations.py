@@ -20,12 +20,8 @@ OURS, CEILING = "ours", "true perception"
 class Configuration:
     """A row of a table.
 
-    Attributes:
-        kind: which table.
-        name: what the row is called.
-        sources: what is joined; the first is what is sought, the others say where it is.
-        needs: models that the profile must have.
-        role: ``baseline`` for single modalities, ``ours``, ``ceiling``, else ``variant``.
+    The first of the ``sources`` is what is sought, the others say where it is; ``role`` is ``baseline`` for single
+    modalities, ``ours``, ``ceiling``, else ``variant``.
     """
 
     kind: TaskKind

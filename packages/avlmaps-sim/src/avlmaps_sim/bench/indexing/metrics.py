@@ -18,14 +18,8 @@ _RESAMPLES = 2000
 class Answered:
     """A configuration's answer to a task.
 
-    Attributes:
-        task: the task's name.
-        configuration: whose answer.
-        position: the first goal, metres, world; None without any.
-        off_m: horizontal distance to the nearest point of the nearest target's box; for no answer the scene's largest
-            distance.
-        centre_m: the same to the middle of that box.
-        found: whether the map reported all that was queried as found.
+    ``position`` is the first goal, metres, world. Distances are horizontal, to the nearest point of the nearest
+    target's box and to its middle; for no answer they are the scene's largest.
     """
 
     task: str
@@ -47,12 +41,7 @@ def judged(task: Task, configuration: str, position: Triple | None, largest_m: f
 class Score:
     """A configuration's figures over all tasks of a table.
 
-    Attributes:
-        count: how many tasks.
-        answered: how many had an answer.
-        hits: how many answers were off by less than each of ``LIMITS_M``.
-        mean_m: mean distance.
-        mean_interval_m: 95 % of it, bootstrapped over the tasks.
+    Hits are off by less than each of ``LIMITS_M``; the interval of the mean is bootstrapped over the tasks.
     """
 
     count: int

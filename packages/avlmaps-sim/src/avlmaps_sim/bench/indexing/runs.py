@@ -61,15 +61,7 @@ class IndexingSettings(SceneSettings):
 class SceneOutcome:
     """The outcome of one scene.
 
-    Attributes:
-        scene: its name.
-        tasks: the tasks of the scene.
-        answers: of every configuration that the profile has the models for.
-        frames: frames of the map.
-        voxels: voxels of the map.
-        sounds: the numbers of sounds that were detected, and that there were.
-        seconds: of work.
-        clips: sound and clip of every event.
+    ``sounds`` counts those that were detected, and those that there were; ``clips`` are sound and clip of every event.
     """
 
     scene: str
@@ -86,11 +78,7 @@ class SceneOutcome:
 class Outcome:
     """The outcome of all scenes.
 
-    Attributes:
-        settings: what the benchmark was run on.
-        tasks: all tasks.
-        scenes: one outcome each.
-        weights: the checksum of every model, by module.
+    ``weights`` are the checksums of the models, by module.
     """
 
     settings: IndexingSettings

@@ -26,14 +26,8 @@ from avlmaps_sim.truth import Truth
 class QueriedScene:
     """A map and the truth of its scene; each source of heat is computed once.
 
-    Attributes:
-        avlmap: the map.
-        recording: what it was made of.
-        truth: what is there.
-        label: the true thing of each voxel, -1 for none.
-        hearing: whether a sound's true place is the robot's (``overlay``) or its source's (``acoustic``).
-        photo_of: draws the photo of a task.
-        seed: of the weak ear's examples.
+    ``label`` is the true thing of each voxel, -1 for none; a sound's true place is the robot's (``overlay``) or its
+    source's (``acoustic``). The seed is that of the weak ear's examples.
     """
 
     avlmap: AVLMap

@@ -27,17 +27,9 @@ _THREADS = {"fusing": "avlmaps-fuse", "snapshots": "avlmaps-behind", "saving": "
 class Played:
     """What a drive took.
 
-    Attributes:
-        frames: that came.
-        seconds: that it lasted.
-        close_s: seconds until it was closed, most of them for frames that waited on the disk.
-        status: at its end.
-        encoded_later: frames that waited on the disk and were encoded after all.
-        asked_ms: of each question meanwhile.
-        processor_ms: a frame, by thread; ``all`` has reading the recording and the questions in it.
-        unsaved_s: how old the oldest thing was, at most, that a kill would have lost.
-        laps: after each lap: voxels, keyframes, frames fused until then, resident MB.
-        load: of the machine, at the end.
+    ``close_s`` goes mostly to frames that waited on the disk, of which ``encoded_later`` were encoded after all.
+    ``processor_ms`` is that of a frame, by thread; ``all`` has reading and questions in it. A kill would have lost
+    things of at most ``unsaved_s``. Each lap has voxels, keyframes, frames fused until then, and resident MB.
     """
 
     frames: int = 0

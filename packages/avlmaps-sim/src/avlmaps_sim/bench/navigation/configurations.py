@@ -14,14 +14,7 @@ _PHOTOS = (Kind.LOCAL, Kind.PLACE, Kind.MATCHER)
 
 @dataclass(frozen=True, slots=True)
 class Configuration:
-    """A row of a table.
-
-    Attributes:
-        name: what the row is called.
-        senses: where heat comes from.
-        series: the experiments that it is run on.
-        needs: models that the profile must have.
-    """
+    """A row of a table."""
 
     name: str
     senses: Senses

@@ -29,12 +29,7 @@ _EXACT_M = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Foreknowledge:
-    """The obstacles that a map knows before a robot drives.
-
-    Attributes:
-        obstacles: the map's own grid.
-        radius_m: of the robot.
-    """
+    """The obstacles that a map knows before a robot drives."""
 
     obstacles: Obstacles
     radius_m: float
@@ -58,12 +53,7 @@ class Foreknowledge:
 
 
 class WatchedBody:
-    """Passes every movement on to a body and counts what it touched.
-
-    Args:
-        body: the body.
-        known: what the map knew.
-    """
+    """Passes every movement on to a body and counts what it touched."""
 
     def __init__(self, body: Body, known: Foreknowledge) -> None:
         self._body, self._known = body, known
@@ -112,15 +102,7 @@ class _Log:
 class Pilot:
     """Everything that a mission in one scene needs.
 
-    Attributes:
-        scene: its map and its truth.
-        floor: where one can truly drive.
-        launch: puts a body at a place and gives a driver for it.
-        translator: from sentences to programs; None runs the missions' own programs.
-        photos: folder of the photos.
-        photo_names: the files of a mission's photos, as it names them.
-        guess: whether robots go to the best guess where nothing is found.
-        seed: of the benchmark.
+    ``launch`` puts a body at a place and gives a driver for it; without a translator the missions' own programs run.
     """
 
     scene: KnownScene

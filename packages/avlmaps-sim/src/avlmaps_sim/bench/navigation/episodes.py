@@ -17,18 +17,8 @@ from avlmaps_sim.bench.navigation.missions import Series
 class Leg:
     """The outcome of one subgoal.
 
-    Attributes:
-        said: how it was named.
-        kind: how it is named: object, sound ...
-        stop: x and y in metres and heading in radians; None where the robot stopped for no such goal.
-        off_m: how far the stop is from the nearest right thing, horizontally.
-        reached: whether that is right.
-        reachable: whether any robot of this size could have.
-        shortest_m: the shortest path from where it stood before, in truth; None where there is none.
-        path_m: what it drove.
-        actions: how many actions it took.
-        contacts: how often it touched something.
-        note: why not, or what the driver had to say.
+    ``stop`` (x, y, heading) is None where the robot stopped for no such goal; ``off_m`` is its horizontal distance to
+    the nearest right thing. ``shortest_m`` is None where truth has no path from where it stood before.
     """
 
     said: str
@@ -54,19 +44,8 @@ class Leg:
 class Episode:
     """The outcome of one mission with the encoders of one configuration.
 
-    Attributes:
-        mission: its name.
-        series: which experiment.
-        scene: the scene's name.
-        configuration: whose senses.
-        seed: of the benchmark.
-        commands: the commands to the robot; more than one where a program broke off and the rest was commanded again.
-        programs: what was run.
-        legs: one for each goal.
-        contacts: how often the body touched something, turns included.
-        foretold: how many of these touches the map had foretold.
-        understood: whether every command became a program.
-        key: of everything that it depends on.
+    It has several commands where a program broke off and the rest was commanded again. Of the contacts the map had
+    ``foretold`` some; ``key`` names everything that the episode depends on.
     """
 
     mission: str

@@ -30,14 +30,7 @@ _THINGS_IN_PHOTO = 2  # a photo of bare walls is in no query
 
 @dataclass(frozen=True, eq=False)
 class Ground:
-    """A scene's evidence and its floor. Everything that it offers can be reached in truth.
-
-    Attributes:
-        evidence: what was recorded, and the truth.
-        floor: where a robot can drive.
-        photos: pictures that a query may use.
-        tasks: tasks of the indexing benchmark: things that only a sound, a photo or an area identifies.
-    """
+    """A scene's evidence and its floor. Everything that it offers can be reached in truth."""
 
     evidence: Evidence
     floor: Floor

@@ -19,10 +19,7 @@ _TRIES = 60
 class Floor:
     """The part of one floor that the recording walked.
 
-    Attributes:
-        space: where a robot of the radius can stand and drive to from there.
-        radius_m: of the robot.
-        number: which floor of the building, counted from the lowest.
+    Floors are counted from the lowest; in ``space`` stands a robot of the radius.
     """
 
     space: FreeSpace

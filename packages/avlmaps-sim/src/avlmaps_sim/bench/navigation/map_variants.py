@@ -44,13 +44,8 @@ class Senses:
 class KnownScene:
     """The truth of a scene, beside its map.
 
-    Attributes:
-        avlmap: the map.
-        truth: things, sounds and rooms.
-        label: the true thing of each voxel, −1 for none.
-        hearing: whether a sound's true place is the robot's (``overlay``) or its source's (``acoustic``).
-        photos: where each photo was taken, ``world_from_camera`` by the name of its file.
-        weak: the plainer ear, made when it is first needed.
+    ``label`` is the true thing of each voxel, -1 for none; a sound's true place is the robot's (``overlay``) or its
+    source's (``acoustic``). Photos are ``world_from_camera`` by the names of their files.
     """
 
     avlmap: AVLMap

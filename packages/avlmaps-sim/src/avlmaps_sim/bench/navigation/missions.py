@@ -110,12 +110,7 @@ def joined(said: list[str]) -> str:
 class MissionSet:
     """Missions of several scenes, with all that is needed to run them again.
 
-    Attributes:
-        recorded: how the scenes are recorded.
-        scenes: their names.
-        radius_m: of the robot that they were made for.
-        missions: of all scenes.
-        asked: what they were made for, so that a run that was broken off knows its own.
+    By ``asked`` a run that was broken off knows its own.
     """
 
     recorded: Recorded

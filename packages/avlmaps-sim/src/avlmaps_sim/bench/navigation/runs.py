@@ -38,13 +38,7 @@ OpenSpec = Callable[[str], Scene]
 class SceneFacts:
     """The properties of one scene.
 
-    Attributes:
-        scene: its name.
-        frames: how many the map was made of.
-        voxels: how many it has.
-        sounds: how many sounds were heard, and how many there were.
-        episodes: what became of its missions, by mission and then configuration.
-        clips: sound and clip of every event.
+    ``sounds`` counts those that were heard, and those that there were; ``clips`` are sound and clip of every event.
     """
 
     scene: str

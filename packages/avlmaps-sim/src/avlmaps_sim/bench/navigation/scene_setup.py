@@ -35,13 +35,7 @@ _STREAM = 20  # of random numbers: those below are the indexing suite's
 
 
 class NavigationPlace:
-    """A scene's folder of work, and what missions take.
-
-    Attributes:
-        job: which scene.
-        settings: of the benchmark.
-        work: its recording and map.
-    """
+    """A scene's folder of work, and what missions take."""
 
     def __init__(self, job: SceneJob, settings: NavigationSettings, open_spec: Callable[[str], Scene]) -> None:
         self.job, self.settings = job, settings

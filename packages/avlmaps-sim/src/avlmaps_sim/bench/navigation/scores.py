@@ -11,13 +11,7 @@ from avlmaps_sim.bench.navigation.metrics import grouped_interval, in_a_row, ind
 
 @dataclass(frozen=True, slots=True)
 class Share:
-    """A share with its count and its 95 % interval.
-
-    Attributes:
-        hits: how many.
-        count: of how many.
-        interval: low and high, in [0, 1].
-    """
+    """A share with its count and its 95 % interval."""
 
     hits: int
     count: int
@@ -38,17 +32,8 @@ class Share:
 class Score:
     """The figures of a row.
 
-    Attributes:
-        sequences: how many missions.
-        rows: share of the missions whose first 1, 2, ... subgoals were all reached.
-        subgoals: share of the subgoals that were reached.
-        whole: share of the missions of which all were reached.
-        spl: mean success weighted by path length over subgoals.
-        spl_interval: 95 % of it.
-        path_m: mean length driven for a subgoal.
-        actions: mean number of actions for a subgoal.
-        contacts: touches in all.
-        foretold: touches that the map had foretold.
+    ``rows`` are shares of the missions whose first 1, 2, ... subgoals were all reached, ``whole`` of those of which all
+    were; path and actions are means of a subgoal, touches are counted in all.
     """
 
     sequences: int

@@ -23,17 +23,8 @@ _WIDTH = 160
 class Draft:
     """A recording in memory.
 
-    Attributes:
-        name: of it.
-        rig: the cameras that its description names.
-        rgb: colour pictures.
-        depth: depth pictures, 16 bit.
-        poses: (n, 4, 4) as they are written.
-        stamps_s: (n,) of the pictures.
-        pose_stamps_s: (n,) of the poses.
-        units_per_m: of depth.
-        quaternion_roll: by how many places the written quaternions are off x y z w.
-        keys: further keys of its description.
+    Depth is 16 bit, ``units_per_m``; written quaternions are off x y z w by ``quaternion_roll`` places, and ``keys`` go
+    into its description.
     """
 
     name: str

@@ -55,13 +55,7 @@ class Outcome(StrEnum):
 class Case:
     """One recording and its outcome.
 
-    Attributes:
-        source: where the right one came from.
-        situation: the mistake; empty for a right recording.
-        group: of the mistake.
-        outcome: what came of it.
-        said: the sentences.
-        format: that it was written in.
+    The situation is empty for a right recording.
     """
 
     source: str

@@ -12,17 +12,15 @@ from avlmaps.recordings.camera_axes import opencv_from_axes
 from avlmaps_sim.bench.recordings.drafts import Draft, Picture
 
 Change = Callable[[Draft, Draft, np.random.Generator], Draft]
+Named = tuple[str, Change, str]  # a mistake within its group: name, change and cause
 
 
 @dataclass(frozen=True, slots=True)
 class Situation:
     """One mistake.
 
-    Attributes:
-        name: of it.
-        group: what it is in: poses, scale, depth, colour, pictures, intrinsics or clock.
-        change: makes it, of a right recording, another walk and a source of randomness.
-        cause: a regular expression that a sentence matches which names the cause.
+    ``change`` makes it of a right recording, another walk and a source of randomness; ``cause`` is a regular expression
+    that a sentence matches which names the cause.
     """
 
     name: str
@@ -33,8 +31,13 @@ class Situation:
 
 def situations() -> tuple[Situation, ...]:
     """Return all of them."""
-    first = (*_of_poses(), *_of_scale(), *_of_depth(), *_of_colour(), *_of_pictures(), *_of_intrinsics(), *_of_clocks())
-    return (*first, *_of_channels())
+    groups = {
+        "poses": _of_poses(), "scale": _of_scale(), "depth": _of_depth(), "colour": _of_colour(),
+        "pictures": _of_pictures(), "intrinsics": _of_intrinsics(), "clock": _of_clocks(),
+    }  # fmt: skip
+    first = [Situation(name, group, change, cause) for group, made in groups.items() for name, change, cause in made]
+    # Red and blue exchanged throughout stand at the end, so that the others keep their seeds.
+    return (*first, Situation("all pictures BGR", "colour", _bgr(lambda i, n, g: True), "BGR"))
 
 
 def _on_poses(change: Callable[[np.ndarray], np.ndarray]) -> Change:
@@ -52,33 +55,27 @@ _GL = np.diag([1.0, -1.0, -1.0, 1.0])
 _Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 
 
-def _of_poses() -> Iterator[Situation]:
-    group, geometry = "poses", r"do not agree|jump|exchanged|m/s|Hardly any|mount"
-    yield Situation("camera_from_world", group, _on_poses(poses.inverse), "camera_from_world|camera-from-world")
-    yield Situation("quaternion written w first", group, lambda d, o, g: replace(d, quaternion_roll=1), "wxyz")
-    yield Situation("OpenGL camera", group, _on_poses(lambda p: p @ _GL), "opengl|RUB")
-    yield Situation("OpenGL camera in a y-up world", group, _on_poses(lambda p: _Y_UP @ p @ _GL), "opengl|RUB")
-    yield Situation("poses of a body, x forward", group, _of_axes("ros"), "ros|FLU")
-    yield Situation(
-        "inverse poses of an OpenGL camera", group, _on_poses(lambda p: poses.inverse(p @ _GL)), "camera-from-world"
-    )
-    yield Situation("rotations transposed", group, _on_poses(_transposed), geometry)
-    yield Situation(
-        "positions in other axes", group, _on_poses(lambda p: _placed(p, p[:, [2, 0, 1], 3])), f"other axes|{geometry}"
-    )
-    yield Situation("poses of another walk", group, lambda d, o, g: replace(d, poses=o.poses[: len(d)]), geometry)
-    yield Situation("poses reversed", group, _on_poses(lambda p: p[::-1].copy()), geometry)
-    yield Situation("all poses the same", group, _on_poses(lambda p: np.repeat(p[:1], len(p), axis=0)), geometry)
-    yield Situation("poses jump by 0.5 m", group, _on_poses(lambda p: _jump(p, (0.5, 0.0, 0.0))), geometry)
-    yield Situation("poses jump by 2.5 m", group, _on_poses(lambda p: _jump(p, (2.5, 0.0, 0.0))), geometry)
-    yield Situation("poses turn by 20 degrees", group, _on_poses(lambda p: _jump(p, (0.0, 0.0, 0.0), 20.0)), geometry)
-    yield Situation(
-        "noise of 5 cm and 3 degrees", group, lambda d, o, g: replace(d, poses=_noisy(d.poses, g)), geometry
-    )
-    yield Situation("pictures of 10 frames exchanged", group, _exchanged, geometry)
-    yield Situation("camera rolled by 8 degrees in its mount", group, _on_poses(lambda p: p @ _ROLLED), geometry)
-    yield Situation("two neighbours exchanged", group, _neighbours(1, 0), "exchanged")
-    yield Situation("three neighbours exchanged", group, _neighbours(1, 2, 0), "exchanged")
+def _of_poses() -> Iterator[Named]:
+    geometry = r"do not agree|jump|exchanged|m/s|Hardly any|mount"
+    yield "camera_from_world", _on_poses(poses.inverse), "camera_from_world|camera-from-world"
+    yield "quaternion written w first", lambda d, o, g: replace(d, quaternion_roll=1), "wxyz"
+    yield "OpenGL camera", _on_poses(lambda p: p @ _GL), "opengl|RUB"
+    yield "OpenGL camera in a y-up world", _on_poses(lambda p: _Y_UP @ p @ _GL), "opengl|RUB"
+    yield "poses of a body, x forward", _of_axes("ros"), "ros|FLU"
+    yield "inverse poses of an OpenGL camera", _on_poses(lambda p: poses.inverse(p @ _GL)), "camera-from-world"
+    yield "rotations transposed", _on_poses(_transposed), geometry
+    yield "positions in other axes", _on_poses(lambda p: _placed(p, p[:, [2, 0, 1], 3])), f"other axes|{geometry}"
+    yield "poses of another walk", lambda d, o, g: replace(d, poses=o.poses[: len(d)]), geometry
+    yield "poses reversed", _on_poses(lambda p: p[::-1].copy()), geometry
+    yield "all poses the same", _on_poses(lambda p: np.repeat(p[:1], len(p), axis=0)), geometry
+    yield "poses jump by 0.5 m", _on_poses(lambda p: _jump(p, (0.5, 0.0, 0.0))), geometry
+    yield "poses jump by 2.5 m", _on_poses(lambda p: _jump(p, (2.5, 0.0, 0.0))), geometry
+    yield "poses turn by 20 degrees", _on_poses(lambda p: _jump(p, (0.0, 0.0, 0.0), 20.0)), geometry
+    yield "noise of 5 cm and 3 degrees", lambda d, o, g: replace(d, poses=_noisy(d.poses, g)), geometry
+    yield "pictures of 10 frames exchanged", _exchanged, geometry
+    yield "camera rolled by 8 degrees in its mount", _on_poses(lambda p: p @ _ROLLED), geometry
+    yield "two neighbours exchanged", _neighbours(1, 0), "exchanged"
+    yield "three neighbours exchanged", _neighbours(1, 2, 0), "exchanged"
 
 
 _ROLLED = np.eye(4)
@@ -138,12 +135,12 @@ def _reordered(draft: Draft, order: np.ndarray, *, colour: bool, depth: bool) ->
     )
 
 
-def _of_scale() -> Iterator[Situation]:
+def _of_scale() -> Iterator[Named]:
     for factor in (0.1, 0.3, 0.5, 2.0, 10.0, 100.0, 1000.0):
-        yield Situation(f"positions x{factor:g}", "scale", _on_poses(lambda p, f=factor: _scaled(p, f)), _SCALE)
+        yield f"positions x{factor:g}", _on_poses(lambda p, f=factor: _scaled(p, f)), _SCALE
     for factor in (0.1, 0.2, 0.25, 0.5, 2.0, 4.0, 5.0, 10.0):
         change: Change = lambda d, o, g, f=factor: replace(d, units_per_m=d.units_per_m / f)  # noqa: E731
-        yield Situation(f"depth x{factor:g}", "scale", change, _SCALE)
+        yield f"depth x{factor:g}", change, _SCALE
 
 
 _SCALE = r"times too|in metres|depth.unit|too far to be reached|m/s|jumps by"
@@ -167,43 +164,32 @@ def _as_16_bit(values: Any) -> Picture:
     return np.clip(values, 0, 65_535).astype(np.uint16)
 
 
-def _of_depth() -> Iterator[Situation]:
-    group, depth = "depth", "do not agree|depth"
-    yield Situation("distance along the ray", group, _along_ray, "along the ray")
-    yield Situation("depth mirrored", group, _on_depth(lambda d: d[:, ::-1]), "depth pictures look mirrored")
-    yield Situation("depth upside down", group, _on_depth(lambda d: d[::-1, ::-1]), "depth pictures look upside down")
-    yield Situation(
-        "depth shuffled", group, lambda d, o, g: _reordered(d, g.permutation(len(d)), colour=False, depth=True), depth
-    )
-    yield Situation("depth of another walk", group, lambda d, o, g: replace(d, depth=_fitted(o.depth, d.depth)), depth)
-    yield Situation("depth constant", group, _on_depth(lambda d: np.full_like(d, 3000)), "same depth")
-    yield Situation(
+def _of_depth() -> Iterator[Named]:
+    depth = "do not agree|depth"
+    yield "distance along the ray", _along_ray, "along the ray"
+    yield "depth mirrored", _on_depth(lambda d: d[:, ::-1]), "depth pictures look mirrored"
+    yield "depth upside down", _on_depth(lambda d: d[::-1, ::-1]), "depth pictures look upside down"
+    yield "depth shuffled", lambda d, o, g: _reordered(d, g.permutation(len(d)), colour=False, depth=True), depth
+    yield "depth of another walk", lambda d, o, g: replace(d, depth=_fitted(o.depth, d.depth)), depth
+    yield "depth constant", _on_depth(lambda d: np.full_like(d, 3000)), "same depth"
+    yield (
         "depth of noise",
-        group,
         lambda d, o, g: replace(d, depth=tuple(g.integers(300, 6000, x.shape).astype(np.uint16) for x in d.depth)),
         depth,
     )
-    yield Situation(
+    yield (
         "disparity for depth",
-        group,
         _on_depth(lambda d: np.where(d > 0, _as_16_bit(4e6 / np.maximum(d, 1)), 0).astype(np.uint16)),
         depth,
     )
-    yield Situation("bytes of depth swapped", group, _on_depth(lambda d: d.byteswap()), depth)
-    yield Situation("depth in steps of 256", group, _on_depth(lambda d: d // 256 * 256), depth)
-    yield Situation(
-        "depth shifted by a sixteenth", group, _on_depth(lambda d: np.roll(d, d.shape[1] // 16, axis=1)), depth
-    )
-    yield Situation(
-        "depth shifted downwards by a sixteenth",
-        group,
-        _on_depth(lambda d: np.roll(d, d.shape[1] // 16, axis=0)),
-        depth,
-    )
-    yield Situation("depth cut off at 2 m", group, _on_depth(lambda d: np.minimum(d, 2000)), depth)
-    yield Situation("depth of two neighbours exchanged", group, _neighbours(1, 0, colour=False), "exchanged|depth")
-    yield Situation("no depth in half of the frames", group, _half_empty, "no depth")
-    yield Situation("depth froze", group, _frozen, depth)
+    yield "bytes of depth swapped", _on_depth(lambda d: d.byteswap()), depth
+    yield "depth in steps of 256", _on_depth(lambda d: d // 256 * 256), depth
+    yield "depth shifted by a sixteenth", _on_depth(lambda d: np.roll(d, d.shape[1] // 16, axis=1)), depth
+    yield "depth shifted downwards by a sixteenth", _on_depth(lambda d: np.roll(d, d.shape[1] // 16, axis=0)), depth
+    yield "depth cut off at 2 m", _on_depth(lambda d: np.minimum(d, 2000)), depth
+    yield "depth of two neighbours exchanged", _neighbours(1, 0, colour=False), "exchanged|depth"
+    yield "no depth in half of the frames", _half_empty, "no depth"
+    yield "depth froze", _frozen, depth
 
 
 def _along_ray(draft: Draft, other: Draft, rng: np.random.Generator) -> Draft:
@@ -229,53 +215,42 @@ def _frozen(draft: Draft, other: Draft, rng: np.random.Generator) -> Draft:
     return replace(draft, depth=(*draft.depth[:half], *[draft.depth[half]] * (len(draft) - half)))
 
 
-def _of_colour() -> Iterator[Situation]:
-    group, colour = "colour", "colour"
-    yield Situation("colour mirrored", group, _on_colour(lambda c: c[:, ::-1]), "colour pictures look mirrored")
-    yield Situation(
-        "colour upside down", group, _on_colour(lambda c: c[::-1, ::-1]), "colour pictures look upside down"
-    )
-    yield Situation(
-        "colour shuffled", group, lambda d, o, g: _reordered(d, g.permutation(len(d)), colour=True, depth=False), colour
-    )
-    yield Situation(
-        "colour reversed",
-        group,
-        lambda d, o, g: _reordered(d, np.arange(len(d))[::-1], colour=True, depth=False),
-        colour,
-    )
-    yield Situation("colour of another walk", group, lambda d, o, g: replace(d, rgb=_fitted(o.rgb, d.rgb)), colour)
-    yield Situation(
+def _of_colour() -> Iterator[Named]:
+    colour = "colour"
+    yield "colour mirrored", _on_colour(lambda c: c[:, ::-1]), "colour pictures look mirrored"
+    yield "colour upside down", _on_colour(lambda c: c[::-1, ::-1]), "colour pictures look upside down"
+    yield "colour shuffled", lambda d, o, g: _reordered(d, g.permutation(len(d)), colour=True, depth=False), colour
+    yield "colour reversed", lambda d, o, g: _reordered(d, np.arange(len(d))[::-1], colour=True, depth=False), colour
+    yield "colour of another walk", lambda d, o, g: replace(d, rgb=_fitted(o.rgb, d.rgb)), colour
+    yield (
         "colour of noise",
-        group,
         lambda d, o, g: replace(d, rgb=tuple(g.integers(0, 255, c.shape, dtype=np.uint8) for c in d.rgb)),
         colour,
     )
-    yield Situation("colour of one shade", group, _on_colour(lambda c: np.full_like(c, 128)), "of one colour")
-    yield Situation("half of the pictures BGR", group, _bgr(lambda i, n, g: g.random() < 0.5), "BGR")
-    yield Situation("every fifth picture BGR", group, _bgr(lambda i, n, g: i % 5 == 0), "BGR")
-    yield Situation("the second half BGR", group, _bgr(lambda i, n, g: i > n // 2), "BGR")
-    yield Situation(
-        "colour shifted by a sixteenth", group, _on_colour(lambda c: np.roll(c, c.shape[1] // 16, axis=1)), "colour"
-    )
-    yield Situation("colour of two neighbours exchanged", group, _neighbours(1, 0, depth=False), "exchanged|colour")
-    yield Situation(
-        "colour froze", group,
-        lambda d, o, g: _reordered(d, np.minimum(np.arange(len(d)), len(d) // 2), colour=True, depth=False), colour,
-    )  # fmt: skip
-    yield Situation(
-        "colour 3 frames late", group,
-        lambda d, o, g: _reordered(d, np.minimum(np.arange(len(d)) + 3, len(d) - 1), colour=True, depth=False), colour,
-    )  # fmt: skip
-    yield Situation("colour black", group, _on_colour(lambda c: np.zeros_like(c)), "black")
-    yield Situation("a third of the pictures black", group, _black, "black")
-    yield Situation("colour dark", group, _on_colour(lambda c: (c * 0.03).astype(np.uint8)), "dark|one colour|black")
-    yield Situation(
-        "colour 10 frames late",
-        group,
-        lambda d, o, g: _reordered(d, np.minimum(np.arange(len(d)) + 10, len(d) - 1), colour=True, depth=False),
+    yield "colour of one shade", _on_colour(lambda c: np.full_like(c, 128)), "of one colour"
+    yield "half of the pictures BGR", _bgr(lambda i, n, g: g.random() < 0.5), "BGR"
+    yield "every fifth picture BGR", _bgr(lambda i, n, g: i % 5 == 0), "BGR"
+    yield "the second half BGR", _bgr(lambda i, n, g: i > n // 2), "BGR"
+    yield "colour shifted by a sixteenth", _on_colour(lambda c: np.roll(c, c.shape[1] // 16, axis=1)), "colour"
+    yield "colour of two neighbours exchanged", _neighbours(1, 0, depth=False), "exchanged|colour"
+    yield (
+        "colour froze",
+        lambda d, o, g: _reordered(d, np.minimum(np.arange(len(d)), len(d) // 2), colour=True, depth=False),
         colour,
     )
+    yield "colour 3 frames late", _late(3), colour
+    yield "colour black", _on_colour(lambda c: np.zeros_like(c)), "black"
+    yield "a third of the pictures black", _black, "black"
+    yield "colour dark", _on_colour(lambda c: (c * 0.03).astype(np.uint8)), "dark|one colour|black"
+    yield "colour 10 frames late", _late(10), colour
+
+
+def _late(frames: int) -> Change:
+    def changed(draft: Draft, other: Draft, rng: np.random.Generator) -> Draft:
+        order = np.minimum(np.arange(len(draft)) + frames, len(draft) - 1)
+        return _reordered(draft, order, colour=True, depth=False)
+
+    return changed
 
 
 def _black(draft: Draft, other: Draft, rng: np.random.Generator) -> Draft:
@@ -293,12 +268,11 @@ def _bgr(chosen: Callable[[int, int, np.random.Generator], bool]) -> Change:
     return changed
 
 
-def _of_pictures() -> Iterator[Situation]:
-    group = "pictures"
-    yield Situation("all mirrored", group, _both(lambda x: x[:, ::-1]), "pictures look mirrored")
-    yield Situation("all upside down", group, _both(lambda x: x[::-1, ::-1]), "LUF|upside down")
-    yield Situation("all turned by 90 degrees", group, _quarter, "URF|DLF|90 degrees")
-    yield Situation("all turned by 90 degrees and squeezed", group, _squeezed, "90 degrees")
+def _of_pictures() -> Iterator[Named]:
+    yield "all mirrored", _both(lambda x: x[:, ::-1]), "pictures look mirrored"
+    yield "all upside down", _both(lambda x: x[::-1, ::-1]), "LUF|upside down"
+    yield "all turned by 90 degrees", _quarter, "URF|DLF|90 degrees"
+    yield "all turned by 90 degrees and squeezed", _squeezed, "90 degrees"
 
 
 def _both(change: Callable[[Picture], Picture]) -> Change:
@@ -323,41 +297,26 @@ def _squeezed(draft: Draft, other: Draft, rng: np.random.Generator) -> Draft:
     return _both(squeeze)(draft, other, rng)
 
 
-def _of_intrinsics() -> Iterator[Situation]:
-    group = "intrinsics"
-    yield Situation(
-        "intrinsics of a picture twice as large", group, _on_cameras(lambda c: _camera(c, 2.0, 2.0, 2.0)), "picture"
-    )
-    yield Situation(
+def _of_intrinsics() -> Iterator[Named]:
+    yield "intrinsics of a picture twice as large", _on_cameras(lambda c: _camera(c, 2.0, 2.0, 2.0)), "picture"
+    yield (
         "intrinsics of a picture half as large",
-        group,
         _on_cameras(lambda c: _camera(c, 0.5, 0.5, 0.5)),
         "picture|intrinsics",
     )
     for factor in (0.5, 0.7, 1.4, 2.0):
-        yield Situation(
-            f"focal length x{factor:g}", group, _on_cameras(lambda c, f=factor: _camera(c, f)), "focal length"
-        )
-    yield Situation(
-        "principal point at the corner", group, _on_cameras(lambda c: _camera(c, 1.0, 0.0, 0.0)), "principal point"
-    )
-    yield Situation(
+        yield f"focal length x{factor:g}", _on_cameras(lambda c, f=factor: _camera(c, f)), "focal length"
+    yield "principal point at the corner", _on_cameras(lambda c: _camera(c, 1.0, 0.0, 0.0)), "principal point"
+    yield (
         "columns and rows exchanged",
-        group,
         _on_cameras(lambda c: Pinhole(c.fy, c.fx, c.cy, c.cx, c.width, c.height)),
         "exchanged|principal|picture",
     )
-    yield Situation(
-        "focal length of colour x0.5", group, _on_cameras(lambda c: _camera(c, 0.5), depth=False), "colour|do not agree"
-    )
-    yield Situation(
-        "focal length of depth x0.5", group, _on_cameras(lambda c: _camera(c, 0.5), colour=False), "do not agree|focal"
-    )
-    yield Situation("colour camera 0.3 m beside", group, _mounted(0.3, 0.0, 0.0), "rgb_from_depth")
-    yield Situation("colour camera 0.15 m above", group, _mounted(0.0, 0.15, 0.0), "rgb_from_depth")
-    yield Situation(
-        "principal point off by a sixteenth", group, _on_cameras(lambda c: _camera(c, 1.0, 1.125)), "princip"
-    )
+    yield "focal length of colour x0.5", _on_cameras(lambda c: _camera(c, 0.5), depth=False), "colour|do not agree"
+    yield "focal length of depth x0.5", _on_cameras(lambda c: _camera(c, 0.5), colour=False), "do not agree|focal"
+    yield "colour camera 0.3 m beside", _mounted(0.3, 0.0, 0.0), "rgb_from_depth"
+    yield "colour camera 0.15 m above", _mounted(0.0, 0.15, 0.0), "rgb_from_depth"
+    yield "principal point off by a sixteenth", _on_cameras(lambda c: _camera(c, 1.0, 1.125)), "princip"
 
 
 def _mounted(*by_m: float) -> Change:
@@ -381,12 +340,7 @@ def _on_cameras(change: Callable[[Pinhole], Pinhole], *, colour: bool = True, de
     return changed
 
 
-def _of_clocks() -> Iterator[Situation]:
+def _of_clocks() -> Iterator[Named]:
     for delay_s in (-0.6, 0.3, 1.0):
         change: Change = lambda d, o, g, s=delay_s: replace(d, pose_stamps_s=d.pose_stamps_s + s)  # noqa: E731
-        yield Situation(f"poses {delay_s:+g} s off", "clock", change, "late|early")
-
-
-def _of_channels() -> Iterator[Situation]:
-    """Yield red and blue exchanged throughout; at the end, so that the others keep their seeds."""
-    yield Situation("all pictures BGR", "colour", _bgr(lambda i, n, g: True), "BGR")
+        yield f"poses {delay_s:+g} s off", change, "late|early"

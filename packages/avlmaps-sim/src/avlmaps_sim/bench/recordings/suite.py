@@ -110,12 +110,8 @@ _WITHOUT_A_WORD = (Outcome.RIGHT, Outcome.UNCHECKED, Outcome.SILENT)
 class _Source:
     """A right recording, another for what is foreign, and which mistakes are made.
 
-    Attributes:
-        right: is changed.
-        other: gives what is foreign.
-        groups: of mistakes; empty: all.
-        form: number of the format among `FORMATS`; None: our own.
-        step: the first of the mistakes, and after how many the next follows.
+    ``form`` is the number of the format among `FORMATS`, None our own; ``step`` is the first of the mistakes, and after
+    how many the next follows; no groups are all.
     """
 
     right: Draft

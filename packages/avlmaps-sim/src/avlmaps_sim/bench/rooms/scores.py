@@ -23,12 +23,8 @@ _WALKED_M = (0.8, 2.2)  # height of cameras over the floor that they stood on
 class Floor:
     """A storey in cells of 10 cm; cell (i, j) covers ``origin_m + [i, i + 1) x [j, j + 1) · CELL_M``.
 
-    Attributes:
-        floor_m: its height.
-        origin_m: x and y of the corner of cell (0, 0).
-        label: number of the true room of each cell; −1 outside.
-        kinds: of each room, the names that are right; several of an open plan.
-        seen: which rooms the map shows some of.
+    ``label`` has the true room of each cell, -1 outside; ``kinds`` are the names that are right, several of an open
+    plan; ``seen`` says which rooms the map shows some of.
     """
 
     floor_m: float
@@ -127,13 +123,7 @@ def _wide_openings(label: Int[np.ndarray, "nx ny"], wall: Bool[np.ndarray, "nx n
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Listed:
-    """A room that a map lists, on a storey.
-
-    Attributes:
-        name: kind of room.
-        mask: its cells.
-        area_m2: as it is reported.
-    """
+    """A room that a map lists, on a storey."""
 
     name: str
     mask: Bool[np.ndarray, "nx ny"]
@@ -144,11 +134,7 @@ class Listed:
 class Matched:
     """A true room and the listed one that it is matched with.
 
-    Attributes:
-        kinds: names that are right.
-        name: of the listed one; "" without one.
-        overlap: intersection over union, in [0, 1].
-        area_error: of the listed area, as a share of the true one; NaN without one.
+    The overlap is intersection over union; the error of the listed area is a share of the true one, NaN without one.
     """
 
     kinds: tuple[str, ...]
@@ -166,10 +152,7 @@ class Matched:
 class Judged:
     """The rooms of a scene.
 
-    Attributes:
-        scene: its name.
-        rooms: true rooms that the map shows.
-        listed: number of listed rooms, without those of true rooms that it does not show.
+    ``listed`` does not count those of true rooms that the map does not show.
     """
 
     scene: str

@@ -26,10 +26,7 @@ _HEADINGS = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 class Wrong:
     """An array as somebody measured it, and how it is.
 
-    Attributes:
-        true: the array.
-        given: the same with its places off; it has no delays.
-        late_s: (m,) by how much each channel is late.
+    The given one has its places off and no delays; each channel is late by ``late_s``.
     """
 
     true: Microphones

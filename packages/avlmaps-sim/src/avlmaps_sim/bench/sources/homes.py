@@ -71,11 +71,7 @@ _CODE = code_of()  # of the code as it was loaded
 class HomeJob:
     """One home to measure.
 
-    Attributes:
-        spec: its name.
-        work: folder of all homes' recordings and maps.
-        seed: of walk and sounds.
-        sounds: folder of clips; None for sounds made by rule.
+    Sounds are made by rule where there is no folder of clips.
     """
 
     spec: str
@@ -88,18 +84,9 @@ class HomeJob:
 class Placed:
     """One sound as one array placed it, or as a baseline did.
 
-    Attributes:
-        array: a name of ``ARRAYS`` with its prior, or a baseline.
-        error_m: on the plan, from the place where it sounded.
-        room: whether the place lies in the right room; None where the source is in none.
-        held_from: probability of what is likelier than the truth's cell: regions of more hold it; None of a baseline.
-        area_90_m2: of the region of 90 %.
-        right: probability that it gives to the truth within 0.5 m of the place.
-        seconds: how long it sounds.
-        thing: whether the right thing is among the first three; None where no thing made it.
-        same_room: whether the robot was in the source's room.
-        elapsed_s: seconds that its evidence took.
-        voxels: of the map.
+    Errors are on the plan. Regions of more than ``held_from`` hold the truth (None of a baseline); ``right`` is the
+    probability within 0.5 m of it. ``thing`` says whether the right one is among the first three, None where no thing
+    made it; ``same_room`` whether the robot was in the source's room.
     """
 
     array: str
@@ -123,12 +110,8 @@ class Placed:
 class Mended:
     """What was found out of a device that says directions, and of an array that was put wrong.
 
-    Attributes:
-        places_m: error of the array's worst place, as given and calibrated; NaN where none was put wrong, or where
-            calibration was refused.
-        delays_s: of its worst channel's delay, likewise.
-        device_off_deg: by how much the device's offset was missed.
-        device_sd_deg: the standard deviation that is said of that.
+    Places and delays are errors of the array's worst channel, as given and calibrated; NaN where none was put wrong, or
+    where calibration was refused.
     """
 
     places_m: tuple[float, float] = (_UNKNOWN, _UNKNOWN)
@@ -139,15 +122,7 @@ class Mended:
 
 @dataclass(frozen=True, slots=True)
 class HomeOutcome:
-    """What was measured in one home, of one set of sounds.
-
-    Attributes:
-        spec: its name.
-        sounds: how many there were.
-        heard: how many of them the map holds.
-        placed: every placement.
-        mended: of device and array.
-    """
+    """What was measured in one home, of one set of sounds."""
 
     spec: str
     sounds: int
@@ -195,13 +170,7 @@ def _map_of(recorded: Path, path: Path) -> AVLMap:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Played:
-    """One set of sounds on a walk.
-
-    Attributes:
-        events: what sounded.
-        audio: the track of all microphones.
-        heard: the sounds that a build finds in it.
-    """
+    """One set of sounds on a walk."""
 
     events: tuple[HeardEvent, ...]
     audio: AudioTrack

@@ -32,13 +32,7 @@ _TRIALS, _WALKS, _SIGNAL_S = 20, 200, 1.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasuredRoom:
-    """The room's responses.
-
-    Attributes:
-        place_m: (25, 3) receivers.
-        response: (25, n) impulse responses.
-        rate_hz: samples a second.
-    """
+    """The room's responses."""
 
     place_m: Float[np.ndarray, "r 3"]
     response: Float[np.ndarray, "r n"]
