@@ -1,6 +1,6 @@
 """Simple solids to build furniture from. Each stands at its given place, z up, metres."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -79,10 +79,25 @@ def polygon(corners: Float[np.ndarray, "k 3"], material: Material) -> Mesh:
     return triangles_of(vertex, fan, material)
 
 
-def prism(outline: Sequence[Pair], z: float, height: float, material: Material) -> Mesh:
+def at_height(flat: Float[np.ndarray, "k 2"], z: float) -> Float[np.ndarray, "k 3"]:
+    """Return points in (x, y) at a height."""
+    return np.column_stack([flat, np.full(len(flat), z)])
+
+
+def shell(levels: Iterable[tuple[Float[np.ndarray, "k 2"], float]], material: Material, capped: bool = True) -> Mesh:
+    """Return the skin through curves at heights, in order: a body, or a bowl where it turns down inside again."""
+    return loft([at_height(flat, z) for flat, z in levels], material, capped)
+
+
+def along_y(side: Float[np.ndarray, "k 2"], low: float, high: float, material: Material) -> Mesh:
+    """Return the solid whose section across y is an outline in (x, z), from one y to another."""
+    return loft([np.column_stack([side[:, 0], np.full(len(side), y), side[:, 1]]) for y in (low, high)], material)
+
+
+def prism(outline: Sequence[Pair] | Float[np.ndarray, "k 2"], z: float, height: float, material: Material) -> Mesh:
     """Return an upright prism over an outline in (x, y), seen whole from its middle."""
     flat = np.asarray(outline, np.float64)
-    return loft([np.column_stack([flat, np.full(len(flat), h)]) for h in (z, z + height)], material)
+    return shell([(flat, z), (flat, z + height)], material)
 
 
 @lru_cache(maxsize=64)

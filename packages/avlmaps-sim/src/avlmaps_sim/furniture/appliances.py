@@ -4,11 +4,11 @@ import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Parts, Support, family
 from avlmaps_sim.furniture.computers import face_up
-from avlmaps_sim.furniture.fittings import chrome, dial, enamel, face, feet, outline, shell, spindle, steel
+from avlmaps_sim.furniture.fittings import chrome, dial, enamel, face, feet, outline, spindle, steel
 from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, made_of, pick
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes, joined
-from avlmaps_sim.shapes import box, cylinder, ellipsoid, lathe, loft, rounded_box, slab, tube
+from avlmaps_sim.shapes import along_y, at_height, box, cylinder, ellipsoid, lathe, rounded_box, shell, slab, tube
 
 
 def _porthole(rng: np.random.Generator, x: float, y: float, z: float, radius: float, look: Material) -> Meshes:
@@ -87,8 +87,7 @@ def _top_loader(rng: np.random.Generator) -> Parts:
     yield rounded_box((0.0, -half, 0.02), (deep, half, high), draw(rng, 0.006, 0.04), look, 2)
     yield from feet((0.0, -half), (deep, half), 0.02, material("black", rng))
     side = np.array([(0.0, high - 0.01), (0.14, high - 0.01), (draw(rng, 0.05, 0.1), high + rise), (0.0, high + rise)])
-    yield loft([np.column_stack([side[:, 0], np.full(4, y), side[:, 1]]) for y in (-half, half)],
-               look if chance(rng, 0.5) else enamel(rng))  # fmt: skip
+    yield along_y(side, -half, half, look if chance(rng, 0.5) else enamel(rng))
     metal = chrome(rng)
     n = count(rng, 1, 4)
     yield from [dial(0.11, float(y), high + 0.45 * rise, 0.025, metal) for y in np.linspace(-0.3, 0.3, n) * wide]
@@ -212,10 +211,9 @@ def _board(rng: np.random.Generator, long: float, wide: float) -> Mesh:
     half = np.array([0.42, 0.5, 0.5, 0.48, 0.38, 0.24, 0.12, 0.03]) * wide
     flat = np.concatenate([np.column_stack([half, y * long]), np.column_stack([-half, y * long])[::-1]])
     cover = material("fabric", rng)
-    rings = [np.column_stack([flat * s, np.full(len(flat), z)]) for s,
-             z in ((0.97, -0.02), (1.0, -0.012), (1.0, 0.0), (0.98, 0.008))]  # fmt: skip
-    return joined([loft(rings, cover, capped=False), *(_strip(np.column_stack([flat * s, np.full(16, z)]), cover) for s,
-                                                       z in ((0.97, -0.02), (0.98, 0.008)))])  # fmt: skip
+    levels = [(flat * s, z) for s, z in ((0.97, -0.02), (1.0, -0.012), (1.0, 0.0), (0.98, 0.008))]
+    faces = [_strip(at_height(*levels[end]), cover) for end in (0, -1)]
+    return joined([shell(levels, cover, capped=False), *faces])
 
 
 def _strip(ring: np.ndarray, look: Material) -> Mesh:

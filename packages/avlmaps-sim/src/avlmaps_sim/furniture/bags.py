@@ -9,7 +9,7 @@ from avlmaps_sim.furniture.containers import cardboard, tub
 from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, made_of, strut
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes, joined
-from avlmaps_sim.shapes import box, cylinder, lathe, loft, rounded_box, rounded_rectangle, slab
+from avlmaps_sim.shapes import box, cylinder, lathe, loft, rounded_box, rounded_rectangle, shell, slab
 
 
 def _strap(path: list[tuple[float, float, float]], look: Material, wide: float = 0.018) -> Mesh:
@@ -46,14 +46,14 @@ def _tote(rng: np.random.Generator) -> Parts:
 def _backpack(rng: np.random.Generator) -> Parts:
     width, tall, thick = draw(rng, 0.26, 0.36), draw(rng, 0.36, 0.52), draw(rng, 0.13, 0.22)
     look, other = made_of(rng, "fabric", "fabric", "leather", "plastic"), made_of(rng, "fabric", "black")
-    rings = []
-    for size, z in ((0.85, 0.0), (1.0, 0.06), (1.0, 0.7), (0.85, 0.9), (0.45, 1.0)):
-        flat = rounded_rectangle(thick * (0.6 + 0.4 * size), width * size, 0.05, 3)
-        rings.append(np.column_stack([flat, np.full(len(flat), z * tall)]))
+    levels = [
+        (rounded_rectangle(thick * (0.6 + 0.4 * size), width * size, 0.05, 3), z * tall)
+        for size, z in ((0.85, 0.0), (1.0, 0.06), (1.0, 0.7), (0.85, 0.9), (0.45, 1.0))
+    ]
     pocket = rounded_box(
         (thick * 0.4, -width * 0.38, tall * 0.06), (thick * 0.4 + 0.07, width * 0.38, tall * 0.48), 0.025, other
     )
-    parts = [loft(rings, look), pocket, _arch(0.0, 0.0, tall - 0.015, 0.05, 0.05, other)]
+    parts = [shell(levels, look), pocket, _arch(0.0, 0.0, tall - 0.015, 0.05, 0.05, other)]
     for s in (-1, 1):
         path = [
             (-thick * 0.4, s * width * 0.2, tall * 0.92),
@@ -68,11 +68,9 @@ def _backpack(rng: np.random.Generator) -> Parts:
 def _handbag(rng: np.random.Generator) -> Parts:
     width, tall, thick = draw(rng, 0.2, 0.36), draw(rng, 0.14, 0.26), draw(rng, 0.07, 0.14)
     look, metal = made_of(rng, "leather", "leather", "fabric"), material("metal", rng)
-    rings = []
-    for size, flat, z in ((0.95, 1.0, 0.0), (1.0, 1.0, 0.15), (0.9, 0.6, 0.8), (0.8, 0.2, 1.0)):
-        ring = rounded_rectangle(thick * flat, width * size, 0.02, 2)
-        rings.append(np.column_stack([ring, np.full(len(ring), z * tall)]))
-    yield from (loft(rings, look), _arch(0.0, 0.0, tall - 0.01, width * 0.25, draw(rng, 0.06, 0.2), look))
+    sizes = ((0.95, 1.0, 0.0), (1.0, 1.0, 0.15), (0.9, 0.6, 0.8), (0.8, 0.2, 1.0))
+    yield shell([(rounded_rectangle(thick * flat, width * size, 0.02, 2), z * tall) for size, flat, z in sizes], look)
+    yield _arch(0.0, 0.0, tall - 0.01, width * 0.25, draw(rng, 0.06, 0.2), look)
     yield slab(thick * 0.38, 0.0, tall * 0.6, 0.02, 0.04, 0.03, metal)
 
 

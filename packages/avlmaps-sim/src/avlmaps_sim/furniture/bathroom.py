@@ -3,11 +3,11 @@
 import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Parts, family
-from avlmaps_sim.furniture.fittings import china, chrome, open_bowl, outline, shell, tap
+from avlmaps_sim.furniture.fittings import china, chrome, open_bowl, outline, tap
 from avlmaps_sim.furniture.recipe_helpers import chance, cloth, draw, made_of, pick, pictured
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes, Triple, joined
-from avlmaps_sim.shapes import box, cylinder, ellipsoid, loft, rounded_box, slab, tube
+from avlmaps_sim.shapes import box, cylinder, ellipsoid, loft, rounded_box, shell, slab, tube
 
 
 def _seat(rng: np.random.Generator, length: float, wide: float, power: float, z: float, x: float,

@@ -20,7 +20,7 @@ from avlmaps_sim.furniture.upholstery import (
 )
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes
-from avlmaps_sim.shapes import box, cylinder, loft, rounded_box, sheet, tube
+from avlmaps_sim.shapes import box, cylinder, loft, rounded_box, sheet, shell, tube
 
 
 @dataclass(frozen=True, slots=True)
@@ -284,8 +284,7 @@ def four_poster(rng: np.random.Generator) -> Parts:
     if chance(rng, 0.5):
         across = np.array([(0.07, 0.0), (0.0, 0.05), (-0.07, 0.0), (0.0, -0.05)])
         for corner in [(x, s * y) for x in (x0, x1) for s in (1, -1)]:
-            rings = [np.column_stack([across + corner, np.full(4, z)]) for z in (0.05, high - 0.05)]
-            yield loft(rings, veil)
+            yield shell([(across + corner, 0.05), (across + corner, high - 0.05)], veil)
 
 
 @family("bed", "sleigh", held_out=True)

@@ -16,6 +16,7 @@ from avlmaps_sim.shapes import (
     rounded_box,
     rounded_rectangle,
     sheet,
+    shell,
     slab,
     tube,
 )
@@ -31,11 +32,11 @@ def tub(
     length: float, width: float, tall: float, taper: float, corner: float, look: Material, wall: float = 0.01
 ) -> Mesh:
     """Return an open vessel with a rounded rectangular plan, its middle at the origin, length along x."""
-    rings = []
-    for size, inset, z in ((taper, 0.0, 0.0), (1.0, 0.0, tall), (1.0, wall, tall), (taper, wall, wall)):
-        flat = rounded_rectangle(length * size - 2 * inset, width * size - 2 * inset, corner * size, 3)
-        rings.append(np.column_stack([flat, np.full(len(flat), z)]))
-    return loft(rings, look)
+    sizes = ((taper, 0.0, 0.0), (1.0, 0.0, tall), (1.0, wall, tall), (taper, wall, wall))
+    return shell(
+        ((rounded_rectangle(length * s - 2 * inset, width * s - 2 * inset, corner * s, 3), z) for s, inset, z in sizes),
+        look,
+    )
 
 
 @family("box", "cardboard")
@@ -229,11 +230,9 @@ def _swing_bin(rng: np.random.Generator) -> Parts:
     length, width, tall = draw(rng, 0.2, 0.32), draw(rng, 0.24, 0.42), draw(rng, 0.4, 0.75)
     look, lid = material("plastic", rng), made_of(rng, "plastic", "black", "white")
     rise = draw(rng, 0.08, 0.16)
-    rings = []
-    for size, z in ((1.02, tall), (1.02, tall + 0.03), (0.95, tall + rise * 0.6), (0.6, tall + rise)):
-        flat = rounded_rectangle(length * size, width * max(size, 0.9), 0.03, 3)
-        rings.append(np.column_stack([flat, np.full(len(flat), z)]))
-    yield from (tub(length, width, tall, draw(rng, 0.75, 0.92), 0.04, look), loft(rings, lid))
+    sizes = ((1.02, tall), (1.02, tall + 0.03), (0.95, tall + rise * 0.6), (0.6, tall + rise))
+    yield tub(length, width, tall, draw(rng, 0.75, 0.92), 0.04, look)
+    yield shell([(rounded_rectangle(length * s, width * max(s, 0.9), 0.03, 3), z) for s, z in sizes], lid)
     flap = slab(0.0, 0.0, 0.0, 0.012, width * 0.75, rise * 0.7, material("black", rng))
     yield flap.tilted("y", -0.5).moved(length * 0.45, 0.0, tall + rise * 0.25)
 

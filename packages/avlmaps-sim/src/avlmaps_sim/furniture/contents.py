@@ -6,7 +6,7 @@ from avlmaps_sim.furniture.carcass import Room
 from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes, Triple, triangles_of
-from avlmaps_sim.shapes import box, lathe, loft, rounded_rectangle, tube
+from avlmaps_sim.shapes import box, lathe, loft, prism, rounded_rectangle, tube
 
 _BOOKS: tuple[Triple, ...] = (
     (0.55, 0.13, 0.12), (0.12, 0.2, 0.4), (0.15, 0.35, 0.22), (0.85, 0.8, 0.68), (0.12, 0.12, 0.13), (0.8, 0.62, 0.2),
@@ -110,8 +110,7 @@ def folded(rng: np.random.Generator, room: Room, looks: list[Material]) -> Meshe
                 break
             deep, wide = min(0.32, (d - a) * 0.8), draw(rng, 0.24, 0.32)
             middle = np.array([(a + d) / 2, y + draw(rng, -0.015, 0.015)])
-            flat = middle + rounded_rectangle(deep, wide, 0.04, 2)
-            yield loft([np.column_stack([flat, np.full(len(flat), h)]) for h in (z, z + high)], pick(rng, looks))
+            yield prism(middle + rounded_rectangle(deep, wide, 0.04, 2), z, high, pick(rng, looks))
             z += high
 
 

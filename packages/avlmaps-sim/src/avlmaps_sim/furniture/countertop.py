@@ -3,11 +3,11 @@
 import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Parts, Support, family
-from avlmaps_sim.furniture.fittings import body, chrome, dial, enamel, face, feet, outline, shell, spindle, steel
+from avlmaps_sim.furniture.fittings import body, chrome, dial, enamel, face, feet, outline, spindle, steel
 from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes, joined
-from avlmaps_sim.shapes import box, cylinder, ellipsoid, lathe, rounded_box, slab, tube
+from avlmaps_sim.shapes import box, cylinder, ellipsoid, lathe, rounded_box, shell, slab, tube
 
 
 def _spout(start: tuple[float, float], end: tuple[float, float], radius: float, look: Material) -> Mesh:

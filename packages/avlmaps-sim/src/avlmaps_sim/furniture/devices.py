@@ -5,11 +5,11 @@ import numpy as np
 from avlmaps_sim.furniture.catalogue import Parts, family
 from avlmaps_sim.furniture.computers import face_up, key_field
 from avlmaps_sim.furniture.electronics import screen
-from avlmaps_sim.furniture.fittings import body, chrome, face, feet, outline, shell, spindle
+from avlmaps_sim.furniture.fittings import body, chrome, face, feet, outline, spindle
 from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, made_of, pick, pictured, strut
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, joined
-from avlmaps_sim.shapes import box, cylinder, ellipsoid, lathe, loft, rounded_box, sheet, slab, tube
+from avlmaps_sim.shapes import along_y, box, cylinder, ellipsoid, lathe, rounded_box, sheet, shell, slab, tube
 
 
 def _shell_look(rng: np.random.Generator) -> Material:
@@ -88,7 +88,7 @@ def _needles(rng: np.random.Generator) -> Parts:
     run = [(-0.05, 0.01), (-0.03, high), (deep * 0.35, high + 0.03), (deep * 0.2, high + 0.16), (-0.05, high + 0.2),
            (-0.1, high + 0.1)]  # fmt: skip
     return [
-        loft([np.column_stack([side[:, 0], np.full(5, v), side[:, 1]]) for v in (-half, half)], look),
+        along_y(side, -half, half, look),
         cloth(np.stack([np.column_stack([np.full(2, x), y, np.full(2, z)]) for x, z in run]), paper),
         spindle([(0.022, 0.0), (0.02, 0.02)], material("black", rng), 0.0, 0.0, 12)
         .turned(np.pi / 2)
@@ -273,7 +273,7 @@ def _desk_phone(rng: np.random.Generator) -> Parts:
     wide, deep, look, dark = draw(rng, 0.17, 0.24), draw(rng, 0.17, 0.23), _shell_look(rng), material("black", rng)
     half, back, low = wide / 2, draw(rng, 0.05, 0.1), draw(rng, 0.02, 0.035)
     side = np.array([(0.0, 0.0), (deep, 0.0), (deep, low), (0.0, back)])
-    yield loft([np.column_stack([side[:, 0], np.full(4, y), side[:, 1]]) for y in (-half, half)], look)
+    yield along_y(side, -half, half, look)
     lean = float(np.arctan2(back - low, deep))
     top = [face_up((deep * 0.45, -half * 0.05), (deep * 0.92, half * 0.85), 0.001, dark),
            *key_field(rng, (deep * 0.47, 0.0), (deep * 0.9, half * 0.8), 0.001, 4, 3, material("white", rng), 0.004,

@@ -10,7 +10,7 @@ from avlmaps_sim.furniture.fittings import Pair, body, face, spindle
 from avlmaps_sim.furniture.recipe_helpers import chance, cloth, draw, made_of, pick, pictured, rim, strut
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Meshes, joined
-from avlmaps_sim.shapes import cylinder, loft, prism, rounded_rectangle, slab, tube
+from avlmaps_sim.shapes import along_y, cylinder, loft, prism, rounded_rectangle, slab, tube
 
 
 def screen(rng: np.random.Generator, on: float = 0.55) -> Material:
@@ -133,7 +133,7 @@ def _rear_projection(rng: np.random.Generator) -> Parts:
     top = base + high + 0.06
     half = wide / 2 + 0.04
     side = np.array([(0.0, 0.0), (deep, 0.0), (deep, top), (0.35 * deep, top), (0.0, 0.75 * base)])
-    return [loft([np.column_stack([side[:, 0], np.full(5, y), side[:, 1]]) for y in (-half, half)], look),
+    return [along_y(side, -half, half, look),
             face(deep + 0.002, (-wide / 2, base), (wide / 2, base + high), screen(rng), fill=True),
             face(deep + 0.003, (-half + 0.05, 0.05), (half - 0.05, base - 0.06),
                  material("fabric", rng, (0.15, 0.15, 0.16)))]  # fmt: skip

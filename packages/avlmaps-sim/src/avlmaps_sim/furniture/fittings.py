@@ -12,7 +12,19 @@ from jaxtyping import Float
 from avlmaps_sim.furniture.recipe_helpers import chance, draw, made_of, pick, rim
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Triple, joined
-from avlmaps_sim.shapes import box, circle, cylinder, ellipsoid, loft, polygon, rounded_box, sheet, tube
+from avlmaps_sim.shapes import (
+    at_height,
+    box,
+    circle,
+    cylinder,
+    ellipsoid,
+    loft,
+    polygon,
+    rounded_box,
+    sheet,
+    shell,
+    tube,
+)
 
 Pair = tuple[float, float]
 Level = tuple[Float[np.ndarray, "k 2"], float]
@@ -32,15 +44,9 @@ def outline(
     return np.column_stack([x * length / 2 + middle[0], y * width / 2 + middle[1]])
 
 
-def shell(levels: Sequence[Level], look: Material, capped: bool = True) -> Mesh:
-    """Return the skin through curves at heights, in order: a body, or a bowl where it turns down inside again."""
-    return loft([np.column_stack([flat, np.full(len(flat), z)]) for flat, z in levels], look, capped)
-
-
 def open_bowl(levels: Sequence[Level], look: Material) -> list[Mesh]:
     """Return a hollow that is open above: the skin through its levels, from the rim inwards, and its floor."""
-    flat, z = levels[-1]
-    return [shell(levels, look, capped=False), polygon(np.column_stack([flat, np.full(len(flat), z)]), look)]
+    return [shell(levels, look, capped=False), polygon(at_height(*levels[-1]), look)]
 
 
 def spindle(

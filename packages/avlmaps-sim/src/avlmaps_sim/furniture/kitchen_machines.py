@@ -7,7 +7,7 @@ from avlmaps_sim.furniture.fittings import Pair, bar_handle, body, chrome, dial,
 from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes, joined
-from avlmaps_sim.shapes import box, loft, rounded_box, rounded_rectangle, slab, tube
+from avlmaps_sim.shapes import along_y, box, loft, rounded_box, rounded_rectangle, slab, tube
 
 
 def _keypad(rng: np.random.Generator, x: float, low: Pair, high: Pair) -> Meshes:
@@ -188,9 +188,9 @@ def _hood_slanted(rng: np.random.Generator) -> Parts:
     wide, high, deep = draw(rng, 0.55, 0.95), draw(rng, 0.35, 0.6), draw(rng, 0.32, 0.45)
     look, glass = enamel(rng), made_of(rng, "black", "black", "white", "glass")
     side = np.array([(0.0, 0.0), (0.12, 0.0), (deep, high * 0.7), (deep - 0.1, high), (0.0, high)])
-    yield loft([np.column_stack([side[:, 0], np.full(5, y), side[:, 1]]) for y in (-wide * 0.42, wide * 0.42)], look)
+    yield along_y(side, -wide * 0.42, wide * 0.42, look)
     pane = np.array([(0.125, 0.0), (deep + 0.015, high * 0.72), (deep, high * 0.74), (0.11, 0.012)])
-    yield loft([np.column_stack([pane[:, 0], np.full(4, y), pane[:, 1]]) for y in (-wide / 2, wide / 2)], glass)
+    yield along_y(pane, -wide / 2, wide / 2, glass)
     if chance(rng, 0.6):
         yield from _duct(rng, (0.24, 0.26), high, high + draw(rng, 0.2, 0.6), look)
 
@@ -201,7 +201,7 @@ def _hood_slim(rng: np.random.Generator) -> Parts:
     wide, deep, high, look = draw(rng, 0.55, 0.95), draw(rng, 0.28, 0.5), draw(rng, 0.1, 0.2), enamel(rng)
     nose = draw(rng, 0.25, 0.8) * high
     side = np.array([(0.0, 0.0), (deep, 0.0), (deep, nose), (deep * draw(rng, 0.6, 0.95), high), (0.0, high)])
-    return [loft([np.column_stack([side[:, 0], np.full(5, y), side[:, 1]]) for y in (-wide / 2, wide / 2)], look),
+    return [along_y(side, -wide / 2, wide / 2, look),
             *_buttons(rng, deep, nose / 2),
             slab(deep / 2, 0.0, -0.004, deep - 0.06, wide - 0.06, 0.005, material("metal", rng))]  # fmt: skip
 

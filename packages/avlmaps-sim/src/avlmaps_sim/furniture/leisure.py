@@ -19,6 +19,7 @@ from avlmaps_sim.shapes import (
     rounded_box,
     rounded_rectangle,
     sheet,
+    shell,
     slab,
     tube,
 )
@@ -215,11 +216,9 @@ def _pool_on_pedestals(rng: np.random.Generator) -> Parts:
 @family("pool table", "cabinet", held_out=True)
 def _cabinet_pool(rng: np.random.Generator) -> Parts:
     wide, long, tall, wood = _pool_size(rng)
-    rings = []
-    for size, z in ((draw(rng, 0.7, 0.85), 0.0), (0.97, tall - 0.2)):
-        flat = rounded_rectangle(wide * size, long * size, 0.02, 2)
-        rings.append(np.column_stack([flat, np.full(len(flat), z)]))
-    return [*_pool_top(rng, wide, long, tall, wood), loft(rings, wood)]
+    sizes = ((draw(rng, 0.7, 0.85), 0.0), (0.97, tall - 0.2))
+    case = shell([(rounded_rectangle(wide * s, long * s, 0.02, 2), z) for s, z in sizes], wood)
+    return [*_pool_top(rng, wide, long, tall, wood), case]
 
 
 def _water(rng: np.random.Generator, long: float, wide: float, tall: float, z: float) -> list[Mesh]:

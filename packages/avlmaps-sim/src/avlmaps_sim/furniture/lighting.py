@@ -11,7 +11,7 @@ from avlmaps_sim.furniture.catalogue import Parts, family
 from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick, strut, turned_ring
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Triple, joined
-from avlmaps_sim.shapes import circle, cylinder, ellipsoid, lathe, loft, rounded_box, slab, tube
+from avlmaps_sim.shapes import circle, cylinder, ellipsoid, lathe, loft, rounded_box, shell, slab, tube
 
 
 def shining(rng: np.random.Generator, kind: str | None = None) -> Material:
@@ -35,11 +35,8 @@ def shade(middle: Triple, low_radius: float, top_radius: float, height: float, l
     """Return an open shade from ``middle``'s z upwards, round or with few sides; ``pleat`` is the depth of folds."""
     x, y, z = middle
     fold = 1.0 - pleat * (np.arange(sides) % 2)
-    rings = [
-        np.column_stack([circle(r, sides) * fold[:, None] + (x, y), np.full(sides, h)])
-        for r, h in ((low_radius, z), (top_radius, z + height))
-    ]
-    return loft(rings, look, capped=False)
+    rims = ((low_radius, z), (top_radius, z + height))
+    return shell([(circle(r, sides) * fold[:, None] + (x, y), h) for r, h in rims], look, capped=False)
 
 
 def _any_shade(rng: np.random.Generator, middle: Triple, radius: float) -> Mesh:
@@ -269,8 +266,8 @@ def _sconce(rng: np.random.Generator) -> Parts:
     if kind == "half":  # half a drum against the wall
         flat = circle(1.0, 24)
         flat = flat[flat[:, 0] > -0.01] * (radius * 1.2, radius * 1.8)
-        rings = [np.column_stack([flat, np.full(len(flat), z)]) for z in (0.0, tall)]
-        return [loft(rings, _shade_material(rng), capped=False), (radius * 0.5, 0.0, tall / 2)]
+        half = shell([(flat, 0.0), (flat, tall)], _shade_material(rng), capped=False)
+        return [half, (radius * 0.5, 0.0, tall / 2)]
     parts = [rounded_box((0.0, -0.05, 0.0), (0.02, 0.05, draw(rng, 0.1, 0.25)), 0.008, metal)]
     sides = (-0.13, 0.13) if kind == "candles" else (0.0,)
     light = []

@@ -7,7 +7,7 @@ from avlmaps_sim.furniture.recipe_helpers import blade, chance, count, draw, mad
 from avlmaps_sim.furniture.vases import flowers
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes
-from avlmaps_sim.shapes import box, circle, cylinder, ellipsoid, lathe, loft, rounded_rectangle, slab, tube
+from avlmaps_sim.shapes import box, circle, cylinder, ellipsoid, lathe, loft, rounded_rectangle, shell, slab, tube
 
 
 def pot(rng: np.random.Generator, radius: float, tall: float) -> list[Mesh]:
@@ -19,11 +19,9 @@ def pot(rng: np.random.Generator, radius: float, tall: float) -> list[Mesh]:
     kind = pick(rng, ("tapered", "tapered", "tube", "bowl", "square", "legs", "basket"))
     soil = cylinder(0.0, 0.0, tall * 0.86, radius * 0.88, tall * 0.04, earth, 12)
     if kind == "square":
-        low, rings = draw(rng, 0.7, 1.0), []
-        for size, z in ((low, 0.0), (1.0, tall), (0.88, tall), (0.86, tall * 0.85)):
-            flat = rounded_rectangle(2 * radius * size, 2 * radius * size, 0.01, 2)
-            rings.append(np.column_stack([flat, np.full(len(flat), z)]))
-        return [loft(rings, look), slab(0.0, 0.0, tall * 0.85, 1.7 * radius, 1.7 * radius, 0.01, earth)]
+        sizes = ((draw(rng, 0.7, 1.0), 0.0), (1.0, tall), (0.88, tall), (0.86, tall * 0.85))
+        body = shell([(rounded_rectangle(2 * radius * s, 2 * radius * s, 0.01, 2), z) for s, z in sizes], look)
+        return [body, slab(0.0, 0.0, tall * 0.85, 1.7 * radius, 1.7 * radius, 0.01, earth)]
     rows = {
         "tapered": [(0.68, 0.0), (0.95, 0.8), (1.03, 0.8), (1.03, 1.0), (0.9, 1.0), (0.88, 0.86)],
         "tube": [(0.98, 0.0), (1.0, 0.02), (1.0, 1.0), (0.92, 1.0), (0.9, 0.86)],

@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from avlmaps_sim.materials import KINDS, material
 from avlmaps_sim.mesh import Material, Mesh, Triple, joined, triangles_of
-from avlmaps_sim.shapes import box, circle, loft
+from avlmaps_sim.shapes import box, circle, loft, shell
 
 T = TypeVar("T")
 
@@ -90,11 +90,7 @@ def turned_ring(
     profile: Sequence[tuple[float, float]], look: Material, x: float = 0.0, y: float = 0.0, sides: int = 18
 ) -> Mesh:
     """Return the surface of a profile of (radius, z) round an upright axis at (x, y), open at both ends."""
-    return loft(
-        [np.column_stack([circle(r, sides) + np.array([x, y]), np.full(sides, z)]) for r, z in profile],
-        look,
-        capped=False,
-    )
+    return shell([(circle(r, sides) + np.array([x, y]), z) for r, z in profile], look, capped=False)
 
 
 def pictured(kind: str, rng: np.random.Generator, plain: str) -> Material:

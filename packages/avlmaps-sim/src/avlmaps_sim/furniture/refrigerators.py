@@ -16,12 +16,11 @@ from avlmaps_sim.furniture.fittings import (
     front,
     front_style,
     outline,
-    shell,
 )  # fmt: skip
 from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh
-from avlmaps_sim.shapes import box, cylinder, rounded_box, slab
+from avlmaps_sim.shapes import box, cylinder, rounded_box, shell, slab
 
 
 def _leaf(rng: np.random.Generator, x: float, low: tuple[float, float], high: tuple[float, float], look: Material,

@@ -23,7 +23,7 @@ from avlmaps_sim.furniture.sofa_parts import (
 from avlmaps_sim.furniture.upholstery import covering, cushion, cushion_row, scattered_pillows
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import joined
-from avlmaps_sim.shapes import box, loft, rounded_box, tube
+from avlmaps_sim.shapes import along_y, box, loft, rounded_box, tube
 
 
 @family("sofa", "block")
@@ -68,7 +68,7 @@ def chesterfield(rng: np.random.Generator) -> Parts:
     scroll = np.column_stack([-0.55 * plan.arm - r * np.cos(angle), top - r + r * np.sin(angle)])
     flat = np.concatenate([[(0.0, plan.clear), (-0.7 * plan.arm, plan.clear), (-0.7 * plan.arm, top - 2 * r)], scroll])
     half = plan.outer / 2 - 0.02
-    yield loft([np.column_stack([flat[:, 0], np.full(len(flat), y), flat[:, 1]]) for y in (-half, half)], look)
+    yield along_y(flat, -half, half, look)
     yield from seat_cushions(rng, plan, pick(rng, (1, seats)), 0.14, look)
     yield from strewn(rng, plan, seats)
 

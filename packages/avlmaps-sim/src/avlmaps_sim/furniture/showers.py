@@ -6,11 +6,11 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps_sim.furniture.catalogue import Parts, family
-from avlmaps_sim.furniture.fittings import china, chrome, outline, shell
+from avlmaps_sim.furniture.fittings import china, chrome, outline
 from avlmaps_sim.furniture.recipe_helpers import chance, cloth, draw, made_of, pick, pictured
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes, Triple, joined
-from avlmaps_sim.shapes import box, cylinder, ellipsoid, slab, tube
+from avlmaps_sim.shapes import at_height, box, cylinder, ellipsoid, shell, slab, tube
 
 
 def _rail(rng: np.random.Generator, x: float, y: float, tall: float, metal: Material) -> Meshes:
@@ -128,7 +128,7 @@ def _quarter_round(rng: np.random.Generator) -> Parts:
             look,
         )
     ]
-    wall = np.stack([np.column_stack([path, np.full(len(path), z)]) for z in (high, tall)], axis=1)
+    wall = np.stack([at_height(path, high), at_height(path, tall)], axis=1)
     parts.append(cloth(wall, glass))
     places: list[tuple[float, float]] = [(float(x), float(y)) for x, y in path]
     parts += [tube([(x, y, z) for x, y in places], 0.016, metal, 5) for z in (high + 0.01, tall)]

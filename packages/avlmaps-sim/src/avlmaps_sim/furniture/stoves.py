@@ -15,13 +15,12 @@ from avlmaps_sim.furniture.fittings import (
     front,
     front_style,
     knob,
-    shell,
     steel,
 )  # fmt: skip
 from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes
-from avlmaps_sim.shapes import box, circle, cylinder, rounded_box, slab, tube
+from avlmaps_sim.shapes import box, circle, cylinder, rounded_box, shell, slab, tube
 
 
 def _window(x: float, low: Pair, high: Pair, look: Material, dark: Material, edge: float) -> list[Mesh]:

@@ -9,7 +9,7 @@ from avlmaps_sim.furniture.legs import four_legs, leg, leg_style, named_leg, sta
 from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, made_of, pick, rim, strut
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes, joined
-from avlmaps_sim.shapes import box, circle, cylinder, lathe, loft, prism, rounded_rectangle, slab, tube
+from avlmaps_sim.shapes import box, circle, cylinder, lathe, prism, rounded_rectangle, shell, slab, tube
 
 Outline = Literal["rectangle", "rounded", "oval", "octagon", "boat", "stadium"]
 
@@ -43,10 +43,9 @@ def table_top(
     """Return a top whose upper face lies at ``high``; a bevel draws its underside in, metres."""
     flat = np.asarray(outline(kind, depth, width))
     if not bevel:
-        return prism([(float(x), float(y)) for x, y in flat], high - thick, thick, look)
+        return prism(flat, high - thick, thick, look)
     shrink = 1 - 2 * bevel / np.array([depth, width])
-    rings = [(flat * shrink, high - thick), (flat, high - thick * 0.4), (flat, high)]
-    return loft([np.column_stack([ring, np.full(len(ring), z)]) for ring, z in rings], look)
+    return shell([(flat * shrink, high - thick), (flat, high - thick * 0.4), (flat, high)], look)
 
 
 def top_support(kind: Outline, depth: float, width: float, z: float) -> Support:
@@ -165,10 +164,7 @@ def tablecloth(rng: np.random.Generator, depth: float, width: float, high: float
         fold = 1 + 0.05 * np.cos(angle * count(rng, 5, 8))
         rim_xy = flat * (depth / 2 + 0.008, width / 2 + 0.008)
         rings = [(rim_xy * 0.98, high + 0.004), (rim_xy, high - 0.005), (rim_xy * (1.01 * fold)[:, None], high - hang)]
-        skin = [np.column_stack([ring, np.full(len(ring), z)]) for ring, z in rings]
-        return joined(
-            [loft(skin, look, capped=False), prism([(float(x), float(y)) for x, y in rings[0][0]], high, 0.004, look)]
-        )
+        return joined([shell(rings, look, capped=False), prism(rings[0][0], high, 0.004, look)])
     x = [
         -depth / 2 - 0.03,
         -depth / 2 - 0.006,

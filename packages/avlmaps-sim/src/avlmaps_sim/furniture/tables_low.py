@@ -19,7 +19,7 @@ from avlmaps_sim.furniture.table_parts import (
 )
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material
-from avlmaps_sim.shapes import box, cylinder, lathe, loft, rounded_box, slab, tube
+from avlmaps_sim.shapes import box, cylinder, lathe, rounded_box, shell, slab, tube
 
 
 def _metal(rng: np.random.Generator) -> Material:
@@ -331,12 +331,8 @@ def half_moon(rng: np.random.Generator) -> Parts:
     depth, look = draw(rng, 0.32, 0.45), made_of(rng, "wood", "white", "painted")
     angle = np.linspace(-np.pi / 2, np.pi / 2, 13)
     flat = np.column_stack([depth * np.cos(angle), width / 2 * np.sin(angle)])
-    for_z = [(flat, high - 0.022), (flat, high)]
-    yield loft([np.column_stack([ring, np.full(len(ring), z)]) for ring, z in for_z], look)
-    inner = flat * 0.88
-    yield loft(
-        [np.column_stack([inner, np.full(len(inner), z)]) for z in (high - draw(rng, 0.09, 0.14), high - 0.02)], look
-    )
+    yield shell([(flat, high - 0.022), (flat, high)], look)
+    yield shell([(flat * 0.88, high - draw(rng, 0.09, 0.14)), (flat * 0.88, high - 0.02)], look)
     style = leg_style(rng, 0.03, 0.05)
     for a in np.linspace(-1.35, 1.35, count(rng, 3, 4)).tolist():
         x, y = depth * 0.82 * float(np.cos(a)), width * 0.42 * float(np.sin(a))

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Parts, family
-from avlmaps_sim.furniture.fittings import chrome, dial, face, feet, outline, shell, spindle
+from avlmaps_sim.furniture.fittings import chrome, dial, face, feet, outline, spindle
 from avlmaps_sim.furniture.recipe_helpers import chance, cloth, count, draw, made_of, pick, strut
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes, joined
-from avlmaps_sim.shapes import box, circle, cylinder, lathe, loft, rounded_box, slab, tube
+from avlmaps_sim.shapes import box, circle, cylinder, lathe, loft, rounded_box, shell, slab, tube
 
 
 def _rotor(rng: np.random.Generator, radius: float, x: float, z: float, look: Material) -> Meshes:

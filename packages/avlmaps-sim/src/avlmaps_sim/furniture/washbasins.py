@@ -5,11 +5,11 @@ from itertools import pairwise
 import numpy as np
 
 from avlmaps_sim.furniture.catalogue import Parts, Support, family
-from avlmaps_sim.furniture.fittings import china, chrome, front, front_style, outline, shell, steel, tap
+from avlmaps_sim.furniture.fittings import china, chrome, front, front_style, outline, steel, tap
 from avlmaps_sim.furniture.recipe_helpers import chance, count, draw, made_of, pick, pictured
 from avlmaps_sim.materials import material
 from avlmaps_sim.mesh import Material, Mesh, Meshes, joined
-from avlmaps_sim.shapes import box, cylinder, lathe, rounded_box, slab, tube
+from avlmaps_sim.shapes import box, cylinder, lathe, rounded_box, shell, slab, tube
 
 Pair = tuple[float, float]
 
