@@ -4,6 +4,7 @@ import numpy as np
 
 from avlmaps_sim.synthesis.blocks import (
     SECONDS,
+    Pieces,
     Rng,
     at_random,
     band,
@@ -23,9 +24,9 @@ from avlmaps_sim.synthesis.blocks import (
 
 
 @makes("cat meowing")
-def cat(rng: Rng) -> np.ndarray:
+def cat(rng: Rng) -> Pieces:
     """A pitch that rises and falls while the mouth opens and closes."""
-    high, pieces = between(rng, 450, 900), []
+    high = between(rng, 450, 900)
     for onset in regular(rng, between(rng, 1.2, 3.0), 0.2):
         seconds = rng.uniform(0.4, 1.3)
         hz = glide(seconds, 0.75 * high, high, jittered(rng, 0.95 * high, 0.1), 0.6 * high)
@@ -33,40 +34,36 @@ def cat(rng: Rng) -> np.ndarray:
         opened = voice(rng, hz, [(1300, 400, 1.0), (2400, 500, 0.7), (3800, 800, 0.3)])
         openness = swell(seconds, 0.5 * seconds, 0.4 * seconds)[: len(hz)]
         mixed = closed * (1 - openness) + opened * openness
-        pieces.append((onset, mixed * swell(seconds, 0.06, 0.25)[: len(hz)]))
-    return place(pieces)
+        yield onset, mixed * swell(seconds, 0.06, 0.25)[: len(hz)]
 
 
 @makes("cow mooing")
-def cow(rng: Rng) -> np.ndarray:
+def cow(rng: Rng) -> Pieces:
     """A long low bellow."""
-    low, pieces = between(rng, 90, 200), []
+    low = between(rng, 90, 200)
     for onset in regular(rng, between(rng, 2.2, 4.0), 0.2):
         seconds = rng.uniform(1.2, 2.4)
         hz = glide(seconds, 0.8 * low, low, 1.15 * low, 0.75 * low)
         sound = voice(rng, hz, [(300, 150, 1.0), (750, 250, 0.6), (1800, 500, 0.15)], 0.08, 0.02)
-        pieces.append((onset, sound * swell(seconds, 0.2, 0.4)[: len(sound)]))
-    return place(pieces)
+        yield onset, sound * swell(seconds, 0.2, 0.4)[: len(sound)]
 
 
 @makes("sheep bleating")
-def sheep(rng: Rng) -> np.ndarray:
+def sheep(rng: Rng) -> Pieces:
     """A nasal voice with a strong tremolo."""
-    low, pieces = between(rng, 220, 500), []
+    low = between(rng, 220, 500)
     for onset in regular(rng, between(rng, 1.1, 2.5), 0.3):
         seconds = rng.uniform(0.5, 1.3)
         shake = 2 * np.pi * rng.uniform(6, 11) * times(seconds)
         hz = glide(seconds, low, 1.1 * low, 0.9 * low) * (1 + 0.05 * np.sin(shake))
         sound = voice(rng, hz, [(800, 300, 1.0), (1600, 400, 0.8), (2900, 600, 0.4)], 0.1)
         tremolo = 0.6 + 0.4 * np.sin(shake)
-        pieces.append((onset, sound * tremolo * swell(seconds, 0.05, 0.2)))
-    return place(pieces)
+        yield onset, sound * tremolo * swell(seconds, 0.05, 0.2)
 
 
 @makes("pig grunting")
-def pig(rng: Rng) -> np.ndarray:
+def pig(rng: Rng) -> Pieces:
     """Short rough grunts; now and then a squeal."""
-    pieces = []
     for onset in regular(rng, between(rng, 0.35, 0.9), 0.4):
         seconds = rng.uniform(0.12, 0.4)
         if rng.random() < 0.15:
@@ -75,54 +72,49 @@ def pig(rng: Rng) -> np.ndarray:
         else:
             hz = glide(seconds, 70, between(rng, 80, 160), 60)
             sound = voice(rng, hz, [(350, 200, 1.0), (1100, 400, 0.7), (2500, 900, 0.3)], 0.6, 0.25)
-        pieces.append((onset, sound * swell(len(sound) / 22050, 0.03, 0.08)[: len(sound)]))
-    return place(pieces)
+        yield onset, sound * swell(len(sound) / 22050, 0.03, 0.08)[: len(sound)]
 
 
 @makes("hen clucking")
-def hen(rng: Rng) -> np.ndarray:
+def hen(rng: Rng) -> Pieces:
     """Runs of short clucks, the last one long and high."""
-    low, pieces, onset = between(rng, 350, 650), [], rng.uniform(0.0, 0.6)
+    low, onset = between(rng, 350, 650), rng.uniform(0.0, 0.6)
     while onset < SECONDS:
         for _ in range(rng.integers(2, 8)):
             hz = glide(0.09, low, jittered(rng, 1.3 * low), 0.8 * low)
             cluck = voice(rng, hz, [(900, 400, 1.0), (2000, 700, 0.5)], 0.2) * swell(0.09, 0.008, 0.05)
-            pieces.append((onset, rng.uniform(0.4, 0.8) * cluck))
+            yield onset, rng.uniform(0.4, 0.8) * cluck
             onset += jittered(rng, 0.24, 0.3)
         hz = glide(0.45, low, 1.9 * low, 1.5 * low)
-        pieces.append((onset, voice(rng, hz, [(1200, 500, 1.0), (2600, 800, 0.6)], 0.2) * swell(0.45, 0.03, 0.15)))
+        yield onset, voice(rng, hz, [(1200, 500, 1.0), (2600, 800, 0.6)], 0.2) * swell(0.45, 0.03, 0.15)
         onset += rng.uniform(0.6, 1.4)
-    return place(pieces)
 
 
 @makes("crow cawing")
-def crow(rng: Rng) -> np.ndarray:
+def crow(rng: Rng) -> Pieces:
     """Harsh, falling caws in groups."""
-    low, pieces = between(rng, 350, 650), []
+    low = between(rng, 350, 650)
     for onset in regular(rng, between(rng, 0.5, 1.2), 0.25):
         seconds = rng.uniform(0.25, 0.5)
         hz = glide(seconds, 0.9 * low, 1.1 * low, 0.75 * low)
         sound = voice(rng, hz, [(1300, 500, 1.0), (1900, 600, 0.8), (3200, 1200, 0.3)], 0.5, 0.15)
-        pieces.append((onset, sound * swell(seconds, 0.04, 0.1)))
-    return place(pieces)
+        yield onset, sound * swell(seconds, 0.04, 0.1)
 
 
 @makes("frog croaking")
-def frog(rng: Rng) -> np.ndarray:
+def frog(rng: Rng) -> Pieces:
     """Trains of pulses through one resonance."""
-    centre, rate, pieces = between(rng, 500, 2600), between(rng, 18, 70), []
+    centre, rate = between(rng, 500, 2600), between(rng, 18, 70)
     for onset in regular(rng, between(rng, 0.4, 1.3), 0.25):
         seconds = rng.uniform(0.15, 0.7)
         pulse = tone(np.full(len(times(0.03)), centre), [1.0, 0.3]) * np.exp(-times(0.03) / 0.007)
         croak = place(((k / rate, pulse) for k in range(int(seconds * rate))), seconds)
-        pieces.append((onset, croak * swell(seconds, 0.05, 0.1)))
-    return place(pieces)
+        yield onset, croak * swell(seconds, 0.05, 0.1)
 
 
 @makes("birds chirping")
-def birds(rng: Rng) -> np.ndarray:
+def birds(rng: Rng) -> Pieces:
     """Whistled syllables that sweep between 2 and 8 kHz, of several birds."""
-    pieces = []
     for _ in range(rng.integers(1, 5)):
         centre, seconds = between(rng, 2200, 6500), between(rng, 0.03, 0.2)
         sweeps = [centre * np.exp(rng.uniform(-0.35, 0.35, 3)) for _ in range(rng.integers(1, 4))]
@@ -130,11 +122,8 @@ def birds(rng: Rng) -> np.ndarray:
         while start < SECONDS:
             for k in range(rng.integers(2, 9)):
                 syllable = tone(glide(seconds, *sweeps[k % len(sweeps)]), [1.0, 0.08])
-                pieces.append(
-                    (start + k * gap, syllable * swell(seconds, seconds / 4, seconds / 3) * rng.uniform(0.4, 1))
-                )
+                yield (start + k * gap, syllable * swell(seconds, seconds / 4, seconds / 3) * rng.uniform(0.4, 1))
             start += 9 * gap + rng.exponential(1.0)
-    return place(pieces)
 
 
 @makes("crickets")
@@ -159,22 +148,19 @@ def insects(rng: Rng) -> np.ndarray:
 
 
 @makes("owl or pigeon")
-def dove(rng: Rng) -> np.ndarray:
+def dove(rng: Rng) -> Pieces:
     """Soft hoots in a fixed rhythm."""
-    low, pieces = between(rng, 300, 650), []
+    low = between(rng, 300, 650)
     for onset in regular(rng, between(rng, 1.4, 2.6), 0.1):
         for delay, seconds in ((0.0, 0.25), (0.35, 0.5), (1.0, 0.3)):
             hoot = tone(glide(seconds, low, 1.06 * low, low), [1.0, 0.1, 0.05]) * swell(seconds, 0.06, 0.12)
-            pieces.append((onset + delay, hoot))
-    return place(pieces)
+            yield (onset + delay, hoot)
 
 
 @makes("mouse squeaking")
-def mouse(rng: Rng) -> np.ndarray:
+def mouse(rng: Rng) -> Pieces:
     """Tiny squeaks above 4 kHz."""
-    pieces = []
     for onset in at_random(rng, between(rng, 1, 5)):
         seconds = rng.uniform(0.04, 0.15)
         hz = glide(seconds, *(between(rng, 4000, 9000) for _ in range(3)))
-        pieces.append((onset, tone(hz, [1.0]) * swell(seconds, 0.01, 0.03)))
-    return place(pieces)
+        yield onset, tone(hz, [1.0]) * swell(seconds, 0.01, 0.03)

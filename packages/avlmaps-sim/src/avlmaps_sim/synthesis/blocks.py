@@ -10,15 +10,20 @@ RATE_HZ = 22_050
 SAMPLES = 448 * 256
 SECONDS = SAMPLES / RATE_HZ
 Rng = np.random.Generator
-Maker = Callable[[Rng], np.ndarray]
-MAKERS: dict[str, Maker] = {}
+Pieces = Iterable[tuple[float, np.ndarray]]  # onsets (s) and what sounds then
+Maker = Callable[[Rng], np.ndarray | Pieces]
+MAKERS: dict[str, Callable[[Rng], np.ndarray]] = {}
 
 
 def makes(name: str) -> Callable[[Maker], Maker]:
-    """Register a function that makes one sound of a category; categories may have several."""
+    """Register a function that makes one sound of a category, or yields the pieces to be placed in time."""
 
     def register(maker: Maker) -> Maker:
-        MAKERS[name] = maker
+        def whole(rng: Rng) -> np.ndarray:
+            made = maker(rng)
+            return made if isinstance(made, np.ndarray) else place(made)
+
+        MAKERS[name] = whole
         return maker
 
     return register
@@ -130,7 +135,7 @@ def glide(seconds: float, *hz: float) -> np.ndarray:
     return PchipInterpolator(np.linspace(0.0, seconds, len(hz)), hz)(t)
 
 
-def place(pieces: Iterable[tuple[float, np.ndarray]], seconds: float = SECONDS) -> np.ndarray:
+def place(pieces: Pieces, seconds: float = SECONDS) -> np.ndarray:
     """Add pieces at their onsets (s); what runs over the end is cut."""
     total = np.zeros(len(times(seconds)))
     for onset_s, piece in pieces:

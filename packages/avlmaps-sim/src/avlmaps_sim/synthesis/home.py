@@ -5,6 +5,7 @@ import numpy as np
 from avlmaps_sim.synthesis.blocks import (
     RATE_HZ,
     SECONDS,
+    Pieces,
     Rng,
     at_random,
     band,
@@ -27,69 +28,61 @@ from avlmaps_sim.synthesis.blocks import (
 
 
 @makes("door knock")
-def door_knock(rng: Rng) -> np.ndarray:
+def door_knock(rng: Rng) -> Pieces:
     """Two to six knuckle blows on a panel, perhaps twice."""
     low, period = between(rng, 70, 220), between(rng, 0.12, 0.3)
     body = [(f * low, jittered(rng, 0.03, 0.3), g) for f, g in ((1.0, 1.0), (1.7, 0.7), (2.6, 0.5), (4.1, 0.3))]
-    pieces = []
     start = rng.uniform(0.1, 1.5)
     for _ in range(rng.integers(1, 4)):
         for k in range(rng.integers(2, 7)):
             hz, decay, gain = zip(*body, strict=True)
             blow = ringing(hz, decay, gain, 0.3) + 0.5 * click(rng, 0.004, 500, 4000, 0.3)
-            pieces.append((start + k * jittered(rng, period, 0.05), rng.uniform(0.6, 1.0) * blow))
+            yield (start + k * jittered(rng, period, 0.05), rng.uniform(0.6, 1.0) * blow)
         start += 6 * period + rng.uniform(0.4, 1.2)
-    return place(pieces)
 
 
 @makes("door opening or closing")
-def door_closing(rng: Rng) -> np.ndarray:
+def door_closing(rng: Rng) -> Pieces:
     """A latch, then a thud of the leaf in its frame, or the other way round."""
     thud = struck(rng, 50, 400, 12, between(rng, 0.04, 0.15), 1.0) + click(rng, 0.03, 60, 1500, 1.0) * 2
     latch = [(0.02 * k, rng.uniform(0.2, 0.6) * click(rng, 0.004, 1200, 7000)) for k in range(rng.integers(1, 4))]
     scrape = band(noise(rng, 0.5), 300, 3000) * swell(0.5, 0.2, 0.2) * rng.uniform(0.0, 0.15)
-    pieces, start = [], rng.uniform(0.1, 2.0)
+    start = rng.uniform(0.1, 2.0)
     for _ in range(rng.integers(1, 3)):
-        pieces += [(start, scrape), (start + 0.4, thud * 0.4)]
-        pieces += [(start + 0.35 + rng.uniform(0.0, 0.15) + onset, sound) for onset, sound in latch]
+        yield from ((start, scrape), (start + 0.4, thud * 0.4))
+        yield from [(start + 0.35 + rng.uniform(0.0, 0.15) + onset, sound) for onset, sound in latch]
         start += rng.uniform(1.0, 2.5)
-    return place(pieces)
 
 
 @makes("creaking door")
-def door_creak(rng: Rng) -> np.ndarray:
+def door_creak(rng: Rng) -> Pieces:
     """Stick and slip: pulses of a rate that moves, through a few woody resonances."""
-    total = []
     for onset in regular(rng, between(rng, 1.2, 3.0), 0.2):
         seconds = rng.uniform(0.6, 2.0)
         rate = glide(seconds, *(between(rng, 25, 240) for _ in range(4)))
         pulses = (np.diff(np.floor(np.cumsum(rate) / RATE_HZ), prepend=0) > 0) * rng.uniform(0.5, 1.0, len(rate))
         peaks = [(between(rng, 400, 3500), between(rng, 60, 250), rng.uniform(0.3, 1.0)) for _ in range(5)]
-        total.append((onset, resonant(pulses, peaks) * swell(seconds, 0.1, 0.3)))
-    return place(total)
+        yield onset, resonant(pulses, peaks) * swell(seconds, 0.1, 0.3)
 
 
 @makes("glass breaking")
-def glass_breaking(rng: Rng) -> np.ndarray:
+def glass_breaking(rng: Rng) -> Pieces:
     """A bang, then a shower of ringing shards."""
     start = rng.uniform(0.1, 2.0)
-    pieces = [(start, 4 * click(rng, 0.01, 800, 9000)), (start, 3 * struck(rng, 1500, 9000, 14, 0.03, 0.4))]
+    yield from ((start, 4 * click(rng, 0.01, 800, 9000)), (start, 3 * struck(rng, 1500, 9000, 14, 0.03, 0.4)))
     spread = between(rng, 0.1, 0.6)
     for _ in range(rng.integers(12, 60)):
         shard = struck(rng, 2500, 10000, 4, between(rng, 0.01, 0.08), 0.4)
         late = rng.exponential(spread)
-        pieces.append((start + late, shard * np.exp(-late) * rng.uniform(0.1, 1.0)))
-    return place(pieces)
+        yield (start + late, shard * np.exp(-late) * rng.uniform(0.1, 1.0))
 
 
 @makes("dishes clattering")
-def dishes(rng: Rng) -> np.ndarray:
+def dishes(rng: Rng) -> Pieces:
     """Plates and cutlery put down, one after another."""
-    pieces = []
     for onset in at_random(rng, between(rng, 2, 7)):
         hard = struck(rng, between(rng, 900, 2500), 8000, 8, between(rng, 0.03, 0.15), 0.5)
-        pieces.append((onset, (hard + click(rng, 0.003, 1500, 9000, 0.5)) * rng.uniform(0.2, 1.0)))
-    return place(pieces)
+        yield onset, (hard + click(rng, 0.003, 1500, 9000, 0.5)) * rng.uniform(0.2, 1.0)
 
 
 @makes("can opening")
@@ -227,46 +220,40 @@ def phone_ringing(rng: Rng) -> np.ndarray:
 
 
 @makes("keyboard typing")
-def keyboard_typing(rng: Rng) -> np.ndarray:
+def keyboard_typing(rng: Rng) -> Pieces:
     """Many small clicks down and up, with a hollow body, in bursts."""
     low = between(rng, 250, 900)
-    pieces = []
     for onset in regular(rng, between(rng, 0.09, 0.22), 0.5):
         key = click(rng, 0.003, 1200, 8000, 0.08) + 0.5 * struck(rng, low, 6 * low, 5, 0.012, 0.08)
         gain = rng.uniform(0.3, 1.0)
-        pieces += [(onset, gain * key), (onset + rng.uniform(0.04, 0.1), 0.4 * gain * click(rng, 0.002, 2000, 9000))]
-    return place(pieces)
+        yield from ((onset, gain * key), (onset + rng.uniform(0.04, 0.1), 0.4 * gain * click(rng, 0.002, 2000, 9000)))
 
 
 @makes("mouse click")
-def mouse_click(rng: Rng) -> np.ndarray:
+def mouse_click(rng: Rng) -> Pieces:
     """Down and up of a small switch, a few times."""
     high = between(rng, 2000, 4500)
-    pieces = []
     for onset in regular(rng, between(rng, 0.3, 1.6), 0.5):
         for delay, gain in ((0.0, 1.0), (rng.uniform(0.05, 0.14), 0.7)):
             switch = struck(rng, high, 9000, 5, 0.004, 0.05) + click(rng, 0.001, 1500, 10000, 0.05)
-            pieces.append((onset + delay, gain * switch))
-    return place(pieces)
+            yield (onset + delay, gain * switch)
 
 
 @makes("footsteps")
-def footsteps(rng: Rng) -> np.ndarray:
+def footsteps(rng: Rng) -> Pieces:
     """Heel and toe at a walking pace on wood, stone, metal or gravel."""
     ground, period = rng.integers(4), between(rng, 0.33, 0.75)
     heel, toe = between(rng, 60, 250), rng.uniform(0.06, 0.16)
-    pieces = []
     for onset in regular(rng, period, 0.06):
         if ground == 3:
             grains = at_random(rng, 250, 0.22)
             step = place(((g, rng.uniform(0.1, 1) * click(rng, 0.003, 900, 9000, 0.03)) for g in grains), 0.3)
-            pieces.append((onset, step))
+            yield onset, step
             continue
         modes, decay, top = ((8, 0.035, 1500), (5, 0.012, 3500), (12, 0.09, 5000))[ground]
         for delay, gain in ((0.0, 1.0), (toe, 0.5)):
             blow = struck(rng, heel, top, modes, decay, 0.4) + 0.7 * click(rng, 0.006, 150, 3500, 0.4)
-            pieces.append((onset + delay, gain * rng.uniform(0.7, 1.0) * blow))
-    return place(pieces)
+            yield (onset + delay, gain * rng.uniform(0.7, 1.0) * blow)
 
 
 @makes("running water")
@@ -288,15 +275,13 @@ def bubbles(rng: Rng, rate_hz: float, pitch: tuple[float, float]) -> np.ndarray:
 
 
 @makes("water drops")
-def water_drops(rng: Rng) -> np.ndarray:
+def water_drops(rng: Rng) -> Pieces:
     """Single drops: a tick and a bubble."""
-    pieces = []
     for onset in regular(rng, between(rng, 0.2, 1.2), rng.uniform(0.0, 0.4)):
         seconds = between(rng, 0.03, 0.1)
         hz = between(rng, 500, 2500) * (1 + rng.uniform(1, 8) * times(seconds))
         drop = tone(hz, [1.0, 0.1]) * np.exp(-4 * times(seconds) / seconds)
-        pieces += [(onset, 0.3 * click(rng, 0.002, 2000, 9000)), (onset + 0.01, drop * rng.uniform(0.6, 1.0))]
-    return place(pieces)
+        yield from ((onset, 0.3 * click(rng, 0.002, 2000, 9000)), (onset + 0.01, drop * rng.uniform(0.6, 1.0)))
 
 
 @makes("pouring water")
@@ -354,32 +339,30 @@ def brushing_teeth(rng: Rng) -> np.ndarray:
 
 
 @makes("piano")
-def piano(rng: Rng) -> np.ndarray:
+def piano(rng: Rng) -> Pieces:
     """Notes of a scale with stretched partials."""
-    root, pieces = between(rng, 110, 330), []
+    root = between(rng, 110, 330)
     for onset in regular(rng, between(rng, 0.18, 0.6), 0.2):
         for hz in root * 2 ** (rng.choice([0, 2, 4, 5, 7, 9, 11, 12, 14, 16], rng.integers(1, 4)) / 12):
             k = np.arange(1, 12)
             partials = hz * k * np.sqrt(1 + 4e-4 * k**2)
             note = ringing(partials, 1.2 / k**0.8, rng.uniform(0.4, 1) / k**1.1, 2.0)
-            pieces.append((onset, note + 0.1 * click(rng, 0.005, 200, 3000, 2.0)))
-    return place(pieces)
+            yield onset, note + 0.1 * click(rng, 0.005, 200, 3000, 2.0)
 
 
 @makes("television or music")
-def music(rng: Rng) -> np.ndarray:
+def music(rng: Rng) -> Pieces:
     """A beat, a bass and chords."""
-    beat, root, pieces = 60 / rng.uniform(80, 150), between(rng, 55, 110), []
+    beat, root = 60 / rng.uniform(80, 150), between(rng, 55, 110)
     for k, onset in enumerate(np.arange(rng.uniform(0, 0.4), SECONDS, beat / 2)):
         if k % 2 == 0:
             kick = tone(glide(0.2, 160, 50), [1.0]) * np.exp(-times(0.2) / 0.06)
             snare = click(rng, 0.05, 200, 8000, 0.3)
-            pieces.append((onset, kick * 1.5 if k % 4 == 0 else snare[: len(snare)]))
-        pieces.append((onset, 0.25 * click(rng, 0.012, 5000, 10000, 0.1)))
+            yield onset, kick * 1.5 if k % 4 == 0 else snare[: len(snare)]
+        yield onset, 0.25 * click(rng, 0.012, 5000, 10000, 0.1)
         hz = root * 2 ** (rng.choice([0, 3, 5, 7, 10]) / 12)
-        pieces.append((onset, 0.5 * tone(np.full(len(times(beat / 2)), hz), [1, 0.5, 0.3, 0.2])))
+        yield onset, 0.5 * tone(np.full(len(times(beat / 2)), hz), [1, 0.5, 0.3, 0.2])
         if k % 4 == 0:
             for step in (0, rng.choice([3, 4]), 7):
                 chord = tone(np.full(len(times(2 * beat)), 4 * hz * 2 ** (step / 12)), [1, 0.5, 0.4, 0.2, 0.1])
-                pieces.append((onset, 0.2 * chord * swell(2 * beat, 0.02, 0.3)))
-    return place(pieces)
+                yield onset, 0.2 * chord * swell(2 * beat, 0.02, 0.3)

@@ -4,6 +4,7 @@ import numpy as np
 
 from avlmaps_sim.synthesis.blocks import (
     SECONDS,
+    Pieces,
     Rng,
     at_random,
     band,
@@ -118,35 +119,32 @@ def airplane(rng: Rng) -> np.ndarray:
 
 
 @makes("church bells")
-def church_bells(rng: Rng) -> np.ndarray:
+def church_bells(rng: Rng) -> Pieces:
     """Struck bells with hum, prime, tierce, quint and nominal."""
-    base, pieces = between(rng, 180, 700), []
+    base = between(rng, 180, 700)
     bells = base * rng.choice([1, 1.125, 1.25, 1.33, 1.5, 1.68], rng.integers(1, 4), replace=False)
     for onset in regular(rng, between(rng, 0.4, 2.2), 0.08):
         hz = float(rng.choice(bells))
         partials = hz * np.array([0.5, 1.0, 1.19, 1.5, 2.0, 2.52, 2.67, 3.01, 4.17])
         decays = np.array([4, 2.5, 2, 1.5, 1.2, 0.8, 0.7, 0.5, 0.3])
         gains = np.array([0.6, 0.8, 0.9, 0.4, 1.0, 0.4, 0.5, 0.4, 0.3]) * rng.uniform(0.5, 1.3, 9)
-        pieces.append((onset, ringing(partials, decays, gains, 5.0)))
-    return place(pieces)
+        yield onset, ringing(partials, decays, gains, 5.0)
 
 
 @makes("fireworks")
-def fireworks(rng: Rng) -> np.ndarray:
+def fireworks(rng: Rng) -> Pieces:
     """Booms, whistling rockets and crackle."""
-    pieces = []
     for onset in at_random(rng, between(rng, 0.6, 3)):
         boom = band(noise(rng, 1.0, -3), 40, between(rng, 500, 4000), 1) * np.exp(
             -times(1.0) / between(rng, 0.05, 0.25)
         )
-        pieces.append((onset, rng.uniform(0.5, 2.0) * boom))
+        yield onset, rng.uniform(0.5, 2.0) * boom
         if rng.random() < 0.3:
             rocket = tone(glide(0.7, 1200, between(rng, 2500, 4500)), [1, 0.1]) * swell(0.7, 0.1, 0.3)
-            pieces.append((max(0.0, onset - 0.7), 0.3 * rocket))
+            yield (max(0.0, onset - 0.7), 0.3 * rocket)
         if rng.random() < 0.5:
             crackle = [(onset + 0.3 + late, click(rng, 0.003, 1500, 9000)) for late in at_random(rng, 60, 1.0)]
-            pieces += [(late, rng.uniform(0.1, 0.5) * spark) for late, spark in crackle]
-    return place(pieces)
+            yield from [(late, rng.uniform(0.1, 0.5) * spark) for late, spark in crackle]
 
 
 @makes("hand saw")
@@ -160,30 +158,26 @@ def hand_saw(rng: Rng) -> np.ndarray:
 
 
 @makes("chopping wood")
-def wood_chop(rng: Rng) -> np.ndarray:
+def wood_chop(rng: Rng) -> Pieces:
     """Single dull strokes with a crack."""
-    pieces = []
     for onset in regular(rng, between(rng, 0.5, 1.8), 0.15):
         blow = struck(rng, between(rng, 100, 350), 3000, 10, between(rng, 0.015, 0.05), 0.4)
-        pieces.append((onset, blow + 1.5 * click(rng, 0.008, 400, 6000, 0.4)))
-    return place(pieces)
+        yield onset, blow + 1.5 * click(rng, 0.008, 400, 6000, 0.4)
 
 
 @makes("hammering")
-def hammering(rng: Rng) -> np.ndarray:
+def hammering(rng: Rng) -> Pieces:
     """Blows on a nail, ringing a little higher each time."""
-    low, pieces = between(rng, 500, 1800), []
+    low = between(rng, 500, 1800)
     for k, onset in enumerate(regular(rng, between(rng, 0.25, 0.7), 0.06)):
         blow = struck(rng, low * (1 + 0.03 * k), 7000, 7, between(rng, 0.02, 0.08), 0.4)
-        pieces.append((onset, (blow + 2 * click(rng, 0.004, 600, 8000, 0.4)) * jittered(rng, 0.8)))
-    return place(pieces)
+        yield onset, (blow + 2 * click(rng, 0.004, 600, 8000, 0.4)) * jittered(rng, 0.8)
 
 
 @makes("bicycle bell")
-def bicycle_bell(rng: Rng) -> np.ndarray:
+def bicycle_bell(rng: Rng) -> Pieces:
     """One or two bright rings."""
-    hz, pieces = between(rng, 1800, 3600), []
+    hz = between(rng, 1800, 3600)
     for onset in regular(rng, between(rng, 0.6, 2.0), 0.2):
         bell = ringing([hz, 1.02 * hz, 2.3 * hz, 3.7 * hz], [0.6, 0.5, 0.25, 0.1], [1, 0.7, 0.6, 0.3], 2.0)
-        pieces += [(onset, bell), (onset + rng.uniform(0.1, 0.2), 0.8 * bell)]
-    return place(pieces)
+        yield from ((onset, bell), (onset + rng.uniform(0.1, 0.2), 0.8 * bell))

@@ -4,6 +4,7 @@ import numpy as np
 
 from avlmaps_sim.synthesis.blocks import (
     SECONDS,
+    Pieces,
     Rng,
     at_random,
     band,
@@ -39,9 +40,9 @@ def vowel(rng: Rng, size: float = 1.0, name: str = "") -> list[tuple[float, floa
 
 
 @makes("laughing")
-def laughing(rng: Rng) -> np.ndarray:
+def laughing(rng: Rng) -> Pieces:
     """Runs of ha-ha: voiced bursts with breath between, falling."""
-    pitch, size, pieces = between(rng, 130, 420), rng.uniform(0.8, 1.1), []
+    pitch, size = between(rng, 130, 420), rng.uniform(0.8, 1.1)
     onset, period, name = rng.uniform(0, 0.8), rng.uniform(0.16, 0.26), str(rng.choice(["a", "e", "i"]))
     while onset < SECONDS:
         for k in range(rng.integers(3, 11)):
@@ -49,76 +50,67 @@ def laughing(rng: Rng) -> np.ndarray:
             burst_s = 0.55 * period
             sound = voice(rng, glide(burst_s, high, 1.08 * high, 0.9 * high), vowel(rng, size, name), 0.15)
             breath = resonant(noise(rng, 0.4 * period), vowel(rng, size, name)) * 0.3
-            pieces += [(onset, sound * swell(burst_s, 0.02, 0.05)), (onset + burst_s, breath)]
+            yield from ((onset, sound * swell(burst_s, 0.02, 0.05)), (onset + burst_s, breath))
             onset += jittered(rng, period, 0.06)
         onset += rng.uniform(0.3, 1.2)
-    return place(pieces)
 
 
 @makes("talking")
-def talking(rng: Rng) -> np.ndarray:
+def talking(rng: Rng) -> Pieces:
     """Syllables of vowels and hissed consonants in phrases."""
-    pitch, size, pieces, onset = between(rng, 90, 260), rng.uniform(0.8, 1.1), [], 0.0
+    pitch, size, onset = between(rng, 90, 260), rng.uniform(0.8, 1.1), 0.0
     while onset < SECONDS:
         for _ in range(rng.integers(3, 12)):
             seconds = rng.uniform(0.09, 0.26)
             hz = glide(seconds, *(pitch * np.exp(0.15 * rng.standard_normal()) for _ in range(3)))
             sound = voice(rng, hz, vowel(rng, size), 0.05) * swell(seconds, 0.03, 0.05)
             hiss = band(noise(rng, 0.08), between(rng, 1500, 4000), 9000) * swell(0.08, 0.02, 0.02)
-            pieces += [(onset, sound), (onset + seconds, hiss * rng.uniform(0.0, 0.5))]
+            yield from ((onset, sound), (onset + seconds, hiss * rng.uniform(0.0, 0.5)))
             onset += seconds + rng.uniform(0.02, 0.09)
         onset += rng.uniform(0.1, 0.8)
-    return place(pieces)
 
 
 @makes("coughing")
-def coughing(rng: Rng) -> np.ndarray:
+def coughing(rng: Rng) -> Pieces:
     """An explosive burst of noise, a short rough voice after it; two or three in a row."""
-    size, pitch, pieces, onset = rng.uniform(0.8, 1.1), between(rng, 120, 350), [], rng.uniform(0, 1.0)
+    size, pitch, onset = rng.uniform(0.8, 1.1), between(rng, 120, 350), rng.uniform(0, 1.0)
     while onset < SECONDS:
         for _ in range(rng.integers(1, 4)):
             burst = resonant(noise(rng, 0.3), vowel(rng, size, "a"), 0.3) * np.exp(
                 -times(0.3) / between(rng, 0.04, 0.1)
             )
             tail = voice(rng, glide(0.2, pitch, 0.7 * pitch), vowel(rng, size, "a"), 0.8, 0.2) * swell(0.2, 0.01, 0.12)
-            pieces += [(onset, 3 * burst), (onset + 0.08, rng.uniform(0.0, 0.8) * tail)]
+            yield from ((onset, 3 * burst), (onset + 0.08, rng.uniform(0.0, 0.8) * tail))
             onset += rng.uniform(0.28, 0.5)
         onset += rng.uniform(0.6, 2.0)
-    return place(pieces)
 
 
 @makes("breathing")
-def breathing(rng: Rng) -> np.ndarray:
+def breathing(rng: Rng) -> Pieces:
     """In and out, each its own colour."""
-    period, pieces = between(rng, 1.0, 3.2), []
+    period = between(rng, 1.0, 3.2)
     colours = [[(between(rng, 400, 2500), between(rng, 300, 1500), 1.0) for _ in range(3)] for _ in range(2)]
     for onset in regular(rng, period, 0.05, -rng.uniform(0, 0.5)):
         for k, part in enumerate((0.0, 0.45)):
             seconds = 0.4 * period
-            pieces.append(
-                (
-                    onset + part * period,
-                    resonant(noise(rng, seconds), colours[k]) * swell(seconds, 0.4 * seconds, 0.5 * seconds),
-                )
+            yield (
+                onset + part * period,
+                resonant(noise(rng, seconds), colours[k]) * swell(seconds, 0.4 * seconds, 0.5 * seconds),
             )
-    return place(pieces)
 
 
 @makes("snoring")
-def snoring(rng: Rng) -> np.ndarray:
+def snoring(rng: Rng) -> Pieces:
     """A flutter of 25 to 90 pulses a second while breathing in, a quiet breath out."""
-    period, rate, pieces = between(rng, 1.8, 4.0), between(rng, 25, 90), []
+    period, rate = between(rng, 1.8, 4.0), between(rng, 25, 90)
     peaks = [(between(rng, 150, 500), 120, 1.0), (between(rng, 600, 1500), 250, 0.5), (2500, 800, 0.1)]
     for onset in regular(rng, period, 0.08, rng.uniform(0, 0.8)):
         seconds = 0.45 * period
         flutter = tone(rate * (1 + 0.1 * wander(rng, seconds, 20)), [1 / k**0.2 for k in range(1, 30)])
         sound = resonant(flutter + 2.0 * noise(rng, seconds)[: len(flutter)] * (flutter > 0), peaks)
         out = 0.15 * resonant(noise(rng, seconds), [(900, 800, 1.0)]) * swell(seconds, 0.3, 0.4)
-        pieces += [
-            (onset, sound / sound.std() * swell(seconds, 0.3 * seconds, 0.2 * seconds)),
-            (onset + 0.5 * period, out),
-        ]
-    return place(pieces)
+        yield onset, sound / sound.std() * swell(seconds, 0.3 * seconds, 0.2 * seconds)
+        yield (onset + 0.5 * period, out)
 
 
 @makes("clapping")
@@ -147,20 +139,19 @@ def cheering(rng: Rng) -> np.ndarray:
 
 
 @makes("drinking or sipping")
-def drinking(rng: Rng) -> np.ndarray:
+def drinking(rng: Rng) -> Pieces:
     """A slurp, then gulps."""
-    pieces, onset = [], rng.uniform(0, 0.8)
+    onset = rng.uniform(0, 0.8)
     while onset < SECONDS:
         seconds = rng.uniform(0.3, 0.9)
         slurp = band(noise(rng, seconds), 1200, 7000) * swell(seconds, 0.1, 0.1) * (1 + 0.7 * wander(rng, seconds, 40))
-        pieces.append((onset, 0.5 * slurp))
+        yield onset, 0.5 * slurp
         onset += seconds
         for _ in range(rng.integers(1, 5)):
             gulp = tone(glide(0.12, between(rng, 150, 300), between(rng, 350, 700)), [1, 0.4]) * swell(0.12, 0.02, 0.06)
-            pieces += [(onset, gulp), (onset, 0.4 * click(rng, 0.006, 800, 5000))]
+            yield from ((onset, gulp), (onset, 0.4 * click(rng, 0.006, 800, 5000)))
             onset += rng.uniform(0.3, 0.7)
         onset += rng.uniform(0.2, 1.0)
-    return place(pieces)
 
 
 @makes("whistling")
