@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
@@ -166,6 +166,15 @@ class Bench(ModelVerb):
         """The words of all --model."""
         return tuple(word for words in self.model for word in words)
 
+    def _of_all_scenes(self) -> dict[str, Any]:
+        """Return what the settings of all suites on scenes share."""
+        chosen = self.indexing
+        return {
+            "profile": self.profile, "models": self.models_chosen, "hearing": chosen.hearing, "sounds": self.sounds,
+            "clips": chosen.sound_clips, "sensor": chosen.sensor, "frames": chosen.frames, "jobs": chosen.jobs,
+            "seed": self.seed,
+        }  # fmt: skip
+
     def indexing_settings(self) -> "IndexingSettings":
         """Return the settings of the suites indexing and objects."""
         from avlmaps_sim.bench.indexing import DEFAULT_SCENES, PAPER_SIZES, IndexingSettings
@@ -173,20 +182,12 @@ class Bench(ModelVerb):
         chosen = self.indexing
         return IndexingSettings(
             scenes=self.scenes or DEFAULT_SCENES,
-            profile=self.profile,
-            models=self.models_chosen,
             rules=chosen.rules,
-            hearing=chosen.hearing,
-            sounds=self.sounds,
-            clips=chosen.sound_clips,
-            sensor=chosen.sensor,
-            frames=chosen.frames,
             tasks_a_scene=chosen.tasks_a_scene,
             sizes=PAPER_SIZES if chosen.size == "paper" else None,
-            jobs=chosen.jobs,
-            seed=self.seed,
             load=chosen.tasks,
             save=chosen.save_tasks,
+            **self._of_all_scenes(),
         )
 
     def live_settings(self) -> "LiveBench":
@@ -214,24 +215,10 @@ class Bench(ModelVerb):
         from avlmaps_sim.bench.change.suite import DAYS, SCENES
         from avlmaps_sim.bench.harness.settings import SceneSettings
 
-        chosen, days = self.indexing, DAYS if self.days is None else self.days
+        days = DAYS if self.days is None else self.days
         if days < 2:
             raise UsageError(f"--days takes a number from 2 on, not {days}.")
-        settings = SceneSettings(
-            scenes=self.scenes or SCENES,
-            profile=self.profile,
-            models=self.models_chosen,
-            hearing=chosen.hearing,
-            sounds=self.sounds,
-            clips=chosen.sound_clips,
-            sensor=chosen.sensor,
-            frames=chosen.frames,
-            sources=3,
-            ambiguous=0,
-            jobs=chosen.jobs,
-            seed=self.seed,
-        )
-        return settings, days
+        return SceneSettings(scenes=self.scenes or SCENES, sources=3, ambiguous=0, **self._of_all_scenes()), days
 
     def navigation_settings(self) -> "NavigationSettings":
         """Return the settings of the suite navigation."""
@@ -241,19 +228,11 @@ class Bench(ModelVerb):
         return navigation.NavigationSettings(
             scenes=self.scenes or navigation.DEFAULT_SCENES,
             series=tuple(map(navigation.Series, chosen.series)) or tuple(navigation.Series),
-            profile=self.profile,
-            models=self.models_chosen,
             rules=scenes.rules,
-            hearing=scenes.hearing,
-            sounds=self.sounds,
-            clips=scenes.sound_clips,
-            sensor=scenes.sensor,
-            frames=scenes.frames,
             sequences=chosen.sequences,
             language=chosen.language,
             guess=chosen.guess,
-            jobs=scenes.jobs,
-            seed=self.seed,
             load=scenes.tasks,
             save=scenes.save_tasks,
+            **self._of_all_scenes(),
         )
