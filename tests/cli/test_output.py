@@ -10,3 +10,12 @@ def test_what_has_no_parts_and_no_size_shows_none() -> None:
     assert found == "found: It was last seen there." and "0.00" not in row
     whole = {**answer, "goals": [{**goal, "size": [0.5, 0.5, 0.0]}]}
     assert "0.50 x 0.50 x 0.00" in query_lines(whole)[-1]
+
+
+def test_what_else_the_sentence_may_mean_is_named_where_it_is_there() -> None:
+    other = {"query": "armchair", "probability": 0.612, "found": True, "goals": []}
+    answer = {
+        "parts": [], "goals": [], "found": True, "text": "The sofa is here.", "frame": "recording",
+        "alternatives": [other, other | {"query": "bench", "found": False}],
+    }  # fmt: skip
+    assert query_lines(answer) == ["found: The sofa is here.", "or: armchair (0.61)"]

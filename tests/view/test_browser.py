@@ -93,7 +93,7 @@ def test_a_question_is_typed_and_its_goal_is_seen(page, room: AVLMap) -> None:
 def test_a_wrong_question_is_told_on_the_page(page) -> None:
     page.fill("#sentence", "near near")
     page.keyboard.press("Enter")
-    page.wait_for_selector("#answer .verdict.lost")
+    page.wait_for_selector("#answer .verdict.fault")
     assert len(page.inner_text("#answer")) > 20
     assert not page.locator("#ask button.main").is_disabled()
 
@@ -138,13 +138,44 @@ def test_the_keyboard_alone_moves_the_view(page) -> None:
     assert (picture(page) != before).any(axis=2).mean() > 0.05
 
 
+def test_nothing_asked_gets_a_hint_and_no_request(page) -> None:
+    requests = []
+    page.on("request", lambda one: requests.append(one.url))
+    page.click("#ask button.main")
+    page.wait_for_selector("#answer .verdict:has-text('Write a question')")
+    assert requests == []
+
+
+def test_a_whole_map_stays_whole_in_a_window_of_another_shape(page) -> None:
+    far = "avlmapsView.viewer.camera.distance"
+    wide = page.evaluate(far)
+    page.set_viewport_size({"width": 420, "height": 1400})
+    page.wait_for_function(f"{far} > {1.2 * wide}")
+    page.focus("#canvas")
+    page.keyboard.press("+")
+    nearer = page.evaluate(far)
+    page.set_viewport_size({"width": 1000, "height": 640})
+    page.wait_for_selector("#canvas[data-state=whole]")
+    assert page.evaluate(far) == nearer, "a view that a person chose stays"
+
+
+def test_a_phone_has_room_for_every_control_and_is_told_of_fingers(browser, served: Served) -> None:
+    context = browser.new_context(viewport={"width": 320, "height": 568}, has_touch=True, is_mobile=True)
+    phone = context.new_page()
+    phone.goto(served.url)
+    phone.wait_for_selector("html[data-ready]", state="attached")
+    assert phone.evaluate("document.documentElement.scrollWidth") <= 320
+    assert phone.is_visible("#touch") and not phone.is_visible("#keys")
+    context.close()
+
+
 def test_a_photo_is_asked_with_and_a_bad_one_refused(page, room: AVLMap, tmp_path: Path) -> None:
     from avlmaps.view.layout import Layout
 
     (tmp_path / "there.jpg").write_bytes(Layout(room).thumbnail(3) or b"")
     (tmp_path / "bad.jpg").write_bytes(b"no picture")
     page.set_input_files("#photo", tmp_path / "bad.jpg")
-    page.wait_for_selector("#answer .verdict.lost")
+    page.wait_for_selector("#answer .verdict.fault")
     assert "bad.jpg" in page.inner_text("#answer")
     page.set_input_files("#photo", tmp_path / "there.jpg")
     page.wait_for_selector("#answer .verdict:has-text('ready')")

@@ -177,7 +177,8 @@ class Panel {
     }
     $("ask").addEventListener("submit", (event) => {
       event.preventDefault();
-      this.ask($("sentence").value);
+      if ($("sentence").value.trim() || Object.keys(this.files).length) this.ask($("sentence").value);
+      else this.say("Write a question, or choose a photo or a sound.", "");
     });
     for (const kind of ["photo", "clip"]) {
       $(kind).addEventListener("change", () => this.give(kind, $(kind).files[0]));
@@ -224,7 +225,7 @@ class Panel {
       this.say(`${file.name} is ready; press Ask.`, "");
     } catch (fault) {
       await this.give(kind, null);
-      this.say(fault.message, "lost");
+      this.say(fault.message, "fault");
     }
   }
 
@@ -247,7 +248,7 @@ class Panel {
       this.showAnswer(sentence, told.answers, performance.now() - begun);
     } catch (fault) {
       this.forget();
-      this.say(fault.message, "lost");
+      this.say(fault.message, "fault");
     } finally {
       $("ask").querySelector(".main").disabled = false;
     }
@@ -289,6 +290,11 @@ class Panel {
           (part.note ? `: ${part.note}` : "") }));
       }
       for (const note of answer.notes ?? []) texts.push(made("p", { className: "soft", textContent: note }));
+      const others = (answer.alternatives ?? []).filter((other) => other.found);
+      if (others.length) {
+        const named = others.map((other) => `${other.query} (${other.probability.toFixed(2)})`).join(", ");
+        texts.push(made("p", { className: "soft", textContent: `Or: ${named}.` }));
+      }
       $("answer").append(...texts);
       if (of) $("goals").append(made("h3", { textContent: `Goals in ${this.maps[k].name}` }));
       const label = of ? `Goals in ${this.maps[k].name}` : "Goals";
@@ -456,7 +462,7 @@ class Panel {
         const place = this.toLevel(k, room.position);
         const floor = room.outline.length ? this.toLevel(k, room.outline[0])[2] : this.floorUnder(map, place[2]);
         const onFloor = [place[0], place[1], floor + 0.02];
-        return { place: onFloor, text: room.name, title: `go to the ${room.name}${areaText(room)}`,
+        return { place: onFloor, text: room.room, title: `go to the ${room.room}${areaText(room)}`,
           onClick: () => this.viewer.flyTo(onFloor, 6) };
       }) : []);
       const outlined = shown("rooms") ? contents.rooms.filter((room) => room.outline.length) : [];
@@ -552,7 +558,7 @@ class Panel {
     }));
     $("sources-section").hidden = $("sources-field").hidden = !this.contents.some((one) => one?.sources.length);
     $("rooms").replaceChildren(...rooms.map((room) =>
-      row(room.name, `${percent(room.probability)}${areaText(room)} · ${room.views} views`, room.position, 7,
+      row(room.room, `${percent(room.probability)}${areaText(room)} · ${room.views} views`, room.position, 7,
         ["room", room.label])));
     for (const [id, list] of [["things", things], ["sounds", sounds], ["sources", sources], ["rooms", rooms]]) {
       $(`${id}-count`).textContent = `(${list.length})`;
@@ -597,7 +603,7 @@ class Panel {
     try {
       this.showVoxel(hit.k, (await this.source.voxel(hit.k, hit.number)) ?? this.keptVoxel(hit));
     } catch (fault) {
-      $("voxel").replaceChildren(made("p", { className: "verdict lost", textContent: fault.message }));
+      $("voxel").replaceChildren(made("p", { className: "verdict fault", textContent: fault.message }));
     }
   }
 
@@ -754,7 +760,7 @@ class Panel {
     try {
       this.showTrip(await this.source.go({ command, ...this.files }));
     } catch (fault) {
-      $("trip").replaceChildren(made("p", { className: "verdict lost", textContent: fault.message }));
+      $("trip").replaceChildren(made("p", { className: "verdict fault", textContent: fault.message }));
       $("steps").hidden = true;
     } finally {
       button.disabled = false;

@@ -57,8 +57,9 @@ class Viewer {
     this.onClick = () => {};
     this.onMove = () => {};
     this.waiting = false;
+    this.whole = null; // the view that was fitted to the picture last
     steer(canvas, this.camera, () => this.moved(), (x, y) => this.clicked(x, y));
-    new ResizeObserver(() => this.moved()).observe(canvas);
+    new ResizeObserver(() => this.resized()).observe(canvas);
     window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.changed());
   }
 
@@ -71,7 +72,14 @@ class Viewer {
     const [field] = this.places();
     if (asPlan) this.camera.frameAbove(least, most, field.aspect);
     else this.camera.frame(least, most, field.aspect);
+    this.whole = { asPlan, view: this.camera.saved() };
     this.moved();
+  }
+
+  /** The picture has another shape: a whole map that nobody has moved since stays whole. */
+  resized() {
+    if (this.whole && `${this.camera.saved()}` === `${this.whole.view}`) this.frameAll(this.whole.asPlan);
+    else this.moved();
   }
 
   /** Where each field lies on the canvas: in CSS pixels from the top left, and in those of WebGL. */
