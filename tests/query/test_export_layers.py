@@ -14,7 +14,7 @@ from avlmaps.core.frames import FrameName
 from avlmaps.core.poses import from_quaternion
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.export_foxglove import write_foxglove
-from avlmaps.query.export_layers import layers_of
+from avlmaps.query.export_layers import Heard, layers_of
 from avlmaps.query.export_openlex3d import FILES, pcd_bytes, write_openlex3d
 from avlmaps.query.export_rerun import write_rerun
 
@@ -114,3 +114,9 @@ def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(QueryError, match="cannot be written"):
         write_openlex3d(tmp_path / "file" / "out", AVLMap(furnished_map()))
+
+
+def test_a_sound_has_its_name_apart_from_how_sure_it_is() -> None:
+    named = Heard("dog bark", 0.754, (0.0, 0.0, 0.0), 1.0, 2.0)
+    nameless = Heard("sound", None, (0.0, 0.0, 0.0), 1.0, 2.0)
+    assert (named.name, named.label, nameless.label) == ("dog bark", "dog bark 0.75", "sound")

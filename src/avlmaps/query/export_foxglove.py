@@ -153,12 +153,15 @@ class _Writer:
             size=m.Vector3(x=_SOUND_M, y=_SOUND_M, z=_SOUND_M),
             color=self._color((230, 120, 30), 0.8),
         )
+        known = sound.confidence is not None
+        confidence = [m.KeyValuePair(key="confidence", value=f"{sound.confidence:.3f}")] if known else []
         return m.SceneEntity(
             timestamp=self._time(sound.onset_s),
             frame_id=self._frame,
             id=f"sound {number}",
             metadata=[
-                m.KeyValuePair(key="name", value=sound.label),
+                m.KeyValuePair(key="name", value=sound.name),
+                *confidence,
                 m.KeyValuePair(key="ends_s", value=f"{sound.offset_s:.3f}"),
             ],
             spheres=[ball],

@@ -47,16 +47,23 @@ class Heard:
     """A sound, where the robot was when it heard it.
 
     Attributes:
-        label: the likeliest name and its confidence; ``sound`` where it has none.
+        name: the likeliest one; ``sound`` where it has none.
+        confidence: of the name, in [0, 1]; None where it has none.
         position: metres.
         onset_s: start, the recording's time.
         offset_s: end.
     """
 
-    label: str
+    name: str
+    confidence: float | None
     position: tuple[float, float, float]
     onset_s: float
     offset_s: float
+
+    @property
+    def label(self) -> str:
+        """Name and confidence, for a person."""
+        return self.name if self.confidence is None else f"{self.name} {self.confidence:.2f}"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -151,9 +158,9 @@ def layers_of(
 
 
 def _heard(sound: "SoundEvent", placed: Callable[[np.ndarray], np.ndarray]) -> Heard:
-    label = f"{sound.names[0]} {sound.confidences[0]:.2f}" if sound.names else "sound"
+    name, confidence = (sound.names[0], sound.confidences[0]) if sound.names else ("sound", None)
     x, y, z = (float(value) for value in placed(np.array(sound.position)))
-    return Heard(label, (x, y, z), sound.onset_s, sound.offset_s)
+    return Heard(name, confidence, (x, y, z), sound.onset_s, sound.offset_s)
 
 
 def _stored_camera(rgb: Pinhole, pictures: tuple[bytes, ...]) -> Pinhole:
