@@ -189,7 +189,7 @@ def test_what_is_no_next_frame_is_refused_and_costs_nothing(tmp_path: Path, wron
 
 def test_a_second_writer_a_finished_map_and_an_empty_one_get_a_sentence(tmp_path: Path) -> None:
     with LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP) as live:
-        with pytest.raises(MapError, match="is being built by another process"):
+        with pytest.raises(MapError, match="is being built by this program"):
             LiveMap(tmp_path / "map", ENCODERS)
         add(live, frame(0))
     with pytest.raises(MapError, match="is a finished map already"):

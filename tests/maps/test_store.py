@@ -24,7 +24,7 @@ from avlmaps.maps.store import array_files, integrity
 from avlmaps.maps.store.array_files import SMALL_BYTES, read_array, sync_files, write_array
 from avlmaps.maps.store.array_validation import array_fields, check_order, validate_arrays
 from avlmaps.maps.store.checkpoints import DONE, save_checkpoint
-from avlmaps.maps.store.lock import is_locked, lock_folder
+from avlmaps.maps.store.lock import EDITING, LOCK, is_locked, lock_folder
 from avlmaps.maps.store.reader import has_unfinished_build, open_stored
 from avlmaps.maps.types import HeardSounds, Voxels
 
@@ -119,6 +119,13 @@ def test_a_full_disk_is_one_sentence_and_leaves_no_rubbish(tmp_path: Path, monke
     assert list(tmp_path.iterdir()) == [tmp_path / "written"]
 
 
+def test_who_may_not_write_is_told_what_helps_a_build_and_what_helps_an_edit(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    for name, helps in ((LOCK, "choose another folder"), (EDITING, "the map is as it was: edit a copy")):
+        with pytest.raises(MapError, match=f"Not a directory; {helps}"), lock_folder(tmp_path / "file" / "map", name):
+            pass
+
+
 class Facts(msgspec.Struct):
     """The facts of a stage that has none."""
 
@@ -189,12 +196,14 @@ def test_a_map_that_is_being_built(tmp_path: Path) -> None:
 
 
 def test_two_builds_into_one_folder_are_refused(tmp_path: Path) -> None:
-    with lock_folder(tmp_path), pytest.raises(MapError) as fault:
-        build_map(Walk(4), tmp_path, PROFILE, SETTINGS, progress=False)
-    assert str(fault.value) == (
-        f"{tmp_path} is being built by another process ({os.getpid()}) at this moment; wait for it, or build into "
-        "another folder."
-    )
+    for holder, said in (
+        (os.getpid(), "this program at this moment; end that first"),
+        (1, "another process (1) at this moment; wait for it"),
+    ):
+        with lock_folder(tmp_path), pytest.raises(MapError) as fault:
+            (tmp_path / LOCK).write_text(f"{holder}\n")
+            build_map(Walk(4), tmp_path, PROFILE, SETTINGS, progress=False)
+        assert str(fault.value) == f"{tmp_path} is being built by {said}, or build into another folder."
 
 
 @pytest.mark.parametrize(("version", "how"), [(2, "upgrade avlmaps"), (0, "build the map again in its place")])

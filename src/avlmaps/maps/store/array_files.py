@@ -26,6 +26,8 @@ from avlmaps.core.npy import load_npy
 
 SMALL_BYTES = 1 << 20  # files up to this size are read whole and always compared with their checksum
 MOST_BYTES = 1 << 42
+TO_BUILD = "choose another folder. What was finished there stays, and a second try continues from it."
+TO_EDIT = "the map is as it was: edit a copy that lies where you may write."
 _QUOTED = 200  # characters of what a damaged manifest says
 _CHUNK_BYTES = 1 << 24
 _SYNCED_AT_ONCE = 8
@@ -54,8 +56,8 @@ class FileInfo(msgspec.Struct, frozen=True, kw_only=True):
 
 
 @contextmanager
-def explain_write_errors(folder: Path) -> Generator[None]:
-    """Turn a full disk, a missing permission and their like into one sentence."""
+def explain_write_errors(folder: Path, then: str = TO_BUILD) -> Generator[None]:
+    """Turn a full disk, a missing permission and their like into one sentence, which ends with what to do then."""
     try:
         yield
     except OSError as fault:
@@ -64,10 +66,7 @@ def explain_write_errors(folder: Path) -> Generator[None]:
         if fault.errno == errno.EEXIST and place.is_symlink():
             why = "it is a symbolic link that leads nowhere"
         make_room = "make room or " if fault.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG) else ""
-        raise MapError(
-            f"Cannot write {place}: {why}; {make_room}choose another folder. What was finished there "
-            "stays, and a second try continues from it."
-        ) from fault
+        raise MapError(f"Cannot write {place}: {why}; {make_room}{then}") from fault
 
 
 def refuse_links(folder: Path) -> None:

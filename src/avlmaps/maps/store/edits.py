@@ -18,7 +18,7 @@ from avlmaps.core.arrays import Float
 from avlmaps.core.errors import MapError
 from avlmaps.core.files import DESCRIPTION_BYTES, decode_json, read_regular, write_bytes_atomically
 from avlmaps.core.poses import apply, inverse, plain_point
-from avlmaps.maps.store.array_files import explain_write_errors
+from avlmaps.maps.store.array_files import TO_EDIT, explain_write_errors
 from avlmaps.maps.store.lock import EDITING, lock_folder
 from avlmaps.maps.store.manifest import MapInfo, RecordingInfo
 from avlmaps.maps.types import Keyframes
@@ -204,7 +204,7 @@ def write_edits(folder: Path, edits: Sequence[Edit]) -> None:
         MapError: the folder cannot be written.
     """
     content = b"".join(msgspec.json.encode(edit) + b"\n" for edit in edits)
-    with explain_write_errors(folder):
+    with explain_write_errors(folder, TO_EDIT):
         write_bytes_atomically(folder / EDITS, content)
 
 

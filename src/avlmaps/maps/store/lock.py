@@ -8,14 +8,18 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from avlmaps.core.errors import MapError
-from avlmaps.maps.store.array_files import explain_write_errors, refuse_links
+from avlmaps.maps.store.array_files import TO_BUILD, TO_EDIT, explain_write_errors, refuse_links
 
 LOCK = ".lock"
 EDITING = ".edits.lock"
 _PATIENCE_S = {LOCK: 0.06, EDITING: 5.0}  # an edit takes milliseconds, and several come at once
 _BUSY = {
-    LOCK: "is being built by another process{} at this moment; wait for it, or build into another folder.",
-    EDITING: "is being edited by another process{} at this moment; try again.",
+    LOCK: "is being built by {} at this moment; {}, or build into another folder.",
+    EDITING: "is being edited by {} at this moment; try again.",
+}
+_UNWRITTEN = {
+    LOCK: TO_BUILD,
+    EDITING: TO_EDIT,
 }
 
 if sys.platform == "win32":  # pragma: no cover - tried on Windows only
@@ -54,7 +58,7 @@ def lock_folder(folder: Path, name: str = LOCK) -> Generator[None]:
         MapError: another process holds it, the folder cannot be written, or holds a link to another folder.
     """
     refuse_links(folder)
-    with explain_write_errors(folder):
+    with explain_write_errors(folder, _UNWRITTEN[name]):
         folder.mkdir(parents=True, exist_ok=True)
         if (folder / name).is_symlink():  # it would be emptied
             (folder / name).unlink()
@@ -64,8 +68,11 @@ def lock_folder(folder: Path, name: str = LOCK) -> Generator[None]:
             _grab_patiently(descriptor, _PATIENCE_S[name])
         except OSError as fault:
             holder = os.pread(descriptor, 32, 0).decode("ascii", "replace").strip() if hasattr(os, "pread") else ""
-            raise MapError(f"{folder} {_BUSY[name].format(f' ({holder})' if holder else '')}") from fault
-        with explain_write_errors(folder):
+            own = holder == str(os.getpid())
+            who = "this program" if own else f"another process ({holder})" if holder else "another process"
+            wait = "end that first" if own else "wait for it"
+            raise MapError(f"{folder} {_BUSY[name].format(who, wait)}") from fault
+        with explain_write_errors(folder, _UNWRITTEN[name]):
             os.ftruncate(descriptor, 0)
             os.write(descriptor, f"{os.getpid()}\n".encode())
         yield
