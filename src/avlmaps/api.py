@@ -4,6 +4,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from avlmaps.core.errors import RecordingError
+from avlmaps.core.files import lasting_path
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -49,14 +52,22 @@ def build_map(
         BackendError: the profile is not known, or a package for it is missing.
     """
     from avlmaps.maps.build import build_map as build
-    from avlmaps.maps.settings import DEFAULTS
+    from avlmaps.maps.settings import DEFAULTS, BuildSettings
     from avlmaps.query.avlmap import AVLMap
+    from avlmaps.query.voxel_map import require_kinds
     from avlmaps.recordings.open import open_recording
+    from avlmaps.recordings.types import Recording
 
+    require_kinds(("settings", settings, BuildSettings))
     opened = open_recording(recording) if isinstance(recording, str | Path) else recording
+    if not isinstance(opened, Recording):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise RecordingError(
+            f"A map is built of the path of a recording or of one from open_recording, not of {type(opened).__name__}; "
+            "add frames of your own to a VoxelMap."
+        )
     stored = build(
         opened,
-        path,
+        lasting_path(path),
         encoders or profile,
         settings or DEFAULTS,
         allow=allow,
@@ -81,7 +92,7 @@ def open_map(path: str | Path, *, encoders: "Encoders | None" = None) -> "AVLMap
     from avlmaps.maps.store.reader import open_stored
     from avlmaps.query.avlmap import AVLMap
 
-    return AVLMap(_asked_with(open_stored(path), encoders))
+    return AVLMap(_asked_with(open_stored(lasting_path(path)), encoders))
 
 
 def _asked_with(stored: "StoredMap", encoders: "Encoders | None") -> "StoredMap":

@@ -2,7 +2,9 @@
 
 import re
 import runpy
+import shutil
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -299,10 +301,37 @@ def test_depths_that_are_masked_are_none(frame: avlmaps.Frame) -> None:
     np.testing.assert_array_equal(live.voxel_index, near.voxel_index)
 
 
-@pytest.mark.parametrize("name", ["settings", "query"])
-def test_settings_of_another_kind_are_refused_at_once(name: str) -> None:
-    with pytest.raises(MapError, match=rf"{name} must be an avlmaps\.\w+Settings, not dict"):
-        avlmaps.VoxelMap(**{name: {}})
+@pytest.mark.parametrize(
+    ("begin", "names"),
+    [
+        (lambda _, **given: avlmaps.VoxelMap(**given), ("settings", "query")),
+        (lambda out, **given: avlmaps.LiveMap(out, **given), ("settings", "live", "query")),
+        (lambda out, **given: avlmaps.build_map("walk", out, **given), ("settings",)),
+    ],
+    ids=["VoxelMap", "LiveMap", "build_map"],
+)
+def test_settings_of_another_kind_are_refused_at_once(begin: Callable, names: tuple[str, ...], tmp_path: Path) -> None:
+    for name in names:
+        with pytest.raises(MapError, match=rf"{name} must be an avlmaps\.\w+Settings, not dict"):
+            begin(tmp_path / "map", **{name: {}})
+    assert not (tmp_path / "map").exists()
+
+
+@pytest.mark.parametrize("words", [None, 5, ["chair"], b"chair"])
+def test_what_is_no_phrase_is_refused_in_a_sentence(m: avlmaps.AVLMap, words: object) -> None:
+    kind = type(words).__name__
+    with pytest.raises(QueryError, match=f"A query is a sentence, .* not {kind}"):
+        m.ask(words)
+    for find in (m.object, m.area, m.sound):
+        with pytest.raises(QueryError, match=f"must be a phrase, .* not {kind}"):
+            find(words)
+    with pytest.raises(QueryError, match="primary is one of object, sound, area, image, not"):
+        m.ask(object="chair", primary="colour" if words is None else words)
+
+
+def test_frames_of_ones_own_are_sent_to_a_map_in_memory(folder: Path, tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match="not of list; add frames of your own to a VoxelMap"):
+        avlmaps.build_map(list(avlmaps.open_recording(folder / "rec")), tmp_path / "map")
 
 
 @given(
@@ -438,6 +467,31 @@ def test_the_examples_are_short() -> None:
             line for line in path.read_text().splitlines() if line.strip() and not line.startswith(('"""', "import"))
         ]
         assert len(code) <= 20, path
+
+
+def test_a_program_may_change_its_folder_while_it_uses_relative_paths(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    shutil.copytree(folder / "rec", tmp_path / "rec")
+    monkeypatch.chdir(tmp_path)
+    recording, rig = avlmaps.open_recording("rec"), avlmaps.Rig(CAMERA, CAMERA)
+    grown = avlmaps.VoxelMap(encoders=avlmaps.Encoders.named("colours"), up_in_world=(0, 0, 1))
+    add(grown, next(iter(recording)))
+    saved = grown.save("grown.avlmap")
+    opened, same = avlmaps.open_map("grown.avlmap"), avlmaps.AVLMap.open("grown.avlmap")
+    live = avlmaps.LiveMap("live.avlmap", avlmaps.Encoders.named("colours"), up_in_world=(0, 0, 1))
+    with live, avlmaps.RecordingWriter(Path("walk"), rig) as writer:
+        monkeypatch.chdir(tmp_path / "elsewhere")
+        for frame in recording:
+            writer.add(frame)
+        live.add_frame(frame.rgb, frame.depth_m, frame.camera, frame.world_from_camera, frame.stamp_s)
+    place = saved.points[0]
+    for number, one in enumerate((saved, opened, same)):
+        one.edit.pin(f"dock {number}", at=place)
+    assert list(Path().iterdir()) == []
+    assert len(avlmaps.open_map("../grown.avlmap").edit.history()["edits"]) == 3
+    assert len(avlmaps.open_map("../live.avlmap").points) and len(avlmaps.open_recording("../walk")) == len(recording)
 
 
 def test_maps_recordings_and_pictures_are_written_and_opened_under_the_home(

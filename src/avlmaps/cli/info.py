@@ -95,7 +95,8 @@ def describe_path(
             say(f"fault: {fault}")
         raise
     parts = {"more": [str(one) for one in more]} if more else {}
-    return {**_describe_recording(recording), **parts, "consistency": _consistency(recording), "faults": faults}
+    own = _describe_recording(recording)
+    return {"path": str(path), **own, **parts, "consistency": _consistency(recording), "faults": faults}
 
 
 def _consistency(recording: "Recording") -> dict[str, Any] | None:
@@ -185,7 +186,6 @@ def _describe_recording(recording: "Recording") -> dict[str, Any]:
     rig, audio = recording.rig, recording.audio
     up = recording.up_in_world
     return {
-        "path": str(recording.path),
         "format": recording.format,
         "frames": len(recording),
         "duration_s": round(recording.duration_s, 3),

@@ -51,6 +51,14 @@ def user_path(path: Path | str) -> Path:
         return Path(path)
 
 
+def lasting_path(path: Path | str) -> Path:
+    """Return a path that a user gave as one that names the same place when the program changes its folder later."""
+    try:
+        return user_path(path).absolute()
+    except OSError:  # the folder that it is in is gone
+        return user_path(path)
+
+
 class RefusedFileError(OSError):
     """A file that is not read: it is not a regular file, or larger than its kind may be; ``strerror`` says why."""
 

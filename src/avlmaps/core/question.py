@@ -52,6 +52,11 @@ class Part:
     at: HeardAt | None = None
 
     def __post_init__(self) -> None:
+        if not isinstance(self.query, str):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise QueryError(
+                f"The {self.modality} in the query must be a phrase, such as {_EXAMPLES[self.modality]}; not "
+                f"{type(self.query).__name__}."
+            )
         if not self.query.strip():
             raise QueryError(f"The {self.modality} in the query is empty; name one: {_EXAMPLES[self.modality]}.")
         if len(self.query) > MOST_CHARACTERS and not self.is_file:

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from avlmaps.core.errors import AudioError, AvlmapsError, BackendError, MapError, RecordingError
-from avlmaps.core.files import user_path
+from avlmaps.core.files import lasting_path
 from avlmaps.core.numbers import as_number
 from avlmaps.core.progress import progress
 from avlmaps.live.gates import LATER_SHARE, EncodingGate, Gates
@@ -40,7 +40,7 @@ from avlmaps.maps.store.reader import StoredMap, open_stored
 from avlmaps.perception.encoders import Encoders, encoders_of
 from avlmaps.perception.profiles import Profile
 from avlmaps.query.avlmap import AVLMap, QuerySettings
-from avlmaps.query.voxel_map import direction
+from avlmaps.query.voxel_map import direction, require_kinds
 from avlmaps.recordings.directions import given_directions
 from avlmaps.recordings.given_frame import given_frame
 from avlmaps.recordings.memory import next_of
@@ -116,12 +116,15 @@ class LiveMap:
                 there.
 
         Raises:
-            MapError: ``begins_s`` is no time, the folder is something else or a map, another process writes it, or
-                ``same_device`` is no map or knows of none.
+            MapError: settings are of another kind, ``begins_s`` is no time, the folder is something else or a map,
+                another process writes it, or ``same_device`` is no map or knows of none.
             RecordingError: the microphones cannot be.
             BackendError: there is no such profile.
         """
-        self.path, self.settings, self._query = user_path(path), live or LiveSettings(), query
+        require_kinds(
+            ("settings", settings, BuildSettings), ("live", live, LiveSettings), ("query", query, QuerySettings)
+        )
+        self.path, self.settings, self._query = lasting_path(path), live or LiveSettings(), query
         began_s = as_number(begins_s)
         if began_s is None or not isfinite(began_s):
             raise MapError(f"begins_s is {begins_s!r}, which is no time; give seconds since 1970, or leave it out.")

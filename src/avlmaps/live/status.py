@@ -68,11 +68,12 @@ class LiveStatus:
 
     def __str__(self) -> str:
         dropped = ", ".join(f"{count} {reason}" for reason, count in sorted(self.dropped.items()))
+        took = "" if np.isnan(self.frame_ms_p95) else f", p95 {self.frame_ms_p95:.0f} ms"
         stored = f"; {self.late_kept} of the late ones stored" if self.late_kept else ""
         return (
             f"{self.frames_in} frames came, {self.fused} fused, {self.encoded} of them encoded, "
             f"{self.encoded_later} later "
-            f"({dropped or 'none'} dropped{stored}), p95 {self.frame_ms_p95:.0f} ms; "
+            f"({dropped or 'none'} dropped{stored}){took}; "
             f"{self.voxels} voxels, {self.keyframes} keyframes, {self.sounds} sounds; {self.memory_mb:.0f} MB"
         )
 

@@ -69,6 +69,8 @@ class Asked:
     at_by_words: bool = False
 
     def __post_init__(self) -> None:
+        if not isinstance(self.sentence, str):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise AskError(f"A query is a sentence, such as: {_EXAMPLE}; not {type(self.sentence).__name__}.")
         named = any(part is not None for part in (self.object, self.sound, self.area))
         words = bool(self.sentence.strip())
         if words == named and (words or not self.files):

@@ -14,7 +14,7 @@ import numpy as np
 from avlmaps.core.arrays import Float, Float16, Int32, UInt8
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import BackendError, MapError, QueryError
-from avlmaps.core.files import user_path
+from avlmaps.core.files import lasting_path, user_path
 from avlmaps.core.numbers import hold_numbers
 from avlmaps.core.question import HeardAt, Modality, Part, Question, Role
 from avlmaps.core.registry import Kind
@@ -120,7 +120,7 @@ class AVLMap:
         """
         from avlmaps.maps.store.reader import open_stored
 
-        return cls(open_stored(path), settings)
+        return cls(open_stored(lasting_path(path)), settings)
 
     @cached_property
     def edited(self) -> "Edited":
@@ -833,6 +833,8 @@ class AVLMap:
                 raise AskError("A question holds its parts already; give a sentence or parts instead.")
             return on_storey(answer_question(self, question.heard_at(at), top, files), self.storeys)
         photo, recording = (None if file is None else str(file) for file in (image, clip))
+        if primary is not None and primary not in list(Modality):
+            raise AskError(f"primary is one of {', '.join(Modality)}, not {primary!r}.")
         sought = None if primary is None else Modality(primary)
         asked = Asked(
             sentence=question, object=object, sound=sound, area=area, image=photo, clip=recording, primary=sought,

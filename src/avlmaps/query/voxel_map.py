@@ -10,7 +10,7 @@ import numpy as np
 from avlmaps.core.arrays import Float, Float16, Int32, UInt8
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import MapError
-from avlmaps.core.files import user_path
+from avlmaps.core.files import lasting_path
 from avlmaps.core.numbers import as_number
 from avlmaps.maps.growing import GrowingMap
 from avlmaps.maps.settings import BuildSettings
@@ -63,9 +63,7 @@ class VoxelMap:
         edge_m = as_number(voxel_size_m)
         if edge_m is None:
             raise MapError(f"voxel_size_m must be a number of metres, not {voxel_size_m!r}.")
-        for name, given, kind in (("settings", settings, BuildSettings), ("query", query, QuerySettings)):
-            if given is not None and not isinstance(given, kind):  # pyright: ignore[reportUnnecessaryIsInstance]
-                raise MapError(f"{name} must be an avlmaps.{kind.__name__}, not {type(given).__name__}.")
+        require_kinds(("settings", settings, BuildSettings), ("query", query, QuerySettings))
         chosen = replace(settings or BuildSettings(), voxel_size_m=edge_m)
         used = encoders_of("embedded" if encoders is None else encoders)
         self._growing = GrowingMap(chosen, used, direction(up_in_world))
@@ -209,7 +207,7 @@ class VoxelMap:
             MapError: there is nothing to write, the folder is something else or a map, or it cannot be written.
         """
         with self._lock:
-            return AVLMap(self._growing.save(user_path(path), overwrite=overwrite), self._query).prepare()
+            return AVLMap(self._growing.save(lasting_path(path), overwrite=overwrite), self._query).prepare()
 
     def __len__(self) -> int:
         """Return how many frames are in the map."""
@@ -218,6 +216,13 @@ class VoxelMap:
     def __repr__(self) -> str:
         encoders = self._growing.encoders
         return f"VoxelMap({len(self)} frames, voxels of {self._growing.settings.voxel_size_m:g} m, {encoders!r})"
+
+
+def require_kinds(*given: tuple[str, object, type]) -> None:
+    """Raise ``MapError`` where an argument is neither None nor of its kind; each is a name, a value and the kind."""
+    for name, value, kind in given:
+        if value is not None and not isinstance(value, kind):
+            raise MapError(f"{name} must be an avlmaps.{kind.__name__}, not {type(value).__name__}.")
 
 
 def direction(up_in_world: Any) -> Float[np.ndarray, "3"] | None:

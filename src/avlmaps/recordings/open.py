@@ -7,7 +7,7 @@ from itertools import islice
 from pathlib import Path
 
 from avlmaps.core.errors import RecordingError
-from avlmaps.core.files import user_path
+from avlmaps.core.files import lasting_path, user_path
 from avlmaps.core.suggestions import did_you_mean, near_path
 from avlmaps.recordings import layout
 from avlmaps.recordings.audio import AudioTrack
@@ -49,10 +49,10 @@ def open_recording(
     found = find_format(path, format)
     if audio is not None and found.has_topics and not (topics or {}).get("audio"):
         topics = {**(topics or {}), "audio": "none"}  # its own sound need not be readable
-    recording = found.open(path, topics=topics, more=more)
+    recording = found.open(lasting_path(path), topics=topics, more=[lasting_path(one) for one in more])
     if audio is not None:
         directions = None if recording.audio is None else recording.audio.directions
-        recording.audio = replace(AudioTrack.open(user_path(audio)), directions=directions)
+        recording.audio = replace(AudioTrack.open(lasting_path(audio)), directions=directions)
         settle_sound(recording)
     if microphones is not None:
         if recording.audio is None:

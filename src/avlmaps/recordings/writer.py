@@ -16,7 +16,7 @@ from jaxtyping import Float
 from avlmaps.core import poses
 from avlmaps.core.camera import Rig
 from avlmaps.core.errors import RecordingError
-from avlmaps.core.files import sync_folder, user_path, write_bytes_atomically
+from avlmaps.core.files import lasting_path, sync_folder, write_bytes_atomically
 from avlmaps.core.timeline import Trajectory
 from avlmaps.recordings import layout
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
@@ -72,7 +72,7 @@ class RecordingWriter:
     _frames: TextIO | None = field(default=None, init=False)
 
     def __enter__(self) -> "RecordingWriter":
-        self.path = user_path(self.path)
+        self.path = lasting_path(self.path)
         _make_empty(self.path)
         # Who reads a recording that is being written finds its cameras here.
         write_bytes_atomically(self.path / layout.UNFINISHED, self._description())
