@@ -46,11 +46,7 @@ def verbalise(intents: Sequence[Intent]) -> str:
 
 
 def _steps(intents: Sequence[Intent]) -> str:
-    said: list[str] = []
-    for intent in intents:
-        step = _step(intent)
-        said.append(step)
-    return ", then ".join(said)
+    return ", then ".join(map(_step, intents))
 
 
 def _step(intent: Intent) -> str:

@@ -138,7 +138,7 @@ class ActionController:
 
     def _turns_to_step(self, pose: GroundPose) -> int | None:
         """Return by how many turns to the left the best safe step begins."""
-        x_m, y_m = self._target(pose)
+        x_m, y_m = _farthest(self.route, _LOOKAHEADS_M, pose, self._safe)
         ahead = round(wrap_angle(bearing(pose, x_m, y_m) - pose.heading_rad) / TURN_RAD)
         if self._safe(pose, pose.turned(ahead * TURN_RAD).ahead(FORWARD_M)):
             return ahead
@@ -150,10 +150,6 @@ class ActionController:
             if left_m < best_m and self._safe(pose, step):
                 best, best_m = turns, left_m
         return best
-
-    def _target(self, pose: GroundPose) -> tuple[float, float]:
-        """Return the place to head for: as far along the path as it can go straight."""
-        return _farthest(self.route, _LOOKAHEADS_M, pose, self._safe)
 
 
 def turns_for(angle_rad: float) -> list[Action]:
@@ -232,7 +228,8 @@ class VelocityController:
         passed = route.length_m - route.along_m < 1e-6
         if left_m <= settings.close_m and passed:
             return None if self._stands() else self._limited(0.0, 0.0)
-        x_m, y_m = self._target(pose)
+        lookaheads_m = tuple(part * settings.lookahead_m for part in _SHORTER)
+        x_m, y_m = _farthest(route, lookaheads_m, pose, self._safe)
         off_rad = wrap_angle(bearing(pose, x_m, y_m) - pose.heading_rad)
         apart_m = max(hypot(x_m - pose.x_m, y_m - pose.y_m), 1e-6)
         self._turning = abs(off_rad) > (0.1 if self._turning else settings.turn_first_rad)
@@ -248,10 +245,6 @@ class VelocityController:
         if abs(angle_left_rad) < 0.01 and self._stands():
             return None
         return self._limited(0.0, self._turn_by(angle_left_rad))
-
-    def _target(self, pose: GroundPose) -> tuple[float, float]:
-        lookaheads_m = tuple(part * self.settings.lookahead_m for part in _SHORTER)
-        return _farthest(self.route, lookaheads_m, pose, self._safe)
 
     def _stands(self) -> bool:
         return abs(self.speed_m_s) < 1e-9 and abs(self.turn_rad_s) < 1e-9

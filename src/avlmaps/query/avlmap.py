@@ -181,13 +181,11 @@ class AVLMap:
         known = self._known_words if vocabulary is None else None
         rivals = self._rivals_of(encoder, vocabulary) if known is None else known
         voxels = self._feature_voxels(encoder, rivals, self.stored.voxels.rgb)
-        known = None if vocabulary is not None else self._stored_search(word)
-        return object_factor(voxels, part, self.settings.heat, known)
-
-    def _stored_search(self, word: str) -> Segmentation | None:
-        """Return what the search for a name of the encoder found, narrower names with it, where that is stored."""
-        known = self._searched(only_stored=True)
-        return known.get((word, False)) or known.get((word, True))
+        found = None
+        if vocabulary is None:  # of a name of the encoder, narrower names with it
+            stored = self._searched(only_stored=True)
+            found = stored.get((word, False)) or stored.get((word, True))
+        return object_factor(voxels, part, self.settings.heat, found)
 
     def instances(self, word: str, alone: bool = False) -> Instances:
         """Return the instances of a word: connected voxels that it wins against the vocabulary.

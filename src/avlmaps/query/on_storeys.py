@@ -45,8 +45,9 @@ def answer_on_storey(
     if len({(one.number, one.above, one.isnt) for one in said}) > 1:
         raise QueryError(f"The question names several storeys ({', '.join(one.said for one in said)}); ask for one.")
     storeys, word = avlmap.storeys, said[0]
-    if not word.said:
-        return _which(ask(word.rest, top), storeys)
+    if not word.said:  # "which floor is it on?"
+        whole = ask(word.rest, top)
+        return whole if storeys is not None else replace(whole, text=f"{whole.text} The map holds one storey.")
     numbers, note = storeys_meant(word, 1 if storeys is None else len(storeys))
     notes = (note,) if note else ()
     if not numbers:
@@ -110,13 +111,6 @@ def _absent(whole: Answer, word: SaidStorey, here: Sequence[Goal], storeys: Stor
         name = storeys[_storey(storeys, whole.goals[0])].name
         text += f"; one is found on the {name} at {place_of(whole.goals[0])}, probability {whole.probability:.2f}"
     return f"{text}."
-
-
-def _which(whole: Answer, storeys: Storeys | None) -> Answer:
-    """Return an answer to "which floor is it on?": where it is, and the name of the storey."""
-    if storeys is None:
-        return replace(whole, text=f"{whole.text} The map holds one storey.")
-    return whole
 
 
 def storeys_meant(word: SaidStorey, count: int) -> tuple[list[int], str]:

@@ -151,10 +151,10 @@ def page_of_things(lists: MapLists, wanted: Wanted) -> ThingsPage:
         QueryError: there is no such room, name, day or page, or no such thing to be near to.
     """
     if wanted.is_whole:
-        return {"things": [_listed(thing) for thing in lists.wanted(wanted)]}
+        return {"things": [ListedThing(**thing) for thing in lists.wanted(wanted)]}
     about = None
     if wanted.room is None and wanted.near is None:
-        rows = [_listed(thing) for thing in lists.wanted(wanted)]
+        rows = [ListedThing(**thing) for thing in lists.wanted(wanted)]
     else:
         chosen, about = selected(lists, wanted)
         names = lists.where.names
@@ -205,10 +205,6 @@ def page_of(rows: Sequence[Row], top: int, page: int, of: str) -> tuple[list[Row
     if not 1 <= page <= pages:
         raise QueryError(f"There is no page {page}; there are {pages} of {top}, for {len(rows)} {of}.")
     return list(rows[(page - 1) * top : page * top]), pages
-
-
-def _listed(thing: ThingAnswer) -> ListedThing:
-    return ListedThing(**thing)
 
 
 def _row(one: Selected, room: str | None) -> ListedThing:

@@ -1,6 +1,5 @@
 """The instances of all names of a large map's encoder, of which lists of things are made, stored beside it."""
 
-import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -68,9 +67,7 @@ def place_of_instances(
         searches: all of which a list of things is made.
         settings: of a search, dataclasses.
     """
-    feature = np.ascontiguousarray(vocabulary.word_feature)
-    words = [vocabulary.words, feature.shape, hashlib.sha256(feature.tobytes()).hexdigest()]
-    return place_of(stored, "instances", settings, [words, list(searches)])
+    return place_of(stored, "instances", settings, [vocabulary.digest, list(searches)])
 
 
 def _to_arrays(known: Sequence[Segmentation]) -> dict[str, np.ndarray]:

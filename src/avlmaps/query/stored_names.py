@@ -1,6 +1,5 @@
 """The two words of a vocabulary closest to each voxel of a large map, stored beside it (``maps.store.derived``)."""
 
-import hashlib
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -42,6 +41,4 @@ def write_closest(stored: "StoredMap", vocabulary: Vocabulary, closest: Closest)
 
 
 def _place(stored: "StoredMap", vocabulary: Vocabulary) -> Derivation | None:
-    feature = np.ascontiguousarray(vocabulary.word_feature)
-    given = [vocabulary.words, feature.shape, hashlib.sha256(feature.tobytes()).hexdigest()]
-    return Derivation.of(stored.path, stored.info, "names", ["voxels/feature"], _MODULES, given)
+    return Derivation.of(stored.path, stored.info, "names", ["voxels/feature"], _MODULES, vocabulary.digest)

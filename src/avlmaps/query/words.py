@@ -4,10 +4,12 @@ As in the paper, the queried word competes with a vocabulary and with "other" fo
 is the closest. The map stores the margin by which it wins: it ranks instances and decides absence.
 """
 
+import hashlib
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -79,6 +81,12 @@ class Vocabulary:
     word_feature: Float32[np.ndarray, "v d"]
     understood: tuple[str, ...]
     has_other: bool
+
+    @property
+    def digest(self) -> list[Any]:
+        """Its words and a hash of their vectors: by these it is known where what follows from it is stored."""
+        feature = np.ascontiguousarray(self.word_feature)
+        return [self.words, feature.shape, hashlib.sha256(feature.tobytes()).hexdigest()]
 
     @classmethod
     def encoded(cls, encoder: PixelEncoder, vocabulary: Sequence[str]) -> "Vocabulary":

@@ -83,48 +83,30 @@ DEEPEST_BLOCK = 10
 KEYWORDS = frozenset(
     {"and", "break", "continue", "elif", "else", "False", "for", "if", "in", "is", "None", "not", "or", "pass", "True"}
 )
-_LOOP = "count with a bounded loop, such as `for i in range(10):`"
-_PLAIN = "write the steps one after the other"
-_KNOWN = "the skills and `len, min, max, abs, range, round` are all there is"
-_REFUSED_WORDS = {
-    "while": _LOOP,
-    "def": _PLAIN,
-    "return": _PLAIN,
-    "yield": _PLAIN,
-    "class": _PLAIN,
-    "lambda": _PLAIN,
-    "async": _PLAIN,
-    "await": _PLAIN,
-    "import": _KNOWN,
-    "from": _KNOWN,
-    "with": "call skills one after the other",
-    "try": "a skill that fails ends the program by itself",
-    "except": "a skill that fails ends the program by itself",
-    "finally": "a skill that fails ends the program by itself",
-    "raise": "a skill that fails ends the program by itself",
-    "assert": "use `if`",
-    "global": "every name is seen everywhere",
-    "nonlocal": "every name is seen everywhere",
-    "del": "let the name be, or give it another value",
-    "as": "give a value a name with `name = value`",
+# What is no part of a program, by what is to be written instead.
+_INSTEAD = {
+    "count with a bounded loop, such as `for i in range(10):`": "while",
+    "write the steps one after the other": "def return yield class lambda async await",
+    "the skills and `len, min, max, abs, range, round` are all there is": "import from",
+    "call skills one after the other": "with",
+    "a skill that fails ends the program by itself": "try except finally raise",
+    "use `if`": "assert",
+    "every name is seen everywhere": "global nonlocal",
+    "let the name be, or give it another value": "del",
+    "give a value a name with `name = value`": "as",
+    "multiply with `*`, and write each argument": "**",
+    "multiply with `*`": "**=",
+    "give the value its name on a line before, with `=`": ":=",
+    "there are no decorators and no matrices": "@",
+    "write a list, [...]": "{ }",
+    "use `not`": "~ !",
+    "use `and`": "&",
+    "use `or`": "|",
+    "use arithmetic": "^ << >>",
+    "nothing is declared in a program": "->",
+    "write `pass` where nothing is to be done": "...",
 }
-_REFUSED_SIGNS = {
-    "**": "multiply with `*`, and write each argument",
-    "**=": "multiply with `*`",
-    ":=": "give the value its name on a line before, with `=`",
-    "@": "there are no decorators and no matrices",
-    "{": "write a list, [...]",
-    "}": "write a list, [...]",
-    "~": "use `not`",
-    "&": "use `and`",
-    "|": "use `or`",
-    "^": "use arithmetic",
-    "<<": "use arithmetic",
-    ">>": "use arithmetic",
-    "->": "nothing is declared in a program",
-    "...": "write `pass` where nothing is to be done",
-    "!": "use `not`",
-}
+_REFUSED = {text: instead for instead, texts in _INSTEAD.items() for text in texts.split()}
 _TOKEN = re.compile(
     r"""
     (?P<space>[ \t]+) | (?P<comment>\#.*)
@@ -306,17 +288,19 @@ class _Lexer:
         self._add(Form.STRING, text, string(self.line, text))
 
     def _name(self, text: str) -> None:
-        if text in _REFUSED_WORDS:
-            raise refused(self.line, f"`{text}` is not part of a program; {_REFUSED_WORDS[text]}")
+        self._refuse(text)
         if len(text) > LONGEST_NAME:
             raise refused(self.line, f"the name `{text[:20]}...` is longer than {LONGEST_NAME} letters; shorten it")
         if text.startswith("__"):
             raise refused(self.line, f"`{text}` starts with two underscores, as no name may; choose another name")
         self._add(Form.WORD if text in KEYWORDS else Form.NAME, text)
 
+    def _refuse(self, text: str) -> None:
+        if text in _REFUSED:
+            raise refused(self.line, f"`{text}` is not part of a program; {_REFUSED[text]}")
+
     def _sign(self, text: str) -> None:
-        if text in _REFUSED_SIGNS:
-            raise refused(self.line, f"`{text}` is not part of a program; {_REFUSED_SIGNS[text]}")
+        self._refuse(text)
         if text in ("(", "["):
             self.brackets.append((text, self.line))
         elif text in (")", "]") and (not self.brackets or self.brackets.pop()[0] != {")": "(", "]": "["}[text]):

@@ -1,7 +1,7 @@
 """The trace of a program: each skill that it called, its result, and how the program ended."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 
@@ -33,14 +33,7 @@ class Step:
 
     def to_json(self) -> dict[str, Any]:
         """Return the step as JSON has it."""
-        return {
-            "skill": self.skill,
-            "arguments": dict(self.arguments),
-            "result": self.result,
-            "line": self.line,
-            "elapsed_s": round(self.elapsed_s, 3),
-            "error": self.error,
-        }
+        return asdict(self) | {"elapsed_s": round(self.elapsed_s, 3)}
 
 
 @dataclass(frozen=True, slots=True)

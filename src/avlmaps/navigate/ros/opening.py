@@ -18,7 +18,6 @@ from avlmaps.navigate.ros.transports import RosKind, own_grid, session_opener, t
 
 if TYPE_CHECKING:
     from avlmaps.maps.obstacles import Obstacles
-    from avlmaps.navigate.planner import Planner
 
 
 class _OpenedDriver(RosDriver):
@@ -128,24 +127,20 @@ def standable_goal(obstacles: "Obstacles", radius_m: float, called: str = "the m
     from avlmaps.navigate.costmap import costmap_of
     from avlmaps.navigate.planner import Planner
 
-    return _Standing(Planner(costmap_of(obstacles, radius_m)), called)
+    planner = Planner(costmap_of(obstacles, radius_m))
 
-
-class _Standing:
-    def __init__(self, planner: "Planner", called: str) -> None:
-        self._planner, self._called = planner, called
-
-    def __call__(
-        self, start: Float[np.ndarray, "2"], wanted: Float[np.ndarray, "2"]
+    def standable(
+        start: Float[np.ndarray, "2"], wanted: Float[np.ndarray, "2"]
     ) -> tuple[Float[np.ndarray, "2"], str] | str:
-        if self._planner.entry(start) is None:
+        if planner.entry(start) is None:
             return (
-                f"The robot says that it is at ({start[0]:.2f}, {start[1]:.2f}), where {self._called} has no floor to "
-                "stand on; set how its frames lie to the map"
+                f"The robot says that it is at ({start[0]:.2f}, {start[1]:.2f}), where {called} has no floor to stand "
+                "on; set how its frames lie to the map"
             )
-        stop = self._planner.stop_for(start, wanted)
+        stop = planner.stop_for(start, wanted)
         if stop is None:
-            return f"No path leads near ({wanted[0]:.2f}, {wanted[1]:.2f}) on {self._called} for a body of that radius"
-        beside = f"The place is not free on {self._called}; it was sent {stop.beside_m:.2f} m beside it"
-        note = beside if stop.beside_m else ""
-        return stop.xy, note
+            return f"No path leads near ({wanted[0]:.2f}, {wanted[1]:.2f}) on {called} for a body of that radius"
+        beside = f"The place is not free on {called}; it was sent {stop.beside_m:.2f} m beside it"
+        return stop.xy, beside if stop.beside_m else ""
+
+    return standable

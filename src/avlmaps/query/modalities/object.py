@@ -90,7 +90,7 @@ class _Search:
         """Return the heat of the confident instances; where there are none, of the best guesses."""
         confident = self._coloured(self._confident)
         if len(confident.instances):
-            return self._factor(confident, self._uncertain_factor)
+            return self._factor(confident, lambda: self._factor(self._uncertain(self.voxels.settings)))
         settings, voxel_size_m = self.voxels.settings, self.voxels.space.grid.voxel_size_m
         uncertain = self._uncertain(settings)
         guess = best_guesses(uncertain.instances, voxel_size_m)
@@ -117,9 +117,6 @@ class _Search:
         scored = self._scored(settings.share_in_company)
         voxels = replace(self.voxels, settings=settings)
         return self._coloured(segment(voxels, self.word, scored, self._confident))
-
-    def _uncertain_factor(self) -> NearThings:
-        return self._factor(self._uncertain(self.voxels.settings))
 
     def _coloured(self, found: Segmentation) -> Segmentation:
         """Return instances with a confidence that falls as their voxels lack the colour that was named."""
