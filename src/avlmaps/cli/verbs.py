@@ -20,27 +20,10 @@ Exit status: 0 done, 1 a known error (one sentence says which), 2 a wrong comman
 With --json an error is {"error": {"kind": ..., "message": ...}} on standard output."""
 
 ENTRY_POINT_GROUP = "avlmaps.verbs"
-_OWN = {
-    "calibrate": "Calibrate",
-    "build": "Build",
-    "live": "Live",
-    "merge": "Merge",
-    "info": "Info",
-    "query": "Query",
-    "things": "Things",
-    "rooms": "Rooms",
-    "sources": "Sources",
-    "changes": "Changes",
-    "edit": "Edit",
-    "shell": "Shell",
-    "view": "View",
-    "export": "Export",
-    "locate": "Locate",
-    "go": "Go",
-    "serve": "Serve",
-    "teach-sound": "TeachSound",
-    "profiles": "Profiles",
-}
+_OWN = (
+    "calibrate", "build", "live", "merge", "info", "query", "things", "rooms", "sources", "changes", "edit", "shell",
+    "view", "export", "locate", "go", "serve", "teach-sound", "profiles",
+)  # fmt: skip
 # As help lists them: in the order in which a person comes to use them; other packages' own verbs follow.
 _ORDER = (
     "demo", "record", "add-sounds", "calibrate", "build", "live", "merge", "import-map", "info", "query", "things",
@@ -55,7 +38,7 @@ if TYPE_CHECKING:
 
 def _own(name: str) -> type[Verb]:
     """Load one of our verbs; the others stay where they are, since one command needs no other's modules."""
-    return getattr(import_module(f"avlmaps.cli.{name.replace('-', '_')}"), _OWN[name])
+    return getattr(import_module(f"avlmaps.cli.{name.replace('-', '_')}"), name.title().replace("-", ""))
 
 
 @cache
