@@ -71,12 +71,7 @@ def export_lines(answer: dict[str, Any]) -> list[str]:
 
 
 def export(verb: Export, opened: "AVLMap | None" = None) -> dict[str, Any]:
-    """Write a map for other programs.
-
-    Args:
-        verb: what to write, and where.
-        opened: the map, where it is open already.
-    """
+    """Write a map for other programs."""
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.export import write_table
     from avlmaps.query.frames import answer_in

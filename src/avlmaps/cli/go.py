@@ -217,13 +217,6 @@ def drive(
 ) -> dict[str, Any]:
     """Run the program of a command on a robot, and close the robot's connection after it.
 
-    Args:
-        verb: the command, with what belongs to it.
-        avlmap: the map.
-        robot: what drives.
-        translator: made the program, and repairs it where it can.
-        translation: the program.
-
     Raises:
         Interrupted: a signal came; its ``halt`` says how the robot stands.
     """
@@ -271,12 +264,7 @@ def _obeyed(
 
 
 def translator_for(verb: "Go", avlmap: "AVLMap | None" = None) -> "Translator":
-    """Return the translator of the command.
-
-    Args:
-        verb: the command; it names the translator.
-        avlmap: the map, whose encoder may know words that the lexicon does not.
-    """
+    """Return the translator of the command."""
     if verb.language != "chat":
         from avlmaps.language.learned_translator import LearnedTranslator
         from avlmaps.language.sentence import Given

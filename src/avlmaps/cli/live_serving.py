@@ -42,12 +42,6 @@ class Drive:
     """Frames that come into a live map in a thread of their own, to the end of which the map is closed."""
 
     def __init__(self, live: LiveMap, drive: Callable[[Callable[[], bool]], None]) -> None:
-        """Begin.
-
-        Args:
-            live: the map.
-            drive: gives it frames until it says that it is over, or they end.
-        """
         self._live, self._drive = live, drive
         self._over = threading.Event()
         self._fault: BaseException | None = None
@@ -86,12 +80,6 @@ class Drive:
 
 def serve_while(live: LiveMap, drive: Callable[[Callable[[], bool]], None], port: int, *, browse: bool) -> None:
     """Serve a live map on this machine until Ctrl-C, while a drive gives it frames, and close it.
-
-    Args:
-        live: the map.
-        drive: gives it frames until it says that it is over, or they end.
-        port: to listen on; 0 takes a free one.
-        browse: open the page in a browser.
 
     Raises:
         ServeError: the port is taken.

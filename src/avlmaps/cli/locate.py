@@ -45,15 +45,7 @@ def locate_photo(
     opened: "AVLMap | None" = None,
     frame: FrameName = FrameName.RECORDING,
 ) -> "LocateAnswer":
-    """Locate a photo.
-
-    Args:
-        map_path: folder of the map.
-        picture: the photo.
-        intrinsics: ``fx,fy,cx,cy`` of its camera; None for those of the map's own.
-        opened: the map, where it is open already.
-        frame: of the pose.
-    """
+    """Locate a photo."""
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.focal import focal_35mm_of
     from avlmaps.query.frames import answer_in

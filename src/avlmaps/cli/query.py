@@ -68,10 +68,6 @@ class Query(MapVerb):
 def ask(verb: "Query", opened: "AVLMap | None" = None) -> dict[str, Any]:
     """Query a map with a sentence or with parts.
 
-    Args:
-        verb: the query.
-        opened: the map, where it is open already.
-
     Raises:
         UsageError: what is given does not fit together.
     """

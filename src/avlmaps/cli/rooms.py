@@ -36,12 +36,7 @@ class Rooms(MapVerb):
 
 
 def rooms(verb: Rooms, opened: "AVLMap | None" = None) -> dict[str, Any]:
-    """List the rooms of a map.
-
-    Args:
-        verb: what to list.
-        opened: the map, where it is open already.
-    """
+    """List the rooms of a map."""
     from avlmaps.core.poses import FRAME
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.frames import answer_in

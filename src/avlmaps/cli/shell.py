@@ -69,11 +69,6 @@ class Shell(ModelVerb):
 def answer_lines(session: Session, lines: "Lines", as_json: bool) -> tuple[int, int]:
     """Answer every line; an error is one sentence, and the next line follows.
 
-    Args:
-        session: answers.
-        lines: where they come from.
-        as_json: print one JSON object for each line.
-
     Returns:
         How many lines failed, and how many there were.
     """

@@ -51,7 +51,6 @@ class PipedLines:
     interactive = False
 
     def __init__(self, stream: TextIO) -> None:
-        """Take the stream."""
         self._stream = stream
         self._kept: str | None = None
 

@@ -16,14 +16,7 @@ _MOST_SHOWN = 40
 
 
 def completions(line: str, verbs: Sequence[str], file_verbs: Sequence[str], here: Iterable[str]) -> list[Completion]:
-    """Return the completions of a line, at most 40.
-
-    Args:
-        line: what stands before the cursor.
-        verbs: the words that a line may begin with.
-        file_verbs: those of them that take a file.
-        here: names of what this map holds; these come first.
-    """
+    """Return the completions of a line, at most 40."""
     first, blank, rest = line.lstrip().partition(" ")
     if blank and first in file_verbs:
         return list(_files(rest.lstrip()))[:_MOST_SHOWN]
@@ -76,13 +69,6 @@ class NameCompleter(Completer):
     """Completes at the prompt."""
 
     def __init__(self, verbs: Sequence[str], file_verbs: Sequence[str], here: Callable[[], Iterable[str]]) -> None:
-        """Take the source of the completions.
-
-        Args:
-            verbs: the words that a line may begin with.
-            file_verbs: those of them that take a file.
-            here: returns the names of what the map holds.
-        """
         self._verbs, self._file_verbs, self._here = verbs, file_verbs, here
 
     def get_completions(self, document: Document, complete_event: CompleteEvent) -> Iterator[Completion]:

@@ -21,12 +21,6 @@ class PromptLines:
     interactive = True
 
     def __init__(self, completer: Completer, with_history: bool = True) -> None:
-        """Prepare the prompt.
-
-        Args:
-            completer: completes words.
-            with_history: read and write the history in the user's state folder.
-        """
         output = create_output(always_prefer_tty=True)
         # A shell that starts a command in the background has SIGINT ignored; at a prompt Ctrl-C stops an answer.
         signal.signal(signal.SIGINT, signal.default_int_handler)

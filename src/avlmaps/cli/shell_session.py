@@ -94,9 +94,6 @@ class Session:
     def __init__(self, given: Given) -> None:
         """Open the map.
 
-        Args:
-            given: the map, and the robot of `go`.
-
         Raises:
             MapError: the map cannot be opened.
         """
@@ -132,10 +129,6 @@ class Session:
 
     def answer(self, line: str, confirms: Callable[[str], bool]) -> Reply:
         """Answer a line.
-
-        Args:
-            line: a question, or a verb with its words.
-            confirms: asks the user whether the robot is to drive.
 
         Raises:
             AvlmapsError: what the verb raises.

@@ -61,12 +61,7 @@ class Things(MapVerb):
 
 
 def contents(verb: Things, opened: "AVLMap | None" = None) -> dict[str, Any]:
-    """List the things, sounds and rooms of a map, or a page of some of its things.
-
-    Args:
-        verb: what to list.
-        opened: the map, where it is open already.
-    """
+    """List the things, sounds and rooms of a map, or a page of some of its things."""
     from avlmaps.core.poses import FRAME
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.export import write_table

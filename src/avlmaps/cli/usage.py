@@ -40,13 +40,7 @@ def _framed(printed: str) -> list[str]:
 
 
 def meant(words: Sequence[str], printed: str, verbs: Mapping[str, type[Verb]]) -> str:
-    """Return the fault in a command line in one sentence, with the verb, option or value that was probably meant.
-
-    Args:
-        words: after ``avlmaps``.
-        printed: what the parser prints about them.
-        verbs: the verbs by their names.
-    """
+    """Return the fault in a command line in one sentence, with the verb, option or value that was probably meant."""
     sentence = usage_sentence(printed)
     name = words[0] if words else ""
     if not name or name.startswith("-"):

@@ -32,13 +32,7 @@ class Verb:
 
 
 def idle(options: "DataclassInstance", names: Sequence[str], why: str) -> list[str]:
-    """Return a note for each option that was given and has no effect.
-
-    Args:
-        options: a verb, or a group of its options.
-        names: of fields.
-        why: the reason, the same for all.
-    """
+    """Return a note for each option that was given and has no effect."""
     defaults = {each.name: each.default for each in fields(options)}
     given = [name for name in names if getattr(options, name) != defaults[name]]
     return [f"--{name.replace('_', '-')} has no effect: {why}." for name in given]

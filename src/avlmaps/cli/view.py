@@ -161,13 +161,7 @@ def require_port(port: int) -> None:
 
 
 def run_page(service: "Service", opened: "socket", started: "Callable[[], None]") -> None:
-    """Serve maps to browsers until Ctrl-C, and close the service.
-
-    Args:
-        service: the maps.
-        opened: a bound socket.
-        started: is called when the page answers.
-    """
+    """Serve maps to browsers until Ctrl-C, and close the service."""
     from avlmaps.serve.app import create_app
     from avlmaps.serve.running import run_http
 

@@ -157,11 +157,6 @@ def spread_m(camera: Float[np.ndarray, "v 4 4"]) -> float:
 def consensus(votes: Votes, settings: AlignSettings, names: Sequence[object]) -> tuple[np.ndarray, dict[str, float]]:
     """Return map_from_other (4x4) as the agreeing votes say, and the numbers behind it.
 
-    Args:
-        votes: of the keyframes.
-        settings: how many must agree.
-        names: of the map and the other one, for the error.
-
     Raises:
         NotTheSamePlaceError: too few agree, or they stand too close together.
     """

@@ -132,15 +132,7 @@ def _padded(clear_mm: np.ndarray, rows: int, columns: int) -> np.ndarray:
 def joined_sources(
     stored: StoredMap, other: StoredMap, moved: Float[np.ndarray, "4 4"], voxels: Voxels, keyframes: Keyframes
 ) -> tuple[SourceEvidence | None, str]:
-    """Return the evidence of where the sounds of all days came from; or why there is none, in a sentence.
-
-    Args:
-        stored: the map.
-        other: the new day's.
-        moved: map_from_other.
-        voxels: of both.
-        keyframes: of both; where the robots were.
-    """
+    """Return the evidence of where the sounds of all days came from; or why there is none, in a sentence."""
     parts = [(of.sources(), where) for of, where in ((stored, np.eye(4)), (other, moved)) if len(of.sounds)]
     known = [(evidence, where) for evidence, where in parts if evidence is not None]
     if not known:

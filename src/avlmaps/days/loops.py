@@ -107,11 +107,6 @@ def close_loops(
 ) -> tuple[StoredMap, Corrected, Loops]:
     """Find where the drive came back, correct the poses by it, and make the map follow them, in its folder.
 
-    Args:
-        stored: a map that was built with submaps.
-        settings: of the search.
-        recording: as ``correct_stored`` takes it.
-
     Raises:
         MapError: the map has no submaps, or no models to find places by; too few closures were found, or they
             contradict each other. It stays as it was.

@@ -39,13 +39,7 @@ class Surface:
 
     @classmethod
     def of(cls, points: Float[np.ndarray, "m 3"], most: int, rng: np.random.Generator) -> "Surface":
-        """Return the flat surface at some points.
-
-        Args:
-            points: middles of voxels, metres.
-            most: points at most, drawn at random.
-            rng: draws them.
-        """
+        """Return the flat surface at some points."""
         if len(points) < _NEIGHBOURS:
             return cls(np.zeros((0, 3)), np.zeros((0, 3)))
         chosen = points if len(points) <= most else points[np.sort(rng.choice(len(points), most, replace=False))]

@@ -62,16 +62,6 @@ def build_together(
     The maps of the single recordings lie beside it, in ``NAME-recordings``: a recording more costs its own work alone.
     Where there are as many recordings as cores each is one job; else their parts are jobs.
 
-    Args:
-        recordings: open each recording, the earliest first.
-        out: folder of the map.
-        encoders: which models perceive.
-        pool: that does the jobs.
-        settings: of each build.
-        cache: of features.
-        allow: see ``build_map``.
-        overwrite: replace maps that came from other recordings or settings.
-
     Raises:
         AvlmapsError: as ``build_map`` and ``merge_maps``; a recording of another place is refused with the numbers.
     """
@@ -128,12 +118,6 @@ def _build_each(
 
 def merge_in_turn(days: Sequence[StoredMap], scratch: Path, out: Path, *, overwrite: bool = False) -> StoredMap:
     """Merge maps in their order, each found in the ones before; what a stopped run had merged is used again.
-
-    Args:
-        days: maps of one recording each, the earliest first.
-        scratch: folder of the maps of the first two, three and so on.
-        out: folder of the map of all.
-        overwrite: replace another map there.
 
     Raises:
         MapError: see ``merge_maps``; what was merged before stays in ``scratch``.

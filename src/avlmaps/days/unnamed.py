@@ -31,13 +31,6 @@ def changed_things(
     Voxels that touch are one thing where rays of another day pass through enough of them. Of a group that is too large
     for a thing, or hardly looked at, those alone that rays pass through are. What lies beside a thing that changed
     itself is a part of it.
-
-    Args:
-        stored: the map.
-        loose: voxels where the other days have no surface.
-        through: voxels through which rays of another day pass.
-        owned: the voxels of each thing that has a name.
-        settings: the rule.
     """
     index = np.asarray(stored.voxels.index)
     changed = [rows for rows in owned if loose[rows].sum() > _MOSTLY * len(rows)]

@@ -31,11 +31,7 @@ def is_strange(word: str) -> bool:
 
 
 def missing_file(kind: TargetKind) -> Clarify:
-    """Return the question for "this photo" or "this recording" where no file came along.
-
-    Args:
-        kind: ``IMAGE`` or ``CLIP``.
-    """
+    """Return the question for "this photo" or "this recording" where no file came along."""
     return Clarify(_FILES[kind])
 
 

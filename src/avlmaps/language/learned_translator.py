@@ -26,7 +26,6 @@ class UnclearError(LanguageError):
     """
 
     def __init__(self, message: str, choices: tuple[str, ...] = ()) -> None:
-        """Take the question or the reason, and its choices."""
         super().__init__(message)
         self.choices = choices
 
@@ -42,7 +41,6 @@ class LearnedTranslator:
     name = "learned"
 
     def __init__(self, given: Given | None = None) -> None:
-        """Take the files and names that came along with the commands."""
         self.given, self.knows_map = given or Given(), given is not None
 
     def read(self, command: str) -> Command:

@@ -199,12 +199,7 @@ _PHOTO = re.compile(r"\b(?:photo|picture|image|snapshot|photograph|pic)\b")
 
 
 def read_list(text: str, own: Sequence[OwnName] = ()) -> ListQuestion | None:
-    """Return the question to the lists that a sentence is; None where it is another one.
-
-    Args:
-        text: the sentence.
-        own: names that people gave to things and rooms of the map.
-    """
+    """Return the question to the lists that a sentence is; None where it is another one."""
     stand = stand_ins(text, own)
     if stand.own:
         read = read_list(stand.text)

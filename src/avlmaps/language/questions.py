@@ -147,11 +147,6 @@ def by_name(sentence: Sentence) -> AskedSentence | None:
 def asked(sentence: Sentence, reads: Sequence[Read], limits: Limits) -> AskedSentence:
     """Return the query of a sentence that was read.
 
-    Args:
-        sentence: the sentence.
-        reads: its readings, the likeliest first.
-        limits: how likely a reading must be.
-
     Raises:
         QueryError: it is not understood; a name or a file is not known.
     """

@@ -177,13 +177,7 @@ def _in_degrees(tokens: list[Token]) -> list[Token]:
 
 
 def _turns(tokens: list[Token], at: int, before: list[Token]) -> tuple[int, float | None]:
-    """Return where an amount of turns ends that begins at a token, and how many; None where none does.
-
-    Args:
-        tokens: the sentence.
-        at: the token.
-        before: the tokens before it, as they are read.
-    """
+    """Return where an amount of turns ends that begins at a token, and how many; None where none does."""
     words = [token.text for token in before if token.text not in ("around", "round", "by")]
     spins, makes = words[-1:] and words[-1] in _SPINS | _TURNED, words[-1:] and words[-1] in _MAKES
     begins = _begins([*before, tokens[at]], len(before)) or spins or makes

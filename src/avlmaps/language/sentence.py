@@ -60,7 +60,6 @@ class Sentence:
     """
 
     def __init__(self, text: str, given: "Given | None" = None) -> None:
-        """Take a sentence, and the files and names that came along with it."""
         given = given or Given()
         self.text = text
         tokens, self.respelt = respelt(lexer.tokenise(text))

@@ -167,13 +167,7 @@ def _moved(stored: StoredMap, submaps: Submaps, now: Float[np.ndarray, "f 4 4"])
 def moved_keyframes(
     keyframes: Keyframes, stamps_s: Float[np.ndarray, " f"], now: Float[np.ndarray, "f 4 4"]
 ) -> Keyframes:
-    """Return keyframes at the poses that their frames have now.
-
-    Args:
-        keyframes: each of one of the frames.
-        stamps_s: of the frames.
-        now: world_from_camera of each.
-    """
+    """Return keyframes at the poses that their frames have now."""
     row = np.searchsorted(stamps_s, np.asarray(keyframes.stamp_s))
     row = np.minimum(row, len(stamps_s) - 1)
     pose = np.asarray(keyframes.world_from_camera, np.float64)

@@ -48,12 +48,6 @@ def perceiving(who: str, what: str) -> Generator[None]:
 def as_grid(features: Any, dim: int | None, who: str, frame: Frame) -> np.ndarray:
     """Return features as an array of the right form.
 
-    Args:
-        features: what came.
-        dim: numbers of a feature; None for any.
-        who: the beginning of the sentence.
-        frame: that they are of.
-
     Raises:
         BackendError: they have another form.
     """

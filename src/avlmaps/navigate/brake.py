@@ -108,13 +108,6 @@ class BrakedBody:
     """A simulated body that takes its time and stops at the brake."""
 
     def __init__(self, body: Body, brake: Brake, action_s: float) -> None:
-        """Take a body.
-
-        Args:
-            body: moves.
-            brake: of the order.
-            action_s: time of one action.
-        """
         self._body, self._brake, self._action_s = body, brake, action_s
 
     @property
@@ -143,7 +136,6 @@ class BrakedDriver:
     """A driver that begins no movement once the brake is pulled."""
 
     def __init__(self, driver: Driver, brake: Brake) -> None:
-        """Take a driver and the brake of an order."""
         self._driver, self._brake = driver, brake
 
     @property

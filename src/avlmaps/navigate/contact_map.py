@@ -47,11 +47,6 @@ class ContactMap:
         the likeliest point cannot be, since the map has something there or the body has been there, points beside
         it are taken.
 
-        Args:
-            before: where the movement began.
-            planned: where it was to end.
-            now: where it ended.
-
         Returns:
             Whether that is something new.
         """

@@ -71,7 +71,6 @@ class StallDetector:
     """Detects a body that does not follow its commands, after any number of them."""
 
     def __init__(self, route: Route) -> None:
-        """Watch a body that follows a route."""
         self._route = route
         self._farthest_m = -1.0
         self._in_vain = 0
@@ -104,12 +103,6 @@ class ActionController:
     """Chooses the paper's actions: turns until it looks along the path as well as 5 degrees allow, then steps on."""
 
     def __init__(self, points: Float[np.ndarray, "n 2"], safe: Safe) -> None:
-        """Follow a path.
-
-        Args:
-            points: (n, 2) its corners.
-            safe: no step is taken that is not.
-        """
         self.route = Route(points)
         self._safe = safe
         self._turns = 0  # still to take, to the left, before the next step
@@ -201,13 +194,6 @@ class VelocityController:
     def __init__(
         self, points: Float[np.ndarray, "n 2"], settings: VelocitySettings | None = None, safe: Safe | None = None
     ) -> None:
-        """Follow a path.
-
-        Args:
-            points: (n, 2) its corners.
-            settings: its bounds.
-            safe: it heads for a place to which it can go straight, where this is known.
-        """
         self.route = Route(points)
         self._safe = safe
         self.settings = settings or VelocitySettings()

@@ -29,10 +29,6 @@ class Readable:
     def find(self, name: str, what: str) -> Path:
         """Return the file of that name.
 
-        Args:
-            name: as the program gives it.
-            what: ``picture`` or ``clip``, for the sentence of an error.
-
         Raises:
             QueryError: it is not there, not offered to the program, or far too large.
         """

@@ -182,10 +182,6 @@ class Seeker:
     def referent(self, target: Target, here: Float[np.ndarray, "2"]) -> Thing:
         """Return the thing that a target refers to for a robot: the best where it says which one, else the nearest.
 
-        Args:
-            target: a phrase, a place or a heatmap.
-            here: where the robot stands, level x and y.
-
         Raises:
             GoalNotFoundError: there is none.
         """
@@ -264,10 +260,6 @@ class Seeker:
 
     def every(self, target: Target, here: Float[np.ndarray, "2"]) -> list[Thing]:
         """Return all things that a target may mean, the nearest first.
-
-        Args:
-            target: a phrase, a place or a heatmap.
-            here: where the robot stands, level x and y.
 
         Raises:
             GoalNotFoundError: there is none.

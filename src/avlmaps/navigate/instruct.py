@@ -126,13 +126,7 @@ class Outcome:
 
 
 def given_by(avlmap: AVLMap, image: str | None = None, clip: str | None = None) -> Given:
-    """Return what a command to a robot on a map may mean: the map's names, and which places its sounds have.
-
-    Args:
-        avlmap: the map.
-        image: the file that "this photo" means.
-        clip: the file that "this recording" means.
-    """
+    """Return what a command to a robot on a map may mean: the map's names, and which places its sounds have."""
     sounds_at, own = avlmap.settings.sounds.at, avlmap.edited.own_names
     return Given(image, clip, avlmap.knows, sounds_at, own, lambda: no_sources(avlmap.stored))
 

@@ -67,12 +67,6 @@ def told_by_map(
     """Return what a drive would report of the map, and the run that ends early by what the map lacks, if it does.
 
     Reported are the map's doubts, how words are taken, what is only a guess, and last of all why it ends early.
-
-    Args:
-        program: that the drive would run; it queries the map, and nothing moves.
-        avlmap: the map.
-        command: its words, which may name files.
-        guess: as of ``RobotSettings``.
     """
     robot, trace = _asked_of(program, avlmap, command, GroundPose(0.0, 0.0), guess)
     missing = None if trace.error is None or trace.error_type == ProgramError.__name__ else trace
@@ -124,21 +118,7 @@ def rehearse(
     tell: Callable[[str], None] = lambda _: None,
     heats: Heats | None = None,
 ) -> Outcome:
-    """Run a program on the map alone, with a body that meets no obstacle; waits take no time.
-
-    Args:
-        words: the command; "" where there is only a program.
-        translation: its program.
-        avlmap: the map.
-        obstacles: of the map, for the shape.
-        start: where the robot stands, level frame.
-        shape: of the body.
-        settings: how the robot takes its skills.
-        budget: of the program.
-        readable: which files the program may load.
-        tell: called with each line of progress.
-        heats: takes what the map answers, for the drive.
-    """
+    """Run a program on the map alone, with a body that meets no obstacle; waits take no time."""
     driver = MapDriver(obstacles, FreeBody(start), shape)
     return instruct(
         words, avlmap, driver, LearnedTranslator(), budget, settings=settings, readable=readable,

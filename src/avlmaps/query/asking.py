@@ -147,11 +147,6 @@ class Files:
 def ask(avlmap: "Queryable", asked: Asked, files: Files | None = None) -> Answer:
     """Answer a sentence or parts.
 
-    Args:
-        avlmap: the map.
-        asked: the query.
-        files: cameras and contents of its files.
-
     Raises:
         AskError: the sentence does not speak of a file that was given, or intrinsics come without a photo.
         QueryError: the sentence is not understood, or a part of it cannot be used.

@@ -41,10 +41,6 @@ class Days:
     def of(cls, stored: "StoredMap", corrected: "Callable[[Life], Life] | None" = None) -> "Days":
         """Return those of a map.
 
-        Args:
-            stored: the map.
-            corrected: gives things the names that people gave them.
-
         Raises:
             QueryError: it was seen on one day alone.
         """
@@ -153,15 +149,7 @@ def when(days: Days, visit: int, stamp_s: float | None = None) -> "DayAnswer":
 def changes_answer(
     days: Days, name: str, since: int = 0, room_of: RoomOf = lambda place: None, *, first_seen: bool = False
 ) -> "ChangesAnswer":
-    """Return what ``avlmaps changes --json`` prints.
-
-    Args:
-        days: of the map.
-        name: of the map.
-        since: visit after which changes count.
-        room_of: names the room of a place.
-        first_seen: list also what was seen first, where nobody had looked before.
-    """
+    """Return what ``avlmaps changes --json`` prints."""
     stays = days.life.stays
     listed: list[ChangeAnswer] = []
     for one in days.changes(since):
@@ -195,14 +183,7 @@ def changes_answer(
 
 
 def last_seen(days: Days, name: str, same: Callable[[str], bool], room_of: RoomOf) -> "LastSeenAnswer":
-    """Return where things of a name were last seen, those that are there still first, then the latest.
-
-    Args:
-        days: of the map.
-        name: the word.
-        same: whether a thing's name is meant by it.
-        room_of: names the room of a place.
-    """
+    """Return where things of a name were last seen, those that are there still first, then the latest."""
     stays = days.life.stays
     own = [stay for stay in stays if same(stay.name) and stay.moved_to is None]
     own.sort(key=lambda stay: (stay.gone is not None, -stay.last_seen_s, -stay.confidence))

@@ -236,10 +236,6 @@ def numbered(names: Sequence[str]) -> tuple[str, ...]:
 def require_known(knows: Callable[[str], bool], names: Sequence[str]) -> None:
     """Raise an error where the pixel encoder does not know one of some names.
 
-    Args:
-        knows: whether it does (``AVLMap.knows``).
-        names: of things.
-
     Raises:
         QueryError: it does not; the sentence says what was probably meant.
     """
@@ -328,10 +324,6 @@ def thing_of(stored: "StoredMap", space: Space, name: str, confidence: float, ro
 def find_sounds(stored: "StoredMap", most_names: int = 3) -> list[SoundEvent]:
     """Return the sounds of a map in the order of their onset, each with its likeliest names.
 
-    Args:
-        stored: the map.
-        most_names: names for each sound.
-
     Raises:
         MapError: the map was built with another sound encoder than is installed.
     """
@@ -371,13 +363,6 @@ def find_rooms(
 
     A room is a region of the floor that walls and doorways bound and that keyframes looked into. Without a plan it
     is a group of keyframes with one likeliest name whose views' places lie close to one another.
-
-    Args:
-        stored: the map.
-        space: its voxels' places.
-        settings: how views are scored and grouped.
-        least_confidence: rooms below it are left out, in [0, 1].
-        by_floor: how likely each place is each kind of room, and the regions; None without a floor plan.
 
     Raises:
         BackendError: the map's profile has no view encoder.

@@ -88,13 +88,7 @@ class Edited(FoundEdits):
         )
 
     def object_factor(self, part: Part, heat: HeatSettings, find: Callable[[], NearThings]) -> NearThings:
-        """Return the heat of the things that a part of a question names, as people corrected them.
-
-        Args:
-            part: of the query.
-            heat: how fast it falls.
-            find: returns it as the encoder sees it; may raise where that understands nothing of it.
-        """
+        """Return the heat of the things that a part of a question names, as people corrected them."""
         if not self.edits or not self.claims:
             return find()
         try:
@@ -251,13 +245,7 @@ class Edited(FoundEdits):
     def said_of(
         self, places: Sequence[Sequence[float]], named: Iterable[str] = (), areas: Iterable[str] = ()
     ) -> tuple[str, ...]:
-        """Return who corrected what an answer is about, and when, in a sentence each.
-
-        Args:
-            places: of its goals, metres, the map's world.
-            named: names that the question has for things and places.
-            areas: those that it has for rooms.
-        """
+        """Return who corrected what an answer is about, and when, in a sentence each."""
         if not self.edits:
             return ()
         space, names, rooms = self._map.space, set(map(plain_name, named)), list(map(plain_name, areas))

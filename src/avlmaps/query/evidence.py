@@ -43,14 +43,7 @@ class Evidence:
 
 
 def evidence_of(factors: Sequence[Factor], instance: int, position: Float[np.ndarray, "3"], peak: float) -> Evidence:
-    """Return the evidence for a goal.
-
-    Args:
-        factors: of the heat.
-        instance: of the lead that the goal lies on.
-        position: of the goal, metres, world.
-        peak: highest heat of the instance's share.
-    """
+    """Return the evidence for a goal."""
     lead = lead_of(factors)
     context = [factor for factor in factors if factor is not lead]
     itself = float(lead.scores[lead.instance == instance].max(initial=0.0)) if isinstance(lead, NearAnchors) else 1.0

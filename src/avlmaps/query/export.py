@@ -124,13 +124,7 @@ def write_ply(
 def voxel_mesh(
     index: Int[np.ndarray, "n 3"], voxel_size_m: float, colors: UInt8[np.ndarray, "n 3"]
 ) -> tuple[Float32[np.ndarray, "v 3"], Int[np.ndarray, "t 3"], UInt8[np.ndarray, "v 3"]]:
-    """Return the outer faces of voxels as vertices, triangles and vertex colours, without those between two voxels.
-
-    Args:
-        index: of the voxels, each once.
-        voxel_size_m: their edge.
-        colors: RGB of each.
-    """
+    """Return the outer faces of voxels as vertices, triangles and vertex colours, without those between two voxels."""
     index = np.asarray(index, np.int64)
     known = _keys(index, index)
     vertices: list[Float32[np.ndarray, "v 3"]] = []
@@ -255,12 +249,6 @@ def write_table(
 
     The column ``frame`` names that of the positions, metres. Sizes are along the axes of the level frame in either, as
     the column ``size_frame`` says. Where rows have a storey, a room or a distance, these are columns at the end.
-
-    Args:
-        path: file.
-        things: rows.
-        sounds: rows.
-        frame: in which their positions are given.
 
     Raises:
         QueryError: the file cannot be written.

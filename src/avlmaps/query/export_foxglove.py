@@ -27,10 +27,6 @@ _SOUND_M = 0.3
 def write_foxglove(path: Path, layers: Layers) -> Path:
     """Write a map's layers as MCAP.
 
-    Args:
-        path: file, ``.mcap``.
-        layers: what to write; the frame of its positions names the root frame of the file.
-
     Raises:
         BackendError: foxglove-sdk is not installed.
         QueryError: the file cannot be written.

@@ -112,12 +112,6 @@ def layers_of(
 ) -> Layers:
     """Gather what a map shows.
 
-    Args:
-        opened: the map.
-        frame: of all positions.
-        heat: a question whose heat becomes a layer.
-        least_confidence: of the things, 0 to 1.
-
     Raises:
         QueryError: the question cannot be answered.
     """

@@ -25,10 +25,6 @@ FILES = ("embeddings.npy", "index.npy", "point_cloud.pcd")
 def write_openlex3d(folder: Path, opened: "AVLMap") -> tuple[Path, ...]:
     """Write the three files; voxels without a feature are left out.
 
-    Args:
-        folder: made where it is not there.
-        opened: the map.
-
     Raises:
         QueryError: no voxel has a feature, or a file cannot be written.
     """

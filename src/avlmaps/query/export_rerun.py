@@ -24,10 +24,6 @@ TIMELINE = "recording"
 def write_rerun(path: Path, layers: Layers) -> Path:
     """Write a map's layers for Rerun.
 
-    Args:
-        path: file, ``.rrd``.
-        layers: what to write.
-
     Raises:
         BackendError: rerun-sdk is not installed.
         QueryError: the file cannot be written.

@@ -69,11 +69,7 @@ class Uncertainty:
 
 
 def focal_35mm_of(photo: Path | bytes) -> float | None:
-    """Return the focal length for 35 mm film that a photo's EXIF notes, mm; None where it has none that can be.
-
-    Args:
-        photo: a file, or what is in it.
-    """
+    """Return the focal length for 35 mm film that a photo's EXIF notes, mm; None where it has none that can be."""
     from PIL import Image
 
     try:

@@ -166,11 +166,6 @@ def threshold_in_company(voxels: FeatureVoxels, scored: Scored, taken: Int[np.nd
     """Return the voxels that count where the context may select among uncertain instances.
 
     For an encoder of names a voxel counts that scores a part of its best rival's score.
-
-    Args:
-        voxels: of the map.
-        scored: with the score of the word.
-        taken: voxels that have an instance already.
     """
     counts, settings = scored.margin > 0.0, voxels.settings
     if isinstance(voxels.encoder, NamedPixelEncoder):

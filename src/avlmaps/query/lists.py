@@ -48,13 +48,6 @@ def answer_list(
 ) -> Answer:
     """Answer a question from the lists of a map.
 
-    Args:
-        avlmap: the map.
-        question: the question.
-        top: most goals.
-        ask: answers what the question names by heat: "the bed", "this photo".
-        at: the place of sounds that are listed by time; None: where they were heard.
-
     Raises:
         QueryError: the map has no such list.
     """

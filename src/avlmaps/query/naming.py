@@ -51,11 +51,7 @@ class VoxelNamer:
         self.calibrated = self._named or self._scale is not None
 
     def confidences(self, rows: Int[np.ndarray, " m"]) -> Float32[np.ndarray, "m k"]:
-        """Return how likely each voxel is each name; all zero where the map has no feature.
-
-        Args:
-            rows: numbers of the voxels in the map.
-        """
+        """Return how likely each voxel is each name; all zero where the map has no feature."""
         feature = np.asarray(self._voxels.feature[rows], np.float32)
         score = feature @ self._columns if len(self.names) else np.zeros((len(rows), 0), np.float32)
         if self._named:
@@ -99,13 +95,7 @@ class VoxelNamer:
 
 
 def keyframes_that_saw(stored: "StoredMap", space: "Space", row: int) -> Int[np.ndarray, " k"]:
-    """Return the keyframes that had a voxel in view with nothing of the map in between, the nearest first.
-
-    Args:
-        stored: the map.
-        space: its voxels' places.
-        row: number of the voxel in the map.
-    """
+    """Return the keyframes that had a voxel in view with nothing of the map in between, the nearest first."""
     poses = np.asarray(stored.keyframes.world_from_camera, np.float64)
     if not len(poses):
         return np.zeros(0, np.int64)

@@ -33,12 +33,6 @@ def answer_on_storey(
 ) -> Answer:
     """Answer a question that names a storey.
 
-    Args:
-        avlmap: the map.
-        said: the storeys that it names, as its words do.
-        top: most goals.
-        ask: answers the question without the storey, with up to a number of goals.
-
     Raises:
         QueryError: the question names several storeys, or cannot be answered.
     """

@@ -123,14 +123,6 @@ class Panoramas:
         keyframes: Keyframes,
         settings: PhotometricSettings = PhotometricSettings(),
     ) -> None:
-        """Draw the panoramas.
-
-        Args:
-            space: the places of the map's voxels.
-            rgb: their colours.
-            keyframes: say where the robot has been.
-            settings: how to seek.
-        """
         self.settings = settings
         self._level_from_world = space.level_from_world
         side_m, colours = space.grid.voxel_size_m, np.asarray(rgb)
@@ -153,13 +145,7 @@ class Panoramas:
     def likeliest(
         self, rgb: UInt8[np.ndarray, "h w 3"], camera: Pinhole, starts: Sequence[Start] = ()
     ) -> ByColour | None:
-        """Return the pose from which the map looks most like a picture; None where it is like no place.
-
-        Args:
-            rgb: the picture.
-            camera: that took it.
-            starts: poses to try beside those that are found.
-        """
+        """Return the pose from which the map looks most like a picture; None where it is like no place."""
         most, starting = self.settings.most_inliers, from_rotation(self._level_from_world)
         found = [_Ranked(pose, 0.0, 0) for pose in self._candidates(rgb, camera)]
         found += [_Ranked(starting @ start.world_from_camera, 0.0, min(start.inliers, most)) for start in starts]

@@ -192,11 +192,6 @@ class LastSeenAnswer(TypedDict):
 def last_seen(avlmap: "AVLMap", thing: str, top: int = 3) -> LastSeenAnswer:
     """Return when a thing was last seen: the latest time of any voxel of each of its instances.
 
-    Args:
-        avlmap: the map.
-        thing: its name.
-        top: most places.
-
     Raises:
         QueryError: the name is empty, or the pixel encoder understands nothing of it.
     """

@@ -167,10 +167,6 @@ class SourceMap:
     def of(cls, avlmap: Listening, evidence: SourceEvidence | None = None) -> "SourceMap":
         """Return the evidence of a map.
 
-        Args:
-            avlmap: the map.
-            evidence: of its sounds; what it stores if None.
-
         Raises:
             QueryError: the map has none.
         """
@@ -228,13 +224,7 @@ class SourceMap:
         return bool(self.evidence.heard[event].any() or self.evidence.expected[event].any())
 
     def joined(self, events: Sequence[int], kind: str, prior: bool = True) -> Joined:
-        """Return what several sounds say together, as if they were of one source.
-
-        Args:
-            events: numbers of the sounds.
-            kind: what they are; chooses the things that usually make them.
-            prior: whether those count.
-        """
+        """Return what several sounds say together, as if they were of one source."""
         chosen = self.prior_of(kind) if prior else np.asarray(self.evidence.prior, np.float64)
         rows = np.array(events)
         heard = np.asarray(self.evidence.heard[rows], np.float64).sum(axis=0)
@@ -323,15 +313,7 @@ def list_joined(
     least: float = 0.0,
     counts: Callable[[int], bool] = lambda event: True,
 ) -> Iterator[tuple[str, float, Joined]]:
-    """Yield the sources of a map's sounds, each with its name and the confidence of it; see ``list_sources``.
-
-    Args:
-        avlmap: the map.
-        names: kinds of sound.
-        prior: whether things that usually make such a sound count.
-        least: sources of a lower confidence are left out, in [0, 1].
-        counts: says of a sound by its number whether it counts.
-    """
+    """Yield the sources of a map's sounds, each with its name and the confidence of it; see ``list_sources``."""
     known = avlmap.source_map
     for kind, scores in _by_kind(avlmap, names).items():
         ranked = sorted(scores.items(), key=lambda one: -one[1])

@@ -24,13 +24,7 @@ _OF_VOXELS = ("rows", "instance", "margin", "score")
 
 
 def read_instances(place: Derivation, searches: Sequence[Search], voxels: int) -> dict[Search, Segmentation] | None:
-    """Return what each search found, where that is stored.
-
-    Args:
-        place: where.
-        searches: all of which a list of things is made.
-        voxels: number of the map's.
-    """
+    """Return what each search found, where that is stored."""
     arrays = place.read()
     known = None if arrays is None else _from_arrays(arrays, len(searches), voxels)
     return None if known is None else dict(zip(searches, known, strict=True))
@@ -59,14 +53,7 @@ def write_instances(
 def place_of_instances(
     stored: "StoredMap", vocabulary: Vocabulary, searches: Sequence[Search], settings: Sequence[Any]
 ) -> Derivation | None:
-    """Return where they are stored; None for a map in memory, or one too small to need it.
-
-    Args:
-        stored: the map.
-        vocabulary: what names compete with.
-        searches: all of which a list of things is made.
-        settings: of a search, dataclasses.
-    """
+    """Return where they are stored; None for a map in memory, or one too small to need it."""
     return place_of(stored, "instances", settings, [vocabulary.digest, list(searches)])
 
 

@@ -25,13 +25,7 @@ _MODULES = tuple(
 
 
 def room_regions_of(stored: "StoredMap", plan: FloorPlan, width_rad: float) -> RoomRegions:
-    """Return the rooms of a map: those that are stored, or found now and stored where its folder can be written.
-
-    Args:
-        stored: the map.
-        plan: its storeys and voxels.
-        width_rad: angle of view of its camera, from side to side.
-    """
+    """Return the rooms of a map: those that are stored, or found now and stored where its folder can be written."""
     poses = np.asarray(stored.keyframes.world_from_camera)
     place = _place(stored, plan, width_rad)
     arrays = None if place is None else place.read()
@@ -53,17 +47,7 @@ def room_field_of(
     settings: "AreaSettings",
     find: Callable[[], RoomField],
 ) -> RoomField:
-    """Return how likely each cell is each kind of room: as it is stored, or found now and stored.
-
-    Args:
-        stored: the map.
-        called: its name among what is stored.
-        plan: its storeys and voxels.
-        kinds: kinds of room.
-        share: how likely each keyframe's view shows each of them.
-        settings: how they are found.
-        find: finds it.
-    """
+    """Return how likely each cell is each kind of room: as it is stored, or found now and stored."""
     views = hashlib.sha256(np.ascontiguousarray(share, np.float64).tobytes()).hexdigest()
     place = place_of(stored, called, [settings], [kinds, views, plan.origin_m.tolist(), plan.wall.shape])
     arrays = None if place is None else place.read()

@@ -200,15 +200,7 @@ def _carved(
     width_rad: float,
     reach: float,
 ) -> Bool[np.ndarray, "nx ny"]:
-    """Return the cells between cameras and the first wall along each line of sight; a line without a wall clears none.
-
-    Args:
-        wall: cells with walls.
-        places: of the cameras, in cells.
-        headings_rad: of their lines of sight.
-        width_rad: angle of view.
-        reach: cells.
-    """
+    """Return the cells between cameras and the first wall along each line of sight; one without a wall clears none."""
     out = np.zeros(np.array(wall.shape) + 2, bool)
     ends = np.pad(np.where(wall, _WALL, 0), 1, constant_values=_EDGE).astype(np.uint8)
     angles = np.arange(-width_rad / 2.0, width_rad / 2.0, _RAY_RAD)

@@ -30,12 +30,6 @@ class ThingsInRooms:
     ) -> Float[np.ndarray, " i"] | None:
         """Return the mean, over the voxels of each instance, of ln of how many times as common such things are there.
 
-        Args:
-            names: of the things that are meant.
-            rows: voxels of the instances.
-            instance: which each of them belongs to.
-            count: number of instances.
-
         Returns:
             Nats in [-3, 1]; None where it is not known in which rooms such things stand.
         """

@@ -47,10 +47,6 @@ def fitting(answer: dict[str, Any], most: int = MOST_TOKENS) -> dict[str, Any]:
 
     The longest list loses its end, wherever it stands in the answer; a path loses places between its ends, and where
     no list is left the longest text is cut.
-
-    Args:
-        answer: as ``compact`` makes it.
-        most: tokens.
     """
     answer = deepcopy(answer)
     gone: dict[str, int] = {}

@@ -68,12 +68,7 @@ _MOST_ENUM = 6  # maps that every tool names in its schema
 
 
 def agent_server(service: Service, tools: Sequence[AgentTool] = TOOLS) -> Server[Any]:
-    """Return the MCP server of a service.
-
-    Args:
-        service: maps, lanes and settings.
-        tools: what agents can call.
-    """
+    """Return the MCP server of a service."""
     table = {tool.name: tool for tool in tools}
     described = [_described(service, tool) for tool in tools]
 

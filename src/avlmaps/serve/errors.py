@@ -52,11 +52,7 @@ class Privacy:
     """Takes this machine's paths out of sentences."""
 
     def __init__(self, names: Iterable[tuple[Path, str]]) -> None:
-        """Remember the folders that may be named.
-
-        Args:
-            names: folders, and the public name of each.
-        """
+        """Remember the folders that may be named."""
         spellings: dict[str, str] = {}
         for path, name in names:
             for spelling in (str(path), str(user_path(path).absolute()), str(user_path(path).resolve())):

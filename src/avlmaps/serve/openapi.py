@@ -33,13 +33,7 @@ clients that accept text/event-stream."""
 
 
 def document(maps: Iterable[str], url: str, with_token: bool) -> dict[str, Any]:
-    """Return the document.
-
-    Args:
-        maps: names of the server's maps.
-        url: of the server.
-        with_token: whether clients need a token.
-    """
+    """Return the document."""
     types = [MapsAnswer, ErrorAnswer, *(one.query for one in OPERATIONS)]
     types += [one.answer for one in OPERATIONS if isinstance(one.answer, type) and one.answer is not dict]
     types = list(dict.fromkeys(types))

@@ -52,13 +52,6 @@ class Service:
     ) -> "Service":
         """Open the maps and start the lanes.
 
-        Args:
-            maps: folders, or other places of maps, by name; see ``shelf.named_maps``.
-            settings: the defaults if None.
-            note: is given a line for the log.
-            robot: puts a simulated robot into a map's scene, for the commands of its page.
-            warm: whether each map computes now what every query needs.
-
         Raises:
             MapError: a map cannot be opened.
         """

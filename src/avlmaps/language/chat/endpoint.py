@@ -26,15 +26,7 @@ from avlmaps.language.chat.settings import NO_KEY, ChatSettings, variable
 
 
 def fault_sentence(fault: EndpointFault, settings: ChatSettings, model: str, attempts: int, offered: str) -> str:
-    """Return the sentence for a fault.
-
-    Args:
-        fault: what happened.
-        settings: of the server.
-        model: the model that was called.
-        attempts: how often it was called.
-        offered: names of models that the server has, empty where it does not say.
-    """
+    """Return the sentence for a fault."""
     url = settings.shown_url
     match fault.kind:
         case "unreachable":

@@ -60,12 +60,7 @@ def unusable_message(fault: str) -> str:
 
 
 def failed_message(error: str, done: Sequence[str]) -> str:
-    """Return the turn that reports that a program failed while it ran, and asks for one that does the rest.
-
-    Args:
-        error: why it failed.
-        done: the steps that were done before, as text; empty where they are not known.
-    """
+    """Return the turn that reports that a program failed while it ran, and asks for one that does the rest."""
     steps = "\n".join(f"- {_cut(step, 200)}" for step in done[-_MOST_DONE:])
     known = f"These steps were done:\n{steps}\n" if done else "What stands before the step that failed was done.\n"
     return (

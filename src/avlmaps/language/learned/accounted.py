@@ -95,12 +95,7 @@ def unaccounted(said: Claimed) -> Clarify | None:
 
 
 def has_strange_words(tokens: Sequence[Token], used: frozenset[int]) -> bool:
-    """Return whether an order has a word beside its names and amounts that no class of words knows.
-
-    Args:
-        tokens: the sentence.
-        used: the tokens that the reading points at.
-    """
+    """Return whether an order has a word beside its names and amounts that no class of words knows."""
     read = list(tokens)
     covered = {at for start in used for at in range(start, max(start + 1, amount_end(read, start)))}
     said = {tokens[at].text for at in covered}

@@ -77,12 +77,7 @@ class Decision:
 
 
 def decided(readings: Sequence[Weighed], limits: Limits) -> Decision:
-    """Return what to do of some readings.
-
-    Args:
-        readings: the likeliest first; at least one.
-        limits: how likely a reading must be.
-    """
+    """Return what to do of some readings."""
     best = readings[0]
     dangers = [one for one in readings if isinstance(one.stops, Refuse) and one.stops.reason in DANGERS]
     if dangers and sum(one.probability for one in dangers) >= limits.danger:

@@ -75,7 +75,6 @@ class Pointable:
     """Which tokens of a sentence each kind of pointer may point at."""
 
     def __init__(self, tokens: Sequence[Token]) -> None:
-        """Take a sentence."""
         self.tokens = tokens
         self.words = frozenset(i for i, t in enumerate(tokens) if t.kind in ("word", "number") or t.text == "&")
         self.files = {kind: frozenset(i for i, t in enumerate(tokens) if t.kind == kind) for kind in ("image", "clip")}

@@ -131,12 +131,7 @@ def _sound(name: str) -> str:
 
 
 def weighed(read: Read, names: NameResolver) -> Weighed:
-    """Return a reading of a command, checked.
-
-    Args:
-        read: the reading.
-        names: of its sentence; a fresh one for each reading.
-    """
+    """Return a reading of a command, checked."""
     assert isinstance(read.meaning, tuple)
     first = read.meaning[0]
     if isinstance(first, Refuse) and first.reason is Reason.UNKNOWN and strange_word(names.tokens):

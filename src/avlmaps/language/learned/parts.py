@@ -34,13 +34,7 @@ def parts_of(tokens: Sequence[Token]) -> list[list[Token]]:
 def by_parts(
     tokens: Sequence[Token], readings: Sequence[Weighed], read: Callable[[list[Token]], Sequence[Weighed]]
 ) -> Weighed | None:
-    """Return what the sentences of a command say together, each of them certain; None where that is no reading of it.
-
-    Args:
-        tokens: the command.
-        readings: of the whole, the likeliest first.
-        read: reads one sentence.
-    """
+    """Return what the sentences of a command say together, each of them certain; None where no reading says that."""
     said: list[Weighed] = []
     for part in parts_of(tokens):
         best = next(iter(read(part)), None)

@@ -128,10 +128,5 @@ SKILLS: Mapping[str, Skill] = skills_of(Vocabulary)
 
 
 def skill_lines(prefix: str = f"{ROBOT}.", skills: Sequence[Skill] | None = None) -> tuple[str, ...]:
-    """Return the table as lines for people and language models: a signature, then what it does.
-
-    Args:
-        prefix: what stands before each skill's name.
-        skills: which skills; all of them by default.
-    """
+    """Return the table as lines for people and language models: a signature, then what it does."""
     return tuple(f"{prefix}{skill.signature}: {skill.doc}" for skill in skills or tuple(SKILLS.values()))

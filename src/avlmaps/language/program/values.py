@@ -63,10 +63,6 @@ class Sizes:
 
         A list that holds another many times over is small in memory and large by this count.
 
-        Args:
-            line: of the program, for the error.
-            value: what to count.
-
         Raises:
             ProgramError: it nests too deep.
         """
@@ -97,13 +93,6 @@ class Sizes:
 
 def combined(line: int, operator: str, left: Any, right: Any, factors: int) -> Value:
     """Return the result of an arithmetic operator on two values.
-
-    Args:
-        line: where it stands.
-        operator: one of + - * / // %.
-        left: the value before it.
-        right: the value after it.
-        factors: how many heatmaps may be multiplied into one.
 
     Raises:
         ProgramError: they are of no kinds that it takes, it divides by zero, or the result is too large.

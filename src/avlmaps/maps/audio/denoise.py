@@ -43,9 +43,6 @@ def noise_profile(quiet: Iterable[Sound]) -> NoiseProfile | None:
 
     Each bin's median over time, scaled to a mean as for noise, so that a stray click does not count.
 
-    Args:
-        quiet: stretches of one rate.
-
     Returns:
         The profile, or None where the stretches are too short (less than 0.2 s in all).
     """
@@ -77,24 +74,13 @@ def is_swell(sound: Sound, quiet: Sequence[Sound]) -> bool:
 
 
 def denoise(sound: Sound, profile: NoiseProfile, reduction_db: float = 12.0) -> Sound:
-    """Return the sound with the background made quieter, of the same length.
-
-    Args:
-        sound: the sound with its background.
-        profile: the background.
-        reduction_db: limit of the reduction, dB.
-    """
+    """Return the sound with the background made quieter, of the same length."""
     samples = [block.samples for block in denoise_blocks([sound], profile, reduction_db)]
     return Sound(np.concatenate(samples) if samples else sound.samples, sound.rate_hz)
 
 
 def denoise_blocks(blocks: Iterable[Sound], profile: NoiseProfile, reduction_db: float = 12.0) -> Iterator[Sound]:
     """Take the background out of a long track block by block; how it is cut into blocks changes nothing.
-
-    Args:
-        blocks: the track, in the rate of the profile.
-        profile: the background.
-        reduction_db: limit of the reduction, dB.
 
     Raises:
         ValueError: a block has another rate than the profile.

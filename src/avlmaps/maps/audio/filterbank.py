@@ -39,9 +39,6 @@ def band_powers(blocks: Iterable[Sound]) -> Iterator[Float32[np.ndarray, "frames
 
     Frame k stands for samples k·hop to (k+1)·hop, its Hann window reaches a little beyond on both sides; before
     the track and after it is silence. The frames do not depend on how the track is cut into blocks.
-
-    Args:
-        blocks: the track in pieces of one rate.
     """
     stream = PowerStream()
     for block in blocks:

@@ -50,10 +50,6 @@ class _Run:
 def segment(track: AudioTrack, settings: SegmentationSettings = _USUAL) -> list[Segment]:
     """Find the sounds in a track, in constant memory.
 
-    Args:
-        track: the track.
-        settings: how.
-
     Returns:
         Segments in the order of time, disjoint and within the track; none for a silent track.
 

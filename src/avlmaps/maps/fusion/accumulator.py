@@ -223,11 +223,6 @@ class VoxelAccumulator:
     def of_submaps(cls, submaps: Submaps, pose: Float64[np.ndarray, "f 4 4"], grid: GridSpec) -> "VoxelAccumulator":
         """Return the map of submaps whose frames have these poses.
 
-        Args:
-            submaps: as they were fused.
-            pose: world_from_camera of each frame.
-            grid: the voxels' size.
-
         Raises:
             MapError: the poses lie too far from the world's origin for voxels.
         """

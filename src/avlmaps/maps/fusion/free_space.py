@@ -55,12 +55,6 @@ class FreeViewCollector:
     """Collects the free views of frames."""
 
     def __init__(self, camera: Pinhole, sensor: SensorModel) -> None:
-        """Begin without frames.
-
-        Args:
-            camera: that measures depth.
-            sensor: its error; without carving nothing is collected.
-        """
         self._size, self._sensor = block_size(camera), sensor
         self._shape = -(-camera.height // self._size), -(-camera.width // self._size)
         self._clear: list[np.ndarray] = []
@@ -156,12 +150,6 @@ def count_through(
 
     A frame does when every ray that may meet the voxel is free for a voxel's edge behind it; a pixel without depth in
     the block of such a ray makes that unknown, and the frame does not count.
-
-    Args:
-        index: voxels.
-        grid: their size.
-        camera: of the frames.
-        parts: the frames' free views.
     """
     intrinsics = (float(camera.fx), float(camera.fy), float(camera.cx), float(camera.cy), camera.width, camera.height)
     chunks = chunks_of(np.ascontiguousarray(index, np.int32))

@@ -34,11 +34,6 @@ class MovedSubmaps:
     def __init__(self, submaps: Submaps, pose: Float64[np.ndarray, "f 4 4"], grid: GridSpec) -> None:
         """Add up what is no feature.
 
-        Args:
-            submaps: as they were fused.
-            pose: world_from_camera of each frame.
-            grid: the voxels' size.
-
         Raises:
             MapError: the poses lie too far from the world's origin for voxels.
         """

@@ -24,15 +24,7 @@ def submap_of(
     poses: Float64[np.ndarray, "f 4 4"],
     clear_mm: UInt16[np.ndarray, "f_or_0 rows columns"],
 ) -> Submaps:
-    """Return one submap.
-
-    Args:
-        sums: of its frames.
-        spread: how the points lie within these voxels.
-        stamps_s: of its frames.
-        poses: world_from_camera of each.
-        clear_mm: how far each saw freely; none where that is not collected.
-    """
+    """Return one submap."""
     feature, scale = in_steps(np.asarray(sums.feature_sum), np.asarray(sums.weight))
     return Submaps(
         row_offsets=np.array([0, len(sums)], np.int64),

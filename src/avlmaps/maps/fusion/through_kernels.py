@@ -21,11 +21,7 @@ Chunks = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
 def chunks_of(index: Int32[np.ndarray, "n 3"]) -> Chunks:
-    """Group voxels into cubes, for ``count_frames``.
-
-    Args:
-        index: voxels, in any order.
-    """
+    """Group voxels into cubes, for ``count_frames``."""
     of = np.empty(len(index), np.int32)
     slots = np.full(1 << (2 * len(index) + 1).bit_length(), -1, np.int32)
     count = _cubes(index, slots, np.empty((len(index), 3), np.int32), of)

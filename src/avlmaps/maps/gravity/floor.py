@@ -157,7 +157,6 @@ class GroundedRecording(Subset):
     """A whole recording whose frames know the up direction and where the floor is."""
 
     def __init__(self, whole: Recording, ground: Ground) -> None:
-        """Put a recording on its ground."""
         super().__init__(whole, range(len(whole)))
         self.ground = ground
 

@@ -120,13 +120,7 @@ class Choice:
 
 
 def choose_floor(view: View, expected: Expected | None = None, usual_m: float | None = None) -> Choice:
-    """Return the floor under the cameras of a view.
-
-    Args:
-        view: what is known round them.
-        expected: what someone said about the floor.
-        usual_m: how high over the floor the camera is in most of the recording, where that is known.
-    """
+    """Return the floor under the cameras of a view."""
     found = [weigh(view, height_m, expected, usual_m) for height_m in hypotheses(view)]
     found = sorted([*found, out_of_view(view, expected)], key=lambda evidence: -evidence.nats)
     weight = np.exp(np.array([evidence.nats for evidence in found]) - found[0].nats)

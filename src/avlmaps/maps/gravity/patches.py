@@ -104,12 +104,7 @@ class Sight:
 
 
 def sight_of(frame: Frame, up_in_world: Float[np.ndarray, "3"]) -> Sight:
-    """Return the surfaces of a frame within 6 m, as voxels in level axes.
-
-    Args:
-        frame: any frame with a pose.
-        up_in_world: unit vector.
-    """
+    """Return the surfaces of a frame within 6 m, as voxels in level axes."""
     axes = level_axes(up_in_world)
     camera, inverse_depth = _blocks(frame)
     x = ((np.arange(camera.width) + 0.5) - camera.cx) / camera.fx

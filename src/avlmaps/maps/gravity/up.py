@@ -136,11 +136,6 @@ def up_doubts(recording: Recording, frames: Iterator[Frame], rng: np.random.Gene
 
     A camera that is mounted on its side shows walls where floors are expected; then the walk decides: nobody walks
     up and down as far as along.
-
-    Args:
-        recording: whose up direction was given.
-        frames: some of its frames.
-        rng: draws the normals.
     """
     given = recording.up_in_world
     if given is None:

@@ -62,11 +62,6 @@ def keyframes_by_motion(
     Every frame lies within the settings' distance, angle and time of the last keyframe before it. Where the camera
     goes beyond them, the frame in the second half of the stretch that moved least becomes the keyframe, because a
     camera that moves less blurs less.
-
-    Args:
-        stamps_s: seconds, rising.
-        world_from_camera: poses.
-        settings: the limits.
     """
     count = len(stamps_s)
     if count == 0:
@@ -141,13 +136,6 @@ def perceive_keyframes(
 ) -> tuple[Keyframes, dict[str, np.ndarray]]:
     """Encode the chosen frames: local, place and view features, 3D points, thumbnails.
 
-    Args:
-        recording: where the frames are; read one at a time.
-        indices: which frames, rising.
-        encoders: the encoders.
-        rng: for what the place encoder learns.
-        settings: how far keypoints get a 3D point, size of thumbnails.
-
     Returns:
         The keyframes, and the arrays that the place encoder learned; the map must keep them.
     """
@@ -212,15 +200,7 @@ def describe_keyframe(
     settings: KeyframeSettings = KeyframeSettings(),
     local: LocalFeatures | None = None,
 ) -> DescribedKeyframe:
-    """Run encoders on one frame.
-
-    Args:
-        frame: the frame.
-        encoders: the encoders; a module without one gives empty features.
-        place_state: what the place encoder learned.
-        settings: how far keypoints get a 3D point, size of thumbnails.
-        local: the frame's keypoints where they are known already.
-    """
+    """Run encoders on one frame."""
     if local is None:
         local = encoders.local.encode(frame.rgb.copy()) if Kind.LOCAL in encoders else _no_features()
     place = np.zeros(0, np.float32)

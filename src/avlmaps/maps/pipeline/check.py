@@ -31,10 +31,6 @@ class _Doubts(msgspec.Struct):
 def checked(plan: BuildPlan, allowed: Sequence[str]) -> BuildPlan:
     """Return the plan with what is doubtful about its recording, each of which is said.
 
-    Args:
-        plan: of the build.
-        allowed: reasons that forbid no map.
-
     Raises:
         RecordingError: the recording cannot be right, or a reason has no such name.
     """
@@ -95,11 +91,6 @@ def judge(recording: Recording, useless: Sequence[str] | None = None) -> Verdict
 
 def doubts_of_channels(track: AudioTrack, walk: Trajectory, name: str) -> tuple[str, ...]:
     """Return what is doubtful about the channels of an array, as a build finds it: their wiring, and those of no use.
-
-    Args:
-        track: with its microphones, more than one.
-        walk: the camera's poses.
-        name: of the track in the sentences.
 
     Raises:
         AudioError: the track cannot be read.

@@ -45,14 +45,7 @@ Fuse = Callable[[BuildPlan, Sequence[tuple[Span, Path]], SensorModel, Sequence[B
 
 
 def encode_and_fuse(plan: BuildPlan, given: Sequence[Path | str], sensor: SensorInfo, fuse: Fuse) -> list[MapPart]:
-    """Encode and fuse all frames that no part covers yet; return the parts that make up the map, in a fixed order.
-
-    Args:
-        plan: of the build.
-        given: folders of parts from other machines.
-        sensor: the depth camera.
-        fuse: fuses stretches of frames, each into its folder.
-    """
+    """Encode and fuse all frames that no part covers yet; return the parts that make up the map, in a fixed order."""
     brought = [load_part(Path(folder), plan.fusion_key) for folder in given]
     covered = [span for part in brought for span in part.info.spans]
     home = plan.folder("fusion", plan.fusion_key)

@@ -112,13 +112,7 @@ def encoded_frames(recording: Recording, settings: BuildSettings, encoders: Enco
 
 
 def plan_spans(frames: int, settings: BuildSettings, covered: Sequence[Span] = ()) -> list[Span]:
-    """Return the stretches to fuse one after the other, each of ``frames.summed`` frames or fewer.
-
-    Args:
-        frames: of the recording.
-        settings: step, and frames of a part.
-        covered: stretches that are fused already.
-    """
+    """Return the stretches to fuse one after the other, each of ``frames.summed`` frames or fewer."""
     wanted = np.zeros(frames, bool)
     wanted[:: settings.frames.step] = True
     for start, stop, step in covered:
@@ -191,10 +185,6 @@ def require_unchanged(plan: BuildPlan, stamp: str) -> None:
     """Refuse to continue with a recording whose files were written since the build began.
 
     What was made of it is removed, since nobody knows which frames are old and which are new.
-
-    Args:
-        plan: of the build.
-        stamp: the recording's ``change_stamp`` before the first frame was read.
 
     Raises:
         MapError: the recording has changed.

@@ -24,16 +24,7 @@ def locate_sources(
     grid: GridSpec,
     walk: Trajectory | None = None,
 ) -> tuple[SourceEvidence | None, float]:
-    """Return the evidence of each sound over the surfaces of a map, and the seconds that took; None without any.
-
-    Args:
-        recording: of the sounds.
-        up_in_world: unit vector.
-        heard: the sounds.
-        voxels: of the map.
-        grid: of the map.
-        walk: the camera's poses in the map's world; the recording's own by default.
-    """
+    """Return the evidence of each sound over the surfaces of a map, and the seconds that took; None without any."""
     begin = perf_counter()
     track = recording.audio
     if track is None or (track.microphones is None and track.directions is None) or not len(heard):

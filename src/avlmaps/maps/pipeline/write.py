@@ -55,13 +55,6 @@ def surfaces(
 ) -> Merged:
     """Return the voxels of the sums that are a surface.
 
-    Args:
-        plan: of the build.
-        total: the sums.
-        views: where the frames saw freely.
-        sensor: the depth camera.
-        counts: what is known of these views from before; they then are of one part.
-
     Raises:
         MapError: there is none.
     """
@@ -117,12 +110,7 @@ def write(
 
 
 def with_clear_views(keyframes: Keyframes, views: Sequence[FreeViews]) -> Keyframes:
-    """Return keyframes with what each of them saw freely, where frames were looked at for that.
-
-    Args:
-        keyframes: of the map.
-        views: of all its frames; a keyframe's is the one of its pose.
-    """
+    """Return keyframes with what each of them saw freely, where frames were looked at for that."""
     rows = {pose.tobytes(): (part, row) for part in views for row, pose in enumerate(np.asarray(part.clear_pose))}
     found = [rows.get(pose.tobytes()) for pose in np.asarray(keyframes.world_from_camera, np.float64)]
     if not found or None in found:
@@ -196,12 +184,7 @@ def _notices(plan: BuildPlan, up: manifest.UpInfo, ground: manifest.GroundInfo, 
 
 
 def carving_doubts(removed: manifest.Removed, voxels: int) -> Iterator[str]:
-    """Yield a sentence where too much of a map was seen through.
-
-    Args:
-        removed: voxels that were no surface.
-        voxels: that are.
-    """
+    """Yield a sentence where too much of a map was seen through."""
     share = removed.seen_through / max(removed.seen_through + voxels, 1)
     if share > MOST_SEEN_THROUGH:
         yield (
@@ -211,12 +194,7 @@ def carving_doubts(removed: manifest.Removed, voxels: int) -> Iterator[str]:
 
 
 def feature_doubts(content: MapContent, models: Mapping[str, manifest.ModelInfo]) -> Iterator[str]:
-    """Yield a sentence for each kind of feature that is zero, or the same, in all of a map.
-
-    Args:
-        content: of the map.
-        models: that made it, by the name of their kind.
-    """
+    """Yield a sentence for each kind of feature that is zero, or the same, in all of a map."""
     voxels = content.voxels
     speaks = np.asarray(voxels.weight) > 0.0
     kinds = (

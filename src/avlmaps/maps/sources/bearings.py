@@ -97,13 +97,7 @@ class Bearings:
 
     @classmethod
     def of(cls, track: DirectionTrack, walk: Trajectory, span_s: tuple[float, float]) -> "Bearings":
-        """Return those of a sound.
-
-        Args:
-            track: of the recording.
-            walk: the camera's poses in the level frame.
-            span_s: onset and offset.
-        """
+        """Return those of a sound."""
         said = track.between(*span_s)
         inside = np.flatnonzero((said.stamp_s >= walk.stamps_s[0]) & (said.stamp_s <= walk.stamps_s[-1]))
         if len(inside) > _MOST:

@@ -71,12 +71,7 @@ class GrowingSources:
             self._said.append(said)
 
     def track(self, heard: AudioTrack, channels: int) -> AudioTrack | None:
-        """Return a track with what is known of its sources; None where that is nothing.
-
-        Args:
-            heard: the track until now.
-            channels: how many it has.
-        """
+        """Return a track with what is known of its sources; None where that is nothing."""
         with self._lock:
             self._said = [DirectionTrack.joined(self._said)] if self._said else []
             said = self._said[0] if self._said else None

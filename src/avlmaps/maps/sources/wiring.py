@@ -63,11 +63,6 @@ class Wiring:
 def check_wiring(track: AudioTrack, walk: Trajectory, spans_s: Sequence[tuple[float, float]]) -> Wiring | None:
     """Compare delays between channels, sound by sound along a drive, with the geometry; None for too few sounds.
 
-    Args:
-        track: with its microphones.
-        walk: the camera's poses.
-        spans_s: onset and offset of the sounds, the recording's time.
-
     Raises:
         AudioError: the track cannot be read.
     """

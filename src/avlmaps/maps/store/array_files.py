@@ -153,11 +153,6 @@ def _hashed(stream: BinaryIO, chunks: Iterable[bytes | memoryview]) -> tuple[int
 def read_array(folder: Path, info: FileInfo, *, verify: bool = False) -> np.ndarray:
     """Return an array of a manifest: small ones read and compared with their checksum, large ones memory-mapped.
 
-    Args:
-        folder: the manifest's folder.
-        info: the manifest's entry.
-        verify: compare large files with their checksums, too.
-
     Raises:
         MapError: the file is missing, truncated, changed, or not the array that the manifest describes.
     """

@@ -87,15 +87,7 @@ def save_checkpoint(
     arrays: Mapping[str, np.ndarray],
     files: Mapping[str, Path] | None = None,
 ) -> None:
-    """Write a finished stage; a kill at any instant leaves a checkpoint or none.
-
-    Args:
-        folder: of this stage alone.
-        key: see ``key_of``.
-        facts: what is not an array.
-        arrays: by name.
-        files: other files, copied.
-    """
+    """Write a finished stage; a kill at any instant leaves a checkpoint or none."""
     written = {name: write_array(folder, name, array) for name, array in arrays.items()}
     written |= {name: write_copy(folder, name, source) for name, source in (files or {}).items()}
     done = _Done(key=key, facts=msgspec.Raw(msgspec.json.encode(facts)), files=written)

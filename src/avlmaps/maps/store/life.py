@@ -116,10 +116,6 @@ def life_arrays(life: Life) -> dict[str, np.ndarray]:
 def read_life(arrays: Mapping[str, np.ndarray], where: str) -> Life:
     """Return what ``life_arrays`` gave.
 
-    Args:
-        arrays: as they were read.
-        where: for the error.
-
     Raises:
         MapError: they are not of this form, or contradict each other.
     """

@@ -57,10 +57,6 @@ def read_manifest(path: Path) -> bytes:
 def parse_manifest(content: bytes, path: Path) -> MapInfo:
     """Return the content of ``map.json``.
 
-    Args:
-        content: of the file.
-        path: the file, for the errors.
-
     Raises:
         MapError: it is not JSON, not UTF-8, of no map, of another schema version, lacks something, contradicts itself,
             or is not what was written.

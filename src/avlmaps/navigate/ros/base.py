@@ -59,13 +59,6 @@ class RosDriver:
     ) -> None:
         """Connect, and wait until the robot reports its pose.
 
-        Args:
-            opener: opens sessions with the robot.
-            tasks: makes its goals.
-            standing: moves a goal to where a body can stand; goals are sent as they are without it.
-            level_from_world: the map's rotation into its level frame; the identity by default.
-            clock: seconds, by which poses age and the loop's own stalls are measured; replaced in tests.
-
         Raises:
             NavigationError: nobody answers there, or the robot does not report its pose.
             BackendError: what the transport needs is not installed.
@@ -411,10 +404,6 @@ class RosDriver:
 
         A lost connection is made again for as long as it takes. A connection that stands and brings no confirmation is
         replaced once: it may be stuck.
-
-        Args:
-            goal: ours.
-            wait_s: how long to try; a robot that is reached and does not obey is given less.
         """
         contact, patience_s = self._contact, self.settings.cancel_timeout_s
         until_s, tries = monotonic() + wait_s, 0

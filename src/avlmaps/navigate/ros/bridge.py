@@ -36,13 +36,6 @@ class BridgeSession(ABC):
     def __init__(self, url: str, token: str | None, settings: RosSettings, ear: Ear, timeout_s: float) -> None:
         """Connect.
 
-        Args:
-            url: ``ws://host:9090``.
-            token: for a proxy before the bridge.
-            settings: names.
-            ear: stores what arrives.
-            timeout_s: how long to wait for the robot.
-
         Raises:
             BackendError: roslibpy is not installed.
             NavigationError: there is no bridge.

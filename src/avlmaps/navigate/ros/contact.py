@@ -24,11 +24,6 @@ class Stillness:
     """
 
     def __init__(self, begun_s: float) -> None:
-        """Begin.
-
-        Args:
-            begun_s: poses count that were taken after this time.
-        """
         self._begun_s = begun_s
         self._first: Sighting | None = None
 
@@ -66,12 +61,6 @@ class Contact:
         self, opener: Opener, frames: Frames, settings: RosSettings, clock: Callable[[], float] = monotonic
     ) -> None:
         """Connect, and wait until the robot reports its pose.
-
-        Args:
-            opener: opens a session.
-            frames: the robot's frames.
-            settings: patience and names.
-            clock: seconds, by which the age of a pose is measured; replaced in tests.
 
         Raises:
             NavigationError: nobody answers there, or the robot does not report its pose.

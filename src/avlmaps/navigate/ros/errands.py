@@ -20,12 +20,6 @@ class Errands:
     """The connections beside a session's first; opened when they are needed, and used again once they are free."""
 
     def __init__(self, open_link: Callable[[float], Link], answer: Callable[[Incoming], None]) -> None:
-        """Begin with none.
-
-        Args:
-            open_link: opens a connection within some seconds.
-            answer: takes what answers goals and calls, in the network's thread.
-        """
         self._open, self._answer = open_link, answer
         self._lock = threading.Lock()
         self._lasting = ""

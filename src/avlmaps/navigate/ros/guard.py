@@ -58,7 +58,6 @@ class GoalGuard:
     """The driver's end of the pipe; no fault of the guard stops the driver."""
 
     def __init__(self, orders: Orders) -> None:
-        """Start a guard."""
         self._orders = orders
         self._start()
 

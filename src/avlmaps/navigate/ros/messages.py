@@ -240,13 +240,7 @@ def rigid(place: Sequence[float], quaternion: Sequence[float]) -> Float[np.ndarr
 
 
 def stamped_pose(pose: GroundPose, frame: str, ros: int) -> dict[str, Any]:
-    """Return a geometry_msgs/PoseStamped; its stamp of zero means the latest.
-
-    Args:
-        pose: in that frame.
-        frame: the robot's fixed frame.
-        ros: 1 or 2; they name the parts of a stamp differently.
-    """
+    """Return a geometry_msgs/PoseStamped; its stamp of zero means the latest."""
     stamp = {"secs": 0, "nsecs": 0} if ros == 1 else {"sec": 0, "nanosec": 0}
     half = 0.5 * pose.heading_rad
     return {

@@ -80,10 +80,6 @@ class NativeSession:
     def __init__(self, settings: RosSettings, ear: Ear) -> None:
         """Join the network. A robot that is not there is noticed by the poses that do not come.
 
-        Args:
-            settings: names.
-            ear: stores what arrives.
-
         Raises:
             BackendError: a message package is not installed.
         """
@@ -401,12 +397,7 @@ def _end_of(response: Any) -> tuple[End, str]:
 
 
 def read_grid(topic: str, wait_s: float) -> OwnGrid | None:
-    """Read a latched grid as a node of its own; None where none arrives.
-
-    Args:
-        topic: of the grid.
-        wait_s: how long to wait.
-    """
+    """Read a latched grid as a node of its own; None where none arrives."""
     context = Context()
     context.init(args=[])
     executor, found = SingleThreadedExecutor(context=context), []

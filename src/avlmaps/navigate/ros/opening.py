@@ -117,13 +117,7 @@ def open_ros_driver(
 
 
 def standable_goal(obstacles: "Obstacles", radius_m: float, called: str = "the map") -> Standing:
-    """Return a function that moves goals to where a body can stand and get to, by a map's obstacles.
-
-    Args:
-        obstacles: of the map.
-        radius_m: of the body.
-        called: name of the map, for notes.
-    """
+    """Return a function that moves goals to where a body can stand and get to, by a map's obstacles."""
     from avlmaps.navigate.costmap import costmap_of
     from avlmaps.navigate.planner import Planner
 

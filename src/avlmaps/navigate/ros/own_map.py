@@ -118,12 +118,6 @@ def checked_grid(
 def read_over_bridge(url: str, token: str | None, kind: str, settings: RosSettings) -> OwnGrid | None:
     """Read a grid over a connection of its own; None where none arrives.
 
-    Args:
-        url: of rosbridge.
-        token: for a proxy before it.
-        kind: the grid's type; ROS 1 and ROS 2 write it differently.
-        settings: its topic, and how long to wait.
-
     Raises:
         BackendError: roslibpy is not installed.
         NavigationError: there is no bridge.
@@ -146,11 +140,6 @@ def on_own_map(ours: Obstacles, grid: OwnGrid, frames: Frames) -> Obstacles:
     """Return the floor as the robot's own grid has it, in our level frame.
 
     What blocks the view is as our map knows it, and where our map knows nothing, as the grid does.
-
-    Args:
-        ours: of our map.
-        grid: the robot's.
-        frames: how the two lie to each other.
 
     Raises:
         NavigationError: the grid is in another frame than the robot's goals.

@@ -30,7 +30,6 @@ class Echoes:
     """
 
     def __init__(self, clock: Callable[[], float]) -> None:
-        """Begin with no echo."""
         self._clock = clock
         self._lock = threading.Lock()
         self._name, self._count = uuid4().hex, 0
@@ -79,7 +78,6 @@ class Servers:
     """The goals that action servers are at, by their own lists. Written by the transport, from any thread."""
 
     def __init__(self, clock: Callable[[], float]) -> None:
-        """Begin with no list."""
         self._clock = clock
         self._lock = threading.Lock()
         self._lists: dict[str, tuple[float, frozenset[str]]] = {}
@@ -222,14 +220,7 @@ def ended_within(goal: Goal, session: Session, wait_s: float) -> bool:
 
 
 def call_off(goal: Goal, session: Session, until_s: float, given_up: Callable[[], bool] = lambda: False) -> bool:
-    """Cancel a goal again and again until it is over, the session is lost or a time has come.
-
-    Args:
-        goal: ours; no other goal is cancelled.
-        session: stands.
-        until_s: by `time.monotonic`.
-        given_up: returns whether to stop sooner.
-    """
+    """Cancel a goal again and again until it is over, the session is lost or a time has come."""
     while goal.end is None and session.lost is None and not given_up() and (left_s := until_s - monotonic()) > 0.0:
         session.cancel(goal)
         ended_within(goal, session, min(left_s, AGAIN_S))

@@ -20,14 +20,7 @@ NATIVE = "native"
 
 
 def session_opener(kind: RosKind, url: str, settings: RosSettings, token: str | None) -> Opener:
-    """Return what opens sessions with a robot.
-
-    Args:
-        kind: what drives it.
-        url: of rosbridge, or ``native``.
-        settings: names.
-        token: for a proxy before the bridge.
-    """
+    """Return what opens sessions with a robot."""
     if url == NATIVE:
         return native_opener(kind, settings)
     session = {"nav2": Nav2Session, "move_base": MoveBaseSession}[kind]
@@ -59,12 +52,6 @@ def native_opener(kind: RosKind, settings: RosSettings) -> Opener:
 
 def own_grid(kind: RosKind, url: str, settings: RosSettings, token: str | None) -> OwnGrid:
     """Read the robot's own map or costmap.
-
-    Args:
-        kind: what drives it.
-        url: of rosbridge, or ``native``.
-        settings: its topic, and how long to wait.
-        token: for a proxy before the bridge.
 
     Raises:
         NavigationError: none arrives.

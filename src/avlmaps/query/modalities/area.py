@@ -112,14 +112,7 @@ def area_scores(
 def view_shares(
     view: Float32[np.ndarray, "k d"], encoder: ViewEncoder, name: str, settings: AreaSettings
 ) -> ViewShares:
-    """Return how likely each view shows the queried area and each name that competes with it.
-
-    Args:
-        view: features.
-        encoder: that made them.
-        name: of the area.
-        settings: how.
-    """
+    """Return how likely each view shows the queried area and each name that competes with it."""
     if isinstance(encoder, NamedViewEncoder):
         share = _named_shares(view, encoder)
         weights = np.asarray(encoder.name_weights(name), np.float64)
@@ -141,13 +134,7 @@ def area_names(encoder: ViewEncoder) -> tuple[str, ...]:
 def name_shares(
     view: Float32[np.ndarray, "k d"], encoder: ViewEncoder, settings: AreaSettings
 ) -> Float[np.ndarray, "k n"]:
-    """Return how likely each view shows each of ``area_names``; rows add up to 1.
-
-    Args:
-        view: features.
-        encoder: that made them.
-        settings: temperature.
-    """
+    """Return how likely each view shows each of ``area_names``; rows add up to 1."""
     if isinstance(encoder, NamedViewEncoder):
         share = _named_shares(view, encoder)
         return share / np.maximum(share.sum(axis=1, keepdims=True), 1e-12)
@@ -158,14 +145,7 @@ def name_shares(
 def pooled_name_shares(
     view: Float32[np.ndarray, "k d"], encoder: ViewEncoder, settings: AreaSettings, places: Float[np.ndarray, "k 3"]
 ) -> Float[np.ndarray, "k n"]:
-    """Return ``name_shares``, pooled over views that looked at about the same place where the settings say so.
-
-    Args:
-        view: features.
-        encoder: that made them.
-        settings: temperature and pooling.
-        places: middle of what each keyframe saw, metres.
-    """
+    """Return ``name_shares``, pooled over views that looked at about the same place where the settings say so."""
     share = name_shares(view, encoder, settings)
     return pool_posteriors(share, places, settings.pool_m) if settings.pool_m > 0.0 and len(share) else share
 

@@ -35,12 +35,6 @@ def object_factor(
 
     With the voxels' colours, an encoder that knows things but no colours is helped out with those.
 
-    Args:
-        voxels: of the map.
-        part: of the query.
-        heat: how fast it falls.
-        searched: the confident instances of the part's whole name, where they were found before.
-
     Raises:
         QueryError: the encoder understands nothing of the word.
     """

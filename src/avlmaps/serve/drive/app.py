@@ -106,12 +106,7 @@ async def _in(threads: ThreadPoolExecutor, work: Callable[[], dict[str, Any]]) -
 
 
 def drive_app(service: DriveService, agents: Any = None) -> Starlette:
-    """Return the application.
-
-    Args:
-        service: the dispatcher and its threads.
-        agents: the ASGI application of the driving tools; None for none.
-    """
+    """Return the application."""
     routes = [
         Route("/", _about, methods=["GET"]),
         Route("/plan", _answered(service, _plan), methods=["POST"]),

@@ -68,15 +68,6 @@ class Dispatcher:
         token_s: float = 60.0,
         clock: Callable[[], float] = monotonic,
     ) -> None:
-        """Take a robot.
-
-        Args:
-            machine: the robot.
-            current: returns the map as it is now.
-            order_log: every order is written there before it moves anything.
-            token_s: how long a token is good.
-            clock: seconds, for tokens; replaced in tests.
-        """
         self._machine, self._current, self._log, self._clock = machine, current, order_log, clock
         self._book = PlanBook(token_s)
         self._preparing = threading.Lock()  # plans and confirmations, one at a time; never needed for a stop

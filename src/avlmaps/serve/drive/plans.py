@@ -129,11 +129,6 @@ class PlanBook:
     """
 
     def __init__(self, lifetime_s: float) -> None:
-        """Begin empty.
-
-        Args:
-            lifetime_s: of a token.
-        """
         self.lifetime_s = lifetime_s
         self.cleared = 0
         self._waiting: OrderedDict[bytes, tuple[OrderPlan, float]] = OrderedDict()

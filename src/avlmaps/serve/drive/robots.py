@@ -130,7 +130,6 @@ class SimulatedMachine:
     is_real = False
 
     def __init__(self, read: RobotFile) -> None:
-        """Take the file."""
         self.name, self.identity = f"simulated robot in {read.scene}", _identity(read)
         self.shape, self.guess, self.map = SHAPES[read.body], read.guess, read.map
         self._read, self._version = read, ""
