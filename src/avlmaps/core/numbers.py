@@ -16,7 +16,7 @@ def as_number(given: Any) -> float | None:
     Args:
         given: a scalar of Python or NumPy, a 0-d array, or a tensor without axes.
     """
-    if np.ma.is_masked(given):
+    if hasattr(given, "mask") and np.ma.is_masked(given):  # numpy.ma takes long to load
         return None
     if getattr(given, "ndim", None) == 0 and hasattr(given, "item"):
         given = given.item()
