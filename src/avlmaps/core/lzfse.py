@@ -26,10 +26,6 @@ _HEADER_BYTES = 32
 def decompress(content: bytes, most_bytes: int) -> bytes:
     """Return what was compressed.
 
-    Args:
-        content: the stream.
-        most_bytes: how many bytes it may unfold to.
-
     Raises:
         ValueError: it is no such stream, is cut off or damaged, or unfolds to more.
     """

@@ -52,10 +52,6 @@ class NpyHeader:
 def read_npy_header(stream: BinaryIO, size: int) -> NpyHeader:
     """Read the header of an NPY file and compare it with the file's size.
 
-    Args:
-        stream: at the file's start.
-        size: of the file, bytes.
-
     Raises:
         ValueError: it is not an NPY header, holds objects, or promises more or fewer bytes than there are.
     """

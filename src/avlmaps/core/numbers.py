@@ -37,12 +37,7 @@ def as_whole(given: Any) -> int | None:
 
 
 def hold_numbers(settings: Any, error: type[Exception]) -> None:
-    """Make the numbers of frozen settings those of Python, so that they can be compared and written into a map.
-
-    Args:
-        settings: a dataclass, whose fields say what they hold.
-        error: raised where a field holds something else.
-    """
+    """Make the numbers of frozen settings those of Python, so that they can be compared and written into a map."""
     for field in fields(settings):
         kind: Any = field.type
         given, name = getattr(settings, field.name), f"{field.name} of {type(settings).__name__}"

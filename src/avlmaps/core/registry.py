@@ -148,11 +148,6 @@ def entry_points(group: str) -> "EntryPoints":
 def brought(entry: "EntryPoint", what: str, error: type[AvlmapsError] = BackendError) -> Any:
     """Return what an entry point of another package leads to.
 
-    Args:
-        entry: the entry point.
-        what: is brought, for the error: ``the verb``.
-        error: the class of the error.
-
     Raises:
         AvlmapsError: it cannot be imported.
     """

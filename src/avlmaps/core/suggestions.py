@@ -21,12 +21,7 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
 
 def near_path(path: Path, fits: Callable[[Path], bool] = lambda _: True) -> Path | None:
-    """Return what lies beside a path that is not there and is spelt most like it, if any comes close.
-
-    Args:
-        path: what was given.
-        fits: whether something beside it can be meant.
-    """
+    """Return what lies beside a path that is not there and is spelt most like it, if any comes close."""
     try:
         beside = [one.name for one in islice(path.parent.iterdir(), _MOST_COMPARED) if fits(one)]
     except OSError:

@@ -187,12 +187,7 @@ class _Columns:
         return np.c_[xy, self.heights_m(keys)]
 
     def under(self, surface: Int[np.ndarray, " m"], cameras: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, " k"]:
-        """Return the height of the surface that each camera was carried over; NaN where none is near.
-
-        Args:
-            surface: numbers of cells with headroom, rising.
-            cameras: level frame, metres.
-        """
+        """Return the height of the surface that each camera was carried over; NaN where none is near."""
         cell = np.floor(cameras / np.array([self.cell_m[0], self.cell_m[0], self.cell_m[1]])) - self.low
         reach = int(np.ceil(_ROUND_M / self.cell_m[0]))
         inside = ((cell[:, :2] >= reach) & (cell[:, :2] < np.array(self.span[:2]) - reach)).all(axis=1)

@@ -216,11 +216,6 @@ def intents_of(
 ) -> tuple[Intent, ...]:
     """Return the intents of a line that ends with ``end``.
 
-    Args:
-        line: the line.
-        tokens: the sentence.
-        at_source: says of the words of a sound whether the place is meant that it came from.
-
     Raises:
         MalformedError: it means nothing.
     """

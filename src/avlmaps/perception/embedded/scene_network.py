@@ -237,10 +237,6 @@ def checksum_of(weights: bytes, notes: Notes) -> str:
     """Return the SHA-256 of all that makes the features, as hexadecimal digits.
 
     How features are read may change, and old maps stay usable: names, instances and the note do not count.
-
-    Args:
-        weights: content of the ONNX file.
-        notes: their description.
     """
     said = msgspec.structs.replace(notes, called={}, kinds={}, instances=InstanceNotes(), note="")
     makes = {name: value for name, value in msgspec.structs.asdict(said).items() if name != "checksum"}

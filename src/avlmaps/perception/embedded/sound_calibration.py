@@ -82,12 +82,6 @@ def kinds_of_windows(
     """Return each window's posterior over the known kinds, and how likely it is of any of them.
 
     The cosine to the nearest example separates unknown sounds (such a sound lies between the kinds).
-
-    Args:
-        cosines: to the words of every kind.
-        typical: to the typical example of every kind.
-        near: to the nearest example of every kind.
-        c: the constants.
     """
     evidence = evidence_for(cosines, typical)
     best = np.sort(evidence, axis=1)

@@ -209,10 +209,6 @@ def read_manifest(path: Path) -> Manifest:
 def parse_manifest(content: bytes, said: str) -> Manifest:
     """Return a manifest from its bytes.
 
-    Args:
-        content: JSON.
-        said: where it comes from, for the error.
-
     Raises:
         BackendError: it is no manifest of this profile, or one of another release.
     """

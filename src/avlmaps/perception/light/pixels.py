@@ -66,12 +66,6 @@ def card_of(bundle: Bundle, module: str, prompts: tuple[str, ...], note: str) ->
 
     The vectors of words that come with the files are no part of the checksum: they are what the text tower gives.
 
-    Args:
-        bundle: the files.
-        module: pixels or views.
-        prompts: sentences round a phrase.
-        note: what to know of its limits.
-
     Raises:
         BackendError: a file is missing or damaged.
     """

@@ -69,10 +69,6 @@ def interpolation(given: int, wanted: int) -> Float32[np.ndarray, "wanted given"
     """Return the weights of a linear interpolation between cells, averaging where there are fewer than before.
 
     As torch's ``interpolate`` with ``antialias``: a triangle round the middle of each cell, at least two cells wide.
-
-    Args:
-        given: cells that there are.
-        wanted: cells that there shall be.
     """
     scale = given / wanted
     reach = max(scale, 1.0)

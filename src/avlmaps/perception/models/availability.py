@@ -41,12 +41,7 @@ class Availability:
 
 
 def availability(backend: Backend, model: str = "") -> Availability:
-    """Return the state of a backend.
-
-    Args:
-        backend: of the registry.
-        model: another model than its default.
-    """
+    """Return the state of a backend."""
     model = model or backend.model
     if backend.missing:
         return Availability("package missing", model, backend.licence, backend.how_to_get)

@@ -54,12 +54,7 @@ class Contrast:
     scale: float
 
     def words(self, sounds: Sequence[Windows], asked: Float32[np.ndarray, "n d"]) -> Float32[np.ndarray, "sounds n"]:
-        """Return how likely each sound holds what each phrase names, by its likeliest window.
-
-        Args:
-            sounds: unit vectors, one for each window.
-            asked: unit vectors of the queried phrases.
-        """
+        """Return how likely each sound holds what each phrase names, by its likeliest window."""
         if not sounds or not len(asked):
             return np.zeros((len(sounds), len(asked)), np.float32)
         rows, starts = joined(sounds)
