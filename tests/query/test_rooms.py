@@ -15,6 +15,7 @@ from avlmaps.query.avlmap import AVLMap, QuerySettings
 from avlmaps.query.factors import NearAnchors
 from avlmaps.query.floor_plan import FloorPlan
 from avlmaps.query.modalities.area import AreaSettings
+from avlmaps.query.room_names import own_names
 from avlmaps.query.rooms import InRooms, NamedVoxels, RoomField, Rooms, RoomSettings, voting_rows
 from avlmaps.query.rules import query_settings
 from avlmaps.query.whereabouts import Whereabouts
@@ -172,16 +173,24 @@ class OpenViews:
         return rows
 
 
-def home(settings: QuerySettings | None = None, door_m: float = 0.8, things: bool = True) -> AVLMap:
-    """A kitchen on the left and a bedroom with a bed on the right, which views hardly tell apart."""
+def home(
+    settings: QuerySettings | None = None, door_m: float = 0.8, things: bool = True, two_kitchens: bool = False
+) -> AVLMap:
+    """A kitchen on the left and a bedroom with a bed on the right, which views hardly tell apart.
+
+    Or, on the right, a second kitchen with a stove.
+    """
     index = two_rooms_index(door_m)
     bed = np.argwhere(np.ones((30, 24, 8), bool)) + np.array([80, 18, 1])
     encoder = NamedPixels(("wall", "bed", "stove"))
-    words = ["wall"] * len(index) + ["bed" if things else "wall"] * len(bed)
+    thing = "stove" if two_kitchens else "bed"
+    words = ["wall"] * len(index) + [thing if things else "wall"] * len(bed)
     places = np.array([[x, y, 1.2] for x in (0.2, 0.8, 3.6, 4.2) for y in (0.8, 2.2)])
     view = OpenViews().encode_words(["kitchen"] * 4 + ["office"] * 4)
     view[:4] += 0.3 * OpenViews().encode_words(["bedroom"])
     view[4:] += 0.7 * OpenViews().encode_words(["bedroom"])
+    if two_kitchens:
+        view[4:] = OpenViews().encode_words(["kitchen"] * 4)
     view /= np.linalg.norm(view, axis=1, keepdims=True)
     voxels = voxels_of(np.concatenate([index, bed]), encoder.encode_words(words))
     encoders = fake_encoders(encoder, FakeSounds(), OpenViews())
@@ -228,6 +237,29 @@ def test_the_rooms_of_the_map_are_listed_by_walls() -> None:
         told = room.to_json("kitchen 1")
         assert told["probability"] == told["confidence"] == told["names"][0]["probability"]
         assert told["area_m2"] == pytest.approx(8.6, abs=1.0) and len(told["outline"]) >= 4
+
+
+def test_one_of_two_kitchens_is_asked_for_by_the_number_that_the_lists_give_it() -> None:
+    m = home(door_m=0.0, two_kitchens=True)
+    x, y = m.points[:, 0], m.points[:, 1]
+    inside, sides = (y > 0.3) & (y < 2.7), {False: (x > 0.3) & (x < 2.8), True: (x > 3.3) & (x < 5.6)}
+    names = {room.to_json(name)["room"]: room for room, name in zip(m.rooms(), Whereabouts.of(m).names, strict=True)}
+    assert set(names) == {"kitchen 1", "kitchen 2"} == set(m.numbered_rooms)
+    for name, room in names.items():
+        is_right = room.position[0] > 3.0
+        heat = m.area(name).values
+        assert (heat[inside & sides[is_right]] == 1.0).all() and (heat[inside & sides[not is_right]] == 0.0).all()
+        (goal,) = m.ask(f"where is {name}?").goals
+        assert (goal.position[0] > 3.0) == is_right and goal.size[0] < 3.0
+        stove = m.ask(f"the stove in {name}")
+        assert stove.found == is_right and f"in {name}" in stove.text
+        assert ("stove" in m.ask(f"what is in {name}?").text) == is_right
+    assert not m.ask("the stove in kitchen 3").found and m.ask("the stove in the kitchen").found
+    assert {name for name, _ in own_names(m, "go to kitchen 2")} == set(names)
+    for counting in ("the stove", "turn left 2 times", "go to the kitchen 2 m ahead", "drive 2.5 m"):
+        assert own_names(m, counting) == ()
+    m.forget_edits()
+    assert "numbered_rooms" not in vars(m)
 
 
 def test_each_voxel_has_the_colour_of_its_room_and_a_question_its_things() -> None:

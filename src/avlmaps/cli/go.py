@@ -271,7 +271,9 @@ def translator_for(verb: "Go", avlmap: "AVLMap | None" = None) -> "Translator":
         from avlmaps.navigate.instruct import given_by
 
         image, clip = (None if file is None else str(file) for file in (verb.image, verb.sound_clip))
-        return LearnedTranslator(Given(image, clip, at=verb.at) if avlmap is None else given_by(avlmap, image, clip))
+        if avlmap is None:
+            return LearnedTranslator(Given(image, clip, at=verb.at))
+        return LearnedTranslator(given_by(avlmap, image, clip, said=verb.sentence))
     from avlmaps.language.chat import ChatSettings, ChatTranslator
 
     chat = verb.chat

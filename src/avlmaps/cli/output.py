@@ -175,9 +175,8 @@ def query_lines(answer: dict[str, Any]) -> list[str]:
     lines += [f"note: {note}" for note in answer.get("notes", [])]
     lines += [f"count: {answer['count']}"] if "count" in answer else []
     lines.append(f"{'found' if answer['found'] else 'not found here'}: {answer['text']}")
-    others = [
-        f"{one['query']} ({one['probability']:.2f})" for one in answer.get("alternatives", []) if one["found"]
-    ]  # fmt: skip
+    others = answer.get("alternatives", []) if answer["found"] else []
+    others = [f"{one['query']} ({one['probability']:.2f})" for one in others if one["found"]]
     lines += [f"or: {', '.join(others)}"] if others else []
     lines += (
         table_lines(("", f"place ({answer['frame']} frame)", "probability", "size in m (level axes)"), rows)

@@ -85,6 +85,11 @@ def coordinates(point: Iterable[float]) -> str:
     return ", ".join(f"{value:.2f}" for value in point)
 
 
+def the_room(name: str) -> str:
+    """Return the name of a room with its article; one with a number has none: the kitchen, bathroom 2."""
+    return name if name[-1:].isdigit() else f"the {name}"
+
+
 def place_text(point: Iterable[float]) -> str:
     """Return a place in metres as people read it: ``(1.00, 2.50, 0.00) m``."""
     return f"({coordinates(point)}) m"

@@ -25,6 +25,7 @@ from avlmaps.navigate.grounding import Heats
 from avlmaps.navigate.motion_log import Move
 from avlmaps.navigate.skills import Robot, RobotSettings
 from avlmaps.query.avlmap import AVLMap
+from avlmaps.query.room_names import own_names
 from avlmaps.query.sound_sources import no_sources
 
 _MOST_PROGRAMS = 6
@@ -125,9 +126,9 @@ class Outcome:
         }
 
 
-def given_by(avlmap: AVLMap, image: str | None = None, clip: str | None = None) -> Given:
-    """Return what a command to a robot on a map may mean: the map's names, and which places its sounds have."""
-    sounds_at, own = avlmap.settings.sounds.at, avlmap.edited.own_names
+def given_by(avlmap: AVLMap, image: str | None = None, clip: str | None = None, *, said: str = "") -> Given:
+    """Return what a command to a robot (``said``) may mean: the map's names, and which places its sounds have."""
+    sounds_at, own = avlmap.settings.sounds.at, own_names(avlmap, said)
     return Given(image, clip, avlmap.knows, sounds_at, own, lambda: no_sources(avlmap.stored))
 
 
@@ -170,7 +171,7 @@ def instruct(
     """
     begin = perf_counter()
     if translation is None and isinstance(translator, LearnedTranslator) and not translator.knows_map:
-        translator = LearnedTranslator(given_by(avlmap))
+        translator = LearnedTranslator(given_by(avlmap, said=command))
     translation = translation or translator.program_for(command)
     brake = EditBrake(avlmap)
     with braked(driver, brake) as held:

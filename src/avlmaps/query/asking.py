@@ -20,6 +20,7 @@ from avlmaps.query.answer import Alternative, Answer, PartAnswer
 from avlmaps.query.factors import Factor, NearAnchors, NearThings
 from avlmaps.query.goals import Goal
 from avlmaps.query.heatmap import Heatmap, product
+from avlmaps.query.room_names import own_names
 from avlmaps.query.wording import UNDERSTOOD_ONLY, absent_text, found_text
 
 if TYPE_CHECKING:
@@ -271,7 +272,7 @@ def _answer_said(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
     from avlmaps.language.list_questions import read_list, said_number
     from avlmaps.query.lists import answer_list
 
-    listed, numbered = read_list(asked.sentence, avlmap.edited.own_names), said_number(asked.sentence)
+    listed, numbered = read_list(asked.sentence, own_names(avlmap, asked.sentence)), said_number(asked.sentence)
     if listed is not None:
         return answer_list(
             avlmap, listed, asked.top, lambda words: _answer_words(avlmap, asked, words, files), asked.at
@@ -298,7 +299,7 @@ def _answer_words(avlmap: "Queryable", asked: Asked, words: str, files: Files) -
 
 def _answer_read(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
     """Answer the questions that a sentence is read as; the likeliest counts."""
-    questions, notes, counted = _questions(asked, avlmap.edited.own_names)
+    questions, notes, counted = _questions(asked, own_names(avlmap, asked.sentence))
     answers: list[tuple[Question, Answer]] = []
     for question in (_placed(one, asked.at) for one in questions):
         if asked.primary is not None:

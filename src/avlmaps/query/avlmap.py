@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -31,6 +31,7 @@ from avlmaps.query.modalities.object import object_factor
 from avlmaps.query.modalities.sound import SoundSettings, read_clip, require_audible, sound_factor, sound_features
 from avlmaps.query.object_settings import ObjectSettings
 from avlmaps.query.queryable import Attachment, Photo
+from avlmaps.query.room_names import numbered_rooms, region_named
 from avlmaps.query.room_regions import RoomRegions
 from avlmaps.query.rooms import NamedVoxels, RoomField, Rooms, voting_rows
 from avlmaps.query.stored_instances import Search, place_of_instances, read_instances, write_instances
@@ -139,7 +140,8 @@ class AVLMap:
 
     def forget_edits(self) -> None:
         """Read what people corrected again at the next question."""
-        for name in ("edited", "room_field", "source_map"):  # what lists things weighs them by what they are called
+        # What lists things weighs them by what they are called.
+        for name in ("edited", "room_field", "source_map", "numbered_rooms"):
             self.__dict__.pop(name, None)
 
     def as_edited_now(self) -> Self:
@@ -433,6 +435,11 @@ class AVLMap:
         rooms = find_rooms(self.stored, self.space, self.settings.areas, least_confidence, by_floor)
         return self.edited.listed_rooms(rooms)
 
+    @cached_property
+    def numbered_rooms(self) -> dict[str, int]:
+        """The region of each room that shares its name with others, by the name with its number; see ``room_names``."""
+        return numbered_rooms(self)
+
     @property
     def points(self) -> Float[np.ndarray, "n 3"]:
         """The middles of the voxels, metres, recording frame; computed once, read-only."""
@@ -558,7 +565,7 @@ class AVLMap:
         return list_sources(self, names, prior, least=least)
 
     def area(self, word: str, primary: bool = False) -> Heatmap:
-        """Return the heat of an area, such as a kitchen.
+        """Return the heat of an area, such as a kitchen; or of one room by its number, such as bathroom 2.
 
         Raises:
             QueryError: the word is empty.
@@ -567,12 +574,19 @@ class AVLMap:
         part = Part(Modality.AREA, word, _role(primary))
         encoder = self.stored.encoders.views
         self.stored.require_model(Kind.VIEWS)
-        settings = self.settings
+        settings, number = self.settings, region_named(self, word)
+        corrected = self.edited.room_field if self.edited else None
         factor = area_factor(
             self.space, self.stored.keyframes, encoder, part, settings.areas, settings.heat, self.room_votes,
-            self.edited.room_field if self.edited else None,
+            corrected if number is None else partial(self._with_room, number), number is not None,
         )  # fmt: skip
         return Heatmap.of(factor, settings.found_at)
+
+    def _with_room(self, number: int, field: RoomField) -> RoomField:
+        """Return the field with one room as a kind of its own behind all others."""
+        regions = self.room_regions
+        assert regions is not None
+        return self.edited.room_field(field).with_certain([("", regions.of_plan_cells == number)])
 
     @cached_property
     def storeys(self) -> "Storeys | None":

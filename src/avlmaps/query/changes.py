@@ -10,6 +10,7 @@ import numpy as np
 from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.poses import FRAME
+from avlmaps.core.wording import the_room
 
 if TYPE_CHECKING:
     from avlmaps.maps.store.life import Life, Stay
@@ -255,7 +256,7 @@ def text_of(answer: "ChangesAnswer", kinds: Iterable[ChangeKind] = ("new", "move
     """Return changes in one sentence."""
     wanted = set(kinds)
     own = [one for one in answer["changes"] if one["kind"] in wanted]
-    where = f" in the {place}" if place else ""
+    where = f" in {the_room(place)}" if place else ""
     if not own:
         words = {"new": "to be new", "moved": "to have moved", "gone": "to be gone"}
         names = " or ".join(word for kind, word in words.items() if kind in wanted)
@@ -279,7 +280,7 @@ def last_seen_text(answer: "LastSeenAnswer") -> str:
         return f"No {answer['name']} was seen on any day."
     one = answer["seen"][0]
     x, y, z = one["position"]
-    room = f"in the {one['room']}, " if one["room"] else ""
+    room = f"in {the_room(one['room'])}, " if one["room"] else ""
     text = f"The {one['name']} was last seen on {said(one['last_seen'])}, {room}at ({x:.2f}, {y:.2f}, {z:.2f}) m."
     if one["gone"] is not None:
         return f"{text} On {said(one['gone'])} it was gone from there."

@@ -205,15 +205,7 @@ class Edited(FoundEdits):
             return field
         regions = self._map.room_regions
         assert regions is not None
-        kinds = list(field.kinds)
-        kinds += dict.fromkeys(edit.name for edit in self.rooms.values() if edit.name not in kinds)
-        share = np.zeros((len(field.share), len(kinds)), np.float32)
-        share[:, : len(field.kinds)] = field.share
-        for number, edit in self.rooms.items():
-            own = regions.of_plan_cells == number
-            share[own] = 0.0
-            share[own, kinds.index(edit.name)] = 1.0
-        return replace(field, kinds=tuple(kinds), share=share)
+        return field.with_certain([(edit.name, regions.of_plan_cells == n) for n, edit in self.rooms.items()])
 
     def listed_rooms(self, rooms: "list[Room]") -> "list[Room]":
         """Return rooms that say who named them."""

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from avlmaps.core.arrays import Float
+from avlmaps.core.arrays import Bool, Float
 from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import HeardAt
+from avlmaps.core.wording import the_room
 from avlmaps.language.list_questions import Listed, ListQuestion
 from avlmaps.query.answer import Answer
 from avlmaps.query.changes import (
@@ -169,7 +170,7 @@ def _changes(avlmap: "Queryable", question: ListQuestion, top: int) -> Answer:
     listed = [one for one in answer["changes"] if one["kind"] in kinds]
     if question.name:
         places = np.array([one["position"] for one in listed]).reshape(-1, 3)
-        inside = Whereabouts.of(avlmap).parts_of(lambda kind: _same_room(kind, question.name), places)
+        inside = _inside(Whereabouts.of(avlmap), question.name, places)
         listed = [one for one, is_in in zip(listed, inside, strict=True) if is_in]
     answer["changes"] = listed
     if question.name and not _has_room(avlmap, question.name):
@@ -211,10 +212,10 @@ def _usual(avlmap: "Queryable", question: ListQuestion, top: int, ask: Callable[
         if not _has_room(avlmap, name):
             return _answer(avlmap, [], _no_room(name))
         places = np.array([stay.position for stay in days.life.stays]).reshape(-1, 3)
-        inside = Whereabouts.of(avlmap).parts_of(lambda kind: _same_room(kind, name), places)
+        inside = _inside(Whereabouts.of(avlmap), name, places)
         within = {id(stay) for stay, is_in in zip(days.life.stays, inside, strict=True) if is_in}
         found = usual(days, lambda stay: id(stay) in within)
-        text = usual_text(found, f"in the {name}")
+        text = usual_text(found, f"in {the_room(name)}")
     else:
         subject = ask(name)
         if not subject.found:
@@ -268,21 +269,32 @@ def _room_of(avlmap: "Queryable", subject: Answer) -> tuple[list[Goal], str]:
     likely = min(goal.probability, room.confidence)
     inside = Goal(goal.position, likely, goal.size, {}, likely, where.names[number])
     words = in_words([one.part for one in subject.parts])
-    return [inside], placed(f"{words} is in the {where.names[number]}", inside)
+    return [inside], placed(f"{words} is in {the_room(where.names[number])}", inside)
 
 
 def _contents(avlmap: "Queryable", name: str) -> tuple[list[Goal], str]:
     where, things = Whereabouts.of(avlmap), _things(avlmap)
     places = np.array([thing.position for thing in things]).reshape(-1, 3)
-    inside = where.parts_of(lambda kind: _same_room(kind, name), places)
+    inside = _inside(where, name, places)
     goals = [_thing_goal(thing) for thing, is_in in zip(things, inside, strict=True) if is_in]
     if not _has_room(avlmap, name):
         return goals, _no_room(name)
-    return goals, f"In the {name}: {counted([goal.name for goal in goals])}."
+    return goals, f"In {the_room(name)}: {counted([goal.name for goal in goals])}."
 
 
 def _has_room(avlmap: "Queryable", name: str) -> bool:
-    return any(room.may_be(lambda kind: _same_room(kind, name)) for room in Whereabouts.of(avlmap).rooms)
+    where = Whereabouts.of(avlmap)
+    return where.one_named(name) is not None or any(
+        room.may_be(lambda kind: _same_room(kind, name)) for room in where.rooms
+    )
+
+
+def _inside(where: Whereabouts, name: str, points: Float[np.ndarray, "m 3"]) -> Bool[np.ndarray, " m"]:
+    """Return which points (metres, recording frame) lie in the room of that name and number, or in one of the kind."""
+    number = where.one_named(name)
+    if number is not None and where.names[number] != where.rooms[number].name:
+        return where.rooms_of(points) == number
+    return where.parts_of(lambda kind: _same_room(kind, name), points)
 
 
 def _no_room(name: str) -> str:

@@ -63,6 +63,10 @@ class Corrections(Protocol):
         """The names that people gave, and whether each is that of a room."""
         ...
 
+    def knows(self, phrase: str) -> bool:
+        """Return whether a person named something so."""
+        ...
+
     def said_of(
         self, places: Sequence[Sequence[float]], named: Iterable[str] = (), areas: Iterable[str] = ()
     ) -> tuple[str, ...]:
@@ -110,6 +114,11 @@ class Queryable(Protocol):
     @cached_property
     def room_field(self) -> "RoomField | None":
         """How likely each place is each kind of room."""
+        ...
+
+    @cached_property
+    def numbered_rooms(self) -> "Mapping[str, int]":
+        """The region of each room that shares its name with others, by the name with its number."""
         ...
 
     @cached_property

@@ -1,7 +1,7 @@
 """What kind of room each place of a map is: views and things vote, and walls bound how far a vote reaches."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 
 import numpy as np
@@ -80,6 +80,20 @@ class RoomField:
     def at(self, points_world: Float[np.ndarray, "m 3"]) -> Float32[np.ndarray, "m n"]:
         """Return how likely each point is in each kind of room."""
         return self.share[self.plan.cells_of(points_world)]
+
+    def with_certain(self, named: "Sequence[tuple[str, Bool[np.ndarray, ' c']]]") -> "RoomField":
+        """Return the field where some cells are certain to be of a kind; new kinds come behind the others.
+
+        Args:
+            named: kinds, each with its cells; of several on one cell the last counts.
+        """
+        kinds = list(dict.fromkeys([*self.kinds, *(name for name, _ in named)]))
+        share = np.zeros((len(self.share), len(kinds)), np.float32)
+        share[:, : len(self.kinds)] = self.share
+        for name, cells in named:
+            share[cells] = 0.0
+            share[cells, kinds.index(name)] = 1.0
+        return replace(self, kinds=tuple(kinds), share=share)
 
     def of_cells(self, weights: Float[np.ndarray, " n"]) -> Float32[np.ndarray, " c"]:
         """Return for every cell how likely it is in a room of some kinds, in [0, 1].

@@ -9,7 +9,7 @@ import numpy as np
 
 from avlmaps.core.errors import QueryError
 from avlmaps.core.inflection import plural_of
-from avlmaps.core.wording import place_text
+from avlmaps.core.wording import place_text, the_room
 from avlmaps.query.changes import Days, RoomOf, when
 
 if TYPE_CHECKING:
@@ -123,7 +123,7 @@ def usual_place_text(days: Days, name: str, found: Sequence[Usual], room_of: Roo
 
     def at(one: Usual) -> str:
         room = room_of(one.stay.position)
-        return (f"in the {room}, " if room else "") + f"at {place_text(one.stay.position)}"
+        return (f"in {the_room(room)}, " if room else "") + f"at {place_text(one.stay.position)}"
 
     best = found[0]
     if best.is_usual:

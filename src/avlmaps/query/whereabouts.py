@@ -118,6 +118,11 @@ class Whereabouts:
         whole[part] = meant[likeliest]
         return whole
 
+    def one_named(self, asked: str) -> int | None:
+        """Return the number of the room that a word names, and no other room; None where it names none so."""
+        word = " ".join(asked.casefold().split()).removeprefix("the ")
+        return next((k for k, name in enumerate(self.names) if name.casefold() == word), None)
+
     def numbers_of(self, asked: str) -> list[int]:
         """Return the numbers of the rooms that a word names: one by its own name, or all of a kind.
 
@@ -125,8 +130,8 @@ class Whereabouts:
             QueryError: there is no such room; the sentence lists those that there are.
         """
         word = " ".join(asked.casefold().split()).removeprefix("the ")
-        own = [k for k, name in enumerate(self.names) if name.casefold() == word]
-        numbers = own or [k for k, room in enumerate(self.rooms) if room.name.casefold() == word]
+        own = self.one_named(asked)
+        numbers = [own] if own is not None else [k for k, room in enumerate(self.rooms) if room.name.casefold() == word]
         if numbers:
             return numbers
         if not self.names:

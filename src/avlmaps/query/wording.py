@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from avlmaps.core.inflection import singulars_of
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import Modality, Part, Role
-from avlmaps.core.wording import place_text
+from avlmaps.core.wording import place_text, the_room
 from avlmaps.query.answer import Alternative, PartAnswer
 from avlmaps.query.goals import Goal
 
@@ -82,7 +82,7 @@ def _named(part: Part) -> str:
         return f"where {_CLIP if part.is_file else f'the {_bare(part)}'} comes from"
     if part.is_file:
         return _PHOTO if part.modality is Modality.IMAGE else _CLIP
-    return f"the {_bare(part)}"
+    return the_room(_bare(part)) if part.modality is Modality.AREA else f"the {_bare(part)}"
 
 
 def _context_words(part: Part) -> str:

@@ -103,7 +103,7 @@ class Guide:
             LanguageError: the command is not understood.
             NavigationError: there is no room for the robot.
         """
-        translator = LearnedTranslator(given_by(self.avlmap, photo, clip))
+        translator = LearnedTranslator(given_by(self.avlmap, photo, clip, said=command))
         readings = explanation(translator, command)[:_MOST_READINGS]
         translation = translator.program_for(command)
         readable = Readable(() if folder is None else (folder,))

@@ -261,6 +261,7 @@ def area_factor(
     heat: HeatSettings,
     rooms: Rooms | None = None,
     corrected: Callable[[RoomField], RoomField] | None = None,
+    is_one_room: bool = False,
 ) -> NearAnchors:
     """Return the heat of an area: one anchor a keyframe.
 
@@ -276,6 +277,7 @@ def area_factor(
         heat: how fast heat falls.
         rooms: of the map; without them heat falls off round every keyframe.
         corrected: puts in the rooms that people named: kinds behind those that the encoder knows.
+        is_one_room: the name is that of one room of the map, which ``corrected`` puts in as the last kind.
     """
     anchors = area_anchors(keyframes, settings)
     view = np.asarray(keyframes.view)
@@ -290,6 +292,8 @@ def area_factor(
             kinds = corrected(kinds)
             named = [1.0 if same_place(kind, part.query) else 0.0 for kind in kinds.kinds[len(weights) :]]
             weights = np.concatenate([weights, named])
+        if is_one_room:
+            weights = np.eye(1, len(kinds.kinds), len(kinds.kinds) - 1)[0]
         posterior = scores = np.clip(kinds.at(anchors) @ weights, 0.0, 1.0).astype(np.float64)
     best = float(posterior.max(initial=0.0))
     missed = f"no view is like {part.query!r}; the best score is {best:.2f}, below {FOUND_AT:.2f}"
@@ -299,6 +303,8 @@ def area_factor(
     if not len(keyframes):
         note = "the map holds no keyframes"
     group = modes(space.level(anchors)[:, :2], scores, settings.link_m)
+    if is_one_room:  # however far apart its views look
+        group = np.where(scores > 0.0, 0, 1 + group)
     falloff, found = heat.falloff_per_m(part.role), best >= FOUND_AT
     if kinds is None or part.role is Role.PRIMARY:
         return NearAnchors(space, part, falloff, anchors, scores, group, found, part.query, note)

@@ -166,7 +166,7 @@ class Dispatcher:
         if program.strip():
             parse_program(program)
             return Translation(program)
-        return LearnedTranslator(given_by(now.avlmap)).program_for(words)
+        return LearnedTranslator(given_by(now.avlmap, said=words)).program_for(words)
 
     @property
     def _settings(self) -> RobotSettings:

@@ -290,7 +290,7 @@ class Panel {
           (part.note ? `: ${part.note}` : "") }));
       }
       for (const note of answer.notes ?? []) texts.push(made("p", { className: "soft", textContent: note }));
-      const others = (answer.alternatives ?? []).filter((other) => other.found);
+      const others = (answer.found ? answer.alternatives ?? [] : []).filter((other) => other.found);
       if (others.length) {
         const named = others.map((other) => `${other.query} (${other.probability.toFixed(2)})`).join(", ");
         texts.push(made("p", { className: "soft", textContent: `Or: ${named}.` }));
