@@ -5,7 +5,7 @@ A command counts as right where its program does the same as one of the list's; 
 
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -38,10 +38,10 @@ def rows(name: str) -> Iterator[tuple[str, list[str]]]:
             yield row["command"], row.get("programs") or [row["program"]]
 
 
-def counted(name: str) -> dict[str, list[str]]:
-    """Return the commands of a list by what became of them: right, asked, other."""
+def counted(commands: Iterable[tuple[str, list[str]]]) -> dict[str, list[str]]:
+    """Return commands, each with the programs that are right, by what became of them: right, asked, other."""
     found: dict[str, list[str]] = {"right": [], "asked": [], "other": []}
-    for command, programs in rows(name):
+    for command, programs in commands:
         try:
             read = read_command(command)
         except LanguageError:
@@ -80,7 +80,7 @@ if __name__ == "__main__":
     import sys
 
     for name in NAMES:
-        found = counted(name)
+        found = counted(rows(name))
         sys.stdout.write(f"{name}: {', '.join(f'{len(commands)} {what}' for what, commands in found.items())}\n")
         for what in ("asked", "other"):
             sys.stdout.writelines(f"  {what}: {command}\n" for command in found[what])

@@ -23,32 +23,32 @@ from avlmaps.language.verbalise import verbalise
 from avlmaps_sim.bench.language import counts, judge, read_list
 
 LISTS = Path(__file__).parent / "commands"
-# How many commands of each development list are right at least, and how many may be read as something else at most.
+# Of every other command of each development list as many are right at least, and read as something else at most.
 REACHED = {
-    "commands.tsv": (350, 7), "free.tsv": (695, 16), "paraphrases.jsonl": (58, 2), "paraphrases_2.jsonl": (73, 4),
-    "paraphrases_3.jsonl": (76, 3), "paraphrases_4.jsonl": (74, 4),
+    "commands.tsv": (175, 4), "free.tsv": (348, 8), "paraphrases.jsonl": (29, 1), "paraphrases_2.jsonl": (38, 2),
+    "paraphrases_3.jsonl": (39, 2), "paraphrases_4.jsonl": (37, 2),
 }  # fmt: skip
 
 
-# Of the lists of many speakers: as many are right at least, and misread at most.
+# Of every other sentence of many speakers: as many are right at least, and misread at most.
 SPEAKERS = {
-    "speakers_commands.jsonl": (530, 8),
-    "speakers_commands_2.jsonl": (109, 3),
-    "speakers_commands_3.jsonl": (66, 3),
-    "speakers_commands_4.jsonl": (61, 3),
-    "speakers_commands_5.jsonl": (61, 3),
-    "speakers_questions.jsonl": (219, 5),
-    "speakers_questions_2.jsonl": (57, 3),
-    "speakers_questions_3.jsonl": (37, 3),
-    "speakers_questions_4.jsonl": (31, 3),
-    "speakers_questions_5.jsonl": (34, 3),
+    "speakers_commands.jsonl": (266, 4),
+    "speakers_commands_2.jsonl": (54, 2),
+    "speakers_commands_3.jsonl": (34, 2),
+    "speakers_commands_4.jsonl": (31, 2),
+    "speakers_commands_5.jsonl": (31, 2),
+    "speakers_questions.jsonl": (110, 3),
+    "speakers_questions_2.jsonl": (29, 2),
+    "speakers_questions_3.jsonl": (19, 2),
+    "speakers_questions_4.jsonl": (17, 2),
+    "speakers_questions_5.jsonl": (17, 2),
 }
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SPEAKERS)
 def test_many_speakers_stay_understood(name: str) -> None:
-    found = counts([judge(row) for row in read_list(LISTS / name)])
+    found = counts([judge(row) for row in read_list(LISTS / name)[::2]])
     assert found["right"] >= SPEAKERS[name][0]
     assert found["misread"] <= SPEAKERS[name][1]
 
@@ -56,7 +56,7 @@ def test_many_speakers_stay_understood(name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_the_development_lists_stay_understood(name: str) -> None:
-    found = counted(name)
+    found = counted(list(rows(name))[::2])
     right, other = REACHED[name]
     assert len(found["right"]) >= right
     assert len(found["other"]) <= other, found["other"]

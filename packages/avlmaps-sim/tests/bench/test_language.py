@@ -4,24 +4,25 @@ import pytest
 
 from avlmaps_sim.bench.language import OUTCOMES, counts, dangerous, judge, sealed, shipped
 
-# At least so many of the sentences of each list are right, and at most so many misread; all are development lists.
+# At least so many of every other sentence of each list are right, and at most so many misread; all are development
+# lists, and `avlmaps bench language` reads the whole of them.
 REACHED = {
-    "child": (119, 4), "nurse": (118, 4), "newcomer": (121, 3), "roboticist": (121, 3),
-    "engineer": (115, 4), "grandmother": (115, 5), "plumber": (113, 7), "tourist": (114, 4),
-    "coach": (112, 5), "overseas": (110, 6), "vet": (120, 3), "wedding": (108, 4),
-    "controls": (33, 0), "manager": (35, 0), "dictated": (37, 0), "elderly": (34, 1),
-    "abroad": (114, 4), "dictation": (114, 6), "guests": (111, 4), "warehouse": (116, 4),
-    "ward": (37, 0), "depot": (38, 0), "tenner": (36, 1), "stack": (37, 0),
-    "landlady": (38, 0), "signals": (57, 0), "concierge": (57, 0), "director": (55, 0),
-    "six_voices": (58, 0), "six_voices_2": (59, 0), "six_voices_3": (60, 0),
-    "six_voices_4": (56, 1), "six_voices_5": (60, 0),
+    "child": (60, 2), "nurse": (61, 2), "newcomer": (61, 2), "roboticist": (62, 2),
+    "engineer": (59, 2), "grandmother": (57, 3), "plumber": (56, 4), "tourist": (58, 2),
+    "coach": (56, 3), "overseas": (56, 3), "vet": (60, 2), "wedding": (54, 2),
+    "controls": (17, 0), "manager": (18, 0), "dictated": (19, 0), "elderly": (16, 1),
+    "abroad": (57, 2), "dictation": (58, 3), "guests": (54, 2), "warehouse": (58, 2),
+    "ward": (18, 0), "depot": (19, 0), "tenner": (18, 1), "stack": (18, 0),
+    "landlady": (19, 0), "signals": (29, 0), "concierge": (28, 0), "director": (27, 0),
+    "six_voices": (30, 0), "six_voices_2": (30, 0), "six_voices_3": (30, 0),
+    "six_voices_4": (29, 1), "six_voices_5": (30, 0),
 }  # fmt: skip
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", REACHED)
 def test_a_sealed_list_stays_understood(name: str) -> None:
-    judged = [judge(row) for row in shipped(name)]
+    judged = [judge(row) for row in shipped(name)[::2]]
     found = counts(judged)
     assert dangerous(judged)[0] == 0
     assert found["right"] >= REACHED[name][0]
