@@ -13,9 +13,9 @@ sys.path.insert(0, str(Path(__file__).parent))
 from campaign import report, run_case, seeds_in
 from mistakes import run_mistake
 
-CASES = 48
+CASES = 30
 BLOCKS = 3
-MISTAKES = 6
+MISTAKES = 4
 
 
 @pytest.fixture(scope="module")

@@ -170,11 +170,11 @@ def test_the_pose_is_that_of_the_camera_that_took_the_photo() -> None:
 
 
 @pytest.mark.slow
-def test_a_hundred_pictures_of_other_places_are_refused(stored: MapOfPictures) -> None:
+def test_thirty_pictures_of_other_places_are_refused(stored: MapOfPictures) -> None:
     other = RoomWalk(frames=40, seed=99)
-    pictures = [other.frame(i).rgb for i in range(0, 40, 2)]
-    pictures += [painting(np.random.default_rng(seed), 240, 320, shapes=300) for seed in range(70)]
-    pictures += [np.random.default_rng(seed).integers(0, 256, (240, 320, 3)).astype(np.uint8) for seed in range(10)]
+    pictures = [other.frame(i).rgb for i in range(0, 40, 4)]
+    pictures += [painting(np.random.default_rng(seed), 240, 320, shapes=300) for seed in range(17)]
+    pictures += [np.random.default_rng(seed).integers(0, 256, (240, 320, 3)).astype(np.uint8) for seed in range(3)]
     found = [locate(stored, picture, None, rng()) for picture in pictures]
     assert [one.world_from_camera for one in found] == [None] * len(pictures)
     assert max(one.score for one in found) < 0.5
