@@ -55,6 +55,17 @@ def test_the_python_of_the_documents_can_be_read_and_its_imports_are_there(page:
                 assert hasattr(avlmaps, line.attr), f"{page}: avlmaps.{line.attr}"
 
 
+@pytest.mark.parametrize("page", ["../README.md", *(page for page in PAGES if _python_of(DOCS / page))])
+def test_a_page_imports_the_packages_that_its_python_uses(page: str) -> None:
+    known: set[str] = set()
+    for tree in map(ast.parse, _python_of(DOCS / page)):
+        found = list(ast.walk(tree))
+        imports = (name for one in found if isinstance(one, ast.Import | ast.ImportFrom) for name in one.names)
+        known |= {name.asname or name.name.partition(".")[0] for name in imports}
+        used = {one.id for one in found if isinstance(one, ast.Name)}
+        assert used & {*OURS, "np", "Path"} <= known, f"{page}:\n{ast.unparse(tree)}"
+
+
 @pytest.mark.parametrize("page", PAGES)
 def test_every_page_is_in_the_menu(page: str) -> None:
     assert f": {page}\n" in (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
