@@ -161,13 +161,8 @@ def seen_again(
 ) -> VoxelEvidence:
     """Return what a day says of a thing's voxels.
 
-    Args:
-        index: its voxels.
-        grid: their size.
-        before: the views of the days on which it was there.
-        known: the surface of the map until then; beside what else it has, new surface says nothing of the thing.
-        day: the day.
-        settings: how near to those a view must look from.
+    ``before`` are the views of the days on which it was there: near to those a view must look from. Beside what else
+    ``known``, the surface of the map until then, has, new surface says nothing of the thing.
     """
     allowed = _from_where_it_was_seen(grid.centre_of(np.asarray(index)), before, day.views, settings)
     through = np.zeros(len(index), bool)
@@ -187,13 +182,7 @@ def seen_before(
 ) -> Verdict:
     """Return what earlier days say of the place of a thing: gone says that they looked through it.
 
-    Args:
-        index: its voxels.
-        grid: their size.
-        before: the views of all earlier days.
-        known: the surface that the map had until then, as those who looked last left it.
-        day: on which it stands there.
-        settings: the rule.
+    ``before`` are the views of all earlier days, ``known`` is the surface as those who looked last left it.
     """
     through = np.sum([day.through(index, grid) for day in before], axis=0) >= settings.through_views
     seen = _counted(through, known.near(grid.centre_of(np.asarray(index))), day.surface.alone(index))

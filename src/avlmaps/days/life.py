@@ -71,18 +71,9 @@ def lived_on(
 ) -> Life:
     """Return what became of things by another day.
 
-    Args:
-        life: until then.
-        things: of the new day.
-        day: what it looked at.
-        before: the views of each earlier visit.
-        known: the surface of the map until then.
-        visit: number of the new day.
-        at_s: when each visit ended, the new one last, the map's time.
-        grid: of the voxels.
-        settings: the rule.
-        same: whether two names may be of one thing.
-        features: how the things of until then look, by the number of their stay, as ``SeenThing.feature``.
+    ``before`` are the views of each earlier visit, ``known`` is the surface of the map until then, ``at_s`` when each
+    visit ended, the new one last, the map's time. ``features`` says how the things of until then look, by the number of
+    their stay, as ``SeenThing.feature``.
     """
     voxels = [life.voxels(number) for number in range(len(life))]
     stays = [

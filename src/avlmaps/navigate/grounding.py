@@ -88,14 +88,8 @@ class Seeker:
     ) -> Heatmap:
         """Return the heatmap of the one thing that is given.
 
-        Args:
-            skill: who asks, for the sentence of an error.
-            obj: words for an object.
-            sound: words for a sound, or a clip.
-            img: a picture.
-            area: words for an area.
-            at: the place of a sound, ``robot`` or ``source``; the map's settings overrule it.
-            primary: whether it is what is sought itself.
+        Of a sound ``at`` says ``robot`` or ``source``; the map's settings overrule it. ``primary`` is what is sought
+        itself.
 
         Raises:
             ProgramError: not exactly one is given, it is of the wrong kind, or it has no such place.

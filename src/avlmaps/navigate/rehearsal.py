@@ -79,13 +79,8 @@ def unfound(
 ) -> Outcome | None:
     """Return the outcome of a program that would drive and then ask for what the map lacks; None for any other.
 
-    Args:
-        words: the command; it may name files.
-        translation: its program, whose steps depend on nothing that a drive would find out.
-        avlmap: the map.
-        start: where the robot stands, level frame.
-        heats: takes what the map answers, for the drive.
-        guess: as of ``RobotSettings``.
+    The program's steps must depend on nothing that a drive would find out. ``heats`` takes what the map answers, for
+    the drive.
     """
     robot, trace = _asked_of(translation.program, avlmap, words, start, guess, heats)
     if trace.error is None or trace.error_type not in _ABSENT or not robot.moves:

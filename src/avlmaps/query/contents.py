@@ -258,14 +258,8 @@ def find_things(
 ) -> list[Thing]:
     """Return the things of a map, most confident first.
 
-    Args:
-        stored: the map.
-        space: its voxels' places.
-        instances_of: returns the instances of a word, with its narrower names or alone (``AVLMap.instances``).
-        names: what to list; by default the pixel encoder's vocabulary.
-        least_confidence: things below it are left out, in [0, 1].
-        structure: list walls, floors and the like as well.
-        watch: is given "things", the number of names that were looked for, and of all; what it raises ends the search.
+    ``instances_of`` returns the instances of a word, with its narrower names or alone. ``watch`` is given "things", the
+    number of names that were looked for, and of all; what it raises ends the search.
 
     Raises:
         QueryError: ``least_confidence`` lies outside [0, 1].

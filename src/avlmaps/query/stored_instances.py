@@ -36,11 +36,7 @@ def write_instances(
 ) -> dict[Search, Segmentation]:  # fmt: skip
     """Make all searches, store what they found where the folder can be written, and return it.
 
-    Args:
-        place: where.
-        searches: all of which a list of things is made.
-        find: searches.
-        watch: is given "things", the number of searches that were made, and of all; what it raises ends them.
+    ``watch`` is as of ``contents.find_things``.
     """
     known: list[Segmentation] = []
     for number, search in enumerate(searches):

@@ -193,12 +193,8 @@ def object_margins(
 
     The margin is positive where the voxel is the object.
 
-    Args:
-        feature: of the voxels, zero where there is none.
-        rivals: what competes.
-        word_rows: those of ``EncodedWord``.
-        silent: which of the rivals' words do not compete.
-        least_score: what the word must beat besides where ``other`` has no feature.
+    ``silent`` are the rivals' words that do not compete; ``least_score`` is what the word must beat besides where
+    ``other`` has no feature.
     """
     score = scores.feature_scores(feature, word_rows)
     return _beaten(score, feature, np.arange(len(score)), rivals, silent, least_score), score

@@ -66,11 +66,7 @@ class Spread(Workers):
     ) -> None:
         """Use a pool.
 
-        Args:
-            pool: that does the jobs.
-            reopen: opens the recording on a worker, as it was opened here.
-            cache: of features.
-            slab_bytes: how much of the sums a worker adds up in one job.
+        ``reopen`` opens the recording on a worker, as it was opened here.
         """
         self._pool, self._reopen, self._cache, self._slab_bytes = pool, reopen, cache, slab_bytes
         self._tokens: dict[str, str] = {}  # by the plan's key: a worker checks what it sees once for a token

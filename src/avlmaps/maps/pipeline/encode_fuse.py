@@ -75,14 +75,7 @@ def fuse_spans(
 ) -> None:
     """Fuse stretches of frames, each into a part of its own; decoding and encoding run ahead of fusion.
 
-    Args:
-        recording: where the frames are.
-        jobs: each stretch, and the folder of its part.
-        encoders: the encoders, of which that of pixels perceives.
-        settings: of the build.
-        sensor: error of the depths.
-        known_bad: frames of other parts that could not be read.
-        done: frames of other parts, for the progress bar.
+    Frames of other parts are ``known_bad``, those that could not be read, and ``done``, for the progress bar.
 
     Raises:
         RecordingError: too many frames cannot be read.

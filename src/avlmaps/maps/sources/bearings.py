@@ -174,13 +174,9 @@ def evidence_of_bearings(
 ) -> BearingEvidence:
     """Return the log-likelihood of each candidate for each sound, and what was found out about the device.
 
-    Args:
-        heard: the directions of each sound.
-        walls: what lies between, for each.
-        candidates: where the sounds may have come from.
-        expected: log-likelihood of each candidate without the sound, for each.
-        known_rad: the device's offset and its standard deviation, as an earlier recording has shown them.
-        others: what other sounds say of the device (``BearingEvidence.of_device``).
+    ``expected`` is the log-likelihood of each candidate without the sound, ``known_rad`` the device's offset and its
+    standard deviation, as an earlier recording has shown them, and ``others`` what other sounds say of the device
+    (``BearingEvidence.of_device``).
     """
     place = candidates.place_m.astype(np.float64)
     # Azimuths depend on the plan alone: one candidate for each of its cells stands for those above and below it.

@@ -49,15 +49,8 @@ def evidence_of(
 ) -> EventEvidence:
     """Return the evidence of a sound.
 
-    Args:
-        track: of the channels of these microphones.
-        microphones: of the robot.
-        walk: the camera's poses in the level frame.
-        span_s: onset and offset, the recording's time.
-        candidates: where it may have come from.
-        walls: what lies between.
-        settings: how much it counts.
-        signs: -1 for a channel that is wired the other way round, else 1.
+    The walk's poses are of the level frame, the span is onset and offset; ``signs`` has -1 for a channel that is wired
+    the other way round.
 
     Raises:
         AudioError: the track cannot be read.

@@ -76,15 +76,8 @@ def find_among(
 ) -> Found | None:
     """Return the evidence of some sounds of a drive; see ``find_sources``.
 
-    Args:
-        track: as there.
-        walk: as there.
-        spans_s: of these sounds.
-        voxel_m: as there.
-        up_in_world: as there.
-        signs_by_s: of the sounds by which the signs of the channels are found.
-        signs: those, where they are known.
-        others: what the other sounds of the drive say of the device (``Found.of_device``).
+    The signs of the channels are found by the sounds of ``signs_by_s``, unless ``signs`` gives them. ``others`` is what
+    other sounds of the drive say of the device (``Found.of_device``).
 
     Raises:
         AudioError: the track cannot be read.

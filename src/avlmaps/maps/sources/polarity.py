@@ -55,13 +55,7 @@ def signs_along(
 ) -> Float[np.ndarray, " m"]:
     """Return the sign of each channel by some sounds along a walk; 1 for all of two channels, or of very many.
 
-    Args:
-        track: of the channels of these microphones.
-        microphones: of the robot.
-        walk: the camera's poses.
-        spans_s: onset and offset of the sounds.
-        place_m: candidates, the frame of the poses.
-        settings: how much a sum counts.
+    The candidates ``place_m`` are in the frame of the walk's poses; the spans are onset and offset of sounds.
 
     Raises:
         AudioError: the track cannot be read.

@@ -35,14 +35,7 @@ def loudest_of_sound(
 ) -> Correlations:
     """Return the frames of a sound that say most of those at which the robot's place is known; perhaps none.
 
-    Args:
-        track: of the channels of these microphones.
-        microphones: of the robot.
-        walk: the camera's poses.
-        span_s: onset and offset of the sound.
-        longest_s: of it that is read.
-        most: frames.
-        smoothing: of their curves, steps.
+    At most ``longest_s`` of the sound are read, and ``most`` frames chosen; ``smoothing`` of their curves is in steps.
 
     Raises:
         AudioError: the track cannot be read.

@@ -218,13 +218,8 @@ def carried_edits(
 ) -> tuple[Edit, ...]:
     """Return the edits of a map as those of another one that holds it; one that is of neither stays as it is.
 
-    Args:
-        edits: all of them.
-        keyframes: of the map that they are of.
-        own: world of that map.
-        world: of the other map.
-        onto: keyframes of the other map.
-        map_from_own: the other's world from the map's own.
+    The edits are of a map with the world ``own`` and these keyframes; the other map has ``world`` and the keyframes
+    ``onto``.
     """
 
     def carried(spot: Spot) -> Spot:

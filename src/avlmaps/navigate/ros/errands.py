@@ -28,10 +28,7 @@ class Errands:
     def send(self, name: str, operation: dict[str, Any], *, lasting: bool = False) -> bool:
         """Send an operation; return whether a connection could take it.
 
-        Args:
-            name: of the operation, until `done`.
-            operation: of the protocol of rosbridge.
-            lasting: keep its connection when others are many; it takes the place of the last such one.
+        The connection of a ``lasting`` one stays open when others are many; it takes the place of the last such one.
         """
         if lasting:
             self.leave(self._lasting)

@@ -29,13 +29,7 @@ def place_to_stand(
 ) -> MovementPlan | str:
     """Plan to stand at a place, or return why that cannot be.
 
-    Args:
-        start: where the robot is, level frame.
-        wanted: the place, level x and y.
-        looked_at: what to look at once there; else it looks in the direction of its arrival.
-        standing: moves the place to where a body can stand.
-        settings: tolerances.
-        task: returns the task of standing at a pose.
+    It looks at ``looked_at`` once there, else in the direction of its arrival.
     """
     if not np.abs(wanted).max() < _FAR_M or (looked_at is not None and not np.abs(looked_at).max() < _FAR_M):
         return "NaN or a place beyond the Earth cannot be driven to"

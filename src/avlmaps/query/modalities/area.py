@@ -92,12 +92,7 @@ def area_scores(
     The scores are the posteriors, pooled over what looked at about the same place; they are stretched and each view
     speaks for itself where the settings ask for the paper's score.
 
-    Args:
-        view: features.
-        encoder: that made them.
-        name: of the area.
-        settings: how.
-        places: what each looked at, metres; None leaves every view for itself.
+    ``places`` is what each view looked at, metres; None leaves every view for itself.
     """
     shares = view_shares(view, encoder, name, settings)
     posterior = np.clip(shares.share @ shares.weights, 0.0, 1.0)
@@ -268,16 +263,8 @@ def area_factor(
     As context it is how likely each place is in such an area; where the area itself is sought it falls from the places
     that look most like it.
 
-    Args:
-        space: of the map.
-        keyframes: its views.
-        encoder: of the views.
-        part: the area's name.
-        settings: how views are scored.
-        heat: how fast heat falls.
-        rooms: of the map; without them heat falls off round every keyframe.
-        corrected: puts in the rooms that people named: kinds behind those that the encoder knows.
-        is_one_room: the name is that of one room of the map, which ``corrected`` puts in as the last kind.
+    Without rooms heat falls off round every keyframe. ``corrected`` puts in the rooms that people named: kinds behind
+    those that the encoder knows; with ``is_one_room`` the name is that of one room of the map, the last such kind.
     """
     anchors = area_anchors(keyframes, settings)
     view = np.asarray(keyframes.view)

@@ -50,13 +50,7 @@ def sound_factor(
 ) -> NearAnchors:
     """Return the heat of a sound: its anchors are the places along its track, each with the sound's score.
 
-    Args:
-        space: the map's voxels.
-        sounds: what was heard.
-        scores: for each detected sound, in [0, 1]: the probability that it matches the query.
-        part: the part of the query.
-        settings: whether to stretch the scores.
-        heat: the falloff.
+    ``scores`` are, for each detected sound, the probability that it matches the query.
     """
     best = float(np.max(scores, initial=0.0))
     note = ""

@@ -80,13 +80,7 @@ def source_factor(
     A cell has the source's score times how likely it is against the likeliest cell. Sounds that are one yes together;
     those of a lower score stay by themselves.
 
-    Args:
-        space: the map's voxels.
-        sources: the evidence.
-        scores: for each detected sound, in [0, 1]: the probability that it matches the query.
-        part: the part of the query.
-        settings: the prior.
-        heat: the falloff.
+    ``scores`` are, for each detected sound, the probability that it matches the query.
     """
     order = np.argsort(-scores, kind="stable")
     kind, with_prior = "" if part.is_file else part.query, settings.prior == "lexicon"

@@ -100,11 +100,7 @@ class Dispatcher:
     def plan(self, words: str, program: str, who: Who, begun: int | None = None) -> dict[str, Any]:
         """Plan a command or a program on the map, and return the plan with its token.
 
-        Args:
-            words: a command; "" where there is a program.
-            program: a program; "" where there is a command.
-            who: wants it.
-            begun: the mark of when it was requested; that of now by default.
+        ``begun`` is the mark of when it was requested; that of now by default.
 
         Raises:
             DriveError: there is no plan, and so no token; the sentence says why.

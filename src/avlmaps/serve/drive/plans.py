@@ -139,10 +139,7 @@ class PlanBook:
     def add(self, plan: OrderPlan, now_s: float, begun: int | None = None) -> str:
         """Keep a plan and return its token; the oldest of too many plans goes.
 
-        Args:
-            plan: of an order.
-            now_s: the time.
-            begun: what ``cleared`` was when the plan was requested; that of now by default.
+        ``begun`` is what ``cleared`` was when the plan was requested; that of now by default.
 
         Raises:
             DriveError: the robot was stopped, or took another order, while the plan was computed.
