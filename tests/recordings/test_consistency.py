@@ -22,6 +22,7 @@ from avlmaps.recordings.consistency.agreement import NOTHING
 from avlmaps.recordings.consistency.causes import cause_of
 from avlmaps.recordings.consistency.check import check_recording, pose_at
 from avlmaps.recordings.consistency.edges import find_edges, shift_of
+from avlmaps.recordings.consistency.planes import offset_in_planes
 from avlmaps.recordings.consistency.sample import Sample, choose_pairs, draw_sample
 from avlmaps.recordings.consistency.single_frames import of_sound
 from avlmaps.recordings.consistency.suspects import Suspect, Trials, suspected_rig
@@ -434,6 +435,24 @@ def test_intrinsics_that_fit_already_are_no_cause() -> None:
     rig = Rig(CAMERA, CAMERA)
     assert suspected_rig(rig, Suspect(centred=True)) is None
     assert suspected_rig(rig, Suspect(focal=1.25)) is not None
+
+
+@pytest.mark.parametrize("added_m", [0.0, 0.15, -0.15, 0.4])
+def test_flat_surfaces_show_what_is_added_to_all_depths(added_m: float) -> None:
+    rng, rays = np.random.default_rng(7), Pinhole(120.0, 110.0, 60.0, 50.0, 128, 96).rays()
+    floors = [1.2 / (rays @ normal) for normal in ([0.1, 0.7, 0.5], [-0.5, 0.4, 0.6], [0.3, -0.6, 0.5])]
+    depth_m = np.stack([np.where((z > 0.3) & (z < 6.0), z + added_m, 0.0) for z in floors]).astype(np.float32)
+    assert offset_in_planes(depth_m) == pytest.approx(added_m, rel=0.2, abs=0.01)
+    noisy = depth_m + (rng.normal(0.0, 0.0008, depth_m.shape) * depth_m**2).astype(np.float32)
+    assert offset_in_planes(noisy) == pytest.approx(added_m, rel=0.2, abs=0.02)
+    assert np.isnan(offset_in_planes(np.full((3, 96, 128), 2.0 + added_m, np.float32)))  # seen face on
+
+
+@pytest.mark.parametrize(("added_m", "said"), [(0.15, "m too large everywhere"), (-0.15, "m too small everywhere")])
+def test_depths_that_are_off_by_one_length_are_doubted(added_m: float, said: str, right: Draft, tmp_path: Path) -> None:
+    depth = tuple(np.where(z > 0, z + 1000.0 * added_m, 0.0).astype(z.dtype) for z in right.depth)
+    (sentence,) = verdict(replace(right, depth=depth), tmp_path).sentences()
+    assert said in sentence and ("Flat surfaces are curved" in sentence) == (added_m > 0.0)  # else frames alone show it
 
 
 def test_a_comparison_of_too_few_points_has_no_difference_and_no_warning() -> None:

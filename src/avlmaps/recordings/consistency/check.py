@@ -28,7 +28,7 @@ from avlmaps.recordings.consistency.single_frames import (
     of_sound,
     warmth_of,
 )
-from avlmaps.recordings.consistency.suspects import PoseAt, Trial, Trials, find_cause, find_closer
+from avlmaps.recordings.consistency.suspects import PoseAt, Trial, Trials, find_cause, find_closer, find_offset
 from avlmaps.recordings.consistency.verdict import Finding, Grade, Reason, Verdict
 from avlmaps.recordings.corrections import NONE, CorrectedRecording, uncorrected
 from avlmaps.recordings.memory import is_of_program
@@ -123,6 +123,13 @@ def _of_agreement(recording: Recording, sample: Sample, found: _Found, median_m:
             "recording is read in another way."
         )
         yield Finding(Reason.GEOMETRY, Grade.SUSPICIOUS, sentence, _words(recording, closer, median_m, ""))
+    elif limits.can_be_judged(after) and (offset := find_offset(_trials(recording, sample))) is not None:
+        sentence = (
+            f"Flat surfaces are curved in the depth of single frames, as if {abs(offset.suspect.farther_m):.2g} m were "
+            f"{'added to' if offset.suspect.farther_m < 0.0 else 'taken from'} all of it, and without that the depths "
+            f"of the same points in two frames differ by {offset.off:.1%}, not by {_off(after, apart):.1%}."
+        )
+        yield Finding(Reason.GEOMETRY, Grade.SUSPICIOUS, sentence, _words(recording, offset, median_m, ""))
     elif misplaced := (
         find_exchanged(recording, sample, after) or find_jump(recording, sample, after) or find_parts(recording)
     ):
