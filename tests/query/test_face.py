@@ -18,6 +18,7 @@ from hypothesis.extra import numpy as some
 import avlmaps
 from avlmaps.cli.main import main
 from avlmaps.core.errors import AudioError, AvlmapsError, BackendError, MapError, QueryError, RecordingError
+from avlmaps.core.question import Question
 from avlmaps.maps.settings import GravitySettings
 from avlmaps.query.export_layers import layers_of
 from avlmaps.recordings.example_room import example_truth
@@ -58,6 +59,24 @@ def test_a_sentence_is_answered_with_count_notes_and_alternatives(m: avlmaps.AVL
     assert isinstance(answer.notes, tuple) and answer.count is None
     assert answer.to_dict()["text"] == answer.text
     assert m.ask("how many chairs are there?").count is not None
+
+
+def test_the_nearest_of_what_is_found_comes_first(folder: Path) -> None:
+    m = avlmaps.AVLMap.open(folder / "home.avlmap", avlmaps.QuerySettings(found_at=0.2))
+    likeliest = m.ask("the chair near the table")
+    first, second, third = likeliest.goals
+    assert third.probability < first.probability / 2.0 < second.probability
+    for near in (second.position, ",".join(map(str, second.position)), m.space.level(np.array(second.position))[:2]):
+        answer = m.ask("the nearest chair near the table", near=near)
+        assert answer.goals == (second, first, third) and answer.found
+        assert "the nearest of 2 that are found, 0.0 m away, is at" in answer.text
+    assert m.ask("the chair near the table", top=1, near=third.position).goals == (second,)
+    assert any("No position is known" in note for note in m.ask("the nearest chair").notes)
+    assert not m.ask("the nearest chair", near=first.position).notes
+    question = Question.of([one.part for one in likeliest.parts])
+    assert m.ask(question, near=second.position).goals == (second, first, third)
+    with pytest.raises(avlmaps.QueryError, match="A place is x,y or x,y,z in metres"):
+        m.ask("chair", near="here")
 
 
 def test_heat_is_an_array_and_has_arithmetic(m: avlmaps.AVLMap) -> None:

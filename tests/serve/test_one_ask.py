@@ -43,6 +43,7 @@ SENTENCES = [
 PARTS = [
     {"object": "sofa", "area": "kitchen"},
     {"object": "red chair"},
+    {"object": "chair", "near": "1.0,2.0"},
     {"sound": "doorbell", "object": "table", "primary": "sound"},
 ]
 

@@ -43,6 +43,8 @@ class Query(MapVerb):
     """Photo taken at the place."""
     intrinsics: Annotated[OptionalText, arg(metavar="FX,FY,CX,CY")] = None
     """Intrinsics of the photo's camera, fx,fy,cx,cy in pixels. Default: the map's own colour camera."""
+    near: Annotated[OptionalText, arg(metavar="X,Y[,Z]")] = None
+    """Goals nearest to this place first, of those that are found: level x,y, or x,y,z of the recording, metres."""
     primary: Annotated[Literal["object", "sound", "image", "area"] | None, arg(metavar="object|sound|image|area")] = (
         None
     )
@@ -94,7 +96,7 @@ def ask(verb: "Query", opened: "AVLMap | None" = None) -> dict[str, Any]:
     try:
         asked = Asked(
             sentence=verb.sentence, object=verb.object, sound=verb.sound, area=verb.area, image=photo, clip=clip,
-            primary=primary, top=verb.top,
+            primary=primary, top=verb.top, near=verb.near,
         )  # fmt: skip
         opened = opened or AVLMap.open(verb.map, settings)
         # A question about one thing runs no loops that are compiled, and loads nothing to announce them.

@@ -288,13 +288,17 @@ def _resolved(inquiry: Inquiry, sentence: Sentence) -> AskedSentence:
     return AskedSentence(Inquiry(inquiry.ask, targets), tuple(dict.fromkeys(notes)))
 
 
+FROM_NOWHERE = "No position is known to count"
+"""Begins the note on "the nearest window", which no place is named for."""
+
+
 def _from_nowhere(sentence: Sentence, targets: Sequence[Target]) -> tuple[str, ...]:
     """Return a note for "the nearest window": a question comes from no place, so that none is the nearest."""
     said = Said(sentence.tokens)
     if any(near.kind is not TargetKind.AREA for target in targets for near in target.near):
         return ()
     return tuple(
-        f"No position is known to count '{' '.join(said.texts[begin:end])}' from: the likeliest comes first. Say what "
-        "it is near."
+        f"{FROM_NOWHERE} '{' '.join(said.texts[begin:end])}' from: the likeliest comes first. Say what "
+        "it is near, or give a place to count from (near)."
         for begin, end in said.spans("nearest")
     )

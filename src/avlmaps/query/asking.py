@@ -11,17 +11,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from avlmaps.core.arrays import Float
 from avlmaps.core.errors import QueryError
 from avlmaps.core.files import user_path
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import HeardAt, Modality, Part, Question, Role
+from avlmaps.core.wording import coordinates
 from avlmaps.perception.protocols import NamedPixelEncoder
 from avlmaps.query.answer import Alternative, Answer, PartAnswer
 from avlmaps.query.factors import Factor, NearAnchors, NearThings
+from avlmaps.query.given_places import distance_m, place_given
 from avlmaps.query.goals import Goal
 from avlmaps.query.heatmap import Heatmap, product
 from avlmaps.query.room_names import own_names
-from avlmaps.query.wording import UNDERSTOOD_ONLY, absent_text, found_text
+from avlmaps.query.wording import UNDERSTOOD_ONLY, absent_text, found_text, placed
 
 if TYPE_CHECKING:
     from avlmaps.core.camera import Pinhole
@@ -31,7 +34,7 @@ if TYPE_CHECKING:
     from avlmaps.query.queryable import Attachment, Queryable
 
 # For a count, up to this many instances are taken; those that are found count.
-_MOST_COUNTED = 200
+MOST_GOALS = 200
 # Each way to name a storey has one of these: floor, storey, story, stories, level, upstairs.
 _STOREY_STEMS = ("floor", "stor", "level", "stair")
 _EXAMPLE = "the red cabinet near the sound of a dog barking"
@@ -67,6 +70,7 @@ class Asked:
     primary: Modality | None = None
     top: int = 3
     at: HeardAt | None = None
+    near: str | Sequence[float] | None = None
     at_by_words: bool = False
 
     def __post_init__(self) -> None:
@@ -156,8 +160,39 @@ def ask(avlmap: "Queryable", asked: Asked, files: Files | None = None) -> Answer
     sentence = asked.sentence.lower()
     # A query of one word loads nothing of the language.
     speaks_of_storeys = any(stem in sentence for stem in _STOREY_STEMS)
-    answer = (_ask_of_storeys if speaks_of_storeys else _ask)(avlmap, asked, files)
+    place = None if asked.near is None else place_given(asked.near)
+    wanted = asked if place is None else replace(asked, top=MOST_GOALS)
+    answer = (_ask_of_storeys if speaks_of_storeys else _ask)(avlmap, wanted, files)
+    if place is not None:
+        answer = nearest_first(avlmap, answer, place, asked.top)
     return on_storey(replace(answer, elapsed_ms=1e3 * (time.perf_counter() - begin)), avlmap.storeys)
+
+
+def nearest_first(avlmap: "Queryable", answer: Answer, place: Float[np.ndarray, " n"], top: int) -> Answer:
+    """Return an answer whose goals are those that count as found, the nearest to a place first.
+
+    One that is less than half as likely as the best is left behind them, as when a robot goes to the nearest. Of what
+    is not found, the likeliest guess stays first.
+    """
+    from avlmaps.language.questions import FROM_NOWHERE
+
+    if top < 1:
+        raise AskError(f"At most {top} goals are wanted; the number must be 1 or more.")
+    if not answer.found or not answer.goals:
+        return replace(answer, goals=answer.goals[:top])
+    least = max(avlmap.settings.found_at, answer.goals[0].probability / 2.0)
+
+    def away_m(goal: Goal) -> float:
+        return distance_m(avlmap.space.level, goal.position, place)
+
+    found = sorted((goal for goal in answer.goals if goal.probability >= least), key=away_m)
+    goals = (*found, *(goal for goal in answer.goals if goal.probability < least))[:top]
+    notes = tuple(note for note in answer.notes if not note.startswith(FROM_NOWHERE))
+    text = answer.text
+    if len(found) > 1 and answer.count is None:
+        away = f"{away_m(goals[0]):.1f} m away"
+        text = placed(f"from ({coordinates(place)}) the nearest of {len(found)} that are found, {away}, is", goals[0])
+    return replace(answer, goals=goals, text=text, notes=notes)
 
 
 def _ask_of_storeys(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
@@ -280,10 +315,10 @@ def _answer_said(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
     if numbered is None:
         return _answer_read(avlmap, asked, files)
     number, what = numbered
-    answer = _answer_read(avlmap, replace(asked, sentence=f"how many {what} are there", top=_MOST_COUNTED), files)
+    answer = _answer_read(avlmap, replace(asked, sentence=f"how many {what} are there", top=MOST_GOALS), files)
     count = answer.count or 0
     said = f"{count} of the {number} {what} are found" if count < number else f"{count} {what} are found"
-    goals = answer.goals[: min(max(number, 1), _MOST_COUNTED)]
+    goals = answer.goals[: min(max(number, 1), MOST_GOALS)]
     return replace(answer, goals=goals, found=count >= number, text=f"{said[:1].upper()}{said[1:]}. {answer.text}")
 
 
@@ -310,7 +345,7 @@ def _answer_read(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
                 "The sentence does not speak of the file; say 'near where this photo was taken' or 'near the sound of "
                 "this recording' in it, or take the sentence or the file away."
             )
-        answers.append((question, answer_question(avlmap, question, _MOST_COUNTED if counted else asked.top, files)))
+        answers.append((question, answer_question(avlmap, question, MOST_GOALS if counted else asked.top, files)))
     answers.sort(key=lambda one: (one[1].found, one[1].probability), reverse=True)
     best, others = answers[0][1], answers[1:]
     alternatives = tuple(Alternative(question, one.probability, one.found, one.goals[:1]) for question, one in others)

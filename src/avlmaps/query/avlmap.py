@@ -813,6 +813,7 @@ class AVLMap:
         clip: str | Path | None = None,
         primary: Modality | str | None = None,
         at: HeardAt | None = None,
+        near: str | Sequence[float] | None = None,
     ) -> "Answer":
         """Answer a query with places, as the command line, the server and the viewer do.
 
@@ -832,25 +833,39 @@ class AVLMap:
             primary: which part is sought; the others say where it is.
             at: the place of a sound: ``robot``, where it was heard, or ``source``, where it came from; by default as
                 ``settings.sounds.at`` says, else as the words do.
+            near: x, y, z in metres of the recording frame, or x, y of the level one: the goals nearest to it come
+                first, of those that are found.
 
         Raises:
             AskError: there is nothing to ask, both a sentence and parts, or a file that the sentence does not speak of.
             QueryError: the sentence is not understood, or a part of the query cannot be used.
         """
-        from avlmaps.query.asking import Asked, AskError, Files, answer_question, ask, on_storey
+        from avlmaps.query.asking import (
+            MOST_GOALS,
+            Asked,
+            AskError,
+            Files,
+            answer_question,
+            ask,
+            nearest_first,
+            on_storey,
+        )
+        from avlmaps.query.given_places import place_given
 
         files = Files(intrinsics, attachments)
         if isinstance(question, Question):
             if any(part is not None for part in (object, sound, area, image, clip, primary)):
                 raise AskError("A question holds its parts already; give a sentence or parts instead.")
-            return on_storey(answer_question(self, question.heard_at(at), top, files), self.storeys)
+            place = None if near is None else place_given(near)
+            answer = answer_question(self, question.heard_at(at), top if place is None else MOST_GOALS, files)
+            return on_storey(answer if place is None else nearest_first(self, answer, place, top), self.storeys)
         photo, recording = (None if file is None else str(file) for file in (image, clip))
         if primary is not None and primary not in list(Modality):
             raise AskError(f"primary is one of {', '.join(Modality)}, not {primary!r}.")
         sought = None if primary is None else Modality(primary)
         asked = Asked(
             sentence=question, object=object, sound=sound, area=area, image=photo, clip=recording, primary=sought,
-            top=top, at=at,
+            top=top, at=at, near=near,
         )  # fmt: skip
         return ask(self, asked, files)
 

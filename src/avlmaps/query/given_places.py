@@ -1,7 +1,7 @@
 """Places as people give them: x,y,z in metres of the recording frame, or x,y of the level frame."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -31,6 +31,22 @@ def place_given(place: str | Sequence[float]) -> Float[np.ndarray, " n"]:
         QueryError: they are no two or three numbers.
     """
     return place_of(place if isinstance(place, str) else ",".join(str(value) for value in place))
+
+
+def distance_m(
+    level: Callable[[Float[np.ndarray, "m 3"]], Float[np.ndarray, "m 3"]],
+    point: Sequence[float],
+    place: Float[np.ndarray, " n"],
+) -> float:
+    """Return how far a point lies from a place: in space, or level where the place has no height.
+
+    Args:
+        level: turns points of the recording frame into the level one.
+        point: x, y, z, recording frame.
+        place: of two or three numbers.
+    """
+    here = np.array(point)
+    return math.dist(here, place) if len(place) == 3 else math.dist(level(here)[:2], place)
 
 
 def is_place(near: str | Sequence[float]) -> bool:

@@ -14,7 +14,7 @@ from avlmaps.core.arrays import Float
 from avlmaps.core.errors import QueryError
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.contents import Watch, listed_rooms, put_storeys, require_known
-from avlmaps.query.given_places import is_place, place_given
+from avlmaps.query.given_places import distance_m, is_place, place_given
 from avlmaps.query.schema import ListedThing, NearAnswer, RoomAnswer, SoundAnswer, ThingAnswer
 from avlmaps.query.sound_sources import with_heard
 from avlmaps.query.unknown_names import unknown_note
@@ -189,7 +189,11 @@ def selected(lists: MapLists, wanted: Wanted) -> tuple[list[Selected], NearAnswe
     place, about = _near(lists, wanted.near, wanted.at)
     itself = None if about is None else about["position"]
     level = lists.avlmap.space.level
-    found = [replace(one, away_m=_away(level, one.thing, place)) for one in found if one.thing["position"] != itself]
+    found = [
+        replace(one, away_m=distance_m(level, one.thing["position"], place))
+        for one in found
+        if one.thing["position"] != itself
+    ]
     return sorted(found, key=lambda one: one.away_m or 0.0), about
 
 
@@ -229,13 +233,3 @@ def _near(
     best = things[0]
     about: NearAnswer = {"name": best["name"], "confidence": best["confidence"], "position": best["position"]}
     return np.array(best["position"]), about
-
-
-def _away(
-    level: Callable[[Float[np.ndarray, "m 3"]], Float[np.ndarray, "m 3"]],
-    thing: ThingAnswer,
-    place: Float[np.ndarray, " n"],
-) -> float:
-    """Return how far a thing's position lies from a place: in space, or level where the place has no height."""
-    point = np.array(thing["position"])
-    return math.dist(point, place) if len(place) == 3 else math.dist(level(point)[:2], place)

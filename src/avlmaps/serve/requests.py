@@ -103,6 +103,10 @@ class AskQuery(Struct, forbid_unknown_fields=True):
         HeardAt | None,
         Meta(description="Place of a sound: robot, where it was heard, or source. Default: as the words say."),
     ] = None
+    near: Annotated[
+        Place | None,
+        Meta(description="x,y,z, or level x,y: the goals nearest to it come first, of those that are found."),
+    ] = None
     intrinsics: Annotated[
         Intrinsics | None,
         Meta(description="fx,fy,cx,cy of the photo's camera in pixels. Default: the map's own camera."),

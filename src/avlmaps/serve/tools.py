@@ -38,6 +38,7 @@ class AskToolQuery(AskQuery, forbid_unknown_fields=True):
     ] = None
     top: Annotated[int, Meta(ge=1, le=100)] = 3
     at: Annotated[HeardAt | None, Meta(description="source: where a sound came from, not where it was heard")] = None
+    near: Annotated[Short | None, Meta(description="x,y: nearest first")] = None
     intrinsics: Intrinsics = None
     photo: Annotated[_Base64 | None, Meta(description="base64, for 'this photo'")] = None
     clip: Annotated[_Base64 | None, Meta(description="base64, for 'this recording'")] = None

@@ -276,6 +276,7 @@ def ask_map(task: Task, query: requests.AskQuery) -> Answer:
         clip=requests.CLIP if requests.CLIP in attachments else None,
         primary=query.primary,
         at=query.at,
+        near=query.near,
     )
 
 
