@@ -49,6 +49,7 @@ _HAND_NOUNS = frozenset({"side", "rail", "wash", "basin", "dryer", "towel"})
 _AHEAD = frozenset({"forward", "forwards", "ahead", "straight"})
 _BACKWARDS = frozenset({"backward", "backwards", "reverse", "reversing"})
 _VAGUE = frozenset({"a", "an", "one", "another"})
+_NO_QUALITIES = frozenset({"near", "close", "far", "distant", "of", "likely", "probable"})
 _COUNTED_ON = frozenset({"nearest", "closest", "farthest", "furthest", "next", "last", "first"})
 _FAR_BACK = 4
 _ONES = (("the", "one"), ("the", "ones"))
@@ -307,15 +308,7 @@ def _is_entry(name: str) -> bool:
 
 
 def _is_quality(said: Claimed, at: int) -> bool:
-    return at < len(said.texts) and said.texts[at] not in (
-        "near",
-        "close",
-        "far",
-        "distant",
-        "of",
-        "likely",
-        "probable",
-    )
+    return at < len(said.texts) and said.texts[at] not in _NO_QUALITIES
 
 
 def is_superlative(word: str) -> bool:

@@ -129,11 +129,7 @@ def manifest_of(
     bad: Sequence[manifest.BadFrame] = (),
 ) -> manifest.MapInfo:
     """Return the content of ``map.json`` but for its list of files."""
-    doubts = (
-        *plan.doubts,
-        *carving_doubts(merged.removed, len(content.voxels)),
-        *feature_doubts(content, plan.models),
-    )
+    doubts = (*plan.doubts, *carving_doubts(merged.removed, len(content.voxels)), *feature_doubts(content, plan.models))
     return manifest.MapInfo(
         avlmaps_version=__version__,
         build_key=plan.key,

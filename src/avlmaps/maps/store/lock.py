@@ -17,10 +17,7 @@ _BUSY = {
     LOCK: "is being built by {} at this moment; {}, or build into another folder.",
     EDITING: "is being edited by {} at this moment; try again.",
 }
-_UNWRITTEN = {
-    LOCK: TO_BUILD,
-    EDITING: TO_EDIT,
-}
+_UNWRITTEN = {LOCK: TO_BUILD, EDITING: TO_EDIT}
 
 if sys.platform == "win32":  # pragma: no cover - tried on Windows only
     import msvcrt
