@@ -301,3 +301,9 @@ def test_another_day_is_merged_and_its_changes_are_told(dated: Path, built: Path
 def test_a_map_without_features_of_things_is_not_offered_a_question() -> None:
     lines = next_lines({"path": "a.avlmap", "voxels": 9, "models": {"sounds": "x"}})
     assert [line.split()[-2] for line in lines[:1]] == ["view"] and lines[0].startswith("next: ") and len(lines) == 2
+
+
+def test_a_map_of_colours_is_offered_a_question_that_it_understands() -> None:
+    answer = {"path": "a.avlmap", "voxels": 9, "models": {"pixels": "x"}}
+    assert '"something red"' in next_lines(answer | {"profile": "colours"})[0]
+    assert '"where is the chair?"' in next_lines(answer | {"profile": "embedded"})[0]

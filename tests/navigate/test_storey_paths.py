@@ -120,6 +120,13 @@ def test_on_one_storey_a_path_is_as_ever() -> None:
         assert np.array(answer["points"])[:, 2] == pytest.approx(z, abs=0.05)
 
 
+def test_what_lies_outside_is_named_in_one_number_or_the_other() -> None:
+    inside, outside = np.array([3.0, 3.0, 0.0]), np.array([90.0, 3.0, 0.0])
+    finder = PathFinder(HOME)
+    assert finder.answer(inside, outside)["note"] == "the goal lies outside of the map"
+    assert finder.answer(outside, outside)["note"] == "the start and the goal lie outside of the map"
+
+
 def test_a_driver_on_the_ground_floor_goes_nowhere_for_a_place_upstairs() -> None:
     driver = MapDriver(obstacles_for(HOME, BASE, 0), FreeBody(GroundPose(3.0, 3.0, 0.0)))
     refused = driver.go_to(np.array(UP))

@@ -228,7 +228,8 @@ def next_lines(answer: dict[str, Any]) -> list[str]:
     """Return what to do next with a map or a recording; one that contradicts itself is not to be built."""
     path = shlex.join([str(answer["path"]), *answer.get("more", ())])
     if "voxels" in answer:
-        query = [f'avlmaps query {path} "where is the chair?"'] if "pixels" in answer["models"] else []
+        words = "something red" if answer.get("profile") == "colours" else "where is the chair?"
+        query = [f'avlmaps query {path} "{words}"'] if "pixels" in answer["models"] else []
         others = [f"avlmaps view {path}", f"avlmaps info {path} --verbose   (every detail)"]
         return [f"{'     ' if number else 'next:'} {line}" for number, line in enumerate([*query, *others])]
     out = shlex.quote(f"{Path(answer['path']).stem or 'home'}.avlmap")

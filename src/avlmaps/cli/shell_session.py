@@ -38,7 +38,7 @@ A line is a question, as `avlmaps query` takes it, or begins with a verb:
   locate photo.jpg                           the pose of the camera that took a photo
   go to the sofa, then turn left             the plan of a command; with --scene the simulated robot drives it
   plot FILE                                  a picture of the last answer, or of the map
-  export FILE [--heat "the sofa"]            the map for other programs: .ply, .glb, .pgm, .csv, .rrd, .mcap
+  export FILE [--heat "the sofa"]            the map for other programs: .ply, .glb, ... (export --help)
   help                                       this text; VERB --help lists the options of a verb
   quit                                       the end, as Ctrl-D; Ctrl-C stops an answer"""
 _PICTURE = re.compile(r"\.(jpe?g|png|webp|bmp|tiff?|ppm|pgm)['\"]?$", re.IGNORECASE)

@@ -176,7 +176,7 @@ class PathFinder:
             off = [name for name, at in (("start", one), ("goal", other)) if not self._holds(at)]
             note = note or self._forbidden(other)
             if off:
-                note = f"the {' and the '.join(off)} lies outside of the map"
+                note = f"the {' and the '.join(off)} {'lies' if len(off) == 1 else 'lie'} outside of the map"
             return {"found": False, "points": [], "length_m": None, "cost": None, "stop": None,
                     "note": note or "no free floor leads there", "frame": FRAME}  # fmt: skip
         answer: PathAnswer = {
