@@ -63,7 +63,7 @@ CAMERAS = (write_polycam, "keyframes/cameras/*.json")
         (NERF, turned, "looks written column by column: transpose it"),
         (NERF, lambda p: p.update(integer_depth_scale=0.001, depth_unit_scale_factor=0.25), "says twice"),
         (R3D, lambda p: p.update(frameTimestamps=p["frameTimestamps"][:3]), "3 frameTimestamps for 6 poses"),
-        (R3D, lambda p: p.update(frameTimestamps=[1e3 * s for s in p["frameTimestamps"]]), "stamps in seconds?"),
+        (R3D, lambda p: p.update(frameTimestamps=[1e3 * s for s in p["frameTimestamps"]]), "look like milliseconds"),
         (R3D, lambda p: p.update(perFrameIntrinsicCoeffs=[p["K"]] * 6), "9 numbers in a row of perFrameIntrinsic"),
     ],
 )
