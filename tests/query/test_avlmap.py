@@ -124,11 +124,13 @@ def test_clips_that_cannot_be_asked_with_are_refused(
     missing = tmp_path / "none.wav"
     with pytest.raises(QueryError, match=f"^The clip {missing} is not there; check the name\\.$"):
         heard.sound_clip(missing)
-    with pytest.raises(QueryError, match=r"^The clip a clip is silent \(its loudest sample is 0\); ask with one"):
+    with pytest.raises(
+        QueryError, match=r"^The clip that was given is silent \(its loudest sample is 0\); ask with one"
+    ):
         heard.sound_clip(Sound(np.zeros(1600, np.float32), 16000))
-    with pytest.raises(QueryError, match=r"^The clip a clip has no samples; ask with another one\.$"):
+    with pytest.raises(QueryError, match=r"^The clip that was given has no samples; ask with another one\.$"):
         heard.sound_clip(Sound(np.zeros(0, np.float32), 16000))
-    with pytest.raises(QueryError, match=r"^The clip a clip holds NaN or infinity; ask with another one\.$"):
+    with pytest.raises(QueryError, match=r"^The clip that was given holds NaN or infinity; ask with another one\.$"):
         heard.sound_clip(Sound(np.full(10, np.nan, np.float32), 16000))
 
     def unreadable(path: Path) -> None:

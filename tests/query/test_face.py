@@ -348,6 +348,34 @@ def test_what_is_no_phrase_is_refused_in_a_sentence(m: avlmaps.AVLMap, words: ob
         m.ask(object="chair", primary="colour" if words is None else words)
 
 
+def test_one_name_is_a_name_and_not_its_letters(m: avlmaps.AVLMap) -> None:
+    name = m.things(least_confidence=0.0)[0].name
+    listed = m.things([name], 0.0)
+    assert listed and [one.position for one in m.things(name, 0.0)] == [one.position for one in listed]
+    assert len(m.contents(0.0, name).things) == len(listed)
+
+
+@pytest.mark.parametrize(
+    ("ask", "said"),
+    [
+        (
+            lambda m: m.ask(image=np.zeros((9, 9, 3), np.uint8)),
+            "image is the path of a file, not ndarray; .*image='it'",
+        ),
+        (lambda m: m.ask(clip=avlmaps.Sound(beeps(), RATE_HZ)), "clip is the path of a file, not Sound; .*clip='it'"),
+        (lambda m: m.sound_clip(beeps()), r"or an avlmaps\.Sound\(samples, rate_hz\), not ndarray"),
+        (lambda m: m.sound("dog bark", at="moon"), "at is robot, .*, or source, .*; not 'moon'"),
+        (lambda m: m.ask("the dog bark", at="moon"), "at is robot, .*, or source, .*; not 'moon'"),
+        (lambda m: m.locate(np.zeros((9, 9, 3), np.uint8), (1.0, 1.0, 4.0, 4.0)), r"avlmaps\.Pinhole\(.*, not tuple"),
+    ],
+)
+def test_a_photo_a_clip_or_a_place_of_another_kind_is_refused_in_a_sentence(
+    m: avlmaps.AVLMap, ask: Callable, said: str
+) -> None:
+    with pytest.raises(QueryError, match=said):
+        ask(m)
+
+
 def test_frames_of_ones_own_are_sent_to_a_map_in_memory(folder: Path, tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="not of list; add frames of your own to a VoxelMap"):
         avlmaps.build_map(list(avlmaps.open_recording(folder / "rec")), tmp_path / "map")

@@ -293,6 +293,7 @@ class AVLMap:
         Raises:
             QueryError: the map was not seen on such a day, or on one day alone.
         """
+        names = [names] if isinstance(names, str) else names
         if at is not None:
             from avlmaps.query.changes import Days, things_at
             from avlmaps.query.sound_sources import with_heard_then
@@ -400,6 +401,7 @@ class AVLMap:
         from avlmaps.query.contents import Contents, require_known
         from avlmaps.query.sound_sources import with_heard
 
+        names = [names] if isinstance(names, str) else names
         models = self.stored.info.models
         require_known(self.knows, (names or ()) if "pixels" in models else ())
         things = self.things(names, least_confidence, structure) if "pixels" in models else []
@@ -522,9 +524,13 @@ class AVLMap:
         Raises:
             QueryError: the clip is missing, unreadable or silent, or the map does not know where sounds came from.
         """
+        if not isinstance(clip, str | Path | Sound):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise QueryError(
+                f"A clip is the path of a file or an avlmaps.Sound(samples, rate_hz), not {type(clip).__name__}."
+            )
         name = "a clip" if isinstance(clip, Sound) else str(clip)
         part = Part(Modality.SOUND, name, _role(primary), is_file=True)
-        sound = require_audible(clip, name) if isinstance(clip, Sound) else read_clip(user_path(clip))
+        sound = require_audible(clip, "that was given") if isinstance(clip, Sound) else read_clip(user_path(clip))
         heard = self.stored.sounds
         scores = np.zeros(0)
         if len(heard):
@@ -535,6 +541,8 @@ class AVLMap:
 
     def _sound_heat(self, part: Part, scores: Float[np.ndarray, " sounds"], at: HeardAt | None) -> Heatmap:
         settings = self.settings.sounds
+        if at not in (None, "robot", "source"):
+            raise QueryError(f"at is robot, where a sound was heard, or source, where it came from; not {at!r}.")
         if (at or settings.at) == "source" and len(scores):
             from avlmaps.query.modalities.source import source_factor
 
@@ -562,7 +570,7 @@ class AVLMap:
         """
         from avlmaps.query.sound_sources import list_sources
 
-        return list_sources(self, names, prior, least=least)
+        return list_sources(self, [names] if isinstance(names, str) else names, prior, least=least)
 
     def area(self, word: str, primary: bool = False) -> Heatmap:
         """Return the heat of an area, such as a kitchen; or of one room by its number, such as bathroom 2.
@@ -859,6 +867,12 @@ class AVLMap:
             place = None if near is None else place_given(near)
             answer = answer_question(self, question.heard_at(at), top if place is None else MOST_GOALS, files)
             return on_storey(answer if place is None else nearest_first(self, answer, place, top), self.storeys)
+        for name, file in (("image", image), ("clip", clip)):
+            if file is not None and not isinstance(file, str | Path):  # pyright: ignore[reportUnnecessaryIsInstance]
+                raise AskError(
+                    f"{name} is the path of a file, not {type(file).__name__}; what is in memory comes as "
+                    f"attachments={{'it': ...}} and {name}='it'."
+                )
         photo, recording = (None if file is None else str(file) for file in (image, clip))
         if primary is not None and primary not in list(Modality):
             raise AskError(f"primary is one of {', '.join(Modality)}, not {primary!r}.")

@@ -46,6 +46,11 @@ def require_fitting(rgb: UInt8[np.ndarray, "h w 3"], intrinsics: Pinhole | None)
             f"The picture is an array of {rgb.dtype} and shape {rgb.shape}; give RGB, uint8 of (height, width, 3)."
         )
     height, width = rgb.shape[:2]
+    if intrinsics is not None and not isinstance(intrinsics, Pinhole):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise QueryError(
+            "The intrinsics of a picture are an avlmaps.Pinhole(fx, fy, cx, cy, width, height), not "
+            f"{type(intrinsics).__name__}."
+        )
     if intrinsics is not None and (intrinsics.width, intrinsics.height) != (width, height):
         raise QueryError(
             f"The picture has {width}x{height} pixels, its intrinsics are for "
