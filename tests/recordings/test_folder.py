@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tracemalloc
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -463,3 +464,33 @@ def test_stamps_that_are_no_numbers_are_refused_without_a_warning(tmp_path: Path
         warnings.simplefilter("error")
         with pytest.raises(RecordingError, match="has no frame with a usable pose"):
             open_recording(folder)
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "sentence"),
+    [
+        ("colour", "bmp", "colour is 'bmp'; it must be png or jpg"),
+        ("depth_units_per_m", 0.0, "depth_units_per_m is 0; it must be positive"),
+        ("up_in_world", np.zeros(3), "it must be a unit vector"),
+        ("rig", rig().rgb, "rig must be an avlmaps.Rig, not Pinhole; of one camera Rig(camera, camera)"),
+    ],
+)
+def test_what_no_reader_would_take_is_refused_before_the_drive(tmp_path: Path, name: str, given: object, sentence: str):
+    writer = RecordingWriter(tmp_path / "walk", rig())
+    setattr(writer, name, given)
+    with pytest.raises(RecordingError, match=re.escape(sentence)):
+        writer.__enter__()
+    assert not (tmp_path / "walk").exists()
+
+
+def test_a_frame_that_would_lose_its_depth_or_its_pose_is_refused(tmp_path: Path):
+    whole = _frame(0, 0.0)
+    turned = np.eye(4)
+    turned[3] = 1.0, 2.0, 3.0, 1.0
+    with RecordingWriter(tmp_path / "walk", rig()) as writer:
+        with pytest.raises(RecordingError, match="looks like millimetres"):
+            writer.add(replace(whole, depth_m=np.full_like(whole.depth_m, 2500.0)))
+        with pytest.raises(RecordingError, match="not a rigid transform"):
+            writer.add(replace(whole, world_from_camera=turned))
+        writer.add(whole)
+    assert len(open_recording(tmp_path / "walk")) == 1

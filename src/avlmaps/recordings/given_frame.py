@@ -14,7 +14,7 @@ from avlmaps.recordings.plausible import MAX_FROM_ORIGIN_M, date_fault
 from avlmaps.recordings.types import Frame
 
 # A picture whose middle depth is farther than this was given in millimetres: 0.2 m of them are more.
-_FARTHEST_MIDDLE_M = 200.0
+FARTHEST_MIDDLE_M = 200.0
 _FARTHEST_MIDDLE_CM = 900.0  # and in centimetres it would be a room
 # One that has no depth beyond this was given in kilometres, or divided twice.
 _NEAREST_FARTHEST_M = 0.02
@@ -106,11 +106,11 @@ def _depths(name: str, given: Any) -> Float[np.ndarray, "hd wd"]:
     if (seen < 0.0).any():
         raise RecordingError(f"depth_m of {name} holds negative depths, down to {seen.min():.4g} m; 0 says none.")
     middle_m, farthest_m = (float(np.median(seen)), float(seen.max())) if len(seen) else (1.0, 1.0)
-    if middle_m > _FARTHEST_MIDDLE_M or farthest_m < _NEAREST_FARTHEST_M:
+    if middle_m > FARTHEST_MIDDLE_M or farthest_m < _NEAREST_FARTHEST_M:
         unit = "millimetres" if middle_m > _FARTHEST_MIDDLE_CM else "centimetres, or millimetres of what is near"
         raise RecordingError(
             f"depth_m of {name} must be in metres; its median is {middle_m:,.4g} and its largest {farthest_m:,.4g}"
-            f"{f', which looks like {unit}' if middle_m > _FARTHEST_MIDDLE_M else ''}."
+            f"{f', which looks like {unit}' if middle_m > FARTHEST_MIDDLE_M else ''}."
         )
     return depth
 

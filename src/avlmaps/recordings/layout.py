@@ -158,7 +158,7 @@ def read_description(folder: Path, report: Report) -> Description:
     path = folder / DESCRIPTION
     try:
         description = decode_description(path)
-        fault = _impossible(description)
+        fault = impossible(description)
         if fault:
             raise RecordingError(f"{path}: {fault}; fix the file.")
     except RecordingError as error:
@@ -212,7 +212,7 @@ def _lower(message: str) -> str:
     return message if message[1:2].isupper() else message[:1].lower() + message[1:]
 
 
-def _impossible(description: Description) -> str:
+def impossible(description: Description) -> str:
     """Return the impossible value of a well-formed description, or an empty string."""
     try:
         description.rig()

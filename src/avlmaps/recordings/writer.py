@@ -22,6 +22,7 @@ from avlmaps.recordings import layout
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
 from avlmaps.recordings.channels import ChannelSound, write_channels
 from avlmaps.recordings.directions import DIRECTIONS, DirectionTrack, write_directions
+from avlmaps.recordings.given_frame import FARTHEST_MIDDLE_M
 from avlmaps.recordings.memory import same_rig
 from avlmaps.recordings.microphones import MicrophoneNumbers, Microphones
 from avlmaps.recordings.types import BaseHeight, Frame
@@ -72,6 +73,7 @@ class RecordingWriter:
     _frames: TextIO | None = field(default=None, init=False)
 
     def __enter__(self) -> "RecordingWriter":
+        self._require_possible()
         self.path = lasting_path(self.path)
         _make_empty(self.path)
         # Who reads a recording that is being written finds its cameras here.
@@ -102,13 +104,20 @@ class RecordingWriter:
         Depth is rounded to the format's unit; what is beyond its range (65.534 m for millimetres) is left out.
 
         Raises:
-            RecordingError: the name was used before, the stamp is not after the last, or the disk is full.
+            RecordingError: the depth is not in metres, the pose is no rigid motion, the name was used before, the stamp
+                is not after the last, or the disk is full.
         """
         if not same_rig(frame.rig, self.rig):
             raise RecordingError(f"Frame {frame.name} was taken by another camera than the recording's first frame.")
+        self._announce(frame.name, frame.stamp_s)
+        poses.orthonormalize(frame.world_from_camera, f"frame {frame.name}")  # or it has no quaternion
         raw = np.rint(frame.depth_m.astype(np.float64) * self.depth_units_per_m)
         raw = np.where((raw > 0) & (raw <= _MAX_DEPTH_VALUE), raw, 0).astype(np.uint16)
-        self._announce(frame.name, frame.stamp_s)
+        if not raw.any() and (middle_m := _middle_m(frame.depth_m)) > FARTHEST_MIDDLE_M:
+            raise RecordingError(
+                f"No depth of frame {frame.name} can be written: its median is {middle_m:,.0f}, which looks like "
+                "millimetres; depth_m is in metres."
+            )
         _write_picture(self.path / "rgb" / f"{frame.name}.{self.colour}", frame.rgb[..., ::-1])
         _write_picture(self.path / "depth" / f"{frame.name}.png", raw)
         self._log(frame.name, frame.stamp_s, frame.world_from_camera)
@@ -194,6 +203,17 @@ class RecordingWriter:
             take_file(path, self.path / name, link=False)
         self._microphones = msgspec.structs.replace(self._microphones, files=names)
 
+    def _require_possible(self) -> None:
+        """Raise ``RecordingError`` where readers would refuse what is written, before a frame is."""
+        if not isinstance(self.rig, Rig):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise RecordingError(
+                f"rig must be an avlmaps.Rig, not {type(self.rig).__name__}; of one camera Rig(camera, camera)."
+            )
+        if self.colour not in ("png", "jpg"):
+            raise RecordingError(f"colour is {self.colour!r}; it must be png or jpg.")
+        if fault := layout.impossible(self._described()):
+            raise RecordingError(f"{fault}.")
+
     def _announce(self, name: str, stamp_s: float) -> None:
         if self._poses is None:
             raise ValueError("the writer is not open; use it in a with block")
@@ -229,9 +249,12 @@ class RecordingWriter:
 
     def _description(self) -> bytes:
         """Return the content of the description of the frames until now."""
+        return msgspec.json.format(msgspec.json.encode(self._described()), indent=2) + b"\n"
+
+    def _described(self) -> layout.Description:
         rate_hz = _rate_hz(self._stamps_s)
         rig = self.rig
-        description = layout.Description(
+        return layout.Description(
             schema_version=layout.SCHEMA_VERSION,
             intrinsics=layout.Intrinsics(
                 rgb=layout.CameraNumbers.of(rig.rgb),
@@ -249,7 +272,6 @@ class RecordingWriter:
             begins_s=self.begins_s or msgspec.UNSET,
             base_height=self.base_height or msgspec.UNSET,
         )
-        return msgspec.json.format(msgspec.json.encode(description), indent=2) + b"\n"
 
 
 def _rate_hz(stamps_s: Sequence[float] | Float[np.ndarray, " n"]) -> float | None:
@@ -314,3 +336,9 @@ def take_file(source: Path, target: Path, link: bool) -> None:
     except OSError as error:
         where = error.filename or source
         raise RecordingError(f"{source} could not be copied to {target} ({where}: {error.strerror}).") from None
+
+
+def _middle_m(depth_m: Float[np.ndarray, "h w"]) -> float:
+    """Return the median of the depths that are known; 0 where none is."""
+    known = depth_m[np.isfinite(depth_m) & (depth_m > 0.0)]
+    return float(np.median(known)) if len(known) else 0.0
