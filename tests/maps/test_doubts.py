@@ -79,6 +79,11 @@ def with_array(draft: Draft, folder: Path, order: tuple[int, ...] = (0, 1, 2, 3)
     return path
 
 
+def of_channels(doubts: tuple[str, ...]) -> tuple[str, ...]:
+    """Return those but of the fake ears, to which all sounds are one."""
+    return tuple(doubt for doubt in doubts if "features of sounds by fake/ears" not in doubt)
+
+
 @pytest.mark.slow
 def test_exchanged_channels_are_a_finding_with_the_order_that_fits(right: Draft, tmp_path: Path) -> None:
     whole = judge(open_recording(with_array(right, tmp_path / "whole")))
@@ -97,9 +102,9 @@ def test_a_dead_channel_stays_with_the_map_and_the_sound_is_read_for_it_once(
     read, look = [], channels._looked_at
     monkeypatch.setattr(channels, "_looked_at", lambda track: read.append(track) or look(track))
     stored = build_map(open_recording(path), tmp_path / "map", PROFILE, SETTINGS, progress=False)
-    (doubt,) = stored.info.doubts
+    (doubt,) = of_channels(stored.info.doubts)
     assert "Channel 2 of dead/audio.flac" in doubt and "not connected" in doubt
-    assert len(read) == 1
+    assert len(read) == 2  # for its level, as of any sound, and for its channels
 
 
 @pytest.mark.slow
@@ -118,8 +123,9 @@ def test_a_live_map_ends_with_the_doubts_about_channels_that_a_build_has(
     said: list[str] = []
     end_drive(live, said.append)
     wanted = doubts_of_channels(recording.audio, recording.walk, "the sound")
-    assert len(wanted) == 1 and live.doubts == wanted == open_stored(live.path).info.doubts
-    assert said == [f"note: {wanted[0]}"]
+    assert len(wanted) == 1 and of_channels(live.doubts) == wanted
+    assert live.doubts == open_stored(live.path).info.doubts
+    assert said == [f"note: {doubt}" for doubt in live.doubts]
 
 
 def test_much_that_is_seen_through_is_doubtful() -> None:

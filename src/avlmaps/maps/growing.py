@@ -500,7 +500,10 @@ class GrowingMap:
         if final:
             self._of_channels = self._doubts_of_channels()
         if self._sensor is None:  # the frames wait on, so that a question changes nothing
-            return self._rehearse()._settled(final)
+            other = self._rehearse()
+            made = other._settled(final)
+            self._of_features = other._of_features
+            return made
         return self._settled(final)
 
     def _settled(self, final: bool) -> StoredMap:
@@ -605,7 +608,8 @@ class GrowingMap:
             other._walk.spread(one.frame, self.settings.gravity.frames)
             other._walk.pass_by(one.frame.stamp_s, one.frame.world_from_camera)
         other._sounds, other._sources = self._sounds, self._sources
-        other._told, other._found, other._of_channels = self._told, self._found, self._of_channels
+        other._told, other._found = self._told, self._found
+        other._of_channels, other._of_features = self._of_channels, self._of_features
         other.settle()
         return other
 
