@@ -70,7 +70,7 @@ def build_map(
         lasting_path(path),
         encoders or profile,
         settings or DEFAULTS,
-        allow=allow,
+        allow=[allow] if isinstance(allow, str) else allow,
         resume=resume,
         overwrite=overwrite,
         progress=progress,

@@ -376,6 +376,11 @@ def test_a_photo_a_clip_or_a_place_of_another_kind_is_refused_in_a_sentence(
         ask(m)
 
 
+def test_one_reason_to_allow_is_a_reason_and_not_its_letters(folder: Path, tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match="There is nothing called 'poses' to allow"):
+        avlmaps.build_map(folder / "rec", tmp_path / "map", "colours", COARSE, allow="poses", progress=False)
+
+
 def test_frames_of_ones_own_are_sent_to_a_map_in_memory(folder: Path, tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="not of list; add frames of your own to a VoxelMap"):
         avlmaps.build_map(list(avlmaps.open_recording(folder / "rec")), tmp_path / "map")

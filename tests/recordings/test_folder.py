@@ -18,7 +18,7 @@ from recording_scenes import CAMERA, metres, pose_line, rig, save_depth, shot, s
 import avlmaps
 from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole, Rig
-from avlmaps.core.errors import RecordingError
+from avlmaps.core.errors import AudioError, RecordingError
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Frame, Recording
@@ -494,3 +494,21 @@ def test_a_frame_that_would_lose_its_depth_or_its_pose_is_refused(tmp_path: Path
             writer.add(replace(whole, world_from_camera=turned))
         writer.add(whole)
     assert len(open_recording(tmp_path / "walk")) == 1
+
+
+def test_a_track_is_given_by_its_name_and_what_is_none_is_refused(tmp_path: Path):
+    with RecordingWriter(tmp_path / "first", rig()) as writer:
+        writer.add(_frame(0, 0.0))
+        writer.set_audio(Sound(np.full(800, 0.25, np.float32), 8000))
+    with RecordingWriter(tmp_path / "walk", rig()) as writer:
+        writer.add(_frame(0, 0.0))
+        with pytest.raises(AudioError, match=r"an avlmaps\.Sound\(samples, rate_hz\) or a ChannelSound, not ndarray"):
+            writer.set_audio(np.zeros(800, np.float32))
+        writer.set_audio(str(tmp_path / "first/audio.flac"))
+    assert open_recording(tmp_path / "walk").audio is not None
+
+
+@pytest.mark.parametrize("path", [None, 5, []])
+def test_what_is_no_path_opens_no_recording(path: object):
+    with pytest.raises(RecordingError, match="A recording is opened by its path"):
+        open_recording(path)  # pyright: ignore[reportArgumentType]

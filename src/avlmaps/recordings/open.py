@@ -45,7 +45,10 @@ def open_recording(
         RecordingError: there is nothing there, it is of no known format, or it cannot be used.
         AudioError: the sound track cannot be used.
     """
-    path, *more = map(user_path, [path] if isinstance(path, str | Path) else path)
+    paths = [path] if isinstance(path, str | Path) else path
+    if not isinstance(paths, Sequence) or not paths:  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise RecordingError(f"A recording is opened by its path, or by those of a split bag; not by {path!r}.")
+    path, *more = map(user_path, paths)
     found = find_format(path, format)
     if audio is not None and found.has_topics and not (topics or {}).get("audio"):
         topics = {**(topics or {}), "audio": "none"}  # its own sound need not be readable

@@ -7,7 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
-from typing import Literal, TextIO
+from typing import Any, Literal, TextIO
 
 import msgspec
 import numpy as np
@@ -15,8 +15,8 @@ from jaxtyping import Float
 
 from avlmaps.core import poses
 from avlmaps.core.camera import Rig
-from avlmaps.core.errors import RecordingError
-from avlmaps.core.files import lasting_path, sync_folder, write_bytes_atomically
+from avlmaps.core.errors import AudioError, RecordingError
+from avlmaps.core.files import lasting_path, sync_folder, user_path, write_bytes_atomically
 from avlmaps.core.timeline import Trajectory
 from avlmaps.recordings import layout
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
@@ -152,7 +152,7 @@ class RecordingWriter:
 
     def set_audio(
         self,
-        audio: Path | Sound | ChannelSound | AudioTrack,
+        audio: Any,
         start_s: float = 0.0,
         microphones: Microphones | None = None,
     ) -> None:
@@ -161,14 +161,20 @@ class RecordingWriter:
         A FLAC, WAV or OGG file is copied as it is; samples, and the sound of a video, are written as FLAC.
 
         Args:
-            audio: the track.
+            audio: the track: a path, a ``Sound``, a ``ChannelSound`` or an ``AudioTrack``.
             start_s: the recording's time at which it begins; a track that is open says so itself.
             microphones: where those of its channels are; a track that is open says so itself.
 
         Raises:
             RecordingError: the file is of a kind that cannot be copied.
-            AudioError: the track cannot be read.
+            AudioError: the track cannot be read, or is none.
         """
+        audio = user_path(audio) if isinstance(audio, str | Path) else audio
+        if not isinstance(audio, Path | Sound | ChannelSound | AudioTrack):
+            raise AudioError(
+                "A sound track is the path of a file, an avlmaps.Sound(samples, rate_hz) or a ChannelSound, not "
+                f"{type(audio).__name__}."
+            )
         for old in self.path.glob("audio.*"):
             old.unlink()
         self._audio_start_s = audio.start_s if isinstance(audio, AudioTrack) else start_s
