@@ -1004,3 +1004,17 @@ def test_a_live_map_without_submaps_follows_no_correction(tmp_path: Path) -> Non
             live.correct_poses([0.0], frame(0).world_from_camera[None])
     with pytest.raises(MapError, match="closed"):
         live.correct_poses([0.0], np.eye(4)[None])
+
+
+def test_microphones_are_given_by_name_and_what_is_none_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r"microphones are an avlmaps.Microphones, a name \(.*not 5"):
+        LiveMap(tmp_path / "none", ENCODERS, microphones=5)  # pyright: ignore[reportArgumentType]
+    assert not (tmp_path / "none").exists()
+    with LiveMap(tmp_path / "map", ENCODERS, up_in_world=UP) as live:
+        with pytest.raises(RecordingError, match="There are no microphones called 'circle'"):
+            live.place_microphones("circle")
+        live.place_microphones("square4")
+        assert live.microphones is not None and len(live.microphones.position_m) == 4
+        add(live, frame(0))
+    with pytest.raises(MapError, match="is closed"):
+        live.place_microphones("stereo")

@@ -44,7 +44,7 @@ from avlmaps.query.voxel_map import direction, require_kinds
 from avlmaps.recordings.directions import given_directions
 from avlmaps.recordings.given_frame import given_frame
 from avlmaps.recordings.memory import next_of
-from avlmaps.recordings.microphones import Microphones, microphones_named
+from avlmaps.recordings.microphones import Microphones, given_microphones
 from avlmaps.recordings.plausible import date_fault
 from avlmaps.recordings.types import Frame
 
@@ -131,7 +131,7 @@ class LiveMap:
         if fault := date_fault(np.array([began_s]), "begins_s"):
             raise MapError(fault)
         used = encoders_of("embedded" if encoders is None else encoders)
-        array = microphones_named(str(microphones)) if isinstance(microphones, str | Path) else microphones
+        array = None if microphones is None else given_microphones(microphones)
         known_rad = None if same_device is None else device_of(open_stored(same_device))
         require_place(self.path, overwrite)
         self._held = contextlib.ExitStack()
@@ -233,14 +233,21 @@ class LiveMap:
         """Where those of the sound's channels are; None where that is not known."""
         return self._growing.microphones
 
-    def place_microphones(self, microphones: Microphones) -> None:
+    def place_microphones(self, microphones: Any) -> None:
         """Say where the microphones are, where that was not known at the beginning.
+
+        Args:
+            microphones: as those of ``LiveMap``.
 
         Raises:
             AudioError: sound came before.
+            RecordingError: the microphones cannot be.
+            MapError: the map is closed.
         """
+        self._require_open()
+        array = given_microphones(microphones)
         with self._ears:
-            self._growing.place_microphones(microphones)
+            self._growing.place_microphones(array)
 
     def add_audio(self, chunk: Any, stamp_s: Any = None) -> None:
         """Add a piece of the microphone's sound; see ``VoxelMap.add_audio``.

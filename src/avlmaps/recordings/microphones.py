@@ -4,6 +4,7 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -174,6 +175,21 @@ def microphones_named(words: str) -> Microphones:
         raise RecordingError(
             f'{path} describes no microphones ({error}); write {{"positions_m": [[x, y, z], ...]}} in metres.'
         ) from None
+
+
+def given_microphones(given: Any) -> Microphones:
+    """Return the array that a program gave: itself, its name or a JSON file.
+
+    Raises:
+        RecordingError: it is none of them, or ``microphones_named`` refuses it.
+    """
+    if isinstance(given, str | Path):
+        return microphones_named(str(given))
+    if not isinstance(given, Microphones):
+        raise RecordingError(
+            f"microphones are an avlmaps.Microphones, a name ({', '.join(PRESETS)}) or a JSON file; not {given!r}."
+        )
+    return given
 
 
 def write_microphones(path: Path, microphones: Microphones) -> None:
