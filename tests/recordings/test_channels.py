@@ -141,6 +141,13 @@ def test_faults_of_channels_are_named_and_a_sound_array_has_none(tmp_path: Path)
     assert [said for said in faults(tmp_path, humming) if "hum at 100 Hz" in said]
 
 
+def test_an_array_that_recorded_nothing_is_said_once(tmp_path: Path) -> None:
+    soundfile.write(tmp_path / "track.wav", np.zeros((RATE_HZ, 4)), RATE_HZ)
+    track = with_microphones(AudioTrack.open(tmp_path / "track.wav"), microphones_named("square4"))
+    (said,) = useless_channels(track, "the sound")
+    assert said.startswith("the sound is silent throughout: every sample is 0. Check the microphones")
+
+
 @settings(max_examples=60, deadline=None)
 @given(st.integers(1, 60_000), st.sampled_from([8_000, 11_025, 22_050, 44_100]), st.floats(0.0, 2e9))
 def test_tracks_of_any_length_and_rate_are_looked_at_for_faults(count: int, rate_hz: int, start_s: float) -> None:

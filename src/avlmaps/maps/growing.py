@@ -459,12 +459,11 @@ class GrowingMap:
     def _doubts_of_channels(self) -> tuple[str, ...]:
         """Check the sound, and the channels of an array along the whole drive, as a build does."""
         grown, track, motion = self.sound_track, self._placed_track(), self._walk.motion()
-        if grown is not None and grown.track is not None and not grown.gaps:  # silence fills gaps
-            silent, _ = level_faults(grown.track, "The sound")
-            if silent:
-                return (f"{silent[0]} Check the microphone: nothing that sounded then is in the map.",)
         if track is None or track.microphones is None or len(track.microphones) < 2 or not len(motion.stamps_s):
-            return ()
+            if grown is None or grown.track is None or grown.gaps:  # silence fills gaps
+                return ()
+            silent, _ = level_faults(grown.track, "The sound")
+            return tuple(f"{one} Check the microphone: nothing that sounded then is in the map." for one in silent)
         return doubts_of_channels(track, Trajectory(motion.stamps_s, motion.world_from_camera), "the sound")
 
     def _placed_track(self) -> AudioTrack | None:

@@ -164,13 +164,15 @@ def level_faults(track: AudioTrack, name: str = "") -> tuple[list[str], list[str
 
 
 def useless_channels(track: AudioTrack, name: str = "") -> list[str]:
-    """Return those of the faults with which an array shows no direction: a channel that is dead, or another's copy.
+    """Return those of the faults with which an array shows no direction: channels that are dead, or another's copy.
 
     Args:
         track: to look at.
         name: of the track in the sentences; its path if empty.
     """
     samples = _looked_at(track)
+    if not np.ptp(samples) and (silent := _silent(samples, track, name)):
+        return [f"{silent[0]} Check the microphones, and which input was recorded."]
     return [*_dead(samples, track, name), *_copied(samples, track, name)]
 
 
@@ -189,6 +191,8 @@ def _named(track: AudioTrack, channel: int, name: str = "") -> str:
 
 def _silent(samples: Float[np.ndarray, "k m n"], track: AudioTrack, name: str) -> list[str]:
     """Find that no sample differs from the others, throughout or in one stretch of half of the track and more."""
+    if samples.shape[2] < 2:
+        return []
     still = np.ptp(samples, axis=2).max(axis=1) == 0.0
     if still.all() and not any(np.ptp(block.samples) for block in track.blocks()):
         return [f"{name or track.path} is silent throughout: every sample is {samples[0, 0, 0]:g}."]

@@ -300,8 +300,8 @@ def _skipped(recording: Recording, missing_s: float) -> tuple[int, float] | None
 
 
 def of_levels(recording: Recording) -> Iterator[Finding]:
-    """Find a track that is silent or clipped; `info` says the latter of the channels of an array."""
-    if recording.audio is None:
+    """Find a track that is silent or clipped; of an array, its channels are looked at elsewhere."""
+    if recording.audio is None or recording.audio.microphones is not None:
         return
     try:
         silent, clipped = level_faults(recording.audio)
@@ -310,7 +310,7 @@ def of_levels(recording: Recording) -> Iterator[Finding]:
     for sentence in silent:
         remedy = "Check the microphone, and which input was recorded: nothing that sounded then is in the map."
         yield Finding(Reason.SOUND, Grade.SUSPICIOUS, sentence, remedy)
-    for sentence in clipped if recording.audio.microphones is None else ():
+    for sentence in clipped:
         remedy = "What is loud may be taken for another sound."
         yield Finding(Reason.SOUND, Grade.SUSPICIOUS, sentence, remedy)
 
