@@ -117,6 +117,11 @@ def test_settings_refuse_what_is_no_number(make: Any, named: str):
             make(given)
 
 
+def test_a_truth_of_numpy_is_one_of_python():
+    for given in (np.True_, np.False_):
+        assert LiveSettings(gates=given).gates is bool(given)  # pyright: ignore[reportArgumentType]
+
+
 @pytest.mark.parametrize("given", [True, "16000", 0, 0.5, None])
 def test_a_rate_is_a_positive_whole_number(given: Any):
     with pytest.raises(ValueError, match=re.escape(f"rate_hz is {given!r}")):

@@ -43,8 +43,10 @@ def hold_numbers(settings: Any, error: type[Exception]) -> None:
         given, name = getattr(settings, field.name), f"{field.name} of {type(settings).__name__}"
         if isinstance(kind, type) and is_dataclass(kind) and not isinstance(given, kind):
             raise error(f"{name} must be of {kind.__name__}, not {given!r}.")
-        if kind is bool and not isinstance(given, bool):
-            raise error(f"{name} must be True or False, not {given!r}.")
+        if kind is bool:
+            if type(given) not in (bool, np.bool_):
+                raise error(f"{name} must be True or False, not {given!r}.")
+            object.__setattr__(settings, field.name, bool(given))
         if kind not in _OF or (given is None and kind not in (float, int)):
             continue
         number = as_number(given) if kind in (float, float | None) else as_whole(given)
