@@ -272,6 +272,8 @@ SILENCES = {
     "a third": (lambda n: noise(n) * (np.arange(n) < 0.66 * n), ""),
     "one short sound": (lambda n: noise(n) * (np.abs(np.arange(n) - 0.53 * n) < 0.01 * n), ""),
     "sounds on silence": (lambda n: noise(n) * (np.arange(n) % (n // 4) < n // 16), ""),
+    "sounds of a gate": (lambda n: noise(n) * (np.arange(n) < 0.4 * n) * (np.arange(n) % (n // 40) > n // 160), ""),
+    "short, then nothing": (lambda n: noise(n)[: n // 10] * (np.arange(n // 10) < 0.04 * n), "is silent in one piece"),
 }
 
 

@@ -13,6 +13,7 @@ from avlmaps.recordings.microphones import MicrophoneNumbers, Microphones
 
 _LOOKS, _LOOK_S = 24, 0.5
 _DEAD_DB = 40.0  # a channel this much below the loudest holds nothing of use
+_PAUSE_S, _PAUSES = 0.05, 200  # of digital silence; the number that is read at once
 _FULL_SCALE, _CLIPPED = 0.999, 1e-3
 _HUM_DB, _HUM_SHARE = 25.0, 0.9
 _WAV = ".wav"
@@ -190,7 +191,10 @@ def _named(track: AudioTrack, channel: int, name: str = "") -> str:
 
 
 def _silent(samples: Float[np.ndarray, "k m n"], track: AudioTrack, name: str) -> list[str]:
-    """Find that no sample differs from the others, throughout or in one stretch of half of the track and more."""
+    """Find that no sample differs from the others, throughout or in one stretch of half of the track and more.
+
+    A track that is digitally silent at other times as well, between its sounds, is of a gate (or was put together so).
+    """
     if samples.shape[2] < 2:
         return []
     still = np.ptp(samples, axis=2).max(axis=1) == 0.0
@@ -199,12 +203,28 @@ def _silent(samples: Float[np.ndarray, "k m n"], track: AudioTrack, name: str) -
     where = np.flatnonzero(still)
     if still.all() or len(where) < len(still) / 2 or where[-1] - where[0] >= len(where):
         return []
+    look_s = min(_LOOK_S, track.duration_s)
+    begins_s = np.linspace(0.0, track.duration_s - look_s, len(still))
+    before_s, behind_s = np.r_[0.0, begins_s][where[0]], np.r_[begins_s, track.duration_s][where[-1] + 1] + look_s
+    if _has_pauses(track, float(before_s), float(behind_s)):
+        return []
     edges_s = track.start_s + np.linspace(0.0, track.duration_s, len(still) + 1)
     from_s, to_s = edges_s[[where[0], where[-1] + 1]].tolist()
     return [
         f"{name or track.path} is silent in one piece from about {from_s:.0f} to {to_s:.0f} s "
         f"({len(where) / len(still):.0%}): every sample is {samples[where[0], 0, 0]:g} there, and not elsewhere."
     ]
+
+
+def _has_pauses(track: AudioTrack, before_s: float, behind_s: float) -> bool:
+    """Return whether a track is digitally silent for `_PAUSE_S` before one of its times or behind another."""
+    size = round(_PAUSE_S * track.rate_hz)
+    for number, block in enumerate(track.blocks(_PAUSES * _PAUSE_S)):
+        begin_s = _PAUSE_S * (number * _PAUSES + np.arange(len(block.samples) // size))
+        pieces = block.samples[: len(begin_s) * size].reshape(-1, size)
+        if (np.ptp(pieces, axis=1)[(begin_s + _PAUSE_S < before_s) | (begin_s > behind_s)] == 0.0).any():
+            return True
+    return False
 
 
 def _dead(samples: Float[np.ndarray, "k m n"], track: AudioTrack, name: str = "") -> list[str]:
