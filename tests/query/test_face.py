@@ -20,6 +20,7 @@ from avlmaps.cli.main import main
 from avlmaps.core.errors import AudioError, AvlmapsError, BackendError, MapError, QueryError, RecordingError
 from avlmaps.core.question import Question
 from avlmaps.maps.settings import GravitySettings
+from avlmaps.query.asking import _OF_A_LIST
 from avlmaps.query.export_layers import layers_of
 from avlmaps.recordings.example_room import example_truth
 from avlmaps.recordings.memory import MemoryRecording
@@ -77,6 +78,15 @@ def test_the_nearest_of_what_is_found_comes_first(folder: Path) -> None:
     assert m.ask(question, near=second.position).goals == (second, first, third)
     with pytest.raises(avlmaps.QueryError, match="A place is x,y or x,y,z in metres"):
         m.ask("chair", near="here")
+    with pytest.raises(avlmaps.QueryError, match="A place is x,y or x,y,z in metres"):
+        m.ask("chair", near=5)  # pyright: ignore[reportArgumentType]
+
+
+def test_a_place_to_count_from_leaves_a_list_in_its_own_order(m: avlmaps.AVLMap) -> None:
+    for question in ("the last sound", "what is in the kitchen?", "which things are there?"):
+        alone, near = m.ask(question), m.ask(question, near=(0, 0))
+        assert near.goals == alone.goals and near.text == alone.text and near.when == alone.when
+        assert near.notes == (*alone.notes, _OF_A_LIST)
 
 
 def test_heat_is_an_array_and_has_arithmetic(m: avlmaps.AVLMap) -> None:

@@ -38,6 +38,7 @@ MOST_GOALS = 200
 # Each way to name a storey has one of these: floor, storey, story, stories, level, upstairs.
 _STOREY_STEMS = ("floor", "stor", "level", "stair")
 _EXAMPLE = "the red cabinet near the sound of a dog barking"
+_OF_A_LIST = "The question has an order of its own, so that no place to count from (near) changes it."
 
 
 class AskError(QueryError):
@@ -161,11 +162,21 @@ def ask(avlmap: "Queryable", asked: Asked, files: Files | None = None) -> Answer
     # A query of one word loads nothing of the language.
     speaks_of_storeys = any(stem in sentence for stem in _STOREY_STEMS)
     place = None if asked.near is None else place_given(asked.near)
-    wanted = asked if place is None else replace(asked, top=MOST_GOALS)
+    listed = place is not None and _asks_for_list(avlmap, asked)
+    wanted = asked if place is None or listed else replace(asked, top=MOST_GOALS)
     answer = (_ask_of_storeys if speaks_of_storeys else _ask)(avlmap, wanted, files)
-    if place is not None:
+    if listed:
+        answer = replace(answer, notes=(*answer.notes, _OF_A_LIST))
+    elif place is not None:
         answer = nearest_first(avlmap, answer, place, asked.top)
     return on_storey(replace(answer, elapsed_ms=1e3 * (time.perf_counter() - begin)), avlmap.storeys)
+
+
+def _asks_for_list(avlmap: "Queryable", asked: Asked) -> bool:
+    """Return whether a question is for a list of the map, which has an order of its own: the largest room."""
+    from avlmaps.language.list_questions import read_list
+
+    return bool(asked.sentence.strip()) and read_list(asked.sentence, own_names(avlmap, asked.sentence)) is not None
 
 
 def nearest_first(avlmap: "Queryable", answer: Answer, place: Float[np.ndarray, " n"], top: int) -> Answer:

@@ -30,7 +30,12 @@ def place_given(place: str | Sequence[float]) -> Float[np.ndarray, " n"]:
     Raises:
         QueryError: they are no two or three numbers.
     """
-    return place_of(place if isinstance(place, str) else ",".join(str(value) for value in place))
+    if isinstance(place, str):
+        return place_of(place)
+    try:
+        return place_of(",".join(str(value) for value in place))
+    except TypeError:  # no list
+        return place_of(str(place))
 
 
 def distance_m(
