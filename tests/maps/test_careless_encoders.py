@@ -1,6 +1,7 @@
 """Encoders of one's own that mask features, write into what they are given, or say the same of everything."""
 
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -176,3 +177,34 @@ def test_the_end_of_a_growing_map_doubts_features_and_a_silent_microphone() -> N
     silent, features = growing.doubts
     assert silent.startswith("The sound is silent throughout: every sample is 0. Check the microphone")
     assert features.startswith("The features of pixels by fake/pixels are the same")
+
+
+def test_a_masked_place_says_nothing_and_a_masked_keypoint_is_left_out() -> None:
+    class MaskedPlaces(Places):
+        def encode(self, rgb: Any, local: Any, state: Any) -> Any:
+            return np.ma.masked_array(super().encode(rgb, local, state), mask=True)
+
+    class MaskedCorners(Corners):
+        def encode(self, rgb: np.ndarray) -> Any:
+            found = super().encode(rgb)
+            mask = np.zeros(found.descriptors.shape, bool)
+            mask[::2, 0] = True
+            return replace(found, descriptors=np.ma.masked_array(found.descriptors, mask))
+
+    careful = made(Words(), local=Corners(), place=Places())
+    assert np.asarray(careful.keyframes.place).any()
+    masked = made(Words(), local=MaskedCorners(), place=MaskedPlaces())
+    assert not np.asarray(masked.keyframes.place).any()
+    offsets = np.asarray(careful.keyframes.offsets)
+    kept = np.concatenate([np.arange(a, b)[1::2] for a, b in pairwise(offsets.tolist())])
+    np.testing.assert_array_equal(masked.keyframes.xy, np.asarray(careful.keyframes.xy)[kept])
+
+
+def test_a_camera_that_stood_has_one_view() -> None:
+    stored = made(Words(), views=ConstantViews())
+    content = MapContent(stored.voxels, stored.keyframes, {}, stored.sounds, stored.path)
+    for said, count in ((0.6, 0), (0.0, 1)):
+        view = np.full((9, 3), said, np.float32)
+        pose = np.repeat(np.asarray(stored.keyframes.world_from_camera)[:1], 9, axis=0)
+        stood = replace(content, keyframes=replace(stored.keyframes, view=view, world_from_camera=pose))
+        assert len(list(feature_doubts(stood, stored.info.models))) == count

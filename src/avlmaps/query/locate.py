@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, Int, UInt8
 
 from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.numbers import unmasked
 from avlmaps.core.poses import rotation_angle_rad
 from avlmaps.core.wording import option
 from avlmaps.maps.types import Keyframes
@@ -200,7 +201,7 @@ def locate(
     start_s = time.perf_counter()
     camera, source = _camera_of(rgb, camera, stored.rig.rgb, focal_35mm)
     local = stored.encoders.local.encode(rgb.copy())  # an encoder may write into what it is given
-    place = stored.encoders.place.encode(rgb.copy(), local, stored.place_state)
+    place = unmasked(stored.encoders.place.encode(rgb.copy(), local, stored.place_state))
     found = locate_features(stored, local, place, camera, rng, settings, source)
     return replace(found, elapsed_ms=1e3 * (time.perf_counter() - start_s))
 

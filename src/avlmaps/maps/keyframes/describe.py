@@ -205,7 +205,7 @@ def describe_keyframe(
         local = encoders.local.encode(frame.rgb.copy()) if Kind.LOCAL in encoders else _no_features()
     place = np.zeros(0, np.float32)
     if Kind.LOCAL in encoders and Kind.PLACE in encoders:
-        place = encoders.place.encode(frame.rgb.copy(), local, place_state)
+        place = unmasked(encoders.place.encode(frame.rgb.copy(), local, place_state))
     return DescribedKeyframe(
         stamp_s=frame.stamp_s,
         world_from_camera=frame.world_from_camera,

@@ -13,6 +13,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Float32, UInt8
 from avlmaps.core.errors import MapError
+from avlmaps.core.numbers import unmasked
 from avlmaps.core.poses import apply
 from avlmaps.core.registry import Kind
 from avlmaps.maps.keyframes.describe import (
@@ -179,7 +180,7 @@ class GrowingKeyframes:
                 with perceiving(f"The place encoder {encoder.card.id}", f"frame {one.index}"):
                     assert one.picture is not None
                     found = encoder.encode(one.picture(), one.keyframe.local, self._state)
-                self._places[one.index] = np.asarray(found, np.float32)
+                self._places[one.index] = np.asarray(unmasked(found), np.float32)
         return [self._places[one.index] for one in seen]
 
     def _describe(self, frame: Frame) -> PicturedKeyframe:

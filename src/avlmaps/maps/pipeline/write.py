@@ -4,11 +4,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
+from itertools import chain
 from time import perf_counter
 
 import numpy as np
 
-from avlmaps.core.arrays import Float
+from avlmaps.core.arrays import Float, Int
 from avlmaps.core.errors import MapError
 from avlmaps.core.registry import Kind
 from avlmaps.core.version import __version__
@@ -33,7 +34,9 @@ MOST_SEEN_THROUGH = 0.15
 # With fewer voxels, or fewer keyframes or sounds, features may be the same by chance.
 _FEWEST_VOXELS, _FEWEST_LOOKS = 100, 4
 _SOME = 100  # that decide for most maps
+_AT_ONCE = 10_000
 _ROUNDING = 1e-3  # of float16
+_STOOD = 0.05  # metres, and entries of a rotation
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,16 +194,20 @@ def carving_doubts(removed: manifest.Removed, voxels: int) -> Iterator[str]:
 
 def feature_doubts(content: MapContent, models: Mapping[str, manifest.ModelInfo]) -> Iterator[str]:
     """Yield a sentence for each kind of feature that is zero, or the same, in all of a map."""
-    voxels = content.voxels
-    speaks = np.asarray(voxels.weight) > 0.0
+    voxels, views, sounds = content.voxels, content.keyframes.view, content.sounds.feature
+    speaks = np.flatnonzero(np.asarray(voxels.weight) > 0.0)
+    pose = np.asarray(content.keyframes.world_from_camera)
+    stood = not len(pose) or float(np.ptp(pose, axis=0).max()) < _STOOD  # what it sees is one picture
     kinds = (
-        (Kind.PIXELS, voxels.feature[speaks] if speaks.any() else voxels.feature, "voxels", _FEWEST_VOXELS),
-        (Kind.VIEWS, content.keyframes.view, "keyframes", _FEWEST_LOOKS),
-        (Kind.SOUNDS, content.sounds.feature, "stretches of sound", _FEWEST_LOOKS),
+        (Kind.PIXELS, voxels.feature, speaks if len(speaks) else np.arange(len(voxels)), "voxels", _FEWEST_VOXELS),
+        (Kind.VIEWS, views, np.arange(len(views)), "keyframes", _FEWEST_LOOKS),
+        (Kind.SOUNDS, sounds, np.arange(len(sounds)), "stretches of sound", _FEWEST_LOOKS),
     )
-    for kind, rows, what, fewest in kinds:
-        if kind.value in models and len(rows) >= fewest and _are_one(np.asarray(rows)):
-            alike = "the same" if rows[0].any() else "zero"
+    for kind, features, rows, what, fewest in kinds:
+        if kind.value in models and len(rows) >= fewest and _are_one(features, rows):
+            alike = "the same" if features[rows[0]].any() else "zero"
+            if kind is Kind.VIEWS and stood and alike != "zero":
+                continue
             yield (
                 f"The features of {kind.value} by {models[kind.value].id} are {alike} in all {len(rows)} {what}, so "
                 "that no word distinguishes them. Check that the encoder looks at what it is given, and that its "
@@ -208,7 +215,9 @@ def feature_doubts(content: MapContent, models: Mapping[str, manifest.ModelInfo]
             )
 
 
-def _are_one(rows: Float[np.ndarray, "n d"]) -> bool:
-    """Return whether all features are the same, within rounding."""
+def _are_one(features: Float[np.ndarray, "n d"], rows: Int[np.ndarray, " m"]) -> bool:
+    """Return whether the features of some rows are the same, within rounding; most maps need but few of them."""
+    first = np.asarray(features[rows[0]], np.float32)
     some = rows[:: max(1, len(rows) // _SOME)]
-    return all(float(np.abs(part - rows[0]).max(initial=0.0)) <= _ROUNDING for part in (some, rows))
+    parts = chain([some], (rows[at : at + _AT_ONCE] for at in range(0, len(rows), _AT_ONCE)))
+    return all(float(np.abs(features[part] - first).max(initial=0.0)) <= _ROUNDING for part in parts)

@@ -258,7 +258,7 @@ class CachedPlaces(_Remembering):
         key = self._key(rgb, *points, *learnt)
         kept = self._get(key)
         if kept is None:
-            kept = np.asarray(self._encoder.encode(rgb, local, state), np.float32)
+            kept = np.asarray(unmasked(self._encoder.encode(rgb, local, state)), np.float32)
             self._put(key, kept)
         return kept
 
