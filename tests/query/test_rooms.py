@@ -15,6 +15,7 @@ from avlmaps.query.avlmap import AVLMap, QuerySettings
 from avlmaps.query.factors import NearAnchors
 from avlmaps.query.floor_plan import FloorPlan
 from avlmaps.query.modalities.area import AreaSettings
+from avlmaps.query.places import describe_place
 from avlmaps.query.room_names import own_names
 from avlmaps.query.rooms import InRooms, NamedVoxels, RoomField, Rooms, RoomSettings, voting_rows
 from avlmaps.query.rules import query_settings
@@ -339,3 +340,18 @@ def test_a_field_is_named_by_its_kinds() -> None:
     field = rooms_of(LEFT).field(KINDS, KITCHEN)
     assert isinstance(field, RoomField) and field.kinds == KINDS
     assert field.of_voxels(np.array([1.0, 1.0, 1.0])) == pytest.approx(1.0, abs=1e-5)
+
+
+def test_a_place_outside_of_the_map_is_in_no_room() -> None:
+    m = home(door_m=0.0)
+    rooms = [describe_place(m, np.array([x, 1.5, 0.4]))["rooms"] for x in (4.5, 6.8, 8.0, 900.0)]
+    assert rooms[0][0]["name"] == "bedroom" and [bool(one) for one in rooms] == [True, True, False, False]
+
+
+def test_the_largest_room_is_the_same_from_everywhere() -> None:
+    m = home(door_m=0.0)
+    answer = m.ask("which is the largest room?")
+    assert len(answer.goals) == 2
+    for goal in answer.goals:
+        near = m.ask("which is the largest room?", near=goal.position)
+        assert (near.goals, near.text) == (answer.goals, answer.text) and "order of its own" in near.notes[-1]

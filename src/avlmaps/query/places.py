@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 MOST_NAMES = 5
 _MOST_VIEWS = 5
-_FAR_M = 1000.0
+_BESIDE_M = 1.0  # how far outside of the map a place may lie that is in a room
 FARTHEST_M = 2e6
 """A place farther away than this, metres, is a mistake; coordinates of requests reach half of it along each axis."""
 
@@ -141,10 +141,11 @@ def _rooms(avlmap: "AVLMap", point: Float[np.ndarray, "3"]) -> list[NameScore]:
     names = area_names(encoder) if field is None else field.kinds
     places = np.asarray(stored.keyframes.centre, np.float64).reshape(-1, 3)
     space = avlmap.space
-    away = np.linalg.norm(space.level(places)[:, :2] - space.level(point)[:2], axis=1)
-    near = np.argsort(away, kind="stable")[:_MOST_VIEWS]
-    if away[near[0]] > _FAR_M:
+    here, map_xy = space.level(point)[:2], space.level_centres()[:, :2]
+    if (here < map_xy.min(axis=0) - _BESIDE_M).any() or (here > map_xy.max(axis=0) + _BESIDE_M).any():
         return []
+    away = np.linalg.norm(space.level(places)[:, :2] - here, axis=1)
+    near = np.argsort(away, kind="stable")[:_MOST_VIEWS]
     if field is not None:
         share = field.at(point[None])[0].astype(np.float64)
     else:
