@@ -1,5 +1,6 @@
 """What a map shows in other programs: every layer in one frame, and OpenLex3D's files as its description says."""
 
+import errno
 import sys
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from query_fakes import furnished_map
 from avlmaps.core.errors import BackendError, QueryError
 from avlmaps.core.frames import FrameName
 from avlmaps.core.poses import from_quaternion
+from avlmaps.query import export_openlex3d
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.export_foxglove import write_foxglove
 from avlmaps.query.export_layers import Heard, layers_of
@@ -120,3 +122,15 @@ def test_a_sound_has_its_name_apart_from_how_sure_it_is() -> None:
     named = Heard("dog bark", 0.754, (0.0, 0.0, 0.0), 1.0, 2.0)
     nameless = Heard("sound", None, (0.0, 0.0, 0.0), 1.0, 2.0)
     assert (named.name, named.label, nameless.label) == ("dog bark", "dog bark 0.75", "sound")
+
+
+def test_what_cannot_be_written_leaves_no_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(path: Path, content: bytes) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(export_openlex3d, "write_bytes_atomically", full)
+    (tmp_path / "there").mkdir()
+    for folder in (tmp_path / "new" / "out", tmp_path / "there"):
+        with pytest.raises(QueryError, match="No space left"):
+            write_openlex3d(folder, AVLMap(furnished_map()))
+    assert [path.name for path in tmp_path.iterdir()] == ["there"]

@@ -8,7 +8,7 @@ as viewers of GLB expect.
 import csv
 import io
 from collections.abc import Generator, Iterable, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -305,10 +305,14 @@ def explain_write_errors(path: Path) -> Generator[None]:
     Raises:
         QueryError: it cannot be written.
     """
+    made = [folder for folder in path.parents if not folder.exists()]
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         yield
     except OSError as fault:
+        with suppress(OSError):
+            for folder in made:  # which are empty
+                folder.rmdir()
         raise QueryError(f"{path} cannot be written ({fault.strerror or fault}); choose another place.") from fault
 
 
