@@ -13,9 +13,13 @@ from avlmaps.recordings.layout import DESCRIPTION, UNFINISHED
 
 
 @pytest.mark.parametrize("pace", [["--as-fast-as-possible", "--every-frame"], ["--rate", "50"]])
-def test_a_recording_is_played_into_a_map(answer, walk: Path, tmp_path: Path, pace: list[str]) -> None:
+def test_a_recording_is_played_into_a_map(
+    answer, walk: Path, tmp_path: Path, pace: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = tmp_path / "live.avlmap"
-    made = answer("live", walk, "--out", path, "--profile", "colours", *pace)
+    monkeypatch.chdir(tmp_path)
+    made = answer("live", walk.absolute(), "--out", path.name, "--profile", "colours", *pace)
+    assert made["path"] == path.name
     live = made["live"]
     assert live["frames_in"] == live["fused"] + sum(live["dropped"].values()) > 0
     if "--every-frame" in pace:

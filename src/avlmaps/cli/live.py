@@ -135,6 +135,7 @@ def _live(verb: Live) -> dict[str, Any]:
     status, stored = live.status(), live.map.stored
     return {
         **describe_map(stored),
+        "path": str(verb.out),
         "live": {**status.to_dict(), "summary": str(status)},
         **({} if first is None else {"into": _joined(first, stored, verb.day or "")}),
         "elapsed_s": round(perf_counter() - begin_s, 3),
