@@ -169,3 +169,20 @@ def test_an_unknown_array_is_refused_with_what_to_write(tmp_path: Path) -> None:
     path.write_text("{}")
     with pytest.raises(RecordingError, match="positions_m"):
         microphones_named(str(path))
+
+
+def unchecked(position_m: object, delay_s: object = None) -> Microphones:
+    """Make an array as a program does, whose types nobody checks."""
+    made = object.__new__(Microphones)
+    for name, value in (("position_m", position_m), ("camera_from_robot", np.eye(4)), ("delay_s", delay_s)):
+        object.__setattr__(made, name, value)
+    made.__post_init__()
+    return made
+
+
+def test_an_array_is_given_as_a_list_or_refused_in_a_sentence() -> None:
+    listed = unchecked([[0, 0.05, 0.2], [0, -0.05, 0.2]], [0, 0.001])
+    assert listed.position_m.dtype == np.float64 and listed.take([1]).delay_s == [0.001]
+    for one in ([[0, 0]], 5, [[0, 0, 0], [0, 0]], "stereo", None, [[True, False, True]]):
+        with pytest.raises(RecordingError, match=r"positions have shape|position_m of microphones must be an array"):
+            unchecked(one)

@@ -492,8 +492,11 @@ def test_a_frame_that_would_lose_its_depth_or_its_pose_is_refused(tmp_path: Path
             writer.add(replace(whole, depth_m=np.full_like(whole.depth_m, 2500.0)))
         with pytest.raises(RecordingError, match="not a rigid transform"):
             writer.add(replace(whole, world_from_camera=turned))
+        with pytest.raises(RecordingError, match="not a rigid transform"):
+            writer.add_files("000000", 0.0, turned, tmp_path / "a.png", tmp_path / "b.png")
         writer.add(whole)
     assert len(open_recording(tmp_path / "walk")) == 1
+    assert len(open_recording(one for one in [tmp_path / "walk"])) == 1
 
 
 def test_a_track_is_given_by_its_name_and_what_is_none_is_refused(tmp_path: Path):
@@ -508,7 +511,7 @@ def test_a_track_is_given_by_its_name_and_what_is_none_is_refused(tmp_path: Path
     assert open_recording(tmp_path / "walk").audio is not None
 
 
-@pytest.mark.parametrize("path", [None, 5, []])
+@pytest.mark.parametrize("path", [None, 5, [], [5]])
 def test_what_is_no_path_opens_no_recording(path: object):
     with pytest.raises(RecordingError, match="A recording is opened by its path"):
         open_recording(path)  # pyright: ignore[reportArgumentType]

@@ -394,6 +394,8 @@ def _gap_m(one: "Thing", other: "Thing") -> float:
 
 
 def _name(name: str) -> str:
+    if not isinstance(name, str):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise QueryError(f"A name is text, not {type(name).__name__}.")
     word = " ".join(name.split())
     if not word or len(word) > LONGEST_NAME or not any(letter.isalnum() for letter in word) or not word.isprintable():
         raise QueryError(f"{name[:40]!r} is no name; give one to {LONGEST_NAME} characters, a letter among them.")

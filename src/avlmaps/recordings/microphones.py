@@ -91,6 +91,10 @@ class Microphones:
         return float(np.linalg.norm(self.position_m[:, None] - self.position_m[None], axis=2).max())
 
     def __post_init__(self) -> None:
+        for name in ("position_m", "camera_from_robot", "delay_s"):
+            given = getattr(self, name)
+            if name != "delay_s" or given is not None:
+                object.__setattr__(self, name, _numbers(given, name))
         place = self.position_m
         if place.ndim != 2 or place.shape[1] != 3 or not 1 <= len(place) <= MOST_CHANNELS:
             raise RecordingError(
@@ -140,6 +144,16 @@ class Microphones:
         """Return some of them."""
         late_s = None if self.delay_s is None else self.delay_s[list(channels)]
         return Microphones(self.position_m[list(channels)], self.camera_from_robot, late_s)
+
+
+def _numbers(given: Any, name: str) -> Float[np.ndarray, "*n"]:
+    try:
+        array = np.asarray(given)
+    except (TypeError, ValueError, RuntimeError):  # rows of several lengths, or a tensor of a GPU
+        array = np.array(None)
+    if array.dtype.kind not in "fiu":
+        raise RecordingError(f"{name} of microphones must be an array of numbers, not {given!r}.")
+    return np.asarray(array, np.float64)
 
 
 def _square(side_m: float) -> list[list[float]]:

@@ -1,7 +1,7 @@
 """Opening a recording of any known format in place, found by what the folder or file holds."""
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -23,7 +23,7 @@ _MAP = "map.json"
 
 
 def open_recording(
-    path: Path | str | Sequence[Path | str],
+    path: Path | str | Iterable[Path | str],
     format: str = "auto",
     audio: Path | str | None = None,
     topics: Mapping[str, str] | None = None,
@@ -45,8 +45,9 @@ def open_recording(
         RecordingError: there is nothing there, it is of no known format, or it cannot be used.
         AudioError: the sound track cannot be used.
     """
-    paths = [path] if isinstance(path, str | Path) else path
-    if not isinstance(paths, Sequence) or not paths:  # pyright: ignore[reportUnnecessaryIsInstance]
+    given = [path] if isinstance(path, str | Path) else path
+    paths = list(given) if isinstance(given, Iterable) else []  # pyright: ignore[reportUnnecessaryIsInstance]
+    if not paths or not all(isinstance(one, str | Path) for one in paths):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise RecordingError(f"A recording is opened by its path, or by those of a split bag; not by {path!r}.")
     path, *more = map(user_path, paths)
     found = find_format(path, format)

@@ -109,8 +109,7 @@ class RecordingWriter:
         """
         if not same_rig(frame.rig, self.rig):
             raise RecordingError(f"Frame {frame.name} was taken by another camera than the recording's first frame.")
-        self._announce(frame.name, frame.stamp_s)
-        poses.orthonormalize(frame.world_from_camera, f"frame {frame.name}")  # or it has no quaternion
+        self._announce(frame.name, frame.stamp_s, frame.world_from_camera)
         raw = np.rint(frame.depth_m.astype(np.float64) * self.depth_units_per_m)
         raw = np.where((raw > 0) & (raw <= _MAX_DEPTH_VALUE), raw, 0).astype(np.uint16)
         if not raw.any() and (middle_m := _middle_m(frame.depth_m)) > FARTHEST_MIDDLE_M:
@@ -145,7 +144,7 @@ class RecordingWriter:
         Raises:
             RecordingError: as ``add``, or a file is missing.
         """
-        self._announce(name, stamp_s)
+        self._announce(name, stamp_s, world_from_camera)
         take_file(colour, self.path / "rgb" / f"{name}{colour.suffix.lower()}", link)
         take_file(depth, self.path / "depth" / f"{name}.png", link)
         self._log(name, stamp_s, world_from_camera)
@@ -220,7 +219,7 @@ class RecordingWriter:
         if fault := layout.impossible(self._described()):
             raise RecordingError(f"{fault}.")
 
-    def _announce(self, name: str, stamp_s: float) -> None:
+    def _announce(self, name: str, stamp_s: float, world_from_camera: Float[np.ndarray, "4 4"]) -> None:
         if self._poses is None:
             raise ValueError("the writer is not open; use it in a with block")
         if not name or name in self._names or any(c in name for c in "/\\\0\n,"):
@@ -228,6 +227,7 @@ class RecordingWriter:
         if not np.isfinite(stamp_s) or (self._stamps_s and stamp_s <= self._stamps_s[-1]):
             last = self._stamps_s[-1] if self._stamps_s else None
             raise RecordingError(f"Frame {name} has the stamp {stamp_s} s after {last} s; stamps must rise.")
+        poses.orthonormalize(world_from_camera, f"frame {name}")  # or it has no quaternion
 
     def _log(self, name: str, stamp_s: float, world_from_camera: Float[np.ndarray, "4 4"]) -> None:
         assert self._poses is not None and self._frames is not None

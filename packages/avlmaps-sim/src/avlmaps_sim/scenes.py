@@ -42,6 +42,8 @@ def open_scene(spec: str) -> Scene:
 
 def open_changed(spec: str) -> tuple[Scene, tuple[Change, ...]]:
     """Return a scene by its name, and what changed in it since day 0; see ``open_scene``."""
+    if not isinstance(spec, str):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise SceneError(f"a scene is a text such as house:12, or the path of a file as a text; not {spec!r}")
     before, day = _day_of(spec)
     if day is None or Path(spec).exists():
         return _opened(spec), ()
