@@ -38,8 +38,8 @@ def checked(plan: BuildPlan, allowed: Sequence[str]) -> BuildPlan:
     for name in allowed:
         if name not in known:
             raise RecordingError(f"There is nothing called {name!r} to allow; known are: {', '.join(known)}.")
-    of_array = audio_key(plan.recording) if _array_of(plan.recording) is not None else None
-    key = key_of("doubts", BUILD_VERSION, plan.recording.fingerprint, sorted(allowed), of_array)
+    sound = audio_key(plan.recording)  # which is no part of the fingerprint
+    key = key_of("doubts", BUILD_VERSION, plan.recording.fingerprint, sorted(allowed), sound)
 
     def compute() -> Computed[_Doubts]:
         return Computed(_doubts(plan.recording, allowed))

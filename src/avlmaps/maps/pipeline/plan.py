@@ -224,5 +224,8 @@ def _difference(plan: BuildPlan, there: MapInfo) -> str:
 
 
 def strip_folder(sentence: str, recording: Recording) -> str:
-    """Return a sentence about a recording without the folders that it lies in: a map may travel."""
-    return sentence.replace(str(recording.path), recording.path.name)
+    """Return a sentence about a recording without the folders that it and its sound lie in: a map may travel."""
+    track = recording.audio
+    for path in (recording.path, *(() if track is None else (track.path, *track.files))):
+        sentence = sentence.replace(str(path), path.name)
+    return sentence
