@@ -13,9 +13,12 @@ from query_fakes import furnished_map
 
 from avlmaps.core.errors import QueryError
 from avlmaps.maps.obstacles import CellState, Obstacles
+from avlmaps.perception.embedded.colours import COLOURS, memberships
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.export import (
     heat_colors,
+    palette,
+    shades_of,
     thing_colors,
     voxel_mesh,
     write_glb,
@@ -104,3 +107,11 @@ def test_a_file_that_cannot_be_written_is_one_sentence(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(QueryError, match="cannot be written"):
         write_ply(tmp_path / "file" / "a.ply", np.zeros((1, 3)), np.zeros((1, 3), np.uint8))
+
+
+def test_the_name_of_a_colour_is_drawn_in_it_and_others_as_before() -> None:
+    names = (*COLOURS, "sofa")
+    shades = shades_of(names)
+    taken = memberships(shades[:-1] / 255.0)[:, : len(COLOURS)].argmax(axis=1)
+    assert [COLOURS[row] for row in taken] == list(COLOURS)
+    np.testing.assert_array_equal(shades[-1], palette(len(names))[-1])

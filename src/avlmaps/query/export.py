@@ -19,6 +19,7 @@ from jaxtyping import Float, Float32, Int, UInt8
 from avlmaps.core.errors import BackendError, QueryError
 from avlmaps.core.files import write_bytes_atomically
 from avlmaps.core.frames import FrameName
+from avlmaps.perception.embedded.colours import COLOURS, example_of
 
 if TYPE_CHECKING:
     from avlmaps.maps.obstacles import Obstacles
@@ -46,7 +47,7 @@ def thing_colors(count: int, things: "Sequence[Thing]") -> UInt8[np.ndarray, "n 
     """Return a colour for each voxel: one for each name, gray where no thing is."""
     colors = np.full((count, 3), 170, np.uint8)
     names = sorted({thing.name for thing in things})
-    shades = palette(len(names))
+    shades = shades_of(names)
     for thing in reversed(things):  # the most confident is drawn last
         colors[thing.rows] = shades[names.index(thing.name)]
     return colors
@@ -60,6 +61,15 @@ def heat_colors(values: Float32[np.ndarray, " n"]) -> UInt8[np.ndarray, "n 3"]:
     colors = (255 * colormaps["inferno"](0.15 + 0.8 * heat)[:, :3]).round().astype(np.uint8)
     colors[heat <= 0.0] = 170
     return colors
+
+
+def shades_of(names: "Sequence[str]") -> UInt8[np.ndarray, "k 3"]:
+    """Return a colour for each name, as of ``palette``; that of a colour is itself."""
+    shades = palette(len(names))
+    for row, name in enumerate(names):
+        if name in COLOURS:
+            shades[row] = example_of(name)
+    return shades
 
 
 def palette(count: int) -> UInt8[np.ndarray, "k 3"]:

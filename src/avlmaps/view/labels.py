@@ -11,7 +11,7 @@ from avlmaps.core.arrays import Bool, Float
 from avlmaps.core.errors import AvlmapsError
 from avlmaps.maps.sources.candidates import CELL_M
 from avlmaps.query.contents import listed_rooms
-from avlmaps.query.export import heat_colors, palette
+from avlmaps.query.export import heat_colors, shades_of
 from avlmaps.query.naming import VoxelNamer
 
 if TYPE_CHECKING:
@@ -170,7 +170,7 @@ def palettes(labels: Labels | None = None) -> dict[str, list[int]]:
 
 def _padded(names: tuple[str, ...]) -> list[int]:
     colours = np.full((256, 3), _GRAY, np.uint8)
-    colours[1 : 1 + len(names)] = palette(len(names))
+    colours[1 : 1 + len(names)] = shades_of(names)
     return colours.ravel().tolist()
 
 

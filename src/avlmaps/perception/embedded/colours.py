@@ -122,6 +122,12 @@ def _example_table() -> tuple[Float[np.ndarray, "e 3"], np.ndarray]:
     return _coordinates(_lab(np.array(linear))), np.array(colour)
 
 
+def example_of(colour: str) -> tuple[int, int, int]:
+    """Return red, green and blue of one of ``COLOURS``, 0 to 255."""
+    code = _EXAMPLES[colour].split()[0]
+    return int(code[:2], 16), int(code[2:4], 16), int(code[4:], 16)
+
+
 def memberships(srgb: Float[np.ndarray, "n 3"]) -> Float32[np.ndarray, "n 16"]:
     """Return unit vectors: how much each colour is each basic term, then dark, medium and light.
 
