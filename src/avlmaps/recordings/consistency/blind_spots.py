@@ -9,6 +9,7 @@ from avlmaps.core.poses import rotation_angle_rad
 from avlmaps.recordings.consistency.agreement import Agreement
 from avlmaps.recordings.consistency.edges import Edges
 from avlmaps.recordings.consistency.jumps import gaps
+from avlmaps.recordings.consistency.levels import Levels
 from avlmaps.recordings.consistency.limits import apart_agrees, can_be_judged, geometry_agrees
 from avlmaps.recordings.consistency.sample import pairs_across
 from avlmaps.recordings.consistency.single_frames import LEAST_WARMTH
@@ -25,7 +26,9 @@ _BESIDE, _ROLLED_DEG = 0.08, 6.0
 _NO_OVERLAP = 0.9
 
 
-def blind_spots(recording: Recording, found: Agreement, trials: Trials, edges: Edges, warmth: float) -> tuple[str, ...]:
+def blind_spots(
+    recording: Recording, found: Agreement, trials: Trials, edges: Edges, levels: Levels, warmth: float
+) -> tuple[str, ...]:
     """Return what cannot be checked in a recording of which nothing is wrong, and why, one sentence each.
 
     Args:
@@ -33,11 +36,12 @@ def blind_spots(recording: Recording, found: Agreement, trials: Trials, edges: E
         found: pairs of its frames that follow one another.
         trials: of its sample.
         edges: of its colour and depth.
+        levels: of its floors.
         warmth: of its pictures.
     """
     if not can_be_judged(found):
         return (_nothing(recording, found),)
-    return (*_spots(recording, trials, edges), *_of_channels(warmth))
+    return (*_spots(recording, trials, edges, levels), *_of_channels(warmth))
 
 
 def _nothing(recording: Recording, found: Agreement) -> str:
@@ -51,7 +55,7 @@ def _nothing(recording: Recording, found: Agreement) -> str:
     return f"Poses, depth, colour, intrinsics and clocks cannot be checked here, because {why}."
 
 
-def _spots(recording: Recording, trials: Trials, edges: Edges) -> Iterator[str]:
+def _spots(recording: Recording, trials: Trials, edges: Edges, levels: Levels) -> Iterator[str]:
     as_it_is = trials.run(Suspect())
 
     def shows(*suspects: Suspect) -> bool:
@@ -82,8 +86,14 @@ def _spots(recording: Recording, trials: Trials, edges: Edges) -> Iterator[str]:
             "The focal length cannot be checked here, because the camera hardly turns between frames that see the same "
             f"place: one {_FOCAL:g} times as long would not show."
         )
-    beside = (Suspect(off_centre=(_BESIDE, 0.0)), Suspect(off_centre=(0.0, _BESIDE)), Suspect(rolled_deg=_ROLLED_DEG))
-    if not shows(*beside):
+    tilted = levels.would_show or shows(Suspect(off_centre=(0.0, _BESIDE)), Suspect(rolled_deg=_ROLLED_DEG))
+    aside = shows(Suspect(off_centre=(_BESIDE, 0.0)))
+    if tilted and not aside:
+        yield (
+            "Whether the camera looks aside in its mount cannot be checked here, because it turns about one axis or "
+            f"hardly: a principal point that is off by {_BESIDE:.0%} of the picture's width would not show."
+        )
+    elif not tilted:
         yield (
             "How the camera sits in its mount and its principal point cannot be checked here, because the camera turns "
             f"about one axis or hardly: a principal point that is off by {_BESIDE:.0%} of the picture, or a roll of "

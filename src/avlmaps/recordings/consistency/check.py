@@ -17,6 +17,7 @@ from avlmaps.recordings.consistency.blind_spots import blind_spots
 from avlmaps.recordings.consistency.causes import cause_of
 from avlmaps.recordings.consistency.edges import Edges, Shift, find_edges, shift_of
 from avlmaps.recordings.consistency.jumps import find_exchanged, find_jump, find_parts
+from avlmaps.recordings.consistency.levels import Levels, Tilt, find_levels
 from avlmaps.recordings.consistency.sample import Sample, Surfaces, draw_sample, steps_between_all
 from avlmaps.recordings.consistency.single_frames import (
     of_colour,
@@ -52,7 +53,8 @@ def check_recording(recording: Recording) -> Verdict:
     after = without_occluded(after, following, surfaces)
     apart = compare(distant, surfaces, sample.world_from_camera, floor_m=APART_SAME_M)
     apart = without_occluded(apart, distant, surfaces)
-    found = _Found(after, apart, find_edges(sample), compare(sample.of_redness(), surfaces, sample.world_from_camera))
+    redness = compare(sample.of_redness(), surfaces, sample.world_from_camera)
+    found = _Found(after, apart, find_edges(sample), redness, find_levels(sample))
     of_program = is_of_program(recording)
     known = sample.depth_m[sample.depth_m > 0.0]
     median_m = float(np.median(known)) if known.size else float("nan")
@@ -68,7 +70,8 @@ def check_recording(recording: Recording) -> Verdict:
     ]
     checked, unchecked = limits.can_be_judged(after), ()
     if not findings:
-        unchecked = blind_spots(recording, after, _trials(recording, sample), found.edges, warmth_of(sample))
+        trials = _trials(recording, sample)
+        unchecked = blind_spots(recording, after, trials, found.edges, found.levels, warmth_of(sample))
     return Verdict(
         frames=len(sample),
         pairs=after.pairs,
@@ -84,12 +87,13 @@ def check_recording(recording: Recording) -> Verdict:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Found:
-    """How pairs agree that follow one another, and from apart; colour at edges of depth; red less blue of pairs."""
+    """How pairs agree that follow one another, and from apart; colour at edges of depth; red less blue; floors."""
 
     after: Agreement
     apart: Agreement
     edges: Edges
     redness: Agreement
+    levels: Levels
 
 
 def _most_unlike(after: Agreement, apart: Agreement) -> Agreement | None:
@@ -107,7 +111,7 @@ def _of_agreement(recording: Recording, sample: Sample, found: _Found, median_m:
             "pairs of frames)."
         )
         cause = _cause(recording, sample, found, median_m)
-        yield Finding(Reason.GEOMETRY, grade, sentence, cause or _other_cause(recording, sample, after))
+        yield Finding(Reason.GEOMETRY, grade, sentence, cause or _other_cause(recording, sample, found))
     elif not limits.apart_agrees(apart):
         sentence = (
             f"Frames that look at the same place from apart do not agree: {apart.same_share:.0%} of their points lie "
@@ -130,6 +134,13 @@ def _of_agreement(recording: Recording, sample: Sample, found: _Found, median_m:
             f"of the same points in two frames differ by {offset.off:.1%}, not by {_off(after, apart):.1%}."
         )
         yield Finding(Reason.GEOMETRY, Grade.SUSPICIOUS, sentence, _words(recording, offset, median_m, ""))
+    elif limits.can_be_judged(after) and (tilt := found.levels.tilt) is not None:
+        sentence = (
+            f"Floors do not stay level while the camera turns: they lie {tilt.off_deg:.1f} degrees off (the middle of "
+            f"{len(found.levels.up)} frames), and {tilt.left_deg:.1f} if the camera sits {_tilt_words(tilt)} than its "
+            "poses say."
+        )
+        yield Finding(Reason.GEOMETRY, Grade.SUSPICIOUS, sentence, _tilt_remedy(tilt, recording))
     elif misplaced := (
         find_exchanged(recording, sample, after) or find_jump(recording, sample, after) or find_parts(recording)
     ):
@@ -177,11 +188,31 @@ def _shift_words(shift: Shift, recording: Recording) -> tuple[str, str]:
     )
 
 
+def _tilt_words(tilt: Tilt) -> str:
+    """Return how the camera sits otherwise in its mount; less than a degree is left out."""
+    parts = (
+        (tilt.down_deg, "farther down", "farther up"),
+        (tilt.right_deg, "lower on its right", "lower on its left"),
+    )
+    words = [f"{abs(by):.0f} degrees {more if by > 0.0 else less}" for by, more, less in parts if abs(by) >= 1.0]
+    return " and ".join(words)
+
+
+def _tilt_remedy(tilt: Tilt, recording: Recording) -> str:
+    camera = recording.rig.depth
+    rows = abs(np.tan(np.radians(tilt.down_deg))) * camera.fy
+    remedy = "Correct the transform from what the poses are of to the camera"
+    if abs(tilt.down_deg) > abs(tilt.right_deg):
+        remedy += f", or cy, if it is {rows:.0f} pixels off in the {camera.width}x{camera.height} pictures"
+    return f"{remedy}."
+
+
 def _off(after: Agreement, apart: Agreement) -> float:
     return float(np.nanmean(np.concatenate([after.off, apart.off])))
 
 
-def _other_cause(recording: Recording, sample: Sample, after: Agreement) -> str:
+def _other_cause(recording: Recording, sample: Sample, found: _Found) -> str:
+    after = found.after
     if float(steps_between_all(sample.world_from_camera).max(initial=0.0)) < _STANDS:
         return "All poses are the same, though the pictures are not: the poses are missing, or those of another camera."
     if (exchanged := find_exchanged(recording, sample, after)) is not None:
@@ -196,6 +227,8 @@ def _other_cause(recording: Recording, sample: Sample, after: Agreement) -> str:
             f"{bad} of the pairs are far off, the others are right: the poses jump, or frames are exchanged, for "
             f"example between {a} and {b}. Cut the recording there, or fix the order or the poses."
         )
+    if (tilt := found.levels.tilt) is not None:
+        return f"By its floors the camera sits {_tilt_words(tilt)} than its poses say. {_tilt_remedy(tilt, recording)}"
     return "No usual mistake explains it; check the poses, the depth and the intrinsics, and that they belong together."
 
 

@@ -28,7 +28,7 @@ MOST_COLOUR_ERROR = 12.0
 _FRAMES, _STEP = 12, 5
 # What `info` says that cannot be checked, where a mistake of a group would not show.
 _UNCHECKED = {
-    "poses": r"Poses|clock of the poses|Jumps of the poses|sits in its mount",
+    "poses": r"Poses|clock of the poses|Jumps of the poses|in its mount",
     "scale": r"Poses|scale of positions",
     "depth": r"Poses|measured along|colour lies on depth",
     "colour": r"Poses|colour lies on depth|colour channels",
