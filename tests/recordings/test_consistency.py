@@ -22,6 +22,7 @@ from avlmaps.recordings.consistency.agreement import NOTHING
 from avlmaps.recordings.consistency.causes import cause_of
 from avlmaps.recordings.consistency.check import check_recording, pose_at
 from avlmaps.recordings.consistency.edges import find_edges, shift_of
+from avlmaps.recordings.consistency.levels import find_levels
 from avlmaps.recordings.consistency.planes import offset_in_planes
 from avlmaps.recordings.consistency.sample import Sample, choose_pairs, draw_sample
 from avlmaps.recordings.consistency.single_frames import of_sound
@@ -130,6 +131,12 @@ def test_a_wrong_option_is_found_out(right: Draft, tmp_path: Path) -> None:
         ("colour shifted by a sixteenth", Reason.COLOUR),
         ("poses jump by 2.5 m", Reason.MOTION),
         ("a third of the pictures black", Reason.COLOUR),
+        ("camera tilted by 8 degrees in its mount", Reason.GEOMETRY),
+        ("camera rolled by 8 degrees, the other way", Reason.GEOMETRY),
+        ("cut to 16:9, with the old middle", Reason.GEOMETRY),
+        ("depth in cm, of which 8 bits are stored", Reason.DEPTH),
+        ("frames sorted as text", Reason.GEOMETRY),
+        ("every second pose is the one before", Reason.GEOMETRY),
     ],
 )
 def test_a_mistake_is_named(name: str, reason: Reason, right: Draft, tmp_path: Path) -> None:
@@ -378,6 +385,32 @@ def test_edges_of_colour_are_found_where_they_were_moved_to(drawn: Sample, x: in
     elif np.hypot(x, y) >= 8.0:
         assert found is not None
         assert np.hypot(found.columns * 128 - x, found.rows * 128 - y) <= 3.0
+
+
+@pytest.fixture(scope="module")
+def turning(tmp_path_factory: pytest.TempPathFactory) -> Sample:
+    walk = RoomWalk("right round", seed=59, frames=24, rate_hz=2.5, noise=0.0019).draft(
+        Pinhole(96.0, 96.0, 64.0, 48.0, 128, 96)
+    )
+    return draw_sample(open_recording(walk.write(tmp_path_factory.mktemp("turning") / "walk")))
+
+
+@pytest.mark.parametrize(("axis", "degrees"), [(0, 6.0), (0, -6.0), (2, 6.0), (2, -6.0), (0, 14.0)])
+def test_floors_show_how_a_camera_sits_in_its_mount(turning: Sample, axis: int, degrees: float) -> None:
+    half = np.radians(degrees) / 2.0
+    off = poses.from_quaternion(np.zeros((1, 3)), np.array([[*(np.sin(half) * np.eye(3)[axis]), np.cos(half)]]))[0]
+    found = find_levels(replace(turning, world_from_camera=turning.world_from_camera @ off)).tilt
+    assert found is not None and found.left_deg < 1.5 < found.off_deg
+    expected = (degrees, 0.0) if axis == 0 else (0.0, -degrees)
+    assert (found.down_deg, found.right_deg) == pytest.approx(expected, abs=1.5)
+
+
+@pytest.mark.parametrize("degrees", [0.0, 5.0, 12.0])
+def test_a_slope_is_no_tilt_of_the_camera(turning: Sample, degrees: float) -> None:
+    half = np.radians(degrees) / 2.0
+    slope = poses.from_quaternion(np.zeros((1, 3)), np.array([[np.sin(half), 0.0, 0.0, np.cos(half)]]))[0]
+    levels = find_levels(replace(turning, world_from_camera=slope @ turning.world_from_camera))
+    assert levels.tilt is None and levels.would_show
 
 
 @pytest.mark.parametrize("count", [2, 3, 7, 200, 5000])

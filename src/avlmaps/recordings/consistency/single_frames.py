@@ -35,6 +35,9 @@ MOST_BLACK = 0.1
 # Share of the depths that are exactly the largest one, in the middle of the frames: those of a wall differ.
 MOST_CUT_OFF = 0.05
 FARTHEST_FUSED_M = 10.0
+# Depth that begins again at 0 beyond its largest number: of two neighbours one is nearly that far, and one nearer than
+# any camera measures, at 5 places of a frame, in a quarter of the frames.
+_NEARLY_MOST, _MEASURED_BY_NONE_M, _FEWEST_WRAPPED, _WRAPPED_FRAMES = 0.92, 0.1, 5, 0.25
 # Share of pairs with one depth picture although the camera moved.
 MOST_FROZEN = 0.08
 # Faster than anybody walks, frame after frame.
@@ -150,6 +153,7 @@ def _flat_depth(sample: Sample, there: np.ndarray) -> Iterator[Finding]:
         yield Finding(Reason.DEPTH, Grade.IMPOSSIBLE, sentence, "Check how they were written.")
     else:
         yield from _cut_off(sample, there)
+        yield from _wrapped(sample, there)
     yield from _frozen(sample, np.where(there, sample.depth_m, np.nan), Reason.DEPTH)
 
 
@@ -161,6 +165,23 @@ def _cut_off(sample: Sample, there: np.ndarray) -> Iterator[Finding]:
     if share > MOST_CUT_OFF and most_m < FARTHEST_FUSED_M:
         sentence = f"{share:.0%} of the depths of a frame are exactly the largest one, {most_m:.4g} m."
         remedy = "They look cut off there, or none was measured: write 0 for these, or the map has a wall there."
+        yield Finding(Reason.DEPTH, Grade.SUSPICIOUS, sentence, remedy)
+
+
+def _wrapped(sample: Sample, there: np.ndarray) -> Iterator[Finding]:
+    """Find depths that begin again at 0, as those of 16 bits do of which 8 are stored."""
+    most_m = float(sample.depth_m.max())
+    far, near = sample.depth_m > _NEARLY_MOST * most_m, there & (sample.depth_m < _MEASURED_BY_NONE_M)
+    beside = np.zeros(len(sample), np.int64)
+    for one, other in ((far, near), (near, far)):
+        beside += (one[:, :, 1:] & other[:, :, :-1]).sum(axis=(1, 2)) + (one[:, 1:] & other[:, :-1]).sum(axis=(1, 2))
+    share = float((beside >= _FEWEST_WRAPPED).mean())
+    if share > _WRAPPED_FRAMES:
+        sentence = (
+            f"In {share:.0%} of the {len(sample)} frames that were looked at, depths of {most_m:.3g} m, the largest, "
+            f"lie beside some below {_MEASURED_BY_NONE_M:g} m, which no camera measures."
+        )
+        remedy = "They look cut to too few bits, so that they begin again at 0: write them whole, or 0 where too far."
         yield Finding(Reason.DEPTH, Grade.SUSPICIOUS, sentence, remedy)
 
 
