@@ -923,6 +923,17 @@ def test_a_clock_of_frames_that_was_set_is_said(slow: float, paused: bool) -> No
         assert "Stamps jump by 40.1 s, from 3.9 to 44.0 s, while 0.1 s passed" in said[0] and len(said) == 1
 
 
+@pytest.mark.parametrize("slow", [1.04, 1.2, 1.0 / 1.2])  # read too slowly, or played faster than it was recorded
+def test_a_reader_that_catches_up_in_a_pause_is_no_jump_of_the_clock(
+    slow: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(PoseCheck, "_compared", lambda _: None)
+    check, last_s, still = PoseCheck(), 400.0 if slow == 1.04 else 50.0, frame(0)
+    for stamp_s in (*np.arange(0.0, last_s, 0.5), *np.arange(last_s + 40.0, last_s + 45.0, 0.5)):
+        late_s = (slow - 1.0) * stamp_s if stamp_s < last_s or slow < 1.0 else 0.0
+        assert not check.add(replace(still, stamp_s=float(stamp_s)), arrived_s=float(stamp_s + late_s))
+
+
 def test_frames_that_were_held_up_on_their_way_are_no_jump_of_the_clock() -> None:
     check = PoseCheck()
     for number in range(80):  # one is 9 s late, those until it arrived are lost

@@ -6,6 +6,7 @@ checks in a row that find otherwise are a doubt, so that one person who walks by
 
 from collections import deque
 from itertools import combinations
+from math import inf
 
 import numpy as np
 
@@ -28,9 +29,9 @@ MOST_M_S, MOST_RAD_S = 5.0, np.radians(540.0)
 _LEAST_MEASURED = 0.01  # of the pixels of a frame; where fewer have a depth, nothing of it comes into the map
 _WITHOUT_DEPTH_S, _WITHOUT_SOUND_S = 2.0, 10.0
 _SURE_S = 1.0  # of frames, until it is plain whether sound that is behind still comes
-# Frames that came at the pace of their stamps for 2 s, within this ratio, come by the clock; one that is 5 s earlier
-# than any of them could be has another.
-_IN_STEP_S, _STEADY, _EARLY_S = 2.0, 1.25, 5.0
+# Frames that came at the pace of their stamps for 2 s, within 0.3 s and a share, come by the clock; one that is 5 s
+# earlier than any frame before has another. Frames that are read too slowly fall behind, and catch up in a pause.
+_IN_STEP_S, _LATE_S, _STEADY, _EARLY_S = 2.0, 0.3, 0.05, 5.0
 _ARRIVALS = 200
 
 
@@ -48,6 +49,7 @@ class PoseCheck:
         self._is_told = False  # that it is, was said
         self._sounded: tuple[float, float, float] | None = None  # frame, sound and its gaps, the last time
         self._arrivals: deque[tuple[float, float]] = deque(maxlen=_ARRIVALS)  # stamps, and when they came
+        self._least_late_s = inf  # of all that came by this clock: when they came, less their stamps
 
     def add(
         self, frame: Frame, heard_s: float | None = None, gap_s: float = 0.0, arrived_s: float | None = None
@@ -111,24 +113,29 @@ class PoseCheck:
     def _clock_at(self, stamp_s: float, arrived_s: float | None) -> str | None:
         """Find a frame that is earlier, by its stamp, than any other that came by the clock."""
         if arrived_s is None:
-            self._arrivals.clear()
+            self._forget_arrivals()
             return None
         before, came = list(self._arrivals), (stamp_s, arrived_s)
+        early_s = self._least_late_s - (arrived_s - stamp_s)
         self._arrivals.append(came)
+        self._least_late_s = min(self._least_late_s, arrived_s - stamp_s)
         if len(before) < 2:
             return None
         lasted_s, took_s = (b - a for a, b in zip(before[0], before[-1], strict=True))
         jump_s, passed_s = (b - a for a, b in zip(before[-1], came, strict=True))
-        early_s = min(arrived - stamp for stamp, arrived in before) - (arrived_s - stamp_s)
-        in_step = lasted_s >= _IN_STEP_S and lasted_s / _STEADY < took_s < lasted_s * _STEADY
+        in_step = lasted_s >= _IN_STEP_S and abs(took_s - lasted_s) < _LATE_S + _STEADY * lasted_s
         if not in_step or min(early_s, jump_s - passed_s) < _EARLY_S or jump_s > LONGEST_GAP_S:
             return None
-        self._arrivals.clear()
+        self._forget_arrivals()
         return (
             f"Stamps jump by {jump_s:.1f} s, from {before[-1][0]:.1f} to {stamp_s:.1f} s, while {passed_s:.1f} s "
             "passed: the clock of the frames was set. Sounds and days that are "
             "looked up by time are wrong; let the robot set its clock before it drives."
         )
+
+    def _forget_arrivals(self) -> None:
+        self._arrivals.clear()
+        self._least_late_s = inf
 
     def _pose_of(self, frame: Frame) -> str | None:
         jump = self._jump_to(frame)
