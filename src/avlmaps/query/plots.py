@@ -249,20 +249,31 @@ def _draw_goals(ax: "Axes", space: Space, goals: Sequence[Goal]) -> None:
     """Number the goals, and write their positions, in the picture's frame, and probabilities into the legend."""
     frame = picture_frame(space)
     named = " (level frame)" if frame is FrameName.LEVEL else ""
-    for number, goal in enumerate(goals, 1):
-        level = space.level(np.array(goal.position))
-        mark(ax, level, str(number), INK)
+    levels = [space.level(np.array(goal.position)) for goal in goals]
+    for number in range(len(goals), 0, -1):  # the best last: no other hides its number
+        mark(ax, levels[number - 1], str(number), INK, _beside(levels[number - 1], levels))
+    for number, (goal, level) in enumerate(zip(goals, levels, strict=True), 1):
         position = place_text(level if named else goal.position)
         ax.plot([], [], " ", label=f"{number}: {position}{named}, probability {goal.probability:.2f}")
 
 
-def mark(ax: "Axes", point_level: Float[np.ndarray, "3"], text: str, colour: str) -> None:
-    """Write a short text in a bubble beside a place."""
+def _beside(place: np.ndarray, places: Sequence[np.ndarray]) -> tuple[float, float]:
+    """Return where to write of a place, in points to the right and up of it: away from the others within 1.5 m."""
+    crowd = [other[:2] for other in places if np.linalg.norm((other - place)[:2]) < 1.5]
+    away = place[:2] - np.mean(crowd, axis=0)
+    length = float(np.linalg.norm(away))
+    return (9.0, 9.0) if length < 1e-6 else (14.0 * float(away[0]) / length, 14.0 * float(away[1]) / length)
+
+
+def mark(
+    ax: "Axes", point_level: Float[np.ndarray, "3"], text: str, colour: str, beside: tuple[float, float] = (9.0, 9.0)
+) -> None:
+    """Write a short text in a bubble beside a place, in points (1/72 inch) to the right and up of it."""
     box = {"boxstyle": "circle,pad=0.25" if len(text) < 3 else "round,pad=0.25", "facecolor": colour}
     ax.annotate(
         text,
         xy=(float(point_level[0]), float(point_level[1])),
-        xytext=(9, 9),
+        xytext=beside,
         textcoords="offset points",
         fontsize=8,
         color="white",
