@@ -16,7 +16,7 @@ from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.factors import HeatSettings, NearThings
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.modalities.image import image_factor
-from avlmaps.query.plots import HEAT_LABEL, _beside, plot_map
+from avlmaps.query.plots import HEAT_LABEL, aside, plot_map
 from avlmaps.query.topdown import TopDown
 from avlmaps.query.voxel_space import Space
 
@@ -145,7 +145,7 @@ def test_goals_that_crowd_have_their_numbers_apart() -> None:
     crowd = [np.array(place) for place in ((0.0, 0.0, 0.7), (0.04, -0.31, 0.4), (-0.26, 0.14, 0.3))]
     far = np.array([6.0, 2.0, 0.5])
     # A point is 1/72 inch, and a metre of a map that fills a panel of 3.5 inches some 20 points.
-    written = [place[:2] * 20.0 + _beside(place, [*crowd, far]) for place in crowd]
+    written = [place[:2] * 20.0 + aside(place, [*crowd, far]) for place in crowd]
     apart = [np.linalg.norm(a - b) for i, a in enumerate(written) for b in written[:i]]
     assert min(apart) > 12.0, "a bubble is 12 points wide"
-    assert _beside(far, [*crowd, far]) == (9.0, 9.0)
+    assert aside(far, [*crowd, far]) == (9.0, 9.0)

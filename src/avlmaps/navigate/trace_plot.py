@@ -10,7 +10,7 @@ from jaxtyping import Float
 from avlmaps.core.motion import GroundPose
 from avlmaps.core.printable import plot_text
 from avlmaps.navigate.motion_log import Move
-from avlmaps.query.plots import INK, draw_ground, finish, mark, panels, save
+from avlmaps.query.plots import INK, aside, draw_ground, finish, mark, panels, save
 from avlmaps.query.topdown import TopDown
 from avlmaps.query.voxel_space import Space
 
@@ -104,7 +104,7 @@ def _draw_subgoal(ax: "Axes", space: Space, number: int, move: Move) -> None:
     ax.plot(*np.stack([goal, stop])[:, :2].T, color=_GOAL, linewidth=1.2, linestyle=":", zorder=6)
     ax.plot(*goal[:2], linestyle="none", marker="o", markersize=11, markerfacecolor="none", markeredgecolor=_GOAL,
             markeredgewidth=2.0, zorder=7)  # fmt: skip
-    mark(ax, stop, str(number), _GOAL if move.reached else _CONTACT)
+    mark(ax, stop, str(number), _GOAL if move.reached else _CONTACT, aside(stop, [stop, goal]))
     name = plot_text(move.name or move.skill.replace("_", " "), _LONGEST_NAME)
     reached = f"{move.distance_m:.2f} m from it" if move.reached else "not reached"
     ax.plot([], [], " ", label=f"{number}: {name}, {reached}")

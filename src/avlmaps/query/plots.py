@@ -251,13 +251,13 @@ def _draw_goals(ax: "Axes", space: Space, goals: Sequence[Goal]) -> None:
     named = " (level frame)" if frame is FrameName.LEVEL else ""
     levels = [space.level(np.array(goal.position)) for goal in goals]
     for number in range(len(goals), 0, -1):  # the best last: no other hides its number
-        mark(ax, levels[number - 1], str(number), INK, _beside(levels[number - 1], levels))
+        mark(ax, levels[number - 1], str(number), INK, aside(levels[number - 1], levels))
     for number, (goal, level) in enumerate(zip(goals, levels, strict=True), 1):
         position = place_text(level if named else goal.position)
         ax.plot([], [], " ", label=f"{number}: {position}{named}, probability {goal.probability:.2f}")
 
 
-def _beside(place: np.ndarray, places: Sequence[np.ndarray]) -> tuple[float, float]:
+def aside(place: np.ndarray, places: Sequence[np.ndarray]) -> tuple[float, float]:
     """Return where to write of a place, in points to the right and up of it: away from the others within 1.5 m."""
     crowd = [other[:2] for other in places if np.linalg.norm((other - place)[:2]) < 1.5]
     away = place[:2] - np.mean(crowd, axis=0)
