@@ -419,6 +419,7 @@ def test_the_editor_says_what_it_cannot_do(tmp_path: Path) -> None:
         (lambda: m.edit.split("table", plane=["4,0"]), "a plane through two places"),
         (lambda: m.edit.forbid("x"), "by a box x0,y0,x1,y1 or by a room"),
         (lambda: m.edit.forbid("x", box=(0.0, 0.0, 0.0, 5.0)), "has no area"),
+        (lambda: m.edit.forbid("x", box=5), "A box is x0,y0,x1,y1 in metres"),
         (lambda: m.edit.forbid("x", room="kitchen"), "no floor plan"),
         (lambda: m.edit.pin("dock", "nowhere"), "A place is x,y"),
         (lambda: m.edit.pin("dock", (500.0, 1.0)), "m outside of the map, which goes from"),

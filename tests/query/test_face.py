@@ -80,6 +80,9 @@ def test_the_nearest_of_what_is_found_comes_first(folder: Path) -> None:
         m.ask("chair", near="here")
     with pytest.raises(avlmaps.QueryError, match="A place is x,y or x,y,z in metres"):
         m.ask("chair", near=5)  # pyright: ignore[reportArgumentType]
+    with pytest.raises(avlmaps.QueryError, match="top must be a whole number of goals, not '2'"):
+        m.ask("chair", top="2")  # pyright: ignore[reportArgumentType]
+    assert len(m.ask("chair", top=np.int64(2)).goals) <= 2
 
 
 def test_a_place_to_count_from_leaves_a_list_in_its_own_order(m: avlmaps.AVLMap) -> None:

@@ -15,7 +15,7 @@ from avlmaps.core.arrays import Float, Float16, Int32, UInt8
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import BackendError, MapError, QueryError
 from avlmaps.core.files import lasting_path, user_path
-from avlmaps.core.numbers import hold_numbers
+from avlmaps.core.numbers import as_whole, hold_numbers
 from avlmaps.core.question import HeardAt, Modality, Part, Question, Role
 from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder, SurveyedEncoder
@@ -860,7 +860,10 @@ class AVLMap:
         )
         from avlmaps.query.given_places import place_given
 
-        files = Files(intrinsics, attachments)
+        files, wanted = Files(intrinsics, attachments), as_whole(top)
+        if wanted is None:
+            raise AskError(f"top must be a whole number of goals, not {top!r}.")
+        top = wanted
         if isinstance(question, Question):
             if any(part is not None for part in (object, sound, area, image, clip, primary)):
                 raise AskError("A question holds its parts already; give a sentence or parts instead.")

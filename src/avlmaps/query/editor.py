@@ -414,6 +414,8 @@ def _own_name(name: str) -> str:
 
 def _corners(box: Sequence[float]) -> list[Float[np.ndarray, "2"]]:
     """Return the corners of a box, level x and y."""
+    if not np.iterable(box):
+        raise QueryError(f"A box is x0,y0,x1,y1 in metres of the level frame, two opposite corners; not {box!r}.")
     if len(box) != 4 or not all(math.isfinite(value) and abs(value) <= 1e5 for value in box):
         raise QueryError(f"A box is x0,y0,x1,y1 in metres of the level frame, two opposite corners; not {tuple(box)}.")
     (x0, x1), (y0, y1) = sorted((box[0], box[2])), sorted((box[1], box[3]))
