@@ -29,7 +29,7 @@ from avlmaps.recordings.consistency.single_frames import of_sound
 from avlmaps.recordings.consistency.suspects import Suspect, Trials, suspected_rig
 from avlmaps.recordings.consistency.verdict import Grade, Reason, Verdict
 from avlmaps.recordings.corrections import Corrections, PoseKind
-from avlmaps.recordings.example_room import example_truth
+from avlmaps.recordings.example_room import example_truth, see
 from avlmaps.recordings.memory import MemoryRecording, is_of_program
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Frame, Recording
@@ -313,6 +313,17 @@ def test_frames_whose_clock_skips_what_the_sound_does_not_are_doubted(
     assert len(found) == doubted and all("ends 40.0 s before the frames do" in one for one in found)
     recording.audio = replace(recording.audio, duration_s=recording.duration_s)  # the robot waited, and listened on
     assert not list(of_sound(recording))
+
+
+def test_two_cameras_that_take_turns_are_compared_each_with_itself(tmp_path: Path) -> None:
+    walk = RoomWalk("turns", seed=59, frames=24, turn_rad_s=0.5)
+    ahead = walk.draft(CAMERA)
+    beside = poses.from_quaternion(np.zeros((1, 3)), np.array([[0.0, np.sqrt(0.5), 0.0, np.sqrt(0.5)]]))[0]
+    pose = np.stack([one @ beside if i % 2 else one for i, one in enumerate(ahead.poses)])
+    seen = [see(CAMERA, one) for one in pose]
+    depth = tuple(np.rint(1000.0 * depth_m).astype(np.uint16) for _, depth_m in seen)
+    found = verdict(replace(ahead, rgb=tuple(rgb for rgb, _ in seen), depth=depth, poses=pose), tmp_path)
+    assert found.grade is Grade.FINE and found.pairs >= 8 and not found.sentences()
 
 
 def test_frames_that_see_nothing_in_common_are_not_called_fine(tmp_path: Path) -> None:

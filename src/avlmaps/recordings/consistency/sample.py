@@ -17,6 +17,8 @@ PAIRS = 30  # that follow in time, at most
 STEP_RAD = np.radians(12.0)
 STEP_M = 0.35
 STEPS = (0.5, 1.2)
+# A frame further away is of another camera that takes turns with this one, or after a jump: a nearer one is compared.
+NO_STEP = 5.0
 # Of the pairs that look one way from apart: this far apart, as long as poses say so.
 APART = 12
 APART_M, APART_RAD = 0.7, np.radians(25.0)
@@ -151,6 +153,8 @@ def choose_pairs(pose: Float[np.ndarray, "n 4 4"]) -> tuple[Int[np.ndarray, "p 2
         moved = steps_between(pose[a], pose[a + 1 : a + 1 + 4 * latest])
         for wanted in STEPS:
             far = np.flatnonzero(moved >= wanted)
+            if len(far) and moved[far[0]] > NO_STEP:
+                far = far[[int(np.argmin(moved[far]))]]
             found[a, a + 1 + (int(far[0]) if len(far) else min(latest, len(moved)) - 1)] = None
     step = steps_between_all(pose)
     odd = np.flatnonzero(step > JUMP_RATIO * max(float(np.median(step)), 0.02))
