@@ -28,7 +28,7 @@ def some_layers() -> Layers:
         colors=np.array([[255, 0, 0], [0, 255, 0], [0, 0, 255]], np.uint8),
         voxel_size_m=0.05,
         things=(Box("chair", 0.8, (1.0, 2.0, 0.5), (0.5, 0.5, 1.0), (0.0, 0.0, 0.0, 1.0), (10, 20, 30)),),
-        sounds=(Heard("dog bark 0.70", (2.0, 0.0, 1.0), 101.5, 103.0),),
+        sounds=(Heard("dog bark", 0.7, (2.0, 0.0, 1.0), 101.5, 103.0),),
         heat=("the chair", np.array([0.0, 0.5, 1.0], np.float32)),
         stamp_s=np.array([100.0, 102.0]),
         frame_from_camera=poses,
