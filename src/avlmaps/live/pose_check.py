@@ -115,20 +115,19 @@ class PoseCheck:
         if arrived_s is None:
             self._forget_arrivals()
             return None
-        before, came = list(self._arrivals), (stamp_s, arrived_s)
+        came = (stamp_s, arrived_s)
+        first, last = (self._arrivals[0], self._arrivals[-1]) if self._arrivals else (came, came)
         early_s = self._least_late_s - (arrived_s - stamp_s)
         self._arrivals.append(came)
         self._least_late_s = min(self._least_late_s, arrived_s - stamp_s)
-        if len(before) < 2:
-            return None
-        lasted_s, took_s = (b - a for a, b in zip(before[0], before[-1], strict=True))
-        jump_s, passed_s = (b - a for a, b in zip(before[-1], came, strict=True))
+        lasted_s, took_s = (b - a for a, b in zip(first, last, strict=True))
+        jump_s, passed_s = (b - a for a, b in zip(last, came, strict=True))
         in_step = lasted_s >= _IN_STEP_S and abs(took_s - lasted_s) < _LATE_S + _STEADY * lasted_s
         if not in_step or min(early_s, jump_s - passed_s) < _EARLY_S or jump_s > LONGEST_GAP_S:
             return None
         self._forget_arrivals()
         return (
-            f"Stamps jump by {jump_s:.1f} s, from {before[-1][0]:.1f} to {stamp_s:.1f} s, while {passed_s:.1f} s "
+            f"Stamps jump by {jump_s:.1f} s, from {last[0]:.1f} to {stamp_s:.1f} s, while {passed_s:.1f} s "
             "passed: the clock of the frames was set. Sounds and days that are "
             "looked up by time are wrong; let the robot set its clock before it drives."
         )

@@ -1,16 +1,15 @@
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from avlmaps_sim.furniture import Piece, families, make
+from avlmaps_sim.furniture import families, make
 from avlmaps_sim.furniture.decor import CARPET_SHAPES, carpet
 from avlmaps_sim.furniture.drapes import CURTAIN_STYLES, curtain
 from avlmaps_sim.furniture.openings import DOOR_STYLES, WINDOW_STYLES, door, folding_door, window
 from avlmaps_sim.furniture.recipe_helpers import blade, cloth, rim, strut, turned_ring
 from avlmaps_sim.mesh import Material
+from helpers.furniture_pieces import every_piece, pieces_of
 
 # Category: least and greatest largest extent, greatest height (metres), least number of families.
 _RANGE = {
@@ -35,22 +34,10 @@ _ALL = [(category, name) for category in _RANGE for name in families(category)]
 _grey = Material()
 
 
-def _pieces(category: str, name: str) -> list[Piece]:
-    return [make(category, np.random.default_rng(seed), name=name) for seed in range(4)]
-
-
-def _every(category: str) -> Iterator[Piece]:
-    """Yield the pieces of all families of a category."""
-    for name in families(category):
-        made = _pieces(category, name)
-        assert {piece.family for piece in made} == {name}
-        yield from made
-
-
 @pytest.mark.parametrize("category", _RANGE)
 def test_a_piece_stands_centred_in_plausible_size_and_few_triangles(category: str) -> None:
     least, most, tallest, _ = _RANGE[category]
-    for piece in _every(category):
+    for piece in every_piece(category):
         low, high = piece.mesh.low, piece.mesh.high
         assert np.isfinite(piece.mesh.vertex).all() and np.isfinite(piece.mesh.uv).all()
         np.testing.assert_allclose([low[2], *(low + high)[:2]], 0.0, atol=2e-3)
@@ -62,7 +49,7 @@ def test_a_piece_stands_centred_in_plausible_size_and_few_triangles(category: st
 
 @pytest.mark.parametrize(("category", "name"), [pair for pair in _ALL if pair[0] in ("lamp", "chandelier", "candle")])
 def test_what_shines_says_where_within_its_own_box(category: str, name: str) -> None:
-    for piece in _pieces(category, name):
+    for piece in pieces_of(category, name):
         assert piece.light
         place = np.array(piece.light)
         assert (place >= piece.mesh.low - 0.06).all() and (place <= piece.mesh.high + 0.06).all()

@@ -1,17 +1,15 @@
 """Kitchens, bathrooms, appliances and electronics: what holds for every family, and a few parts by themselves."""
 
-from collections.abc import Iterator
-from functools import cache
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from avlmaps_sim.furniture import Piece, families, make
+from avlmaps_sim.furniture import families, make
 from avlmaps_sim.furniture.computers import key_field
 from avlmaps_sim.furniture.fittings import face, front, front_style, open_bowl, outline, shell, spindle, tap
 from avlmaps_sim.mesh import Material, joined
+from helpers.furniture_pieces import every_piece, pieces_of
 
 # Category: least and greatest largest extent, greatest height (metres), least number of families.
 _RANGE = {
@@ -29,27 +27,13 @@ _RANGE = {
     "clock": (0.06, 2.5, 2.5, 7),
 }  # fmt: skip
 _ALL = [(category, name) for category in _RANGE for name in families(category)]
-_SEEDS = 3
 _grey = Material()
-
-
-@cache
-def _pieces(category: str, name: str) -> tuple[Piece, ...]:
-    return tuple(make(category, np.random.default_rng(seed), name=name) for seed in range(_SEEDS))
-
-
-def _every(category: str) -> Iterator[Piece]:
-    """Yield the pieces of all families of a category."""
-    for name in families(category):
-        made = _pieces(category, name)
-        assert {piece.family for piece in made} == {name}
-        yield from made
 
 
 @pytest.mark.parametrize("category", _RANGE)
 def test_a_piece_stands_on_the_floor_about_its_middle_within_plausible_sizes(category: str) -> None:
     least, greatest, tallest, _ = _RANGE[category]
-    for piece in _every(category):
+    for piece in every_piece(category):
         mesh = piece.mesh
         assert piece.category == category
         assert np.isfinite(mesh.vertex).all() and np.isfinite(mesh.uv).all()
@@ -62,7 +46,7 @@ def test_a_piece_stands_on_the_floor_about_its_middle_within_plausible_sizes(cat
 
 @pytest.mark.parametrize("category", _RANGE)
 def test_things_can_stand_on_the_supports_of_a_piece(category: str) -> None:
-    for piece in _every(category):
+    for piece in every_piece(category):
         for top in piece.supports:
             assert top.high[0] > top.low[0] and top.high[1] > top.low[1] and top.clearance_m > 0
             assert (np.array(top.low) >= piece.mesh.low[:2] - 0.006).all()
@@ -89,7 +73,7 @@ def test_training_never_sees_the_held_out_families(category: str) -> None:
 
 @pytest.mark.parametrize("category", _RANGE)
 def test_the_families_of_a_category_are_built_differently(category: str) -> None:
-    made = {name: _pieces(category, name) for name in families(category)}
+    made = {name: pieces_of(category, name) for name in families(category)}
     areas = {tuple(np.round(pieces[0].mesh.areas_m2(), 6).tolist()) for pieces in made.values()}
     assert len(areas) == len(made)
     for name, pieces in made.items():
@@ -99,14 +83,14 @@ def test_the_families_of_a_category_are_built_differently(category: str) -> None
 
 @pytest.mark.parametrize(("category", "name"), [(c, n) for c, n in _ALL if n.startswith("wall ")])
 def test_what_hangs_touches_the_wall_with_a_surface(category: str, name: str) -> None:
-    for piece in _pieces(category, name):
+    for piece in pieces_of(category, name):
         at_wall = piece.mesh.vertex[:, 0] < piece.mesh.low[0] + 0.012
         assert at_wall.sum() >= 3
 
 
 @pytest.mark.parametrize("name", families("kitchen counter"))
 def test_worktops_lie_at_the_height_of_a_kitchen(name: str) -> None:
-    for piece in _pieces("kitchen counter", name):
+    for piece in pieces_of("kitchen counter", name):
         assert any(0.8 <= top.z <= 1.0 for top in piece.supports)
 
 

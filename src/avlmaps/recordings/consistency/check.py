@@ -23,7 +23,7 @@ from avlmaps.recordings.consistency.single_frames import (
     of_colour,
     of_depth,
     of_intrinsics,
-    of_levels,
+    of_loudness,
     of_motion,
     of_poses,
     of_sound,
@@ -64,7 +64,7 @@ def check_recording(recording: Recording) -> Verdict:
         *of_colour(sample, surfaces),
         *of_poses(recording),
         *of_sound(recording),
-        *of_levels(recording),
+        *of_loudness(recording),
         *of_motion(recording, after, limits.can_be_judged(after)),
         *_of_agreement(recording, sample, found, median_m),
     ]

@@ -11,7 +11,6 @@ import numpy as np
 
 from avlmaps.core.arrays import Float, Float32
 from avlmaps.core.camera import Pinhole
-from avlmaps.core.poses import from_quaternion
 from avlmaps.recordings.consistency.sample import Sample
 
 # Normals are measured over this many pixels to each side, on surface that bends by less than this share of its depth.
@@ -161,9 +160,9 @@ def _turned(vectors: Float[np.ndarray, "n 3"], by_rad: Float[np.ndarray, "3"]) -
 
 def _rotation(axis: int, degrees: float) -> Float[np.ndarray, "3 3"]:
     """Return a rotation about one axis of the camera."""
-    half = np.sin(np.radians(degrees) / 2.0) * np.eye(3)[axis]
-    quaternion = np.array([*half, np.cos(np.radians(degrees) / 2.0)])
-    return from_quaternion(np.zeros((1, 3)), quaternion[None])[0, :3, :3]
+    import cv2
+
+    return np.asarray(cv2.Rodrigues(np.radians(degrees) * np.eye(3)[axis])[0], np.float64)
 
 
 def _unit(vector: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:

@@ -320,7 +320,7 @@ def _skipped(recording: Recording, missing_s: float) -> tuple[int, float] | None
     return at, float(apart_s[at])
 
 
-def of_levels(recording: Recording) -> Iterator[Finding]:
+def of_loudness(recording: Recording) -> Iterator[Finding]:
     """Find a track that is silent or clipped; of an array, its channels are looked at elsewhere."""
     if recording.audio is None or recording.audio.microphones is not None:
         return
