@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from avlmaps.core import poses
-from avlmaps.core.errors import MapError
+from avlmaps.core.errors import MapError, NavigationError
 from avlmaps.maps.grid import GridSpec
-from avlmaps.maps.obstacles import Body, CellState, find_obstacles, floor_height
+from avlmaps.maps.obstacles import BodyShape, CellState, find_obstacles, floor_height
 from avlmaps.maps.types import Voxels
 
 GRID = GridSpec(0.05)
@@ -93,7 +93,7 @@ def test_the_first_voxel_is_an_obstacle_like_any_other():
 def test_the_body_decides_what_is_in_the_way():
     voxels = voxels_of(room())
     lamp, table = np.array([3.1, 0.3, 0.0]), np.array([1.5, 1.3, 0.0])
-    tall, flat = Body(height_m=2.2), Body(height_m=0.4)
+    tall, flat = BodyShape(height_m=2.2), BodyShape(height_m=0.4)
     assert find_obstacles(voxels, GRID, UP, tall).state_at(lamp) == OCCUPIED
     assert find_obstacles(voxels, GRID, UP, flat).state_at(table) == FREE
 
@@ -104,7 +104,7 @@ def test_speckles_do_not_count():
     both = Voxels(*(np.concatenate([getattr(room_voxels, name), getattr(speck, name)]) for name in names))
     place = np.array([0.5, 0.5, 0.0])
     assert find_obstacles(both, GRID, UP).state_at(place) == FREE
-    assert find_obstacles(both, GRID, UP, Body(min_hits=1)).state_at(place) == OCCUPIED
+    assert find_obstacles(both, GRID, UP, min_hits=1).state_at(place) == OCCUPIED
 
 
 def test_cells_and_points_of_the_world_agree():
@@ -148,8 +148,8 @@ def test_a_grid_too_large_for_memory_is_refused():
 
 
 def test_a_body_that_is_none_is_refused():
-    with pytest.raises(MapError, match="the radius must not be negative, and the step between 0 and the height"):
-        Body(step_m=2.0)
+    with pytest.raises(NavigationError, match="give a radius between 0 and 10 m, and a step between 0 and the height"):
+        BodyShape(step_m=2.0)
 
 
 def walk(*places, step_m=0.4, high_m=1.3):

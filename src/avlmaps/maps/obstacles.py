@@ -11,7 +11,7 @@ from enum import IntEnum
 import numpy as np
 from jaxtyping import Bool, Float, Float64, Int, UInt8
 
-from avlmaps.core.errors import MapError, NoFloorError
+from avlmaps.core.errors import MapError, NavigationError, NoFloorError
 from avlmaps.core.poses import rotation_to_level
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.storeys import Storeys
@@ -25,6 +25,8 @@ _WALKER_M = 0.25  # radius of who carries it; a larger body is promised no more
 _STRIDE_M = 0.5  # between two places no farther apart it went straight
 _SWAY_M = 0.12  # from the usual height of a camera over its floor; on stairs it is farther off
 _BEYOND_M = 3.0  # a walk farther beyond what was seen is a wrong pose
+MIN_HITS = 3
+"""Voxels with fewer pixels count for nothing: a depth camera's lone speckles."""
 SIGHT_M = (1.2, 1.7)  # heights over the floor of a robot's and of a person's eyes: what stands there blocks the view
 
 
@@ -37,30 +39,34 @@ class CellState(IntEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Body:
-    """The robot's body, as far as obstacles matter to it."""
+class BodyShape:
+    """How large a robot is, and what counts as an obstacle to it (the embodiments of VLMaps)."""
 
     radius_m: float = 0.2
-    """Radius of the circle that it stands on."""
+    """Radius of the circle round its middle that it needs free."""
     height_m: float = 1.5
-    """Height over the floor that it needs free."""
+    """Height of its top over the floor."""
     step_m: float = 0.1
-    """Lower voxels are floor to it: it can drive over them, and depth is no more exact."""
-    min_hits: int = 3
-    """Voxels with fewer pixels count for nothing: a depth camera's lone speckles."""
+    """It drives over lower obstacles."""
     flies_m: float | None = None
-    """How high its lowest part flies over the floor; None for a body that stands on it."""
+    """Height of its lowest part over the floor, for a body that flies: lower things are not in its way."""
+    ignores: tuple[str, ...] = ()
+    """Words for what is not an obstacle to it: what the map holds for such a thing is passed over or through."""
+    only: tuple[str, ...] | None = None
+    """Where given, nothing but these words counts as an obstacle, as VLMaps lists them; unnamed things are passed."""
+    climbs: bool = False
+    """Whether it takes the stairs that a map holds to another storey."""
 
     def __post_init__(self) -> None:
-        if self.flies_m is not None and not 0.0 <= self.flies_m < self.height_m:
-            raise MapError(
-                f"A body that flies {self.flies_m} m over the floor and reaches up to {self.height_m} m is none; "
-                "height_m is the height of its top over the floor."
-            )
-        if not (self.radius_m >= 0.0 and 0.0 < self.step_m < self.height_m):
-            raise MapError(
+        if not (0.0 < self.radius_m < 10.0 and 0.0 < self.step_m < self.height_m):
+            raise NavigationError(
                 f"A body of radius {self.radius_m} m that steps over {self.step_m} m and is {self.height_m} m high is "
-                "none; the radius must not be negative, and the step between 0 and the height."
+                "none; give a radius between 0 and 10 m, and a step between 0 and the height."
+            )
+        if self.flies_m is not None and not 0.0 <= self.flies_m < self.height_m:
+            raise NavigationError(
+                f"A body cannot fly {self.flies_m} m over the floor and reach up to {self.height_m} m; height_m is the "
+                "height of its top over the floor."
             )
 
 
@@ -177,12 +183,13 @@ def find_obstacles(
     voxels: Voxels,
     grid: GridSpec,
     up_in_world: Float[np.ndarray, "3"],
-    body: Body | None = None,
+    body: BodyShape | None = None,
     cell_size_m: float | None = None,
     ignored: Bool[np.ndarray, " n"] | None = None,
     walked: Float[np.ndarray, "k 3"] | None = None,
     storeys: Storeys | None = None,
     storey: int = 0,
+    min_hits: int = MIN_HITS,
 ) -> Obstacles:
     """Draw the grid of a map.
 
@@ -201,21 +208,22 @@ def find_obstacles(
         walked: where the camera was, world, in the order of time; only places of this storey count.
         storeys: of the map, where it has more than one; without them the lowest floor is the floor.
         storey: number of the storey that is drawn. The grids of all storeys have the same cells.
+        min_hits: voxels with fewer pixels count for nothing.
 
     Raises:
         MapError: the map has no voxel with enough hits, or would need too large a grid.
     """
-    body = body or Body()
+    body = body or BodyShape()
     cell_size_m = grid.voxel_size_m if cell_size_m is None else cell_size_m
     if cell_size_m < grid.voxel_size_m:
         raise MapError(
             f"Cells of {cell_size_m} m are smaller than the map's voxels of {grid.voxel_size_m} m; ask for larger ones."
         )
-    sure = np.asarray(voxels.hits) >= body.min_hits
+    sure = np.asarray(voxels.hits) >= min_hits
     index = np.asarray(voxels.index)[sure]
     if len(index) == 0:
         raise NoFloorError(
-            f"None of the map's {len(voxels)} voxels was hit {body.min_hits} times, so that no floor can be found; "
+            f"None of the map's {len(voxels)} voxels was hit {min_hits} times, so that no floor can be found; "
             "lower min_hits or map more frames."
         )
     level_from_world = rotation_to_level(up_in_world)
@@ -290,7 +298,7 @@ def _states(
     cell: Int[np.ndarray, "p n 2"],
     size: Int[np.ndarray, "2"],
     height_m: Float[np.ndarray, " n"],
-    body: Body,
+    body: BodyShape,
     ignored: Bool[np.ndarray, " n"],
 ) -> UInt8[np.ndarray, "nx ny"]:
     """Return the grid's states from the cells and the height over the floor of each voxel."""

@@ -1,12 +1,13 @@
 """A robot's body as a navigator sees it: where it is and how it moves, how large it is, what is in its way."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Protocol, runtime_checkable
 
-from avlmaps.core.errors import NavigationError
 from avlmaps.core.motion import Action, GroundPose, Moved
+from avlmaps.maps.obstacles import BodyShape
+
+__all__ = ["BASE", "DRONE", "SHAPES", "WALKER", "Body", "BodyShape"]
 
 
 @runtime_checkable
@@ -38,38 +39,6 @@ class Body(Protocol):
             duration_s: for how long.
         """
         ...
-
-
-@dataclass(frozen=True, slots=True)
-class BodyShape:
-    """How large a robot is, and what counts as an obstacle to it (the embodiments of VLMaps)."""
-
-    radius_m: float = 0.2
-    """Radius of the circle round its middle that it needs free."""
-    height_m: float = 1.5
-    """Height of its top over the floor."""
-    step_m: float = 0.1
-    """It drives over lower obstacles."""
-    flies_m: float | None = None
-    """Height of its lowest part over the floor, for a body that flies: lower things are not in its way."""
-    ignores: tuple[str, ...] = ()
-    """Words for what is not an obstacle to it: what the map holds for such a thing is passed over or through."""
-    only: tuple[str, ...] | None = None
-    """Where given, nothing but these words counts as an obstacle, as VLMaps lists them; unnamed things are passed."""
-    climbs: bool = False
-    """Whether it takes the stairs that a map holds to another storey."""
-
-    def __post_init__(self) -> None:
-        if not (0.0 < self.radius_m < 10.0 and 0.0 < self.step_m < self.height_m):
-            raise NavigationError(
-                f"A body of radius {self.radius_m} m that steps over {self.step_m} m and is {self.height_m} m high is "
-                "none; give a radius between 0 and 10 m, and a step between 0 and the height."
-            )
-        if self.flies_m is not None and not 0.0 <= self.flies_m < self.height_m:
-            raise NavigationError(
-                f"A body cannot fly {self.flies_m} m over the floor and reach up to {self.height_m} m; height_m is the "
-                "height of its top over the floor."
-            )
 
 
 BASE = BodyShape()

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, Float64, Int
 
 from avlmaps.core.errors import MapError, NavigationError
-from avlmaps.maps.obstacles import Body, CellState, Obstacles, find_obstacles, floor_height
+from avlmaps.maps.obstacles import MIN_HITS, CellState, Obstacles, find_obstacles, floor_height
 from avlmaps.maps.storeys import said_storeys
 from avlmaps.navigate.bodies import BASE, BodyShape
 
@@ -145,14 +145,13 @@ def obstacles_for(avlmap: "AVLMap", shape: BodyShape = BASE, storey: int | None 
         for word in shape.only:
             counting |= _voxels_called(avlmap, word)
         ignored |= ~counting
-    body = Body(shape.radius_m, shape.height_m, shape.step_m, flies_m=shape.flies_m)
     walked = np.asarray(stored.keyframes.world_from_camera)[:, :3, 3]
     storeys = avlmap.storeys
     number = storey_of_walk(avlmap) if storey is None else storey
     if not 0 <= number < (1 if storeys is None else len(storeys)):
         raise MapError(f"The map has no storey {number}; {said_storeys(storeys)}.")
     found = find_obstacles(
-        stored.voxels, stored.grid, stored.up_in_world, body, ignored=ignored, walked=walked, storeys=storeys,
+        stored.voxels, stored.grid, stored.up_in_world, shape, ignored=ignored, walked=walked, storeys=storeys,
         storey=number,
     )  # fmt: skip
     return found.without(avlmap.edited.forbidden)
@@ -174,7 +173,7 @@ def floor_of_walk(avlmap: "AVLMap") -> float:
     if not len(space):
         return 0.0
     height_m = space.level(space.centres)[:, 2]
-    sure = np.asarray(avlmap.stored.voxels.hits) >= Body().min_hits  # as where obstacles are sought
+    sure = np.asarray(avlmap.stored.voxels.hits) >= MIN_HITS  # as where obstacles are sought
     return floor_height(height_m[sure] if sure.any() else height_m, space.grid.voxel_size_m)
 
 

@@ -604,9 +604,9 @@ class AVLMap:
         cameras = self.space.level(np.asarray(self.stored.keyframes.world_from_camera, np.float64)[:, :3, 3])
         if stayed_on_one(cameras[:, 2]):
             return None
-        from avlmaps.maps.obstacles import Body  # slow to load, and most maps have one storey
+        from avlmaps.maps.obstacles import MIN_HITS  # slow to load, and most maps have one storey
 
-        certain = np.asarray(self.stored.voxels.hits) >= Body().min_hits
+        certain = np.asarray(self.stored.voxels.hits) >= MIN_HITS
         level = self.space.level(self.space.centres[certain])
         found = find_storeys(level, self.space.grid.voxel_size_m, cameras)
         x, y, z = self.space.level_from_world[2].tolist()
