@@ -297,7 +297,7 @@ def test_a_turn_that_does_not_come_about_is_not_reached(drive, wrong):
     body = Free(GroundPose(2.0, 2.0), **wrong)
     arrival = MapDriver(FLOOR, body, settings=drive).turn(1.0)
     assert not arrival.reached
-    assert arrival.note.startswith("the turn ended ")
+    assert arrival.note.startswith(("the turn ended ", "the body does not turn when commanded"))
     assert len(arrival.actions) <= 60
     assert body.time_s <= 15.0
     assert bool(arrival.contacts) == body.contact
@@ -333,7 +333,7 @@ def test_a_body_that_stands_dead_is_given_up_in_seconds():
     body = Free(GroundPose(2.0, 2.0, 2.0), ahead=0.0, turns=0.0)
     arrival = MapDriver(FLOOR, body, settings=VELOCITY).go_to(place(8.0, 2.5))
     assert not arrival.reached
-    assert "does not move when commanded" in arrival.note
+    assert "when commanded" in arrival.note
     assert body.time_s < 30.0
 
 
@@ -406,6 +406,12 @@ class Odd(FreeBody):
                 self.pose = GroundPose(x + 2.5, y + 2.0, heading)
             case "creeps":
                 self.pose = GroundPose(x, y + 0.12, heading)
+            case "is there":
+                self.pose = GroundPose(3.0, 3.2, heading)
+            case "looks ahead":
+                self.pose = GroundPose(x, y, 0.0)
+            case "ends the program":
+                raise KeyboardInterrupt
         return Moved(self.pose)
 
 
@@ -426,6 +432,51 @@ def test_a_body_that_fails_or_does_something_else_is_stopped(drive, odd, says):
         assert not arrival.reached and says in arrival.note
         assert np.isfinite(arrival.path).all() and body.count <= 6
         assert odd == "jumps" or body.stops
+
+
+@MODES
+def test_a_body_that_says_it_is_at_the_goal_at_once_is_not_there(drive):
+    body = Odd("is there")
+    arrival = MapDriver(MAP, body, settings=drive).go_to(place(3.0, 3.2))
+    assert not arrival.reached and "the body moved by" in arrival.note and body.stops
+
+
+@MODES
+def test_a_body_whose_heading_never_changes_is_stopped_soon(drive):
+    body = Odd("looks ahead")
+    arrival = MapDriver(MAP, body, settings=drive).go_to(place(3.0, 3.2))
+    assert not arrival.reached and "does not turn when commanded" in arrival.note
+    assert body.stops and body.count < 60
+
+
+@MODES
+def test_a_program_that_is_ended_while_the_body_moves_stops_it(drive):
+    for move in (lambda d: d.go_to(place(3.0, 3.2)), lambda d: d.forward(0.9), lambda d: d.turn(pi / 2)):
+        body = Odd("ends the program")
+        with pytest.raises(KeyboardInterrupt):
+            move(MapDriver(MAP, body, settings=drive))
+        assert body.stops == 1
+
+
+def test_a_stop_that_does_nothing_is_told():
+    class Rolling(FreeBody):
+        rolls = True
+
+        @property
+        def pose(self):
+            if self.rolls:
+                self._pose = self._pose.ahead(0.02)
+            return self._pose
+
+        @pose.setter
+        def pose(self, pose):
+            self._pose = pose
+
+    body = Rolling(START)
+    arrival = MapDriver(MAP, body).stop()
+    assert not arrival.reached and "use its own stop" in arrival.note
+    body.rolls = False
+    assert MapDriver(MAP, body).stop().reached
 
 
 def test_what_ends_elsewhere_than_it_should_is_not_reached():

@@ -313,6 +313,20 @@ def test_a_robot_that_is_not_seen_to_stand_takes_no_order_until_it_is(client: Te
     idle(client)
 
 
+def test_an_order_that_fails_while_the_robot_may_move_leaves_it_unstopped(
+    client: TestClient, drive: Driven, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(*_: Any, **__: Any) -> None:
+        drive.machine.stands = False
+        raise RuntimeError("of avlmaps")
+
+    token = plan(client, "turn left")["token"]
+    monkeypatch.setattr("avlmaps.serve.drive.orders.instruct", fails)
+    assert client.post("/drive/confirm", json={"token": token}).status_code == 202
+    until(lambda: client.get("/drive/status").json()["order"] is None)
+    assert client.get("/drive/status").json()["state"] == "unstopped"
+
+
 def test_a_robot_that_cannot_be_driven_is_not(client: TestClient, drive: Driven) -> None:
     token = plan(client, "turn left")["token"]
     drive.machine.broken = "its pose is not known"

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from math import pi
+from time import sleep
 from typing import Literal, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
@@ -29,12 +30,15 @@ from avlmaps.navigate.costmap import CostSettings, costmap_of
 from avlmaps.navigate.planner import Planner, PlanSettings, Stop
 
 _SAMPLE_M = 0.02  # places along a straight move that are looked at
+_STILL_RAD = 0.01  # smaller turns may not show
 _STILL_M = 0.005  # a step that brings the body no farther was stopped
 _OPEN_M = 0.5  # beside a place in which it could stand, but to which no path leads, it stops no farther off
 _TURNED_RAD = 0.5 * TURN_RAD + 0.01  # a turn that is off by no more is done
 _EXTRA_TURNS = 36  # actions that a turn may take beyond its angle
 _PATIENCE_S = 5.0  # time for which a body may stand still against its commands
 _MOST_M, _MOST_RAD = 1e6, 1e3
+_IN_VAIN = 12  # turns that change no heading: a body that does not say how it turns is not driven
+_LOOK_S, _CREEP_M = 0.1, 0.01  # a body that moves by more within that time of its stop does not stand
 _BEYOND_M = 0.3  # a body that moves by more than this beyond its command does not follow it, or its pose jumped
 _OFF_M, _OFF_SHARE = 0.25, 0.2  # a straight drive that ends farther off, in metres and of its length, is not done
 T = TypeVar("T")
@@ -132,6 +136,7 @@ class _Trip:
     actions: list[Action] = field(default_factory=list)
     contacts: int = 0
     movements: int = 0
+    turns_in_vain: int = 0  # one after the other
     fault: str = ""  # a fault of the body, so that there is no use in continuing
 
 
@@ -252,25 +257,37 @@ class MapDriver:
         return self._arrival(trip, True, "it drives 0.1 m at a time, so that it did not move" if small else "")
 
     def stop(self) -> Arrival:
-        """Stand still."""
+        """Stand still; whether the body does is looked at for a tenth of a second."""
 
         def stopped(trip: _Trip) -> Arrival:
             self._take(Action.STOP, trip)
+            before = self.pose
+            sleep(_LOOK_S)
+            if (moved_m := before.distance_m(self.pose)) > _CREEP_M:
+                trip.fault = f"the body moved by {moved_m:.2f} m after its stop; it may still move: use its own stop"
             return self._arrival(trip, not trip.fault, trip.fault)
 
         return self._moved_by(stopped)
 
     def _moved_by(self, movement: Callable[[_Trip], Arrival]) -> Arrival:
-        """Return the result of a movement; a body that fails is stopped, and is where it was seen last."""
+        """Return the result of a movement; a body that fails is stopped, and is where it was seen last.
+
+        It is stopped as well where a movement ends by anything else, such as Ctrl-C.
+        """
         trip = _Trip([(self._last.x_m, self._last.y_m)])
+        whole = False
         try:
             trip.path[0] = self.pose.x_m, self.pose.y_m
-            return movement(trip)
+            arrival = movement(trip)
+            whole = not trip.fault
+            return arrival
         except NavigationError as fault:
-            with suppress(Exception):
-                self.body.act(Action.STOP)
             why = str(fault).rstrip(".")
             return Arrival(False, self._last, tuple(trip.actions), np.array(trip.path), why, trip.contacts)
+        finally:
+            if not whole:
+                with suppress(Exception):
+                    self.body.act(Action.STOP)
 
     def _of_body(self, do: str, call: Callable[[], T]) -> T:
         """Return what the body does.
@@ -302,8 +319,9 @@ class MapDriver:
             return self._arrival(trip, False, note)
         off_m = float(np.hypot(*(self._xy - stop.xy)))
         away_m = float(np.hypot(*(self._xy - goal)))
-        if off_m > self.settings.tolerance_m:
-            return self._arrival(trip, False, f"{note or 'it got no nearer'}, {away_m:.2f} m from the place")
+        if off_m > self.settings.tolerance_m or trip.fault:
+            why = trip.fault or note or "it got no nearer"
+            return self._arrival(trip, False, f"{why}, {away_m:.2f} m from the place")
         if not stop.seen:
             return self._arrival(
                 trip, False, f"no path leads to where the place can be seen; it stands {away_m:.2f} m away from it"
@@ -445,7 +463,7 @@ class MapDriver:
         before = self.pose
         moved = self._of_body("move", lambda: _moved(self.body.act(action)))
         trip.actions.append(action)
-        planned = before.ahead(FORWARD_M) if action is Action.FORWARD else before
+        planned = before.after(action)
         return self._noted(trip, before, planned, moved)
 
     def _drive(self, speed_m_s: float, turn_rad_s: float, trip: _Trip) -> bool:
@@ -454,7 +472,7 @@ class MapDriver:
             return False
         tick_s, before = self.settings.velocities.tick_s, self.pose
         moved = self._of_body("move", lambda: _moved(self.body.drive(speed_m_s, turn_rad_s, tick_s)))
-        planned = before.turned(0.5 * turn_rad_s * tick_s).ahead(speed_m_s * tick_s)
+        planned = before.driven(speed_m_s, turn_rad_s, tick_s)
         return self._noted(trip, before, planned, moved)
 
     def _is_held(self, trip: _Trip) -> bool:
@@ -470,6 +488,14 @@ class MapDriver:
         if moved_m > planned_m + _BEYOND_M:
             trip.fault = f"the body moved by {moved_m:.2f} m where it was to move by {planned_m:.2f} m (check its pose)"
             return False
+        turned = abs(wrap_angle(planned.heading_rad - before.heading_rad)) > _STILL_RAD
+        if turned and not moved.contact and abs(wrap_angle(moved.pose.heading_rad - before.heading_rad)) < 1e-3:
+            trip.turns_in_vain += 1
+            if trip.turns_in_vain >= _IN_VAIN:
+                trip.fault = "the body does not turn when commanded (check its pose)"
+                return False
+        elif turned:
+            trip.turns_in_vain = 0
         stopped = moved.contact or (planned_m > 2 * _STILL_M and moved_m < _STILL_M)
         if planned_m:
             self.contacts.mark_free(moved.pose)

@@ -262,7 +262,9 @@ class Dispatcher:
         except Exception:
             log.exception("order %s", order.plan.order)
             order.brake.pull()
-            self._halt()
+            stands, note = self._halt()
+            with self._lock:
+                self._fault = "" if stands else note
         order.over.set()
         answer = {"ok": False, "error": error} if outcome is None else outcome.to_json()
         ended = {
