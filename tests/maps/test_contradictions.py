@@ -4,6 +4,7 @@ import hashlib
 import json
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +18,9 @@ from hypothesis import strategies as st
 from avlmaps.core.errors import MapError
 from avlmaps.maps.build import build_map
 from avlmaps.maps.store.manifest import MapInfo
-from avlmaps.maps.store.manifest_file import checksum_of, manifest_fault
+from avlmaps.maps.store.manifest_file import checksum_of, manifest_fault, sources_fault
 from avlmaps.maps.store.reader import open_stored
+from avlmaps.maps.types import SourceEvidence
 
 PROFILE = register_fakes()
 
@@ -118,6 +120,22 @@ WRONG: dict[str, tuple[Callable[[Path], None], str]] = {
     ),
     "keyframes backwards": (with_array("keyframes/stamp_s", lambda a: a[::-1]), "not in the order of time"),
     "onset after offset": (with_array("sounds/onset_s", lambda a: a + 1000), "before it begins at"),
+    "a camera far outside": (
+        with_array("keyframes/world_from_camera", lambda a: a + 2000.0 * (np.arange(16) == 3).reshape(4, 4)),
+        "a keyframe lies 1,9",
+    ),
+    "views far outside": (
+        with_array("keyframes/centre", lambda a: a + np.float32(1e4)),
+        "what a keyframe saw lies",
+    ),
+    "sounds far outside": (
+        with_array("sounds/track", lambda a: a - np.float32(1e4)),
+        "where a sound was heard lies",
+    ),
+    "keypoints at no place": (
+        with_array("keyframes/points_world", lambda a: np.full_like(a, np.inf)),
+        "a place in it is no place",
+    ),
     "sounds backwards": (with_array("sounds/onset_s", lambda a: a[::-1]), "not in the order of their onset"),
 }
 
@@ -129,6 +147,21 @@ def test_a_contradiction_is_refused_in_words(copied: Path, name: str) -> None:
     with pytest.raises(MapError) as fault:
         open_stored(copied)
     assert words in str(fault.value) and str(copied) in str(fault.value)
+
+
+def test_evidence_of_sources_that_cannot_be_is_refused_in_words(built: Path) -> None:
+    info = open_stored(built).info
+    sounds = info.counts.sounds
+    some = SourceEvidence(
+        place=np.zeros((2, 3), np.float32), prior=np.full(2, 0.5, np.float32),
+        heard=np.zeros((sounds, 2), np.float16), expected=np.zeros((sounds, 2), np.float16),
+        moving=np.zeros(sounds, np.uint8), channels=np.array([2]),
+    )  # fmt: skip
+    assert sources_fault(info, some) == ""
+    assert "add up to 3" in sources_fault(info, replace(some, prior=np.full(2, 1.5, np.float32)))
+    assert "likelihood" in sources_fault(info, replace(some, heard=some.heard + np.float16(1)))
+    assert "outside of its voxels" in sources_fault(info, replace(some, place=some.place + np.float32(1e5)))
+    assert "evidence of 0 sounds" in sources_fault(info, replace(some, heard=some.heard[:0]))
 
 
 def test_a_map_of_an_older_release_has_no_checksum_and_opens(copied: Path) -> None:

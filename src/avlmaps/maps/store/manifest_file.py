@@ -20,7 +20,7 @@ from avlmaps.core.wording import coordinates
 from avlmaps.maps.grid import index_ends
 from avlmaps.maps.store.array_files import explain_write_errors
 from avlmaps.maps.store.manifest import SCHEMA_VERSION, MapInfo
-from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
+from avlmaps.maps.types import HeardSounds, Keyframes, SourceEvidence, Voxels
 
 MANIFEST = "map.json"
 RESTORE = "restore it from a copy, or build the map again in its place"
@@ -86,8 +86,11 @@ def parse_manifest(content: bytes, path: Path) -> MapInfo:
 
 _UNIT = 1e-3
 _ROTATION = 1e-3
+_PROBABILITY = 0.01
 # Corners of the box are written with six digits.
 _BOX_M = 1e-4
+# No camera, nothing that it saw and no sound lies farther outside of a map's voxels.
+_OUTSIDE_M = 1000.0
 
 
 def checksum_of(content: bytes) -> str:
@@ -142,8 +145,15 @@ def _geometry_faults(info: MapInfo) -> Iterator[str]:
         yield f"the up direction has length {length:g}, not 1"
     if not 0.0 <= info.up.support <= 1.0 + 1e-6:
         yield f"the support of the up direction is {info.up.support:g}; it lies in [0, 1]"
-    if fault := _rigid_fault(np.array(info.rig.rgb_from_depth, np.float64)[None]):
-        yield f"rgb_from_depth {fault}"
+    rigid = {"rgb_from_depth": info.rig.rgb_from_depth}
+    for number, visit in enumerate(info.visits, 1):
+        rigid |= {
+            f"map_from_recording of visit {number}": visit.map_from_recording,
+            f"rgb_from_depth of visit {number}": visit.rig.rgb_from_depth,
+        }
+    for what, rows in rigid.items():
+        if fault := _rigid_fault(np.array(rows, np.float64)[None]):
+            yield f"{what} {fault}"
     low, high = np.array(info.bounding_box_m.low), np.array(info.bounding_box_m.high)
     if not (np.isfinite([low, high]).all() and (low <= high).all()):
         yield f"the bounding box goes from {low.tolist()} to {high.tolist()}"
@@ -167,9 +177,22 @@ def arrays_fault(info: MapInfo, voxels: Voxels, keyframes: Keyframes, sounds: He
             _voxel_faults(info, voxels),
             _keyframe_faults(keyframes),
             _sound_faults(sounds),
+            _place_faults(info, voxels, keyframes, sounds),
         ),
         "",
     )
+
+
+def sources_fault(info: MapInfo, sources: SourceEvidence) -> str:
+    """Return how the evidence of where sounds came from contradicts the map, or probability."""
+    if len(sources) != info.counts.sounds:
+        return f"it has evidence of {len(sources)} sounds, the map has {info.counts.sounds}"
+    total = float(sources.prior.sum(dtype=np.float64))
+    if (sources.prior < 0.0).any() or (len(sources.prior) and not abs(total - 1.0) < _PROBABILITY):
+        return f"its probabilities add up to {total:g}, or one is negative"
+    if sources.heard.max(initial=0.0) > _PROBABILITY:
+        return "a likelihood is over that of the likeliest place"
+    return _outside(info, "a place where sounds may come from", sources.place)
 
 
 def _model_faults(info: MapInfo, voxels: Voxels, keyframes: Keyframes, sounds: HeardSounds) -> Iterator[str]:
@@ -215,6 +238,22 @@ def _sound_faults(sounds: HeardSounds) -> Iterator[str]:
     if (length_s := np.asarray(sounds.offset_s) - np.asarray(sounds.onset_s)).min(initial=0.0) < 0.0:
         worst = int(np.argmin(length_s))
         yield f"sound {worst} ends at {sounds.offset_s[worst]:.2f} s, before it begins at {sounds.onset_s[worst]:.2f} s"
+
+
+def _place_faults(info: MapInfo, voxels: Voxels, keyframes: Keyframes, sounds: HeardSounds) -> Iterator[str]:
+    places = {
+        "a keyframe": keyframes.world_from_camera[:, :3, 3],
+        "what a keyframe saw": keyframes.centre,
+        "where a sound was heard": sounds.track,
+    }
+    if len(voxels):
+        yield from filter(None, (_outside(info, what, found) for what, found in places.items()))
+
+
+def _outside(info: MapInfo, what: str, places: np.ndarray) -> str:
+    low, high = np.array(info.bounding_box_m.low), np.array(info.bounding_box_m.high)
+    away_m = float(np.maximum(low - places, places - high).max(initial=0.0))
+    return f"{what} lies {away_m:,.0f} m outside of its voxels" if away_m > _OUTSIDE_M else ""
 
 
 def _rigid_fault(poses: np.ndarray) -> str:

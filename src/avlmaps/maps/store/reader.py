@@ -25,7 +25,14 @@ from avlmaps.maps.store.integrity import IntegrityCheck
 from avlmaps.maps.store.life import LIFE, Life, read_life
 from avlmaps.maps.store.lock import is_locked
 from avlmaps.maps.store.manifest import GroundInfo, MapInfo
-from avlmaps.maps.store.manifest_file import MANIFEST, RESTORE, arrays_fault, parse_manifest, read_manifest
+from avlmaps.maps.store.manifest_file import (
+    MANIFEST,
+    RESTORE,
+    arrays_fault,
+    parse_manifest,
+    read_manifest,
+    sources_fault,
+)
 from avlmaps.maps.types import HeardSounds, Keyframes, SourceEvidence, Submaps, Voxels
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.models.names import public_choice, public_name
@@ -137,7 +144,8 @@ class StoredMap:
         files = {name.removeprefix(LIFE): file for name, file in self.info.files.items() if name.startswith(LIFE)}
         if not files:
             return None
-        return read_life({name: read_array(self.path, file) for name, file in files.items()}, f"{self.path}/life")
+        arrays = {name: read_array(self.path, file) for name, file in files.items()}
+        return read_life(arrays, f"{self.path}/life", len(self.info.visits))
 
     def submaps(self) -> Submaps | None:
         """Return the submaps by which it can follow corrected poses, memory-mapped; None where it has none.
@@ -173,11 +181,8 @@ class StoredMap:
             return self.arrays.sources
         arrays = {name: read_array(self.path, file) for name, file in names.items()}
         found = validate_arrays(SourceEvidence, arrays, f"{self.path}/sources")
-        if len(found) != self.info.counts.sounds:
-            raise MapError(
-                f"{self.path}/sources is damaged: it has evidence of {len(found)} sounds, the map has "
-                f"{self.info.counts.sounds}; restore the map from a copy, or build it again."
-            )
+        if fault := sources_fault(self.info, found):
+            raise MapError(f"{self.path}/sources is damaged: {fault}; restore the map from a copy, or build it again.")
         return found
 
     def require_model(self, kind: Kind) -> None:
