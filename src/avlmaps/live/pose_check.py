@@ -175,7 +175,8 @@ class PoseCheck:
         pairs = np.array([(a, b) for a, b in combinations(range(len(self._held)), 2) if b - a <= 2])
         sample = draw_pairs(MemoryRecording(self._held), pairs, np.ones(len(pairs), bool))
         surfaces = Surfaces.of(sample.depth_m)
-        found = without_occluded(compare(sample, surfaces, sample.world_from_camera), sample, surfaces)
+        found = compare(sample, surfaces, sample.world_from_camera, colour=False)
+        found = without_occluded(found, sample, surfaces)
         if not can_be_judged(found):
             return None
         if geometry_agrees(found) or found.same_share >= _LEAST_AGREEING:

@@ -91,7 +91,7 @@ NOTHING = Agreement(_NONE, _NONE, _NONE, _NONE, np.zeros(0), 0.0, float("nan"), 
 @np.errstate(divide="ignore", invalid="ignore", over="ignore")  # of points beside and behind a camera
 def compare(
     sample: Sample, surfaces: Surfaces, world_from_camera: Float[np.ndarray, "f 4 4"], rig: Rig | None = None,
-    scale: float = 1.0, floor_m: float = SAME_M,
+    scale: float = 1.0, floor_m: float = SAME_M, *, colour: bool = True,
 ) -> Agreement:  # fmt: skip
     """Compare the pairs of a sample.
 
@@ -102,6 +102,7 @@ def compare(
         rig: other cameras than the sample's.
         scale: what its depths are multiplied by.
         floor_m: by how much depths of one surface may differ however near it is.
+        colour: whether likeness is measured as well, which takes a third of the time; otherwise nothing is alike.
     """
     rig = rig or sample.rig
     camera = rig.depth
@@ -129,7 +130,9 @@ def compare(
     outside = 1.0 - float(inside.sum() / max(there.sum(), 1))
     counts = (seen.sum(axis=1), same.sum(axis=1), through.sum(axis=1), hidden.sum(axis=1))
     measured = sample.depth_m[b[:, None], at_v, at_u] * scale
-    return Agreement(*counts, _off(measured, far, seen), outside, *_likeness(sample, rig, (a, b), points, moved, same))
+    unknown = float("nan"), np.full(len(a), np.nan), 0, 0.0
+    alike = _likeness(sample, rig, (a, b), points, moved, same) if colour else unknown
+    return Agreement(*counts, _off(measured, far, seen), outside, *alike)
 
 
 def without_occluded(found: Agreement, sample: Sample, surfaces: Surfaces) -> Agreement:
@@ -148,7 +151,7 @@ def without_occluded(found: Agreement, sample: Sample, surfaces: Surfaces) -> Ag
     step_m = np.linalg.norm(place[sample.pairs[:, 1]] - place[sample.pairs[:, 0]], axis=-1)
     wide = np.flatnonzero((step_m > WIDE_STEP_M) & (found.through <= MOST_THROUGH * found.points))
     apart = sample.only(wide)
-    back = compare(replace(apart, pairs=apart.pairs[:, ::-1]), surfaces, sample.world_from_camera)
+    back = compare(replace(apart, pairs=apart.pairs[:, ::-1]), surfaces, sample.world_from_camera, colour=False)
     occluded = wide[back.through <= MOST_THROUGH * back.points]
     points = found.points.copy()
     points[occluded] -= found.hidden[occluded]

@@ -56,10 +56,10 @@ def _nothing(recording: Recording, found: Agreement) -> str:
 
 
 def _spots(recording: Recording, trials: Trials, edges: Edges, levels: Levels) -> Iterator[str]:
-    as_it_is = trials.run(Suspect())
+    as_it_is = trials.run(Suspect(), colour=False)
 
     def shows(*suspects: Suspect) -> bool:
-        return all(_would_show(as_it_is, trials.run(suspect)) for suspect in suspects)
+        return all(_would_show(as_it_is, trials.run(suspect, colour=False)) for suspect in suspects)
 
     places = recording.world_from_camera[:, :3, 3]
     across_m = float(np.linalg.norm(np.ptp(places, axis=0)))

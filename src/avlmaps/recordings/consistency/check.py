@@ -54,7 +54,7 @@ def check_recording(recording: Recording) -> Verdict:
     apart = compare(distant, surfaces, sample.world_from_camera, floor_m=APART_SAME_M)
     apart = without_occluded(apart, distant, surfaces)
     redness = compare(sample.of_redness(), surfaces, sample.world_from_camera)
-    found = _Found(after, apart, find_edges(sample), redness, find_levels(sample))
+    found = _Found(after, apart, find_edges(sample), redness, find_levels(sample), _trials(recording, sample))
     of_program = is_of_program(recording)
     known = sample.depth_m[sample.depth_m > 0.0]
     median_m = float(np.median(known)) if known.size else float("nan")
@@ -70,8 +70,7 @@ def check_recording(recording: Recording) -> Verdict:
     ]
     checked, unchecked = limits.can_be_judged(after), ()
     if not findings:
-        trials = _trials(recording, sample)
-        unchecked = blind_spots(recording, after, trials, found.edges, found.levels, warmth_of(sample))
+        unchecked = blind_spots(recording, after, found.trials, found.edges, found.levels, warmth_of(sample))
     return Verdict(
         frames=len(sample),
         pairs=after.pairs,
@@ -87,13 +86,14 @@ def check_recording(recording: Recording) -> Verdict:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Found:
-    """How pairs agree that follow one another, and from apart; colour at edges of depth; red less blue; floors."""
+    """How pairs agree that follow, and from apart; colour at edges of depth; red less blue; floors; what is tried."""
 
     after: Agreement
     apart: Agreement
     edges: Edges
     redness: Agreement
     levels: Levels
+    trials: Trials
 
 
 def _most_unlike(after: Agreement, apart: Agreement) -> Agreement | None:
@@ -110,7 +110,7 @@ def _of_agreement(recording: Recording, sample: Sample, found: _Found, median_m:
             f"lie on the surface that another sees, and {after.through_share:.1%} are seen through ({after.pairs} "
             "pairs of frames)."
         )
-        cause = _cause(recording, sample, found, median_m)
+        cause = _cause(recording, found, median_m)
         yield Finding(Reason.GEOMETRY, grade, sentence, cause or _other_cause(recording, sample, found))
     elif not limits.apart_agrees(apart):
         sentence = (
@@ -118,16 +118,16 @@ def _of_agreement(recording: Recording, sample: Sample, found: _Found, median_m:
             f"on one surface, and {apart.through_share:.1%} are seen through ({apart.pairs} pairs of frames)."
         )
         other = "The poses drift, depth and positions have different scales, or much was moved; check them."
-        cause = _cause(recording, sample, found, median_m)
+        cause = _cause(recording, found, median_m)
         yield Finding(Reason.GEOMETRY, Grade.SUSPICIOUS, sentence, cause or other)
-    elif limits.can_be_judged(after) and (closer := find_closer(_trials(recording, sample))) is not None:
+    elif limits.can_be_judged(after) and (closer := find_closer(found.trials)) is not None:
         then = _off(closer.agreement, closer.apart)
         sentence = (
             f"The depths of the same points in two frames differ by {_off(after, apart):.1%}, and by {then:.1%} if the "
             "recording is read in another way."
         )
         yield Finding(Reason.GEOMETRY, Grade.SUSPICIOUS, sentence, _words(recording, closer, median_m, ""))
-    elif limits.can_be_judged(after) and (offset := find_offset(_trials(recording, sample))) is not None:
+    elif limits.can_be_judged(after) and (offset := find_offset(found.trials)) is not None:
         sentence = (
             f"Flat surfaces are curved in the depth of single frames, as if {abs(offset.suspect.farther_m):.2g} m were "
             f"{'added to' if offset.suspect.farther_m < 0.0 else 'taken from'} all of it, and without that the depths "
@@ -156,7 +156,7 @@ def _of_agreement(recording: Recording, sample: Sample, found: _Found, median_m:
         other = "Check that colour and depth of a frame belong together (order of names, clock, intrinsics of colour)."
         shift = shift_of(found.edges, sample)
         where = "" if shift is None else " ".join(_shift_words(shift, recording))
-        yield Finding(Reason.COLOUR, grade, sentence, _cause(recording, sample, found, median_m) or where or other)
+        yield Finding(Reason.COLOUR, grade, sentence, _cause(recording, found, median_m) or where or other)
     elif opposite := limits.opposite_pairs(found.redness):
         sentence = (
             f"Red and blue of the same points are exchanged in {opposite} of "
@@ -232,9 +232,9 @@ def _other_cause(recording: Recording, sample: Sample, found: _Found) -> str:
     return "No usual mistake explains it; check the poses, the depth and the intrinsics, and that they belong together."
 
 
-def _cause(recording: Recording, sample: Sample, found: _Found, median_m: float) -> str:
+def _cause(recording: Recording, found: _Found, median_m: float) -> str:
     """Return what makes the recording agree with itself, or nothing."""
-    best = find_cause(_trials(recording, sample), lambda trial: _explains(trial, found))
+    best = find_cause(found.trials, lambda trial: _explains(trial, found))
     return "" if best is None else _words(recording, best, median_m, _gain(found, best))
 
 

@@ -51,7 +51,8 @@ def find_jump(recording: Recording, sample: Sample, after: Agreement) -> Finding
         near = draw_pairs(recording, across, np.arange(len(across)) < 4)
         surfaces = Surfaces.of(near.depth_m)
         over, beside = (
-            compare(near.only(kind), surfaces, near.world_from_camera) for kind in (near.follows, ~near.follows)
+            compare(near.only(kind), surfaces, near.world_from_camera, colour=False)
+            for kind in (near.follows, ~near.follows)
         )
         few = over.pairs >= limits.FEWEST_PAIRS and over.same_share < limits.HARDLY_ANY
         seen = (limits.can_be_judged(over) or few) and limits.can_be_judged(beside)
@@ -77,7 +78,7 @@ def find_parts(recording: Recording) -> Finding | None:
         if not len(pairs):
             continue
         both = draw_pairs(recording, np.concatenate([pairs, pairs[:, ::-1]]), np.ones(2 * len(pairs), bool))
-        found = compare(both, Surfaces.of(both.depth_m), both.world_from_camera, floor_m=APART_SAME_M)
+        found = compare(both, Surfaces.of(both.depth_m), both.world_from_camera, floor_m=APART_SAME_M, colour=False)
         least = max(_MOST_THROUGH_PARTS, worst[0] if worst else 0.0)
         if limits.can_be_judged(found) and found.through_share > least and found.same_share < _SAME_PARTS:
             worst = found.through_share, at, found
@@ -162,7 +163,10 @@ def _better_order(near: Sample, *, colour: bool) -> list[int] | None:
         touched = near.only(np.isin(near.pairs, moved).sum(axis=1) == 1)
         other = replace(touched, grey=touched.grey[rows]) if colour else touched
         poses = near.world_from_camera if colour else near.world_from_camera[rows]
-        before, after = compare(touched, surfaces, near.world_from_camera), compare(other, surfaces, poses)
+        before, after = (
+            compare(one, surfaces, pose, colour=colour)
+            for one, pose in ((touched, near.world_from_camera), (other, poses))
+        )
         if not limits.can_be_judged(before) or not limits.can_be_judged(after) or before.pairs < 2 * len(moved) - 1:
             continue
         least = limits.LEAST_LIKENESS if colour else limits.LEAST_AGREEING

@@ -159,10 +159,15 @@ class Trials:
         self._compared = 0
         self._points = max(int(self._measured(Suspect())[1].there[self.sample.pairs[:, 0]].sum()), 1)
         self._compared = int(_LEAST_COMPARED * self._points)
-        self._compared = max(self._compared, int(_OF_AS_IT_IS * self._seen(self.run(Suspect()))))
+        self._compared = max(self._compared, int(_OF_AS_IT_IS * self._seen(self.run(Suspect(), colour=False))))
 
-    def run(self, suspect: Suspect) -> Trial:
-        """Return how well the sample agrees with a suspect; a score of 0 where it cannot be tried."""
+    def run(self, suspect: Suspect, *, colour: bool = True) -> Trial:
+        """Return how well the sample agrees with a suspect; a score of 0 where it cannot be tried.
+
+        Args:
+            suspect: that is tried.
+            colour: whether likeness of colour is part of the score; where depths alone decide it need not be measured.
+        """
         given = suspect.given.over(self.given)
         delay_s = given.pose_delay_s or 0.0
         if delay_s not in self._delayed:
@@ -174,7 +179,7 @@ class Trials:
         pose = _replaced(reread_poses(pose, given), suspect) @ _rolled(suspect.rolled_deg)
         surfaces, median_m = self._measured(suspect)[1], self._median_m * suspect.scale
         after, apart = (
-            compare(kind, surfaces, pose, rig, suspect.scale, floor * median_m)
+            compare(kind, surfaces, pose, rig, suspect.scale, floor * median_m, colour=colour)
             for kind, floor in zip(self._turned(suspect), (_FLOOR_SHARE, _APART_FLOOR_SHARE), strict=True)
         )
         return Trial(suspect, after, apart, self._score(after, apart))
@@ -268,14 +273,15 @@ def find_closer(trials: Trials) -> Trial | None:
     With a slow camera, points stay within the tolerance of a surface in spite of such a mistake; their differences show
     it, and people who walk by do not change that.
     """
-    as_it_is = trials.run(Suspect())
+    as_it_is = trials.run(Suspect(), colour=False)
     if not _LEAST_OFF < as_it_is.off < float("inf"):
         return None
-    tried = map(trials.run, (*_scales(), *_farther(), *_delays(), *_focal(), *_mounts()))
+    suspects = (*_scales(), *_farther(), *_delays(), *_focal(), *_mounts())
+    tried = (trials.run(suspect, colour=False) for suspect in suspects)
     closer = [trial for trial in tried if _is_less_off(trial, as_it_is)]
     if not closer:
         return None
-    best = _refined(trials, min(closer, key=lambda trial: trial.off))
+    best = _refined(trials, trials.run(min(closer, key=lambda trial: trial.off).suspect))
     return best if is_closer(best, as_it_is) else None
 
 
@@ -292,8 +298,8 @@ def find_offset(trials: Trials) -> Trial | None:
     too_large_m = offset_in_planes(trials.sample.depth_m)
     if not _LEAST_OFFSET_M <= abs(too_large_m) <= _MOST_OFFSET_M:
         return None
-    trial = trials.run(Suspect(farther_m=-round(too_large_m, 2)))
-    return trial if _is_less_off(trial, trials.run(Suspect()), _OFFSET_BETTER, _OFFSET_STEP) else None
+    trial, as_it_is = (trials.run(Suspect(farther_m=m), colour=False) for m in (-round(too_large_m, 2), 0.0))
+    return trial if _is_less_off(trial, as_it_is, _OFFSET_BETTER, _OFFSET_STEP) else None
 
 
 def _is_less_off(trial: Trial, than: Trial, most_better: float = _MOST_BETTER, least_step: float = _LEAST_STEP) -> bool:
