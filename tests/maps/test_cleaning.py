@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.columns import concat
 from avlmaps.core.progress import silence
 from avlmaps.maps.fusion import free_space
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
@@ -15,7 +16,6 @@ from avlmaps.maps.fusion.free_space import (
     FreeViews,
     block_size,
     clean,
-    concat_views,
     count_through,
     seen_through,
     smear_reach,
@@ -125,7 +125,7 @@ def test_the_order_and_the_parts_of_the_frames_do_not_matter(seed):
     whole = clean(evidence, [views_of(frames)], CAMERA, GRID, PERFECT)
     order = [frames[n] for n in rng.permutation(5)]
     parts = [views_of(order[:2]), views_of([]), views_of(order[2:])]
-    for views in (parts, [concat_views(parts)]):
+    for views in (parts, [concat(parts)]):
         kept, removed = clean(evidence, views, CAMERA, GRID, PERFECT)
         np.testing.assert_array_equal(kept, whole[0])
         assert removed == whole[1]

@@ -12,6 +12,7 @@ from msgspec import structs
 from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
+from avlmaps.core.columns import concat
 from avlmaps.core.errors import AvlmapsError, MapError
 from avlmaps.core.poses import apply
 from avlmaps.maps.build import build_map
@@ -26,7 +27,7 @@ from avlmaps.maps.fusion.free_space import (
 from avlmaps.maps.fusion.moved_submaps import MovedSubmaps
 from avlmaps.maps.fusion.sensor import PERFECT
 from avlmaps.maps.fusion.submap_kernels import sum_features
-from avlmaps.maps.fusion.submaps import concat_submaps, in_steps, submap_of
+from avlmaps.maps.fusion.submaps import in_steps, submap_of
 from avlmaps.maps.fusion.voxel_sums import VoxelSums
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.growing import GrowingMap
@@ -244,7 +245,7 @@ def test_features_that_are_summed_at_the_end_are_those_of_a_table_that_goes_on()
     walk = Walk(8)
     _, submap = one_submap(walk)
     poses = motion(27.0, (0.4, 0.1, 0.0)) @ walk.world_from_camera
-    moved = MovedSubmaps(concat_submaps([submap, submap]), np.concatenate([poses, poses]), GridSpec(0.05))
+    moved = MovedSubmaps(concat([submap, submap]), np.concatenate([poses, poses]), GridSpec(0.05))
     table, evidence = moved.table(), moved.evidence()
     kept = np.arange(len(evidence)) % 3 > 0
     one, other = moved.voxels(kept), table.voxels(kept=kept)
@@ -258,7 +259,7 @@ def test_a_map_grows_beyond_the_room_that_was_made_for_it() -> None:
     walk = Walk(8)
     _, submap = one_submap(walk)
     apart = np.concatenate([motion(shift=(9.0 * n, 0.0, 0.0)) @ walk.world_from_camera for n in range(6)])
-    moved = MovedSubmaps(concat_submaps([submap] * 6), apart, GridSpec(0.05))
+    moved = MovedSubmaps(concat([submap] * 6), apart, GridSpec(0.05))
     once = MovedSubmaps(submap, apart[:8], GridSpec(0.05))
     assert len(moved.evidence()) == 6 * len(once.evidence())
     np.testing.assert_array_equal(moved.voxels().feature, np.tile(once.voxels().feature, (6, 1)))
@@ -267,8 +268,8 @@ def test_a_map_grows_beyond_the_room_that_was_made_for_it() -> None:
 def test_the_order_of_submaps_does_not_matter() -> None:
     parts = [one_submap(Walk(4, seed=seed))[1] for seed in range(5)]
     poses = [motion(17.0 * n, (0.3 * n, 0.1, 0.0)) @ Walk(4).world_from_camera for n in range(5)]
-    one = MovedSubmaps(concat_submaps(parts), np.concatenate(poses), GridSpec(0.05))
-    other = MovedSubmaps(concat_submaps(parts[::-1]), np.concatenate(poses[::-1]), GridSpec(0.05))
+    one = MovedSubmaps(concat(parts), np.concatenate(poses), GridSpec(0.05))
+    other = MovedSubmaps(concat(parts[::-1]), np.concatenate(poses[::-1]), GridSpec(0.05))
     for name in ("index", "hits", "views", "sharp"):
         np.testing.assert_array_equal(getattr(one.evidence(), name), getattr(other.evidence(), name))
     np.testing.assert_allclose(one.voxels().weight, other.voxels().weight, rtol=1e-6)
@@ -294,7 +295,7 @@ def test_looks_that_weigh_next_to_nothing_are_not_missed() -> None:
     other = np.random.default_rng(0).integers(-127, 128, submap.feature.shape).astype(np.int8)
     for weighs in (1.0, 1e-2, 1e-3, 1e-9):
         faint = replace(submap, feature=other, weight=submap.weight * np.float32(weighs))
-        both = concat_submaps([submap, faint])
+        both = concat([submap, faint])
         found = MovedSubmaps(both, np.concatenate([walk.world_from_camera] * 2), GridSpec(0.05)).table().sums()
         one, two = (part.feature * (part.feature_scale * part.weight)[:, None] for part in (submap, faint))
         np.testing.assert_array_equal(found.index, submap.index)

@@ -22,6 +22,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Int, UInt16
 from avlmaps.core.camera import Pinhole
+from avlmaps.core.columns import take
 from avlmaps.core.poses import apply, inverse
 from avlmaps.core.progress import silence_progress
 from avlmaps.days.settings import ChangeSettings
@@ -96,7 +97,7 @@ class DayViews:
 
     def only(self, some: Bool[np.ndarray, " k"]) -> "DayViews":
         """Return some of the views."""
-        return DayViews(self.clear_mm[some], self.pose[some], self.camera)
+        return take(self, some)
 
     def moved(self, map_from_recording: Float[np.ndarray, "4 4"]) -> "DayViews":
         """Return them in another world."""

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Int
+from avlmaps.core.columns import concat
 from avlmaps.core.poses import apply, rotation_angle_rad
 from avlmaps.days.align import local_features, thumbnail
 from avlmaps.days.surfaces import Occupied, resampled
@@ -167,18 +168,12 @@ def joined_sounds(
         clips.append(f"{number:06d}{source.suffix}")
         shutil.copyfile(source, folder / clips[-1])
     width = max(old.feature.shape[1], new.feature.shape[1])
-    tracks = [np.asarray(old.track), apply(moved, np.asarray(new.track, np.float64))]
-    features = [each.feature if len(each.feature) else np.zeros((0, width)) for each in (old, new)]
-    return HeardSounds(
-        onset_s=np.concatenate([old.onset_s, np.asarray(new.onset_s) + shift_s]),
-        offset_s=np.concatenate([old.offset_s, np.asarray(new.offset_s) + shift_s]),
-        track_offsets=np.concatenate([old.track_offsets, old.track_offsets[-1] + new.track_offsets[1:]]).astype(
-            np.int64
-        ),
-        track=np.concatenate(tracks).astype(np.float32),
-        feature_offsets=np.concatenate([old.feature_offsets, old.feature_offsets[-1] + new.feature_offsets[1:]]).astype(
-            np.int64
-        ),
-        feature=np.concatenate(features).astype(np.float32),
-        clips=tuple(clips),
+    laid = replace(
+        new,
+        onset_s=np.asarray(new.onset_s) + shift_s,
+        offset_s=np.asarray(new.offset_s) + shift_s,
+        track=apply(moved, np.asarray(new.track, np.float64)).astype(np.float32),
     )
+    without = np.zeros((0, width), np.float32)
+    parts = [each if len(each.feature) else replace(each, feature=without) for each in (old, laid)]
+    return concat(parts, clips=tuple(clips))

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Int
+from avlmaps.core.columns import take
 from avlmaps.core.poses import inverse
 
 _STEPS = 60
@@ -41,10 +42,7 @@ class Edges:
 
     def only(self, kept: Bool[np.ndarray, " e"]) -> "Edges":
         """Return some of them."""
-        return Edges(
-            self.first[kept], self.second[kept], self.measured[kept], self.sigma_m[kept], self.sigma_rad[kept],
-            self.is_closure[kept],
-        )  # fmt: skip
+        return take(self, kept)
 
     def errors(self, poses: Float[np.ndarray, "n 4 4"]) -> Float[np.ndarray, "e 6"]:
         """Return how far each is from what the poses say: translation (3, metres), rotation (3, radians)."""

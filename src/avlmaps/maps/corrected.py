@@ -9,6 +9,7 @@ import numpy as np
 from msgspec import structs
 
 from avlmaps.core.arrays import Float
+from avlmaps.core.columns import offsets_of
 from avlmaps.core.errors import MapError
 from avlmaps.core.poses import inverse
 from avlmaps.core.progress import silence_progress
@@ -194,5 +195,4 @@ def _replaced(sounds: HeardSounds, walk: Motion) -> HeardSounds:
         track_of(walk, Segment(float(onset), float(offset)))
         for onset, offset in zip(sounds.onset_s, sounds.offset_s, strict=True)
     ]
-    offsets = np.cumsum([0, *map(len, tracks)]).astype(np.int64)
-    return replace(sounds, track=np.concatenate(tracks), track_offsets=offsets)
+    return replace(sounds, track=np.concatenate(tracks), track_offsets=offsets_of([len(track) for track in tracks]))

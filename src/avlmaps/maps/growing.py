@@ -16,6 +16,7 @@ import numpy as np
 from msgspec import structs
 
 from avlmaps.core.arrays import Float
+from avlmaps.core.columns import concat
 from avlmaps.core.errors import AudioError, BackendError, MapError
 from avlmaps.core.numbers import as_number
 from avlmaps.core.progress import silence_progress
@@ -25,7 +26,7 @@ from avlmaps.core.wording import option
 from avlmaps.maps.audio.growing import GrowingSounds
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
 from avlmaps.maps.fusion.free_space import FreeViewCollector, ThroughCounts, stack_views
-from avlmaps.maps.fusion.submaps import concat_submaps, submap_of
+from avlmaps.maps.fusion.submaps import submap_of
 from avlmaps.maps.fusion.voxel_sums import VoxelSums, features_alone
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.growing_walk import HERE, Walk
@@ -350,7 +351,7 @@ class GrowingMap:
         if self._part is None or self._free is None or not self.settings.frames.per_submap:
             return None
         last = [] if not self._part_walk else [self._as_submap(self._part.sums())]
-        every = concat_submaps([*self._submaps, *last])
+        every = concat([*self._submaps, *last])
         clear = self._free.views().clear_mm
         return replace(every, pose=self._walk.pose_of(every.stamp_s), clear_mm=clear)
 
@@ -360,7 +361,7 @@ class GrowingMap:
         if self._part_walk:
             self._keep_submap(self._part.sums())
         self._part, self._part_number = self._empty(self._sensor), -1
-        submaps = concat_submaps(self._submaps)
+        submaps = concat(self._submaps)
         self._total = VoxelAccumulator.of_submaps(submaps, self._walk.pose_of(submaps.stamp_s), self._part.grid)
         self._total_is_read = False
         self._free.place(self._walk.pose_of(submaps.stamp_s))

@@ -1,10 +1,12 @@
 """The content of a map, in memory or memory-mapped: voxels, keyframes, sounds; all in the recording's world."""
 
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
 from avlmaps.core.arrays import Float16, Float32, Float64, Int, Int8, Int32, Int64, UInt8, UInt16
+from avlmaps.core.columns import take
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -56,6 +58,7 @@ class Keyframes:
             what of this one it looked at. Empty where depths are used as they are, and in maps written before.
     """
 
+    RAGGED: ClassVar = (("offsets", "xy"), ("thumbnail_offsets", "thumbnails"))
     stamp_s: Float64[np.ndarray, " k"]
     world_from_camera: Float64[np.ndarray, "k 4 4"]
     centre: Float32[np.ndarray, "k 3"]
@@ -83,32 +86,7 @@ class Keyframes:
 
     def take(self, rows: Int[np.ndarray, " r"]) -> "Keyframes":
         """Return some of them."""
-        offsets, points = _ragged(np.asarray(self.offsets), rows)
-        thumbnail_offsets, pixels = _ragged(np.asarray(self.thumbnail_offsets), rows)
-        score, clear_mm = np.asarray(self.score), np.asarray(self.clear_mm)
-        return Keyframes(
-            stamp_s=np.asarray(self.stamp_s)[rows],
-            world_from_camera=np.asarray(self.world_from_camera)[rows],
-            centre=np.asarray(self.centre)[rows],
-            view=np.asarray(self.view)[rows],
-            place=np.asarray(self.place)[rows],
-            offsets=offsets,
-            xy=np.asarray(self.xy)[points],
-            descriptors=np.asarray(self.descriptors)[points],
-            points_world=np.asarray(self.points_world)[points],
-            thumbnail_offsets=thumbnail_offsets,
-            thumbnails=np.asarray(self.thumbnails)[pixels],
-            score=score[points] if len(score) else score,
-            clear_mm=clear_mm[rows] if len(clear_mm) else clear_mm,
-        )
-
-
-def _ragged(offsets: Int[np.ndarray, " k1"], rows: Int[np.ndarray, " r"]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the offsets of some rows of a ragged array, and the entries that they have."""
-    size: Int[np.ndarray, " r"] = np.diff(offsets)[rows]
-    ends = np.concatenate([[0], np.cumsum(size)]).astype(np.int64)
-    first: Int[np.ndarray, " m"] = np.repeat(offsets[:-1][rows] - ends[:-1], size)
-    return ends, first + np.arange(len(first))
+        return take(self, rows)
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -125,6 +103,7 @@ class HeardSounds:
         clips: file names below the map's folder, FLAC.
     """
 
+    RAGGED: ClassVar = (("track_offsets", "track"), ("feature_offsets", "feature"))
     onset_s: Float64[np.ndarray, " n"]
     offset_s: Float64[np.ndarray, " n"]
     track_offsets: Int64[np.ndarray, " n1"]
@@ -167,6 +146,7 @@ class Submaps:
         clear_mm: how far it saw freely, as ``FreeViews``; empty where depths are used as they are.
     """
 
+    RAGGED: ClassVar = (("row_offsets", "index"), ("frame_offsets", "stamp_s"))
     row_offsets: Int64[np.ndarray, " b1"]
     index: Int32[np.ndarray, "n 3"]
     feature: Int8[np.ndarray, "n d"]

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from avlmaps.core.arrays import Bool, Float16, Float32, Int
+from avlmaps.core.columns import take
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder
 from avlmaps.query import scores
 from avlmaps.query.encoded_words import encoded_words
@@ -179,7 +180,7 @@ class Scored:
 
     def only(self, which: Bool[np.ndarray, " m"]) -> "Scored":
         """Return some of the voxels."""
-        return Scored(self.rows[which], self.margin[which], self.score[which])
+        return take(self, which)
 
 
 def object_margins(

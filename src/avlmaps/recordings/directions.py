@@ -5,13 +5,14 @@ elsewhere has an offset, which a build finds along the walk (``avlmaps.maps.sour
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from avlmaps.core.arrays import Float
+from avlmaps.core.columns import concat, take
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import TABLE_BYTES, read_regular, write_bytes_atomically
 
@@ -95,20 +96,12 @@ class DirectionTrack:
         Raises:
             RecordingError: their stamps do not rise.
         """
-        return cls(
-            np.concatenate([part.stamp_s for part in parts]),
-            np.concatenate([part.azimuth_rad for part in parts]),
-            np.concatenate([part.elevation_rad for part in parts]),
-            np.concatenate([part.confidence for part in parts]),
-            parts[0].known_rad,
-        )
+        return concat(parts, known_rad=parts[0].known_rad)
 
     def between(self, onset_s: float, offset_s: float) -> "DirectionTrack":
         """Return the part of a stretch of time."""
         rows = slice(*np.searchsorted(self.stamp_s, [onset_s, offset_s]).tolist())
-        return DirectionTrack(
-            self.stamp_s[rows], self.azimuth_rad[rows], self.elevation_rad[rows], self.confidence[rows]
-        )
+        return take(replace(self, known_rad=None), rows)
 
     def require_beside(self, start_s: float, end_s: float, where: str) -> None:
         """Refuse directions of another clock than the sound's.

@@ -9,6 +9,7 @@ from typing import cast
 import numpy as np
 
 from avlmaps.core.arrays import Float, Float32
+from avlmaps.core.columns import offsets_of
 from avlmaps.core.errors import BackendError
 from avlmaps.core.numbers import unmasked
 from avlmaps.core.progress import progress, say
@@ -200,17 +201,13 @@ def _encoded(encoder: SoundEncoder, sound: Sound) -> Float32[np.ndarray, "window
 
 def collect(heard: Sequence[Heard], dim: int) -> HeardSounds:
     """Put sounds, in the order of time, into the map's arrays; ``dim`` is the length of a feature."""
-
-    def offsets(parts: Sequence[np.ndarray]) -> np.ndarray:
-        return np.cumsum([0, *(len(part) for part in parts)], dtype=np.int64)
-
     tracks, features = [one.track for one in heard], [one.feature for one in heard]
     return HeardSounds(
         onset_s=np.array([one.segment.onset_s for one in heard], np.float64),
         offset_s=np.array([one.segment.offset_s for one in heard], np.float64),
-        track_offsets=offsets(tracks),
+        track_offsets=offsets_of([len(track) for track in tracks]),
         track=np.concatenate([np.zeros((0, 3), np.float32), *tracks]),
-        feature_offsets=offsets(features),
+        feature_offsets=offsets_of([len(feature) for feature in features]),
         feature=np.concatenate([np.zeros((0, dim), np.float32), *features]),
         clips=tuple(one.clip for one in heard),
     )

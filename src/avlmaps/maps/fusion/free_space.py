@@ -137,12 +137,6 @@ def stack_views(clear: Sequence[np.ndarray], pose: Sequence[np.ndarray], shape: 
     return FreeViews(stacked, np.stack(pose) if len(pose) else np.zeros((0, 4, 4)))
 
 
-def concat_views(parts: Sequence[FreeViews]) -> FreeViews:
-    """Put the views of parts one after the other."""
-    clear, pose = [part.clear_mm for part in parts], [part.clear_pose for part in parts]
-    return FreeViews(np.concatenate(clear), np.concatenate(pose))
-
-
 def count_through(
     index: Int32[np.ndarray, "n 3"], grid: GridSpec, camera: Pinhole, parts: Sequence[FreeViews]
 ) -> Int32[np.ndarray, " n"]:

@@ -5,8 +5,6 @@ poses give each of its frames a motion; a voxel moves with the frame in the midd
 then are sums, so that a map follows any number of corrections, one after the other, and no error adds up.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from avlmaps.core.arrays import Float, Float32, Float64, Int8, UInt16
@@ -61,16 +59,3 @@ def in_steps(
     steps, scale = np.empty(feature_sum.shape, np.int8), np.empty(len(feature_sum), np.float32)
     round_to_steps(np.array(feature_sum, np.float32, order="C"), np.array(weight, np.float64), steps, scale)
     return steps, scale
-
-
-def concat_submaps(parts: Sequence[Submaps]) -> Submaps:
-    """Put submaps, at least one, one after the other."""
-    arrays: dict[str, np.ndarray] = {}
-    for name in Submaps.__dataclass_fields__:
-        every = [np.asarray(getattr(part, name)) for part in parts]
-        if name.endswith("_offsets"):
-            lengths = np.concatenate([np.diff(offsets) for offsets in every])
-            arrays[name] = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
-        else:
-            arrays[name] = np.concatenate(every)
-    return Submaps(**arrays)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32, Int64
 
+from avlmaps.core.columns import take
 from avlmaps.core.errors import MapError
 from avlmaps.maps.fusion import voxel_kernels as kernels
 from avlmaps.maps.types import Voxels
@@ -86,7 +87,7 @@ class Evidence:
 
     def only(self, kept: Bool[np.ndarray, " n"]) -> "Evidence":
         """Return some of the voxels."""
-        return Evidence(self.index[kept], self.hits[kept], self.views[kept], self.sharp[kept])
+        return take(self, kept)
 
 
 class VoxelTable:
@@ -173,17 +174,8 @@ class VoxelTable:
         feature_sum = feature_array(feature_out, (self.count, self.dim), np.float32)
         for block in blocks(self.count, self.dim):
             feature_sum[block] = self.feature_sum[rows[block]]
-        return VoxelSums(
-            index=self.index[rows],
-            feature_sum=feature_sum,
-            weight=self.weight[rows],
-            rgb_sum=self.rgb_sum[rows],
-            rgb_weight=self.rgb_weight[rows],
-            hits=self.hits[rows],
-            views=self.views[rows],
-            sharp=self.sharp[rows],
-            last_seen_s=self.last_seen_s[rows],
-        )
+        others = [field.name for field in fields(VoxelSums) if field.name != "feature_sum"]
+        return VoxelSums(feature_sum=feature_sum, **{name: getattr(self, name)[rows] for name in others})
 
     def evidence(self) -> Evidence:
         """Return the evidence of each voxel's surface, sorted."""

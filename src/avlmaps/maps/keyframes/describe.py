@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from avlmaps.core.arrays import Float, Float16, Float32, Int, Int64, UInt8
+from avlmaps.core.arrays import Float, Float16, Float32, Int, UInt8
+from avlmaps.core.columns import offsets_of
 from avlmaps.core.numbers import hold_numbers, unmasked
 from avlmaps.core.poses import apply, inverse, rotation_angle_rad
 from avlmaps.core.progress import progress
@@ -226,11 +227,11 @@ def stack_keyframes(seen: Sequence[DescribedKeyframe]) -> Keyframes:
         centre=_stacked([one.centre for one in seen], (3,), np.float32),
         view=_stacked([one.view for one in seen], (0,), np.float32),
         place=_stacked([one.place for one in seen], (0,), np.float32),
-        offsets=_offsets([len(one.local.xy) for one in seen]),
+        offsets=offsets_of([len(one.local.xy) for one in seen]),
         xy=_joined([one.local.xy for one in seen], (2,), np.float32),
         descriptors=_joined([one.local.descriptors for one in seen], (0,), np.float16),
         points_world=_joined([one.points_world for one in seen], (3,), np.float32),
-        thumbnail_offsets=_offsets([len(one.thumbnail) for one in seen]),
+        thumbnail_offsets=offsets_of([len(one.thumbnail) for one in seen]),
         thumbnails=np.frombuffer(b"".join(one.thumbnail for one in seen), np.uint8),
         score=_scores([one.local for one in seen]),
     )
@@ -249,10 +250,6 @@ def _stacked(rows: Sequence[np.ndarray], shape: tuple[int, ...], dtype: type[np.
 
 def _joined(pieces: Sequence[np.ndarray], shape: tuple[int, ...], dtype: type[np.generic]) -> np.ndarray:
     return np.concatenate(pieces).astype(dtype) if len(pieces) else np.zeros((0, *shape), dtype)
-
-
-def _offsets(lengths: Sequence[int]) -> Int64[np.ndarray, " k1"]:
-    return np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
 
 
 def _no_features() -> LocalFeatures:

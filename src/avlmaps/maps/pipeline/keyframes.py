@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Float32, Int
 
 from avlmaps.core.ahead import run_ahead
+from avlmaps.core.columns import concat
 from avlmaps.core.numbers import unmasked
 from avlmaps.core.progress import progress
 from avlmaps.core.registry import Kind
@@ -19,7 +20,7 @@ from avlmaps.maps.keyframes.describe import describe_keyframe, learn_places, sel
 from avlmaps.maps.pipeline.parts import MapPart
 from avlmaps.maps.pipeline.plan import BUILD_VERSION, BuildPlan
 from avlmaps.maps.store import checkpoints
-from avlmaps.maps.store.array_validation import RAGGED, ROWS_OR_NONE, array_fields, validate_arrays
+from avlmaps.maps.store.array_validation import array_fields, validate_arrays
 from avlmaps.maps.types import Keyframes
 from avlmaps.perception.cache.cached_encoders import cache_note
 from avlmaps.perception.protocols import LocalFeatures, ViewEncoder
@@ -170,17 +171,5 @@ def fused_frames(parts: Sequence[MapPart]) -> Int[np.ndarray, " n"]:
 
 
 def concat_keyframes(pieces: Sequence[Keyframes]) -> Keyframes:
-    """Put keyframes one after the other; the offsets of ragged arrays run on."""
-    if not pieces:
-        return stack_keyframes([])
-    arrays = {name: [getattr(piece, name) for piece in pieces] for name in array_fields(Keyframes)}
-    for offsets, _ in RAGGED[Keyframes]:
-        lengths = np.concatenate([np.diff(piece) for piece in arrays[offsets]])
-        arrays[offsets] = [np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)]
-    if len({clear.shape[1:] for clear in arrays["clear_mm"]}) > 1:  # of other cameras, or not known of every piece
-        arrays["clear_mm"] = [arrays["clear_mm"][0][:0]]
-    whole = {name: np.concatenate(values) for name, values in arrays.items()}
-    for some, rows in ROWS_OR_NONE[Keyframes]:
-        if len(whole[some]) != len(whole[rows]):  # not known of every piece
-            whole[some] = whole[some][:0]
-    return Keyframes(**whole)
+    """Put keyframes one after the other; none without pieces."""
+    return concat(pieces) if pieces else stack_keyframes([])

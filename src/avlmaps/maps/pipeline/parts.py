@@ -13,9 +13,10 @@ import msgspec
 import numpy as np
 
 from avlmaps.core.arrays import Float32, Float64, Int64
+from avlmaps.core.columns import concat
 from avlmaps.core.errors import MapError
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator, VoxelSums
-from avlmaps.maps.fusion.free_space import FreeViews, concat_views
+from avlmaps.maps.fusion.free_space import FreeViews
 from avlmaps.maps.fusion.submaps import submap_of
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.pipeline.plan import Span
@@ -118,7 +119,7 @@ def merge_parts(folders: Sequence[Path | str], out: Path | str) -> MapPart:
         elapsed_s=sum(part.info.elapsed_s for part in parts),
     )
     # The grid only turns metres into voxels, and merging meets none.
-    views = concat_views([part.views() for part in parts])
+    views = concat([part.views() for part in parts])
     save_part(Path(out), key, info, sum_parts(parts, GridSpec()).sums(), views)
     return load_part(Path(out), key)
 

@@ -10,13 +10,13 @@ from time import perf_counter
 import numpy as np
 
 from avlmaps.core.arrays import Float, Int
+from avlmaps.core.columns import concat
 from avlmaps.core.errors import MapError
 from avlmaps.core.registry import Kind
 from avlmaps.core.version import __version__
 from avlmaps.core.wording import option
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
 from avlmaps.maps.fusion.free_space import FreeViews, ThroughCounts, clean
-from avlmaps.maps.fusion.submaps import concat_submaps
 from avlmaps.maps.pipeline.estimate import EstimatedFloor, EstimatedUp, ground_notices
 from avlmaps.maps.pipeline.keyframes import KeyframeResult
 from avlmaps.maps.pipeline.parts import MapPart
@@ -90,7 +90,7 @@ def write(
 ) -> manifest.MapInfo:
     """Write the map and, last of all, its manifest; then the parts go."""
     keyframes = with_clear_views(pictures.keyframes, [part.views() for part in parts])
-    submaps = concat_submaps([part.submap() for part in parts]) if plan.settings.frames.per_submap else None
+    submaps = concat([part.submap() for part in parts]) if plan.settings.frames.per_submap else None
     clips, evidence = heard.clips_folder, sources[0]
     content = MapContent(
         merged.voxels, keyframes, pictures.place_state, heard.sounds, clips, submaps=submaps, sources=evidence

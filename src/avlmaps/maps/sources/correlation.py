@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from avlmaps.core.arrays import Float, Float32, Int
+from avlmaps.core.columns import take
 
 FRAME_S = 0.064
 HOP_S = 0.032
@@ -43,9 +44,7 @@ class Correlations:
 
     def take(self, frames: Int[np.ndarray, " k"]) -> "Correlations":
         """Return some of the frames."""
-        return Correlations(
-            self.at_s[frames], self.pair, self.curve[frames], self.first_s, self.step_s, self.weight[frames]
-        )
+        return take(self, frames)
 
     def turned(self, signs: Float[np.ndarray, " m"]) -> "Correlations":
         """Return the same with the signs of some channels turned."""

@@ -6,23 +6,13 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from avlmaps.core.columns import axes_of, ragged, rows_or_none
 from avlmaps.core.errors import MapError
 from avlmaps.maps.grid import index_ends
-from avlmaps.maps.types import HeardSounds, Keyframes, Submaps, Voxels
+from avlmaps.maps.types import Voxels
 
 T = TypeVar("T")
 
-# Ragged arrays: the field of offsets and the field whose rows it divides.
-RAGGED: dict[type, tuple[tuple[str, str], ...]] = {
-    Keyframes: (("offsets", "xy"), ("thumbnail_offsets", "thumbnails")),
-    HeardSounds: (("track_offsets", "track"), ("feature_offsets", "feature")),
-    Submaps: (("row_offsets", "index"), ("frame_offsets", "stamp_s")),
-}
-# Arrays that are empty where nothing is known, and the field along whose rows they go where it is.
-ROWS_OR_NONE: dict[type, tuple[tuple[str, str], ...]] = {
-    Keyframes: (("score", "xy"), ("clear_mm", "stamp_s")),
-    Submaps: (("clear_mm", "stamp_s"),),
-}
 # The keypoints' points are NaN where there was no depth.
 # Features: of unit length, or zero where there is nothing to say.
 UNIT_ROWS = frozenset({"voxels/feature", "sounds/feature", "keyframes/view", "keyframes/descriptors"})
@@ -35,7 +25,7 @@ _MEND = "build the map again in its place"
 
 def array_fields(kind: type) -> list[str]:
     """Return the names of a dataclass's fields that hold arrays."""
-    return [field.name for field in dataclasses.fields(kind) if hasattr(field.type, "dim_str")]
+    return list(axes_of(kind))
 
 
 def validate_arrays(kind: type[T], values: Mapping[str, Any], where: str) -> T:
@@ -58,9 +48,9 @@ def validate_arrays(kind: type[T], values: Mapping[str, Any], where: str) -> T:
         if hasattr(field.type, "dim_str"):
             _check_array(f"{where}, {field.name}", values[field.name], field.type, sizes)
     whole = kind(**values)
-    for offsets, rows in RAGGED.get(kind, ()):
+    for offsets, rows in ragged(kind):
         _check_offsets(f"{where}, {offsets}", getattr(whole, offsets), len(getattr(whole, rows)), len(whole))  # pyright: ignore[reportArgumentType]
-    for some, rows in ROWS_OR_NONE.get(kind, ()):
+    for some, rows in rows_or_none(kind):
         count, wanted = len(getattr(whole, some)), len(getattr(whole, rows))
         if count not in (0, wanted):
             raise MapError(f"{where}, {some} has {count} rows; {rows} has {wanted}; {_MEND}.")

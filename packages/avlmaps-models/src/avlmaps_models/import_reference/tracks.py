@@ -9,18 +9,18 @@ continue from the end of the scene's walk, one walk after the other.
 import glob
 import shutil
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
+from avlmaps.core.columns import concat
 from avlmaps.core.errors import MapError
 from avlmaps.core.registry import Kind, find, load
 from avlmaps.maps.audio.events import detect_events
 from avlmaps.maps.audio.settings import HearingSettings
-from avlmaps.maps.store.array_validation import array_fields
 from avlmaps.maps.store.manifest import ModelInfo
 from avlmaps.maps.types import HeardSounds
 from avlmaps.recordings.open import open_recording
@@ -129,18 +129,9 @@ def _moved(found: HeardSounds, here: Path, clips_folder: Path, start_s: float) -
     names = tuple(f"{here.name}-{clip}" for clip in found.clips)
     for clip, name in zip(found.clips, names, strict=True):
         (here / clip).rename(clips_folder / name)
-    arrays = {name: getattr(found, name) for name in array_fields(HeardSounds)}
-    arrays["onset_s"], arrays["offset_s"] = found.onset_s + start_s, found.offset_s + start_s
-    return HeardSounds(**arrays, clips=names)
+    return replace(found, onset_s=found.onset_s + start_s, offset_s=found.offset_s + start_s, clips=names)
 
 
 def _joined(heard: Sequence[HeardSounds]) -> HeardSounds:
     """Put the sounds of walks one after the other; the offsets of ragged arrays run on."""
-    arrays = {name: [getattr(one, name) for one in heard] for name in array_fields(HeardSounds)}
-    for name in ("track_offsets", "feature_offsets"):
-        lengths = np.concatenate([np.diff(offsets) for offsets in arrays[name]])
-        arrays[name] = [np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)]
-    return HeardSounds(
-        **{name: np.concatenate(parts) for name, parts in arrays.items()},
-        clips=tuple(clip for one in heard for clip in one.clips),
-    )
+    return concat(heard, clips=tuple(clip for one in heard for clip in one.clips))
