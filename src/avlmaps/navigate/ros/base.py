@@ -21,7 +21,7 @@ from avlmaps.core.motion import GroundPose
 from avlmaps.navigate.driver import Arrival
 from avlmaps.navigate.interrupts import Halt
 from avlmaps.navigate.ros.contact import Contact
-from avlmaps.navigate.ros.goals import End, Goal, MovementPlan, Stopwatch, Task, Tasks, Track
+from avlmaps.navigate.ros.goals import End, Goal, MovementPlan, Task, Tasks, Track
 from avlmaps.navigate.ros.guard import GoalGuard
 from avlmaps.navigate.ros.plans import LEAST_M, LONGEST_M, Standing, ahead_of, place_to_stand, plan_turn
 from avlmaps.navigate.ros.session import AGAIN_S, Opener, call_off, ended_within
@@ -324,7 +324,7 @@ class RosDriver:
 
     def _watch(self, goal: Goal, track: Track) -> tuple[str, bool]:
         """Wait for a goal's end; else return why it is to be given up, and whether nobody is there to take it."""
-        watch, settings, session = Stopwatch(), self.settings, self._contact.session
+        begun_s, settings, session = monotonic(), self.settings, self._contact.session
         sent_s = looked_s = beaten_s = asked_s = self._clock()
         before, jump = self._contact.sighting(), ""
         while not ended_within(goal, session, _LOOK_EVERY_S):
@@ -343,11 +343,11 @@ class RosDriver:
             silent_s = self._silent_s(goal, sent_s, now_s)
             if why := self._lost_sight(goal, silent_s):
                 return why, False
-            if not goal.answered and watch.took_s > settings.answer_timeout_s:
+            if not goal.answered and monotonic() - begun_s > settings.answer_timeout_s:
                 says = f" The bridge says: {session.complaint}" if session.complaint else ""
                 within = f"within {settings.answer_timeout_s:g} s; is {self._tasks.called} running?{says}"
                 return f"Nothing answers at {goal.task.action} {within}", True
-            if watch.took_s > goal.task.limit_s:
+            if monotonic() - begun_s > goal.task.limit_s:
                 return f"{self._tasks.called} was not done within {goal.task.limit_s:g} s", False
             if silent_s > _ASK_AFTER * settings.server_max_age_s and now_s - asked_s > AGAIN_S:
                 asked_s = now_s

@@ -4,7 +4,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import StrEnum
-from time import monotonic
 from typing import Any, ClassVar
 from uuid import uuid4
 
@@ -123,18 +122,6 @@ class Track:
     def places(self) -> Float[np.ndarray, "n 2"]:
         """All of them, in order."""
         return np.array(self._places, np.float64)
-
-
-class Stopwatch:
-    """Measures how long something takes."""
-
-    def __init__(self) -> None:
-        self._begun_s = monotonic()
-
-    @property
-    def took_s(self) -> float:
-        """Seconds since it was made."""
-        return monotonic() - self._begun_s
 
 
 class Tasks(ABC):

@@ -27,9 +27,10 @@ from unique_identifier_msgs.msg import UUID as GoalUuid  # noqa: N811 - a class
 
 from avlmaps.core.errors import AvlmapsError
 from avlmaps.core.ros_interfaces import interface
+from avlmaps.navigate.ros import nav2_tasks
 from avlmaps.navigate.ros.goals import End, Goal
 from avlmaps.navigate.ros.messages import Transform, rigid, sanitize_line
-from avlmaps.navigate.ros.nav2_tasks import MOVING, why_of
+from avlmaps.navigate.ros.nav2_tasks import MOVING, RESULT_WITHIN_S, UNDER_WAY
 from avlmaps.navigate.ros.own_map import OwnGrid, checked_grid
 from avlmaps.navigate.ros.session import Ear
 from avlmaps.navigate.ros.settings import RosSettings
@@ -51,11 +52,6 @@ def filled(message: Any, values: Mapping[str, Any]) -> Any:
 _LOOK_EVERY_S = 0.05
 _DISCOVERY_S, _LEAST_DISCOVERY_S, _CANCEL_DISCOVERY_S = 6.0, 1.0, 20.0
 """Longest discovery of a server, seconds: since we joined, later, and where it has our goal."""
-_RESULT_WITHIN_S = 1.0
-"""After a list says that a goal is over, its result says why."""
-_SUCCEEDED, _CANCELLED = 4, 5  # action_msgs/GoalStatus
-_UNDER_WAY = (1, 2, 3)
-_REFUSED, _UNKNOWN, _ENDED = 1, 2, 3  # return codes of action_msgs/CancelGoal
 _NOBODY = GoalUuid()
 # Best effort receives from reliable publishers as well, and a lost message does not hold up those after it.
 _MOVING = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -101,10 +97,7 @@ class NativeSession:
         transforms = interface("tf2_msgs/msg/TFMessage")
         self._context = Context()
         self._context.init(args=[])
-        self._node = Node(
-            f"avlmaps_{os.getpid()}_{next(_names)}", context=self._context, use_global_arguments=False,
-            start_parameter_services=False, enable_rosout=False,
-        )  # fmt: skip
+        self._node = _node_in(self._context)
         node, prefix = self._node, settings.tf_namespace
         node.create_subscription(transforms, f"{prefix}/tf", partial(self._placed, static=False), _MOVING)
         node.create_subscription(transforms, f"{prefix}/tf_static", partial(self._placed, static=True), _LATCHED)
@@ -244,19 +237,17 @@ class NativeSession:
 
     def _listed(self, server: str, message: Any) -> None:
         states = {bytes(one.goal_info.goal_id.uuid).hex(): one.status for one in message.status_list}
-        under_way = [digits for digits, status in states.items() if status in _UNDER_WAY]
+        under_way = [digits for digits, status in states.items() if status in UNDER_WAY]
         self._writers[server] = self._writers_of(server)
         self._ear.servers.listed(server, under_way)
         for digits, goal in list(self._ours.items()):
             status = states.get(digits)
             if goal.task.action != server or status is None:
                 continue
-            if status in _UNDER_WAY:
+            if status in UNDER_WAY:
                 goal.heard_s = self._ear.clock()  # a list comes at a change only: no sign of life that recurs
             else:
-                end = {_SUCCEEDED: End.SUCCEEDED, _CANCELLED: End.CANCELLED}.get(status, End.FAILED)
-                note = "" if end is End.SUCCEEDED else "Nav2 lists the goal as over"
-                self._later(partial(self._over, goal, end, note))
+                self._later(partial(self._over, goal, *nav2_tasks.end_listed(status)))
         self._notify()
 
     def _writers_of(self, server: str) -> frozenset[bytes]:
@@ -264,7 +255,7 @@ class NativeSession:
         return frozenset(bytes(one.endpoint_gid) for one in known)
 
     def _later(self, act: Callable[[], None]) -> None:
-        at_s = monotonic() + _RESULT_WITHIN_S
+        at_s = monotonic() + RESULT_WITHIN_S
         self._waiting.append(lambda: monotonic() > at_s and (act(), True)[1])
 
     def _over(self, goal: Goal, end: End, note: str = "") -> None:
@@ -354,8 +345,8 @@ class NativeSession:
             self._met.add(server)
             self._ear.servers.answered(server, serves=True)
             if goal_id == _NOBODY:
-                self._agreed_s[server] = now_s, answer.return_code != _REFUSED
-            gone = answer.return_code in (_UNKNOWN, _ENDED)
+                self._agreed_s[server] = now_s, answer.return_code != nav2_tasks.REFUSED
+            gone = answer.return_code in (nav2_tasks.UNKNOWN, nav2_tasks.ENDED)
             if goal is not None and gone and _digits(goal) not in self._sending:  # else it is still on its way there
                 self._over(goal, End.CANCELLED, "Nav2 is not at the goal any more")
             self._notify()
@@ -375,6 +366,13 @@ class NativeSession:
         self._when(client.service_is_ready, go, absent, patient_s)
 
 
+def _node_in(context: Context) -> Node:
+    return Node(
+        f"avlmaps_{os.getpid()}_{next(_names)}", context=context, use_global_arguments=False,
+        start_parameter_services=False, enable_rosout=False,
+    )  # fmt: skip
+
+
 def _digits(goal: Goal) -> str:
     return goal.id[-32:]
 
@@ -386,14 +384,8 @@ def _uuid(goal: Goal) -> GoalUuid:
 
 def _end_of(response: Any) -> tuple[End, str]:
     """Read the response of an action's result service."""
-    match response.status:
-        case 4:
-            return End.SUCCEEDED, ""
-        case 5:
-            return End.CANCELLED, "The goal was cancelled, by the robot or another of its users"
-        case _:
-            code, text = getattr(response.result, "error_code", 0), getattr(response.result, "error_msg", "")
-            return End.FAILED, f"Nav2 gave up ({why_of(code, sanitize_line(text))})"
+    code, text = getattr(response.result, "error_code", 0), getattr(response.result, "error_msg", "")
+    return nav2_tasks.end_of(response.status, code, sanitize_line(text))
 
 
 def read_grid(topic: str, wait_s: float) -> OwnGrid | None:
@@ -401,10 +393,7 @@ def read_grid(topic: str, wait_s: float) -> OwnGrid | None:
     context = Context()
     context.init(args=[])
     executor, found = SingleThreadedExecutor(context=context), []
-    node = Node(
-        f"avlmaps_{os.getpid()}_{next(_names)}", context=context, use_global_arguments=False,
-        start_parameter_services=False, enable_rosout=False,
-    )  # fmt: skip
+    node = _node_in(context)
     try:
         executor.add_node(node)
         kind = interface("nav_msgs/msg/OccupancyGrid")

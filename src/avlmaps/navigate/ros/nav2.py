@@ -5,17 +5,14 @@ from uuid import uuid4
 
 import msgspec
 
+from avlmaps.navigate.ros import nav2_tasks
 from avlmaps.navigate.ros.bridge import BridgeSession
 from avlmaps.navigate.ros.errands import Errands
 from avlmaps.navigate.ros.goals import End, Goal
 from avlmaps.navigate.ros.link import Link
 from avlmaps.navigate.ros.messages import ActionEnd, ActionStates, CancelAnswer, Incoming, sanitize_line, text_in
-from avlmaps.navigate.ros.nav2_tasks import ASKED_FOR, MOVING, why_of
+from avlmaps.navigate.ros.nav2_tasks import ASKED_FOR, MOVING, RESULT_WITHIN_S, UNDER_WAY
 
-_SUCCEEDED, _CANCELLED = 4, 5  # action_msgs/GoalStatus
-_UNDER_WAY = (1, 2, 3)
-_REFUSED, _UNKNOWN, _ENDED = 1, 2, 3  # return codes of action_msgs/CancelGoal
-_RESULT_WITHIN_S = 1.0  # after a list says that a goal is over, its result says why
 _NOBODY = [0] * 16
 
 
@@ -125,7 +122,7 @@ class Nav2Session(BridgeSession):
 
     def _listed(self, server: str, message: msgspec.Raw) -> None:
         states = {one.name: one.status for one in msgspec.json.decode(message, type=ActionStates).status_list}
-        under_way = frozenset(name for name, status in states.items() if status in _UNDER_WAY)
+        under_way = frozenset(name for name, status in states.items() if status in UNDER_WAY)
         self.ear.servers.listed(server, under_way)
         taken = {goal.alias for goal in self._ours.values()}
 
@@ -136,7 +133,7 @@ class Nav2Session(BridgeSession):
             if not goal.alias and len(new) == 1:
                 goal.alias = next(iter(new))
             status = states.get(goal.alias)
-            if status in _UNDER_WAY:
+            if status in UNDER_WAY:
                 goal.show(self.ear.clock())
             elif (goal.id in self._cancelled_s and not under_way) or status is not None:
                 self._over_soon(goal, status)
@@ -145,9 +142,8 @@ class Nav2Session(BridgeSession):
 
     def _over_soon(self, goal: Goal, status: int | None) -> None:
         """Take a goal for over by its list, unless its result comes before, which says more."""
-        end = {_SUCCEEDED: End.SUCCEEDED, _CANCELLED: End.CANCELLED}.get(status or 0, End.FAILED)
-        note = "" if end is End.SUCCEEDED else "Nav2 lists the goal as over"
-        self.link.later(_RESULT_WITHIN_S if goal.id == self._sent else 0.0, lambda: goal.over(end, note))
+        wait_s = RESULT_WITHIN_S if goal.id == self._sent else 0.0
+        self.link.later(wait_s, lambda: goal.over(*nav2_tasks.end_listed(status)))
 
     def _answered(self, message: Incoming) -> None:
         if message.op == "service_response" and message.id in self._calls:
@@ -175,8 +171,10 @@ class Nav2Session(BridgeSession):
         except ValueError:
             return
         self.ear.servers.answered(server, serves=True)
-        self._agreed_s[server] = self.ear.clock(), answer.return_code != _REFUSED
-        stopped = answer.return_code in (_UNKNOWN, _ENDED) or (everyone and answer == CancelAnswer())
+        self._agreed_s[server] = self.ear.clock(), answer.return_code != nav2_tasks.REFUSED
+        stopped = answer.return_code in (nav2_tasks.UNKNOWN, nav2_tasks.ENDED) or (
+            everyone and answer == CancelAnswer()
+        )
         if goal is not None and stopped:
             goal.over(End.CANCELLED, "Nav2 is not at the goal any more")
 
@@ -194,9 +192,5 @@ def _end_of(message: Incoming) -> tuple[End, str]:
     except ValueError:
         end = inner = ActionEnd()
     status = message.status if message.status is not None else end.status
-    if status == _SUCCEEDED:
-        return End.SUCCEEDED, ""
-    if status == _CANCELLED:
-        return End.CANCELLED, "The goal was cancelled, by the robot or another of its users"
-    why = why_of(end.error_code or inner.error_code, sanitize_line(end.error_msg or inner.error_msg))
-    return End.FAILED, f"Nav2 gave up ({why})"
+    text = sanitize_line(end.error_msg or inner.error_msg)
+    return nav2_tasks.end_of(status, end.error_code or inner.error_code, text)

@@ -3,7 +3,7 @@
 from typing import ClassVar
 
 from avlmaps.core.motion import GroundPose
-from avlmaps.navigate.ros.goals import Task, Tasks
+from avlmaps.navigate.ros.goals import End, Task, Tasks
 from avlmaps.navigate.ros.messages import duration, stamped_pose
 
 NAVIGATE, SPIN, STRAIGHT = "navigate_to_pose", "spin", "drive_on_heading"
@@ -11,6 +11,11 @@ ASKED_FOR = (NAVIGATE, "navigate_through_poses", "follow_waypoints", SPIN, STRAI
 """Nav2's actions that clients use; it uses others for itself."""
 MOVING = (*ASKED_FOR, "backup", "follow_path")
 """Each of Nav2's actions that moves a robot."""
+UNDER_WAY = (1, 2, 3)  # action_msgs/GoalStatus
+REFUSED, UNKNOWN, ENDED = 1, 2, 3  # return codes of action_msgs/CancelGoal
+RESULT_WITHIN_S = 1.0
+"""After a list says that a goal is over, its result says why."""
+_SUCCEEDED, _CANCELLED = 4, 5  # action_msgs/GoalStatus
 
 # nav2_msgs' error codes, by the action that sets them: ComputePathToPose 2xx, FollowPath 1xx, behaviours 7xx.
 _WHY = {
@@ -33,6 +38,21 @@ _WHY = {
 def why_of(code: int, text: str) -> str:
     """Return why Nav2 gave up, in part of a sentence, by what its result says."""
     return text or _WHY.get(code, "" if code == 0 else f"error {code}") or "it does not say why"
+
+
+def end_listed(status: int | None) -> tuple[End, str]:
+    """Return how a goal ended that a server lists with a status, or lists no more, and what is said of it."""
+    end = {_SUCCEEDED: End.SUCCEEDED, _CANCELLED: End.CANCELLED}.get(status or 0, End.FAILED)
+    return end, "" if end is End.SUCCEEDED else "Nav2 lists the goal as over"
+
+
+def end_of(status: int | None, code: int, text: str) -> tuple[End, str]:
+    """Return how a goal ended by its result: a status, an error code and a text."""
+    if status == _SUCCEEDED:
+        return End.SUCCEEDED, ""
+    if status == _CANCELLED:
+        return End.CANCELLED, "The goal was cancelled, by the robot or another of its users"
+    return End.FAILED, f"Nav2 gave up ({why_of(code, text)})"
 
 
 class Nav2Tasks(Tasks):
