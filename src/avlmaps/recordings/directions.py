@@ -15,6 +15,7 @@ from avlmaps.core.arrays import Float
 from avlmaps.core.columns import concat, take
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import TABLE_BYTES, read_regular, write_bytes_atomically
+from avlmaps.recordings.faults import readable
 
 DIRECTIONS = "directions.csv"
 COLUMNS = ("stamp_s", "azimuth_rad", "elevation_rad", "confidence")
@@ -152,9 +153,8 @@ def read_directions(path: Path) -> DirectionTrack:
         RecordingError: it cannot be read, or a line is not as it should be; the sentence names the file and the row.
     """
     try:
-        lines = read_regular(path, TABLE_BYTES).decode("utf-8-sig").splitlines()
-    except OSError as error:
-        raise RecordingError(f"{path} cannot be read ({error.strerror or error}); check the file.") from None
+        with readable(path):
+            lines = read_regular(path, TABLE_BYTES).decode("utf-8-sig").splitlines()
     except UnicodeDecodeError:
         raise RecordingError(f"{path} is not UTF-8 text; save the file as UTF-8.") from None
     rows = [line.strip() for line in lines if line.strip() and not line.startswith("#")]

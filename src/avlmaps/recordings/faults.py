@@ -1,6 +1,7 @@
 """Faults of a recording and their reports: opening stops at the first fault, the validator lists them all."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -38,3 +39,22 @@ def stop_at_first(fault: Fault) -> None:
     """
     if fault.fatal:
         raise RecordingError(fault.sentence)
+
+
+@contextmanager
+def readable(path: Path, missing: str = "") -> Generator[None]:
+    """Say why a file cannot be read that is read within.
+
+    Args:
+        path: the file.
+        missing: what is to be done where there is none, the end of a sentence.
+
+    Raises:
+        RecordingError: it is missing or cannot be read.
+    """
+    try:
+        yield
+    except OSError as error:
+        if missing and isinstance(error, FileNotFoundError):
+            raise RecordingError(f"{path} is missing; {missing}.") from None
+        raise RecordingError(f"{path} cannot be read ({error.strerror or error}); check the file.") from None

@@ -6,8 +6,8 @@ A picture's header is compared with the camera before anything is decoded: a PNG
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,7 @@ from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import PICTURE_BYTES, open_regular, read_regular
 from avlmaps.core.npy import load_npy, npy_header
+from avlmaps.recordings.faults import readable
 from avlmaps.recordings.turning import Turn, exif_turn
 
 _PNG = b"\x89PNG\r\n\x1a\n"
@@ -25,6 +26,7 @@ _JPEG = b"\xff\xd8"
 _JPEG_SIZE_MARKERS = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 _HEADER_BYTES = 1 << 18
 _TRIED = 9
+_RESTORE = "restore it, or leave that frame out of the recording"
 # No RGB-D camera has more; 8192x8192.
 MOST_PIXELS = 1 << 26
 DEPTH_SATURATED = 65535
@@ -36,12 +38,8 @@ def read_bytes(path: Path) -> bytes:
     Raises:
         RecordingError: it is missing or cannot be read.
     """
-    try:
+    with readable(path, _RESTORE):
         return read_regular(path, PICTURE_BYTES)
-    except FileNotFoundError:
-        raise RecordingError(f"{path} is missing; restore it, or leave that frame out of the recording.") from None
-    except OSError as error:
-        raise RecordingError(f"{path} cannot be read ({error.strerror or error}); check the file.") from None
 
 
 def check_whole(path: Path, content: bytes) -> None:
@@ -102,10 +100,8 @@ def encoded_size(content: bytes) -> tuple[int, int] | None:
 
 
 def _npy_size(path: Path) -> tuple[int, int] | None:
-    try:
+    with _whole_npy(path):
         shape = npy_header(path, PICTURE_BYTES).shape
-    except (ValueError, OSError) as error:
-        raise _no_npy(path, error) from None
     return (shape[1], shape[0]) if len(shape) >= 2 else None
 
 
@@ -124,11 +120,8 @@ def first_picture_size(folder: Path, names: Sequence[str]) -> tuple[int, int]:
 
 
 def _head(path: Path) -> bytes:
-    try:
-        with open_regular(path, PICTURE_BYTES) as stream:
-            return stream.read(_HEADER_BYTES)
-    except OSError as error:
-        raise RecordingError(f"{path} cannot be read ({error.strerror or error}); check the file.") from None
+    with readable(path), open_regular(path, PICTURE_BYTES) as stream:
+        return stream.read(_HEADER_BYTES)
 
 
 def _jpeg_size(content: bytes) -> tuple[int, int] | None:
@@ -268,27 +261,26 @@ def decode_depth_png(path: Path, content: bytes) -> np.ndarray:
 
 
 def _npy_depth(path: Path, camera: Pinhole) -> Float32[np.ndarray, "h w"]:
-    try:
+    with _whole_npy(path):
         header = npy_header(path, PICTURE_BYTES)
         shape = header.shape[:2] if len(header.shape) == 3 and header.shape[2] == 1 else header.shape
         if len(shape) != 2 or header.dtype.kind not in "fiu":
             raise RecordingError(f"{path} holds {header.dtype} of {shape}; depth must be numbers of (height, width).")
         _check_size(path, shape, camera)
         raw = load_npy(path, PICTURE_BYTES).reshape(shape)
-    except (ValueError, OSError) as error:
-        raise _no_npy(path, error) from None
     with np.errstate(over="ignore"):  # float64 beyond float32 becomes infinity, which is not a depth
         depth_m = raw.astype(np.float32)
     depth_m[~(np.isfinite(depth_m) & (depth_m > 0.0))] = 0.0
     return depth_m
 
 
-def _no_npy(path: Path, error: ValueError | OSError) -> RecordingError:
-    if isinstance(error, FileNotFoundError):
-        return RecordingError(f"{path} is missing; restore it, or leave that frame out of the recording.")
-    if isinstance(error, OSError):
-        return RecordingError(f"{path} cannot be read ({error.strerror or error}); check the file.")
-    return RecordingError(f"{path} is not a whole NPY file ({error}); copy it again.")
+@contextmanager
+def _whole_npy(path: Path) -> Generator[None]:
+    with readable(path, _RESTORE):
+        try:
+            yield
+        except ValueError as error:
+            raise RecordingError(f"{path} is not a whole NPY file ({error}); copy it again.") from None
 
 
 def _check_size(path: Path, shape: tuple[int, ...], camera: Pinhole) -> None:

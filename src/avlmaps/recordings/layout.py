@@ -25,7 +25,7 @@ from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import DESCRIPTION_BYTES, decode_json, read_regular
 from avlmaps.recordings.corrections import Corrections, PoseKind
-from avlmaps.recordings.faults import Fault, Report
+from avlmaps.recordings.faults import Fault, Report, readable
 from avlmaps.recordings.microphones import MicrophoneNumbers
 from avlmaps.recordings.types import BaseHeight
 
@@ -174,7 +174,8 @@ def decode_description(path: Path) -> Description:
         RecordingError: it is missing, cannot be read, or is none.
     """
     try:
-        content = read_regular(path, DESCRIPTION_BYTES).removeprefix(b"\xef\xbb\xbf")
+        with readable(path, "every recording in this format has one"):
+            content = read_regular(path, DESCRIPTION_BYTES).removeprefix(b"\xef\xbb\xbf")
         content.decode("utf-8")
         version = decode_json(content, _Version).schema_version
         if version != SCHEMA_VERSION:
@@ -186,10 +187,6 @@ def decode_description(path: Path) -> Description:
     except UnicodeDecodeError as error:
         line = error.object[: error.start].count(b"\n") + 1
         raise RecordingError(f"{path}, line {line}: this is not UTF-8 text; save the file as UTF-8.") from None
-    except FileNotFoundError:
-        raise RecordingError(f"{path} is missing; every recording in this format has one.") from None
-    except OSError as error:
-        raise RecordingError(f"{path} cannot be read ({error.strerror or error}); check the file.") from None
     except msgspec.ValidationError as error:
         message, _, where = str(error).partition(" - at ")
         if unknown := re.search("unknown field `([^`]*)`", message):

@@ -11,6 +11,7 @@ import numpy as np
 
 from avlmaps.core.errors import AvlmapsError, RecordingError
 from avlmaps.core.files import DESCRIPTION_BYTES, SAMPLED_BYTES, checked_size
+from avlmaps.recordings.faults import readable
 from avlmaps.recordings.formats.bag_containers import Connection, Container, McapContainer, RosbagsContainer, first_line
 
 # Kinds of files that a bag's folder may hold without a metadata.yaml, the first that is there counts.
@@ -103,10 +104,8 @@ def bag_files(path: Path) -> list[Path]:
         raise RecordingError(f"There is no bag at {path}.")
     inside = sorted((entry for entry in path.iterdir() if not entry.is_dir()), key=_by_numbers) if path.is_dir() else []
     for file in inside or [path]:
-        try:
+        with readable(file):
             checked_size(file, DESCRIPTION_BYTES if file.suffix == ".yaml" else SAMPLED_BYTES)
-        except OSError as error:
-            raise RecordingError(f"{file} cannot be read ({error.strerror or error}); check the file.") from None
     if not path.is_dir() or (path / "metadata.yaml").is_file():
         return [path]
     empty: list[Path] = []

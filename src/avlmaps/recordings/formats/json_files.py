@@ -9,6 +9,7 @@ import msgspec
 
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import MANIFEST_BYTES, decode_json, read_regular
+from avlmaps.recordings.faults import readable
 
 T = TypeVar("T")
 # A key with such a word in it is about where a pixel lies in space; it is never passed over.
@@ -24,12 +25,8 @@ def read_json(file: Path, kind: type[T], limit_bytes: int = MANIFEST_BYTES) -> t
     Raises:
         RecordingError: it is missing, damaged, or lacks what the type needs.
     """
-    try:
+    with readable(file, "the recording needs it"):
         return parse_json(file, read_regular(file, limit_bytes), kind)
-    except FileNotFoundError:
-        raise RecordingError(f"{file} is missing; the recording needs it.") from None
-    except OSError as error:
-        raise RecordingError(f"{file} cannot be read ({error.strerror or error}); check the file.") from None
 
 
 def parse_json(file: Path, content: bytes, kind: type[T]) -> tuple[T, dict[str, Any]]:

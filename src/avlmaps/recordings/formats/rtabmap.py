@@ -26,7 +26,7 @@ from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import SAMPLED_BYTES, checked_size
 from avlmaps.core.rvl import decode_rvl
 from avlmaps.recordings import images
-from avlmaps.recordings.faults import Fault, Report, stop_at_first
+from avlmaps.recordings.faults import Fault, Report, readable, stop_at_first
 from avlmaps.recordings.formats.file_recording import Shots, settle
 from avlmaps.recordings.formats.intrinsics import fitted, resized_notice
 from avlmaps.recordings.formats.stored_recording import StoredRecording
@@ -53,10 +53,8 @@ class _Database:
     def __init__(self, path: Path) -> None:
         self.path = path
         self._local = threading.local()
-        try:
+        with readable(path):
             checked_size(path, SAMPLED_BYTES)
-        except OSError as error:
-            raise RecordingError(f"{path} cannot be read ({error.strerror or error}); check the file.") from None
         wal = path.with_name(path.name + "-wal")
         if wal.is_file() and wal.stat().st_size > 0:
             raise RecordingError(

@@ -10,7 +10,7 @@ from jaxtyping import Float, Int
 
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import DESCRIPTION_BYTES, TABLE_BYTES, open_regular, read_regular
-from avlmaps.recordings.faults import Fault, Report
+from avlmaps.recordings.faults import Fault, Report, readable
 from avlmaps.recordings.formats.columns import is_header_in_comment, named_order, split_header
 
 # A line holds 16 numbers or a name; without a limit a file of zeros would be one line of gigabytes.
@@ -151,13 +151,11 @@ def read_matrix(path: Path, rows: int, columns: int) -> Float[np.ndarray, "rows 
     Raises:
         RecordingError: the file is missing, is not text, or holds another count of numbers.
     """
+    with readable(path, "the recording needs it"):
+        content = read_regular(path, DESCRIPTION_BYTES)
     try:
-        fields = read_regular(path, DESCRIPTION_BYTES).decode("utf-8-sig").replace(",", " ").split()
+        fields = content.decode("utf-8-sig").replace(",", " ").split()
         numbers = [_number(field) for field in fields]
-    except FileNotFoundError:
-        raise RecordingError(f"{path} is missing; the recording needs it.") from None
-    except OSError as error:
-        raise RecordingError(f"{path} cannot be read ({error.strerror or error}); check the file.") from None
     except UnicodeDecodeError:
         raise RecordingError(f"{path} is not UTF-8 text; save the file as UTF-8.") from None
     except ValueError as error:
