@@ -20,6 +20,7 @@ from avlmaps.core.errors import RecordingError
 from avlmaps.core.timeline import Trajectory
 from avlmaps.core.wording import flag, option
 from avlmaps.recordings.camera_axes import OPENCV, opencv_from_axes
+from avlmaps.recordings.subset import Subset
 from avlmaps.recordings.types import Frame, Recording
 
 _LARGEST_UNIT_M = 1000.0
@@ -174,7 +175,7 @@ def corrected(recording: Recording, given: Corrections) -> Recording:
     return CorrectedRecording(recording, given) if given else recording
 
 
-class CorrectedRecording(Recording):
+class CorrectedRecording(Subset):
     """A recording in place, with corrected unit, cameras, poses and up direction."""
 
     def __init__(self, whole: Recording, given: Corrections) -> None:
@@ -187,15 +188,13 @@ class CorrectedRecording(Recording):
         Raises:
             RecordingError: something does not fit the recording.
         """
-        self.whole, self.given = whole, given
-        self.path, self.format = whole.path, whole.format
-        self.audio, self.topics, self.begins_s = whole.audio, whole.topics, whole.begins_s
+        at, world_from_camera, self.lost = _delayed(whole, given.pose_delay_s)
+        super().__init__(whole, at)
+        self.given, self.topics = given, whole.topics
         self.rig = corrected_rig(whole.rig, given.intrinsics, whole.path)
         self._scale = 1.0 if given.depth_unit_m is None else given.depth_unit_m / whole.stored_depth_unit_m
-        self._at, world_from_camera, self.lost = self._delayed()
         self.notices = (*whole.notices, *self.lost)
-        self.posed = whole.posed * len(self._at) / max(len(whole), 1)
-        self.stamps_s = whole.stamps_s[self._at]
+        self.posed = whole.posed * len(at) / max(len(whole), 1)
         self.world_from_camera = reread_poses(world_from_camera, given)
         known = whole.trajectory
         if known is not None:
@@ -203,46 +202,15 @@ class CorrectedRecording(Recording):
             self.trajectory = Trajectory(own_s, reread_poses(known.world_from_body, given))
         untouched = not given.poses and given.camera_axes is None
         self.base_height = whole.base_height if untouched else None
-        self.up_in_world = whole.up_in_world
         if given.up_in_world is not None:
             self.up_in_world = np.array(given.up_in_world) / np.linalg.norm(given.up_in_world)
 
-    def _delayed(self) -> tuple[np.ndarray, Float[np.ndarray, "n 4 4"], tuple[str, ...]]:
-        """Return the frames that have a pose, their poses as the files have them, and a notice of the others."""
-        whole, delay_s = self.whole, self.given.pose_delay_s
-        if not delay_s or len(whole) == 0:
-            return np.arange(len(whole)), whole.world_from_camera, ()
-        known = whole.walk
-        stamps_s = whole.stamps_s + delay_s
-        there = np.flatnonzero(known.covers(stamps_s))
-        if len(there) == 0:
-            raise RecordingError(
-                f"{whole.path}: poses that are {delay_s:g} s late leave no frame with a pose; the frames go from "
-                f"{whole.stamps_s[0]:.2f} to {whole.stamps_s[-1]:.2f} s, the poses from {known.stamps_s[0]:.2f} to "
-                f"{known.stamps_s[-1]:.2f} s. Give a smaller {option('pose-delay')}."
-            )
-        lost = len(whole) - len(there)
-        notice = f"{lost} frame(s) have no pose {delay_s:g} s later and are left out."
-        return there, known.at(stamps_s[there]), (notice,) if lost else ()
-
     def frame(self, index: int) -> Frame:
         """Read one frame."""
-        frame = self.whole.frame(int(self._at[index]))
+        frame = super().frame(index)
         depth_m = frame.depth_m if self._scale == 1.0 else frame.depth_m * np.float32(self._scale)
         pose = self.world_from_camera[index]
-        return replace(frame, index=index, depth_m=depth_m, world_from_camera=pose, rig=self.rig)
-
-    def name(self, index: int) -> str:
-        """Return the recording's name of the frame."""
-        return self.whole.name(int(self._at[index]))
-
-    def colour_file(self, index: int) -> Path | None:
-        """Return the frame's colour file."""
-        return self.whole.colour_file(int(self._at[index]))
-
-    def depth_file(self, index: int) -> Path | None:
-        """Return the frame's depth file."""
-        return self.whole.depth_file(int(self._at[index]))
+        return replace(frame, depth_m=depth_m, world_from_camera=pose, rig=self.rig)
 
     @property
     def depth_units_per_m(self) -> float:
@@ -256,14 +224,28 @@ class CorrectedRecording(Recording):
         """Metres of one unit of the depth as stored, as corrected."""
         return self.whole.stored_depth_unit_m * self._scale
 
-    def change_stamp(self) -> str:
-        """Of the recording itself."""
-        return self.whole.change_stamp()
-
     @cached_property
     def fingerprint(self) -> str:
         """Of the recording and the corrections."""
         return hashlib.sha256(f"{self.whole.fingerprint} {self.given.words(flag)}".encode()).hexdigest()
+
+
+def _delayed(whole: Recording, delay_s: float | None) -> tuple[np.ndarray, Float[np.ndarray, "n 4 4"], tuple[str, ...]]:
+    """Return the frames that have a pose, their poses as the files have them, and a notice of the others."""
+    if not delay_s or len(whole) == 0:
+        return np.arange(len(whole)), whole.world_from_camera, ()
+    known = whole.walk
+    stamps_s = whole.stamps_s + delay_s
+    there = np.flatnonzero(known.covers(stamps_s))
+    if len(there) == 0:
+        raise RecordingError(
+            f"{whole.path}: poses that are {delay_s:g} s late leave no frame with a pose; the frames go from "
+            f"{whole.stamps_s[0]:.2f} to {whole.stamps_s[-1]:.2f} s, the poses from {known.stamps_s[0]:.2f} to "
+            f"{known.stamps_s[-1]:.2f} s. Give a smaller {option('pose-delay')}."
+        )
+    lost = len(whole) - len(there)
+    notice = f"{lost} frame(s) have no pose {delay_s:g} s later and are left out."
+    return there, known.at(stamps_s[there]), (notice,) if lost else ()
 
 
 def uncorrected(recording: Recording) -> Recording:
