@@ -306,7 +306,6 @@ def _manifest(
     notice: str,
 ) -> MapInfo:
     info, grid = stored.info, stored.grid
-    finished = datetime.now(UTC).isoformat(timespec="seconds")
     recording = RecordingInfo(
         name=info.recording.name,
         format=info.recording.format,
@@ -315,18 +314,13 @@ def _manifest(
         duration_s=visits[-1].end_s - visits[0].begin_s,
         notices=info.recording.notices,
     )
-    counts = Counts(
-        frames=sum(visit.frames for visit in visits),
-        keyframes=len(content.keyframes),
-        voxels=len(content.voxels),
-        sounds=len(content.sounds),
-    )
+    frames = sum(visit.frames for visit in visits)
     return msgspec.structs.replace(
         info,
         avlmaps_version=__version__,
         build_key=merged_key(info.build_key, other.info.build_key, settings),
         recording=recording,
-        counts=counts,
+        counts=Counts.of(frames, content.keyframes, content.voxels, content.sounds),
         rig=RigInfo.of(stored.rig),
         bounding_box_m=Box.of(content.voxels.index, grid.voxel_size_m),
         notices=(
@@ -336,5 +330,5 @@ def _manifest(
         doubts=tuple(dict.fromkeys((*info.doubts, *other.info.doubts))),
         visits=visits,
         files={},
-        timings=Timings(finished=finished, elapsed_s=elapsed_s, stages_s={"merging": elapsed_s}),
+        timings=Timings.now({"merging": elapsed_s}),
     )

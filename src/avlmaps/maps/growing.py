@@ -5,7 +5,6 @@ is that of a build. Of a longer one they are found again each time it has double
 """
 
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from math import isfinite
 from pathlib import Path
 from threading import RLock
@@ -746,9 +745,7 @@ class GrowingMap:
         content = MapContent(merged.voxels, keyframes, state, sounds, clips)
         if final:
             self._of_features = tuple(feature_doubts(content, plan.models))
-        finished = datetime.now(UTC).isoformat(timespec="seconds")
-        stages_s = {"growing": begin - self._begin_s, "merging": perf_counter() - begin}
-        timings = Timings(finished=finished, elapsed_s=sum(stages_s.values()), stages_s=stages_s)
+        timings = Timings.now({"growing": begin - self._begin_s, "merging": perf_counter() - begin})
         left_out = sorted(came.left_out, key=lambda frame: frame.index)
         return content, manifest_of(plan, up, ground, content, merged, timings, len(came.walk), left_out)
 

@@ -6,7 +6,6 @@ from pathlib import Path
 from time import perf_counter
 
 import msgspec
-import numpy as np
 
 from avlmaps.core.registry import Kind
 from avlmaps.maps.pipeline.plan import BUILD_VERSION, BuildPlan, audio_key
@@ -58,13 +57,7 @@ def detect_sounds(plan: BuildPlan) -> SoundResult:
 
 def silence(plan: BuildPlan) -> HeardSounds:
     """Return no sounds, with features as long as the model's."""
+    from avlmaps.maps.audio.events import collect
+
     model = plan.models.get(Kind.SOUNDS.value)
-    return HeardSounds(
-        onset_s=np.zeros(0),
-        offset_s=np.zeros(0),
-        track_offsets=np.zeros(1, np.int64),
-        track=np.zeros((0, 3), np.float32),
-        feature_offsets=np.zeros(1, np.int64),
-        feature=np.zeros((0, model.dim if model else 0), np.float32),
-        clips=(),
-    )
+    return collect([], model.dim if model else 0)

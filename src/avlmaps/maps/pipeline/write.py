@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from functools import partial
 from itertools import chain
 from time import perf_counter
@@ -105,8 +104,7 @@ def write(
     }
     if sources[0] is not None:
         stages_s["sources"] = sources[1]
-    finished = datetime.now(UTC).isoformat(timespec="seconds")
-    timings = manifest.Timings(finished=finished, elapsed_s=sum(stages_s.values()), stages_s=stages_s)
+    timings = manifest.Timings.now(stages_s)
     bad = sorted((frame for part in parts for frame in part.info.bad_frames), key=lambda frame: frame.index)
     fused = sum(part.info.fused for part in parts)
     return write_map(plan.path, content, manifest_of(plan, up.up, floor.ground, content, merged, timings, fused, bad))
@@ -147,9 +145,7 @@ def manifest_of(
         removed=merged.removed,
         seed=plan.settings.seed,
         recording=_recording_info(plan.recording),
-        counts=manifest.Counts(
-            frames=fused, keyframes=len(content.keyframes), voxels=len(content.voxels), sounds=len(content.sounds)
-        ),
+        counts=manifest.Counts.of(fused, content.keyframes, content.voxels, content.sounds),
         bounding_box_m=manifest.Box.of(content.voxels.index, plan.settings.voxel_size_m),
         bad_frames=tuple(bad),
         notices=(*doubts, *_notices(plan, up, ground, fused, len(bad))),

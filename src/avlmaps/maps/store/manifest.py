@@ -1,5 +1,7 @@
 """The content of ``map.json``: what is written about a map beside its arrays."""
 
+from collections.abc import Sized
+from datetime import UTC, datetime
 from typing import Literal
 
 import msgspec
@@ -261,6 +263,11 @@ class Counts(msgspec.Struct, frozen=True, kw_only=True):
     voxels: int
     sounds: int
 
+    @classmethod
+    def of(cls, frames: int, keyframes: Sized, voxels: Sized, sounds: Sized) -> "Counts":
+        """Return those of a number of fused frames and what a map holds."""
+        return cls(frames=frames, keyframes=len(keyframes), voxels=len(voxels), sounds=len(sounds))
+
 
 class Box(msgspec.Struct, frozen=True, kw_only=True):
     """The smallest box along the world's axes that holds every occupied voxel, metres."""
@@ -282,6 +289,12 @@ class Timings(msgspec.Struct, frozen=True, kw_only=True):
     finished: str
     elapsed_s: float
     stages_s: dict[str, float]
+
+    @classmethod
+    def now(cls, stages_s: dict[str, float]) -> "Timings":
+        """Return those of a map that is finished now."""
+        finished = datetime.now(UTC).isoformat(timespec="seconds")
+        return cls(finished=finished, elapsed_s=sum(stages_s.values()), stages_s=stages_s)
 
 
 class MapInfo(msgspec.Struct, frozen=True, kw_only=True):

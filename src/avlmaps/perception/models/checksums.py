@@ -5,10 +5,9 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
-from avlmaps.core.files import write_bytes_atomically
+from avlmaps.core.files import sha256_of_file, write_bytes_atomically
 from avlmaps.perception.user_folder import user_folder
 
-_BLOCK = 1 << 22
 _KEPT = "checksums.json"
 
 
@@ -43,12 +42,9 @@ def remembered_sha256(path: Path) -> str:
     entry = kept.get(str(path))
     if isinstance(entry, list) and entry[:2] == stamp:
         return str(entry[2])
-    found = hashlib.sha256()
-    with path.open("rb") as file:
-        while block := file.read(_BLOCK):
-            found.update(block)
-    _remember(kept_in, {**kept, str(path): [*stamp, found.hexdigest()]})
-    return found.hexdigest()
+    found = sha256_of_file(path)
+    _remember(kept_in, {**kept, str(path): [*stamp, found]})
+    return found
 
 
 def _read(path: Path) -> dict[str, object]:

@@ -6,7 +6,6 @@ voxels of ours whose middle it holds, and where two meet they are averaged by th
 """
 
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from pathlib import Path
 from time import perf_counter
 
@@ -146,7 +145,6 @@ def _write(path: Path, source: Source, settings: ImportSettings, key: str, begin
     heard = source.ears.detect_events(clips)
     content = MapContent(voxels, walk.keyframes(grid.centre_of(voxels.index)), {}, heard, clips)
     elapsed_s = perf_counter() - begin
-    finished = datetime.now(UTC).isoformat(timespec="seconds")
     info = MapInfo(
         avlmaps_version=__version__,
         build_key=key,
@@ -158,12 +156,10 @@ def _write(path: Path, source: Source, settings: ImportSettings, key: str, begin
         settings=BuildSettings(voxel_size_m=grid.voxel_size_m, hearing=HEARING).for_profile(WEIGHT_VARIANCE_M2),
         seed=0,
         recording=source.recording(),
-        counts=Counts(
-            frames=source.voxels.frames, keyframes=len(content.keyframes), voxels=len(voxels), sounds=len(heard)
-        ),
+        counts=Counts.of(source.voxels.frames, content.keyframes, voxels, heard),
         bounding_box_m=Box.of(voxels.index, grid.voxel_size_m),
         notices=tuple(source.notices(len(voxels), left_out)),
-        timings=Timings(finished=finished, elapsed_s=elapsed_s, stages_s={"import": elapsed_s}),
+        timings=Timings.now({"import": elapsed_s}),
     )
     write_map(path, content, info)
 

@@ -19,7 +19,7 @@ from jaxtyping import Float
 from avlmaps.core.columns import concat
 from avlmaps.core.errors import MapError
 from avlmaps.core.registry import Kind, find, load
-from avlmaps.maps.audio.events import detect_events
+from avlmaps.maps.audio.events import collect, detect_events
 from avlmaps.maps.audio.settings import HearingSettings
 from avlmaps.maps.store.manifest import ModelInfo
 from avlmaps.maps.types import HeardSounds
@@ -85,7 +85,7 @@ class Ears:
             The sounds in the order of their onset, in the map's time.
         """
         if not self.walks:
-            return _silence()
+            return collect([], 0)
         shutil.rmtree(clips_folder, ignore_errors=True)
         heard: list[HeardSounds] = []
         for walk, start_s in zip(self.walks, self.start_s.tolist(), strict=True):
@@ -110,18 +110,6 @@ def _find_walks(scene: Path, track: str) -> tuple[Recording, ...]:
         there = sorted({path.name for path in folder.glob("*/*.wav")})
         raise MapError(f"No folder below {folder} has a {track}; there are: {', '.join(there) or 'no .wav files'}.")
     return tuple(open_recording(path.parent, format="avlmaps", audio=path) for path in found)
-
-
-def _silence() -> HeardSounds:
-    return HeardSounds(
-        onset_s=np.zeros(0),
-        offset_s=np.zeros(0),
-        track_offsets=np.zeros(1, np.int64),
-        track=np.zeros((0, 3), np.float32),
-        feature_offsets=np.zeros(1, np.int64),
-        feature=np.zeros((0, 0), np.float32),
-        clips=(),
-    )
 
 
 def _moved(found: HeardSounds, here: Path, clips_folder: Path, start_s: float) -> HeardSounds:
