@@ -98,9 +98,8 @@ class GroundReader(Protocol):
         ...
 
 
-@runtime_checkable
-class NamedPixelEncoder(PixelEncoder, Protocol):
-    """A pixel encoder that distinguishes a closed set of names and can say how likely each of them is.
+class NamedEncoder(Protocol):
+    """An encoder that distinguishes a closed set of names.
 
     Its features lie in the span of orthonormal codes, one for each name: Σ √p·code. A phrase may mean several names.
     """
@@ -118,6 +117,11 @@ class NamedPixelEncoder(PixelEncoder, Protocol):
     def name_weights(self, word: str) -> Float32[np.ndarray, " k"]:
         """Return for each name how much a phrase means it, in [0, 1]; all zero where it means none."""
         ...
+
+
+@runtime_checkable
+class NamedPixelEncoder(NamedEncoder, PixelEncoder, Protocol):
+    """A pixel encoder that distinguishes a closed set of names and can say how likely each of them is."""
 
     def instance_probability(
         self, name: str, mean_probability: Float[np.ndarray, " i"], area_m2: Float[np.ndarray, " i"]
@@ -161,22 +165,8 @@ class ViewEncoder(Protocol):
 
 
 @runtime_checkable
-class NamedViewEncoder(ViewEncoder, Protocol):
-    """A view encoder that distinguishes a closed set of rooms; see ``NamedPixelEncoder`` for its features."""
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The names that it distinguishes."""
-        ...
-
-    @property
-    def codes(self) -> Float32[np.ndarray, "k d"]:
-        """The code of each name."""
-        ...
-
-    def name_weights(self, word: str) -> Float32[np.ndarray, " k"]:
-        """Return for each name how much a phrase means it, in [0, 1]; all zero where it means none."""
-        ...
+class NamedViewEncoder(NamedEncoder, ViewEncoder, Protocol):
+    """A view encoder that distinguishes a closed set of rooms."""
 
 
 @runtime_checkable

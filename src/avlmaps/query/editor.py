@@ -12,7 +12,6 @@ from avlmaps.core.errors import MapError, QueryError
 from avlmaps.core.poses import plain_point
 from avlmaps.core.wording import place_text
 from avlmaps.maps.store.edits import LONGEST_NAME, Does, Edit, Spot, World, append_edit, in_force, read_edits
-from avlmaps.query.edit_spots import SeenMap
 from avlmaps.query.edits import Edited, apply, means
 from avlmaps.query.found_edits import plain_name, said
 from avlmaps.query.given_places import is_place, place_given, place_of
@@ -30,7 +29,7 @@ _APART_M = 3.0  # how far apart things that are one may be
 _MOST_NAMED = 8
 
 
-class EditableMap(SeenMap, Queryable, Protocol):
+class EditableMap(Queryable, Protocol):
     """A map that can be corrected: ``AVLMap`` is one."""
 
     @cached_property

@@ -10,17 +10,14 @@ import numpy as np
 from avlmaps.core.arrays import UInt8
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.question import Part
+from avlmaps.query.edit_spots import SeenMap
 from avlmaps.query.heatmap import Heatmap
-from avlmaps.query.voxel_space import Space
 from avlmaps.recordings.audio import Sound
 
 if TYPE_CHECKING:
     from avlmaps.maps.store.life import Life
-    from avlmaps.maps.store.reader import StoredMap
-    from avlmaps.maps.storeys import Storeys
     from avlmaps.query.contents import Room, SoundEvent, Thing
     from avlmaps.query.modalities.sound import SoundSettings
-    from avlmaps.query.room_regions import RoomRegions
     from avlmaps.query.rooms import RoomField, Rooms
 
 
@@ -78,13 +75,8 @@ class Corrections(Protocol):
         ...
 
 
-class Queryable(Protocol):
+class Queryable(SeenMap, Protocol):
     """A map that gives heat for parts of a question, and lists of what it holds."""
-
-    @property
-    def stored(self) -> "StoredMap":
-        """The map as it lies on the disk."""
-        ...
 
     @property
     def settings(self) -> FoundSettings:
@@ -94,16 +86,6 @@ class Queryable(Protocol):
     @cached_property
     def edited(self) -> "Corrections":
         """What people corrected, as it applies to this map."""
-        ...
-
-    @cached_property
-    def space(self) -> Space:
-        """The voxels' places."""
-        ...
-
-    @cached_property
-    def storeys(self) -> "Storeys | None":
-        """The storeys of the map and the stairs between them; None for a map of one storey."""
         ...
 
     @cached_property
@@ -119,11 +101,6 @@ class Queryable(Protocol):
     @cached_property
     def numbered_rooms(self) -> "Mapping[str, int]":
         """The region of each room that shares its name with others, by the name with its number."""
-        ...
-
-    @cached_property
-    def room_regions(self) -> "RoomRegions | None":
-        """The rooms that walls and doorways bound."""
         ...
 
     def heat(
