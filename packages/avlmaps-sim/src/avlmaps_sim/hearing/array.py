@@ -230,10 +230,10 @@ def _late(
     noise = rng.standard_normal((_WAVES, count)) / np.sqrt(_WAVES)
     direction = _all_around(_WAVES)
     room = [heard.air.room_at(place[:2]) for place in ears.mean(axis=1)]
+    rooms = sorted({one for one in room if one >= 0})
+    coloured = building.coloured(noise, envelope[:, rooms])
     spectra: dict[int, Complex[np.ndarray, "w f"]] = {
-        one: np.fft.rfft(building.coloured(noise, envelope[:, one]), size, axis=1).astype(np.complex64)
-        for one in set(room)
-        if one >= 0
+        one: np.fft.rfft(field, size, axis=1).astype(np.complex64) for one, field in zip(rooms, coloured, strict=True)
     }
     out = np.zeros((*ears.shape[:2], count), np.float32)
     centre = ears.mean(axis=(0, 1))

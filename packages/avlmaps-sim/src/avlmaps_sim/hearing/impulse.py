@@ -131,9 +131,11 @@ class Acoustics:
                 out[band, room] = np.sqrt(np.interp(times_s, coarse, energy[band, room]) / self.rate_hz)
         return out
 
-    def coloured(self, noise: Float[np.ndarray, "w t"], envelope: Float[np.ndarray, "b t"]) -> Float[np.ndarray, "w t"]:
-        """Return each of several noises with the envelope of each band."""
-        return np.stack([(split(one, self.rate_hz) * envelope).sum(axis=0) for one in noise])
+    def coloured(
+        self, noise: Float[np.ndarray, "w t"], envelope: Float[np.ndarray, "b r t"]
+    ) -> Float[np.ndarray, "r w t"]:
+        """Return each of several noises with the envelope of each band, for each room."""
+        return np.stack([(split(one, self.rate_hz)[:, None] * envelope).sum(axis=0) for one in noise], axis=1)
 
     def _images(
         self, rooms: Rooms, own: int, source: Float[np.ndarray, "3"], ears: Float[np.ndarray, "n 3"]

@@ -51,12 +51,11 @@ def _made(kind: str, rms: float, rate_hz: int, rng: np.random.Generator) -> Iter
     scale = rms / _rms_of_filtered_noise(b, a)
     state = np.zeros(max(len(a), len(b)) - 1)
     phases = rng.uniform(0.0, 2.0 * np.pi, 5)
-    second = 0
+    hum, second = rms * 0.24 * _hum(rate_hz, phases), 0
     while True:
         noise, state = lfilter(b, a, rng.standard_normal(rate_hz), zi=state)
         if kind == "room":
-            noise = noise * scale * 0.97 + rms * 0.24 * _hum(second, rate_hz, phases)
-            yield (noise * _swell(second, rate_hz, phases)).astype(np.float32)
+            yield ((noise * scale * 0.97 + hum) * _swell(second, rate_hz, phases)).astype(np.float32)
         else:
             yield (noise * scale).astype(np.float32)
         second += 1
@@ -70,9 +69,9 @@ def _rms_of_filtered_noise(b: Float[np.ndarray, " zeros"], a: Float[np.ndarray, 
     return float(np.sqrt((np.asarray(lfilter(b, a, impulse)) ** 2).sum()))
 
 
-def _hum(second: int, rate_hz: int, phases: Float[np.ndarray, " 5"]) -> Float[np.ndarray, " second"]:
-    """Return mains hum of RMS 1: 50 Hz and two harmonics, whose phase continues from second to second."""
-    time_s = second + np.arange(rate_hz) / rate_hz
+def _hum(rate_hz: int, phases: Float[np.ndarray, " 5"]) -> Float[np.ndarray, " second"]:
+    """Return mains hum of RMS 1: 50 Hz and two harmonics, of which every second is the same."""
+    time_s = np.arange(rate_hz) / rate_hz
     tones = [
         level * np.sin(2.0 * np.pi * hz * time_s + phase)
         for hz, level, phase in zip((50.0, 100.0, 150.0), (1.0, 0.8, 0.6), phases, strict=False)
