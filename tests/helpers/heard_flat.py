@@ -20,8 +20,8 @@ def heard_flat(factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 
 def _map_flat(folder: Path) -> None:
     settings = RecordSettings(
-        size=(160, 120), fps=4.0, hearing="acoustic", microphones="square4", snr_db=20.0, sources=3, workers=1,
-        max_frames=80,
+        size=(160, 120), fps=4.0, hearing="acoustic", microphones="square4", snr_db=20.0, rt60_s=0.3,
+        rate_hz=16_000, sources=2, workers=1, max_frames=80,
     )  # fmt: skip
     record_scene(flat(), folder / "rec", settings, seed=1)
     built = BuildSettings(frames=FrameSettings(per_submap=32))

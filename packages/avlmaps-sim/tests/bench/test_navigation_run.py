@@ -219,7 +219,10 @@ def shown(episodes: list[Episode]) -> list[tuple[object, ...]]:
 
 
 @pytest.mark.slow
-def test_a_run_that_was_broken_off_goes_on_and_ends_with_the_same_tables(tmp_path: Path):
+def test_a_run_that_was_broken_off_goes_on_and_ends_with_the_same_tables(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr("avlmaps_sim.bench.navigation.scene_setup._PHOTOS", 30)  # enough for one sequence
     first = run(small_settings(), tmp_path, opener([]))  # pyright: ignore[reportArgumentType]
     true = [leg for e in first.episodes if e.configuration == CEILING for leg in e.legs if leg.reachable]
     assert len(true) >= 10

@@ -1,4 +1,6 @@
-from functools import lru_cache
+"""Homes and offices made by rule, with people in them, and the names that they are opened by; each is made once."""
+
+from functools import cache
 
 import numpy as np
 import pytest
@@ -6,31 +8,41 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
 
+from avlmaps_sim import scenes
 from avlmaps_sim.free_space import free_space
-from avlmaps_sim.furniture import families
-from avlmaps_sim.homes import make_home, make_office
+from avlmaps_sim.furniture import families, make
+from avlmaps_sim.homes import lived_in, make_home, make_office
 from avlmaps_sim.homes.doors import _opened  # pyright: ignore[reportPrivateUsage]
 from avlmaps_sim.homes.layout import cut, floor_of, home_programme
+from avlmaps_sim.homes.lived_in import with_curtains_apart
 from avlmaps_sim.homes.plan import OUTSIDE, Room, Wall, walls_between
 from avlmaps_sim.homes.polygons import area_m2, corners_of, half, inside, overlapping, rectangle, shrunk, widths_m
-from avlmaps_sim.scene import Scene
+from avlmaps_sim.scene import Scene, SceneBuilder
 from avlmaps_sim.scenes import SceneError, open_scene
 
 SEEDS = (0, 3, 63)
 SEATS = {"chair", "office chair", "stool", "bench", "armchair", "sofa"}
 TABLES = {"dining table", "desk", "kitchen island", "coffee table"}
 LYING = {"carpet", "mat"}
+ADDED = ("person", "clothing", "paper", "shower curtain")
+ONCE = {"house": cache(make_home), "office": cache(make_office)}
 
 
-@lru_cache
 def home(seed: int) -> Scene:
-    return make_home(seed, "training")
+    return ONCE["house"](seed, "training")
+
+
+@pytest.fixture(autouse=True)
+def _buildings_are_opened_as_they_were_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let a name open the building that another test made of the same seed and families."""
+    for kind, maker in ONCE.items():
+        monkeypatch.setitem(scenes._MAKERS, kind, maker)  # pyright: ignore[reportPrivateUsage]
 
 
 @pytest.fixture(params=[*(f"house:{seed}" for seed in SEEDS), "office:1"], scope="module")
 def scene(request: pytest.FixtureRequest) -> Scene:
     kind, _, seed = request.param.partition(":")
-    return home(int(seed)) if kind == "house" else make_office(int(seed), "training")
+    return home(int(seed)) if kind == "house" else ONCE["office"](int(seed), "training")
 
 
 def footprints(scene: Scene) -> dict[int, np.ndarray]:
@@ -196,3 +208,93 @@ def test_scenes_open_by_name() -> None:
     for spec in ("house:", "house:x", "office:3:neither", "nowhere.glb"):
         with pytest.raises(SceneError):
             open_scene(spec)
+
+
+@pytest.mark.parametrize("name", ["house:3", "house:3:held-out", "house:3:training"])
+def test_a_building_is_named_by_what_opens_it_again(name: str) -> None:
+    scene = open_scene(name)
+    assert scene.name == name
+    assert open_scene(scene.name).objects == scene.objects
+
+
+@pytest.mark.parametrize("spec", [None, 5])
+def test_what_is_no_name_of_a_scene_is_refused(spec: object) -> None:
+    with pytest.raises(SceneError, match="a scene is a text such as house:12"):
+        open_scene(spec)  # pyright: ignore[reportArgumentType]
+
+
+# With people, clothes and papers: the home stays, and what is added is where it should be.
+
+
+@pytest.fixture(scope="module")
+def worlds() -> list[tuple[Scene, Scene]]:
+    """Return homes and an office, each as it is made and with people in it."""
+    made = [home(3), home(0), ONCE["office"](1, "training")]
+    return [(scene, lived_in(scene, np.random.default_rng(n), "training")) for n, scene in enumerate(made)]
+
+
+def test_the_home_stays_and_things_are_added_after_it(worlds: list[tuple[Scene, Scene]]) -> None:
+    for before, after in worlds:
+        assert after.objects[: len(before.objects)] == before.objects
+        assert {thing.category for thing in after.objects[len(before.objects) :]} <= set(ADDED)
+        count = len(before.mesh.triangle)
+        np.testing.assert_array_equal(after.mesh.corners()[:count], before.mesh.corners())
+        assert after.areas == before.areas and after.lights == before.lights
+        names = [thing.name for thing in after.objects]
+        assert all(names) and len(set(names)) == len(names)
+    added = {thing.category for before, after in worlds for thing in after.objects[len(before.objects) :]}
+    assert {"person", "clothing", "paper"} <= added
+
+
+def test_what_is_added_lies_in_the_building(worlds: list[tuple[Scene, Scene]]) -> None:
+    for before, after in worlds:
+        low, high = before.mesh.low - 0.5, before.mesh.high + 0.5
+        for number, thing in enumerate(after.objects[len(before.objects) :], start=len(before.objects)):
+            assert (np.array(thing.low) >= low).all() and (np.array(thing.high) <= high).all()
+            at = after.mesh.corners()[after.instance == number].reshape(-1, 3)
+            np.testing.assert_allclose(at.min(axis=0), thing.low, atol=1e-5)
+            np.testing.assert_allclose(at.max(axis=0), thing.high, atol=1e-5)
+
+
+def test_people_stand_or_sit_on_a_floor_or_lie_on_a_bed(worlds: list[tuple[Scene, Scene]]) -> None:
+    people = [(scene, thing) for _, scene in worlds for thing in scene.objects if thing.category == "person"]
+    assert people
+    for scene, thing in people:
+        over_floor = min(abs(thing.low[2] - area.floor_m) for area in scene.areas)
+        if over_floor > 0.3:
+            assert max(thing.size[:2]) > 0.9 and thing.size[2] < 0.9, "who is not on a floor lies"
+        else:
+            assert 0.7 < thing.size[2] < 2.2
+
+
+def test_the_generator_alone_decides(worlds: list[tuple[Scene, Scene]]) -> None:
+    scene, one = worlds[0]
+    two = lived_in(scene, np.random.default_rng(0), "training")
+    assert one.objects == two.objects
+    np.testing.assert_array_equal(one.mesh.vertex, two.mesh.vertex)
+
+
+def test_the_cloth_of_a_tub_becomes_a_shower_curtain() -> None:
+    builder = SceneBuilder("bath")
+    piece = make("bathtub", np.random.default_rng(2), name="with shower curtain")
+    builder.add("bathtub", piece.mesh, family=piece.family)
+    builder.add("bathtub", make("bathtub", np.random.default_rng(2), name="built in").mesh.moved(x=3.0))
+    scene = with_curtains_apart(builder.build())
+    assert [thing.category for thing in scene.objects] == ["bathtub", "bathtub", "shower curtain"]
+    cloth = scene.objects[2]
+    assert cloth.size[2] > 1.4 and cloth.high[0] < 2.0
+    assert (scene.instance == 0).any() and (scene.instance == 2).any()
+
+
+@pytest.mark.slow
+def test_a_scene_of_that_name_holds_people_and_mirrors_that_reflect() -> None:
+    bare, full = open_scene("house:3:training"), open_scene("house:3:training:lived-in")
+    assert full.objects[: len(bare.objects)] == bare.objects and len(full.objects) > len(bare.objects)
+    assert full.mirrors and not bare.mirrors
+    assert open_scene("house:3:lived-in").objects == open_scene("house:3:all:lived-in").objects
+
+
+@pytest.mark.parametrize("words", ["3:lived", "lived-in", "3:lived-in:lived-in", "3:all:training"])
+def test_other_words_are_refused(words: str) -> None:
+    with pytest.raises(SceneError, match="lived-in"):
+        open_scene(f"house:{words}")

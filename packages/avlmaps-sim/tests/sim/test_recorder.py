@@ -15,7 +15,6 @@ from avlmaps.core.errors import AvlmapsError, RecordingError
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.formats.folder import open_folder
 from avlmaps.recordings.layout import UNFINISHED
-from avlmaps_sim import recorder
 from avlmaps_sim.mesh import Material
 from avlmaps_sim.mixing.add_sounds import read_events
 from avlmaps_sim.recorder import RecordSettings, record_scene, sound_again
@@ -103,29 +102,28 @@ def test_its_events_say_what_sounds_where_and_the_track_is_loud_then(recorded: P
     assert [(e.category, e.position) for e in short] == [(e.category, e.robot) for e in truth.events]
 
 
+FAULTY = changed(sensor="kinect", drift=OdometryFaults(), semantic=True, max_frames=6)
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("hearing", ["overlay", "acoustic"])
-def test_the_same_seed_gives_the_same_bytes_on_however_many_processes(
-    hearing: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    faulty = changed(hearing=hearing, sensor="kinect", drift=OdometryFaults(), semantic=True, max_frames=6)
-    record_scene(flat(), tmp_path / "one", faulty, seed=5)
-    if hearing == "overlay":
-        monkeypatch.setattr(recorder, "_FEWEST_FOR_PROCESSES", 2)
-        faulty = replace(faulty, workers=2)
-    record_scene(flat(), tmp_path / "two", faulty, seed=5)
+def test_the_same_seed_gives_the_same_bytes(tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        record_scene(flat(), tmp_path / name, replace(FAULTY, hearing="acoustic"), seed=5)
     one, two = fingerprint(tmp_path / "one"), fingerprint(tmp_path / "two")
     assert one == two
     assert {"audio.flac", "events.csv", "objects.json", "areas.json", "simulation.json", "true_poses.csv"} <= set(one)
 
 
 _UNGUARDED = """
+import numpy as np
 from pathlib import Path
 from helpers.hearing_scenes import flat
 from avlmaps_sim import recorder
+from avlmaps_sim.recorder import RecordSettings
+from avlmaps_sim.sensor import OdometryFaults
+from avlmaps_sim.walk import WalkSettings
 recorder._FEWEST_FOR_PROCESSES = 2
-few = recorder.RecordSettings(size=(48, 32), max_frames=4, hearing="none", workers=2)
-recorder.record_scene({scene}, Path("rec"), few)
+recorder.record_scene({scene}, Path("rec"), {settings!r}, seed=5)
 """
 _OF_ITS_OWN = """
 from avlmaps_sim.scene import Scene
@@ -142,16 +140,18 @@ def ran(script: str, folder: Path) -> "subprocess.CompletedProcess[str]":
 
 
 @pytest.mark.slow
-def test_a_script_needs_no_guard(tmp_path: Path) -> None:
-    done = ran(_UNGUARDED.format(scene="flat()"), tmp_path)
+def test_a_script_needs_no_guard_and_its_processes_write_the_same_bytes(tmp_path: Path) -> None:
+    done = ran(_UNGUARDED.format(scene="flat()", settings=replace(FAULTY, workers=2)), tmp_path)
     assert done.returncode == 0, done.stderr
-    assert len(open_folder(tmp_path / "rec")) == 4
+    record_scene(flat(), tmp_path / "one", FAULTY, seed=5)
+    assert fingerprint(tmp_path / "one") == fingerprint(tmp_path / "rec")
 
 
 @pytest.mark.slow
 def test_processes_that_die_are_told_and_never_waited_for(tmp_path: Path) -> None:
     own = "Own(**{name: getattr(flat(), name) for name in Scene.__dataclass_fields__})"
-    done = ran(_OF_ITS_OWN + _UNGUARDED.format(scene=own), tmp_path)
+    silent = changed(hearing="none", max_frames=4, workers=2)
+    done = ran(_OF_ITS_OWN + _UNGUARDED.format(scene=own, settings=silent), tmp_path)
     assert done.returncode == 1
     assert "keep the script's own work under if __name__ == '__main__'" in done.stderr
 

@@ -96,7 +96,7 @@ def test_an_offset_of_no_device_is_refused() -> None:
 @pytest.mark.slow
 def test_the_next_map_begins_with_the_offset_that_the_first_one_stored(tmp_path: Path) -> None:
     settings = RecordSettings(
-        size=(64, 48), fps=4.0, sources=3, workers=1, max_frames=80, directions=True, directions_offset_deg=60.0
+        size=(64, 48), fps=4.0, sources=2, workers=1, max_frames=30, directions=True, directions_offset_deg=60.0
     )
     record_scene(flat(), tmp_path / "rec", settings, seed=1)
     first = build_map(open_recording(tmp_path / "rec"), tmp_path / "first.avlmap", "colours", progress=False)

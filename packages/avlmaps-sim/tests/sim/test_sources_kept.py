@@ -169,7 +169,7 @@ def test_a_merge_says_why_it_does_not_know(heard: tuple[Path, Path], copy: Store
     )  # fmt: skip
     found, why = joined_sources(first, open_stored(copy.path), np.eye(4), first.voxels, first.keyframes)
     assert found is None and "4 microphones" in why and "2" in why
-    merged = merge_maps(first, open_stored(copy.path), tmp_path / "both.avlmap")
+    merged = merge_maps(first, open_stored(copy.path), tmp_path / "both.avlmap", things_of=lambda _: [])
     assert why in merged.info.notices
     with pytest.raises(QueryError, match="merge them again"):
         AVLMap(merged).sources()
