@@ -58,6 +58,7 @@ _COUNTED_PARTS = {"quarter": 0.25, "quarters": 0.25, "third": 1 / 3, "thirds": 1
 _VAGUE = {("a", "couple"): 2, ("a", "few"): 3, ("couple",): 2, ("few",): 3, ("several",): 3, ("a", "pair"): 2,
           ("a", "dozen"): 12, ("some",): 3}  # fmt: skip
 _BEGIN_NUMBERS = frozenset({*_SMALL, *_TENS, *_PARTS, *(words[0] for words in _VAGUE), "an"})
+_ONES = frozenset({"a", "an", "another", "one"})
 LENGTHS = {
     "m": 1.0, "metre": 1.0, "meter": 1.0, "mtr": 1.0, "cm": 0.01, "centimetre": 0.01, "centimeter": 0.01, "dm": 0.1,
     "mm": 0.001, "millimetre": 0.001, "millimeter": 0.001, "ft": 0.3048, "foot": 0.3048, "feet": 0.3048,
@@ -236,11 +237,18 @@ def _spelled(tokens: list[Token], i: int) -> tuple[int, float] | None:
     return (at, total) if any_word else None
 
 
+def begins_amount(token: Token) -> bool:
+    """Return whether an amount, with or without a unit, may begin with a token; with most none does."""
+    return token.kind == "number" or token.text in _BEGIN_NUMBERS or token.text in _ONES
+
+
 def amounts_at(tokens: list[Token], i: int, units: dict[str, float]) -> list[tuple[int, float]]:
     """Return the amounts with a unit that begin at a token: "2 m", "a metre and a half", "half a step"."""
     found: list[tuple[int, float]] = []
+    if i >= len(tokens) or not begins_amount(tokens[i]):
+        return found
     numbers = number_at(tokens, i)
-    if i < len(tokens) and tokens[i].text in ("a", "an", "another", "one"):
+    if tokens[i].text in _ONES:
         numbers = [*numbers, (i + 1, 1.0)]
     for end, value in numbers:
         part_of = end < len(tokens) and end > i and tokens[end - 1].text == "of" and tokens[end].text in ("a", "an")

@@ -50,8 +50,10 @@ def amount(tokens: Sequence[Token], at: int, of: str) -> float | None:
 
 def amount_end(tokens: Sequence[Token], at: int) -> int:
     """Return where the longest amount that begins at a token ends; the token itself where none does."""
-    reads = (lexer.length_at, lexer.angle_at, lexer.clock_at, lexer.duration_at, lexer.number_at)
-    return max((end for read in reads for end, _ in read(list(tokens), at)), default=at)
+    if at >= len(tokens) or not lexer.begins_amount(tokens[at]):
+        return at
+    reads, words = (lexer.length_at, lexer.angle_at, lexer.clock_at, lexer.duration_at, lexer.number_at), list(tokens)
+    return max((end for read in reads for end, _ in read(words, at)), default=at)
 
 
 @dataclass(frozen=True, slots=True)

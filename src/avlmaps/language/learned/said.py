@@ -69,6 +69,8 @@ class Said:
         """Return where the phrases of a class begin and end, the longest at each word."""
         begin = words().phrases[name]
         found: list[tuple[int, int]] = []
+        if begin.keys().isdisjoint(self.texts):  # of most classes there is none
+            return found
         for at, text in enumerate(self.texts):
             if found and at < found[-1][1]:
                 continue
