@@ -11,6 +11,7 @@ from avlmaps.recordings.microphones import Microphones
 RATE_HZ = 16_000
 SPEED_M_S = 343.0
 _FINE = 8
+_BESIDE_S = 0.2  # sound needs less for its way
 _CAMERA_LEVEL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 
 
@@ -52,15 +53,17 @@ def heard_in_the_open(
     flat = array.in_world_m(walk.world_from_body).reshape(len(walk.stamps_s), -1)
     ears = np.stack([np.interp(at_s, walk.stamps_s, axis) for axis in flat.T], axis=1).reshape(len(at_s), -1, 3)
     out = noise * rng.standard_normal((len(array), len(at_s)))
-    fine_s = np.arange(len(at_s) * _FINE) / (RATE_HZ * _FINE)
     for place, onset_s, offset_s in sounds:
         plain = rng.standard_normal(len(at_s)) * ((at_s >= onset_s) & (at_s < offset_s)) * (at_s % 0.5 < 0.17)
-        spectrum = np.fft.rfft(plain)
+        first = max(0, round((onset_s - _BESIDE_S) * RATE_HZ))
+        near = slice(first, round((offset_s + _BESIDE_S) * RATE_HZ))  # elsewhere it is not heard
+        spectrum, near_s = np.fft.rfft(plain[near]), at_s[near]
+        fine_s = first / RATE_HZ + np.arange(len(near_s) * _FINE) / (RATE_HZ * _FINE)
         whole = np.zeros(len(fine_s) // 2 + 1, complex)
         whole[: len(spectrum)] = spectrum
         source = np.fft.irfft(whole, len(fine_s)) * _FINE
         for channel in range(len(array)):
-            away_m = np.linalg.norm(ears[:, channel] - place, axis=1)
+            away_m = np.linalg.norm(ears[near, channel] - place, axis=1)
             late = 0.0 if late_s is None else float(late_s[channel])
-            out[channel] += 0.1 * np.interp(at_s - away_m / SPEED_M_S - late, fine_s, source) / away_m
+            out[channel, near] += 0.1 * np.interp(near_s - away_m / SPEED_M_S - late, fine_s, source) / away_m
     return ChannelSound(out.astype(np.float32), RATE_HZ)

@@ -65,14 +65,21 @@ def test_a_right_one_has_no_doubts(right: Draft, tmp_path: Path) -> None:
     assert "notes" not in Contents([], [], [], stored.info.doubts).to_json("map")
 
 
-def with_array(draft: Draft, folder: Path, order: tuple[int, ...] = (0, 1, 2, 3), dead: int | None = None) -> Path:
+@pytest.fixture(scope="module")
+def heard(right: Draft) -> ChannelSound:
+    """What an array of four hears on that walk, slowly, of five sounds one after the other."""
+    walk, middle = Trajectory(12.0 * right.stamps_s, right.poses), right.poses[:, :3, 3].mean(axis=0)
+    sounds = [(middle + 2.0 * np.array([np.cos(k), np.sin(k), 0.1]), 5.0 * k + 1.0, 5.0 * k + 4.0) for k in range(5)]
+    return heard_in_the_open(microphones_named("square4"), walk, sounds, np.random.default_rng(4))
+
+
+def with_array(
+    draft: Draft, heard: ChannelSound, folder: Path, order: tuple[int, ...] = (0, 1, 2, 3), dead: int | None = None
+) -> Path:
     """Write a slow walk that an array listened on, its channels in an order, one of them perhaps dead."""
     stamps_s = 12.0 * draft.stamps_s
     path = replace(draft, stamps_s=stamps_s, pose_stamps_s=stamps_s).write(folder)
-    array, walk = microphones_named("square4"), Trajectory(stamps_s, draft.poses)
-    middle = draft.poses[:, :3, 3].mean(axis=0)
-    sounds = [(middle + 2.0 * np.array([np.cos(k), np.sin(k), 0.1]), 5.0 * k + 1.0, 5.0 * k + 4.0) for k in range(5)]
-    sound = heard_in_the_open(array, walk, sounds, np.random.default_rng(4))
+    array, sound = microphones_named("square4"), heard
     samples = sound.samples[list(order)]
     samples[[] if dead is None else [dead]] = 0.0
     write_channels(path / "audio.flac", ChannelSound(samples, sound.rate_hz))
@@ -88,10 +95,12 @@ def of_channels(doubts: tuple[str, ...]) -> tuple[str, ...]:
 
 
 @pytest.mark.slow
-def test_exchanged_channels_are_a_finding_with_the_order_that_fits(right: Draft, tmp_path: Path) -> None:
-    whole = judge(open_recording(with_array(right, tmp_path / "whole")))
+def test_exchanged_channels_are_a_finding_with_the_order_that_fits(
+    right: Draft, heard: ChannelSound, tmp_path: Path
+) -> None:
+    whole = judge(open_recording(with_array(right, heard, tmp_path / "whole")))
     assert not whole.findings
-    found = judge(open_recording(with_array(right, tmp_path / "wrong", order=(0, 2, 1, 3)))).findings
+    found = judge(open_recording(with_array(right, heard, tmp_path / "wrong", order=(0, 2, 1, 3)))).findings
     assert [one.reason for one in found] == [Reason.MICROPHONES] and found[0].grade is Grade.SUSPICIOUS
     assert "Channels 2 and 3" in found[0].sentence and "in the order 1, 3, 2, 4" in found[0].sentence
     assert "positions_m" in found[0].remedy
@@ -99,9 +108,9 @@ def test_exchanged_channels_are_a_finding_with_the_order_that_fits(right: Draft,
 
 @pytest.mark.slow
 def test_a_dead_channel_stays_with_the_map_and_the_sound_is_read_for_it_once(
-    right: Draft, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    right: Draft, heard: ChannelSound, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path = with_array(right, tmp_path / "dead", dead=1)
+    path = with_array(right, heard, tmp_path / "dead", dead=1)
     read, look = [], channels._looked_at
     monkeypatch.setattr(channels, "_looked_at", lambda track: read.append(track) or look(track))
     stored = build_map(open_recording(path), tmp_path / "map", PROFILE, SETTINGS, progress=False)
@@ -113,9 +122,9 @@ def test_a_dead_channel_stays_with_the_map_and_the_sound_is_read_for_it_once(
 @pytest.mark.slow
 @pytest.mark.parametrize("wrong", [{"order": (0, 2, 1, 3)}, {"dead": 1}], ids=["exchanged", "dead"])
 def test_a_live_map_ends_with_the_doubts_about_channels_that_a_build_has(
-    right: Draft, tmp_path: Path, wrong: dict[str, Any]
+    right: Draft, heard: ChannelSound, tmp_path: Path, wrong: dict[str, Any]
 ) -> None:
-    recording = open_recording(with_array(right, tmp_path / "rec", **wrong))
+    recording = open_recording(with_array(right, heard, tmp_path / "rec", **wrong))
     assert recording.audio is not None
     live = LiveMap(
         tmp_path / "map", PROFILE, up_in_world=recording.up_in_world, settings=SETTINGS, live=LiveSettings(gates=False),
