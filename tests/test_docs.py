@@ -24,7 +24,7 @@ def test_the_tutorial_runs_from_top_to_bottom(tmp_path: Path) -> None:
     page = (DOCS / "tutorials/first-map.md").read_text(encoding="utf-8")
     blocks = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     assert "max_frames=60" in blocks[0]
-    blocks[0] = blocks[0].replace("max_frames=60", "max_frames=24")
+    blocks[0] = blocks[0].replace("max_frames=60", "max_frames=16")
     (tmp_path / "first_map.py").write_text("\n".join(blocks), encoding="utf-8")
     done = subprocess.run(
         [sys.executable, "first_map.py"], cwd=tmp_path, capture_output=True, text=True, check=False, timeout=280

@@ -17,7 +17,7 @@ from helpers.raycast import render
 from helpers.room import Room
 from helpers.walked_room import CAMERA
 
-BUILT = ("--profile", "colours", "--sensor", "none")
+BUILT = ("--profile", "colours", "--sensor", "none", "--voxel-size-m", "0.1")
 
 
 @pytest.fixture(scope="module")
@@ -121,7 +121,7 @@ def test_a_drive_that_does_not_come_back_closes_no_loop(run, walk: Path, copied:
 def there_and_back(path: Path, stray_m: float) -> tuple[Path, np.ndarray]:
     """Write a drive there and back whose poses stray to one side, and return it with the true poses."""
     room, rig = Room(), Rig(CAMERA, CAMERA)
-    out = room.walk()[100:196:4]
+    out = room.walk()[100:196:6]
     true = np.concatenate([out, out[::-1]])
     with RecordingWriter(path, rig, up_in_world=np.array([0.0, 0.0, 1.0])) as writer:
         for index, pose in enumerate(true):

@@ -40,8 +40,8 @@ def watched(where: Path, *arguments: str) -> dict[str, Any]:
 
 @pytest.mark.slow
 def test_thousands_of_hostile_programs_reach_nothing_and_stop(tmp_path: Path) -> None:
-    told = watched(tmp_path, "6000", "1")
-    assert told["programs"] == 6_000 == told["refused"] + told["stopped"] + told["ended"]
+    told = watched(tmp_path, "4000", "1")
+    assert told["programs"] == 4_000 == told["refused"] + told["stopped"] + told["ended"]
     # Not one audit event: nothing is opened, connected, started, imported or compiled, and no id or frame is asked.
     assert told["events"] == []
     # Every refusal is one sentence with its line, every trace is JSON, no more skills are called than the budget has,
@@ -50,7 +50,7 @@ def test_thousands_of_hostile_programs_reach_nothing_and_stop(tmp_path: Path) ->
     assert told["largest_trace"] < 100_000
     assert told["grown_mb"] < 100
     # And the programs are not all turned away at the door.
-    assert told["ended"] > 300 and told["stopped"] > 150 and told["calls"] > 3_000 and told["sentences"] > 100
+    assert told["ended"] > 200 and told["stopped"] > 100 and told["calls"] > 2_000 and told["sentences"] > 100
 
 
 def test_the_watch_sees_a_parser_that_hands_the_text_to_python(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """A live map ends as a build does, answers meanwhile, and refuses what is no frame without losing anything."""
 
 import _thread
+import os
 import resource
 import signal
 import subprocess
@@ -489,33 +490,38 @@ def test_one_channel_of_several_microphones_is_a_doubt_and_several_without_place
 
 
 KILLED = """
-import sys, time
+import os, sys
 sys.path[:0] = {path!r}
 from test_live_map import ENCODERS, UP, add, frame
 from avlmaps.live.live_map import LiveMap
 from avlmaps.live.settings import LiveSettings
 from avlmaps.live.status import Tally
 chosen = LiveSettings(first_frames=2, snapshot_s=0.0, save_s=0.0, new_share=0.0)
-live = LiveMap(sys.argv[1], ENCODERS, up_in_world=UP, live=chosen)
-for number in range(100_000):
-    add(live, frame(number))
-    if live.status().saved_age_s >= 0.0:
-        print(number, flush=True)
+for folder in sys.argv[1:]:
+    if process := os.fork():  # it has what was imported
+        print("process", process, flush=True)
+        os.waitpid(process, 0)
+        continue
+    live = LiveMap(folder, ENCODERS, up_in_world=UP, live=chosen)
+    for number in range(100_000):
+        add(live, frame(number))
+        if live.status().saved_age_s >= 0.0:
+            print("saved", flush=True)
 """
 
 
 @pytest.mark.slow
 def test_what_a_kill_leaves_is_a_whole_map(tmp_path: Path) -> None:
-    rng = np.random.default_rng(1)
-    for trial in range(2):
-        folder = tmp_path / f"map{trial}"
-        program = KILLED.format(path=[str(Path(__file__).parent)])
-        process = subprocess.Popen([sys.executable, "-c", program, str(folder)], stdout=subprocess.PIPE)
-        assert process.stdout is not None and process.stdout.readline()
-        time.sleep(float(rng.uniform(0.0, 0.8)))
-        process.kill()
-        process.wait()
-        process.stdout.close()
+    rng, folders = np.random.default_rng(1), [tmp_path / "map0", tmp_path / "map1"]
+    command = [sys.executable, "-c", KILLED.format(path=[str(Path(__file__).parent)]), *map(str, folders)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        for _ in folders:
+            child = next(int(line.split()[1]) for line in process.stdout if line.startswith("process"))
+            assert process.stdout.readline() == "saved\n"
+            time.sleep(float(rng.uniform(0.0, 0.5)))
+            os.kill(child, signal.SIGKILL)
+    for folder in folders:
         left = open_stored(folder, verify=True)
         assert len(left.voxels) > 0 and avlmaps.open_map(folder).object("red").peak >= 0.0
         with LiveMap(folder, ENCODERS, up_in_world=UP, overwrite=True) as again:  # the lock went with the process

@@ -170,11 +170,11 @@ def test_the_pose_is_that_of_the_camera_that_took_the_photo() -> None:
 
 
 @pytest.mark.slow
-def test_thirty_pictures_of_other_places_are_refused(stored: MapOfPictures) -> None:
+def test_pictures_of_other_places_are_refused(stored: MapOfPictures) -> None:
     other = RoomWalk(frames=40, seed=99)
-    pictures = [other.frame(i).rgb for i in range(0, 40, 4)]
-    pictures += [painting(np.random.default_rng(seed), 240, 320, shapes=300) for seed in range(17)]
-    pictures += [np.random.default_rng(seed).integers(0, 256, (240, 320, 3)).astype(np.uint8) for seed in range(3)]
+    pictures = [other.frame(i).rgb for i in range(0, 40, 7)]
+    pictures += [painting(np.random.default_rng(seed), 240, 320, shapes=300) for seed in range(6)]
+    pictures += [np.random.default_rng(seed).integers(0, 256, (240, 320, 3)).astype(np.uint8) for seed in range(2)]
     found = [locate(stored, picture, None, rng()) for picture in pictures]
     assert [one.world_from_camera for one in found] == [None] * len(pictures)
     assert max(one.score for one in found) < 0.5
@@ -183,7 +183,7 @@ def test_thirty_pictures_of_other_places_are_refused(stored: MapOfPictures) -> N
 
 @pytest.mark.slow
 def test_the_mirrored_room_is_another_place(stored: MapOfPictures) -> None:
-    for index in range(0, 30, 3):
+    for index in range(0, 30, 6):
         mirrored = np.ascontiguousarray(WALK.frame(index).rgb[:, ::-1])
         assert locate(stored, mirrored, None, rng()).world_from_camera is None
 
