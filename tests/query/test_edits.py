@@ -411,7 +411,7 @@ def test_the_editor_says_what_it_cannot_do(tmp_path: Path) -> None:
         (lambda: m.edit.rename("chair", "stool", at="5.9,0.1"), "no chair within 1 m"),
         (lambda: m.edit.rename(None, "stool"), "Which thing"),
         (lambda: m.edit.rename("table", "  "), "is no name"),
-        (lambda: m.edit.rename("table", 5), "A name is text, not int"),
+        (lambda: m.edit.rename("table", 5), "must be text, not 5"),
         (lambda: m.edit.pin("dock", at=5), "A place is x,y or x,y,z in metres"),
         (lambda: m.edit.merge((0.6, 0.6), (0.6, 0.6)), "fewer than two"),
         (lambda: m.edit.split("table"), "stays whole: it is one connected piece"),

@@ -355,10 +355,37 @@ def test_what_is_no_phrase_is_refused_in_a_sentence(m: avlmaps.AVLMap, words: ob
     with pytest.raises(QueryError, match=f"A query is a sentence, .* not {kind}"):
         m.ask(words)
     for find in (m.object, m.area, m.sound):
-        with pytest.raises(QueryError, match=f"must be a phrase, .* not {kind}"):
+        with pytest.raises(QueryError, match="must be text, not"):
             find(words)
     with pytest.raises(QueryError, match="primary is one of object, sound, area, image, not"):
         m.ask(object="chair", primary="colour" if words is None else words)
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda m: m.things(5), "names must be a list of words, not 5"),
+        (lambda m: m.things(b"chair"), "names must be a list of words, not b'chair'"),
+        (lambda m: m.things(least_confidence=None), "least_confidence must be a number, not None"),
+        (lambda m: m.things(structure="no"), "structure must be True or False, not 'no'"),
+        (lambda m: m.contents(names=[5]), r"names must be a list of words, not \[5\]"),
+        (lambda m: m.rooms(least_confidence="half"), "least_confidence must be a number, not 'half'"),
+        (lambda m: m.sounds(most_names=1.5), "most_names must be a whole number, not 1.5"),
+        (lambda m: m.object("chair", primary="False"), "primary must be True or False, not 'False'"),
+        (lambda m: m.object("chair", vocabulary=5), "vocabulary must be a list of words, not 5"),
+        (lambda m: m.knows(5), "phrase must be text, not 5"),
+        (lambda m: m.instances(np.zeros((3, 3))), "word must be text, not ndarray"),
+        (lambda m: m.sound_scores(5), "text must be text, not 5"),
+        (lambda m: m.ask("the chair", at=5), "at is robot, where a sound was heard, .* not 5"),
+        (lambda m: m.ask(object="chair", primary=np.zeros((2, 2))), "primary is one of object, sound"),
+        (lambda m: m.locate(np.zeros((9, 9, 3), np.uint8), focal_35mm=-1), "focal_35mm is a length over 0 mm, not -1"),
+        (lambda m: m.edit.rename(5, "stool"), "thing must be text, not 5"),
+        (lambda m: m.edit.undo(5), "which must be text, not 5"),
+    ],
+)
+def test_an_argument_of_another_kind_is_named(m: avlmaps.AVLMap, call: Callable, said: str) -> None:
+    with pytest.raises(QueryError, match=said):
+        call(m)
 
 
 def test_one_name_is_a_name_and_not_its_letters(m: avlmaps.AVLMap) -> None:

@@ -7,6 +7,7 @@ import pytest
 from PIL import Image
 
 from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.errors import MapError
 from avlmaps.core.poses import inverse, rotation_angle_rad
 from avlmaps.maps.keyframes.describe import stack_keyframes
 from avlmaps.perception.encoders import Encoders
@@ -233,6 +234,8 @@ def test_the_most_alike_come_first_and_never_more_than_there_are(stored: MapOfPi
     likeness = stored.keyframes.place @ place
     np.testing.assert_array_equal(order, np.argsort(-likeness)[:3])
     assert len(alike(stored.keyframes, place, 10_000)) == len(stored.keyframes)
+    with pytest.raises(MapError, match="what that learned of the map is damaged"):
+        alike(stored.keyframes, place[: len(place) // 2], 3)
 
 
 def test_the_nearest_keyframe_to_its_own_pose_is_itself(stored: MapOfPictures) -> None:

@@ -1,13 +1,26 @@
-"""Numbers that programs give: of Python or NumPy, 0-d arrays, tensors without axes; and features with a mask."""
+"""What programs give: numbers of Python or NumPy, 0-d arrays, tensors without axes; words; and features with a mask."""
 
+import inspect
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import fields, is_dataclass
+from functools import wraps
 from math import inf
 from numbers import Integral, Real
-from typing import Any
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
+P = ParamSpec("P")
+T = TypeVar("T")
 _OF: dict[Any, str] = {float: "a number", float | None: "a number", int: "a whole number", int | None: "a whole number"}
+_WORDS: tuple[Any, ...] = (Sequence[str], Sequence[str] | None, tuple[str, ...], tuple[str, ...] | None)
+_NULLABLE = (str | None, float | None, int | None, *_WORDS[1::2])
+_WANTED: dict[Any, str] = _OF | {
+    str: "text",
+    str | None: "text",
+    bool: "True or False",
+    **dict.fromkeys(_WORDS, "a list of words"),
+}
 
 
 def as_number(given: Any) -> float | None:
@@ -36,6 +49,64 @@ def as_whole(given: Any) -> int | None:
     return int(given) if isinstance(given, Integral) else int(number)
 
 
+def as_words(given: Any) -> tuple[str, ...] | None:
+    """Return words as a tuple, one word as a tuple of itself; None for anything else."""
+    if isinstance(given, str):
+        return (given,)
+    if not isinstance(given, Iterable):
+        return None
+    words: tuple[Any, ...] = tuple(given)  # pyright: ignore[reportUnknownArgumentType, reportUnknownVariableType]
+    return words if all(isinstance(word, str) for word in words) else None
+
+
+def _as_kind(given: Any, kind: Any) -> Any:
+    """Return what is given as that kind; None for another one."""
+    if kind in _OF:
+        return as_number(given) if kind in (float, float | None) else as_whole(given)
+    if kind in _WORDS:
+        return as_words(given)
+    if kind is bool:
+        return bool(given) if type(given) in (bool, np.bool_) else None
+    return given if isinstance(given, str) else None
+
+
+def _came(given: Any) -> str:
+    said = repr(given)
+    return said if len(said) <= 60 and said.isprintable() else type(given).__name__
+
+
+def _is_known(annotation: Any) -> bool:
+    try:
+        return annotation in _WANTED
+    except TypeError:  # an annotation that has no hash
+        return False
+
+
+def checked(error: type[Exception]) -> Callable[[Callable[P, T]], Callable[P, T]]:
+    """Make a function refuse text, words, numbers and booleans of another kind than its annotations say, by name."""
+
+    def of(function: Callable[P, T]) -> Callable[P, T]:
+        signature = inspect.signature(function)
+        kinds = {one.name: one.annotation for one in signature.parameters.values() if _is_known(one.annotation)}
+
+        @wraps(function)
+        def called(*args: P.args, **named: P.kwargs) -> T:
+            bound = signature.bind(*args, **named)
+            for name, kind in kinds.items():
+                given = bound.arguments.get(name)
+                if name not in bound.arguments or (given is None and kind in _NULLABLE):
+                    continue
+                held = _as_kind(given, kind)
+                if held is None:
+                    raise error(f"{name} must be {_WANTED[kind]}, not {_came(given)}.")
+                bound.arguments[name] = held
+            return function(*bound.args, **bound.kwargs)
+
+        return called
+
+    return of
+
+
 def hold_numbers(settings: Any, error: type[Exception]) -> None:
     """Make the numbers of frozen settings those of Python, so that they can be compared and written into a map."""
     for field in fields(settings):
@@ -43,16 +114,12 @@ def hold_numbers(settings: Any, error: type[Exception]) -> None:
         given, name = getattr(settings, field.name), f"{field.name} of {type(settings).__name__}"
         if isinstance(kind, type) and is_dataclass(kind) and not isinstance(given, kind):
             raise error(f"{name} must be of {kind.__name__}, not {given!r}.")
-        if kind is bool:
-            if type(given) not in (bool, np.bool_):
-                raise error(f"{name} must be True or False, not {given!r}.")
-            object.__setattr__(settings, field.name, bool(given))
-        if kind not in _OF or (given is None and kind not in (float, int)):
+        if kind not in (bool, *_OF, *_WORDS) or (given is None and kind in _NULLABLE):
             continue
-        number = as_number(given) if kind in (float, float | None) else as_whole(given)
-        if number is None:
-            raise error(f"{name} must be {_OF[kind]}, not {given!r}.")
-        object.__setattr__(settings, field.name, number)
+        held = _as_kind(given, kind)
+        if held is None:
+            raise error(f"{name} must be {_WANTED[kind]}, not {_came(given)}.")
+        object.__setattr__(settings, field.name, held)
 
 
 def unmasked(features: Any) -> Any:

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Float64, Int, UInt8
 
 from avlmaps.core.errors import MapError, NavigationError, NoFloorError
+from avlmaps.core.numbers import hold_numbers
 from avlmaps.core.poses import rotation_to_level
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.storeys import Storeys
@@ -58,6 +59,9 @@ class BodyShape:
     """Whether it takes the stairs that a map holds to another storey."""
 
     def __post_init__(self) -> None:
+        hold_numbers(self, NavigationError)
+        if self.only == ():
+            raise NavigationError("A body with no word in only would drive through everything; leave only out.")
         if not (0.0 < self.radius_m < 10.0 and 0.0 < self.step_m < self.height_m):
             raise NavigationError(
                 f"A body of radius {self.radius_m} m that steps over {self.step_m} m and is {self.height_m} m high is "

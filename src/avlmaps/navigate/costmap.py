@@ -14,6 +14,7 @@ from avlmaps.core.errors import MapError, NavigationError
 from avlmaps.maps.obstacles import MIN_HITS, CellState, Obstacles, find_obstacles, floor_height
 from avlmaps.maps.storeys import said_storeys
 from avlmaps.navigate.bodies import BASE, BodyShape
+from avlmaps.query.contents import require_known
 
 if TYPE_CHECKING:
     from avlmaps.query.avlmap import AVLMap
@@ -133,7 +134,7 @@ def obstacles_for(avlmap: "AVLMap", shape: BodyShape = BASE, storey: int | None 
 
     Raises:
         MapError: the map holds too little to find a floor, or has no such storey.
-        QueryError: a word of the shape means nothing to the map's encoder.
+        QueryError: a word of the shape means nothing to the map's encoder, or one of ``only`` is not known to it.
         BackendError: the shape has words, and the map's profile has no pixel encoder.
     """
     stored = avlmap.stored
@@ -141,6 +142,7 @@ def obstacles_for(avlmap: "AVLMap", shape: BodyShape = BASE, storey: int | None 
     for word in shape.ignores:
         ignored |= _voxels_called(avlmap, word)
     if shape.only is not None:
+        require_known(avlmap.knows, shape.only)  # else nothing would be in its way
         counting = np.zeros(len(stored.voxels), bool)
         for word in shape.only:
             counting |= _voxels_called(avlmap, word)

@@ -15,7 +15,7 @@ from avlmaps.core.arrays import Float, Float16, Int32, UInt8
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import BackendError, MapError, QueryError
 from avlmaps.core.files import lasting_path, user_path
-from avlmaps.core.numbers import as_whole, hold_numbers
+from avlmaps.core.numbers import as_whole, checked, hold_numbers
 from avlmaps.core.question import HeardAt, Modality, Part, Question, Role
 from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder, SurveyedEncoder
@@ -155,6 +155,7 @@ class AVLMap:
         """The voxels' places, shared by all heatmaps of this map."""
         return Space(self.stored.grid, self.stored.voxels.index, self.stored.up_in_world, self.stored)
 
+    @checked(QueryError)
     def object(self, word: str, primary: bool = False, vocabulary: Sequence[str] | None = None) -> Heatmap:
         """Return the heat of an object.
 
@@ -189,6 +190,7 @@ class AVLMap:
             found = stored.get((word, False)) or stored.get((word, True))
         return object_factor(voxels, part, self.settings.heat, found)
 
+    @checked(QueryError)
     def instances(self, word: str, alone: bool = False) -> Instances:
         """Return the instances of a word: connected voxels that it wins against the vocabulary.
 
@@ -209,6 +211,7 @@ class AVLMap:
             encoded = EncodedWord.of(encoder, word)
         return confident_instances(self._feature_voxels(encoder, rivals), encoded)
 
+    @checked(QueryError)
     def pieces(self, word: str, alone: bool = False) -> Instances:
         """Return ``instances``, by the name that they had before."""
         warnings.warn("AVLMap.pieces goes in the next release; use .instances.", DeprecationWarning, stacklevel=2)
@@ -275,6 +278,7 @@ class AVLMap:
             return KnownClosestWords.known_everywhere(vocabulary, closest)
         return KnownClosestWords.of(vocabulary, len(self.stored.voxels))
 
+    @checked(QueryError)
     def things(
         self,
         names: Sequence[str] | None = None,
@@ -293,7 +297,6 @@ class AVLMap:
         Raises:
             QueryError: the map was not seen on such a day, or on one day alone.
         """
-        names = [names] if isinstance(names, str) else names
         if at is not None:
             from avlmaps.query.changes import Days, things_at
             from avlmaps.query.sound_sources import with_heard_then
@@ -308,6 +311,7 @@ class AVLMap:
         found = self.unedited_things(seen, least_confidence, structure, watch)
         return self.edited.things(found, names, least_confidence)
 
+    @checked(QueryError)
     def unedited_things(
         self,
         names: Sequence[str] | None = None,
@@ -375,6 +379,7 @@ class AVLMap:
         since_visit = days.visit_of(since)
         return changes_answer(days, self.stored.path.name, since_visit, room_namer(self), first_seen=first_seen)
 
+    @checked(QueryError)
     def last_seen(self, name: str) -> "LastSeenAnswer":
         """Return where things of a name were last seen, and when: those that are there still first, then the latest.
 
@@ -385,6 +390,7 @@ class AVLMap:
 
         return last_seen(Days.of(self.stored, self.edited.life), name, is_meant(name), room_namer(self))
 
+    @checked(QueryError)
     def contents(
         self, least_confidence: float = 0.5, names: Sequence[str] | None = None, structure: bool = False
     ) -> "Contents":
@@ -401,7 +407,6 @@ class AVLMap:
         from avlmaps.query.contents import Contents, require_known
         from avlmaps.query.sound_sources import with_heard
 
-        names = [names] if isinstance(names, str) else names
         models = self.stored.info.models
         require_known(self.knows, (names or ()) if "pixels" in models else ())
         things = self.things(names, least_confidence, structure) if "pixels" in models else []
@@ -422,12 +427,14 @@ class AVLMap:
             return doubts
         return (*doubts, "The map was made without a model for things, so that it names none.")
 
+    @checked(QueryError)
     def sounds(self, most_names: int = 3) -> list["SoundEvent"]:
         """Return the sounds of the map in the order of their onset; see ``contents.find_sounds``."""
         from avlmaps.query.contents import find_sounds
 
         return find_sounds(self.stored, most_names)
 
+    @checked(QueryError)
     def rooms(self, least_confidence: float = 0.0) -> list["Room"]:
         """Return the rooms of the map, those with most views first; see ``contents.find_rooms``."""
         from avlmaps.query.contents import find_rooms
@@ -485,10 +492,12 @@ class AVLMap:
             f"{counts.keyframes} keyframes, {counts.sounds} sounds, profile {self.stored.info.profile})"
         )
 
+    @checked(QueryError)
     def knows(self, phrase: str) -> bool:
         """Return whether the map can be queried for a thing: the pixel encoder sees such, or a person named one so."""
         return self.edited.knows(phrase) or self.sees(phrase)
 
+    @checked(QueryError)
     def sees(self, phrase: str) -> bool:
         """Return whether the pixel encoder can look for a phrase: any phrase for an open vocabulary, else its words."""
         from avlmaps.query.synonyms import is_open
@@ -496,6 +505,7 @@ class AVLMap:
         encoder = self.stored.encoders.pixels
         return is_open(encoder) or bool(encoder.understood(phrase))
 
+    @checked(QueryError)
     def sound(self, text: str, primary: bool = False, *, at: HeardAt | None = None) -> Heatmap:
         """Return the heat of a sound of that name: where the robot was when it heard it, or where it came from.
 
@@ -510,6 +520,7 @@ class AVLMap:
         part = Part(Modality.SOUND, text, _role(primary))
         return self._sound_heat(part, self.sound_scores(text), at)
 
+    @checked(QueryError)
     def sound_scores(self, text: str) -> Float[np.ndarray, " sounds"]:
         """Return for each sound of the map the probability that it is called so, in [0, 1]."""
         heard = self.stored.sounds
@@ -518,6 +529,7 @@ class AVLMap:
         self.stored.require_model(Kind.SOUNDS)
         return self.stored.encoders.sounds.score_words(sound_features(heard), [text])[:, 0]
 
+    @checked(QueryError)
     def sound_clip(self, clip: str | Path | Sound, primary: bool = False, *, at: HeardAt | None = None) -> Heatmap:
         """Return the heat of sounds of the same kind as a clip; see ``sound``.
 
@@ -541,8 +553,7 @@ class AVLMap:
 
     def _sound_heat(self, part: Part, scores: Float[np.ndarray, " sounds"], at: HeardAt | None) -> Heatmap:
         settings = self.settings.sounds
-        if at not in (None, "robot", "source"):
-            raise QueryError(f"at is robot, where a sound was heard, or source, where it came from; not {at!r}.")
+        _require_place(at)
         if (at or settings.at) == "source" and len(scores):
             from avlmaps.query.modalities.source import source_factor
 
@@ -562,6 +573,7 @@ class AVLMap:
 
         return SourceMap.of(self)
 
+    @checked(QueryError)
     def sources(self, names: Sequence[str] = (), *, prior: bool = True, least: float = 0.0) -> "list[SoundSource]":
         """Return the places that sounds came from, as regions with probabilities; see ``sound_sources.list_sources``.
 
@@ -570,8 +582,9 @@ class AVLMap:
         """
         from avlmaps.query.sound_sources import list_sources
 
-        return list_sources(self, [names] if isinstance(names, str) else names, prior, least=least)
+        return list_sources(self, names, prior, least=least)
 
+    @checked(QueryError)
     def area(self, word: str, primary: bool = False) -> Heatmap:
         """Return the heat of an area, such as a kitchen; or of one room by its number, such as bathroom 2.
 
@@ -704,6 +717,7 @@ class AVLMap:
         contents = surveyed or read_room_contents()
         return NamedVoxels(rows, namer.names, namer.confidences(rows), area_m2, contents)
 
+    @checked(QueryError)
     def image(
         self,
         picture: str | Path | Photo | UInt8[np.ndarray, "h w 3"],
@@ -744,6 +758,7 @@ class AVLMap:
         stored = self.stored
         return Panoramas(self.space, stored.voxels.rgb, stored.keyframes)
 
+    @checked(QueryError)
     def locate(
         self,
         picture: str | Path | UInt8[np.ndarray, "h w 3"],
@@ -760,6 +775,8 @@ class AVLMap:
         Raises:
             QueryError: the picture is missing, no picture, or does not fit the camera.
         """
+        if focal_35mm is not None and not 0.0 < focal_35mm < np.inf:
+            raise QueryError(f"focal_35mm is a length over 0 mm, not {focal_35mm:g}.")
         photo = _photo(picture, intrinsics)
         focal_35mm = photo.focal_35mm if focal_35mm is None else focal_35mm
         return self._located(photo.rgb, intrinsics, focal_35mm=focal_35mm)
@@ -864,6 +881,7 @@ class AVLMap:
         if wanted is None:
             raise AskError(f"top must be a whole number of goals, not {top!r}.")
         top = wanted
+        _require_place(at)
         if isinstance(question, Question):
             if any(part is not None for part in (object, sound, area, image, clip, primary)):
                 raise AskError("A question holds its parts already; give a sentence or parts instead.")
@@ -877,7 +895,7 @@ class AVLMap:
                     f"attachments={{'it': ...}} and {name}='it'."
                 )
         photo, recording = (None if file is None else str(file) for file in (image, clip))
-        if primary is not None and primary not in list(Modality):
+        if primary is not None and (not isinstance(primary, str) or primary not in list(Modality)):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise AskError(f"primary is one of {', '.join(Modality)}, not {primary!r}.")
         sought = None if primary is None else Modality(primary)
         asked = Asked(
@@ -885,6 +903,11 @@ class AVLMap:
             top=top, at=at, near=near,
         )  # fmt: skip
         return ask(self, asked, files)
+
+
+def _require_place(at: Any) -> None:
+    if at is not None and (not isinstance(at, str) or at not in ("robot", "source")):
+        raise QueryError(f"at is robot, where a sound was heard, or source, where it came from; not {at!r}.")
 
 
 def _photo(picture: "str | Path | Photo | UInt8[np.ndarray, 'h w 3']", intrinsics: Pinhole | None) -> "Photo":

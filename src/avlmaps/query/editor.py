@@ -9,6 +9,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Float
 from avlmaps.core.errors import MapError, QueryError
+from avlmaps.core.numbers import checked
 from avlmaps.core.poses import plain_point
 from avlmaps.core.wording import place_text
 from avlmaps.maps.store.edits import LONGEST_NAME, Does, Edit, Spot, World, append_edit, in_force, read_edits
@@ -51,6 +52,7 @@ class Editor:
     def __init__(self, avlmap: EditableMap) -> None:
         self._map = avlmap
 
+    @checked(QueryError)
     def rename(self, thing: str | None, to: str, *, at: Place | None = None, by: str = "") -> Edit:
         """Give a thing another name: "that is not a chair, it is a stool".
 
@@ -69,6 +71,7 @@ class Editor:
             raise QueryError(f"The {to} at {place_text(found.position)} is called so already.")
         return self._add("rename", [self._map.edited.spot_of(found.name, found.rows)], name=to, by=by)
 
+    @checked(QueryError)
     def rename_room(self, room: str, to: str, *, by: str = "") -> Edit:
         """Give a room another name: "this room is the studio".
 
@@ -83,6 +86,7 @@ class Editor:
         """
         return self._add("rename room", [self._room(room)], name=_own_name(to), by=by)
 
+    @checked(QueryError)
     def merge(self, *things: Place, to: str = "", by: str = "") -> Edit:
         """Make one thing of several that the map takes apart.
 
@@ -111,6 +115,7 @@ class Editor:
         spots = [self._map.edited.spot_of(one.name, one.rows) for one in found]
         return self._add("merge", spots, name=_own_name(to) if to else "", by=by)
 
+    @checked(QueryError)
     def split(
         self,
         thing: str | None,
@@ -149,6 +154,7 @@ class Editor:
             raise QueryError(f"The {found.name} at {place_text(found.position)} stays whole: {how}.")
         return self._append(edit)
 
+    @checked(QueryError)
     def forbid(self, name: str, *, box: Sequence[float] = (), room: str | None = None, by: str = "") -> Edit:
         """Forbid an area to robots: no path goes through it, and no goal in it is accepted.
 
@@ -170,6 +176,7 @@ class Editor:
         spot = self._room(room) if room is not None else self._area(corners)
         return self._add("forbid", [spot], name=_name(name), by=by)
 
+    @checked(QueryError)
     def pin(self, name: str, at: Place, *, by: str = "") -> Edit:
         """Give a place a name of one's own: "my charging dock". The same name again moves it.
 
@@ -189,6 +196,7 @@ class Editor:
             "pin", [Spot(middle=plain_point(place)).anchored(self._map.stored.keyframes)], name=_own_name(name), by=by
         )
 
+    @checked(QueryError)
     def undo(self, which: str = "", *, by: str = "") -> Edit:
         """Undo an edit.
 
@@ -393,8 +401,6 @@ def _gap_m(one: "Thing", other: "Thing") -> float:
 
 
 def _name(name: str) -> str:
-    if not isinstance(name, str):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise QueryError(f"A name is text, not {type(name).__name__}.")
     word = " ".join(name.split())
     if not word or len(word) > LONGEST_NAME or not any(letter.isalnum() for letter in word) or not word.isprintable():
         raise QueryError(f"{name[:40]!r} is no name; give one to {LONGEST_NAME} characters, a letter among them.")

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, Int, UInt8
 
 from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.errors import MapError
 from avlmaps.core.numbers import unmasked
 from avlmaps.core.poses import rotation_angle_rad
 from avlmaps.core.wording import option
@@ -273,6 +274,12 @@ def alike(keyframes: Keyframes, place: Float32[np.ndarray, " d"], count: int) ->
     """Return the keyframes whose place descriptors are the most like the given one, best first."""
     if not len(keyframes) or not count:
         return np.zeros(0, np.int64)
+    if (size := np.shape(place)) != keyframes.place.shape[1:]:
+        raise MapError(
+            f"The map's keyframes have place descriptors of {keyframes.place.shape[1]} numbers, and its place encoder "
+            f"gave {size} for the picture; what that learned of the map is damaged: restore the map from a copy, or "
+            "build it again."
+        )
     likeness = keyframes.place @ place
     best = np.argpartition(-likeness, min(count, len(likeness)) - 1)[:count]
     return best[np.lexsort((best, -likeness[best]))]
