@@ -121,7 +121,7 @@ def test_a_full_disk_is_one_sentence_and_leaves_no_rubbish(tmp_path: Path, monke
 
 def test_who_may_not_write_is_told_what_helps_a_build_and_what_helps_an_edit(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    for name, helps in ((LOCK, "choose another folder"), (EDITING, "the map is as it was: edit a copy")):
+    for name, helps in ((LOCK, "choose another folder"), (EDITING, "edit a copy that lies where you may write")):
         with pytest.raises(MapError, match=f"Not a directory; {helps}"), lock_folder(tmp_path / "file" / "map", name):
             pass
 

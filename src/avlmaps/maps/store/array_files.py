@@ -27,7 +27,7 @@ from avlmaps.core.npy import load_npy
 SMALL_BYTES = 1 << 20  # files up to this size are read whole and always compared with their checksum
 MOST_BYTES = 1 << 42
 TO_BUILD = "choose another folder. What was finished there stays, and a second try continues from it."
-TO_EDIT = "the map is as it was: edit a copy that lies where you may write."
+TO_EDIT = "edit a copy that lies where you may write; the map is as it was."
 _QUOTED = 200  # characters of what a damaged manifest says
 _CHUNK_BYTES = 1 << 24
 _SYNCED_AT_ONCE = 8
