@@ -4,7 +4,8 @@ import errno
 import math
 import tokenize
 from dataclasses import dataclass
-from io import BufferedIOBase
+from functools import lru_cache
+from io import BufferedIOBase, BytesIO
 from pathlib import Path
 from typing import BinaryIO, cast
 
@@ -13,6 +14,7 @@ import numpy as np
 from avlmaps.core.files import open_regular
 
 _MOST_DIMENSIONS = 8
+_USUAL, _HEAD = b"\x93NUMPY\x01\x00", 10  # of version 1.0, and it with the length of the header
 _CANNOT_MAP = {errno.ENODEV, errno.EINVAL, errno.ENOTSUP, errno.EACCES, errno.EPERM, errno.ENOSYS}
 # The header is a Python literal; what its parser raises is numpy's and Python's own affair.
 _UNREADABLE = (
@@ -55,10 +57,15 @@ def read_npy_header(stream: BinaryIO, size: int) -> NpyHeader:
     Raises:
         ValueError: it is not an NPY header, holds objects, or promises more or fewer bytes than there are.
     """
+    begin = stream.tell()
+    head = stream.read(_HEAD)
     try:
-        version = np.lib.format.read_magic(stream)  # pyright: ignore[reportArgumentType]
-        read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-        shape, fortran, dtype = read(stream)  # pyright: ignore[reportArgumentType]
+        if head[:-2] == _USUAL:  # many files of a map begin alike
+            header = head + stream.read(int.from_bytes(head[-2:], "little"))
+            shape, fortran, dtype = _described(header)
+        else:
+            stream.seek(begin)
+            shape, fortran, dtype = _read_header(stream)
     except _UNREADABLE as fault:
         reason = str(fault).splitlines()[0].rstrip(".") if str(fault) and size else "it is empty"
         raise ValueError(reason) from None
@@ -72,6 +79,17 @@ def read_npy_header(stream: BinaryIO, size: int) -> NpyHeader:
             f"its header promises {dtype} of {shape}, {header.bytes:,} bytes in all, and the file has {size:,}"
         )
     return header
+
+
+def _read_header(stream: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype]:
+    version = np.lib.format.read_magic(stream)  # pyright: ignore[reportArgumentType]
+    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    return read(stream)  # pyright: ignore[reportArgumentType]
+
+
+@lru_cache(maxsize=1000)
+def _described(header: bytes) -> tuple[tuple[int, ...], bool, np.dtype]:
+    return _read_header(BytesIO(header))
 
 
 def load_npy(path: Path, limit_bytes: int, *, mapped: bool = False) -> np.ndarray:
