@@ -9,9 +9,10 @@ import pytest
 
 from avlmaps.core.errors import QueryError
 from avlmaps.language.list_questions import Listed, read_list
+from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.store.life import Life, Stay
 from avlmaps.maps.store.manifest import CameraInfo, RecordingInfo, RigInfo, Visit
-from avlmaps.query.changes import Days, changes_answer, is_meant, last_seen, last_seen_text, text_of
+from avlmaps.query.changes import Days, changes_answer, is_meant, last_seen, last_seen_text, text_of, things_at
 from avlmaps.query.goals import Goal
 from avlmaps.query.lists import lies
 from avlmaps.query.usual import days_of, usual, usual_place_text, usual_text
@@ -120,6 +121,17 @@ def test_where_a_thing_was_last_seen_is_where_its_last_stay_was() -> None:
         sofa
     )
     assert last_seen(days(), "piano", is_meant("piano"), lambda place: None)["seen"] == []
+
+
+def test_what_a_map_of_colours_calls_red_is_the_red_thing() -> None:
+    assert is_meant("red thing")("red") and is_meant("red")("red")
+    assert not is_meant("red thing")("blue") and not is_meant("red chair")("red") and not is_meant("thing")("")
+
+
+@pytest.mark.parametrize(("names", "count"), [(None, 4), (["couch"], 1), (["sofa", "bag"], 2), (["piano"], 0)])
+def test_things_of_a_day_are_meant_by_other_words_as_well(names: list[str] | None, count: int) -> None:
+    space = SimpleNamespace(index=np.zeros((0, 3), np.int32), grid=GridSpec(0.05))
+    assert len(things_at(space, days(), 1, names, 0.5)) == count  # pyright: ignore[reportArgumentType]
 
 
 @pytest.mark.parametrize(

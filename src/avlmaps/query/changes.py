@@ -215,10 +215,11 @@ def things_at(
 
     voxels: list[list[int]] = np.asarray(space.index).tolist()
     row_of = {(x, y, z): row for row, (x, y, z) in enumerate(voxels)}
+    meant = None if names is None else [is_meant(name) for name in names]
     found: list[Thing] = []
     for number in days.at(days.visit_of(at)):
         stay, index = days.life.stays[number], days.life.voxels(number)
-        if stay.confidence < least_confidence or (names is not None and stay.name not in names):
+        if stay.confidence < least_confidence or not (meant is None or any(means(stay.name) for means in meant)):
             continue
         own: list[list[int]] = index.tolist()
         left = sorted(row for x, y, z in own if (row := row_of.get((x, y, z))) is not None)
@@ -231,7 +232,7 @@ def things_at(
 def is_meant(name: str) -> Callable[[str], bool]:
     """Return whether a thing's name is meant by a word: by itself, by another word for it, or by a wider one."""
     entry = lexicon().find(name, EntryKind.THING)
-    own = name if entry is None else entry.name
+    own = name.removesuffix(" thing") if entry is None else entry.name  # "red thing", of a map of colours
     return lambda other: other in (name, own) or lexicon().is_a(other, own, EntryKind.THING)
 
 
