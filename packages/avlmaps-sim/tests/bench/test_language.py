@@ -4,25 +4,25 @@ import pytest
 
 from avlmaps_sim.bench.language import OUTCOMES, counts, dangerous, judge, sealed, shipped
 
-# At least so many of every other sentence of each list are right, and at most so many misread; all are development
+# At least so many of every third sentence of each list are right, and at most so many misread; all are development
 # lists, and `avlmaps bench language` reads the whole of them.
 REACHED = {
-    "child": (60, 2), "nurse": (61, 2), "newcomer": (61, 2), "roboticist": (62, 2),
-    "engineer": (59, 2), "grandmother": (57, 3), "plumber": (56, 4), "tourist": (58, 2),
-    "coach": (56, 3), "overseas": (56, 3), "vet": (60, 2), "wedding": (54, 2),
-    "controls": (17, 0), "manager": (18, 0), "dictated": (19, 0), "elderly": (16, 1),
-    "abroad": (57, 2), "dictation": (58, 3), "guests": (54, 2), "warehouse": (58, 2),
-    "ward": (18, 0), "depot": (19, 0), "tenner": (18, 1), "stack": (18, 0),
-    "landlady": (19, 0), "signals": (29, 0), "concierge": (28, 0), "director": (27, 0),
-    "six_voices": (30, 0), "six_voices_2": (30, 0), "six_voices_3": (30, 0),
-    "six_voices_4": (29, 1), "six_voices_5": (30, 0),
+    "child": (40, 1), "nurse": (41, 1), "newcomer": (41, 1), "roboticist": (41, 1),
+    "engineer": (38, 1), "grandmother": (38, 2), "plumber": (37, 3), "tourist": (39, 1),
+    "coach": (37, 2), "overseas": (37, 2), "vet": (40, 1), "wedding": (36, 1),
+    "controls": (11, 0), "manager": (12, 0), "dictated": (13, 0), "elderly": (11, 1),
+    "abroad": (38, 1), "dictation": (38, 2), "guests": (36, 1), "warehouse": (39, 1),
+    "ward": (12, 0), "depot": (13, 0), "tenner": (12, 1), "stack": (12, 0),
+    "landlady": (13, 0), "signals": (19, 0), "concierge": (19, 0), "director": (18, 0),
+    "six_voices": (19, 0), "six_voices_2": (20, 0), "six_voices_3": (20, 0),
+    "six_voices_4": (18, 1), "six_voices_5": (20, 0),
 }  # fmt: skip
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", REACHED)
 def test_a_sealed_list_stays_understood(name: str) -> None:
-    judged = [judge(row) for row in shipped(name)[::2]]
+    judged = [judge(row) for row in shipped(name)[::3]]
     found = counts(judged)
     assert dangerous(judged)[0] == 0
     assert found["right"] >= REACHED[name][0]
