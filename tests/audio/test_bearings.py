@@ -35,14 +35,14 @@ def said(walk: Trajectory, offset_rad: float, rng: np.random.Generator, outliers
     stamps: list[float] = []
     azimuth: list[float] = []
     for place, (begin_s, end_s) in zip(PLACES, SPANS, strict=True):
-        for at_s in np.arange(begin_s, end_s, 0.1):
-            pose = walk.at(np.array([at_s]))[0]
+        at_s = np.arange(begin_s, end_s, 0.1)
+        for stamp_s, pose in zip(at_s, walk.at(at_s), strict=True):
             away = place - pose[:3, 3]
             true = np.arctan2(away[1], away[0]) - np.arctan2(pose[1, 2], pose[0, 2])
             value = (
                 rng.uniform(-np.pi, np.pi) if rng.random() < outliers else true + np.deg2rad(8) * rng.standard_normal()
             )
-            stamps.append(float(at_s))
+            stamps.append(float(stamp_s))
             azimuth.append(float(np.angle(np.exp(1j * (value + offset_rad)))))
     return DirectionTrack.of(stamps, azimuth)
 
