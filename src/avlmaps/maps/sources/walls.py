@@ -51,6 +51,8 @@ class Walls:
         away = np.linalg.norm(place_xy - ear_xy, axis=1)
         begin, along = (ear_xy - self.origin_m) / _CELL_M, (place_xy - ear_xy) / _CELL_M
         last, blocked = np.array(self.solid.shape) - 1, np.zeros(len(place_xy), bool)
+        if not self.solid.any():
+            return blocked
         for at_m in np.arange(0.2, float(away.max(initial=0.0)), _STEP_M):
             there = np.flatnonzero((away - _AT_CANDIDATE_M > at_m) & ~blocked)
             if not len(there):
