@@ -104,6 +104,7 @@ WRONG: dict[str, tuple[Callable[[Path], None], str]] = {
         "are one file",
     ),
     "moved voxels": (with_array("voxels/index", lambda a: a + np.int32(40)), "its bounding box goes from"),
+    "voxels of another order": (with_array("voxels/index", lambda a: a[::-1]), "not sorted by index"),
     "features of no length": (with_array("voxels/feature", lambda a: a * np.float16(2)), "neither unit length"),
     "descriptors": (with_array("keyframes/descriptors", lambda a: a * np.float16(0.5)), "neither unit length"),
     "sound features": (with_array("sounds/feature", lambda a: a * 3), "neither unit length"),

@@ -88,6 +88,8 @@ def content_fault(name: str, array: np.ndarray) -> str:
         name: what it holds, such as ``voxels/feature``.
         array: of any shape; of a piece of an array of features, whole rows.
     """
+    if name == "voxels/index" and array.ndim == 2 and not _is_sorted(array):
+        return "its voxels are not sorted by index, or one comes twice"
     if array.dtype.kind != "f":
         return ""
     if name in MAY_BE_NAN:
@@ -121,8 +123,13 @@ def check_extent(index: np.ndarray, voxel_size_m: float, where: str) -> None:
 
 def check_order(voxels: Voxels, where: str) -> None:
     """Raise ``MapError`` unless the voxels are sorted by index and none comes twice."""
-    index = np.asarray(voxels.index)
-    step = np.diff(index.astype(np.int64), axis=0)
-    first = np.take_along_axis(step, (step != 0).argmax(axis=1)[:, None], axis=1)
-    if len(step) and (first <= 0).any():
+    if not _is_sorted(np.asarray(voxels.index)):
         raise MapError(f"{where} are not sorted by index, or one comes twice; {_MEND}.")
+
+
+def _is_sorted(index: np.ndarray) -> bool:
+    step = np.diff(index.astype(np.int64), axis=0)
+    if not step.size:
+        return True
+    first = np.take_along_axis(step, (step != 0).argmax(axis=1)[:, None], axis=1)
+    return bool((first > 0).all())
