@@ -84,7 +84,7 @@ def run_mistake(number: int, scratch: Path) -> dict[str, object]:
     """Run one case; return its line for the report, with the verdict map, told, sentence or finding."""
     rng = np.random.default_rng([2026, 33, number])
     walk, form = WALKS[int(rng.integers(len(WALKS)))], _FORMS[number % len(_FORMS)]
-    known = [one for one in situations() if not one.known_silent]
+    known = situations()
     chosen = [known[int(i)] for i in rng.integers(len(known), size=1 + int(rng.random() < _TWO))]
     draft = _draft(walk)
     for situation in chosen:

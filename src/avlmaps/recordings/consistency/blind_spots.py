@@ -11,6 +11,7 @@ from avlmaps.recordings.consistency.edges import Edges
 from avlmaps.recordings.consistency.jumps import gaps
 from avlmaps.recordings.consistency.levels import Levels
 from avlmaps.recordings.consistency.limits import apart_agrees, can_be_judged, geometry_agrees
+from avlmaps.recordings.consistency.right_angles import RightAngles
 from avlmaps.recordings.consistency.sample import pairs_across
 from avlmaps.recordings.consistency.single_frames import LEAST_WARMTH
 from avlmaps.recordings.consistency.suspects import Suspect, Trial, Trials, is_closer
@@ -27,7 +28,13 @@ _NO_OVERLAP = 0.9
 
 
 def blind_spots(
-    recording: Recording, found: Agreement, trials: Trials, edges: Edges, levels: Levels, warmth: float
+    recording: Recording,
+    found: Agreement,
+    trials: Trials,
+    edges: Edges,
+    levels: Levels,
+    angles: RightAngles,
+    warmth: float,
 ) -> tuple[str, ...]:
     """Return what cannot be checked in a recording of which nothing is wrong, and why, one sentence each.
 
@@ -37,11 +44,12 @@ def blind_spots(
         trials: of its sample.
         edges: of its colour and depth.
         levels: of its floors.
+        angles: of its flat surfaces.
         warmth: of its pictures.
     """
     if not can_be_judged(found):
         return (_nothing(recording, found),)
-    return (*_spots(recording, trials, edges, levels), *_of_channels(warmth))
+    return (*_spots(recording, trials, edges, levels), *_of_flats(angles), *_of_channels(warmth))
 
 
 def _nothing(recording: Recording, found: Agreement) -> str:
@@ -111,6 +119,19 @@ def _spots(recording: Recording, trials: Trials, edges: Edges, levels: Levels) -
         )
     yield from _of_gaps(recording)
     yield from _of_parts(recording)
+
+
+def _of_flats(angles: RightAngles) -> Iterator[str]:
+    if not angles.lens_would_show:
+        yield (
+            "Whether the distortion of the lens was taken out cannot be checked here, because too few flat surfaces "
+            "are seen: a wide lens that bends walls would not show."
+        )
+    if not angles.squeeze_would_show:
+        yield (
+            "The ratio of fx to fy cannot be checked here, because too few flat surfaces that meet at right angles are "
+            "seen, or all of them by a level camera: pictures that were squeezed along one axis would not show."
+        )
 
 
 def _of_channels(warmth: float) -> Iterator[str]:

@@ -18,6 +18,7 @@ from avlmaps.recordings.consistency.causes import cause_of
 from avlmaps.recordings.consistency.edges import Edges, Shift, find_edges, shift_of
 from avlmaps.recordings.consistency.jumps import find_exchanged, find_jump, find_parts
 from avlmaps.recordings.consistency.levels import Levels, Tilt, find_levels
+from avlmaps.recordings.consistency.right_angles import RightAngles
 from avlmaps.recordings.consistency.sample import Sample, Surfaces, draw_sample, steps_between_all
 from avlmaps.recordings.consistency.single_frames import (
     of_colour,
@@ -54,7 +55,15 @@ def check_recording(recording: Recording) -> Verdict:
     apart = compare(distant, surfaces, sample.world_from_camera, floor_m=APART_SAME_M)
     apart = without_occluded(apart, distant, surfaces)
     redness = compare(sample.of_redness(), surfaces, sample.world_from_camera)
-    found = _Found(after, apart, find_edges(sample), redness, find_levels(sample), _trials(recording, sample))
+    found = _Found(
+        after,
+        apart,
+        find_edges(sample),
+        redness,
+        find_levels(sample),
+        RightAngles.of(sample),
+        _trials(recording, sample),
+    )
     of_program = is_of_program(recording)
     known = sample.depth_m[sample.depth_m > 0.0]
     median_m = float(np.median(known)) if known.size else float("nan")
@@ -70,7 +79,9 @@ def check_recording(recording: Recording) -> Verdict:
     ]
     checked, unchecked = limits.can_be_judged(after), ()
     if not findings:
-        unchecked = blind_spots(recording, after, found.trials, found.edges, found.levels, warmth_of(sample))
+        unchecked = blind_spots(
+            recording, after, found.trials, found.edges, found.levels, found.angles, warmth_of(sample)
+        )
     return Verdict(
         frames=len(sample),
         pairs=after.pairs,
@@ -86,13 +97,14 @@ def check_recording(recording: Recording) -> Verdict:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Found:
-    """How pairs agree that follow, and from apart; colour at edges of depth; red less blue; floors; what is tried."""
+    """How pairs agree that follow, and from apart; colour at edges; red less blue; floors; walls; what is tried."""
 
     after: Agreement
     apart: Agreement
     edges: Edges
     redness: Agreement
     levels: Levels
+    angles: RightAngles
     trials: Trials
 
 
@@ -120,6 +132,8 @@ def _of_agreement(recording: Recording, sample: Sample, found: _Found, median_m:
         other = "The poses drift, depth and positions have different scales, or much was moved; check them."
         cause = _cause(recording, found, median_m)
         yield Finding(Reason.GEOMETRY, Grade.SUSPICIOUS, sentence, cause or other)
+    elif flat := found.angles.finding(recording, found.levels):
+        yield flat
     elif limits.can_be_judged(after) and (closer := find_closer(found.trials)) is not None:
         then = _off(closer.agreement, closer.apart)
         sentence = (
@@ -145,7 +159,13 @@ def _of_agreement(recording: Recording, sample: Sample, found: _Found, median_m:
         find_exchanged(recording, sample, after) or find_jump(recording, sample, after) or find_parts(recording)
     ):
         yield misplaced
-    elif differing := _most_unlike(after, apart):
+    else:
+        yield from _of_colours(recording, sample, found, median_m)
+
+
+def _of_colours(recording: Recording, sample: Sample, found: _Found, median_m: float) -> Iterator[Finding]:
+    after, apart = found.after, found.apart
+    if differing := _most_unlike(after, apart):
         grade = Grade.IMPOSSIBLE if after.likeness < limits.IMPOSSIBLE_LIKENESS else Grade.SUSPICIOUS
         sentence = (
             "The colour pictures do not show what the depth pictures show: the brightness of the same points in two "
@@ -217,6 +237,8 @@ def _other_cause(recording: Recording, sample: Sample, found: _Found) -> str:
         return "All poses are the same, though the pictures are not: the poses are missing, or those of another camera."
     if (exchanged := find_exchanged(recording, sample, after)) is not None:
         return str(exchanged)
+    if (flat := found.angles.finding(recording, found.levels)) is not None:
+        return str(flat)
     used = after.points >= FEWEST_POINTS
     share = np.where(used, after.same / np.maximum(after.points, 1), np.nan)
     bad, others = limits.bad_pairs(after), share[share >= limits.BAD_PAIR]

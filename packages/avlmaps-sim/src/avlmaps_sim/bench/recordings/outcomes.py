@@ -33,7 +33,7 @@ _UNCHECKED = {
     "depth": r"Poses|measured along|colour lies on depth",
     "colour": r"Poses|colour lies on depth|colour channels",
     "pictures": r"Poses",
-    "intrinsics": r"Poses|focal length|principal point|colour lies on depth",
+    "intrinsics": r"Poses|focal length|principal point|colour lies on depth|of the lens|fx to fy",
     "clock": r"Poses|clock of the poses",
 }
 _CLOUD_STEP = 3
