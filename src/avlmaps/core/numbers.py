@@ -75,19 +75,12 @@ def _came(given: Any) -> str:
     return said if len(said) <= 60 and said.isprintable() else type(given).__name__
 
 
-def _is_known(annotation: Any) -> bool:
-    try:
-        return annotation in _WANTED
-    except TypeError:  # an annotation that has no hash
-        return False
-
-
 def checked(error: type[Exception]) -> Callable[[Callable[P, T]], Callable[P, T]]:
     """Make a function refuse text, words, numbers and booleans of another kind than its annotations say, by name."""
 
     def of(function: Callable[P, T]) -> Callable[P, T]:
         signature = inspect.signature(function)
-        kinds = {one.name: one.annotation for one in signature.parameters.values() if _is_known(one.annotation)}
+        kinds = {one.name: one.annotation for one in signature.parameters.values() if one.annotation in _WANTED}
 
         @wraps(function)
         def called(*args: P.args, **named: P.kwargs) -> T:
