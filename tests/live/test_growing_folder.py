@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_live_map import ENCODERS, UP, frame
+from live_frames import ENCODERS, UP, frame
 
 import avlmaps
 from avlmaps.core.errors import RecordingError

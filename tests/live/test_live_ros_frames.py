@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from test_live_map import ENCODERS, UP, frame
+from live_frames import ENCODERS, UP, frame
 
 from avlmaps.core.errors import BackendError, RecordingError
 from avlmaps.live.live_map import LiveMap

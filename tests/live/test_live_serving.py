@@ -9,8 +9,8 @@ from pathlib import Path
 from urllib.request import urlopen
 
 import pytest
+from live_frames import ENCODERS, UP, add, frame, recorded, wait_for, within
 from starlette.testclient import TestClient
-from test_live_map import ENCODERS, UP, add, frame, recorded, wait_for, within
 
 from avlmaps.cli.live_serving import Drive, LiveSource
 from avlmaps.live.live_map import LiveMap
