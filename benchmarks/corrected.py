@@ -19,13 +19,14 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from avlmaps.core.camera import Rig
+from avlmaps.core.columns import concat
 from avlmaps.core.poses import inverse
 from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
 from avlmaps.maps.fusion.free_space import FreeViewCollector, FreeViews, clean, count_where_it_matters
 from avlmaps.maps.fusion.moved_submaps import MovedSubmaps
 from avlmaps.maps.fusion.sensor import PERFECT
-from avlmaps.maps.fusion.submaps import concat_submaps, submap_of
+from avlmaps.maps.fusion.submaps import submap_of
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.types import Submaps
 from avlmaps.recordings.open import open_recording
@@ -66,7 +67,7 @@ def fused(frames: list[Frame], poses: np.ndarray, features: np.ndarray, step: in
             free.add(placed)
         stamps = np.array([frame.stamp_s for frame in some])
         parts.append(submap_of(total.sums(), total.spread(), stamps, at, free.views().clear_mm))
-    return concat_submaps(parts)
+    return concat(parts)
 
 
 def surface(total: VoxelAccumulator, clear_mm: np.ndarray, poses: np.ndarray, rig: Rig) -> np.ndarray:
