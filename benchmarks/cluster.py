@@ -22,7 +22,7 @@ from avlmaps.core.progress import silence
 from avlmaps.days.merge import merge_maps
 from avlmaps.maps.build import build_map
 from avlmaps.maps.grid import GridSpec
-from avlmaps.maps.pipeline.cluster import Spread
+from avlmaps.maps.pipeline.cluster import ClusterWorkers
 from avlmaps.maps.pipeline.parts import MapPart, sum_parts
 from avlmaps.maps.pipeline.plan import BuildPlan
 from avlmaps.maps.pipeline.ray_pool import RayPool
@@ -55,7 +55,7 @@ class OneByOne:
             yield number, done
 
 
-class Weighed(Spread):
+class Weighed(ClusterWorkers):
     """Notes what adding the parts up costs."""
 
     bytes, add_s, part_mb, part_s = 0, 0.0, 0.0, 0.0
@@ -124,7 +124,7 @@ def main() -> None:
         if find_spec("ray") is not None:
             with RayPool(cores=2) as cluster:
                 shared = build_map(first(path, LENGTHS[-1]), Path(folder) / "ray", settings=SETTINGS,
-                                   workers=Spread(cluster, partial(first, path, LENGTHS[-1])))  # fmt: skip
+                                   workers=ClusterWorkers(cluster, partial(first, path, LENGTHS[-1])))  # fmt: skip
             same = "the same bits" if arrays(shared) == arrays(stored) else "OTHER BITS"
             print(f"\ntwo workers of Ray, {LENGTHS[-1]} frames: {same}")
 

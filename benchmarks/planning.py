@@ -15,7 +15,7 @@ import numpy as np  # noqa: E402
 
 from avlmaps.maps.obstacles import CellState, Obstacles  # noqa: E402
 from avlmaps.navigate.costmap import Costmap, costmap_of  # noqa: E402
-from avlmaps.navigate.planner import Planner, PlanSettings, Way  # noqa: E402
+from avlmaps.navigate.planner import PlannedPath, Planner, PlanSettings  # noqa: E402
 
 CELL_M, RADIUS_M = 0.05, 0.2
 
@@ -58,7 +58,7 @@ def ends(costmap: Costmap) -> tuple[np.ndarray, np.ndarray]:
     return costmap.middle_of(cells[0]), costmap.middle_of(cells[-1])
 
 
-def way(costmap: Costmap, places: tuple[np.ndarray, np.ndarray], settings: PlanSettings) -> Way:
+def way(costmap: Costmap, places: tuple[np.ndarray, np.ndarray], settings: PlanSettings) -> PlannedPath:
     planner = Planner(costmap, settings)
     stop = planner.stop_for(*places)
     found = planner.way(places[0], stop.xy) if stop else None

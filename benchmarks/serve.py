@@ -29,7 +29,7 @@ import numpy as np  # noqa: E402
 from avlmaps.core.camera import Pinhole, Rig  # noqa: E402
 from avlmaps.maps.build import build_map  # noqa: E402
 from avlmaps.maps.settings import BuildSettings  # noqa: E402
-from avlmaps.maps.store.manifest import Box  # noqa: E402
+from avlmaps.maps.store.manifest import MapBounds  # noqa: E402
 from avlmaps.maps.store.writer import MapContent, write_map  # noqa: E402
 from avlmaps.maps.types import HeardSounds, Keyframes, Voxels  # noqa: E402
 from avlmaps.perception.embedded.codes import features_of  # noqa: E402
@@ -93,7 +93,7 @@ def made_up_map(path: Path, voxels: int, rng: np.random.Generator) -> Path:
     sounds = _sounds(10, side_m, rng)
     counts = msgspec.structs.replace(stored.info.counts, voxels=n, keyframes=len(keyframes), sounds=len(sounds))
     lived = msgspec.structs.replace(stored.info.recording, duration_s=300.0)
-    box = Box.of(index, VOXEL_SIZE_M)
+    box = MapBounds.of(index, VOXEL_SIZE_M)
     info = msgspec.structs.replace(stored.info, counts=counts, recording=lived, bounding_box_m=box)
     clips = path.parent / "clips"
     clips.mkdir()

@@ -26,7 +26,7 @@ from avlmaps.maps.fusion.voxel_sums import VoxelSums
 from avlmaps.maps.pipeline.parts import PartInfo
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.checkpoints import save_checkpoint
-from avlmaps.maps.store.manifest import Box, Counts, MapInfo, RecordingInfo, RigInfo, Timings, UpInfo
+from avlmaps.maps.store.manifest import Counts, MapBounds, MapInfo, RecordingInfo, RigInfo, Timings, UpInfo
 from avlmaps.maps.store.writer import MapContent, write_map
 from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
 
@@ -128,7 +128,7 @@ def manifest(made_up: MapContent) -> MapInfo:
             duration_s=float(np.ptp(made_up.voxels.last_seen_s)),
         ),
         counts=Counts(frames=0, keyframes=len(made_up.keyframes), voxels=len(made_up.voxels), sounds=0),
-        bounding_box_m=Box.of(made_up.voxels.index, 0.05),
+        bounding_box_m=MapBounds.of(made_up.voxels.index, 0.05),
         timings=Timings(finished="", elapsed_s=0.0, stages_s={}),
     )
 

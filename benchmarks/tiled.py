@@ -13,7 +13,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from avlmaps.maps.store.manifest import Box
+from avlmaps.maps.store.manifest import MapBounds
 from avlmaps.maps.store.reader import StoredMap, open_stored
 from avlmaps.maps.store.writer import MapContent, write_map
 from avlmaps.maps.types import Keyframes, Voxels
@@ -114,7 +114,7 @@ def write_tiled(source: Path, out: Path, count: int, seed: int = 0) -> None:
     voxels, keyframes = tiled(stored, count, seed)
     info, structs = stored.info, msgspec.structs
     counts = structs.replace(info.counts, voxels=len(voxels), keyframes=len(keyframes))
-    box = Box.of(voxels.index, info.voxel_size_m)
+    box = MapBounds.of(voxels.index, info.voxel_size_m)
     info = structs.replace(info, counts=counts, bounding_box_m=box, build_key="")
     content = MapContent(voxels, keyframes, stored.place_state, stored.sounds, stored.path / "sounds")
     write_map(out, content, info)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from avlmaps.core.errors import AudioError, BackendError
 from avlmaps.maps.audio.change_points import frames_of_track, split_at_changes
 from avlmaps.maps.audio.events import detect_events
-from avlmaps.maps.audio.settings import ChangeSettings, HearingSettings
+from avlmaps.maps.audio.settings import HearingSettings, SoundChangeSettings
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.perception.protocols import FrameSoundEncoder, ModelCard
 from avlmaps.recordings.audio import Sound
@@ -71,7 +71,7 @@ def test_no_division_is_better_than_the_one_that_is_found(
     rng = np.random.default_rng(seed)
     kind = np.sort(rng.integers(0, changes + 1, count))
     rows = unit(rng.standard_normal((changes + 1, 3))[kind] + 0.2 * rng.standard_normal((count, 3)))
-    chosen = ChangeSettings(change_s=shortest * HOP_S, max_length_s=longest * HOP_S + 1e-9)
+    chosen = SoundChangeSettings(change_s=shortest * HOP_S, max_length_s=longest * HOP_S + 1e-9)
     edges = split_at_changes(rows, HOP_S, chosen).tolist()
     assert edges[0] == 0
     assert edges[-1] == count
@@ -85,7 +85,7 @@ def test_edges_are_where_the_features_change_whatever_the_noise_on_them(lengths:
     rng = np.random.default_rng(seed)
     kinds = np.arange(len(lengths)) % 4
     rows = unit(np.eye(64)[np.repeat(kinds, lengths)] + 0.05 * rng.standard_normal((sum(lengths), 64)))
-    edges = split_at_changes(rows, HOP_S, ChangeSettings(max_length_s=60 * HOP_S))
+    edges = split_at_changes(rows, HOP_S, SoundChangeSettings(max_length_s=60 * HOP_S))
     np.testing.assert_array_equal(edges, np.cumsum([0, *lengths]))
 
 
@@ -93,7 +93,7 @@ def test_edges_are_where_the_features_change_whatever_the_noise_on_them(lengths:
 @given(seed=st.integers(0, 1000), count=st.integers(0, 700))
 def test_stretches_are_disjoint_whole_and_of_the_asked_lengths(seed: int, count: int) -> None:
     rows = unit(np.random.default_rng(seed).standard_normal((count, 6)))
-    edges = split_at_changes(rows, HOP_S, ChangeSettings(change_s=0.2, max_length_s=2.0))
+    edges = split_at_changes(rows, HOP_S, SoundChangeSettings(change_s=0.2, max_length_s=2.0))
     assert edges[0] == 0
     assert edges[-1] == count
     if count > 5:
@@ -103,8 +103,8 @@ def test_stretches_are_disjoint_whole_and_of_the_asked_lengths(seed: int, count:
 
 def test_what_does_not_change_is_cut_only_because_it_is_long() -> None:
     rows = np.tile(np.eye(4, dtype=np.float32)[0], (250, 1))
-    assert len(split_at_changes(rows, HOP_S, ChangeSettings(max_length_s=20.0))) == 2
-    assert len(split_at_changes(rows, HOP_S, ChangeSettings(max_length_s=5.0))) == 3
+    assert len(split_at_changes(rows, HOP_S, SoundChangeSettings(max_length_s=20.0))) == 2
+    assert len(split_at_changes(rows, HOP_S, SoundChangeSettings(max_length_s=5.0))) == 3
 
 
 def test_a_track_is_divided_by_its_sounds_loud_or_hardly_audible(tmp_path: Path) -> None:
@@ -174,9 +174,9 @@ def test_an_encoder_that_breaks_its_promise_is_named(tmp_path: Path) -> None:
 
 def test_settings_that_make_no_sense_are_told_and_old_maps_lack_them() -> None:
     with pytest.raises(AudioError, match=r"hearing.changes.change_s is 0.0; choose a positive number\."):
-        ChangeSettings(change_s=0.0)
+        SoundChangeSettings(change_s=0.0)
     with pytest.raises(AudioError, match=r"max_length_s is 0.3; choose at least twice change_s \(0.2\)\."):
-        ChangeSettings(max_length_s=0.3)
+        SoundChangeSettings(max_length_s=0.3)
     written = msgspec.to_builtins(BuildSettings())
     del written["hearing"]["cut"], written["hearing"]["changes"]
     assert msgspec.convert(written, BuildSettings) == BuildSettings()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from avlmaps.maps.store.edits import EDITS, Edit, Spot, append_edit, read_edits
+from avlmaps.maps.store.edits import EDITS, Edit, EditedSpot, append_edit, read_edits
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.view.on_page import MapOnPage
 
@@ -52,7 +52,7 @@ def test_edits_are_there_in_another_build_of_the_map(home: Path, walk: Path, run
     (row,) = json.loads(run("edit", home, "--list", "--json")[1])["edits"]
     assert row["state"] == "applied"
     assert json.loads(run("query", home, "my pad", "--json")[1])["found"]
-    nowhere = Spot(name="sofa", middle=(90.0, 0.0, 0.0), size=(1.0, 1.0, 1.0))
+    nowhere = EditedSpot(name="sofa", middle=(90.0, 0.0, 0.0), size=(1.0, 1.0, 1.0))
     append_edit(home, Edit.new("rename", [nowhere], name="couch", world=read_edits(home)[0].world))
     told = json.loads(run("info", home, "--json")[1])
     assert told["edits"] == 2
@@ -60,7 +60,7 @@ def test_edits_are_there_in_another_build_of_the_map(home: Path, walk: Path, run
 
 
 def test_people_who_edit_at_once_lose_nothing(tmp_path: Path) -> None:
-    edits = [Edit.new("pin", [Spot(middle=(float(k), 0.0, 0.0))], name=f"place {k}") for k in range(12)]
+    edits = [Edit.new("pin", [EditedSpot(middle=(float(k), 0.0, 0.0))], name=f"place {k}") for k in range(12)]
     with ThreadPoolExecutor(4) as pool:
         list(pool.map(lambda edit: append_edit(tmp_path, edit), edits))
     assert sorted(edit.name for edit in read_edits(tmp_path)) == sorted(edit.name for edit in edits)

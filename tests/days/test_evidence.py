@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.camera import Pinhole
-from avlmaps.days.evidence import Day, DayViews, Verdict, VoxelEvidence, seen_again, seen_before
+from avlmaps.days.evidence import Day, DayVerdict, DayViews, VoxelEvidence, seen_again, seen_before
 from avlmaps.days.settings import ChangeSettings
 from avlmaps.days.surfaces import Occupied
 from avlmaps.maps.grid import GridSpec
@@ -20,7 +20,7 @@ COUNT = st.integers(0, 500)
 @given(COUNT, COUNT)
 def test_what_nobody_looked_at_is_unknown(voxels: int, rest: int) -> None:
     seen = VoxelEvidence(voxels + rest, 0, 0)
-    assert seen.p_gone(0.05, SETTINGS) == 0.5 and seen.verdict(0.05, SETTINGS) is Verdict.UNKNOWN
+    assert seen.p_gone(0.05, SETTINGS) == 0.5 and seen.verdict(0.05, SETTINGS) is DayVerdict.UNKNOWN
 
 
 @given(st.integers(1, 500), COUNT, COUNT)
@@ -32,7 +32,7 @@ def test_surface_speaks_for_a_thing_and_a_ray_against_it(voxels: int, surface: i
     assert VoxelEvidence(seen.voxels + 1, surface, through + 1).p_gone(0.05, SETTINGS) > p_gone
     # Both sides change places: the equation favours neither.
     assert VoxelEvidence(seen.voxels, through, surface).p_gone(0.05, SETTINGS) == pytest.approx(1.0 - p_gone)
-    if seen.verdict(0.05, SETTINGS) is Verdict.GONE:
+    if seen.verdict(0.05, SETTINGS) is DayVerdict.GONE:
         assert through > surface and seen.coverage() >= SETTINGS.least_coverage
 
 
@@ -74,12 +74,12 @@ def day(seen: DayViews, index: np.ndarray = NOTHING) -> Day:
 def test_rays_through_the_place_from_where_it_was_seen_are_evidence() -> None:
     before = [views(FRONT, MIDDLE, 1.9)]
     seen = seen_again(BOX, GRID, before, HERE, day(views(FRONT, MIDDLE, 4.0)), SETTINGS)
-    assert seen.through == len(BOX) and seen.verdict(GRID.voxel_size_m, SETTINGS) is Verdict.GONE
+    assert seen.through == len(BOX) and seen.verdict(GRID.voxel_size_m, SETTINGS) is DayVerdict.GONE
 
 
 def test_rays_from_the_other_side_prove_nothing() -> None:
     seen = seen_again(BOX, GRID, [views(FRONT, MIDDLE, 1.9)], HERE, day(views(BACK, MIDDLE, 4.0)), SETTINGS)
-    assert seen.through == 0 and seen.verdict(GRID.voxel_size_m, SETTINGS) is Verdict.UNKNOWN
+    assert seen.through == 0 and seen.verdict(GRID.voxel_size_m, SETTINGS) is DayVerdict.UNKNOWN
 
 
 @pytest.mark.parametrize("free_m", [0.0, 1.0, 1.5])
@@ -96,15 +96,15 @@ def test_one_view_is_not_enough() -> None:
 def test_surface_in_its_place_keeps_it() -> None:
     before, now = [views(FRONT, MIDDLE, 1.9)], views(FRONT, MIDDLE, 4.0)
     seen = seen_again(BOX, GRID, before, HERE, day(now, BOX + np.array([1, 0, 0], np.int32)), SETTINGS)
-    assert seen.surface == len(BOX) and seen.verdict(GRID.voxel_size_m, SETTINGS) is Verdict.THERE
+    assert seen.surface == len(BOX) and seen.verdict(GRID.voxel_size_m, SETTINGS) is DayVerdict.THERE
 
 
 def test_a_place_seen_before_only_where_somebody_looked() -> None:
     none, through, short = Occupied.of(NOTHING, GRID), views(FRONT, MIDDLE, 4.0), views(FRONT, MIDDLE, 1.0)
     now = day(through, BOX)
-    assert seen_before(BOX, GRID, [through], none, now, SETTINGS) is Verdict.GONE
-    assert seen_before(BOX, GRID, [short], none, now, SETTINGS) is Verdict.UNKNOWN
-    assert seen_before(BOX, GRID, [through], HERE, now, SETTINGS) is Verdict.THERE
+    assert seen_before(BOX, GRID, [through], none, now, SETTINGS) is DayVerdict.GONE
+    assert seen_before(BOX, GRID, [short], none, now, SETTINGS) is DayVerdict.UNKNOWN
+    assert seen_before(BOX, GRID, [through], HERE, now, SETTINGS) is DayVerdict.THERE
 
 
 def test_the_floor_under_a_box_is_no_box() -> None:
@@ -114,6 +114,6 @@ def test_the_floor_under_a_box_is_no_box() -> None:
     both, before = np.concatenate([flat, floor]), [views(FRONT, MIDDLE, 1.9)]
     known = Occupied.of(both, GRID)
     empty = seen_again(flat, GRID, before, known, day(views(FRONT, MIDDLE, 4.0), floor), SETTINGS)
-    assert empty.surface == 0 and empty.verdict(GRID.voxel_size_m, SETTINGS) is Verdict.GONE
+    assert empty.surface == 0 and empty.verdict(GRID.voxel_size_m, SETTINGS) is DayVerdict.GONE
     still = seen_again(flat, GRID, before, known, day(views(FRONT, MIDDLE, 1.8), both), SETTINGS)
-    assert still.through == 0 and still.verdict(GRID.voxel_size_m, SETTINGS) is Verdict.THERE
+    assert still.through == 0 and still.verdict(GRID.voxel_size_m, SETTINGS) is DayVerdict.THERE

@@ -10,7 +10,7 @@ from avlmaps.core.motion import Action, GroundPose
 from avlmaps.maps.grid import GridSpec
 from avlmaps.navigate.driver import Arrival
 from avlmaps.navigate.footprint import Outline
-from avlmaps.navigate.instances import Thing
+from avlmaps.navigate.instances import Destination
 from avlmaps.navigate.skills import Robot, RobotSettings
 from avlmaps.query.voxel_space import Space
 
@@ -65,18 +65,20 @@ class KnownThings:
 
     def __init__(self, **polygons: np.ndarray) -> None:
         self.things = {
-            name: Thing(name, Outline(np.asarray(corners, float)), np.append(np.mean(corners, axis=0), 0.4), solid=True)
+            name: Destination(
+                name, Outline(np.asarray(corners, float)), np.append(np.mean(corners, axis=0), 0.4), solid=True
+            )
             for name, corners in polygons.items()
         }
         self.notes: list[str] = []
 
-    def best(self, target: Any) -> Thing:
+    def best(self, target: Any) -> Destination:
         return self.things[target]
 
-    def referent(self, target: Any, here: np.ndarray) -> Thing:
+    def referent(self, target: Any, here: np.ndarray) -> Destination:
         return self.things[target]
 
-    def pair(self, a: Any, b: Any, here: np.ndarray) -> tuple[Thing, Thing]:
+    def pair(self, a: Any, b: Any, here: np.ndarray) -> tuple[Destination, Destination]:
         return self.things[a], self.things[b]
 
 

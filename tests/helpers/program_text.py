@@ -44,7 +44,7 @@ def _lines(block: tuple[syntax.Statement, ...], indent: str) -> list[str]:
     return lines
 
 
-def _target(target: syntax.Target) -> str:
+def _target(target: syntax.AssignmentTarget) -> str:
     return ", ".join(target.names) + ("," if target.unpacks and len(target.names) == 1 else "")
 
 

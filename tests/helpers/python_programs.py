@@ -69,11 +69,11 @@ def _if(node: ast.If) -> own.If:
     return own.If(tuple(branches), _block(node.orelse), 0)
 
 
-def _target(node: ast.expr) -> own.Target:
+def _target(node: ast.expr) -> own.AssignmentTarget:
     if isinstance(node, ast.Name):
-        return own.Target((node.id,), unpacks=False)
+        return own.AssignmentTarget((node.id,), unpacks=False)
     assert isinstance(node, ast.Tuple)
-    return own.Target(tuple(each.id for each in node.elts if isinstance(each, ast.Name)), unpacks=True)
+    return own.AssignmentTarget(tuple(each.id for each in node.elts if isinstance(each, ast.Name)), unpacks=True)
 
 
 def _part(node: ast.expr) -> own.Expression:  # noqa: C901 -- one case for each form

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from avlmaps.language.commands import read_command
-from avlmaps.language.intents import Reason, Refuse
+from avlmaps.language.intents import RefusalReason, Refuse
 from avlmaps.language.learned.accounted import has_strange_words
 from avlmaps.language.lexer import tokenise
 from avlmaps.language.verbalise import verbalise
@@ -36,7 +36,7 @@ def test_an_order_at_a_time_or_a_sign_does_not_drive(when: str, order: str, firs
 def test_nothing_alive_is_driven_over(over: str, whom: str) -> None:
     stops = read_command(f"drive {over} {whom} to the door").stops
     assert isinstance(stops, Refuse)
-    assert stops.reason in (Reason.HARM, Reason.FLYING)
+    assert stops.reason in (RefusalReason.HARM, RefusalReason.FLYING)
 
 
 @FEW

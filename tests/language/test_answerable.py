@@ -10,7 +10,7 @@ from avlmaps.core.errors import QueryError
 from avlmaps.language.commands import read_command
 from avlmaps.language.list_questions import said_alternatives
 from avlmaps.language.questions import read_question
-from avlmaps.language.sentence import Given
+from avlmaps.language.sentence import Attachments
 from avlmaps_sim.bench.language import Judged, judge, read_list
 
 LISTS = Path(__file__).parent / "commands"
@@ -91,7 +91,7 @@ def test_a_purpose_keeps_its_place(place: str) -> None:
 
 
 def test_the_till_is_no_until() -> None:
-    (target,) = read_question("the bin near the till", Given(knows=lambda _: True)).inquiry.of
+    (target,) = read_question("the bin near the till", Attachments(knows=lambda _: True)).inquiry.of
     assert [near.name for near in target.near] == ["till"]
 
 

@@ -32,7 +32,7 @@ from avlmaps.core.errors import LanguageError
 from avlmaps.core.extras import install_command
 from avlmaps.language.chat import endpoint
 from avlmaps.language.chat.endpoint import Endpoint
-from avlmaps.language.chat.replay import Message, Request
+from avlmaps.language.chat.replay import ChatRequest, Message
 from avlmaps.language.chat.settings import ChatSettings
 
 KEY = "sk-test-8c1f0e77a2"
@@ -61,9 +61,11 @@ def _settings(server: ChatServer, **changes: Any) -> ChatSettings:
     return ChatSettings(**{"base_url": server.url, "timeout_s": 60.0, **changes})
 
 
-def _request(model: str = "test-model", **changes: Any) -> Request:
+def _request(model: str = "test-model", **changes: Any) -> ChatRequest:
     messages = (Message("system", "You write programs."), Message("user", "Command: “go”"))
-    return Request(**{"model": model, "messages": messages, "temperature": 0.0, "seed": 7, "max_tokens": 99, **changes})
+    return ChatRequest(
+        **{"model": model, "messages": messages, "temperature": 0.0, "seed": 7, "max_tokens": 99, **changes}
+    )
 
 
 def _sentence(server: ChatServer, **changes: Any) -> str:

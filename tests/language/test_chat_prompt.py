@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from program_equality import same_program
 
 from avlmaps.core.errors import LanguageError
-from avlmaps.language.chat.answer import Answer, program_text
+from avlmaps.language.chat.answer import ModelReply, program_text
 from avlmaps.language.chat.prompt import (
     MOST_COMMAND_CHARACTERS,
     command_message,
@@ -108,7 +108,7 @@ def test_the_examples_of_what_cannot_be_done_are_read_as_such() -> None:
     assert without
     for each in without:
         with pytest.raises(LanguageError, match="cannot be done"):
-            program_text(Answer(program_message(each.program)))
+            program_text(ModelReply(program_message(each.program)))
 
 
 @given(st.text(min_size=1, max_size=MOST_COMMAND_CHARACTERS))

@@ -7,15 +7,17 @@ from typing import Any
 import pytest
 
 from avlmaps.core.errors import LanguageError
-from avlmaps.language.chat.answer import Answer
-from avlmaps.language.chat.replay import Message, Replay, Request
+from avlmaps.language.chat.answer import ModelReply
+from avlmaps.language.chat.replay import ChatRequest, Message, Replay
 
-TURN = Answer("robot.turn(90)", tokens=(3, 4), model="served")
+TURN = ModelReply("robot.turn(90)", tokens=(3, 4), model="served")
 
 
-def _request(asked: str = "Command: “turn”", prompt: str = "You write.", **changes: Any) -> Request:
+def _request(asked: str = "Command: “turn”", prompt: str = "You write.", **changes: Any) -> ChatRequest:
     messages = (Message("system", prompt), Message("user", asked))
-    return Request(**{"model": "m", "messages": messages, "temperature": 0.0, "seed": 0, "max_tokens": 9, **changes})
+    return ChatRequest(
+        **{"model": "m", "messages": messages, "temperature": 0.0, "seed": 0, "max_tokens": 9, **changes}
+    )
 
 
 @pytest.fixture
@@ -23,7 +25,7 @@ def path(tmp_path: Path) -> Path:
     return tmp_path / "chat.jsonl"
 
 
-def _recorded(path: Path, *exchanges: tuple[Request, Answer]) -> Replay:
+def _recorded(path: Path, *exchanges: tuple[ChatRequest, ModelReply]) -> Replay:
     recording = Replay.open(path)
     assert recording.recording
     for request, answer in exchanges:
@@ -34,7 +36,7 @@ def _recorded(path: Path, *exchanges: tuple[Request, Answer]) -> Replay:
 
 
 def test_what_was_recorded_is_answered(path: Path) -> None:
-    other = Answer("", refusal="No.\n\x1b", finish=None, tool_calls=2)
+    other = ModelReply("", refusal="No.\n\x1b", finish=None, tool_calls=2)
     replay = _recorded(path, (_request(), TURN), (_request("other"), other))
     assert replay.answer(_request("other")) == other
     assert replay.answer(_request()) == TURN
@@ -43,7 +45,7 @@ def test_what_was_recorded_is_answered(path: Path) -> None:
 
 
 def test_what_was_asked_twice_is_answered_in_order(path: Path) -> None:
-    replay = _recorded(path, (_request(), TURN), (_request(), Answer("second")))
+    replay = _recorded(path, (_request(), TURN), (_request(), ModelReply("second")))
     assert [replay.answer(_request()).content for _ in range(3)] == [TURN.content, "second", "second"]
 
 
@@ -58,7 +60,7 @@ def test_what_was_asked_twice_is_answered_in_order(path: Path) -> None:
         (_request(max_tokens=10), "temperature, seed or most tokens, are others"),
     ],
 )
-def test_what_was_not_recorded_is_refused_and_the_difference_named(path: Path, request_: Request, why: str) -> None:
+def test_what_was_not_recorded_is_refused_and_the_difference_named(path: Path, request_: ChatRequest, why: str) -> None:
     replay = _recorded(path, (_request(), TURN))
     with pytest.raises(LanguageError) as told:
         replay.answer(request_)

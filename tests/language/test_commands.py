@@ -17,7 +17,7 @@ from avlmaps.language.learned_translator import LearnedTranslator, UnclearError,
 from avlmaps.language.program import parse_program
 from avlmaps.language.program.writing import write_program
 from avlmaps.language.questions import read_question
-from avlmaps.language.sentence import Given
+from avlmaps.language.sentence import Attachments
 from avlmaps.language.translator import Translator
 from avlmaps.language.verbalise import verbalise
 from avlmaps_sim.bench.language import counts, judge, read_list
@@ -102,7 +102,7 @@ def test_a_mended_word_is_said() -> None:
 
 
 def test_an_open_vocabulary_takes_any_noun() -> None:
-    read = read_command("go to the frobnicator", Given(knows=lambda _: True))
+    read = read_command("go to the frobnicator", Attachments(knows=lambda _: True))
     assert read.intents == (Go(Target(TargetKind.OBJECT, "frobnicator")),)
 
 

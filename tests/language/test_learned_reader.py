@@ -23,7 +23,7 @@ from avlmaps.language.intents import (
     Inquiry,
     Intent,
     Move,
-    Reason,
+    RefusalReason,
     Refuse,
     Repeat,
     Return,
@@ -40,7 +40,7 @@ from avlmaps.language.intents import (
 from avlmaps.language.learned.decision import DANGERS, Weighed, decided, is_doubtful, is_same
 from avlmaps.language.learned.features import columns, features
 from avlmaps.language.learned.grammar import SYMBOLS
-from avlmaps.language.learned.limits import Limits
+from avlmaps.language.learned.limits import ReadingLimits
 from avlmaps.language.learned.linear import (
     MalformedError,
     Pointable,
@@ -53,7 +53,7 @@ from avlmaps.language.learned.linear import (
 from avlmaps.language.learned.name_resolver import NameResolver, weighed
 from avlmaps.language.learned.reader import LearnedReader, learned_reader
 from avlmaps.language.learned_translator import LearnedTranslator, explanation
-from avlmaps.language.sentence import Given, Sentence
+from avlmaps.language.sentence import Attachments, Sentence
 from avlmaps.language.word_classes import load_word_classes
 from avlmaps_sim.bench.language import judge, judge_intents, judge_question, read_list
 
@@ -197,9 +197,11 @@ driving = st.one_of(
 )  # fmt: skip
 drives = st.lists(driving, min_size=1, max_size=3).map(tuple)
 dangers = st.sampled_from(DANGERS).map(lambda reason: (Refuse(reason, "no"),))
-stops = st.one_of(st.sampled_from(list(Reason)).map(lambda reason: (Refuse(reason, "no"),)), st.just((Clarify("?"),)))
+stops = st.one_of(
+    st.sampled_from(list(RefusalReason)).map(lambda reason: (Refuse(reason, "no"),)), st.just((Clarify("?"),))
+)
 probabilities = st.floats(0.0, 1.0)
-limits = st.builds(Limits, *(st.floats(0.0, 1.0) for _ in range(5)))
+limits = st.builds(ReadingLimits, *(st.floats(0.0, 1.0) for _ in range(5)))
 
 
 def stopped(intents: tuple[Intent, ...]) -> bool:
@@ -207,14 +209,16 @@ def stopped(intents: tuple[Intent, ...]) -> bool:
 
 
 @given(first=st.one_of(drives, stops), second=dangers, likely=probabilities, limits=limits)
-def test_a_likely_danger_stops_whatever_is_likelier(first: Any, second: Any, likely: float, limits: Limits) -> None:
+def test_a_likely_danger_stops_whatever_is_likelier(
+    first: Any, second: Any, likely: float, limits: ReadingLimits
+) -> None:
     answer = decided([Weighed(first, 1.0), Weighed(second, likely)], limits)
     if likely >= limits.danger:
         assert stopped(answer.intents)
 
 
 @given(reading=drives, likely=probabilities, limits=limits, doubtful=st.booleans())
-def test_an_unlikely_reading_never_drives(reading: Any, likely: float, limits: Limits, doubtful: bool) -> None:
+def test_an_unlikely_reading_never_drives(reading: Any, likely: float, limits: ReadingLimits, doubtful: bool) -> None:
     answer = decided([Weighed(reading, likely, doubtful)], limits)
     least = limits.doubtful if doubtful else limits.command
     assert stopped(answer.intents) == (likely < least)
@@ -224,7 +228,7 @@ def test_an_unlikely_reading_never_drives(reading: Any, likely: float, limits: L
 
 @given(first=drives, second=drives, likely=st.floats(0.1, 0.4))
 def test_two_likely_readings_are_a_question_with_choices(first: Any, second: Any, likely: float) -> None:
-    limits = Limits(command=0.9, doubtful=0.9)
+    limits = ReadingLimits(command=0.9, doubtful=0.9)
     answer = decided([Weighed(first, 0.4), Weighed(second, likely)], limits)
     assert isinstance(answer.intents[0], Clarify)
     assert len(answer.intents[0].choices) in (1, 2)
@@ -233,7 +237,7 @@ def test_two_likely_readings_are_a_question_with_choices(first: Any, second: Any
 @given(first=st.lists(names.map(Go), min_size=1, max_size=3).map(tuple), likely=st.floats(0.3, 0.5))
 def test_readings_that_end_at_the_same_places_count_together(first: Any, likely: float) -> None:
     second = (*first, Wait(5.0))
-    answer = decided([Weighed(first, likely), Weighed(second, likely)], Limits(command=2 * likely, doubtful=1.0))
+    answer = decided([Weighed(first, likely), Weighed(second, likely)], ReadingLimits(command=2 * likely, doubtful=1.0))
     assert is_same(first, second)
     assert answer.intents == first
 
@@ -251,7 +255,7 @@ def test_a_name_that_nothing_knows_is_a_question() -> None:
     for read in learned_reader().command(sentence.tokens):
         checked = weighed(read, NameResolver(sentence))
         assert stopped(checked.intents) or not any(target.name for target in targets_of(checked.intents))
-    known = Sentence("go to the frobnicator", Given(knows=lambda _: True))
+    known = Sentence("go to the frobnicator", Attachments(knows=lambda _: True))
     assert any(
         not stopped(weighed(read, NameResolver(known)).intents) for read in learned_reader().command(known.tokens)
     )
@@ -264,7 +268,7 @@ def test_the_explanation_shows_readings_and_what_decided() -> None:
 
 
 def test_a_file_that_came_along_is_what_this_photo_means() -> None:
-    read = read_command("go to where this photo was taken", Given(image="view.png"))
+    read = read_command("go to where this photo was taken", Attachments(image="view.png"))
     assert read.intents == (Go(Target(TargetKind.IMAGE, "view.png")),)
     assert stopped(read_command("go to where this photo was taken").intents)
 
@@ -287,7 +291,7 @@ def held_out() -> list[Any]:
 
 def alone(row: Any, reader: LearnedReader) -> str:
     """Return what becomes of a row where its likeliest reading counts."""
-    sentence = Sentence(row["say"], Given(row.get("image"), row.get("clip"), lambda _: True))
+    sentence = Sentence(row["say"], Attachments(row.get("image"), row.get("clip"), lambda _: True))
     if "question" in row:
         reads = reader.question(sentence.tokens)
         found = reads[0].meaning if reads else None
@@ -324,5 +328,5 @@ def test_the_network_alone_reads_most_of_them_and_random_weights_do_not(monkeypa
 
 
 def test_the_whole_reader_takes_the_words_of_a_map() -> None:
-    read = read_command("go to the frobnicator", Given(knows=lambda _: True))
+    read = read_command("go to the frobnicator", Attachments(knows=lambda _: True))
     assert read.intents == (Go(Target(TargetKind.OBJECT, "frobnicator")),)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from avlmaps.core.errors import AvlmapsError, GoalNotFoundError, NavigationError, ProgramError, QueryError
 from avlmaps.language.program import SKILLS, Budget, Step, Trace, parse_program, run_program
 from avlmaps.language.program.values import is_among
-from avlmaps.language.program.vocabulary import Picture, Place, Vocabulary
+from avlmaps.language.program.vocabulary import Picture, Place, RobotSkills
 from helpers.recording_robot import RecordedHeat, RecordingRobot
 
 
@@ -122,7 +122,7 @@ def test_a_list_from_a_skill_is_the_programs_own() -> None:
 def test_what_is_not_a_vocabulary_is_not_run() -> None:
     with pytest.raises(TypeError):
         run_program(parse_program("turn(1)"), object())  # type: ignore[arg-type]
-    assert isinstance(RecordingRobot(), Vocabulary)
+    assert isinstance(RecordingRobot(), RobotSkills)
 
 
 # ---- budgets

@@ -13,17 +13,17 @@ from avlmaps.language.program import SKILLS, parse_program, run_program, skill_l
 from avlmaps.language.program.calls import BUILTINS
 from avlmaps.language.program.table import skills_of
 from avlmaps.language.program.value_types import ValueType
-from avlmaps.language.program.vocabulary import Vocabulary
+from avlmaps.language.program.vocabulary import RobotSkills
 from helpers.recording_robot import RecordingRobot
 
 PAGE = Path(__file__).parents[2] / "docs" / "programs.md"
 
 
 def test_every_skill_of_the_vocabulary_is_in_the_table_and_nothing_else() -> None:
-    declared = [name for name in vars(Vocabulary) if not name.startswith("_")]
+    declared = [name for name in vars(RobotSkills) if not name.startswith("_")]
     assert list(SKILLS) == declared
     for name, skill in SKILLS.items():
-        method = getattr(Vocabulary, name)
+        method = getattr(RobotSkills, name)
         assert [each.name for each in skill.parameters] == list(inspect.signature(method).parameters)[1:]
         assert skill.doc == " ".join(inspect.getdoc(method).split())  # type: ignore[union-attr]
 

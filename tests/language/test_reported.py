@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from avlmaps.language.commands import read_command
 from avlmaps.language.intents import Clarify, Turn
-from avlmaps.language.sentence import Given
+from avlmaps.language.sentence import Attachments
 from avlmaps.language.verbalise import verbalise
 
 FEW = settings(max_examples=10, deadline=None)
@@ -85,10 +85,10 @@ def test_decimals_of_turns_have_either_point() -> None:
 @pytest.mark.parametrize("own", ["stop", "left", "halt", "it", "5 m", "go"])
 def test_no_name_of_a_map_changes_an_order(own: str) -> None:
     for command in ("stop", "halt", "go left 5 m", "turn left", "go to it", "move forward 5 m"):
-        assert read_command(command, Given(own=((own, False),))).intents == read_command(command).intents
+        assert read_command(command, Attachments(own=((own, False),))).intents == read_command(command).intents
 
 
 def test_a_question_back_has_the_names_of_the_map() -> None:
-    read = read_command("go to the workbench or the gizmo", Given(own=(("workbench", False), ("gizmo", False))))
+    read = read_command("go to the workbench or the gizmo", Attachments(own=(("workbench", False), ("gizmo", False))))
     said = verbalise(read.intents)
     assert "lamp" not in said and "clock" not in said

@@ -10,10 +10,10 @@ from avlmaps.language.learned_translator import LearnedTranslator
 from avlmaps.language.list_questions import Listed, read_list
 from avlmaps.language.program import parse_program
 from avlmaps.language.questions import read_question
-from avlmaps.language.sentence import Given
+from avlmaps.language.sentence import Attachments
 from avlmaps.language.source_words import asks_for_source
 
-WORDS = Given(at=None)
+WORDS = Attachments(at=None)
 ORIGIN = (
     "where does the barking come from?", "Where did that noise come from", "where is the beeping coming from?",
     "from where did the doorbell ring?", "where do you hear the barking from?", "what made that noise?",
@@ -42,7 +42,7 @@ def test_others_ask_for_no_origin(sentence: str) -> None:
     assert not asks_for_source(sentence)
 
 
-def places(command: str, given: Given = WORDS) -> list[HeardAt | None]:
+def places(command: str, given: Attachments = WORDS) -> list[HeardAt | None]:
     """Return the place of each sound of a command, in the order of the words."""
     read = read_command(command, given)
     assert read.stops is None, read.stops
@@ -151,18 +151,19 @@ def test_each_part_of_a_command_has_its_own_place(command: str, each: list[Heard
 
 def test_a_place_that_is_chosen_for_all_wins() -> None:
     asks, asks_not = "go to where the barking comes from", "go to where you heard the barking"
-    assert places(asks, Given(at="robot")) == places(asks, Given()) == [None]
-    assert places(asks_not, Given(at="source")) == ["source"]
-    assert "at=" not in LearnedTranslator(Given(at="robot")).program_for(asks).program
+    assert places(asks, Attachments(at="robot")) == places(asks, Attachments()) == [None]
+    assert places(asks_not, Attachments(at="source")) == ["source"]
+    assert "at=" not in LearnedTranslator(Attachments(at="robot")).program_for(asks).program
 
 
 def test_without_sources_it_is_the_robots_place_and_the_plan_says_so() -> None:
     asks = "go to where the barking comes from"
-    plan = LearnedTranslator(Given(at=None, no_sources=lambda: "The place is the robot's.")).program_for(asks)
+    plan = LearnedTranslator(Attachments(at=None, no_sources=lambda: "The place is the robot's.")).program_for(asks)
     assert plan.plan == "I will go to where barking was heard." and "at=" not in plan.program
     assert plan.notes == ("The place is the robot's.",)
     assert (
-        LearnedTranslator(Given(at=None, no_sources=lambda: "-")).program_for("go to the sound of barking").notes == ()
+        LearnedTranslator(Attachments(at=None, no_sources=lambda: "-")).program_for("go to the sound of barking").notes
+        == ()
     )
 
 

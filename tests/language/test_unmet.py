@@ -12,19 +12,19 @@ from avlmaps.language.intents import (
     Go,
     Move,
     Pick,
-    Reason,
+    RefusalReason,
     Refuse,
     Repeat,
     Target,
     TargetKind,
     Turn,
+    TurnSense,
     VisitEach,
     Wait,
-    Way,
 )  # fmt: skip
 from avlmaps.language.learned_translator import command_to_program
 from avlmaps.language.questions import read_question
-from avlmaps.language.sentence import Given, Sentence
+from avlmaps.language.sentence import Attachments, Sentence
 from avlmaps.language.verbalise import verbalise
 
 THINGS = ("chair", "sofa", "table", "window", "fridge", "bed", "lamp", "sink")
@@ -51,7 +51,7 @@ def intents(command: str) -> tuple[object, ...]:
     return read_command(command).intents
 
 
-def stops(command: str, given: Given | None = None) -> Command:
+def stops(command: str, given: Attachments | None = None) -> Command:
     """Return a reading that does not move the robot."""
     read = read_command(command, given)
     assert read.stops is not None, f"{command!r} drives: {verbalise(read.intents)}"
@@ -126,7 +126,7 @@ def test_a_danger_is_refused(command: str) -> None:
     "go to the kitchen as fast as you can", "go to the charging station as fast as you can",
 ])  # fmt: skip
 def test_what_can_be_passed_is_no_danger(command: str) -> None:
-    assert read_command(command).stops != Refuse(Reason.HARM)
+    assert read_command(command).stops != Refuse(RefusalReason.HARM)
 
 
 @pytest.mark.parametrize(
@@ -180,7 +180,7 @@ def test_what_is_said_of_the_robot_is_said_to_it(form: str, thing: str) -> None:
 
 
 def test_a_thing_that_others_carry_is_not_the_robot() -> None:
-    assert intents("bring the cup to the table") == (Refuse(Reason.MANIPULATION),)
+    assert intents("bring the cup to the table") == (Refuse(RefusalReason.MANIPULATION),)
 
 
 @FEW
@@ -225,12 +225,12 @@ def test_a_loop_goes_round_as_often_as_it_says(times: int, head: str) -> None:
 
 @pytest.mark.parametrize(
     ("said", "way"),
-    [("clockwise", Way.CLOCKWISE), ("cw", Way.CLOCKWISE), ("counterclockwise", Way.COUNTERCLOCKWISE),
-     ("anti-clockwise", Way.COUNTERCLOCKWISE), ("counter clockwise", Way.COUNTERCLOCKWISE),
-     ("clock wise", Way.CLOCKWISE),
-     ("", Way.ANY)],
+    [("clockwise", TurnSense.CLOCKWISE), ("cw", TurnSense.CLOCKWISE), ("counterclockwise", TurnSense.COUNTERCLOCKWISE),
+     ("anti-clockwise", TurnSense.COUNTERCLOCKWISE), ("counter clockwise", TurnSense.COUNTERCLOCKWISE),
+     ("clock wise", TurnSense.CLOCKWISE),
+     ("", TurnSense.ANY)],
 )  # fmt: skip
-def test_a_circle_runs_the_way_round_that_is_said(said: str, way: Way) -> None:
+def test_a_circle_runs_the_way_round_that_is_said(said: str, way: TurnSense) -> None:
     assert intents(f"go around the table {said}") == (Circle(Target(TargetKind.OBJECT, "table"), way=way),)
 
 
@@ -280,12 +280,12 @@ def test_amounts_behind_a_plain_command_change_nothing_else() -> None:
 )  # fmt: skip
 def test_a_question_that_turns_round_is_not_answered_half(sentence: str) -> None:
     with pytest.raises(QueryError):
-        read_question(sentence, Given(knows=lambda _: True))
+        read_question(sentence, Attachments(knows=lambda _: True))
 
 
 def test_contexts_of_different_kinds_are_all_kept() -> None:
     sentence = "the chair near the sound of dog barking and the area of the kitchen and the image ./a.png"
-    (target,) = read_question(sentence, Given(knows=lambda _: True)).inquiry.of
+    (target,) = read_question(sentence, Attachments(knows=lambda _: True)).inquiry.of
     assert {str(one.kind) for one in target.near} == {"sound", "area", "image"}
 
 
@@ -341,7 +341,7 @@ def test_manners_are_no_condition(command: str) -> None:
 def test_outside_is_not_inside(form: str, room: str) -> None:
     stops(form.format(room))
     with pytest.raises(QueryError, match="outside"):
-        read_question(f"where is the chair outside the {room}", Given(knows=lambda _: True))
+        read_question(f"where is the chair outside the {room}", Attachments(knows=lambda _: True))
 
 
 @FEW
@@ -398,7 +398,7 @@ def test_a_label_of_a_sound_is_a_sound() -> None:
 @pytest.mark.parametrize("said", ["status of the stove", "the state of the stove", "battery level", "colour of walls"])
 def test_what_a_map_does_not_hold_is_not_answered(said: str) -> None:
     with pytest.raises(QueryError):
-        read_question(said, Given(knows=lambda _: True))
+        read_question(said, Attachments(knows=lambda _: True))
 
 
 SIXTEENTHS = ("north", "north north east", "north east", "east north east", "east", "east south east", "south east")

@@ -12,7 +12,7 @@ import pytest
 from live_frames import ENCODERS, UP, add, frame, recorded, wait_for, within
 from starlette.testclient import TestClient
 
-from avlmaps.cli.live_serving import Drive, LiveSource
+from avlmaps.cli.live_serving import LiveFeed, LiveSource
 from avlmaps.live.live_map import LiveMap
 from avlmaps.live.settings import LiveSettings
 from avlmaps.maps.store.reader import open_stored
@@ -57,7 +57,7 @@ def test_a_drive_that_fails_says_so_and_raises_where_it_is_waited_for(
     def fails(over: object) -> None:
         raise ZeroDivisionError("nothing is left")
 
-    drive = Drive(live, fails)
+    drive = LiveFeed(live, fails)
     wait_for(lambda: drive.has_ended)
     assert "no frame comes any more; stop with Ctrl-C. nothing is left" in capsys.readouterr().err
     with pytest.raises(ZeroDivisionError):

@@ -21,7 +21,7 @@ from avlmaps.maps.fusion.free_space import (
     smear_reach,
 )
 from avlmaps.maps.fusion.sensor import KINECT, NONE, PERFECT, SensorModel
-from avlmaps.maps.fusion.voxel_sums import Evidence
+from avlmaps.maps.fusion.voxel_sums import VoxelViews
 from avlmaps.maps.grid import GridSpec
 from avlmaps.recordings.types import Frame
 
@@ -48,7 +48,7 @@ def views_of(frames, sensor=PERFECT):
 def evidence_of(index, views=1, sharp=256, hits=1):
     index = np.asarray(index, np.int32).reshape(-1, 3)
     shape = len(index)
-    return Evidence(
+    return VoxelViews(
         index,
         np.array(np.broadcast_to(hits, shape), np.int64),
         np.array(np.broadcast_to(views, shape), np.int32),

@@ -17,8 +17,8 @@ from build_fakes import SETTINGS, Pixels, Walk, content_of, open_walk, register_
 from avlmaps.core.errors import AvlmapsError, BackendError, MapError, RecordingError
 from avlmaps.maps.build import build_map
 from avlmaps.maps.pipeline import cluster_jobs
-from avlmaps.maps.pipeline.cluster import Pool, Spread
-from avlmaps.maps.pipeline.cluster_jobs import Done, FuseJob, fuse_job, software
+from avlmaps.maps.pipeline.cluster import ClusterWorkers, Pool
+from avlmaps.maps.pipeline.cluster_jobs import FuseJob, JobResult, fuse_job, software
 from avlmaps.perception.encoders import Encoders
 from helpers.pool_here import Here
 
@@ -65,7 +65,7 @@ def processes() -> Iterator[Processes]:
 
 
 def build(path: Path, pool: Pool, audio: Path | None = None, slab_bytes: int = 1, **how: Any) -> dict[str, bytes]:
-    workers = Spread(pool, partial(open_walk, audio), slab_bytes=slab_bytes)
+    workers = ClusterWorkers(pool, partial(open_walk, audio), slab_bytes=slab_bytes)
     build_map(open_walk(audio), path, PROFILE, SETTINGS, workers=workers, progress=False, **how)
     return content_of(path)
 
@@ -146,7 +146,7 @@ def test_a_worker_that_dies_in_a_job_leaves_nothing_that_counts(
 def test_too_many_frames_that_cannot_be_read_stop_a_spread_build_as_they_stop_one_alone(tmp_path: Path) -> None:
     bad = (3, 4, 9, 13, 17, 18)
     said = []
-    for workers in (None, Spread(Here(), partial(open_walk, bad=bad))):
+    for workers in (None, ClusterWorkers(Here(), partial(open_walk, bad=bad))):
         with pytest.raises(RecordingError) as fault:
             build_map(
                 open_walk(bad=bad),
@@ -243,12 +243,14 @@ def test_an_encoder_that_is_an_object_cannot_travel(tmp_path: Path) -> None:
 
     encoders = Encoders.named(PROFILE, pixels=Mine())
     with pytest.raises(BackendError, match="register it as a backend that they can import"):
-        build_map(open_walk(), tmp_path / "map", encoders, SETTINGS, workers=Spread(Here(), open_walk), progress=False)
+        build_map(
+            open_walk(), tmp_path / "map", encoders, SETTINGS, workers=ClusterWorkers(Here(), open_walk), progress=False
+        )
 
 
 def test_what_went_wrong_with_a_job_keeps_its_class() -> None:
     with pytest.raises(RecordingError, match="dark"):
-        Done("here", 0.0, "RecordingError", "It is dark.").require()
+        JobResult("here", 0.0, "RecordingError", "It is dark.").require()
     with pytest.raises(MapError, match="loud"):
-        Done("here", 0.0, "AudioError", "It is loud.").require()
-    Done("here", 0.0).require()
+        JobResult("here", 0.0, "AudioError", "It is loud.").require()
+    JobResult("here", 0.0).require()

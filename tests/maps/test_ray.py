@@ -20,7 +20,7 @@ from build_fakes import SETTINGS, content_of, open_walk, register_fakes, write_b
 from avlmaps.core.errors import AvlmapsError, BackendError, MapError
 from avlmaps.days.together import build_together
 from avlmaps.maps.build import build_map
-from avlmaps.maps.pipeline.cluster import Spread
+from avlmaps.maps.pipeline.cluster import ClusterWorkers
 from avlmaps.maps.pipeline.ray_pool import RayPool
 from avlmaps.perception.encoders import encoders_of
 
@@ -57,7 +57,7 @@ def pool() -> Iterator[RayPool]:
 
 
 def build(path: Path, pool: RayPool, audio: Path, slow_s: float = 0.0) -> dict[str, bytes]:
-    workers = Spread(pool, partial(open_walk, audio, slow_s=slow_s), slab_bytes=1)
+    workers = ClusterWorkers(pool, partial(open_walk, audio, slow_s=slow_s), slab_bytes=1)
     build_map(open_walk(audio), path, PROFILE, SETTINGS, workers=workers, progress=False)
     return content_of(path)
 

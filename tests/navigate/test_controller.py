@@ -13,7 +13,7 @@ from avlmaps.core.motion import FORWARD_M, TURN_RAD, Action, GroundPose, wrap_an
 from avlmaps.navigate.controller import (
     CLOSE_M,
     ActionController,
-    Route,
+    RouteProgress,
     VelocityController,
     VelocitySettings,
     bearing,
@@ -176,7 +176,7 @@ def test_a_turn_by_velocities_comes_to_rest_at_its_heading(turn):
 
 
 def test_a_route_never_goes_back():
-    route = Route(np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 0.1), (0.0, 0.1)]))
+    route = RouteProgress(np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 0.1), (0.0, 0.1)]))
     assert route.length_m == pytest.approx(2.1)
     far = [route.advance(GroundPose(x, 0.05)) for x in (0.2, 0.6, 0.9, 0.6, 0.2)]
     assert far == sorted(far)

@@ -10,9 +10,9 @@ from avlmaps.core.errors import LanguageError
 from avlmaps.core.motion import GroundPose
 from avlmaps.language.learned_translator import LearnedTranslator
 from avlmaps.language.program import Budget
-from avlmaps.language.sentence import Given
+from avlmaps.language.sentence import Attachments
 from avlmaps.language.translator import Translation
-from avlmaps.maps.store.edits import Edit, Spot, World
+from avlmaps.maps.store.edits import Edit, EditedSpot, World
 from avlmaps.navigate.driver import Arrival
 from avlmaps.navigate.instruct import Outcome, instruct
 from avlmaps.navigate.trace_plot import draw_path, plot_path
@@ -70,13 +70,13 @@ def test_a_translator_that_knows_no_map_is_given_this_one() -> None:
     outcome, lines = told(said)
     assert outcome.ok and outcome.notes[0].startswith("The place is where the robot was when it heard it: ")
     assert "I will go to where dog was heard." in lines
-    fixed, _ = told(said, LearnedTranslator(Given(at="robot")))
+    fixed, _ = told(said, LearnedTranslator(Attachments(at="robot")))
     assert fixed.ok and fixed.notes == () and fixed.program == outcome.program
 
 
 def test_a_forbidden_area_that_the_map_does_not_know_is_told_before_the_robot_moves() -> None:
     corners = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0))
-    area = Edit.new("forbid", [Spot(middle=corners[0], corners=corners)], name="the stairs", world=OTHER)
+    area = Edit.new("forbid", [EditedSpot(middle=corners[0], corners=corners)], name="the stairs", world=OTHER)
     m = AVLMap(furnished_map(), edits=[area])
     outcome = instruct("turn left", m, KinematicDriver(GroundPose(3.0, 2.0)), LearnedTranslator())
     assert outcome.notes == (

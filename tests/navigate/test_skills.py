@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from avlmaps.core.errors import NavigationError, ProgramError
 from avlmaps.core.motion import Action, GroundPose, wrap_angle
 from avlmaps.language.program import SKILLS
-from avlmaps.language.program.vocabulary import Vocabulary
+from avlmaps.language.program.vocabulary import RobotSkills
 from avlmaps.navigate.driver import Arrival
 from avlmaps.navigate.skills import Robot, RobotSettings
 from helpers.kinematic import KinematicDriver, box, robot_among
@@ -41,14 +41,14 @@ def turned(corners: np.ndarray, angle_rad: float) -> np.ndarray:
 
 @pytest.mark.parametrize("name", list(SKILLS))
 def test_every_skill_is_as_the_vocabulary_says(name: str) -> None:
-    declared, own = getattr(Vocabulary, name), getattr(Robot, name)
+    declared, own = getattr(RobotSkills, name), getattr(Robot, name)
     assert list(signature(own).parameters.values()) == list(signature(declared).parameters.values())
     assert get_type_hints(own) == get_type_hints(declared)
     assert getdoc(own) == getdoc(declared)
 
 
 def test_a_robot_has_the_whole_vocabulary() -> None:
-    assert isinstance(robot_among(GroundPose(0.0, 0.0)), Vocabulary)
+    assert isinstance(robot_among(GroundPose(0.0, 0.0)), RobotSkills)
 
 
 def test_facing_west_a_thing_dead_ahead_needs_no_turn() -> None:

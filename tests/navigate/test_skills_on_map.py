@@ -17,7 +17,7 @@ from avlmaps.language.program.vocabulary import Picture, Place
 from avlmaps.maps.grid import GridSpec
 from avlmaps.navigate.file_access import Readable, named_files, offered_by
 from avlmaps.navigate.footprint import Outline, middle_between
-from avlmaps.navigate.instances import Thing, nearest
+from avlmaps.navigate.instances import Destination, nearest
 from avlmaps.navigate.skills import Robot, RobotSettings
 from avlmaps.query.avlmap import AVLMap, QuerySettings
 from avlmaps.query.voxel_space import Space
@@ -302,7 +302,7 @@ def test_no_thing_is_nearest_that_is_less_than_half_as_likely_as_the_best(
     placed: list[tuple[float, float]], found_at: float
 ) -> None:
     things = [
-        Thing("chair", Outline.at(np.array([x, 0.0])), np.array([x, 0.0, 0.5]), likely, found=likely >= found_at)
+        Destination("chair", Outline.at(np.array([x, 0.0])), np.array([x, 0.0, 0.5]), likely, found=likely >= found_at)
         for x, likely in sorted(placed, key=lambda one: -one[1])
     ]
     chosen = nearest(things, np.zeros(2))

@@ -20,7 +20,7 @@ from avlmaps.navigate.driver import MapDriver
 from avlmaps.navigate.file_access import Readable
 from avlmaps.navigate.footprint import Outline
 from avlmaps.navigate.grounding import Seeker
-from avlmaps.navigate.instances import Thing
+from avlmaps.navigate.instances import Destination
 from avlmaps.navigate.paths import PathFinder
 from avlmaps.navigate.rehearsal import FreeBody
 from avlmaps.navigate.skills import Robot
@@ -147,7 +147,7 @@ def test_a_skill_beside_a_thing_upstairs_is_refused_and_not_driven_on_the_floor_
 def test_of_things_on_two_storeys_those_of_the_robots_own_count_where_one_is_found() -> None:
     robot = Robot(HOME, MapDriver(obstacles_for(HOME, BASE, 0), FreeBody(GroundPose(3.0, 3.0, 0.0))))
     up, down, unlikely = (
-        Thing("bed", Outline.at(np.array([x, 2.0])), np.array([x, 2.0, z]), likely)
+        Destination("bed", Outline.at(np.array([x, 2.0])), np.array([x, 2.0, z]), likely)
         for x, z, likely in ((3.0, UPPER_M + 0.5, 0.9), (5.0, 0.5, 0.8), (5.0, 0.5, 0.3))
     )
     assert robot.seeker._near_first([up, down], 0.5) == [down]

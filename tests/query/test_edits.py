@@ -31,11 +31,11 @@ from avlmaps.core.poses import plain_point
 from avlmaps.language.commands import read_command
 from avlmaps.language.intents import targets_of
 from avlmaps.language.own_names import stand_ins
-from avlmaps.language.sentence import Given
+from avlmaps.language.sentence import Attachments
 from avlmaps.maps.store.edits import (
     EDITS,
     Edit,
-    Spot,
+    EditedSpot,
     World,
     append_edit,
     carried_edits,
@@ -57,7 +57,7 @@ WORDS = ("chair", "table", "stool", "furniture", "my dock")
 DAY = "2026-11-26T10:00:00.000+00:00"
 
 
-def spot(thing: Any) -> Spot:
+def spot(thing: Any) -> EditedSpot:
     return RAW.edited.spot_of(thing.name, thing.rows)
 
 
@@ -69,8 +69,10 @@ STOOL = edit("rename", A, name="stool")
 BENCH = edit("rename", TABLE, name="bench")
 PAIR = edit("merge", A, B)
 HALVES = edit("split", TABLE, cut=[(1.4, 0.0, 0.1), (1.4, 2.0, 0.1)])
-DOCK = Edit.new("pin", [Spot(middle=(3.0, 1.0, 0.0))], name="My dock", made=DAY)
-LOST = Edit.new("rename", [Spot(name="sofa", middle=(4.0, 0.5, 0.2), size=(1.0, 1.0, 1.0))], name="couch", made=DAY)
+DOCK = Edit.new("pin", [EditedSpot(middle=(3.0, 1.0, 0.0))], name="My dock", made=DAY)
+LOST = Edit.new(
+    "rename", [EditedSpot(name="sofa", middle=(4.0, 0.5, 0.2), size=(1.0, 1.0, 1.0))], name="couch", made=DAY
+)
 EVERY = (STOOL, BENCH, PAIR, HALVES, DOCK, LOST)
 
 
@@ -305,10 +307,10 @@ def test_a_known_kind_takes_the_place_of_another() -> None:
 
 def test_a_room_that_is_no_more_is_reported() -> None:
     raw = two_named_rooms(())
-    gone = Edit.new("rename room", [Spot(name="attic", middle=(90.0, 0.0, 1.0))], name="studio", made=DAY)
+    gone = Edit.new("rename room", [EditedSpot(name="attic", middle=(90.0, 0.0, 1.0))], name="studio", made=DAY)
     small = [(0.5, 0.5, 0.0), (0.9, 0.5, 0.0), (0.9, 0.9, 0.0), (0.5, 0.9, 0.0)]
     nook = Edit.new(
-        "rename room", [Spot(name="nook", middle=(0.7, 0.7, 0.0), corners=tuple(small))], name="den", made=DAY
+        "rename room", [EditedSpot(name="nook", middle=(0.7, 0.7, 0.0), corners=tuple(small))], name="den", made=DAY
     )
     m = two_named_rooms([gone, nook])
     assert [one.edit.name for one in m.edited.lost] == ["studio", "den"]
@@ -319,7 +321,7 @@ def test_a_room_is_found_by_its_outline_where_its_middle_lies_in_another() -> No
     raw = two_named_rooms(())
     (kitchen,) = (room for room in raw.rooms() if room.name == "kitchen")
     (bedroom,) = (room for room in raw.rooms() if room.name == "bedroom")
-    moved_away = Spot(name="kitchen", middle=bedroom.position, corners=tuple(map(plain_point, kitchen.outline)))
+    moved_away = EditedSpot(name="kitchen", middle=bedroom.position, corners=tuple(map(plain_point, kitchen.outline)))
     m = two_named_rooms([Edit.new("rename room", [moved_away], name="studio", made=DAY)])
     assert not m.edited.lost
     assert {room.name: room.position for room in m.rooms()} == {
@@ -332,9 +334,9 @@ def test_a_room_is_found_by_its_outline_where_its_middle_lies_in_another() -> No
 
 def test_a_command_and_a_question_speak_of_own_names() -> None:
     own = (("wobble pad", False), ("studio seven", True))
-    (intent,) = read_command("go to my wobble pad", Given(own=own)).intents
+    (intent,) = read_command("go to my wobble pad", Attachments(own=own)).intents
     assert [target.name for target in targets_of(intent)] == ["wobble pad"]
-    (intent,) = read_command("drive to the studio seven", Given(own=own)).intents
+    (intent,) = read_command("drive to the studio seven", Attachments(own=own)).intents
     assert [(target.kind.value, target.name) for target in targets_of(intent)] == [("area", "studio seven")]
     assert stand_ins("go to the sofa", own).text == "go to the sofa"
     assert stand_ins("where is the chair", (("chair", False),)).own == {}

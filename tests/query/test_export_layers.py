@@ -16,7 +16,7 @@ from avlmaps.core.poses import from_quaternion
 from avlmaps.query import export_openlex3d
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.export_foxglove import write_foxglove
-from avlmaps.query.export_layers import Heard, layers_of
+from avlmaps.query.export_layers import ExportedSound, layers_of
 from avlmaps.query.export_openlex3d import FILES, pcd_bytes, write_openlex3d
 from avlmaps.query.export_rerun import write_rerun
 
@@ -119,8 +119,8 @@ def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
 
 
 def test_a_sound_has_its_name_apart_from_how_sure_it_is() -> None:
-    named = Heard("dog bark", 0.754, (0.0, 0.0, 0.0), 1.0, 2.0)
-    nameless = Heard("sound", None, (0.0, 0.0, 0.0), 1.0, 2.0)
+    named = ExportedSound("dog bark", 0.754, (0.0, 0.0, 0.0), 1.0, 2.0)
+    nameless = ExportedSound("sound", None, (0.0, 0.0, 0.0), 1.0, 2.0)
     assert (named.name, named.label, nameless.label) == ("dog bark", "dog bark 0.75", "sound")
 
 

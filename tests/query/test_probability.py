@@ -10,13 +10,13 @@ from training.found.fit import fitted, held_out
 from training.found.rows import balanced, read_rows
 
 from avlmaps.core.question import Modality
-from avlmaps.query.evidence import Evidence, logit
+from avlmaps.query.evidence import GoalEvidence, logit
 from avlmaps.query.probability import MOST_ODDS, NUMBERS, most_likely, probability_of, weights
 from avlmaps_sim.bench.found.suite import brier
 
 logits, logs = st.floats(-4, 4), st.floats(-4, 0)
 joined = st.builds(
-    lambda lead, context, thing, near, room, marks, first: Evidence(
+    lambda lead, context, thing, near, room, marks, first: GoalEvidence(
         lead, (context,), 1 / (1 + np.exp(-thing)), thing, near, room, marks, first
     ),
     st.sampled_from(Modality), st.sampled_from(Modality), logits, logs, logs, logits, st.floats(0, 1),
@@ -24,13 +24,13 @@ joined = st.builds(
 
 
 @given(joined, st.sampled_from(NUMBERS), st.floats(0, 2))
-def test_more_of_any_evidence_makes_a_goal_no_less_likely(evidence: Evidence, name: str, more: float) -> None:
+def test_more_of_any_evidence_makes_a_goal_no_less_likely(evidence: GoalEvidence, name: str, more: float) -> None:
     better = replace(evidence, **{name: getattr(evidence, name) + more})
     assert 0.0 <= probability_of(evidence) <= probability_of(better) <= 1.0
 
 
 @given(joined, st.floats(0, 1))
-def test_the_odds_are_at_most_a_multiple_of_those_of_the_thing_alone(evidence: Evidence, other: float) -> None:
+def test_the_odds_are_at_most_a_multiple_of_those_of_the_thing_alone(evidence: GoalEvidence, other: float) -> None:
     p, first = probability_of(evidence), evidence.first_alone
     assert p <= most_likely(first) + 1e-3
     assert p * (1.0 - first) <= MOST_ODDS * first * (1.0 - p) + 4e-3
@@ -45,7 +45,7 @@ def test_what_is_most_likely_rises_with_the_thing_alone_and_is_no_less(one: floa
 
 
 @given(joined, joined)
-def test_a_part_alone_has_its_own_confidence(evidence: Evidence, other: Evidence) -> None:
+def test_a_part_alone_has_its_own_confidence(evidence: GoalEvidence, other: GoalEvidence) -> None:
     alone = replace(evidence, context=(), near=other.near, marks=other.marks)
     assert probability_of(alone) == pytest.approx(evidence.alone, abs=1e-3)
 

@@ -11,7 +11,7 @@ from query_fakes import furnished_map, sounds_of
 
 from avlmaps.core.question import HeardAt, Modality, Part, Role
 from avlmaps.language.learned_translator import LearnedTranslator
-from avlmaps.language.sentence import Given
+from avlmaps.language.sentence import Attachments
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.sources.density import Spread
 from avlmaps.maps.types import SourceEvidence
@@ -103,7 +103,7 @@ def test_a_sound_that_is_not_located_yet_is_not_called_unheard() -> None:
 
 
 def test_a_plan_says_where_a_sound_comes_from_where_that_is_meant() -> None:
-    said = [LearnedTranslator(Given(at=at)).program_for("go to where the smoke alarm is heard").plan for at in AT]
+    said = [LearnedTranslator(Attachments(at=at)).program_for("go to where the smoke alarm is heard").plan for at in AT]
     assert said == [
         "I will go to where smoke alarm was heard.",
         "I will go to where the sound of smoke alarm comes from.",

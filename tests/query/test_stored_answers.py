@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store import derived
 from avlmaps.maps.store.derived import DERIVED
-from avlmaps.maps.store.manifest import Box
+from avlmaps.maps.store.manifest import MapBounds
 from avlmaps.maps.store.reader import open_stored
 from avlmaps.maps.store.writer import MapContent, write_map
 from avlmaps.perception.embedded.codes import features_of
@@ -66,7 +66,9 @@ def random_map(base: Path, out: Path, seed: int) -> Path:
     fewer = type(voxels)(*(np.asarray(getattr(changed, name))[kept] for name in columns))
     info, structs = stored.info, msgspec.structs
     counts = structs.replace(info.counts, voxels=len(fewer))
-    info = structs.replace(info, counts=counts, bounding_box_m=Box.of(fewer.index, info.voxel_size_m), build_key="")
+    info = structs.replace(
+        info, counts=counts, bounding_box_m=MapBounds.of(fewer.index, info.voxel_size_m), build_key=""
+    )
     write_map(out, MapContent(fewer, stored.keyframes, stored.place_state, stored.sounds, base / "sounds"), info)
     return out
 

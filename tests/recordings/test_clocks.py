@@ -24,7 +24,7 @@ from avlmaps.recordings.formats.ros_audio import GAP_S, Pcm, SoundTopic, extract
 from avlmaps.recordings.formats.ros_clock import PictureClock
 from avlmaps.recordings.formats.rosbag import open_rosbag
 from avlmaps.recordings.open import open_recording
-from avlmaps.recordings.turning import Turn, exif_turn
+from avlmaps.recordings.turning import DisplayTurn, exif_turn
 from avlmaps.recordings.video import VideoFrames
 
 CHUNK_S = 0.1
@@ -269,7 +269,7 @@ def test_the_eight_orientations_of_exif(tmp_path: Path, orientation: int) -> Non
     assert np.array_equal(turn.applied(picture), ORIENTATIONS[orientation](picture))
     assert turn.size(8, 6) == turn.applied(picture).shape[1::-1]
     assert (turn.words == "mirrored") == (orientation in (2, 4, 5, 7))
-    assert turn == Turn.of_exif(orientation)
+    assert turn == DisplayTurn.of_exif(orientation)
 
 
 @pytest.mark.parametrize("orientation", [3, 6])

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from avlmaps.core.question import Modality
-from avlmaps.query.evidence import Evidence
+from avlmaps.query.evidence import GoalEvidence
 from avlmaps.query.probability import NUMBERS
 from avlmaps_sim.bench.found.answers import Judged
 
@@ -42,23 +42,23 @@ class Row:
     first_alone: float
 
     @classmethod
-    def of(cls, judged: Judged, evidence: Evidence) -> "Row":
+    def of(cls, judged: Judged, evidence: GoalEvidence) -> "Row":
         """Return the row of an answer."""
         numbers = tuple(round(float(getattr(evidence, name)), 4) for name in NUMBERS)
         facts = judged.scene, judged.kind, judged.words, judged.answerable, judged.right
         return cls(*facts, combination(evidence), numbers, round(evidence.first_alone, 4))
 
     @property
-    def evidence(self) -> Evidence:
+    def evidence(self) -> GoalEvidence:
         """The evidence again."""
         lead, *near = self.combination.replace(" near ", " and ").split(" and ")
         alone = 1.0 / (1.0 + math.exp(-self.numbers[0]))
         numbers = dict(zip(NUMBERS, self.numbers, strict=True))
         near_kinds = tuple(map(Modality, near))
-        return Evidence(Modality(lead), near_kinds, alone, **numbers, first_alone=self.first_alone)
+        return GoalEvidence(Modality(lead), near_kinds, alone, **numbers, first_alone=self.first_alone)
 
 
-def combination(evidence: Evidence) -> str:
+def combination(evidence: GoalEvidence) -> str:
     """Return what is sought and the kinds of what it is near: ``sound near object``; ``object`` for one alone."""
     kinds = sorted(set(evidence.context))
     return f"{evidence.lead} near {' and '.join(kinds)}" if kinds else str(evidence.lead)

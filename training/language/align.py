@@ -15,7 +15,7 @@ from avlmaps.language.learned.linear import MalformedError, Pointable, Symbol, a
 from avlmaps.language.lexer import Token
 from avlmaps.language.names import sounding_forms
 from avlmaps.language.questions import use_in
-from avlmaps.language.sentence import Given, Sentence
+from avlmaps.language.sentence import Attachments, Sentence
 
 _ALIKE = 0.75
 _ENDINGS = ("ings", "ing", "ers", "ies", "ed", "es", "s", "er", "y", "e")
@@ -40,7 +40,7 @@ class Aligned:
 
 def aligned(example: Example) -> Aligned | None:
     """Return an example with its line; None where its words or numbers do not stand in the sentence."""
-    tokens = Sentence(example.say, Given(example.image, example.clip)).tokens
+    tokens = Sentence(example.say, Attachments(example.image, example.clip)).tokens
     if not tokens:
         return None
     found = _Found(tokens, example)

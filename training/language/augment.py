@@ -18,7 +18,7 @@ from avlmaps.language.intents import (
     Inquiry,
     Intent,
     Pick,
-    Reason,
+    RefusalReason,
     Refuse,
     Repeat,
     Return,
@@ -272,7 +272,7 @@ def joinable(example: Example) -> bool:
     if isinstance(meaning[0], Clarify):
         return False
     if isinstance(meaning[0], Refuse):
-        return meaning[0].reason in (Reason.MANIPULATION, Reason.HARM, Reason.FLYING)
+        return meaning[0].reason in (RefusalReason.MANIPULATION, RefusalReason.HARM, RefusalReason.FLYING)
     if any(target.pick is Pick.OTHER or target.is_file for target in targets_of(meaning)):
         return False
     return "\n" not in example.say

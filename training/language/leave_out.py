@@ -17,10 +17,10 @@ from avlmaps.core.errors import QueryError
 from avlmaps.language.commands import answered, weighed_readings
 from avlmaps.language.intents import Clarify, Intent, to_json
 from avlmaps.language.learned.decision import Weighed, decided, is_same
-from avlmaps.language.learned.limits import Limits
+from avlmaps.language.learned.limits import ReadingLimits
 from avlmaps.language.learned.reader import LearnedReader, Read
 from avlmaps.language.questions import asked, by_name
-from avlmaps.language.sentence import Given, Sentence
+from avlmaps.language.sentence import Attachments, Sentence
 from avlmaps_sim.bench.language import OUTCOMES, judge_intents, judge_question, read_list
 
 FOLDS = (
@@ -62,7 +62,7 @@ def read_voices(voices: Iterable[str], reader: LearnedReader) -> list[Heard]:
 
 def heard(row: Mapping[str, Any], voice: str, reader: LearnedReader) -> Heard:
     """Return a row with what the networks read in it."""
-    given = Given(row.get("image"), row.get("clip"))
+    given = Attachments(row.get("image"), row.get("clip"))
     if "question" in row:
         sentence = Sentence(row["say"], replace(given, knows=lambda _: True))
         return Heard(row, voice, reader, sentence, question=tuple(reader.question(sentence.tokens)))
@@ -70,7 +70,7 @@ def heard(row: Mapping[str, Any], voice: str, reader: LearnedReader) -> Heard:
     return Heard(row, voice, reader, sentence, weighed_readings(sentence, reader))
 
 
-def outcome(one: Heard, limits: Limits) -> str:
+def outcome(one: Heard, limits: ReadingLimits) -> str:
     """Return what became of a row: right, harmless, a question back or misread."""
     if "question" in one.row:
         try:
@@ -94,15 +94,15 @@ def _judged(one: Heard, intents: "tuple[Intent, ...]") -> str:
     return _JUDGED[key]
 
 
-def counted(rows: Sequence[Heard], limits: Limits, *, questions: bool) -> Counter[str]:
+def counted(rows: Sequence[Heard], limits: ReadingLimits, *, questions: bool) -> Counter[str]:
     """Return how many rows had each outcome."""
     return Counter(outcome(one, limits) for one in rows if ("question" in one.row) is questions)
 
 
-def chosen(rows: Sequence[Heard]) -> Limits:
+def chosen(rows: Sequence[Heard]) -> ReadingLimits:
     """Return the limits that are worth most: a command misread costs several that are right."""
     levels = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.95)
-    kept = Limits()
+    kept = ReadingLimits()
     best = -float("inf")
     for danger in (0.1, 0.3, 0.5):
         # What each row is worth where the robot may act on its reading, and where it may not; and how likely that is.
@@ -112,8 +112,8 @@ def chosen(rows: Sequence[Heard]) -> Limits:
                 worth = sum(acts if likely >= (doubtful if doubt else command) else asks
                             for likely, doubt, acts, asks in told)  # fmt: skip
                 if worth > best:
-                    best, kept = worth, Limits(command=command, doubtful=doubtful, danger=danger)
-    scored: list[tuple[float, Limits]] = []
+                    best, kept = worth, ReadingLimits(command=command, doubtful=doubtful, danger=danger)
+    scored: list[tuple[float, ReadingLimits]] = []
     levels = (0.1, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
     for question, doubtful in product(levels, levels):
         if doubtful >= question:
@@ -125,7 +125,7 @@ def chosen(rows: Sequence[Heard]) -> Limits:
 
 def _worths(one: Heard, danger: float) -> tuple[float, bool, float, float]:
     """Return the largest limit at which a row is acted on, whether it is doubtful, and its worths acting and asking."""
-    acts, asks = (decided(one.command, Limits(limit, limit, danger)).intents for limit in (0.0, 2.0))
+    acts, asks = (decided(one.command, ReadingLimits(limit, limit, danger)).intents for limit in (0.0, 2.0))
     best = one.command[0]
     likely = sum(each.probability for each in one.command if each.stops is None and is_same(each.intents, best.intents))
     worth = {"right": 1.0, "harmless": 1.0, "asked back": 0.0, "misread": -_EACH_MISREAD}
@@ -140,11 +140,11 @@ def halves(rows: Sequence[Heard]) -> tuple[tuple[list[Heard], list[Heard]], tupl
     return (even, odd), (odd, even)
 
 
-def table(rows: Sequence[Heard], limits: Limits) -> list[str]:
+def table(rows: Sequence[Heard], limits: ReadingLimits) -> list[str]:
     """Return lines: counts of some rows, acting on any reading and with limits."""
     lines: list[str] = []
     for questions in (False, True):
-        for name, given in (("any reading", Limits(0.0, 0.0, 1.1, 0.0, 0.0)), ("with limits", limits)):
+        for name, given in (("any reading", ReadingLimits(0.0, 0.0, 1.1, 0.0, 0.0)), ("with limits", limits)):
             found = counted(rows, given, questions=questions)
             total = max(1, sum(found.values()))
             shares = ", ".join(f"{name} {found[name]} ({100 * found[name] / total:.1f} %)" for name in OUTCOMES)

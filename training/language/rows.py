@@ -19,7 +19,7 @@ from avlmaps.language.intents import (
     Intent,
     Move,
     Pick,
-    Reason,
+    RefusalReason,
     Refuse,
     Repeat,
     Return,
@@ -28,9 +28,9 @@ from avlmaps.language.intents import (
     Target,
     TargetKind,
     Turn,
+    TurnSense,
     VisitEach,
     Wait,
-    Way,
 )  # fmt: skip
 
 ROOT = Path(__file__).parents[2]
@@ -96,7 +96,7 @@ def intent_of(said: Mapping[str, Any]) -> Intent:  # noqa: C901
         case "stop_at":
             return StopAt(target_of(to), float(said["metres"]))
         case "circle":
-            return Circle(target_of(to), said.get("views"), Way(said.get("way", "")))
+            return Circle(target_of(to), said.get("views"), TurnSense(said.get("way", "")))
         case "visit_each":
             return VisitEach(target_of(to))
         case "wait":
@@ -106,7 +106,7 @@ def intent_of(said: Mapping[str, Any]) -> Intent:  # noqa: C901
         case "repeat":
             return Repeat(int(said["times"]), tuple(intent_of(one) for one in said["body"]))
         case "refuse":
-            return Refuse(Reason(said.get("reason") or "unknown"))
+            return Refuse(RefusalReason(said.get("reason") or "unknown"))
         case _:
             return Clarify()
 

@@ -53,7 +53,7 @@ def main() -> None:
     write_edition(arguments.out / WEIGHTS, corpus, arguments.work, 0, words, constants)
 
 
-def fitted_constants(answers: Answers, encode: EncodeWords) -> calibrate.Calibration:
+def fitted_constants(answers: Answers, encode: EncodeWords) -> calibrate.SoundCalibration:
     """Fit every constant in turn, on clips as they are, the same clips in a room, and pieces in rooms and noise."""
     heard, kinds = answers.held.every, answers.held.every_kind
     evidence = evidence_for(heard.cosines, heard.typical)
@@ -68,7 +68,7 @@ def fitted_constants(answers: Answers, encode: EncodeWords) -> calibrate.Calibra
 
 
 def write_edition(
-    folder: Path, corpus: Corpus, work: Path, fold: int, words: EmbeddedWords, c: calibrate.Calibration
+    folder: Path, corpus: Corpus, work: Path, fold: int, words: EmbeddedWords, c: calibrate.SoundCalibration
 ) -> None:
     """Write what ``EmbeddedSounds`` reads: a network that learnt nothing from a fold (0 for none), examples, notes."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -82,7 +82,7 @@ def write_edition(
 
 
 def notes(
-    learnt: Sequence[Clip], words: EmbeddedWords, c: calibrate.Calibration, examples: Sequence[int]
+    learnt: Sequence[Clip], words: EmbeddedWords, c: calibrate.SoundCalibration, examples: Sequence[int]
 ) -> dict[str, Any]:
     """Return the notes that ship beside a network.
 

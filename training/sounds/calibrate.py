@@ -10,7 +10,7 @@ from training.sounds.fit import EncodeWords, targets
 from training.sounds.kinds import CALLED, KINDS, RECORDED
 
 from avlmaps.perception.embedded.sound_calibration import (
-    Calibration,
+    SoundCalibration,
     evidence_for,
     kinds_of_phrases,
     kinds_of_windows,
@@ -21,7 +21,7 @@ from avlmaps.perception.embedded.sound_calibration import (
     typical_examples,
 )
 
-START = Calibration(0.07, (0.0, 0.0, 0.0), 0.05, (0.0, 0.0), (0.0, 1.0), (0.0, 0.0, 0.0), (-4.0, 8.0))
+START = SoundCalibration(0.07, (0.0, 0.0, 0.0), 0.05, (0.0, 0.0), (0.0, 1.0), (0.0, 0.0, 0.0), (-4.0, 8.0))
 
 UNKNOWN_SHARE = 0.2
 RECORDED_COUNT = len(RECORDED)
@@ -121,7 +121,7 @@ def fit_temperature(cosines: np.ndarray, kinds: np.ndarray) -> float:
     return float(np.exp(least.x))
 
 
-def fit_phrases(encode_words: EncodeWords, c: Calibration) -> Calibration:
+def fit_phrases(encode_words: EncodeWords, c: SoundCalibration) -> SoundCalibration:
     """Fit what a phrase means on the kinds' other names, and what names no sound on the list above."""
     names = encode_words(CALLED)
     others = [(k, word) for k, called in enumerate(KINDS.values()) for word in called[1:]]
@@ -135,13 +135,13 @@ def fit_phrases(encode_words: EncodeWords, c: Calibration) -> Calibration:
     return replace(c, phrase_temperature=temperature, phrase=(float(bias), float(slope)))
 
 
-def heard_kinds(heard: Evidence, c: Calibration) -> np.ndarray:
+def heard_kinds(heard: Evidence, c: SoundCalibration) -> np.ndarray:
     """Return how likely each sound is of each kind, as ``EmbeddedSounds`` finds it."""
     posterior, known = kinds_of_windows(heard.cosines, heard.typical, heard.near, c)
     return posterior * known[:, None]
 
 
-def fit_known(known: Evidence, unknown: Evidence, c: Calibration) -> Calibration:
+def fit_known(known: Evidence, unknown: Evidence, c: SoundCalibration) -> SoundCalibration:
     """Fit the refusal of unknown sounds, both sides weighing the same."""
 
     def clues(heard: Evidence) -> np.ndarray:
@@ -155,7 +155,9 @@ def fit_known(known: Evidence, unknown: Evidence, c: Calibration) -> Calibration
     return replace(c, known=(float(beta[0]), float(beta[1]), float(beta[2])))
 
 
-def matching_odds(heard: Evidence, phrases: Sequence[str], encode_words: EncodeWords, c: Calibration) -> np.ndarray:
+def matching_odds(
+    heard: Evidence, phrases: Sequence[str], encode_words: EncodeWords, c: SoundCalibration
+) -> np.ndarray:
     """Return log-odds (sounds, phrases) before the last logistic."""
     names = encode_words([word for called in KINDS.values() for word in called])
     starts = np.cumsum([0, *(len(called) for called in KINDS.values())])[:-1]
@@ -169,8 +171,8 @@ def fit_word(
     kinds: np.ndarray,
     unknown: Sequence[tuple[Evidence, Sequence[int]]],
     encode_words: EncodeWords,
-    c: Calibration,
-) -> Calibration:
+    c: SoundCalibration,
+) -> SoundCalibration:
     """Fit the last step of a question in words, as if UNKNOWN_SHARE of a building's sounds were of no known kind.
 
     Args:
@@ -197,7 +199,7 @@ def fit_word(
     return replace(c, word=(float(bias), float(slope)))
 
 
-def flattened(c: Calibration) -> Calibration:
+def flattened(c: SoundCalibration) -> SoundCalibration:
     """Let the log-odds of a word count less, about the same yes.
 
     Recordings of another collection are scored lower than clips of the one that the constants were fitted on.
@@ -205,13 +207,13 @@ def flattened(c: Calibration) -> Calibration:
     return replace(c, word=(ABROAD * c.word[0], ABROAD * c.word[1]))
 
 
-def pair_features(heard: Evidence, c: Calibration) -> np.ndarray:
+def pair_features(heard: Evidence, c: SoundCalibration) -> np.ndarray:
     """Return cosine and agreement of every pair (n, n, 2)."""
     direction = np.sqrt(heard_kinds(heard, c))
     return np.stack([heard.features @ heard.features.T, direction @ direction.T], axis=2)
 
 
-def fit_pairs(heard: Evidence, kinds: np.ndarray, rooms: np.ndarray, c: Calibration) -> Calibration:
+def fit_pairs(heard: Evidence, kinds: np.ndarray, rooms: np.ndarray, c: SoundCalibration) -> SoundCalibration:
     """Fit the question by a clip on pairs of held-out clips in one room."""
     pairs = pair_features(heard, c)
     first, second = np.triu_indices(len(kinds), 1)
@@ -260,7 +262,7 @@ def lessons(heard: Evidence, kinds: np.ndarray, sources: np.ndarray, taught: Seq
     return found
 
 
-def fit_taught(given: Sequence[Lesson], c: Calibration) -> Calibration:
+def fit_taught(given: Sequence[Lesson], c: SoundCalibration) -> SoundCalibration:
     """Fit what counts as a taught kind; those that are weigh half of those that are not."""
     lead, right = (np.concatenate([getattr(lesson, name) for lesson in given]) for name in ("lead", "right"))
     weights = np.where(right, 0.5 * (~right).sum() / right.sum(), 1.0)

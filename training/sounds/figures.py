@@ -11,7 +11,7 @@ from training.sounds.crossvalidate import LEFT_OUT, ROOM_S, Answers, Held
 from training.sounds.fit import EncodeWords
 from training.sounds.kinds import CALLED, ESC10, KINDS, NAMES, RECORDED
 
-from avlmaps.perception.embedded.sound_calibration import Calibration, log_odds, sigmoid
+from avlmaps.perception.embedded.sound_calibration import SoundCalibration, log_odds, sigmoid
 from avlmaps_sim.bench.harness.intervals import wilson
 
 Table = dict[str, Any]
@@ -25,13 +25,13 @@ def share(hits: np.ndarray) -> list[Any]:
     return [found, count, round(100.0 * found / max(count, 1), 1), f"{100 * low:.1f}-{100 * high:.1f}"]
 
 
-def scores(heard: Evidence, phrases: Sequence[str], encode: EncodeWords, c: Calibration) -> np.ndarray:
+def scores(heard: Evidence, phrases: Sequence[str], encode: EncodeWords, c: SoundCalibration) -> np.ndarray:
     """Return how likely each clip is what each phrase names."""
     bias, slope = c.word
     return sigmoid(bias + slope * matching_odds(heard, phrases, encode, c))
 
 
-def words_table(answers: Answers, encode: EncodeWords, c: Calibration) -> Table:
+def words_table(answers: Answers, encode: EncodeWords, c: SoundCalibration) -> Table:
     """Return the questions by words: household clips, and those of ESC-10, among fifty names."""
     rows, held = [], answers.held
     rooms = (("dry", held.dry), (f"RT60 {ROOM_S} s, 4 m", held.wet), ("pieces in rooms and noise", held.pieces))
@@ -52,7 +52,7 @@ def words_table(answers: Answers, encode: EncodeWords, c: Calibration) -> Table:
     return {"columns": ["clips", "room", "question", "hits", "of", "%", "95 %"], "rows": rows}
 
 
-def kinds_table(held: Held, learnt: dict[str, int], encode: EncodeWords, c: Calibration) -> Table:
+def kinds_table(held: Held, learnt: dict[str, int], encode: EncodeWords, c: SoundCalibration) -> Table:
     """Return for every recorded kind how many clips it was learnt from and how its held-out clips fare."""
     found = scores(held.dry, FIFTY, encode, c)
     order = np.argsort(-found, axis=1)
@@ -88,7 +88,7 @@ def area_under_curve(known: np.ndarray, unknown: np.ndarray) -> tuple[float, flo
     return area, max(0.0, area - half), min(1.0, area + half)
 
 
-def refusal_table(answers: Answers, c: Calibration) -> Table:
+def refusal_table(answers: Answers, c: SoundCalibration) -> Table:
     """Return how well unknown clips are separated from known ones, by the score of the most likely recorded kind.
 
     Strangers are clips of ten kinds that one network was fitted without.
@@ -108,7 +108,7 @@ def refusal_table(answers: Answers, c: Calibration) -> Table:
     return {"columns": columns, "rows": rows}
 
 
-def taught_table(answers: Answers, c: Calibration) -> Table:
+def taught_table(answers: Answers, c: SoundCalibration) -> Table:
     """Return how well kinds are found that a network was fitted without and that were taught from a few clips.
 
     The clips to find are of other sources than those that taught. Twenty lessons a kind, drawn by seed.
@@ -134,7 +134,7 @@ def taught_table(answers: Answers, c: Calibration) -> Table:
     return {"columns": columns, "rows": rows}
 
 
-def all_tables(answers: Answers, learnt: dict[str, int], encode: EncodeWords, c: Calibration) -> dict[str, Table]:
+def all_tables(answers: Answers, learnt: dict[str, int], encode: EncodeWords, c: SoundCalibration) -> dict[str, Table]:
     """Return every table of figures."""
     return {
         "asked by words": words_table(answers, encode, c),

@@ -14,7 +14,7 @@ from avlmaps.core.motion import GroundPose
 from avlmaps.core.question import Modality
 from avlmaps.language.learned_translator import command_to_program
 from avlmaps.navigate.instruct import Outcome
-from avlmaps.navigate.motion_log import Move
+from avlmaps.navigate.motion_log import LoggedMove
 from avlmaps.perception.embedded.scene_network import load_network
 from avlmaps_sim import furniture
 from avlmaps_sim.demo import run_demo
@@ -164,7 +164,7 @@ def test_a_stop_is_right_within_a_metre_of_what_was_meant(tmp_path: Path, away_m
     asks, _ = choose_questions(two_rooms(), [], tmp_path, np.random.default_rng(0))
     chair = asks[1].truth[0]
     stop = (chair.high[0] + away_m, chair.high[1], 0.0)
-    move = Move("move_to", "'chair'", (0.0, 0.0, 0.0), stop, away_m, 0.0, True, (), np.zeros((1, 2)))
+    move = LoggedMove("move_to", "'chair'", (0.0, 0.0, 0.0), stop, away_m, 0.0, True, (), np.zeros((1, 2)))
     outcome = Outcome("go", ("",), (), (), (move,), "Line 2: no.", "NavigationError", 1.0)
     drive = Drive("go", (asks[1], asks[3]), GroundPose(0.0, 0.0), outcome, outcome.error)
     assert drive.right == (right, False)

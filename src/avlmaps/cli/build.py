@@ -137,7 +137,7 @@ class Build(ModelVerb):
 def build(verb: "Build") -> dict[str, Any]:
     """Build a map and describe it."""
     from avlmaps.maps.build import build_map
-    from avlmaps.maps.pipeline.cluster import Spread
+    from avlmaps.maps.pipeline.cluster import ClusterWorkers
     from avlmaps.maps.pipeline.workers import ALONE
     from avlmaps.maps.settings import SUBMAP_FRAMES, BuildSettings, FrameSettings, FusionSettings, GravitySettings
     from avlmaps.perception.cache.feature_store import CacheSettings
@@ -192,7 +192,7 @@ def build(verb: "Build") -> dict[str, Any]:
                 used,
                 resolved,
                 cache=cache,
-                workers=ALONE if pool is None else Spread(pool, openings[0], cache),
+                workers=ALONE if pool is None else ClusterWorkers(pool, openings[0], cache),
                 allow=verb.allow,
                 resume=not verb.fresh,
                 overwrite=verb.overwrite,

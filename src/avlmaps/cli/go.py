@@ -267,12 +267,12 @@ def translator_for(verb: "Go", avlmap: "AVLMap | None" = None) -> "Translator":
     """Return the translator of the command."""
     if verb.language != "chat":
         from avlmaps.language.learned_translator import LearnedTranslator
-        from avlmaps.language.sentence import Given
+        from avlmaps.language.sentence import Attachments
         from avlmaps.navigate.instruct import given_by
 
         image, clip = (None if file is None else str(file) for file in (verb.image, verb.sound_clip))
         if avlmap is None:
-            return LearnedTranslator(Given(image, clip, at=verb.at))
+            return LearnedTranslator(Attachments(image, clip, at=verb.at))
         return LearnedTranslator(given_by(avlmap, image, clip, said=verb.sentence))
     from avlmaps.language.chat import ChatSettings, ChatTranslator
 

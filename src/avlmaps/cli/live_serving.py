@@ -38,7 +38,7 @@ class LiveSource:
         return self._live.map.stored
 
 
-class Drive:
+class LiveFeed:
     """Frames that come into a live map in a thread of their own, to the end of which the map is closed."""
 
     def __init__(self, live: LiveMap, drive: Callable[[Callable[[], bool]], None]) -> None:
@@ -87,7 +87,7 @@ def serve_while(live: LiveMap, drive: Callable[[Callable[[], bool]], None], port
     require_port(port)
     settings = ServeSettings(host="127.0.0.1", port=port)
     with listening_socket(settings) as opened:
-        running = Drive(live, drive)
+        running = LiveFeed(live, drive)
         try:
             while not live.generation and not running.has_ended:
                 time.sleep(_LOOK_S)

@@ -11,7 +11,7 @@ from tyro.conf import Positional, arg
 
 from avlmaps.cli.go import read_start
 from avlmaps.cli.output import AnsweredError, UsageError, emit, error_answer, fault_sentence, kind_of
-from avlmaps.cli.shell_session import VERBS, WITH_FILES, Given, Over, Session
+from avlmaps.cli.shell_session import VERBS, WITH_FILES, Over, SessionSettings, ShellSession
 from avlmaps.cli.verb import ModelVerb
 from avlmaps.core.errors import AvlmapsError, BackendError
 from avlmaps.core.extras import install_command
@@ -55,7 +55,7 @@ class Shell(ModelVerb):
         start = read_start(self.start)
         if start is not None and self.scene is None:
             raise UsageError("--start places the simulated robot; give its --scene as well.")
-        session = Session(Given(self.map, self.scene, start, self.body, self.guess))
+        session = ShellSession(SessionSettings(self.map, self.scene, start, self.body, self.guess))
         interactive = sys.stdin.isatty() and not self.json
         lines = _prompt(session, not self.no_history) if interactive else _piped()
         if interactive:
@@ -66,7 +66,7 @@ class Shell(ModelVerb):
             raise AnsweredError(f"{failed} of {answered} lines failed.")
 
 
-def answer_lines(session: Session, lines: "Lines", as_json: bool) -> tuple[int, int]:
+def answer_lines(session: ShellSession, lines: "Lines", as_json: bool) -> tuple[int, int]:
     """Answer every line; an error is one sentence, and the next line follows.
 
     Returns:
@@ -117,7 +117,7 @@ def _piped() -> "Lines":
     return PipedLines(sys.stdin)
 
 
-def _prompt(session: Session, with_history: bool) -> "Lines":
+def _prompt(session: ShellSession, with_history: bool) -> "Lines":
     """Return the lines that a person types.
 
     Raises:

@@ -66,7 +66,7 @@ class Reply:
 
 
 @dataclass(frozen=True, slots=True)
-class Given:
+class SessionSettings:
     """The settings of a session.
 
     Attributes:
@@ -84,14 +84,14 @@ class Given:
     guess: bool = False
 
 
-class Session:
+class ShellSession:
     """One map that stays open, and what was queried last.
 
     Attributes:
         given: the map, and the robot of `go`.
     """
 
-    def __init__(self, given: Given) -> None:
+    def __init__(self, given: SessionSettings) -> None:
         """Open the map.
 
         Raises:
@@ -269,18 +269,18 @@ class Session:
         return Reply({**answer, "error": failed}, going.go_lines(answer), failed is None)
 
 
-VERBS: dict[str, Callable[[Session, str], Reply]] = {
-    "query": Session.query,
-    "things": Session.things,
-    "sounds": Session.sounds,
-    "rooms": Session.rooms,
-    "info": Session.info,
-    "locate": Session.locate,
-    "plot": Session.plot,
-    "export": Session.export,
-    "help": Session.help,
-    "quit": Session.quit,
-    "exit": Session.quit,
+VERBS: dict[str, Callable[[ShellSession, str], Reply]] = {
+    "query": ShellSession.query,
+    "things": ShellSession.things,
+    "sounds": ShellSession.sounds,
+    "rooms": ShellSession.rooms,
+    "info": ShellSession.info,
+    "locate": ShellSession.locate,
+    "plot": ShellSession.plot,
+    "export": ShellSession.export,
+    "help": ShellSession.help,
+    "quit": ShellSession.quit,
+    "exit": ShellSession.quit,
 }
 _WITH_WORDS = ("query", "plot", "export")
 WITH_FILES = ("locate", "plot", "export")

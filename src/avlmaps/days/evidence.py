@@ -37,7 +37,7 @@ _SOME = 0.1  # of a thing's voxels
 _FEWEST_OWN, _LEAST_OWN = 8, 0.15  # voxels of a thing that lie beside nothing else, and their part of it
 
 
-class Verdict(StrEnum):
+class DayVerdict(StrEnum):
     """What a day says of a thing's place."""
 
     THERE = "there"
@@ -68,14 +68,14 @@ class VoxelEvidence:
         patches = min((voxel_size_m / settings.patch_m) ** 2, 1.0)
         return (1.0 + patches * self.through) / (2.0 + patches * (self.through + self.surface))
 
-    def verdict(self, voxel_size_m: float, settings: ChangeSettings) -> Verdict:
+    def verdict(self, voxel_size_m: float, settings: ChangeSettings) -> DayVerdict:
         """Return what follows."""
         if self.coverage() < settings.least_coverage:
-            return Verdict.UNKNOWN
+            return DayVerdict.UNKNOWN
         p_gone = self.p_gone(voxel_size_m, settings)
         if p_gone >= settings.gone_at:
-            return Verdict.GONE
-        return Verdict.THERE if p_gone < 0.5 else Verdict.UNKNOWN
+            return DayVerdict.GONE
+        return DayVerdict.THERE if p_gone < 0.5 else DayVerdict.UNKNOWN
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -180,7 +180,7 @@ def seen_before(
     known: Occupied,
     day: Day,
     settings: ChangeSettings,
-) -> Verdict:
+) -> DayVerdict:
     """Return what earlier days say of the place of a thing: gone says that they looked through it.
 
     ``before`` are the views of all earlier days, ``known`` is the surface as those who looked last left it.

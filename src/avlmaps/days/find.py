@@ -26,7 +26,7 @@ _IDENTITY = tuple(tuple(float(value) for value in row) for row in np.eye(4))
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class FoundMap:
     """Where another map lies in this one, and the numbers that say so.
 
     Attributes:
@@ -40,7 +40,7 @@ class Found:
 
 def find_other(
     stored: StoredMap, other: StoredMap, settings: MergeSettings = DEFAULTS, known: Occupied | None = None
-) -> Found:
+) -> FoundMap:
     """Return where another map lies in this one, without a guess; ``known`` are this one's voxels, where they are had.
 
     Raises:
@@ -60,7 +60,7 @@ def find_other(
         checks["surface_off_m"] = round(off_m, 4)
     known = known or Occupied.of(np.asarray(stored.voxels.index), grid)
     checks |= _agreement(stored, other.path, apply(fine, others), known, settings)
-    return Found(fine, checks)
+    return FoundMap(fine, checks)
 
 
 def _agreement(

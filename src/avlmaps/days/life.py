@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from avlmaps.core.arrays import Float, Int
-from avlmaps.days.evidence import Day, DayViews, Verdict, seen_again, seen_before
+from avlmaps.days.evidence import Day, DayVerdict, DayViews, seen_again, seen_before
 from avlmaps.days.settings import ChangeSettings
 from avlmaps.days.surfaces import AROUND, Occupied, packed
 from avlmaps.maps.grid import GridSpec
@@ -100,29 +100,29 @@ def lived_on(
         views = [one for one in before[stay.first : visit] if len(one)]
         seen = seen_again(voxels[number], grid, views, known, day, settings)
         match seen.verdict(grid.voxel_size_m, settings):
-            case Verdict.THERE:
+            case DayVerdict.THERE:
                 there_on = (*stay.there_on, visit)
                 stays[number] = msgspec.structs.replace(
                     stay, last=visit, looked=visit, last_seen_s=at_s[visit], there_on=there_on
                 )
-            case Verdict.GONE:
+            case DayVerdict.GONE:
                 absent_on = (*stay.absent_on, visit)
                 stays[number] = msgspec.structs.replace(stay, looked=visit, gone=visit, absent_on=absent_on)
-            case Verdict.UNKNOWN:
+            case DayVerdict.UNKNOWN:
                 pass
     new: list[int] = []
     looks = dict(features)
     for number in sorted(set(range(len(things))) - set(matched.values())):
         thing = things[number]
         then = seen_before(thing.index, grid, before, known, day, settings)
-        if then is not Verdict.THERE:
+        if then is not DayVerdict.THERE:
             new.append(len(stays))
         if thing.feature is not None:
             looks[len(stays)] = thing.feature
-        stay = _stay(thing, visit, appeared=then is Verdict.GONE)
+        stay = _stay(thing, visit, appeared=then is DayVerdict.GONE)
         if stay.appeared:
             each = [seen_before(thing.index, grid, [views], known, day, settings) for views in before]
-            absent_on = tuple(one for one, verdict in enumerate(each) if verdict is Verdict.GONE)
+            absent_on = tuple(one for one, verdict in enumerate(each) if verdict is DayVerdict.GONE)
             stay = msgspec.structs.replace(stay, absent_on=absent_on)
         stays.append(stay)
         voxels.append(thing.index)
@@ -144,7 +144,7 @@ def _still_absent(
         return stay
     views = [one for one in before[stay.first : stay.gone] if len(one)]
     seen = seen_again(voxels, grid, views, known, day, settings)
-    if seen.verdict(grid.voxel_size_m, settings) is not Verdict.GONE:
+    if seen.verdict(grid.voxel_size_m, settings) is not DayVerdict.GONE:
         return stay
     return msgspec.structs.replace(stay, absent_on=(*stay.absent_on, visit))
 

@@ -31,7 +31,7 @@ from avlmaps.maps.store.checkpoints import key_of
 from avlmaps.maps.store.edits import Edit, World, carried_edits, read_edits, write_edits
 from avlmaps.maps.store.life import Life
 from avlmaps.maps.store.lock import EDITING, lock_folder
-from avlmaps.maps.store.manifest import Box, Counts, MapInfo, RecordingInfo, RigInfo, Timings, Visit
+from avlmaps.maps.store.manifest import Counts, MapBounds, MapInfo, RecordingInfo, RigInfo, Timings, Visit
 from avlmaps.maps.store.reader import StoredMap, open_stored
 from avlmaps.maps.store.writer import MapContent, write_map
 from avlmaps.maps.types import Keyframes
@@ -322,7 +322,7 @@ def _manifest(
         recording=recording,
         counts=Counts.of(frames, content.keyframes, content.voxels, content.sounds),
         rig=RigInfo.of(stored.rig),
-        bounding_box_m=Box.of(content.voxels.index, grid.voxel_size_m),
+        bounding_box_m=MapBounds.of(content.voxels.index, grid.voxel_size_m),
         notices=(
             *dict.fromkeys(one for one in (*info.notices, *other.info.notices) if not one.startswith(NO_SOURCES)),
             *([notice] if notice else ()),

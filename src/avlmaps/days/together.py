@@ -13,9 +13,9 @@ from avlmaps.core.progress import progress, say
 from avlmaps.days.merge import merge_maps, merged_key
 from avlmaps.maps.build import build_map
 from avlmaps.maps.growing import require_place
-from avlmaps.maps.pipeline.cluster import Pool, Spread
+from avlmaps.maps.pipeline.cluster import ClusterWorkers, Pool
 from avlmaps.maps.pipeline.cluster_jobs import (
-    Done,
+    JobResult,
     Models,
     Reopen,
     done_by,
@@ -72,12 +72,12 @@ def build_together(
         _build_each(recordings, paths, encoders, pool, settings, cache, tuple(allow), overwrite)
     else:
         for reopen, path in zip(recordings, paths, strict=True):
-            build_map(reopen(), path, encoders, settings, cache=cache, workers=Spread(pool, reopen, cache),
+            build_map(reopen(), path, encoders, settings, cache=cache, workers=ClusterWorkers(pool, reopen, cache),
                       allow=allow, overwrite=overwrite)  # fmt: skip
     return merge_in_turn([open_stored(path) for path in paths], folder, out, overwrite=overwrite)
 
 
-def build_job(job: BuildJob) -> Done:
+def build_job(job: BuildJob) -> JobResult:
     """Build the map of one recording on a worker."""
 
     def work(host: str) -> None:

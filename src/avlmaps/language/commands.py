@@ -21,14 +21,14 @@ from avlmaps.language.intents import (
 )
 from avlmaps.language.learned.decision import Decision, Weighed, decided
 from avlmaps.language.learned.forbidden import forbidden, is_stop
-from avlmaps.language.learned.limits import Limits
+from avlmaps.language.learned.limits import ReadingLimits
 from avlmaps.language.learned.name_resolver import EXAMPLE, REFUSALS, NameResolver, weighed
 from avlmaps.language.learned.parts import by_parts
 from avlmaps.language.learned.reader import LearnedReader, learned_reader
 from avlmaps.language.lexer import Token, tokenise
 from avlmaps.language.own_names import StandIns, stand_ins
 from avlmaps.language.rephrase import behind_remark
-from avlmaps.language.sentence import Given, Sentence
+from avlmaps.language.sentence import Attachments, Sentence
 from avlmaps.language.storey_words import SaidStorey, said_storeys
 from avlmaps.language.word_classes import load_word_classes
 
@@ -69,7 +69,7 @@ class Command:
         return first if isinstance(first, Refuse | Clarify) else None
 
 
-def read_command(text: str, given: Given | None = None) -> Command:
+def read_command(text: str, given: Attachments | None = None) -> Command:
     """Return the meaning of a command; the same command always means the same.
 
     Raises:
@@ -122,7 +122,7 @@ def _back(intent: Intent, stand: StandIns) -> Intent:
     return Clarify(stand.back(intent.question), tuple(map(stand.back, intent.choices)))
 
 
-def _on_storey(text: str, storeys: Sequence[SaidStorey], given: Given | None) -> Command | None:
+def _on_storey(text: str, storeys: Sequence[SaidStorey], given: Attachments | None) -> Command | None:
     """Return a command whose one target is on a storey, by the target's name: "bed upstairs"; None for any other."""
     word = storeys[0]
     if len(storeys) > 1 or not word.said or word.isnt or not word.rest or _CHANGES_STOREY.search(text.lower()):
@@ -144,7 +144,7 @@ def weighed_readings(sentence: Sentence, reader: LearnedReader) -> tuple[Weighed
     return tuple(weighed(read, NameResolver(sentence)) for read in reader.command(sentence.tokens))
 
 
-def answered(sentence: Sentence, readings: Sequence[Weighed], reader: LearnedReader, limits: Limits) -> Decision:
+def answered(sentence: Sentence, readings: Sequence[Weighed], reader: LearnedReader, limits: ReadingLimits) -> Decision:
     """Return what to do of the readings of a command; where none is likely enough, its sentences are read apart."""
     answer = decided(readings, limits)
     if answer.why != "unsure":

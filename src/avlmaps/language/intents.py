@@ -46,7 +46,7 @@ class Side(StrEnum):
     AHEAD = "ahead"
 
 
-class Way(StrEnum):
+class TurnSense(StrEnum):
     """Which way round in a top-down view."""
 
     ANY = ""
@@ -54,7 +54,7 @@ class Way(StrEnum):
     COUNTERCLOCKWISE = "counterclockwise"
 
 
-class Reason(StrEnum):
+class RefusalReason(StrEnum):
     """Why a command is refused."""
 
     MANIPULATION = "manipulation"
@@ -184,7 +184,7 @@ class Circle:
     do: ClassVar[str] = "circle"
     of: Target
     views: int | None = None
-    way: Way = Way.ANY
+    way: TurnSense = TurnSense.ANY
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,7 +224,7 @@ class Refuse:
     """The robot does nothing; ``said`` is the sentence that says why."""
 
     do: ClassVar[str] = "refuse"
-    reason: Reason
+    reason: RefusalReason
     said: str = field(default="", compare=False)
 
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from avlmaps.core.errors import LanguageError
 from avlmaps.language.commands import Command, read_command
 from avlmaps.language.program.writing import write_program
-from avlmaps.language.sentence import Given
+from avlmaps.language.sentence import Attachments
 from avlmaps.language.translator import Translation, Translator
 from avlmaps.language.verbalise import verbalise
 
@@ -40,8 +40,8 @@ class LearnedTranslator:
 
     name = "learned"
 
-    def __init__(self, given: Given | None = None) -> None:
-        self.given, self.knows_map = given or Given(), given is not None
+    def __init__(self, given: Attachments | None = None) -> None:
+        self.given, self.knows_map = given or Attachments(), given is not None
 
     def read(self, command: str) -> Command:
         """Return the meaning of a command, with all readings that were weighed."""

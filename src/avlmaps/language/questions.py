@@ -11,7 +11,7 @@ from avlmaps.language.asking_back import lacks_file
 from avlmaps.language.foreign import ASK, language_of
 from avlmaps.language.intents import Ask, Inquiry, Pick, Target, TargetKind
 from avlmaps.language.learned.decision import is_doubtful
-from avlmaps.language.learned.limits import Limits
+from avlmaps.language.learned.limits import ReadingLimits
 from avlmaps.language.learned.name_resolver import NameResolver, kind_of
 from avlmaps.language.learned.reader import Read, learned_reader
 from avlmaps.language.learned.said import Said
@@ -19,7 +19,7 @@ from avlmaps.language.learned.unmet import unmet_by
 from avlmaps.language.list_questions import SUPPORTED
 from avlmaps.language.names import is_entry, is_known, sounding_forms, sounds_like, third_forms
 from avlmaps.language.own_names import stand_ins
-from avlmaps.language.sentence import Given, Sentence
+from avlmaps.language.sentence import Attachments, Sentence
 from avlmaps.language.word_classes import listed, load_word_classes
 
 _EXAMPLE = "the chair near the sound of glass breaking, or: the table in the kitchen"
@@ -84,7 +84,7 @@ def parse_sentence(sentence: str) -> Question:
     Raises:
         QueryError: the sentence is empty, too long, or not understood.
     """
-    return read_question(sentence, Given(knows=lambda _: True)).questions[0]
+    return read_question(sentence, Attachments(knows=lambda _: True)).questions[0]
 
 
 def question_of(target: Target) -> Question:
@@ -93,7 +93,7 @@ def question_of(target: Target) -> Question:
     return Question.of(parts)
 
 
-def read_question(text: str, given: Given | None = None) -> AskedSentence:
+def read_question(text: str, given: Attachments | None = None) -> AskedSentence:
     """Return the query of a sentence.
 
     Raises:
@@ -144,7 +144,7 @@ def by_name(sentence: Sentence) -> AskedSentence | None:
     return AskedSentence(Inquiry(Ask.WHERE, (Target(kind_of(name, TargetKind.OBJECT), name),)), sentence.notes)
 
 
-def asked(sentence: Sentence, reads: Sequence[Read], limits: Limits) -> AskedSentence:
+def asked(sentence: Sentence, reads: Sequence[Read], limits: ReadingLimits) -> AskedSentence:
     """Return the query of a sentence that was read.
 
     Raises:
@@ -170,7 +170,7 @@ def asked(sentence: Sentence, reads: Sequence[Read], limits: Limits) -> AskedSen
     return _resolved(_likely(plain, sentence, limits), sentence)
 
 
-def _likely(reads: Sequence[Read], sentence: Sentence, limits: Limits) -> Inquiry:
+def _likely(reads: Sequence[Read], sentence: Sentence, limits: ReadingLimits) -> Inquiry:
     """Return the likeliest question.
 
     Raises:
@@ -223,7 +223,7 @@ def _names_nothing(read: Read) -> bool:
     return bool(named) and not any(is_known(one.name) for one in named)
 
 
-def _for_use(sentence: Sentence, use: str, limits: Limits) -> Inquiry:
+def _for_use(sentence: Sentence, use: str, limits: ReadingLimits) -> Inquiry:
     """Return the question for the things that serve a purpose: "where can I sit near the window?".
 
     Raises:
@@ -249,7 +249,7 @@ def _place_of_use(sentence: Sentence, use: str) -> str:
     return "" if not place or _HERE.intersection(place) else " ".join(place)
 
 
-def _near(name: str, place: str, sentence: Sentence, limits: Limits) -> tuple[Target, ...]:
+def _near(name: str, place: str, sentence: Sentence, limits: ReadingLimits) -> tuple[Target, ...]:
     """Return what a thing should be near.
 
     Raises:

@@ -22,7 +22,7 @@ _POINTS = frozenset({"this", "these", "attached", "attachment", "here", "file", 
 
 
 @dataclass(frozen=True, slots=True)
-class Given:
+class Attachments:
     """The files and names that came along with a sentence.
 
     Attributes:
@@ -59,8 +59,8 @@ class Sentence:
         order_notes: one sentence for each time that is read before its order.
     """
 
-    def __init__(self, text: str, given: "Given | None" = None) -> None:
-        given = given or Given()
+    def __init__(self, text: str, given: "Attachments | None" = None) -> None:
+        given = given or Attachments()
         self.text = text
         tokens, self.respelt = respelt(lexer.tokenise(text))
         self.tokens, self.order_notes = rephrased(tokens)

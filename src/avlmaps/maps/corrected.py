@@ -15,7 +15,7 @@ from avlmaps.core.poses import inverse
 from avlmaps.core.progress import silence_progress
 from avlmaps.core.timeline import Trajectory
 from avlmaps.core.wording import option
-from avlmaps.maps.audio.events import Motion, track_of
+from avlmaps.maps.audio.events import WalkedTrack, track_of
 from avlmaps.maps.audio.segmentation import Segment
 from avlmaps.maps.fusion.free_space import FreeViews, clean, count_where_it_matters
 from avlmaps.maps.fusion.moved_submaps import MovedSubmaps
@@ -24,7 +24,7 @@ from avlmaps.maps.pipeline.sources import locate_sources
 from avlmaps.maps.pipeline.write import carving_doubts
 from avlmaps.maps.pose_correction import PoseCorrection
 from avlmaps.maps.store.lock import lock_folder
-from avlmaps.maps.store.manifest import Box, Removed, Timings, UpInfo
+from avlmaps.maps.store.manifest import MapBounds, Removed, Timings, UpInfo
 from avlmaps.maps.store.reader import StoredMap, open_stored
 from avlmaps.maps.store.writer import MapContent, as_written, write_map
 from avlmaps.maps.types import HeardSounds, Keyframes, SourceEvidence, Submaps
@@ -98,7 +98,7 @@ def correct_stored(
                 info,
                 up=UpInfo.of(motion.turn @ info.up.vector(), info.up.known_from, info.up.support),
                 counts=structs.replace(info.counts, voxels=count),
-                bounding_box_m=Box.of(content.voxels.index, info.voxel_size_m),
+                bounding_box_m=MapBounds.of(content.voxels.index, info.voxel_size_m),
                 removed=removed,
                 doubts=(*kept, *doubts),
                 notices=(*kept, *doubts, *others, said),
@@ -157,7 +157,7 @@ def _moved(stored: StoredMap, submaps: Submaps, now: Float[np.ndarray, "f 4 4"])
     if not kept.any():
         raise MapError("With the corrected poses every voxel is seen through or a speck; check the poses.")
     keyframes = moved_keyframes(stored.keyframes, np.asarray(submaps.stamp_s), now)
-    sounds = _replaced(stored.sounds, Motion(np.asarray(submaps.stamp_s), now))
+    sounds = _replaced(stored.sounds, WalkedTrack(np.asarray(submaps.stamp_s), now))
     content = MapContent(
         total.voxels(kept=kept), keyframes, stored.place_state, sounds, stored.path / "sounds", stored.life(),
         replace(submaps, pose=now),
@@ -187,7 +187,7 @@ def _apply(step: Float[np.ndarray, "n 4 4"], points: np.ndarray) -> np.ndarray:
     return moved.astype(np.float32)
 
 
-def _replaced(sounds: HeardSounds, walk: Motion) -> HeardSounds:
+def _replaced(sounds: HeardSounds, walk: WalkedTrack) -> HeardSounds:
     """Return sounds with where the robot was now."""
     if not len(sounds):
         return sounds

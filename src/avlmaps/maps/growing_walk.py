@@ -9,7 +9,7 @@ import numpy as np
 from avlmaps.core.arrays import Float
 from avlmaps.core.camera import Rig
 from avlmaps.core.errors import RecordingError
-from avlmaps.maps.audio.events import Motion
+from avlmaps.maps.audio.events import WalkedTrack
 from avlmaps.maps.pose_correction import PoseCorrection, moved_frame
 from avlmaps.recordings.memory import MemoryRecording, frame_digest
 from avlmaps.recordings.types import Frame, Recording
@@ -38,9 +38,9 @@ class _Poses:
         other._poses[: self._count] = step.moved(now.stamps_s, now.world_from_camera)
         return other
 
-    def until_now(self) -> Motion:
+    def until_now(self) -> WalkedTrack:
         count = self._count
-        return Motion(self._stamps_s[:count], self._poses[:count])
+        return WalkedTrack(self._stamps_s[:count], self._poses[:count])
 
     def __len__(self) -> int:
         return self._count
@@ -79,7 +79,7 @@ class Walk(Recording):
         """Take note of where the robot was."""
         self._passed.append(stamp_s, world_from_camera)
 
-    def motion(self) -> Motion:
+    def motion(self) -> WalkedTrack:
         """Return where the robot was until now; another thread may add to it meanwhile."""
         return self._passed.until_now()
 

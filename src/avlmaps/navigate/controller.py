@@ -27,7 +27,7 @@ def bearing(pose: GroundPose, x_m: float, y_m: float) -> float:
     return atan2(y_m - pose.y_m, x_m - pose.x_m)
 
 
-class Route:
+class RouteProgress:
     """A path and how far along it a body has come; that never goes back.
 
     Attributes:
@@ -70,7 +70,7 @@ class Route:
 class StallDetector:
     """Detects a body that does not follow its commands, after any number of them."""
 
-    def __init__(self, route: Route) -> None:
+    def __init__(self, route: RouteProgress) -> None:
         self._route = route
         self._farthest_m = -1.0
         self._in_vain = 0
@@ -92,7 +92,7 @@ def still(before: GroundPose, now: GroundPose) -> bool:
 
 
 def _farthest(
-    route: Route, lookaheads_m: tuple[float, ...], pose: GroundPose, safe: Safe | None
+    route: RouteProgress, lookaheads_m: tuple[float, ...], pose: GroundPose, safe: Safe | None
 ) -> tuple[float, float]:
     """Return the first place at these distances along a path to which a body can go straight; else the last."""
     places = [route.at(route.along_m + lookahead_m) for lookahead_m in lookaheads_m]
@@ -103,7 +103,7 @@ class ActionController:
     """Chooses the paper's actions: turns until it looks along the path as well as 5 degrees allow, then steps on."""
 
     def __init__(self, points: Float[np.ndarray, "n 2"], safe: Safe) -> None:
-        self.route = Route(points)
+        self.route = RouteProgress(points)
         self._safe = safe
         self._turns = 0  # still to take, to the left, before the next step
         self._aligned = False
@@ -194,7 +194,7 @@ class VelocityController:
     def __init__(
         self, points: Float[np.ndarray, "n 2"], settings: VelocitySettings | None = None, safe: Safe | None = None
     ) -> None:
-        self.route = Route(points)
+        self.route = RouteProgress(points)
         self._safe = safe
         self.settings = settings or VelocitySettings()
         self.speed_m_s, self.turn_rad_s = 0.0, 0.0

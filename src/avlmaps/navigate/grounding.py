@@ -18,7 +18,7 @@ from avlmaps.maps.store.integrity import stamp
 from avlmaps.maps.storeys import said_storeys as storeys_in_words
 from avlmaps.navigate.file_access import Readable
 from avlmaps.navigate.footprint import Outline
-from avlmaps.navigate.instances import Thing, likely, nearest, same_thing, tells_one, things_in
+from avlmaps.navigate.instances import Destination, likely, nearest, same_thing, tells_one, things_in
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.on_storeys import at_storey, storeys_meant
@@ -79,7 +79,7 @@ class Seeker:
         self.readable = readable
         self.notes: list[str] = []
         self._tell = tell
-        self._handed_out: dict[Place, Thing] = {}
+        self._handed_out: dict[Place, Destination] = {}
         self._instances: set[Place] = set()
         self._last_line = ""
 
@@ -164,7 +164,7 @@ class Seeker:
             raise GoalNotFoundError(f"No {word.rest} is found {at_storey(word)}; one is on the {name_of}.")
         return only
 
-    def best(self, target: Target) -> Thing:
+    def best(self, target: Target) -> Destination:
         """Return the best thing that a target may mean.
 
         Raises:
@@ -173,7 +173,7 @@ class Seeker:
         things, _ = self._candidates(target)
         return self._chosen(things[0], len(things))
 
-    def referent(self, target: Target, here: Float[np.ndarray, "2"]) -> Thing:
+    def referent(self, target: Target, here: Float[np.ndarray, "2"]) -> Destination:
         """Return the thing that a target refers to for a robot: the best where it says which one, else the nearest.
 
         Raises:
@@ -182,7 +182,7 @@ class Seeker:
         things, one = self._candidates(target)
         return self._chosen(things[0] if one else nearest(things, here), len(things))
 
-    def pair(self, a: Target, b: Target, here: Float[np.ndarray, "2"]) -> tuple[Thing, Thing]:
+    def pair(self, a: Target, b: Target, here: Float[np.ndarray, "2"]) -> tuple[Destination, Destination]:
         """Return the two things that are meant: of several, those nearest to each other and to the robot.
 
         Raises:
@@ -197,18 +197,18 @@ class Seeker:
                 "two different things."
             )
 
-        def far_m(pair: tuple[Thing, Thing]) -> float:
+        def far_m(pair: tuple[Destination, Destination]) -> float:
             near, far = pair[0].outline.gap_to(pair[1].outline)
             return float(np.linalg.norm(near - far) + np.linalg.norm((near + far) / 2 - here))
 
         x, y = min(pairs, key=far_m)
         return self._chosen(x, len(first)), self._chosen(y, len(second))
 
-    def _candidates(self, target: Target) -> tuple[list[Thing], bool]:
+    def _candidates(self, target: Target) -> tuple[list[Destination], bool]:
         """Return the things that a target may mean, best first, and whether it says itself which one."""
         if isinstance(target, Place):
             level = self.avlmap.space.level(np.array([target.x, target.y, target.z]))
-            known = self._handed_out.get(target, Thing("", Outline.at(level[:2]), level))
+            known = self._handed_out.get(target, Destination("", Outline.at(level[:2]), level))
             return [known if target in self._instances else replace(known, outline=Outline.at(level[:2]))], True
         heat = target
         if isinstance(target, str):
@@ -224,7 +224,7 @@ class Seeker:
             self.note(f"the probability of {things[0].name} is {likely_by}; this is the best guess")
         return things, tells_one(heat)
 
-    def _near_first(self, things: list[Thing], found_at: float) -> list[Thing]:
+    def _near_first(self, things: list[Destination], found_at: float) -> list[Destination]:
         """Return the things on the robot's own storey where one of them is found, else all of them."""
         storeys = self.avlmap.storeys
         if storeys is None:
@@ -246,13 +246,13 @@ class Seeker:
         """
         return self._handed(self.best(target))
 
-    def place_of_thing(self, thing: Thing) -> Place:
+    def place_of_thing(self, thing: Destination) -> Place:
         """Return the place of one thing; a skill that is given this place knows the thing with its outline."""
         place = self._handed(thing)
         self._instances.add(place)
         return place
 
-    def every(self, target: Target, here: Float[np.ndarray, "2"]) -> list[Thing]:
+    def every(self, target: Target, here: Float[np.ndarray, "2"]) -> list[Destination]:
         """Return all things that a target may mean, the nearest first.
 
         Raises:
@@ -262,7 +262,7 @@ class Seeker:
         chosen = likely(things, one) if not one else things
         return sorted(chosen, key=lambda thing: float(np.linalg.norm(thing.outline.nearest_to(here) - here)))
 
-    def _handed(self, thing: Thing) -> Place:
+    def _handed(self, thing: Destination) -> Place:
         x, y, z = (float(value) for value in self.avlmap.space.world(thing.place))
         place = Place(x, y, z)
         self._handed_out[place] = thing
@@ -277,7 +277,7 @@ class Seeker:
     def _note(self, heat: Heatmap) -> None:
         self.note(heat.factors[0].note)
 
-    def _chosen(self, thing: Thing, of: int) -> Thing:
+    def _chosen(self, thing: Destination, of: int) -> Destination:
         place = place_text(self.avlmap.space.world(thing.place))
         line = f"{thing.name}: at {place}, probability {thing.probability:.2f}"
         if thing.name and not self._last_line.startswith(line):

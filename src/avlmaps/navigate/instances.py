@@ -21,7 +21,7 @@ _MOST_GOALS = 30
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Thing:
+class Destination:
     """Something to go to.
 
     Attributes:
@@ -59,7 +59,7 @@ def tells_one(heat: Heatmap) -> bool:
     return len(heat.factors) > 1 or not isinstance(heat.lead, NearThings)
 
 
-def things_in(heat: Heatmap, guess: bool = False) -> list[Thing]:
+def things_in(heat: Heatmap, guess: bool = False) -> list[Destination]:
     """Return the distinct things that a heatmap asks for, best first; at least one, and all of them found.
 
     Args:
@@ -90,7 +90,7 @@ def _guesses(heat: Heatmap) -> Iterator[Heatmap]:
         yield lead.include_uncertain()
 
 
-def nearest(things: Sequence[Thing], xy: Float[np.ndarray, "2"]) -> Thing:
+def nearest(things: Sequence[Destination], xy: Float[np.ndarray, "2"]) -> Destination:
     """Return the thing nearest to a place, of those that are found; the best where none is.
 
     One that is less than half as likely as the best is no choice: it counts as found only where the limit is low.
@@ -99,26 +99,26 @@ def nearest(things: Sequence[Thing], xy: Float[np.ndarray, "2"]) -> Thing:
     return min(found, key=lambda thing: thing.outline.distance_m(xy)) if found else things[0]
 
 
-def likely(things: Sequence[Thing], one: bool) -> Sequence[Thing]:
+def likely(things: Sequence[Destination], one: bool) -> Sequence[Destination]:
     """Return the things that may be meant: the best where one is meant, else those that are found."""
     return things[:1] if one else [thing for thing in things if thing.found] or things[:1]
 
 
-def same_thing(a: Thing, b: Thing) -> bool:
+def same_thing(a: Destination, b: Destination) -> bool:
     """Return whether two are one and the same thing."""
     return a.solid and b.solid and np.allclose(a.outline.centre, b.outline.centre, atol=1e-6)
 
 
-def _thing(heat: Heatmap, lead: Factor, goal: Goal) -> Thing:
+def _thing(heat: Heatmap, lead: Factor, goal: Goal) -> Destination:
     position = np.array(goal.position)
     instance = int(lead.instance[np.argmin(np.linalg.norm(lead.anchors - position, axis=1))])
     place, found = heat.space.level(position), goal.probability >= heat.found_at
     if not isinstance(lead, NearThings):
         name, outline = describe_query(heat), Outline.at(place[:2])
-        return Thing(name, outline, place, goal.probability, found=found, spread=goal.spread)
+        return Destination(name, outline, place, goal.probability, found=found, spread=goal.spread)
     own = heat.space.level(lead.anchors[lead.instance == instance])
     outline = Outline.round(own[:, :2], heat.space.grid.voxel_size_m)
-    return Thing(describe_query(heat), outline, place, goal.probability, solid=True, found=found)
+    return Destination(describe_query(heat), outline, place, goal.probability, solid=True, found=found)
 
 
 def explain_absence(heat: Heatmap, guess: bool = False) -> str:

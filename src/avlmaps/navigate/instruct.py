@@ -16,13 +16,13 @@ from avlmaps.core.motion import Action
 from avlmaps.core.poses import FRAME
 from avlmaps.language.learned_translator import LearnedTranslator
 from avlmaps.language.program import Budget, Step, Trace, parse_program, run_program
-from avlmaps.language.sentence import Given
+from avlmaps.language.sentence import Attachments
 from avlmaps.language.translator import Translation, Translator
 from avlmaps.navigate.brake import Brake, EditBrake, braked
 from avlmaps.navigate.driver import Driver
 from avlmaps.navigate.file_access import Readable, offered_by
 from avlmaps.navigate.grounding import Heats
-from avlmaps.navigate.motion_log import Move
+from avlmaps.navigate.motion_log import LoggedMove
 from avlmaps.navigate.skills import Robot, RobotSettings
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.room_names import own_names
@@ -33,7 +33,7 @@ _NEAR_M = 1.0  # within this distance a goal counts as reached where the paper j
 
 
 @dataclass(frozen=True, slots=True)
-class Done:
+class ReportedStep:
     """A step of a program, and the movement that it made.
 
     Attributes:
@@ -42,7 +42,7 @@ class Done:
     """
 
     step: Step
-    move: Move | None
+    move: LoggedMove | None
 
     def to_json(self) -> dict[str, Any]:
         """Return the step as JSON has it; a movement is its result."""
@@ -73,8 +73,8 @@ class Outcome:
     command: str
     programs: tuple[str, ...]
     notes: tuple[str, ...]
-    done: tuple[Done, ...]
-    moves: tuple[Move, ...]
+    done: tuple[ReportedStep, ...]
+    moves: tuple[LoggedMove, ...]
     error: str | None
     error_type: str | None
     elapsed_s: float
@@ -90,7 +90,7 @@ class Outcome:
         return "\n# What was left to do:\n".join(self.programs)
 
     @property
-    def subgoals(self) -> tuple[Move, ...]:
+    def subgoals(self) -> tuple[LoggedMove, ...]:
         """The movements to a place, in order."""
         return tuple(move for move in self.moves if move.goal is not None)
 
@@ -126,10 +126,10 @@ class Outcome:
         }
 
 
-def given_by(avlmap: AVLMap, image: str | None = None, clip: str | None = None, *, said: str = "") -> Given:
+def given_by(avlmap: AVLMap, image: str | None = None, clip: str | None = None, *, said: str = "") -> Attachments:
     """Return what a command to a robot (``said``) may mean: the map's names, and which places its sounds have."""
     sounds_at, own = avlmap.settings.sounds.at, own_names(avlmap, said)
-    return Given(image, clip, avlmap.knows, sounds_at, own, lambda: no_sources(avlmap.stored))
+    return Attachments(image, clip, avlmap.knows, sounds_at, own, lambda: no_sources(avlmap.stored))
 
 
 def _silent(_: str) -> None:
@@ -208,7 +208,7 @@ class _Run:
         self.tell = tell
         self.programs: list[str] = []
         self.notes: list[str] = []
-        self.done: list[Done] = []
+        self.done: list[ReportedStep] = []
         self.last: Trace | None = None
 
     def through(self, translation: Translation | None) -> None:
@@ -235,7 +235,7 @@ class _Run:
 
     def on_step(self, step: Step) -> None:
         moved = self.robot.moves[sum(one.move is not None for one in self.done) :]
-        self.done.append(Done(step, moved[-1] if moved else None))
+        self.done.append(ReportedStep(step, moved[-1] if moved else None))
         if moved or step.error is None:
             self.tell(str(self.done[-1]))
 

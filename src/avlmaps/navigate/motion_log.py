@@ -14,7 +14,7 @@ Triple = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Move:
+class LoggedMove:
     """One movement that a skill made.
 
     Attributes:

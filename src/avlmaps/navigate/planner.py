@@ -43,7 +43,7 @@ class PlanSettings:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Way:
+class PlannedPath:
     """A path for a body's middle.
 
     Attributes:
@@ -105,7 +105,7 @@ class Planner:
     def _blocks(self) -> "_BlockGraph":
         return _BlockGraph.of(self.costmap)
 
-    def way(self, start: Float[np.ndarray, "2"], goal: Float[np.ndarray, "2"]) -> Way | None:
+    def way(self, start: Float[np.ndarray, "2"], goal: Float[np.ndarray, "2"]) -> PlannedPath | None:
         """Return the cheapest path between two places, None where there is none.
 
         Args:
@@ -231,14 +231,14 @@ class Planner:
         thinned = np.ascontiguousarray(corners[turns])
         return thinned[grid_kernels.shortcuts(thinned, passable, cost, _WINDOW)]
 
-    def _measured(self, points: Float[np.ndarray, "n 2"], before: Float[np.ndarray, "2"] | None) -> Way:
+    def _measured(self, points: Float[np.ndarray, "n 2"], before: Float[np.ndarray, "2"] | None) -> PlannedPath:
         costmap = self.costmap
         cost = grid_kernels.path_cost(points, costmap.passable, costmap.cost)
         xy = costmap.origin_m + points * costmap.cell_size_m
         if before is not None:
             xy = np.concatenate([[before], xy])
         length_m = float(np.linalg.norm(np.diff(xy, axis=0), axis=1).sum())
-        return Way(xy, float(cost) * costmap.cell_size_m, length_m)
+        return PlannedPath(xy, float(cost) * costmap.cell_size_m, length_m)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -23,8 +23,8 @@ from avlmaps.navigate.driver import Arrival, Driver
 from avlmaps.navigate.file_access import Readable
 from avlmaps.navigate.footprint import Outline, bearing_rad, middle_between, to_the_left
 from avlmaps.navigate.grounding import Heats, Seeker, kind_of, number_of, text_of
-from avlmaps.navigate.instances import Thing
-from avlmaps.navigate.motion_log import Move, Triple, concat_motions
+from avlmaps.navigate.instances import Destination
+from avlmaps.navigate.motion_log import LoggedMove, Triple, concat_motions
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.heatmap import Heatmap
 
@@ -49,7 +49,7 @@ def _silent(_: str) -> None:
 
 
 class Robot:
-    """A robot that knows a map and can drive; it implements `avlmaps.language.program.vocabulary.Vocabulary`.
+    """A robot that knows a map and can drive; it implements `avlmaps.language.program.vocabulary.RobotSkills`.
 
     Where a phrase alone says what is meant, skills that stand in relation to the robot (`face`, `move_to_left`,
     `move_to_object` ...) take the nearest thing of that name that is found; `move_to`, `get_pos` and
@@ -89,7 +89,7 @@ class Robot:
         self._pause = pause
         self.settings = settings or RobotSettings()
         self.seeker = Seeker(asked, self.settings.guess, readable or Readable(), tell, storey_of_walk(asked), heats)
-        self.moves: list[Move] = []
+        self.moves: list[LoggedMove] = []
 
     def load_image(self, path: str) -> Picture:
         """Load a picture from a file, to ask where it was taken."""
@@ -175,7 +175,7 @@ class Robot:
         """Drive to the middle between the nearest points of two things."""
         first, second = self.seeker.pair(a, b, self._here)
         middle = middle_between(first.outline, second.outline)
-        both = Thing(
+        both = Destination(
             f"between {first.name or 'a place'} and {second.name or 'a place'}",
             Outline.at(middle),
             self._on_floor(middle, first, second),
@@ -270,7 +270,7 @@ class Robot:
         pose = self.driver.pose
         return np.array([pose.x_m, pose.y_m])
 
-    def _on_floor(self, xy: Float[np.ndarray, "2"], *things: Thing) -> Float[np.ndarray, "3"]:
+    def _on_floor(self, xy: Float[np.ndarray, "2"], *things: Destination) -> Float[np.ndarray, "3"]:
         """Return a place on the floor: that of things, where they are on another storey than the robot."""
         storeys, floors = self.asked.storeys, [self.floor_m]
         if storeys is not None and things:
@@ -281,20 +281,20 @@ class Robot:
     def _place(self, level: Float[np.ndarray, "3"]) -> Place:
         return Place(*_triple(self.asked.space.world(level)))
 
-    def _towards(self, thing: Thing) -> Float[np.ndarray, "2"]:
+    def _towards(self, thing: Destination) -> Float[np.ndarray, "2"]:
         """Return the direction in which the robot sees a thing; straight ahead where it stands in its middle."""
         bearing = bearing_rad(self._here, thing.outline.centre)
         bearing = self.driver.pose.heading_rad if bearing is None else bearing
         return np.array([np.cos(bearing), np.sin(bearing)])
 
-    def _go_beside(self, skill: str, thing: Thing, direction: Float[np.ndarray, "2"], distance_m: float) -> None:
+    def _go_beside(self, skill: str, thing: Destination, direction: Float[np.ndarray, "2"], distance_m: float) -> None:
         distance_m = number_of(distance_m, skill, _MOST_M, "metres")
         if distance_m < 0.0:
             raise ProgramError(f"{skill} takes a distance of 0 m or more, not {distance_m:g}; go to the other side.")
         self._go(skill, thing, self._on_floor(thing.outline.beside(direction, distance_m), thing))
 
     def _go(
-        self, skill: str, thing: Thing, goal: Float[np.ndarray, "3"], face: Float[np.ndarray, "3"] | None = None
+        self, skill: str, thing: Destination, goal: Float[np.ndarray, "3"], face: Float[np.ndarray, "3"] | None = None
     ) -> None:
         """Drive to a place of the level frame, and look at another once there."""
         world = self.asked.space.world
@@ -326,7 +326,7 @@ class Robot:
         stop = _triple(world(self._on_floor(here)))
         target = None if goal is None else _triple(world(goal))
         away_m = None if goal is None else float(np.hypot(*(goal[:2] - here)))
-        move = Move(
+        move = LoggedMove(
             skill, name, target, stop, away_m, pose.heading_rad, arrival.reached, arrival.actions, arrival.path,
             arrival.note, arrival.contacts,
         )  # fmt: skip
@@ -340,7 +340,7 @@ def _triple(vector: Float[np.ndarray, "3"]) -> Triple:
     return x, y, z
 
 
-def _not_reached(move: Move) -> str:
+def _not_reached(move: LoggedMove) -> str:
     why = move.note.rstrip(".") or "the driver gave up"
     if move.distance_m is None:
         return f"{move.skill} could not be finished: {why}; the robot looks along {np.rad2deg(move.heading_rad):.0f}°."

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from avlmaps.core.motion import GroundPose
 from avlmaps.core.printable import plot_text
-from avlmaps.navigate.motion_log import Move
+from avlmaps.navigate.motion_log import LoggedMove
 from avlmaps.query.plots import INK, aside, draw_ground, finish, mark, panels, save
 from avlmaps.query.topdown import TopDown
 from avlmaps.query.voxel_space import Space
@@ -31,7 +31,7 @@ def plot_path(
     path: Path,
     space: Space,
     start: GroundPose,
-    moves: Sequence[Move],
+    moves: Sequence[LoggedMove],
     obstacles: "Obstacles | None" = None,
     contacts: Float[np.ndarray, "m 2"] | None = None,
     title: str = "",
@@ -47,7 +47,7 @@ def plot_path(
 def draw_path(
     space: Space,
     start: GroundPose,
-    moves: Sequence[Move],
+    moves: Sequence[LoggedMove],
     obstacles: "Obstacles | None" = None,
     contacts: Float[np.ndarray, "m 2"] | None = None,
     title: str = "",
@@ -98,7 +98,7 @@ def _draw_pose(ax: "Axes", pose: GroundPose, name: str) -> None:
     )  # fmt: skip
 
 
-def _draw_subgoal(ax: "Axes", space: Space, number: int, move: Move) -> None:
+def _draw_subgoal(ax: "Axes", space: Space, number: int, move: LoggedMove) -> None:
     """Ring the goal, dot the stop, and join them where they are apart."""
     goal, stop = space.level(np.array(move.goal)), space.level(np.array(move.stop))
     ax.plot(*np.stack([goal, stop])[:, :2].T, color=_GOAL, linewidth=1.2, linestyle=":", zorder=6)

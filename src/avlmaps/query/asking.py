@@ -412,9 +412,9 @@ def _read(
 ) -> "AskedSentence":
     """Return the reading of a sentence; it depends on nothing but the words, and agents repeat theirs."""
     from avlmaps.language.questions import read_question
-    from avlmaps.language.sentence import Given
+    from avlmaps.language.sentence import Attachments
 
-    return read_question(sentence, Given(image, clip, knows=lambda _: True, at=at, own=own))
+    return read_question(sentence, Attachments(image, clip, knows=lambda _: True, at=at, own=own))
 
 
 def _probability(factor: Factor) -> float:

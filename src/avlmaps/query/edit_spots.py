@@ -8,7 +8,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Float, Int
 from avlmaps.core.poses import plain_point
-from avlmaps.maps.store.edits import Spot
+from avlmaps.maps.store.edits import EditedSpot
 
 if TYPE_CHECKING:
     from avlmaps.maps.store.life import Life
@@ -65,7 +65,7 @@ class Spots:
     def __init__(self, avlmap: SeenMap) -> None:
         self._map = avlmap
 
-    def thing_at(self, spot: Spot | None) -> "Thing | None":
+    def thing_at(self, spot: EditedSpot | None) -> "Thing | None":
         """Return the thing of the map, as its encoder sees it, that fills the box of a spot best."""
         if spot is None:
             return None
@@ -79,7 +79,7 @@ class Spots:
                 return best
         return None
 
-    def carried(self, spot: Spot) -> Spot | None:
+    def carried(self, spot: EditedSpot) -> EditedSpot | None:
         """Return where a later day found the thing of a spot, of which an earlier day knew; None where it did not."""
         life = self._map.stored.life() if getattr(self._map.stored.info, "visits", ()) else None
         if life is None:
@@ -92,9 +92,9 @@ class Spots:
         points = self._map.space.grid.centre_of(life.voxels(number))
         low, high = self._box_of(self._map.space.level(points))
         middle = self._map.space.world((low + high) / 2.0)
-        return Spot(name=spot.name, middle=plain_point(middle), size=plain_point(high - low))
+        return EditedSpot(name=spot.name, middle=plain_point(middle), size=plain_point(high - low))
 
-    def stay_at(self, life: "Life", spot: Spot) -> int | None:
+    def stay_at(self, life: "Life", spot: EditedSpot) -> int | None:
         """Return the number of the stay that fills the box of a spot best."""
         level = self._map.space.level
         near = [
@@ -113,7 +113,7 @@ class Spots:
         half = self._map.space.grid.voxel_size_m / 2.0
         return level.min(axis=0) - half, level.max(axis=0) + half
 
-    def overlap(self, spot: Spot, box: Box) -> float:
+    def overlap(self, spot: EditedSpot, box: Box) -> float:
         """Return which share of two boxes together both hold, in [0, 1]."""
         middle, size = self._map.space.level(np.array(spot.middle)), np.array(spot.size)
         low, high = middle - size / 2.0, middle + size / 2.0
@@ -121,9 +121,9 @@ class Spots:
         whole = np.prod(size) + np.prod(box[1] - box[0]) - both
         return float(both / whole) if whole > 0.0 else 0.0
 
-    def spot_of(self, name: str, rows: Int[np.ndarray, " m"]) -> Spot:
+    def spot_of(self, name: str, rows: Int[np.ndarray, " m"]) -> EditedSpot:
         """Return what an edit is about: the thing of some voxels."""
         low, high = self.box(rows)
         middle = self._map.space.world((low + high) / 2.0)
-        spot = Spot(name=name, middle=plain_point(middle), size=plain_point(high - low))
+        spot = EditedSpot(name=name, middle=plain_point(middle), size=plain_point(high - low))
         return spot.anchored(self._map.stored.keyframes)

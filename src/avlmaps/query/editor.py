@@ -12,7 +12,7 @@ from avlmaps.core.errors import MapError, QueryError
 from avlmaps.core.numbers import checked
 from avlmaps.core.poses import plain_point
 from avlmaps.core.wording import place_text
-from avlmaps.maps.store.edits import LONGEST_NAME, Does, Edit, Spot, World, append_edit, in_force, read_edits
+from avlmaps.maps.store.edits import LONGEST_NAME, Does, Edit, EditedSpot, World, append_edit, in_force, read_edits
 from avlmaps.query.edits import Edited, apply, means
 from avlmaps.query.found_edits import plain_name, said
 from avlmaps.query.given_places import is_place, place_given, place_of
@@ -193,7 +193,10 @@ class Editor:
         self._require_here(self._level(at)[None], "The place")
         place = numbers if len(numbers) == 3 else self._map.space.world(np.append(numbers, self._floor_m()))
         return self._add(
-            "pin", [Spot(middle=plain_point(place)).anchored(self._map.stored.keyframes)], name=_own_name(name), by=by
+            "pin",
+            [EditedSpot(middle=plain_point(place)).anchored(self._map.stored.keyframes)],
+            name=_own_name(name),
+            by=by,
         )
 
     @checked(QueryError)
@@ -270,7 +273,7 @@ class Editor:
                 f"{place_text(high)} on the plan (level frame); give x and y in metres."
             )
 
-    def _room(self, room: str) -> Spot:
+    def _room(self, room: str) -> EditedSpot:
         """Return the room that is meant."""
         from avlmaps.query.whereabouts import Whereabouts
 
@@ -287,14 +290,14 @@ class Editor:
         found = where.rooms[numbers[0]] if numbers[0] >= 0 else None
         if found is None or found.region < 0:
             raise QueryError(f"The floor of the room {room!r} is not mapped, so that it has no extent to name.")
-        spot = Spot(name=found.name, middle=found.position, corners=tuple(map(plain_point, found.outline)))
+        spot = EditedSpot(name=found.name, middle=found.position, corners=tuple(map(plain_point, found.outline)))
         return spot.anchored(self._map.stored.keyframes)
 
-    def _area(self, corners: Sequence[Float[np.ndarray, "2"]]) -> Spot:
+    def _area(self, corners: Sequence[Float[np.ndarray, "2"]]) -> EditedSpot:
         floor_m = self._floor_m()
         points = [self._map.space.world(np.append(corner, floor_m)) for corner in corners]
         middle = plain_point(np.mean(points, axis=0))
-        return Spot(middle=middle, corners=tuple(map(plain_point, points))).anchored(self._map.stored.keyframes)
+        return EditedSpot(middle=middle, corners=tuple(map(plain_point, points))).anchored(self._map.stored.keyframes)
 
     def _floor_m(self) -> float:
         """Return the level height of the floor on which the map's walk began."""
@@ -316,7 +319,7 @@ class Editor:
     def _new(
         self,
         does: Does,
-        at: Sequence[Spot] = (),
+        at: Sequence[EditedSpot] = (),
         *,
         name: str = "",
         cut: Sequence[tuple[float, float, float]] = (),
@@ -326,7 +329,7 @@ class Editor:
         world = World.of(self._map.stored.info) if at else None
         return Edit.new(does, at, name=name, cut=cut, of=of, by=_name(by) if by else "", world=world)
 
-    def _add(self, does: Does, at: Sequence[Spot], *, name: str, by: str) -> Edit:
+    def _add(self, does: Does, at: Sequence[EditedSpot], *, name: str, by: str) -> Edit:
         return self._append(self._new(does, at, name=name, by=by))
 
     def _append(self, edit: Edit) -> Edit:

@@ -18,7 +18,7 @@ _LEAST_HEAT, _LEAST_SCORE = 0.02, 0.01
 
 
 @dataclass(frozen=True, slots=True)
-class Evidence:
+class GoalEvidence:
     """What speaks for a goal.
 
     Attributes:
@@ -42,7 +42,9 @@ class Evidence:
     first_alone: float = 1.0
 
 
-def evidence_of(factors: Sequence[Factor], instance: int, position: Float[np.ndarray, "3"], peak: float) -> Evidence:
+def evidence_of(
+    factors: Sequence[Factor], instance: int, position: Float[np.ndarray, "3"], peak: float
+) -> GoalEvidence:
     """Return the evidence for a goal."""
     lead = lead_of(factors)
     context = [factor for factor in factors if factor is not lead]
@@ -52,7 +54,7 @@ def evidence_of(factors: Sequence[Factor], instance: int, position: Float[np.nda
     room = float(np.prod([_mean_heat(factor, lead, instance, position) for factor in rooms]))
     near = peak / max(itself * room, _LEAST_SCORE) if context else 1.0
     marks = [_mark(factor, position) for factor in context if factor not in rooms]
-    return Evidence(
+    return GoalEvidence(
         lead.part.modality,
         tuple(factor.part.modality for factor in context),
         alone,

@@ -18,7 +18,7 @@ from avlmaps.core.extras import install_command
 from avlmaps.core.files import replacing
 from avlmaps.core.poses import to_quaternion
 from avlmaps.query.export import explain_write_errors, heat_colors
-from avlmaps.query.export_layers import Heard, Layers
+from avlmaps.query.export_layers import ExportedSound, Layers
 
 CAMERA_FRAME = "camera"
 _SOUND_M = 0.3
@@ -142,7 +142,7 @@ class _Writer:
             pose=pose, billboard=True, font_size=14.0, scale_invariant=True, color=dark, text=label
         )
 
-    def _sound(self, number: int, sound: Heard) -> Any:
+    def _sound(self, number: int, sound: ExportedSound) -> Any:
         m = self._messages
         ball = m.SpherePrimitive(
             pose=self._pose(sound.position),

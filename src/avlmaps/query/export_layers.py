@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Box:
+class ExportedBox:
     """A thing's box, upright in the room.
 
     Attributes:
@@ -43,7 +43,7 @@ class Box:
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class ExportedSound:
     """A sound, where the robot was when it heard it.
 
     Attributes:
@@ -88,8 +88,8 @@ class Layers:
     points: Float32[np.ndarray, "n 3"]
     colors: UInt8[np.ndarray, "n 3"]
     voxel_size_m: float
-    things: tuple[Box, ...]
-    sounds: tuple[Heard, ...]
+    things: tuple[ExportedBox, ...]
+    sounds: tuple[ExportedSound, ...]
     heat: tuple[str, Float32[np.ndarray, " n"]] | None
     stamp_s: Float64[np.ndarray, " k"]
     frame_from_camera: Float64[np.ndarray, "k 4 4"]
@@ -124,13 +124,13 @@ def layers_of(
         return np.asarray(points, np.float64) @ turn[:3, :3].T + turn[:3, 3]
 
     qx, qy, qz, qw = (float(value) for value in to_quaternion(axes))
-    boxes: list[Box] = []
+    boxes: list[ExportedBox] = []
     known = "pixels" in stored.info.models  # else it names none, and shows the rest
     for thing in opened.things(least_confidence=least_confidence) if known else []:
         corners = space.level(thing.points)
         middle = (corners.min(axis=0) + corners.max(axis=0)) / 2.0
         x, y, z = (float(value) for value in axes[:3, :3] @ middle + axes[:3, 3])
-        boxes.append(Box(thing.name, thing.confidence, (x, y, z), thing.size, (qx, qy, qz, qw), thing.color))
+        boxes.append(ExportedBox(thing.name, thing.confidence, (x, y, z), thing.size, (qx, qy, qz, qw), thing.color))
     warm = None
     if heat is not None and (asked := opened.ask(heat).heat) is not None:
         warm = heat, np.asarray(asked.values, np.float32)
@@ -151,10 +151,10 @@ def layers_of(
     )
 
 
-def _heard(sound: "SoundEvent", placed: Callable[[np.ndarray], np.ndarray]) -> Heard:
+def _heard(sound: "SoundEvent", placed: Callable[[np.ndarray], np.ndarray]) -> ExportedSound:
     name, confidence = (sound.names[0], sound.confidences[0]) if sound.names else ("sound", None)
     x, y, z = (float(value) for value in placed(np.array(sound.position)))
-    return Heard(name, confidence, (x, y, z), sound.onset_s, sound.offset_s)
+    return ExportedSound(name, confidence, (x, y, z), sound.onset_s, sound.offset_s)
 
 
 def _stored_camera(rgb: Pinhole, pictures: tuple[bytes, ...]) -> Pinhole:

@@ -9,7 +9,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Float, Int
 from avlmaps.core.wording import place_text
-from avlmaps.maps.store.edits import Edit, Spot, World
+from avlmaps.maps.store.edits import Edit, EditedSpot, World
 from avlmaps.query.components import linked
 from avlmaps.query.edit_spots import ALIKE_BOX, SeenMap, Spots
 from avlmaps.query.raster import in_polygon
@@ -137,10 +137,12 @@ class FoundEdits:
         if not edit.cut:
             return np.zeros((0, 2))
         spot = edit.at[0]
-        with_cut = Spot(middle=spot.middle, corners=edit.cut, seen_from=spot.seen_from).now(self._map.stored.keyframes)
+        with_cut = EditedSpot(middle=spot.middle, corners=edit.cut, seen_from=spot.seen_from).now(
+            self._map.stored.keyframes
+        )
         return self._map.space.level(np.array(with_cut.corners, np.float64))[:, :2]
 
-    def _targets(self, spot: Spot, claims: Sequence[Claim]) -> list[Claim]:
+    def _targets(self, spot: EditedSpot, claims: Sequence[Claim]) -> list[Claim]:
         """Return the claims, or the thing of the map, that a spot is about; none where there is nothing like it."""
         own = [(self._spots.overlap(spot, self._spots.box(one.rows)), one) for one in claims]
         share, best = max(own, key=lambda one: one[0], default=(0.0, None))
@@ -158,7 +160,7 @@ class FoundEdits:
         nobody = Edit(schema=1, id="", does="rename", made="")
         return [Claim(thing.name, rows, thing.confidence, False, nobody)] if len(rows) else []
 
-    def spot_of(self, name: str, rows: Int[np.ndarray, " m"]) -> Spot:
+    def spot_of(self, name: str, rows: Int[np.ndarray, " m"]) -> EditedSpot:
         """Return what an edit is about: the thing of some voxels."""
         return self._spots.spot_of(name, rows)
 

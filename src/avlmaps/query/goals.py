@@ -17,7 +17,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Float, Float32, Int
 from avlmaps.core.poses import plain_point
-from avlmaps.query.evidence import Evidence, evidence_of
+from avlmaps.query.evidence import GoalEvidence, evidence_of
 from avlmaps.query.factors import Factor, NearAnchors, NearThings, lead_of
 from avlmaps.query.probability import probability_of
 
@@ -157,13 +157,13 @@ def _highest(instance: Int[np.ndarray, " m"], heat: Float[np.ndarray, " m"], cou
     return peak
 
 
-def weigh_goals(factors: Sequence[Factor], shares: Shares, top: int) -> list[tuple[Goal, Evidence]]:
+def weigh_goals(factors: Sequence[Factor], shares: Shares, top: int) -> list[tuple[Goal, GoalEvidence]]:
     """Return up to ``top`` goals, best first by heat times the confidence of the lead's instance, with the evidence."""
     lead, is_named = lead_of(factors), all(factor.is_named for factor in factors)
     score = np.round(shares.peak * lead.confidence, 3)  # more digits would be noise; of equals the larger leads
     extent = np.bincount(lead.instance, minlength=len(score))
     ground: list[Float[np.ndarray, 2]] = []
-    goals: list[tuple[Goal, Evidence]] = []
+    goals: list[tuple[Goal, GoalEvidence]] = []
     for instance in map(int, np.lexsort((-extent, -score))):
         if len(goals) >= top or score[instance] <= 0.0:
             break

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Float32, Int
-from avlmaps.query.evidence import Evidence
+from avlmaps.query.evidence import GoalEvidence
 from avlmaps.query.factors import FOUND_AT, Factor, lead_of, product_of, times
 from avlmaps.query.goals import Goal, Shares, share_voxels, weigh_goals
 from avlmaps.query.heat import Heat
@@ -148,7 +148,7 @@ class Heatmap(Heat):
         """Return the best distinct places, best first; fewer where there are fewer, none where there is no heat."""
         return [goal for goal, _ in self.weighed(top)]
 
-    def weighed(self, top: int = 3) -> list[tuple[Goal, Evidence]]:
+    def weighed(self, top: int = 3) -> list[tuple[Goal, GoalEvidence]]:
         """Return the goals, each with the evidence that its probability rests on."""
         if self.where is None:
             return weigh_goals(self.factors, self._shares, top)

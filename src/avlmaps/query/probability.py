@@ -17,7 +17,7 @@ from functools import cache
 from pathlib import Path
 
 from avlmaps.core.question import Modality
-from avlmaps.query.evidence import Evidence
+from avlmaps.query.evidence import GoalEvidence
 
 NUMBERS = ("thing", "near", "room", "marks")
 """The numbers of the evidence that have a weight."""
@@ -28,7 +28,7 @@ MOST_ODDS = 1.75
 Weights = Mapping[str, float]
 
 
-def probability_of(evidence: Evidence, given: Weights | None = None, most_odds: float = MOST_ODDS) -> float:
+def probability_of(evidence: GoalEvidence, given: Weights | None = None, most_odds: float = MOST_ODDS) -> float:
     """Return the probability that a goal with this evidence is right, by the weights that ship or those given."""
     if not evidence.context:
         return round(evidence.alone, 3)  # more digits would be noise
@@ -41,7 +41,7 @@ def most_likely(alone: float, most_odds: float = MOST_ODDS) -> float:
     return most_odds * alone / (1.0 + (most_odds - 1.0) * alone)
 
 
-def factor_values(evidence: Evidence, given: Weights | None = None) -> dict[str, float]:
+def factor_values(evidence: GoalEvidence, given: Weights | None = None) -> dict[str, float]:
     """Return each factor of the probability of a goal of several parts, by its name."""
     own = given or weights()
     odds = {
@@ -51,7 +51,7 @@ def factor_values(evidence: Evidence, given: Weights | None = None) -> dict[str,
     return {factor: 1.0 / (1.0 + math.exp(-value)) for factor, value in odds.items()}
 
 
-def factors_of(evidence: Evidence) -> tuple[str, ...]:
+def factors_of(evidence: GoalEvidence) -> tuple[str, ...]:
     """Return the factors that a query has: ``room`` where it names an area, ``near`` and ``marks`` where others."""
     near = ("near", "marks") if any(kind is not Modality.AREA for kind in evidence.context) else ()
     return ("thing", *near, *(("room",) if Modality.AREA in evidence.context else ()))

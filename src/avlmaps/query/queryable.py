@@ -52,7 +52,7 @@ class FoundSettings(Protocol):
         ...
 
 
-class Corrections(Protocol):
+class EditedNames(Protocol):
     """What people corrected in a map, as far as an answer needs it; ``edits.Edited`` is it."""
 
     @property
@@ -84,7 +84,7 @@ class Queryable(SeenMap, Protocol):
         ...
 
     @cached_property
-    def edited(self) -> "Corrections":
+    def edited(self) -> "EditedNames":
         """What people corrected, as it applies to this map."""
         ...
 

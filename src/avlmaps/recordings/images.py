@@ -18,7 +18,7 @@ from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import PICTURE_BYTES, open_regular, read_regular
 from avlmaps.core.npy import load_npy, npy_header
 from avlmaps.recordings.faults import readable
-from avlmaps.recordings.turning import Turn, exif_turn
+from avlmaps.recordings.turning import DisplayTurn, exif_turn
 
 _PNG = b"\x89PNG\r\n\x1a\n"
 _JPEG = b"\xff\xd8"
@@ -196,14 +196,14 @@ def _check_outside(path: Path, content: bytes, camera: Pinhole) -> None:
     _check_size(path, (height, width), camera)
 
 
-def file_turn(path: Path) -> Turn:
+def file_turn(path: Path) -> DisplayTurn:
     """Return how a JPEG's EXIF requests that it be turned; none where there is no such tag, or no such file."""
     if path.suffix.lower() not in (".jpg", ".jpeg"):
-        return Turn()
+        return DisplayTurn()
     try:
         return exif_turn(_head(path))
     except RecordingError:  # which says more when the picture is read
-        return Turn()
+        return DisplayTurn()
 
 
 def turn_notices(folder: Path, names: Sequence[str]) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ _ONE = 1 << 16  # in the fixed-point numbers of a display matrix
 
 
 @dataclass(frozen=True, slots=True)
-class Turn:
+class DisplayTurn:
     """How a stored picture is turned to be shown: columns and rows change places first, then they are reversed.
 
     Attributes:
@@ -47,7 +47,7 @@ class Turn:
         return "turned by 180°" if self.flip_x else "as stored"
 
     @classmethod
-    def of_exif(cls, orientation: int) -> "Turn":
+    def of_exif(cls, orientation: int) -> "DisplayTurn":
         """Return the turn that an EXIF orientation (1 to 8) requests; none for any other number."""
         numbered = {
             2: cls(flip_x=True), 3: cls(flip_x=True, flip_y=True), 4: cls(flip_y=True), 5: cls(transpose=True),
@@ -56,7 +56,7 @@ class Turn:
         return numbered.get(orientation, cls())
 
     @classmethod
-    def of_display_matrix(cls, content: bytes) -> "Turn":
+    def of_display_matrix(cls, content: bytes) -> "DisplayTurn":
         """Return the turn of a display matrix, nine whole numbers row by row; none where it is no quarter turn."""
         a, b, _, c, d = struct.unpack_from("=5i", content)  # x shown = a x + c y, y shown = b x + d y
         if abs(a) == abs(d) == _ONE and b == c == 0:
@@ -66,22 +66,22 @@ class Turn:
         return cls()
 
 
-def exif_turn(content: bytes) -> Turn:
+def exif_turn(content: bytes) -> DisplayTurn:
     """Return the turn that a JPEG's or PNG's EXIF requests; none where it has no EXIF."""
     if b"Exif" not in content[: 1 << 16] and b"eXIf" not in content[: 1 << 16]:
-        return Turn()
+        return DisplayTurn()
     from PIL import Image
 
     try:
         with Image.open(BytesIO(content)) as picture:
-            return Turn.of_exif(int(picture.getexif().get(_ORIENTATION, 1)))
+            return DisplayTurn.of_exif(int(picture.getexif().get(_ORIENTATION, 1)))
     except (OSError, ValueError, TypeError, SyntaxError):  # it is a tag that cannot be read; the picture may be whole
-        return Turn()
+        return DisplayTurn()
 
 
-def display_turn(frame: Any) -> Turn:
+def display_turn(frame: Any) -> DisplayTurn:
     """Return the turn that a decoded frame of a video (PyAV) requests."""
     for data in frame.side_data:
         if data.type.name == "DISPLAYMATRIX":
-            return Turn.of_display_matrix(bytes(data))
-    return Turn()
+            return DisplayTurn.of_display_matrix(bytes(data))
+    return DisplayTurn()

@@ -10,7 +10,7 @@ from jaxtyping import Float64, UInt8
 from avlmaps.core.errors import RecordingError
 from avlmaps.recordings.images import MOST_PIXELS
 from avlmaps.recordings.media_files import checked_media
-from avlmaps.recordings.turning import Turn, display_turn
+from avlmaps.recordings.turning import DisplayTurn, display_turn
 
 
 class VideoFrames:
@@ -119,14 +119,14 @@ class VideoFrames:
             raise RecordingError(f"{self.path} has a video stream without a single frame.")
         return np.unique(np.array(stamps, np.int64))
 
-    def _find_turn(self) -> Turn:
+    def _find_turn(self) -> DisplayTurn:
         from av.error import FFmpegError
 
         try:
             self._seek(0)
             return display_turn(next(self._decoder))
         except (FFmpegError, StopIteration, ValueError):  # the picture itself will be an error when it is read
-            return Turn()
+            return DisplayTurn()
 
     def _seek(self, index: int) -> None:
         self._container.seek(int(self._pts[index]), stream=self._stream(), backward=True)

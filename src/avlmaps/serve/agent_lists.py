@@ -15,7 +15,7 @@ from avlmaps.query.unknown_names import unknown_note
 from avlmaps.query.whereabouts import Whereabouts
 from avlmaps.serve.errors import RequestError
 from avlmaps.serve.requests import Words
-from avlmaps.serve.work import Task, lists_of
+from avlmaps.serve.work import WorkInput, lists_of
 
 Confidence = Annotated[float, Meta(ge=0.0, le=1.0)]
 Top = Annotated[int, Meta(ge=1, le=50)]
@@ -66,7 +66,7 @@ class MapQuery(Struct, forbid_unknown_fields=True):
     picture: bool = False
 
 
-def describe_building(task: Task, query: MapQuery) -> dict[str, Any]:
+def describe_building(task: WorkInput, query: MapQuery) -> dict[str, Any]:
     """Return the floors with their rooms, and how many things of each name there are."""
     del query
     avlmap, lists = task.map.avlmap, lists_of(task)
@@ -92,7 +92,7 @@ def describe_building(task: Task, query: MapQuery) -> dict[str, Any]:
     }
 
 
-def list_things(task: Task, query: ListThingsQuery) -> dict[str, Any]:
+def list_things(task: WorkInput, query: ListThingsQuery) -> dict[str, Any]:
     """Return the things of a room, or near a place, or of a name; a page of them.
 
     Raises:
@@ -113,7 +113,7 @@ def list_things(task: Task, query: ListThingsQuery) -> dict[str, Any]:
     return _paged(task, "things", rows, query.top, query.page) | about
 
 
-def list_rooms(task: Task, query: ListRoomsQuery) -> dict[str, Any]:
+def list_rooms(task: WorkInput, query: ListRoomsQuery) -> dict[str, Any]:
     """Return the rooms of a floor, each with the number of things in it; a page of them."""
     lists = lists_of(task)
     where = lists.where
@@ -141,7 +141,7 @@ def list_rooms(task: Task, query: ListRoomsQuery) -> dict[str, Any]:
     return _paged(task, "rooms", rows, query.top, query.page)
 
 
-def list_sounds(task: Task, query: ListSoundsQuery) -> dict[str, Any]:
+def list_sounds(task: WorkInput, query: ListSoundsQuery) -> dict[str, Any]:
     """Return the sounds with their likeliest names, times and places; a page of them."""
     lists, names = lists_of(task), {name.casefold() for name in _names(query.name)}
     where, sounds = lists.where, lists.sounds()
@@ -173,7 +173,7 @@ def _thing_row(one: Selected, where: Whereabouts) -> dict[str, Any]:
     }
 
 
-def _paged(task: Task, key: str, rows: list[dict[str, Any]], top: int, page: int) -> dict[str, Any]:
+def _paged(task: WorkInput, key: str, rows: list[dict[str, Any]], top: int, page: int) -> dict[str, Any]:
     shown, pages = page_of(rows, top, page, key)
     paging = {"page": page, "pages": pages} if pages > 1 else {}
     return {"map": task.map.name, "frame": FRAME, "total": len(rows), **paging, key: shown}

@@ -26,7 +26,7 @@ from avlmaps.serve.lanes import Cancellation, Lane, Report
 from avlmaps.serve.requests import NoQuery, checked
 from avlmaps.serve.service import Service, error_response
 from avlmaps.serve.tools import TOOLS, AgentTool, ToolResult
-from avlmaps.serve.work import Task, describe_map, encoded, list_maps
+from avlmaps.serve.work import WorkInput, describe_map, encoded, list_maps
 
 INSTRUCTIONS = """Maps of buildings, made of what a robot saw and heard. Go from describe_map to list_rooms to
 list_things of a room, or use ask. Positions are metres in the recording frame, sizes in the level frame; times are
@@ -169,7 +169,7 @@ async def _resource(service: Service, uri: str) -> mcp.ReadResourceResult:
     if uri == _SCHEME:
         answer: Any = list_maps(service.shelf)
     elif uri in names:
-        task = Task(service.shelf.get(names[uri]), service.settings.limits)
+        task = WorkInput(service.shelf.get(names[uri]), service.settings.limits)
         answer = await service.slow.run(lambda _: describe_map(task, NoQuery()))
     else:
         raise MCPError(mcp.INVALID_PARAMS, f"There is no resource {uri[:120]!r}; list them first.")
@@ -236,7 +236,7 @@ async def _called(
     lane: Lane = service.slow if tool.slow or files else service.quick
 
     def job(watch: Cancellation) -> ToolResult:
-        return tool.work(Task(served, service.settings.limits, watch=watch), query)
+        return tool.work(WorkInput(served, service.settings.limits, watch=watch), query)
 
     return await lane.run(job, _reporter(ctx))
 

@@ -26,7 +26,7 @@ from avlmaps.serve.requests import checked, checked_texts
 from avlmaps.serve.service import JSON_TYPE, Service, error_response
 from avlmaps.serve.tools import TOOLS, AgentTool
 from avlmaps.serve.uploads import Uploads
-from avlmaps.serve.work import File, Task, encoded, list_maps
+from avlmaps.serve.work import File, WorkInput, encoded, list_maps
 
 
 class _Count(Convertor[int]):
@@ -193,7 +193,7 @@ async def _answered(service: Service, operation: Operation, request: Request) ->
     tag = f'"{served.version}"'
 
     def job(watch: Cancellation) -> Any:
-        made = operation.work(Task(served, service.settings.limits, uploads, watch, numbers), query)
+        made = operation.work(WorkInput(served, service.settings.limits, uploads, watch, numbers), query)
         return made if isinstance(made, File) else encoded(made)
 
     if isinstance(operation.answer, str):

@@ -19,7 +19,7 @@ from avlmaps.serve.errors import RequestError
 from avlmaps.serve.pictures import small_picture
 from avlmaps.serve.requests import AskQuery, LocateQuery, PlaceQuery, Short, Words
 from avlmaps.serve.uploads import Uploads
-from avlmaps.serve.work import Task
+from avlmaps.serve.work import WorkInput
 
 _Base64 = Annotated[str, Meta(max_length=1 << 26)]
 Intrinsics = Annotated[Short | None, Meta(description="fx,fy,cx,cy of another camera than the map's")]
@@ -110,7 +110,7 @@ class AgentTool:
     name: str
     about: str
     query: type[Struct]
-    work: Callable[[Task, Any], ToolResult]
+    work: Callable[[WorkInput, Any], ToolResult]
     slow: bool = False
     read_only: bool = True
     destructive: bool = False
@@ -125,51 +125,51 @@ def _bytes_of(text: str | None, what: str) -> bytes | None:
         raise RequestError(f"The {what} is no base64; send the file's bytes in base64.") from None
 
 
-def _listed(lists: Callable[[Task, Any], dict[str, Any]], key: str) -> Callable[[Task, Any], ToolResult]:
+def _listed(lists: Callable[[WorkInput, Any], dict[str, Any]], key: str) -> Callable[[WorkInput, Any], ToolResult]:
     """Return the work of a tool that lists things, sounds or rooms, with their places in the picture."""
 
-    def listing(task: Task, query: Any) -> ToolResult:
+    def listing(task: WorkInput, query: Any) -> ToolResult:
         answer = lists(task, query)
         return ToolResult(answer, _marked(task, query, [one["position"] for one in answer.get(key, [])]))
 
     return listing
 
 
-def _describe_map(task: Task, query: MapQuery) -> ToolResult:
+def _describe_map(task: WorkInput, query: MapQuery) -> ToolResult:
     return ToolResult(agent_lists.describe_building(task, query), _marked(task, query, []))
 
 
-def _marked(task: Task, query: Any, places: Sequence[Sequence[float]]) -> bytes | None:
+def _marked(task: WorkInput, query: Any, places: Sequence[Sequence[float]]) -> bytes | None:
     """Return a picture of some places where the query wants one."""
     if not query.picture:
         return None
     return small_picture(task.map, places=[np.array(place) for place in places[:_MOST_MARKS]])
 
 
-def _ask(task: Task, query: AskToolQuery) -> ToolResult:
+def _ask(task: WorkInput, query: AskToolQuery) -> ToolResult:
     task = replace(task, uploads=Uploads(_bytes_of(query.photo, "photo"), _bytes_of(query.clip, "clip")))
     answer = work.ask_map(task, query)
     return ToolResult(answer.to_dict(), small_picture(task.map, answer) if query.picture else None)
 
 
-def _locate(task: Task, query: LocatePhotoQuery) -> ToolResult:
+def _locate(task: WorkInput, query: LocatePhotoQuery) -> ToolResult:
     answer = work.locate(replace(task, uploads=Uploads(_bytes_of(query.photo, "photo"))), query)
     pose = answer["world_from_camera"]
     at = [] if pose is None else [[row[3] for row in pose[:3]]]
     return ToolResult(answer, _marked(task, query, at))
 
 
-def _describe_place(task: Task, query: DescribePlaceQuery) -> ToolResult:
+def _describe_place(task: WorkInput, query: DescribePlaceQuery) -> ToolResult:
     answer = work.place(task, query)
     return ToolResult(answer, _marked(task, query, [answer["position"]]))
 
 
-def _last_seen(task: Task, query: LastSeenQuery) -> ToolResult:
+def _last_seen(task: WorkInput, query: LastSeenQuery) -> ToolResult:
     answer = last_seen(task.map.avlmap, query.thing, query.top)
     return ToolResult(answer, _marked(task, query, [one["position"] for one in answer["places"]]))
 
 
-def _goal_near(task: Task, query: GoalNearQuery) -> ToolResult:
+def _goal_near(task: WorkInput, query: GoalNearQuery) -> ToolResult:
     reply = work.ask_map(task, AskQuery(sentence=query.sentence, top=20))
     answer = goals_near(task.map.paths, reply, place_given(query.near), query.top)
     return ToolResult(answer, _marked(task, query, [one["position"] for one in answer["goals"]]))

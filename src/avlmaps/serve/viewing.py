@@ -9,12 +9,12 @@ import msgspec
 from avlmaps.core.motion import GroundPose
 from avlmaps.serve.errors import RequestError
 from avlmaps.serve.requests import AskQuery, NoQuery, RehearseQuery, ViewQuery
-from avlmaps.serve.work import File, Task, ask_map
+from avlmaps.serve.work import File, WorkInput, ask_map
 
 _BYTES = "application/octet-stream"
 
 
-def viewer(task: Task, query: ViewQuery) -> File:
+def viewer(task: WorkInput, query: ViewQuery) -> File:
     """Return the page; it learns from its address which maps it shows."""
     from avlmaps.view.page import live_page
 
@@ -22,7 +22,7 @@ def viewer(task: Task, query: ViewQuery) -> File:
     return File(live_page(), "text/html")
 
 
-def drawn_map(task: Task, query: NoQuery) -> dict[str, Any]:
+def drawn_map(task: WorkInput, query: NoQuery) -> dict[str, Any]:
     """Return what the page needs before it draws the first voxel."""
     from avlmaps.view.labels import palettes
 
@@ -31,25 +31,25 @@ def drawn_map(task: Task, query: NoQuery) -> dict[str, Any]:
     return told | {"version": task.map.voxels_version}
 
 
-def drawn_voxels(task: Task, query: NoQuery) -> File:
+def drawn_voxels(task: WorkInput, query: NoQuery) -> File:
     """Return the voxels in the order of drawing (``layout.RECORD``)."""
     del query
     return File(task.map.page.layout.records, _BYTES)
 
 
-def drawn_labels(task: Task, query: NoQuery) -> File:
+def drawn_labels(task: WorkInput, query: NoQuery) -> File:
     """Return four bytes for each voxel: thing, room, name, confidence of the name."""
     del query
     return File(task.map.page.labels.voxels.tobytes(), _BYTES)
 
 
-def drawn_contents(task: Task, query: NoQuery) -> dict[str, Any]:
+def drawn_contents(task: WorkInput, query: NoQuery) -> dict[str, Any]:
     """Return things, sounds and rooms with the colours of the page."""
     del query
     return task.map.page.describe_contents()
 
 
-def drawn_voxel(task: Task, query: NoQuery) -> dict[str, Any]:
+def drawn_voxel(task: WorkInput, query: NoQuery) -> dict[str, Any]:
     """Return what one voxel is taken for."""
     del query
     page, number = task.map.page, int(task.path["voxel"])
@@ -58,7 +58,7 @@ def drawn_voxel(task: Task, query: NoQuery) -> dict[str, Any]:
     return page.describe_voxel(number)
 
 
-def keyframe(task: Task, query: NoQuery) -> File:
+def keyframe(task: WorkInput, query: NoQuery) -> File:
     """Return the picture of a keyframe."""
     del query
     number, keyframes = int(task.path["keyframe"]), task.map.avlmap.stored.keyframes
@@ -70,14 +70,14 @@ def keyframe(task: Task, query: NoQuery) -> File:
     return File(jpeg, "image/jpeg", {"etag": f'"{task.map.version}"'})
 
 
-def ask_in_view(task: Task, query: AskQuery) -> File:
+def ask_in_view(task: WorkInput, query: AskQuery) -> File:
     """Return the length of the answer's JSON (4 bytes, little-endian), the JSON, and the heat of each drawn voxel."""
     answer = ask_map(task, query)
     told = msgspec.json.encode({"answer": answer.to_dict(), "version": task.map.voxels_version})
     return File(len(told).to_bytes(4, "little") + told + task.map.page.heat_of(answer), _BYTES)
 
 
-def rehearse(task: Task, query: RehearseQuery) -> dict[str, Any]:
+def rehearse(task: WorkInput, query: RehearseQuery) -> dict[str, Any]:
     """Plan a command on the map; drive it where the server has the robot of a scene."""
     start = None if query.start is None else GroundPose(*(float(word) for word in query.start.split(",")))
     _ = task.uploads.attachments(task.limits)  # what is no photo and no clip is refused here

@@ -38,7 +38,7 @@ from avlmaps.serve.uploads import Uploads, camera_of, numbers_of
 
 
 @dataclass(frozen=True, slots=True)
-class Task:
+class WorkInput:
     """What a piece of work is given.
 
     Attributes:
@@ -129,7 +129,7 @@ def list_maps(shelf: Shelf) -> MapsAnswer:
     return {"maps": entries}
 
 
-def describe_map(task: Task, query: requests.NoQuery) -> dict[str, Any]:
+def describe_map(task: WorkInput, query: requests.NoQuery) -> dict[str, Any]:
     """Return what ``avlmaps info --json`` prints, with the map's name for its path."""
     del query
     described = map_answer(task.map.avlmap)
@@ -137,7 +137,7 @@ def describe_map(task: Task, query: requests.NoQuery) -> dict[str, Any]:
     return {**described, "path": task.map.name, "notices": notices}
 
 
-def lists_of(task: Task) -> MapLists:
+def lists_of(task: WorkInput) -> MapLists:
     """Return the lists of a task's map, which the server stores."""
     return MapLists(task.map.avlmap, task.map.once, task.watch.step)
 
@@ -150,7 +150,7 @@ def wanted(query: requests.ThingsQuery) -> Wanted:
     return replace(named, room=query.room, near=query.near, top=query.top, page=query.page, at=query.at)
 
 
-def list_contents(task: Task, query: requests.ThingsQuery) -> ContentsAnswer:
+def list_contents(task: WorkInput, query: requests.ThingsQuery) -> ContentsAnswer:
     """Return what ``avlmaps things --json`` prints."""
     lists = lists_of(task)
     answer: ContentsAnswer = {
@@ -166,7 +166,7 @@ def list_contents(task: Task, query: requests.ThingsQuery) -> ContentsAnswer:
 Noted = TypeVar("Noted", ContentsAnswer, ListedThingsAnswer, SoundsAnswer, RoomsAnswer)
 
 
-def _noted(task: Task, answer: Noted) -> Noted:
+def _noted(task: WorkInput, answer: Noted) -> Noted:
     """Add what is doubtful about the map to an answer."""
     opened = task.map.avlmap
     if doubts := opened.doubts_of_things if "things" in answer else opened.stored.info.doubts:
@@ -174,41 +174,41 @@ def _noted(task: Task, answer: Noted) -> Noted:
     return answer
 
 
-def list_things(task: Task, query: requests.ListedThingsQuery) -> ListedThingsAnswer:
+def list_things(task: WorkInput, query: requests.ListedThingsQuery) -> ListedThingsAnswer:
     """Return a page of the things that are meant."""
     page = page_of_things(lists_of(task), wanted(query))
     return _noted(task, ListedThingsAnswer(map=task.map.name, frame=FRAME, **page))
 
 
-def list_sounds(task: Task, query: requests.NoQuery) -> SoundsAnswer:
+def list_sounds(task: WorkInput, query: requests.NoQuery) -> SoundsAnswer:
     """Return the sounds of a map."""
     del query
     return _noted(task, SoundsAnswer(map=task.map.name, frame=FRAME, sounds=lists_of(task).sounds()))
 
 
-def list_rooms(task: Task, query: requests.RoomsQuery) -> RoomsAnswer:
+def list_rooms(task: WorkInput, query: requests.RoomsQuery) -> RoomsAnswer:
     """Return what ``avlmaps rooms --json`` prints."""
     return _noted(task, RoomsAnswer(map=task.map.name, frame=FRAME, rooms=lists_of(task).rooms(query.least)))
 
 
-def list_sources(task: Task, query: requests.SourcesQuery) -> SourcesAnswer:
+def list_sources(task: WorkInput, query: requests.SourcesQuery) -> SourcesAnswer:
     """Return what ``avlmaps sources --json`` prints."""
     found = task.map.avlmap.sources(query.sound, prior=query.prior == "lexicon", least=query.least)
     return {"map": task.map.name, "frame": FRAME, "sources": [one.to_json() for one in found]}
 
 
-def list_changes(task: Task, query: requests.ChangesQuery) -> ChangesAnswer:
+def list_changes(task: WorkInput, query: requests.ChangesQuery) -> ChangesAnswer:
     """Return what ``avlmaps changes --json`` prints."""
     return {**task.map.avlmap.changes(query.since, first_seen=query.first_seen), "map": task.map.name}
 
 
-def list_edits(task: Task, query: requests.NoQuery) -> EditsAnswer:
+def list_edits(task: WorkInput, query: requests.NoQuery) -> EditsAnswer:
     """Return what ``avlmaps edit --list --json`` prints."""
     del query
     return {**task.map.avlmap.edit.history(), "map": task.map.name}
 
 
-def edit(task: Task, query: requests.EditQuery) -> EditsAnswer:
+def edit(task: WorkInput, query: requests.EditQuery) -> EditsAnswer:
     """Correct the map, and return all edits; later queries know it.
 
     Raises:
@@ -241,7 +241,7 @@ def edit(task: Task, query: requests.EditQuery) -> EditsAnswer:
     return {**editor.history(), "map": task.map.name, "text": edit_text(made)}
 
 
-def sound_clip(task: Task, query: requests.NoQuery) -> File:
+def sound_clip(task: WorkInput, query: requests.NoQuery) -> File:
     """Return the FLAC file of a sound."""
     del query
     stored, number = task.map.avlmap.stored, int(task.path["sound"])
@@ -256,7 +256,7 @@ def sound_clip(task: Task, query: requests.NoQuery) -> File:
     return File(content, "audio/flac", {"etag": f'"{task.map.version}"'})
 
 
-def ask_map(task: Task, query: requests.AskQuery) -> Answer:
+def ask_map(task: WorkInput, query: requests.AskQuery) -> Answer:
     """Answer a sentence or parts, with the files of the request.
 
     Raises:
@@ -280,12 +280,12 @@ def ask_map(task: Task, query: requests.AskQuery) -> Answer:
     )
 
 
-def ask(task: Task, query: requests.AskQuery) -> QueryAnswer:
+def ask(task: WorkInput, query: requests.AskQuery) -> QueryAnswer:
     """Return what ``avlmaps query --json`` prints."""
     return ask_map(task, query).to_dict()
 
 
-def locate(task: Task, query: requests.LocateQuery) -> LocateAnswer:
+def locate(task: WorkInput, query: requests.LocateQuery) -> LocateAnswer:
     """Return what ``avlmaps locate --json`` prints."""
     photo = task.uploads.attachments(task.limits).get(requests.PHOTO)
     if not isinstance(photo, Photo):
@@ -296,7 +296,7 @@ def locate(task: Task, query: requests.LocateQuery) -> LocateAnswer:
     return locate_answer(found, task.map.avlmap.stored.info.doubts)
 
 
-def place(task: Task, query: requests.PlaceQuery) -> PlaceAnswer:
+def place(task: WorkInput, query: requests.PlaceQuery) -> PlaceAnswer:
     """Return what is at a place."""
     avlmap = task.map.avlmap
     point = np.array([query.x, query.y, 0.0 if query.z is None else query.z])
@@ -306,13 +306,13 @@ def place(task: Task, query: requests.PlaceQuery) -> PlaceAnswer:
     return describe_place(avlmap, point, query.radius_m)
 
 
-def path(task: Task, query: requests.PathQuery) -> PathAnswer:
+def path(task: WorkInput, query: requests.PathQuery) -> PathAnswer:
     """Return the path between two places."""
     finder = task.map.paths_by_stairs if query.stairs else task.map.paths
     return finder.answer(place_of(query.start), place_of(query.goal))
 
 
-def picture(task: Task, query: requests.PictureQuery) -> File:
+def picture(task: WorkInput, query: requests.PictureQuery) -> File:
     """Return a PNG of an answer, or of the map."""
     from avlmaps.serve.pictures import full_picture, map_picture, small_picture
 
@@ -329,13 +329,13 @@ def picture(task: Task, query: requests.PictureQuery) -> File:
     return File(draw(task.map, answer), "image/png")
 
 
-def tiles(task: Task, query: requests.NoQuery) -> TilesAnswer:
+def tiles(task: WorkInput, query: requests.NoQuery) -> TilesAnswer:
     """Return the list of tiles."""
     del query
     return task.map.pyramid.index(task.map.version)
 
 
-def tile(task: Task, query: requests.TilesQuery) -> File:
+def tile(task: WorkInput, query: requests.TilesQuery) -> File:
     """Return one tile."""
     heat = None
     if query.heat is not None:

@@ -13,7 +13,7 @@ from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import QueryError
 from avlmaps.core.frames import FrameName
 from avlmaps.query.export_foxglove import CAMERA_FRAME, write_foxglove
-from avlmaps.query.export_layers import Box, Heard, Layers
+from avlmaps.query.export_layers import ExportedBox, ExportedSound, Layers
 from avlmaps.query.export_rerun import write_rerun
 
 
@@ -27,8 +27,8 @@ def some_layers() -> Layers:
         points=np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32),
         colors=np.array([[255, 0, 0], [0, 255, 0], [0, 0, 255]], np.uint8),
         voxel_size_m=0.05,
-        things=(Box("chair", 0.8, (1.0, 2.0, 0.5), (0.5, 0.5, 1.0), (0.0, 0.0, 0.0, 1.0), (10, 20, 30)),),
-        sounds=(Heard("dog bark", 0.7, (2.0, 0.0, 1.0), 101.5, 103.0),),
+        things=(ExportedBox("chair", 0.8, (1.0, 2.0, 0.5), (0.5, 0.5, 1.0), (0.0, 0.0, 0.0, 1.0), (10, 20, 30)),),
+        sounds=(ExportedSound("dog bark", 0.7, (2.0, 0.0, 1.0), 101.5, 103.0),),
         heat=("the chair", np.array([0.0, 0.5, 1.0], np.float32)),
         stamp_s=np.array([100.0, 102.0]),
         frame_from_camera=poses,

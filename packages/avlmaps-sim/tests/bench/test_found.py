@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import Modality, Role
-from avlmaps.query.evidence import Evidence as QueryEvidence
+from avlmaps.query.evidence import GoalEvidence as QueryEvidence
 from avlmaps.query.probability import FACTORS, probability_of
 from avlmaps_sim.bench.found.answers import Judged
 from avlmaps_sim.bench.found.queries import FAR_M, NEAR_M, labelled_queries

@@ -24,7 +24,7 @@ class UnusableAnswerError(LanguageError):
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class ModelReply:
     """The answer of a model.
 
     Attributes:
@@ -44,7 +44,7 @@ class Answer:
     tokens: tuple[int, int] = (0, 0)
 
 
-def program_text(answer: Answer) -> str:
+def program_text(answer: ModelReply) -> str:
     """Return the program that an answer holds: its one code block, or all of it where it has no block.
 
     Raises:

@@ -19,9 +19,9 @@ from typing import Any
 
 from avlmaps.core.errors import LanguageError
 from avlmaps.core.extras import install_command
-from avlmaps.language.chat.answer import Answer, quoted
+from avlmaps.language.chat.answer import ModelReply, quoted
 from avlmaps.language.chat.protocol import EndpointFault, read_answer, read_error, read_models
-from avlmaps.language.chat.replay import Request
+from avlmaps.language.chat.replay import ChatRequest
 from avlmaps.language.chat.settings import NO_KEY, ChatSettings, variable
 
 
@@ -118,7 +118,7 @@ class Endpoint:
         self._openai, self._http = _client_library()
         self._http_error: type[Exception] = self._http.HTTPError
 
-    def complete(self, request: Request) -> Answer:
+    def complete(self, request: ChatRequest) -> ModelReply:
         """Return the server's answer to a request.
 
         Raises:
@@ -161,7 +161,7 @@ class Endpoint:
                 raise LanguageError(self._sentence(fault, "", 1)) from None
             return ()
 
-    def _parameters(self, request: Request) -> dict[str, Any]:
+    def _parameters(self, request: ChatRequest) -> dict[str, Any]:
         optional = {
             "temperature": request.temperature,
             "seed": request.seed,

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from avlmaps.language.chat.answer import Answer
+from avlmaps.language.chat.answer import ModelReply
 
 Shape = TypeVar("Shape")
 _LONGEST_NAME = 100
@@ -70,7 +70,7 @@ class _Models(msgspec.Struct):
     data: list[_Model]
 
 
-def read_answer(raw: bytes) -> Answer:
+def read_answer(raw: bytes) -> ModelReply:
     """Return the first choice of a completion.
 
     Raises:
@@ -85,7 +85,7 @@ def read_answer(raw: bytes) -> Answer:
     parts = choice.message.content if isinstance(choice.message.content, list) else []
     content = choice.message.content if isinstance(choice.message.content, str) else ""
     usage = completion.usage if isinstance(completion.usage, dict) else {}
-    return Answer(
+    return ModelReply(
         content=content or "".join(part.text or "" for part in parts),
         refusal=choice.message.refusal or next((part.refusal for part in parts if part.refusal), None),
         finish=choice.finish_reason,

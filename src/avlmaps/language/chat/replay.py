@@ -13,7 +13,7 @@ from pathlib import Path
 import msgspec
 
 from avlmaps.core.errors import LanguageError
-from avlmaps.language.chat.answer import Answer, quoted
+from avlmaps.language.chat.answer import ModelReply, quoted
 
 _VERSION = 1
 
@@ -25,7 +25,7 @@ class Message(msgspec.Struct, frozen=True):
     content: str
 
 
-class Request(msgspec.Struct, frozen=True):
+class ChatRequest(msgspec.Struct, frozen=True):
     """All that decides what a model answers, as far as it can be decided."""
 
     model: str
@@ -48,7 +48,7 @@ class _Line(msgspec.Struct):
     model: str
     prompt: str
     asked: str
-    answer: Answer
+    answer: ModelReply
 
 
 @dataclass(slots=True)
@@ -87,7 +87,7 @@ class Replay:
         """The model that was recorded first."""
         return self._lines[0].model if self._lines else None
 
-    def answer(self, request: Request) -> Answer:
+    def answer(self, request: ChatRequest) -> ModelReply:
         """Return the recorded answer to this very request.
 
         Raises:
@@ -104,7 +104,7 @@ class Replay:
         self._used[fingerprint] = turn + 1
         return answers[min(turn, len(answers) - 1)]
 
-    def add(self, request: Request, answer: Answer) -> None:
+    def add(self, request: ChatRequest, answer: ModelReply) -> None:
         """Write one exchange at the end of the file.
 
         Raises:
@@ -128,7 +128,7 @@ class Replay:
                 f"The replay file {self.path} was cut off: the disk is full; make room and record again."
             )
 
-    def _difference(self, request: Request) -> str:
+    def _difference(self, request: ChatRequest) -> str:
         """Say in what the request differs from those of the file."""
         asked = request.messages[-1].content
         like = [line for line in self._lines if line.asked == asked]

@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 
 from avlmaps.core.errors import LanguageError, ProgramError
-from avlmaps.language.chat.answer import Answer, UnusableAnswerError, program_text, quoted, without_thoughts
+from avlmaps.language.chat.answer import ModelReply, UnusableAnswerError, program_text, quoted, without_thoughts
 from avlmaps.language.chat.endpoint import Endpoint
 from avlmaps.language.chat.prompt import (
     command_message,
@@ -14,7 +14,7 @@ from avlmaps.language.chat.prompt import (
     system_prompt,
     unusable_message,
 )
-from avlmaps.language.chat.replay import Message, Replay, Request
+from avlmaps.language.chat.replay import ChatRequest, Message, Replay
 from avlmaps.language.chat.settings import ChatSettings
 from avlmaps.language.program import SKILLS, Program, parse_program
 from avlmaps.language.program.syntax import Constant, SkillCall, expressions_of, parts_of
@@ -108,13 +108,13 @@ class ChatTranslator:
                 corrected.append(_one_sentence(fault))
             self._rounds_used += 1
 
-    def _asked(self, messages: tuple[Message, ...]) -> Answer:
+    def _asked(self, messages: tuple[Message, ...]) -> ModelReply:
         """Return the answer to a conversation, from the file where there is one."""
         settings, replay = self._settings, self._replay
         replayed = replay if replay and not replay.recording else None
         if self._model is None:
             self._model = (replayed.model or "") if replayed else self._server().model()
-        request = Request(self._model, messages, settings.temperature, settings.seed, settings.max_tokens)
+        request = ChatRequest(self._model, messages, settings.temperature, settings.seed, settings.max_tokens)
         if replayed:
             return replayed.answer(request)
         answer = self._server().complete(request)
@@ -183,7 +183,7 @@ def _opening(command: str) -> tuple[Message, ...]:
     return (Message("system", system_prompt()), Message("user", command_message(command)))
 
 
-def _parsed(program: str, answer: Answer) -> Program:
+def _parsed(program: str, answer: ModelReply) -> Program:
     """Return the parsed program; where the model wrote no code at all, say that rather than what is wrong with it."""
     try:
         return parse_program(program)

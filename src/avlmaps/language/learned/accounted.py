@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from avlmaps.language import lexer
-from avlmaps.language.intents import Clarify, Reason, Refuse
+from avlmaps.language.intents import Clarify, RefusalReason, Refuse
 from avlmaps.language.learned.linear import amount_end
 from avlmaps.language.learned.said import BREAKS, DETERMINERS, LOOKS, PREPOSITIONS, Claimed, Said, words
 from avlmaps.language.lexer import Token
@@ -52,7 +52,7 @@ def circumstance(said: Said) -> Refuse | None:
     """Return the refusal for an order that holds at a time or at a sign alone: "at noon", "on my signal"."""
     tokens = list(said.tokens)
     if said.spans("signals") or said.spans("times") or _is_put_off(said.tokens):
-        return Refuse(Reason.CONDITION)
+        return Refuse(RefusalReason.CONDITION)
     for at, text in enumerate(said.texts):
         # "two metres at 2 o'clock" is a direction
         if text in _BY_CLOCK and not any(amount_end(tokens, start) == at for start in range(max(0, at - 4), at)):
@@ -61,10 +61,10 @@ def circumstance(said: Said) -> Refuse | None:
             while end > at and end < len(tokens) and said.texts[end] in ("hundred", "thirty", "fifteen", ":", "oh"):
                 end += 1
             if end > at and said.texts[end : end + 1] and said.texts[end] in _CLOCK:
-                return Refuse(Reason.CONDITION)
+                return Refuse(RefusalReason.CONDITION)
     for at, text in enumerate(said.texts):
         if text == "sure" and _is_to_be_so(said.texts[at + 1 : at + 8]):
-            return Refuse(Reason.CONDITION)
+            return Refuse(RefusalReason.CONDITION)
     return None
 
 

@@ -16,7 +16,7 @@ from avlmaps.language.intents import (
     Go,
     Intent,
     Pick,
-    Reason,
+    RefusalReason,
     Refuse,
     Repeat,
     StopAt,
@@ -27,13 +27,19 @@ from avlmaps.language.intents import (
     on_targets,
 )  # fmt: skip
 from avlmaps.language.intents import Move as MoveIntent
-from avlmaps.language.learned.limits import Limits
+from avlmaps.language.learned.limits import ReadingLimits
 from avlmaps.language.learned.linear import amount_end
 from avlmaps.language.learned.said import words
 from avlmaps.language.lexer import Token
 from avlmaps.language.verbalise import verbalise
 
-DANGERS = (Reason.HARM, Reason.FLYING, Reason.ENDLESS, Reason.CONDITION, Reason.NEGATION)
+DANGERS = (
+    RefusalReason.HARM,
+    RefusalReason.FLYING,
+    RefusalReason.ENDLESS,
+    RefusalReason.CONDITION,
+    RefusalReason.NEGATION,
+)
 _SMALL_WORDS = frozenset({"a", "an", "one", "some", "first", "second", "half", "couple", "few", "several"})
 _WORTH_ASKING = 0.1
 
@@ -76,7 +82,7 @@ class Decision:
     notes: tuple[str, ...] = ()
 
 
-def decided(readings: Sequence[Weighed], limits: Limits) -> Decision:
+def decided(readings: Sequence[Weighed], limits: ReadingLimits) -> Decision:
     """Return what to do of some readings."""
     best = readings[0]
     dangers = [one for one in readings if isinstance(one.stops, Refuse) and one.stops.reason in DANGERS]

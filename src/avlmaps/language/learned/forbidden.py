@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from avlmaps.language import lexer
-from avlmaps.language.intents import Clarify, Reason, Refuse
+from avlmaps.language.intents import Clarify, RefusalReason, Refuse
 from avlmaps.language.learned.accounted import circumstance, runs_down
 from avlmaps.language.learned.linear import amount_end
 from avlmaps.language.learned.said import BREAKS, HEARD, LOOKS, PREPOSITIONS, TURNS, Said, words
@@ -25,14 +25,14 @@ def forbidden(tokens: Sequence[Token]) -> Clarify | Refuse | None:
     """
     said = Said(tokens)
     if said.spans("unsafe") or _through(said) or _races(said) or runs_down(said):
-        return Refuse(Reason.HARM)
+        return Refuse(RefusalReason.HARM)
     if said.spans("bans") or any(_ends_with(said, end) for _, end in said.spans("cancels")):
-        return Refuse(Reason.NEGATION)
+        return Refuse(RefusalReason.NEGATION)
     conditions = [at for at, _ in said.spans("conditions") if said.texts[at - 1 : at] not in (("as",), ("even",))]
     if conditions or _alternative(said):
-        return Refuse(Reason.CONDITION)
+        return Refuse(RefusalReason.CONDITION)
     if said.spans("risks") or said.spans("questions"):
-        return Refuse(Reason.QUESTION)
+        return Refuse(RefusalReason.QUESTION)
     return circumstance(said) or _timed(said) or _signed(said) or _run_on(said) or _scaled(said)
 
 
@@ -94,7 +94,7 @@ def _timed(said: Said) -> Clarify | Refuse | None:
         if text == "within" or said.texts[max(0, at - 2) : at + 1] == ("in", "less", "than"):
             return Clarify(f"'{phrase}': the robot knows no deadline. Say only where to go.")
         if text == "every":
-            return Refuse(Reason.ENDLESS)
+            return Refuse(RefusalReason.ENDLESS)
         if text == "for" and at and said.texts[at - 1] in words().lists["drives"]:
             return Clarify(f"'{phrase}': say how far to drive or to turn, not how long.")
     return None

@@ -124,7 +124,7 @@ ROWS = (
     _row("wait", intents.Wait, seconds=Amount("seconds", optional=True)),
     _row("return", intents.Return),
     _row("repeat", intents.Repeat, times=Amount("count", TIMES), body=Slot.BODY),
-    *(_row(f"refuse_{reason}", intents.Refuse, reason=reason) for reason in intents.Reason),
+    *(_row(f"refuse_{reason}", intents.Refuse, reason=reason) for reason in intents.RefusalReason),
     _row("clarify", intents.Clarify),
 )
 ASKS = {f"ask_{ask}": ask for ask in intents.Ask}

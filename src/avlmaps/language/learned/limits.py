@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class ReadingLimits:
     """How likely a reading must be; chosen on voices that the networks were not fitted to.
 
     Attributes:

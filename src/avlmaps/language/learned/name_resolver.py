@@ -12,7 +12,7 @@ from avlmaps.language.intents import (
     Clarify,
     Intent,
     Move,
-    Reason,
+    RefusalReason,
     Refuse,
     Repeat,
     StopAt,
@@ -33,15 +33,15 @@ from avlmaps.language.sentence import Sentence
 
 EXAMPLE = "go to the chair near the sound of glass breaking, then turn left"
 REFUSALS = {
-    Reason.MANIPULATION: "The robot has no hands and no voice; it can only drive, turn and look.",
-    Reason.ENDLESS: "The robot does not drive without an end; say how often.",
-    Reason.HARM: "The robot does not do what could hurt someone or break something.",
-    Reason.FLYING: "The robot stays on its floor; it cannot fly, jump or climb stairs.",
-    Reason.CONDITION: "The robot cannot wait for a condition; say what to do now.",
-    Reason.NEGATION: "Say only what to do: nothing to avoid, no choice between two.",
-    Reason.CHAT: "The robot does not talk; say where it should go.",
-    Reason.QUESTION: 'This is a question; ask the map: avlmaps query MAP "QUESTION".',
-    Reason.UNKNOWN: f"This is not understood; say it like: {EXAMPLE}.",
+    RefusalReason.MANIPULATION: "The robot has no hands and no voice; it can only drive, turn and look.",
+    RefusalReason.ENDLESS: "The robot does not drive without an end; say how often.",
+    RefusalReason.HARM: "The robot does not do what could hurt someone or break something.",
+    RefusalReason.FLYING: "The robot stays on its floor; it cannot fly, jump or climb stairs.",
+    RefusalReason.CONDITION: "The robot cannot wait for a condition; say what to do now.",
+    RefusalReason.NEGATION: "Say only what to do: nothing to avoid, no choice between two.",
+    RefusalReason.CHAT: "The robot does not talk; say where it should go.",
+    RefusalReason.QUESTION: 'This is a question; ask the map: avlmaps query MAP "QUESTION".',
+    RefusalReason.UNKNOWN: f"This is not understood; say it like: {EXAMPLE}.",
 }
 _FAR_M, _LONG_TIMES = 100.0, 50
 _ROOM_WORDS = frozenset({"room", "area", "zone", "hall", "corner", "wing", "bay", "ward", "lab", "office", "aisle"})
@@ -134,7 +134,7 @@ def weighed(read: Read, names: NameResolver) -> Weighed:
     """Return a reading of a command, checked."""
     assert isinstance(read.meaning, tuple)
     first = read.meaning[0]
-    if isinstance(first, Refuse) and first.reason is Reason.UNKNOWN and strange_word(names.tokens):
+    if isinstance(first, Refuse) and first.reason is RefusalReason.UNKNOWN and strange_word(names.tokens):
         return Weighed((unclear(names.tokens),), read.probability)
     if isinstance(first, Refuse):
         return Weighed((Refuse(first.reason, REFUSALS[first.reason]),), read.probability)

@@ -21,7 +21,7 @@ from avlmaps.language.intents import Inquiry, Intent, Target, on_targets
 from avlmaps.language.learned import linear
 from avlmaps.language.learned.features import columns, features
 from avlmaps.language.learned.grammar import INDEX, SYMBOLS
-from avlmaps.language.learned.limits import Limits
+from avlmaps.language.learned.limits import ReadingLimits
 from avlmaps.language.lexer import Token
 from avlmaps.language.source_words import seeks_source
 from avlmaps.perception.embedded.words import words_checksum
@@ -91,7 +91,7 @@ class LearnedReader:
             ) from fault
         _check(facts)
         self._vocabulary = {word: at for at, word in enumerate(facts["vocabulary"], start=1)}
-        self.limits = Limits(**facts.get("limits", {}))
+        self.limits = ReadingLimits(**facts.get("limits", {}))
         self._words, self._step = map(open_network, graphs)
 
     def command(self, tokens: Sequence[Token]) -> list[Read]:

@@ -20,7 +20,7 @@ from avlmaps.language.intents import (
     Intent,
     Move,
     Pick,
-    Reason,
+    RefusalReason,
     Refuse,
     Side,
     StopAt,
@@ -217,7 +217,7 @@ def _no_thing(said: Claimed) -> Refuse | None:
     """Return the refusal for "no kitchen" that is driven to."""
     for at, (before, after) in enumerate(pairwise(said.texts)):
         if before == "no" and _is_entry(after) and said.names_in({at + 1}):
-            return Refuse(Reason.NEGATION)
+            return Refuse(RefusalReason.NEGATION)
     return None
 
 
@@ -241,10 +241,10 @@ def _excluded(said: Claimed) -> Clarify | Refuse | None:
             phrase == ("without",) and not words().lists["manners"].intersection(said.texts[end : end + 1])
         )
         if said.names_in(scope) or (lacks and scope):
-            return Refuse(Reason.NEGATION)
+            return Refuse(RefusalReason.NEGATION)
         one = said.texts[end : end + 1] in (("one",), ("ones",)) and len(said.content(scope)) > 1
         if one and phrase[0] in ("not", "but", "and") and not any(t.pick is Pick.OTHER for t in said.targets):
-            return Refuse(Reason.NEGATION)
+            return Refuse(RefusalReason.NEGATION)
     return None
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from avlmaps.language.intents import Circle, Clarify, Intent, Repeat, Way
+from avlmaps.language.intents import Circle, Clarify, Intent, Repeat, TurnSense
 from avlmaps.language.learned.said import TURNS, Claimed, Said
 from avlmaps.language.lexer import Token
 
@@ -36,7 +36,7 @@ def in_direction(tokens: Sequence[Token], intents: Sequence[Intent]) -> tuple[In
     def turned(intent: Intent) -> Intent:
         if isinstance(intent, Repeat):
             return replace(intent, body=tuple(turned(one) for one in intent.body))
-        return replace(intent, way=Way(next(left))) if isinstance(intent, Circle) else intent
+        return replace(intent, way=TurnSense(next(left))) if isinstance(intent, Circle) else intent
 
     return tuple(turned(one) for one in intents)
 

@@ -294,6 +294,6 @@ def grown(statement: syntax.Update) -> ProgramError:
     return refused(statement.line, f"a list is not changed but made again; write `{name} = {name} + [...]`")
 
 
-def misfit(line: int, target: syntax.Target, values: int) -> ProgramError:
+def misfit(line: int, target: syntax.AssignmentTarget, values: int) -> ProgramError:
     """Return the refusal of an assignment of more or fewer values than names."""
     return refused(line, f"{len(target.names)} names cannot take {values} values; give one value to each")

@@ -4,7 +4,7 @@ from avlmaps.core.errors import ProgramError
 from avlmaps.language.program import syntax
 from avlmaps.language.program.budget import refused
 from avlmaps.language.program.calls import BUILTINS, RESERVED, bind_builtin, bind_skill, skill_named, unknown_function
-from avlmaps.language.program.lexer import Form, Token
+from avlmaps.language.program.lexer import Form, ProgramToken
 from avlmaps.language.program.table import ROBOT, SKILLS
 
 DEEPEST = 50
@@ -20,17 +20,17 @@ _CONSTANTS = {"None": None, "True": True, "False": False}
 class Expressions:
     """Reads expressions from tokens, one after the other."""
 
-    def __init__(self, tokens: list[Token]) -> None:
+    def __init__(self, tokens: list[ProgramToken]) -> None:
         self.tokens = tokens
         self.at = 0
         self.deep = 0
 
     @property
-    def here(self) -> Token:
+    def here(self) -> ProgramToken:
         """The token that comes next."""
         return self.tokens[self.at]
 
-    def take(self) -> Token:
+    def take(self) -> ProgramToken:
         """Return the token that comes next, and advance."""
         token = self.tokens[self.at]
         self.at += 1
@@ -168,7 +168,7 @@ class Expressions:
             raise refused(token.line, "`*` before a value spreads it, which programs cannot; write each value")
         raise refused(token.line, f"there should be a value, not {token.shown}")
 
-    def _bracketed(self, opening: Token) -> syntax.Expression:
+    def _bracketed(self, opening: ProgramToken) -> syntax.Expression:
         closing, elements, comma = {"(": ")", "[": "]"}[opening.text], [], False
         while not self.sees(closing):
             elements.append(self.expression())
@@ -182,7 +182,7 @@ class Expressions:
             return elements[0]
         return syntax.Collection(tuple(elements), opening.text == "[", opening.line)
 
-    def _named(self, token: Token) -> syntax.Expression:
+    def _named(self, token: ProgramToken) -> syntax.Expression:
         name = token.text
         if name == ROBOT:
             if not self.took("."):
@@ -198,7 +198,7 @@ class Expressions:
             raise unknown_function(token.line, name)
         return syntax.Name(name, token.line)
 
-    def _call(self, token: Token, written: str) -> syntax.SkillCall | syntax.BuiltinCall:
+    def _call(self, token: ProgramToken, written: str) -> syntax.SkillCall | syntax.BuiltinCall:
         if not self.took("("):
             raise refused(token.line, f"`{written}` is called, not handed on; write `{written}(...)`")
         positional: list[syntax.Expression] = []
@@ -236,7 +236,7 @@ def _comprehension(line: int) -> ProgramError:
     return refused(line, "a `for` inside brackets is not part of a program; write the loop on lines of its own")
 
 
-def _attribute(line: int, asked: Token) -> ProgramError:
+def _attribute(line: int, asked: ProgramToken) -> ProgramError:
     if asked.text in ("append", "extend", "insert"):
         return refused(line, f"`.{asked.text}` does not work on a value; write `name = name + [element]`")
     written = asked.text if asked.form is Form.NAME else "..."

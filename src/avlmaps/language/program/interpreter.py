@@ -14,7 +14,7 @@ from avlmaps.language.program.table import SKILLS
 from avlmaps.language.program.trace import Step, Trace, told
 from avlmaps.language.program.value_types import ValueType
 from avlmaps.language.program.values import Value
-from avlmaps.language.program.vocabulary import Vocabulary
+from avlmaps.language.program.vocabulary import RobotSkills
 
 # Between two skills the clock is read once in this many steps.
 _STEPS_BETWEEN_LOOKS = 256
@@ -22,7 +22,7 @@ _STEPS_BETWEEN_LOOKS = 256
 
 def run_program(
     program: syntax.Program,
-    vocabulary: Vocabulary,
+    vocabulary: RobotSkills,
     budget: Budget | None = None,
     on_step: Callable[[Step], None] | None = None,
     *,
@@ -43,7 +43,7 @@ def run_program(
     Raises:
         TypeError: the vocabulary lacks a skill, or a skill returned what its signature does not promise.
     """
-    if not isinstance(vocabulary, Vocabulary):
+    if not isinstance(vocabulary, RobotSkills):
         raise TypeError(f"{type(vocabulary).__name__} does not have every skill of a Vocabulary")
     run = _Run(vocabulary, budget or Budget(), on_step or (lambda step: None), clock)
     error = error_type = None
@@ -79,7 +79,7 @@ class _Run:
     """One run: the values of its names, and what is left of its budget."""
 
     def __init__(
-        self, vocabulary: Vocabulary, budget: Budget, on_step: Callable[[Step], None], clock: Callable[[], float]
+        self, vocabulary: RobotSkills, budget: Budget, on_step: Callable[[Step], None], clock: Callable[[], float]
     ) -> None:
         self.vocabulary = vocabulary
         self.budget = budget
@@ -166,7 +166,7 @@ class _Run:
                 break
         return _Next.STATEMENT
 
-    def give(self, line: int, target: syntax.Target, value: Any) -> None:
+    def give(self, line: int, target: syntax.AssignmentTarget, value: Any) -> None:
         if not target.unpacks:
             self.names[target.names[0]] = value
             return

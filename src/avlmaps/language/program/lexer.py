@@ -138,7 +138,7 @@ class Form(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Token:
+class ProgramToken:
     """One token.
 
     Attributes:
@@ -161,7 +161,7 @@ class Token:
         return words.get(self.form) or (f"`{self.text}`" if len(self.text) <= 40 else f"`{self.text[:40]}...`")
 
 
-def tokens_of(text: str) -> list[Token]:
+def tokens_of(text: str) -> list[ProgramToken]:
     """Return the tokens of a program, lines and blocks marked.
 
     Raises:
@@ -193,9 +193,9 @@ class _Lexer:
         self.line = 1
         self.indents = [""]
         self.brackets: list[tuple[str, int]] = []
-        self.found: list[Token] = []
+        self.found: list[ProgramToken] = []
 
-    def run(self) -> list[Token]:
+    def run(self) -> list[ProgramToken]:
         while self.at < len(self.text):
             if not self.brackets and self._at_line_start() and not self._indentation():
                 continue
@@ -208,12 +208,12 @@ class _Lexer:
             raise refused(line, f"the bracket `{bracket}` is never closed; close it")
         if self.found and self.found[-1].form is not Form.LINE_END:
             self._add(Form.LINE_END, "")
-        self.found += [Token(Form.DEDENT, "", self.line) for _ in self.indents[1:]]
+        self.found += [ProgramToken(Form.DEDENT, "", self.line) for _ in self.indents[1:]]
         self._add(Form.END, "")
         return self.found
 
     def _add(self, form: Form, text: str, value: int | float | str | None = None) -> None:
-        self.found.append(Token(form, text, self.line, value))
+        self.found.append(ProgramToken(form, text, self.line, value))
 
     def _at_line_start(self) -> bool:
         return not self.found or self.found[-1].form is Form.LINE_END

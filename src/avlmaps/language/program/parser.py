@@ -98,7 +98,7 @@ class _Statements(Expressions):
         self.loops -= 1
         return syntax.For(target, through, body, line)
 
-    def _for_target(self) -> syntax.Target:
+    def _for_target(self) -> syntax.AssignmentTarget:
         bracketed = self.took("(")
         names, unpacks = [], False
         while self.here.form is Form.NAME:
@@ -110,7 +110,7 @@ class _Statements(Expressions):
             self.need(")", "after the names that `for` gives")
         if not names:
             raise refused(self.here.line, f"there should be a name after `for`, not {self.here.shown}")
-        return syntax.Target(tuple(names), unpacks)
+        return syntax.AssignmentTarget(tuple(names), unpacks)
 
     def _simple(self) -> syntax.Statement:
         token, after = self.here, self.tokens[min(self.at + 1, len(self.tokens) - 1)]
@@ -134,19 +134,19 @@ class _Statements(Expressions):
             raise refused(token.line, "the line works out a value and does nothing with it; name it or call a skill")
         return syntax.Perform(found, token.line)
 
-    def _assigned(self, target: syntax.Target, line: int) -> syntax.Assign:
+    def _assigned(self, target: syntax.AssignmentTarget, line: int) -> syntax.Assign:
         value = self.listed("=", ";")
         if self.sees("="):
             raise refused(line, "a line has one `=`; give each name its value on a line of its own")
         return syntax.Assign(target, value, line)
 
-    def _target(self, written: syntax.Expression, line: int) -> syntax.Target:
+    def _target(self, written: syntax.Expression, line: int) -> syntax.AssignmentTarget:
         if isinstance(written, syntax.Name):
-            return syntax.Target((check_assignable(line, written.name),), unpacks=False)
+            return syntax.AssignmentTarget((check_assignable(line, written.name),), unpacks=False)
         if isinstance(written, syntax.Collection) and not written.is_list and written.elements:
             names = [part.name for part in written.elements if isinstance(part, syntax.Name)]
             if len(names) == len(written.elements):
-                return syntax.Target(tuple(check_assignable(line, name) for name in names), unpacks=True)
+                return syntax.AssignmentTarget(tuple(check_assignable(line, name) for name in names), unpacks=True)
         if isinstance(written, syntax.Element):
             raise refused(line, "a list is not changed but made again, as in `a = a + [b]`")
         raise refused(line, "only a name is given a value, or several as in `a, b = 1, 2`; put it left of the `=`")

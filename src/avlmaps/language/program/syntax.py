@@ -154,7 +154,7 @@ Expression = (
 
 
 @dataclass(frozen=True, slots=True)
-class Target:
+class AssignmentTarget:
     """The left side of an assignment: one name, or several that a collection is taken apart into."""
 
     names: tuple[str, ...]
@@ -165,7 +165,7 @@ class Target:
 class Assign:
     """`name = value` or `a, b = value`."""
 
-    target: Target
+    target: AssignmentTarget
     value: Expression
     line: int = field(compare=False)
 
@@ -210,7 +210,7 @@ class If:
 class For:
     """A block that is run once for each element of a collection."""
 
-    target: Target
+    target: AssignmentTarget
     through: Expression
     body: "tuple[Statement, ...]"
     line: int = field(compare=False)

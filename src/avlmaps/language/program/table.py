@@ -1,4 +1,4 @@
-"""The table of skills, derived from the one `Vocabulary`: its signatures, its docstrings, nothing by hand."""
+"""The table of skills, derived from the one `RobotSkills`: its signatures, its docstrings, nothing by hand."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from types import MappingProxyType, NoneType, UnionType
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
 from avlmaps.language.program.value_types import ValueType
-from avlmaps.language.program.vocabulary import Clip, Heat, Picture, Place, Vocabulary
+from avlmaps.language.program.vocabulary import Clip, Heat, Picture, Place, RobotSkills
 
 ROBOT = "robot"
 
@@ -124,7 +124,7 @@ def _kinds_of(skill: str, hint: Any) -> tuple[frozenset[ValueType], str]:
     return frozenset(kind for kind, _ in known), " | ".join(text for _, text in known)
 
 
-SKILLS: Mapping[str, Skill] = skills_of(Vocabulary)
+SKILLS: Mapping[str, Skill] = skills_of(RobotSkills)
 
 
 def skill_lines(prefix: str = f"{ROBOT}.", skills: Sequence[Skill] | None = None) -> tuple[str, ...]:

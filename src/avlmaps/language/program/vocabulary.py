@@ -1,6 +1,6 @@
 """The robot's vocabulary: every skill that a program may call, in one table.
 
-`Vocabulary` is that table: each method with its typed signature and docstring is a skill. The interpreter calls
+`RobotSkills` is that table: each method with its typed signature and docstring is a skill. The interpreter calls
 nothing else, the chat prompt is made from it, plans are written in it, and `avlmaps.navigate` implements it.
 Names are those of the paper and of VLMaps; angles in degrees and metres, since people write programs in them.
 """
@@ -77,7 +77,7 @@ Target = str | Place | Heat
 
 
 @runtime_checkable
-class Vocabulary(Protocol):
+class RobotSkills(Protocol):
     """The skills of a robot. A skill whose thing is not in the map raises ``GoalNotFoundError``."""
 
     def load_image(self, path: str) -> Picture:

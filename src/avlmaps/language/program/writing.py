@@ -23,9 +23,9 @@ from avlmaps.language.intents import (
     Target,
     TargetKind,
     Turn,
+    TurnSense,
     VisitEach,
     Wait,
-    Way,
     targets_of,
 )  # fmt: skip
 
@@ -157,7 +157,7 @@ class _Writer:
         contour = self.variable("outline")
         self.add(f"{contour} = robot.get_contour({self.value(intent.of)})")
         self.add(f"for i in range({count}):")
-        back = "" if intent.way is not Way.CLOCKWISE else "-"  # an outline runs counterclockwise
+        back = "" if intent.way is not TurnSense.CLOCKWISE else "-"  # an outline runs counterclockwise
         corner = f"i * len({contour}) // {count}"
         self.add(f"    robot.move_to({contour}[{f'-({corner})' if back else corner}])")
         if intent.views:

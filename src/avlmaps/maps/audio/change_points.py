@@ -15,14 +15,14 @@ import numpy as np
 from avlmaps.core.arrays import Float, Float32, Int
 from avlmaps.core.errors import BackendError
 from avlmaps.core.progress import progress
-from avlmaps.maps.audio.settings import ChangeSettings
+from avlmaps.maps.audio.settings import SoundChangeSettings
 from avlmaps.perception.protocols import FrameSoundEncoder
 from avlmaps.recordings.audio import AudioTrack
 
 _BLOCK_S = 26.0
 _CONTEXT_S = 2.0  # heard on either side of a block, so that its first and last frames know what is round them
 _AT_ONCE = 256
-_USUAL = ChangeSettings()
+_USUAL = SoundChangeSettings()
 
 
 def frames_of_track(track: AudioTrack, encoder: FrameSoundEncoder) -> Float32[np.ndarray, "frames d"]:
@@ -57,7 +57,7 @@ def _check(rows: Float32[np.ndarray, "..."], wanted: int, encoder: FrameSoundEnc
 
 
 def split_at_changes(
-    features: Float32[np.ndarray, "frames d"], hop_s: float, settings: ChangeSettings = _USUAL
+    features: Float32[np.ndarray, "frames d"], hop_s: float, settings: SoundChangeSettings = _USUAL
 ) -> Int[np.ndarray, " edges"]:
     """Return where a sequence of unit vectors is divided: 0, the first frame of each further stretch, their number.
 

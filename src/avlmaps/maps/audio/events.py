@@ -16,7 +16,7 @@ from avlmaps.core.progress import progress, say
 from avlmaps.maps.audio.change_points import frames_of_track, split_at_changes
 from avlmaps.maps.audio.denoise import denoise, is_swell, noise_profile
 from avlmaps.maps.audio.segmentation import Segment, segment
-from avlmaps.maps.audio.settings import ChangeSettings, HearingSettings
+from avlmaps.maps.audio.settings import HearingSettings, SoundChangeSettings
 from avlmaps.maps.types import HeardSounds
 from avlmaps.perception.protocols import FrameSoundEncoder, SoundEncoder
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
@@ -55,12 +55,12 @@ def detect_events(
         pieces = by_changes(recording.audio, cast("FrameSoundEncoder", encoder), settings.changes)
     else:
         pieces = _by_energy(recording.audio, encoder, settings)
-    motion = Motion(recording.stamps_s, recording.world_from_camera)
-    heard: list[Heard] = []
+    motion = WalkedTrack(recording.stamps_s, recording.world_from_camera)
+    heard: list[StoredSound] = []
     for found, sound, feature in pieces:
         clip = f"{found.onset_s:010.3f}.flac"
         write_flac(clips_folder / clip, sound)
-        heard.append(Heard(found, track_of(motion, found), feature, clip))
+        heard.append(StoredSound(found, track_of(motion, found), feature, clip))
     _tell_outside(recording, [one.segment for one in heard])
     return collect(heard, encoder.card.dim)
 
@@ -109,7 +109,7 @@ def feature_of(
     return _encoded(encoder, _cleaned(sound, track, found, index, settings))
 
 
-def by_changes(track: AudioTrack, encoder: FrameSoundEncoder, settings: ChangeSettings) -> Iterator[Piece]:
+def by_changes(track: AudioTrack, encoder: FrameSoundEncoder, settings: SoundChangeSettings) -> Iterator[Piece]:
     """Yield the stretches of the track between changes, and the features of their steps."""
     features = frames_of_track(track, encoder)
     edges = split_at_changes(features, encoder.hop_s, settings)
@@ -122,7 +122,7 @@ def by_changes(track: AudioTrack, encoder: FrameSoundEncoder, settings: ChangeSe
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class WalkedTrack:
     """Where a robot was, also in frames that were not fused; perhaps nowhere yet.
 
     Attributes:
@@ -134,7 +134,7 @@ class Motion:
     world_from_camera: Float[np.ndarray, "n 4 4"]
 
 
-def track_of(walk: Motion, heard: Segment) -> Float32[np.ndarray, "places 3"]:
+def track_of(walk: WalkedTrack, heard: Segment) -> Float32[np.ndarray, "places 3"]:
     """Return where the robot was from a sound's onset to its offset: at both, and at every frame between.
 
     Positions between frames are interpolated; before the first frame and after the last the nearest one's place
@@ -150,7 +150,7 @@ def track_of(walk: Motion, heard: Segment) -> Float32[np.ndarray, "places 3"]:
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class StoredSound:
     """A sound as the map stores it: when, where the robot was, its features, and the name of its clip's file."""
 
     segment: Segment
@@ -199,7 +199,7 @@ def _encoded(encoder: SoundEncoder, sound: Sound) -> Float32[np.ndarray, "window
     return feature
 
 
-def collect(heard: Sequence[Heard], dim: int) -> HeardSounds:
+def collect(heard: Sequence[StoredSound], dim: int) -> HeardSounds:
     """Put sounds, in the order of time, into the map's arrays; ``dim`` is the length of a feature."""
     tracks, features = [one.track for one in heard], [one.feature for one in heard]
     return HeardSounds(

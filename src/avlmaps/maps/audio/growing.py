@@ -19,9 +19,9 @@ import numpy as np
 
 from avlmaps.core.arrays import Float32
 from avlmaps.maps.audio.events import (
-    Heard,
     HearingSettings,
-    Motion,
+    StoredSound,
+    WalkedTrack,
     by_changes,
     collect,
     cuts_by_changes,
@@ -64,7 +64,7 @@ class GrowingSounds:
         self._powers: list[np.ndarray] = []
         self._stream, self._lock = PowerStream(), Lock()
         self._loudest, self._window = 0.0, 0  # the window begins at this sample, at a step of the powers
-        self._old: list[Heard] = []
+        self._old: list[StoredSound] = []
         self._features: dict[_Key, Float32[np.ndarray, "windows d"]] = {}
         self._clips: set[str] = set()
 
@@ -86,7 +86,7 @@ class GrowingSounds:
             self._loudest = max(self._loudest, float(powers.mean(axis=1).max()))
             self._powers.append(powers)
 
-    def heard(self, walk: Motion, *, final: bool) -> HeardSounds:
+    def heard(self, walk: WalkedTrack, *, final: bool) -> HeardSounds:
         """Return the sounds until now.
 
         Args:
@@ -110,7 +110,7 @@ class GrowingSounds:
             pieces = self._let_go(track, pieces)
         return collect([*self._old, *pieces], dim)
 
-    def _let_go(self, track: RawTrack, pieces: list[Heard]) -> list[Heard]:
+    def _let_go(self, track: RawTrack, pieces: list[StoredSound]) -> list[StoredSound]:
         """Move sounds that ended before the window out of it, and return those that are still in it."""
         begin_s = track.end_s - _WINDOW_S
         left = [one for one in pieces if one.segment.offset_s >= begin_s]
@@ -125,14 +125,16 @@ class GrowingSounds:
                 self._powers = [np.concatenate(self._powers)[steps:]]
         return left
 
-    def _pieces(self, track: RawTrack, walk: Motion, *, final: bool, powers: Sequence[np.ndarray] = ()) -> list[Heard]:
+    def _pieces(
+        self, track: RawTrack, walk: WalkedTrack, *, final: bool, powers: Sequence[np.ndarray] = ()
+    ) -> list[StoredSound]:
         over_s = np.inf if final else track.end_s - ENDED_S
         if self._by_changes:
             encoder = cast(FrameSoundEncoder, self._encoder)
             every = by_changes(track, encoder, self._settings.changes)
             return [self._heard(walk, *piece) for piece in every if final or piece[0].offset_s <= over_s]
         found = self._segments(track, powers)
-        pieces: list[Heard] = []
+        pieces: list[StoredSound] = []
         for i, one in enumerate(found):
             if one.offset_s <= over_s:
                 sound = track.read(one.onset_s, one.offset_s)
@@ -169,10 +171,12 @@ class GrowingSounds:
         assert track is not None
         return tuple(round((at_s - track.start_s) * track.rate_hz) for at_s in seconds)
 
-    def _heard(self, walk: Motion, found: Segment, sound: Sound, feature: Float32[np.ndarray, "windows d"]) -> Heard:
+    def _heard(
+        self, walk: WalkedTrack, found: Segment, sound: Sound, feature: Float32[np.ndarray, "windows d"]
+    ) -> StoredSound:
         begin, end = self._samples(found.onset_s, found.offset_s)
         clip = f"{begin:012d}-{end:012d}.flac"
         if clip not in self._clips:
             write_flac(self.clips_folder / clip, sound)
             self._clips.add(clip)
-        return Heard(found, track_of(walk, found), feature, clip)
+        return StoredSound(found, track_of(walk, found), feature, clip)

@@ -54,7 +54,7 @@ class SegmentationSettings:
 
 
 @dataclass(frozen=True, slots=True)
-class ChangeSettings:
+class SoundChangeSettings:
     """Cutting a track where what sounds changes."""
 
     change_s: float = 0.2
@@ -89,7 +89,7 @@ class HearingSettings:
     cut: Literal["auto", "energy", "changes"] = "auto"
     """energy: sounds are what stands out from the background; changes: the whole track is used, divided at its change
     points; auto: changes where the sound model gives a feature every few hundredths of a second."""
-    changes: ChangeSettings = field(default_factory=ChangeSettings)
+    changes: SoundChangeSettings = field(default_factory=SoundChangeSettings)
     """Dividing the track where what sounds changes."""
 
     def __post_init__(self) -> None:

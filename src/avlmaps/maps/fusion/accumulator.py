@@ -20,7 +20,7 @@ from avlmaps.maps.fusion.moved_submaps import MovedSubmaps
 from avlmaps.maps.fusion.sensor import NONE, FusionSettings, SensorModel
 from avlmaps.maps.fusion.submap_kernels import SPREAD_COLUMNS, add_spread, finish_spread
 from avlmaps.maps.fusion.voxel_kernels import look_up_views
-from avlmaps.maps.fusion.voxel_sums import Evidence, VoxelSums, VoxelTable, with_rows
+from avlmaps.maps.fusion.voxel_sums import VoxelSums, VoxelTable, VoxelViews, with_rows
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.types import Submaps, Voxels
 from avlmaps.recordings.types import Frame
@@ -250,7 +250,7 @@ class VoxelAccumulator:
         """
         return self._table.sums(feature_out)
 
-    def evidence(self) -> Evidence:
+    def evidence(self) -> VoxelViews:
         """Return the evidence of each voxel's surface, sorted by index, for `free_space.clean`."""
         return self._table.evidence()
 

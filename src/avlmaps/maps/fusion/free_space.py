@@ -20,7 +20,7 @@ from avlmaps.maps.fusion.measure_kernels import SHARP_UNITS
 from avlmaps.maps.fusion.sensor import SensorModel
 from avlmaps.maps.fusion.through_kernels import chunks_of, count_frames
 from avlmaps.maps.fusion.voxel_kernels import rehash
-from avlmaps.maps.fusion.voxel_sums import Evidence
+from avlmaps.maps.fusion.voxel_sums import VoxelViews
 from avlmaps.maps.grid import GridSpec
 from avlmaps.recordings.types import Frame
 
@@ -161,7 +161,7 @@ def count_through(
 
 
 def count_where_it_matters(
-    evidence: Evidence, grid: GridSpec, camera: Pinhole, views: FreeViews
+    evidence: VoxelViews, grid: GridSpec, camera: Pinhole, views: FreeViews
 ) -> Int32[np.ndarray, " n"]:
     """Return how many frames see through each voxel as `count_through` does, or 0 sooner.
 
@@ -191,7 +191,7 @@ MOST_REACH = 4.0  # voxels: a smear is looked for no farther
 
 
 def clean(
-    evidence: Evidence,
+    evidence: VoxelViews,
     views: Sequence[FreeViews],
     camera: Pinhole,
     grid: GridSpec,
@@ -219,7 +219,7 @@ def clean(
     return kept, removed
 
 
-def _through(evidence: Evidence, count: _Count, sensor: SensorModel) -> Bool[np.ndarray, " n"]:
+def _through(evidence: VoxelViews, count: _Count, sensor: SensorModel) -> Bool[np.ndarray, " n"]:
     if not sensor.carve:
         return np.zeros(len(evidence), bool)
     return seen_through(count(evidence.index), evidence.views)
@@ -230,14 +230,14 @@ def seen_through(through: Int32[np.ndarray, " n"], views: Int32[np.ndarray, " n"
     return (through >= FEWEST_THROUGH) & (through > THROUGH_SHARE * views)
 
 
-def smear_reach(evidence: Evidence, sensor: SensorModel) -> Float64[np.ndarray, " n"]:
+def smear_reach(evidence: VoxelViews, sensor: SensorModel) -> Float64[np.ndarray, " n"]:
     """Return how far the surface that a voxel's hits came from may be, voxels."""
     # sharp / hits is the mean of 1 / (1 + (σ / half a voxel)²)
     exact = np.clip(evidence.sharp / (SHARP_UNITS * evidence.hits), 1.0 / SHARP_UNITS, 1.0)
     return np.minimum(sensor.smear_sigmas * 0.5 * np.sqrt(1.0 / exact - 1.0), MOST_REACH)
 
 
-def _smeared(evidence: Evidence, count: _Count, sensor: SensorModel) -> Bool[np.ndarray, " n"]:
+def _smeared(evidence: VoxelViews, count: _Count, sensor: SensorModel) -> Bool[np.ndarray, " n"]:
     smeared = np.zeros(len(evidence), bool)
     if sensor.smear_sigmas > 0.0:
         carving_kernels.mark_smeared(
@@ -246,7 +246,7 @@ def _smeared(evidence: Evidence, count: _Count, sensor: SensorModel) -> Bool[np.
     return smeared
 
 
-def _specks(evidence: Evidence, count: _Count, sensor: SensorModel) -> Bool[np.ndarray, " n"]:
+def _specks(evidence: VoxelViews, count: _Count, sensor: SensorModel) -> Bool[np.ndarray, " n"]:
     if sensor.speck_voxels == 0 or len(evidence) == 0:
         return np.zeros(len(evidence), bool)
     of = np.empty(len(evidence), np.int64)
@@ -257,7 +257,7 @@ def _specks(evidence: Evidence, count: _Count, sensor: SensorModel) -> Bool[np.n
     return (size[of] <= sensor.speck_voxels) & (often[of] <= SPECK_VIEWS)
 
 
-def _table(evidence: Evidence) -> Int32[np.ndarray, " slots"]:
+def _table(evidence: VoxelViews) -> Int32[np.ndarray, " slots"]:
     table = np.full(1 << (2 * len(evidence) + 1).bit_length(), -1, np.int32)
     rehash(table, evidence.index, len(evidence))
     return table

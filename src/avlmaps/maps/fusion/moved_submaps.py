@@ -15,7 +15,7 @@ from avlmaps.core.errors import MapError
 from avlmaps.core.poses import inverse
 from avlmaps.maps.fusion import submap_kernels as kernels
 from avlmaps.maps.fusion.voxel_kernels import rehash, unit_rows
-from avlmaps.maps.fusion.voxel_sums import Evidence, VoxelTable, blocks, sorted_rows, with_rows
+from avlmaps.maps.fusion.voxel_sums import VoxelTable, VoxelViews, blocks, sorted_rows, with_rows
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.types import Submaps, Voxels
 
@@ -51,11 +51,11 @@ class MovedSubmaps:
         self._views = sums.counts[: sums.count, kernels.VIEWS]
         self._order = sorted_rows(self._index)
 
-    def evidence(self) -> Evidence:
+    def evidence(self) -> VoxelViews:
         """Return the evidence of each voxel's surface, sorted by index, for `free_space.clean`."""
         rows = self._order
         hits, sharp = (self._sums[rows, column].astype(np.int64) for column in (kernels.HITS, kernels.SHARP))
-        return Evidence(self._index[rows], hits, self._views[rows], sharp)
+        return VoxelViews(self._index[rows], hits, self._views[rows], sharp)
 
     def voxels(self, kept: Bool[np.ndarray, " n"] | None = None) -> Voxels:
         """Return the means, sorted by index: features of unit length, colours.

@@ -74,7 +74,7 @@ def features_alone(sums: VoxelSums) -> VoxelSums:
 
 
 @dataclass(frozen=True, slots=True)
-class Evidence:
+class VoxelViews:
     """How well each voxel was seen; the fields are those of `VoxelSums`."""
 
     index: Int32[np.ndarray, "n 3"]
@@ -85,7 +85,7 @@ class Evidence:
     def __len__(self) -> int:
         return len(self.index)
 
-    def only(self, kept: Bool[np.ndarray, " n"]) -> "Evidence":
+    def only(self, kept: Bool[np.ndarray, " n"]) -> "VoxelViews":
         """Return some of the voxels."""
         return take(self, kept)
 
@@ -177,10 +177,10 @@ class VoxelTable:
         others = [field.name for field in fields(VoxelSums) if field.name != "feature_sum"]
         return VoxelSums(feature_sum=feature_sum, **{name: getattr(self, name)[rows] for name in others})
 
-    def evidence(self) -> Evidence:
+    def evidence(self) -> VoxelViews:
         """Return the evidence of each voxel's surface, sorted."""
         rows = self.sort_rows()
-        return Evidence(self.index[rows], self.hits[rows], self.views[rows], self.sharp[rows])
+        return VoxelViews(self.index[rows], self.hits[rows], self.views[rows], self.sharp[rows])
 
     def voxels(self, feature_out: np.ndarray | None = None, kept: Bool[np.ndarray, " n"] | None = None) -> Voxels:
         """Return the means, sorted; see `VoxelAccumulator.voxels`."""

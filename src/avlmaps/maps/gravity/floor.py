@@ -11,7 +11,15 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
-from avlmaps.maps.gravity.floor_choice import CERTAIN, SAME_M, Choice, Expected, View, choose_floor, stood_over
+from avlmaps.maps.gravity.floor_choice import (
+    CERTAIN,
+    SAME_M,
+    Choice,
+    Expected,
+    SurfacesAtHeight,
+    choose_floor,
+    stood_over,
+)
 from avlmaps.maps.gravity.patches import Sight, Voxelised, sight_of
 from avlmaps.recordings.subset import Subset
 from avlmaps.recordings.types import Frame, Ground, Recording
@@ -106,11 +114,11 @@ def _view(
     cameras_m: Float[np.ndarray, " k"],
     under_m: Float[np.ndarray, " k"],
     band: Int[np.ndarray, " m"],
-) -> View:
+) -> SurfacesAtHeight:
     """Return the surfaces round a group of cameras."""
     middle_m = float(np.median(cameras_m[band]))
     near = [sight for sight, at_m in zip(sights, cameras_m, strict=True) if abs(at_m - middle_m) < _STOREY_M]
-    return View(
+    return SurfacesAtHeight(
         camera_m=middle_m,
         surface=Voxelised.union([sight.surface for sight in near]),
         level=Voxelised.union([sight.level for sight in near]),

@@ -42,7 +42,7 @@ _AT_BOTTOM = 0.65  # the bottom of what is in view is taken for a floor out of v
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class SurfacesAtHeight:
     """The surfaces round a camera height.
 
     Attributes:
@@ -74,7 +74,7 @@ class Expected:
 
 
 @dataclass(frozen=True, slots=True)
-class Evidence:
+class FloorEvidence:
     """The evidence for and against a floor at one height.
 
     Attributes:
@@ -113,13 +113,13 @@ class Choice:
         runner_up_confidence: how likely that one is, in [0, 1].
     """
 
-    best: Evidence
+    best: FloorEvidence
     confidence: float
-    runner_up: Evidence | None
+    runner_up: FloorEvidence | None
     runner_up_confidence: float
 
 
-def choose_floor(view: View, expected: Expected | None = None, usual_m: float | None = None) -> Choice:
+def choose_floor(view: SurfacesAtHeight, expected: Expected | None = None, usual_m: float | None = None) -> Choice:
     """Return the floor under the cameras of a view."""
     found = [weigh(view, height_m, expected, usual_m) for height_m in hypotheses(view)]
     found = sorted([*found, out_of_view(view, expected)], key=lambda evidence: -evidence.nats)
@@ -137,7 +137,7 @@ def choose_floor(view: View, expected: Expected | None = None, usual_m: float | 
     return Choice(best, float(weight[same].sum()), second, float(weight[near].sum()))
 
 
-def hypotheses(view: View) -> list[float]:
+def hypotheses(view: SurfacesAtHeight) -> list[float]:
     """Return the heights along up at which level surface gathers, below the camera."""
     lowest = view.camera_m - DEEPEST_M
     level = view.level.height_m
@@ -151,7 +151,9 @@ def hypotheses(view: View) -> list[float]:
     return [float(np.median(level[np.abs(level - height) < 2.5 * _BIN_M])) for height in middles]
 
 
-def weigh(view: View, height_m: float, expected: Expected | None = None, usual_m: float | None = None) -> Evidence:
+def weigh(
+    view: SurfacesAtHeight, height_m: float, expected: Expected | None = None, usual_m: float | None = None
+) -> FloorEvidence:
     """Return the evidence for a floor at a height where level surface was seen."""
     at = np.abs(view.level.height_m - height_m) < 2.5 * _BIN_M
     off = (view.level.height_m[at] - height_m) / _BLUR_M
@@ -172,10 +174,12 @@ def weigh(view: View, height_m: float, expected: Expected | None = None, usual_m
         + _STOOD_NATS * trusted
         + prior
     )
-    return Evidence(height_m, view.camera_m - height_m, level_m2, below, undercut, stood, trusted, True, float(nats))
+    return FloorEvidence(
+        height_m, view.camera_m - height_m, level_m2, below, undercut, stood, trusted, True, float(nats)
+    )
 
 
-def out_of_view(view: View, expected: Expected | None = None) -> Evidence:
+def out_of_view(view: SurfacesAtHeight, expected: Expected | None = None) -> FloorEvidence:
     """Return the hypothesis that no level surface in view is the floor.
 
     The floor then lies where someone said; else at the bottom of what is in view, or where cameras usually have it if
@@ -190,7 +194,7 @@ def out_of_view(view: View, expected: Expected | None = None) -> Evidence:
     height_m = view.camera_m - camera_height_m
     nats = _UNSEEN_NATS + prior_nats(height_m, view.camera_m, expected)
     below, _ = _beneath(view, height_m)
-    return Evidence(height_m, camera_height_m, 0.0, below, 0.0, 0.0, False, False, float(nats))
+    return FloorEvidence(height_m, camera_height_m, 0.0, below, 0.0, 0.0, False, False, float(nats))
 
 
 def prior_nats(height_m: float, camera_m: float, expected: Expected | None = None) -> float:
@@ -209,7 +213,7 @@ def prior_nats(height_m: float, camera_m: float, expected: Expected | None = Non
     return float(np.log(likely + (0.07 if ratio < 0.0 else 0.002))) - _NOT_SAID_NATS * too_high
 
 
-def _beneath(view: View, height_m: float) -> tuple[float, Voxelised]:
+def _beneath(view: SurfacesAtHeight, height_m: float) -> tuple[float, Voxelised]:
     """Return the share of all surface in view that lies below a height, in [0, 1], and that surface."""
     window = view.surface.height_m > view.camera_m - DEEPEST_M
     deep_m = height_m - view.surface.height_m - _BELOW_M - _BELOW_PER_M * view.surface.range_m

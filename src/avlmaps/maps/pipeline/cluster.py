@@ -17,12 +17,12 @@ from avlmaps.maps.gravity.floor import GroundedRecording
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.pipeline.cluster_jobs import (
     AddJob,
+    BuildRequest,
     DescribeJob,
     FuseJob,
     Models,
     NoFacts,
     Reopen,
-    Request,
     add_job,
     describe_job,
     fuse_job,
@@ -58,7 +58,7 @@ class Pool(Protocol):
         ...
 
 
-class Spread(Workers):
+class ClusterWorkers(Workers):
     """Gives a build's jobs to a pool of workers."""
 
     def __init__(
@@ -139,12 +139,12 @@ class Spread(Workers):
             total.merge(VoxelSums(**load_checkpoint(order.folder, NoFacts, order.key).arrays))
         return total
 
-    def _request(self, plan: BuildPlan) -> Request:
+    def _request(self, plan: BuildPlan) -> BuildRequest:
         models, recording = Models.of(plan.encoders, self._cache), plan.recording
         # A path that is relative means another place on another machine.
         path, token = plan.path.absolute(), self._tokens.setdefault(plan.key, secrets.token_hex(8))
         show_token(token_file(path, plan.key, token))
-        return Request(
+        return BuildRequest(
             reopen=self._reopen,
             path=path,
             models=models,

@@ -105,7 +105,7 @@ class Models:
 
 
 @dataclass(frozen=True, slots=True)
-class Request:
+class BuildRequest:
     """From what a worker makes the plan of a build, and by what it knows that it is the same.
 
     Attributes:
@@ -137,7 +137,7 @@ class Request:
 class FuseJob:
     """A stretch of frames that is to become the part in a folder."""
 
-    request: Request
+    request: BuildRequest
     span: Span
     folder: Path
     sensor: SensorModel
@@ -147,7 +147,7 @@ class FuseJob:
 class DescribeJob:
     """A lot of keyframes, numbers of the recording's frames, that is to be stored in a folder."""
 
-    request: Request
+    request: BuildRequest
     frames: Int64[np.ndarray, " k"]
     folder: Path
     places: Path
@@ -158,7 +158,7 @@ class DescribeJob:
 class AddJob:
     """A slab of voxels, those with ``low`` <= x < ``high``, whose sums over parts are to be stored in a folder."""
 
-    request: Request
+    request: BuildRequest
     parts: tuple[Path, ...]
     low: int
     high: int
@@ -167,7 +167,7 @@ class AddJob:
 
 
 @dataclass(frozen=True, slots=True)
-class Done:
+class JobResult:
     """What became of a job.
 
     Attributes:
@@ -197,7 +197,7 @@ class NoFacts(msgspec.Struct):
     """A slab's arrays are all of it."""
 
 
-def fuse_job(job: FuseJob) -> Done:
+def fuse_job(job: FuseJob) -> JobResult:
     """Fuse a stretch of frames on a worker."""
 
     def work(plan: BuildPlan, folder: Path) -> None:
@@ -206,7 +206,7 @@ def fuse_job(job: FuseJob) -> Done:
     return _do(job.request, job.folder, work)
 
 
-def describe_job(job: DescribeJob) -> Done:
+def describe_job(job: DescribeJob) -> JobResult:
     """Describe a lot of keyframes on a worker."""
 
     def work(plan: BuildPlan, folder: Path) -> None:
@@ -217,7 +217,7 @@ def describe_job(job: DescribeJob) -> Done:
     return _do(job.request, job.folder, work)
 
 
-def add_job(job: AddJob) -> Done:
+def add_job(job: AddJob) -> JobResult:
     """Add the parts of a slab up on a worker."""
 
     def work(plan: BuildPlan, folder: Path) -> None:
@@ -248,18 +248,18 @@ def software() -> dict[str, str]:
     return found
 
 
-def done_by(work: Callable[[str], None]) -> Done:
+def done_by(work: Callable[[str], None]) -> JobResult:
     """Do a job, of the worker's name, and return what became of it; errors of users become values."""
     host, begin = socket.gethostname(), process_time()
     try:
         with silence_progress():
             work(host)
     except AvlmapsError as fault:
-        return Done(host, process_time() - begin, type(fault).__name__, str(fault))
-    return Done(host, process_time() - begin)
+        return JobResult(host, process_time() - begin, type(fault).__name__, str(fault))
+    return JobResult(host, process_time() - begin)
 
 
-def _do(request: Request, folder: Path, work: Callable[[BuildPlan, Path], None]) -> Done:
+def _do(request: BuildRequest, folder: Path, work: Callable[[BuildPlan, Path], None]) -> JobResult:
     """Do a job into a folder that takes its name when it is whole."""
 
     def into_folder(host: str) -> None:
@@ -288,7 +288,7 @@ def _whole(folder: Path) -> Generator[Path]:
 _known: list[tuple[str, BuildPlan]] = []  # the last plan that this worker made, by its token
 
 
-def _plan(request: Request, host: str) -> BuildPlan:
+def _plan(request: BuildRequest, host: str) -> BuildPlan:
     """Return the plan of the build, with the ground that was found meanwhile; what a worker sees is checked once."""
     if not _known or _known[0][0] != request.token:
         _known[:] = [(request.token, _checked_plan(request, host))]
@@ -298,7 +298,7 @@ def _plan(request: Request, host: str) -> BuildPlan:
     )
 
 
-def _checked_plan(request: Request, host: str) -> BuildPlan:
+def _checked_plan(request: BuildRequest, host: str) -> BuildPlan:
     """Return the plan of the build, made from what this worker sees.
 
     Raises:

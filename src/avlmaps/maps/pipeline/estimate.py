@@ -13,7 +13,7 @@ from avlmaps.core.errors import RecordingError
 from avlmaps.core.wording import option
 from avlmaps.maps.fusion.sensor import FRAMES, MODELS, SensorModel, measure_noise, nearest_model
 from avlmaps.maps.gravity.floor import FoundFloor, GroundedRecording, find_ground
-from avlmaps.maps.gravity.floor_choice import Evidence, Expected
+from avlmaps.maps.gravity.floor_choice import Expected, FloorEvidence
 from avlmaps.maps.pipeline.plan import BUILD_VERSION, BuildPlan
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.checkpoints import Computed, key_of, load_or_compute
@@ -146,7 +146,7 @@ def _expected(
     return None, "surfaces"
 
 
-def _guess(evidence: Evidence, confidence: float, camera_height_m: float) -> FloorGuess:
+def _guess(evidence: FloorEvidence, confidence: float, camera_height_m: float) -> FloorGuess:
     return FloorGuess(
         height_m=round(evidence.height_m, 4),
         camera_height_m=round(camera_height_m, 4),

@@ -146,7 +146,7 @@ def manifest_of(
         seed=plan.settings.seed,
         recording=_recording_info(plan.recording),
         counts=manifest.Counts.of(fused, content.keyframes, content.voxels, content.sounds),
-        bounding_box_m=manifest.Box.of(content.voxels.index, plan.settings.voxel_size_m),
+        bounding_box_m=manifest.MapBounds.of(content.voxels.index, plan.settings.voxel_size_m),
         bad_frames=tuple(bad),
         notices=(*doubts, *_notices(plan, up, ground, fused, len(bad))),
         doubts=doubts,

@@ -40,7 +40,7 @@ LEAST_EXPLAINED = 0.9  # of the clear delays: 1.0 in rooms with one source, 0.3 
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Calibration:
+class ArrayCalibration:
     """A refined array.
 
     Attributes:
@@ -68,7 +68,7 @@ class Calibration:
     turned: tuple[int, ...] = ()
 
 
-def calibrate(track: AudioTrack, walk: Trajectory, between_s: tuple[float, float] | None = None) -> Calibration:
+def calibrate(track: AudioTrack, walk: Trajectory, between_s: tuple[float, float] | None = None) -> ArrayCalibration:
     """Refine the places of the microphones and the delays of the channels.
 
     Args:
@@ -134,7 +134,7 @@ def calibrate(track: AudioTrack, walk: Trajectory, between_s: tuple[float, float
             "and so do channels in another order. Let the source stand still in the room, and check the given places."
         )
     refined = fit.array_of(solution)
-    return Calibration(
+    return ArrayCalibration(
         refined, fit.source_of(solution), _scale(fit.residual_s(fit.only_source(solution, measured), measured)),
         after_s, place_sd.max(axis=1), delay_sd, moved_m,
         frames, held, tuple(np.flatnonzero(signs < 0.0).tolist()),

@@ -26,7 +26,7 @@ LEAST = -60.0  # of a log-likelihood: no difference below matters
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Found:
+class FoundSources:
     """The evidence of some sounds, and what it took.
 
     Attributes:
@@ -73,11 +73,11 @@ def find_among(
     signs_by_s: Sequence[tuple[float, float]],
     signs: Float[np.ndarray, " m"] | None = None,
     others: Float[np.ndarray, "s g o"] | None = None,
-) -> Found | None:
+) -> FoundSources | None:
     """Return the evidence of some sounds of a drive; see ``find_sources``.
 
     The signs of the channels are found by the sounds of ``signs_by_s``, unless ``signs`` gives them. ``others`` is what
-    other sounds of the drive say of the device (``Found.of_device``).
+    other sounds of the drive say of the device (``FoundSources.of_device``).
 
     Raises:
         AudioError: the track cannot be read.
@@ -130,7 +130,7 @@ def find_among(
         channels=np.array([channels], np.int64),
         device=np.zeros((0, 4)) if said is None or said.device is None else said.device.row[None],
     )
-    return Found(evidence, signs, np.zeros((0, 1, 1)) if said is None else said.of_device)
+    return FoundSources(evidence, signs, np.zeros((0, 1, 1)) if said is None else said.of_device)
 
 
 def _said(

@@ -15,7 +15,7 @@ from avlmaps.core.arrays import Bool, Float, Int
 from avlmaps.core.errors import AudioError, RecordingError
 from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.sources.carried import laid
-from avlmaps.maps.sources.find import LEAST, Found, find_among, find_sources
+from avlmaps.maps.sources.find import LEAST, FoundSources, find_among, find_sources
 from avlmaps.maps.types import SourceEvidence
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.directions import DirectionTrack
@@ -167,7 +167,7 @@ class GrowingSources:
 
     def _keep(
         self,
-        found: Found,
+        found: FoundSources,
         spans_s: Spans,
         row: Int[np.ndarray, " n"],
         old: Int[np.ndarray, " k"],

@@ -39,7 +39,7 @@ class SeenFrom(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     world_from_camera: tuple[Row, Row, Row, Row]
 
 
-class Spot(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
+class EditedSpot(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
     """What an edit is about: a thing, a room, an area or a place.
 
     Attributes:
@@ -56,7 +56,7 @@ class Spot(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     corners: tuple[Vector, ...] = ()
     seen_from: SeenFrom | None = None
 
-    def now(self, keyframes: Keyframes) -> "Spot":
+    def now(self, keyframes: Keyframes) -> "EditedSpot":
         """Return it in the world as it is now: it moved with the keyframe that looked at it; itself if that did not."""
         if self.seen_from is None or not len(keyframes):
             return self
@@ -68,13 +68,13 @@ class Spot(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
         motion = np.asarray(keyframes.world_from_camera[row], np.float64) @ inverse(then)
         return self if np.abs(motion - np.eye(4)).max() < _STILL else self.moved(motion)
 
-    def moved(self, motion: Float[np.ndarray, "4 4"]) -> "Spot":
+    def moved(self, motion: Float[np.ndarray, "4 4"]) -> "EditedSpot":
         """Return it after a rigid motion of the world."""
         corners = tuple(plain_point(apply(motion, np.array(corner))) for corner in self.corners)
         middle = plain_point(apply(motion, np.array(self.middle)))
         return msgspec.structs.replace(self, middle=middle, corners=corners)
 
-    def anchored(self, keyframes: Keyframes) -> "Spot":
+    def anchored(self, keyframes: Keyframes) -> "EditedSpot":
         """Return it with the keyframe that looked nearest to it."""
         if not len(keyframes):
             return msgspec.structs.replace(self, seen_from=None)
@@ -123,7 +123,7 @@ class Edit(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     id: str
     does: Does
     made: str
-    at: tuple[Spot, ...] = ()
+    at: tuple[EditedSpot, ...] = ()
     name: str = ""
     cut: tuple[Vector, ...] = ()
     of: str = ""
@@ -134,7 +134,7 @@ class Edit(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     def new(
         cls,
         does: Does,
-        at: Sequence[Spot] = (),
+        at: Sequence[EditedSpot] = (),
         *,
         name: str = "",
         cut: Sequence[Vector] = (),
@@ -222,7 +222,7 @@ def carried_edits(
     ``onto``.
     """
 
-    def carried(spot: Spot) -> Spot:
+    def carried(spot: EditedSpot) -> EditedSpot:
         return spot.now(keyframes).moved(map_from_own).anchored(onto)
 
     def point(place: Vector) -> Vector:

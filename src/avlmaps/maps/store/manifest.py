@@ -269,14 +269,14 @@ class Counts(msgspec.Struct, frozen=True, kw_only=True):
         return cls(frames=frames, keyframes=len(keyframes), voxels=len(voxels), sounds=len(sounds))
 
 
-class Box(msgspec.Struct, frozen=True, kw_only=True):
+class MapBounds(msgspec.Struct, frozen=True, kw_only=True):
     """The smallest box along the world's axes that holds every occupied voxel, metres."""
 
     low: Vector
     high: Vector
 
     @classmethod
-    def of(cls, index: Int32[np.ndarray, "n 3"], voxel_size_m: float) -> "Box":
+    def of(cls, index: Int32[np.ndarray, "n 3"], voxel_size_m: float) -> "MapBounds":
         """Return the box around voxels, of which there is at least one."""
         corners = np.stack([index.min(axis=0), index.max(axis=0) + 1]) * voxel_size_m
         low, high = (tuple(round(float(value), 6) for value in corner) for corner in corners)
@@ -342,7 +342,7 @@ class MapInfo(msgspec.Struct, frozen=True, kw_only=True):
     seed: int
     recording: RecordingInfo
     counts: Counts
-    bounding_box_m: Box
+    bounding_box_m: MapBounds
     bad_frames: tuple[BadFrame, ...] = ()
     notices: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()

@@ -21,7 +21,7 @@ from avlmaps.core.motion import GroundPose
 from avlmaps.navigate.driver import Arrival
 from avlmaps.navigate.interrupts import Halt
 from avlmaps.navigate.ros.contact import Contact
-from avlmaps.navigate.ros.goals import End, Goal, MovementPlan, Task, Tasks, Track
+from avlmaps.navigate.ros.goals import ActionGoal, End, MovementPlan, SentGoal, Tasks, Track
 from avlmaps.navigate.ros.guard import GoalGuard
 from avlmaps.navigate.ros.plans import LEAST_M, LONGEST_M, Standing, ahead_of, place_to_stand, plan_turn
 from avlmaps.navigate.ros.session import AGAIN_S, Opener, call_off, ended_within
@@ -67,9 +67,9 @@ class RosDriver:
         self._standing = standing
         self._level_from_world = np.eye(3) if level_from_world is None else np.asarray(level_from_world, np.float64)
         self._busy, self._halted, self._closing = threading.Lock(), threading.Event(), threading.Event()
-        self._goal: Goal | None = None
-        self._owed: Goal | None = None  # was sent, and its end is not confirmed
-        self._ours: deque[Goal] = deque(maxlen=50)
+        self._goal: SentGoal | None = None
+        self._owed: SentGoal | None = None  # was sent, and its end is not confirmed
+        self._ours: deque[SentGoal] = deque(maxlen=50)
         self._halt = _IDLE
         self._clock = clock
         self.guard: GoalGuard | None = None
@@ -275,9 +275,9 @@ class RosDriver:
             return self._arrival(False, track, f"{called} says that it arrived, but {off}; {why}")
         return self._arrival(True, track, plan.note)
 
-    def _pursue(self, task: Task, track: Track) -> Goal:
+    def _pursue(self, task: ActionGoal, track: Track) -> SentGoal:
         """Send one goal and see it to its end, good or bad."""
-        goal = Goal(task)
+        goal = SentGoal(task)
         if self._is_absent(task.action):
             goal.over(End.ABSENT, f"No action server takes the goal; start {self._tasks.called}, or name its namespace")
             return goal
@@ -301,7 +301,7 @@ class RosDriver:
                 self._settle(goal)
         return goal
 
-    def _settle(self, goal: Goal) -> None:
+    def _settle(self, goal: SentGoal) -> None:
         """Take note that nothing is left of a goal."""
         goal.over(End.CANCELLED)
         if self._owed is goal:
@@ -322,7 +322,7 @@ class RosDriver:
                 self._mute.add(server)
         return served is not None and not served[1]
 
-    def _watch(self, goal: Goal, track: Track) -> tuple[str, bool]:
+    def _watch(self, goal: SentGoal, track: Track) -> tuple[str, bool]:
         """Wait for a goal's end; else return why it is to be given up, and whether nobody is there to take it."""
         begun_s, settings, session = monotonic(), self.settings, self._contact.session
         sent_s = looked_s = beaten_s = asked_s = self._clock()
@@ -355,7 +355,7 @@ class RosDriver:
             session.remind(goal)
         return "", False
 
-    def _lost_sight(self, goal: Goal, silent_s: float) -> str:
+    def _lost_sight(self, goal: SentGoal, silent_s: float) -> str:
         """Return why a goal cannot be watched any more, or must not continue; "" where it can."""
         contact, settings = self._contact, self.settings
         if contact.session.lost is not None:
@@ -371,7 +371,7 @@ class RosDriver:
             return f"{self._tasks.called} has said nothing of {goal.task.action} {since}; it may have ended"
         return ""
 
-    def _silent_s(self, goal: Goal, sent_s: float, now_s: float) -> float:
+    def _silent_s(self, goal: SentGoal, sent_s: float, now_s: float) -> float:
         """Return since when nothing shows that a server is there that had taken a goal."""
         if goal.heard_s is None:
             return 0.0
@@ -385,7 +385,7 @@ class RosDriver:
 
     # Calling off.
 
-    def _give_up(self, goal: Goal, why: str, absent: bool) -> None:
+    def _give_up(self, goal: SentGoal, why: str, absent: bool) -> None:
         """Call a goal off, for as long as it could last, and say how it went."""
         was_lost = self._contact.session.lost is not None
         wait_s = min(self.settings.cancel_timeout_s, 1.0) if absent else goal.task.limit_s
@@ -399,7 +399,7 @@ class RosDriver:
         else:
             goal.note = f"{why}; it does not say that it gave up, and may still be driving"
 
-    def _called_off(self, goal: Goal, wait_s: float) -> bool:
+    def _called_off(self, goal: SentGoal, wait_s: float) -> bool:
         """Cancel a goal until the robot confirms it; return whether it does.
 
         A lost connection is made again for as long as it takes. A connection that stands and brings no confirmation is
@@ -433,7 +433,7 @@ class RosDriver:
                     return True
         return idle
 
-    def _beat(self, goal: Goal) -> None:
+    def _beat(self, goal: SentGoal) -> None:
         """Report that a goal is active and watched, to the guard and to the robot."""
         if self.guard is not None:
             self.guard.beat(goal)

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import msgspec
 
-from avlmaps.navigate.ros.goals import Goal
+from avlmaps.navigate.ros.goals import SentGoal
 from avlmaps.navigate.ros.link import Link
 from avlmaps.navigate.ros.messages import Clock, Text
 from avlmaps.navigate.ros.session import Ear
@@ -42,7 +42,7 @@ class BridgeSession(ABC):
         """
         self.heard = threading.Condition()
         self.settings, self.ear = settings, ear
-        self._ours: dict[str, Goal] = {}
+        self._ours: dict[str, SentGoal] = {}
         self._cancelled_s: dict[str, float] = {}
         self._url, self._token = url, token
         self.link = Link(url, token, timeout_s, self.heard)
@@ -84,15 +84,15 @@ class BridgeSession(ABC):
         return False
 
     @abstractmethod
-    def send(self, goal: Goal) -> None:
+    def send(self, goal: SentGoal) -> None:
         """Send a goal."""
 
     @abstractmethod
-    def remind(self, goal: Goal) -> None:
+    def remind(self, goal: SentGoal) -> None:
         """Send a goal again where it may have been lost."""
 
     @abstractmethod
-    def cancel(self, goal: Goal) -> None:
+    def cancel(self, goal: SentGoal) -> None:
         """Ask for the end of one goal."""
 
     @abstractmethod
@@ -103,7 +103,7 @@ class BridgeSession(ABC):
     def is_idle(self, since_s: float) -> bool | None:
         """Return whether the servers are at nothing."""
 
-    def beat(self, goal: Goal) -> None:
+    def beat(self, goal: SentGoal) -> None:
         """Publish a heartbeat."""
         self.link.publish(self._named("avlmaps/heartbeat"), {"data": goal.id})
 
@@ -113,16 +113,16 @@ class BridgeSession(ABC):
 
     # Our goals, as servers list them.
 
-    def _adopt(self, goal: Goal) -> None:
+    def _adopt(self, goal: SentGoal) -> None:
         """Hear what becomes of a goal, also of one that another session sent."""
         self._ours[goal.id] = goal
 
-    def _calling_off(self, goal: Goal) -> float:
+    def _calling_off(self, goal: SentGoal) -> float:
         """Adopt a goal that is cancelled, and return since when this session has done so."""
         self._adopt(goal)
         return self._cancelled_s.setdefault(goal.id, self.ear.clock())
 
-    def _each(self, take: Callable[[Goal], None]) -> None:
+    def _each(self, take: Callable[[SentGoal], None]) -> None:
         """Do something with each goal of ours that has not ended; forget the others."""
         for name, goal in list(self._ours.items()):
             if goal.end is None:

@@ -136,7 +136,7 @@ class Frames:
         Raises:
             NavigationError: the file cannot be read or does not hold what it must.
         """
-        file = RobotFile.read(path)
+        file = RosRobotFile.read(path)
         shift = file.map_from_avlmap
         try:
             lie = GroundTransform(shift.x_m, shift.y_m, radians(shift.yaw_deg))
@@ -147,7 +147,7 @@ class Frames:
     def write(self, path: Path | str) -> None:
         """Write them to a JSON file that ``read`` takes."""
         shift = self.map_from_avlmap
-        file = RobotFile(self.map_frame, self.base_frame, _Shift(shift.x_m, shift.y_m, degrees(shift.yaw_rad)))
+        file = RosRobotFile(self.map_frame, self.base_frame, _Shift(shift.x_m, shift.y_m, degrees(shift.yaw_rad)))
         write_bytes_atomically(user_path(path), msgspec.json.format(msgspec.json.encode(file), indent=2) + b"\n")
 
 
@@ -157,7 +157,7 @@ class _Shift(msgspec.Struct, forbid_unknown_fields=True):
     yaw_deg: float = 0.0
 
 
-class RobotFile(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
+class RosRobotFile(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
     """The content of a robot's file; `Frames.read` and `RosSettings.read` check it further."""
 
     map_frame: str = "map"
@@ -166,7 +166,7 @@ class RobotFile(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
     settings: dict[str, Any] = msgspec.field(default_factory=dict)
 
     @classmethod
-    def read(cls, path: Path | str) -> "RobotFile":
+    def read(cls, path: Path | str) -> "RosRobotFile":
         """Read a robot's file.
 
         Raises:

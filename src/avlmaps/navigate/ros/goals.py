@@ -29,7 +29,7 @@ class End(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Task:
+class ActionGoal:
     """One goal for one action server.
 
     Attributes:
@@ -46,7 +46,7 @@ class Task:
 
 
 @dataclass(slots=True, eq=False)
-class Goal:
+class SentGoal:
     """A task that was sent. The transport's thread writes what comes of it; the first end stands.
 
     Attributes:
@@ -59,7 +59,7 @@ class Goal:
         note: why, where the robot says.
     """
 
-    task: Task
+    task: ActionGoal
     id: str = field(default_factory=lambda: f"avlmaps-{uuid4().hex}")
     alias: str = ""
     heard_s: float | None = None
@@ -99,7 +99,7 @@ class MovementPlan:
         note: something to say even so.
     """
 
-    tasks: tuple[Task, ...]
+    tasks: tuple[ActionGoal, ...]
     off: Callable[[GroundPose], str]
     note: str = ""
 
@@ -139,13 +139,13 @@ class Tasks(ABC):
         self.frames, self.settings = frames, settings
 
     @abstractmethod
-    def pose(self, pose: GroundPose) -> Task:
+    def pose(self, pose: GroundPose) -> ActionGoal:
         """Return the task of standing at a pose, level frame."""
 
-    def turn(self, start: GroundPose, angle_rad: float) -> tuple[Task, ...]:
+    def turn(self, start: GroundPose, angle_rad: float) -> tuple[ActionGoal, ...]:
         """Return the tasks of a turn on the spot; the first whose server is there is done."""
         return (self.pose(start.turned(angle_rad)),)
 
-    def forward(self, start: GroundPose, distance_m: float) -> tuple[Task, ...]:
+    def forward(self, start: GroundPose, distance_m: float) -> tuple[ActionGoal, ...]:
         """Return the tasks of a straight drive; the first whose server is there is done."""
         return (self.pose(start.ahead(distance_m)),)

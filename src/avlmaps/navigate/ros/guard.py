@@ -18,7 +18,7 @@ from time import monotonic, sleep
 import msgspec
 
 from avlmaps.core.errors import AvlmapsError
-from avlmaps.navigate.ros.goals import Goal, Task
+from avlmaps.navigate.ros.goals import ActionGoal, SentGoal
 from avlmaps.navigate.ros.session import Ear, call_off
 from avlmaps.navigate.ros.settings import RosSettings
 from avlmaps.navigate.ros.transports import RosKind, session_opener
@@ -81,7 +81,7 @@ class GoalGuard:
             self._start()
         return self.stands
 
-    def beat(self, goal: Goal) -> None:
+    def beat(self, goal: SentGoal) -> None:
         """Report that a goal is active and watched; a guard that has done its work, or died, is started again."""
         if not self.stands:
             self._start()
@@ -132,7 +132,7 @@ def watch(pipe: int, silence_s: float) -> Beat | None:
                 return None
 
 
-def cancelled(orders: Orders, goal: Goal) -> bool:
+def cancelled(orders: Orders, goal: SentGoal) -> bool:
     """Connect once and cancel a goal; return whether the robot confirms that it is over."""
     try:
         session = session_opener(orders.kind, orders.url, orders.settings, orders.token)(Ear(), 2.0)
@@ -158,7 +158,7 @@ def main() -> None:
     left = watch(0, orders.silence_s)
     if left is None:
         return
-    goal = Goal(Task(left.action, "", {}, orders.trying_s), left.id, left.alias)
+    goal = SentGoal(ActionGoal(left.action, "", {}, orders.trying_s), left.id, left.alias)
     until_s = monotonic() + orders.trying_s
     while not cancelled(orders, goal) and monotonic() < until_s:
         sleep(_BETWEEN_TRIES_S)

@@ -11,7 +11,7 @@ import msgspec
 
 from avlmaps.core.motion import GroundPose
 from avlmaps.navigate.ros.bridge import BridgeSession
-from avlmaps.navigate.ros.goals import End, Goal, Task, Tasks
+from avlmaps.navigate.ros.goals import ActionGoal, End, SentGoal, Tasks
 from avlmaps.navigate.ros.messages import GoalState, GoalStates, GoalUpdate, sanitize_line, stamped_pose
 
 # actionlib_msgs/GoalStatus
@@ -30,11 +30,13 @@ class MoveBaseTasks(Tasks):
 
     called: ClassVar[str] = "move_base"
 
-    def pose(self, pose: GroundPose) -> Task:
+    def pose(self, pose: GroundPose) -> ActionGoal:
         """Return the task of standing at a pose."""
         target = stamped_pose(self.frames.to_robot(pose), self.frames.map_frame, ros=1)
         server = f"{self.settings.namespace}/move_base"
-        return Task(server, "move_base_msgs/MoveBaseAction", {"target_pose": target}, self.settings.goal_timeout_s)
+        return ActionGoal(
+            server, "move_base_msgs/MoveBaseAction", {"target_pose": target}, self.settings.goal_timeout_s
+        )
 
 
 class MoveBaseSession(BridgeSession):
@@ -57,7 +59,7 @@ class MoveBaseSession(BridgeSession):
         link.subscribe(self._topic("result"), "move_base_msgs/MoveBaseActionResult", self._update)
         link.subscribe(self._topic("feedback"), "move_base_msgs/MoveBaseActionFeedback", self._update)
 
-    def send(self, goal: Goal) -> None:
+    def send(self, goal: SentGoal) -> None:
         """Publish a goal."""
         self._adopt(goal)
         self._sent_s = monotonic()
@@ -69,7 +71,7 @@ class MoveBaseSession(BridgeSession):
         }
         self.link.publish(self._topic("goal"), message)
 
-    def remind(self, goal: Goal) -> None:
+    def remind(self, goal: SentGoal) -> None:
         """Send a goal again that got no answer: a topic that was just advertised may lose its first message.
 
         The server knows a goal by its id, and takes it only once.
@@ -77,7 +79,7 @@ class MoveBaseSession(BridgeSession):
         if not goal.answered and monotonic() - self._sent_s > _SEND_AGAIN_S:
             self.send(goal)
 
-    def cancel(self, goal: Goal) -> None:
+    def cancel(self, goal: SentGoal) -> None:
         """Publish the goal's id; the server remembers it, also where the goal comes after its cancel."""
         self._calling_off(goal)
         self._call_off(goal.id)
@@ -103,7 +105,7 @@ class MoveBaseSession(BridgeSession):
             self._named("move_base"), [name for name, state in listed.items() if state.status in _UNDER_WAY]
         )
 
-        def take(goal: Goal) -> None:
+        def take(goal: SentGoal) -> None:
             if goal.id in listed:
                 self._note(goal, listed[goal.id])
             elif goal.heard_s is not None and goal.id not in self._cancelled_s:
@@ -117,7 +119,7 @@ class MoveBaseSession(BridgeSession):
         state = msgspec.json.decode(message, type=GoalUpdate).status
         self._each(lambda goal: self._note(goal, state) if goal.id == state.goal_id.id else None)
 
-    def _note(self, goal: Goal, state: GoalState) -> None:
+    def _note(self, goal: SentGoal, state: GoalState) -> None:
         """Take in how a goal stands."""
         if state.status in _UNDER_WAY:
             goal.show(self.ear.clock())

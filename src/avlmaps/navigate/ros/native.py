@@ -28,7 +28,7 @@ from unique_identifier_msgs.msg import UUID as GoalUuid  # noqa: N811 - a class
 from avlmaps.core.errors import AvlmapsError
 from avlmaps.core.ros_interfaces import interface
 from avlmaps.navigate.ros import nav2_tasks
-from avlmaps.navigate.ros.goals import End, Goal
+from avlmaps.navigate.ros.goals import End, SentGoal
 from avlmaps.navigate.ros.messages import Transform, rigid, sanitize_line
 from avlmaps.navigate.ros.nav2_tasks import MOVING, RESULT_WITHIN_S, UNDER_WAY
 from avlmaps.navigate.ros.own_map import OwnGrid, checked_grid
@@ -85,7 +85,7 @@ class NativeSession:
         self.complaint = ""
         self.lists_every_s: float | None = None
         self._settings, self._ear = settings, ear
-        self._ours: dict[str, Goal] = {}  # by their digits
+        self._ours: dict[str, SentGoal] = {}  # by their digits
         self._actions: dict[str, ActionClient] = {}
         self._clients: dict[str, Any] = {}
         self._writers: dict[str, frozenset[bytes]] = {}
@@ -125,14 +125,14 @@ class NativeSession:
         self._do(self._ask, server)
         return True
 
-    def send(self, goal: Goal) -> None:
+    def send(self, goal: SentGoal) -> None:
         """Send a goal as soon as its server is discovered."""
         self._do(self._send, goal)
 
-    def remind(self, goal: Goal) -> None:
+    def remind(self, goal: SentGoal) -> None:
         """Do nothing: services are reliable."""
 
-    def cancel(self, goal: Goal) -> None:
+    def cancel(self, goal: SentGoal) -> None:
         """Cancel a goal by its id."""
         self._do(self._cancel, goal)
 
@@ -149,7 +149,7 @@ class NativeSession:
         under_way = self._ear.servers.under_way()
         return all(answers) and not any(under_way.get(server) for server in self._servers())
 
-    def beat(self, goal: Goal) -> None:
+    def beat(self, goal: SentGoal) -> None:
         """Publish a heartbeat."""
         with suppress(Exception):  # the network was left meanwhile
             self._beats.publish(String(data=goal.id))
@@ -258,12 +258,12 @@ class NativeSession:
         at_s = monotonic() + RESULT_WITHIN_S
         self._waiting.append(lambda: monotonic() > at_s and (act(), True)[1])
 
-    def _over(self, goal: Goal, end: End, note: str = "") -> None:
+    def _over(self, goal: SentGoal, end: End, note: str = "") -> None:
         goal.over(end, note)
         self._ours.pop(_digits(goal), None)
         self._notify()
 
-    def _send(self, goal: Goal) -> None:
+    def _send(self, goal: SentGoal) -> None:
         goal.alias = _digits(goal)  # so do servers list it
         self._ours[goal.alias] = goal
         name = goal.task.action
@@ -305,7 +305,7 @@ class NativeSession:
         none = "No action server takes the goal; start Nav2, or name its namespace"
         self._when(client.server_is_ready, go, partial(self._over, goal, End.ABSENT, none), self._patience_s())
 
-    def _cancel(self, goal: Goal) -> None:
+    def _cancel(self, goal: SentGoal) -> None:
         self._ours.setdefault(_digits(goal), goal)
         self._call_cancel(goal.task.action, _uuid(goal), goal)
 
@@ -318,7 +318,7 @@ class NativeSession:
             if goal.task.action == server and goal.heard_s is not None and goal.task.kind:
                 self._ask_result(goal)
 
-    def _ask_result(self, goal: Goal) -> None:
+    def _ask_result(self, goal: SentGoal) -> None:
         """Request a goal's result again: a server that was started again says that it does not know the goal."""
         kind, service = interface(goal.task.kind), f"{goal.task.action}/_action/get_result"
         client = self._clients.get(service)
@@ -335,7 +335,7 @@ class NativeSession:
             request = kind.Impl.GetResultService.Request(goal_id=_uuid(goal))
             client.call_async(request).add_done_callback(ended)
 
-    def _call_cancel(self, server: str, goal_id: Any, goal: Goal | None) -> None:
+    def _call_cancel(self, server: str, goal_id: Any, goal: SentGoal | None) -> None:
         client = self._cancels[server]
         request = CancelGoal.Request()
         request.goal_info.goal_id = goal_id
@@ -373,11 +373,11 @@ def _node_in(context: Context) -> Node:
     )  # fmt: skip
 
 
-def _digits(goal: Goal) -> str:
+def _digits(goal: SentGoal) -> str:
     return goal.id[-32:]
 
 
-def _uuid(goal: Goal) -> GoalUuid:
+def _uuid(goal: SentGoal) -> GoalUuid:
     """Return a goal's id in ROS 2: the hexadecimal digits at the end of ours."""
     return GoalUuid(uuid=list(UUID(hex=_digits(goal)).bytes))
 

@@ -8,7 +8,7 @@ import msgspec
 from avlmaps.navigate.ros import nav2_tasks
 from avlmaps.navigate.ros.bridge import BridgeSession
 from avlmaps.navigate.ros.errands import Errands
-from avlmaps.navigate.ros.goals import End, Goal
+from avlmaps.navigate.ros.goals import End, SentGoal
 from avlmaps.navigate.ros.link import Link
 from avlmaps.navigate.ros.messages import ActionEnd, ActionStates, CancelAnswer, Incoming, sanitize_line, text_in
 from avlmaps.navigate.ros.nav2_tasks import ASKED_FOR, MOVING, RESULT_WITHIN_S, UNDER_WAY
@@ -26,7 +26,7 @@ class Nav2Session(BridgeSession):
 
     def _greet(self) -> None:
         self._errands = Errands(lambda within_s: Link(self._url, self._token, within_s, self.heard), self._answered)
-        self._calls: dict[str, tuple[str, bool, Goal | None]] = {}  # server, every goal or one, and which of ours
+        self._calls: dict[str, tuple[str, bool, SentGoal | None]] = {}  # server, every goal or one, and which of ours
         self._known: dict[str, frozenset[str]] = {}  # goals that a server had listed before ours was sent
         self._agreed_s: dict[str, tuple[float, bool]] = {}
         self._sent = ""
@@ -46,7 +46,7 @@ class Nav2Session(BridgeSession):
         """Cancel a goal that does not exist: the answer shows whether there is a server."""
         return self._call(server, list(uuid4().bytes), None)
 
-    def send(self, goal: Goal) -> None:
+    def send(self, goal: SentGoal) -> None:
         """Send a goal, on a connection to itself."""
         task = goal.task
         self._adopt(goal)
@@ -68,10 +68,10 @@ class Nav2Session(BridgeSession):
         if not sent:
             goal.over(End.FAILED, "The bridge takes no second connection, over which the goal would go")
 
-    def remind(self, goal: Goal) -> None:
+    def remind(self, goal: SentGoal) -> None:
         """Do nothing: a goal that was sent arrives."""
 
-    def cancel(self, goal: Goal) -> None:
+    def cancel(self, goal: SentGoal) -> None:
         """Cancel a goal by our name at the bridge, which forgets it when it restarts, and by Nav2's where it is known.
 
         Where Nav2's name is not known and Nav2 lists no other goal, every goal is cancelled: that is ours, if any.
@@ -92,7 +92,7 @@ class Nav2Session(BridgeSession):
         for action in MOVING:
             self._call(self._named(action), _NOBODY, None)
 
-    def _call(self, server: str, goal_id: list[int], goal: Goal | None) -> bool:
+    def _call(self, server: str, goal_id: list[int], goal: SentGoal | None) -> bool:
         name = f"avlmaps-{uuid4().hex}"
         self._calls[name] = server, goal_id == _NOBODY, goal
         while len(self._calls) > 100:
@@ -126,7 +126,7 @@ class Nav2Session(BridgeSession):
         self.ear.servers.listed(server, under_way)
         taken = {goal.alias for goal in self._ours.values()}
 
-        def take(goal: Goal) -> None:
+        def take(goal: SentGoal) -> None:
             if goal.task.action != server:
                 return
             new = under_way - self._known.get(goal.id, under_way) - taken
@@ -140,7 +140,7 @@ class Nav2Session(BridgeSession):
 
         self._each(take)
 
-    def _over_soon(self, goal: Goal, status: int | None) -> None:
+    def _over_soon(self, goal: SentGoal, status: int | None) -> None:
         """Take a goal for over by its list, unless its result comes before, which says more."""
         wait_s = RESULT_WITHIN_S if goal.id == self._sent else 0.0
         self.link.later(wait_s, lambda: goal.over(*nav2_tasks.end_listed(status)))
@@ -159,7 +159,7 @@ class Nav2Session(BridgeSession):
             goal.over(*_end_of(message))
             self._each(lambda _: None)
 
-    def _called(self, server: str, everyone: bool, goal: Goal | None, message: Incoming) -> None:
+    def _called(self, server: str, everyone: bool, goal: SentGoal | None, message: Incoming) -> None:
         if not message.result:
             if "not exist" in text_in(message.values):
                 self.ear.servers.answered(server, serves=False)

@@ -3,7 +3,7 @@
 from typing import ClassVar
 
 from avlmaps.core.motion import GroundPose
-from avlmaps.navigate.ros.goals import End, Task, Tasks
+from avlmaps.navigate.ros.goals import ActionGoal, End, Tasks
 from avlmaps.navigate.ros.messages import duration, stamped_pose
 
 NAVIGATE, SPIN, STRAIGHT = "navigate_to_pose", "spin", "drive_on_heading"
@@ -67,21 +67,21 @@ class Nav2Tasks(Tasks):
     def _named(self, action: str) -> str:
         return f"{self.settings.namespace}/{action}"
 
-    def pose(self, pose: GroundPose) -> Task:
+    def pose(self, pose: GroundPose) -> ActionGoal:
         """Return the task of standing at a pose."""
         goal = stamped_pose(self.frames.to_robot(pose), self.frames.map_frame, ros=2)
         arguments = {"pose": goal, "behavior_tree": ""}
         kind = "nav2_msgs/action/NavigateToPose"
-        return Task(self._named(NAVIGATE), kind, arguments, self.settings.goal_timeout_s)
+        return ActionGoal(self._named(NAVIGATE), kind, arguments, self.settings.goal_timeout_s)
 
-    def turn(self, start: GroundPose, angle_rad: float) -> tuple[Task, ...]:
+    def turn(self, start: GroundPose, angle_rad: float) -> tuple[ActionGoal, ...]:
         """Return the tasks of a turn on the spot."""
         allowed_s = 10.0 + abs(angle_rad) / 0.1
         arguments = {"target_yaw": angle_rad, "time_allowance": duration(allowed_s)}
-        spin = Task(self._named(SPIN), "nav2_msgs/action/Spin", arguments, allowed_s + 5.0)
+        spin = ActionGoal(self._named(SPIN), "nav2_msgs/action/Spin", arguments, allowed_s + 5.0)
         return (spin, *super().turn(start, angle_rad))
 
-    def forward(self, start: GroundPose, distance_m: float) -> tuple[Task, ...]:
+    def forward(self, start: GroundPose, distance_m: float) -> tuple[ActionGoal, ...]:
         """Return the tasks of a straight drive."""
         speed = self.settings.speed_m_s
         allowed_s = 10.0 + 3.0 * distance_m / speed
@@ -90,5 +90,5 @@ class Nav2Tasks(Tasks):
             "speed": speed,
             "time_allowance": duration(allowed_s),
         }
-        straight = Task(self._named(STRAIGHT), "nav2_msgs/action/DriveOnHeading", arguments, allowed_s + 5.0)
+        straight = ActionGoal(self._named(STRAIGHT), "nav2_msgs/action/DriveOnHeading", arguments, allowed_s + 5.0)
         return (straight, *super().forward(start, distance_m))

@@ -7,12 +7,12 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core.motion import GroundPose, wrap_angle
-from avlmaps.navigate.ros.goals import MovementPlan, Task
+from avlmaps.navigate.ros.goals import ActionGoal, MovementPlan
 from avlmaps.navigate.ros.settings import RosSettings
 
 # From where to where, level x and y: where a body stops for a place and a note, or why it cannot.
 Standing = Callable[[Float[np.ndarray, "2"], Float[np.ndarray, "2"]], tuple[Float[np.ndarray, "2"], str] | str]
-Tasks = Callable[[GroundPose, float], tuple[Task, ...]]
+Tasks = Callable[[GroundPose, float], tuple[ActionGoal, ...]]
 
 LEAST_M, LEAST_RAD = 0.01, 0.01  # a movement so small is none
 _FAR_M = 1e6
@@ -25,7 +25,7 @@ def place_to_stand(
     looked_at: Float[np.ndarray, "2"] | None,
     standing: Standing | None,
     settings: RosSettings,
-    task: Callable[[GroundPose], Task],
+    task: Callable[[GroundPose], ActionGoal],
 ) -> MovementPlan | str:
     """Plan to stand at a place, or return why that cannot be.
 

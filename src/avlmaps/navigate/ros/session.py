@@ -13,7 +13,7 @@ from time import monotonic
 from typing import Protocol
 from uuid import uuid4
 
-from avlmaps.navigate.ros.goals import Goal
+from avlmaps.navigate.ros.goals import SentGoal
 from avlmaps.navigate.ros.tree import LiveTree
 
 AGAIN_S = 0.5
@@ -175,19 +175,19 @@ class Session(Protocol):
         """
         ...
 
-    def send(self, goal: Goal) -> None:
+    def send(self, goal: SentGoal) -> None:
         """Send a goal; what comes of it is written into it."""
         ...
 
-    def remind(self, goal: Goal) -> None:
+    def remind(self, goal: SentGoal) -> None:
         """Send a goal again where it may have been lost; servers take each goal once."""
         ...
 
-    def cancel(self, goal: Goal) -> None:
+    def cancel(self, goal: SentGoal) -> None:
         """Ask for the end of one goal, which another session may have sent, and of no other.
 
-        It is called again until `Goal.end` is set: by the server's result or list, or because the server says that it
-        does not know the goal.
+        It is called again until `SentGoal.end` is set: by the server's result or list, or because the server says that
+        it does not know the goal.
         """
         ...
 
@@ -199,7 +199,7 @@ class Session(Protocol):
         """Return whether the servers are at nothing, by what they said after a time; None where they said nothing."""
         ...
 
-    def beat(self, goal: Goal) -> None:
+    def beat(self, goal: SentGoal) -> None:
         """Publish a heartbeat: that a goal is active and watched."""
         ...
 
@@ -212,14 +212,14 @@ Opener = Callable[[Ear, float], Session]
 """Opens a session within some seconds; raises `NavigationError` where nobody answers."""
 
 
-def ended_within(goal: Goal, session: Session, wait_s: float) -> bool:
+def ended_within(goal: SentGoal, session: Session, wait_s: float) -> bool:
     """Wait until a goal is over, or the session; return whether the goal is."""
     with session.heard:
         session.heard.wait_for(lambda: goal.end is not None or session.lost is not None, wait_s)
     return goal.end is not None
 
 
-def call_off(goal: Goal, session: Session, until_s: float, given_up: Callable[[], bool] = lambda: False) -> bool:
+def call_off(goal: SentGoal, session: Session, until_s: float, given_up: Callable[[], bool] = lambda: False) -> bool:
     """Cancel a goal again and again until it is over, the session is lost or a time has come."""
     while goal.end is None and session.lost is None and not given_up() and (left_s := until_s - monotonic()) > 0.0:
         session.cancel(goal)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from avlmaps.core.errors import NavigationError
-from avlmaps.navigate.ros.frames import RobotFile
+from avlmaps.navigate.ros.frames import RosRobotFile
 
 # The least and the most that each number may be; beyond lies a slip of the unit (milliseconds, centimetres, degrees).
 _RANGES: Mapping[str, tuple[float, float]] = {
@@ -84,7 +84,7 @@ class RosSettings:
         Raises:
             NavigationError: the file cannot be read, or sets what there is not.
         """
-        given: dict[str, Any] = RobotFile.read(path).settings
+        given: dict[str, Any] = RosRobotFile.read(path).settings
         unknown = sorted(set(given) - set(cls.__slots__))
         if unknown:
             known = ", ".join(cls.__slots__)

@@ -15,7 +15,7 @@ Array = Float[np.ndarray, "..."]
 
 
 @dataclass(frozen=True, slots=True)
-class Calibration:
+class SoundCalibration:
     """The fitted constants.
 
     Attributes:
@@ -77,7 +77,7 @@ def kinds_of_windows(
     cosines: Float[np.ndarray, "windows kinds"],
     typical: Float[np.ndarray, "windows kinds"],
     near: Float[np.ndarray, "windows kinds"],
-    c: Calibration,
+    c: SoundCalibration,
 ) -> tuple[Float[np.ndarray, "windows kinds"], Float[np.ndarray, " windows"]]:
     """Return each window's posterior over the known kinds, and how likely it is of any of them.
 
@@ -91,7 +91,7 @@ def kinds_of_windows(
 
 
 def kinds_of_phrases(
-    cosines: Float[np.ndarray, "phrases kinds"], c: Calibration
+    cosines: Float[np.ndarray, "phrases kinds"], c: SoundCalibration
 ) -> tuple[Float[np.ndarray, "phrases kinds"], Float[np.ndarray, " phrases"]]:
     """Return the share of each phrase for each kind, and how likely it names a known kind at all."""
     bias, highest = c.phrase
@@ -102,14 +102,14 @@ def kinds_of_phrases(
 
 
 def matched(
-    sound: Float[np.ndarray, " kinds"], phrase: Float[np.ndarray, " kinds"], named: float, c: Calibration
+    sound: Float[np.ndarray, " kinds"], phrase: Float[np.ndarray, " kinds"], named: float, c: SoundCalibration
 ) -> float:
     """Return how likely a sound is what a phrase names, from both distributions over kinds."""
     bias, slope = c.word
     return float(sigmoid(bias + slope * log_odds(np.asarray(named * (sound * phrase).sum()))))
 
 
-def same_kind(cosine: Array, agreement: Array, c: Calibration) -> Array:
+def same_kind(cosine: Array, agreement: Array, c: SoundCalibration) -> Array:
     """Return how likely two sounds are of one kind."""
     bias, by_cosine, by_agreement = c.pair
     return sigmoid(bias + by_cosine * cosine + by_agreement * agreement)

@@ -22,7 +22,7 @@ from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Kind, load
 from avlmaps.perception.embedded import logmel
 from avlmaps.perception.embedded.sound_calibration import (
-    Calibration,
+    SoundCalibration,
     kinds_of_phrases,
     kinds_of_windows,
     matched,
@@ -58,7 +58,7 @@ class KnownKind:
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class EncodedSound:
     """The features of one sound.
 
     Attributes:
@@ -104,7 +104,7 @@ class EmbeddedSounds:
         self._examples = np.load(BytesIO(examples), allow_pickle=False).astype(np.float32)
         self._starts = np.cumsum([0, *(k["examples"] for k in about["kinds"][:-1])])
         self._typical = typical_examples(self._examples, self._starts)
-        self.calibration = msgspec.convert(about["calibration"], Calibration)
+        self.calibration = msgspec.convert(about["calibration"], SoundCalibration)
         self.card = ModelCard(
             id=about["id"],
             dim=about["dim"],
@@ -178,7 +178,7 @@ class EmbeddedSounds:
         agreement = np.array([float(_direction(self._hear(features, taught).kinds) @ ours) for features in sounds])
         return np.asarray(same_kind(cosines, agreement, self.calibration), np.float32).reshape(len(sounds))
 
-    def describe(self, features: Float32[np.ndarray, "windows d"]) -> Heard:
+    def describe(self, features: Float32[np.ndarray, "windows d"]) -> EncodedSound:
         """Return the scores of a sound, for lists of what a map holds."""
         return self._hear(features, self.taught)
 
@@ -216,7 +216,7 @@ class EmbeddedSounds:
             cosines = np.hstack([cosines, asked @ self._words.encode([t.name for t in taught]).T])
         return kinds_of_phrases(cosines, self.calibration)
 
-    def _hear(self, features: Float32[np.ndarray, "windows d"], taught: Sequence[TaughtSound]) -> Heard:
+    def _hear(self, features: Float32[np.ndarray, "windows d"], taught: Sequence[TaughtSound]) -> EncodedSound:
         """Return the kinds in a sound: for each the most likely window."""
         near = nearness(features, self._examples, self._starts)
         typical = features @ self._typical.T
@@ -229,7 +229,7 @@ class EmbeddedSounds:
             # the user's own sounds go before the network's scores for a sound that it was not trained on
             likely = np.hstack([likely * (1.0 - own.max(axis=1, keepdims=True)), own])
             known = np.maximum(known, own.max(axis=1))
-        return Heard(likely.max(axis=0), float(known.max()))
+        return EncodedSound(likely.max(axis=0), float(known.max()))
 
 
 def _direction(kinds: Float[np.ndarray, " kinds"]) -> Float[np.ndarray, " kinds"]:

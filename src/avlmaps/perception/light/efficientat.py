@@ -37,7 +37,7 @@ NAMES, CENTRES = "names", "centres"  # keys of the file's notes: AudioSet's name
 
 
 @dataclass(frozen=True, slots=True)
-class Calibration:
+class WordCalibration:
     """From the network's log-odds and the words' cosines to probabilities.
 
     Fitted on 989 free clips of ESC-50, folds 2 to 4, of 50 kinds by their names. On fold 5 the own name says yes for
@@ -60,7 +60,7 @@ class Calibration:
     pair: tuple[float, float] = (-11.2, 16.8)
 
 
-CALIBRATION = Calibration()
+CALIBRATION = WordCalibration()
 
 
 @cache

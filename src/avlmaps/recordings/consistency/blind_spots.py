@@ -7,7 +7,7 @@ import numpy as np
 from avlmaps.core.arrays import Bool
 from avlmaps.core.poses import rotation_angle_rad
 from avlmaps.recordings.consistency.agreement import Agreement
-from avlmaps.recordings.consistency.edges import Edges
+from avlmaps.recordings.consistency.edges import DepthEdges
 from avlmaps.recordings.consistency.jumps import gaps
 from avlmaps.recordings.consistency.levels import Levels
 from avlmaps.recordings.consistency.limits import apart_agrees, can_be_judged, geometry_agrees
@@ -31,7 +31,7 @@ def blind_spots(
     recording: Recording,
     found: Agreement,
     trials: Trials,
-    edges: Edges,
+    edges: DepthEdges,
     levels: Levels,
     angles: RightAngles,
     warmth: float,
@@ -63,7 +63,7 @@ def _nothing(recording: Recording, found: Agreement) -> str:
     return f"Poses, depth, colour, intrinsics and clocks cannot be checked here, because {why}."
 
 
-def _spots(recording: Recording, trials: Trials, edges: Edges, levels: Levels) -> Iterator[str]:
+def _spots(recording: Recording, trials: Trials, edges: DepthEdges, levels: Levels) -> Iterator[str]:
     as_it_is = trials.run(Suspect(), colour=False)
 
     def shows(*suspects: Suspect) -> bool:

@@ -2,7 +2,7 @@
 
 from avlmaps.core.camera import Rig
 from avlmaps.recordings.camera_axes import NAMED, opencv_from_axes
-from avlmaps.recordings.consistency.suspects import UNITS, Suspect, Turn, suspected_rig
+from avlmaps.recordings.consistency.suspects import UNITS, PictureTurn, Suspect, suspected_rig
 from avlmaps.recordings.corrections import Corrections, GivenCamera, PoseKind
 
 # A camera in a building looks at this much, in the middle of what it sees.
@@ -102,7 +102,7 @@ def _camera(axes: str) -> str:
     return names.get(axes, f"a camera with the axes {axes} (turned pictures, or another convention)")
 
 
-def _turned(colour: Turn | None, depth: Turn | None) -> list[str]:
+def _turned(colour: PictureTurn | None, depth: PictureTurn | None) -> list[str]:
     if colour is not None and colour == depth:
         return [f"the pictures look {colour.words()}"]
     said = [(f"the {what} pictures look", turn) for what, turn in (("colour", colour), ("depth", depth))]

@@ -15,7 +15,7 @@ from avlmaps.recordings.consistency import limits
 from avlmaps.recordings.consistency.agreement import APART_SAME_M, FEWEST_POINTS, Agreement, compare, without_occluded
 from avlmaps.recordings.consistency.blind_spots import blind_spots
 from avlmaps.recordings.consistency.causes import cause_of
-from avlmaps.recordings.consistency.edges import Edges, Shift, find_edges, shift_of
+from avlmaps.recordings.consistency.edges import DepthEdges, Shift, find_edges, shift_of
 from avlmaps.recordings.consistency.jumps import find_exchanged, find_jump, find_parts
 from avlmaps.recordings.consistency.levels import Levels, Tilt, find_levels
 from avlmaps.recordings.consistency.right_angles import RightAngles
@@ -101,7 +101,7 @@ class _Found:
 
     after: Agreement
     apart: Agreement
-    edges: Edges
+    edges: DepthEdges
     redness: Agreement
     levels: Levels
     angles: RightAngles

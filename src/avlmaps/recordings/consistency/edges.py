@@ -33,7 +33,7 @@ _LEAST_FAR_RATIO, _LEAST_FAR_SPREADS = 1.8, 2.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Edges:
+class DepthEdges:
     """The gradient of colour around edges of depth.
 
     Attributes:
@@ -90,7 +90,7 @@ def _near(columns: float, rows: float) -> Bool[np.ndarray, "k k"]:
     return np.hypot(_SHIFTS[None, :] - columns, _SHIFTS[:, None] - rows) <= _NONE
 
 
-def find_edges(sample: Sample) -> Edges:
+def find_edges(sample: Sample) -> DepthEdges:
     """Measure the gradient of colour around the edges of depth."""
     import cv2
 
@@ -119,7 +119,7 @@ def find_edges(sample: Sample) -> Edges:
         far, inside_far = far + one, inside_far + inside
         frames, count = frames + 1, count + len(near)
     shifted, parallax = sums / max(count, 1)
-    return Edges(shifted, parallax, far / np.maximum(inside_far, 1), frames, count, middle_m)
+    return DepthEdges(shifted, parallax, far / np.maximum(inside_far, 1), frames, count, middle_m)
 
 
 def _shifted(
@@ -133,7 +133,7 @@ def _shifted(
     return np.where(inside, found, 0.0).sum(axis=0), inside.sum(axis=0).astype(np.float64)
 
 
-def shift_of(edges: Edges, sample: Sample) -> Shift | None:
+def shift_of(edges: DepthEdges, sample: Sample) -> Shift | None:
     """Return where edges of colour lie, None where they lie on those of depth or nothing shows it."""
     none = _near(0.0, 0.0)
     kinds = [one for one in (edges.shifted, edges.parallax) if _stands_out(one, none)]

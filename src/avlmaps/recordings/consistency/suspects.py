@@ -50,7 +50,7 @@ _PAIRS, _POINTS = 14, 128
 
 
 @dataclass(frozen=True, slots=True)
-class Turn:
+class PictureTurn:
     """How pictures are turned before they fit: mirrored from left to right, then turned by quarters to the left."""
 
     mirror: bool
@@ -78,7 +78,9 @@ class Turn:
         return {0: "mirrored", 1: "transposed", 2: "mirrored from top to bottom", 3: "transposed"}[self.quarters]
 
 
-TURNS = tuple(Turn(mirror, quarters) for mirror, quarters in product((False, True), range(4)) if mirror or quarters)
+TURNS = tuple(
+    PictureTurn(mirror, quarters) for mirror, quarters in product((False, True), range(4)) if mirror or quarters
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,8 +111,8 @@ class Suspect:
     rolled_deg: float = 0.0
     centred: bool = False
     swapped: bool = False
-    turn_colour: Turn | None = None
-    turn_depth: Turn | None = None
+    turn_colour: PictureTurn | None = None
+    turn_depth: PictureTurn | None = None
     along_ray: bool = False
     farther_m: float = 0.0
     turned_back: bool = False
@@ -151,8 +153,8 @@ class Trials:
         """
         few = [_some(np.flatnonzero(kind)) for kind in (sample.follows, ~sample.follows)]
         self.sample, self._pose_at, self.given = sample.only(np.concatenate(few)), pose_at, given
-        self._depth: dict[tuple[Turn | None, bool, float], tuple[np.ndarray, Surfaces]] = {}
-        self._kinds: dict[tuple[Turn | None, Turn | None, bool, float], tuple[Sample, Sample]] = {}
+        self._depth: dict[tuple[PictureTurn | None, bool, float], tuple[np.ndarray, Surfaces]] = {}
+        self._kinds: dict[tuple[PictureTurn | None, PictureTurn | None, bool, float], tuple[Sample, Sample]] = {}
         self._delayed: dict[float, np.ndarray | None] = {}
         usual = sample.depth_m[sample.depth_m > 0.0]
         self._median_m = float(np.median(usual)) if len(usual) else 1.0

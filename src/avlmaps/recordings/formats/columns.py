@@ -21,7 +21,7 @@ _COMMENT_SHARE = 0.5
 
 
 @dataclass(frozen=True, slots=True)
-class Order:
+class ColumnOrder:
     """Where each wanted column stands in the file, and the factor that takes it to seconds or metres."""
 
     columns: tuple[int, ...]
@@ -39,7 +39,7 @@ def split_header(text: str) -> list[str]:
     return [field.strip() for field in text.split(separator)]
 
 
-def named_order(fields: Sequence[str], wanted: Sequence[str]) -> Order:
+def named_order(fields: Sequence[str], wanted: Sequence[str]) -> ColumnOrder:
     """Return where the wanted columns stand.
 
     Raises:
@@ -55,7 +55,7 @@ def named_order(fields: Sequence[str], wanted: Sequence[str]) -> Order:
         found[column] = (at, factor)
     if missing := [column for column in wanted if column not in found]:
         raise ValueError(f"the column {missing[0]} is missing; {','.join(wanted)} are needed")
-    return Order(tuple(found[column][0] for column in wanted), tuple(found[column][1] for column in wanted))
+    return ColumnOrder(tuple(found[column][0] for column in wanted), tuple(found[column][1] for column in wanted))
 
 
 def is_header_in_comment(fields: Sequence[str], wanted: Sequence[str]) -> bool:

@@ -24,7 +24,7 @@ from avlmaps.recordings.images import file_turn, first_picture_size
 from avlmaps.recordings.layout import Description
 from avlmaps.recordings.microphones import MicrophoneNumbers
 from avlmaps.recordings.plausible import clock_fault, date_fault, pace_fault
-from avlmaps.recordings.turning import Turn
+from avlmaps.recordings.turning import DisplayTurn
 from avlmaps.recordings.types import Recording
 from avlmaps.recordings.video import VideoFrames
 
@@ -101,7 +101,7 @@ def _check_sizes(folder: Path, description: Description, found: "_Pictures") -> 
         if files:
             with suppress(RecordingError):  # of files that are missing or damaged, each has a sentence of its own
                 size = first_picture_size(folder, files)
-        turn = file_turn(folder / files[0]) if files else Turn()
+        turn = file_turn(folder / files[0]) if files else DisplayTurn()
         if (camera.width, camera.height) in (size, turn.size(*size)):
             continue
         if name == "depth" and own is None:

@@ -103,7 +103,7 @@ def _check_pose_topic(bag: Bag, topic: str) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class CameraMotion:
     """What moves the camera.
 
     Attributes:
@@ -121,7 +121,7 @@ class Motion:
 
 def find_motion(
     bag: Bag, named: str, camera_frame: str, transforms: TransformTree, tf_topic: str, no_pose_topic: str = ""
-) -> Motion:
+) -> CameraMotion:
     """Find what moves the camera: transforms, else odometry or a topic of poses.
 
     Args:
@@ -136,11 +136,11 @@ def find_motion(
         RecordingError: nothing moves it, or what does is not linked to it.
     """
     if named and Path(named).is_file():
-        return Motion(_tree_of_file(Path(named), camera_frame), named, z_is_up=False)
+        return CameraMotion(_tree_of_file(Path(named), camera_frame), named, z_is_up=False)
     if named:
         _check_pose_topic(bag, named)
     if (not named or named == tf_topic) and transforms.moves(camera_frame):
-        return Motion(transforms, tf_topic)
+        return CameraMotion(transforms, tf_topic)
     candidates = [named] if named and named != tf_topic else []
     if not named:
         candidates = [topic for topic in bag.topics_of(_POSE_TYPES) if topic != no_pose_topic]
@@ -161,7 +161,7 @@ def find_motion(
             f"{bag.path} has poses of {body!r} on {topic} but no static transform from there to the camera "
             f"{camera_frame!r}; record /tf_static.{_unlinked(tree, camera_frame, body)}"
         )
-    return Motion(tree, topic, (assumed,) if assumed else ())
+    return CameraMotion(tree, topic, (assumed,) if assumed else ())
 
 
 def _tree_of_file(file: Path, camera_frame: str) -> TransformTree:

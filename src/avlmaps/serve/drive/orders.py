@@ -44,7 +44,7 @@ _KINDS = {"GoalNotFoundError": "goal-not-found", "NavigationError": "navigation"
 
 
 @dataclass(slots=True)
-class Order:
+class RunningOrder:
     """A confirmed plan that runs."""
 
     plan: OrderPlan
@@ -72,7 +72,7 @@ class Dispatcher:
         self._book = PlanBook(token_s)
         self._preparing = threading.Lock()  # plans and confirmations, one at a time; never needed for a stop
         self._lock = threading.Lock()  # of what follows; never held while something waits
-        self._running: Order | None = None
+        self._running: RunningOrder | None = None
         self._last: dict[str, Any] | None = None
         self._fault = ""
         self._change = 0
@@ -203,7 +203,7 @@ class Dispatcher:
         self._changed()
         return {"order": order.plan.order, "state": "driving", "reading": order.plan.reading}
 
-    def _begun(self, token: str) -> Order:
+    def _begun(self, token: str) -> RunningOrder:
         """Take the token and reserve the robot."""
         self._require_idle()
         now = self._current()
@@ -218,7 +218,7 @@ class Dispatcher:
                     f"The robot did not confirm its last stop ({self._fault}); stop it until it does.", 503, "unstopped"
                 )
             self._book.clear()  # other plans begin where the robot stands now
-            self._running = Order(plan, now)
+            self._running = RunningOrder(plan, now)
             return self._running
 
     def _require_idle(self) -> None:
@@ -232,7 +232,7 @@ class Dispatcher:
                     "busy",
                 )
 
-    def _require_ready(self, order: Order) -> None:
+    def _require_ready(self, order: RunningOrder) -> None:
         self._machine.prepare(order.now.avlmap, order.now.version)
         if fault := self._machine.fault():
             raise DriveError(f"The robot cannot be driven: {fault.rstrip('.')}.", 503, "navigation")
@@ -246,7 +246,7 @@ class Dispatcher:
                 "moved",
             )
 
-    def _run(self, order: Order, who: Who) -> None:
+    def _run(self, order: RunningOrder, who: Who) -> None:
         outcome: Outcome | None = None
         error = "The order ended by a fault of avlmaps; the server's log has the details."
         watch = copy_context().run
@@ -279,7 +279,7 @@ class Dispatcher:
             self._running, self._last = None, ended
         self._changed()
 
-    def _watch(self, order: Order) -> None:
+    def _watch(self, order: RunningOrder) -> None:
         """Stop the robot when a person forbids an area while it drives: the order knows the map as it was."""
         known = _forbidden(order.now)
         while not order.over.wait(_WATCH_S):
@@ -296,7 +296,7 @@ class Dispatcher:
                 self.stop(Who("server", "edit"))
                 return
 
-    def _tell(self, order: Order, line: str) -> None:
+    def _tell(self, order: RunningOrder, line: str) -> None:
         order.lines.append(printable(line, _LONGEST_LINE))
         self._changed()
 
@@ -332,7 +332,7 @@ class Dispatcher:
         """Pull the brake without waiting for the robot; `stop` follows."""
         self._brake()
 
-    def _brake(self) -> Order | None:
+    def _brake(self) -> RunningOrder | None:
         with self._lock:
             self._book.clear()
             if self._running is not None:

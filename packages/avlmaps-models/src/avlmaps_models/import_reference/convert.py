@@ -25,8 +25,8 @@ from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.checkpoints import key_of
 from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.manifest import (
-    Box,
     Counts,
+    MapBounds,
     MapInfo,
     RigInfo,
     Timings,
@@ -157,7 +157,7 @@ def _write(path: Path, source: Source, settings: ImportSettings, key: str, begin
         seed=0,
         recording=source.recording(),
         counts=Counts.of(source.voxels.frames, content.keyframes, voxels, heard),
-        bounding_box_m=Box.of(voxels.index, grid.voxel_size_m),
+        bounding_box_m=MapBounds.of(voxels.index, grid.voxel_size_m),
         notices=tuple(source.notices(len(voxels), left_out)),
         timings=Timings.now({"import": elapsed_s}),
     )

@@ -17,7 +17,7 @@ from avlmaps.core.errors import LanguageError, QueryError
 from avlmaps.core.inflection import singulars_of, stem_of
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.language.list_questions import Listed, ListQuestion
-from avlmaps.language.sentence import Given
+from avlmaps.language.sentence import Attachments
 from avlmaps_sim.bench.harness.intervals import wilson
 
 OUTCOMES = ("right", "harmless", "asked back", "misread")
@@ -87,7 +87,7 @@ def _intents_of(row: Row) -> list[Any]:
     from avlmaps.language.intents import to_json
 
     try:
-        read = read_command(str(row["say"]), Given(row.get("image"), row.get("clip")))
+        read = read_command(str(row["say"]), Attachments(row.get("image"), row.get("clip")))
     except LanguageError as fault:
         return [{"do": "refuse", "reason": "unknown", "said": str(fault)}]
     return [to_json(intent) for intent in read.intents]
@@ -95,13 +95,13 @@ def _intents_of(row: Row) -> list[Any]:
 
 def _judge_question(row: Row) -> Judged:
     try:
-        got: Any = _asked(str(row["say"]), Given(row.get("image"), row.get("clip"), lambda _: True))
+        got: Any = _asked(str(row["say"]), Attachments(row.get("image"), row.get("clip"), lambda _: True))
     except QueryError as fault:
         got = {"ask": "refuse", "said": str(fault)}
     return Judged(str(row["say"]), True, judge_question(got, row), got, row["question"])
 
 
-def _asked(sentence: str, given: Given) -> dict[str, Any]:
+def _asked(sentence: str, given: Attachments) -> dict[str, Any]:
     """Return the query of a sentence, as JSON; `query` takes storeys, lists and numbers in the same order.
 
     Raises:

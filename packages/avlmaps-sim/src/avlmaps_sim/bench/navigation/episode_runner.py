@@ -14,7 +14,7 @@ from avlmaps.maps.obstacles import CellState, Obstacles
 from avlmaps.navigate.bodies import Body
 from avlmaps.navigate.driver import Driver
 from avlmaps.navigate.file_access import Readable
-from avlmaps.navigate.motion_log import Move
+from avlmaps.navigate.motion_log import LoggedMove
 from avlmaps.navigate.skills import Robot, RobotSettings
 from avlmaps_sim.bench.navigation.configurations import Configuration
 from avlmaps_sim.bench.navigation.episodes import Episode, Leg
@@ -162,7 +162,7 @@ class Pilot:
         log.legs += self._judged(goals, begin, robot.moves[before:])
         return trace.error
 
-    def _judged(self, goals: Sequence[Goal], begin: GroundPose, moves: Sequence[Move]) -> list[Leg]:
+    def _judged(self, goals: Sequence[Goal], begin: GroundPose, moves: Sequence[LoggedMove]) -> list[Leg]:
         """Return a leg for each movement that was for a goal: a place for a place, a turn for a heading."""
         legs: list[Leg] = []
         for move in moves:
@@ -172,7 +172,7 @@ class Pilot:
             begin = pose
         return legs
 
-    def _leg(self, goal: Goal, begin: GroundPose, pose: GroundPose, move: Move) -> Leg:
+    def _leg(self, goal: Goal, begin: GroundPose, pose: GroundPose, move: LoggedMove) -> Leg:
         off_m = float(goal.off_m(np.array([[pose.x_m, pose.y_m]]))[0])
         stop = (round(pose.x_m, 4), round(pose.y_m, 4), round(pose.heading_rad, 4))
         return Leg(

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core.timeline import Trajectory
-from avlmaps.maps.sources.calibrate import Calibration, calibrate
+from avlmaps.maps.sources.calibrate import ArrayCalibration, calibrate
 from avlmaps.recordings.audio import AudioTrack, Sound
 from avlmaps.recordings.channels import ChannelSound, with_microphones, write_channels
 from avlmaps.recordings.microphones import Microphones
@@ -76,7 +76,7 @@ def oval(seconds: float) -> Trajectory:
 
 def calibrated(
     wrong: Wrong, settings: AcousticSettings, rng: np.random.Generator, path: Path, seconds: float = 24.0
-) -> Calibration:
+) -> ArrayCalibration:
     """Record the drive with an array that is wrong, and calibrate it by that.
 
     The array's frame is level here, and the rate of the settings is not used.
