@@ -157,6 +157,14 @@ def test_the_check_of_a_recording_says_it(name: str, cause: str, walk: Draft, tm
     assert re.search(cause, " ".join(sentences)), sentences
 
 
+def test_a_lens_is_said_also_where_a_shorter_focal_length_would_let_frames_agree(tmp_path: Path) -> None:
+    walk = RoomWalk("right round", seed=60, frames=24, rate_hz=2.5, noise=0.0019).draft(CAMERA)
+    lens = next(one for one in situations() if one.name.startswith("lenses as they are"))
+    written = lens.change(walk, walk, np.random.default_rng(0)).write(tmp_path / "walk")
+    (sentence,) = check_recording(open_recording(written)).sentences()
+    assert "do not agree" in sentence and "behind a wide lens" in sentence and "focal length looks" not in sentence
+
+
 def test_what_would_not_show_is_said(tmp_path: Path) -> None:
     far = RoomWalk("few surfaces", seed=59, frames=24, rate_hz=2.5, holes=0.3).draft(CAMERA)
     unchecked = " ".join(check_recording(open_recording(far.write(tmp_path / "walk"))).unchecked)

@@ -30,7 +30,7 @@ from avlmaps.recordings.consistency.single_frames import (
     of_sound,
     warmth_of,
 )
-from avlmaps.recordings.consistency.suspects import PoseAt, Trial, Trials, find_cause, find_closer, find_offset
+from avlmaps.recordings.consistency.suspects import PoseAt, Suspect, Trial, Trials, find_cause, find_closer, find_offset
 from avlmaps.recordings.consistency.verdict import Finding, Grade, Reason, Verdict
 from avlmaps.recordings.corrections import NONE, CorrectedRecording, uncorrected
 from avlmaps.recordings.memory import is_of_program
@@ -257,7 +257,12 @@ def _other_cause(recording: Recording, sample: Sample, found: _Found) -> str:
 def _cause(recording: Recording, found: _Found, median_m: float) -> str:
     """Return what makes the recording agree with itself, or nothing."""
     best = find_cause(found.trials, lambda trial: _explains(trial, found))
-    return "" if best is None else _words(recording, best, median_m, _gain(found, best))
+    if best is None:
+        return ""
+    of_focal_alone = best.suspect == Suspect(focal=best.suspect.focal)
+    if of_focal_alone and (lens := found.angles.lens()) is not None:
+        return str(lens)  # another focal length moves what it bends, and leaves flat surfaces flat
+    return _words(recording, best, median_m, _gain(found, best))
 
 
 def _trials(recording: Recording, sample: Sample) -> Trials:

@@ -97,7 +97,7 @@ class RightAngles:
 
     def finding(self, recording: Recording, levels: Levels) -> Finding | None:
         """Return what cannot be right, one thing at most."""
-        return self._lens() or self._squeezed(recording) or self._drift(levels)
+        return self.lens() or self._squeezed(recording) or self._drift(levels)
 
     def _bend(self) -> _Spread:
         sure = self.flats.sure
@@ -106,7 +106,8 @@ class RightAngles:
         seen = np.hstack([self.flats.normal, camera[:, :3, 2], camera[:, :3, 3]])
         return _Spread.of(self.flats.bend, np.minimum(sure, most), seen)
 
-    def _lens(self) -> Finding | None:
+    def lens(self) -> Finding | None:
+        """Return that the distortion of a wide lens was not taken out."""
         bend = self._bend()
         if not bend.is_enough(_FEWEST_BENT) or bend.middle < 0.0 or not bend.beyond(_LEAST_BEND, _LEAST_QUARTER):
             return None
