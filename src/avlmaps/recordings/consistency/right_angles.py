@@ -93,7 +93,7 @@ class RightAngles:
     @property
     def squeeze_would_show(self) -> bool:
         """Whether there are enough surfaces at right angles to distinguish fx from fy."""
-        return self._factor("fy")[0].is_enough(_FEWEST_PAIRS)
+        return self._factors()["fy"][0].is_enough(_FEWEST_PAIRS)
 
     def finding(self, recording: Recording, levels: Levels) -> Finding | None:
         """Return what cannot be right, one thing at most."""
@@ -134,27 +134,25 @@ class RightAngles:
         one, other = np.nonzero(pairs & (np.abs(flats.normal @ flats.normal.T) < _CROSS))
         return flats.normal[one], flats.normal[other], np.minimum(flats.share[one], flats.share[other])
 
-    def _factor(self, axes: str) -> tuple[_Spread, float, float]:
-        """Return the logarithm of a factor of focal lengths, and by how many degrees pairs are off without and with.
+    def _factors(self) -> dict[str, tuple[_Spread, float, float]]:
+        """Return the logarithms of a factor of focal lengths, and by how many degrees pairs are off without and with.
 
         An angle is that of normals whose x and y grow with the focal lengths.
         """
         one, other, share = self._pairs()
-        cross = (one * other).sum(axis=1)
+        cross, both = (one * other).sum(axis=1), np.hstack([one, other])
         slopes = {name: 2.0 * (one * other) @ of - cross * ((one**2 + other**2) @ of) for name, of in _AXES.items()}
-        slope = slopes[axes]
-        turned = np.abs(slope) > _TURNED
-        seen = np.hstack([one, other])[turned]
-        found = _Spread.of(-cross[turned] / slope[turned], slope[turned] ** 2 * share[turned], seen)
-        by_any = np.stack([np.abs(some) > _TURNED for some in slopes.values()]).any(axis=0)
-        if not by_any.any():
-            return found, 0.0, 0.0
-        without: Float[np.ndarray, " p"] = np.abs(cross[by_any])
-        left: Float[np.ndarray, " p"] = np.abs((cross + slope * found.middle)[by_any])
-        return found, float(np.degrees(without.mean())), float(np.degrees(left.mean()))
+        by_any = np.stack([np.abs(slope) > _TURNED for slope in slopes.values()]).any(axis=0)
+        found: dict[str, tuple[_Spread, float, float]] = {}
+        for name, slope in slopes.items():
+            turned = np.abs(slope) > _TURNED
+            values, weight = -cross[turned] / slope[turned], slope[turned] ** 2 * share[turned]
+            spread = _Spread.of(values, weight, both[turned])
+            found[name] = spread, _mean_deg(cross[by_any]), _mean_deg((cross + slope * spread.middle)[by_any])
+        return found
 
     def _squeezed(self, recording: Recording) -> Finding | None:
-        tried = {axes: self._factor(axes) for axes in _AXES}
+        tried = self._factors()
         sure = [
             (left_deg, axes)
             for axes, (found, off_deg, left_deg) in tried.items()
@@ -169,8 +167,7 @@ class RightAngles:
         fx, fy = (old * factor if name in axes else old for name, old in (("fx", camera.fx), ("fy", camera.fy)))
         sentence = (
             f"Floors, walls and tables do not meet at right angles in single frames: pairs of flat surfaces are off by "
-            f"{off_deg:.0f} degrees (their mean), and by {left_deg:.0f} if {axes} "
-            f"were {factor:.2f} times as large."
+            f"{off_deg:.0f} degrees (their mean), and by {left_deg:.0f} if {axes} were {factor:.2f} times as large."
         )
         size = f"{camera.width}x{camera.height}"
         given = "as the camera" if is_of_program(recording) else f"with {option('intrinsics', 'fx,fy,cx,cy')}"
@@ -220,3 +217,7 @@ class RightAngles:
         across = np.cross(up, np.eye(3)[int(np.argmin(np.abs(up)))])
         world, across = world[kept], across / np.linalg.norm(across)
         return self.sample.stamps_s[flats.frame[kept]], np.arctan2(world @ np.cross(up, across), world @ across)
+
+
+def _mean_deg(cross: Float[np.ndarray, " p"]) -> float:
+    return float(np.degrees(np.abs(cross).mean())) if len(cross) else 0.0
