@@ -34,7 +34,7 @@ FAST := tests/core tests/test_imports.py tests/test_conventions.py tests/query/t
 # The further Pythons that `make dist-test` tries; each needs the locked dependencies once, from the network.
 PYTHONS ?=
 
-.PHONY: help demo test test-most test-fast dist-test test-kernels bounds test-foundation test-ros1 faults-ros1 types-foundation test-ros2 faults-ros2 test-cluster python312 lint format pictures docs fuzz bench train lock clean
+.PHONY: help demo test nightly test-most test-fast dist-test test-kernels bounds test-foundation test-ros1 faults-ros1 types-foundation test-ros2 faults-ros2 test-cluster python312 lint format pictures docs fuzz bench train lock clean
 
 help:  ## Show what can be made.
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -50,14 +50,17 @@ demo: $(READY)  ## Make a home, walk it, hear it, map it, ask it; pictures land 
 	$(RUN)/avlmaps demo --out demo_out
 	@echo "For the command avlmaps in this shell: source $(VENV)/bin/activate"
 
-test: $(READY)  ## Run every test (offline, two cores, no GPU).
-	$(RUN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder --durations=30
+test: $(READY)  ## Run what every change must pass (offline, two cores, no GPU).
+	$(RUN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder --durations=30 -m "not nightly"
+
+nightly: $(READY)  ## Run every test: laws on four times the cases, fuzz, kills, lists, suites, browser (an hour).
+	AVLMAPS_TESTS=nightly $(RUN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder --durations=30
 
 test-most: $(READY)  ## Run every test that is not marked slow, without the data beside the checkout (3 to 4 minutes).
-	$(RUN)/python -m pytest -q -n 3 --dist loadfile --no-loadscope-reorder -m "not slow and not shared"
+	$(RUN)/python -m pytest -q -n 3 --dist loadfile --no-loadscope-reorder -m "not slow and not shared and not nightly"
 
 test-fast: $(READY)  ## Run the quick tests: core, imports, laws of the query, planner, help (under a minute).
-	$(RUN)/python -m pytest -q -n 2 --dist loadfile -m "not slow and not shared" $(FAST)
+	$(RUN)/python -m pytest -q -n 2 --dist loadfile -m "not slow and not shared and not nightly" $(FAST)
 
 dist-test: $(READY)  ## Build wheels and sdists of all three, and try them in empty environments (build/dist-test, offline).
 	$(RUN)/python tests/helpers/dist_smoke.py build/dist-test $(PYTHONS)
@@ -67,9 +70,9 @@ bounds: $(READY)  ## Run 100,000 random programs; print the worst processor time
 
 # Floats may differ in their last digits from processor to processor; no test may depend on them.
 test-kernels: $(READY)  ## Run the fast numeric tests as older processors compute.
-	OPENBLAS_CORETYPE=Prescott $(RUN)/python -m pytest -n 2 --dist loadfile -m "not slow and not shared" $(NUMERIC)
+	OPENBLAS_CORETYPE=Prescott $(RUN)/python -m pytest -n 2 --dist loadfile -m "not slow and not shared and not nightly" $(NUMERIC)
 	OPENBLAS_CORETYPE=Haswell NUMBA_CPU_NAME=generic NUMBA_CACHE_DIR=$(VENV)/numba-generic \
-	  $(RUN)/python -m pytest -n 2 --dist loadfile -m "not slow and not shared" $(NUMERIC_COMPILED)
+	  $(RUN)/python -m pytest -n 2 --dist loadfile -m "not slow and not shared and not nightly" $(NUMERIC_COMPILED)
 
 test-foundation: $(TORCH)/.ready  ## Run the tests of the models on torch (in a virtual environment of their own, 1.5 GB).
 	$(TORCH)/bin/python -m pytest -n 2 --dist loadfile $(MODELS)/tests

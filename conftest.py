@@ -24,8 +24,9 @@ gc.disable()
 
 from hypothesis import settings  # noqa: E402
 
-settings.register_profile("ci", deadline=None, max_examples=40, derandomize=True)
-settings.load_profile("ci")
+settings.register_profile("change", deadline=None, max_examples=10, derandomize=True)
+settings.register_profile("nightly", deadline=None, max_examples=40, derandomize=True)
+settings.load_profile(os.environ.get("AVLMAPS_TESTS", "change"))
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -8,7 +8,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps import watchdog
@@ -38,7 +38,6 @@ class Robot:
 
 
 @pytest.mark.parametrize("name", NAMES.values(), ids=NAMES)
-@settings(max_examples=15)
 @given(beaten_s=st.floats(0.5, 20.0), silence_s=st.floats(1.0, 10.0))
 def test_a_goal_of_ours_is_cancelled_soon_after_its_last_heartbeat_and_again_until_it_is_over(
     name, beaten_s, silence_s
@@ -59,7 +58,6 @@ def test_a_goal_of_ours_is_cancelled_soon_after_its_last_heartbeat_and_again_unt
     assert len(robot.cancelled) == count
 
 
-@settings(max_examples=15)
 @given(started_s=st.floats(0.0, 10.0), beaten_s=st.floats(0.0, 10.0))
 @pytest.mark.parametrize("name", NAMES.values(), ids=NAMES)
 def test_a_goal_of_an_operator_is_never_cancelled(name, started_s, beaten_s):

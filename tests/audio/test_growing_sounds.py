@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from audio_fakes import RATE_HZ, FakeEncoder, FakeWalk, straight_walk, track_of
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import AudioError
@@ -59,7 +59,6 @@ def track(tmp_path_factory: pytest.TempPathFactory) -> AudioTrack:
 
 @pytest.mark.slow
 @given(cuts=st.lists(st.integers(0, len(SAMPLES)), max_size=30), asked=st.integers(0, 30))
-@settings(max_examples=15, deadline=None)
 def test_however_the_track_is_cut_the_sounds_are_those_of_the_whole_track(
     track: AudioTrack, tmp_path_factory: pytest.TempPathFactory, cuts: list[int], asked: int
 ) -> None:
@@ -76,7 +75,6 @@ def test_however_the_track_is_cut_the_sounds_are_those_of_the_whole_track(
 
 
 @given(cuts=st.lists(st.integers(0, len(SAMPLES)), max_size=20))
-@settings(max_examples=15, deadline=None)
 def test_powers_do_not_depend_on_the_pieces(cuts: list[int]) -> None:
     stream = PowerStream()
     known = [stream.add(Sound(piece, RATE_HZ)) for piece in np.split(SAMPLES, sorted(cuts))]
@@ -121,7 +119,6 @@ def test_the_window_of_a_long_track_moves_on_and_keeps_what_was_heard(
 
 
 @given(late_s=st.floats(-1.0, 3.0), jitter_s=st.floats(-0.05, 0.05))
-@settings(max_examples=40, deadline=None)
 def test_gaps_become_silence_overlaps_are_left_out_and_jitter_changes_nothing(
     tmp_path_factory: pytest.TempPathFactory, late_s: float, jitter_s: float
 ) -> None:

@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from audio_fakes import RATE_HZ, quiet, tone, track_of
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import AudioError
@@ -151,7 +151,6 @@ def bursts(parts: list[tuple[float, float, float]]) -> np.ndarray:
     return np.concatenate([*pieces, quiet(0.5, 8_000)])
 
 
-@settings(max_examples=25)
 @given(
     parts=BURSTS, method=st.sampled_from(["adaptive", "silence"]), merge=st.floats(0.0, 2.0), pad=st.floats(0.0, 1.0)
 )
@@ -171,7 +170,6 @@ def test_segments_are_ordered_disjoint_and_within_the_track(
     assert bool(len(edges)) == bool(parts)
 
 
-@settings(max_examples=20)
 @given(parts=BURSTS, gain_db=st.floats(-30.0, 0.0))
 def test_a_constant_gain_does_not_change_the_segments(
     tmp_path_factory: pytest.TempPathFactory, parts: list[tuple[float, float, float]], gain_db: float
@@ -186,7 +184,6 @@ def test_a_constant_gain_does_not_change_the_segments(
     assert found[0] == found[1]
 
 
-@settings(max_examples=20)
 @given(parts=BURSTS, hops=st.integers(1, 500), method=st.sampled_from(["adaptive", "silence"]))
 def test_silence_before_shifts_the_segments(
     tmp_path_factory: pytest.TempPathFactory, parts: list[tuple[float, float, float]], hops: int, method: str

@@ -7,7 +7,7 @@ import msgspec
 import numpy as np
 import pytest
 from audio_fakes import RATE_HZ, FakeEncoder, quiet, straight_walk, tone, track_of
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import AudioError, BackendError
@@ -57,7 +57,6 @@ def every_division(count: int, shortest: int, longest: int) -> list[list[int]]:
     return found
 
 
-@settings(max_examples=60, deadline=None)
 @given(
     seed=st.integers(0, 10_000),
     count=st.integers(3, 11),
@@ -79,7 +78,6 @@ def test_no_division_is_better_than_the_one_that_is_found(
     assert spread(rows, edges) + shortest * (len(edges) - 1) == pytest.approx(min(costs), abs=1e-4)
 
 
-@settings(max_examples=40, deadline=None)
 @given(lengths=st.lists(st.integers(6, 60), min_size=1, max_size=8), seed=st.integers(0, 1000))
 def test_edges_are_where_the_features_change_whatever_the_noise_on_them(lengths: list[int], seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -89,7 +87,6 @@ def test_edges_are_where_the_features_change_whatever_the_noise_on_them(lengths:
     np.testing.assert_array_equal(edges, np.cumsum([0, *lengths]))
 
 
-@settings(max_examples=40, deadline=None)
 @given(seed=st.integers(0, 1000), count=st.integers(0, 700))
 def test_stretches_are_disjoint_whole_and_of_the_asked_lengths(seed: int, count: int) -> None:
     rows = unit(np.random.default_rng(seed).standard_normal((count, 6)))

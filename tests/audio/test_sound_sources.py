@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.maps.sources.candidates import CELL_M, candidates_of
@@ -44,7 +44,6 @@ def uniform(share: np.ndarray) -> np.ndarray:
 
 
 @given(st.floats(0.8, 6.0), st.floats(0.0, 2 * np.pi), st.integers(0, 9))
-@settings(max_examples=10, deadline=None)
 def test_the_steered_sum_is_greatest_in_the_true_direction(far_m: float, angle: float, seed: int) -> None:
     noise = np.random.default_rng(seed).standard_normal(RATE_HZ)
     source = np.array([far_m * np.cos(angle), far_m * np.sin(angle), 0.0])
@@ -71,7 +70,6 @@ def test_silence_and_what_only_lingers_say_nothing() -> None:
 
 
 @given(st.floats(-60.0, 60.0))
-@settings(max_examples=20, deadline=None)
 def test_loudness_that_is_not_known_changes_nothing(offset_db: float) -> None:
     walk = np.column_stack([np.linspace(0, 3, 6), np.zeros(6)])
     places = np.array([[1.0, 1.0], [3.0, -2.0], [-1.0, 0.5]])
@@ -132,7 +130,6 @@ def densities(seed: int) -> tuple[CandidateGrid, np.ndarray, list[Density]]:
 
 
 @given(st.integers(0, 20), st.floats(0.05, 0.6), st.floats(0.65, 0.98))
-@settings(max_examples=20, deadline=None)
 def test_regions_hold_what_they_say_and_lie_within_one_another(seed: int, low: float, high: float) -> None:
     _, _, (one, _) = densities(seed)
     assert one.share.sum() == pytest.approx(1.0) and (one.share >= 0.0).all()
@@ -146,7 +143,6 @@ def test_regions_hold_what_they_say_and_lie_within_one_another(seed: int, low: f
 
 
 @given(st.integers(0, 20))
-@settings(max_examples=15, deadline=None)
 def test_two_sounds_of_one_place_are_one_source_and_of_two_places_two(seed: int) -> None:
     plan, prior, (one, other) = densities(seed)
     apart_m = float(np.linalg.norm(one.position_m - other.position_m))
@@ -167,7 +163,6 @@ def around(sigma_m: float, seed: int, numbers: SourceSettings) -> Density:
 
 
 @given(st.floats(0.05, 1.5), st.floats(1.1, 4.0), st.integers(0, 9))
-@settings(max_examples=30, deadline=None)
 def test_what_is_known_less_well_is_never_likelier_right(sigma_m: float, wider: float, seed: int) -> None:
     one, other = (around(sigma, seed, SourceSettings()).spread for sigma in (sigma_m, sigma_m * wider))
     assert 0.0 <= other.right <= one.right + 0.01 <= 1.01
@@ -175,14 +170,12 @@ def test_what_is_known_less_well_is_never_likelier_right(sigma_m: float, wider: 
 
 
 @given(st.floats(0.11, 0.6), st.floats(1.2, 3.0), st.floats(0.0, 0.2), st.integers(0, 9))
-@settings(max_examples=20, deadline=None)
 def test_larger_errors_never_make_a_place_likelier(blur_m: float, wider: float, astray: float, seed: int) -> None:
     small, large = (SourceSettings(blur_m=(b, 0.6), astray=astray) for b in (blur_m, blur_m * wider))
     assert around(0.1, seed, large).spread.right <= around(0.1, seed, small).spread.right + 0.01
 
 
 @given(st.integers(0, 200))
-@settings(max_examples=20, deadline=None)
 def test_a_source_that_lies_in_one_cell_is_right_with_certainty(seed: int) -> None:
     plan = CandidateGrid.of(room(step=0.15))
     share = np.zeros(plan.shape)
@@ -208,7 +201,6 @@ def evidence_of(seed: int, sounds: int = 2) -> SourceEvidence:
 
 
 @given(st.integers(0, 9), st.floats(0.0, 6.0), st.floats(-3.0, 3.0))
-@settings(max_examples=15, deadline=None)
 def test_evidence_that_is_carried_names_the_moved_places(seed: int, angle: float, x: float) -> None:
     own, turn = evidence_of(seed), np.eye(4)
     turn[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
@@ -250,7 +242,6 @@ def test_shares_of_candidates_add_up_to_their_cells() -> None:
 
 
 @given(st.integers(0, 20))
-@settings(max_examples=10, deadline=None)
 def test_near_the_robot_every_place_in_the_air_has_a_candidate_beside_it(seed: int) -> None:
     rng = np.random.default_rng(seed)
     ear = np.array([[*rng.uniform([1.5, 1.5], [4.5, 3.5]), 1.3]])

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from test_surfaces import turned
 
@@ -33,7 +33,6 @@ def votes(right: int, wrong: int, rng: np.random.Generator, spacing_m: float = 0
     return Votes(np.stack(made), camera, right + wrong + 5)
 
 
-@settings(max_examples=20, deadline=None)
 @given(st.integers(6, 20), st.integers(0, 8), st.integers(0, 1000))
 def test_the_agreeing_votes_win_and_give_the_transform(right: int, wrong: int, seed: int) -> None:
     given_votes = votes(right, wrong, np.random.default_rng(seed))

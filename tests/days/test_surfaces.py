@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.poses import apply, inverse
@@ -61,7 +61,6 @@ def test_the_identity_changes_no_voxel() -> None:
     assert np.array_equal(same, index) and np.array_equal(cell, source) and (part == 1.0).all()
 
 
-@settings(max_examples=10, deadline=None)
 @given(st.floats(-3.1, 3.1), st.tuples(*[st.floats(-5, 5)] * 3))
 def test_a_turned_surface_is_whole_and_not_thicker_than_two(yaw: float, shift: tuple) -> None:
     index, transform = room(), turned(yaw, shift)

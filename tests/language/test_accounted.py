@@ -10,7 +10,7 @@ from avlmaps.language.learned.accounted import has_strange_words
 from avlmaps.language.lexer import tokenise
 from avlmaps.language.verbalise import verbalise
 
-FEW = settings(max_examples=10, deadline=None)
+FEW = settings(deadline=None)
 ORDERS = st.sampled_from(("go to the sofa", "drive to the table", "move to the lamp"))
 
 

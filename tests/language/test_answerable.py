@@ -43,7 +43,6 @@ def is_refused(question: str) -> bool:
     return False
 
 
-@settings(max_examples=25, deadline=None)
 @given(
     thing=THINGS,
     room=ROOMS,
@@ -57,7 +56,6 @@ def test_what_a_map_does_not_hold_is_refused(thing: str, room: str, asks: str) -
     assert is_refused(asks.format(thing, room))
 
 
-@settings(max_examples=25, deadline=None)
 @given(
     thing=THINGS,
     room=ROOMS,
@@ -95,7 +93,6 @@ def test_the_till_is_no_until() -> None:
     assert [near.name for near in target.near] == ["till"]
 
 
-@settings(max_examples=25, deadline=None)
 @given(
     thing=st.sampled_from(["plant", "lamp", "fish", "chair", "light"]),
     room=ROOMS,

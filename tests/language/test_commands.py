@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from development import NAMES, counted, rows
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import AvlmapsError, LanguageError
@@ -187,7 +187,6 @@ def test_two_orders_are_done_one_after_the_other(first: str, second: str, joint:
         assert both == (*read_command(first).intents, *read_command(second).intents)
 
 
-@settings(max_examples=25, deadline=None)
 @given(metres=st.integers(1, 9999).map(lambda cm: cm / 100), degrees=st.integers(1, 179))
 def test_figures_are_taken_as_they_are(metres: float, degrees: int) -> None:
     assert command_to_program(f"move forward {metres} m") == f"robot.move_forward({metres:g})\n"
@@ -227,7 +226,6 @@ def test_word_salad_raises_nothing_but_errors_of_the_family(text: str) -> None:
         read_question(text[:400])
 
 
-@settings(max_examples=60, deadline=None)
 @given(text=st.text(max_size=200))
 @example(text="{" * 50)
 @example(text="a " * 250)
@@ -258,7 +256,6 @@ REMARKS = st.sampled_from([
 BEHIND = st.sampled_from(["go to the kitchen", "drive to the table", "go to the door, then turn left 90 degrees"])
 
 
-@settings(max_examples=25)
 @given(REMARKS, st.sampled_from(["; ", ", ", ". ", "; would you ", ", please ", " so "]), BEHIND)
 def test_what_somebody_heard_is_no_goal_where_the_order_has_its_own(remark: str, joint: str, order: str) -> None:
     said = read_command(f"{remark}{joint}{order}")

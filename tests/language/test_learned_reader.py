@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import BackendError
@@ -102,7 +102,6 @@ def flat(intents: tuple[Intent, ...]) -> list[Intent]:
     return [part for one in intents for part in (flat(one.body) if isinstance(one, Repeat) else [one])]
 
 
-@settings(max_examples=40, deadline=None)
 @given(text=salads)
 def test_names_are_words_of_the_sentence(text: str) -> None:
     tokens = Sentence(text).tokens
@@ -113,7 +112,6 @@ def test_names_are_words_of_the_sentence(text: str) -> None:
             assert set(target.name.split()) <= said
 
 
-@settings(max_examples=40, deadline=None)
 @given(text=salads)
 def test_no_amount_is_made_up(text: str) -> None:
     tokens = Sentence(text).tokens
@@ -130,7 +128,6 @@ def test_no_amount_is_made_up(text: str) -> None:
                 assert intent.seconds in seconds
 
 
-@settings(max_examples=15, deadline=None)
 @given(text=salads)
 def test_the_same_sentence_is_read_the_same(text: str) -> None:
     tokens = Sentence(text).tokens
@@ -138,7 +135,6 @@ def test_the_same_sentence_is_read_the_same(text: str) -> None:
     assert reader.command(tokens) == reader.command(tokens)
 
 
-@settings(max_examples=40, deadline=None)
 @given(text=salads)
 def test_every_line_is_written_well(text: str) -> None:
     tokens = Sentence(text).tokens
@@ -148,7 +144,6 @@ def test_every_line_is_written_well(text: str) -> None:
             assert line.log <= 1e-4
 
 
-@settings(max_examples=60, deadline=None)
 @given(data=st.data())
 def test_what_may_follow_ends_in_something_that_can_be_read(data: st.DataObject) -> None:
     tokens = lexer.tokenise("go 2 m behind the red chair in the kitchen, turn left 30 degrees, wait 5 seconds, x.png")

@@ -9,7 +9,7 @@ from avlmaps.language.intents import Clarify, Turn
 from avlmaps.language.sentence import Attachments
 from avlmaps.language.verbalise import verbalise
 
-FEW = settings(max_examples=10, deadline=None)
+FEW = settings(deadline=None)
 places = st.sampled_from(("kitchen", "sofa", "bed", "bathroom", "table"))
 
 

@@ -43,7 +43,7 @@ DELAYS = (
     "go to the door in {}",
     "go to the door after {}",
 )
-FEW = settings(max_examples=12, deadline=None)
+FEW = settings(deadline=None)
 
 
 def intents(command: str) -> tuple[object, ...]:

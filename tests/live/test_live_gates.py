@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from live_frames import ENCODERS, EVERY, UP, Ones, add, frame, wait_for
 from scipy.spatial import cKDTree
@@ -352,7 +352,6 @@ def test_a_quiet_map_has_nothing_unsaved(tmp_path: Path) -> None:
 
 
 @given(st.lists(st.tuples(st.floats(0.01, 1.0), st.booleans()), max_size=30), st.integers(0, 6))
-@settings(max_examples=30, deadline=None)
 def test_the_frames_that_are_worth_most_are_kept(worths: list[tuple[float, bool]], most: int) -> None:
     kept = KeptBack(most)
     for number, (worth, is_fused) in enumerate(worths):

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from live_frames import ENCODERS, UP, frame
 
@@ -76,7 +76,6 @@ def moved_at(one, stamp_s: float):
 
 
 @given(st.integers(0, 10_000))
-@settings(max_examples=15, deadline=None)
 def test_frames_come_once_and_in_order_however_messages_are_mixed(seed: int) -> None:
     rng, robot = np.random.default_rng(seed), Robot()
     events = [(kind, number) for number in range(8) for kind in ("tf", "rgb", "depth")]

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core import poses
@@ -87,7 +87,6 @@ def is_through(voxel, frame, sensor):
     return bool((depth > 0).all() and np.floor(1000 * free.min()) >= int(1000 * (z + radius + GRID.voxel_size_m)) + 1)
 
 
-@settings(max_examples=10, deadline=None)
 @given(seeds, st.sampled_from([PERFECT, KINECT]))
 def test_frames_that_see_through_are_counted_as_by_looking_at_every_block(seed, sensor):
     rng = np.random.default_rng(seed)
@@ -97,7 +96,6 @@ def test_frames_that_see_through_are_counted_as_by_looking_at_every_block(seed, 
     np.testing.assert_array_equal(found, [sum(is_through(v, f, sensor) for f in frames) for v in index])
 
 
-@settings(max_examples=10, deadline=None)
 @given(seeds)
 def test_a_voxel_that_is_seen_through_has_no_pixel_in_it_or_before_it(seed):
     rng = np.random.default_rng(seed)
@@ -115,7 +113,6 @@ def test_the_bar_of_cleaning_counts_frames(capsys: pytest.CaptureFixture[str], m
     assert " 10/10 " in capsys.readouterr().err
 
 
-@settings(max_examples=10, deadline=None)
 @given(seeds)
 def test_the_order_and_the_parts_of_the_frames_do_not_matter(seed):
     rng = np.random.default_rng(seed)
@@ -159,7 +156,6 @@ def test_more_looks_through_never_bring_a_voxel_back_and_more_hits_never_remove_
     assert gone(through, views) or not gone(through, views + 1)
 
 
-@settings(max_examples=20, deadline=None)
 @given(seeds)
 def test_smears_are_found_as_by_comparing_all_pairs(seed):
     rng = np.random.default_rng(seed)
@@ -178,7 +174,6 @@ def test_hits_without_error_are_no_smears():
     assert clean(evidence, [], CAMERA, GRID, ONLY_SMEARS)[0].all()
 
 
-@settings(max_examples=20, deadline=None)
 @given(seeds)
 def test_specks_are_found_as_by_walking_from_neighbour_to_neighbour(seed):
     rng = np.random.default_rng(seed)

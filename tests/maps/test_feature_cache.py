@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from build_fakes import SETTINGS, Corners, Ears, Pixels, Places, Walk, register_fakes, write_beeps
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as some
 
@@ -121,7 +121,6 @@ def array_files(path: Path) -> dict[str, bytes]:
 
 
 @given(array=some.arrays(st.sampled_from([np.float16, np.float32]), some.array_shapes(max_dims=3, max_side=5)))
-@settings(max_examples=20)
 def test_what_is_kept_comes_back_bit_by_bit(tmp_path_factory: pytest.TempPathFactory, array: np.ndarray) -> None:
     store = FeatureStore(tmp_path_factory.mktemp("store"))
     assert store.get(Kind.PIXELS, CARD, "k") is None

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from build_fakes import SETTINGS, Corners, Ears, Pixels, Places, Walk, write_beeps
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import BackendError, MapError, RecordingError
@@ -115,7 +115,6 @@ def test_the_voxels_of_many_parts_are_those_of_a_build_bit_by_bit(tmp_path: Path
 @given(
     steps=st.lists(st.tuples(st.floats(0.01, 0.3), st.floats(-0.3, 0.3), st.floats(-0.2, 0.2)), min_size=1, max_size=30)
 )
-@settings(max_examples=60)
 def test_keyframes_that_are_decided_as_frames_come_are_those_of_the_whole_walk(steps: list) -> None:
     chosen = KeyframeSettings(translation_m=0.4, rotation_deg=20.0)
     stamps, place, turn = np.cumsum(np.array(steps), axis=0).T

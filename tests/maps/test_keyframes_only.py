@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from build_fakes import SETTINGS, Pixels, Walk, register_fakes
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.registry import Backend, Kind, register
@@ -82,7 +82,6 @@ def test_other_keyframes_are_another_map_for_such_an_encoder_alone() -> None:
 
 
 @given(st.integers(1, 40), st.integers(1, 5))
-@settings(max_examples=30, deadline=None)
 def test_the_chosen_are_among_the_frames_that_are_fused(frames: int, step: int) -> None:
     chosen = encoded_frames(Walk(frames), replace(SETTINGS, frames=FrameSettings(step=step)), ALONE)
     assert chosen is not None and 0 in chosen
@@ -90,7 +89,6 @@ def test_the_chosen_are_among_the_frames_that_are_fused(frames: int, step: int) 
 
 
 @given(st.sets(st.integers(0, 21)), st.sets(st.integers(0, 21), max_size=3), st.integers(1, 5))
-@settings(max_examples=40, deadline=None)
 def test_frames_come_in_their_order_and_the_chosen_with_features(chosen: set[int], bad: set[int], batch: int) -> None:
     class Batched(SlowPixels):
         def encode_batch(self, frames) -> list[np.ndarray]:

@@ -2,7 +2,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core import poses
@@ -67,7 +67,6 @@ def test_free_occupied_and_unknown_are_kept_apart(place, floor_m):
     assert obstacles.floor_m == pytest.approx(floor_m + 0.02, abs=0.03)
 
 
-@settings(max_examples=10)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_a_room_in_a_tilted_world_is_the_same_room(seed):
     rng = np.random.default_rng(seed)
@@ -180,7 +179,6 @@ def test_where_the_camera_was_carried_is_free_though_the_floor_was_never_seen():
 
 
 @pytest.mark.slow
-@settings(max_examples=25)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_a_walk_only_ever_makes_unknown_cells_free(seed):
     rng = np.random.default_rng(seed)

@@ -8,7 +8,7 @@ from threading import Condition, current_thread, main_thread
 import numpy as np
 import pytest
 from build_fakes import SETTINGS, Corners, Pixels, Walk, register_fakes
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.ahead import run_ahead
@@ -42,7 +42,6 @@ class InBatches(Pixels):
         return ""
 
 
-@settings(max_examples=15)
 @given(
     bad=st.sets(st.integers(0, 11)),
     cuts=st.sets(st.integers(1, 11), max_size=3),

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from fusion_oracle import RIGS, assert_same_sums, fused, pixels_of, random_features, random_frame
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.camera import Pinhole, Rig
@@ -85,7 +85,6 @@ def test_cameras_reach_as_far_as_a_voxel_bears_their_error():
     assert PERFECT.farthest_m(0.05) == NONE.farthest_m(0.05) == np.inf
 
 
-@settings(max_examples=15, deadline=None)
 @given(seeds, st.sampled_from(sorted(RIGS)))
 def test_fusion_with_an_error_equals_adding_up_every_pixel(seed, rig):
     rng = np.random.default_rng(seed)
@@ -96,7 +95,6 @@ def test_fusion_with_an_error_equals_adding_up_every_pixel(seed, rig):
     assert_same_sums(total.sums(), fused([pixels_of(f, x, GRID, FusionSettings(), NOISY) for f, x in pairs]))
 
 
-@settings(max_examples=10, deadline=None)
 @given(seeds)
 def test_evidence_is_the_same_whatever_the_order_and_the_parts(seed):
     rng = np.random.default_rng(seed)
@@ -122,7 +120,6 @@ def test_without_an_error_every_hit_is_exact_and_weighs_as_in_the_paper():
     np.testing.assert_array_equal(bare.sums().sharp, 256 * bare.sums().hits)
 
 
-@settings(max_examples=10, deadline=None)
 @given(seeds)
 def test_flying_pixels_are_found_as_by_looking_at_each_pixel(seed):
     rng = np.random.default_rng(seed)

@@ -6,7 +6,7 @@ from math import hypot, pi
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core import poses
@@ -46,7 +46,6 @@ def test_it_is_a_driver():
     assert isinstance(driver_in(BUILDING), Driver)
 
 
-@settings(max_examples=25)
 @given(
     goals=st.lists(PLACES, min_size=1, max_size=4), smooth=st.booleans(), on_contact=st.sampled_from(["stop", "slide"])
 )

@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.ndimage import label
 from test_costmap import CELL_M, grid_of, of_states
@@ -52,7 +52,6 @@ def costs_along(costmap, points):
     return total
 
 
-@settings(max_examples=60)
 @given(seed=st.integers(0, 100_000), coarse=st.booleans())
 def test_a_way_is_found_where_there_is_one_and_never_leads_through_an_obstacle(seed, coarse):
     planner = Planner(costmap_of(of_states(clutter(seed)), 0.15), COARSE if coarse else None)
@@ -71,7 +70,6 @@ def test_a_way_is_found_where_there_is_one_and_never_leads_through_an_obstacle(s
         assert way.length_m >= np.linalg.norm(goal - start) - 1e-9
 
 
-@settings(max_examples=60)
 @given(seed=st.integers(0, 100_000))
 def test_searching_coarse_to_fine_costs_at_most_a_tenth_more(seed):
     costmap = costmap_of(of_states(clutter(seed, 120)), 0.1)
@@ -305,7 +303,6 @@ def test_what_is_no_place_is_answered_without_a_warning(number):
         assert planner.stop_for(*ends) is None
 
 
-@settings(max_examples=25, deadline=None)
 @given(
     low=st.tuples(st.floats(0.6, 2.0), st.floats(-0.5, 1.5)),
     size=st.tuples(st.floats(0.05, 1.5), st.floats(0.05, 2.5)),

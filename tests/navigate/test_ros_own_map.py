@@ -5,7 +5,7 @@ from math import pi
 import msgspec
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import NavigationError
@@ -22,7 +22,6 @@ def own(values: np.ndarray, cell_m: float = 0.1, corner: tuple[float, float, flo
     return OwnGrid(values.astype(np.int8), cell_m, GroundPose(*corner), "map")
 
 
-@settings(max_examples=25)
 @given(lie=poses, corner=poses, seed=st.integers(0, 1000))
 def test_the_middle_of_each_cell_of_the_robot_has_its_state_on_our_floor(lie, corner, seed):
     rng = np.random.default_rng(seed)

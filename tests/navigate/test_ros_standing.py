@@ -1,7 +1,7 @@
 """Laws of standing and of age: bodies whose motion is known, over ways that delay, reorder and queue."""
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.navigate.ros.contact import STILL_M, STILL_S, Stillness
@@ -55,7 +55,6 @@ class Robot:
         self.clock.now_s = 100.0 + now_s
 
 
-@settings(max_examples=25)
 @given(
     st.floats(0.06, 2.0), st.floats(0.5, 3.0), st.floats(0.02, 0.2), st.sampled_from([0.1, 0.3, 0.5, 0.9]),
     st.lists(st.sampled_from([0.0, 0.05, 0.3]), min_size=1, max_size=4), st.floats(-50.0, 50.0).filter(bool),
@@ -77,7 +76,6 @@ def test_a_body_that_moves_is_never_seen_to_stand_and_one_that_stopped_soon_is(
     assert stood_s <= stops_s + STILL_S + 2.0 * map_s + 2.0 * odom_s + max(late_s) * 2.0 + 0.2
 
 
-@settings(max_examples=25)
 @given(st.floats(0.2, 2.0), st.floats(0.5, 4.0))
 def test_a_queue_that_grows_makes_a_pose_as_old_as_it_is(speed: float, growth_s: float) -> None:
     """Transforms come later and later; by their stamps the age is right, though each has just arrived."""

@@ -8,7 +8,7 @@ from typing import get_type_hints
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import NavigationError, ProgramError
@@ -165,7 +165,6 @@ MIRRORED = {
 COMPASS = (("move_north", "a"), ("move_south", "a"), ("move_east", "a"), ("move_west", "a"))
 
 
-@settings(max_examples=20)
 @given(poses, places, places, sizes, sizes, angles)
 def test_turning_the_whole_world_turns_what_the_robot_does(
     pose: GroundPose, x: float, y: float, width: float, depth: float, angle: float
@@ -181,7 +180,6 @@ def test_turning_the_whole_world_turns_what_the_robot_does(
         same(here, there, lambda corners: turned(corners, angle), lambda heading: heading + angle)
 
 
-@settings(max_examples=20)
 @given(poses, places, places, sizes, sizes)
 def test_a_mirror_swaps_left_and_right(pose: GroundPose, x: float, y: float, width: float, depth: float) -> None:
     def flipped(corners: np.ndarray) -> np.ndarray:

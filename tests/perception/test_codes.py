@@ -1,5 +1,5 @@
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.perception.embedded.codes import features_of, orthonormal_codes
@@ -13,7 +13,6 @@ MEANINGS = Meanings(
 )  # fmt: skip
 
 
-@settings(max_examples=30)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 12))
 def test_codes_are_orthonormal_and_nearer_to_the_words_than_any_turned_ones(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
@@ -25,7 +24,6 @@ def test_codes_are_orthonormal_and_nearer_to_the_words_than_any_turned_ones(seed
     assert np.linalg.norm(codes - words) <= np.linalg.norm(turned - words) + 1e-6
 
 
-@settings(max_examples=30)
 @given(st.integers(0, 2**32 - 1))
 def test_probabilities_are_read_back_and_products_are_bhattacharyya_coefficients(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import BackendError
@@ -60,7 +60,6 @@ def test_a_profile_takes_an_object_too() -> None:
 
 
 @given(st.floats(0.1, 9.0), st.floats(0.1, 9.0))
-@settings(max_examples=20)
 def test_a_made_card_tells_encoders_apart_by_what_they_hold(one: float, other: float) -> None:
     def checksum(scale: float, table: np.ndarray | None = None) -> str:
         return Encoders(pixels=Words(scale, table)).card(Kind.PIXELS).checksum

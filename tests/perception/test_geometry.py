@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.camera import Pinhole
@@ -19,7 +19,6 @@ def floor_seen(height_m: float, pitch_rad: float) -> tuple[np.ndarray, np.ndarra
     return np.where(down > 0.05, height_m / np.maximum(down, 0.05), 0.0).astype(np.float32), up
 
 
-@settings(max_examples=20, deadline=None)
 @given(st.floats(0.5, 2.0), st.floats(0.2, 1.2))
 def test_a_floor_has_height_zero_and_looks_up_however_the_camera_is_held(height_m: float, pitch_rad: float) -> None:
     depth, up = floor_seen(height_m, pitch_rad)

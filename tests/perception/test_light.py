@@ -7,7 +7,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import BackendError
@@ -188,7 +188,6 @@ def test_a_folder_of_files_may_be_named_itself(folder: Path, tmp_path: Path) -> 
 
 
 @given(st.integers(1, 40), st.integers(1, 80))
-@settings(max_examples=60, deadline=None)
 def test_interpolation_keeps_what_is_even_and_where_it_lies(given_cells: int, wanted: int) -> None:
     weights = interpolation(given_cells, wanted)
     np.testing.assert_allclose(weights.sum(axis=1), 1.0, atol=1e-6)
@@ -225,7 +224,6 @@ def test_bytes_are_cut_as_gpt_does() -> None:
 
 
 @given(st.text(max_size=40))
-@settings(max_examples=100, deadline=None)
 def test_any_text_has_tokens_up_to_the_most(text: str) -> None:
     for known in (
         TokenList("words", ["<unk>", "▁", "a", "▁a"], [("▁", "a")], unknown=0),

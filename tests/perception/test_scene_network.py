@@ -7,7 +7,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from avlmaps.core.camera import Pinhole, Rig
@@ -30,7 +30,6 @@ def frame_of(width: int, height: int, focal_px: float) -> Frame:
     return Frame(0, "0", 0.0, rgb, np.full((height, width), 2.0, np.float32), np.eye(4), Rig(camera, camera))
 
 
-@settings(max_examples=25, deadline=None)
 @given(
     st.integers(40, 700), st.integers(40, 500), st.floats(0.4, 4.0), st.sampled_from([120, 160, 240]), st.integers(1, 2)
 )  # fmt: skip

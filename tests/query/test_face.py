@@ -11,7 +11,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as some
 
@@ -105,7 +105,6 @@ def test_heat_is_an_array_and_has_arithmetic(m: avlmaps.AVLMap) -> None:
 
 
 @given(a=st.floats(-3, 3, width=32), b=st.floats(0.25, 3, width=32))
-@settings(max_examples=15)
 def test_arithmetic_of_heat_is_that_of_its_arrays(m: avlmaps.AVLMap, a: float, b: float) -> None:
     one, two = m.object("sofa"), m.object("table")
     x, y = np.asarray(one), np.asarray(two)
@@ -434,7 +433,6 @@ def test_frames_of_ones_own_are_sent_to_a_map_in_memory(folder: Path, tmp_path: 
     pose=some.arrays(np.float64, st.sampled_from([(4, 4), (3, 4), (4,)])),
     stamp=st.one_of(st.floats(), st.text(max_size=2), st.none()),
 )
-@settings(max_examples=60)
 def test_any_arrays_make_a_frame_or_a_sentence(rgb, depth, pose, stamp) -> None:
     live = avlmaps.VoxelMap(0.1, avlmaps.Encoders())
     try:

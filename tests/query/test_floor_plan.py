@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from walled_rooms import UP, storeys_at, two_rooms
 
@@ -33,7 +33,6 @@ def on_the_right(plan: FloorPlan, mass: np.ndarray) -> float:
     return float(mass[beyond, 0].sum())
 
 
-@settings(max_examples=25, deadline=None)
 @given(st.floats(0.2, 5.8), st.floats(0.2, 2.8), st.floats(0.2, 2.0), st.sampled_from([0.0, 0.8, 3.0]))
 def test_no_mass_is_lost_and_none_is_negative(x: float, y: float, sigma_m: float, door_m: float) -> None:
     plan = plan_of(door_m)
@@ -152,7 +151,6 @@ def test_a_map_without_voxels_or_kilometres_wide_has_no_plan() -> None:
     assert FloorPlan.of(Space(GridSpec(0.05), wide, UP), storeys_at(0.0)) is None
 
 
-@settings(max_examples=30, deadline=None)
 @given(st.integers(0, 999), st.sampled_from([0.0, 0.002, 0.05, 0.6]), st.integers(1, 2))
 def test_a_point_belongs_to_the_open_cell_nearest_to_it(seed: int, share: float, storeys: int) -> None:
     rng = np.random.default_rng(seed)

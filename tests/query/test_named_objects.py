@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.question import Modality, Part, Role
@@ -212,7 +212,6 @@ def test_a_guess_among_weaker_voxels_can_be_turned_off() -> None:
     assert not object_factor(FeatureVoxels(SPACE, feature, ENCODER, rivals, settings), part, HeatSettings()).mask.any()
 
 
-@settings(max_examples=30, deadline=None)
 @given(
     st.sampled_from(sorted(MEANT)),
     st.sampled_from([0.02, 0.1, 0.5, 5.0]),
@@ -243,7 +242,6 @@ def test_voxels_with_little_of_the_word_need_no_comparison(
             assert (one.found, one.note, one.understood) == (other.found, other.note, other.understood)
 
 
-@settings(max_examples=60, deadline=None)
 @given(
     st.one_of(st.sampled_from(sorted(MEANT)), st.sampled_from(NAMES)),
     st.booleans(),
@@ -296,7 +294,6 @@ def test_weak_voxels_round_a_chair_leave_it_as_it_is_in_company() -> None:
     assert joined.factors[0].confidence.tolist() == [pytest.approx(0.7, abs=0.01), pytest.approx(0.3, abs=0.01)]
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.sampled_from(sorted(MEANT)), st.sampled_from([0.1, 0.5, 5.0]), st.integers(0, 2**32 - 1))
 def test_what_is_found_alone_is_the_same_in_company(word: str, evenness: float, seed: int) -> None:
     probability = np.random.default_rng(seed).dirichlet(np.full(len(NAMES), evenness), len(INDEX))
@@ -315,7 +312,6 @@ def test_what_is_found_alone_is_the_same_in_company(word: str, evenness: float, 
     assert (instance[company.mask & ~alone.mask] >= len(alone.confidence)).all()
 
 
-@settings(max_examples=60, deadline=None)
 @given(
     st.sampled_from(sorted(MEANT)), st.sampled_from([0.1, 0.5, 5.0]), st.integers(0, 2**32 - 1), st.sampled_from([1, 3])
 )  # fmt: skip
@@ -338,7 +334,6 @@ def test_other_does_not_compete_with_itself() -> None:
     assert rivals.not_competing(ENCODER, encoded, 0.95).tolist() == [False] * 4 + [True]
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.integers(2, 200), st.floats(0.01, 1.0), st.sampled_from([0.003, 0.03, 0.3, 30.0]), st.integers(0, 2**32 - 1))
 def test_what_reaches_a_share_of_its_best_rival_is_above_the_least_score(
     names: int, share: float, evenness: float, seed: int

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from query_fakes import furnished_map, keyframes_at
 
@@ -157,7 +157,6 @@ def test_another_word_for_the_same_place_does_not_compete_with_it(asked: str, na
     assert area_scores(row, views, "garage", AreaSettings())[0][0] < 0.1
 
 
-@settings(max_examples=20, deadline=None)
 @given(st.lists(st.sampled_from(AREA_NAMES), max_size=5), st.sampled_from(AREA_NAMES), st.floats(0.0, 0.2))
 def test_the_posterior_is_the_models_softmax(rooms: list[str], asked: str, more: float) -> None:
     views = ScaledViews()

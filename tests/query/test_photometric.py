@@ -6,7 +6,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -174,7 +174,6 @@ def correlation(one: np.ndarray, other: np.ndarray) -> float:
     return float((one * other).sum() / np.sqrt((one**2).sum() * (other**2).sum()))
 
 
-@settings(max_examples=25)
 @given(st.integers(0, 2**32 - 1))
 def test_a_view_is_compared_as_its_definition_says(seed: int) -> None:
     """One voxel a pixel: what is drawn is known."""

@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from query_fakes import UP
 from walled_rooms import storeys_at, two_rooms_index
@@ -50,7 +50,6 @@ class Drawn:
         return slice(cells(x + 1.0), cells(x + 1.0 + wide_m)), slice(cells(y + 1.0), cells(y + 1.0 + deep_m))
 
 
-@settings(max_examples=12, deadline=None)
 @given(st.floats(2.0, 5.0), st.floats(1.8, 4.0), st.floats(3.0, 5.0), st.floats(0.0, 1.0), st.floats(0.7, 1.2))
 def test_a_door_parts_two_rooms_wherever_it_is(left: float, right: float, deep: float, at: float, door: float) -> None:
     y = 0.1 + at * (deep - 0.2 - door)
@@ -63,7 +62,6 @@ def test_a_door_parts_two_rooms_wherever_it_is(left: float, right: float, deep: 
         assert area_m2 - 0.1 <= found <= area_m2 + 0.3 * (left + right + deep), "up to the middle of its walls"
 
 
-@settings(max_examples=10, deadline=None)
 @given(st.floats(2.4, 3.2), st.floats(0.0, 1.0))
 def test_an_opening_wider_than_any_door_makes_an_open_plan(opening: float, at: float) -> None:
     deep = 4.0
@@ -86,7 +84,6 @@ def test_a_passage_whose_walls_are_the_ends_of_others_is_one_room(passage_m: flo
     assert found.neighbours[hall.pop()] == 4 and sorted(found.neighbours.tolist()) == [1, 1, 1, 1, 4]
 
 
-@settings(max_examples=10, deadline=None)
 @given(st.floats(0.7, 1.0), st.floats(0.4, 2.4), st.booleans())
 def test_the_leaf_of_a_door_and_a_lamp_part_nothing(leaf: float, y: float, lamp: bool) -> None:
     drawn = Drawn(4.0, 3.0).room(0, 0, 4.0, 3.0)
@@ -97,7 +94,6 @@ def test_the_leaf_of_a_door_and_a_lamp_part_nothing(leaf: float, y: float, lamp:
     assert set(np.unique(label).tolist()) == {NONE, 0}
 
 
-@settings(max_examples=12, deadline=None)
 @given(st.floats(0.7, 2.6), st.floats(0.0, 1.0), st.floats(0.15, 0.25))
 def test_a_room_ends_at_its_wall_where_a_window_is_set_into_it(window: float, at: float, deep: float) -> None:
     x = 0.5 + at * (3.0 - window)
@@ -125,7 +121,6 @@ def test_a_nook_belongs_to_its_room_and_an_empty_storey_has_none() -> None:
     assert (found.label == NONE).all() and not len(found.neighbours)
 
 
-@settings(max_examples=20, deadline=None)
 @given(st.integers(0, 89), st.floats(3.0, 6.0), st.floats(3.0, 6.0))
 def test_the_heading_of_walls_is_found(degrees: int, wide: float, deep: float) -> None:
     along = np.arange(0.0, 1.0, 0.005)
@@ -189,7 +184,6 @@ def test_cameras_that_look_down_or_at_the_same_count_no_more_than_once() -> None
     assert len(sights.places) == 2 and sights.headings_rad == pytest.approx([0.0, 0.0])
 
 
-@settings(max_examples=15, deadline=None)
 @given(st.integers(0, 10_000))
 def test_a_room_has_a_distribution_of_names_and_a_dead_end_is_seldom_a_hallway(seed: int) -> None:
     regions = two_room_regions(0.0)

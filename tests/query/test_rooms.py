@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from query_fakes import FakePixels, FakeSounds, fake_encoders, fake_map, keyframes_at, voxels_of
 from walled_rooms import storeys_at, two_rooms, two_rooms_index
@@ -54,7 +54,6 @@ def views(seed: int, count: int = 9) -> tuple[np.ndarray, np.ndarray]:
     return rng.dirichlet(np.ones(3), count), rng.uniform([0.3, 0.3, 0.3], [5.7, 2.7, 2.0], (count, 3))
 
 
-@settings(max_examples=30, deadline=None)
 @given(st.integers(0, 10_000), st.sampled_from([0.0, 0.8]))
 def test_every_place_has_a_distribution_and_views_have_no_order(seed: int, door_m: float) -> None:
     share, places = views(seed)
@@ -66,7 +65,6 @@ def test_every_place_has_a_distribution_and_views_have_no_order(seed: int, door_
     np.testing.assert_allclose(again.share, field.share, atol=1e-4)
 
 
-@settings(max_examples=20, deadline=None)
 @given(st.integers(0, 10_000))
 def test_kinds_have_no_order_either(seed: int) -> None:
     share, places = views(seed)
@@ -140,7 +138,6 @@ def test_a_map_without_names_lets_views_vote() -> None:
     np.testing.assert_array_equal(with_none.share, rooms_of(places).field(KINDS, share).share)
 
 
-@settings(max_examples=20, deadline=None)
 @given(st.integers(1, 400_000), st.integers(1, 200_000))
 def test_voters_are_few_enough_and_stand_for_all(count: int, products: int) -> None:
     index = np.stack([np.arange(count) % 97, np.arange(count) % 89, np.arange(count) // 97], axis=1)

@@ -1,7 +1,7 @@
 """What a search computes of every voxel is what brute force gives."""
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
@@ -11,7 +11,6 @@ from avlmaps.query.components import connected, linked
 from avlmaps.query.scores import feature_scores, margins, two_closest
 
 
-@settings(max_examples=40, deadline=None)
 @given(st.integers(0, 60), st.integers(0, 6), st.integers(0, 2**32 - 1))
 def test_the_two_closest_words_are_those_of_a_stable_sort(voxels: int, words: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -30,7 +29,6 @@ def test_the_two_closest_words_are_those_of_a_stable_sort(voxels: int, words: in
         assert number.dtype == of_voxels.word_type(words)
 
 
-@settings(max_examples=40, deadline=None)
 @given(st.integers(0, 60), st.integers(1, 4), st.booleans(), st.integers(0, 2**32 - 1))
 def test_scores_are_products_or_their_lengths(voxels: int, count: int, some: bool, seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -53,7 +51,6 @@ def test_many_rows_are_scored_as_few(monkeypatch) -> None:
         np.testing.assert_allclose(one, other, atol=1e-6)
 
 
-@settings(max_examples=20, deadline=None)
 @given(st.integers(1, 5000), st.integers(1, 4), st.integers(0, 2**32 - 1))
 def test_equal_features_score_the_same_wherever_they_stand(count: int, words: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -70,7 +67,6 @@ def test_every_half_is_widened_exactly() -> None:
     np.testing.assert_array_equal(feature_scores(finite[:, None], one), finite.astype(np.float32))
 
 
-@settings(max_examples=40, deadline=None)
 @given(st.integers(0, 60), st.integers(0, 6), st.floats(-1.0, 1.0, width=32), st.integers(0, 2**32 - 1))
 def test_margins_are_over_the_best_rival_that_competes(voxels: int, words: int, least: float, seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -83,7 +79,6 @@ def test_margins_are_over_the_best_rival_that_competes(voxels: int, words: int, 
     assert (found[unsure] >= expected[unsure] - 1e-5).all(), "a third word may take more"
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.integers(0, 80), st.integers(1, 3), st.integers(3, 14), st.integers(0, 2**32 - 1))
 def test_voxels_are_linked_as_pairs_within_reach_are(voxels: int, reach: int, side: int, seed: int) -> None:
     index = np.unique(np.random.default_rng(seed).integers(-side, side, (voxels, 3)), axis=0)
@@ -92,7 +87,6 @@ def test_voxels_are_linked_as_pairs_within_reach_are(voxels: int, reach: int, si
     np.testing.assert_array_equal(linked(index, reach), labels)
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.integers(1, 40), st.integers(0, 60), st.integers(0, 2**32 - 1))
 def test_joined_nodes_are_the_connected_components(nodes: int, edges: int, seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.cli.reading_options import Reading
@@ -387,7 +387,6 @@ def drawn(tmp_path_factory: pytest.TempPathFactory) -> Sample:
 
 
 @given(st.integers(-16, 16), st.integers(-16, 16))
-@settings(max_examples=12, deadline=None)
 def test_edges_of_colour_are_found_where_they_were_moved_to(drawn: Sample, x: int, y: int) -> None:
     moved = replace(drawn, grey=np.roll(drawn.grey, (y, x), axis=(1, 2)))
     found = shift_of(find_edges(moved), moved)

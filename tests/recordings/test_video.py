@@ -6,7 +6,7 @@ from pathlib import Path
 import av
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import RecordingError
@@ -38,7 +38,6 @@ def test_stamps_follow_the_rate(video: VideoFrames) -> None:
     assert (video.width, video.height) == (64, 48)
 
 
-@settings(max_examples=15)
 @given(order=st.lists(st.integers(0, COUNT - 1), min_size=1, max_size=6))
 def test_any_order_gives_the_frames_that_were_written(video: VideoFrames, order: list[int]) -> None:
     for index in order:

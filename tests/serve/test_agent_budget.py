@@ -9,7 +9,7 @@ from typing import Any
 
 import anyio
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from mcp.client.client import Client
 from starlette.testclient import TestClient
@@ -217,7 +217,6 @@ _ROWS = st.lists(
 )
 
 
-@settings(max_examples=20, deadline=None)
 @given(
     st.fixed_dictionaries({"rows": _ROWS, "text": _TEXTS, "last": st.fixed_dictionaries({"lines": st.lists(_TEXTS)})}),
     st.integers(2, 400),

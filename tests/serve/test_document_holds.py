@@ -11,7 +11,7 @@ from starlette.testclient import TestClient
 
 # Of a query with neither a sentence nor a part, or with both: OpenAPI cannot state that of an address.
 MAY_LACK_WORDS = ("ask", "askInView", "drawAnswer")
-light = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+light = settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 @pytest.fixture(scope="module")
@@ -113,7 +113,7 @@ parts = st.dictionaries(
 )
 
 
-@settings(light, max_examples=50)
+@light
 @given(body=parts, name=st.sampled_from(["ask", "picture"]))
 def test_a_body_is_answered_where_it_fits_and_else_refused(
     client: TestClient, document: dict[str, Any], body: dict[str, Any], name: str

@@ -9,7 +9,7 @@ from typing import Any
 
 import anyio
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator, ValidationError
 from mcp.client.client import Client
@@ -387,7 +387,6 @@ def a_plan(order: str) -> OrderPlan:
     return OrderPlan(order, "", "", "", (), (), 0.0, (), START, "m", "v", "r")
 
 
-@settings(max_examples=60)
 @given(st.lists(st.tuples(st.sampled_from(["add", "take", "old", "wrong", "clear"]), st.integers(0, 5)), max_size=30))
 def test_a_token_returns_its_own_plan_once_whatever_comes_before(steps: list[tuple[str, int]]) -> None:
     book, now, tokens, good = PlanBook(10.0), 0.0, [], {}

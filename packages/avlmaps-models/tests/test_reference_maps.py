@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core import poses
@@ -42,7 +42,6 @@ def _nearest(cubes: Cubes, row: int, point_world: np.ndarray) -> np.ndarray:
     return off[np.abs(off[:, :2]).max(axis=1).argmin()]
 
 
-@settings(max_examples=25)
 @given(
     st.floats(-3.1, 3.1),
     st.tuples(*[st.floats(-20.0, 20.0)] * 3),
@@ -91,7 +90,6 @@ def test_cells_of_a_cloud_are_centred_where_they_were_rounded() -> None:
     assert np.abs(found - poses.apply(WORLD_FROM_HABITAT, points)).max() <= 0.025 + 1e-9
 
 
-@settings(max_examples=10)
 @given(st.floats(-3.1, 3.1), st.tuples(*[st.floats(-20.0, 20.0)] * 3))
 def test_a_full_floor_has_no_holes_and_no_cell_is_lost(yaw, place) -> None:
     side, first = 31, _habitat_pose(yaw, place)

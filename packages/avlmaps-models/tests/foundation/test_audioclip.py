@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from tiny.audioclip import DIM, MODEL, tiny_state, write_audioclip
 
@@ -85,7 +85,6 @@ def test_silence_has_a_feature(encoder):
     assert np.linalg.norm(found, axis=1) == pytest.approx([1.0])
 
 
-@settings(max_examples=40, deadline=None)
 @given(count=st.integers(1, 400), length=st.integers(1, 90))
 def test_windows_cover_a_sound_without_a_gap(count, length):
     samples = np.arange(1, count + 1, dtype=np.float32)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 import torch
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from tiny.audioclip import layout, tiny_state
 from torch.nn import functional
@@ -93,7 +93,6 @@ def test_wavelets_as_they_are_before_training_are_a_fourier_transform():
     assert np.allclose(real + 1j * imaginary, np.exp(-1j * np.arange(33)[:, None] * t) / 8, atol=1e-5)
 
 
-@settings(max_examples=25, deadline=None)
 @given(count=st.integers(1, 5000), length=st.integers(1, 700), hop=st.integers(1, 600))
 def test_frames_are_slices_of_the_sound_with_silence_at_both_ends(count, length, hop):
     signal = torch.arange(1.0, count + 1.0)[None]

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import BackendError
@@ -102,7 +102,6 @@ def merged_by_hand(word: str, merges: list[tuple[str, str]]) -> list[str]:
         pieces = found
 
 
-@settings(max_examples=60, deadline=None)
 @given(words=st.lists(st.text("dogbarkn", min_size=1, max_size=9), min_size=1, max_size=4))
 def test_words_fall_into_the_pieces_that_the_list_merges(words):
     tokens = ClipTokens(MERGES)
@@ -148,7 +147,6 @@ INTERESTING = (
 )
 
 
-@settings(max_examples=100, deadline=None)
 @given(text=st.text(INTERESTING, max_size=12))
 def test_phrases_are_prepared_as_the_published_library_does_it(text):
     ftfy = pytest.importorskip("ftfy")

@@ -124,7 +124,7 @@ def test_the_strongest_are_kept_where_there_are_too_many(name: str, monkeypatch:
     assert few.score.min() >= np.sort(every.score)[-16]
 
 
-@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(width=st.integers(1, 90), height=st.integers(1, 90), seed=st.integers(0, 99))
 def test_pictures_of_any_size_have_keypoints_inside_or_none(name: str, width: int, height: int, seed: int) -> None:
     rgb = np.random.default_rng(seed).integers(0, 256, (height, width, 3)).astype(np.uint8)

@@ -137,7 +137,7 @@ def test_its_settings_are_the_papers_whatever_the_folder_says(encoder: SuperPoin
     np.testing.assert_allclose(SuperPointKeypoints().encode(picture()).xy, before.xy, atol=1e-3)
 
 
-@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(width=st.integers(1, 100), height=st.integers(1, 100))
 def test_pictures_of_any_size_have_keypoints_inside_or_none(
     encoder: SuperPointKeypoints, width: int, height: int

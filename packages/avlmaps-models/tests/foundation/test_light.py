@@ -10,7 +10,7 @@ if find_spec("onnx") is None:
     pytest.skip("the export needs onnx (requirements/foundation.txt)", allow_module_level=True)
 
 import torch
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from tiny.light import SHORT_SIDE, export_light, write_light_sources
 from tiny.tipsv2 import write_tips_tokens
@@ -142,14 +142,12 @@ TEXTS = st.text(st.sampled_from("abcXYZ .,'-_1²½é漢\n\tﬁ🙂"), max_size=3
 
 
 @given(TEXTS)
-@settings(max_examples=150, deadline=None)
 def test_sentencepiece_is_read_as_published(tips_tokenizer, text: str) -> None:
     tokenizer, ours = tips_tokenizer
     assert ours.encode(text) == tokenizer(text, truncation=True, max_length=64)["input_ids"]
 
 
 @given(TEXTS)
-@settings(max_examples=150, deadline=None)
 def test_bytes_are_read_as_published(roberta_tokenizer, text: str) -> None:
     tokenizer, ours = roberta_tokenizer
     if any(name in text for name in tokenizer.all_special_tokens):

@@ -265,7 +265,6 @@ def own_input(matcher: Any, local: LocalFeatures) -> Any:
     return network_input(local, matcher.card, torch.device("cpu"))
 
 
-@settings(max_examples=25, deadline=None)
 @given(
     n=st.integers(1, 12), m=st.integers(1, 12), scale=st.sampled_from([0.1, 1.0, 10.0, 1000.0]), seed=st.integers(0, 99)
 )

@@ -84,7 +84,7 @@ def test_the_picture_is_seen_at_its_full_size_and_the_keypoints_are_not_looked_a
     assert encoder.fit([some], np.random.default_rng(0)) == {}
 
 
-@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(width=st.integers(1, 60), height=st.integers(1, 60), value=st.integers(0, 255))
 def test_pictures_of_any_size_and_blank_ones_have_a_unit_vector(
     encoder: NetVlad, width: int, height: int, value: int

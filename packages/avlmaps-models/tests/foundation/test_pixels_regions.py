@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from safetensors.torch import load_file, save_file
 from tiny.clip_patches import DIM, IMAGE
@@ -40,7 +40,6 @@ def unit(rows: np.ndarray) -> np.ndarray:
 
 
 @given(st.integers(1, 6), st.integers(0, 1000))
-@settings(max_examples=30, deadline=None)
 def test_the_mixture_is_the_papers(count: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     whole, regions = unit(rng.standard_normal(8)), unit(rng.standard_normal((count, 8)))
@@ -56,7 +55,6 @@ def test_the_mixture_is_the_papers(count: int, seed: int) -> None:
 
 
 @given(st.integers(0, 12), st.integers(0, 1000), st.sampled_from([0.0, 0.3, 0.7, 1.0]))
-@settings(max_examples=40, deadline=None)
 def test_what_stays_is_apart_and_what_goes_overlaps_something_better(count: int, seed: int, same: float) -> None:
     rng = np.random.default_rng(seed)
     corner = rng.integers(0, 4, (count, 2)) / 8.0

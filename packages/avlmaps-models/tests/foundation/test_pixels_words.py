@@ -5,7 +5,7 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import BackendError
@@ -33,7 +33,6 @@ def test_every_sentence_holds_the_word_once(prompts: tuple[str, ...]) -> None:
 
 
 @given(st.lists(st.text(min_size=0, max_size=8), max_size=5))
-@settings(max_examples=40, deadline=None)
 def test_a_word_is_a_unit_vector_whatever_stands_beside_it(words: list[str]) -> None:
     prompted = Prompted(letters, 8, CLIP_PROMPTS)
     rows = prompted.encode(words)
@@ -67,7 +66,6 @@ def test_a_word_is_encoded_once() -> None:
 
 
 @given(st.integers(1, 4000), st.integers(1, 4000), st.sampled_from([14, 16, 32]), st.sampled_from([224, 336, 448]))
-@settings(max_examples=60, deadline=None)
 def test_a_working_size_is_whole_patches_in_the_shape_of_the_picture(h: int, w: int, patch: int, short: int) -> None:
     rows, columns = working_size(h, w, short, patch)
     assert rows % patch == columns % patch == 0

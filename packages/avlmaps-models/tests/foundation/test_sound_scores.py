@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.perception.models.sound_scores import OTHERS, Contrast, one_kind
@@ -83,7 +83,6 @@ def test_sounds_of_one_kind_are_alike_and_of_two_are_not(contrast: Contrast) -> 
     assert scores[1] >= 0.5 > scores[2]
 
 
-@settings(max_examples=25, deadline=None)
 @given(seed=st.integers(0, 10_000), scale=st.sampled_from([1.0, 14.3, 100.0, 1e4]), count=st.integers(1, 5))
 def test_scores_are_finite_and_lie_between_nought_and_one(seed: int, scale: float, count: int) -> None:
     rng = np.random.default_rng(seed)

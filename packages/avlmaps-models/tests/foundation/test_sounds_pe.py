@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from safetensors.torch import load_file, save_file
 from tiny.pe_a_frame import MODEL, write_pe_a_frame
@@ -108,7 +108,6 @@ def test_a_track_is_mapped_whole_and_asked_by_its_stretches(framed: FrameSounds,
     assert len(edges) > 2
 
 
-@settings(max_examples=60, deadline=None)
 @given(frames=st.integers(1, 4000))
 def test_chunks_give_every_frame_once_in_order_and_none_is_too_long(frames: int) -> None:
     given_ = [np.arange(begin, end)[kept] for begin, end, kept in _chunks(frames)]
@@ -116,7 +115,6 @@ def test_chunks_give_every_frame_once_in_order_and_none_is_too_long(frames: int)
     assert all(0 < end - begin <= 750 for begin, end, _ in _chunks(frames))
 
 
-@settings(max_examples=40, deadline=None)
 @given(
     seed=st.integers(0, 1000),
     length=st.sampled_from([1e-3, 1.0, 30.0, 1e3]),

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.camera import Pinhole, Rig
@@ -119,7 +119,6 @@ def test_kinds_of_a_class_add_up_against_a_likelier_kind_of_another() -> None:
     assert summed.sum(axis=2).max() == pytest.approx(0.65, abs=1e-5)
 
 
-@settings(max_examples=20, deadline=None)
 @given(st.lists(st.sampled_from([k for ks in KINDS_OF_CLASS.values() for k in ks]), min_size=1, max_size=20))
 def test_the_sums_of_classes_keep_all_probability_that_is_scored(kinds: list[str]) -> None:
     p = np.full((4, 4, len(kinds)), 1.0 / len(kinds), np.float32)

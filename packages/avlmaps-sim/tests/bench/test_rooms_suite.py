@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps_sim.bench.harness.intervals import median_interval
@@ -45,7 +45,6 @@ def test_an_oracle_is_right_and_a_map_without_rooms_is_not() -> None:
     assert [(room.overlap, room.is_named) for room in nothing.rooms] == [(0.0, False)] * 2 and nothing.listed == 0
 
 
-@settings(max_examples=15, deadline=None)
 @given(st.integers(0, 10_000))
 def test_order_does_not_matter_and_no_overlap_is_counted_twice(seed: int) -> None:
     rng, floor = np.random.default_rng(seed), true_floor(0.9)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.recordings.audio import Sound
@@ -37,7 +37,6 @@ def along(positions: np.ndarray, heading_rad: float = 0.0) -> np.ndarray:
 
 
 @given(st.floats(1.0, 8.0), st.floats(0.0, 2 * np.pi), st.floats(-0.8, 0.8))
-@settings(max_examples=10, deadline=None)
 def test_direct_sound_reaches_each_microphone_when_its_distance_says(far_m: float, angle: float, up_m: float) -> None:
     ears = np.array([0.0, 0.0, 1.2]) + SQUARE
     source = np.array([far_m * np.cos(angle), far_m * np.sin(angle), 1.2 + up_m])

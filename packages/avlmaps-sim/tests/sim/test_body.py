@@ -4,7 +4,7 @@ from math import hypot, pi
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import NavigationError
@@ -170,7 +170,6 @@ def test_noise_needs_a_generator_and_repeats_with_it():
     assert ends[0].distance_m(START) > 0.01
 
 
-@settings(max_examples=10)
 @given(seed=st.integers(0, 1000))
 def test_what_it_is_near_to_is_what_the_scene_has_there(seed):
     """The cut's distances, against distances to points spread over the triangles."""

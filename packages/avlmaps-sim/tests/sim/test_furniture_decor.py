@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps_sim.furniture import families, make
@@ -67,7 +67,6 @@ def test_families_differ_and_some_are_held_out(category: str) -> None:
 
 
 @given(st.sampled_from(_ALL), st.integers(0, 2**31))
-@settings(max_examples=30, deadline=None)
 def test_the_seed_alone_decides_the_piece(pair: tuple[str, str], seed: int) -> None:
     first, second = (make(pair[0], np.random.default_rng(seed), name=pair[1]) for _ in range(2))
     np.testing.assert_array_equal(first.mesh.vertex, second.mesh.vertex)
@@ -76,7 +75,6 @@ def test_the_seed_alone_decides_the_piece(pair: tuple[str, str], seed: int) -> N
 
 
 @given(st.integers(0, 2**31), st.floats(0.65, 2.0), st.floats(1.9, 2.4), st.floats(0.08, 0.35))
-@settings(max_examples=15, deadline=None)
 def test_a_closed_door_fills_its_hole_and_keeps_within_its_trims(
     seed: int, width: float, height: float, wall: float
 ) -> None:
@@ -98,7 +96,6 @@ def test_an_open_door_turns_into_the_room_and_leaves_the_hole_free() -> None:
 
 
 @given(st.integers(0, 2**31), st.floats(0.5, 2.6), st.floats(0.5, 2.4), st.floats(0.08, 0.4))
-@settings(max_examples=15, deadline=None)
 def test_a_window_closes_its_hole(seed: int, width: float, height: float, wall: float) -> None:
     mesh = window(np.random.default_rng(seed), width, height, wall).mesh
     assert width - 1e-5 <= mesh.size[1] <= width + 0.26
@@ -110,7 +107,6 @@ def test_a_window_closes_its_hole(seed: int, width: float, height: float, wall: 
 
 
 @given(st.integers(0, 2**31), st.floats(0.7, 2.6), st.floats(1.9, 2.4), st.floats(0.08, 0.3))
-@settings(max_examples=10, deadline=None)
 def test_a_folding_door_keeps_to_its_hole(seed: int, width: float, height: float, wall: float) -> None:
     mesh = folding_door(np.random.default_rng(seed), width, height, wall).mesh
     assert width <= mesh.size[1] <= width + 0.21
@@ -127,7 +123,6 @@ def test_styles_come_from_the_asked_set(which: str) -> None:
 
 
 @given(st.integers(0, 2**31), st.floats(0.6, 3.2), st.floats(0.6, 2.8))
-@settings(max_examples=10, deadline=None)
 def test_a_curtain_hangs_before_the_wall_between_hem_and_rod(seed: int, width: float, height: float) -> None:
     mesh = curtain(np.random.default_rng(seed), width, height).mesh
     assert mesh.low[0] >= -1e-6 and mesh.high[0] < 0.3

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps_sim.furniture import families, make
@@ -94,7 +94,6 @@ def test_worktops_lie_at_the_height_of_a_kitchen(name: str) -> None:
         assert any(0.8 <= top.z <= 1.0 for top in piece.supports)
 
 
-@settings(max_examples=30, deadline=None)
 @given(st.floats(0.05, 2.0), st.floats(0.05, 2.0), st.floats(2.0, 30.0))
 def test_an_outline_fills_more_of_its_rectangle_the_squarer_it_is(length: float, width: float, power: float) -> None:
     def area(flat: np.ndarray) -> float:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.lexicon import EntryKind, lexicon
@@ -42,7 +42,6 @@ def test_families_differ_and_some_are_held_out(category: str) -> None:
 
 
 @given(st.integers(0, 2**31), st.floats(0.3, 0.7))
-@settings(max_examples=25, deadline=None)
 def test_who_sits_touches_the_seat_and_not_the_ground_below_the_floor(seed: int, seat_m: float) -> None:
     mesh = seated(np.random.default_rng(seed), seat_m)
     assert float(mesh.low[2]) > -0.2  # feet reach the floor or hang over it, but for the longest legs on low seats
@@ -51,7 +50,6 @@ def test_who_sits_touches_the_seat_and_not_the_ground_below_the_floor(seed: int,
 
 
 @given(st.integers(0, 2**31), st.floats(0.3, 0.7), st.floats(0.01, 0.2))
-@settings(max_examples=25, deadline=None)
 def test_what_is_thrown_over_an_edge_hangs_down_on_both_sides_and_clear_of_it(
     seed: int, wide: float, thick: float
 ) -> None:

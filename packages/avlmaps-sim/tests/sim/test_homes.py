@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy import ndimage
 
@@ -150,7 +150,6 @@ def test_training_homes_hold_no_shape_that_is_held_out() -> None:
             assert thing.family not in held_out
 
 
-@settings(max_examples=60, deadline=None)
 @given(length_m=st.floats(1.7, 9.0), seed=st.integers(0, 999))
 @example(length_m=4.169982735479752, seed=63)
 def test_a_gap_of_an_open_plan_fits_into_its_wall(length_m: float, seed: int) -> None:
@@ -161,7 +160,6 @@ def test_a_gap_of_an_open_plan_fits_into_its_wall(length_m: float, seed: int) ->
         assert hole.at_m + hole.width_m / 2 < length_m - 0.14
 
 
-@settings(max_examples=25, deadline=None)
 @given(st.integers(0, 10_000))
 def test_rooms_tile_their_outline(seed: int) -> None:
     """The rooms cover the outline without overlap, and each stretch of a side has one wall."""
@@ -176,7 +174,6 @@ def test_rooms_tile_their_outline(seed: int) -> None:
     assert np.max(np.sum([inside(p, places, -1e-6) for p in polygons], axis=0)) <= 1
 
 
-@settings(max_examples=40, deadline=None)
 @given(st.floats(0.1, 0.9), st.floats(-3.1, 3.1), st.integers(0, 99))
 def test_a_cut_gives_each_part_its_share(share: float, heading_rad: float, seed: int) -> None:
     polygon = rectangle(0.0, 0.0, 6.0, 4.0)
@@ -190,7 +187,6 @@ def test_shrinking_moves_every_side_inwards() -> None:
     np.testing.assert_allclose(widths_m(shrunk(rectangle(0.0, 0.0, 4.0, 3.0), 0.25)), (2.5, 3.5))
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.floats(-2, 2), st.floats(-2, 2), st.floats(-3, 3))
 def test_rectangles_overlap_as_their_points_do(x: float, y: float, heading_rad: float) -> None:
     a = corners_of(np.zeros((1, 2)), np.array([[1.0, 0.5]]), np.zeros(1))

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.camera import Pinhole
@@ -84,7 +84,6 @@ def test_the_reflection_is_a_view_of_the_world_turned_round():
 
 
 @given(st.integers(0, 2**31), st.tuples(*[st.floats(-1, 1)] * 3), st.floats(-1, 1))
-@settings(max_examples=50, deadline=None)
 def test_cutting_leaves_what_lies_in_front(seed: int, normal: tuple[float, float, float], offset: float):
     across = np.array(normal)
     if np.linalg.norm(across) < 0.1:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import Delaunay
 
@@ -72,7 +72,6 @@ def test_depth_of_a_fine_sphere_is_that_of_the_sphere():
     assert not depth[under_root < -0.02 * a * radius**2].any()
 
 
-@settings(max_examples=15, deadline=None)
 @given(seed=st.integers(0, 10_000), heading=st.floats(-3.1, 3.1), shift=st.floats(-5, 5))
 def test_moving_the_world_and_the_camera_together_changes_no_depth(seed, heading, shift):
     mesh = soup(np.random.default_rng(seed), 30)
@@ -86,7 +85,6 @@ def test_moving_the_world_and_the_camera_together_changes_no_depth(seed, heading
     assert np.mean(~np.isclose(before, after, rtol=1e-3)) < 2e-3
 
 
-@settings(max_examples=15, deadline=None)
 @given(seed=st.integers(0, 10_000))
 def test_a_surface_cut_into_slivers_has_neither_holes_nor_overlap(seed):
     rng = np.random.default_rng(seed)
@@ -111,7 +109,6 @@ def test_each_pixel_of_a_cut_surface_belongs_to_exactly_one_piece():
     assert np.array_equal((one > 0) | (other > 0), both > 0)
 
 
-@settings(max_examples=20, deadline=None)
 @given(seed=st.integers(0, 10_000))
 def test_nothing_behind_the_camera_is_seen(seed):
     mesh = soup(np.random.default_rng(seed), 20)

@@ -107,7 +107,6 @@ def test_a_bare_room_sounds_as_loud_as_all_its_image_sources_together() -> None:
     st.floats(0.0, 3.0),
     st.integers(0, 1),
 )
-@settings(max_examples=25, deadline=None)
 def test_coupled_rooms_hold_the_energy_that_the_steady_state_says(
     absorbing: list[float], opening_m2: float, source: int
 ) -> None:
@@ -189,7 +188,6 @@ def test_a_storey_away_only_the_slab_lets_something_through() -> None:
 
 
 @given(st.lists(st.floats(0.001, 2.0), min_size=len(BANDS_HZ), max_size=len(BANDS_HZ)))
-@settings(max_examples=25, deadline=None)
 def test_a_shaped_impulse_has_the_asked_gains_and_begins_at_once(gain: list[float]) -> None:
     smooth = np.convolve(np.log(np.pad(gain, 2, mode="edge")), np.ones(5) / 5, mode="valid")
     made = shaped_impulse(np.exp(smooth), 22_050)
