@@ -24,6 +24,8 @@ gc.disable()
 
 from hypothesis import settings  # noqa: E402
 
+pytest_plugins = ["helpers.processor_seconds"]
+
 settings.register_profile("change", deadline=None, max_examples=10, derandomize=True)
 settings.register_profile("nightly", deadline=None, max_examples=40, derandomize=True)
 settings.load_profile(os.environ.get("AVLMAPS_TESTS", "change"))
