@@ -34,7 +34,7 @@ FAST := tests/core tests/test_imports.py tests/test_conventions.py tests/query/t
 # The further Pythons that `make dist-test` tries; each needs the locked dependencies once, from the network.
 PYTHONS ?=
 
-.PHONY: help demo test nightly test-most test-fast dist-test test-kernels bounds test-foundation test-ros1 faults-ros1 types-foundation test-ros2 faults-ros2 test-cluster python312 lint format pictures docs fuzz bench train lock clean
+.PHONY: help demo test nightly test-most test-fast dist-test test-kernels bounds test-foundation test-ros1 faults-ros1 types-foundation test-ros2 faults-ros2 test-cluster python312 lint budget format pictures docs fuzz bench train lock clean
 
 help:  ## Show what can be made.
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -52,6 +52,7 @@ demo: $(READY)  ## Make a home, walk it, hear it, map it, ask it; pictures land 
 
 test: $(READY)  ## Run what every change must pass (offline, two cores, no GPU).
 	$(RUN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder --durations=30 -m "not nightly"
+	$(RUN)/python tests/helpers/budget.py seconds
 
 nightly: $(READY)  ## Run every test: laws on four times the cases, fuzz, kills, lists, suites, browser (an hour).
 	AVLMAPS_TESTS=nightly $(RUN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder --durations=30
@@ -86,12 +87,15 @@ faults-ros1: $(READY)  ## Break a drive on ROS 1 in 200 random ways (ROSBRIDGE=D
 types-foundation: $(TORCH)/.ready  ## Check the types of the models on torch.
 	$(TORCH)/bin/basedpyright -p requirements/pyright-foundation.json
 
-lint: $(READY)  ## Check style, types, the order of imports and the words of the prose.
+lint: $(READY)  ## Check style, types, the order of imports and the budget of lines, files, kernels and words.
 	$(RUN)/ruff check .
 	$(RUN)/ruff format --check .
 	$(RUN)/basedpyright
 	$(RUN)/lint-imports
-	$(RUN)/python tests/helpers/vocabulary.py
+	$(RUN)/python tests/helpers/budget.py
+
+budget: $(READY)  ## Lower the numbers of .ci/budget.toml to today's counts.
+	$(RUN)/python tests/helpers/budget.py --lower
 
 # A virtual environment with the locked dependencies, and with others: of which Python, and the name of their file.
 define ENVIRONMENT
