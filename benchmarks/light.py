@@ -21,11 +21,11 @@ from tempfile import TemporaryDirectory  # noqa: E402
 import numpy as np  # noqa: E402
 
 from avlmaps.core.camera import Pinhole, Rig  # noqa: E402
-from avlmaps.perception.light.bundle import open_bundle  # noqa: E402
-from avlmaps.perception.light.pixels import LightPixels  # noqa: E402
-from avlmaps.perception.light.sounds import LightSounds  # noqa: E402
 from avlmaps.perception.models.settings import ModelSettings, using_models  # noqa: E402
 from avlmaps.recordings.types import Frame  # noqa: E402
+from avlmaps_models.light.bundle import open_bundle  # noqa: E402
+from avlmaps_models.light.pixels import LightPixels  # noqa: E402
+from avlmaps_models.light.sounds import LightSounds  # noqa: E402
 from models import frame, sound  # noqa: E402
 
 

@@ -10,8 +10,8 @@ import pytest
 
 from avlmaps.core.lexicon import EntryKind, lexicon, squeezed
 from avlmaps.perception.embedded.words import EmbeddedWords
-from avlmaps.perception.models.prompts import THINGS
 from avlmaps.query.modalities.area import AREA_NAMES
+from avlmaps_models.common.prompts import THINGS
 from avlmaps_sim.demo import questions
 from avlmaps_sim.furniture import categories
 from avlmaps_sim.hearing import KINDS as SOUND_KINDS

@@ -108,7 +108,7 @@ def answer(python: Path, cwd: Path, *words: object, status: int = 0) -> dict[str
 def alone(python: Path, cwd: Path) -> None:
     """Try `avlmaps` without the other two."""
     assert run(python.with_name("avlmaps"), "--version", cwd=cwd).startswith("avlmaps ")
-    assert {one["name"] for one in answer(python, cwd, "profiles")["profiles"]} >= {"embedded", "light"}
+    assert {one["name"] for one in answer(python, cwd, "profiles")["profiles"]} >= {"embedded", "colours"}
     run(python, "-c", _WALK, cwd / "rec", cwd=cwd, PYTHONPATH=str(ROOT / "tests"))
     answer(python, cwd, "build", "rec", "--out", "room.avlmap", "--voxel-size-m", "0.1")
     found = answer(python, cwd, "query", "room.avlmap", "a chair")

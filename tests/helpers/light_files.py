@@ -11,8 +11,8 @@ import msgspec
 import numpy as np
 
 from avlmaps.core.files import sha256_of_file
-from avlmaps.perception.light import bundle as files
-from avlmaps.perception.light.tokens import TokenList
+from avlmaps_models.light import bundle as files
+from avlmaps_models.light.tokens import TokenList
 
 DIM, PATCH, BANDS = 8, 14, 8
 KNOWN = ("chair", "sofa", "other", "office chair")

@@ -11,8 +11,8 @@ import tyro
 from training.light.export import export_pictures, export_sounds, write_manifest, write_words
 
 from avlmaps.core.errors import BackendError
-from avlmaps.perception.light.bundle import MODEL
 from avlmaps.perception.models.settings import ModelSettings, using_models
+from avlmaps_models.light.bundle import MODEL
 
 
 @dataclass(frozen=True)

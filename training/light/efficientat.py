@@ -14,7 +14,7 @@ from training.sounds.efficientat import EfficientAT, opinion, read_efficientat
 from training.sounds.mixtures import of_training, read_audio
 
 from avlmaps.core.progress import progress, say
-from avlmaps.perception.light import efficientat as backend
+from avlmaps_models.light import efficientat as backend
 
 ROOT = Path(__file__).resolve().parents[2]
 _OPSET = 17

@@ -17,16 +17,16 @@ from training.light.towers import PictureTower, PictureWords, SoundTower, SoundW
 
 from avlmaps.core.files import sha256_of_file
 from avlmaps.core.lexicon import EntryKind, lexicon
-from avlmaps.perception.light import bundle as files
-from avlmaps.perception.light.sounds import log_mel
-from avlmaps.perception.light.tokens import Tokens
-from avlmaps.perception.light.tower import interpolation, resized
-from avlmaps.perception.models.checksums import checksum_of, weights_in
 from avlmaps.perception.models.names import public_name
-from avlmaps.perception.models.prompts import AREA_PROMPTS, TIPS_PROMPTS, clean, mean_direction
-from avlmaps.perception.models.sound_scores import OTHERS
+from avlmaps_models.common.checksums import checksum_of, weights_in
 from avlmaps_models.common.pretrained import load_helper, load_pretrained, pretrained_folder
+from avlmaps_models.common.prompts import AREA_PROMPTS, TIPS_PROMPTS, clean, mean_direction
+from avlmaps_models.common.sound_scores import OTHERS
 from avlmaps_models.foundation.clap import PROMPT as SOUND_PROMPT
+from avlmaps_models.light import bundle as files
+from avlmaps_models.light.sounds import log_mel
+from avlmaps_models.light.tokens import Tokens
+from avlmaps_models.light.tower import interpolation, resized
 
 _CPU = torch.device("cpu")
 _OPSET = 17
@@ -260,7 +260,7 @@ def _small_vectors(path: Path, tokens: Tokens, phrases: Sequence[str], prompts: 
 
 
 def _picture_input(rgb: np.ndarray, note: files.PictureNote) -> dict[str, np.ndarray]:
-    from avlmaps.perception.models.picture_sizes import working_size
+    from avlmaps_models.common.picture_sizes import working_size
 
     height, width = working_size(rgb.shape[0], rgb.shape[1], note.short_side, note.patch)
     return {

@@ -1,4 +1,4 @@
-"""Writing a published tokenizer as the plain list that `perception/light/tokens.py` reads, and proving it equal."""
+"""Writing a published tokenizer as the plain list that `avlmaps_models/light/tokens.py` reads, and proving it equal."""
 
 import gzip
 import json
@@ -8,7 +8,7 @@ from typing import Any
 
 import msgspec
 
-from avlmaps.perception.light.tokens import TokenList, Tokens
+from avlmaps_models.light.tokens import TokenList, Tokens
 
 _SENTENCEPIECE = ["WhitespaceSplit", "Metaspace"]
 _PLAIN = ("Lowercase", "Precompiled", "NFKC")

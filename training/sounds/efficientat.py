@@ -15,8 +15,8 @@ import torch.nn.functional as functional
 from jaxtyping import Float32
 from torch import Tensor, nn
 
-from avlmaps.perception.light.efficientat import RATE_HZ, log_mel
 from avlmaps.recordings.audio import Sound, resample
+from avlmaps_models.light.efficientat import RATE_HZ, log_mel
 
 NORM_EPSILON = 1e-3  # of the batch norms
 

@@ -20,8 +20,8 @@ from training.sounds.kinds import MADE, NAMES
 
 from avlmaps.core.progress import progress
 from avlmaps.perception.embedded import logmel
-from avlmaps.perception.light.efficientat import RATE_HZ
 from avlmaps.recordings.audio import Sound, resample
+from avlmaps_models.light.efficientat import RATE_HZ
 from avlmaps_sim.synthesis import MAKERS
 
 SECONDS = 5.2  # one window of the encoder

@@ -7,7 +7,10 @@ from tyro.conf import arg
 
 from avlmaps.cli.output import emit, table_lines
 from avlmaps.cli.verb import ModelVerb
+from avlmaps.core.distributions import how_to_get
 from avlmaps.core.errors import BackendError
+
+FETCHERS_GROUP = "avlmaps.fetchers"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,9 +44,13 @@ class Profiles(ModelVerb):
         emit(answer, lines, self.json)
 
     def _bring(self) -> None:
-        from avlmaps.perception.light.fetch import fetch_light
+        from avlmaps.core.registry import brought, entry_points
 
-        found = fetch_light(self.source or "")
+        fetchers = entry_points(FETCHERS_GROUP).select(name=self.fetch)
+        if not fetchers:
+            get = how_to_get("profiles", self.fetch or "")
+            raise BackendError(f"The profile {self.fetch!r} is not installed; get it with: {get}")
+        found = brought(next(iter(fetchers)), "the fetcher")(self.source or "")
         whole = sum(note.bytes for note in found.manifest.files.values())
         answer = {
             "fetched": found.manifest.id,

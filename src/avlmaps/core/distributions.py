@@ -32,8 +32,9 @@ SIMULATOR = Distribution("avlmaps-sim", verbs=("demo", "record", "add-sounds", "
 MODELS = Distribution(
     "avlmaps-models",
     verbs=("import-map",),
-    profiles=("foundation", "paper"),
+    profiles=("light", "foundation", "paper"),
     backends=(
+        "pixels:light", "views:light", "sounds:light", "sounds:efficientat",
         "pixels:tipsv2", "pixels:clip-patches", "pixels:regions", "pixels:lseg",
         "views:siglip2", "views:clip", "views:clip-paper",
         "sounds:clap", "sounds:pe-a-frame", "sounds:audioclip",

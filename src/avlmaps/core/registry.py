@@ -103,39 +103,11 @@ _BUILT_IN = (
     Backend(Kind.MATCHER, "mutual-ratio", f"{_EMBEDDED}.matching:MutualRatio"),
 )
 
-
-def _light(kind: Kind, target: str) -> Backend:
-    """Return the entry of a backend that runs small copies of published models in onnxruntime."""
-    place = f"avlmaps.perception.light.{target}"
-    return Backend(
-        kind,
-        "light",
-        place,
-        model="avlmaps/light-1",
-        licence="Apache-2.0",
-        slow=True,
-        keyframes_only=kind is Kind.PIXELS,
-    )
-
-
-_LIGHT = (
-    _light(Kind.PIXELS, "pixels:LightPixels"),
-    _light(Kind.VIEWS, "views:LightViews"),
-    _light(Kind.SOUNDS, "sounds:LightSounds"),
-    Backend(
-        Kind.SOUNDS,
-        "efficientat",
-        "avlmaps.perception.light.efficientat:EfficientATSounds",
-        model="efficientat/mn04_as.onnx",
-        licence="MIT",
-    ),
-)
 _TRAINED = (
     Backend(Kind.PIXELS, "trained", f"{_EMBEDDED}.trained:trained_pixels", model="eyes", licence="your own"),
     Backend(Kind.VIEWS, "trained", f"{_EMBEDDED}.trained:trained_views", model="eyes", licence="your own"),
 )
-_ALL = (*_BUILT_IN, *_LIGHT, *_TRAINED)
-_registered: dict[tuple[Kind, str], Backend] = {(b.kind, b.name): b for b in _ALL}
+_registered: dict[tuple[Kind, str], Backend] = {(b.kind, b.name): b for b in (*_BUILT_IN, *_TRAINED)}
 
 
 def entry_points(group: str) -> "EntryPoints":

@@ -231,16 +231,6 @@ register_profile(
 register_profile(
     replace(
         _EMBEDDED,
-        name="light",
-        pixels="light",
-        views="light",
-        sounds="light",
-        about="any word for things, rooms and sounds on a CPU without torch; files of 250 MB, fetched once",
-    )
-)
-register_profile(
-    replace(
-        _EMBEDDED,
         name="synthetic",
         pixels="embedded-synthetic",
         views="embedded-synthetic",

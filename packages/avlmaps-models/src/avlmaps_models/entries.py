@@ -1,12 +1,13 @@
-"""What is known of the models on torch before one is loaded: backends, profiles, and where each model is published."""
+"""What is known of the models before one is loaded: backends, profiles, and where each model is published."""
 
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 from avlmaps.core.distributions import MODELS
 from avlmaps.core.registry import Backend, Kind
 from avlmaps.perception.models.published_models import Published
-from avlmaps.perception.profiles import Profile
+from avlmaps.perception.profiles import Profile, profile
 
 
 def _keypoints(repository: str, file: str, size_mb: float, *cached: str) -> Published:
@@ -21,6 +22,9 @@ _REGIONS = "facebook/sam2.1-hiera-tiny"
 _LIGHTGLUE = "kornia/lightglue"
 
 PUBLISHED: dict[str, Published] = {
+    "avlmaps/light-1": Published(
+        fetched="manifest.json", get="avlmaps profiles --fetch light --from URL|DIR", size_mb=250
+    ),
     "google/tipsv2-b14": Published(size_mb=750),
     "google/siglip2-base-patch16-224": Published(size_mb=1500),
     "openai/clip-vit-base-patch16": Published(size_mb=600),
@@ -69,7 +73,27 @@ def _with_torch(
 
 
 _foundation, _paper = partial(_with_torch, "foundation"), partial(_with_torch, "paper")
+
+
+def _light(kind: Kind, target: str) -> Backend:
+    """Return the entry of a backend that runs small copies of published models in onnxruntime."""
+    place = f"avlmaps_models.light.{target}"
+    frames = {"keyframes_only": kind is Kind.PIXELS, "distribution": MODELS.name}
+    return Backend(kind, "light", place, model="avlmaps/light-1", licence="Apache-2.0", slow=True, **frames)
+
+
 BACKENDS = (
+    _light(Kind.PIXELS, "pixels:LightPixels"),
+    _light(Kind.VIEWS, "views:LightViews"),
+    _light(Kind.SOUNDS, "sounds:LightSounds"),
+    Backend(
+        Kind.SOUNDS,
+        "efficientat",
+        "avlmaps_models.light.efficientat:EfficientATSounds",
+        model="efficientat/mn04_as.onnx",
+        licence="MIT",
+        distribution=MODELS.name,
+    ),
     _foundation(Kind.PIXELS, "tipsv2", "tipsv2:TipsPixels", "google/tipsv2-b14", "Apache-2.0", "transformers"),
     _foundation(
         Kind.PIXELS, "clip-patches", "clip_patches:ClipPatches", "openai/clip-vit-base-patch16", "MIT", "transformers"
@@ -139,6 +163,14 @@ BACKENDS = (
     ),
 )
 
+LIGHT = replace(
+    profile("embedded"),
+    name="light",
+    pixels="light",
+    views="light",
+    sounds="light",
+    about="any word for things, rooms and sounds on a CPU without torch; files of 250 MB, fetched once",
+)
 FOUNDATION = Profile(
     name="foundation",
     pixels="tipsv2",

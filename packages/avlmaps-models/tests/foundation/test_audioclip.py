@@ -14,8 +14,8 @@ from tiny.audioclip import DIM, MODEL, tiny_state, write_audioclip
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Kind, load
 from avlmaps.perception.conformance import check, example_sound
-from avlmaps.perception.models.sound_windows import windows
 from avlmaps.recordings.audio import Sound
+from avlmaps_models.common.sound_windows import windows
 from avlmaps_models.paper.audioclip import AudioClipSounds
 from avlmaps_models.paper.fbsp import FrontEnd
 

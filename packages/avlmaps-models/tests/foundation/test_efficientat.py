@@ -15,9 +15,9 @@ from training.sounds.mixtures import read_audio
 
 from avlmaps.core.registry import Kind, forget_loaded, load
 from avlmaps.perception.conformance import check
-from avlmaps.perception.light.efficientat import MODEL, RATE_HZ, EfficientATSounds
 from avlmaps.perception.models.settings import ModelSettings, using_models
 from avlmaps.recordings.audio import Sound
+from avlmaps_models.light.efficientat import MODEL, RATE_HZ, EfficientATSounds
 
 SHARED = Path(__file__).resolve().parents[5] / "shared"
 TEACHER, NAMES = SHARED / "teachers" / "mn04_as_mAP_432.pt", SHARED / "teachers" / "class_labels_indices.csv"

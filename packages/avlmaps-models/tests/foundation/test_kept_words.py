@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from tiny.clip import write_clip
 
-from avlmaps.perception.cache.text_features import KeptWords
-from avlmaps.perception.models.prompts import Prompted
 from avlmaps.perception.models.settings import ModelSettings, using_models
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.perception.user_folder import cache_folder
+from avlmaps_models.common.kept_words import KeptWords
+from avlmaps_models.common.prompts import Prompted
 from avlmaps_models.foundation.clip import ClipViews
 
 CARD = ModelCard("made/up", 3, "MIT", "0" * 64, ("a {}", "the {}"))

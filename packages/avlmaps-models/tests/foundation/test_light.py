@@ -22,17 +22,17 @@ from training.light.tokenizers import UnknownTokenizerError, list_of, write_toke
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.registry import Kind, forget_loaded, load
 from avlmaps.perception.conformance import check, example_frame, example_sound
-from avlmaps.perception.light import bundle as files
-from avlmaps.perception.light.pixels import LightPixels
-from avlmaps.perception.light.sounds import LightSounds, log_mel
-from avlmaps.perception.light.tower import interpolation
-from avlmaps.perception.light.views import LightViews
-from avlmaps.perception.models.prompts import AREA_PROMPTS, THINGS, TIPS_PROMPTS, clean
 from avlmaps.perception.models.settings import ModelSettings, using_models
-from avlmaps.perception.models.sound_scores import OTHERS
 from avlmaps.query.modalities.area import AREA_NAMES
+from avlmaps_models.common.prompts import AREA_PROMPTS, THINGS, TIPS_PROMPTS, clean
+from avlmaps_models.common.sound_scores import OTHERS
 from avlmaps_models.foundation.clap import ClapSounds
 from avlmaps_models.foundation.tipsv2 import TipsPixels
+from avlmaps_models.light import bundle as files
+from avlmaps_models.light.pixels import LightPixels
+from avlmaps_models.light.sounds import LightSounds, log_mel
+from avlmaps_models.light.tower import interpolation
+from avlmaps_models.light.views import LightViews
 
 CLAP = "laion/clap-htsat-unfused"
 KEPT = 0.95  # of float's ranking, see training/light/parity.py

@@ -11,8 +11,8 @@ from tiny.clip_patches import DIM, HEADS, IMAGE, PATCH, SCALE, WIDTH, write_clip
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Kind, load
 from avlmaps.perception.conformance import check, example_frame
-from avlmaps.perception.models.prompts import CLIP_PROMPTS
 from avlmaps.perception.protocols import BatchPixelEncoder, ScaledEncoder
+from avlmaps_models.common.prompts import CLIP_PROMPTS
 from avlmaps_models.foundation.clip_patches import ClipPatches
 
 HUB_ID = "openai/clip-vit-base-patch16"

@@ -12,8 +12,8 @@ from tiny.tipsv2 import HEADS, IMAGE, PATCH, WIDTH, write_tipsv2
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Kind, load
 from avlmaps.perception.conformance import check, example_frame
-from avlmaps.perception.models.prompts import TIPS_PROMPTS
 from avlmaps.perception.protocols import BatchPixelEncoder, ScaledEncoder
+from avlmaps_models.common.prompts import TIPS_PROMPTS
 from avlmaps_models.foundation.tipsv2 import TipsPixels
 
 HUB_ID = "google/tipsv2-b14"

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import BackendError
-from avlmaps.perception.models.picture_sizes import working_size
-from avlmaps.perception.models.prompts import CLIP_PROMPTS, THINGS, TIPS_PROMPTS, Prompted, mean_direction
+from avlmaps_models.common.picture_sizes import working_size
+from avlmaps_models.common.prompts import CLIP_PROMPTS, THINGS, TIPS_PROMPTS, Prompted, mean_direction
 from avlmaps_models.foundation.pictures import split_model_way
 
 

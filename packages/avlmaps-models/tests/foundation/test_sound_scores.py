@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps.perception.models.sound_scores import OTHERS, Contrast, one_kind
+from avlmaps_models.common.sound_scores import OTHERS, Contrast, one_kind
 
 DIM = 512
 SCALE = 18.0  # about what CLAP learnt

@@ -13,8 +13,8 @@ from tiny.siglip2 import BIAS, IMAGE, PLACES, SCALE, write_siglip2
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Kind
 from avlmaps.perception.conformance import check, example_frame
-from avlmaps.perception.models.prompts import AREA_PROMPTS
 from avlmaps.perception.protocols import NamedViewEncoder, ScaledEncoder
+from avlmaps_models.common.prompts import AREA_PROMPTS
 from avlmaps_models.foundation.siglip2 import SiglipTokens, SiglipViews
 
 MODEL, NAFLEX = "google/siglip2-base-patch16-224", "google/siglip2-base-patch16-naflex"

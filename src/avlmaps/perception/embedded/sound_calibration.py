@@ -9,8 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.perception.models.sound_scores import sigmoid
-
 Array = Float[np.ndarray, "..."]
 
 
@@ -122,3 +120,8 @@ def taught_lead(
 ) -> Float[np.ndarray, " windows"]:
     """Return how much nearer each window is to the nearest taught example than to any known one (cosines)."""
     return (features @ examples.T).max(axis=1).astype(np.float64) - near.max(axis=1)
+
+
+def sigmoid(x: Array) -> Array:
+    """Return the logistic function."""
+    return 0.5 * (1.0 + np.tanh(0.5 * x))

@@ -30,9 +30,6 @@ class Published:
 
 # By the name that a profile or the registry gives them. A model that is not here is looked for by its name.
 PUBLISHED: dict[str, Published] = {
-    "avlmaps/light-1": Published(
-        fetched="manifest.json", get="avlmaps profiles --fetch light --from URL|DIR", size_mb=250
-    ),
     "eyes": Published(get="python -m training.pixels --out MODELS/eyes (docs/guides/train-eyes.md)"),
 }
 

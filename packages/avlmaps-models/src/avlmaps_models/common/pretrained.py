@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import torch
 
 from avlmaps.core.errors import BackendError
-from avlmaps.perception.models.checksums import weights_in
+from avlmaps_models.common.checksums import weights_in
 from avlmaps_models.common.files import model_folder
 from avlmaps_models.common.published import differences
 

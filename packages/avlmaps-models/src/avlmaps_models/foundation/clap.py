@@ -19,14 +19,14 @@ import numpy as np
 import torch
 from jaxtyping import Float32
 
-from avlmaps.perception.models.checksums import checksum_of, weights_in
 from avlmaps.perception.models.names import public_name
-from avlmaps.perception.models.sound_windows import by_portions, usable_samples, windows
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.audio import Sound
+from avlmaps_models.common.checksums import checksum_of, weights_in
 from avlmaps_models.common.device import select_batch, select_device, unit_rows
 from avlmaps_models.common.precision import mixed_precision
 from avlmaps_models.common.pretrained import load_helper, load_pretrained, pretrained_folder
+from avlmaps_models.common.sound_windows import by_portions, usable_samples, windows
 from avlmaps_models.common.texts import text_features
 from avlmaps_models.foundation.open_sounds import ContrastSounds
 

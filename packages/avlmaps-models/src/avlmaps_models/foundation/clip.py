@@ -16,7 +16,7 @@ import numpy as np
 import torch
 from jaxtyping import UInt8
 
-from avlmaps.perception.models.checksums import weights_in
+from avlmaps_models.common.checksums import weights_in
 from avlmaps_models.common.pretrained import load_helper
 from avlmaps_models.common.texts import text_features
 from avlmaps_models.foundation.open_views import OpenViews, hub_model, image_processor, views_card

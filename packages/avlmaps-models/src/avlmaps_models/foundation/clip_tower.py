@@ -7,11 +7,11 @@ import numpy as np
 import torch
 from jaxtyping import Float, UInt8
 
-from avlmaps.perception.models.checksums import checksum_of, weights_in
 from avlmaps.perception.models.names import public_name
-from avlmaps.perception.models.prompts import CLIP_PROMPTS, Prompted
+from avlmaps_models.common.checksums import checksum_of, weights_in
 from avlmaps_models.common.device import inference, select_device, select_dtype, to_numpy
 from avlmaps_models.common.pretrained import load_helper, load_pretrained, pretrained_folder
+from avlmaps_models.common.prompts import CLIP_PROMPTS, Prompted
 from avlmaps_models.common.texts import text_features
 from avlmaps_models.foundation.open_views import licence_of
 from avlmaps_models.foundation.pictures import Size, stack_pictures

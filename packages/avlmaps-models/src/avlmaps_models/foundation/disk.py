@@ -16,8 +16,8 @@ from jaxtyping import UInt8
 from kornia.feature import DISK
 
 from avlmaps.core.errors import BackendError
-from avlmaps.perception.models.checksums import checksum_of
 from avlmaps.perception.protocols import LocalFeatures, ModelCard
+from avlmaps_models.common.checksums import checksum_of
 from avlmaps_models.common.device import inference, select_device, to_numpy, unit_rows
 from avlmaps_models.common.pictures import has_nothing, local_features, no_features, shrunk
 from avlmaps_models.common.published import load_strictly, published_file, read_tensors

@@ -14,8 +14,8 @@ from jaxtyping import Int
 from kornia.feature import LightGlue as KorniaLightGlue
 
 from avlmaps.core.errors import BackendError
-from avlmaps.perception.models.checksums import checksum_of
 from avlmaps.perception.protocols import LocalFeatures, ModelCard
+from avlmaps_models.common.checksums import checksum_of
 from avlmaps_models.common.device import select_device
 from avlmaps_models.common.matches import network_input, no_matches
 from avlmaps_models.common.precision import mixed_precision

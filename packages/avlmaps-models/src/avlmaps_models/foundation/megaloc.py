@@ -24,9 +24,9 @@ from torch import nn
 from torch.nn import functional
 
 from avlmaps.core.errors import BackendError
-from avlmaps.perception.models.checksums import checksum_of, weights_in
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.protocols import LocalFeatures, ModelCard
+from avlmaps_models.common.checksums import checksum_of, weights_in
 from avlmaps_models.common.device import select_device, unit_rows
 from avlmaps_models.common.files import model_folder
 from avlmaps_models.common.precision import mixed_precision

@@ -6,10 +6,10 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from jaxtyping import Float32, UInt8
 
-from avlmaps.perception.models.prompts import THINGS, Prompted, clean
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.types import Frame
 from avlmaps_models.common.device import select_batch
+from avlmaps_models.common.prompts import THINGS, Prompted, clean
 from avlmaps_models.foundation.pictures import encode_in_batches
 
 

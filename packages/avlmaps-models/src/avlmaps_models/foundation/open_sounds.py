@@ -8,12 +8,12 @@ import numpy as np
 import torch
 from jaxtyping import Float32
 
-from avlmaps.perception.models.sound_scores import OTHERS, Contrast
-from avlmaps.perception.models.sound_windows import WORDS_AT_ONCE, by_portions
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.audio import Sound
 from avlmaps_models.common.device import select_device, unit_rows
 from avlmaps_models.common.precision import mixed_precision
+from avlmaps_models.common.sound_scores import OTHERS, Contrast
+from avlmaps_models.common.sound_windows import WORDS_AT_ONCE, by_portions
 
 
 class ContrastSounds(ABC):

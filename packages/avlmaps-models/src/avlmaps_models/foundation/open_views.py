@@ -10,15 +10,15 @@ import torch
 from jaxtyping import Float32, UInt8
 
 from avlmaps.core.errors import BackendError
-from avlmaps.perception.cache.text_features import KeptWords
-from avlmaps.perception.models.checksums import checksum_of
 from avlmaps.perception.models.names import public_name
-from avlmaps.perception.models.prompts import AREA_PROMPTS, Prompted
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.types import Frame
+from avlmaps_models.common.checksums import checksum_of
 from avlmaps_models.common.device import select_batch, select_device, unit_rows
+from avlmaps_models.common.kept_words import KeptWords
 from avlmaps_models.common.precision import mixed_precision
 from avlmaps_models.common.pretrained import load_helper, load_pretrained, pretrained_folder
+from avlmaps_models.common.prompts import AREA_PROMPTS, Prompted
 
 UNKNOWN_LICENCE = "LicenseRef-unknown"
 APPLE_RESEARCH = "LicenseRef-apple-amlr"

@@ -25,15 +25,15 @@ import numpy as np
 import torch
 from jaxtyping import Float, Float32
 
-from avlmaps.perception.models.checksums import checksum_of, weights_in
 from avlmaps.perception.models.names import public_name
-from avlmaps.perception.models.sound_scores import OTHERS, QUIET, joined, one_kind, sigmoid
-from avlmaps.perception.models.sound_windows import WORDS_AT_ONCE, by_portions, usable_samples
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.audio import Sound
+from avlmaps_models.common.checksums import checksum_of, weights_in
 from avlmaps_models.common.device import select_device, to_numpy
 from avlmaps_models.common.precision import mixed_precision
 from avlmaps_models.common.pretrained import load_helper, load_pretrained, pretrained_folder
+from avlmaps_models.common.sound_scores import OTHERS, QUIET, joined, one_kind, sigmoid
+from avlmaps_models.common.sound_windows import WORDS_AT_ONCE, by_portions, usable_samples
 from avlmaps_models.common.texts import text_tokens
 
 _MOST_TOKENS = 512

@@ -8,8 +8,8 @@ import torch
 from jaxtyping import Float32, UInt8
 
 from avlmaps.core.errors import BackendError
-from avlmaps.perception.models.picture_sizes import Size
 from avlmaps.recordings.types import Frame
+from avlmaps_models.common.picture_sizes import Size
 
 
 def stack_pictures(

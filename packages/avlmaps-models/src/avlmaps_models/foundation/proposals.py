@@ -13,8 +13,8 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float, Float32, Int, UInt8
 
-from avlmaps.perception.models.checksums import checksum_of, weights_in
 from avlmaps.perception.models.names import public_name
+from avlmaps_models.common.checksums import checksum_of, weights_in
 from avlmaps_models.common.device import select_device, to_numpy
 from avlmaps_models.common.precision import mixed_precision
 from avlmaps_models.common.pretrained import load_pretrained, pretrained_folder

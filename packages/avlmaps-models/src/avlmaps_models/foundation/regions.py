@@ -19,10 +19,10 @@ import numpy as np
 import torch
 from jaxtyping import Float32, UInt8
 
-from avlmaps.perception.models.picture_sizes import working_size
-from avlmaps.perception.models.prompts import CLIP_PROMPTS
 from avlmaps.perception.protocols import ModelCard
 from avlmaps_models.common.device import inference, select_batch, to_numpy, unit_rows
+from avlmaps_models.common.picture_sizes import working_size
+from avlmaps_models.common.prompts import CLIP_PROMPTS
 from avlmaps_models.foundation.clip_tower import ClipTower
 from avlmaps_models.foundation.open_pixels import OpenPixels
 from avlmaps_models.foundation.proposals import Proposals, ProposalSettings, Sam2Proposals

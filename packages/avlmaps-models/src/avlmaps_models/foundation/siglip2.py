@@ -27,7 +27,7 @@ import torch
 from jaxtyping import Int64, UInt8
 
 from avlmaps.core.errors import BackendError
-from avlmaps.perception.models.checksums import weights_in
+from avlmaps_models.common.checksums import weights_in
 from avlmaps_models.foundation.open_views import OpenViews, hub_model, image_processor, views_card
 
 _CLASSES = {"siglip": "SiglipModel", "siglip2": "Siglip2Model"}

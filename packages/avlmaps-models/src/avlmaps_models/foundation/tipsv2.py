@@ -21,11 +21,9 @@ import numpy as np
 import torch
 from jaxtyping import Float32, UInt8
 
-from avlmaps.perception.models.checksums import checksum_of, weights_in
 from avlmaps.perception.models.names import public_name
-from avlmaps.perception.models.picture_sizes import working_size
-from avlmaps.perception.models.prompts import TIPS_PROMPTS, Prompted
 from avlmaps.perception.protocols import ModelCard
+from avlmaps_models.common.checksums import checksum_of, weights_in
 from avlmaps_models.common.device import (
     inference,
     select_device,
@@ -33,7 +31,9 @@ from avlmaps_models.common.device import (
     to_numpy,
     unit_rows,
 )
+from avlmaps_models.common.picture_sizes import working_size
 from avlmaps_models.common.pretrained import load_helper, load_pretrained, pretrained_folder
+from avlmaps_models.common.prompts import TIPS_PROMPTS, Prompted
 from avlmaps_models.common.texts import text_features
 from avlmaps_models.foundation.open_pixels import OpenPixels
 from avlmaps_models.foundation.pictures import split_model_way, stack_pictures

@@ -21,15 +21,15 @@ import torch
 from jaxtyping import Float32
 
 from avlmaps.core.errors import BackendError
-from avlmaps.perception.models.checksums import checksum_of
 from avlmaps.perception.models.names import public_name
-from avlmaps.perception.models.sound_scores import OTHERS
-from avlmaps.perception.models.sound_windows import by_portions, usable_samples, windows
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.audio import Sound
+from avlmaps_models.common.checksums import checksum_of
 from avlmaps_models.common.device import inference, select_batch, select_device, unit_rows
 from avlmaps_models.common.precision import mixed_precision
 from avlmaps_models.common.published import load_strictly, published_file, read_tensors
+from avlmaps_models.common.sound_scores import OTHERS
+from avlmaps_models.common.sound_windows import by_portions, usable_samples, windows
 from avlmaps_models.foundation.open_sounds import ContrastSounds
 from avlmaps_models.paper.audioclip_network import NOT_NEEDED, AudioClipNetwork, SoundSizes
 from avlmaps_models.paper.clip_text import ClipTextSizes, padded

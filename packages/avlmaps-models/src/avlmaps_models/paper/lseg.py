@@ -21,13 +21,13 @@ import torch
 from jaxtyping import Float32, UInt8
 
 from avlmaps.core.errors import BackendError
-from avlmaps.perception.models.checksums import checksum_of
 from avlmaps.perception.models.names import public_name
-from avlmaps.perception.models.prompts import Prompted
 from avlmaps.perception.protocols import ModelCard
+from avlmaps_models.common.checksums import checksum_of
 from avlmaps_models.common.device import inference, select_device, to_numpy, unit_rows
 from avlmaps_models.common.files import model_file
 from avlmaps_models.common.precision import mixed_precision
+from avlmaps_models.common.prompts import Prompted
 from avlmaps_models.common.published import network_from
 from avlmaps_models.foundation.open_pixels import OpenPixels
 from avlmaps_models.paper.archives import read_weights

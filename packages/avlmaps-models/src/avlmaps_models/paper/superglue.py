@@ -16,9 +16,9 @@ import torch
 from jaxtyping import Float, Int
 
 from avlmaps.core.errors import BackendError
-from avlmaps.perception.models.checksums import checksum_of, weights_in
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.protocols import LocalFeatures, ModelCard
+from avlmaps_models.common.checksums import checksum_of, weights_in
 from avlmaps_models.common.device import select_device
 from avlmaps_models.common.matches import NetworkInput, network_input, no_matches
 from avlmaps_models.common.operators import declare_missing_operators

@@ -13,9 +13,9 @@ import numpy as np
 import torch
 from jaxtyping import UInt8
 
-from avlmaps.perception.models.checksums import checksum_of, weights_in
 from avlmaps.perception.models.names import public_name
 from avlmaps.perception.protocols import LocalFeatures, ModelCard
+from avlmaps_models.common.checksums import checksum_of, weights_in
 from avlmaps_models.common.device import inference, select_device, to_numpy, unit_rows
 from avlmaps_models.common.operators import declare_missing_operators
 from avlmaps_models.common.pictures import has_nothing, local_features, no_features

@@ -11,11 +11,11 @@ import numpy as np
 from jaxtyping import Float32
 
 from avlmaps.core.errors import BackendError
-from avlmaps.perception.cache.text_features import KeptWords
-from avlmaps.perception.light.bundle import HOW_TO_GET, KNOWN_WORDS, Bundle
-from avlmaps.perception.light.tokens import Tokens, read_tokens
-from avlmaps.perception.models.prompts import Prompted, clean
 from avlmaps.perception.protocols import ModelCard
+from avlmaps_models.common.kept_words import KeptWords
+from avlmaps_models.common.prompts import Prompted, clean
+from avlmaps_models.light.bundle import HOW_TO_GET, KNOWN_WORDS, Bundle
+from avlmaps_models.light.tokens import Tokens, read_tokens
 
 
 class TextTower:

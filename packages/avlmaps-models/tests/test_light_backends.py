@@ -14,14 +14,14 @@ from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Kind, find, forget_loaded, load
 from avlmaps.perception.conformance import check, example_frame, example_sound
 from avlmaps.perception.encoders import Encoders
-from avlmaps.perception.light import bundle as files
-from avlmaps.perception.light.pixels import LightPixels
-from avlmaps.perception.light.sounds import LightSounds, log_mel
-from avlmaps.perception.light.tokens import TokenList, Tokens
-from avlmaps.perception.light.tower import interpolation
-from avlmaps.perception.light.views import LightViews
 from avlmaps.perception.models.availability import availability
 from avlmaps.perception.models.settings import ModelSettings, using_models
+from avlmaps_models.light import bundle as files
+from avlmaps_models.light.pixels import LightPixels
+from avlmaps_models.light.sounds import LightSounds, log_mel
+from avlmaps_models.light.tokens import TokenList, Tokens
+from avlmaps_models.light.tower import interpolation
+from avlmaps_models.light.views import LightViews
 from helpers.light_files import KNOWN, PATCH, write_light, write_manifest
 
 

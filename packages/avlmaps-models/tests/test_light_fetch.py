@@ -13,11 +13,11 @@ import pytest
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Kind, find, forget_loaded, load
 from avlmaps.perception.conformance import example_frame
-from avlmaps.perception.light import bundle as files
-from avlmaps.perception.light import fetch
-from avlmaps.perception.light.fetch import fetch_light
 from avlmaps.perception.models.availability import availability
 from avlmaps.perception.models.settings import ModelSettings, using_models
+from avlmaps_models.light import bundle as files
+from avlmaps_models.light import fetch
+from avlmaps_models.light.fetch import fetch_light
 from helpers.light_files import write_light
 
 

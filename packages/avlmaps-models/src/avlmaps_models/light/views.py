@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float32
 
-from avlmaps.perception.light.pixels import LightPictures
 from avlmaps.recordings.types import Frame
+from avlmaps_models.light.pixels import LightPictures
 
 
 class LightViews(LightPictures):

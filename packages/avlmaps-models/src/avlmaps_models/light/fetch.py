@@ -25,10 +25,10 @@ from avlmaps.core.network import is_loopback
 from avlmaps.core.progress import progress
 from avlmaps.core.version import __version__
 from avlmaps.core.wording import option
-from avlmaps.perception.light.bundle import MANIFEST, MODEL, FileNote, Manifest, parse_manifest
-from avlmaps.perception.models.checksums import remembered_sha256
 from avlmaps.perception.models.files import fetched_folder
 from avlmaps.perception.models.settings import model_settings
+from avlmaps_models.common.checksums import remembered_sha256
+from avlmaps_models.light.bundle import MANIFEST, MODEL, FileNote, Manifest, parse_manifest
 
 PLACE_VARIABLE = "AVLMAPS_LIGHT_FROM"
 _BLOCK = 1 << 20

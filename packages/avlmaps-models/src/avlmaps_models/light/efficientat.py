@@ -16,12 +16,12 @@ from jaxtyping import Float, Float32
 
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Kind, load
-from avlmaps.perception.models.checksums import checksum_of
 from avlmaps.perception.models.files import local_model
 from avlmaps.perception.models.networks import open_network
-from avlmaps.perception.models.sound_windows import usable_samples, windows
 from avlmaps.perception.protocols import ModelCard, WordEncoder
 from avlmaps.recordings.audio import Sound
+from avlmaps_models.common.checksums import checksum_of
+from avlmaps_models.common.sound_windows import usable_samples, windows
 
 MODEL = "efficientat/mn04_as.onnx"
 HOW_TO_GET = (

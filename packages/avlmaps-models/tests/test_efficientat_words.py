@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import BackendError
-from avlmaps.perception.light.efficientat import (
+from avlmaps.perception.models.settings import ModelSettings, using_models
+from avlmaps_models.light.efficientat import (
     BANDS,
     FFT_SAMPLES,
     HIGHEST_HZ,
@@ -18,7 +19,6 @@ from avlmaps.perception.light.efficientat import (
     log_mel,
     mel_triangles,
 )
-from avlmaps.perception.models.settings import ModelSettings, using_models
 
 
 def test_the_triangles_share_every_bin_between_two_bands() -> None:

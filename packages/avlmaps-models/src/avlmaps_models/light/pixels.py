@@ -6,12 +6,12 @@ from typing import ClassVar, Literal
 import numpy as np
 from jaxtyping import Float32
 
-from avlmaps.perception.light.bundle import MODEL, PICTURE_TOKENS, PICTURE_WORDS, PICTURES, Bundle, open_bundle
-from avlmaps.perception.light.tower import tower_of
-from avlmaps.perception.light.words import LightWords, TextTower
-from avlmaps.perception.models.prompts import THINGS, clean
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.types import Frame
+from avlmaps_models.common.prompts import THINGS, clean
+from avlmaps_models.light.bundle import MODEL, PICTURE_TOKENS, PICTURE_WORDS, PICTURES, Bundle, open_bundle
+from avlmaps_models.light.tower import tower_of
+from avlmaps_models.light.words import LightWords, TextTower
 
 
 class LightPictures:

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Float32
 
-from avlmaps.perception.light.bundle import MODEL, SOUND_TOKENS, SOUND_WORDS, SOUNDS, MelNote, open_bundle
-from avlmaps.perception.light.words import LightWords, TextTower
-from avlmaps.perception.models.sound_scores import OTHERS, Contrast
-from avlmaps.perception.models.sound_windows import usable_samples, windows
 from avlmaps.perception.protocols import ModelCard
 from avlmaps.recordings.audio import Sound
+from avlmaps_models.common.sound_scores import OTHERS, Contrast
+from avlmaps_models.common.sound_windows import usable_samples, windows
+from avlmaps_models.light.bundle import MODEL, SOUND_TOKENS, SOUND_WORDS, SOUNDS, MelNote, open_bundle
+from avlmaps_models.light.words import LightWords, TextTower
 
 _FLOOR = 1e-10
 _LINEAR_TO_HZ, _LINEAR_TO_MEL = 1000.0, 15.0
