@@ -112,7 +112,7 @@ def measure(stored: MapOfPictures, photos: list[np.ndarray]) -> dict[str, float]
         xy, points = local.xy[pairs[:, 0]], keyframes.points_world[rows][pairs[:, 1]]
         timed("pose, PoseLib", estimate_pose, xy, points, CAMERA, np.random.default_rng(0))
         timed("pose, cv2", by_opencv_pnp, xy, points)
-        found = timed("all of it", locate, stored, rgb, None, np.random.default_rng(0))
+        found = timed("all of it", locate, stored, rgb, CAMERA, np.random.default_rng(0))
         if found.world_from_camera is None:
             raise SystemExit("a photo of the map was not located; the figures would mean nothing")
     return {name: float(np.median(values)) for name, values in taken.items()}

@@ -111,6 +111,9 @@ class _Words:
         self.table = rng.standard_normal((101, dim)).astype(np.float32)
         self.table /= np.linalg.norm(self.table, axis=1, keepdims=True)
 
+    def understood(self, word: str) -> str:
+        return word
+
     def encode_words(self, words: list[str]) -> np.ndarray:
         return self.table[[int(word) if word.isdigit() else 100 for word in words]]
 

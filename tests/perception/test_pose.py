@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.poses import apply, from_quaternion, inverse, rotation_angle_rad
-from avlmaps.perception.pose import PoseSettings, agreement, estimate_pose, refine_focal
+from avlmaps.perception.pose import PoseSettings, agreement, estimate_pose, pose_deviation, refine_focal
 
 CAMERA = Pinhole(520.0, 530.0, 318.0, 243.0, 640, 480)
 
@@ -99,6 +99,15 @@ def test_a_wrong_focal_length_is_found_out(seed: int, factor: float) -> None:
     refined = refine_focal(xy, points, given_camera, answer[0].world_from_camera)
     assert refined.fx == pytest.approx(CAMERA.fx, rel=0.01)
     assert refined.fy / refined.fx == pytest.approx(CAMERA.fy / CAMERA.fx)
+
+
+@given(st.integers(0, 1000), st.floats(0.5, 5.0))
+def test_a_flat_wall_seen_straight_on_fixes_no_focal_length_and_is_no_error(seed: int, depth_m: float) -> None:
+    xy = np.random.default_rng(seed).uniform((0, 0), (640, 480), (200, 2))
+    points = np.column_stack([(xy - (CAMERA.cx, CAMERA.cy)) / (CAMERA.fx, CAMERA.fy), np.ones(200)]) * depth_m
+    refined = refine_focal(xy, points, CAMERA, np.eye(4))
+    assert refined.fx == pytest.approx(CAMERA.fx, rel=1e-3)
+    assert pose_deviation(xy + 0.5, points, CAMERA, np.eye(4))[1] > 1.0
 
 
 def test_world_from_camera_is_told_not_camera_from_world() -> None:

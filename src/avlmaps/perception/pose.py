@@ -113,8 +113,9 @@ def refine_focal(
         residual, jacobian = _reprojection(xy[front], points[front], focal * np.exp(log_factor), (camera.cx, camera.cy))
         weight = 1.0 / (1.0 + (residual**2).sum(axis=1) / tolerance_px**2)
         weighted = (jacobian * weight[:, None, None]).reshape(-1, 7).T
-        normal = weighted @ jacobian.reshape(-1, 7) + 1e-9 * np.eye(7)
-        step = np.linalg.solve(normal, -weighted @ residual.reshape(-1))
+        normal = weighted @ jacobian.reshape(-1, 7)
+        # Of a wall that is seen straight on, focal length and distance cannot be told apart: the shortest step.
+        step = np.linalg.lstsq(normal, -weighted @ residual.reshape(-1), rcond=1e-12)[0]
         camera_from_world = _small_motion(step[:6]) @ camera_from_world
         log_factor = float(np.clip(log_factor + step[6], -0.5, 0.5))
     factor = float(np.exp(log_factor))
