@@ -1,19 +1,16 @@
 """The server under load: clients that query at a fixed rate, each answer compared with the in-process one.
 
-python benchmarks/serve.py [--voxels 300000] [--clients 8] [--rate 30] [--minutes 10] [--map MAP] [--json]
+    python benchmarks/serve.py home.avlmap [--clients 8] [--rate 30] [--minutes 10] [--json]
 
-Without --map, the map is made up: the surfaces of a storey, boxes with the features of the embedded encoder's names,
-600 views of rooms and ten sounds. The server is a process of its own; clients and the comparison run in this one.
+The server is a process of its own; clients and the comparison run in this one.
 """
 
 import json
 import os
 import subprocess
 import sys
-import tempfile
 import threading
 import time
-from functools import cached_property
 from http.client import HTTPConnection
 from pathlib import Path
 from typing import Any
@@ -23,118 +20,13 @@ from timing import parser, show, use_one_thread
 
 use_one_thread()
 
-import msgspec  # noqa: E402
 import numpy as np  # noqa: E402
 
-from avlmaps.core.camera import Pinhole, Rig  # noqa: E402
-from avlmaps.maps.build import build_map  # noqa: E402
-from avlmaps.maps.settings import BuildSettings  # noqa: E402
-from avlmaps.maps.store.manifest import MapBounds  # noqa: E402
-from avlmaps.maps.store.writer import MapContent, write_map  # noqa: E402
-from avlmaps.maps.types import HeardSounds, Keyframes, Voxels  # noqa: E402
-from avlmaps.perception.embedded.codes import features_of  # noqa: E402
-from avlmaps.perception.encoders import Encoders  # noqa: E402
 from avlmaps.query.avlmap import AVLMap  # noqa: E402
-from avlmaps.recordings.audio import Sound, write_flac  # noqa: E402
-from avlmaps.recordings.types import Frame, Recording  # noqa: E402
-from queries import VOXEL_SIZE_M, building  # noqa: E402
 
 THINGS = ("chair", "table", "sofa", "bed", "lamp", "door", "window", "plant", "sink", "toilet", "shelf", "television")
 ROOMS = ("kitchen", "bedroom", "bathroom", "living room", "hallway", "office")
 SOUNDS = ("dog", "running water", "doorbell")
-
-
-class _Corner(Recording):
-    """A wall in random colours, seen a few times: what a map is made of before its voxels are exchanged."""
-
-    def __init__(self) -> None:
-        camera = Pinhole(100.0, 100.0, 80.0, 60.0, 160, 120)
-        self.path, self.format, self.rig = Path("made-up"), "made up", Rig(camera, camera)
-        self.stamps_s = np.arange(8) * 0.5
-        self.world_from_camera = np.tile(np.eye(4), (8, 1, 1))
-        self.world_from_camera[:, :3, :3] = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
-        self.world_from_camera[:, 0, 3] = 0.3 * np.arange(8)
-        self.up_in_world, self.audio, self.notices = np.array([0.0, 0.0, 1.0]), None, ()
-
-    @cached_property
-    def fingerprint(self) -> str:
-        return "made up"
-
-    def frame(self, index: int) -> Frame:
-        rng = np.random.default_rng(index)
-        rgb = np.kron(rng.integers(0, 256, (12, 16, 3)), np.ones((10, 10, 1))).astype(np.uint8)
-        depth = np.full((120, 160), 2.0, np.float32)
-        return Frame(
-            index, self.name(index), float(self.stamps_s[index]), rgb, depth, self.world_from_camera[index], self.rig
-        )
-
-
-def made_up_map(path: Path, voxels: int, rng: np.random.Generator) -> Path:
-    """Write a map of that many voxels."""
-    stored = build_map(_Corner(), path, "embedded", BuildSettings(voxel_size_m=VOXEL_SIZE_M), progress=False)
-    index = building(voxels, rng)
-    encoder: Any = Encoders.named("embedded").pixels
-    names = list(encoder.names)
-    # Blocks of 1.2 m hold one thing each, the lowest layer is floor.
-    block = (index[:, 0] // 24 * 7919 + index[:, 1] // 24 * 104729) % len(THINGS)
-    kinds = np.array([names.index(name) if name in names else 0 for name in THINGS])
-    label = np.where(index[:, 2] == 0, names.index("floor"), kinds[block])
-    feature = np.empty((len(index), encoder.codes.shape[1]), np.float16)
-    for a in range(0, len(index), 20_000):
-        some = rng.gamma(0.05, 1.0, (len(label[a : a + 20_000]), len(names))).astype(np.float32)
-        some[np.arange(len(some)), label[a : a + 20_000]] += rng.uniform(1.0, 6.0, len(some))
-        feature[a : a + 20_000] = features_of(some / some.sum(axis=1, keepdims=True), encoder.codes)
-    n, side_m = len(index), float(index[:, 0].max()) * VOXEL_SIZE_M
-    rgb = rng.integers(0, 256, (n, 3)).astype(np.uint8)
-    some_voxels = Voxels(
-        index, feature, np.ones(n, np.float32), rgb, rng.uniform(0, 300, n), np.full(n, 9, np.int64)
-    )  # fmt: skip
-    keyframes = _views(600, side_m, stored.keyframes, rng)
-    sounds = _sounds(10, side_m, rng)
-    counts = msgspec.structs.replace(stored.info.counts, voxels=n, keyframes=len(keyframes), sounds=len(sounds))
-    lived = msgspec.structs.replace(stored.info.recording, duration_s=300.0)
-    box = MapBounds.of(index, VOXEL_SIZE_M)
-    info = msgspec.structs.replace(stored.info, counts=counts, recording=lived, bounding_box_m=box)
-    clips = path.parent / "clips"
-    clips.mkdir()
-    for name in sounds.clips:
-        write_flac(clips / name, Sound(np.zeros(800, np.float32), 16000))
-    write_map(path, MapContent(some_voxels, keyframes, dict(stored.place_state), sounds, clips), info)
-    return path
-
-
-def _views(count: int, side_m: float, like: Keyframes, rng: np.random.Generator) -> Keyframes:
-    """Return views along a walk; each part of the storey is a room."""
-    encoder: Any = Encoders.named("embedded").views
-    rooms = np.asarray(encoder.encode_words(list(ROOMS)), np.float32)
-    walk = np.abs((np.cumsum(rng.normal(0, 0.4, (count, 2)), axis=0) + side_m / 2) % (2 * side_m) - side_m)
-    poses = np.tile(np.eye(4), (count, 1, 1))
-    poses[:, :3, :3] = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
-    poses[:, :2, 3], poses[:, 2, 3] = walk, 1.3
-    view = rooms[(walk // 4.0).astype(int).sum(axis=1) % len(ROOMS)]
-    noisy = view + rng.normal(0, 0.02, view.shape).astype(np.float32)
-    place = np.asarray(like.place)[rng.integers(0, len(like), count)]
-    return Keyframes(
-        np.arange(count) * 0.5, poses, poses[:, :3, 3].astype(np.float32) + np.float32(0.5),
-        (noisy / np.linalg.norm(noisy, axis=1, keepdims=True)).astype(np.float32), place,
-        np.zeros(count + 1, np.int64), np.zeros((0, 2), np.float32), np.asarray(like.descriptors)[:0],
-        np.zeros((0, 3), np.float32), np.zeros(count + 1, np.int64), np.zeros(0, np.uint8),
-    )  # fmt: skip
-
-
-def _sounds(count: int, side_m: float, rng: np.random.Generator) -> HeardSounds:
-    encoder: Any = Encoders.named("embedded").sounds
-    features = [
-        np.asarray(encoder.encode(Sound(rng.normal(0, 0.1, 32000).astype(np.float32), 16000)), np.float32)
-        for _ in range(count)
-    ]
-    offsets = np.concatenate([[0], np.cumsum([len(one) for one in features])]).astype(np.int64)
-    track = rng.uniform(0, side_m, (5 * count, 3)).astype(np.float32)
-    onset = np.arange(count) * 10.0
-    clips = tuple(f"{k:04d}.flac" for k in range(count))
-    return HeardSounds(
-        onset, onset + 2.0, 5 * np.arange(count + 1, dtype=np.int64), track, offsets, np.concatenate(features), clips
-    )
 
 
 def sentences() -> list[str]:
@@ -212,15 +104,12 @@ def run(url: str, seconds: float, rate: float, clients: int, expected: dict[str,
 def main() -> None:
     """Print the table, or one JSON object."""
     arguments = parser(str(__doc__).splitlines()[0])
-    arguments.add_argument("--voxels", type=int, default=300_000)
+    arguments.add_argument("map", type=Path)
     arguments.add_argument("--clients", type=int, default=8)
     arguments.add_argument("--rate", type=float, default=30.0)
     arguments.add_argument("--minutes", type=float, default=10.0)
-    arguments.add_argument("--map", type=Path, default=None)
     asked = arguments.parse_args()
-    with tempfile.TemporaryDirectory() as folder:
-        path = asked.map or made_up_map(Path(folder) / "home.avlmap", asked.voxels, np.random.default_rng(0))
-        report(path, asked)
+    report(asked.map, asked)
 
 
 def report(path: Path, asked: Any) -> None:
