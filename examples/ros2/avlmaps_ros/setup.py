@@ -6,7 +6,7 @@ from setuptools import setup
 
 setup(
     name="avlmaps_ros",
-    version="0.2.0",
+    version="0.3.0",
     packages=["avlmaps_ros"],
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/avlmaps_ros"]),
