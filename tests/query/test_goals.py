@@ -273,7 +273,7 @@ def test_two_kitchens_are_two_goals() -> None:
     view = np.zeros((11, 2), np.float32)
     view[:, 1] = 1.0
     view[[1, 2, 8, 9]] = [1.0, 0.0]
-    from_cameras = QuerySettings(areas=AreaSettings(anchor="camera"))
+    from_cameras = QuerySettings(areas=AreaSettings(anchor="camera", extent="cones"))
     m = AVLMap(furnished_map(keyframes=keyframes_at(places, view), views=FakeViews()), from_cameras)
     goals = m.area("kitchen", primary=True).goals(top=2)
     assert sorted(goal.position[0] for goal in goals) == pytest.approx([1.25, 4.75], abs=0.3)

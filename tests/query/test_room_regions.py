@@ -1,5 +1,6 @@
 """Rooms by walls and doorways: one region a room, whatever stands in it, however the building is turned."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -80,8 +81,8 @@ def test_a_passage_whose_walls_are_the_ends_of_others_is_one_room(passage_m: flo
     found = rooms_of_storey(drawn.grid())
     middle = 3.15 + passage_m / 2
     hall = {drawn.at(found.label, x, middle) for x in (0.5, 2.0, 4.07, 6.0, 7.5)}
-    assert len(hall) == 1 and len(found.neighbours) == 5
-    assert found.neighbours[hall.pop()] == 4 and sorted(found.neighbours.tolist()) == [1, 1, 1, 1, 4]
+    assert len(hall) == 1 and found.count == 5
+    assert all(hall <= set(pair) for pair in found.beside.tolist()) and len(found.beside) == 4
 
 
 @given(st.floats(0.7, 1.0), st.floats(0.4, 2.4), st.booleans())
@@ -118,7 +119,7 @@ def test_a_nook_belongs_to_its_room_and_an_empty_storey_has_none() -> None:
     assert drawn.at(label, 1.35, 3.5) == drawn.at(label, 2.0, 1.5) == 0
     empty = np.zeros((30, 30), bool)
     found = rooms_of_storey(StoreyGrid(0.0, np.zeros(2), CELL, empty, empty, empty))
-    assert (found.label == NONE).all() and not len(found.neighbours)
+    assert (found.label == NONE).all() and not found.count and not len(found.beside)
 
 
 @given(st.integers(0, 89), st.floats(3.0, 6.0), st.floats(3.0, 6.0))
@@ -188,10 +189,15 @@ def test_cameras_that_look_down_or_at_the_same_count_no_more_than_once() -> None
 def test_a_room_has_a_distribution_of_names_and_a_dead_end_is_seldom_a_hallway(seed: int) -> None:
     regions = two_room_regions(0.0)
     kinds = ("hallway", "kitchen", "bedroom")
-    share = np.random.default_rng(seed).dirichlet(np.ones(3), len(regions.plan)).astype(np.float32)
-    named = RoomField(regions.plan, kinds, share, np.ones(len(share), np.float32)).of_rooms(regions)
+    share = np.random.default_rng(seed).dirichlet(np.full(3, 30.0), len(regions.plan)).astype(np.float32)
+    field = RoomField(regions.plan, kinds, share, np.ones(len(share), np.float32))
+    named = field.whole_rooms(regions)
     assert named.shape == (2, 3)
     np.testing.assert_allclose(named.sum(axis=1), 1.0)
-    even = RoomField(regions.plan, kinds, np.full_like(share, 1 / 3), np.ones(len(share), np.float32)).of_rooms(regions)
+    settled = field.settled(regions, regions.of_plan_cells)
+    np.testing.assert_allclose(settled.share.sum(axis=1), 1.0, rtol=1e-5)
+    np.testing.assert_allclose(settled.of_rooms(regions), named, atol=1e-3)
+    np.testing.assert_array_equal(settled.share[regions.of_plan_cells == NONE], share[regions.of_plan_cells == NONE])
+    even = replace(field, share=np.full_like(share, 1 / 3)).whole_rooms(regions)
     assert (even[:, 0] < 0.5 * even[:, 1]).all()
     np.testing.assert_allclose(even[:, 1], even[:, 2])

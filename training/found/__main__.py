@@ -9,7 +9,6 @@ from training.found.fit import fitted, held_out
 from training.found.rows import Row, balanced, read_rows, write_rows
 
 import avlmaps.query
-from avlmaps.query.factors import FOUND_AT
 from avlmaps_sim.bench.found.answers import judged_scene
 from avlmaps_sim.bench.found.suite import brier
 from avlmaps_sim.bench.indexing import IndexingSettings
@@ -23,11 +22,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--collect", type=Path, metavar="WORK", help="record, map and query the homes in this folder")
     parser.add_argument("--scenes", nargs="+", default=SCENES)
-    parser.add_argument("--limits", action="store_true", help="compare limits by the thing alone, and write nothing")
     given = parser.parse_args()
-    if given.limits:
-        compare_limits(read_rows())
-        return
     if given.collect is not None:
         settings = IndexingSettings(scenes=tuple(given.scenes), jobs=1)
         answers = [one for spec in given.scenes for one in judged_scene(settings, spec, given.collect)]
@@ -40,19 +35,6 @@ def main() -> None:
         print(f"{kind:15} {own.sum():4} queries, Brier score {brier(probability[own], right[own], weight[own]):.3f}")
     homes = sorted({row.scene for row in rows})
     WEIGHTS.write_text(json.dumps({"homes": homes, "weights": weights}, indent=1) + "\n", encoding="utf-8")
-
-
-def compare_limits(rows: list[Row]) -> None:
-    """Print what limits of the odds do, on homes left out: queries of several parts."""
-    rows = [row for row in rows if row.evidence.context]
-    right, weight = np.array([row.right for row in rows]), balanced(rows)
-    answerable = np.array([row.answerable for row in rows])
-    for most_odds in (1e9, 2.5, 2.0, 1.75, 1.5, 1.0):
-        p = held_out(rows, most_odds)
-        held = np.clip(p, 5e-4, 1.0 - 5e-4)  # probabilities have three digits
-        loss = -np.average(np.where(right, np.log(held), np.log1p(-held)), weights=weight)
-        found = [int((p[own] >= FOUND_AT).sum()) for own in (right, answerable & ~right, ~answerable)]
-        print(f"{most_odds:g}: Brier score {brier(p, right, weight):.4f}, log loss {loss:.4f}, found {found}")
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.optimize import minimize
 from training.found.rows import Row, balanced
 
-from avlmaps.query.probability import FACTORS, MOST_ODDS, factors_of, most_likely, probability_of
+from avlmaps.query.probability import FACTORS, factors_of, probability_of
 
 COLUMNS = tuple(name for factor, numbers in FACTORS.items() for name in (f"{factor}_bias", *numbers))
 # The ridge draws a number's weight towards 1, and a bias towards 2: most of what is likely passes.
@@ -16,13 +16,13 @@ _BOUNDS = [(-6.0, 6.0) if name.endswith("_bias") else (0.0, 6.0) for name in COL
 Weights = dict[str, float]
 
 
-def fitted(rows: Sequence[Row], most_odds: float = MOST_ODDS) -> Weights:
+def fitted(rows: Sequence[Row]) -> Weights:
     """Return the weights of the largest likelihood, less the ridge; rows of one part say nothing about them."""
     rows = [row for row in rows if row.evidence.context]
     right, weight = np.array([row.right for row in rows], float), balanced(rows)
     designs = [_design(rows, factor) for factor in FACTORS]
     used = [np.array([factor in factors_of(row.evidence) for row in rows], float) for factor in FACTORS]
-    log_most = np.log([max(most_likely(row.first_alone, most_odds), 1e-6) for row in rows])
+    log_most = np.log([max(row.evidence.alone, 1e-6) for row in rows])
 
     def loss(beta: np.ndarray) -> tuple[float, np.ndarray]:
         odds = [design @ beta for design in designs]
@@ -51,17 +51,17 @@ def _design(rows: Sequence[Row], factor: str) -> np.ndarray:
     return design
 
 
-def probabilities(rows: Sequence[Row], weights: Weights, most_odds: float = MOST_ODDS) -> np.ndarray:
+def probabilities(rows: Sequence[Row], weights: Weights) -> np.ndarray:
     """Return the probability of each row under some weights."""
-    return np.array([probability_of(row.evidence, weights, most_odds) for row in rows])
+    return np.array([probability_of(row.evidence, weights) for row in rows])
 
 
-def held_out(rows: Sequence[Row], most_odds: float = MOST_ODDS) -> np.ndarray:
+def held_out(rows: Sequence[Row]) -> np.ndarray:
     """Return the probability of each row under the weights that the other scenes give."""
     scenes = np.array([row.scene for row in rows])
     out = np.zeros(len(rows))
     for scene in sorted(set(scenes.tolist())):
         others = [row for row in rows if row.scene != scene]
         own = [row for row in rows if row.scene == scene]
-        out[scenes == scene] = probabilities(own, fitted(others, most_odds), most_odds)
+        out[scenes == scene] = probabilities(own, fitted(others))
     return out

@@ -29,7 +29,7 @@ class Row:
         right: whether the first goal is.
         combination: of what is sought and what it is near.
         numbers: of the evidence, in the order of ``NUMBERS``.
-        first_alone: of the evidence.
+        first_alone: probability of the first goal of a query for what is sought alone.
     """
 
     scene: str
@@ -46,16 +46,16 @@ class Row:
         """Return the row of an answer."""
         numbers = tuple(round(float(getattr(evidence, name)), 4) for name in NUMBERS)
         facts = judged.scene, judged.kind, judged.words, judged.answerable, judged.right
-        return cls(*facts, combination(evidence), numbers, round(evidence.first_alone, 4))
+        return cls(*facts, combination(evidence), numbers, round(evidence.alone, 4))
 
     @property
     def evidence(self) -> GoalEvidence:
         """The evidence again."""
         lead, *near = self.combination.replace(" near ", " and ").split(" and ")
-        alone = 1.0 / (1.0 + math.exp(-self.numbers[0]))
+        alone = min(1.0 / (1.0 + math.exp(-self.numbers[0])), self.first_alone)
         numbers = dict(zip(NUMBERS, self.numbers, strict=True))
         near_kinds = tuple(map(Modality, near))
-        return GoalEvidence(Modality(lead), near_kinds, alone, **numbers, first_alone=self.first_alone)
+        return GoalEvidence(Modality(lead), near_kinds, alone, **numbers)
 
 
 def combination(evidence: GoalEvidence) -> str:

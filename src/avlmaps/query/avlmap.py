@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from avlmaps.core.arrays import Float, Float16, Int32, UInt8
+from avlmaps.core.arrays import Float, Float16, Int, Int32, UInt8
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import BackendError, MapError, QueryError
 from avlmaps.core.files import lasting_path, user_path
@@ -33,7 +33,7 @@ from avlmaps.query.object_settings import ObjectSettings
 from avlmaps.query.queryable import Attachment, Photo
 from avlmaps.query.room_names import numbered_rooms, region_named
 from avlmaps.query.room_regions import RoomRegions
-from avlmaps.query.rooms import NamedVoxels, RoomField, Rooms, voting_rows
+from avlmaps.query.rooms import NamedVoxels, RoomField, Rooms, rooms_of_cells, seen_twice, voting_rows
 from avlmaps.query.stored_instances import Search, place_of_instances, read_instances, write_instances
 from avlmaps.query.stored_names import read_closest, write_closest
 from avlmaps.query.stored_rooms import room_field_of, room_regions_of
@@ -596,18 +596,29 @@ class AVLMap:
         encoder = self.stored.encoders.views
         self.stored.require_model(Kind.VIEWS)
         settings, number = self.settings, region_named(self, word)
-        corrected = self.edited.room_field if self.edited else None
         factor = area_factor(
             self.space, self.stored.keyframes, encoder, part, settings.areas, settings.heat, self.room_votes,
-            corrected if number is None else partial(self._with_room, number), number is not None,
+            self._settled if number is None else partial(self._with_room, number), self._room_of_places,
         )  # fmt: skip
         return Heatmap.of(factor, settings.found_at)
 
+    def _settled(self, field: RoomField) -> RoomField:
+        """Return a field in which a room is of one kind, and those that people named are so."""
+        assert self.room_regions is not None
+        return self.edited.room_field(field.settled(self.room_regions, self._room_of_cells))
+
     def _with_room(self, number: int, field: RoomField) -> RoomField:
         """Return the field with one room as a kind of its own behind all others."""
-        regions = self.room_regions
-        assert regions is not None
-        return self.edited.room_field(field).with_certain([("", regions.of_plan_cells == number)])
+        return self._settled(field).with_certain([("", self._room_of_cells == number)])
+
+    def _room_of_places(self, places: Float[np.ndarray, "k 3"]) -> Int[np.ndarray, " k"]:
+        assert self.room_votes is not None
+        return self._room_of_cells[self.room_votes.plan.cells_of(places)]
+
+    @cached_property
+    def _room_of_cells(self) -> Int[np.ndarray, " c"]:
+        assert self.room_regions is not None
+        return rooms_of_cells(self.room_regions, area_anchors(self.stored.keyframes, self.settings.areas))
 
     @cached_property
     def storeys(self) -> "Storeys | None":
@@ -664,7 +675,9 @@ class AVLMap:
             return None
         camera = self.stored.rig.depth
         width_rad = 2.0 * float(np.arctan2(camera.width, 2.0 * camera.fx))
-        return room_regions_of(self.stored, votes.plan, width_rad)
+        regions = room_regions_of(self.stored, votes.plan, width_rad)
+        field = self._known_room_field
+        return regions if field is None else regions.joined(seen_twice(field, regions))
 
     @cached_property
     def room_field(self) -> RoomField | None:
@@ -677,7 +690,7 @@ class AVLMap:
             MapError: the map was built with another encoder than is installed.
         """
         seen = self._seen_room_field
-        return None if seen is None else self.edited.room_field(seen)
+        return None if seen is None else self._settled(seen)
 
     @cached_property
     def _seen_room_field(self) -> RoomField | None:
@@ -693,11 +706,15 @@ class AVLMap:
     @cached_property
     def things_in_rooms(self) -> ThingsInRooms | None:
         """The evidence of rooms on the things in them; None for a map whose rooms are not known."""
+        field = self._known_room_field
+        return None if field is None else ThingsInRooms(field, read_room_contents())
+
+    @property
+    def _known_room_field(self) -> RoomField | None:
         try:
-            field = self._seen_room_field
+            return self._seen_room_field
         except (BackendError, MapError):  # no features of views, or those of another encoder
             return None
-        return None if field is None else ThingsInRooms(field, read_room_contents())
 
     def _voting_voxels(self) -> NamedVoxels | None:
         """Return the voxels whose names vote on kinds of room; None where the map holds no probabilities of names."""

@@ -22,6 +22,7 @@ from avlmaps.query.factors import FOUND_AT
 from avlmaps.query.instances import Instances
 from avlmaps.query.modalities.area import AreaSettings, area_names, modes, pooled_name_shares
 from avlmaps.query.modalities.sound import sound_features
+from avlmaps.query.rooms import FEWEST_VIEWS, LEAST_PART
 from avlmaps.query.stored_instances import Search
 from avlmaps.query.voxel_space import Space
 
@@ -40,12 +41,10 @@ Watch = Callable[[str, int, int], object]
 STRUCTURE = ("wall", "floor", "ceiling", "column", "stairs", "railing")
 # A claim that shares this part of its voxels with a more confident thing names the same thing again.
 _SAME_SHARE = 0.5
-# A room is listed where at least this many keyframes show it.
-_FEWEST_VIEWS = 2
 # Of a room as many names are listed as are at least so likely.
 _MOST_ROOM_NAMES, _LEAST_ROOM_NAME = 3, 0.1
-LEAST_PART = 0.25
-"""Probability from which a second name of a room is taken for a part of an open plan."""
+UNKNOWN = "room"
+"""The name of a room that is of no kind with a probability of ``FOUND_AT``."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -130,8 +129,8 @@ class Room:
     """One room: a region of the floor that walls and doorways bound, and the keyframes that looked into it.
 
     Attributes:
-        name: kind of room.
-        confidence: probability of the name, in [0, 1].
+        name: kind of room; ``UNKNOWN`` where none is likely enough.
+        confidence: probability of the likeliest kind, in [0, 1].
         position: its view's place nearest to their middle, metres, recording frame.
         views: number of keyframes.
         places: middle of what each of its keyframes saw, metres, recording frame.
@@ -171,8 +170,9 @@ class Room:
         return answer
 
     def may_be(self, kind: Callable[[str], bool]) -> bool:
-        """Return whether the room is of a kind, or a part of it may be: an open plan has several names."""
-        return kind(self.name) or any(kind(name) and likely >= LEAST_PART for name, likely in self.names)
+        """Return whether the room is of a kind, or a part of it is: an open plan has several names."""
+        parts = [name for name, likely in self.names if likely >= LEAST_PART] if self.name != UNKNOWN else []
+        return any(map(kind, [self.name, *parts]))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -378,7 +378,7 @@ def find_rooms(
         beyond = np.flatnonzero(own < 0)  # where no floor is mapped, views alone speak
         group = _groups_of_views(space.level(places[beyond])[:, :2], share[beyond], settings.link_m)
         rooms += _rooms_of_views(names, share[beyond], places[beyond], group)
-    listed = [room for room in rooms if room.views >= _FEWEST_VIEWS and room.confidence >= least_confidence]
+    listed = [room for room in rooms if room.views >= FEWEST_VIEWS and room.confidence >= least_confidence]
     return sorted(listed, key=lambda room: (-room.views, room.name))
 
 
@@ -386,13 +386,14 @@ def _rooms_by_floor(
     field: "RoomField", regions: "RoomRegions", places: Float[np.ndarray, "k 3"], own: Int[np.ndarray, " k"]
 ) -> Iterator[Room]:
     """Yield the regions into which views looked, by the region that each view's place lies in."""
-    share = field.of_rooms(regions)
+    share, has_parts = field.of_rooms(regions), field.parts_of_rooms(regions)
     for number in np.unique(own[own >= 0]).tolist():
         seen = places[own == number]
         best: list[int] = np.argsort(-share[number], kind="stable")[:_MOST_ROOM_NAMES].tolist()
         likely = [(field.kinds[k], round(float(share[number, k]), 3)) for k in best]
+        known = likely[0][1] >= FOUND_AT or bool(has_parts[number].any())
         yield Room(
-            *likely[0], _middle(seen), len(seen), seen,
+            likely[0][0] if known else UNKNOWN, likely[0][1], _middle(seen), len(seen), seen,
             tuple(one for one in likely if one[1] >= _LEAST_ROOM_NAME) or (likely[0],),
             number, round(float(regions.areas_m2[number]), 2), regions.outline(number),
         )  # fmt: skip
@@ -411,7 +412,14 @@ def _rooms_of_views(
         kind = int(likeliest[members[0]])
         likely = round(float(share[members, kind].mean()), 3)
         seen = places[members]
-        yield Room(names[kind], likely, _middle(seen), len(members), seen, ((names[kind], likely),))
+        yield Room(
+            names[kind] if likely >= FOUND_AT else UNKNOWN,
+            likely,
+            _middle(seen),
+            len(members),
+            seen,
+            ((names[kind], likely),),
+        )
 
 
 def _groups_of_views(

@@ -29,7 +29,6 @@ class GoalEvidence:
         near: log of the heat of what it is near, there; 0 beside it.
         room: log of the probability that it stands in such an area.
         marks: log-odds of the least certain of the things, sounds and photos that it is near.
-        first_alone: probability of the first goal of a query for what is sought alone.
     """
 
     lead: Modality
@@ -39,7 +38,6 @@ class GoalEvidence:
     near: float = 0.0
     room: float = 0.0
     marks: float = 0.0
-    first_alone: float = 1.0
 
 
 def evidence_of(
@@ -62,7 +60,6 @@ def evidence_of(
         float(np.log(np.clip(near, _LEAST_HEAT, 1.0))),
         float(np.log(np.clip(room, _LEAST_HEAT, 1.0))),
         min(map(logit, marks), default=0.0),
-        lead.first_alone,
     )
 
 

@@ -125,11 +125,6 @@ class Factor(ABC):
         """Return this factor with all that may be meant, however unsure."""
         return self
 
-    @property
-    def first_alone(self) -> float:
-        """The probability of the first goal of a query for the part alone; 0 where there is none."""
-        return float(self.confidence.max(initial=0.0))
-
     @cached_property
     def shown(self) -> Float32[np.ndarray, " n"]:
         """Heat times the confidence of the instance that it comes from, in [0, 1]: what pictures show."""
@@ -153,7 +148,6 @@ class NearThings(Factor):
         with_uncertain: makes the same with the instances whose confidence is too low to count in a query for the
         thing alone: the context may select one of them. None where there are no others.
         is_named: see ``Factor``.
-        sure: the best confidence of the instances that a query for the thing alone has, where these are others.
     """
 
     space: Space
@@ -167,7 +161,6 @@ class NearThings(Factor):
     note: str = ""
     with_uncertain: "Callable[[], NearThings] | None" = None
     is_named: bool = True
-    sure: float | None = None
     flat: bool = field(default=False, init=False)
 
     def for_product(self) -> "NearThings":
@@ -180,12 +173,11 @@ class NearThings(Factor):
 
     @cached_property
     def _with_uncertain(self) -> "NearThings":
-        return replace(self.with_uncertain(), sure=self.first_alone) if self.with_uncertain is not None else self
-
-    @property
-    def first_alone(self) -> float:
-        """The best confidence of the instances that a query for the thing alone has."""
-        return super().first_alone if self.sure is None else self.sure
+        if self.with_uncertain is None:
+            return self
+        all_of_it = self.with_uncertain()  # context makes none of them likelier than the first of the thing alone
+        sure = np.minimum(all_of_it.confidence, self.confidence.max(initial=0.0))
+        return replace(all_of_it, confidence=sure.astype(all_of_it.confidence.dtype))
 
     @cached_property
     def anchors(self) -> Float[np.ndarray, "a 3"]:  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -249,11 +241,6 @@ class NearAnchors(Factor):
     def confidence(self) -> Float[np.ndarray, " i"]:  # pyright: ignore[reportIncompatibleVariableOverride]
         """The certainty, for each instance."""
         return np.full(int(self.instance.max(initial=-1)) + 1, self.certainty)
-
-    @property
-    def first_alone(self) -> float:
-        """The best score, times the certainty."""
-        return float(self.scores.max(initial=0.0)) * self.certainty
 
     def heat_and_anchors(
         self, among: Bool[np.ndarray, " n"] | None = None

@@ -126,10 +126,11 @@ def share_voxels(
         rows = np.flatnonzero(values() > 0.0) if len(lead.anchors) else np.zeros(0, np.int64)
         instance = lead.instance[lead.anchor_of(rows)] if len(rows) else np.zeros(0, np.int64)
         heat = values()[rows].astype(np.float64)
-    if lead.flat:
-        at_anchors = np.ones(len(lead.anchors))
+    if isinstance(lead, NearAnchors):
+        at_anchors = np.array(lead.scores, np.float64)
         for factor in factors:
-            at_anchors *= factor.at(lead.anchors)
+            if factor is not lead:
+                at_anchors *= factor.at(lead.anchors)
         heat, instance = np.append(heat, at_anchors), np.append(instance, lead.instance)
     regions = [factor for factor in factors if factor.regional]
     if regions and isinstance(lead, NearThings):

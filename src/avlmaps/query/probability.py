@@ -3,8 +3,7 @@
     p = s(thing) * s(near) * s(marks) * s(room),   s the logistic function of a weight times a number, and a bias
 
 so that a goal is likely only where the thing, how near it is, what it is near and the room all are: beside a photo
-whose place is certain, a thing 4 m away is no nearer. The odds are at most ``MOST_ODDS`` times those of the first goal
-of a query for the thing alone: in a home that seems to hold no chair, none near the sofa is likely. The weights
+whose place is certain, a thing 4 m away is no nearer. It is at most the probability of the thing alone. The weights
 (``found.json``) are fitted by ``training/found`` on homes that no table uses, half of the queries being for what is not
 there. A thing, a sound, an area or a photo alone is as likely as the models that made it out say: those are calibrated
 by themselves.
@@ -23,22 +22,13 @@ NUMBERS = ("thing", "near", "room", "marks")
 """The numbers of the evidence that have a weight."""
 FACTORS = {"thing": ("thing",), "near": ("near",), "marks": ("marks",), "room": ("room",)}
 """The factors of the product, and the numbers that each weighs; the weights have a bias for each as well."""
-MOST_ODDS = 1.75
-"""What is sought near something has at most this many times the odds that it has alone (training/found/README.md)."""
 Weights = Mapping[str, float]
 
 
-def probability_of(evidence: GoalEvidence, given: Weights | None = None, most_odds: float = MOST_ODDS) -> float:
+def probability_of(evidence: GoalEvidence, given: Weights | None = None) -> float:
     """Return the probability that a goal with this evidence is right, by the weights that ship or those given."""
-    if not evidence.context:
-        return round(evidence.alone, 3)  # more digits would be noise
-    all_parts = math.prod(factor_values(evidence, given).values())
-    return round(min(all_parts, most_likely(evidence.first_alone, most_odds)), 3)
-
-
-def most_likely(alone: float, most_odds: float = MOST_ODDS) -> float:
-    """Return the largest probability that a goal of several parts has, where the thing alone has this one."""
-    return most_odds * alone / (1.0 + (most_odds - 1.0) * alone)
+    all_parts = math.prod(factor_values(evidence, given).values()) if evidence.context else 1.0
+    return round(min(all_parts, evidence.alone), 3)  # more digits would be noise
 
 
 def factor_values(evidence: GoalEvidence, given: Weights | None = None) -> dict[str, float]:

@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Float32, Int
+from avlmaps.query.components import connected
 from avlmaps.query.doorways import closed_doorways, recesses, without_leaves, without_posts
 from avlmaps.query.floor_plan import CELL_M as PLAN_CELL_M
 from avlmaps.query.floor_plan import FloorPlan
@@ -37,11 +38,13 @@ class StoreyRooms:
 
     Attributes:
         label: number of the room of each cell, from 0; ``NONE`` outside.
-        neighbours: of each room, the number of rooms that one can see into through its doorways.
+        count: number of rooms.
+        beside: pairs of rooms with an opening between them.
     """
 
     label: Int[np.ndarray, "nx ny"]
-    neighbours: Int[np.ndarray, " r"]
+    count: int
+    beside: Int[np.ndarray, "p 2"]
 
 
 def rooms_of_storey(grid: StoreyGrid) -> StoreyRooms:
@@ -60,10 +63,9 @@ def rooms_of_storey(grid: StoreyGrid) -> StoreyRooms:
     label = _grown(label, free | doorway, _GAP_M / cell_m)
     label = _without_nooks(label, half_m, grid.stood, cell_m)
     label = np.unique(np.append(label.reshape(-1), 0), return_inverse=True)[1][:-1].reshape(label.shape)
-    neighbours = np.zeros(int(label.max(initial=0)), np.int64)
-    for pair, cells in contacts(label).items():
-        neighbours[np.array(pair) - 1] += cells * cell_m >= _LEAST_CONTACT_M - 1e-6
-    return StoreyRooms(_grown(label, np.ones_like(free), _TO_WALL_M / cell_m) - 1, neighbours)
+    wide = [pair for pair, cells in contacts(label).items() if cells * cell_m >= _LEAST_CONTACT_M - 1e-6]
+    beside = np.array(wide, np.int64).reshape(-1, 2) - 1
+    return StoreyRooms(_grown(label, np.ones_like(free), _TO_WALL_M / cell_m) - 1, int(label.max(initial=0)), beside)
 
 
 def _whole(
@@ -184,13 +186,15 @@ class RoomRegions:
         plan: storeys of the map.
         grids: of each storey.
         labels: of each storey, the number of the room of each cell; ``NONE`` outside.
-        neighbours: of each room, the number of rooms that one can see into through its doorways.
+        count: number of rooms.
+        beside: pairs of rooms with an opening between them.
     """
 
     plan: FloorPlan
     grids: tuple[StoreyGrid, ...]
     labels: tuple[Int[np.ndarray, "nx ny"], ...]
-    neighbours: Int[np.ndarray, " r"]
+    count: int
+    beside: Int[np.ndarray, "p 2"]
 
     @classmethod
     def of(cls, plan: FloorPlan, world_from_camera: Float[np.ndarray, "k 4 4"], width_rad: float) -> "RoomRegions":
@@ -207,17 +211,31 @@ class RoomRegions:
         level_from_camera = space.level_from_recording @ poses
         grids: list[StoreyGrid] = []
         labels: list[Int[np.ndarray, "nx ny"]] = []
-        neighbours = [np.zeros(0, np.int64)]
+        beside = [np.zeros((0, 2), np.int64)]
+        count = 0
         for storey in storeys:
             at = level if len(storeys) == 1 else level[plan.storeys.of(level[:, 2]) == storey]
             at = at if len(at) else np.r_[plan.origin_m, plan.storeys[storey].floor_m][None]
             sights = Sights.of(level_from_camera[cameras == storey], width_rad)
             grids.append(StoreyGrid.of(at, plan.storeys[storey].floor_m, sights, space.grid.voxel_size_m))
             found = rooms_of_storey(grids[-1])
-            before = sum(len(each) for each in neighbours)
-            labels.append(np.where(found.label >= 0, found.label + before, NONE))
-            neighbours.append(found.neighbours)
-        return cls(plan, tuple(grids), tuple(labels), np.concatenate(neighbours))
+            labels.append(np.where(found.label >= 0, found.label + count, NONE))
+            beside.append(found.beside + count)
+            count += found.count
+        return cls(plan, tuple(grids), tuple(labels), count, np.concatenate(beside))
+
+    @property
+    def neighbours(self) -> Int[np.ndarray, " r"]:
+        """Of each room, the number of rooms that one can see into through its openings."""
+        return np.bincount(self.beside.reshape(-1), minlength=self.count)
+
+    def joined(self, pairs: Int[np.ndarray, "p 2"]) -> "RoomRegions":
+        """Return the rooms where those of each pair are one."""
+        number = connected(self.count, pairs[:, 0], pairs[:, 1])
+        labels = tuple(np.where(label >= 0, number[label], NONE) for label in self.labels)
+        beside = np.unique(np.sort(number[self.beside], axis=1), axis=0)
+        beside = beside[beside[:, 0] != beside[:, 1]].reshape(-1, 2)
+        return RoomRegions(self.plan, self.grids, labels, int(number.max(initial=-1)) + 1, beside)
 
     @cached_property
     def areas_m2(self) -> Float[np.ndarray, " r"]:
@@ -230,7 +248,7 @@ class RoomRegions:
 
     def __len__(self) -> int:
         """Return the number of rooms."""
-        return len(self.neighbours)
+        return self.count
 
     def at(self, points_world: Float[np.ndarray, "m 3"]) -> Int[np.ndarray, " m"]:
         """Return the number of the room of each point on its storey, up to 0.6 m away; ``NONE`` beyond."""

@@ -9,7 +9,7 @@ import numpy as np
 from avlmaps.core.arrays import Bool, Float, Float32, Int
 from avlmaps.core.lexicon import Entry, EntryKind, lexicon
 from avlmaps.perception.room_contents import RoomContents
-from avlmaps.query.factors import NearAnchors
+from avlmaps.query.factors import FOUND_AT, NearAnchors
 from avlmaps.query.floor_plan import CELL_M, FloorPlan
 from avlmaps.query.room_contents import votes
 from avlmaps.query.room_regions import NONE, RoomRegions
@@ -23,6 +23,12 @@ _PASSAGES = ("hallway", "corridor", "entrance hall", "staircase")
 # How much less likely a passage is for a room that has none, one, two or more rooms beside it.
 _PASSAGE_ODDS = (0.2, 0.2, 0.4, 1.0)
 _LEAST_SHARE = 0.003  # no view rules a kind of room out by more than this
+_LOOKS = 2.0  # as views that agree count in ``modalities.area.pool_posteriors``
+FEWEST_VIEWS = 2
+"""A room is listed where at least this many keyframes show it."""
+LEAST_PART, _LEAST_PART_M2 = 0.2, 1.0  # of an open plan's floor
+# Two such rooms side by side are one, seen in two parts.
+_ONE_IF_BESIDE = ("kitchen", "living room", "dining room", *_PASSAGES)
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,19 +114,82 @@ class RoomField:
         return self.of_cells(weights)[self.plan.voxel_cells]
 
     def of_rooms(self, regions: RoomRegions) -> Float[np.ndarray, "r n"]:
-        """Return how likely each room is each kind: the mean over its floor; rows add up to 1.
+        """Return which share of each room's floor is of each kind; rows add up to 1."""
+        total = self._sum_of_floors(regions, self.share.astype(np.float64)) + 1e-6
+        return total / total.sum(axis=1, keepdims=True)
 
-        A room that leads to few others is seldom a passage, though one sees a hallway through its door.
-        """
+    def _sum_of_floors(self, regions: RoomRegions, of_cells: Float[np.ndarray, "c n"]) -> Float[np.ndarray, "r n"]:
         room = np.where(self.plan.open.reshape(-1), regions.of_plan_cells, NONE)
         own = np.flatnonzero(room != NONE)
-        total = np.zeros((len(regions), len(self.kinds)))
-        np.add.at(total, room[own], self.share[own].astype(np.float64))
-        total += 1e-6
+        total = np.zeros((len(regions), of_cells.shape[1]))
+        np.add.at(total, room[own], of_cells[own])
+        return total
+
+    def whole_rooms(self, regions: RoomRegions) -> Float[np.ndarray, "r n"]:
+        """Return how likely each room is each kind, if it is of one kind; rows add up to 1.
+
+        The looks at different parts of one floor are evidence for one room: their mean log counts ``_LOOKS`` times. A
+        room that leads to few others is seldom a passage, though one sees a hallway through its door.
+        """
+        cells = self._sum_of_floors(regions, np.ones((len(self.share), 1)))
+        nats = self._sum_of_floors(regions, np.log(np.maximum(self.share, _LEAST_SHARE))) / np.maximum(cells, 1.0)
         passage = np.array([lexicon().find(kind, EntryKind.ROOM) in _passages() for kind in self.kinds])
         fewest = np.minimum(regions.neighbours, len(_PASSAGE_ODDS) - 1)
-        total *= np.where(passage, np.array(_PASSAGE_ODDS)[fewest][:, None], 1.0)
+        total = np.exp(_LOOKS * nats) * np.where(passage, np.array(_PASSAGE_ODDS)[fewest][:, None], 1.0)
         return total / total.sum(axis=1, keepdims=True)
+
+    def parts_of_rooms(self, regions: RoomRegions) -> Bool[np.ndarray, "r n"]:
+        """Return which kinds are parts of which rooms: of an open plan, those of much of the floor whose kind is sure.
+
+        A room that is of one kind has no parts.
+        """
+        sure = self._sum_of_floors(regions, (self.share >= FOUND_AT).astype(np.float64))
+        parts = sure >= np.maximum(LEAST_PART * sure.sum(axis=1, keepdims=True), _LEAST_PART_M2 / CELL_M**2)
+        parts[np.count_nonzero(parts, axis=1) < 2] = False
+        return parts
+
+    def settled(self, regions: RoomRegions, room_of_cell: Int[np.ndarray, " c"]) -> "RoomField":
+        """Return the field in which all of a room is of its kind, and of an open plan each place of one of its parts.
+
+        Args:
+            regions: the rooms.
+            room_of_cell: the room that each cell belongs to; ``NONE`` leaves a cell as it is.
+        """
+        inside = np.flatnonzero(room_of_cell != NONE)
+        room = room_of_cell[inside]
+        parts, whole = self.parts_of_rooms(regions)[room], self.whole_rooms(regions)[room]
+        in_parts = np.where(parts, self.share[inside] + 1e-6, 0.0)
+        in_parts /= np.maximum(in_parts.sum(axis=1, keepdims=True), 1e-12)
+        share = self.share.copy()
+        share[inside] = np.where(parts.any(axis=1, keepdims=True), in_parts, whole)
+        return replace(self, share=share)
+
+
+def seen_twice(field: RoomField, regions: RoomRegions) -> Int[np.ndarray, "p 2"]:
+    """Return the pairs of rooms beside each other that are surely of one kind of which homes have one: a kitchen."""
+    share = field.whole_rooms(regions)
+    single = [lexicon().find(name, EntryKind.ROOM) for name in _ONE_IF_BESIDE]
+    is_single = np.array([lexicon().find(kind, EntryKind.ROOM) in single for kind in field.kinds])
+    one_kind = ~field.parts_of_rooms(regions).any(axis=1)
+    kind = np.where(one_kind & (share.max(axis=1, initial=0.0) >= FOUND_AT), share.argmax(axis=1), -1)
+    a, b = regions.beside.T
+    return regions.beside[(kind[a] == kind[b]) & (kind[a] >= 0) & is_single[kind[a]]]
+
+
+def rooms_of_cells(regions: RoomRegions, places: Float[np.ndarray, "k 3"]) -> Int[np.ndarray, " c"]:
+    """Return the room that each cell of the floor plan belongs to: its region, or that of the nearest view.
+
+    Regions into which fewer than ``FEWEST_VIEWS`` views looked are no rooms. ``NONE``: near views beyond all floors.
+
+    Args:
+        regions: of the map.
+        places: middle of what each keyframe saw, metres, world.
+    """
+    own = regions.at(places)
+    is_room = np.append(np.bincount(own[own != NONE], minlength=len(regions)) >= FEWEST_VIEWS, False)
+    kept = np.flatnonzero(is_room[own] | (own == NONE))
+    nearest = np.append(own[kept], NONE)[regions.plan.nearest(places[kept])]
+    return np.where(is_room[regions.of_plan_cells], regions.of_plan_cells, nearest)
 
 
 KeptField = Callable[[str, FloorPlan, tuple[str, ...], Float[np.ndarray, "k n"], Callable[[], RoomField]], RoomField]

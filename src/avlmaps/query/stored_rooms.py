@@ -72,7 +72,7 @@ def _place(stored: "StoredMap", plan: FloorPlan, width_rad: float) -> Derivation
 
 
 def _to_arrays(regions: RoomRegions) -> dict[str, np.ndarray]:
-    arrays: dict[str, np.ndarray] = {"neighbours": regions.neighbours}
+    arrays: dict[str, np.ndarray] = {"count": np.array([regions.count]), "beside": regions.beside}
     for number, (grid, label) in enumerate(zip(regions.grids, regions.labels, strict=True)):
         arrays[f"frame_{number}"] = np.array([grid.heading_rad, *grid.origin_m, grid.cell_m])
         arrays[f"cells_{number}"] = np.stack([grid.wall, grid.free, grid.stood])
@@ -83,9 +83,11 @@ def _to_arrays(regions: RoomRegions) -> dict[str, np.ndarray]:
 def _from_arrays(plan: FloorPlan, arrays: Mapping[str, np.ndarray]) -> RoomRegions | None:
     """Return stored rooms; None where the arrays are not those of this many storeys, or name rooms that are none."""
     storeys = range(len(plan.storeys))
-    if set(arrays) != {"neighbours", *(f"{name}_{k}" for k in storeys for name in ("frame", "cells", "label"))}:
+    if set(arrays) != {"count", "beside", *(f"{name}_{k}" for k in storeys for name in ("frame", "cells", "label"))}:
         return None
-    neighbours: Int[np.ndarray, " r"] = arrays["neighbours"]
+    count, beside = int(arrays["count"].sum()), arrays["beside"]
+    if beside.ndim != 2 or beside.shape[1:] != (2,) or not 0 <= beside.min(initial=0) <= beside.max(initial=0) <= count:
+        return None
     grids: list[StoreyGrid] = []
     labels: list[Int[np.ndarray, "nx ny"]] = []
     for number in storeys:
@@ -93,8 +95,8 @@ def _from_arrays(plan: FloorPlan, arrays: Mapping[str, np.ndarray]) -> RoomRegio
         cells, label = arrays[f"cells_{number}"], arrays[f"label_{number}"]
         if frame.shape != (4,) or cells.shape != (3, *label.shape) or not label.size:
             return None
-        if not NONE <= int(label.min()) <= int(label.max()) < len(neighbours):
+        if not NONE <= int(label.min()) <= int(label.max()) < count:
             return None
         grids.append(StoreyGrid(float(frame[0]), frame[1:3], float(frame[3]), *cells))
         labels.append(label)
-    return RoomRegions(plan, tuple(grids), tuple(labels), neighbours)
+    return RoomRegions(plan, tuple(grids), tuple(labels), count, beside)

@@ -255,16 +255,16 @@ def area_factor(
     settings: AreaSettings,
     heat: HeatSettings,
     rooms: Rooms | None = None,
-    corrected: Callable[[RoomField], RoomField] | None = None,
-    is_one_room: bool = False,
+    settled: Callable[[RoomField], RoomField] = lambda field: field,
+    room_of: Callable[[Float[np.ndarray, "k 3"]], Int[np.ndarray, " k"]] | None = None,
 ) -> NearAnchors:
     """Return the heat of an area: one anchor a keyframe.
 
     As context it is how likely each place is in such an area; where the area itself is sought it falls from the places
-    that look most like it.
+    that look most like it, and each room is one goal. Without rooms heat falls off round every keyframe.
 
-    Without rooms heat falls off round every keyframe. ``corrected`` puts in the rooms that people named: kinds behind
-    those that the encoder knows; with ``is_one_room`` the name is that of one room of the map, the last such kind.
+    ``settled`` makes a room of one kind, and puts in the rooms that people named: kinds behind those that the encoder
+    knows; one without a name is the room that the query names by its number. ``room_of`` returns the rooms of places.
     """
     anchors = area_anchors(keyframes, settings)
     view = np.asarray(keyframes.view)
@@ -275,11 +275,10 @@ def area_factor(
     else:
         shares = view_shares(view, encoder, part.query, settings)
         kinds, weights = rooms.field(shares.kinds, shares.share, "kinds_asked"), shares.weights
-        if corrected is not None:
-            kinds = corrected(kinds)
-            named = [1.0 if same_place(kind, part.query) else 0.0 for kind in kinds.kinds[len(weights) :]]
-            weights = np.concatenate([weights, named])
-        if is_one_room:
+        kinds = settled(kinds)
+        named = [1.0 if same_place(kind, part.query) else 0.0 for kind in kinds.kinds[len(weights) :]]
+        weights = np.concatenate([weights, named])
+        if not kinds.kinds[-1]:
             weights = np.eye(1, len(kinds.kinds), len(kinds.kinds) - 1)[0]
         posterior = scores = np.clip(kinds.at(anchors) @ weights, 0.0, 1.0).astype(np.float64)
     best = float(posterior.max(initial=0.0))
@@ -290,8 +289,9 @@ def area_factor(
     if not len(keyframes):
         note = "the map holds no keyframes"
     group = modes(space.level(anchors)[:, :2], scores, settings.link_m)
-    if is_one_room:  # however far apart its views look
-        group = np.where(scores > 0.0, 0, 1 + group)
+    if kinds is not None and room_of is not None:  # however far apart the views of a room look
+        room = room_of(anchors)
+        group = np.unique(np.where(room >= 0, room, 1 + room.max(initial=-1) + group), return_inverse=True)[1]
     falloff, found = heat.falloff_per_m(part.role), best >= FOUND_AT
     if kinds is None or part.role is Role.PRIMARY:
         return NearAnchors(space, part, falloff, anchors, scores, group, found, part.query, note)

@@ -35,7 +35,8 @@ class SourceAnchors(NearAnchors):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "found", self.first_alone >= FOUND_AT)
+        best = float((self.scores * self.confidence[self.instance]).max(initial=0.0))
+        object.__setattr__(self, "found", best >= FOUND_AT)
         object.__setattr__(self, "note", "" if self.found else self._absence())
 
     @cached_property
@@ -44,11 +45,6 @@ class SourceAnchors(NearAnchors):
         if self.part.role is Role.CONTEXT:
             return np.ones(len(self.spreads))
         return np.array([spread.right for spread in self.spreads])
-
-    @property
-    def first_alone(self) -> float:
-        """The best score of a source, times the probability of its place."""
-        return float((self.scores * self.confidence[self.instance]).max(initial=0.0))
 
     def spread_of(self, instance: int) -> Spread:
         """Return how well the place of a source is known."""
