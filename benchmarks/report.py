@@ -1,4 +1,4 @@
-"""Run every benchmark into docs/benchmarks.json; write docs/benchmarks.md and the tables of two other pages from it.
+"""Run every benchmark into docs/benchmarks.json; write docs/benchmarks.md and the README's table from it.
 
     python benchmarks/report.py --sounds SOUNDS --recording RECORDING --house HOUSE
     python benchmarks/report.py --only words sounds --sounds SOUNDS
@@ -15,7 +15,6 @@ import json
 import os
 import platform
 import shlex
-import shutil
 import subprocess
 import sys
 from datetime import date
@@ -31,16 +30,12 @@ from avlmaps_sim.bench.harness.models import shipped_checksums  # noqa: E402
 from page import (  # noqa: E402
     ENTRIES,
     FIGURES,
-    LANGUAGE,
     PAGE,
     README,
-    RECORDINGS,
     Entry,
-    language_tables,
     page,
     read_figures,
     readme_table,
-    recordings_tables,
     stale,
     with_figures,
 )
@@ -85,12 +80,9 @@ def write(found: dict[str, Any]) -> None:
 def rendered(found: dict[str, Any]) -> dict[Path, str]:
     """Return the text of every file that follows from the figures."""
     readme = README.read_text(encoding="utf-8")
-    recordings, language = RECORDINGS.read_text(encoding="utf-8"), LANGUAGE.read_text(encoding="utf-8")
     return {
         PAGE: page(found, shipped_checksums()),
         README: with_figures(readme, readme_table(found)),
-        RECORDINGS: with_figures(recordings, recordings_tables(found)),
-        LANGUAGE: with_figures(language, language_tables(found)),
     }
 
 
@@ -121,7 +113,7 @@ def main() -> None:
     data["OUT"] = asked.out
     data["ROOMS"] = asked.rooms
     for entry in () if asked.page else ENTRIES:
-        if asked.only and entry.name not in asked.only:
+        if entry.name == "outside" or (asked.only and entry.name not in asked.only):
             continue
         if asked.stale and not stale(entry, found.get(entry.name), shipped_checksums()):
             continue
@@ -131,8 +123,6 @@ def main() -> None:
             continue
         print(f"running {entry.name}: {entry.command}", file=sys.stderr)
         found[entry.name] = measured(entry, words)
-        if entry.picture:
-            shutil.copyfile(asked.out / entry.picture, PAGE.parent / "pictures" / entry.picture)
         write({one.name: found[one.name] for one in ENTRIES if one.name in found})
     write({one.name: found[one.name] for one in ENTRIES if one.name in found})
 

@@ -17,17 +17,15 @@ from page import (  # noqa: E402 - benchmarks is not a package
     BEGIN,
     END,
     ENTRIES,
-    LANGUAGE,
     NOT_YET,
     PAGE,
     README,
-    README_FIGURES,
-    RECORDINGS,
-    language_tables,
+    README_ROWS,
     page,
+    pooled,
     read_figures,
     readme_table,
-    recordings_tables,
+    shown,
     stale,
     with_figures,
 )
@@ -40,22 +38,10 @@ def test_the_page_is_what_the_figures_make():
     assert PAGE.read_text(encoding="utf-8") == page(MEASURED, shipped_checksums()), "python benchmarks/report.py --page"
 
 
-def test_the_readme_shows_the_figures_that_were_measured():
+def test_the_readme_shows_the_figures_that_were_measured_with_the_weights_that_ship():
     readme = README.read_text(encoding="utf-8")
     assert readme == with_figures(readme, readme_table(MEASURED)), "python benchmarks/report.py --page"
-    assert len(README_FIGURES) <= 10
-
-
-def test_the_page_of_recordings_shows_the_figures_that_were_measured():
-    shown = RECORDINGS.read_text(encoding="utf-8")
-    assert shown == with_figures(shown, recordings_tables(MEASURED)), "python benchmarks/report.py --page"
-    assert ("silent wrong" in recordings_tables(MEASURED)) == ("recordings" in MEASURED)
-
-
-def test_the_page_of_language_shows_each_round_and_all_lists_now() -> None:
-    shown = LANGUAGE.read_text(encoding="utf-8")
-    assert shown == with_figures(shown, language_tables(MEASURED)), "python benchmarks/report.py --page"
-    assert ("all, commands" in language_tables(MEASURED)) == ("language" in MEASURED)
+    assert not [name for name in README_ROWS if stale(COMMANDS[name], MEASURED.get(name), shipped_checksums())]
 
 
 def test_a_figure_typed_into_the_readme_by_hand_is_noticed():
@@ -71,10 +57,24 @@ def test_a_readme_without_markers_is_refused():
     assert with_figures(f"a\n{BEGIN}\nold\n{END}\nb", "new") == f"a\n{BEGIN}\nnew\n{END}\nb"
 
 
-def test_every_row_of_the_readme_that_was_measured_has_its_figure():
-    for figure, line in zip(README_FIGURES, readme_table(MEASURED).splitlines()[2:], strict=True):
-        assert figure.entry in COMMANDS
-        assert (NOT_YET in line) == (figure.entry not in MEASURED), line
+@pytest.mark.parametrize("entry", ENTRIES, ids=lambda entry: entry.name)
+def test_every_row_of_what_was_measured_has_its_figure(entry):
+    for figure in entry.figures:
+        assert (shown(figure, MEASURED.get(entry.name)) == NOT_YET) == (entry.name not in MEASURED), figure.label
+
+
+def test_sealed_rounds_are_added_up_from_the_one_after_the_fourth():
+    columns = ["list", "sentences", "right", "harmless", "asked back", "misread", "dangers driven"]
+    rows = [
+        ["fourth four, commands", 9, "9 (x)", "", "", "0 (x)", "-"],
+        ["fifth, commands", 10, "8 (x)", "", "", "2 (x)", "1 of 3"],
+        ["fifth, questions", 10, "0 (x)", "", "", "9 (x)", "-"],
+        ["sixth, commands", 10, "9 (x)", "", "", "0 (x)", "0 of 4"],
+    ]
+    told = pooled({"columns": columns, "rows": rows})
+    assert (told[2], told[5], told[6]) == (
+        "right 17 of 20 (85.0 %)", "misread 2 of 20 (10.0 %)", "dangers driven 1 of 7",
+    )  # fmt: skip
 
 
 def test_what_was_measured_is_known_by_an_entry_and_by_its_own_command():
@@ -108,31 +108,17 @@ def indexing(weights: dict[str, str] | None) -> dict[str, object]:
 SHIPPED = {"pixels": "a" * 64, "views": "b" * 64}
 
 
-def test_a_table_of_other_weights_says_so_and_is_run_again():
+def test_a_row_of_other_weights_says_so_and_is_run_again():
     entry = COMMANDS["indexing"]
-    for weights, told in (({**SHIPPED, "views": "c" * 64}, "(other weights: views)"), (None, "were not recorded")):
+    for weights, told in (({**SHIPPED, "views": "c" * 64}, "| older, 2"), (None, "| not recorded, 2")):
         found = indexing(weights)
         assert told in page({"indexing": found}, SHIPPED)
         assert stale(entry, found, SHIPPED)
     found = indexing(SHIPPED)
-    shown = page({"indexing": found}, SHIPPED)
-    assert "other weights:" not in shown
-    assert "not recorded" not in shown
+    row = f"| **45.0 %** of 100 within 0.5 m (35.6 to 54.8) | shipped, 2026-11-22 | `{entry.command}` |"
+    assert row in page({"indexing": found}, SHIPPED)
     assert not stale(entry, found, SHIPPED)
     assert stale(entry, None, SHIPPED)
-
-
-def test_a_table_states_command_scenes_seed_weights_and_what_was_chosen_on_it():
-    shown = page({"indexing": indexing(SHIPPED)}, SHIPPED)
-    for told in (
-        COMMANDS["indexing"].command, "1 scene (house:1)", "seed 3", "pixels aaaaaaaaaaaa", "| 45.0 | 35.6 to 54.8 |",
-        "Chosen on the same data: the weight by distance.",
-    ):  # fmt: skip
-        assert told in shown
-
-
-def test_the_readme_takes_the_row_the_count_and_the_interval():
-    assert "| **45.0 %** of 100 within 0.5 m (35.6 to 54.8) |" in readme_table({"indexing": indexing(SHIPPED)})
 
 
 @pytest.mark.parametrize("entry", [entry for entry in ENTRIES if entry.is_suite], ids=lambda entry: entry.name)
