@@ -27,7 +27,7 @@ NUMERIC := tests/query/test_heatmap.py tests/query/test_goals.py tests/query/tes
 NUMERIC_COMPILED := tests/query/test_heatmap.py tests/query/test_objects.py tests/query/test_scores.py tests/query/test_storey_kernels.py tests/maps/test_fusion.py
 
 # What `make test-fast` runs: the quick tests of each room that is changed most.
-FAST := tests/core tests/test_imports.py tests/test_conventions.py tests/query/test_goals.py tests/query/test_instances.py \
+FAST := tests/core tests/test_imports.py tests/query/test_goals.py tests/query/test_instances.py \
   tests/query/test_joining.py tests/maps/test_grid.py tests/navigate/test_planner.py tests/perception/test_codes.py \
   tests/perception/test_matching.py tests/language/test_program_run.py tests/cli/test_help.py
 

@@ -104,7 +104,7 @@ class Build(ModelVerb):
     ray: Annotated[tuple[str, ...] | None, arg(metavar="[HOST:PORT]")] = None
     """Let the workers of a Ray cluster encode, fuse and describe, by jobs of 200 frames: the cluster at HOST:PORT, to
     which this machine belongs, or without an address one of this machine's cores. The recording and MAP must lie on
-    storage that all machines share; the map is the same (docs/guides/cluster.md)."""
+    storage that all machines share; the map is the same (docs/guides/map-your-own-bag.md)."""
     resume: bool = False
     """Resume a stopped build. This is the default; the flag lets scripts say so."""
     fresh: bool = False

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 class Sources(MapVerb):
     """List where the sounds of a map came from: a region with a probability, rooms and things that it may be.
 
-    The recording must say where its microphones are (docs/concepts/sound-sources.md). Sounds of one kind from one place
-    are one source.
+    The recording must say where its microphones are (docs/guides/where-sounds-come-from.md). Sounds of one kind from
+    one place are one source.
 
     Example: avlmaps sources home.avlmap --sound "dog bark"
     """

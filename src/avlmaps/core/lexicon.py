@@ -1,7 +1,7 @@
 """The words that this project knows: things, rooms and sounds, with what is usual about each (`lexicon.toml`).
 
 Every table that needs a name, a synonym or a wider kind reads it here. Look-ups ignore case, hyphens, blanks and the
-plural, so "Arm-chairs" is an armchair. How to add a thing stands in ``docs/guides/add-a-thing.md``.
+plural, so "Arm-chairs" is an armchair. How to add a thing stands in ``docs/guides/extend.md``.
 """
 
 import tomllib

@@ -10,7 +10,7 @@ from avlmaps.maps.fusion.sensor import FusionSettings
 from avlmaps.maps.keyframes.describe import KeyframeSettings
 
 SUBMAP_FRAMES = 32
-"""Frames of a submap: fewer follow corrections more closely and take more room (docs/guides/correct-poses.md)."""
+"""Frames of a submap: fewer follow corrections more closely and take more room (docs/guides/map-while-you-drive.md)."""
 
 
 @dataclass(frozen=True, slots=True)

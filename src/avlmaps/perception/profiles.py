@@ -214,7 +214,7 @@ _EMBEDDED = Profile(
     about="small models shipped with the package: no download, no GPU; its eyes learnt from rendered worlds and from "
     "frames of NYU Depth V2, a data set for research that states no licence",
     # A small network knows a sofa from two metres better than a cushion's width of it from half a metre: with nearly
-    # even weights 44 % of the voxels of things are named rightly, with the paper's 41 % (docs/experiments.md).
+    # even weights 44 % of the voxels of things are named rightly, with the paper's 41 %.
     weight_variance_m2=50.0,
 )
 register_profile(_EMBEDDED)

@@ -21,7 +21,7 @@ class ObjectSettings:
     """Instances below this are noise (one or two voxels of 5 cm) and give no heat; 0 admits all, as the paper does."""
     least_in_company: float = 0.02
     """The same where the query has context: then a weak instance there is likelier than a
-    confident one elsewhere (docs/experiments.md)."""
+    confident one elsewhere."""
     score_in_company: float = 0.5
     """And there a voxel counts that scores at least this part of its best rival's score, for an encoder of names."""
     least_score_in_company: float = 0.0
@@ -35,7 +35,7 @@ class ObjectSettings:
     room_weight: float = 0.75
     """How much the kind of room that a thing stands in counts, for an encoder of names: the thing's log-odds rise by
     this times ln of how many times as common it is in such rooms. 0: not at all. It and the next were chosen on eight
-    development homes (docs/experiments.md)."""
+    development homes."""
     room_cost: float = 0.4
     """Nats that the log-odds lose with that: most things stand where things of their name do."""
     too_long: float = 1.5

@@ -77,7 +77,7 @@ class PhotometricSettings:
     """A pose at least this far away is another place, over which the best has its lead."""
     odds: tuple[float, float, float, float] = (-15.3, 16.6, 0.5, 4.0)
     """Log-odds that the place is right within 0.75 m: a constant, and the worth of likeness, of each keypoint, of the
-    lead. Fitted to 176 photos that keypoints do not locate, two thirds of them of other homes (docs/experiments.md)."""
+    lead. Fitted to 176 photos that keypoints do not locate, two thirds of them of other homes."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,7 +33,7 @@ _ONE_IF_BESIDE = ("kitchen", "living room", "dining room", *_PASSAGES)
 
 @dataclass(frozen=True, slots=True)
 class RoomSettings:
-    """From views and things to kinds of room. Chosen on six development homes (docs/experiments.md)."""
+    """From views and things to kinds of room. Chosen on six development homes."""
 
     views_m: float = 0.8
     """Standard deviation of how far a view's vote spreads from the middle of what it saw, metres."""

@@ -1,4 +1,4 @@
-"""The numbers of the evidence, chosen on development homes (docs/concepts/sound-sources.md)."""
+"""The numbers of the evidence, chosen on development homes (docs/guides/where-sounds-come-from.md)."""
 
 from dataclasses import dataclass
 

@@ -34,7 +34,7 @@ class AreaSettings:
 
     anchor: Literal["camera", "centre"] = "centre"
     """Where a keyframe's heat falls from: the camera (the paper), or the middle of what the camera saw (things are
-    found in the right place for 45 % of 191 tasks, with the camera's place for 35 %; docs/experiments.md)."""
+    found in the right place for 45 % of 191 tasks, with the camera's place for 35 %)."""
     extent: Literal["rooms", "cones"] = "rooms"
     """How far an area's heat reaches. ``rooms``: views and things vote on the kind of room of every place, up to the
     walls (``rooms.py``). ``cones`` (the paper): heat falls off round every keyframe, through walls."""

@@ -56,8 +56,7 @@ class RobotFile(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
                 read = msgspec.json.decode(stream.read(_MOST_BYTES), type=cls)
         except (OSError, ValueError, RecursionError) as fault:
             raise NavigationError(
-                f"The robot's file {path} cannot be read ({fault}); write it as "
-                "docs/guides/drive-through-the-server.md shows."
+                f"The robot's file {path} cannot be read ({fault}); write it as docs/guides/serve.md shows."
             ) from None
         if read.robot == "simulated" and read.scene is None:
             raise NavigationError(f"{path} names no scene for the simulated robot; add one, such as house:7.")
