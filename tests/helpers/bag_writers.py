@@ -335,6 +335,7 @@ def descriptions() -> bytes:
     files = b""
     for package in ("google.protobuf", "foxglove"):
         body = _field(1, f"{package}.proto".encode()) + _field(2, package.encode())
+        body += _field(3, b"google.protobuf.proto") if package == "foxglove" else b""
         for name, fields in _SCHEMAS.items():
             if name.rpartition(".")[0] == package:
                 body += _field(4, _field(1, name.rpartition(".")[2].encode()) + b"".join(map(_described, fields)))

@@ -20,8 +20,8 @@ from avlmaps.live.ros_source import follow_ros2, open_ros2, ros_topics
 from avlmaps.live.settings import LiveSettings
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.channels import ChannelSound
-from avlmaps.recordings.formats.ros_audio import Pcm
-from avlmaps.recordings.formats.ros_topics import RosTopics
+from avlmaps.recordings.formats.ros_messages import RosTopics
+from avlmaps.recordings.formats.ros_sound import Pcm
 from helpers import ros_messages as ros
 
 START_S = 1_700_000_000.0

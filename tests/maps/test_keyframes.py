@@ -22,7 +22,7 @@ from avlmaps.maps.keyframes.describe import (
 )
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.protocols import ModelCard
-from avlmaps.recordings.registration import depth_in_colour
+from avlmaps.recordings.images import depth_in_colour
 from avlmaps.recordings.types import Frame
 from helpers.picture_room import CAMERA, RoomWalk, distance_to_surface_m, looking
 

@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from test_rosbag import HEIGHT, START_S, WIDTH, BagMaker, world_from_body
 
-from avlmaps.recordings.formats.ros_messages import camera_of, is_rectified
-from avlmaps.recordings.formats.ros_topics import pair_images
+from avlmaps.recordings.formats.ros_messages import camera_of, is_rectified, pair_images
 from avlmaps.recordings.formats.rosbag import open_rosbag
 
 

@@ -341,7 +341,7 @@ def test_plain_samples_without_audio_info_say_how_to_name_them(
 ) -> None:
     path = bag_with(tmp_path, kind, monkeypatch, _sound)
     with pytest.raises(
-        RecordingError, match=r"has no AudioInfo and is not an MP3.*audio_pcm=16000,1.*audio=FILE.*audio=none"
+        RecordingError, match=r"has no AudioInfo and is not an MP3.*audio_pcm=8000,1.*audio=FILE.*audio=none"
     ):
         open_rosbag(path)
     recording = open_rosbag(path, {"audio_pcm": f"{RATE_HZ}"})

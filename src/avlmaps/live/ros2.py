@@ -16,8 +16,8 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from avlmaps.core.ros_interfaces import interface
-from avlmaps.recordings.formats import ros_directions
-from avlmaps.recordings.formats.ros_topics import RosTopics, info_beside, pair_images
+from avlmaps.recordings.formats.ros_messages import RosTopics, info_beside, pair_images
+from avlmaps.recordings.formats.ros_sound import DIRECTION_TYPES
 
 # pyright: reportMissingImports=false
 _RAW, _COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
@@ -142,7 +142,7 @@ class Ros2Inbox:
         if "audio" not in self.chosen and self._topics.audio != "none":
             self._choose_sound()
         said = self._topics.directions
-        if said and "directions" not in self.chosen and self._known.get(said) in ros_directions.TYPES:
+        if said and "directions" not in self.chosen and self._known.get(said) in DIRECTION_TYPES:
             self._subscribe("directions", said, self._known[said], depth=100)
         if "audio" in self.chosen and "audio_info" not in self.chosen:  # it may be discovered long after the sound
             self._choose_sound_info()

@@ -15,9 +15,16 @@ from avlmaps.core.arrays import Float32, Float64, UInt8
 from avlmaps.core.camera import Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.live.patience import Once
-from avlmaps.recordings.formats.ros_messages import camera_of, colour_of, depth_of, is_rectified, pose_of, stamp_of
+from avlmaps.recordings.formats.ros_messages import (
+    PAIRING_TOLERANCE_S,
+    camera_of,
+    colour_of,
+    depth_of,
+    is_rectified,
+    pose_of,
+    stamp_of,
+)
 from avlmaps.recordings.formats.ros_motion import body_of
-from avlmaps.recordings.formats.ros_topics import PAIRING_TOLERANCE_S
 from avlmaps.recordings.formats.ros_transforms import HOLD_S, TransformTree
 
 Kind = Literal["rgb", "depth", "rgb_info", "depth_info", "tf", "tf_static", "pose"]

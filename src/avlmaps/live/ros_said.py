@@ -6,8 +6,8 @@ from typing import Any
 
 from avlmaps.core.motion import wrap_angle
 from avlmaps.live.patience import Once
-from avlmaps.recordings.formats.ros_directions import BEYOND_A_TURN_RAD, angle_of
 from avlmaps.recordings.formats.ros_messages import stamp_of
+from avlmaps.recordings.formats.ros_sound import BEYOND_A_TURN_RAD, angle_of
 
 HELD = 100
 """Floats that wait until one is no angle in radians; if all are, they are taken as radians."""

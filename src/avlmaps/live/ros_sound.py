@@ -10,8 +10,8 @@ from avlmaps.core.wording import option
 from avlmaps.live.patience import Once
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.channels import ChannelSound
-from avlmaps.recordings.formats.ros_audio import Pcm, sampled_pieces
 from avlmaps.recordings.formats.ros_messages import stamp_of
+from avlmaps.recordings.formats.ros_sound import Pcm, sampled_pieces
 
 DRIFT_S = 0.1
 """Sound without stamps is given a place again where it is off by more than this, seconds."""

@@ -14,9 +14,8 @@ from avlmaps.live.replay import tell_doubts
 from avlmaps.live.ros_frames import RosFrames
 from avlmaps.live.ros_said import RosDirections
 from avlmaps.live.ros_sound import RosSound
-from avlmaps.recordings.formats.ros_audio import Pcm
-from avlmaps.recordings.formats.ros_messages import stamp_of
-from avlmaps.recordings.formats.ros_topics import RosTopics
+from avlmaps.recordings.formats.ros_messages import RosTopics, stamp_of
+from avlmaps.recordings.formats.ros_sound import Pcm
 
 _LOOK_S = 0.05
 _SAID = ("rgb", "depth", "pose", "audio", "directions")  # at the beginning, what is read

@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Float32
 
 from avlmaps.core.errors import AudioError, NoAudioStreamError
+from avlmaps.core.files import SOUND_BYTES, RefusedFileError, checked_size
 from avlmaps.core.wording import option
-from avlmaps.recordings.media_files import checked_media
 
 if TYPE_CHECKING:
     import soundfile
@@ -23,12 +23,20 @@ _SELF_CONTAINED = (
 _PIECE_SAMPLES = 1 << 16
 _UNKNOWN = 1 << 48  # a FLAC that was written to a pipe may say that it has this many samples or more
 _SAMPLE_BYTES, _PICTURES_BYTES = 5, 64 << 20  # no FLAC takes more for a sample, and for the pictures and tags beside
+_UNKNOWN_BYTES = (0, 0xFFFFFFFF - 0xFFFF)  # and a WAV that it has none, or this many and more
 _PREROLL_S = 1.0  # a decoder that starts in the middle needs a while until its output is right
 _RESYNC_S = 0.05  # stamps are rounded (to 1 ms in mkv); only a larger jump is a gap
 _LOOKS, _LOOK_S = 20, 0.25  # of a file, to find out whether its channels cancel
 _CANCELLED = 0.01
 _AUDIBLE_POWER = 1e-8
 _SLACK_S = 0.5  # containers round their durations, encoders drop or pad a few hundred samples
+
+_MOST_ZEROS_BYTES = 64 << 20
+_BLOCK_BYTES = 1 << 20
+# Formats that say where their samples lie: (offset, bytes there). Zeros at their end are silence, or are never read.
+_INDEXED = (
+    (8, b"WAVE"), (0, b"FORM"), (0, b"caff"), (0, b"riff"), (4, b"ftyp"), (4, b"moov"), (4, b"mdat"), (4, b"wide"),
+)  # fmt: skip
 
 
 def self_contained_suffix(content: bytes) -> str | None:
@@ -193,73 +201,35 @@ def _opened_plain(path: Path) -> "soundfile.SoundFile":
 def _examine_plain(path: Path) -> tuple[int, int]:
     with _opened_plain(path) as file:
         rate_hz, count = int(file.samplerate), int(file.frames)
-        promised = _promised_wav_samples(path, file.channels)
-        if promised is not None and count < promised:
-            raise truncation_error(path, count / rate_hz, promised / rate_hz)
-        if file.format == "FLAC":
-            count = _flac_samples(path, file, rate_hz, count)
-    return rate_hz, count
+        known = 0 < count < _UNKNOWN
+        most = count * file.channels * _SAMPLE_BYTES + _PICTURES_BYTES  # libsndfile looks for samples in all there is
+        padded = known and file.format == "FLAC" and path.stat().st_size > most
+        if known and not (padded or _is_short_wav(path) or _lacks_its_last_sample(file)):
+            return rate_hz, count
+        if known:
+            raise AudioError(
+                f"{path} is truncated or damaged: its header promises {count / rate_hz:.2f} s of sound, and it is "
+                "not as long; copy or convert it again."
+            )
+        file.seek(0)
+        return rate_hz, sum(len(piece) for piece in file.blocks(_PIECE_SAMPLES, dtype="float32"))
 
 
-def _promised_wav_samples(path: Path, channels: int) -> int | None:
-    """Return how many samples a WAV file's header promises, which libsndfile quietly cuts to what is there."""
-    with path.open("rb") as stream_:
-        if stream_.read(4) != b"RIFF" or stream_.seek(8) != 8 or stream_.read(4) != b"WAVE":
-            return None
-        frame_bytes = 0
-        while len(head := stream_.read(8)) == 8:
-            size = int.from_bytes(head[4:], "little")
-            if head[:4] == b"fmt ":
-                fmt = stream_.read(min(size, 16))
-                frame_bytes = int.from_bytes(fmt[12:14], "little")
-                stream_.seek(size - len(fmt) + size % 2, 1)
-            elif head[:4] == b"data":
-                unknown = size >= 0xFFFFFFFF - 0xFFFF or size == 0  # written to a pipe: the length was never filled in
-                return None if unknown or not frame_bytes or not channels else size // frame_bytes
-            else:
-                stream_.seek(size + size % 2, 1)
-    return None
+def _is_short_wav(path: Path) -> bool:
+    """Return whether a WAV file has fewer bytes than its header promises, which libsndfile would pass over."""
+    with path.open("rb") as file:
+        head = file.read(12)
+    promised = int.from_bytes(head[4:8], "little")
+    whole = head[:4] != b"RIFF" or head[8:] != b"WAVE" or not _UNKNOWN_BYTES[0] < promised < _UNKNOWN_BYTES[1]
+    return not whole and promised + 7 > path.stat().st_size
 
 
-def _flac_samples(path: Path, file: "soundfile.SoundFile", rate_hz: int, promised: int) -> int:
-    """Return how many samples a FLAC has; its header may promise none, or more than there are."""
-    known = 0 < promised < _UNKNOWN
-    most = promised * file.channels * _SAMPLE_BYTES + _PICTURES_BYTES
-    if known and (size := path.stat().st_size) > most:  # libsndfile would look for samples in all of what follows
-        raise AudioError(
-            f"{path} has {size:,} bytes for {promised / rate_hz:.2f} s of sound, which take {most:,} at most; it is "
-            "damaged: copy or convert it again."
-        )
-    if _ends_at(file, promised):
-        return promised
-    found = sum(len(piece) for piece in _readable(path))
-    if known and found < promised:
-        raise truncation_error(path, found / rate_hz, promised / rate_hz)
-    return found
-
-
-def _ends_at(file: "soundfile.SoundFile", count: int) -> bool:
-    """Return whether a file's last sample can be read (a truncated FLAC still promises its full length)."""
-    if not 0 < count < _UNKNOWN:
-        return False
+def _lacks_its_last_sample(file: "soundfile.SoundFile") -> bool:
     try:
-        file.seek(count - 1)
-        return len(file.read(1, dtype="float32")) == 1
+        file.seek(file.frames - 1)
+        return len(file.read(1, dtype="float32")) < 1
     except RuntimeError:
-        return False
-
-
-def _readable(path: Path) -> Iterator[Float32[np.ndarray, " _"]]:
-    """Yield the readable samples of a file, from its beginning to its end or its first fault."""
-    with _opened_plain(path) as file:
-        while True:
-            try:
-                piece = file.read(4096, dtype="float32", always_2d=True)
-            except RuntimeError:
-                return
-            if not len(piece):
-                return
-            yield piece[:, 0]
+        return True
 
 
 def _examine_video(path: Path) -> tuple[int, int]:
@@ -346,3 +316,38 @@ def _placed(
             return
     if end - at <= _SLACK_S * rate_hz:
         yield np.zeros(end - at, np.float32)
+
+
+def checked_media(path: Path) -> int:
+    """Return the size of a file of sound or video that a decoder may open.
+
+    The decoders of the other formats (Ogg, MP3, Matroska, WebM, AVI) look for the next packet in all that follows:
+    20 GB of zeros, as a full disk or a broken copy leaves them, keep a processor busy for minutes.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+        OSError: it is no regular file, is too large, or ends in 64 MB of zeros and its format has no index;
+            ``strerror`` is the reason in words.
+    """
+    size = checked_size(path, SOUND_BYTES)
+    if size >= _MOST_ZEROS_BYTES and not _is_indexed(path) and _ends_in_zeros(path, size):
+        raise RefusedFileError(
+            path, f"the last {_MOST_ZEROS_BYTES:,} of its {size:,} bytes are zeros, as after a copy that broke off"
+        )
+    return size
+
+
+def _is_indexed(path: Path) -> bool:
+    with path.open("rb") as stream:
+        head = stream.read(16)
+    return any(head[at : at + len(magic)] == magic for at, magic in _INDEXED)
+
+
+def _ends_in_zeros(path: Path, size: int) -> bool:
+    zeros = bytes(_BLOCK_BYTES)
+    with path.open("rb") as stream:
+        for back in range(_BLOCK_BYTES, _MOST_ZEROS_BYTES + 1, _BLOCK_BYTES):
+            stream.seek(size - back)
+            if stream.read(_BLOCK_BYTES) != zeros:
+                return False
+    return True

@@ -1,35 +1,113 @@
-"""Reading pictures of a recording: colour (JPEG, PNG) and depth (16-bit PNG, NPY), never half a file.
+"""Reading pictures of a recording: colour and depth, never half a file; and how they are turned to be shown.
 
 A picture's header is compared with the camera before anything is decoded: a PNG of 2 MB may unfold to 4 GB.
 """
 
+import re
 import struct
-import zlib
 from collections import Counter
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from jaxtyping import Float32, UInt8
+from jaxtyping import Float, Float32, UInt8
 
-from avlmaps.core.camera import Pinhole
+from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import PICTURE_BYTES, open_regular, read_regular
 from avlmaps.core.npy import load_npy, npy_header
+from avlmaps.core.poses import apply
 from avlmaps.recordings.faults import readable
-from avlmaps.recordings.turning import DisplayTurn, exif_turn
 
-_PNG = b"\x89PNG\r\n\x1a\n"
-_JPEG = b"\xff\xd8"
-# A JPEG's frame headers carry its size; of the codes C0 to CF these three mean something else.
-_JPEG_SIZE_MARKERS = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
-_HEADER_BYTES = 1 << 18
-_TRIED = 9
-_RESTORE = "restore it, or leave that frame out of the recording"
+COLOUR_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".heic", ".heif", ".avif", ".tif", ".tiff", ".bmp")
+DEPTH_SUFFIXES = (".png", ".npy", ".tif", ".tiff")
 # No RGB-D camera has more; 8192x8192.
 MOST_PIXELS = 1 << 26
 DEPTH_SATURATED = 65535
+_JPEG, _PNG = b"\xff\xd8", b"\x89PNG\r\n\x1a\n"
+_HEIF_KINDS = (b"heic", b"heix", b"hevc", b"heim", b"heis", b"mif1", b"msf1")
+_HEADER_BYTES = 1 << 18
+_TRIED = 9
+_RESTORE = "restore it, or leave that frame out of the recording"
+_FORMATS = ("PNG", "JPEG", "MPO", "WEBP", "TIFF", "BMP", "AVIF", "HEIF")
+# What Pillow raises where a file is none of a format, or is damaged.
+_UNREADABLE = (OSError, SyntaxError, ValueError, TypeError, LookupError, EOFError, OverflowError, struct.error)
+_ORIENTATION = 0x0112
+_ONE = 1 << 16  # in the fixed-point numbers of a display matrix
+
+
+@dataclass(frozen=True, slots=True)
+class DisplayTurn:
+    """How a stored picture is turned to be shown: columns and rows change places first, then they are reversed."""
+
+    transpose: bool = False
+    flip_x: bool = False
+    flip_y: bool = False
+
+    def __bool__(self) -> bool:
+        return self.transpose or self.flip_x or self.flip_y
+
+    def applied(self, picture: np.ndarray) -> np.ndarray:
+        """Return a picture (rows, columns, ...) as it is shown."""
+        shown = np.swapaxes(picture, 0, 1) if self.transpose else picture
+        return np.ascontiguousarray(shown[:: -1 if self.flip_y else 1, :: -1 if self.flip_x else 1])
+
+    def size(self, width: int, height: int) -> tuple[int, int]:
+        """Return (width, height) of a stored picture as it is shown."""
+        return (height, width) if self.transpose else (width, height)
+
+    @property
+    def words(self) -> str:
+        """The turn in words."""
+        if self.transpose ^ self.flip_x ^ self.flip_y:
+            return "mirrored"
+        if self.transpose:
+            return f"turned by 90° {'clockwise' if self.flip_x else 'counter-clockwise'}"
+        return "turned by 180°" if self.flip_x else "as stored"
+
+    @classmethod
+    def of_exif(cls, orientation: int) -> "DisplayTurn":
+        """Return the turn that an EXIF orientation (1 to 8) requests; none for any other number."""
+        numbered = {
+            2: cls(flip_x=True), 3: cls(flip_x=True, flip_y=True), 4: cls(flip_y=True), 5: cls(transpose=True),
+            6: cls(True, flip_x=True), 7: cls(True, True, True), 8: cls(True, flip_y=True),
+        }  # fmt: skip
+        return numbered.get(orientation, cls())
+
+    @classmethod
+    def of_display_matrix(cls, content: bytes) -> "DisplayTurn":
+        """Return the turn of a video's display matrix, nine whole numbers row by row; none if it is no quarter turn."""
+        a, b, _, c, d = struct.unpack_from("=5i", content)  # x shown = a x + c y, y shown = b x + d y
+        if abs(a) == abs(d) == _ONE and b == c == 0:
+            return cls(False, a < 0, d < 0)
+        return cls(True, c < 0, b < 0) if abs(b) == abs(c) == _ONE and a == d == 0 else cls()
+
+
+def exif_turn(content: bytes) -> DisplayTurn:
+    """Return the turn that a picture's EXIF requests; none where it has no EXIF."""
+    if b"Exif" not in content[: 1 << 16] and b"eXIf" not in content[: 1 << 16]:
+        return DisplayTurn()
+    try:
+        with _opened(content) as picture:
+            return DisplayTurn.of_exif(int(picture.getexif().get(_ORIENTATION, 1)))
+    except _UNREADABLE:  # it is a tag that cannot be read; the picture may be whole
+        return DisplayTurn()
+
+
+def _opened(content: bytes) -> Any:
+    """Open a picture by its header alone; HEIC as well where pillow-heif is installed."""
+    from PIL import Image
+
+    if content[4:8] == b"ftyp" and content[8:12] in _HEIF_KINDS:
+        with suppress(ImportError):
+            from pillow_heif import register_heif_opener
+
+            register_heif_opener()
+    return Image.open(BytesIO(content), formats=_FORMATS)
 
 
 def read_bytes(path: Path) -> bytes:
@@ -43,47 +121,56 @@ def read_bytes(path: Path) -> bytes:
 
 
 def check_whole(path: Path, content: bytes) -> None:
-    """Refuse a JPEG or PNG that is cut off or damaged; decoders would return a half-grey picture without a word.
+    """Refuse a picture that is cut off or damaged as far as its outside shows it, and files that are no pictures.
 
     Raises:
-        RecordingError: the file is truncated, damaged, empty or neither PNG nor JPEG.
+        RecordingError: the file is truncated, damaged, empty or of a kind that is not read.
     """
-    if content.startswith(_PNG):
-        fault = _png_fault(content)
-    elif content.startswith(_JPEG):
-        # Within the scan 0xFF is always followed by 0x00, so the end marker is found only where the picture ends.
-        fault = "" if content.rfind(b"\xff\xd9") > content.rfind(b"\xff\xda") else "truncated"
-    else:
-        fault = "neither PNG nor JPEG" if content else "empty"
-    if fault:
-        raise RecordingError(f"{path} is {fault} ({len(content)} bytes); copy it again or leave that frame out.")
+    again = f"({len(content)} bytes); copy it again or leave that frame out."
+    if not content:
+        raise RecordingError(f"{path} is empty {again}")
+    # Within a JPEG's scan 0xFF is always followed by 0x00, so the end marker is found only where the picture ends.
+    cut = content.startswith(_JPEG) and content.rfind(b"\xff\xd9") <= content.rfind(b"\xff\xda")
+    if cut or (content.startswith(_PNG) and b"IEND\xaeB`\x82" not in content):
+        raise RecordingError(f"{path} is truncated {again}")
+    if content.startswith(_JPEG):
+        return
+    if encoded_size(content) is None:
+        raise RecordingError(_unknown_kind(path, content))
+    try:
+        with _opened(content) as picture:
+            picture.verify()  # of a PNG the checksums of all its parts
+    except _UNREADABLE as error:
+        raise RecordingError(f"{path} is truncated or damaged: {str(error).rstrip('.')} {again}") from None
 
 
-def _png_fault(content: bytes) -> str:
-    at = len(_PNG)
-    view = memoryview(content)
-    while at + 12 <= len(content):
-        (length,) = struct.unpack_from(">I", content, at)
-        end = at + 12 + length
-        if end > len(content):
-            return "truncated"
-        if zlib.crc32(view[at + 4 : end - 4]) != struct.unpack_from(">I", content, end - 4)[0]:
-            return f"damaged at byte {at}"
-        if content[at + 4 : at + 8] == b"IEND":
-            return ""
-        at = end
-    return "truncated"
+def _unknown_kind(path: Path, content: bytes) -> str:
+    if content[4:8] == b"ftyp" and content[8:12] in _HEIF_KINDS:
+        return (
+            f"{path} is a HEIC picture, which needs another package: pip install 'avlmaps[heic]', or convert all of "
+            "them to JPEG."
+        )
+    if content.startswith((_PNG[:4], _JPEG)):
+        return f"{path} is truncated or damaged in its header ({len(content)} bytes); copy it again."
+    known = ", ".join(suffix[1:] for suffix in COLOUR_SUFFIXES)
+    return f"{path} is no picture that is read ({len(content)} bytes, first {content[:4].hex(' ')}); {known} are."
 
 
 def picture_size(path: Path, content: bytes | None = None) -> tuple[int, int]:
-    """Return (width, height) of a JPEG, PNG or NPY file from its header alone.
+    """Return (width, height) of a picture or an NPY file from its header alone.
 
     Raises:
         RecordingError: the file is missing, has no such header, or is of a size that no camera has.
     """
-    size = _npy_size(path) if path.suffix == ".npy" else encoded_size(_head(path) if content is None else content)
-    if size is None:
-        raise RecordingError(f"{path} is not a PNG, JPEG or NPY picture (or is cut off); copy it again.")
+    if path.suffix == ".npy":
+        with _whole_npy(path):
+            height, width = _depth_shape(path, npy_header(path, PICTURE_BYTES))
+        size: tuple[int, int] | None = (width, height)
+    else:
+        content = _head(path) if content is None else content
+        size = encoded_size(content)
+        if size is None:
+            raise RecordingError(_unknown_kind(path, content) if content else f"{path} is empty; copy it again.")
     if size[0] < 1 or size[1] < 1 or size[0] * size[1] > MOST_PIXELS:
         raise RecordingError(
             f"{path} says that it is {size[0]}x{size[1]}; pictures have 1 to {MOST_PIXELS:,} pixels, so copy it again."
@@ -92,17 +179,18 @@ def picture_size(path: Path, content: bytes | None = None) -> tuple[int, int]:
 
 
 def encoded_size(content: bytes) -> tuple[int, int] | None:
-    """Return (width, height) that a JPEG's or PNG's header says, None where there is no whole header."""
-    if content.startswith(_PNG) and len(content) >= 33:
-        whole = zlib.crc32(content[12:29]) == struct.unpack_from(">I", content, 29)[0]
-        return struct.unpack_from(">II", content, 16) if whole and content[8:16] == b"\0\0\0\rIHDR" else None
-    return _jpeg_size(content) if content.startswith(_JPEG) else None
+    """Return (width, height) that a picture's header says, None where there is no whole header."""
+    from PIL import Image
 
-
-def _npy_size(path: Path) -> tuple[int, int] | None:
-    with _whole_npy(path):
-        shape = npy_header(path, PICTURE_BYTES).shape
-    return (shape[1], shape[0]) if len(shape) >= 2 else None
+    try:
+        with _opened(content) as picture:
+            return picture.size
+    except Image.DecompressionBombError as error:  # it says how many pixels
+        if content.startswith(_PNG):
+            return struct.unpack_from(">II", content, 16)
+        return int(re.findall(r"[0-9]+", str(error))[0]), 1
+    except _UNREADABLE:
+        return None
 
 
 def first_picture_size(folder: Path, names: Sequence[str]) -> tuple[int, int]:
@@ -112,29 +200,20 @@ def first_picture_size(folder: Path, names: Sequence[str]) -> tuple[int, int]:
         RecordingError: none of the few has a size; the sentence is about the first.
     """
     sizes: Counter[tuple[int, int]] = Counter()
-    spread: list[int] = np.linspace(0, len(names) - 1, _TRIED).round().astype(int).tolist()
-    for at in dict.fromkeys(spread):
+    for at in _some(len(names)):
         with suppress(RecordingError):
             sizes[picture_size(folder / names[at])] += 1
     return sizes.most_common(1)[0][0] if sizes else picture_size(folder / names[0])
 
 
+def _some(count: int) -> list[int]:
+    spread: list[int] = np.linspace(0, count - 1, _TRIED).round().astype(int).tolist() if count else []
+    return list(dict.fromkeys(spread))
+
+
 def _head(path: Path) -> bytes:
     with readable(path), open_regular(path, PICTURE_BYTES) as stream:
         return stream.read(_HEADER_BYTES)
-
-
-def _jpeg_size(content: bytes) -> tuple[int, int] | None:
-    at = 2
-    while at + 9 <= len(content):
-        if content[at] != 0xFF:
-            return None
-        marker = content[at + 1]
-        if marker in _JPEG_SIZE_MARKERS:
-            height, width = struct.unpack_from(">HH", content, at + 5)
-            return width, height
-        at += 1 if marker == 0xFF else 2 + struct.unpack_from(">H", content, at + 2)[0]
-    return None
 
 
 def read_colour(path: Path, camera: Pinhole) -> UInt8[np.ndarray, "h w 3"]:
@@ -155,7 +234,7 @@ def decode_colour(path: Path, content: bytes, camera: Pinhole) -> UInt8[np.ndarr
     _check_outside(path, content, camera)
     bgr = decode_picture(content, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
     if bgr is None:
-        raise RecordingError(f"{path} cannot be decoded ({len(content)} bytes); copy it again or leave that frame out.")
+        raise _undecodable(path, content)
     if bgr.shape[:2] != (camera.height, camera.width):
         bgr = exif_turn(content).applied(bgr)
     _check_size(path, bgr.shape, camera)
@@ -163,58 +242,63 @@ def decode_colour(path: Path, content: bytes, camera: Pinhole) -> UInt8[np.ndarr
 
 
 def read_mask(path: Path, camera: Pinhole) -> UInt8[np.ndarray, "h w"]:
-    """Read an 8-bit picture of one channel that belongs to a depth picture.
-
-    Raises:
-        RecordingError: the file is missing, truncated, no picture or not of the camera's size.
-    """
+    """Read an 8-bit picture of one channel that belongs to a depth picture; errors as of ``read_colour``."""
     import cv2
 
     content = read_bytes(path)
     _check_outside(path, content, camera)
     mask = decode_picture(content, cv2.IMREAD_GRAYSCALE)
     if mask is None:
-        raise RecordingError(f"{path} cannot be decoded ({len(content)} bytes); copy it again or leave that frame out.")
+        raise _undecodable(path, content)
     _check_size(path, mask.shape, camera)
     return mask
 
 
 def decode_picture(content: bytes, flags: int) -> np.ndarray | None:
-    """Decode a PNG or JPEG whose header was compared before; None where that fails."""
+    """Decode a picture whose header was compared before, as OpenCV does; None where it is damaged."""
     import cv2
 
     with suppress(cv2.error, MemoryError):
-        return cv2.imdecode(np.frombuffer(content, np.uint8), flags)
+        found = cv2.imdecode(np.frombuffer(content, np.uint8), flags)
+        if found is not None:
+            return found
+    if content[4:8] != b"ftyp":
+        return None
+    with suppress(OSError, ValueError, MemoryError, SyntaxError), _opened(content) as picture:  # HEIC
+        return np.ascontiguousarray(np.asarray(picture.convert("RGB"))[..., ::-1])
     return None
 
 
+def _undecodable(path: Path, content: bytes) -> RecordingError:
+    return RecordingError(f"{path} cannot be decoded ({len(content)} bytes); copy it again or leave that frame out.")
+
+
 def _check_outside(path: Path, content: bytes, camera: Pinhole) -> None:
-    check_whole(path, content)
     width, height = picture_size(path, content)
+    if content.startswith(_JPEG):
+        check_whole(path, content)
     if (width, height) != (camera.width, camera.height) == (height, width):
         width, height = exif_turn(content).size(width, height)
     _check_size(path, (height, width), camera)
 
 
 def file_turn(path: Path) -> DisplayTurn:
-    """Return how a JPEG's EXIF requests that it be turned; none where there is no such tag, or no such file."""
-    if path.suffix.lower() not in (".jpg", ".jpeg"):
-        return DisplayTurn()
+    """Return how a picture's EXIF requests that it be turned; none where there is no such tag, or no such file."""
     try:
-        return exif_turn(_head(path))
+        return exif_turn(_head(path)) if path.suffix.lower() in (".jpg", ".jpeg") else DisplayTurn()
     except RecordingError:  # which says more when the picture is read
         return DisplayTurn()
 
 
 def turn_notices(folder: Path, names: Sequence[str]) -> tuple[str, ...]:
     """Return a notice where a few of the colour files are to be shown turned, or nothing."""
-    spread: list[int] = np.linspace(0, len(names) - 1, _TRIED).round().astype(int).tolist() if len(names) else []
-    turned = {at: turn for at in dict.fromkeys(spread) if (turn := file_turn(folder / names[at]))}
+    spread = _some(len(names))
+    turned = {at: turn for at in spread if (turn := file_turn(folder / names[at]))}
     if not turned:
         return ()
     at, turn = next(iter(turned.items()))
     return (
-        f"{names[at]} is to be shown {turn.words} (its EXIF), as {len(turned)} of {len(set(spread))} pictures looked "
+        f"{names[at]} is to be shown {turn.words} (its EXIF), as {len(turned)} of {len(spread)} pictures looked "
         "at; they are read as they are stored, like depth, unless the intrinsics are of the turned size.",
     )
 
@@ -222,13 +306,13 @@ def turn_notices(folder: Path, names: Sequence[str]) -> tuple[str, ...]:
 def read_depth(path: Path, camera: Pinhole, units_per_m: float) -> Float32[np.ndarray, "h w"]:
     """Read z-depth in metres; 0 where there is none.
 
-    A PNG holds 16-bit whole numbers, of which 0 and 65535 say that nothing was measured; an NPY holds metres, of
-    which NaN, infinity and what is not positive say so.
+    A PNG or TIFF holds 16-bit whole numbers, of which 0 and 65535 say that nothing was measured; an NPY, or a TIFF of
+    floats, holds metres, of which NaN, infinity and what is not positive say so.
 
     Args:
-        path: a 16-bit PNG or an NPY file.
+        path: a 16-bit PNG, a TIFF or an NPY file.
         camera: the depth camera.
-        units_per_m: the PNG's units in a metre.
+        units_per_m: units of whole numbers in a metre.
 
     Raises:
         RecordingError: the file is missing, truncated, of another kind or not of the camera's size.
@@ -237,41 +321,53 @@ def read_depth(path: Path, camera: Pinhole, units_per_m: float) -> Float32[np.nd
         return _npy_depth(path, camera)
     content = read_bytes(path)
     _check_outside(path, content, camera)
-    raw = decode_depth_png(path, content)
+    raw = decode_depth(path, content)
     _check_size(path, raw.shape, camera)
-    depth_m = raw.astype(np.float32)
-    depth_m[raw == DEPTH_SATURATED] = 0.0
-    depth_m /= np.float32(units_per_m)
+    return metres(raw, units_per_m)
+
+
+def metres(raw: np.ndarray, units_per_m: float) -> Float32[np.ndarray, "h w"]:
+    """Return depth as stored, whole numbers or floats in metres, in metres; 0 where there is none."""
+    with np.errstate(over="ignore"):  # float64 beyond float32 becomes infinity, which is not a depth
+        depth_m = raw.astype(np.float32)
+    if raw.dtype == np.uint16:
+        depth_m[raw == DEPTH_SATURATED] = 0.0
+        depth_m /= np.float32(units_per_m)
+    else:
+        depth_m[~(np.isfinite(depth_m) & (depth_m > 0.0))] = 0.0
     return depth_m
 
 
-def decode_depth_png(path: Path, content: bytes) -> np.ndarray:
-    """Return the whole numbers of a depth PNG as uint16."""
+def decode_depth(path: Path, content: bytes) -> np.ndarray:
+    """Return a depth picture as it is stored: uint16, or float32 of a TIFF."""
     import cv2
 
-    check_whole(path, content)
     picture_size(path, content)
     raw = decode_picture(content, cv2.IMREAD_UNCHANGED)
     if raw is None:
-        raise RecordingError(f"{path} cannot be decoded ({len(content)} bytes); copy it again or leave that frame out.")
-    if raw.dtype != np.uint16 or raw.ndim != 2:
+        raise _undecodable(path, content)
+    if raw.dtype not in (np.uint16, np.float32) or raw.ndim != 2:
         kind = f"{raw.dtype.itemsize * 8}-bit with {raw.shape[2] if raw.ndim == 3 else 1} channel(s)"
         raise RecordingError(f"{path} is {kind}; depth must be a 16-bit PNG with one channel.")
     return raw
 
 
+def _depth_shape(path: Path, header: Any) -> tuple[int, int]:
+    shape = header.shape[:2] if len(header.shape) == 3 and header.shape[2] == 1 else header.shape
+    if len(shape) != 2 or header.dtype.kind not in "fiu":
+        raise RecordingError(
+            f"{path} holds {header.dtype} of {tuple(shape)}; depth must be numbers of (height, width): save it in that "
+            "shape."
+        )
+    return shape
+
+
 def _npy_depth(path: Path, camera: Pinhole) -> Float32[np.ndarray, "h w"]:
     with _whole_npy(path):
-        header = npy_header(path, PICTURE_BYTES)
-        shape = header.shape[:2] if len(header.shape) == 3 and header.shape[2] == 1 else header.shape
-        if len(shape) != 2 or header.dtype.kind not in "fiu":
-            raise RecordingError(f"{path} holds {header.dtype} of {shape}; depth must be numbers of (height, width).")
+        shape = _depth_shape(path, npy_header(path, PICTURE_BYTES))
         _check_size(path, shape, camera)
         raw = load_npy(path, PICTURE_BYTES).reshape(shape)
-    with np.errstate(over="ignore"):  # float64 beyond float32 becomes infinity, which is not a depth
-        depth_m = raw.astype(np.float32)
-    depth_m[~(np.isfinite(depth_m) & (depth_m > 0.0))] = 0.0
-    return depth_m
+    return metres(raw if raw.dtype.kind == "f" else raw.astype(np.float32), 1.0)
 
 
 @contextmanager
@@ -295,10 +391,47 @@ def check_picture(path: Path, camera: Pinhole) -> None:
     """Check a picture's wholeness and size without decoding it.
 
     Raises:
-        RecordingError: as reading it would, if the file's head already shows the fault.
+        RecordingError: as reading it would, if the file's outside already shows the fault.
     """
     if path.suffix == ".npy":
         width, height = picture_size(path)
         _check_size(path, (height, width), camera)
     else:
-        _check_outside(path, read_bytes(path), camera)
+        content = read_bytes(path)
+        check_whole(path, content)
+        _check_outside(path, content, camera)
+
+
+def depth_in_colour(depth_m: Float32[np.ndarray, "hd wd"], rig: Rig) -> tuple[Pinhole, Float32[np.ndarray, "h w"]]:
+    """Return the depth picture as the colour camera would see it, and that camera at the depth's resolution.
+
+    Where depth is registered to colour it is the depth picture itself. Otherwise every depth pixel is thrown into
+    the colour camera and the nearest wins. The picture is made no finer than the depth is, so that it has no holes.
+    """
+    if rig.registered:
+        return rig.rgb.resized(depth_m.shape[1], depth_m.shape[0]), depth_m
+    shrink = min(1.0, rig.depth.fx / rig.rgb.fx, rig.depth.fy / rig.rgb.fy)
+    camera = rig.rgb.resized(max(1, round(rig.rgb.width * shrink)), max(1, round(rig.rgb.height * shrink)))
+    row, column = np.nonzero(depth_m > 0.0)
+    z = depth_m[row, column].astype(np.float64)
+    x = (column + 0.5 - rig.depth.cx) / rig.depth.fx * z
+    y = (row + 0.5 - rig.depth.cy) / rig.depth.fy * z
+    points = apply(rig.rgb_from_depth, np.stack([x, y, z], axis=1))
+    seen = nearest_depth(points[points[:, 2] > 0.0], camera)
+    seen[np.isinf(seen)] = 0.0
+    return camera, seen
+
+
+def nearest_depth(points_camera: Float[np.ndarray, "n 3"], camera: Pinhole) -> Float32[np.ndarray, "h w"]:
+    """Return the z-depth of the nearest point in each pixel, metres; infinite where there is none.
+
+    Args:
+        points_camera: metres, in front of the camera.
+        camera: that sees them.
+    """
+    pixel = np.floor(camera.project(points_camera)).astype(np.int64)
+    inside = ((pixel >= 0) & (pixel < (camera.width, camera.height))).all(axis=1)
+    depth_m = np.full(camera.height * camera.width, np.inf, np.float32)
+    at = pixel[inside, 1] * camera.width + pixel[inside, 0]
+    np.minimum.at(depth_m, at, points_camera[inside, 2].astype(np.float32))
+    return depth_m.reshape(camera.height, camera.width)

@@ -8,9 +8,8 @@ import numpy as np
 from jaxtyping import Float64, UInt8
 
 from avlmaps.core.errors import RecordingError
-from avlmaps.recordings.images import MOST_PIXELS
-from avlmaps.recordings.media_files import checked_media
-from avlmaps.recordings.turning import DisplayTurn, display_turn
+from avlmaps.recordings.containers import checked_media
+from avlmaps.recordings.images import MOST_PIXELS, DisplayTurn
 
 
 class VideoFrames:
@@ -124,7 +123,8 @@ class VideoFrames:
 
         try:
             self._seek(0)
-            return display_turn(next(self._decoder))
+            matrices = [data for data in next(self._decoder).side_data if data.type.name == "DISPLAYMATRIX"]
+            return DisplayTurn.of_display_matrix(bytes(matrices[0])) if matrices else DisplayTurn()
         except (FFmpegError, StopIteration, ValueError):  # the picture itself will be an error when it is read
             return DisplayTurn()
 

@@ -15,7 +15,7 @@ from avlmaps.core.registry import Kind
 from avlmaps.maps.types import Keyframes
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.protocols import LocalFeatures
-from avlmaps.recordings.registration import depth_in_colour
+from avlmaps.recordings.images import depth_in_colour
 from avlmaps.recordings.types import Frame, Recording
 
 LEARN_FROM_KEYFRAMES = 64

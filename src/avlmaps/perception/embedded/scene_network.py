@@ -20,7 +20,7 @@ from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import BackendError
 from avlmaps.perception.embedded.geometry import channels
 from avlmaps.perception.models.networks import open_network
-from avlmaps.recordings.registration import depth_in_colour
+from avlmaps.recordings.images import depth_in_colour
 from avlmaps.recordings.types import Frame
 
 # Without ground a camera is taken to be upright and as high as people and robots mostly hold it.

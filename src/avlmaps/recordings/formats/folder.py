@@ -20,11 +20,10 @@ from avlmaps.recordings.faults import Fault, Report, stop_at_first
 from avlmaps.recordings.formats.columns import NAMED_FILE, POSE, named_order, split_header
 from avlmaps.recordings.formats.file_recording import FileRecording, Shots, find_audio, list_names, settle
 from avlmaps.recordings.formats.tables import read_table, text_lines
-from avlmaps.recordings.images import file_turn, first_picture_size
+from avlmaps.recordings.images import DisplayTurn, file_turn, first_picture_size
 from avlmaps.recordings.layout import Description
 from avlmaps.recordings.microphones import MicrophoneNumbers
 from avlmaps.recordings.plausible import clock_fault, date_fault, pace_fault
-from avlmaps.recordings.turning import DisplayTurn
 from avlmaps.recordings.types import Recording
 from avlmaps.recordings.video import VideoFrames
 

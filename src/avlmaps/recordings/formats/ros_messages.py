@@ -1,10 +1,14 @@
-"""Reading the few ROS messages that a recording needs: images, depth, camera calibration, poses.
+"""Reading the few ROS messages that a recording needs: images, depth, clouds, calibration, poses, topics.
 
 Works on messages as `rosbags` deserialises them, of ROS 1 and ROS 2 alike, and on those of rclpy.
 """
 
 import re
 import struct
+import sys
+from collections.abc import Collection
+from dataclasses import dataclass
+from itertools import takewhile
 from typing import Any
 
 import numpy as np
@@ -13,17 +17,39 @@ from jaxtyping import Float, Float32, UInt8
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.poses import MAX_ROTATION_FAULT, from_quaternion
-from avlmaps.recordings.images import MOST_PIXELS, decode_picture, encoded_size
+from avlmaps.recordings.images import MOST_PIXELS, decode_picture, encoded_size, nearest_depth
 
-_COLOUR_ENCODINGS = {
-    "rgb8": (3, (0, 1, 2)),
-    "bgr8": (3, (2, 1, 0)),
-    "rgba8": (4, (0, 1, 2)),
-    "bgra8": (4, (2, 1, 0)),
-    "8UC3": (3, (2, 1, 0)),
-    "mono8": (1, (0, 0, 0)),
-    "8UC1": (1, (0, 0, 0)),
+# Encodings of colour: bits and channels of a pixel, then the order of red, green and blue, or the conversion of OpenCV.
+_COLOUR_ENCODINGS: dict[str, tuple[int, int, tuple[int, int, int] | str]] = {
+    "rgb8": (8, 3, (0, 1, 2)),
+    "bgr8": (8, 3, (2, 1, 0)),
+    "rgba8": (8, 4, (0, 1, 2)),
+    "bgra8": (8, 4, (2, 1, 0)),
+    "8UC3": (8, 3, (2, 1, 0)),
+    "rgb16": (16, 3, (0, 1, 2)),
+    "bgr16": (16, 3, (2, 1, 0)),
+    "rgba16": (16, 4, (0, 1, 2)),
+    "bgra16": (16, 4, (2, 1, 0)),
+    "mono8": (8, 1, (0, 0, 0)),
+    "8UC1": (8, 1, (0, 0, 0)),
+    "mono16": (16, 1, (0, 0, 0)),
+    **{
+        f"bayer_{pattern}{bits}": (bits, 1, f"COLOR_Bayer{code}2RGB")
+        for pattern, code in (("rggb", "BG"), ("bggr", "RG"), ("gbrg", "GR"), ("grbg", "GB"))
+        for bits in (8, 16)
+    },
+    "yuv422": (8, 2, "COLOR_YUV2RGB_UYVY"),
+    "uyvy": (8, 2, "COLOR_YUV2RGB_UYVY"),
+    "yuv422_yuy2": (8, 2, "COLOR_YUV2RGB_YUYV"),
+    "yuyv": (8, 2, "COLOR_YUV2RGB_YUYV"),
 }
+_DEPTH_ENCODINGS = ("16UC1", "mono16", "32FC1")
+CLOUD_TYPES = ("sensor_msgs/msg/PointCloud2",)
+# A LiDAR's lines are far apart: in a finer picture what is behind would be seen between them.
+_MOST_COLUMNS = 320
+# A point is hidden where one within this many pixels is nearer by this factor.
+_HIDDEN_PIXELS, _HIDDEN_FACTOR = 2, 1.25
+_POINT_KINDS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 
 
 def header_stamp_s(rawdata: bytes, is_ros2: bool) -> float:
@@ -49,12 +75,40 @@ def colour_of(message: Any, name: str, camera: Pinhole | None = None) -> UInt8[n
     """
     if _is_compressed(message):
         return _decoded(message.data, name, camera, colour=True)[..., ::-1]
-    if message.encoding not in _COLOUR_ENCODINGS:
-        known = ", ".join(_COLOUR_ENCODINGS)
-        raise RecordingError(f"The picture {name} has encoding {message.encoding!r}; colour is read from: {known}.")
-    channels, order = _COLOUR_ENCODINGS[message.encoding]
-    pixels = _rows(message, np.dtype(np.uint8), channels, name)
+    require_encoding(message, name, colour=True)
+    bits, channels, order = _COLOUR_ENCODINGS[message.encoding]
+    dtype = np.dtype(np.uint8) if bits == 8 else np.dtype(">u2" if message.is_bigendian else "<u2")
+    pixels = _rows(message, dtype, channels, name)
+    if bits == 16:
+        pixels = (pixels >> 8).astype(np.uint8)
+    if isinstance(order, str):
+        import cv2
+
+        return cv2.cvtColor(np.ascontiguousarray(pixels), getattr(cv2, order))
     return np.ascontiguousarray(pixels[..., list(order)])
+
+
+def require_encoding(message: Any, name: str, *, colour: bool) -> None:
+    """Refuse pictures whose encoding is not read, before all of them would fail one by one.
+
+    Raises:
+        RecordingError: the encoding is none of colour, or of depth.
+    """
+    if message is None or _is_compressed(message):
+        return
+    known = _COLOUR_ENCODINGS if colour else _DEPTH_ENCODINGS
+    if message.encoding not in known:
+        what = "colour" if colour else "depth"
+        raise RecordingError(
+            f"The pictures of {name} have the encoding {message.encoding!r}; {what} is read from: {', '.join(known)}. "
+            "Record or republish another topic of that camera."
+        )
+
+
+def is_grey(message: Any, topic: str) -> bool:
+    """Return whether a topic's pictures have no colour: of one channel, or infrared by its name."""
+    one_channel = getattr(message, "encoding", "") in ("mono8", "8UC1", "mono16")
+    return one_channel or bool(re.search(r"(^|[/_])(infra|ir)[0-9]*([/_]|$)", topic.lower()))
 
 
 def _is_compressed(message: Any) -> bool:
@@ -70,15 +124,12 @@ def depth_of(message: Any, name: str, camera: Pinhole | None = None) -> Float32[
     """
     if _is_compressed(message):
         return _decompressed_depth(message, name, camera)
+    require_encoding(message, name, colour=False)
     order = ">" if message.is_bigendian else "<"
-    if message.encoding in ("16UC1", "mono16"):
+    if message.encoding != "32FC1":
         return _rows(message, np.dtype(order + "u2"), 1, name)[..., 0].astype(np.float32) / np.float32(1000.0)
-    if message.encoding == "32FC1":
-        depth_m = _rows(message, np.dtype(order + "f4"), 1, name)[..., 0].astype(np.float32)
-        return np.where(np.isfinite(depth_m) & (depth_m > 0), depth_m, np.float32(0.0))
-    raise RecordingError(
-        f"The depth {name} has encoding {message.encoding!r}; depth is read from: 16UC1, mono16, 32FC1."
-    )
+    depth_m = _rows(message, np.dtype(order + "f4"), 1, name)[..., 0].astype(np.float32)
+    return np.where(np.isfinite(depth_m) & (depth_m > 0), depth_m, np.float32(0.0))
 
 
 def _rows(message: Any, dtype: np.dtype, channels: int, name: str) -> np.ndarray:
@@ -193,3 +244,111 @@ def pose_of(message: Any) -> Float[np.ndarray, "4 4"]:
     if not (np.isfinite(xyz).all() and abs(np.linalg.norm(xyzw) - 1.0) <= MAX_ROTATION_FAULT):  # NaN is not
         return np.full((4, 4), np.nan)
     return from_quaternion(xyz, xyzw)
+
+
+def cloud_camera(rgb: Pinhole) -> Pinhole:
+    """Return the camera of the depth pictures: the colour camera, coarse enough for a LiDAR."""
+    share = min(1.0, _MOST_COLUMNS / rgb.width)
+    return rgb.resized(max(1, round(rgb.width * share)), max(1, round(rgb.height * share)))
+
+
+def points_of(message: Any, name: str) -> Float[np.ndarray, "n 3"]:
+    """Return the finite points of a PointCloud2, in its frame, metres.
+
+    Raises:
+        RecordingError: it has no x, y and z, or fewer bytes than it says.
+    """
+    fields = {field.name: field for field in message.fields}
+    step, count = int(message.point_step), int(message.width) * int(message.height)
+    content = np.asarray(message.data, np.uint8)
+    if not {"x", "y", "z"} <= fields.keys():
+        raise RecordingError(f"The point cloud {name} has the fields {', '.join(fields)}, and not x, y and z.")
+    if step < 1 or len(content) < count * step:
+        raise RecordingError(
+            f"The point cloud {name} has {len(content)} bytes where {count} points of {step} need {count * step}."
+        )
+    rows = content[: count * step].reshape(count, step)
+    order = ">" if message.is_bigendian else "<"
+    axes: list[np.ndarray] = []
+    for axis in "xyz":
+        kind = np.dtype(order + _POINT_KINDS.get(int(fields[axis].datatype), "V0"))
+        begin = int(fields[axis].offset)
+        if kind.itemsize == 0 or begin + kind.itemsize > step:
+            raise RecordingError(f"The field {axis} of the point cloud {name} is of an unknown type, or out of place.")
+        axes.append(np.ascontiguousarray(rows[:, begin : begin + kind.itemsize]).view(kind)[:, 0].astype(np.float64))
+    points = np.stack(axes, axis=1)
+    return points[np.isfinite(points).all(axis=1) & (points != 0.0).any(axis=1)]
+
+
+def depth_of_points(points_camera: Float[np.ndarray, "n 3"], camera: Pinhole) -> Float32[np.ndarray, "h w"]:
+    """Return a camera's picture of z-depth, metres, of points: the nearest in each pixel, without what is hidden."""
+    import cv2
+
+    depth_m = nearest_depth(points_camera[points_camera[:, 2] > sys.float_info.epsilon], camera)
+    around = 2 * _HIDDEN_PIXELS + 1
+    nearest = cv2.erode(depth_m, np.ones((around, around), np.uint8), borderValue=np.inf)
+    depth_m[np.isinf(depth_m) | (depth_m > _HIDDEN_FACTOR * nearest)] = 0.0
+    return depth_m
+
+
+# A colour and a depth picture at most this far apart are taken for one moment.
+PAIRING_TOLERANCE_S = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class RosTopics:
+    """Topics by name; empty ones are found by type.
+
+    Attributes:
+        rgb: colour images (raw or compressed).
+        depth: depth images (raw or compressedDepth), or point clouds.
+        pose: odometry, poses of the camera or the body, transforms, or a file of poses; empty: /tf first.
+        audio: audio data; ``none`` leaves the sound out.
+        audio_pcm: no topic: ``16000,1`` says that audio data are plain 16-bit samples, 16,000 a second, in one channel.
+        directions: azimuths of sounds, numbers or stamped poses; they are not found by type.
+    """
+
+    rgb: str = ""
+    depth: str = ""
+    pose: str = ""
+    audio: str = ""
+    audio_pcm: str = ""
+    directions: str = ""
+
+
+def pair_images(colours: list[str], depths: list[str]) -> tuple[str, str]:
+    """Return the colour and the depth topic that belong together: of one namespace, depth registered to colour.
+
+    Raw topics go before compressed ones (the order of the lists).
+    """
+    pairs = [(colour, depth) for depth in depths for colour in colours]
+    if not pairs:
+        return next(iter(colours), ""), next(iter(depths), "")
+
+    def likeliness(pair: tuple[str, str]) -> tuple[int, bool, bool]:
+        registered = any(word in pair[1].lower() for word in ("align", "registered"))
+        coloured = any(word in pair[0].lower() for word in ("color", "rgb", "colour"))
+        return shared_namespace(*pair), registered, coloured
+
+    return max(pairs, key=likeliness)
+
+
+def shared_namespace(one: str, other: str) -> int:
+    """Return how many names two topics begin with alike."""
+    names = zip(one.strip("/").split("/"), other.strip("/").split("/"), strict=False)
+    return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], names))
+
+
+def info_beside(image_topic: str, infos: Collection[str]) -> str:
+    """Return the topic of the calibration that is published beside an image topic, or nothing.
+
+    Args:
+        image_topic: of the pictures.
+        infos: topics of calibrations.
+    """
+    parts = image_topic.split("/")
+    for length in range(len(parts) - 1, 0, -1):
+        for name in ("camera_info", "info/camera_info"):  # the latter as RealSense's viewer has it
+            if (beside := "/".join([*parts[:length], name])) in infos:
+                return beside
+    return ""

@@ -14,7 +14,6 @@ import weakref
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from functools import cached_property
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -27,18 +26,33 @@ from avlmaps.core.timeline import associate, gap_notices, in_order
 from avlmaps.core.wording import option
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.content import add_files, stamp_of
-from avlmaps.recordings.formats import ros_clouds, ros_directions
-from avlmaps.recordings.formats.bag_files import Bag
-from avlmaps.recordings.formats.ros_audio import STAMPED, Pcm, SoundTopic, extract_audio
-from avlmaps.recordings.formats.ros_clock import PictureClock
-from avlmaps.recordings.formats.ros_messages import camera_of, colour_of, depth_of, is_rectified
-from avlmaps.recordings.formats.ros_motion import base_height, find_motion, is_tf, no_pose, read_tf
-from avlmaps.recordings.formats.ros_topics import (
+from avlmaps.recordings.formats.bags import Bag
+from avlmaps.recordings.formats.ros_messages import (
+    CLOUD_TYPES,
     PAIRING_TOLERANCE_S,
     RosTopics,
+    camera_of,
+    cloud_camera,
+    colour_of,
+    depth_of,
+    depth_of_points,
     info_beside,
+    is_grey,
+    is_rectified,
     pair_images,
+    points_of,
+    require_encoding,
     shared_namespace,
+)
+from avlmaps.recordings.formats.ros_motion import base_height, find_motion, is_tf, no_pose, read_tf
+from avlmaps.recordings.formats.ros_sound import (
+    DIRECTION_TYPES,
+    STAMPED,
+    Pcm,
+    PictureClock,
+    SoundTopic,
+    directions_of,
+    extract_audio,
 )
 from avlmaps.recordings.formats.ros_transforms import TransformTree
 from avlmaps.recordings.plausible import plausible_walk
@@ -85,7 +99,7 @@ class RosbagRecording(Recording):
         self.path = path
         self._bag = Bag(path, more)
         self._rgb_topic, self._depth_topic = _image_topics(self._bag, topics)
-        self._of_points = self._depth_topic in self._bag.topics_of(ros_clouds.TYPES)
+        self._of_points = self._depth_topic in self._bag.topics_of(CLOUD_TYPES)
         named_tf = topics.pose if topics.pose and is_tf(self._bag, topics.pose) else ""
         transforms, tf_topic = read_tf(self._bag, self._rgb_topic, named_tf)
         mounts = transforms.mounts()
@@ -157,8 +171,8 @@ class RosbagRecording(Recording):
         with self._bag.readable(self._depth_topic):
             message = self._bag.message_at(self._depth_topic, received_ns, stamp_s)
             if self._of_points:
-                points = apply(self._camera_from_cloud[index], ros_clouds.points_of(message, name))
-                depth_m = ros_clouds.depth_of_points(points, self.rig.depth)
+                points = apply(self._camera_from_cloud[index], points_of(message, name))
+                depth_m = depth_of_points(points, self.rig.depth)
             else:
                 depth_m = depth_of(message, name, self.rig.depth)
         for picture, camera in ((rgb, self.rig.rgb), (depth_m, self.rig.depth)):
@@ -222,7 +236,7 @@ class RosbagRecording(Recording):
         Raises:
             RecordingError: there is no such topic of angles, no sound beside it, or they are of another clock.
         """
-        known = self._bag.topics_of(ros_directions.TYPES)
+        known = self._bag.topics_of(DIRECTION_TYPES)
         if topic not in known:
             has = ", ".join(known) or "none"
             raise RecordingError(
@@ -233,14 +247,14 @@ class RosbagRecording(Recording):
             raise RecordingError(
                 f"{self.path} has no sound, so that the directions on {topic} are of nothing; leave them out."
             )
-        found, notices = ros_directions.directions_of(topic, lambda: self._bag.messages(topic), clock)
+        found, notices = directions_of(topic, lambda: self._bag.messages(topic), clock)
         found.require_beside(self.audio.start_s, self.audio.end_s, f"{self.path}, {topic}")
         self.topics = {**self.topics, "directions": topic}
         return replace(self.audio, directions=found), notices
 
 
 def _image_topics(bag: Bag, topics: RosTopics) -> tuple[str, str]:
-    images, clouds = bag.topics_of(_IMAGE_TYPES), bag.topics_of(ros_clouds.TYPES)
+    images, clouds = bag.topics_of(_IMAGE_TYPES), bag.topics_of(CLOUD_TYPES)
     every = ", ".join(images) or "none"
     for topic, known in ((topics.rgb, images), (topics.depth, [*images, *clouds])):
         if topic and topic not in known:
@@ -284,7 +298,7 @@ def _read_rig(bag: Bag, rgb_topic: str, depth_topic: str, mounts: TransformTree)
     cameras: dict[str, Any] = {}
     notices: list[str] = []
     frames: dict[str, str] = {}
-    of_points = depth_topic in bag.topics_of(ros_clouds.TYPES)
+    of_points = depth_topic in bag.topics_of(CLOUD_TYPES)
     for topic in (rgb_topic,) if of_points else (rgb_topic, depth_topic):
         info_topic = _info_topic(bag, topic)
         if not info_topic and topic == depth_topic:  # drivers that register depth often publish one calibration
@@ -293,19 +307,22 @@ def _read_rig(bag: Bag, rgb_topic: str, depth_topic: str, mounts: TransformTree)
         if not info_topic:
             has = ", ".join(bag.topics_of(_INFO_TYPES)) or "none"
             raise RecordingError(f"{bag.path} has no CameraInfo beside {topic} (it has: {has}); record it too.")
-        first = next(iter(bag.messages(info_topic)), None)
+        first = bag.first(info_topic)
         if first is None:
             raise RecordingError(f"{bag.path} has no message on {info_topic}, the calibration of {topic}.")
-        cameras[topic], distorted = camera_of(first[1], info_topic, is_rectified(topic))
+        cameras[topic], distorted = camera_of(first, info_topic, is_rectified(topic))
         if distorted:
             remedy = "its P is empty" if is_rectified(topic) else "rectified images make a better map"
             notices.append(f"{topic} has lens distortion, which a pinhole leaves out; {remedy}.")
-        image = next(iter(bag.messages(topic)), None)
-        frames[topic] = (image[1] if image else first[1]).header.frame_id
+        image = bag.first(topic)
+        require_encoding(None if of_points and topic == depth_topic else image, topic, colour=topic == rgb_topic)
+        if topic == rgb_topic and is_grey(image, topic):
+            notices.append(f"The pictures of {topic} have no colour (infrared, or grey); colours tell nothing apart.")
+        frames[topic] = (image or first).header.frame_id
     if of_points:
         rgb = cameras[rgb_topic]
         notices.append(f"Depth is that of the points of {depth_topic}, as the camera of {rgb_topic} sees them.")
-        return Rig(rgb, ros_clouds.cloud_camera(rgb)), notices, frames[rgb_topic]
+        return Rig(rgb, cloud_camera(rgb)), notices, frames[rgb_topic]
     rgb_from_depth = mounts.fixed(frames[rgb_topic], frames[depth_topic])
     if rgb_from_depth is None:
         rgb_from_depth = np.eye(4)
@@ -320,10 +337,10 @@ def _info_topic(bag: Bag, image_topic: str) -> str:
     infos = bag.topics_of(_INFO_TYPES)
     if beside := info_beside(image_topic, infos):
         return beside
-    image = next(iter(bag.messages(image_topic)), None)
-    frame = image[1].header.frame_id if image else ""
+    image = bag.first(image_topic)
+    frame = image.header.frame_id if image else ""
     others = [topic for topic in infos if frame and not topic.endswith("/camera_info")]
-    alike = [t for t in others for _, info in islice(bag.messages(t), 1) if info.header.frame_id == frame]
+    alike = [t for t in others if (info := bag.first(t)) is not None and info.header.frame_id == frame]
     return max(alike, key=lambda topic: sum(a == b for a, b in zip(topic, image_topic, strict=False)), default="")
 
 
@@ -342,8 +359,8 @@ def _clouds_in_cameras(
     bag: Bag, topic: str, camera_frame: str, tree: TransformTree, stamps_s: np.ndarray, world_from_camera: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return ``camera_from_cloud`` of each cloud, taken at its own stamp, and where it is known."""
-    first = next(iter(bag.messages(topic)), None)
-    frame = first[1].header.frame_id if first else ""
+    first = bag.first(topic)
+    frame = first.header.frame_id if first else ""
     if tree.root(frame) != tree.root(camera_frame):
         raise RecordingError(
             f"No transform of {bag.path} links the LiDAR {frame!r} of {topic} to the camera {camera_frame!r}; record "

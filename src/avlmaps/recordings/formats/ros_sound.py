@@ -1,8 +1,8 @@
-"""The sound of a ROS bag, gathered into one file that can be read in pieces.
+"""The sound of a ROS bag, gathered into one file that can be read in pieces, and directions that a device published.
 
 Two packages are called ``audio_common_msgs``. That of ROS 1 (and its port) has AudioData or AudioDataStamped with
 bytes, and an AudioInfo on a topic of its own that says how they are coded. That of ROS 2 has AudioStamped, each with
-samples and an AudioInfo (PortAudio's numbers of formats).
+samples and an AudioInfo (PortAudio's numbers of formats). What they declare is held against when the messages came.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -17,8 +17,8 @@ from jaxtyping import Float
 from avlmaps.core.errors import AudioError, RecordingError
 from avlmaps.core.wording import option
 from avlmaps.recordings.audio import LOWEST_RATE_HZ, AudioTrack, Sound, write_flac
-from avlmaps.recordings.formats.ros_clock import PictureClock
-from avlmaps.recordings.formats.ros_messages import stamp_of
+from avlmaps.recordings.directions import DirectionTrack
+from avlmaps.recordings.formats.ros_messages import pose_of, stamp_of
 
 STAMPED = "audio_common_msgs/msg/AudioStamped"
 _PCM = ("wave", "wav", "pcm")
@@ -38,6 +38,82 @@ _SAMPLES = {
 }
 # How files and streams begin that FFmpeg and libsndfile know.
 _BEGINNINGS = {b"ID3": "mp3", b"RIFF": "wav", b"OggS": "ogg", b"fLaC": "flac"}
+
+
+# Rates that recorders use, the likeliest first: with some channels one of them fits what came.
+_USUAL_RATES_HZ = (16_000, 48_000, 44_100, 32_000, 8_000, 24_000, 22_050, 11_025, 96_000)
+_USUAL_CHANNELS = (1, 2, 4, 6, 7, 8, 3, 16)
+_FITS, _AGREES, _FEWEST_MESSAGES, _SHORTEST_S = 0.04, 1.25, 8, 1.0
+# A clock that is this far from the pictures' is worth a notice.
+_APART_S = 0.5
+DIRECTION_TYPES = (
+    *(f"std_msgs/msg/{name}" for name in ("Int32", "Int16", "Float32", "Float64")),
+    "geometry_msgs/msg/PoseStamped",
+)
+BEYOND_A_TURN_RAD = 2.0 * np.pi + 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class PictureClock:
+    """Turns the times at which a bag received messages into seconds of the recording.
+
+    Pictures carry stamps, and a bag notes when it received them. In simulation, and where a bag is replayed into
+    another, the two are different clocks; what has no stamp of its own is placed as the pictures around it are.
+
+    Attributes:
+        received_s: when the pictures were received, seconds, rising.
+        stamps_s: the stamps in them, seconds.
+        start_s: the stamp at which the recording begins.
+    """
+
+    received_s: Float[np.ndarray, " n"]
+    stamps_s: Float[np.ndarray, " n"]
+    start_s: float
+
+    @classmethod
+    def of(cls, received_ns: np.ndarray, stamps_s: Float[np.ndarray, " n"], start_s: float) -> "PictureClock":
+        """Return the clock of pictures in any order."""
+        order = np.argsort(received_ns, kind="stable")
+        return cls(received_ns[order] * 1e-9, stamps_s[order], start_s)
+
+    @property
+    def apart_s(self) -> float:
+        """By how much the pictures' stamps are ahead of the times at which they were received, their median."""
+        return float(np.median(self.stamps_s - self.received_s))
+
+    @property
+    def rate(self) -> float:
+        """How fast the pictures' clock runs against that of the bag: 1 but in simulations."""
+        length_s = float(self.received_s[-1] - self.received_s[0])
+        return float(self.stamps_s[-1] - self.stamps_s[0]) / length_s if length_s > 0.0 else 1.0
+
+    def of_received(self, received_s: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
+        """Return the recording's time of messages without a stamp, by when they were received."""
+        return received_s + self.apart_s - self.start_s
+
+    def of_stamps(self, stamps_s: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
+        """Return the recording's time of messages with stamps."""
+        return stamps_s - self.start_s
+
+    def overlaps(self, times_s: Float[np.ndarray, " k"]) -> bool:
+        """Return whether times of the recording lie among its pictures, at least some."""
+        first, last = self.stamps_s.min() - self.start_s, self.stamps_s.max() - self.start_s
+        return bool(((times_s >= first) & (times_s <= last)).any())
+
+    def notices(self, topic: str) -> tuple[str, ...]:
+        """Return a notice where the sound was received on another clock than that of the pictures' stamps."""
+        said: list[str] = []
+        if abs(self.apart_s) > _APART_S:
+            said.append(
+                f"The stamps of the pictures are {self.apart_s:+.6g} s from when the bag received them; {topic} has no "
+                "stamps on their clock and is placed as they are."
+            )
+        if not 0.9 < self.rate < 1.1:
+            said.append(
+                f"The pictures' clock runs {self.rate:.3g} times as fast as the bag's, so that {topic} fits them only "
+                "near the middle; record in real time."
+            )
+        return tuple(said)
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,7 +245,7 @@ def extract_audio(
         pcm = Pcm.check_rate(int(info.sample_rate), int(info.channels), f"The AudioInfo of {sound.name}")
     if pcm is not None:
         return _sampled(lambda: _plain(_messages(sound), pcm), sound.name, folder, times_s, notices)
-    suffix = _coding_of(_content(first[1]), coding, sound.name)
+    suffix = _coding_of(sound, _content(first[1]), coding, times_s)
     return _compressed(sound, suffix, folder, times_s, notices)
 
 
@@ -187,7 +263,9 @@ def _sampled(
     """Write messages of samples, with silence where some are missing."""
     import soundfile
 
-    lengths_s = np.array([len(samples) / pcm.rate_hz for pcm, samples in pieces()])
+    measured = [(len(samples), pcm) for pcm, samples in pieces()]
+    lengths_s = np.array([count / pcm.rate_hz for count, pcm in measured])
+    require_pace(topic, measured[0][1], lengths_s, times_s)
     start_s, silence_s = silences(times_s, lengths_s)
     target = folder / "audio.flac"
     every = pieces()
@@ -206,7 +284,51 @@ def _sampled(
                 stream.write(more)
     except (soundfile.SoundFileError, AssertionError) as error:  # it asserts that all samples were taken
         raise _cannot_write(topic, target, error) from None
-    return AudioTrack.open(target, start_s=start_s), (*notices, *_gap_notice(topic, start_s, lengths_s, silence_s))
+    track = AudioTrack.open(target, start_s=start_s)
+    if pcm.channels > 1 and track.channel is None:
+        notices = (
+            *notices,
+            f"The sound of {topic} has {pcm.channels} channels, of which the mean is heard; where their microphones "
+            f"are ({option('microphones', 'FILE')}) would show where sounds come from.",
+        )
+    return track, (*notices, *_gap_notice(topic, start_s, lengths_s, silence_s))
+
+
+def require_pace(topic: str, said: Pcm, lengths_s: Float[np.ndarray, " n"], times_s: Float[np.ndarray, " n"]) -> None:
+    """Hold how long messages sound, as their declared rate and channels have it, against when they came.
+
+    Lost messages leave gaps between others that follow on one another; a wrong rate or number of channels makes all of
+    them longer or shorter than the time until the next.
+
+    Raises:
+        RecordingError: they do not agree.
+    """
+    lasts_s, came_s = float(lengths_s.sum()), float(np.ptp(times_s)) + float(lengths_s.mean())
+    if len(times_s) < _FEWEST_MESSAGES or came_s < _SHORTEST_S:
+        return
+    between_s = float(np.median(np.diff(np.sort(times_s))))
+    shorter = lasts_s * _AGREES < came_s and float(np.median(lengths_s)) * _AGREES < between_s
+    if not shorter and lasts_s <= _AGREES * came_s:
+        return
+    total = lasts_s * said.rate_hz * said.channels / came_s
+    raise RecordingError(
+        f"The sound of {topic} does not agree with itself: at {said.rate_hz} samples a second in {said.channels} "
+        f"channel(s) its {len(times_s)} messages last {lasts_s:.1f} s, but they came within {came_s:.1f} s. "
+        f"{_fits(total)} Give a file instead ({option('audio', 'FILE')}), or leave it out "
+        f"({option('topics', 'audio=none')})."
+    )
+
+
+def _fits(total: float) -> str:
+    """Return which rates and channels have as many samples a second in all as came."""
+    found = [
+        f"{rate},{channels}"
+        for rate in _USUAL_RATES_HZ
+        for channels in _USUAL_CHANNELS
+        if abs(total / (rate * channels) - 1.0) < _FITS
+    ]
+    named = f", as {' or '.join(found[:3])} has ({option('topics', f'audio_pcm={found[0]}')})" if found else ""
+    return f"They hold {total:,.0f} samples of 16 bits a second in all channels{named}."
 
 
 def _write_silence(stream: Any, count: int) -> None:
@@ -246,7 +368,15 @@ def _compressed(
     begins = [0, *cuts.tolist()]
     start_s = float(times_s[0])
     if len(parts) == 1:
-        return AudioTrack.open(parts[0], start_s=start_s), notices
+        track = AudioTrack.open(parts[0], start_s=start_s)
+        came_s = float(np.ptp(times_s)) + usual_s
+        if len(times_s) >= _FEWEST_MESSAGES and came_s >= _SHORTEST_S and track.duration_s > _AGREES * came_s:
+            raise RecordingError(
+                f"The sound of {sound.name} does not agree with itself: its {len(times_s)} messages came within "
+                f"{came_s:.1f} s, and as {suffix} they last {track.duration_s:.1f} s; give a file instead "
+                f"({option('audio', 'FILE')}), or leave it out ({option('topics', 'audio=none')})."
+            )
+        return track, notices
     if suffix != "mp3":  # other codings have a head that the later parts lack
         whole_s = float(interval_s[cuts - 1].sum())
         raise RecordingError(
@@ -278,13 +408,13 @@ def _joined(
     return AudioTrack.open(target, start_s=start_s), (*notices, *_gap_notice(topic, start_s, lengths_s, silence_s))
 
 
-def _coding_of(beginning: bytes, said: str, topic: str) -> str:
+def _coding_of(sound: SoundTopic, beginning: bytes, said: str, times_s: Float[np.ndarray, " n"]) -> str:
     """Return the coding of a stream: what AudioInfo says, or what it begins like."""
     if said:
         if not (said.isalnum() and len(said) < 10):
             raise RecordingError(
-                f"The AudioInfo of {topic} says that the sound is coded as {said[:20]!r}, which is no coding; give a "
-                f"file ({option('audio', 'FILE')}) or leave it out ({option('topics', 'audio=none')})."
+                f"The AudioInfo of {sound.name} says that the sound is coded as {said[:20]!r}, which is no coding; "
+                f"give a file ({option('audio', 'FILE')}) or leave it out ({option('topics', 'audio=none')})."
             )
         return said
     for start, coding in _BEGINNINGS.items():
@@ -292,9 +422,12 @@ def _coding_of(beginning: bytes, said: str, topic: str) -> str:
             return coding
     if len(beginning) > 2 and beginning[0] == 0xFF and beginning[1] & 0xE6 == 0xE2:  # an MPEG frame of layer 3
         return "mp3"
+    size = sum(len(_content(message)) for message in _messages(sound))
+    usual_s = float(np.median(np.diff(times_s))) if len(times_s) > 1 else 0.0
+    total = size / 2 / (float(np.ptp(times_s)) + usual_s) if usual_s > 0.0 else 0.0
     raise RecordingError(
-        f"The sound on {topic} has no AudioInfo and is not an MP3, FLAC, OGG or WAV stream; if it is plain 16-bit "
-        f"samples, say how many a second and in how many channels ({option('topics', 'audio_pcm=16000,1')}), else give "
+        f"The sound on {sound.name} has no AudioInfo and is not an MP3, FLAC, OGG or WAV stream; if it is plain 16-bit "
+        f"samples, say how many a second and in how many channels (audio_pcm=RATE,CHANNELS). {_fits(total)} Else give "
         f"a file ({option('audio', 'FILE')}) or leave it out ({option('topics', 'audio=none')})."
     )
 
@@ -332,3 +465,63 @@ def sampled_pieces(messages: Iterable[Any], topic: str) -> Iterator[tuple[Pcm, n
         whole = samples[: len(samples) // pcm.channels * pcm.channels].reshape(-1, pcm.channels)[:, :_FLAC_CHANNELS]
         middle = 128.0 if dtype == "u1" else 0.0
         yield pcm, np.clip(np.nan_to_num((whole - middle) / scale), -1.0, 1.0)
+
+
+def directions_of(
+    topic: str, messages: Callable[[], Iterator[tuple[int, Any]]], clock: PictureClock
+) -> tuple[DirectionTrack, tuple[str, ...]]:
+    """Return the directions on a topic, and notices.
+
+    Whole numbers are degrees, since whole radians are no angles; so are floats beyond a turn. A pose's yaw is its
+    azimuth, or, where it is not turned, the direction to its position.
+
+    Args:
+        topic: for sentences.
+        messages: gives (received ns, message) of each.
+        clock: of the pictures; numbers have no stamp of their own.
+
+    Raises:
+        RecordingError: there is no message, or they hold no angles.
+    """
+    received: list[float] = []
+    stamped: list[float] = []
+    angle: list[float] = []
+    whole = True
+    for received_ns, message in messages():
+        received.append(received_ns * 1e-9)
+        if hasattr(message, "pose"):
+            stamped.append(stamp_of(message))
+        value, is_whole = angle_of(message)
+        angle.append(value)
+        whole = whole and is_whole
+    if not angle:
+        raise RecordingError(f"The topic {topic} has no messages, so that it says no directions; name another.")
+    at_s = clock.of_stamps(np.array(stamped)) if stamped else clock.of_received(np.array(received))
+    azimuth = np.array(angle)
+    order = np.argsort(at_s, kind="stable")
+    at_s, azimuth = at_s[order], azimuth[order]
+    used = np.isfinite(azimuth) & np.append(np.diff(at_s) > 0.0, True)
+    notices: list[str] = []
+    if not used.all():
+        notices.append(
+            f"{int((~used).sum())} of {len(used)} directions of {topic} are no numbers, or came at one moment."
+        )
+    at_s, azimuth = at_s[used], azimuth[used]
+    if whole or np.abs(azimuth).max(initial=0.0) > BEYOND_A_TURN_RAD:
+        azimuth = np.deg2rad(azimuth)
+        notices.append(f"The directions of {topic} are taken as degrees.")
+    return DirectionTrack.of(at_s, np.angle(np.exp(1j * azimuth))), tuple(notices)
+
+
+def angle_of(message: Any) -> tuple[float, bool]:
+    """Return the angle that a message says, a pose in radians, and whether it is a whole number."""
+    if hasattr(message, "pose"):
+        return _yaw(message), False
+    return float(message.data), isinstance(message.data, int | np.integer)
+
+
+def _yaw(message: Any) -> float:
+    pose = pose_of(message)
+    yaw = float(np.arctan2(pose[1, 0], pose[0, 0]))
+    away = pose[:2, 3]
+    return float(np.arctan2(away[1], away[0])) if abs(yaw) < 1e-9 and np.linalg.norm(away) > 1e-6 else yaw

@@ -1,0 +1,462 @@
+"""The messages of a bag by topic, with their stamps, of one file or several.
+
+ROS 1 and ROS 2 bags are read by `rosbags`, MCAP files by `mcap`: their messages may be of ROS or of Foxglove.
+"""
+
+import heapq
+import os
+import re
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from functools import cached_property
+from operator import itemgetter
+from pathlib import Path
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+
+from avlmaps.core.errors import AvlmapsError, RecordingError
+from avlmaps.core.files import DESCRIPTION_BYTES, SAMPLED_BYTES, checked_size, decode_json
+from avlmaps.recordings.faults import readable
+from avlmaps.recordings.formats import foxglove
+from avlmaps.recordings.formats.ros_messages import header_stamp_s
+
+# Kinds of files that a bag's folder may hold without a metadata.yaml, the first that is there counts.
+SUFFIXES = (".bag", ".mcap", ".db3")
+_ZSTD = b"\x28\xb5\x2f\xfd"  # how a compressed message begins; CDR begins with 0
+_CHUNKS_HELD = 4
+_LARGEST_RECORD = 1 << 31
+
+
+@runtime_checkable
+class Connection(Protocol):
+    """A topic in one file, and the ROS type of its messages."""
+
+    topic: str
+    msgtype: str
+
+
+@runtime_checkable
+class Container(Protocol):
+    """Files of messages."""
+
+    @property
+    def connections(self) -> Sequence[Any]:
+        """The topics of every file."""
+        ...
+
+    def messages(self, connections: Sequence[Any]) -> Iterator[tuple[Any, int, bytes]]:
+        """Yield (connection, receive time in ns, content) in the order of time."""
+        ...
+
+    def messages_at(self, connections: Sequence[Any], received_ns: int) -> Iterator[tuple[Any, bytes]]:
+        """Yield (connection, content) of the messages that were received at one time."""
+        ...
+
+    def message(self, connection: Any, raw: bytes) -> Any:
+        """Return a message as that of ROS."""
+        ...
+
+    def stamp_s(self, connection: Any, raw: bytes) -> float:
+        """Return the stamp of a message that has a header, seconds."""
+        ...
+
+
+class Bag:
+    """An open bag, of one file or several."""
+
+    def __init__(self, path: Path, more: Sequence[Path] = ()) -> None:
+        """Find its files; they are opened when they are first needed.
+
+        Args:
+            path: a file, the folder of a ROS 2 bag, or a folder of the files of one walk.
+            more: further files of the same walk.
+        """
+        self.path = path
+        self.files = sorted((file for given in (path, *more) for file in bag_files(given)), key=_by_numbers)
+        unfinished = sorted(file.name for file in path.glob("*.bag.active")) if path.is_dir() else []
+        self.notices = [
+            f"{name} was never finished, and is not read; repair it with `rosbag reindex`." for name in unfinished
+        ]
+        suffixes = {file.suffix.lower() for file in self.files}
+        if len(suffixes) > 1:
+            raise RecordingError(f"{path} and {self.files[-1]} are bags of two kinds; convert one of them first.")
+        self._container: Container = (McapContainer if suffixes == {".mcap"} else RosbagsContainer)(self.files)
+
+    @property
+    def topics(self) -> dict[str, str]:
+        """The type of each topic."""
+        return {c.topic: c.msgtype for c in self._container.connections}
+
+    def connections(self, topic: str) -> list[Connection]:
+        """Return the connections of a topic; each has a ``msgtype``."""
+        return [connection for connection in self._container.connections if connection.topic == topic]
+
+    def topics_of(self, types: tuple[str, ...]) -> list[str]:
+        """Return the topics of some types, in the order of the types, then of names."""
+        found = {topic: kind for topic, kind in self.topics.items() if kind in types}
+        return sorted(found, key=lambda topic: (types.index(found[topic]), topic))
+
+    def messages(self, topic: str) -> Iterator[tuple[int, Any]]:
+        """Yield (receive time in ns, message) of a topic."""
+        if connections := self.connections(topic):
+            with self.readable(topic):
+                for connection, received_ns, raw in self._container.messages(connections):
+                    yield received_ns, self._container.message(connection, raw)
+
+    def first(self, topic: str) -> Any:
+        """Return the first message of a topic, None where it has none."""
+        return next((message for _, message in self.messages(topic)), None)
+
+    def stamps(self, topic: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return the header stamps (s) and receive times (ns) of a topic's messages."""
+        with self.readable(topic):
+            found = [
+                (self._container.stamp_s(connection, raw), received_ns)
+                for connection, received_ns, raw in self._container.messages(self.connections(topic))
+            ]
+        return np.array([stamp for stamp, _ in found], np.float64), np.array([ns for _, ns in found], np.int64)
+
+    def message_at(self, topic: str, received_ns: int, stamp_s: float) -> Any:
+        """Return the message of a topic that was received and stamped so."""
+        with self.readable(topic):
+            for connection, raw in self._container.messages_at(self.connections(topic), received_ns):
+                if abs(self._container.stamp_s(connection, raw) - stamp_s) < 1e-6:
+                    return self._container.message(connection, raw)
+        raise RecordingError(
+            f"{self.path} lost the message of {topic} at {stamp_s:.6f} s; was the bag changed meanwhile?"
+        )
+
+    @contextmanager
+    def readable(self, topic: str) -> Generator[None]:
+        """Turn what libraries raise over damaged messages into one sentence."""
+        try:
+            yield
+        except (AvlmapsError, GeneratorExit):
+            raise
+        except Exception as error:
+            raise RecordingError(
+                f"A message of {topic} in {self.path} cannot be read ({type(error).__name__}: {_first_line(error)}); "
+                "the bag is damaged: copy it, or fix it with `rosbag reindex`, `ros2 bag reindex` or `mcap recover`."
+            ) from error
+
+
+def bag_files(path: Path) -> list[Path]:
+    """Return the files of a bag, in the order of the numbers in their names; a ROS 2 bag's folder counts as one.
+
+    Raises:
+        RecordingError: a folder holds no bag, or something that is no regular file.
+    """
+    if not os.path.lexists(path):
+        raise RecordingError(f"There is no bag at {path}.")
+    inside = sorted((entry for entry in path.iterdir() if not entry.is_dir()), key=_by_numbers) if path.is_dir() else []
+    for file in inside or [path]:
+        with readable(file):
+            checked_size(file, DESCRIPTION_BYTES if file.suffix == ".yaml" else SAMPLED_BYTES)
+    if not path.is_dir() or (path / "metadata.yaml").is_file():
+        return [path]
+    for kind in SUFFIXES:
+        if parts := [file for file in inside if file.suffix.lower() == kind]:
+            return parts
+    packed = [file.name for file in inside if file.suffixes[:1] in ([".mcap"], [".db3"])]
+    what = f"{packed[0]} is packed, and needs the metadata.yaml to be found" if packed else "it holds no bag"
+    raise RecordingError(f"{path} cannot be read as a bag: {what}; run `ros2 bag reindex` in it.")
+
+
+def _by_numbers(file: Path) -> list[tuple[int, str]]:
+    """Return a key by which ``walk_2`` goes before ``walk_10``."""
+    return [(int(word), "") if word.isdigit() else (-1, word) for word in re.findall(r"[0-9]+|[^0-9]+", file.name)]
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).strip().split("\n")[0][:200].rstrip(".") or "no reason given"
+
+
+class RosbagsContainer:
+    """Bags that `rosbags` reads; one reader for each thread, since readers keep a file position."""
+
+    def __init__(self, files: Sequence[Path]) -> None:
+        self.files = files
+        self._local = threading.local()
+
+    @property
+    def connections(self) -> Sequence[Any]:
+        """See ``Container``."""
+        return self._reader.connections
+
+    def messages(self, connections: Sequence[Any]) -> Iterator[tuple[Any, int, bytes]]:
+        """See ``Container``."""
+        return self._reader.messages(connections=connections)
+
+    def messages_at(self, connections: Sequence[Any], received_ns: int) -> Iterator[tuple[Any, bytes]]:
+        """See ``Container``."""
+        found = self._reader.messages(connections=connections, start=received_ns, stop=received_ns + 1)
+        return ((connection, raw) for connection, _, raw in found)
+
+    def message(self, connection: Any, raw: bytes) -> Any:
+        """See ``Container``."""
+        return self._reader.deserialize(self._plain(raw), connection.msgtype)
+
+    def stamp_s(self, connection: Any, raw: bytes) -> float:
+        """See ``Container``."""
+        return header_stamp_s(self._plain(raw), self._reader.is2)
+
+    def _plain(self, raw: bytes) -> bytes:
+        """Decompress a message of a ``.db3`` without the metadata.yaml that says that messages are compressed."""
+        if not self._reader.is2 or raw[:4] != _ZSTD:
+            return raw
+        import zstandard
+
+        return zstandard.ZstdDecompressor().decompressobj().decompress(raw)
+
+    @property
+    def _reader(self) -> Any:
+        if not hasattr(self._local, "reader"):
+            from rosbags.highlevel import AnyReader
+            from rosbags.typesys import Stores, get_typestore
+
+            try:
+                # Old ROS 2 bags carry no message definitions; the long-term release's are the best guess.
+                reader = AnyReader(self.files, default_typestore=get_typestore(Stores.ROS2_HUMBLE))
+                reader.open()
+            except Exception as error:  # rosbags, sqlite and yaml raise their own kinds
+                raise RecordingError(
+                    f"{self.files[0]} cannot be read as a ROS bag ({type(error).__name__}: {_first_line(error)}); if "
+                    "it was cut off while recording, fix it with `rosbag reindex`, `ros2 bag reindex` or `mcap "
+                    "recover`."
+                ) from error
+            names: list[Any] = [connection.topic for connection in reader.connections]
+            if odd := [name for name in names if not isinstance(name, str)]:  # as YAML reads an unquoted number
+                raise RecordingError(
+                    f"{self.files[0]} lists a topic called {odd[0]!r}, which is no text; fix its metadata.yaml with "
+                    "`ros2 bag reindex`."
+                )
+            self._local.reader = reader
+        return self._local.reader
+
+
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """Where a chunk lies, or a message outside of chunks; when its messages were logged, and of which channels."""
+
+    offset: int
+    first_ns: int
+    last_ns: int
+    channels: frozenset[int] | None  # None: any
+
+
+class _McapFile:
+    """An MCAP file of any profile; its index is that of the summary, else it is found by going through the file."""
+
+    def __init__(self, path: Path) -> None:
+        self.channels: dict[int, Any] = {}
+        self.schemas: dict[int, Any] = {}
+        self._lock, self._held = threading.Lock(), OrderedDict[int, list[Any]]()
+        self._stream = path.open("rb")
+        try:
+            self._places = sorted(self._indexed() or self._found(), key=lambda place: place.first_ns)
+        except Exception as error:  # mcap, struct and decompressors raise their own kinds
+            self._stream.close()
+            raise RecordingError(
+                f"{path} was cut off while recording or copying, or is damaged ({_first_line(error)}); repair it with "
+                "`mcap recover`, or copy it again."
+            ) from error
+
+    def messages(self, channel: int) -> Iterator[tuple[int, bytes]]:
+        """Yield (time of logging in ns, content) of a channel's messages, in that order."""
+        waiting: list[tuple[int, int, bytes]] = []
+        count = 0
+        for place in self._places:
+            if place.channels is not None and channel not in place.channels:
+                continue
+            while waiting and waiting[0][0] < place.first_ns:
+                logged_ns, _, raw = heapq.heappop(waiting)
+                yield logged_ns, raw
+            for message in self._messages_in(place.offset):
+                if message.channel_id == channel:
+                    heapq.heappush(waiting, (message.log_time, count, message.data))
+                    count += 1
+        while waiting:
+            logged_ns, _, raw = heapq.heappop(waiting)
+            yield logged_ns, raw
+
+    def messages_at(self, channel: int, logged_ns: int) -> Iterator[bytes]:
+        """Yield a channel's messages of one time."""
+        for place in self._places:
+            if place.first_ns > logged_ns:
+                return
+            if place.last_ns >= logged_ns and (place.channels is None or channel in place.channels):
+                for message in self._messages_in(place.offset):
+                    if message.channel_id == channel and message.log_time == logged_ns:
+                        yield message.data
+
+    def _indexed(self) -> list[_Place]:
+        from mcap.reader import SeekingReader
+
+        summary = SeekingReader(self._stream, record_size_limit=_LARGEST_RECORD).get_summary()
+        if summary is None:
+            return []
+        self.channels, self.schemas = summary.channels, summary.schemas
+        chunks = [(c, frozenset(c.message_index_offsets) or None) for c in summary.chunk_indexes]
+        return [_Place(c.chunk_start_offset, c.message_start_time, c.message_end_time, of) for c, of in chunks]
+
+    def _found(self) -> list[_Place]:
+        from mcap.records import Channel, Chunk, Message, Schema
+        from mcap.stream_reader import StreamReader, breakup_chunk
+
+        found: list[_Place] = []
+        self._stream.seek(0)
+        at = 0
+        for record in StreamReader(self._stream, emit_chunks=True, record_size_limit=_LARGEST_RECORD).records:
+            if isinstance(record, Chunk):
+                found.append(_Place(at, record.message_start_time, record.message_end_time, None))
+            elif isinstance(record, Message):
+                found.append(_Place(at, record.log_time, record.log_time, frozenset([record.channel_id])))
+            for inner in breakup_chunk(record) if isinstance(record, Chunk) else [record]:
+                if isinstance(inner, Channel):
+                    self.channels[inner.id] = inner
+                elif isinstance(inner, Schema):
+                    self.schemas[inner.id] = inner
+            at = self._stream.tell()
+        return found
+
+    def _messages_in(self, offset: int) -> list[Any]:
+        from mcap.records import Chunk, Message
+        from mcap.stream_reader import StreamReader, breakup_chunk
+
+        with self._lock:
+            if offset not in self._held:
+                self._stream.seek(offset)
+                reader = StreamReader(self._stream, True, emit_chunks=True, record_size_limit=_LARGEST_RECORD)
+                record = next(iter(reader.records))
+                records = breakup_chunk(record) if isinstance(record, Chunk) else [record]
+                self._held[offset] = [inner for inner in records if isinstance(inner, Message)]
+                if len(self._held) > _CHUNKS_HELD:
+                    self._held.popitem(last=False)
+            self._held.move_to_end(offset)
+            return self._held[offset]
+
+
+@dataclass(frozen=True, slots=True)
+class McapConnection:
+    """A channel of an MCAP file.
+
+    Attributes:
+        topic: its name.
+        msgtype: the ROS type of its messages, as which those of Foxglove are read; else the schema's name.
+        file: the file.
+        channel: the channel in it.
+        schema: how its messages are laid out; None where the file does not say.
+    """
+
+    topic: str
+    msgtype: str
+    file: _McapFile
+    channel: Any
+    schema: Any
+
+    @property
+    def is_foxglove(self) -> bool:
+        """Whether its messages are Foxglove's."""
+        return self.schema is not None and bool(foxglove.ros_type(self.schema.name))
+
+
+class McapContainer:
+    """MCAP files of any profile: messages of ROS 1 and ROS 2, and Foxglove's in JSON, protobuf and ROS's codings."""
+
+    def __init__(self, files: Sequence[Path]) -> None:
+        self.files = files
+        self._decoders: dict[tuple[str, str, bytes], Callable[[bytes], Any]] = {}
+
+    @cached_property
+    def connections(self) -> Sequence[McapConnection]:
+        """See ``Container``."""
+        return [
+            McapConnection(channel.topic, _msgtype(schema.name if schema else ""), file, channel, schema)
+            for file in map(_McapFile, self.files)
+            for channel in file.channels.values()
+            for schema in [file.schemas.get(channel.schema_id)]
+        ]
+
+    def messages(self, connections: Sequence[McapConnection]) -> Iterator[tuple[McapConnection, int, bytes]]:
+        """See ``Container``."""
+
+        def of(connection: McapConnection) -> Iterator[tuple[McapConnection, int, bytes]]:
+            return ((connection, ns, raw) for ns, raw in connection.file.messages(connection.channel.id))
+
+        return heapq.merge(*map(of, connections), key=itemgetter(1))
+
+    def messages_at(
+        self, connections: Sequence[McapConnection], received_ns: int
+    ) -> Iterator[tuple[McapConnection, bytes]]:
+        """See ``Container``."""
+        return ((c, raw) for c in connections for raw in c.file.messages_at(c.channel.id, received_ns))
+
+    def message(self, connection: McapConnection, raw: bytes) -> Any:
+        """See ``Container``."""
+        decoded = self._decoded(connection, raw)
+        return foxglove.to_ros(connection.schema.name, decoded) if connection.is_foxglove else decoded
+
+    def stamp_s(self, connection: McapConnection, raw: bytes) -> float:
+        """See ``Container``."""
+        encoding = connection.channel.message_encoding
+        if encoding in ("ros1", "cdr") and not connection.is_foxglove:
+            return header_stamp_s(raw, encoding == "cdr")
+        return foxglove.stamp_s(self._decoded(connection, raw))
+
+    def _decoded(self, connection: McapConnection, raw: bytes) -> Any:
+        schema = connection.schema
+        key = (connection.channel.message_encoding, schema.name if schema else "", schema.data if schema else b"")
+        if key not in self._decoders:
+            self._decoders[key] = _decoder(connection)
+        return self._decoders[key](raw)
+
+
+def _msgtype(schema: str) -> str:
+    if known := foxglove.ros_type(schema):
+        return known
+    name = _full_name(schema)
+    return "tf2_msgs/msg/TFMessage" if name == "tf/msg/tfMessage" else name
+
+
+def _full_name(schema: str) -> str:
+    parts = schema.split("/")
+    return f"{parts[0]}/msg/{parts[-1]}" if len(parts) == 2 else schema
+
+
+def _decoder(connection: McapConnection) -> Callable[[bytes], Any]:
+    encoding, schema, topic = connection.channel.message_encoding, connection.schema, connection.topic
+    if encoding == "json":
+        return lambda raw: foxglove.plain(decode_json(raw))
+    if encoding not in ("protobuf", "ros1", "cdr"):
+        raise RecordingError(
+            f"The messages of {topic} are coded as {encoding!r}, which is not read; ROS 1, CDR (ROS 2), JSON and "
+            "protobuf are."
+        )
+    if schema is None:
+        raise RecordingError(f"The topic {topic} has no schema that says how its messages are laid out.")
+    if encoding == "protobuf":
+        from mcap_protobuf.decoder import DecoderFactory
+
+        decoder = DecoderFactory().decoder_for(encoding, schema)
+        if decoder is None:
+            raise RecordingError(f"The topic {topic} has a schema in {schema.encoding!r} for messages in protobuf.")
+        return decoder
+    from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
+
+    name, text = _full_name(schema.name), schema.data.decode()
+    if not text.strip():  # the long-term release's are the best guess
+        store = get_typestore(Stores.ROS1_NOETIC if encoding == "ros1" else Stores.ROS2_HUMBLE)
+    else:
+        store = get_typestore(Stores.EMPTY)
+        if schema.encoding in ("ros2idl", "omgidl"):
+            for part in text.split("=" * 80 + "\n"):
+                with suppress(IndexError):
+                    store.register(get_types_from_idl(part.split("\n", 1)[1] if part.startswith("IDL: ") else part))
+        else:
+            store.register(get_types_from_msg(text, name))
+    deserialize = store.deserialize_ros1 if encoding == "ros1" else store.deserialize_cdr
+    return lambda raw: deserialize(raw, name)

@@ -1,0 +1,29 @@
+"""Files of other hands, each with its right value: what people who do this job really have."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from avlmaps.core.errors import RecordingError
+from avlmaps.recordings.open import open_recording
+
+ROUND4 = Path(__file__).resolve().parents[3] / "shared/field/round4"
+pytestmark = [
+    pytest.mark.shared,
+    pytest.mark.skipif(not ROUND4.is_dir(), reason="files of other hands are not beside the repository"),
+]
+
+
+def test_six_channels_are_not_believed_to_be_one() -> None:
+    bag = ROUND4 / "respeaker_6ch.bag"
+    for topics in ({}, {"audio_pcm": "16000,1"}):
+        with pytest.raises(RecordingError, match=r"audio_pcm=16000,6"):
+            open_recording(bag, topics=topics)
+    recording = open_recording(bag, topics={"audio_pcm": "16000,6"})
+    track = recording.audio
+    assert track is not None
+    assert track.every_channel(0, 1).shape == (1, 6)
+    assert track.duration_s == pytest.approx(12.0, abs=0.2)
+    power = [float(np.square(track.read(at_s, at_s + 0.2).samples).mean()) for at_s in np.arange(0.0, 11.0, 0.2)]
+    assert 0.2 * int(np.argmax(power)) == pytest.approx(8.2, abs=0.61)
