@@ -157,7 +157,7 @@ LEFT_OUT = {
         "7.250 s after the last pose",
     ),
     "an encoding": (
-        lambda robot: (robot.be(0), robot.see(0, rgb=lambda f, s: ros.colour(f, s, "yuv422"))), "has encoding 'yuv422'",
+        lambda robot: (robot.be(0), robot.see(0, rgb=lambda f, s: ros.colour(f, s, "nv21"))), "have the encoding 'nv21'",
     ),
     "another size": (
         lambda robot: (
@@ -209,7 +209,7 @@ MISSING = {
     "depth": (lambda robot: robot.give("rgb", ros.colour(frame(0), START_S)), "no depth picture has come on /depth"),
     "stamps": (lambda robot: robot.see(0, depth=lambda one, _: ros.depth(one, 0.0)), "on /depth have no stamps"),
     "encoding": (
-        lambda robot: (robot.be(0), robot.see(0, rgb=lambda f, s: ros.colour(f, s, "yuv422"))), "none of 1 frames can",
+        lambda robot: (robot.be(0), robot.see(0, rgb=lambda f, s: ros.colour(f, s, "nv21"))), "none of 1 frames can",
     ),
 }  # fmt: skip
 
