@@ -193,3 +193,23 @@ def test_in_ros1_the_goal_is_cancelled_by_its_id(monkeypatch):
     monkeypatch.setattr(watchdog.time, "monotonic", lambda: 0.05 * next(ticks))
     watchdog.run_ros1(Watch(2.0), ["avlmaps-watchdog"])
     assert sent and set(map(str, sent)) == {str(("move_base/cancel", {"id": OURS}))}
+
+
+def test_the_part_of_a_dead_navigator_is_cancelled_and_that_of_an_operator_is_not():
+    watch = Watch(2.0)
+    watch.beat("avlmaps-0a", 0.0)
+    watch.active("navigate_to_pose", ["0a"], 0.1)
+    watch.active("follow_path", ["0b"], 0.2)
+    watch.beat("avlmaps-0a over", 3.0)
+    assert ("follow_path", "0b") in watch.due(3.0)
+    watch.active("navigate_to_pose", ["0c"], 4.0)
+    watch.active("follow_path", ["0d"], 4.1)
+    assert not {("navigate_to_pose", "0c"), ("follow_path", "0d")} & set(watch.due(9.0))
+
+
+def test_a_goal_after_the_end_of_ours_is_not_taken_for_it():
+    watch = Watch(2.0)
+    watch.beat("avlmaps-0a", 0.0)
+    watch.beat("avlmaps-0a over", 1.0)
+    watch.active("navigate_to_pose", ["ff"], 1.5)
+    assert not watch.due(9.0)

@@ -19,11 +19,13 @@ import time
 from importlib.util import find_spec
 
 ACTIONS = ("navigate_to_pose", "spin", "drive_on_heading")
+PARTS = ("follow_path",)
+"""Actions of Nav2 that do parts of the goals above: its controller drives on when its navigator is dead."""
 LOOK_EVERY_S = 0.1
 AGAIN_S = 1.0
 """A cancel is sent again after this time, until the goal is over."""
 BEFORE_S, AFTER_S = 1.0, 5.0
-"""A goal of another name is ours where it was first seen near its first heartbeat: within these seconds."""
+"""A goal of another name is ours where it was first seen between its first heartbeat and its last one, or so near."""
 MOST = 200
 
 
@@ -43,8 +45,12 @@ class Watch:
         self._spent: set[str] = set()  # names that a goal has, or had
         self._asked_s: dict[str, float] = {}
 
-    def beat(self, name: str, now_s: float) -> None:
-        """Take in a heartbeat."""
+    def beat(self, text: str, now_s: float) -> None:
+        """Take in a heartbeat: the name of a goal, with another word when that is over: it names no further goal."""
+        name, _, is_over = text.partition(" ")
+        if is_over:
+            self._spent.update({name} & set(self._beats))
+            return
         self._beats.setdefault(name, [now_s, now_s])[1] = now_s
         while len(self._beats) > MOST:
             oldest = min(self._beats, key=lambda one: self._beats[one][1])
@@ -55,6 +61,8 @@ class Watch:
         """Take in all goals that a server is at."""
         before = self._goals.get(server, {})
         self._goals[server] = {goal: before.get(goal, now_s) for goal in goals}
+        if server in PARTS:
+            self._own_parts([goal for goal in goals if goal not in before])
         for goal in before:
             if goal not in goals:
                 self._owner.pop(goal, None)
@@ -74,6 +82,13 @@ class Watch:
                     found.append((server, goal))
         return found
 
+    def _own_parts(self, begun: list[str]) -> None:
+        """Take parts that begin while all goals under way are ours for parts of the newest of these."""
+        self._own()
+        whole = {goal: at_s for name, goals in self._goals.items() if name not in PARTS for goal, at_s in goals.items()}
+        if whole and all(goal in self._owner for goal in whole):
+            self._owner.update(dict.fromkeys(begun, self._owner[max(whole, key=lambda goal: whole[goal])]))
+
     def _own(self) -> None:
         """Find out which goals are ours.
 
@@ -81,16 +96,16 @@ class Watch:
         that was first seen when heartbeats of a new name began is ours. A name is given once: a goal that ends ours is
         not ours.
         """
-        seen = {goal: seen_s for goals in self._goals.values() for goal, seen_s in goals.items()}
+        seen = {goal: at_s for name, goals in self._goals.items() if name not in PARTS for goal, at_s in goals.items()}
         for goal in seen:
             for name in self._beats:
                 if name == goal or name.endswith("-" + goal):
-                    self._owner = {one: owner for one, owner in self._owner.items() if owner != name}
+                    self._owner = {one: owner for one, owner in self._owner.items() if owner != name or one not in seen}
                     self._owner[goal] = name
                     self._spent.add(name)
         for goal, seen_s in sorted(seen.items(), key=lambda item: item[1]):
-            for name, (first_s, _) in self._beats.items():
-                near = first_s - BEFORE_S <= seen_s <= first_s + AFTER_S
+            for name, (first_s, last_s) in self._beats.items():
+                near = first_s - BEFORE_S <= seen_s <= last_s + AFTER_S
                 if near and goal not in self._owner and name not in self._spent:
                     self._owner[goal] = name
                     self._spent.add(name)
@@ -104,13 +119,14 @@ def run_ros2(watch: Watch, words: list[str]) -> None:
     from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
     from std_msgs.msg import String
 
+    watched = (*ACTIONS, *PARTS)
     rclpy.init(args=words)
     ended = threading.Event()  # the handlers of rclpy end ROS beneath a step, which then raises or waits for ever
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: ended.set())
     node = rclpy.create_node("avlmaps_watchdog")
     log = node.get_logger()
-    cancels = {name: node.create_client(CancelGoal, f"{name}/_action/cancel_goal") for name in ACTIONS}
+    cancels = {name: node.create_client(CancelGoal, f"{name}/_action/cancel_goal") for name in watched}
 
     def heard(message: String) -> None:
         watch.beat(message.data, time.monotonic())
@@ -129,7 +145,7 @@ def run_ros2(watch: Watch, words: list[str]) -> None:
     heartbeats = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)  # takes reliable ones as well
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     node.create_subscription(String, "avlmaps/heartbeat", heard, heartbeats)
-    for name in ACTIONS:
+    for name in watched:
         node.create_subscription(
             GoalStatusArray, f"{name}/_action/status", lambda message, name=name: status(name, message), latched
         )
@@ -191,7 +207,10 @@ def main(words: list[str] | None = None) -> None:
             f"this Python ({sys.executable}) has no {needed}; source ROS's setup.bash and run it with the Python of ROS"
         )
     run = run_ros2 if version == "2" else run_ros1
-    run(Watch(given.silence), [words[0], *rest])
+    try:
+        run(Watch(given.silence), [words[0], *rest])
+    except ImportError as fault:
+        reader.error(f"this Python ({sys.executable}) lacks a package of ROS ({fault}); install it beside {needed}")
 
 
 if __name__ == "__main__":

@@ -200,7 +200,7 @@ class FakeRobot:
 
     def _tell_states(self) -> None:
         """Publish the goals of each action, as its server does at a change."""
-        for action in {goal["action"] for goal in self.goals.values()}:
+        for action in {goal["action"] for goal in self.goals.values() if goal["listed"]}:
             states = [
                 {
                     "goal_info": {"goal_id": {"uuid": list(uuid_of(name))}, "stamp": {"sec": 1, "nanosec": 0}},
@@ -247,8 +247,9 @@ class FakeRobot:
                 self._called_off(message["id"])
             case "call_service":
                 self._serve(client, message)
-            case "publish" if message["topic"].endswith("/avlmaps/echo"):
-                self.received.pop()
+            case "publish" if message["topic"].endswith(("/avlmaps/echo", "/avlmaps/heartbeat")):
+                if message["topic"].endswith("echo"):
+                    self.received.pop()
                 self._publish(message["topic"], message["msg"])
             case "publish" if message["topic"] == "/move_base/goal":
                 self._begin(client, "/move_base", message["msg"]["goal_id"]["id"], message["msg"]["goal"])

@@ -1,7 +1,9 @@
-"""Random faults under a native drive: each process of a robot with ROS 2 is killed, stopped, restarted or silenced.
+"""Random faults under a drive: each process of a robot with ROS 2 is killed, stopped, restarted or silenced.
 
     faults.py --cases 200 --seed 1 --workers 2 --out OUT.jsonl
 
+Natively; where AVLMAPS_ROSBRIDGE names a checkout of rosbridge, half of the cases go over that. The robot takes up to
+3 s to accept a goal, the goal's connection is late by up to 1 s, and the fault may come before the goal is accepted.
 Case N of a seed is the same on every run, up to the timing of the machine. A watchdog runs on the robot. The law, by
 the body's own log: within 5 s of the fault the body stands, or the drive goes on watched (its heartbeats reach the
 robot), or an operator's goal goes on untouched; and no program says that the robot stands while it moves. After the
@@ -19,11 +21,12 @@ import subprocess
 import sys
 import tempfile
 import time
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+CHECKOUT = os.environ.get("AVLMAPS_ROSBRIDGE", "")
 WITHIN_S, CLAIM_S = 5.0, 0.3
 FAULTS = (
     "nav2 kill", "nav2 restart", "nav2 pause", "client kill", "client pause", "client term", "client int", "guard kill",
@@ -43,6 +46,10 @@ def chosen(seed: int, number: int) -> dict[str, Any]:
         "after_s": round(rng.uniform(0.3, 3.0), 2),
         "operator": rng.random() < 0.3,
         "hz": rng.choice([10.0, 2.0]),
+        "accept_s": round(rng.choice([0.0, rng.uniform(0.0, 3.0)]), 2),
+        "late_s": round(rng.choice([0.0, rng.uniform(0.0, 1.0)]), 2),
+        "early": rng.random() < 0.4,
+        "bridged": bool(CHECKOUT) and rng.random() < 0.5,
     }
 
 
@@ -51,28 +58,40 @@ def run(seed: int, number: int) -> dict[str, Any]:
     os.environ["ROS_DOMAIN_ID"] = str(1 + number % 100)  # another one than the cases beside it
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     os.environ["FASTDDS_BUILTIN_TRANSPORTS"] = "UDPv4"
-    from running import Robot
+    from running import Bridge, LateLink, Robot
 
     case = chosen(seed, number)
-    with tempfile.TemporaryDirectory() as folder, Robot(Path(folder), case["hz"]) as robot:
-        return {**case, **_tried(case, robot, Path(folder)), "load": round(os.getloadavg()[0], 1)}
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        robot, url = stack.enter_context(Robot(folder, case["hz"])), "native"
+        if case["bridged"]:
+            bridge = stack.enter_context(Bridge(Path(CHECKOUT)))
+            url = stack.enter_context(LateLink(bridge.port, case["late_s"])).url
+        if case["accept_s"]:
+            robot.mode(f"accept {case['accept_s']}")
+        return {**case, **_tried(case, robot, folder, url), "load": round(os.getloadavg()[0], 1)}
 
 
-def _tried(case: dict[str, Any], robot: Any, folder: Path) -> dict[str, Any]:
-    from running import HERE, Operator
+def _tried(case: dict[str, Any], robot: Any, folder: Path, url: str) -> dict[str, Any]:
+    from running import HERE, Operator, lines_of
 
     said = folder / "said.jsonl"
     watchdog = subprocess.Popen([sys.executable, "-m", "avlmaps.watchdog"], stderr=subprocess.DEVNULL)
     with said.open("w") as out:
-        client = subprocess.Popen([sys.executable, str(HERE / "program.py")], stdout=out, stderr=subprocess.DEVNULL)
+        client = subprocess.Popen(
+            [sys.executable, str(HERE / "program.py"), url], stdout=out, stderr=subprocess.DEVNULL
+        )
     try:
-        if not robot.soon(lambda: robot.moves and bool(said.read_text()), 40.0):
+        early = case["early"] and not case["operator"]
+        if not robot.soon(
+            lambda: (bool(robot.rows("beat")) if early else robot.moves) and bool(said.read_text()), 90.0
+        ):
             return {"verdict": "no start"}
         operators = ""
         if case["operator"]:
             operators = Operator(robot).send(50.0)
-        time.sleep(case["after_s"])
-        guard = json.loads(said.read_text().splitlines()[0])["guard"]
+        time.sleep(case["after_s"] / (3.0 if early else 1.0))
+        guard = lines_of(said.read_text())[0]["guard"]
         faulted_s = time.time()
         _break(case, robot, client, guard, watchdog)
         time.sleep(max(0.0, WITHIN_S + 0.5 - (time.time() - faulted_s)))
@@ -90,7 +109,7 @@ def _tried(case: dict[str, Any], robot: Any, folder: Path) -> dict[str, Any]:
             ends = [row for row in robot.rows("cancelled", "replaced", "aborted") if row["id"] == operators]
             if ends or not robot.moves:
                 verdict = {"verdict": "VIOLATION", "why": f"the operator's goal was ended: {ends}"}
-        claims = [json.loads(line) for line in said.read_text().splitlines()]
+        claims = lines_of(said.read_text())
         for claim in claims:
             near = [row for row in robot.rows("body") if abs(row["t"] - claim["t"]) < CLAIM_S]
             if claim.get("stopped") and "stands at" in claim["note"] and near and all(_moves(row) for row in near):

@@ -15,8 +15,8 @@ def say(kind: str, **values: object) -> None:
     sys.stdout.flush()
 
 
-def main(guarded: bool) -> None:
-    with raised_signals(), open_ros_driver("nav2", "native", guarded=guarded) as driver:
+def main(url: str, guarded: bool) -> None:
+    with raised_signals(), open_ros_driver("nav2", url, guarded=guarded) as driver:
         say("open", guard=None if driver.guard is None else driver.guard._process.pid)
         try:
             arrival = driver.go_to(np.array([60.0, 0.0, 0.0]))
@@ -28,4 +28,5 @@ def main(guarded: bool) -> None:
 
 
 if __name__ == "__main__":
-    main("--unguarded" not in sys.argv)
+    addresses = [word for word in sys.argv if word.startswith("ws://")]
+    main([*addresses, "native"][0], "--unguarded" not in sys.argv)

@@ -2,12 +2,16 @@
 # pyright: reportMissingImports=false
 
 import json
+import os
+import socket
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
+from queue import SimpleQueue
 from typing import Any
 from uuid import uuid4
 
@@ -75,8 +79,7 @@ class Robot:
 
     def rows(self, *kinds: str) -> list[dict[str, Any]]:
         text = self.log.read_text() if self.log.exists() else ""
-        rows = [json.loads(line) for line in text.splitlines() if line.endswith("}")]
-        return [row for row in rows if row["kind"] in kinds]
+        return [row for row in lines_of(text) if row["kind"] in kinds]
 
     @property
     def moves(self) -> bool:
@@ -94,6 +97,106 @@ class Robot:
         while not holds() and time.monotonic() < until_s:
             time.sleep(0.02)
         return holds()
+
+
+def lines_of(text: str) -> list[dict[str, Any]]:
+    """Return the lines of JSON in a text; a line that is cut off, or says something else, is left out."""
+    found = []
+    for line in text.splitlines():
+        with suppress(ValueError):
+            found.append(json.loads(line))
+    return [row for row in found if isinstance(row, dict) and "kind" in row]
+
+
+def free_port() -> int:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        return taken.getsockname()[1]
+
+
+class Bridge:
+    """An unmodified rosbridge of a checkout, in this test's network."""
+
+    def __init__(self, checkout: Path) -> None:
+        self.port, self._checkout = free_port(), checkout
+
+    def __enter__(self) -> "Bridge":
+        self.start()
+        return self
+
+    def start(self) -> None:
+        sources = [str(self._checkout / name / "src") for name in ("rosbridge_library", "rosbridge_server")]
+        script = self._checkout / "rosbridge_server" / "scripts" / "rosbridge_websocket.py"
+        words = ["--ros-args", "-p", f"port:={self.port}", "-p", "address:=127.0.0.1", "--log-level", "error"]
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sources)}
+        self.process = subprocess.Popen([sys.executable, script, *words], env=environment)
+        until_s = time.monotonic() + 30.0
+        while time.monotonic() < until_s:
+            with suppress(OSError), socket.create_connection(("127.0.0.1", self.port), 1.0):
+                return
+            time.sleep(0.1)
+        raise AssertionError("the bridge did not start")
+
+    @property
+    def url(self) -> str:
+        return f"ws://127.0.0.1:{self.port}"
+
+    def __exit__(self, *_: object) -> None:
+        self.process.kill()
+        self.process.wait()
+
+
+class LateLink:
+    """A way to a bridge on which one connection is late: what the client sends on it arrives seconds later."""
+
+    def __init__(self, port: int, late_s: float, which: int = 2) -> None:
+        self.port, self._target, self._late_s, self._which = free_port(), port, late_s, which
+        self._count = 0
+
+    def __enter__(self) -> "LateLink":
+        self._listener = socket.create_server(("127.0.0.1", self.port))
+        threading.Thread(target=self._serve, daemon=True).start()
+        return self
+
+    @property
+    def url(self) -> str:
+        return f"ws://127.0.0.1:{self.port}"
+
+    def __exit__(self, *_: object) -> None:
+        self._listener.close()
+
+    def _serve(self) -> None:
+        with suppress(OSError):
+            while True:
+                client, _ = self._listener.accept()
+                self._count += 1
+                bridge = socket.create_connection(("127.0.0.1", self._target))
+                late_s = self._late_s if self._count == self._which else 0.0
+                for one, other, seconds in ((client, bridge, late_s), (bridge, client, 0.0)):
+                    queue: SimpleQueue[tuple[float, bytes]] = SimpleQueue()
+                    threading.Thread(target=_received, args=(one, queue, seconds), daemon=True).start()
+                    threading.Thread(target=_forwarded, args=(queue, other), daemon=True).start()
+
+
+def _received(one: socket.socket, queue: "SimpleQueue[tuple[float, bytes]]", late_s: float) -> None:
+    content = b"."
+    while content:
+        try:
+            content = one.recv(65536)
+        except OSError:
+            content = b""
+        queue.put((time.monotonic() + late_s, content))
+
+
+def _forwarded(queue: "SimpleQueue[tuple[float, bytes]]", other: socket.socket) -> None:
+    with suppress(OSError):
+        while True:
+            at_s, content = queue.get()
+            time.sleep(max(0.0, at_s - time.monotonic()))
+            if not content:
+                other.shutdown(socket.SHUT_WR)
+                return
+            other.sendall(content)
 
 
 class Operator:

@@ -115,7 +115,7 @@ class Nav2(Node):
     """Drives as Nav2 does: a newer goal of the same action ends the older one, a cancel brakes.
 
     Modes: ``abort``, ``reject``, ``deaf`` (refuses cancels), ``runaway`` (accepts them and drives on), ``lie``
-    (succeeds without moving), ``normal``.
+    (succeeds without moving), ``accept SECONDS`` (takes as long to accept), ``normal``.
     """
 
     def __init__(self, log: Log) -> None:
@@ -151,9 +151,12 @@ class Nav2(Node):
         self.log("mode", mode=message.data)
 
     def _beat(self, message: String) -> None:
-        self.log("beat", id=message.data)
+        self.log("beat" if " " not in message.data else "beat over", id=message.data)
 
     def _offered(self, _goal) -> GoalResponse:
+        self.log("offered")
+        if self.mode.startswith("accept "):
+            time.sleep(float(self.mode.split()[1]))
         return GoalResponse.REJECT if self.mode == "reject" else GoalResponse.ACCEPT
 
     def _asked_to_cancel(self) -> CancelResponse:

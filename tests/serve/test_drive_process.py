@@ -91,6 +91,23 @@ def test_every_end_of_the_server_leaves_no_goal(serve: Started, number: signal.S
             assert process.wait(60) == 0
 
 
+@pytest.mark.parametrize("does", ["stubborn", "mute"])
+def test_a_robot_that_is_at_its_goal_still_is_not_said_to_stand(serve: Started, does: str) -> None:
+    """One refuses to cancel; the other answers nothing at all, and pauses."""
+    with FakeRobot(2, "drive on", GroundPose(4.4, 3.2)) as robot:
+        process, client = serve(robot.url, cancel_timeout_s=1.0, answer_timeout_s=1.0)
+        drive(client, "go to the red thing")
+        assert robot.soon(lambda: len(robot.published("/avlmaps/heartbeat")) > 1, 60.0)
+        robot.does[""] = does
+        for goal in robot.goals.values():
+            goal["does"] = does
+        stopped = client.post("/drive/stop")
+        assert stopped.status_code == 503 and stopped.json()["stopped"] is False, stopped.text
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(60) == 3
+        assert "may still be driving" in process.communicate()[1]
+
+
 @pytest.mark.slow
 def test_a_robot_that_cannot_be_reached_starts_no_server(room: Path, tmp_path: Path) -> None:
     file = tmp_path / "robot.json"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from tyro.conf import Positional, UseAppendAction, arg
 
-from avlmaps.cli.output import UsageError, emit
+from avlmaps.cli.output import AnsweredError, UsageError, emit
 from avlmaps.cli.verb import ModelVerb
 from avlmaps.core.errors import BackendError
 from avlmaps.core.extras import install_command
@@ -134,6 +134,14 @@ def serve(verb: "Serve") -> None:
             if driving is not None:
                 driving.dispatcher.close()
             service.close()
+        if driving is not None and driving.dispatcher.fault:
+            from avlmaps.navigate.interrupts import UNCONFIRMED_STATUS
+
+            raise AnsweredError(
+                f"The robot did not confirm that it stands ({driving.dispatcher.fault.rstrip('.')}), and may still be "
+                "driving; use its own stop.",
+                UNCONFIRMED_STATUS,
+            )
 
 
 def _driving(verb: "Serve", service: "Service") -> "Driving | None":

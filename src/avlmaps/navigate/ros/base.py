@@ -21,16 +21,17 @@ from avlmaps.core.motion import GroundPose
 from avlmaps.navigate.driver import Arrival
 from avlmaps.navigate.interrupts import Halt
 from avlmaps.navigate.ros.contact import Contact
-from avlmaps.navigate.ros.goals import ActionGoal, End, MovementPlan, SentGoal, Tasks, Track
+from avlmaps.navigate.ros.goals import ActionGoal, End, MovementPlan, SentGoal, Stage, Tasks, Track
 from avlmaps.navigate.ros.guard import GoalGuard
 from avlmaps.navigate.ros.plans import LEAST_M, LONGEST_M, Standing, ahead_of, place_to_stand, plan_turn
-from avlmaps.navigate.ros.session import AGAIN_S, Opener, call_off, ended_within
+from avlmaps.navigate.ros.session import AGAIN_S, Opener, Session, call_off, ended_within
 from avlmaps.navigate.ros.tree import Sighting
 
 _LOOK_EVERY_S = 0.1
 _ASK_S = 1.5
 _REGULAR = 3
 _NEXT_LIST_S = 0.5
+_BEATS = 2.5  # heartbeats without one, after which nobody watches a goal
 _LEAP_M, _FASTEST_M_S = 0.5, 2.0  # a pose that moves by more than a robot drives has jumped
 _ASK_AFTER = 0.4  # of the time for which a server may be silent
 _IDLE = Halt(True, "no goal was active")
@@ -122,12 +123,16 @@ class RosDriver:
         still = contact.stands_still(wait_s)
         if idle and self._owed is not None:
             self._settle(self._owed)
+        called = self._tasks.called
         if not still:
             return self._arrival(False, track, "The robot was stopped, but its pose changes or is lost")
+        if idle:
+            return self._arrival(True, track, "")
         if idle is False:
-            return self._arrival(False, track, f"{self._tasks.called} does not give up its goal; the robot pauses")
-        silent = "" if idle else f"The robot stands, but {self._tasks.called} does not say that it has no goal"
-        return self._arrival(True, track, silent)
+            return self._arrival(False, track, f"{called} does not give up its goal; the robot pauses")
+        if self._may_go_on():
+            return self._arrival(False, track, f"{called} does not answer, and was at a goal; the robot pauses")
+        return self._arrival(True, track, f"The robot stands, but {called} does not say that it has no goal")
 
     def fault(self) -> str:
         """Return why the robot cannot be driven now, in part of a sentence; "" where it can.
@@ -162,17 +167,17 @@ class RosDriver:
     @property
     def owes(self) -> bool:
         """Whether a goal was sent whose end the robot has not confirmed, so that it may still be driving."""
-        return self._owed is not None and self._owed.end is None
+        return self._owed is not None and self._owed.stage is not Stage.OVER
 
     def close(self) -> None:
         """End the connection; a goal that is not over is called off first, and else left to the guard."""
-        goal = self._goal or self._owed
-        if goal is not None and goal.end is None:
+        goal = self._unfinished
+        if goal is not None:
             self._called_off(goal, self.settings.cancel_timeout_s)
         self._closing.set()
         self._contact.session.close()
         if self.guard is not None:
-            self.guard.close(dismissed=goal is None or goal.end is not None)
+            self.guard.close(dismissed=goal is None or goal.stage is Stage.OVER)
 
     def __enter__(self) -> Self:
         return self
@@ -181,6 +186,16 @@ class RosDriver:
         self.close()
 
     # One movement.
+
+    @property
+    def _unfinished(self) -> SentGoal | None:
+        """The goal of ours that is not over."""
+        goal = self._goal or self._owed
+        return None if goal is None or goal.stage is Stage.OVER else goal
+
+    def _may_go_on(self) -> bool:
+        """Return whether a goal, of ours or of others, is not over as far as is known."""
+        return self._unfinished is not None or any(self._contact.ear.servers.under_way().values())
 
     def _level(self, place: Float[np.ndarray, "3"]) -> Float[np.ndarray, "2"]:
         known = np.isfinite(place).all()  # NaN stays NaN, without a warning
@@ -229,15 +244,16 @@ class RosDriver:
         return ""
 
     def _others(self, wait_s: float = 0.0) -> bool:
-        """Return whether a goal of others is under way, by the servers' lists, also after some time."""
+        """Return whether a goal of others is under way, by lists and heartbeats, also after some time."""
         contact, until_s, asked = self._contact, monotonic() + wait_s, False
         every_s = contact.session.lists_every_s
         while True:
             names = frozenset(name for goal in self._ours for name in goal.names)
             lists = contact.ear.servers.under_way(None if every_s is None else 10.0 * every_s)
             servers = [server for server, goals in lists.items() if goals - names]
-            if not servers or monotonic() >= until_s:
-                return bool(servers)
+            is_driven = bool(servers or contact.ear.beats.within(_BEATS * self.settings.heartbeat_s) - names)
+            if not is_driven or monotonic() >= until_s:
+                return is_driven
             if not asked:  # a list may be the last of a server that is gone
                 asked = True
                 for server in servers:
@@ -277,7 +293,9 @@ class RosDriver:
 
     def _pursue(self, task: ActionGoal, track: Track) -> SentGoal:
         """Send one goal and see it to its end, good or bad."""
-        goal = SentGoal(task)
+        listed = self._contact.ear.servers.list_of(task.action)
+        before = frozenset[str]() if listed is None else listed[1]
+        goal = SentGoal(task, self.settings.answer_timeout_s, before)
         if self._is_absent(task.action):
             goal.over(End.ABSENT, f"No action server takes the goal; start {self._tasks.called}, or name its namespace")
             return goal
@@ -290,20 +308,21 @@ class RosDriver:
             if goal.end is None:
                 self._give_up(goal, why, absent)
         except BaseException:  # above all KeyboardInterrupt: nobody watches the robot any more
-            agreed = self._called_off(goal, 2.0 * self.settings.cancel_timeout_s)
+            agreed = self._called_off(goal, self._patience_s(goal))
             self._halt = Halt(agreed, "the active goal was cancelled" if agreed else _UNCONFIRMED)
             raise
         finally:
             self._goal = None
-            if goal.end is None:
-                self._owed = goal
-            else:
+            if goal.stage is Stage.OVER:
                 self._settle(goal)
+            else:
+                self._owed = goal
         return goal
 
     def _settle(self, goal: SentGoal) -> None:
         """Take note that nothing is left of a goal."""
         goal.over(End.CANCELLED)
+        self._contact.session.beat(goal)
         if self._owed is goal:
             self._owed = None
         if self.guard is not None and self._owed is None:
@@ -343,7 +362,7 @@ class RosDriver:
             silent_s = self._silent_s(goal, sent_s, now_s)
             if why := self._lost_sight(goal, silent_s):
                 return why, False
-            if not goal.answered and monotonic() - begun_s > settings.answer_timeout_s:
+            if goal.stage is Stage.SENT and monotonic() - begun_s > settings.answer_timeout_s:
                 says = f" The bridge says: {session.complaint}" if session.complaint else ""
                 within = f"within {settings.answer_timeout_s:g} s; is {self._tasks.called} running?{says}"
                 return f"Nothing answers at {goal.task.action} {within}", True
@@ -388,8 +407,11 @@ class RosDriver:
     def _give_up(self, goal: SentGoal, why: str, absent: bool) -> None:
         """Call a goal off, for as long as it could last, and say how it went."""
         was_lost = self._contact.session.lost is not None
-        wait_s = min(self.settings.cancel_timeout_s, 1.0) if absent else goal.task.limit_s
-        agreed = self._called_off(goal, wait_s)
+        agreed = self._called_off(goal, goal.answer_s + 2.0 * AGAIN_S if absent else goal.task.limit_s)
+        servers = self._contact.ear.servers
+        if absent and not servers.has_shown(goal.task.action):
+            goal.over(End.ABSENT)
+        absent = absent and goal.stage is Stage.OVER
         if absent:
             goal.end = End.ABSENT
         if agreed or absent:
@@ -405,7 +427,7 @@ class RosDriver:
         A lost connection is made again for as long as it takes. A connection that stands and brings no confirmation is
         replaced once: it may be stuck.
         """
-        contact, patience_s = self._contact, self.settings.cancel_timeout_s
+        contact = self._contact
         until_s, tries = monotonic() + wait_s, 0
         while goal.end is None and tries < 2 and not self._closing.is_set() and (left_s := until_s - monotonic()) > 0.0:
             if not contact.renewed_within(min(left_s, AGAIN_S)):
@@ -413,22 +435,42 @@ class RosDriver:
             if tries and not contact.replace():
                 continue
             session = contact.session
+            patience_s = self._patience_s(goal) / 2.0
             call_off(goal, session, min(until_s, monotonic() + patience_s), self._closing.is_set)
             tries += session.lost is None
         return goal.end is not None
 
+    def _patience_s(self, goal: SentGoal) -> float:
+        """Return how long the robot may take to confirm a cancel."""
+        wait_s = 2.0 * self.settings.cancel_timeout_s
+        return wait_s + (goal.answer_s if goal.stage is Stage.SENT else 0.0)
+
     def _all_called_off(self, wait_s: float) -> bool | None:
-        """Cancel every goal until the servers say that they are at none; return what they said last."""
+        """Cancel every goal until the servers say that they are at none; return what they said last.
+
+        A goal of ours that may still be accepted has to be over as well; it is waited for four times as long, on the
+        connection that will bring its result.
+        """
         contact, since_s, idle = self._contact, self._clock(), None
+
+        def waits() -> bool:
+            goal = self._unfinished
+            return goal is not None and goal.stage is Stage.SENT
+
+        def is_idle(session: Session) -> bool | None:
+            return False if waits() else session.is_idle(since_s)
+
         for replaced in (False, True):
-            if replaced and not contact.replace():
+            if replaced and (waits() or not contact.replace()):
                 break
-            session, until_s = contact.session, monotonic() + wait_s / 2
-            while session.lost is None and monotonic() < until_s:
+            session, begun_s = contact.session, monotonic()
+            while session.lost is None and monotonic() - begun_s < (2.0 * wait_s if waits() else 0.5 * wait_s):
                 session.cancel_all()
+                if (goal := self._unfinished) is not None:
+                    session.cancel(goal)
                 with session.heard:
-                    session.heard.wait_for(lambda s=session: s.is_idle(since_s) or s.lost is not None, AGAIN_S)
-                idle = session.is_idle(since_s)
+                    session.heard.wait_for(lambda s=session: is_idle(s) or s.lost is not None, AGAIN_S)
+                idle = is_idle(session)
                 if idle:
                     return True
         return idle

@@ -10,7 +10,7 @@ import msgspec
 from avlmaps.navigate.ros.goals import SentGoal
 from avlmaps.navigate.ros.link import Link
 from avlmaps.navigate.ros.messages import Clock, Text
-from avlmaps.navigate.ros.session import Ear
+from avlmaps.navigate.ros.session import Ear, heartbeat
 from avlmaps.navigate.ros.settings import RosSettings
 
 _ECHO_EVERY_S = 0.2
@@ -43,19 +43,21 @@ class BridgeSession(ABC):
         self.heard = threading.Condition()
         self.settings, self.ear = settings, ear
         self._ours: dict[str, SentGoal] = {}
-        self._cancelled_s: dict[str, float] = {}
         self._url, self._token = url, token
         self.link = Link(url, token, timeout_s, self.heard)
         self.name = self.link.url
         link, tree = self.link, ear.tree
-        link.subscribe(f"{settings.tf_namespace}/tf", self.tf_kind, lambda told: tree.hear(told, static=False))
-        link.subscribe(f"{settings.tf_namespace}/tf_static", self.tf_kind, lambda told: tree.hear(told, static=True))
-        link.subscribe("/clock", self.clock_kind, lambda told: tree.tick(_seconds(told)), _CLOCK_EVERY_S)
-        link.advertise(self._named("avlmaps/heartbeat"), self.text_kind)
-        echo = self._named("avlmaps/echo")
-        link.advertise(echo, self.text_kind)
-        link.subscribe(echo, self.text_kind, lambda told: ear.echoes.back(msgspec.json.decode(told, type=Text).data))
-        link.repeat(_ECHO_EVERY_S, lambda: link.publish(echo, {"data": ear.echoes.next()}))
+        self._beats, echo = self._named("avlmaps/heartbeat"), self._named("avlmaps/echo")
+        link.advertise(self._beats, self.text_kind)
+        if ear.wants_poses:
+            prefix = settings.tf_namespace
+            link.subscribe(f"{prefix}/tf", self.tf_kind, lambda told: tree.hear(told, static=False))
+            link.subscribe(f"{prefix}/tf_static", self.tf_kind, lambda told: tree.hear(told, static=True))
+            link.subscribe("/clock", self.clock_kind, lambda told: tree.tick(_seconds(told)), _CLOCK_EVERY_S)
+            link.subscribe(self._beats, self.text_kind, lambda told: ear.beats.hear(_text(told)))
+            link.advertise(echo, self.text_kind)
+            link.subscribe(echo, self.text_kind, lambda told: ear.echoes.back(_text(told)))
+            link.repeat(_ECHO_EVERY_S, lambda: link.publish(echo, {"data": ear.echoes.next()}))
         self._greet()
 
     @abstractmethod
@@ -105,7 +107,7 @@ class BridgeSession(ABC):
 
     def beat(self, goal: SentGoal) -> None:
         """Publish a heartbeat."""
-        self.link.publish(self._named("avlmaps/heartbeat"), {"data": goal.id})
+        self.link.publish(self._beats, {"data": heartbeat(goal)})
 
     def close(self) -> None:
         """End the connection."""
@@ -117,10 +119,10 @@ class BridgeSession(ABC):
         """Hear what becomes of a goal, also of one that another session sent."""
         self._ours[goal.id] = goal
 
-    def _calling_off(self, goal: SentGoal) -> float:
-        """Adopt a goal that is cancelled, and return since when this session has done so."""
+    def _call_off(self, goal: SentGoal) -> None:
+        """Adopt a goal, and take note that it is being cancelled."""
         self._adopt(goal)
-        return self._cancelled_s.setdefault(goal.id, self.ear.clock())
+        goal.call_off(self.ear.clock())
 
     def _each(self, take: Callable[[SentGoal], None]) -> None:
         """Do something with each goal of ours that has not ended; forget the others."""
@@ -129,7 +131,10 @@ class BridgeSession(ABC):
                 take(goal)
             if goal.end is not None:
                 self._ours.pop(name, None)
-                self._cancelled_s.pop(name, None)
+
+
+def _text(message: msgspec.Raw) -> str:
+    return msgspec.json.decode(message, type=Text).data
 
 
 def _seconds(message: msgspec.Raw) -> float:

@@ -39,6 +39,13 @@ class Errands:
         link.send(operation)
         return True
 
+    def follow(self, name: str, operation: dict[str, Any]) -> None:
+        """Send an operation behind another one, on its connection where that stands."""
+        with self._lock:
+            links = [link for link, at in self._links if at == name]
+        for link in links:
+            link.send(operation)
+
     def _taken(self, name: str) -> Link | None:
         with self._lock:
             self._links = [(link, at) for link, at in self._links if link.lost is None]

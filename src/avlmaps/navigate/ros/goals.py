@@ -18,6 +18,15 @@ _STEP_M = 0.05
 _MOST_PLACES = 20_000
 
 
+class Stage(StrEnum):
+    """How far a goal is, as far as we know."""
+
+    SENT = "sent"
+    """Its server may still accept it, at any moment; also one that does not know it now."""
+    ACCEPTED = "accepted"
+    OVER = "over"
+
+
 class End(StrEnum):
     """How a goal ended."""
 
@@ -49,10 +58,16 @@ class ActionGoal:
 class SentGoal:
     """A task that was sent. The transport's thread writes what comes of it; the first end stands.
 
+    A server that does not know a goal ends it only where it had accepted it. A goal that was only sent may be on its
+    way, or wait to be accepted: it is over by its own result, or when it was called off for the whole answer time.
+
     Attributes:
         task: the requested task.
+        answer_s: longest time from sending a goal until its server accepts it.
+        before: the goals that its server listed before it was sent, by the server's names.
         id: our name for it, unlike any other client's.
         alias: the server's name for it, where that is another and is known.
+        called_off_s: when it was first cancelled; None before.
         heard_s: when the server last showed that it is at it, by the driver's clock; None before it did.
         shown: how often it did.
         end: how it ended; None while it has not.
@@ -60,17 +75,22 @@ class SentGoal:
     """
 
     task: ActionGoal
+    answer_s: float = 10.0
+    before: frozenset[str] = frozenset()
     id: str = field(default_factory=lambda: f"avlmaps-{uuid4().hex}")
     alias: str = ""
+    called_off_s: float | None = None
     heard_s: float | None = None
     shown: int = 0
     end: End | None = None
     note: str = ""
 
     @property
-    def answered(self) -> bool:
-        """Whether anything came of it."""
-        return self.heard_s is not None or self.end is not None
+    def stage(self) -> Stage:
+        """How far it is."""
+        if self.end is not None:
+            return Stage.OVER
+        return Stage.SENT if self.heard_s is None else Stage.ACCEPTED
 
     @property
     def names(self) -> frozenset[str]:
@@ -87,6 +107,16 @@ class SentGoal:
         if self.end is None:
             self.note = note
             self.end = end
+
+    def call_off(self, now_s: float) -> None:
+        """Take note that it is being cancelled."""
+        self.called_off_s = now_s if self.called_off_s is None else self.called_off_s
+
+    def unknown(self, now_s: float, note: str) -> None:
+        """Take note that its server does not know it, or is gone."""
+        cancelled_for_s = 0.0 if self.called_off_s is None else now_s - self.called_off_s
+        if self.stage is Stage.ACCEPTED or cancelled_for_s >= self.answer_s:
+            self.over(End.FAILED if self.called_off_s is None else End.CANCELLED, note)
 
 
 @dataclass(frozen=True, slots=True)

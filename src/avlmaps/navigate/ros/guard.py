@@ -1,9 +1,10 @@
 """A second process that cancels the robot's goal when the first one dies or stands still.
 
 A process that is killed cannot cancel anything, and Nav2 and move_base finish a goal on their own. The guard reads the
-driver's beats from a pipe. When the pipe closes, or no beat comes while a goal is active, it connects to the robot and
-cancels that goal until the robot confirms it; goals of others continue. It runs in a session of its own: what ends the
-terminal does not end it.
+driver's beats from a pipe. When the pipe closes, or no beat comes while a goal is active, it cancels that goal until
+the robot confirms it; goals of others continue. It runs in a session of its own: what ends the terminal does not end
+it. It is connected from the beginning, since imports, discovery and handshakes take seconds on a busy machine, and says
+in one empty line that it is ready.
 
 Run as ``python -m avlmaps.navigate.ros.guard`` by `GoalGuard`; it reads its orders, then beats, from standard input.
 """
@@ -17,14 +18,15 @@ from time import monotonic, sleep
 
 import msgspec
 
-from avlmaps.core.errors import AvlmapsError
-from avlmaps.navigate.ros.goals import ActionGoal, SentGoal
-from avlmaps.navigate.ros.session import Ear, call_off
+from avlmaps.core.errors import AvlmapsError, NavigationError
+from avlmaps.navigate.ros.goals import ActionGoal, SentGoal, Stage
+from avlmaps.navigate.ros.session import Ear, Session, call_off
 from avlmaps.navigate.ros.settings import RosSettings
 from avlmaps.navigate.ros.transports import RosKind, session_opener
 
 _BETWEEN_TRIES_S = 0.5
-_ONE_TRY_S = 5.0
+_FIRST_TRY_S = 3.0
+_READY_WITHIN_S = 60.0
 
 
 class Orders(msgspec.Struct):
@@ -45,13 +47,30 @@ class Beat(msgspec.Struct, omit_defaults=True):
         id: our name for the active goal; "" where none is active.
         alias: the server's name for it.
         action: name of the server.
+        is_accepted: whether its server has accepted it.
+        before: the goals that its server listed before it was sent.
         over: whether the guard ends.
     """
 
     id: str = ""
     alias: str = ""
     action: str = ""
+    is_accepted: bool = False
+    before: tuple[str, ...] = ()
     over: bool = False
+
+    @classmethod
+    def of(cls, goal: SentGoal) -> "Beat":
+        """Return that of an active goal."""
+        accepted = goal.stage is Stage.ACCEPTED
+        return cls(goal.id, goal.alias, goal.task.action, accepted, tuple(sorted(goal.before)))
+
+    def goal(self, orders: Orders) -> SentGoal:
+        """Return the goal, to be called off."""
+        task = ActionGoal(self.action, "", {}, orders.trying_s)
+        goal = SentGoal(task, orders.settings.answer_timeout_s, frozenset(self.before), self.id, self.alias)
+        goal.heard_s = monotonic() if self.is_accepted else None
+        return goal
 
 
 class GoalGuard:
@@ -63,10 +82,10 @@ class GoalGuard:
 
     def _start(self) -> None:
         command = [sys.executable, "-m", "avlmaps.navigate.ros.guard"]
-        silent = subprocess.DEVNULL
+        pipe, silent = subprocess.PIPE, subprocess.DEVNULL
         # PYTHONPATH stays as it is; a session of its own shields it from the terminal's signals.
         self._process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=silent, stderr=silent, start_new_session=True, bufsize=0
+            command, stdin=pipe, stdout=pipe, stderr=silent, start_new_session=True, bufsize=0
         )
         self._write(self._orders)
 
@@ -74,6 +93,20 @@ class GoalGuard:
     def stands(self) -> bool:
         """Whether the guard runs."""
         return self._process.poll() is None
+
+    def require_ready(self) -> None:
+        """Wait until the guard is ready.
+
+        Raises:
+            NavigationError: it is not.
+        """
+        assert self._process.stdout is not None
+        if not (select.select([self._process.stdout], [], [], _READY_WITHIN_S)[0] and self._process.stdout.read(1)):
+            self.close()
+            raise NavigationError(
+                f"The guard, which cancels the robot's goals when this program dies, did not start within "
+                f"{_READY_WITHIN_S:g} s; try again on a machine that is less busy."
+            )
 
     def revived(self) -> bool:
         """Start the guard again where it ended; return whether it runs."""
@@ -85,7 +118,7 @@ class GoalGuard:
         """Report that a goal is active and watched; a guard that has done its work, or died, is started again."""
         if not self.stands:
             self._start()
-        self._write(Beat(goal.id, goal.alias, goal.task.action))
+        self._write(Beat.of(goal))
 
     def rest(self) -> None:
         """Report that no goal is active."""
@@ -132,16 +165,12 @@ def watch(pipe: int, silence_s: float) -> Beat | None:
                 return None
 
 
-def cancelled(orders: Orders, goal: SentGoal) -> bool:
-    """Connect once and cancel a goal; return whether the robot confirms that it is over."""
+def opened(orders: Orders) -> Session | None:
+    """Connect; None where nobody answers."""
     try:
-        session = session_opener(orders.kind, orders.url, orders.settings, orders.token)(Ear(), 2.0)
+        return session_opener(orders.kind, orders.url, orders.settings, orders.token)(Ear(wants_poses=False), 2.0)
     except AvlmapsError:
-        return False
-    try:
-        return call_off(goal, session, monotonic() + _ONE_TRY_S)
-    finally:
-        session.close()
+        return None
 
 
 def main() -> None:
@@ -153,15 +182,21 @@ def main() -> None:
             return
         line += content
     orders = msgspec.json.decode(line, type=Orders)
-    with suppress(ImportError):  # now, since it takes seconds on a busy machine; a native session needs none of it
-        import avlmaps.navigate.ros.wire  # noqa: F401
+    session = opened(orders)
+    os.write(1, b"\n")
     left = watch(0, orders.silence_s)
-    if left is None:
-        return
-    goal = SentGoal(ActionGoal(left.action, "", {}, orders.trying_s), left.id, left.alias)
-    until_s = monotonic() + orders.trying_s
-    while not cancelled(orders, goal) and monotonic() < until_s:
-        sleep(_BETWEEN_TRIES_S)
+    if left is not None:
+        goal, until_s, patience_s = left.goal(orders), monotonic() + orders.trying_s, _FIRST_TRY_S
+        while goal.stage is not Stage.OVER and monotonic() < until_s:
+            session = session or opened(orders)
+            if session is None:
+                sleep(_BETWEEN_TRIES_S)
+            elif not call_off(goal, session, monotonic() + patience_s):  # the connection may be stuck
+                patience_s *= 2.0
+                session.close()
+                session = None
+    if session is not None:
+        session.close()
 
 
 if __name__ == "__main__":

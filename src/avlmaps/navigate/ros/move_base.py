@@ -11,14 +11,13 @@ import msgspec
 
 from avlmaps.core.motion import GroundPose
 from avlmaps.navigate.ros.bridge import BridgeSession
-from avlmaps.navigate.ros.goals import ActionGoal, End, SentGoal, Tasks
+from avlmaps.navigate.ros.goals import ActionGoal, End, SentGoal, Stage, Tasks
 from avlmaps.navigate.ros.messages import GoalState, GoalStates, GoalUpdate, sanitize_line, stamped_pose
 
 # actionlib_msgs/GoalStatus
 _PENDING, _ACTIVE, _PREEMPTED, _SUCCEEDED, _ABORTED, _REJECTED, _PREEMPTING, _RECALLING, _RECALLED, _LOST = range(10)
 _UNDER_WAY = (_PENDING, _ACTIVE, _PREEMPTING)  # a goal that is recalled never began
 _SEND_AGAIN_S = 1.0
-_UNKNOWN_AFTER_S = 1.0  # a topic that was just advertised loses its first messages, and a list may be on its way
 _ANYONE = ""
 
 
@@ -76,19 +75,19 @@ class MoveBaseSession(BridgeSession):
 
         The server knows a goal by its id, and takes it only once.
         """
-        if not goal.answered and monotonic() - self._sent_s > _SEND_AGAIN_S:
+        if goal.stage is Stage.SENT and monotonic() - self._sent_s > _SEND_AGAIN_S:
             self.send(goal)
 
     def cancel(self, goal: SentGoal) -> None:
         """Publish the goal's id; the server remembers it, also where the goal comes after its cancel."""
-        self._calling_off(goal)
-        self._call_off(goal.id)
+        self._call_off(goal)
+        self._publish_cancel(goal.id)
 
     def cancel_all(self) -> None:
         """Publish an empty id, which means every goal."""
-        self._call_off(_ANYONE)
+        self._publish_cancel(_ANYONE)
 
-    def _call_off(self, name: str) -> None:
+    def _publish_cancel(self, name: str) -> None:
         self.link.publish(self._topic("cancel"), {"stamp": {"secs": 0, "nsecs": 0}, "id": name})
 
     def is_idle(self, since_s: float) -> bool | None:
@@ -108,10 +107,8 @@ class MoveBaseSession(BridgeSession):
         def take(goal: SentGoal) -> None:
             if goal.id in listed:
                 self._note(goal, listed[goal.id])
-            elif goal.heard_s is not None and goal.id not in self._cancelled_s:
-                goal.over(End.FAILED, "move_base does not know the goal any more; it was restarted")
-            elif self.ear.clock() - self._cancelled_s.get(goal.id, self.ear.clock()) >= _UNKNOWN_AFTER_S:
-                goal.over(End.CANCELLED, "move_base does not know the goal")
+            else:
+                goal.unknown(self.ear.clock(), "move_base does not know the goal; it may have been restarted")
 
         self._each(take)
 

@@ -32,7 +32,7 @@ from avlmaps.navigate.ros.goals import End, SentGoal
 from avlmaps.navigate.ros.messages import Transform, rigid, sanitize_line
 from avlmaps.navigate.ros.nav2_tasks import MOVING, RESULT_WITHIN_S, UNDER_WAY
 from avlmaps.navigate.ros.own_map import OwnGrid, checked_grid
-from avlmaps.navigate.ros.session import Ear
+from avlmaps.navigate.ros.session import Ear, heartbeat
 from avlmaps.navigate.ros.settings import RosSettings
 from avlmaps.recordings.formats.ros_messages import stamp_of
 
@@ -92,20 +92,24 @@ class NativeSession:
         self._agreed_s: dict[str, tuple[float, bool]] = {}
         self._waiting: list[Callable[[], bool]] = []
         self._met: set[str] = set()  # servers that answered
-        self._sending: set[str] = set()  # goals that no server has accepted or refused yet
+        self._unsent: set[str] = set()  # goals whose server is not discovered yet
         self._joined_s = monotonic()
         transforms = interface("tf2_msgs/msg/TFMessage")
         self._context = Context()
         self._context.init(args=[])
         self._node = _node_in(self._context)
         node, prefix = self._node, settings.tf_namespace
-        node.create_subscription(transforms, f"{prefix}/tf", partial(self._placed, static=False), _MOVING)
-        node.create_subscription(transforms, f"{prefix}/tf_static", partial(self._placed, static=True), _LATCHED)
+        if ear.wants_poses:
+            node.create_subscription(transforms, f"{prefix}/tf", partial(self._placed, static=False), _MOVING)
+            node.create_subscription(transforms, f"{prefix}/tf_static", partial(self._placed, static=True), _LATCHED)
         for server in self._servers():
             node.create_subscription(
                 GoalStatusArray, f"{server}/_action/status", partial(self._listed, server), _LATCHED
             )
-        self._beats = node.create_publisher(String, f"{settings.namespace}/avlmaps/heartbeat", 10)
+        beats = f"{settings.namespace}/avlmaps/heartbeat"
+        self._beats = node.create_publisher(String, beats, 10)
+        if ear.wants_poses:
+            node.create_subscription(String, beats, lambda message: ear.beats.hear(message.data[:256]), 100)
         self._cancels = {
             server: node.create_client(CancelGoal, f"{server}/_action/cancel_goal") for server in self._servers()
         }
@@ -152,7 +156,7 @@ class NativeSession:
     def beat(self, goal: SentGoal) -> None:
         """Publish a heartbeat."""
         with suppress(Exception):  # the network was left meanwhile
-            self._beats.publish(String(data=goal.id))
+            self._beats.publish(String(data=heartbeat(goal)))
 
     def close(self) -> None:
         """Leave the network."""
@@ -263,6 +267,12 @@ class NativeSession:
         self._ours.pop(_digits(goal), None)
         self._notify()
 
+    def _unknown(self, goal: SentGoal | None, note: str) -> None:
+        if goal is not None:
+            goal.unknown(self._ear.clock(), note)
+            if goal.end is not None:
+                self._ours.pop(_digits(goal), None)
+
     def _send(self, goal: SentGoal) -> None:
         goal.alias = _digits(goal)  # so do servers list it
         self._ours[goal.alias] = goal
@@ -283,29 +293,33 @@ class NativeSession:
 
         def taken(future: Any) -> None:
             handle = future.result()
-            self._sending.discard(goal.alias)
             if not handle.accepted:
                 self._over(goal, End.FAILED, "Nav2 refused the goal (it does not say why)")
                 return
             goal.heard_s = self._ear.clock()
             self._ear.servers.answered(name, serves=True)
             handle.get_result_async().add_done_callback(ended)
-            if goal.end is not None:  # it was given up before it was taken
+            if goal.called_off_s is not None:  # it was given up before it was taken
                 self._cancel(goal)
 
         def ended(future: Any) -> None:
             self._over(goal, *_end_of(future.result()))
 
         def go() -> None:
+            self._unsent.discard(goal.alias)
             if goal.end is None:  # it may have been called off meanwhile
-                self._sending.add(goal.alias)
                 sent = client.send_goal_async(message, feedback_callback=fed, goal_uuid=_uuid(goal))
                 sent.add_done_callback(taken)
 
         none = "No action server takes the goal; start Nav2, or name its namespace"
+        self._unsent.add(goal.alias)
         self._when(client.server_is_ready, go, partial(self._over, goal, End.ABSENT, none), self._patience_s())
 
     def _cancel(self, goal: SentGoal) -> None:
+        goal.call_off(self._ear.clock())
+        if _digits(goal) in self._unsent:
+            self._over(goal, End.CANCELLED, "It was called off before it was sent")
+            return
         self._ours.setdefault(_digits(goal), goal)
         self._call_cancel(goal.task.action, _uuid(goal), goal)
 
@@ -346,16 +360,14 @@ class NativeSession:
             self._ear.servers.answered(server, serves=True)
             if goal_id == _NOBODY:
                 self._agreed_s[server] = now_s, answer.return_code != nav2_tasks.REFUSED
-            gone = answer.return_code in (nav2_tasks.UNKNOWN, nav2_tasks.ENDED)
-            if goal is not None and gone and _digits(goal) not in self._sending:  # else it is still on its way there
-                self._over(goal, End.CANCELLED, "Nav2 is not at the goal any more")
+            if answer.return_code in (nav2_tasks.UNKNOWN, nav2_tasks.ENDED):
+                self._unknown(goal, "Nav2 is not at the goal any more")
             self._notify()
 
         def absent() -> None:
             self._met.discard(server)
             self._ear.servers.answered(server, serves=False)
-            if goal is not None:
-                self._over(goal, End.CANCELLED, "Its action server is gone")
+            self._unknown(goal, "Its action server is gone")
             self._notify()
 
         def go() -> None:

@@ -8,7 +8,7 @@ import msgspec
 from avlmaps.navigate.ros import nav2_tasks
 from avlmaps.navigate.ros.bridge import BridgeSession
 from avlmaps.navigate.ros.errands import Errands
-from avlmaps.navigate.ros.goals import End, SentGoal
+from avlmaps.navigate.ros.goals import End, SentGoal, Stage
 from avlmaps.navigate.ros.link import Link
 from avlmaps.navigate.ros.messages import ActionEnd, ActionStates, CancelAnswer, Incoming, sanitize_line, text_in
 from avlmaps.navigate.ros.nav2_tasks import ASKED_FOR, MOVING, RESULT_WITHIN_S, UNDER_WAY
@@ -26,8 +26,7 @@ class Nav2Session(BridgeSession):
 
     def _greet(self) -> None:
         self._errands = Errands(lambda within_s: Link(self._url, self._token, within_s, self.heard), self._answered)
-        self._calls: dict[str, tuple[str, bool, SentGoal | None]] = {}  # server, every goal or one, and which of ours
-        self._known: dict[str, frozenset[str]] = {}  # goals that a server had listed before ours was sent
+        self._calls: dict[str, tuple[str, SentGoal | None]] = {}  # server, and which goal of ours
         self._agreed_s: dict[str, tuple[float, bool]] = {}
         self._sent = ""
         for action in ASKED_FOR:
@@ -50,8 +49,6 @@ class Nav2Session(BridgeSession):
         """Send a goal, on a connection to itself."""
         task = goal.task
         self._adopt(goal)
-        listed = self.ear.servers.list_of(task.action)
-        self._known[goal.id] = frozenset() if listed is None else listed[1]
         self._sent = goal.id
         sent = self._errands.send(
             goal.id,
@@ -74,18 +71,18 @@ class Nav2Session(BridgeSession):
     def cancel(self, goal: SentGoal) -> None:
         """Cancel a goal by our name at the bridge, which forgets it when it restarts, and by Nav2's where it is known.
 
-        Where Nav2's name is not known and Nav2 lists no other goal, every goal is cancelled: that is ours, if any.
+        The bridge takes a cancel before the goal where the goal's own connection is slow, and leaves it out; so it goes
+        by that connection as well. Where Nav2's name is not known, a question shows whether Nav2 is there to take it.
         """
-        self._calling_off(goal)
+        self._call_off(goal)
+        self._recognise(goal)
         action = goal.task.action
         name = f"avlmaps-{uuid4().hex}"
-        self._errands.send(name, {"op": "cancel_action_goal", "id": goal.id, "action": action})
+        cancel = {"op": "cancel_action_goal", "id": goal.id, "action": action}
+        self._errands.send(name, cancel)
         self._errands.done(name)  # a bridge never answers it
-        listed = self.ear.servers.list_of(action)
-        if goal.alias:
-            self._call(action, list(bytes.fromhex(goal.alias)), goal)
-        elif listed is None or (len(listed[1]) == 1 and listed[1].isdisjoint(self._known.get(goal.id, ()))):
-            self._call(action, _NOBODY, goal)
+        self._errands.follow(goal.id, cancel)
+        self._call(action, list(bytes.fromhex(goal.alias) or uuid4().bytes), goal)
 
     def cancel_all(self) -> None:
         """Call the cancel service of each action that moves the robot; an empty request means every goal."""
@@ -94,7 +91,7 @@ class Nav2Session(BridgeSession):
 
     def _call(self, server: str, goal_id: list[int], goal: SentGoal | None) -> bool:
         name = f"avlmaps-{uuid4().hex}"
-        self._calls[name] = server, goal_id == _NOBODY, goal
+        self._calls[name] = server, goal
         while len(self._calls) > 100:
             self._calls.pop(next(iter(self._calls)))
         args: dict[str, Any] = {"goal_info": {"goal_id": {"uuid": goal_id}, "stamp": {"sec": 0, "nanosec": 0}}}
@@ -124,23 +121,38 @@ class Nav2Session(BridgeSession):
         states = {one.name: one.status for one in msgspec.json.decode(message, type=ActionStates).status_list}
         under_way = frozenset(name for name, status in states.items() if status in UNDER_WAY)
         self.ear.servers.listed(server, under_way)
-        taken = {goal.alias for goal in self._ours.values()}
 
         def take(goal: SentGoal) -> None:
             if goal.task.action != server:
                 return
-            new = under_way - self._known.get(goal.id, under_way) - taken
-            if not goal.alias and len(new) == 1:
-                goal.alias = next(iter(new))
+            self._recognise(goal)
             status = states.get(goal.alias)
             if status in UNDER_WAY:
                 goal.show(self.ear.clock())
-            elif (goal.id in self._cancelled_s and not under_way) or status is not None:
+            elif status is not None:
                 self._over_soon(goal, status)
 
         self._each(take)
 
-    def _over_soon(self, goal: SentGoal, status: int | None) -> None:
+    def _recognise(self, goal: SentGoal) -> None:
+        """Take the only new goal of its server for ours."""
+        new = self._new(goal)
+        if not goal.alias and len(new) == 1:
+            goal.alias = next(iter(new))
+            goal.show(self.ear.clock())
+
+    def _new(self, goal: SentGoal) -> frozenset[str]:
+        """Return the goals under way that may be ours: its server did not list them before, and no other of ours is."""
+        listed = self.ear.servers.list_of(goal.task.action)
+        known = {one.alias for one in self._ours.values()}
+        return frozenset() if listed is None else listed[1] - goal.before - known
+
+    def _is_unlisted(self, goal: SentGoal) -> bool:
+        """Return whether no goal is listed that may be ours; a server that had no goal yet lists nothing."""
+        listed = self.ear.servers.list_of(goal.task.action) is not None
+        return (listed or goal.stage is Stage.SENT) and not self._new(goal)
+
+    def _over_soon(self, goal: SentGoal, status: int) -> None:
         """Take a goal for over by its list, unless its result comes before, which says more."""
         wait_s = RESULT_WITHIN_S if goal.id == self._sent else 0.0
         self.link.later(wait_s, lambda: goal.over(*nav2_tasks.end_listed(status)))
@@ -148,6 +160,7 @@ class Nav2Session(BridgeSession):
     def _answered(self, message: Incoming) -> None:
         if message.op == "service_response" and message.id in self._calls:
             self._called(*self._calls.pop(message.id), message)
+            self._each(lambda _: None)
             self._errands.done(message.id)
         goal = self._ours.get(message.id or "")
         if goal is None:
@@ -159,12 +172,12 @@ class Nav2Session(BridgeSession):
             goal.over(*_end_of(message))
             self._each(lambda _: None)
 
-    def _called(self, server: str, everyone: bool, goal: SentGoal | None, message: Incoming) -> None:
+    def _called(self, server: str, goal: SentGoal | None, message: Incoming) -> None:
         if not message.result:
             if "not exist" in text_in(message.values):
                 self.ear.servers.answered(server, serves=False)
                 if goal is not None:
-                    goal.over(End.CANCELLED, "Its action server is gone")
+                    goal.unknown(self.ear.clock(), "Its action server is gone")
             return
         try:
             answer = msgspec.json.decode(message.values, type=CancelAnswer)
@@ -172,11 +185,9 @@ class Nav2Session(BridgeSession):
             return
         self.ear.servers.answered(server, serves=True)
         self._agreed_s[server] = self.ear.clock(), answer.return_code != nav2_tasks.REFUSED
-        stopped = answer.return_code in (nav2_tasks.UNKNOWN, nav2_tasks.ENDED) or (
-            everyone and answer == CancelAnswer()
-        )
-        if goal is not None and stopped:
-            goal.over(End.CANCELLED, "Nav2 is not at the goal any more")
+        gone = answer.return_code in (nav2_tasks.UNKNOWN, nav2_tasks.ENDED)
+        if goal is not None and gone and (goal.alias or self._is_unlisted(goal)):
+            goal.unknown(self.ear.clock(), "Nav2 is not at the goal any more")
 
 
 def _end_of(message: Incoming) -> tuple[End, str]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from jaxtyping import Float
 
+from avlmaps.core.errors import NavigationError
 from avlmaps.navigate.ros.base import RosDriver
 from avlmaps.navigate.ros.frames import Frames
 from avlmaps.navigate.ros.guard import GoalGuard, Orders
@@ -107,12 +108,24 @@ def open_ros_driver(
         own = on_own_map(obstacles, grid, frames or Frames())
         standing = standable_goal(own, 0.0 if grid.is_costmap else settings.radius_m, "the robot's own map")
     driver = {"nav2": Nav2Driver, "move_base": MoveBaseDriver}[kind]
-    opened = driver(url, frames, settings, standing=standing, level_from_world=level_from_world, token=token)
+    silence_s = settings.stall_s + settings.heartbeat_s
+    orders = Orders(kind, url, token, settings, silence_s, settings.goal_timeout_s)
+    guard = GoalGuard(orders) if guarded else None  # it starts while the driver connects
+    try:
+        opened = driver(url, frames, settings, standing=standing, level_from_world=level_from_world, token=token)
+    except BaseException:
+        if guard is not None:
+            guard.close()
+        raise
+    opened.guard = guard
+    try:
+        if guard is not None:
+            guard.require_ready()
+    except NavigationError:
+        opened.close()
+        raise
     if obstacles is not None:
         opened.elsewhere = obstacles.elsewhere
-    if guarded:
-        silence_s = settings.stall_s + settings.heartbeat_s
-        opened.guard = GoalGuard(Orders(kind, url, token, settings, silence_s, settings.goal_timeout_s))
     return opened
 
 

@@ -13,13 +13,13 @@ from time import monotonic
 from typing import Protocol
 from uuid import uuid4
 
-from avlmaps.navigate.ros.goals import SentGoal
+from avlmaps.navigate.ros.goals import SentGoal, Stage
 from avlmaps.navigate.ros.tree import LiveTree
 
 AGAIN_S = 0.5
 """Time after which a cancel is sent again."""
 
-_MOST_ECHOES = 2000
+_MOST_ECHOES, _MOST_BEATING = 2000, 100
 
 
 class Echoes:
@@ -105,6 +105,11 @@ class Servers:
         with self._lock:
             return self._lists.get(server)
 
+    def has_shown(self, server: str) -> bool:
+        """Return whether anything ever showed that a server is there."""
+        with self._lock:
+            return server in self._lists or self._served.get(server, (0.0, False))[1]
+
     def under_way(self, longest_s: float | None = None) -> dict[str, frozenset[str]]:
         """Return the goals under way, by server.
 
@@ -120,26 +125,52 @@ class Servers:
             }
 
 
+class Beats:
+    """The heartbeats of goals of every avlmaps that drives this robot. Written by the transport, from any thread."""
+
+    def __init__(self, clock: Callable[[], float]) -> None:
+        self._clock = clock
+        self._last_s: dict[str, float] = {}
+
+    def hear(self, text: str) -> None:
+        """Take in a heartbeat: the name of a goal, and after its end another word."""
+        name, _, is_over = text.partition(" ")
+        if is_over:
+            self._last_s.pop(name, None)
+        else:
+            self._last_s = {**dict(list(self._last_s.items())[-_MOST_BEATING:]), name: self._clock()}
+
+    def within(self, longest_s: float) -> frozenset[str]:
+        """Return the goals that beat within some seconds."""
+        now_s = self._clock()
+        return frozenset(name for name, heard_s in self._last_s.items() if now_s - heard_s <= longest_s)
+
+
 @dataclass(frozen=True, slots=True)
 class Ear:
     """What has arrived over one session; a new session gets a new one.
 
     Attributes:
         clock: seconds; everything in here is dated by it.
+        wants_poses: whether transforms and other clients are listened to; who only cancels needs neither.
         tree: the robot's transforms.
         echoes: messages of ours that came back, where the transport can delay what it brings.
         servers: the goals that the robot's servers are at.
+        beats: the goals that an avlmaps watches.
     """
 
     clock: Callable[[], float] = monotonic
+    wants_poses: bool = True
     tree: LiveTree = field(init=False)
     echoes: Echoes = field(init=False)
     servers: Servers = field(init=False)
+    beats: Beats = field(init=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "echoes", Echoes(self.clock))
         object.__setattr__(self, "tree", LiveTree(self.clock, self.echoes.sent_before))
         object.__setattr__(self, "servers", Servers(self.clock))
+        object.__setattr__(self, "beats", Beats(self.clock))
 
 
 class Session(Protocol):
@@ -200,12 +231,17 @@ class Session(Protocol):
         ...
 
     def beat(self, goal: SentGoal) -> None:
-        """Publish a heartbeat: that a goal is active and watched."""
+        """Publish a heartbeat: that a goal is active and watched, or over; see `heartbeat`."""
         ...
 
     def close(self) -> None:
         """End the connection."""
         ...
+
+
+def heartbeat(goal: SentGoal) -> str:
+    """Return the text of a heartbeat: our name of the goal; with another word after it when it is over."""
+    return f"{goal.id} over" if goal.stage is Stage.OVER else goal.id
 
 
 Opener = Callable[[Ear, float], Session]

@@ -311,15 +311,15 @@ class Dispatcher:
 
     def stop(self, who: Who) -> dict[str, Any]:
         """Stop the robot at once, and forget every plan; never raises."""
-        order = self._brake()
+        order, until_s = self._brake(), monotonic() + _LONGEST_STOP_S
         stands, note = self._halt()
-        thread, until_s = None if order is None else order.thread, monotonic() + _LONGEST_STOP_S
+        thread = None if order is None else order.thread
         while thread is not None and thread.is_alive() and monotonic() < until_s:
             thread.join(_STOP_AGAIN_S)
             if thread.is_alive():  # a goal that was sent in the same instant is cancelled as well
                 stands, note = self._halt()
         if thread is not None and thread.is_alive():
-            stands, note = False, f"{note}; its program has not ended"
+            stands, note = False, f"{note.rstrip('.')}; its program has not ended"
         with self._lock:
             self._fault = "" if stands else note
         name = None if order is None else order.plan.order
@@ -357,6 +357,11 @@ class Dispatcher:
         self._log.close()
 
     # Status.
+
+    @property
+    def fault(self) -> str:
+        """Why the robot may still drive although it was stopped last; "" where it stood."""
+        return self._fault
 
     @property
     def change(self) -> int:
