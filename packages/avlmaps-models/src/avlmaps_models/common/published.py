@@ -101,6 +101,7 @@ def load_strictly(
     *,
     computed: Collection[str] = (),
     not_needed: Collection[str] = (),
+    takes_all: bool = True,
 ) -> None:
     """Put weights into a network: each of the network's is there, each of the file's has a place, all sizes agree.
 
@@ -111,6 +112,7 @@ def load_strictly(
         how_to_get: the command that brings the published one, for the error.
         computed: names that the network works out itself; a file may lack them.
         not_needed: names that the file must have as well, and that this network knowingly does without.
+        takes_all: each tensor of the file needs a place; False where the published loader passes over others, too.
 
     Raises:
         BackendError: the file is of another network; the sentence names the first differences.
@@ -118,7 +120,7 @@ def load_strictly(
     own = module.state_dict()
     needed = [name for name in own if name not in computed and not name.endswith(_COUNTED)]
     missing = [name for name in (*needed, *sorted(not_needed)) if name not in state]
-    unknown = [name for name in state if name not in own and name not in not_needed]
+    unknown = [name for name in state if takes_all and name not in own and name not in not_needed]
     sizes = [
         f"{name} {tuple(state[name].shape)} for {tuple(own[name].shape)}"
         for name in own

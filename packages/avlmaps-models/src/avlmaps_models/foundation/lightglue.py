@@ -49,7 +49,8 @@ class LightGlue:
         path = published_file(name, get, _REPOSITORY, cached)
         network = KorniaLightGlue(features=None, input_dim=DIM, filter_threshold=SCORE, n_layers=LAYERS)  # pyright: ignore[reportArgumentType]
         state = {_present_name(key): value for key, value in read_tensors(path, get).items()}
-        load_strictly(network, state, path, get, computed=_COMPUTED)
+        # The published files hold constants of training, too (log_assignment.0.r ...), which its loader ignores.
+        load_strictly(network, state, path, get, computed=_COMPUTED, takes_all=False)
         self._device = select_device()
         self._network = network.eval().to(self._device)
         self.card = ModelCard(
