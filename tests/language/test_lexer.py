@@ -4,7 +4,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps.language.lexer import duration_at, length_at, tokenise
+from avlmaps.language.learned_translator import LearnedTranslator
+from avlmaps.language.lexer import duration_at, length_at, number_at, tokenise
+from avlmaps.language.numbers import SMALL, TENS, in_figures
 
 
 @pytest.mark.parametrize(
@@ -45,3 +47,46 @@ def test_a_time_is_read_whole(said: str, seconds: float) -> None:
 @given(st.integers(1, 99), st.integers(10, 99))
 def test_centimetres_need_no_unit_behind_metres(metres: int, centimetres: int) -> None:
     assert max(length_at(tokenise(f"{metres} metres {centimetres}"), 0))[1] == pytest.approx(metres + centimetres / 100)
+
+
+SMALL_WORDS = {value: word for word, value in SMALL.items() if word != "nought"}
+TENS_WORDS = {value: word for word, value in TENS.items() if word != "fourty"}
+
+
+def in_words(number: int, *, joined: bool, article: str) -> str:
+    """Return a number below 10,000 in words, with or without "and"."""
+    if number < 20:
+        return SMALL_WORDS[number]
+    if number < 100:
+        return f"{TENS_WORDS[number // 10 * 10]} {SMALL_WORDS[number % 10] if number % 10 else ''}".strip()
+    size, name = (1000, "thousand") if number >= 1000 else (100, "hundred")
+    head = f"{article} {name}" if number // size == 1 and article != "one" else f"{SMALL_WORDS[number // size]} {name}"
+    rest = in_words(number % size, joined=joined, article="one") if number % size else ""
+    return " ".join(f"{head} {'and' if rest and joined else ''} {rest}".split())
+
+
+@given(st.integers(0, 9999), st.booleans(), st.sampled_from(["", "a", "one"]))
+def test_a_number_in_words_is_the_number(number: int, joined: bool, article: str) -> None:
+    (figures,) = in_figures(tokenise(in_words(number, joined=joined, article=article)))
+    assert max(number_at([figures], 0))[1] == number
+
+
+@given(st.integers(0, 99), st.text("0123456789", min_size=1, max_size=4), st.sampled_from(["point", "comma"]))
+def test_a_decimal_fraction_in_words_is_the_number(whole: int, digits: str, mark: str) -> None:
+    said = f"{in_words(whole, joined=False, article='one')} {mark} {' '.join(SMALL_WORDS[int(one)] for one in digits)}"
+    (figures,) = in_figures(tokenise(said))
+    assert max(number_at([figures], 0))[1] == pytest.approx(float(f"{whole}.{digits}"))
+
+
+@pytest.mark.parametrize(
+    ("said", "program"),
+    [
+        ("turn hundred twenty degrees", "robot.turn(120)"),
+        ("turn right one eighty", "robot.turn(180)"),
+        ("go forward one comma five meters", "robot.move_forward(1.5)"),
+        ("turn left a third of a full turn", "robot.turn(-120)"),
+        ("turn two thirds of a turn to the right", "robot.turn(240)"),
+    ],
+)
+def test_no_reading_takes_a_part_of_a_number(said: str, program: str) -> None:
+    assert LearnedTranslator().program_for(said).program == f"{program}\n"

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from math import degrees
 from unicodedata import normalize
 
+from avlmaps.language.numbers import SMALL, TENS, spelled
+
 _CHARACTERS = str.maketrans("‘’“”–—−‐‑﹣－…º", "''\"\"-------.°")
 _IMAGES = r"\.(?:png|jpe?g|bmp|webp|tiff?|gif)"
 _CLIPS = r"\.(?:wav|flac|ogg|mp3|m4a|aac)"
@@ -44,20 +46,12 @@ _IS = frozenset({
     "that", "there", "what", "where", "it", "he", "she", "who", "here", "how", "someone", "somebody", "which",
     "everyone", "everybody", "something",
 })  # fmt: skip
-_SMALL = {
-    "zero": 0, "one": 1, "two": 2, "three": 3, "four": 4, "five": 5, "six": 6, "seven": 7, "eight": 8, "nine": 9,
-    "ten": 10, "eleven": 11, "twelve": 12, "thirteen": 13, "fourteen": 14, "fifteen": 15, "sixteen": 16,
-    "seventeen": 17, "eighteen": 18, "nineteen": 19,
-}  # fmt: skip
-_TENS = {
-    "twenty": 20, "thirty": 30, "forty": 40, "fourty": 40, "fifty": 50, "sixty": 60, "seventy": 70, "eighty": 80,
-    "ninety": 90,
-}  # fmt: skip
 _PARTS = {"half": 0.5, "quarter": 0.25, "quarters": 0.25, "third": 1 / 3}
 _COUNTED_PARTS = {"quarter": 0.25, "quarters": 0.25, "third": 1 / 3, "thirds": 1 / 3}
 _VAGUE = {("a", "couple"): 2, ("a", "few"): 3, ("couple",): 2, ("few",): 3, ("several",): 3, ("a", "pair"): 2,
           ("a", "dozen"): 12, ("some",): 3}  # fmt: skip
-_BEGIN_NUMBERS = frozenset({*_SMALL, *_TENS, *_PARTS, *(words[0] for words in _VAGUE), "an"})
+_LONGEST_NUMBER = 12  # words
+_BEGIN_NUMBERS = frozenset({*SMALL, *TENS, *_PARTS, *(words[0] for words in _VAGUE), "an", "hundred", "thousand"})
 _ONES = frozenset({"a", "an", "another", "one"})
 LENGTHS = {
     "m": 1.0, "metre": 1.0, "meter": 1.0, "mtr": 1.0, "cm": 0.01, "centimetre": 0.01, "centimeter": 0.01, "dm": 0.1,
@@ -166,7 +160,7 @@ def _words(raw: str, start: int) -> list[Token]:
 
 
 WORDS = frozenset({
-    *_SMALL, *_TENS, *_PARTS, "hundred", "couple", "few", "several", "dozen", *LENGTHS, *_ANGLES, *_TIMES, *_SIZES,
+    *SMALL, *TENS, *_PARTS, "hundred", "couple", "few", "several", "dozen", *LENGTHS, *_ANGLES, *_TIMES, *_SIZES,
     *_WHOLE, "o'clock",
 })  # fmt: skip
 
@@ -192,9 +186,9 @@ def number_at(tokens: list[Token], i: int) -> list[tuple[int, float]]:
         end += end < len(tokens) and tokens[end].text == "of"
         end += end < len(tokens) and tokens[end].text in ("a", "an", "the")
         found.append((end, _PARTS[token.text]))
-    spelled = _spelled(tokens, i)
-    if spelled is not None:
-        end, value = spelled
+    found_words = spelled([each.text for each in tokens[i : i + _LONGEST_NUMBER]], 0)
+    if found_words is not None:
+        end, value = i + found_words[0], found_words[1]
         if tokens[end : end + 1] and tokens[end].text in ("quarters", "thirds"):
             is_of = end + 1 < len(tokens) and tokens[end + 1].text == "of"
             found.append((end + 1 + is_of, value * _COUNTED_PARTS[tokens[end].text]))
@@ -210,31 +204,11 @@ def _with_part(tokens: list[Token], end: int, value: float) -> list[tuple[int, f
         found.insert(0, (end + 3, value + _PARTS[words[2]]))
     elif words[:1] == ["and"] and words[1:2] and words[1] in _PARTS:
         found.insert(0, (end + 2, value + _PARTS[words[1]]))
-    elif words[:1] == ["and"] and words[1:2] and words[1] in _SMALL and words[2:] and words[2] in _COUNTED_PARTS:
-        found.insert(0, (end + 3, value + _SMALL[words[1]] * _COUNTED_PARTS[words[2]]))
-    elif words[:1] in (["point"], ["decimal"]) and words[1:2] and words[1] in _SMALL:
-        found.insert(0, (end + 2, value + _SMALL[words[1]] / 10))
+    elif words[:1] == ["and"] and words[1:2] and words[1] in SMALL and words[2:] and words[2] in _COUNTED_PARTS:
+        found.insert(0, (end + 3, value + SMALL[words[1]] * _COUNTED_PARTS[words[2]]))
+    elif words[:1] in (["point"], ["decimal"]) and words[1:2] and words[1] in SMALL:
+        found.insert(0, (end + 2, value + SMALL[words[1]] / 10))
     return found
-
-
-def _spelled(tokens: list[Token], i: int) -> tuple[int, float] | None:
-    """Return the whole number spelled at a token: "one hundred and twenty", "ninety", "a hundred"."""
-    total, at, any_word = 0.0, i, False
-    while at < len(tokens):
-        word = tokens[at].text
-        after = tokens[at + 1].text if at + 1 < len(tokens) else ""
-        if word in _TENS and total % 100 == 0:
-            total += _TENS[word]
-        elif word in _SMALL and total % 10 == 0:
-            total += _SMALL[word]
-        elif word == "hundred" and 0 < total < 10:
-            total *= 100
-        elif word in ("a", "an") and after == "hundred" and not any_word:
-            total += 1
-        elif not (word == "and" and total >= 100 and (after in _TENS or after in _SMALL)):
-            break
-        any_word, at = True, at + 1
-    return (at, total) if any_word else None
 
 
 def begins_amount(token: Token) -> bool:

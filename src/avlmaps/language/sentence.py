@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from avlmaps.core.question import HeardAt
 from avlmaps.language import lexer
 from avlmaps.language.lexer import Token
+from avlmaps.language.numbers import in_figures
 from avlmaps.language.own_names import OwnName
 from avlmaps.language.rephrase import rephrased
 from avlmaps.language.spelling import respelt
@@ -63,7 +64,7 @@ class Sentence:
         given = given or Attachments()
         self.text = text
         tokens, self.respelt = respelt(lexer.tokenise(text))
-        self.tokens, self.order_notes = rephrased(tokens)
+        self.tokens, self.order_notes = rephrased(in_figures(tokens))
         self.tokens += given.tokens((token.text for token in self.tokens), len(text))
         self.given = given
 

@@ -42,6 +42,7 @@ DANGERS = (
 )
 _SMALL_WORDS = frozenset({"a", "an", "one", "some", "first", "second", "half", "couple", "few", "several"})
 _WORTH_ASKING = 0.1
+_LARGE = 12
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,6 +170,20 @@ def is_doubtful(tokens: Sequence[Token], used: frozenset[int], *, waits: bool = 
     return any(
         at not in covered and (_is_number(tokens, at) or _is_name(tokens[at], said)) for at in range(len(tokens))
     )
+
+
+def unread_number(tokens: Sequence[Token], used: frozenset[int]) -> str | None:
+    """Return the first large number that a reading does not use, beside those of a correction; None without.
+
+    Small ones are often no amounts: "these two", "2 the door", "step 3".
+    """
+    if words().lists["corrections"] & {token.text for token in tokens}:
+        return None
+    covered = {at for start in used for at in range(start, max(start + 1, amount_end(tokens, start)))}
+    said = {tokens[at].text for at in covered}
+    unread = (at for at in range(len(tokens)) if at not in covered and tokens[at].text not in said)
+    large = (at for at in unread if any(value > _LARGE for _, value in lexer.number_at(list(tokens), at)))
+    return next((tokens[at].raw for at in large if _is_number(tokens, at)), None)
 
 
 def _is_name(token: Token, said: set[str]) -> bool:

@@ -23,7 +23,7 @@ from avlmaps.language.intents import (
     on_targets,
 )  # fmt: skip
 from avlmaps.language.learned.accounted import has_strange_words
-from avlmaps.language.learned.decision import Weighed, is_doubtful
+from avlmaps.language.learned.decision import Weighed, is_doubtful, unread_number
 from avlmaps.language.learned.reader import Read
 from avlmaps.language.learned.unmet import unmet
 from avlmaps.language.learned.ways import in_direction
@@ -148,6 +148,10 @@ def weighed(read: Read, names: NameResolver) -> Weighed:
     if stop is not None:
         stop = Refuse(stop.reason, REFUSALS[stop.reason]) if isinstance(stop, Refuse) else stop
         return Weighed((stop,), read.probability)
+    number = unread_number(names.tokens, read.used)
+    if number is not None:
+        question = f"What is '{number}' for? Say each step with its own distance, angle or time."
+        return Weighed((Clarify(question),), read.probability)
     turned = in_direction(names.tokens, intents)
     if isinstance(turned, Clarify):
         return Weighed((turned,), read.probability)
