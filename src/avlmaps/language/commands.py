@@ -6,11 +6,13 @@ from dataclasses import dataclass, replace
 
 from avlmaps.core.errors import LanguageError
 from avlmaps.language.foreign import ASK, language_of
+from avlmaps.language.gate import NoOrder, no_order
 from avlmaps.language.intents import (
     Beside,
     Clarify,
     Face,
     Intent,
+    RefusalReason,
     Refuse,
     Repeat,
     StopAt,
@@ -30,6 +32,7 @@ from avlmaps.language.own_names import StandIns, stand_ins
 from avlmaps.language.rephrase import behind_remark
 from avlmaps.language.sentence import Attachments, Sentence
 from avlmaps.language.storey_words import SaidStorey, said_storeys
+from avlmaps.language.verbalise import verbalise
 from avlmaps.language.word_classes import load_word_classes
 
 MOST_CHARACTERS = 1000
@@ -46,6 +49,18 @@ _CHANGES_STOREY = re.compile(
 )
 
 
+class UnclearError(LanguageError):
+    """A command is refused, or needs an answer before the robot may drive.
+
+    Attributes:
+        choices: answers that would do; empty where any words may.
+    """
+
+    def __init__(self, message: str, choices: tuple[str, ...] = ()) -> None:
+        super().__init__(message)
+        self.choices = choices
+
+
 @dataclass(frozen=True, slots=True)
 class Command:
     """The meaning of a command.
@@ -54,7 +69,8 @@ class Command:
         intents: what to do; one refusal or question where the robot may not drive.
         notes: one sentence each: how words were taken, and what has no effect.
         readings: all readings that were weighed, the likeliest first.
-        why: ``read``, ``parts``, ``danger``, ``stop``, ``unsure``, or ``words`` where single words decide.
+        why: ``read``, ``parts``, ``danger``, ``stop``, ``unsure``, ``words`` where single words decide, or ``gate``
+            where the sentence may be no order.
     """
 
     intents: tuple[Intent, ...]
@@ -72,13 +88,45 @@ class Command:
 def read_command(text: str, given: Attachments | None = None) -> Command:
     """Return the meaning of a command; the same command always means the same.
 
+    What may be no order, to the robot, now, becomes a question.
+
     Raises:
         LanguageError: the command is empty or too long.
     """
     _check_length(text)
+    read = _read(text, given)
+    closed = None if read.stops is not None or is_stop(tokenise(text)) else no_order(text)
+    return read if closed is None else replace(read, intents=(_asked(closed, read.intents),), why="gate")
+
+
+def check_order(text: str) -> None:
+    """Refuse a sentence that is no order, or a danger, before a language model may write a program for it.
+
+    Raises:
+        UnclearError: it is one; the sentence says why or asks back.
+        LanguageError: the command is empty or too long.
+    """
+    read = read_command(text)
+    stop = read.stops
+    harms = isinstance(stop, Refuse) and stop.reason is RefusalReason.HARM
+    if stop is not None and (harms or read.why == "gate"):
+        raise UnclearError(verbalise((stop,)), getattr(stop, "choices", ()))
+    closed = None if stop is None else no_order(text)  # the reader refuses it too, perhaps for another reason
+    if closed is not None:
+        raise UnclearError(f"{closed.answer} Say what to do now, such as: go to the kitchen.")
+
+
+def _asked(closed: NoOrder, intents: Sequence[Intent]) -> Clarify:
+    """Return the question whether a sentence is meant as an order, with the order that would be one."""
+    order = verbalise(intents).removeprefix("I will ").rstrip(".")
+    return Clarify(f"{closed.answer} Shall I {order}?", (order,))
+
+
+def _read(text: str, given: Attachments | None) -> Command:
+    """Return the meaning of a command, taken as an order."""
     stand = stand_ins(text, () if given is None else given.own)
     if stand.own and given is not None:
-        read = read_command(stand.text, replace(given, own=()))
+        read = _read(stand.text, replace(given, own=()))
         intents = tuple(_back(on_targets(one, stand.target), stand) for one in read.intents)
         return replace(read, intents=intents, notes=tuple(map(stand.back, read.notes)))
     language = language_of(text)
@@ -94,7 +142,7 @@ def read_command(text: str, given: Attachments | None = None) -> Command:
         return Command((stop,), (), (), "words")
     order = behind_remark(sentence.tokens)
     if order is not None:
-        said = read_command(text[order:], given)
+        said = _read(text[order:], given)
         remark = f"'{text[:order].strip(' ,;.:')}' is taken as a remark: it is not where to go."
         return replace(said, notes=(remark, *said.notes))
     storeys = said_storeys(text)
@@ -127,7 +175,7 @@ def _on_storey(text: str, storeys: Sequence[SaidStorey], given: Attachments | No
     word = storeys[0]
     if len(storeys) > 1 or not word.said or word.isnt or not word.rest or _CHANGES_STOREY.search(text.lower()):
         return None
-    inner = read_command(word.rest, given)
+    inner = _read(word.rest, given)
     targets = {target for intent in inner.intents for target in targets_of(intent)}
     if inner.stops is not None or len(targets) != 1:
         return None

@@ -2,32 +2,21 @@
 
 from collections.abc import Sequence
 
-from avlmaps.core.errors import LanguageError
-from avlmaps.language.commands import Command, read_command
+from avlmaps.language.commands import Command, UnclearError, read_command
 from avlmaps.language.program.writing import write_program
 from avlmaps.language.sentence import Attachments
 from avlmaps.language.translator import Translation, Translator
 from avlmaps.language.verbalise import verbalise
 
+__all__ = ["LearnedTranslator", "UnclearError", "command_to_program", "explanation"]
 _WHY = {
     "read": "a reading that is likely enough", "parts": "its sentences, each certain alone",
     "danger": "a refusal for safety",
     "stop": "the likeliest reading, which stops",
     "words": "single words, which no reading can outweigh",
+    "gate": "the gate: this may be no order, to the robot, now",
     "unsure": "nobody: no reading is likely enough",
 }  # fmt: skip
-
-
-class UnclearError(LanguageError):
-    """A command is refused, or needs an answer before the robot may drive.
-
-    Attributes:
-        choices: answers that would do; empty where any words may.
-    """
-
-    def __init__(self, message: str, choices: tuple[str, ...] = ()) -> None:
-        super().__init__(message)
-        self.choices = choices
 
 
 class LearnedTranslator:

@@ -16,6 +16,7 @@ from avlmaps.language.chat.prompt import (
 )
 from avlmaps.language.chat.replay import ChatRequest, Message, Replay
 from avlmaps.language.chat.settings import ChatSettings
+from avlmaps.language.commands import check_order
 from avlmaps.language.program import SKILLS, Program, parse_program
 from avlmaps.language.program.syntax import Constant, SkillCall, expressions_of, parts_of
 from avlmaps.language.translator import Translation
@@ -54,8 +55,10 @@ class ChatTranslator:
         """Return the program that the model writes for a command; it parses, but has not run.
 
         Raises:
+            UnclearError: the sentence is no order, or a danger; no model is asked.
             LanguageError: the command is empty or too long, no answer came, or none held a program.
         """
+        check_order(plain_command(command))
         self._command, self._rounds_used = command, 0
         return self._translated(command, _opening(command))
 

@@ -1,0 +1,54 @@
+"""The gate: what is no order, to the robot, now, moves nothing, whoever would read it."""
+
+import pytest
+
+from avlmaps.language.chat import ChatSettings, ChatTranslator
+from avlmaps.language.commands import UnclearError, read_command
+from avlmaps.language.gate import no_order
+from avlmaps.language.learned_translator import LearnedTranslator
+
+NO_ORDERS = {
+    "cancelled": ["cancel the visit to the sofa", "never mind going to the bed", "Don't bother driving to the desk."],
+    "postponed": ["postpone the drive to the sofa", "I may send you to the kitchen later"],
+    "asked": ["what if you drove to the sofa?", "imagine going to the kitchen", "are you able to go to the bed?"],
+    "reported": ["my brother went to the kitchen", "the sign says go to the door", "You always go to the sofa."],
+    "other": ["Alexa, go to the kitchen", "the other robot should go to the bed"],
+    "wished": ["I wish you could go to the bed", "You should have gone to the kitchen."],
+    "sarcastic": ["as if you could go to the bed", "Good luck going to the sofa"],
+    "crossed": ["go to the sofa ❌", "👎 go to the bed"],
+}
+ORDERS = [
+    "Could you go to the kitchen?", "cancel that and go to the sofa", "forget the garden, go to the sofa",
+    "I need you to go to the bed", "never mind that, drive to the desk", "stop what you are doing and go to the bed",
+    "why don't you go to the kitchen?", "I was wondering if you could go to the sofa",
+]  # fmt: skip
+ROWS = [(kind, text) for kind, texts in NO_ORDERS.items() for text in texts]
+
+
+@pytest.mark.parametrize(("kind", "text"), ROWS)
+def test_no_front_drives_by_what_is_no_order(kind: str, text: str) -> None:
+    closed = no_order(text)
+    assert closed is not None and closed.kind == kind
+    with pytest.raises(UnclearError):
+        LearnedTranslator().program_for(text)
+    # No server is there: a model that was asked would fail otherwise.
+    with pytest.raises(UnclearError):
+        ChatTranslator(ChatSettings(base_url="http://127.0.0.1:9", model="none")).program_for(text)
+
+
+def test_the_question_offers_the_order_that_would_be_one() -> None:
+    asked = read_command("imagine going to the kitchen")
+    assert asked.why == "gate" and asked.stops is not None
+    (order,) = asked.stops.choices  # type: ignore[union-attr]
+    assert read_command(order).intents == read_command("go to the kitchen").intents
+
+
+@pytest.mark.parametrize("text", ORDERS)
+def test_an_order_passes(text: str) -> None:
+    assert no_order(text) is None
+
+
+@pytest.mark.parametrize("text", ["run over the cat", "drive into the child", "go through the window"])
+def test_no_model_is_asked_to_write_a_danger(text: str) -> None:
+    with pytest.raises(UnclearError, match="hurt"):
+        ChatTranslator(ChatSettings(base_url="http://127.0.0.1:9", model="none")).program_for(text)
