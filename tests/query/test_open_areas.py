@@ -74,12 +74,12 @@ def test_the_cosines_are_as_close_as_those_of_clip() -> None:
 
 
 def test_a_room_that_was_seen_is_found_and_one_that_was_not_is_not() -> None:
-    m = _map(ScaledViews(), ["kitchen", "bedroom", "office"])
-    for room in ("kitchen", "bedroom", "office"):
+    m = _map(ScaledViews(), ["kitchen", "living room", "office"])
+    for room in ("kitchen", "living room", "office"):
         assert m.area(room).found, room
     for room in ("garage", "library", "swimming pool", "cathedral"):
         assert not m.area(room).found, room
-    heat = m.area("bedroom", primary=True)
+    heat = m.area("living room", primary=True)
     anchors, scores = heat.factors[0].anchors, heat.factors[0].scores
     assert np.argmax(scores) == 1
     assert heat.goals()[0].position[:2] == pytest.approx(tuple(anchors[1][:2]))
@@ -123,9 +123,9 @@ def test_which_words_mean_the_same_place(area: str, asked: str, same: bool) -> N
 
 def test_without_the_scale_nothing_would_be_found() -> None:
     """What the scale is for: at the temperature that suits other encoders, all names look alike."""
-    assert not _map(OpenViews(), ["kitchen", "bedroom"]).area("kitchen").found
+    assert not _map(OpenViews(), ["kitchen", "living room"]).area("kitchen").found
     fixed = AreaSettings(temperature=0.01)
-    m = AVLMap(_map(OpenViews(), ["kitchen", "bedroom"]).stored, QuerySettings(areas=fixed))
+    m = AVLMap(_map(OpenViews(), ["kitchen", "living room"]).stored, QuerySettings(areas=fixed))
     assert m.area("kitchen").found
 
 

@@ -113,6 +113,15 @@ def test_two_doors_side_by_side_are_no_open_plan() -> None:
     assert drawn.at(label, 2.0, 2.0) != drawn.at(label, 6.0, 2.0)
 
 
+@given(st.floats(0.5, 0.8), st.floats(0.7, 0.95))
+def test_a_piece_of_wall_between_two_doors_is_no_screen_though_a_leaf_stands_at_it(post: float, leaf: float) -> None:
+    drawn = Drawn(8.15, 4.0).room(0, 0, 4.0, 4.0).room(4.15, 0, 4.0, 4.0)
+    drawn.room(3.95, 0.9, 0.3, 0.9).room(3.95, 1.8 + post, 0.3, 0.9)
+    drawn.block(4.15, 1.8, leaf, 0.05)
+    label = rooms_of_storey(drawn.grid()).label
+    assert drawn.at(label, 2.0, 2.0) != drawn.at(label, 6.0, 3.5) != NONE
+
+
 def test_a_nook_belongs_to_its_room_and_an_empty_storey_has_none() -> None:
     drawn = Drawn(4.0, 4.3).room(0, 0, 4.0, 3.0).room(1.0, 3.0, 0.7, 1.0)
     label = rooms_of_storey(drawn.grid()).label

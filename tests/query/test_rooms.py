@@ -198,7 +198,7 @@ def home(
 
 
 def test_a_bed_makes_the_bedroom() -> None:
-    with_bed, without = home(), home(things=False)
+    with_bed, without = home(door_m=0.0), home(door_m=0.0, things=False)
     right, left = np.array([[4.5, 1.5, 0.4]]), np.array([[1.0, 1.5, 0.4]])
     assert with_bed.area("bedroom").factors[0].at(right)[0] > without.area("bedroom").factors[0].at(right)[0] + 0.2
     assert with_bed.area("bedroom").found and not without.area("bedroom").found

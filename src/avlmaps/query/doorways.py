@@ -39,7 +39,21 @@ def without_leaves(
     out = wall & ~_short(wall & ~thick, _LEAF_M / cell_m)
     piece = pieces(out, diagonally=True)
     rows, columns, _ = extents(piece).T
-    return out & ~((np.hypot(rows, columns) <= _SCREEN_M / cell_m) & ~of_pieces(piece, thick))[piece]
+    out &= ~((np.hypot(rows, columns) <= _SCREEN_M / cell_m) & ~of_pieces(piece, thick))[piece]
+    aside = wall & ~out
+    return out | (_between_doors(wall, aside, cell_m) | _between_doors(wall.T, aside.T, cell_m).T) & wall
+
+
+def _between_doors(
+    wall: Bool[np.ndarray, "r c"], screen: Bool[np.ndarray, "r c"], cell_m: float
+) -> Bool[np.ndarray, "r c"]:
+    """Return the cells of screens that are pieces of a wall along a row, with a doorway on either side."""
+    row, start, end = _runs(_as_rows(wall))
+    alone = _sums(dilated(screen, 3, 1))
+    is_wall = alone[row, end] - alone[row, start] < 0.5 * (end - start)
+    long = (end - start) * cell_m >= _LEAST_WALL_M - 1e-6
+    piece = ~is_wall & long & _pillars(row, start, end, is_wall, _DOOR_M / cell_m)
+    return _filled(_Gaps(row, start, end, piece).where(piece), wall.shape)
 
 
 def _shadows(unseen: Bool[np.ndarray, "nx ny"], cell_m: float) -> Bool[np.ndarray, "nx ny"]:

@@ -7,7 +7,7 @@ from functools import cache, cached_property
 import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Float32, Int
-from avlmaps.core.lexicon import Entry, EntryKind, lexicon
+from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.perception.room_contents import RoomContents
 from avlmaps.query.factors import FOUND_AT, NearAnchors
 from avlmaps.query.floor_plan import CELL_M, FloorPlan
@@ -27,6 +27,7 @@ _LOOKS = 2.0  # as views that agree count in ``modalities.area.pool_posteriors``
 FEWEST_VIEWS = 2
 """A room is listed where at least this many keyframes show it."""
 LEAST_PART, _LEAST_PART_M2 = 0.2, 1.0  # of an open plan's floor
+_OPEN = ("kitchen", "living room", "dining room", "office", "reception")  # kinds that may be parts of an open plan
 # Two such rooms side by side are one, seen in two parts.
 _ONE_IF_BESIDE = ("kitchen", "living room", "dining room", *_PASSAGES)
 
@@ -133,7 +134,7 @@ class RoomField:
         """
         cells = self._sum_of_floors(regions, np.ones((len(self.share), 1)))
         nats = self._sum_of_floors(regions, np.log(np.maximum(self.share, _LEAST_SHARE))) / np.maximum(cells, 1.0)
-        passage = np.array([lexicon().find(kind, EntryKind.ROOM) in _passages() for kind in self.kinds])
+        passage = _among(self.kinds, _PASSAGES)
         fewest = np.minimum(regions.neighbours, len(_PASSAGE_ODDS) - 1)
         total = np.exp(_LOOKS * nats) * np.where(passage, np.array(_PASSAGE_ODDS)[fewest][:, None], 1.0)
         return total / total.sum(axis=1, keepdims=True)
@@ -145,6 +146,7 @@ class RoomField:
         """
         sure = self._sum_of_floors(regions, (self.share >= FOUND_AT).astype(np.float64))
         parts = sure >= np.maximum(LEAST_PART * sure.sum(axis=1, keepdims=True), _LEAST_PART_M2 / CELL_M**2)
+        parts &= _among(self.kinds, _OPEN)
         parts[np.count_nonzero(parts, axis=1) < 2] = False
         return parts
 
@@ -168,8 +170,7 @@ class RoomField:
 def seen_twice(field: RoomField, regions: RoomRegions) -> Int[np.ndarray, "p 2"]:
     """Return the pairs of rooms beside each other that are surely of one kind of which homes have one: a kitchen."""
     share = field.whole_rooms(regions)
-    single = [lexicon().find(name, EntryKind.ROOM) for name in _ONE_IF_BESIDE]
-    is_single = np.array([lexicon().find(kind, EntryKind.ROOM) in single for kind in field.kinds])
+    is_single = _among(field.kinds, _ONE_IF_BESIDE)
     one_kind = ~field.parts_of_rooms(regions).any(axis=1)
     kind = np.where(one_kind & (share.max(axis=1, initial=0.0) >= FOUND_AT), share.argmax(axis=1), -1)
     a, b = regions.beside.T
@@ -196,9 +197,10 @@ KeptField = Callable[[str, FloorPlan, tuple[str, ...], Float[np.ndarray, "k n"],
 
 
 @cache
-def _passages() -> frozenset[Entry | None]:
-    known = (lexicon().find(name, EntryKind.ROOM) for name in _PASSAGES)
-    return frozenset(entry for entry in known if entry is not None)
+def _among(kinds: tuple[str, ...], names: tuple[str, ...]) -> Bool[np.ndarray, " n"]:
+    find = lexicon().find
+    known = [entry for entry in (find(name, EntryKind.ROOM) for name in names) if entry is not None]
+    return np.array([kind in names or find(kind, EntryKind.ROOM) in known for kind in kinds], bool)
 
 
 class Rooms:
