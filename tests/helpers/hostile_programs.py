@@ -2,7 +2,7 @@
 
 Run as a script: python hostile_programs.py COUNT SEED FILE [--leak | --hang]; it prints one JSON object. FILE holds
 the number of the program that is run, so that one that never ends is known. With --leak the parser is replaced by one
-that lets Python compile the text, with --hang by one that never ends, to show that the watch over the process sees it.
+that lets Python run code, with --hang by one that never ends, to show that the watch over the process sees it.
 """
 # ruff: noqa: E501 -- tables of programs
 
@@ -260,6 +260,9 @@ class _Watch:
         sys.addaudithook(self._hook)
 
     def _hook(self, event: str, arguments: Any) -> None:
+        # Python's parser is asked, of a file without a name; its errors look for the line in that file.
+        if (event, arguments[1:2]) == ("compile", ("",)) or (event, arguments[:1]) == ("open", ("",)):
+            return
         if self.on:
             self.on = False
             self.seen.append((event, repr(arguments)[:200]))
@@ -267,7 +270,8 @@ class _Watch:
 
 
 def _leak(text: str) -> Any:
-    return compile(text, "", "exec")
+    exec(compile("1", "", "exec"))
+    return text
 
 
 def _hang(text: str) -> Any:

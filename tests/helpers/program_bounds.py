@@ -149,7 +149,6 @@ def main(count: int, seed: int, count_calls: bool = False) -> dict[str, Any]:
 
     from avlmaps.core.errors import ProgramError
     from avlmaps.language.program import parse_program, run_program
-    from helpers.program_text import program_text
     from helpers.recording_robot import RecordingRobot
 
     random, told, worst_s, worst = Random(seed), Counter[str](), 0.0, ""
@@ -169,7 +168,6 @@ def main(count: int, seed: int, count_calls: bool = False) -> dict[str, Any]:
         sys.setprofile(counted if count_calls else None)
         try:
             program = parse_program(text)
-            program_text(program)
             trace = run_program(program, RecordingRobot())
             json.dumps(trace.to_json(), allow_nan=False)
             trace.lines()

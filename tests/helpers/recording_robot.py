@@ -84,6 +84,8 @@ def _method(skill: Skill) -> Any:
             "Heat": lambda: RecordedHeat(text),
             "Place": lambda: place,
             "list[Place]": lambda: [place, place * 0.5, place / 4.0],
+            "bool": lambda: True,
+            "float": lambda: place.x,
             "None": lambda: None,
         }
         return results[skill.returns_text]()

@@ -23,6 +23,8 @@ _PURE = {
     "get_contour",
     "get_nearest_pos",
     "get_all_pos",
+    "exists",
+    "get_distance",
 }
 _WHERE_IT_STANDS = "current_pos"
 _MOST_TURNS_OF_A_LOOP = 50

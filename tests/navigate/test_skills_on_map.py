@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from avlmaps.core.errors import GoalNotFoundError, ProgramError, QueryError
 from avlmaps.core.motion import GroundPose
 from avlmaps.core.question import Modality, Part, Question
+from avlmaps.language.program import parse_program, run_program
 from avlmaps.language.program.vocabulary import Picture, Place
 from avlmaps.maps.grid import GridSpec
 from avlmaps.navigate.file_access import Readable, named_files, offered_by
@@ -128,7 +129,6 @@ SKILLS = {
     "get_pos": lambda robot, what: robot.get_pos(what),
     "get_nearest_pos": lambda robot, what: robot.get_nearest_pos(what),
     "get_max_pos_3d": lambda robot, what: robot.get_max_pos_3d(what),
-    "get_all_pos": lambda robot, what: robot.get_all_pos(what),
     "get_contour": lambda robot, what: robot.get_contour(what),
 }
 
@@ -146,6 +146,24 @@ def test_no_skill_takes_what_the_answer_calls_not_found(skill: str, score: float
             SKILLS[skill](robot, heat)
         assert robot.moves == []
     assert answer.found == (score > 0.9)
+
+
+@pytest.mark.parametrize(("score", "there"), [(0.05, False), (0.95, True)])
+def test_a_program_can_ask_whether_something_is_there(score: float, there: bool) -> None:
+    robot = furnished_robot(sounds=sounds_of([track(5.0, 3.1)], [score]))
+    heat = robot.get_major_map(obj="chair") * robot.get_map(sound="dog")
+    assert robot.exists(heat) is there and bool(robot.get_all_pos(heat)) is there
+    asks = "if robot.exists(h):\n    turn(90)\nelse:\n    turn(-90)\n"
+    trace = run_program(parse_program(f"h = get_major_map(obj='chair') * get_map(sound='dog')\n{asks}"), robot)
+    assert trace.ok and trace.steps[-1].arguments == {"angle_deg": 90 if there else -90}
+
+
+def test_distances_of_things_are_between_their_nearest_points() -> None:
+    robot = furnished_robot()
+    assert robot.get_distance("chair", "chair") == 0.0
+    apart = robot.get_distance("chair", "table")
+    assert 0.0 <= apart == pytest.approx(robot.get_distance("table", "chair"))
+    assert robot.get_distance(robot.current_pos(), "table") > 0.0
 
 
 def test_a_stricter_map_stops_what_another_lets_pass() -> None:

@@ -238,6 +238,20 @@ class Seeker:
         self.note(f"{others} of {len(things)} places for {own[0].name} are on other storeys; those of the {name} count")
         return own
 
+    def finds(self, target: Target) -> bool:
+        """Return whether the map has something that a target may mean; a guess is nothing."""
+        if isinstance(target, Place):
+            return True
+        try:
+            heat = target
+            if isinstance(target, str):
+                heat = self._named("object", target, True, lambda name: self.avlmap.object(name, primary=True))
+        except GoalNotFoundError:
+            return False
+        if not isinstance(heat, Heatmap):
+            raise ProgramError(f"A skill takes a phrase, a place or a heatmap to look for, not {kind_of(target)}.")
+        return bool(heat.found)
+
     def place_of(self, target: Target) -> Place:
         """Return the place of the best thing that a target may mean; a later skill finds the thing again at that place.
 

@@ -15,7 +15,7 @@ from typing import cast
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.core.errors import NavigationError, ProgramError
+from avlmaps.core.errors import GoalNotFoundError, NavigationError, ProgramError
 from avlmaps.core.motion import Action, wrap_angle
 from avlmaps.language.program.vocabulary import Clip, Heat, Picture, Place, Target
 from avlmaps.navigate.costmap import floor_of_walk, storey_of_walk
@@ -148,8 +148,21 @@ class Robot:
         return self.seeker.place_of_thing(self.seeker.referent(target, self._here))
 
     def get_all_pos(self, target: Target) -> list[Place]:
-        """Return the places of all objects of that name that the map is confident of, the nearest first."""
-        return [self.seeker.place_of_thing(thing) for thing in self.seeker.every(target, self._here)]
+        """Return the places of all objects of that name that the map is confident of, the nearest first; [] of none."""
+        try:
+            return [self.seeker.place_of_thing(thing) for thing in self.seeker.every(target, self._here)]
+        except GoalNotFoundError:
+            return []
+
+    def exists(self, target: Target) -> bool:
+        """Return whether the map is confident of something of that name, or of a heatmap's best place."""
+        return self.seeker.finds(target)
+
+    def get_distance(self, a: Target, b: Target) -> float:
+        """Return how many metres of floor are between the nearest points of two things."""
+        one, other = (self.seeker.referent(target, self._here) for target in (a, b))
+        near, far = one.outline.gap_to(other.outline)
+        return float(np.linalg.norm(near - far))
 
     def get_contour(self, target: Target) -> list[Place]:
         """Return the outline on the ground of the best instance of an object, counter-clockwise."""

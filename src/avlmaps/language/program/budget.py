@@ -10,6 +10,18 @@ def refused(line: int, text: str) -> ProgramError:
     return ProgramError(f"Line {line}: {text}.")
 
 
+LARGEST = 10**15
+"""No number in a program is further from zero: below it, whole numbers and floats are both exact."""
+
+
+def bounded(line: int, value: int | float) -> int | float:
+    """Return a number, unless it is too far from zero, infinite or none at all."""
+    # Not a number is on neither side.
+    if not -LARGEST <= value <= LARGEST:
+        raise refused(line, "a number came out beyond 1e15 in size; programs reckon in metres and degrees")
+    return value
+
+
 @dataclass(frozen=True, slots=True)
 class Budget:
     """The limits of one run of a program; running past any of them stops it."""

@@ -255,14 +255,6 @@ def parts_of(top: Expression) -> Iterator[Expression]:
         waiting.extend(reversed(part.children))
 
 
-def depth_of(top: Expression) -> int:
-    """Return how deep an expression nests, without recursion."""
-    depth, level = 0, [top]
-    while level:
-        depth, level = depth + 1, [child for part in level for child in part.children]
-    return depth
-
-
 def statements_of(block: tuple[Statement, ...]) -> Iterator[Statement]:
     """Yield the statements of a block and of the blocks inside it, in the order of the text."""
     for statement in block:

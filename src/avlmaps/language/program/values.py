@@ -4,8 +4,7 @@ from dataclasses import dataclass
 from types import NoneType
 from typing import Any
 
-from avlmaps.language.program.budget import refused
-from avlmaps.language.program.lexer import bounded
+from avlmaps.language.program.budget import bounded, refused
 from avlmaps.language.program.table import Skill
 from avlmaps.language.program.value_types import ValueType, check_sign, kind_of_result
 from avlmaps.language.program.vocabulary import Clip, Heat, Picture, Place
@@ -219,7 +218,11 @@ def adopted(skill: Skill, result: Any, how: str) -> Value:
             return [_place(each) for each in result]
         case ValueType.PLACE if isinstance(result, Place):
             return _place(result)
-        case ValueType.NOTHING | ValueType.PICTURE | ValueType.CLIP if _KINDS.get(type(result)) is skill.returns:
+        case ValueType.NUMBER if isinstance(result, (int, float)) and not isinstance(result, bool):
+            return float(result)
+        case ValueType.NOTHING | ValueType.TRUTH | ValueType.PICTURE | ValueType.CLIP if (
+            _KINDS.get(type(result)) is skill.returns
+        ):
             return result
     raise TypeError(f"the skill {skill.name} returned {type(result).__name__}, not {skill.returns_text}")
 

@@ -129,7 +129,15 @@ class RobotSkills(Protocol):
         ...
 
     def get_all_pos(self, target: Target) -> list[Place]:
-        """Return the places of all objects of that name that the map is confident of, the nearest first."""
+        """Return the places of all objects of that name that the map is confident of, the nearest first; [] of none."""
+        ...
+
+    def exists(self, target: Target) -> bool:
+        """Return whether the map is confident of something of that name, or of a heatmap's best place."""
+        ...
+
+    def get_distance(self, a: Target, b: Target) -> float:
+        """Return how many metres of floor are between the nearest points of two things."""
         ...
 
     def get_contour(self, target: Target) -> list[Place]:

@@ -103,6 +103,7 @@ class _Writer:
             case Circle():
                 self.circle(intent)
             case VisitEach(of=target):
+                self.add(f"robot.get_nearest_pos({self.query(target)})")  # where there is none, that is told
                 self.add(f"for place in robot.get_all_pos({self.query(target)}):")
                 self.add("    robot.move_to(place)")
             case Wait(seconds=seconds):
@@ -178,7 +179,9 @@ class _Writer:
         if target not in self.names:
             if target.pick in (Pick.OTHER, Pick.FARTHEST):
                 every = self.variable(f"{target.name.split()[-1]}s")
-                self.add(f"{every} = robot.get_all_pos({self.query(Target(target.kind, target.name, target.near))})")
+                query = self.query(Target(target.kind, target.name, target.near))
+                self.add(f"robot.get_nearest_pos({query})")
+                self.add(f"{every} = robot.get_all_pos({query})")
                 at = "1" if target.pick is Pick.OTHER else f"len({every}) - 1"
                 name = self.variable(target.name.split()[-1])
                 self.add(f"{name} = {every}[{at}]")
