@@ -244,7 +244,7 @@ def test_saying_that_there_is_none_is_right_only_where_there_is_none(tmp_path: P
     assert not Step(asks[-1], {"found": True, "goals": [{"position": [0, 0, 0], "score": 1.0}]}, "p.png").right
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_chosen_home_is_one_that_no_training_has_seen_and_can_be_asked(monkeypatch: pytest.MonkeyPatch) -> None:
     assert FIRST_SEED == 3_000_000
     monkeypatch.setattr("avlmaps_sim.demo.home.FIRST_SEED", FIRST_SEED + 3)  # those before do not fit, nor does it

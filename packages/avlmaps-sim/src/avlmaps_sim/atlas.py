@@ -32,7 +32,6 @@ class Atlas:
 
 
 def _halvings(picture: UInt8[np.ndarray, "h w 3"]) -> list[UInt8[np.ndarray, "..."]]:
-    """Return a picture and its means over 2x2, 4x4 ... texels, taken in linear light."""
     levels = [np.ascontiguousarray(picture)]
     linear = np.square(picture.astype(np.float32))
     while max(linear.shape[:2]) > 2 and len(levels) < _MOST_LEVELS:
@@ -92,7 +91,6 @@ def picture_maps(
 
 
 def _dual(edge: Float[np.ndarray, "t 2 3"]) -> Float[np.ndarray, "t 2 3"]:
-    """Return the vectors that measure how far along each of two edges a step goes; zero where they are parallel."""
     a, b = edge[:, 0], edge[:, 1]
     aa, bb, ab = (np.einsum("ti,ti->t", p, q)[:, None] for p, q in ((a, a), (b, b), (a, b)))
     area = aa * bb - ab * ab

@@ -14,13 +14,13 @@ from jaxtyping import Float
 
 from avlmaps.core.errors import NavigationError
 from avlmaps.core.motion import FORWARD_M, TURN_RAD, Action, GroundPose, Moved
-from avlmaps_sim import body_kernels
+from avlmaps_sim.body_contact import Point, Surroundings, cut_segments, nearest_point
 from avlmaps_sim.free_space import floor_cells, floor_heights, free_space
 from avlmaps_sim.grid_kernels import mark_slab
 from avlmaps_sim.scene import Scene
 
 _FINE_M = 0.05  # cells of the grids of room and of floor
-_COARSE_M = 0.25  # cells that lines are sorted into
+_BLOCK_M = 1.0  # outlines are looked up by blocks of this size
 _CHORD_M = 0.02  # a curve is driven in straight pieces of at most this length
 _CHORD_RAD = 0.1  # ... and turn
 
@@ -64,8 +64,7 @@ class Building:
         )
         low, high = self.floor_m + low_m, self.floor_m + high_m
         corners = scene.mesh.corners().astype(np.float64)
-        cut = body_kernels.cut_segments(corners, low, high)
-        self.segments = np.unique(np.round(cut, 7), axis=0)
+        self.segments = np.unique(np.round(cut_segments(corners, low, high), 7), axis=0)
         extent = np.stack([scene.mesh.low[:2], scene.mesh.high[:2]]).astype(np.float64)
         origin = extent[0] - 4 * _FINE_M
         shape = tuple(int(n) for n in np.ceil((extent[1] - origin) / _FINE_M) + 4)
@@ -74,24 +73,37 @@ class Building:
             ground = floor_cells(scene, self.floor_m, origin, (shape[0], shape[1]), _FINE_M)
         blocked = np.zeros(shape, np.bool_)
         mark_slab(corners, low, high, origin, _FINE_M, blocked)
-        nx, ny = (int(n) for n in np.ceil((extent[1] - origin) / _COARSE_M) + 1)
-        starts, members = body_kernels.sorted_into_cells(self.segments, origin, _COARSE_M, nx, ny)
-        self._sorted = (self.segments, starts, members, origin, _COARSE_M, nx, ny)
-        self._ground = ground
+        self._blocks: dict[tuple[int, int], np.ndarray] = {}
+        self._origin, self._ground = origin, ground
         self._room_m, self._floor_room_m = _room_m(blocked), _room_m(~np.pad(ground, 1))[1:-1, 1:-1]
 
-    def arrays(self, radius_m: float) -> tuple:
-        """Return the arrays that the compiled loops need for a body of some radius."""
-        room_m = np.minimum(self._room_m, self._floor_room_m + radius_m)
-        return (*self._sorted, room_m, self._ground, _FINE_M)
+    def is_open(self, place: Point, radius_m: float, length_m: float) -> bool:
+        """Return whether a disc can go so far to any side for sure."""
+        i, j = (int(np.floor((place[axis] - self._origin[axis]) / _FINE_M)) for axis in (0, 1))
+        if not (0 <= i < self._room_m.shape[0] and 0 <= j < self._room_m.shape[1]):
+            return False
+        return min(self._room_m[i, j], self._floor_room_m[i, j] + radius_m) > radius_m + length_m
+
+    def around(self, place: Point, radius_m: float, length_m: float = 0.0) -> Surroundings:
+        """Return what a disc may touch that moves so far."""
+        reach_m = radius_m + length_m + 0.05
+        i, j = (int(np.floor(value / _BLOCK_M)) for value in place)
+        if (i, j) not in self._blocks:
+            self._blocks[i, j] = _within(self.segments, ((i + 0.5) * _BLOCK_M, (j + 0.5) * _BLOCK_M), 1.5 * _BLOCK_M)
+        found = self._blocks[i, j] if reach_m <= _BLOCK_M else self.segments
+        return Surroundings(_within(found, place, reach_m), self._ground, self._origin, _FINE_M, radius_m)
 
     def clearance_m(self, x_m: float, y_m: float) -> float:
         """Return the distance from a place to the nearest obstacle; by looking at everything."""
-        return float(body_kernels.nearest_point(x_m, y_m, self.segments)[0])
+        return nearest_point((x_m, y_m), self.segments)[0]
+
+
+def _within(segments: Float[np.ndarray, "s 4"], place: Point, reach_m: float) -> Float[np.ndarray, "k 4"]:
+    low, high = np.minimum(segments[:, :2], segments[:, 2:]), np.maximum(segments[:, :2], segments[:, 2:])
+    return segments[((low <= np.add(place, reach_m)) & (high >= np.subtract(place, reach_m))).all(axis=1)]
 
 
 def _room_m(blocked: np.ndarray) -> np.ndarray:
-    """Return the distance from anywhere in a cell to anything in a blocked one, never overstated."""
     if not blocked.any():
         return np.full(blocked.shape, 1e6)
     apart = cv2.distanceTransform((~blocked).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE).astype(np.float64)
@@ -150,7 +162,6 @@ class SimulatedBody:
         self.on_contact = on_contact
         self.contacts, self.travelled_m = 0, 0.0
         self._noise, self._rng = noise or MotionNoise(), rng
-        self._arrays = self.building.arrays(radius_m)
         self._pose = pose
         self.place_at(pose)
 
@@ -161,7 +172,8 @@ class SimulatedBody:
 
     def fits(self, xy: Float[np.ndarray, "2"]) -> bool:
         """Return whether the body can stand at a place, level x and y."""
-        return bool(body_kernels.fits(float(xy[0]), float(xy[1]), self.radius_m, self._arrays))
+        place = float(xy[0]), float(xy[1])
+        return self.building.around(place, self.radius_m).fits(place)
 
     def place_at(self, pose: GroundPose) -> None:
         """Put it somewhere else.
@@ -208,13 +220,18 @@ class SimulatedBody:
         slides = self.on_contact == "slide"
         for _ in range(pieces if ahead_m else 0):
             along = heading + 0.5 * turn_rad / pieces
-            dx, dy = cos(along) * ahead_m / pieces, sin(along) * ahead_m / pieces
-            x_m, y_m, hit = body_kernels.moved(x_m, y_m, dx, dy, self.radius_m, slides, self._arrays)
+            (x_m, y_m), hit = self._straight((x_m, y_m), along, ahead_m / pieces, slides)
             touched |= hit
             heading += turn_rad / pieces
             if hit and not slides:
                 break
-        self._pose = GroundPose(x_m, y_m, pose.heading_rad + turn_rad)
+        self._pose = GroundPose(float(x_m), float(y_m), pose.heading_rad + turn_rad)
         self.contacts += touched
         self.travelled_m += hypot(x_m - pose.x_m, y_m - pose.y_m)
         return Moved(self._pose, touched)
+
+    def _straight(self, place: Point, heading_rad: float, length_m: float, slides: bool) -> tuple[Point, bool]:
+        step = cos(heading_rad) * length_m, sin(heading_rad) * length_m
+        if self.building.is_open(place, self.radius_m, abs(length_m)):
+            return (place[0] + step[0], place[1] + step[1]), False
+        return self.building.around(place, self.radius_m, abs(length_m)).moved(place, step, slides)

@@ -145,7 +145,6 @@ def _inside(space: FreeSpace, cell: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 
 def _floors_face(scene: Scene) -> str | None:
-    """Return the level axis that most named floors face; None where they face up or none has that name."""
     floors = np.array([thing.category == "floor" for thing in scene.objects], bool)
     if not floors.any():
         return None

@@ -174,5 +174,4 @@ def sweep(headings: Float[np.ndarray, " m"], heading: float, seen_rad: float) ->
 
 
 def _wrapped(angle_rad: np.ndarray | float) -> np.ndarray:
-    """Return angles within a half turn of 0."""
     return np.asarray((np.asarray(angle_rad) + np.pi) % (2 * np.pi) - np.pi)

@@ -171,7 +171,6 @@ def floor_heights(scene: Scene) -> tuple[float, ...]:
 
 
 def _standing_m2(wall: Float[np.ndarray, "w 3"], wall_m2: Float[np.ndarray, " w"], level_m: float) -> float:
-    """Return how much wall stands on a level."""
     return float(wall_m2[(wall.max(axis=1) > level_m + 0.5) & (wall.min(axis=1) < level_m + 1.5)].sum())
 
 
@@ -226,7 +225,6 @@ def _one_floor(scene: Scene, floor_m: float, radius_m: float, height_m: float, c
 
 
 def _without_pockets(free: Bool[np.ndarray, "nx ny"], cell_m: float) -> Bool[np.ndarray, "nx ny"]:
-    """Leave out parts too small for a room, such as the inside of a wardrobe; the largest part stays."""
     label, count = _labelled(free)
     size = np.bincount(label.ravel(), minlength=count + 1)
     size[0] = 0
@@ -255,7 +253,6 @@ def _graph(number: np.ndarray, clearance_m: np.ndarray | None, cell_m: float) ->
 
 
 def _shifted(grid: np.ndarray, by: tuple[int, int], step: tuple[int, int]) -> np.ndarray:
-    """Return the part of a grid that lies ``by`` cells on from every cell from which ``step`` stays on the grid."""
     nx, ny = grid.shape
     first_j = max(0, -step[1])
     last_j = ny - max(0, step[1])
@@ -263,7 +260,6 @@ def _shifted(grid: np.ndarray, by: tuple[int, int], step: tuple[int, int]) -> np
 
 
 def _passed(step: tuple[int, int]) -> list[tuple[int, int]]:
-    """Return the cells that a step to a neighbour passes over."""
     i, j = step
     side = 1 if j > 0 else -1
     if abs(i) == abs(j):
@@ -276,7 +272,6 @@ def _has_floor(scene: Scene) -> bool:
 
 
 def _flat_triangles(scene: Scene, only_named: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return which triangles can be stood on, and every triangle's middle height and area."""
     mesh = scene.mesh
     flat = np.abs(mesh.normals()[:, 2]) > _FLAT
     if only_named:
@@ -286,7 +281,6 @@ def _flat_triangles(scene: Scene, only_named: bool) -> tuple[np.ndarray, np.ndar
 
 
 def _apart(height: Float[np.ndarray, " n"]) -> list[float]:
-    """Return the median of each group of heights, where groups are more than a step of one floor apart."""
     height = np.sort(height)
     groups = np.split(height, np.flatnonzero(np.diff(height) > _STOREY_M) + 1)
     return [float(np.median(group)) for group in groups]
@@ -323,5 +317,4 @@ def reaching_part(scene: Scene, space: FreeSpace) -> FreeSpace:
 
 
 def _labelled(free: Bool[np.ndarray, "nx ny"]) -> tuple[np.ndarray, int]:
-    """Number the connected parts from 1."""
     return cast("tuple[np.ndarray, int]", ndimage.label(free))

@@ -117,7 +117,6 @@ def _solid(scene: Scene, lights: tuple[Light, ...]) -> _Solid:
 
 
 def _close(cells: UInt8[np.ndarray, "x y z"], scene: Scene, low_m: float, cell_m: float) -> None:
-    """Make all solid below the lowest floor and above the highest ceiling, which may be as thin as paper."""
     known = {thing.category for thing in scene.objects}
     if scene.areas and "floor" in known:
         cells[:, :, : max(0, int((min(area.floor_m for area in scene.areas) - low_m) / cell_m))] = 1
@@ -155,7 +154,6 @@ def _merged(lights: tuple[Light, ...]) -> tuple[Light, ...]:
 
 
 def _smooth_corners(mesh: Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the corners' smooth normals, and the corners at each vertex as (first, incident)."""
     incident = np.argsort(mesh.triangle.reshape(-1), kind="stable").astype(np.int64)
     first = np.concatenate([[0], np.cumsum(np.bincount(mesh.triangle.reshape(-1), minlength=len(mesh.vertex)))])
     smooth = np.zeros((len(mesh.triangle), 3, 3), np.float32)
@@ -246,7 +244,6 @@ def _joined(a: _Samples, b: _Samples) -> _Samples:
 
 
 def _directions(count: int, half: bool = False) -> Float[np.ndarray, "r 3"]:
-    """Return directions spread evenly over the sphere, or by the cosine law over the upper half of it."""
     k = np.arange(count) + 0.5
     turn = np.pi * (1 + 5**0.5) * k
     z = np.sqrt(1 - k / count) if half else 1 - 2 * k / count
@@ -282,7 +279,6 @@ def _lit(samples: _Samples, lights: tuple[Light, ...], solid: _Solid, albedo: np
 def _around(
     place: Float[np.ndarray, "s 3"], light: Float32[np.ndarray, "s 2 3"], free: Bool[np.ndarray, "s 2"]
 ) -> Float32[np.ndarray, "s 3"]:
-    """Return for each sample a part of the mean light of the free samples near it: what a crevice gets."""
     low = place.min(axis=0)
     cell = np.floor((place - low) / _NEARBY_M).astype(np.int64)
     count = cell.max(axis=0) + 1

@@ -143,7 +143,6 @@ def direct(place, normal, lamp, power, empty, low, cell_m, light, start, free): 
 
 @njit(cache=True)
 def _face(nx, ny, nz):  # pragma: no cover - compiled
-    """Return which of the six sides of a box a direction looks through most: 0 +x, 1 -x, 2 +y, 3 -y, 4 +z, 5 -z."""
     ax, ay, az = abs(nx), abs(ny), abs(nz)
     if ax >= ay and ax >= az:
         return 0 if nx > 0 else 1

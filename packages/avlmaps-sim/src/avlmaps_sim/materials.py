@@ -153,7 +153,6 @@ PICTURES: tuple[str, ...] = ("rug", "painting", "poster", "screen", "books", "ke
 
 @cache
 def _texture(kind: str, pictured: bool, number: int) -> Texture:
-    """Return one texture of a kind's pool, made at the first call."""
     look = _KIND[kind]
     maker = look.pictured if pictured else look.grey
     assert maker is not None

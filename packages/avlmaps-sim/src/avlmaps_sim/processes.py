@@ -49,7 +49,6 @@ class _WithoutScript(SpawnContext):
 
 @contextmanager
 def _nameless_script() -> Generator[None]:
-    """Hide what the running script is: a process that is started now runs by its name or file what is not hidden."""
     script = vars(sys.modules["__main__"])
     hidden = {name: script.pop(name) for name in ("__spec__", "__file__") if name in script}
     script["__spec__"] = None

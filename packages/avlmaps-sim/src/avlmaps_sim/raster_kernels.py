@@ -72,7 +72,6 @@ def _snapped(x, z, focal, centre):  # pragma: no cover - compiled
 
 @njit(cache=True)
 def _span(e, step, first, last):  # pragma: no cover - compiled
-    """Return the columns of first..last, counted from where the edge function is ``e``, on which it is >= 0."""
     if step > 0:
         return max(first, (-e + step - 1) // step), last
     if step < 0:
@@ -120,7 +119,6 @@ def _fill(x0, y0, x1, y1, x2, y2, plane, limits, number, width, height, inverse,
 
 @njit(cache=True)
 def _plane(ax, ay, az, bx, by, bz, cx, cy, cz, lens):  # pragma: no cover - compiled
-    """Return (per column, per row, at the middle of pixel 0, 0) of the inverse z-depth of a triangle's plane."""
     ex, ey, ez, fx, fy, fz = bx - ax, by - ay, bz - az, cx - ax, cy - ay, cz - az
     nx, ny, nz = ey * fz - ez * fy, ez * fx - ex * fz, ex * fy - ey * fx
     d = nx * ax + ny * ay + nz * az
@@ -132,7 +130,6 @@ def _plane(ax, ay, az, bx, by, bz, cx, cy, cz, lens):  # pragma: no cover - comp
 
 @njit(cache=True)
 def _cut(ax, ay, az, bx, by, bz):  # pragma: no cover - compiled
-    """Return where the edge from a (in front) to b (behind) meets the near plane."""
     s = (NEAR_M - az) / (bz - az)
     return ax + s * (bx - ax), ay + s * (by - ay), NEAR_M
 

@@ -150,7 +150,6 @@ class _Ways:
 
 
 def _space_for(scene: Scene, reach_m: float, floor_m: float) -> FreeSpace:
-    """Return where on a floor something round may stand."""
     from avlmaps_sim.free_space import floor_heights
 
     floors = floor_heights(scene)
@@ -159,7 +158,6 @@ def _space_for(scene: Scene, reach_m: float, floor_m: float) -> FreeSpace:
 
 
 def _places(scene: Scene, reach_m: float, floor_m: float, rng: np.random.Generator) -> Float[np.ndarray, "n 2"]:
-    """Return places for something round, in random order, those beside other things rather earlier."""
     space = _space_for(scene, reach_m, floor_m)
     cells = np.argwhere(space.free)
     if not len(cells):
@@ -185,7 +183,6 @@ def _moved(scene: Scene, number: int, rng: np.random.Generator, ways: _Ways) -> 
 
 
 def _carried(scene: Scene, number: int, xy: tuple[float, float], turn_rad: float) -> Scene:
-    """Return the scene with a thing turned by an angle, the middle of its box over another place."""
     thing, own = scene.objects[number], scene.instance == number
     middle = np.array([*thing.centre[:2], 0.0])
     return _bent(scene, number, own, middle, turn_rad, xy)
@@ -229,7 +226,6 @@ def _bent(
 
 
 def _without(scene: Scene, gone: set[int]) -> Scene:
-    """Return the scene without some things."""
     if not gone:
         return scene
     stays = ~np.isin(scene.instance, list(gone))
@@ -288,7 +284,6 @@ def _swung(scene: Scene, number: int, rng: np.random.Generator, ways: _Ways) -> 
 
 
 def _meets(scene: Scene, number: int, own: Bool[np.ndarray, " t"]) -> bool:
-    """Return whether some triangles of a thing lie in the boxes of others."""
     points = scene.mesh.corners()[own].reshape(-1, 3)
     for other, thing in enumerate(scene.objects):
         if other == number or thing.category in ("floor", "ceiling", "carpet", "mat"):

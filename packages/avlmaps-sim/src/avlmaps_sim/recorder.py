@@ -60,7 +60,7 @@ class RecordSettings:
         sounds: folder of clips, as ``avlmaps add-sounds`` reads it; None makes them by rule.
         categories: only these kinds of sound; all that homes make if empty.
         sources: how many sounds; one for every twelve seconds of the walk if None.
-        ambiguous: how many kinds of sound play in two places.
+        ambiguous: how many kinds of sound play in several places (``places``).
         rate_hz: samples a second of the track.
         snr_db: how far the room's noise lies below a sound at 1 m.
         overlap_s: how much two sounds may overlap.
@@ -86,6 +86,7 @@ class RecordSettings:
     categories: tuple[str, ...] = ()
     sources: int | None = None
     ambiguous: int = 0
+    places: int = 2
     rate_hz: int = 22_050
     snr_db: float = 30.0
     overlap_s: float = 0.0
@@ -103,7 +104,8 @@ class RecordSettings:
             (10.0 <= self.fov_deg <= 150.0, f"a field of view of {self.fov_deg:g} degrees", "10 to 150"),
             (0.1 <= self.fps <= 240.0, f"{self.fps:g} frames a second", "0.1 to 240"),
             (self.sources is None or self.sources >= 0, f"{self.sources} sounds", "0 or more"),
-            (self.ambiguous >= 0, f"{self.ambiguous} kinds that sound twice", "0 or more"),
+            (self.ambiguous >= 0, f"{self.ambiguous} kinds that sound in several places", "0 or more"),
+            (self.places >= 2, f"{self.places} places of an ambiguous kind", "2 or more"),
             (0.0 <= self.overlap_s <= 5.0, f"sounds that overlap by {self.overlap_s:g} s", "0 to 5"),
             (8_000 <= self.rate_hz <= 96_000, f"a track of {self.rate_hz} Hz", "8000 to 96000"),
             (0.0 <= self.snr_db <= 90.0, f"a signal-to-noise ratio of {self.snr_db:g} dB", "0 to 90"),
@@ -236,7 +238,6 @@ def sound_again(
 
 
 def _plain(settings: RecordSettings) -> dict[str, Any]:
-    """Return the settings as JSON can hold them; how many processes drew is not a part of what was made."""
     plain = asdict(replace(settings, sounds=None, workers=1))
     return {**plain, "sounds": None if settings.sounds is None else settings.sounds.name}
 
@@ -263,10 +264,10 @@ def _soundings(scene: Scene, settings: RecordSettings, trip: _Trip, rng: np.rand
     bank = Synthesised() if settings.sounds is None else Recorded(settings.sounds, settings.rate_hz)
     count = max(1, round(trip.duration_s / _SECONDS_A_SOUND)) if settings.sources is None else settings.sources
     robot = trip.world_from_camera[:, :3, 3]
-    pairs = settings.ambiguous  # more kinds are drawn than play: not every place has its moment in the walk
-    drawn = candidates(scene, rng, 2 * (count + pairs), settings.categories, bank=bank, walk=robot)
+    doubtful = settings.ambiguous  # more kinds are drawn than play: not every place has its moment in the walk
+    drawn = candidates(scene, rng, 2 * (count + doubtful), settings.categories, bank=bank, walk=robot)
     rule = ScheduleRule(pause_s=-settings.overlap_s if settings.overlap_s > 0.0 else ScheduleRule().pause_s)
-    soundings = schedule(scene, drawn, trip.stamps_s, robot, rule, most=count, pairs=pairs)
+    soundings = schedule(scene, drawn, trip.stamps_s, robot, rule, count, doubtful, settings.places)
     if len(soundings) < count and settings.sources is not None:
         say(f"note: {len(soundings)} of {count} sounds play: the walk has no room for more.")
     return soundings
@@ -385,7 +386,6 @@ _artist: list[_Artist] = []
 
 
 def _take_up(name: str, size: int) -> None:
-    """Begin a process: take over what the frames are drawn with."""
     import cv2
 
     end_with_parent()

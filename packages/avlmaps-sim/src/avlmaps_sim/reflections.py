@@ -87,7 +87,6 @@ def in_front_of(
 def _from_corner(
     start: Int[np.ndarray, " n"], at: Float[np.ndarray, "n 3 3"], height: Float[np.ndarray, "n 3"]
 ) -> tuple[Float[np.ndarray, "3 n 3"], Float[np.ndarray, "3 n 1"]]:
-    """Return the corners of triangles and their heights, in turn from a corner of each."""
     rows, turn = np.arange(len(start)), [(start + k) % 3 for k in range(3)]
     return np.stack([at[rows, k] for k in turn]), np.stack([height[rows, k] for k in turn])[..., None]
 
@@ -95,5 +94,4 @@ def _from_corner(
 def _cut(
     ahead: Float[np.ndarray, "n 3"], behind: Float[np.ndarray, "n 3"], above: np.ndarray, below: np.ndarray
 ) -> Float[np.ndarray, "n 3"]:
-    """Return where edges meet the plane, by the heights of their ends over it."""
     return ahead + (behind - ahead) * (above / (above - below))

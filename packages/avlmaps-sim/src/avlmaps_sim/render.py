@@ -116,7 +116,6 @@ def _grouped(mesh: Mesh) -> _Groups:
 
 
 def _curve(shoulder: bool) -> UInt8[np.ndarray, " n"]:
-    """Return the 8-bit value by the root of linear light, from 0 to 2; a shoulder protects bright places from white."""
     linear = np.square(2 * np.arange(shade_kernels.LEVELS) / shade_kernels.LEVELS)
     if shoulder:
         linear = np.where(linear < 0.5, linear, 0.5 + 0.5 * np.tanh(0.9 * (linear - 0.5) / 0.5))
@@ -124,7 +123,6 @@ def _curve(shoulder: bool) -> UInt8[np.ndarray, " n"]:
 
 
 def _returns(mesh: Mesh, atlas: Atlas) -> Float32[np.ndarray, " m"]:
-    """Return the share of a depth sensor's light that each material scatters back."""
     gloss = np.array([m.gloss for m in mesh.materials], np.float32)
     opacity = np.array([m.opacity for m in mesh.materials], np.float32)
     brightness = np.sqrt(atlas.mean.max(axis=1, initial=0.0))  # many dark dyes are bright in the near infrared
@@ -195,7 +193,6 @@ class Renderer:
         view.strength.reshape(-1)[pixels] = other.strength.reshape(-1)[pixels]
 
     def _paint(self, front: _Layer, behind: _Layer, eye: _Eye, corners: _Corners) -> None:
-        """Find what each pixel shows, and the light that comes from there."""
         self._draw(front, behind, eye, corners)
         self._shade(front, eye)
         if self._any_clear:
@@ -206,7 +203,6 @@ class Renderer:
                                           behind.colour, front.colour)  # fmt: skip
 
     def _layers_for(self, pixels: int) -> tuple[_Layer, _Layer]:
-        """Return the working memory for pictures of a size, reused from the view before."""
         if self._layers is None or len(self._layers[0].shown) != pixels:
             front, behind = _Layer.empty(pixels), _Layer.empty(pixels)
             self._layers = (front, behind)
@@ -249,7 +245,6 @@ class Renderer:
                                       atlas.table, layer.colour)  # fmt: skip
 
     def _finished(self, layer: _Layer, gain: float, height: int, width: int) -> View:
-        """Return the images of a view."""
         images = (np.empty((height * width, 3), np.uint8), np.empty(height * width, np.float32),
                   np.empty(height * width, np.int32), np.empty(height * width, np.int32),
                   np.empty(height * width, np.uint8))  # fmt: skip
@@ -261,7 +256,6 @@ class Renderer:
 
 
 def _exposure(layer: _Layer) -> float:
-    """Return the gain that a camera would choose: middling places become grey, and few places white."""
     light = layer.colour[::_METER_STEP][layer.shown[::_METER_STEP] >= 0] @ np.array([0.3, 0.6, 0.1], np.float32)
     if not len(light):
         return 1.0

@@ -67,7 +67,6 @@ def robot_in(avlmap: AVLMap, scene: Scene, shape: BodyShape = BASE, start: Groun
 
 
 def _on_storey(cameras: Float[np.ndarray, "k 4 4"], obstacles: Obstacles) -> Float[np.ndarray, "m 4 4"]:
-    """Return the cameras that were carried over the floor of a storey, those on its stairs left out."""
     if obstacles.storeys is None or not len(cameras):
         return cameras
     height_m = cameras[:, :3, 3] @ obstacles.level_from_world[2]
@@ -77,7 +76,6 @@ def _on_storey(cameras: Float[np.ndarray, "k 4 4"], obstacles: Obstacles) -> Flo
 
 
 def _floor(scene: Scene, cameras: Float[np.ndarray, "k 4 4"]) -> int | None:
-    """Return which floor of a scene a walk was on; None where it cannot be decided."""
     heights = np.array(floor_heights(scene))
     below = heights < np.median(cameras[:, 2, 3]) if len(cameras) else np.zeros(len(heights), bool)
     return int(np.flatnonzero(below)[-1]) if below.any() else None
@@ -130,7 +128,6 @@ def _start_near(
 
 
 def _largest_part(free: Bool[np.ndarray, "nx ny"]) -> Bool[np.ndarray, "nx ny"]:
-    """Return the largest connected part."""
     from scipy.ndimage import label
 
     part, count = label(free, np.ones((3, 3)))  # pyright: ignore[reportGeneralTypeIssues]

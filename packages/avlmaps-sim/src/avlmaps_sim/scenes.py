@@ -53,7 +53,6 @@ def open_changed(spec: str) -> tuple[Scene, tuple[Change, ...]]:
 
 @lru_cache(maxsize=2)  # days are mostly opened one after the other, and each follows from the one before
 def _rearranged(before: str, day: int) -> tuple[Scene, tuple[Change, ...]]:
-    """Return a scene some days later, and what changed since day 0."""
     if day == 0:
         return _opened(before), ()
     scene, changes = _rearranged(before, day - 1)
@@ -77,7 +76,6 @@ def on_day(spec: str, day: int) -> str:
 
 
 def _day_of(spec: str) -> tuple[str, int | None]:
-    """Return the name of a scene on day 0, and the day that it says; None where it says none."""
     before, _, last = spec.rpartition(":")
     if before and last.startswith(_DAY) and last.removeprefix(_DAY).isdecimal():
         return before, int(last.removeprefix(_DAY))

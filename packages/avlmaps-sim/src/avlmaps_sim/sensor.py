@@ -44,7 +44,6 @@ class Shift:
 
 @lru_cache(maxsize=1)
 def _numbers() -> tuple[Float32[np.ndarray, " n"], Float32[np.ndarray, " n"]]:
-    """Return fixed Gaussian numbers and numbers from 0 to 1; where a picture begins in them is drawn."""
     rng = np.random.default_rng(20_231_006)
     gauss = rng.standard_normal(_TABLE, np.float32)
     uniform = rng.random(_TABLE, np.float32)

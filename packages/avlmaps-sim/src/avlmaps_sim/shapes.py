@@ -165,14 +165,12 @@ def tube(path: Sequence[Triple], radius: float, material: Material, sides: int =
 
 
 def _crossed(one: Float[np.ndarray, "3"], other: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
-    """Return the cross product; for single vectors this is much faster than numpy's."""
     (a, b, c), (d, e, f) = one.tolist(), other.tolist()
     return np.array([b * f - c * e, c * d - a * f, a * e - b * d])
 
 
 @lru_cache(maxsize=256)
 def _quarters(steps: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return for each point of a rounded rectangle where its corner lies (signs) and its place on the unit circle."""
     angle = np.linspace(0.0, np.pi / 2, steps)
     turns = np.concatenate([angle + quarter * np.pi / 2 for quarter in range(4)])
     signs = np.repeat(np.array([(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)]), steps, axis=0)

@@ -88,13 +88,11 @@ def viewpoints(
 
 
 def _turned_to(new: Bool[np.ndarray, " t"], targets: Targets) -> Int[np.ndarray, " m"]:
-    """Return the targets to turn to: the things that a place shows; bare floor only where it shows no thing."""
     things = np.flatnonzero(new & (targets.worth >= _OBJECT))
     return things if len(things) else np.flatnonzero(new)
 
 
 def _candidates(space: FreeSpace) -> Float[np.ndarray, "c 2"]:
-    """Return the roomiest free place of every square of the candidates' grid."""
     cells = np.argwhere(space.free)
     square = np.floor(cells * space.cell_m / _CANDIDATE_M).astype(np.int64)
     order = np.lexsort((-space.clearance_m[space.free], square[:, 1], square[:, 0]))
@@ -112,7 +110,6 @@ def areas_at(scene: Scene, space: FreeSpace, xy: Float[np.ndarray, "n 2"]) -> In
 
 
 def _entered(scene: Scene, space: FreeSpace, candidates: Float[np.ndarray, "c 2"]) -> list[np.ndarray]:
-    """Return for each area that can be entered which candidates are in the midst of its free floor."""
     free = space.middles()
     owner, of_candidate = areas_at(scene, space, free), areas_at(scene, space, candidates)
     entered = []
@@ -144,7 +141,6 @@ def targets_of(scene: Scene, space: FreeSpace, eye_m: float) -> Targets:
 
 
 def _comfort(space: FreeSpace, candidates: np.ndarray) -> np.ndarray:
-    """Return how well one stands at each place: a little better where there is room around."""
     i, j = space.cell_of(candidates).T
     return 1.0 + 0.2 * np.minimum(space.clearance_m[i, j], 0.8)
 

@@ -137,7 +137,6 @@ def _aimed(
 
 
 def _ahead(scene: Scene, space: FreeSpace, rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return n places and headings; those with the next thing at a good distance first."""
     place = space.middles()[rng.integers(np.count_nonzero(space.free), size=_TRIES * n)]
     heading = rng.uniform(-np.pi, np.pi, len(place))
     solid = occupied(scene, space, 0.1, 2.0)

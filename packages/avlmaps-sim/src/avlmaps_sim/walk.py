@@ -122,7 +122,6 @@ def _cheapest(
 
 
 def _evened(points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
-    """Average a path over a few of its points, its ends excepted: steps become a slope, as a walker's head rises."""
     half = _SMOOTH // 2
     padded = np.concatenate([np.repeat(points[:1], half, axis=0), points, np.repeat(points[-1:], half, axis=0)])
     even = np.stack([np.convolve(column, np.ones(_SMOOTH) / _SMOOTH, "valid") for column in padded.T], axis=1)
@@ -257,7 +256,6 @@ def _tour(
 
 
 def _order(cost: Float[np.ndarray, "k k"], rng: np.random.Generator) -> list[int]:
-    """Return a short open tour: the best of nearest-neighbour tours from several starts, improved by 2-opt."""
     count = len(cost)
     starts = rng.permutation(count)[:8]
     tours = [_improved(_nearest_neighbour(cost, int(start)), cost) for start in starts]
@@ -298,7 +296,6 @@ def _poses(
     settings: WalkSettings,
     rng: np.random.Generator,
 ) -> Float[np.ndarray, "n 4 4"]:
-    """Return camera poses with the pitch and roll of a camera on a mast that sways a little."""
     seconds = np.arange(len(place)) / settings.rate_hz
     sway = [np.sin(2 * np.pi * seconds / rng.uniform(4, 12) + rng.uniform(0, 2 * np.pi)) for _ in range(3)]
     pitch = pitch_rad - settings.pitch_down_rad + settings.pitch_sway_rad * sway[0]

@@ -25,7 +25,7 @@ def test_the_table_has_a_row_for_the_place_and_one_for_others() -> None:
     assert other[6:12] == [""] * 6
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_photos_of_other_places_can_be_given() -> None:
     other = RoomWalk(frames=3, seed=5)
     table = run(RoomWalk(frames=8, turn=0.1), 0, steps=(2,), photos=1, foreign=[other.frame(i).rgb for i in range(3)])
@@ -41,7 +41,7 @@ def red_kitchen(shared_data: Path) -> tuple[Recording, MapOfPictures]:
     )
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.shared
 def test_half_of_the_red_kitchen_locates_the_other_half(red_kitchen: tuple[Recording, MapOfPictures]) -> None:
     """The issue's figures, in the first part of the walk; `avlmaps bench locate` asks everywhere."""
@@ -55,7 +55,7 @@ def test_half_of_the_red_kitchen_locates_the_other_half(red_kitchen: tuple[Recor
     assert np.isinf(foreign_errors(stored, mirrored, 0).cm).all()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.shared
 def test_the_depth_cameras_intrinsics_do_not_spoil_the_red_kitchen(
     red_kitchen: tuple[Recording, MapOfPictures],

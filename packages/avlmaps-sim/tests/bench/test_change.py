@@ -72,7 +72,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
     return out, run_change(settings, 2, out)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_home_over_two_days_is_recognised_and_judged(bench: tuple[Path, dict]) -> None:
     out, answer = bench
     row = answer["tables"]["homes, true perception"]["rows"][0]
@@ -83,7 +83,7 @@ def test_a_home_over_two_days_is_recognised_and_judged(bench: tuple[Path, dict])
     assert json.loads((out / "change.json").read_text())["days"] == 2
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_merged_map_is_a_map_and_bad_merges_are_refused(bench: tuple[Path, dict], tmp_path: Path) -> None:
     work = bench[0] / "work"
     (first,) = work.glob("house-7-*/synthetic.avlmap")
@@ -107,7 +107,7 @@ def test_a_merged_map_is_a_map_and_bad_merges_are_refused(bench: tuple[Path, dic
     assert not (tmp_path / "no.avlmap").exists()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_another_home_is_refused_with_numbers(
     bench: tuple[Path, dict], tmp_path_factory: pytest.TempPathFactory, tmp_path: Path
 ) -> None:

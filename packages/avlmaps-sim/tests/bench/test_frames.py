@@ -282,7 +282,7 @@ def test_suites_of_the_embedded_encoder_refuse_another_model(tmp_path: Path, sui
         run_suite(suite, SuiteInputs(sounds=tmp_path, models=("pixels=colours",)), tmp_path / "out")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_suite_writes_its_tables_in_every_form(tmp_path: Path, folder: Path) -> None:
     answer = run_suite("frames", SuiteInputs(nyuv2=folder, profile="synthetic"), tmp_path / "out")
     assert set(answer["tables"]) == {"labelled frames", "by class", "by class at several scales"}

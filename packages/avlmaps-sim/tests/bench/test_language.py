@@ -19,7 +19,7 @@ REACHED = {
 }  # fmt: skip
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", REACHED)
 def test_a_sealed_list_stays_understood(name: str) -> None:
     judged = [judge(row) for row in shipped(name)[::3]]

@@ -13,7 +13,7 @@ from avlmaps_sim.bench.output import BenchError
 from helpers.walked_room import write_walk
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_drive_ends_as_its_build_and_says_what_it_took(tmp_path: Path) -> None:
     walk, used = write_walk(tmp_path / "rec"), avlmaps.Encoders.named("colours")
     tables = run_live([walk], used, "colours", LiveBench(laps=2, kills=0, rate=20.0), 0, tmp_path)
@@ -68,7 +68,7 @@ def test_what_a_killed_process_runs_decides_whether_kills_are_made_again(tmp_pat
         file.write_text("one")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_kill_leaves_a_whole_map_and_the_lost_seconds_are_counted(tmp_path: Path) -> None:
     walk = write_walk(tmp_path / "rec")
     assert lost_s(walk, tmp_path / "map", "colours", np.random.default_rng(0), 0.5) >= 0.0

@@ -137,7 +137,7 @@ def test_what_was_mended_is_told_and_refusals_are_counted() -> None:
     assert made["note"].startswith("1 of 2")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_an_array_that_was_put_wrong_is_calibrated_and_its_track_is_late(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     wrong = Wrong.of(microphones_named("square4"), rng)

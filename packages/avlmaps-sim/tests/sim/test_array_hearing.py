@@ -73,7 +73,7 @@ def test_reflections_are_those_of_pyroomacoustics() -> None:
         assert np.linalg.norm(theirs - ours) < 0.12 * np.linalg.norm(theirs)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_late_field_is_diffuse() -> None:
     building, apart_m = Acoustics(shoebox(), RATE_HZ), 0.2
     ears = np.array([[[3.0, 2.5, 1.3], [3.0 + apart_m, 2.5, 1.3]]])

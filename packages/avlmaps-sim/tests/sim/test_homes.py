@@ -69,7 +69,7 @@ def test_the_same_seed_makes_the_same_home() -> None:
     assert again.lights == first.lights
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_other_seeds_make_other_homes() -> None:
     plans = {tuple((area.kind, round(float(area_m2(area.polygon)), 3)) for area in home(seed).areas) for seed in SEEDS}
     assert len(plans) == len(SEEDS)
@@ -282,7 +282,7 @@ def test_the_cloth_of_a_tub_becomes_a_shower_curtain() -> None:
     assert (scene.instance == 0).any() and (scene.instance == 2).any()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_scene_of_that_name_holds_people_and_mirrors_that_reflect() -> None:
     bare, full = open_scene("house:3:training"), open_scene("house:3:training:lived-in")
     assert full.objects[: len(bare.objects)] == bare.objects and len(full.objects) > len(bare.objects)

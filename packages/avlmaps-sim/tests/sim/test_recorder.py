@@ -105,7 +105,7 @@ def test_its_events_say_what_sounds_where_and_the_track_is_loud_then(recorded: P
 FAULTY = changed(sensor="kinect", drift=OdometryFaults(), semantic=True, max_frames=6)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_same_seed_gives_the_same_bytes(tmp_path: Path) -> None:
     for name in ("one", "two"):
         record_scene(flat(), tmp_path / name, replace(FAULTY, hearing="acoustic"), seed=5)
@@ -139,7 +139,7 @@ def ran(script: str, folder: Path) -> "subprocess.CompletedProcess[str]":
     return subprocess.run(command, cwd=folder, env=path, timeout=240, capture_output=True, text=True, check=False)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_script_needs_no_guard_and_its_processes_write_the_same_bytes(tmp_path: Path) -> None:
     done = ran(_UNGUARDED.format(scene="flat()", settings=replace(FAULTY, workers=2)), tmp_path)
     assert done.returncode == 0, done.stderr
@@ -147,7 +147,7 @@ def test_a_script_needs_no_guard_and_its_processes_write_the_same_bytes(tmp_path
     assert fingerprint(tmp_path / "one") == fingerprint(tmp_path / "rec")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_processes_that_die_are_told_and_never_waited_for(tmp_path: Path) -> None:
     own = "Own(**{name: getattr(flat(), name) for name in Scene.__dataclass_fields__})"
     silent = changed(hearing="none", max_frames=4, workers=2)

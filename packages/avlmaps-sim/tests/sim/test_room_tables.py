@@ -28,7 +28,7 @@ def test_rooms_are_called_as_the_view_encoder_calls_them(kind: str, name: str) -
     assert kind_of_room(kind) == name
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_scene_is_counted_room_by_room() -> None:
     scene = open_scene("house:300000:training")
     rooms = rooms_of(scene)

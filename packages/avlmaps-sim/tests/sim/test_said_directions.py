@@ -93,7 +93,7 @@ def test_an_offset_of_no_device_is_refused() -> None:
         RecordSettings(directions_offset_deg=90.0)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_next_map_begins_with_the_offset_that_the_first_one_stored(tmp_path: Path) -> None:
     settings = RecordSettings(
         size=(64, 48), fps=4.0, sources=2, workers=1, max_frames=30, directions=True, directions_offset_deg=60.0

@@ -25,7 +25,7 @@ from avlmaps.query.avlmap import AVLMap
 from avlmaps.recordings.open import open_recording
 from helpers.heard_flat import heard_flat
 
-pytestmark = pytest.mark.slow  # the recording and the map are made by the first of the modules that need them
+pytestmark = pytest.mark.nightly  # the recording and the map are made by the first of the modules that need them
 
 
 @pytest.fixture(scope="module")

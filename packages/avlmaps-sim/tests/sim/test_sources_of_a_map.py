@@ -35,7 +35,7 @@ from helpers.hearing_scenes import flat, shoebox
 from helpers.kinematic import KinematicDriver
 
 ROBOT = SoundSettings(at="robot")
-pytestmark = pytest.mark.slow  # the recording and the map are made by the first of the modules that need them
+pytestmark = pytest.mark.nightly  # the recording and the map are made by the first of the modules that need them
 
 SOURCE = np.array([1.5, 4.2, 0.6])
 

@@ -13,7 +13,7 @@ from avlmaps.recordings.open import open_recording
 from avlmaps_sim.recorder import RecordSettings, record_scene
 from avlmaps_sim.scenes import open_scene
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.nightly
 
 
 @pytest.fixture(scope="module")

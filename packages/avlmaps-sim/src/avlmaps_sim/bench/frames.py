@@ -99,14 +99,12 @@ def measure(
 
 
 def _confusion(label: UInt8[np.ndarray, "h w"], said: Int[np.ndarray, "h w"]) -> Int[np.ndarray, "37 37"]:
-    """Return the scored pixels of each true class that were taken for each class."""
     truth, said = label[::STEP, ::STEP].astype(np.int64) - 1, said[::STEP, ::STEP]
     scored = (truth >= 0) & (truth < SCORED)
     return np.bincount(truth[scored] * SCORED + said[scored], minlength=SCORED**2).reshape(SCORED, SCORED)
 
 
 def _figures(counts: Sequence[Int[np.ndarray, "37 37"]], labelled: int) -> FrameFigures:
-    """Return the figures of frames from each one's confusion."""
     shares = [np.trace(own) / own.sum() for own in counts if own.any()]
     return FrameFigures(np.sum(counts, axis=0), len(counts), labelled, np.array(shares, np.float32))
 

@@ -143,7 +143,6 @@ def smooth_depth(value: UInt8[np.ndarray, "h w"]) -> Float32[np.ndarray, "h w"]:
 
 
 def _grounded(frame: Frame, label: UInt8[np.ndarray, "h w"], up: Float[np.ndarray, "3"]) -> LabelledFrame:
-    """Return the frame on the floor that its labels show, or on the one that a build would find."""
     floor = (label == _FLOOR) & (frame.depth_m > 0.0)
     is_labelled = bool(floor.mean() >= LEAST_FLOOR)
     if is_labelled:

@@ -166,7 +166,6 @@ def _answered(got: Mapping[str, Any], wanted: Any) -> str:
 
 
 def _plainly(got: Mapping[str, Any], ask: str) -> Mapping[str, Any]:
-    """Return an answer from the lists as what it answers too: a room says where, "2 of the 3" says how many."""
     if "room_of" in got and ask == "where":
         return {"ask": "where", "of": [got["room_of"]]}
     if "at_least" in got:
@@ -175,7 +174,6 @@ def _plainly(got: Mapping[str, Any], ask: str) -> Mapping[str, Any]:
 
 
 def _without_storey(target: Any, said: str) -> Any:
-    """Return a target without the storey that a question names apart from it: the "upstairs bathroom" upstairs."""
     near = [_without_storey(one, said) for one in target.get("near", ()) if one.get("area") != said]
     plain = {key: value.replace(said, "").strip() if isinstance(value, str) else value for key, value in target.items()}
     return {**plain, "near": near} if near else {key: value for key, value in plain.items() if key != "near"}
@@ -198,7 +196,6 @@ def _outcome(got: Sequence[Any], wanted: Sequence[Any]) -> str:
 
 
 def _plain(intents: Sequence[Any]) -> list[Any]:
-    """Return intents with names as the lexicon has them and without what a list need not say."""
     return [_intent(each) for each in intents]
 
 
@@ -230,7 +227,6 @@ def _rounded(value: Any) -> float | None:
 
 
 def _places(intents: Sequence[Any]) -> list[Any]:
-    """Return where the robot goes; turns count where a straight move follows, for they decide where it ends."""
     flat = [part for each in intents for part in (each[2] * each[1] if each[0] == "repeat" else (each,))]
     keeps = _LOOKS - ({"turn", "face"} if any(each[0] == "move" for each in flat) else frozenset())
     return [each for each in flat if each[0] not in keeps]
@@ -252,7 +248,6 @@ def _target(target: Any) -> Any:
 
 
 def _storey_apart(target: Any, kind: str) -> Any:
-    """Return a target with the storey that its name carries among what it is near, as lists have it."""
     from avlmaps.language.storey_words import said_storeys
 
     storeys = said_storeys(str(target[kind])) if kind in ("object", "area") else ()
@@ -263,7 +258,6 @@ def _storey_apart(target: Any, kind: str) -> Any:
 
 
 def _is_both(name: str) -> bool:
-    """Return whether a name is one of a thing and of a room."""
     words = name.lower().split()
     tail = words[-1] if words else ""
     return lexicon().find(tail, EntryKind.THING) is not None and lexicon().find(tail, EntryKind.ROOM) is not None

@@ -168,7 +168,6 @@ def _figures(errors: Errors) -> list[object]:
 
 
 def _percentile(values: Float[np.ndarray, " n"], q: float) -> object:
-    """Return a percentile over all photos, the unlocated ones being infinitely far off."""
     value = float(np.sort(values)[min(len(values) - 1, int(len(values) * q / 100))])
     return round(value, 2) if np.isfinite(value) else "not located"
 

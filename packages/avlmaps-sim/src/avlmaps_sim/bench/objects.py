@@ -26,7 +26,7 @@ from avlmaps.query.naming import VoxelNamer
 from avlmaps_sim.bench.harness.chosen import chosen_on
 from avlmaps_sim.bench.harness.intervals import of_mean, wilson
 from avlmaps_sim.bench.harness.provenance import in_words, provenance, shown_scene
-from avlmaps_sim.bench.output import draw, markdown, write_answer
+from avlmaps_sim.bench.output import markdown, write_answer
 from avlmaps_sim.scene import SceneObject
 
 if TYPE_CHECKING:
@@ -152,7 +152,6 @@ def _inside(centres: Float[np.ndarray, "n 3"], thing: SceneObject, grown_m: floa
 
 
 def _distance(position: Sequence[float], things: Sequence[SceneObject]) -> float:
-    """Return the distance of a place to the nearest point of the nearest box."""
     place = np.array(position)
     gaps = [np.maximum(np.array(t.low) - place, 0) + np.maximum(place - np.array(t.high), 0) for t in things]
     return float(min(np.linalg.norm(gap) for gap in gaps))
@@ -185,12 +184,10 @@ def run_objects(settings: "IndexingSettings | None", out: Path) -> dict[str, Any
     tables = {name: {**table, "chosen on": chosen} if chosen else table for name, table in named.items()}
     answer = {"suite": "objects", **provenance(settings, settings.recorded, settings.scenes, weights), "tables": tables}
     written = write_answer(answer, out, f"{in_words(answer)}\n\n{markdown(tables)}")
-    draw(tables, out / "objects.png")
     return written
 
 
 def _same(things: Sequence[SceneObject]) -> dict[str, str]:
-    """Return the lexicon's name for what scenes from files call otherwise: ``picture frame`` counts as ``picture``."""
     entries = {thing.category: lexicon().find(thing.category, EntryKind.THING) for thing in things}
     return {word: entry.name for word, entry in entries.items() if entry is not None}
 
@@ -246,7 +243,6 @@ def _row(name: str, scenes: Sequence[ObjectFigures]) -> list[str]:
 
 
 def _naming(voxels: Int[np.ndarray, " things"], named: Int[np.ndarray, " things"]) -> list[str]:
-    """Return the share of voxels named rightly, and its mean over things with an interval; voxels of one are alike."""
     shares = named[voxels > 0] / voxels[voxels > 0]
     if not len(shares):
         return ["none", "none"]

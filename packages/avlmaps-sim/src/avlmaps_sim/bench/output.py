@@ -4,7 +4,6 @@ import csv
 import io
 import json
 import re
-import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -61,42 +60,3 @@ def table_markdown(table: Table) -> str:
 
 def _row(cells: Sequence[object]) -> str:
     return "| " + " | ".join(str(cell).replace("|", "\\|") for cell in cells) + " |"
-
-
-_ROW_IN, _COLUMNS = 0.26, 80  # height of a line in the picture, inches; characters of one
-
-
-def _wrapped(cell: object) -> str:
-    return textwrap.fill(str(cell), _COLUMNS)
-
-
-def _lines(row: Sequence[str]) -> int:
-    return max(cell.count("\n") + 1 for cell in row)
-
-
-def draw(tables: Mapping[str, Table], path: Path) -> None:
-    """Draw tables as a picture, to be pasted where Markdown is not shown."""
-    from matplotlib.figure import Figure
-
-    wrapped = {name: [[_wrapped(cell) for cell in row] for row in table["rows"]] for name, table in tables.items()}
-    heights = [_ROW_IN * (1 + sum(map(_lines, rows))) + 0.6 for rows in wrapped.values()]
-    figure = Figure(figsize=(12, sum(heights)))
-    panes = figure.subplots(len(tables), 1, height_ratios=heights, squeeze=False)[:, 0]
-    for axes, (name, table) in zip(panes, tables.items(), strict=True):
-        axes.axis("off")
-        axes.set_title(name, loc="left", fontsize=11, fontweight="bold")
-        if not table["rows"]:
-            continue
-        cells = wrapped[name]
-        columns = [str(column) for column in table["columns"]]
-        drawn = axes.table(cells, colLabels=columns, loc="upper left", cellLoc="left")
-        drawn.auto_set_font_size(False)
-        drawn.set_fontsize(9)
-        drawn.auto_set_column_width(list(range(len(columns))))
-        for (row, _), cell in drawn.get_celld().items():
-            cell.set_edgecolor("#dddddd")
-            if row == 0:
-                cell.set_text_props(fontweight="bold")
-            else:
-                cell.set_height(cell.get_height() * _lines(cells[row - 1]))
-    figure.savefig(path, dpi=110, bbox_inches="tight")

@@ -80,7 +80,6 @@ def others_table(
 
 
 def _sums(rows: list[list[Any]]) -> list[list[Any]]:
-    """Return a line for each origin."""
     sums = []
     for origin in ("recorded", "synthesised", "unknown to it"):
         mine = [row for row in rows if row[2] == origin]

@@ -12,7 +12,7 @@ from avlmaps.perception.encoders import Encoders, encoders_of
 from avlmaps.perception.profiles import choose_models
 from avlmaps_sim.bench.harness.models import checksums, shipped_checksums
 from avlmaps_sim.bench.harness.provenance import in_words
-from avlmaps_sim.bench.output import BenchError, Table, draw, markdown, write_answer
+from avlmaps_sim.bench.output import BenchError, Table, markdown, write_answer
 
 if TYPE_CHECKING:
     from avlmaps_sim.bench.harness.settings import SceneSettings
@@ -56,7 +56,7 @@ class SuiteInputs:
 
 
 def run_suite(suite: str, inputs: SuiteInputs, out: Path) -> dict[str, Any]:
-    """Run a suite and write SUITE.json, SUITE.md, SUITE.png and a CSV file for each table into ``out``.
+    """Run a suite and write SUITE.json, SUITE.md and a CSV file for each table into ``out``.
 
     Args:
         suite: ``words``, ``language``, ``sounds``, ``segmentation``, ``locate``, ``frames``, ``recordings``,
@@ -129,7 +129,6 @@ def _written(
         "tables": tables,
     }
     written = write_answer(answer, out, f"{in_words(answer)}\n\n{markdown(tables)}")
-    draw(tables, out / f"{suite}.png")
     return written
 
 
@@ -144,7 +143,6 @@ _MEASURED = {
 
 
 def _weights(suite: str, used: Encoders) -> dict[str, str]:
-    """Return the checksums of the models that a suite measures, by module."""
     if suite == "words":
         return {"words": shipped_checksums()["words"]}
     known = checksums(used)

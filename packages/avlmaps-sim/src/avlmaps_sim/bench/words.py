@@ -35,7 +35,6 @@ def places(encoder: EmbeddedWords, rows: Sequence[tuple[str, str, str]]) -> np.n
 
 
 def _milliseconds_a_phrase(encoder: EmbeddedWords, phrases: Sequence[str]) -> float:
-    """Return the best processor time of five runs over phrases not yet seen (the encoder remembers those it has)."""
     spent = []
     for turn in range(5):
         fresh = [f"{phrase} {number} {turn}" for number, phrase in enumerate(phrases)]

@@ -94,7 +94,6 @@ class Evidence:
 
 
 def _shown(folder: Path, count: int) -> Bool[np.ndarray, " objects"]:
-    """Return which things filled enough of enough pictures; pictures hold the instance plus one."""
     import cv2
 
     frames: Int[np.ndarray, " objects"] = np.zeros(count, np.int64)

@@ -59,7 +59,6 @@ def fits(scene: Scene) -> bool:
 
 
 def _far_apart(evidence: Evidence) -> list[str]:
-    """Return the kinds of furniture of which one can be near a place that another is far from."""
     found: list[str] = []
     for category, own in evidence.ambiguous().items():
         boxes = [Box.of(evidence.objects[i]) for i in own]

@@ -210,7 +210,6 @@ def alone_near(
 
 
 def _several(evidence: Evidence, wanted: Sequence[str], used: Sequence[str]) -> list[tuple[str, list[int]]]:
-    """Return those of the wanted things of which there are several, those of earlier queries last."""
     ambiguous = evidence.ambiguous()
     names = sorted((name for name in wanted if name in ambiguous), key=lambda name: name in used)
     return [(name, ambiguous[name]) for name in names]

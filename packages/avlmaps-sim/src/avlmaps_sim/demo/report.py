@@ -304,7 +304,6 @@ def _said(step: "Step") -> str:
 
 
 def _without_folder(note: str, step: "Step") -> str:
-    """Return a note with the names of files alone, as the commands beside it have them."""
     for part in step.ask.question.parts:
         if part.is_file:
             note = note.replace(part.query, Path(part.query).name)

@@ -102,7 +102,6 @@ def run_demo(
 
 @contextmanager
 def _stage(name: str, seconds: dict[str, float], sentence: str) -> Iterator[None]:
-    """Print what begins, and store how long it took."""
     say(sentence)
     begin = perf_counter()
     yield
@@ -169,7 +168,6 @@ def _choose(
 
 
 def _write_clip(asks: list[Ask], out: Path, rng: np.random.Generator) -> None:
-    """Make another recording of the sound that is queried by a clip."""
     import soundfile
 
     from avlmaps_sim.hearing import Synthesised
@@ -189,7 +187,6 @@ def _answer(avlmap: "AVLMap", ask: Ask, number: int, out: Path) -> "tuple[Step, 
 
 
 def _write_page(avlmap: "AVLMap", asks: "list[Ask]", out: Path) -> None:
-    """Write the map as one page with the questions that are words alone."""
     from avlmaps.view.page import write_page
 
     words = [(ask.title, ask.question) for ask in asks if not any(part.is_file for part in ask.question.parts)]
@@ -197,7 +194,6 @@ def _write_page(avlmap: "AVLMap", asks: "list[Ask]", out: Path) -> None:
 
 
 def _located(avlmap: "AVLMap", photo: "PhotoView", out: Path) -> tuple[float, float] | None:
-    """Return how far off the map takes the photo's camera to be, cm and degrees; None where it is not located."""
     from avlmaps.core.poses import rotation_angle_rad
     from avlmaps.query.modalities.image import read_picture
 

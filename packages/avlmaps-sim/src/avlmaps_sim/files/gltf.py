@@ -245,7 +245,6 @@ def _look(material: PBRMaterial) -> Material:
 
 
 def _picture(image: Any) -> UInt8[np.ndarray, "h w 3"] | None:
-    """Return a picture as an array; of a very large one every second pixel, until it is not."""
     if image is None:
         return None
     picture = np.asarray(image.convert("RGB"), np.uint8)
@@ -260,7 +259,6 @@ def _srgb(linear: np.ndarray) -> np.ndarray:
 
 
 def _up(wanted: Axis, notes: dict[str, Any], header: dict[str, Any], parts: Sequence[MeshPart]) -> str:
-    """Decide which axis of a file is up."""
     if wanted != "auto":
         return wanted
     extras = header.get("asset", {}).get("extras")

@@ -131,7 +131,6 @@ def _data_set(path: Path) -> _DataSet:
 
 
 def _words(root: Path) -> dict[int, str]:
-    """Read the lexicon: a word for each semantic id."""
     for pattern in _LEXICONS:
         for file in sorted(root.glob(pattern)):
             classes = read_json(file).get("classes", ())
@@ -156,7 +155,6 @@ def _categories(root: Path) -> dict[str, str]:
 
 
 def _framed(mesh: Mesh, config: dict[str, Any]) -> Mesh:
-    """Turn and scale a model into Habitat's axes, as its config says."""
     up = np.array(config.get("up", (0.0, 1.0, 0.0)), np.float64)
     front = np.array(config.get("front", (0.0, 0.0, -1.0)), np.float64)
     if abs(up @ front) > 1e-3 or not np.linalg.norm(up) or not np.linalg.norm(front):
@@ -167,7 +165,6 @@ def _framed(mesh: Mesh, config: dict[str, Any]) -> Mesh:
 
 
 def _matrix(thing: dict[str, Any]) -> tuple[Float[np.ndarray, "3 3"], Float[np.ndarray, "3"]]:
-    """Return the linear part and the translation of an instance, in Habitat's axes."""
     w, x, y, z = (float(v) for v in thing.get("rotation", (1.0, 0.0, 0.0, 0.0)))
     scale = np.broadcast_to(np.array(thing.get("non_uniform_scale", 1.0), np.float64), (3,))
     turn = Rotation.from_quat([x, y, z, w]).as_matrix()
@@ -197,7 +194,6 @@ def _own_id(thing: dict[str, Any]) -> dict[str, Any]:
 
 
 def _add_articulated(builder: SceneBuilder, data: _DataSet, thing: dict[str, Any]) -> None:
-    """Add a thing with joints, in its closed state."""
     name = Path(str(thing["template_name"])).name.removesuffix(".urdf")
     file = data.files.get(f"{name}.urdf")
     if file is None:
@@ -208,7 +204,6 @@ def _add_articulated(builder: SceneBuilder, data: _DataSet, thing: dict[str, Any
 
 
 def _add_stage(builder: SceneBuilder, mesh: Mesh) -> None:
-    """Add the empty building: what faces up is floor, what faces down is ceiling, the rest is wall."""
     upward = np.abs(mesh.normals()[:, 2]) > _FLAT
     height = mesh.corners()[:, :, 2].mean(axis=1)
     middle = (float(mesh.low[2]) + float(mesh.high[2])) / 2
@@ -220,7 +215,6 @@ def _add_stage(builder: SceneBuilder, mesh: Mesh) -> None:
 
 
 def _trimmed(mesh: Mesh) -> Mesh:
-    """Return a mesh without the vertices that no triangle names."""
     used, triangle = np.unique(mesh.triangle, return_inverse=True)
     return Mesh(mesh.vertex[used], triangle.reshape(-1, 3).astype(np.int32), mesh.uv, mesh.material, mesh.materials)
 

@@ -126,7 +126,6 @@ def _paint(part: MeshPart, weight: Float[np.ndarray, "3"]) -> Int[np.ndarray, " 
 
 
 def _textured(path: Path) -> Mesh:
-    """Read the mesh that a camera sees."""
     if not path.exists() and path.with_name(f"{path.stem}.basis.glb").exists():
         raise SceneError(
             f"the pictures of {path.stem}.basis.glb are packed for graphics cards (Basis Universal); "

@@ -138,7 +138,6 @@ def cut(mesh: Mesh, longest_m: float) -> tuple[Mesh, Int[np.ndarray, " t"]]:
 def _halved(
     corners: np.ndarray, uv: np.ndarray, origin: np.ndarray, longest: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Halve every triangle at the middle of its longest edge (which begins at corner ``longest``)."""
     turn = (longest[:, None] + np.arange(3)) % 3
 
     def halves(value: np.ndarray) -> np.ndarray:
@@ -150,7 +149,6 @@ def _halved(
 
 
 def _boxes(mesh: Mesh, instance: np.ndarray, count: int) -> list[tuple]:
-    """Return the lowest and the highest corner of every instance."""
     corners = mesh.corners()
     low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
     np.minimum.at(low, instance, corners.min(axis=1))

@@ -130,7 +130,6 @@ def _note(house: House, words: list[str]) -> None:
 
 
 def _object_of_face(path: Path, house: House, scan: PlyMesh) -> Int[np.ndarray, " t"]:
-    """Return which object each face belongs to: said by the PLY, or by its segment."""
     if "object_id" in scan.face:
         return scan.face["object_id"]
     for name in ("segment_id", "face_material", "material_id"):
@@ -190,7 +189,6 @@ def _outline(house: House, region: int, low: np.ndarray, high: np.ndarray) -> Fl
 
 
 def _meanings(house: House, area_of_region: dict[int, int]) -> dict[int, Label]:
-    """Return the category of each object: one of forty, named by the annotator's word."""
     meanings = {}
     for index, (region, category) in house.thing.items():
         raw, one_of_forty = house.category.get(category, ("", ""))

@@ -115,7 +115,6 @@ def _twin_tub(rng: np.random.Generator) -> Parts:
 
 
 def _hose(path: list[tuple[float, float, float]], look: Material, radius: float = 0.018) -> Mesh:
-    """Return a bent hose through some points."""
     points = np.array(path)
     t = np.linspace(0, len(points) - 1, 5 * (len(points) - 1) + 1)
     smooth = np.column_stack([np.interp(t, np.arange(len(points)), points[:, i]) for i in range(3)])
@@ -206,7 +205,6 @@ def _drum(rng: np.random.Generator) -> Parts:
 
 
 def _board(rng: np.random.Generator, long: float, wide: float) -> Mesh:
-    """Return an ironing board's top about z = 0, its pointed end at +y."""
     y = np.array([-0.5, -0.47, -0.2, 0.1, 0.3, 0.42, 0.48, 0.5])
     half = np.array([0.42, 0.5, 0.5, 0.48, 0.38, 0.24, 0.12, 0.03]) * wide
     flat = np.concatenate([np.column_stack([half, y * long]), np.column_stack([-half, y * long])[::-1]])
@@ -217,7 +215,6 @@ def _board(rng: np.random.Generator, long: float, wide: float) -> Mesh:
 
 
 def _strip(ring: np.ndarray, look: Material) -> Mesh:
-    """Return the flat face of a ring whose first and second half run along each other."""
     n = len(ring) // 2
     return cloth(np.stack([ring[:n], ring[n:][::-1]]), look)
 

@@ -17,7 +17,6 @@ def _strap(path: list[tuple[float, float, float]], look: Material, wide: float =
 
 
 def _arch(x: float, y: float, z: float, reach: float, rise: float, look: Material) -> Mesh:
-    """Return a handle's arch across y at x."""
     angle = np.linspace(0.0, np.pi, 7)
     return _strap([(x, y + reach * float(np.cos(a)), z + rise * float(np.sin(a))) for a in angle], look)
 

@@ -69,7 +69,6 @@ def _button(x: float, y: float, z: float, look: Material) -> Mesh:
 
 
 def _flush(rng: np.random.Generator, deep: float, wide: float, top: float, metal: Material) -> list[Mesh]:
-    """Return the flush of the tank: a button on its lid, two buttons, or a lever at its front."""
     if chance(rng, 0.3):
         return [tube([(deep, -wide * 0.35, top - 0.07), (deep + 0.02, -wide * 0.35, top - 0.07),
                       (deep + 0.022, -wide * 0.15, top - 0.075)], 0.006, metal, 5)]  # fmt: skip
@@ -86,7 +85,6 @@ def _tank(rng: np.random.Generator, deep: float, wide: float, z: tuple[float, fl
 
 
 def _sizes(rng: np.random.Generator) -> tuple[float, float, float, float]:
-    """Return length, width and height of a toilet's rim, metres, and how square it is."""
     return draw(rng, 0.42, 0.52), draw(rng, 0.34, 0.4), draw(rng, 0.38, 0.46), pick(rng, (2.0, 2.2, 2.6, 4.0))
 
 
@@ -202,13 +200,11 @@ def _tub(low: Triple, high: Triple, power: float, wall: float, look: Material, s
 
 
 def _tub_tap(rng: np.random.Generator, x: float, y: float, z: float, metal: Material) -> list[Mesh]:
-    """Return a tap at the middle of the back or at the end of a tub's rim, pouring inwards."""
     parts = tap(rng, (0.0, 0.0, 0.0), draw(rng, 0.12, 0.18), draw(rng, 0.1, 0.2), metal)
     return [joined(parts).turned(-np.pi / 2).moved(x, y, z)]
 
 
 def _tub_size(rng: np.random.Generator) -> tuple[float, float, float]:
-    """Return width, length and height of a tub, metres."""
     return draw(rng, 0.66, 0.85), draw(rng, 1.4, 1.85), draw(rng, 0.48, 0.62)
 
 

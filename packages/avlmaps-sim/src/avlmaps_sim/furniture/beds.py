@@ -104,7 +104,6 @@ def _runner(rng: np.random.Generator, plan: BedPlan, hang: float) -> Mesh:
 
 
 def _rails(plan: BedPlan, look: Material, tall: float, thick: float = 0.025) -> Meshes:
-    """Return the boards along the sides and the slatted ground, seen as one board."""
     y, z = plan.width / 2, plan.base + 0.03
     low = max(z - tall, 0.02)
     for s in (1, -1):

@@ -16,7 +16,6 @@ from avlmaps_sim.shapes import box, cylinder, lathe, prism, rounded_rectangle, s
 
 
 def _barred(length: float, low: float, high: float, bar: float, look: Material, round_bars: bool) -> Meshes:
-    """Return a fence along y of a length about y = 0 at x = 0: two rails with bars between."""
     yield from [box((-0.015, -length / 2, z - 0.04), (0.015, length / 2, z), look) for z in (low + 0.04, high)]
     number = max(2, int(length / bar))
     for y in np.linspace(-length / 2, length / 2, number + 2)[1:-1].tolist():
@@ -116,7 +115,6 @@ def travel_cot(rng: np.random.Generator) -> Parts:
 
 
 def _ladder(rng: np.random.Generator, x: float, y: float, top: float, look: Material) -> Meshes:
-    """Return a ladder with flat steps at (x, y), its foot standing out along y."""
     lean = draw(rng, 0.0, 0.25)
     yield from [tube([(x + s * 0.18, y + lean, 0.0), (x + s * 0.18, y, top)], 0.018, look, 4) for s in (1, -1)]
     steps = np.arange(0.25, top - 0.05, 0.27).tolist()

@@ -181,7 +181,6 @@ def split(low: float, high: float, shares: list[float]) -> list[tuple[float, flo
 
 
 def _gap(x: float, low: tuple[float, float], high: tuple[float, float]) -> Mesh:
-    """Return the dark that one sees in the gaps round a closed front, just before x."""
     (b, c), (e, f) = low, high
     return sheet((x + 0.001, b, c), (0.0, e - b, 0.0), (0.0, 0.0, f - c), _SHADOW)
 

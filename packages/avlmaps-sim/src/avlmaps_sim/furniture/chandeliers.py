@@ -17,7 +17,6 @@ def _metal(rng: np.random.Generator) -> Material:
 
 
 def _hung(rng: np.random.Generator, z: float, top: float, look: Material, x: float = 0.0) -> list[Mesh]:
-    """Return a rose on the ceiling at ``top`` and a rod or cord from it down to z."""
     rose = lathe([(0.012, top - 0.05), (0.045, top - 0.02), (draw(rng, 0.045, 0.07), top)], look, x, 0.0, 12)
     return [rose, cylinder(x, 0.0, z, draw(rng, 0.004, 0.01), top - z, look, 6)]
 

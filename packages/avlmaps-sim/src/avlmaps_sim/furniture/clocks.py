@@ -13,7 +13,6 @@ from avlmaps_sim.shapes import box, circle, cylinder, ellipsoid, loft, rounded_b
 
 
 def _hands(rng: np.random.Generator, x: float, z: float, radius: float, look: Material) -> Meshes:
-    """Return a clock's two hands round (y = 0, z)."""
     for share, wide in ((0.5, 0.05), (0.78, 0.035)):
         a = draw(rng, 0.0, 2 * np.pi)
         yield strut((x, -0.1 * radius * float(np.cos(a)), z - 0.1 * radius * float(np.sin(a))),

@@ -247,7 +247,6 @@ _SIZES = ((0.21, 0.297), (0.21, 0.297), (0.297, 0.42), (0.148, 0.21), (0.11, 0.2
 
 
 def _look(rng: np.random.Generator) -> Material:
-    """Return paper: mostly white, at times coloured, printed or torn from something else."""
     kind = rng.random()
     if kind < 0.65:
         return material("paper", rng)

@@ -15,7 +15,6 @@ _BOOKS: tuple[Triple, ...] = (
 
 
 def _half_box(low: Triple, high: Triple, look: Material) -> Mesh:
-    """Return the front, the top and both sides of a box: what one sees of a book on a shelf, in eight triangles."""
     (a, b, c), (d, e, f) = low, high
     corner = np.array([(x, y, z) for z in (c, f) for y in (b, e) for x in (a, d)], np.float64)
     quads = np.array([[4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [1, 3, 7, 5]])

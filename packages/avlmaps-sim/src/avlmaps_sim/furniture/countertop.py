@@ -11,13 +11,11 @@ from avlmaps_sim.shapes import box, cylinder, ellipsoid, lathe, rounded_box, she
 
 
 def _spout(start: tuple[float, float], end: tuple[float, float], radius: float, look: Material) -> Mesh:
-    """Return a spout in the plane y = 0 between two places (x, z), narrowing outwards."""
     (a, b), (c, d) = start, end
     return tube([(a, 0.0, b), ((a + c) / 2 + 0.01, 0.0, (b + d) / 2 - 0.01), (c, 0.0, d)], radius, look, 7)
 
 
 def _any_turn(rng: np.random.Generator, parts: list[Mesh]) -> Parts:
-    """Finish a piece that people put down facing anywhere within an eighth of a turn."""
     return [joined(parts).turned(draw(rng, -0.8, 0.8))]
 
 

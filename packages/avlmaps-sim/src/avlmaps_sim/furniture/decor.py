@@ -19,7 +19,6 @@ def _art(rng: np.random.Generator) -> Material:
 
 
 def _format(rng: np.random.Generator, low: float, high: float) -> tuple[float, float]:
-    """Draw width and height of a picture, metres: upright, lying or square."""
     long = draw(rng, low, high)
     short = long * draw(rng, 0.55, 0.85)
     return pick(rng, ((long, short), (short, long), (long, long)))
@@ -44,7 +43,6 @@ def _framed(rng: np.random.Generator, width: float, height: float, look: Materia
 
 
 def _face(x: float, y0: float, z0: float, y1: float, z1: float, look: Material) -> Mesh:
-    """Return an upright picture that looks along +x."""
     return sheet((x, y0, z0), (0.0, y1 - y0, 0.0), (0.0, 0.0, z1 - z0), look, fill=True)
 
 
@@ -163,7 +161,6 @@ def _photo_frame(rng: np.random.Generator) -> Parts:
 
 
 def _pile(outline: np.ndarray, thick: float, look: Material) -> list[Mesh]:
-    """Return a carpet over an outline: its rim, and a top that shows the picture once."""
     side = prism(outline.tolist(), 0.0, thick, look)
     k = len(outline)
     size = np.ptp(outline, axis=0)

@@ -98,7 +98,6 @@ def _needles(rng: np.random.Generator) -> Parts:
 
 
 def _cone(x: float, y: float, z: float, radius: float, ring: Material, dark: Material) -> list[Mesh]:
-    """Return a loudspeaker's cone: surround, hollow, cap."""
     return [spindle([(radius, x), (radius * 0.98, x + 0.006), (radius * 0.85, x + 0.004),
                      (radius * 0.4, x - 0.012 if radius < 0.02 else x + 0.001)], ring, y, z, 16, capped=False),
             spindle([(radius * 0.85, x + 0.0035), (radius * 0.35, x + 0.0015), (radius * 0.2, x + 0.008)], dark, y, z,
@@ -216,14 +215,12 @@ def _subwoofer(rng: np.random.Generator) -> Parts:
 
 
 def _key_look(rng: np.random.Generator) -> tuple[Material, Material]:
-    """Return the materials of a keyboard's case and keys."""
     case = material("plastic", rng,
                     pick(rng, ((0.08, 0.08, 0.08), (0.85, 0.83, 0.76), (0.9, 0.9, 0.9), (0.3, 0.3, 0.32))))  # fmt: skip
     return case, case if chance(rng, 0.4) else material("plastic", rng, (g := pick(rng, (0.1, 0.92, 0.6)), g, g))
 
 
 def _slanted(rng: np.random.Generator, parts: list[Mesh]) -> Parts:
-    """Finish a keyboard: its far edge is a little higher; it looks at who types, towards +x."""
     return [joined(parts).tilted("y", draw(rng, 0.02, 0.1))]
 
 

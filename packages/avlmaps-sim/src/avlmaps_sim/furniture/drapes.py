@@ -136,7 +136,6 @@ for _which, _names in CURTAIN_STYLES.items():
 
 
 def _measures(rng: np.random.Generator) -> tuple[float, float]:
-    """Draw width and height of a window to be blinded, metres."""
     return draw(rng, 0.5, 2.0), draw(rng, 0.6, 2.1)
 
 

@@ -30,7 +30,6 @@ def casing(rng: np.random.Generator) -> Material:
 
 def _panel(rng: np.random.Generator, wide: float, high: float, z: float, thick: float, look: Material,
            glow: Material) -> Meshes:  # fmt: skip
-    """Return a flat display whose back is at x = 0: casing, bezel and picture, a fatter middle behind at times."""
     bezel, chin = draw(rng, 0.004, 0.03), draw(rng, 0.0, 0.04)
     yield body(rng, (0.0, -wide / 2, z), (thick, wide / 2, z + high), look, min(0.4 * thick, draw(rng, 0.003, 0.012)))
     low, top = (-wide / 2 + bezel, z + bezel + chin), (wide / 2 - bezel, z + high - bezel)
@@ -40,7 +39,6 @@ def _panel(rng: np.random.Generator, wide: float, high: float, z: float, thick: 
 
 
 def _width(rng: np.random.Generator, low_inch: float, high_inch: float, aspect: float = 16 / 9) -> Pair:
-    """Return width and height of a display of a drawn diagonal, metres."""
     diagonal = draw(rng, low_inch, high_inch) * 0.0254
     high = diagonal / float(np.hypot(aspect, 1.0))
     return high * aspect, high

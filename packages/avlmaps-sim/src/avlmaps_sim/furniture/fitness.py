@@ -11,7 +11,6 @@ from avlmaps_sim.shapes import box, cylinder, ellipsoid, lathe, rounded_box, sla
 
 
 def _looks(rng: np.random.Generator) -> tuple[Material, Material, Material]:
-    """Draw frame, padding and accent."""
     frame = made_of(rng, "black", "metal", "white", "painted")
     return (frame, made_of(rng, "black", "black", "leather"), made_of(rng, "plastic", "metal", "black"))
 

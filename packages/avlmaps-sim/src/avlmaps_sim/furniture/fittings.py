@@ -180,7 +180,6 @@ def _grip(style: FrontStyle, x: float, low: Pair, high: Pair, opens: str, grip: 
 
 
 def _long_bar(height: float) -> float:
-    """Return how long the bar of a tall door is, metres."""
     return min(0.45, 0.3 * height)
 
 

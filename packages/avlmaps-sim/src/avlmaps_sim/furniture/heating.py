@@ -17,7 +17,6 @@ def _paint(rng: np.random.Generator) -> Material:
 
 
 def _valve(rng: np.random.Generator, x: float, y: float, z: float) -> list[Mesh]:
-    """Return a radiator's valve and its pipe down to the floor."""
     look = chrome(rng)
     return [tube([(x, y, 0.0), (x, y, z)], 0.009, look, 6),
             spindle([(0.02, -0.03), (0.022, 0.03)], material("white", rng), 0.0, 0.0,
@@ -188,7 +187,6 @@ def _fire(rng: np.random.Generator, x: float, wide: float, z: float) -> Meshes:
 
 def _hearth(rng: np.random.Generator, wide: float, high: float, deep: float, hole: tuple[float, float],
             look: Material) -> list[Mesh]:  # fmt: skip
-    """Return a body with an opening (width, height) from the floor, dark inside, with a fire in it."""
     half, a, dark = wide / 2, hole[0] / 2, material("black", rng)
     return [box((0.0, -half, 0.0), (deep, -a, high), look), box((0.0, a, 0.0), (deep, half, high), look),
             box((0.0, -a, hole[1]), (deep, a, high), look), box((0.0, -a, 0.0), (0.02, a, hole[1]), dark),

@@ -19,7 +19,6 @@ def _worktop(rng: np.random.Generator) -> Material:
 
 
 def _split(rng: np.random.Generator, length: float, low: float = 0.4, high: float = 0.8) -> list[float]:
-    """Return where the units of a run begin and end along its length."""
     n = max(1, round(length / draw(rng, low, high)))
     widths = rng.uniform(0.7, 1.3, n) if chance(rng, 0.5) else np.ones(n)
     return [0.0, *(np.cumsum(widths) / widths.sum() * length).tolist()]
@@ -73,7 +72,6 @@ def _plinth(rng: np.random.Generator, style: FrontStyle) -> tuple[float, Materia
 
 
 def _measures(rng: np.random.Generator) -> tuple[float, float, float]:
-    """Return depth of the bodies, height of the worktop and its thickness, metres."""
     return draw(rng, 0.52, 0.64), draw(rng, 0.84, 0.97), draw(rng, 0.012, 0.065)
 
 

@@ -11,7 +11,6 @@ from avlmaps_sim.shapes import along_y, box, loft, rounded_box, rounded_rectangl
 
 
 def _keypad(rng: np.random.Generator, x: float, low: Pair, high: Pair) -> Meshes:
-    """Return a display over a field of keys between two corners (y, z)."""
     dark, pale = material("black", rng), made_of(rng, "metal", "white", "plastic")
     (a, b), (c, d) = low, high
     yield face(x + 0.001, (a + 0.1 * (c - a), d - 0.2 * (d - b)), (c - 0.1 * (c - a), d - 0.06 * (d - b)), dark)
@@ -24,7 +23,6 @@ def _keypad(rng: np.random.Generator, x: float, low: Pair, high: Pair) -> Meshes
 
 def _oven_box(rng: np.random.Generator, wide: float, deep: float, high: float, look: Material,
               panel: float) -> Meshes:  # fmt: skip
-    """Return a table oven: box, dark window, and a control panel of width ``panel`` at its right."""
     half, dark = wide / 2, material("black", rng)
     yield body(rng, (0.0, -half, 0.012), (deep, half, high), look, draw(rng, 0.004, 0.02))
     yield from feet((0.0, -half), (deep, half), 0.012, dark)
@@ -197,7 +195,6 @@ def _hood_slanted(rng: np.random.Generator) -> Parts:
 
 @family("range hood", "wall slim")
 def _hood_slim(rng: np.random.Generator) -> Parts:
-    """Return a hood that fits under a wall cabinet."""
     wide, deep, high, look = draw(rng, 0.55, 0.95), draw(rng, 0.28, 0.5), draw(rng, 0.1, 0.2), enamel(rng)
     nose = draw(rng, 0.25, 0.8) * high
     side = np.array([(0.0, 0.0), (deep, 0.0), (deep, nose), (deep * draw(rng, 0.6, 0.95), high), (0.0, high)])

@@ -26,7 +26,6 @@ from avlmaps_sim.shapes import (
 
 
 def _keys(x: float, z: float, wide: float, rng: np.random.Generator) -> list[Mesh]:
-    """Return a keyboard of a piano whose front edge lies at x."""
     parts, black = [slab(x - 0.075, 0.0, z, 0.15, wide, 0.02, material("white", rng))], material("black", rng)
     step = wide / 36
     for number in range(36):

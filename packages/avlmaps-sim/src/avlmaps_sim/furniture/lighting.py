@@ -40,7 +40,6 @@ def shade(middle: Triple, low_radius: float, top_radius: float, height: float, l
 
 
 def _any_shade(rng: np.random.Generator, middle: Triple, radius: float) -> Mesh:
-    """Return a shade of a drawn form: drum, cone, empire, few-sided or pleated; up to ``radius`` wide."""
     top = radius * pick(rng, (1.0, draw(rng, 0.8, 0.95), draw(rng, 0.25, 0.7)))
     height = radius * draw(rng, 0.85, 1.7)
     sides, pleat = pick(rng, ((20, 0.0), (20, 0.0), (4, 0.0), (6, 0.0), (36, 0.08)))
@@ -48,7 +47,6 @@ def _any_shade(rng: np.random.Generator, middle: Triple, radius: float) -> Mesh:
 
 
 def _dome(x: float, y: float, z: float, radius: float, look: Material, deep: float = 1.0) -> Mesh:
-    """Return a dome open downwards, its rim at z."""
     angle = np.linspace(0.0, np.pi / 2 - 0.12, 6)
     rings = [
         np.column_stack(

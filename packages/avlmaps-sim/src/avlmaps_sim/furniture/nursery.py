@@ -80,7 +80,6 @@ def _flat_horse(rng: np.random.Generator) -> Parts:
 
 
 def _hood(x: float, z: float, radius: float, wide: float, low: float, high: float, look: Material) -> Mesh:
-    """Return a folding hood: part of a drum across y, between two angles."""
     points = np.array([[(x + radius * np.cos(a) * (1 - 0.1 * (v * 2 - 1) ** 2), (v - 0.5) * wide,
                          z + radius * np.sin(a)) for v in np.linspace(0, 1, 5)]
                        for a in np.linspace(low, high, 7)])  # fmt: skip

@@ -192,7 +192,6 @@ def _bottle_dispenser(rng: np.random.Generator) -> Parts:
 
 
 def _taps(rng: np.random.Generator, x: float, wide: float, z: float) -> Meshes:
-    """Return two taps over a drip tray on a front at x."""
     dark = material("black", rng)
     for side, colour in ((-1, (0.2, 0.35, 0.8)), (1, (0.8, 0.15, 0.1))):
         tap = material("plastic", rng, colour)

@@ -78,7 +78,6 @@ def door(rng: np.random.Generator, width_m: float, height_m: float, wall_m: floa
 
 def _panes(rng: np.random.Generator, low: tuple[float, float], high: tuple[float, float], x: tuple[float, float],
            columns: int, rows: int, look: Material) -> list[Mesh]:  # fmt: skip
-    """Return a sash: its frame and glazing bars, without the glass."""
     bar, thin = draw(rng, 0.035, 0.07), draw(rng, 0.016, 0.03)
     (a, b), (c, d) = low, high
     parts = [rim(low, high, bar, x, look)]
@@ -155,7 +154,6 @@ def window(rng: np.random.Generator, width_m: float, height_m: float, wall_m: fl
 
 
 def _folded(leaf: Mesh, width: float, leaves: int, bend_rad: float) -> Mesh:
-    """Return leaves hinged to each other in a zigzag that starts at y = 0, each turned out of its plane."""
     step = width * np.cos(bend_rad)
     parts = []
     for number in range(leaves):

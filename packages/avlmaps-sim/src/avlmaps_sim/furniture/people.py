@@ -86,7 +86,6 @@ def _limb(path: Sequence[Float[np.ndarray, "3"]], radii: Sequence[float], look: 
 
 
 def _bent(forward_rad: float, aside_rad: float, side: int) -> Float[np.ndarray, "3"]:
-    """Return the unit direction that points down, turned forward and then to a side (+1: left)."""
     c = np.cos(aside_rad)
     return np.array([np.sin(forward_rad) * c, side * np.sin(aside_rad), -np.cos(forward_rad) * c])
 
@@ -161,7 +160,6 @@ def _tall(rng: np.random.Generator) -> float:
 
 
 def _arms(rng: np.random.Generator) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Draw shoulders and elbows: hanging, holding something, or one arm raised."""
     kind = rng.random()
     if kind < 0.5:
         return (draw(rng, -0.2, 0.2), draw(rng, -0.2, 0.2)), (draw(rng, 0.1, 0.6), draw(rng, 0.1, 0.6))
@@ -237,7 +235,6 @@ def fabric(rng: np.random.Generator) -> Material:
 
 
 def _waves(rng: np.random.Generator, number: int, longest: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the wave vectors, phases and heights of random folds."""
     turn, wave = rng.uniform(0, 2 * np.pi, number), longest * rng.uniform(0.25, 1.0, number)
     vector = np.stack([np.cos(turn), np.sin(turn)], axis=1) * (2 * np.pi / wave)[:, None]
     return vector, rng.uniform(0, 2 * np.pi, number), rng.uniform(0.3, 1.0, number) * wave
@@ -281,7 +278,6 @@ def thrown_over(rng: np.random.Generator, wide: float, front: float, back: float
 
 
 def _hanging(rng: np.random.Generator, look: Material, shoulders: float, long: float, deep: float) -> Mesh:
-    """Return a garment that hangs from z = 0 downwards: narrow at the collar, wide below, folded."""
     rings, sides = [], 22
     angle = np.linspace(0.0, 2 * np.pi, sides, endpoint=False)
     phase, folds = draw(rng, 0, 6.3), count(rng, 3, 7)

@@ -57,7 +57,6 @@ def _greens(rng: np.random.Generator) -> list[Material]:
 
 
 def _pot_for(rng: np.random.Generator, height: float) -> tuple[list[Mesh], float, float]:
-    """Return a pot for a plant so high, its radius and the height of its earth."""
     radius = min(max(height * draw(rng, 0.11, 0.2), 0.05), 0.24)
     tall = radius * draw(rng, 1.1, 2.2)
     return pot(rng, radius, tall), radius, tall * 0.9

@@ -25,14 +25,12 @@ from avlmaps_sim.shapes import box, cylinder, rounded_box, shell, slab
 
 def _leaf(rng: np.random.Generator, x: float, low: tuple[float, float], high: tuple[float, float], look: Material,
           thick: float, soft: float) -> Mesh:  # fmt: skip
-    """Return a refrigerator's door: a thick panel with soft edges between two corners (y, z)."""
     return rounded_box((x, low[0], low[1]), (x + thick, high[0], high[1]), soft, look, 2 if soft < 0.012 else 3)
 
 
 def _pull(
     rng: np.random.Generator, kind: str, x: float, y: float, z: tuple[float, float], metal: Material
 ) -> list[Mesh]:
-    """Return an upright handle between two heights: a bar, a block, a groove's shadow or nothing."""
     if kind == "bar":
         return [bar_handle((x, y, z[0]), z[1] - z[0], True, metal, draw(rng, 0.035, 0.055), draw(rng, 0.007, 0.013))]
     if kind == "block":
@@ -43,7 +41,6 @@ def _pull(
 
 
 def _case(rng: np.random.Generator, depth: float, wide: float, high: float, look: Material) -> list[Mesh]:
-    """Return the body behind the doors, on a dark foot."""
     foot = draw(rng, 0.03, 0.09)
     dark = material("black", rng)
     return [box((0.0, -wide / 2, foot), (depth, wide / 2, high), look),
@@ -160,7 +157,6 @@ def _under_counter(rng: np.random.Generator) -> Parts:
 
 
 def _bulged(depth: float, wide: float, z: tuple[float, float], front_x: float, look: Material, soft: float) -> Mesh:
-    """Return a body with strongly rounded upright edges whose top turns in softly."""
     levels = [(soft * (1 - np.sin(a)), z[1] - soft * (1 - np.cos(a))) for a in np.linspace(np.pi / 2, 0.0, 4)]
     rings = [(outline(depth, wide, 7.0, 24, middle=(front_x, 0.0)), z[0])]
     rings += [(outline(depth - 2 * i, wide - 2 * i, 7.0, 24, middle=(front_x, 0.0)), h) for i, h in levels]

@@ -217,7 +217,6 @@ def scandinavian(rng: np.random.Generator) -> Parts:
 
 
 def _swivel(rng: np.random.Generator, seat: float) -> list[Mesh]:
-    """Return a foot on castors with a gas lift up to the seat."""
     look = made_of(rng, "black", "black", "metal", "white")
     return [star_base(5, draw(rng, 0.27, 0.34), seat - 0.08, look, draw(rng, 0.022, 0.032), True),
             slab(0.0, 0.0, seat - 0.1, 0.2, 0.16, 0.05, material("black", rng))]  # fmt: skip

@@ -120,7 +120,6 @@ def step_stool(rng: np.random.Generator) -> Parts:
 
 
 def _bench(rng: np.random.Generator) -> tuple[float, float, float]:
-    """Draw depth, width and height of a bench, metres."""
     return draw(rng, 0.28, 0.45), draw(rng, 0.8, 1.7), draw(rng, 0.4, 0.5)
 
 

@@ -105,7 +105,6 @@ def box_arms(rng: np.random.Generator, plan: SofaPlan, look: Material, style: st
 
 
 def _rolled_arm(plan: SofaPlan, x0: float, x1: float, look: Material) -> Mesh:
-    """Return the left arm with a scroll that rolls outwards."""
     y0, y1 = plan.width / 2, plan.width / 2 + plan.arm
     r = plan.arm * 0.5
     angle = np.linspace(-0.35 * np.pi, np.pi, 8)

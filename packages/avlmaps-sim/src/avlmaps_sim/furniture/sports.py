@@ -36,7 +36,6 @@ def barbell(rng: np.random.Generator, long: float, z: float, x: float) -> Meshes
 
 
 def _weight(rng: np.random.Generator, long: float, size: float, sides: int, look: Material) -> Mesh:
-    """Return a dumbbell along x about the origin, its heads of radius ``size``."""
     head = long * 0.3
     rows = [(size * 0.8, 0.0), (size, head * 0.2), (size, head * 0.8), (size * 0.8, head)]
     one = lathe(rows, look, sides=sides).tilted("y", np.pi / 2)
@@ -116,7 +115,6 @@ def wheel(x: float, y: float, radius: float, spokes: int, tyre: Material, metal:
 
 
 def _handlebar(rng: np.random.Generator, x: float, z: float, drop: bool, look: Material) -> Meshes:
-    """Return the two halves of a handlebar, flat or dropped, from its clamp at (x, z)."""
     bar = draw(rng, 0.2, 0.32)
     for s in (-1, 1):
         path = [(x, 0.0, z), (x + 0.03, s * bar * 0.7, z + 0.02), (x - draw(rng, 0.02, 0.18), s * bar, z + 0.02)]

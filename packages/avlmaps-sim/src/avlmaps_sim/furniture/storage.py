@@ -30,7 +30,6 @@ def _wardrobe_room(rng: np.random.Generator, wide: tuple[float, float], base: fl
 
 
 def _cornice(rng: np.random.Generator, room: Room, look: Material) -> list[Mesh]:
-    """Return a moulding that stands out over the top, sometimes."""
     if chance(rng, 0.6):
         return []
     (a, b, _), (d, e, f) = room.low, room.high
@@ -42,7 +41,6 @@ def _cornice(rng: np.random.Generator, room: Room, look: Material) -> list[Mesh]
 
 
 def _on_top(rng: np.random.Generator, room: Room) -> list[Mesh]:
-    """Return boxes that lie on a wardrobe, sometimes."""
     if chance(rng, 0.8):
         return []
     (a, b, _), (d, e, f) = room.low, room.high

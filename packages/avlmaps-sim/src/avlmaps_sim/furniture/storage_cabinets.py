@@ -16,7 +16,6 @@ from avlmaps_sim.shapes import box, prism, slab
 def _body(
     rng: np.random.Generator, depth: float, width: float, height: float, look: Material
 ) -> tuple[list[Mesh], Room, float]:  # fmt: skip
-    """Return a base and a carcass on it, its room, and the height of the top laid over it."""
     base, lift = cabinet_base(rng, depth, width, look)
     room = Room((-depth / 2, -width / 2, lift), (depth / 2, width / 2, max(height, lift + 0.25)))
     out = pick(rng, (0.0, 0.0, draw(rng, 0.005, 0.03)))

@@ -31,7 +31,6 @@ def shoe(rng: np.random.Generator, look: Material) -> Mesh:
 
 
 def _shoes(rng: np.random.Generator, y: tuple[float, float], x: float, z: float, full: float) -> Meshes:
-    """Return pairs of shoes side by side along y."""
     looks = [made_of(rng, "leather", "fabric", "plastic", "white", "black") for _ in range(4)]
     for at in np.arange(y[0] + 0.12, y[1] - 0.1, 0.24).tolist():
         if chance(rng, full):
@@ -198,7 +197,6 @@ def rolling_file(rng: np.random.Generator) -> Parts:
 
 
 def _coat(rng: np.random.Generator, x: float, y: float, z: float, look: Material, heading: float) -> Mesh:
-    """Return a coat that hangs from a hook at a place, away from the stand along a heading."""
     long, half = draw(rng, 0.6, 1.0), draw(rng, 0.12, 0.2)
     rings = []
     for dz, share, thick in ((0.0, 0.25, 0.03), (-0.1, 0.9, 0.1), (-0.5 * long, 1.0, 0.12), (-long, 1.15, 0.09)):

@@ -24,14 +24,12 @@ from avlmaps_sim.shapes import box, circle, cylinder, rounded_box, shell, slab, 
 
 
 def _window(x: float, low: Pair, high: Pair, look: Material, dark: Material, edge: float) -> list[Mesh]:
-    """Return an oven's door with a dark pane in it, between two corners (y, z)."""
     (a, b), (c, d) = low, high
     return [rounded_box((x, a, b), (x + 0.03, c, d), 0.005, look, 2),
             box((x + 0.029, a + edge, b + edge), (x + 0.032, c - edge, d - 1.6 * edge), dark)]  # fmt: skip
 
 
 def _oven(rng: np.random.Generator, x: float, low: Pair, high: Pair, look: Material) -> Meshes:
-    """Return an oven's door with its handle."""
     dark, metal = material("black", rng), chrome(rng)
     full = chance(rng, 0.35)
     yield from _window(x, low, high, dark if full else look, dark, draw(rng, 0.03, 0.09))
@@ -42,7 +40,6 @@ def _oven(rng: np.random.Generator, x: float, low: Pair, high: Pair, look: Mater
 
 
 def _grate(x: float, y: float, z: float, size: float, look: Material) -> list[Mesh]:
-    """Return a gas burner: cap, ring and an iron cross over it."""
     bars = [box((x - size, y - 0.006, z + 0.022), (x + size, y + 0.006, z + 0.034), look),
             box((x - 0.006, y - size, z + 0.022), (x + 0.006, y + size, z + 0.034), look)]  # fmt: skip
     ends = [slab(x + a * size, y + b * size, z, 0.012, 0.012, 0.03, look) for a,
@@ -52,7 +49,6 @@ def _grate(x: float, y: float, z: float, size: float, look: Material) -> list[Me
 
 
 def _coil(x: float, y: float, z: float, size: float, look: Material, metal: Material) -> list[Mesh]:
-    """Return an electric coil in its pan."""
     rings = []
     for share in (0.9, 0.5):
         flat = circle(size * share, 12) + np.array((x, y))
@@ -94,7 +90,6 @@ def _hob(rng: np.random.Generator, low: Pair, high: Pair, z: float, kind: str) -
 
 
 def _dials(rng: np.random.Generator, x: float, low: Pair, high: Pair, look: Material) -> Meshes:
-    """Return a row of dials on a strip between two corners (y, z), with a clock's display at times."""
     n, z = count(rng, 4, 7), (low[1] + high[1]) / 2
     places = np.linspace(low[0] + 0.06, high[0] - 0.06, n)
     radius = min(draw(rng, 0.017, 0.025), 0.4 * (high[1] - low[1]))

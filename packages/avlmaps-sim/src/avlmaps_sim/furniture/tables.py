@@ -29,7 +29,6 @@ def _metal(rng: np.random.Generator) -> Material:
 
 
 def _dining(rng: np.random.Generator) -> tuple[float, float, float]:
-    """Draw depth, width and height of a dining table, metres."""
     depth = draw(rng, 0.7, 1.1)
     width = depth * draw(rng, 1.0, 1.1) if chance(rng, 0.2) else draw(rng, 1.15, 2.3)
     return depth, width, draw(rng, 0.71, 0.78)
@@ -180,7 +179,6 @@ def double_pedestal(rng: np.random.Generator) -> Parts:
 
 
 def _desk(rng: np.random.Generator) -> tuple[float, float, float, float]:
-    """Draw depth, width, height and thickness of the top of a desk, metres."""
     return draw(rng, 0.48, 0.8), draw(rng, 0.9, 1.75), draw(rng, 0.71, 0.77), draw(rng, 0.018, 0.035)
 
 

@@ -27,7 +27,6 @@ def _metal(rng: np.random.Generator) -> Material:
 
 
 def _coffee(rng: np.random.Generator) -> tuple[float, float, float]:
-    """Draw depth, width and height of a coffee table, metres."""
     depth = draw(rng, 0.45, 0.8)
     return depth, depth * draw(rng, 1.0, 2.0), draw(rng, 0.3, 0.52)
 
@@ -272,7 +271,6 @@ def tray_table(rng: np.random.Generator) -> Parts:
 
 
 def _console(rng: np.random.Generator) -> tuple[float, float, float]:
-    """Draw depth, width and height of a console table, metres."""
     return draw(rng, 0.26, 0.45), draw(rng, 0.75, 1.6), draw(rng, 0.72, 0.92)
 
 

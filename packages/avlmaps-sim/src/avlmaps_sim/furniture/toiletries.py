@@ -43,7 +43,6 @@ def _bare(rng: np.random.Generator) -> Parts:
 
 
 def _round_mirror(rng: np.random.Generator, flat: np.ndarray, bar: float, deep: float, look: Material) -> list[Mesh]:
-    """Return a mirror of a closed outline in (y, z) with a frame round it."""
     inner = flat * (1 - bar / np.abs(flat).max())
 
     def ring(points: np.ndarray, x: float) -> np.ndarray:
@@ -148,7 +147,6 @@ def _towel(rng: np.random.Generator) -> Material:
 
 def _draped(rng: np.random.Generator, x: float, y: float, z: float, wide: float, drop: float, look: Material,
             fold: float = 0.03) -> Mesh:  # fmt: skip
-    """Return a towel over a bar at (x, z): down in front, less far down behind, with soft folds."""
     n, phase = 9, draw(rng, 0.0, 6.0)
     across = np.linspace(-wide / 2, wide / 2, n)
     ripple = draw(rng, 0.0, 0.012) * np.sin(across / wide * draw(rng, 6.0, 16.0) + phase)

@@ -104,7 +104,6 @@ def mattress(bed: Bedding, look: Material) -> Mesh:
 
 
 def _smooth_noise(rng: np.random.Generator, n: int, m: int) -> np.ndarray:
-    """Return gentle hills over a grid, in [-1, 1] or so."""
     u, v = np.meshgrid(np.linspace(0.0, 1.0, n), np.linspace(0.0, 1.0, m), indexing="ij")
     out = np.zeros((n, m))
     for _ in range(5):

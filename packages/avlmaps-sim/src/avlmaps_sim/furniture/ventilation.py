@@ -38,7 +38,6 @@ def _cage(radius: float, x: float, z: float, depth: float, wires: int, look: Mat
 
 
 def _fan_head(rng: np.random.Generator, radius: float, look: Material, metal: Material) -> Mesh:
-    """Return a fan's head about the origin: cage, rotor and the motor behind."""
     rotor = made_of(rng, "plastic", "white", "black", "metal")
     depth = radius * draw(rng, 0.25, 0.4)
     return joined([*_cage(radius, 0.0, 0.0, depth, count(rng, 14, 22), metal), *_rotor(rng, radius, 0.0, 0.0, rotor),

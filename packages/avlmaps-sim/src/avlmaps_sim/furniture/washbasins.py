@@ -162,7 +162,6 @@ def _wash_stand(rng: np.random.Generator) -> Parts:
 
 
 def _vessel(rng: np.random.Generator, x: float, y: float, z: float, look: Material) -> Meshes:
-    """Return a bowl that stands on a top at ``z``, with a tall tap behind it."""
     size, high = draw(rng, 0.34, 0.42), draw(rng, 0.1, 0.17)
     long = size * draw(rng, 1.0, 1.35)
     look = look if chance(rng, 0.7) else made_of(rng, "stone", "glass", "metal")

@@ -5,7 +5,7 @@ from avlmaps_sim.hearing.kinds import KINDS, SoundKind, kind_of
 from avlmaps_sim.hearing.overlay import overlay
 from avlmaps_sim.hearing.schedule import ScheduleRule, Sounding, schedule
 from avlmaps_sim.hearing.sound_library import Bank, Recorded, Synthesised
-from avlmaps_sim.hearing.sources import Source, candidates, place_sources
+from avlmaps_sim.hearing.sources import Source, candidates
 
 __all__ = [
     "KINDS",
@@ -21,6 +21,5 @@ __all__ = [
     "candidates",
     "kind_of",
     "overlay",
-    "place_sources",
     "schedule",
 ]

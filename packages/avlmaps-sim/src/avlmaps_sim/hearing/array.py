@@ -183,14 +183,12 @@ def _early(
 
 
 def _gains(way: Way) -> list[tuple[bool, Float[np.ndarray, " b"]]]:
-    """Return for each arrival whether it comes round a corner, and its gains by band."""
     return [(number > 0, gain) for number, (_, gain) in enumerate(arrivals(way))]
 
 
 def _distances(
     source: Float[np.ndarray, "3"], ears: Float[np.ndarray, "m 3"], way: Way, round_corner: bool
 ) -> Float[np.ndarray, " m"]:
-    """Return how far each microphone is, straight or round the last corner."""
     if not round_corner or way.corner is None:
         return np.maximum(np.linalg.norm(ears - source, axis=1), NEAREST_M)
     middle = ears.mean(axis=0)
@@ -252,7 +250,6 @@ def _late(
 
 
 def _turned(delay: Float[np.ndarray, "m w"], size: int) -> Complex[np.ndarray, "m w f"]:
-    """Return the spectra of delays in samples: exp of coarse steps times exp of fine ones, which is quicker."""
     fine, bins = 256, size // 2 + 1
     per_bin = -2j * np.pi * delay[..., None] / size
     low = np.exp(per_bin * np.arange(fine)).astype(np.complex64)
@@ -261,7 +258,6 @@ def _turned(delay: Float[np.ndarray, "m w"], size: int) -> Complex[np.ndarray, "
 
 
 def _all_around(count: int) -> Float[np.ndarray, "w 3"]:
-    """Return directions spread evenly over the sphere (a Fibonacci lattice)."""
     index = np.arange(count) + 0.5
     z = 1.0 - 2.0 * index / count
     angle = np.pi * (1.0 + np.sqrt(5.0)) * index

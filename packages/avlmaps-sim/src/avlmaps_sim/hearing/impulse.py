@@ -211,7 +211,6 @@ def arrivals(way: Way) -> list[tuple[float, Float[np.ndarray, " b"]]]:
 
 
 def _add(out: Float[np.ndarray, " t"], at: float, piece: Float[np.ndarray, " k"]) -> None:
-    """Add a piece at a fractional sample, shared out between the two samples round it."""
     whole = int(np.floor(at))
     for begin, share in ((whole, 1.0 - (at - whole)), (whole + 1, at - whole)):
         count = min(len(piece), len(out) - begin)
@@ -220,7 +219,6 @@ def _add(out: Float[np.ndarray, " t"], at: float, piece: Float[np.ndarray, " k"]
 
 
 def _areas(scene: Scene) -> tuple[Area, ...]:
-    """Return the rooms; a building without any is one room as large as it, and what has no walls is open air."""
     if scene.areas:
         return scene.areas
     if not any(thing.category == "wall" for thing in scene.objects):

@@ -108,7 +108,6 @@ class Rooms:
 
 
 def _plan(area: Area) -> tuple[float, float]:
-    """Return the area and the circumference of a room's polygon."""
     here, there = area.polygon, np.roll(area.polygon, -1, axis=0)
     signed = (here[:, 0] * there[:, 1] - there[:, 0] * here[:, 1]).sum() / 2
     return abs(float(signed)), float(np.linalg.norm(there - here, axis=1).sum())
@@ -121,7 +120,6 @@ def _things(scene: Scene, area: Area) -> list[SceneObject]:
 
 
 def _taken_by(thing: SceneObject) -> Float[np.ndarray, " b"]:
-    """Return the absorption area of one piece of furniture: its top and sides times what such things take."""
     x, y, z = thing.size
     if thing.category in _STRUCTURE:
         return np.zeros(len(BANDS_HZ))

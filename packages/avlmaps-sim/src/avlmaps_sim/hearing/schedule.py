@@ -57,13 +57,14 @@ def schedule(
     robot: Float[np.ndarray, "n 3"],
     rule: ScheduleRule | None = None,
     most: int | None = None,
-    pairs: int = 0,
+    ambiguous: int = 0,
+    places: int = 2,
 ) -> list[Sounding]:
     """Let sources sound when the robot is nearest to them, as far as the rule allows; what finds no room is left out.
 
-    Each kind plays once, from the first of its sources for which there is room; ``pairs`` of the kinds play twice, from
-    sources that are far apart, and these come first. The most wanted sources come first; one in another room than the
-    robot counts as farther away.
+    Each kind plays once, from the first of its sources for which there is room; ``ambiguous`` of the kinds play in
+    ``places`` places that are far apart, and these come first. The most wanted sources come first; one in another room
+    than the robot counts as farther away.
     """
     planner = _Planner(scene, Walk.along(stamps_s, robot), rule or ScheduleRule())
     most = len(sources) if most is None else most
@@ -71,8 +72,8 @@ def schedule(
     for source in sources:
         kinds.setdefault(source.category, []).append(source)
     for name, own in list(kinds.items()):
-        if pairs > 0 and len(planner.found) + 2 <= most and planner.take_two_of(own):
-            pairs -= 1
+        if ambiguous > 0 and len(planner.found) + places <= most and planner.take_several_of(own, places):
+            ambiguous -= 1
             del kinds[name]
     for own in kinds.values():
         if len(planner.found) < most:
@@ -90,15 +91,17 @@ class _Planner:
     found: list[Sounding] = field(default_factory=list)
     _areas: np.ndarray | None = None
 
-    def take_two_of(self, sources: Sequence[Source]) -> bool:
-        """Let two of these play that are far apart, or none."""
-        for i, one in enumerate(sources):
-            far = [other for other in sources[i + 1 :] if _distance_m(one, other) >= self.rule.twins_m]
-            if not far or not self.take_one_of([one]):
-                continue
-            if self.take_one_of(far):
-                return True
-            self.found.pop()
+    def take_several_of(self, sources: Sequence[Source], places: int) -> bool:
+        """Let as many of these play that are far apart from each other, or none."""
+        before = len(self.found)
+        for first in range(len(sources)):
+            for source in sources[first:]:
+                taken = [sounding.source for sounding in self.found[before:]]
+                if all(_distance_m(source, other) >= self.rule.twins_m for other in taken):
+                    self.take_one_of([source])
+                if len(self.found) == before + places:
+                    return True
+            del self.found[before:]
         return False
 
     def take_one_of(self, sources: Sequence[Source]) -> bool:

@@ -132,7 +132,6 @@ class Air:
         return ways
 
     def _walls_between(self, a: Float[np.ndarray, "2"], b: Float[np.ndarray, "2"]) -> int:
-        """Count the walls that a straight line crosses."""
         length_m = float(np.linalg.norm(b - a))
         steps = max(2, int(length_m / (0.4 * self.cell_m)))
         i, j = self.cell(a + np.linspace(0.0, 1.0, steps)[:, None] * (b - a)).T
@@ -180,7 +179,6 @@ class Air:
 
 
 def _filled(solid: Bool[np.ndarray, "nx ny"], indoors: Bool[np.ndarray, "nx ny"]) -> Bool[np.ndarray, "nx ny"]:
-    """Fill what is hollow: walls made of two sheets, pockets between a door and its frame."""
     closed: Any = ndimage.binary_closing(np.pad(solid, 1), np.ones((3, 3)))
     solid = closed[1:-1, 1:-1]
     pockets, _ = cast("tuple[np.ndarray, int]", ndimage.label(~solid))
@@ -189,7 +187,6 @@ def _filled(solid: Bool[np.ndarray, "nx ny"], indoors: Bool[np.ndarray, "nx ny"]
 
 
 def _walls(scene: Scene) -> Bool[np.ndarray, " t"]:
-    """Return which triangles stop sound: those of walls, or of anything tall where a file names no walls."""
     solid = np.array([thing.category in SOLID for thing in scene.objects], bool)
     if not any(thing.category == "wall" for thing in scene.objects):
         solid |= np.array([thing.high[2] - thing.low[2] > _TALL_M for thing in scene.objects], bool)

@@ -46,46 +46,6 @@ class _Place:
     instance: int
 
 
-def place_sources(
-    scene: Scene,
-    rng: np.random.Generator,
-    count: int,
-    categories: Sequence[str] | None = None,
-    ambiguous: int = 0,
-    *,
-    bank: Bank | None = None,
-    walk: Float[np.ndarray, "n 3"] | None = None,
-    apart_m: float = 2.0,
-    twins_apart_m: float = 4.0,
-) -> list[Source]:
-    """Draw at most ``count`` sounds and put each at a thing that makes it, or where such a sound occurs.
-
-    ``ambiguous`` of the kinds play in two places (of different clips), so that the kind alone does not identify the
-    place. Only places that the ``walk`` comes near to are taken, no two nearer than ``apart_m``, of one kind
-    ``twins_apart_m``.
-
-    Raises:
-        AudioError: a category that the bank lacks.
-    """
-    bank = bank or Synthesised()
-    names = chosen_categories(bank, tuple(categories) if categories else None)
-    places = {name: _places(scene, kind_of(name), rng, walk) for name in names}
-    order = [names[i] for i in rng.permutation(len(names)) if places[names[i]]]
-    taken: list[tuple[str, _Place]] = []
-    for name in order:
-        if len(taken) + 2 > count or sum(1 for _ in _twins(taken)) >= ambiguous:
-            break
-        taken += _pair(name, places[name], taken, apart_m, twins_apart_m)
-    for name in order:
-        if len(taken) >= count:
-            break
-        if any(name == other for other, _ in taken):
-            continue
-        free = [place for place in places[name] if _clear(place, taken, apart_m)]
-        taken += [(name, free[0])] if free else []
-    return [_source(name, place, bank, rng) for name, place in taken]
-
-
 def candidates(
     scene: Scene,
     rng: np.random.Generator,
@@ -112,31 +72,6 @@ def candidates(
     return found
 
 
-def _twins(taken: Sequence[tuple[str, _Place]]) -> set[str]:
-    names = [name for name, _ in taken]
-    return {name for name in names if names.count(name) > 1}
-
-
-def _pair(
-    name: str, places: Sequence[_Place], taken: Sequence[tuple[str, _Place]], apart_m: float, twins_apart_m: float
-) -> list[tuple[str, _Place]]:
-    """Return two places of one kind, the first pair that is far enough apart; none where there is no such pair."""
-    free = [place for place in places if _clear(place, taken, apart_m)]
-    for i, one in enumerate(free):
-        for other in free[i + 1 :]:
-            if _distance_m(one, other) >= twins_apart_m:
-                return [(name, one), (name, other)]
-    return []
-
-
-def _clear(place: _Place, taken: Sequence[tuple[str, _Place]], apart_m: float) -> bool:
-    return all(_distance_m(place, other) >= apart_m for _, other in taken)
-
-
-def _distance_m(a: _Place, b: _Place) -> float:
-    return float(np.linalg.norm(np.subtract(a.position, b.position)))
-
-
 def _source(name: str, place: _Place, bank: Bank, rng: np.random.Generator) -> Source:
     clip, sound = bank.draw(name, rng)
     return Source(name, place.position, place.instance, clip, sound, kind_of(name).level_db)
@@ -159,7 +94,6 @@ def _places(
 
 
 def _mouth(scene: Scene, instance: int, kind: SoundKind) -> Triple:
-    """Return where on an object its sound comes from: the middle of its front half, at the kind's usual height."""
     thing = scene.objects[instance]
     x, y, _ = thing.centre
     low, high = thing.low[2], thing.high[2]

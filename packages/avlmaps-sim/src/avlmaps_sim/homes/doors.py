@@ -103,7 +103,6 @@ def _spots(wall: Wall, rooms: list[Room], width_m: float) -> list[float]:
 
 
 def _opened(rng: np.random.Generator, wall: Wall, rooms: list[Room]) -> Wall:
-    """Return the wall as an open plan has it: not built at all, or with a wide gap."""
     ceiling = min(rooms[wall.left].height_m, rooms[wall.right].height_m)
     if chance(rng, 0.45) or wall.length_m < 1.7:
         return replace(wall, built=False)

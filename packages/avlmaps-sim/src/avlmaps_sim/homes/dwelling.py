@@ -50,7 +50,6 @@ def _plan(rng: np.random.Generator, programme: Programme, corridor: str, stairs:
 
 
 def _upper(rng: np.random.Generator, ground: Storey) -> Storey | None:
-    """Draw the floor above a floor with stairs; None where no doors reach all of it."""
     floor_m = ground.rooms[0].floor_m + ground.rooms[0].height_m + ground.slab_m
     for _ in range(4):
         rooms = upstairs(rng, ground.rooms, floor_m, draw(rng, 2.3, 2.8))

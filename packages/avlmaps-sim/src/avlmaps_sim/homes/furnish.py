@@ -51,7 +51,6 @@ _ON_FLOOR = {"printer": ("office copier",), "clock": ("grandfather",), "loudspea
 
 
 def _fit_to_stand(category: str) -> Among:
-    """Return which families of a category stand on the floor or hang on a wall by themselves."""
     only = _ON_FLOOR.get(category)
     return lambda name: wall_hung(name) or (on_floor_or_wall(name) and (only is None or name in only))
 

@@ -124,7 +124,6 @@ def _on(filled: _Filled, thing: SceneObject, corners: np.ndarray) -> None:
 
 
 def _no_larger(mesh: Mesh, thing: SceneObject) -> Mesh:
-    """Return what shall lie on a thing, shrunk to fit where it is larger than that."""
     share = min(1.0, 0.9 * min(thing.size[:2]) / float(max(mesh.size[:2])))
     return mesh.scaled(share, share, share)
 
@@ -148,7 +147,6 @@ def _a_top(
 
 
 def _forward(thing: SceneObject) -> tuple[np.ndarray, np.ndarray]:
-    """Return the unit vectors of a thing's front and left, top-down."""
     c, s = np.cos(thing.heading_rad), np.sin(thing.heading_rad)
     return np.array([c, s]), np.array([-s, c])
 
@@ -172,7 +170,6 @@ def _throw_over(filled: _Filled, thing: SceneObject, corners: np.ndarray) -> Non
 
 
 def _curtain_before(filled: _Filled, thing: SceneObject, corners: np.ndarray) -> None:
-    """Hang a shower curtain along the front of a tub or shower."""
     rng, points = filled.rng, corners.reshape(-1, 3)
     front, left = _forward(thing)
     deep, wide = points[:, :2] @ front, points[:, :2] @ left
@@ -234,5 +231,4 @@ def _on_wall(
 
 
 def _over(place: np.ndarray, thing: SceneObject) -> bool:
-    """Return whether a place lies in the box of a thing, top-down."""
     return all(low <= value <= high for low, value, high in zip(thing.low[:2], place, thing.high[:2], strict=True))

@@ -88,7 +88,6 @@ def _tall_lamp(family: str) -> bool:
 
 
 def _facing(f: Furnisher, piece: Piece, screen: PlacedPiece) -> PlacedPiece | None:
-    """Stand a piece so that it looks at a screen from some metres."""
     foot = footprint(piece.mesh)
     ahead = np.array([np.cos(screen.place.heading_rad), np.sin(screen.place.heading_rad)])
     away = draw(f.rng, 1.9, 3.6) + foot.half[0] + np.array([0.0, 0.3, -0.3, 0.7, -0.5, 1.1])

@@ -89,7 +89,6 @@ def _clear_of_holes(
 
 
 def _sink(f: Furnisher) -> None:
-    """Set a sink into a counter, or stand one of its own where there is room; sometimes a hob beside it."""
     counters = [s for s in f.stood if s.piece.category == "kitchen counter"]
     f.rng.shuffle(counters)  # type: ignore[arg-type]
     sunk = any(set_at(f, s, "sink", 0.5, draw(f.rng, 0.1, 0.9), among=_let_in) for s in counters[:3])

@@ -39,7 +39,6 @@ def surface(kind: str, rng: np.random.Generator, colour: Triple | None = None) -
 
 
 def _pale(rng: np.random.Generator) -> Triple:
-    """Draw a colour that people paint walls with: mostly light, sometimes strong."""
     if chance(rng, 0.12):
         red, green, blue = rng.uniform(0.15, 0.75, 3).tolist()
         return (red, green, blue)
@@ -156,7 +155,6 @@ def wall_mesh(plan: Storey, wall: Wall, looks: list[Looks], edge: Material, oute
 
 
 def _extension(plan: Storey, wall: Wall, end: Float[np.ndarray, "2"]) -> float:
-    """Return how far a wall runs on beyond its end: into the wall across it, not into one that continues it."""
     for other in plan.walls:
         if other is wall or not other.built:
             continue
@@ -242,7 +240,6 @@ def _fill(rng: np.random.Generator, builder: SceneBuilder, plan: Storey, wall: W
 
 
 def _hinged(mesh: Mesh, hole: Hole, thick: float) -> Mesh:
-    """Return a door with its leaf on the side that its hole wants."""
     out = mesh.vertex[mesh.vertex[:, 0] > thick / 2 + 0.1]
     if hole.width_m > 1.2 or not len(out):
         return mesh

@@ -240,7 +240,6 @@ def _place(
 
 
 def _draws(clips: Sequence[Clip], rng: np.random.Generator) -> Iterator[Clip]:
-    """Yield clips without end: every category once in a random order, then again; within one likewise."""
     stacks: dict[str, list[Clip]] = {clip.category: [] for clip in clips}
     while True:
         for category in rng.permutation(sorted(stacks)):

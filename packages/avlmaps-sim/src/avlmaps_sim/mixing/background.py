@@ -70,7 +70,6 @@ def _rms_of_filtered_noise(b: Float[np.ndarray, " zeros"], a: Float[np.ndarray, 
 
 
 def _hum(rate_hz: int, phases: Float[np.ndarray, " 5"]) -> Float[np.ndarray, " second"]:
-    """Return mains hum of RMS 1: 50 Hz and two harmonics, of which every second is the same."""
     time_s = np.arange(rate_hz) / rate_hz
     tones = [
         level * np.sin(2.0 * np.pi * hz * time_s + phase)
@@ -103,7 +102,6 @@ def _repeated(loop: Float32[np.ndarray, " n"], rate_hz: int) -> Iterator[Float32
 
 
 def _seamless(loop: Float32[np.ndarray, " n"], rate_hz: int) -> Float32[np.ndarray, " m"]:
-    """Blend the end of a recording into its beginning, so that it repeats without a click."""
     join = min(round(_JOIN_S * rate_hz), len(loop) // 4)
     if join == 0:
         return loop

@@ -120,7 +120,6 @@ def _frame_samples(sound: Sound) -> int:
 
 
 def _levels(sound: Sound) -> Float32[np.ndarray, " frames"]:
-    """Return the mean power of every 10 ms, without the constant part; the last frame may be shorter."""
     if len(sound.samples) == 0:
         return np.zeros(0, np.float32)
     starts = np.arange(0, len(sound.samples), _frame_samples(sound))

@@ -127,7 +127,6 @@ def chosen_spacing(walk: Walk, spacing: Spacing, length_s: float, wanted: int = 
 
 
 def _walked(position: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, " n"]:
-    """Return the length of the path up to each point, in strides, evenly shared out between their ends."""
     marks, lengths = [0], [0.0]
     for i, place in enumerate(position):
         stride_m = float(np.linalg.norm(place - position[marks[-1]]))

@@ -14,7 +14,6 @@ Picture = Float32[np.ndarray, "h w 3"]
 
 
 def _dark_screen(rng: np.random.Generator, size: int) -> Picture:
-    """Return a screen that is off, with the dim reflection of a window or a lamp."""
     x, y = grid(size)
     a, b = rng.uniform(0.1, 0.9, 2)
     near = np.maximum(np.abs(x - a) / rng.uniform(0.05, 0.2), np.abs(y - b) / rng.uniform(0.05, 0.3))

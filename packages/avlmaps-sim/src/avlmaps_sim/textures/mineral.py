@@ -27,7 +27,6 @@ def stone(rng: np.random.Generator) -> Texture:
 
 
 def _veins(rng: np.random.Generator, size: int) -> Float32[np.ndarray, "s s"]:
-    """Return branching veins in [0, 1]."""
     out = np.zeros((size, size), np.float32)
     for sharp, strength in ((0.05, 1.0), (0.09, 0.5), (0.03, 0.4)):
         field = cloud(rng, size, float(rng.uniform(1.5, 2.0)), stretch=float(rng.uniform(0.5, 1.8)))
@@ -104,7 +103,6 @@ def _laid(
 
 
 def _tile_plan(rng: np.random.Generator) -> tuple[int, int, float, tuple[float, float]]:
-    """Return columns, rows, shift and the size in metres of a field of tiles: from mosaic to slabs."""
     wide, high = ((0.6, 0.6), (0.3, 0.3), (0.6, 0.3), (0.2, 0.2), (0.15, 0.15), (0.2, 0.1), (0.05, 0.05), (0.1, 0.1),
                   (0.45, 0.45), (0.25, 0.4))[int(rng.integers(10))]  # fmt: skip
     n = 2 if wide >= 0.3 else 4 if wide >= 0.1 else 8

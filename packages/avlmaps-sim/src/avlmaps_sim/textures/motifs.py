@@ -9,20 +9,17 @@ Plane = Float32[np.ndarray, "s s"]
 
 
 def _stripes(rng: np.random.Generator, size: int) -> Int[np.ndarray, "s s"]:
-    """Return bands of different widths along the columns."""
     edges = np.sort(rng.choice(size, int(rng.integers(3, 12)), replace=False))
     band = np.searchsorted(edges, np.arange(size), side="right") % len(edges)
     return np.broadcast_to(rng.integers(0, 4, len(edges))[band], (size, size))
 
 
 def _checks(rng: np.random.Generator, size: int) -> Int[np.ndarray, "s s"]:
-    """Return gingham or tartan: stripes crossed with themselves."""
     band = _stripes(rng, size)[0] if rng.random() < 0.6 else np.arange(size) * int(rng.choice((4, 8))) // size % 2 * 2
     return (band[None, :] + band[:, None]) // 2
 
 
 def _lattice(rng: np.random.Generator, size: int) -> tuple[Plane, Plane, Int[np.ndarray, "s s"]]:
-    """Return offsets from the middle of each cell, in (-0.5, 0.5), and the cells' numbers; rows may be staggered."""
     n = int(rng.choice((2, 4, 6)))
     x, y = grid(size)
     row = (y * n).astype(np.int64)
@@ -31,7 +28,6 @@ def _lattice(rng: np.random.Generator, size: int) -> tuple[Plane, Plane, Int[np.
 
 
 def _dots(rng: np.random.Generator, size: int) -> Int[np.ndarray, "s s"]:
-    """Return dots, rings or squares."""
     dx, dy, cell = _lattice(rng, size)
     away = np.hypot(dx, dy) if rng.random() < 0.7 else np.maximum(np.abs(dx), np.abs(dy))
     radius = float(rng.uniform(0.15, 0.4))
@@ -40,7 +36,6 @@ def _dots(rng: np.random.Generator, size: int) -> Int[np.ndarray, "s s"]:
 
 
 def _flowers(rng: np.random.Generator, size: int) -> Int[np.ndarray, "s s"]:
-    """Return rosettes of petals with a heart and leaves between them."""
     dx, dy, _ = _lattice(rng, size)
     angle, away = np.arctan2(dy, dx), np.hypot(dx, dy)
     petals, depth = int(rng.integers(3, 9)), float(rng.uniform(0.2, 0.7))
@@ -50,7 +45,6 @@ def _flowers(rng: np.random.Generator, size: int) -> Int[np.ndarray, "s s"]:
 
 
 def _ogee(rng: np.random.Generator, size: int) -> Int[np.ndarray, "s s"]:
-    """Return damask: swelling and narrowing bands, filled with a mirrored ornament."""
     n = int(rng.choice((2, 3, 4)))
     x, y = grid(size)
     u, v = 2 * np.pi * n * x, 2 * np.pi * n * y / int(rng.choice((1, n)))
@@ -61,7 +55,6 @@ def _ogee(rng: np.random.Generator, size: int) -> Int[np.ndarray, "s s"]:
 
 
 def _zigzag(rng: np.random.Generator, size: int) -> Int[np.ndarray, "s s"]:
-    """Return chevrons or waves."""
     n, m = int(rng.choice((4, 6, 8))), int(rng.choice((2, 4, 6)))
     x, y = grid(size)
     bend = np.abs((x * m) % 1.0 - 0.5) * 2.0 if rng.random() < 0.6 else 0.5 * np.sin(2 * np.pi * m * x)
@@ -69,13 +62,11 @@ def _zigzag(rng: np.random.Generator, size: int) -> Int[np.ndarray, "s s"]:
 
 
 def _camouflage(rng: np.random.Generator, size: int) -> Int[np.ndarray, "s s"]:
-    """Return irregular patches: ikat, animal print, abstract prints."""
     field = cloud(rng, size, float(rng.uniform(0.8, 1.8)), float(rng.choice((0.4, 1.0, 2.5))), low=3.0, high=24.0)
     return np.digitize(field, (-0.6, 0.2, 0.9)).astype(np.int64)
 
 
 def _trellis(rng: np.random.Generator, size: int) -> Int[np.ndarray, "s s"]:
-    """Return a net of diagonal bars with a knot where they cross."""
     n = int(rng.choice((3, 4, 6, 8)))
     x, y = grid(size)
     a, b = np.abs((n * (x + y)) % 1.0 - 0.5), np.abs((n * (x - y)) % 1.0 - 0.5)

@@ -10,7 +10,6 @@ from jaxtyping import Float32
 
 @lru_cache(maxsize=32)
 def _log_wavenumber(size: int, stretch: float) -> Float32[np.ndarray, "h w2"]:
-    """Return the logarithm of the cycles per picture of each coefficient, those along the rows weighted; 0 at least."""
     down = np.fft.fftfreq(size, 1.0 / size)[:, None]
     right = np.fft.rfftfreq(size, 1.0 / size)[None, :] * stretch
     return np.log(np.maximum(np.hypot(down, right), 1.0)).astype(np.float32)

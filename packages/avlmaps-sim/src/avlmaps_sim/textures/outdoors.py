@@ -16,7 +16,6 @@ _SKIES = (((0.25, 0.48, 0.85), (0.75, 0.86, 0.95)), ((0.6, 0.72, 0.85), (0.88, 0
 
 
 def _sky(rng: np.random.Generator, size: int) -> Picture:
-    """Return a gradient from overhead to the horizon with clouds."""
     over, far = (np.array(c) for c in _SKIES[int(rng.integers(len(_SKIES)))])
     _, y = grid(size)
     sky = over + (far - over) * np.minimum(y * 1.5, 1.0)[..., None]
@@ -25,7 +24,6 @@ def _sky(rng: np.random.Generator, size: int) -> Picture:
 
 
 def _ridge(rng: np.random.Generator, size: int, height: float, rough: float) -> np.ndarray:
-    """Return for each column the row where a ridge or a row of treetops begins."""
     line = cloud(rng, 64, rough)[0]
     wide = np.interp(np.linspace(0, 63, size), np.arange(64), line)
     return size * (height + float(rng.uniform(0.01, 0.06)) * wide)
@@ -101,7 +99,6 @@ def landscape(rng: np.random.Generator, size: int) -> Picture:
 
 
 def _night(rng: np.random.Generator, size: int) -> Picture:
-    """Return the dark with lit windows and lamps far away."""
     image = np.full((size, size, 3), 0.03, np.float32) + np.array((0.0, 0.01, 0.03), np.float32)
     for _ in range(int(rng.integers(3, 50))):
         x, y = int(rng.integers(0, size)), int(rng.integers(size // 3, size))

@@ -62,7 +62,6 @@ def _fields(rng: np.random.Generator, size: int) -> Picture:
 
 
 def _poured(rng: np.random.Generator, size: int) -> Picture:
-    """Return paint that was poured and stirred."""
     colours = harmony(rng, 7)
     field = cloud(rng, size, float(rng.uniform(1.2, 2.2)))
     stir = float(rng.uniform(4.0, 25.0))
@@ -121,12 +120,10 @@ def _still_life(rng: np.random.Generator, size: int) -> Picture:
 
 
 def _print(rng: np.random.Generator, size: int) -> Picture:
-    """Return a sheet of pattern, as botanical and textile prints are."""
     return harmony(rng, 4)[levels(rng, size)].astype(np.float32)
 
 
 def _photograph(rng: np.random.Generator, size: int) -> Picture:
-    """Return a landscape, sometimes without colours."""
     image = landscape(rng, size)
     return np.repeat(image.mean(axis=2, keepdims=True), 3, axis=2) if rng.random() < 0.25 else image
 

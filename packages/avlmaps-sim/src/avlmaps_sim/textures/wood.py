@@ -8,7 +8,6 @@ from avlmaps_sim.textures.texture import Texture, grey
 
 
 def _grain(rng: np.random.Generator, size: int) -> Float32[np.ndarray, "s s"]:
-    """Return growth rings cut along the stem (they run along x), pores and a few knots, about 0 with spread 1."""
     rings = int(rng.integers(3, 14))
     drift = cloud(rng, size, 2.0, stretch=float(rng.uniform(3.0, 8.0))) * float(rng.uniform(0.02, 0.12))
     _, y = grid(size)
@@ -52,7 +51,6 @@ def wood(rng: np.random.Generator) -> Texture:
 
 
 def _strips(rng: np.random.Generator, size: int) -> tuple[Int[np.ndarray, "s s"], Float32[np.ndarray, "s s"]]:
-    """Return planks laid along x with staggered joints: the number of each pixel's plank, and 1 on its edge."""
     rows = int(rng.choice((5, 6, 8, 10, 14)))
     per_row = int(rng.integers(1, 4))
     y = np.arange(size) * rows // size
@@ -64,7 +62,6 @@ def _strips(rng: np.random.Generator, size: int) -> tuple[Int[np.ndarray, "s s"]
 
 
 def _herringbone(rng: np.random.Generator, size: int) -> tuple[Int[np.ndarray, "s s"], Float32[np.ndarray, "s s"]]:
-    """Return blocks 1 by 4 laid alternately along x and y; 1 where they run along y."""
     long, cells = 4, int(rng.choice((8, 16)))
     j, i = np.meshgrid(np.arange(size) * cells // size, np.arange(size) * cells // size)
     phase = (j - i) % (2 * long)
@@ -75,7 +72,6 @@ def _herringbone(rng: np.random.Generator, size: int) -> tuple[Int[np.ndarray, "
 
 
 def _blocks(rng: np.random.Generator, size: int) -> tuple[Int[np.ndarray, "s s"], Float32[np.ndarray, "s s"]]:
-    """Return squares of parallel fingers, turned by a right angle from one square to the next."""
     squares, fingers = int(rng.choice((4, 6, 8))), int(rng.integers(4, 7))
     step = np.arange(size) * squares / size
     x, y = np.meshgrid(step, step)

@@ -151,7 +151,6 @@ def _oriental(rng: np.random.Generator, size: int) -> Level:
 
 
 def _framed(rng: np.random.Generator, size: int) -> Level:
-    """Return a plain or patterned field with one or two bands along the rim."""
     x, y = grid(size)
     rim = np.maximum(np.abs(2 * x - 1), np.abs(2 * y - 1))
     field = levels(rng, size) if rng.random() < 0.5 else np.zeros((size, size), np.int64)
@@ -175,7 +174,6 @@ def _modern(rng: np.random.Generator, size: int) -> Level:
 
 
 def _shag(rng: np.random.Generator, size: int) -> Level:
-    """Return a field of one colour, or one crossed by a net of lines."""
     if rng.random() < 0.5:
         return np.zeros((size, size), np.int64)
     x, y = grid(size)

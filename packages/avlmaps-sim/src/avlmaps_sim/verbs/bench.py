@@ -119,7 +119,7 @@ class Bench(ModelVerb):
     model: Annotated[tuple[tuple[str, ...], ...], arg(metavar="MODULE=NAME[@MODEL] ..."), UseAppendAction] = ()
     """Other backends or models than the profile's: pixels=clip-patches@openai/clip-vit-large-patch14 views=clip."""
     out: Annotated[Path, arg(metavar="DIR")] = Path("bench_out")
-    """Folder for SUITE.json, SUITE.md, SUITE.png and a CSV file for each table."""
+    """Folder for SUITE.json, SUITE.md and a CSV file for each table."""
     seed: Annotated[int, arg(metavar="N")] = 0
     """Seed of all random choices."""
     days: Annotated[int | None, arg(metavar="N")] = None
@@ -167,7 +167,6 @@ class Bench(ModelVerb):
         return tuple(word for words in self.model for word in words)
 
     def _of_all_scenes(self) -> dict[str, Any]:
-        """Return what the settings of all suites on scenes share."""
         chosen = self.indexing
         return {
             "profile": self.profile, "models": self.models_chosen, "hearing": chosen.hearing, "sounds": self.sounds,

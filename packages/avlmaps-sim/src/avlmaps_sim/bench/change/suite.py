@@ -36,7 +36,7 @@ from avlmaps_sim.bench.harness.settings import SceneSettings
 from avlmaps_sim.bench.harness.workers import side_by_side
 from avlmaps_sim.bench.harness.workplace import SceneJob, Workplace, scene_jobs
 from avlmaps_sim.bench.objects import FEWEST_VOXELS, STRUCTURE
-from avlmaps_sim.bench.output import Table, draw, markdown, write_answer
+from avlmaps_sim.bench.output import Table, markdown, write_answer
 from avlmaps_sim.mesh import Triple
 from avlmaps_sim.rearranged import Change
 from avlmaps_sim.scene import NOTHING, Scene, SceneObject
@@ -105,7 +105,6 @@ def run_change(
         "tables": tables,
     }
     written = write_answer(answer, out, f"# Change\n\n{in_words(answer)}\n\n{NOTE}\n\n{markdown(tables)}")
-    draw(tables, out / "change.png")
     return written
 
 
@@ -127,7 +126,6 @@ def _home(job: SceneJob, days: int, open_spec: Callable[[str], Scene]) -> dict[s
 
 
 def _seen_names(place: Workplace) -> set[str]:
-    """Return the names of the things of which the day's map has enough voxels."""
     label = place.label
     count = np.bincount(label[label != NOTHING], minlength=len(place.truth.objects))
     return {thing.name for thing, voxels in zip(place.truth.objects, count, strict=True) if voxels >= FEWEST_VOXELS}
@@ -198,7 +196,6 @@ def _lived(
 
 
 def _noticeable(true: Sequence[Happened], places: Sequence[Workplace]) -> list[Happened]:
-    """Return the changes that depth shows: it goes through where a thing was, or where one appeared before that."""
     before = [one.before for one in true]
     after = [one.after if one.kind == "appeared" else None for one in true]
     empty_now = _looked_through(places[-1:], before)
@@ -261,7 +258,6 @@ def _stay(thing: Thing, scene_from_map: Float[np.ndarray, "4 4"]) -> Stay:
 
 
 def _misplaced(rows: Sequence[Sequence[float]], place: Workplace) -> tuple[float, float]:
-    """Return how far a day's walk was put from where it was driven: all days share the scene's own frame."""
     found: Float[np.ndarray, "4 4"] = np.array(rows, np.float64)
     at = place.recording.world_from_camera[:, :3, 3]
     turn = place.turn if isinstance(place, TurnedPlace) else np.eye(4)

@@ -128,7 +128,6 @@ def _near(sought: str, mark: str, targets: tuple[Box, ...] = ()) -> LabelledQuer
 
 
 def _holds(evidence: Evidence, task: Task, kind: str) -> bool:
-    """Return whether a room of a kind holds what a task seeks, or may."""
     return any(
         thing.area < 0 or evidence.areas[thing.area].kind == kind
         for thing in evidence.objects
@@ -168,5 +167,4 @@ def _is(category: str, name: str) -> bool:
 
 
 def _any_is(held: Sequence[str], name: str) -> bool:
-    """Return whether a home holds what a name means, or may be taken to mean."""
     return any(_is(category, name) or lexicon().is_a(name, category, EntryKind.THING) for category in held)

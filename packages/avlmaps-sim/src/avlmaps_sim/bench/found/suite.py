@@ -56,7 +56,6 @@ def run_found(settings: IndexingSettings | None, out: Path) -> Any:
     page = f"# Is found true?\n\n{in_words(answer)}\n\n{NOTE}\n\n{markdown(answer['tables'])}"
     written = write_answer(answer, out, page)
     write_bytes_atomically(out / "found_answers.json", msgspec.json.encode(answers))
-    draw_reliability(answers, out / "found.png")
     return written
 
 
@@ -112,7 +111,6 @@ def factors_table(answers: Sequence[Judged]) -> Table:
 
 
 def _share_found(group: Sequence[Judged]) -> str:
-    """Return how many of some queries are reported as found; nothing of none."""
     if not group:
         return ""
     found = sum(one.probability >= FOUND_AT for one in group)
@@ -157,36 +155,9 @@ def _brier_interval(answers: Sequence[Judged]) -> str:
 def _numbers(
     answers: Sequence[Judged],
 ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
-    """Return probability, truth and weight; of each kind what has an answer and what has none weigh alike."""
     key = [(one.kind, one.answerable) for one in answers]
     return (
         np.array([one.probability for one in answers]),
         np.array([one.right for one in answers], float),
         np.array([1.0 / key.count(one) for one in key]),
     )
-
-
-def draw_reliability(answers: Sequence[Judged], path: Path) -> None:
-    """Draw the share of right goals over their probability, with 95 % intervals, and how many there are of each."""
-    from matplotlib.figure import Figure
-    from matplotlib.ticker import NullFormatter
-
-    figure = Figure(figsize=(5.2, 5.6), layout="constrained")
-    top, below = figure.subplots(2, 1, height_ratios=[4, 1], sharex=True)
-    rows = reliability_table(answers)["rows"]
-    p = np.array([one.probability for one in answers])
-    top.plot([0, 1], [0, 1], color="#9aa0a6", linewidth=1)
-    for row in rows:
-        count, mean, share = int(row[1]), float(row[2]), float(row[3])
-        top.plot([mean, mean], wilson(round(share * count), count), color="#e07b39", linewidth=1.2)
-        top.plot(mean, share, "o", color="#e07b39", markersize=6)
-    top.set_ylabel("share of first goals that are right")
-    below.hist(p, bins=_BINS.tolist(), color="#7fa6c9")
-    below.set_yscale("log")
-    below.yaxis.set_minor_formatter(NullFormatter())  # with one decade and a half all of them would be named
-    below.set_ylabel("queries")
-    below.set_xlabel("probability that the first goal is right")
-    top.set_title(f"{len(answers)} queries in {len({one.scene for one in answers})} scenes", loc="left", fontsize=10)
-    for axes in (top, below):
-        axes.spines[["top", "right"]].set_visible(False)
-    figure.savefig(path, dpi=110)

@@ -31,7 +31,8 @@ class Recorded:
         hearing: ``overlay`` or ``acoustic``.
         frames: limit of frames in a scene.
         sources: limit of sounds in a scene.
-        ambiguous: how many kinds of sound play in two places.
+        ambiguous: how many kinds of sound play in several places.
+        places: in how many.
         sensor: whose faults colour and depth have.
         sounds: name of the folder of clips; ``""`` for sounds made by rule.
         seed: of walks, sounds and tasks.
@@ -46,6 +47,7 @@ class Recorded:
     sounds: str
     seed: int
     clips: str = "all"
+    places: int = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,7 +65,8 @@ class SceneSettings:
         sensor: whose faults colour and depth have.
         frames: limit of frames a scene.
         sources: limit of sounds a scene.
-        ambiguous: how many kinds of sound play in two places.
+        ambiguous: how many kinds of sound play in several places.
+        places: in how many.
         jobs: scenes side by side; 0 takes as many as there are cores.
         seed: of walks, sounds and all queries.
         load: tasks to use instead of making new ones; how the scenes were recorded comes from the file.
@@ -81,6 +84,7 @@ class SceneSettings:
     frames: int = 600
     sources: int = 14
     ambiguous: int = 2
+    places: int = 3
     jobs: int = 0
     seed: int = 0
     load: Path | None = None
@@ -92,7 +96,7 @@ class SceneSettings:
         sounds = "" if self.sounds is None else self.sounds.resolve().name
         clips = "all" if self.sounds is None else self.clips
         return Recorded(
-            self.hearing, self.frames, self.sources, self.ambiguous, self.sensor, sounds, self.seed, clips
+            self.hearing, self.frames, self.sources, self.ambiguous, self.sensor, sounds, self.seed, clips, self.places
         )  # fmt: skip
 
     @property

@@ -42,7 +42,6 @@ def side_by_side(
 
 
 def _begin() -> None:
-    """Begin a process of the pool."""
     end_with_parent()
     silence()
 

@@ -89,7 +89,7 @@ class SceneJob:
             sounds = unheard_folder(sounds, self.work)
         return RecordSettings(
             fps=_FPS, sensor=wanted.sensor, hearing=wanted.hearing, sounds=sounds, sources=wanted.sources,  # pyright: ignore[reportArgumentType]
-            ambiguous=wanted.ambiguous, max_frames=wanted.frames, workers=1,
+            ambiguous=wanted.ambiguous, places=wanted.places, max_frames=wanted.frames, workers=1,
         )  # fmt: skip
 
 
@@ -242,7 +242,6 @@ class Workplace:
         return Evidence(self.job.spec, truth.objects, seen, truth.areas, events, storey_m)
 
     def _event(self, event: HeardEvent) -> Event:
-        """Return a sound with its true places: its source, or where the robot was while it was heard (the paper's)."""
         if self.job.recorded.hearing == "acoustic":
             return Event(event.category, event.source)
         stamps_s = self.recording.stamps_s
@@ -267,7 +266,6 @@ class Workplace:
 
 
 def _same_things(made: Sequence[SceneObject], recorded: Sequence[SceneObject]) -> bool:
-    """Return whether things are the same, to the rounding of the files."""
     if [thing.category for thing in made] != [thing.category for thing in recorded]:
         return False
     corners = (np.array([(*thing.low, *thing.high) for thing in things]) for things in (made, recorded))

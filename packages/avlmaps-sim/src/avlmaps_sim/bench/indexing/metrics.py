@@ -59,13 +59,18 @@ class Score:
         return wilson(self.hits[LIMITS_M.index(limit_m)], self.count)
 
 
-def scored(answers: Sequence[Answered], seed: int = 0) -> Score:
-    """Sum up answers."""
-    off_m = np.array([answer.off_m for answer in answers], np.float64)
+def scored(answers: Sequence[Answered], seed: int = 0, *, by_centre: bool = False) -> Score:
+    """Sum up answers, by the nearest face of the right thing or by its centre."""
+    off_m = np.array([answer.centre_m if by_centre else answer.off_m for answer in answers], np.float64)
     hits = tuple(int((off_m < limit).sum()) for limit in LIMITS_M)
     answered = sum(answer.position is not None for answer in answers)
     mean = float(off_m.mean()) if len(off_m) else 0.0
     return Score(len(answers), answered, hits, mean, bootstrapped_mean(off_m, np.random.default_rng(seed)))
+
+
+def chance(tasks: Sequence[Task]) -> float:
+    """Return the share that is right where one of the candidates of each name is drawn at random."""
+    return float(np.mean([len(task.targets) / (len(task.targets) + task.rivals) for task in tasks])) if tasks else 0.0
 
 
 def bootstrapped_mean(values: Float[np.ndarray, " n"], rng: np.random.Generator) -> tuple[float, float]:

@@ -1,7 +1,7 @@
 """The rules by which tasks are made of a scene, so that each is truly ambiguous and has one right answer.
 
 The name of the goal alone never identifies it: the recording shows at least two things of the category, or holds the
-sound at two places. The context does: the right one is near it, and every other is clearly farther.
+sound at several places. The context does: the right one is near it, and every other is clearly farther.
 """
 
 from collections.abc import Sequence
@@ -15,19 +15,20 @@ from avlmaps_sim.mesh import Triple
 
 APART_M = 1.0  # things in other areas are at least this far from the right things
 LEAST_PIXELS = 0.01  # of a photo that show the thing
+_LEAST_PLACES = 3  # of a sound that is sought, so that a coin does not win
 _A_CATEGORY = 3  # tasks of one category in a scene and table, at most
 _A_SOUND = 10  # the same for a sound that is sought: few sounds play at two places
 
 
 def sound_tasks(evidence: Evidence, rng: np.random.Generator, most: int) -> list[Task]:
-    """Make tasks "the sound of SOUND near the OBJECT" (Table IV): of several places, one is near such a thing.
+    """Make tasks "the sound of SOUND near the OBJECT" (Table IV): of three places or more, one is near such a thing.
 
     Any thing of the category may be the near one; a thing that the recording does not show counts as well.
     """
     found: list[Task] = []
     boxes = shown_boxes(evidence)
     for sound, heard in heard_places(evidence.events).items():
-        for category, own in boxes.items() if len(heard) > 1 else ():
+        for category, own in boxes.items() if len(heard) >= _LEAST_PLACES else ():
             away = [min(box.distance_m(event.place) for box in own) for event in heard]
             chosen = alone_near(away)
             if chosen is not None:

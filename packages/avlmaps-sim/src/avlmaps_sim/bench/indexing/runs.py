@@ -151,7 +151,6 @@ def _tasks(settings: IndexingSettings, work: Path, open_spec: Callable[[str], Sc
 
 
 def _in_turn(made: Sequence[Sequence[Task]], kind: TaskKind, sizes: Mapping[TaskKind, int] | None) -> list[Task]:
-    """Take a kind's tasks from the scenes in turn, up to the size of its table; return them scene by scene."""
     own = [[task for task in scene if task.kind is kind] for scene in made]
     longest = max(map(len, own), default=0)
     turns = [scene[number] for number in range(longest) for scene in own if number < len(scene)]
@@ -216,5 +215,4 @@ def _answers(place: Workplace, tasks: Sequence[Task]) -> list[Answered]:
 
 
 def _key(job: SceneJob, recipe: int, *facts: object) -> str:
-    """Return a short name of everything that tasks or answers depend on beside the scene's folder."""
     return sha256(repr((job.map_name, __version__, recipe, *facts)).encode()).hexdigest()[:12]

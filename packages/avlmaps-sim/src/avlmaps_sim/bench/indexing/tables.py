@@ -8,7 +8,7 @@ from avlmaps_sim.bench.harness.intervals import in_percent, wilson
 from avlmaps_sim.bench.harness.paper import paper_figures
 from avlmaps_sim.bench.harness.provenance import clip_table, shown_scene
 from avlmaps_sim.bench.indexing.configurations import OURS, configurations
-from avlmaps_sim.bench.indexing.metrics import LIMITS_M, Score, scored
+from avlmaps_sim.bench.indexing.metrics import LIMITS_M, Score, chance, scored
 from avlmaps_sim.bench.indexing.runs import Outcome
 from avlmaps_sim.bench.indexing.tasks import Task, TaskKind
 
@@ -38,11 +38,15 @@ def tables(outcome: Outcome) -> dict[str, dict[str, Any]]:
 
 
 def _table(outcome: Outcome, kind: TaskKind) -> dict[str, Any]:
-    rows: list[list[Any]] = []
+    tasks = [task for task in outcome.tasks.tasks if task.kind is kind]
+    coin = ["chance: one of the candidates", len(tasks), _percent(chance(tasks))]
+    rows = [[*coin, *[""] * (len(columns()) - len(coin))]]
     for one in configurations(kind):
         answers = outcome.answers(kind, one.name)
         if answers:
             rows.append(_row(one.name, scored(answers, outcome.settings.seed)))
+            if one.role == OURS:
+                rows.append(_row(f"{one.name}, by the centre", scored(answers, outcome.settings.seed, by_centre=True)))
         else:
             rows.append([one.name, 0, *[""] * (len(columns()) - 2)])
     table = {"columns": columns(), "rows": [*rows, *_paper_rows(kind)]}

@@ -57,7 +57,6 @@ def region_features(avlmap: AVLMap, recording: Recording) -> Float32[np.ndarray,
 
 
 def _encoded(encoder: ViewEncoder, cut: list[Frame], dim: int) -> Float32[np.ndarray, "r d"]:
-    """Encode cut-outs one by one: they differ in size."""
     return np.concatenate([np.zeros((0, dim), np.float32), *(np.asarray(encoder.encode([one])) for one in cut)])
 
 
@@ -138,12 +137,10 @@ def _spread(avlmap: AVLMap, recording: Recording, rows_of: _Rows) -> Float32[np.
 def _once_each(
     key: Int[np.ndarray, " n"], which: Int[np.ndarray, " n"]
 ) -> tuple[Int[np.ndarray, " m"], Int[np.ndarray, " m"]]:
-    """Return each pair of voxel and region once."""
     pairs = np.unique(np.stack([key, which], axis=1), axis=0)
     return pairs[:, 0], pairs[:, 1]
 
 
 def _packed(index: Int[np.ndarray, "n 3"]) -> Int[np.ndarray, " n"]:
-    """Pack voxel indices into one number each, in the order of the map (x, then y, then z)."""
     shifted = np.asarray(index, np.int64) + (1 << 20)
     return (shifted[:, 0] << 42) | (shifted[:, 1] << 21) | shifted[:, 2]

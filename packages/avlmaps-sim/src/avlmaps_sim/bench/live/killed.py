@@ -67,7 +67,6 @@ def main() -> None:
 
 
 def _tell(live: LiveMap) -> None:
-    """Print when it is, how many frames are in the map, and whether it was saved already."""
     saved = "saved" if live.status().saved_age_s >= 0.0 else "-"
     sys.stdout.write(f"{time.monotonic()} {len(live)} {saved}\n")
     sys.stdout.flush()

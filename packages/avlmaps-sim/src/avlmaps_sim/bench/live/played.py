@@ -88,7 +88,6 @@ def play(
 
 
 def _frames(recording: Recording, laps: int) -> Iterator[tuple[Frame, float, bool]]:
-    """Yield frames, their stamps, and whether each ends a lap; those of the first lap are the recording's."""
     stamps_s = recording.stamps_s
     lap_s = recording.duration_s + float(np.median(np.diff(stamps_s)))
     for lap in range(laps):
@@ -110,6 +109,5 @@ def _ask(live: LiveMap, over: threading.Event, took_ms: list[float]) -> None:
 
 
 def _processor_s(name: str) -> float:
-    """Return the processor time of a thread that runs; what its encoders' own threads take is not in it."""
     found = [one.ident for one in threading.enumerate() if one.name == name and one.ident is not None]
     return sum(time.clock_gettime(time.pthread_getcpuclockid(ident)) for ident in found)

@@ -106,7 +106,6 @@ def _pace_word(rate: float | None) -> str:
 
 
 def _paces(chosen: LiveBench) -> tuple[float | None, ...]:
-    """Return the rates of the drives; None is as fast as the map takes it."""
     return () if not chosen.laps else (chosen.rate, None) if chosen.ends else (chosen.rate,)
 
 
@@ -150,7 +149,6 @@ def _kills(recording: Path, path: Path, profile: str, kills: int, seed: int, wor
 
 
 def _code(*places: Path) -> str:
-    """Return a hash of what a process that is killed runs: the whole package, its weights among it, and the bench."""
     digest = sha256()
     for place in places:
         for file in sorted(place.rglob("*")) if place.is_dir() else [place]:
@@ -166,7 +164,6 @@ def _killed(lost: list[float]) -> list[list[object]]:
 
 
 def _ends(name: str, recording: Recording, place: Path, used: Encoders, rate: float) -> list[list[object]]:
-    """Compare maps at the end of a drive, with gates, by the clock too, and without, with the build."""
     built = build_map(recording, place / "built", used, progress=False, allow=["geometry", "colour"])
     rows: list[list[object]] = []
     for gates, pace in ((True, None), (True, rate), (False, None)):
@@ -186,7 +183,6 @@ def _compared(live: AVLMap, built: AVLMap) -> list[object]:
 
 
 def _equality(one: StoredMap, other: StoredMap) -> str:
-    """Say whether two maps have the same voxels, or which of their arrays differ."""
     names = [field.name for field in fields(one.voxels)]
     differ = [name for name in names if not np.array_equal(getattr(one.voxels, name), getattr(other.voxels, name))]
     if len(differ) == len(names):

@@ -112,7 +112,6 @@ def _filled(ground: Ground, series: Series, form: Form, rng: np.random.Generator
 
 
 def _shown(form: Form) -> str:
-    """Return a form as tables show it: what it is filled with, in its place."""
     text = form.command
     for number, part in enumerate(form.parts):
         text = text.replace(f"{{{number}}}", f"<{part}>")
@@ -139,7 +138,6 @@ _Found = list[tuple[Goal, Photo | None]]
 
 
 def _tasks(ground: Ground, kind: TaskKind) -> _Found:
-    """Return ambiguous things of which exactly one is right."""
     return [(goal, _photo_of(task)) for goal, task in ground.ambiguous_things(kind) if len(goal.boxes) == 1]
 
 
@@ -189,12 +187,10 @@ def _spot(form: Form, parts: Sequence[Goal], place: tuple[float, float, float], 
 
 
 def _argument(part: Goal) -> str:
-    """Return the argument of a skill: a phrase for the name of a thing, else a heat."""
     return heat_of(part)
 
 
 def _box_of(part: Goal) -> Box:
-    """Return the box of a part's only right thing, or of its only right place, which has no extent."""
     if part.boxes:
         return part.boxes[0]
     x, y, _ = part.places[0]

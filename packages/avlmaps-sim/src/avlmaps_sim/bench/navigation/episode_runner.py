@@ -163,7 +163,6 @@ class Pilot:
         return trace.error
 
     def _judged(self, goals: Sequence[Goal], begin: GroundPose, moves: Sequence[LoggedMove]) -> list[Leg]:
-        """Return a leg for each movement that was for a goal: a place for a place, a turn for a heading."""
         legs: list[Leg] = []
         for move in moves:
             pose = GroundPose(move.stop[0], move.stop[1], move.heading_rad)

@@ -93,7 +93,6 @@ class Goal:
 
 
 def _off_box_rad(box: Box, pose: GroundPose) -> float:
-    """Return the angle from straight ahead to the nearest part of a box; 0 where some of it is ahead."""
     if box.distance_m((pose.x_m, pose.y_m, 0.0)) == 0.0:
         return 0.0
     corners = [(x, y) for x in (box.low[0], box.high[0]) for y in (box.low[1], box.high[1])]
@@ -129,7 +128,6 @@ def between(a: Box, b: Box) -> Triple:
 
 
 def _middle(low_a: float, high_a: float, low_b: float, high_b: float) -> float:
-    """Return the middle of what two ranges share, or of the gap between them."""
     return (max(low_a, low_b) + min(high_a, high_b)) / 2
 
 

@@ -127,7 +127,6 @@ class Perceived(AVLMap):
         return Heatmap.of(true_things(self.space, part, falloff, self._scene.label, own))
 
     def _category(self, text: str) -> str:
-        """Return the kind of sound that a phrase names, if it was made here; the plain ear knows kinds by name only."""
         named = {spoken(event.category): event.category for event in self._scene.truth.events}
         return named.get(spoken(_plain(text)), text)
 
@@ -160,5 +159,4 @@ def _role(primary: bool) -> Role:
 
 
 def _plain(words: str) -> str:
-    """Return a phrase as truth spells it."""
     return " ".join(words.replace("_", " ").lower().split()).removeprefix("the ")

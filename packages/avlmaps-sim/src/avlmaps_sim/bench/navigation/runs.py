@@ -121,7 +121,6 @@ def _named(todo: _Todo) -> str:
 
 
 def _journal(settings: NavigationSettings, out: Path, job: SceneJob) -> Path:
-    """Return the file of a scene's episodes: one for each way of sending robots, so that its lines can be counted."""
     return out / "episodes" / f"{job.folder.name}-{_key(settings)[:8]}.jsonl"
 
 
@@ -166,7 +165,6 @@ def _shared_out(settings: NavigationSettings, series: Any, made: list[list[Missi
 
 
 def _made(todo: _Todo) -> list[Mission]:
-    """Record and map a scene, and make its missions."""
     return NavigationPlace(todo.job, todo.settings, todo.open_spec).missions()
 
 
@@ -192,7 +190,6 @@ def _sent(todo: _Todo) -> SceneFacts:
 
 
 def _key(settings: NavigationSettings, *facts: object) -> str:
-    """Return a short name of how robots are sent and of all else that an episode depends on."""
     how = (settings.rules, settings.language, settings.guess, BASE, settings.recorded, __version__, _SENDING)
     return sha256("\n".join(map(repr, (*how, *facts))).encode()).hexdigest()[:24]
 

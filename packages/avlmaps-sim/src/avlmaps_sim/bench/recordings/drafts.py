@@ -82,7 +82,6 @@ class Draft:
 
 
 def _thinned(rig: Rig, step: int) -> Rig:
-    """Return the cameras of pictures of which every few pixels are taken; of colour they are averaged."""
     d, rgb = rig.depth, rig.rgb
     size = (-(-d.width // step), -(-d.height // step))
     depth = Pinhole(d.fx / step, d.fy / step, (d.cx - 0.5) / step + 0.5, (d.cy - 0.5) / step + 0.5, *size)

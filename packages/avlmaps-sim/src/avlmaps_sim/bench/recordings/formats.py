@@ -77,7 +77,6 @@ def _row(values: Iterable[float]) -> str:
 
 
 def _stored(draft: Draft, units_per_m: float) -> list[Picture]:
-    """Return depth in the unit of a format that cannot say which it is in."""
     pictures = [np.rint(depth * (units_per_m / draft.units_per_m)) for depth in draft.depth]
     return [np.clip(picture, 0, _MOST).astype(np.uint16) for picture in pictures]
 
@@ -97,7 +96,6 @@ def _of_one_camera(draft: Draft) -> bool:
 
 
 def _of_matrices(draft: Draft) -> bool:
-    """Return whether poses need neither quaternions nor a clock of their own."""
     return draft.quaternion_roll == 0 and np.array_equal(draft.stamps_s, draft.pose_stamps_s)
 
 

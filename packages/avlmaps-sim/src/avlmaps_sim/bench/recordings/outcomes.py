@@ -154,7 +154,6 @@ def _spread(count: int) -> list[int]:
 
 
 def _points(recording: Recording, index: int, step: int) -> Float[np.ndarray, "k 3"]:
-    """Return points of a frame in the recording's world, every few pixels."""
     frame = recording.frame(index)
     camera = recording.rig.depth
     points = camera.backproject(frame.depth_m.astype(np.float64))[::step, ::step].reshape(-1, 3)

@@ -66,7 +66,6 @@ def _of_later() -> Iterator[Situation]:
 
 
 def _turn(axis: int, degrees: float) -> np.ndarray:
-    """Return a turn about one axis of the camera."""
     half = np.deg2rad(degrees) / 2.0
     return poses.from_quaternion(np.zeros((1, 3)), np.array([[*(np.sin(half) * np.eye(3)[axis]), np.cos(half)]]))[0]
 
@@ -166,7 +165,6 @@ def _of_a_lens(draft: Draft, other: Draft, rng: np.random.Generator) -> Draft:
 
 
 def _narrow(picture: Picture) -> Picture:
-    """Stretch the middle three quarters of the rows to all of them."""
     height = len(picture)
     return picture[(np.arange(height) * 3 // 4) + height // 8]
 
@@ -183,7 +181,6 @@ def _on_poses(change: Callable[[np.ndarray], np.ndarray]) -> Change:
 
 
 def _of_axes(name: str) -> Change:
-    """Write the poses of a camera with other axes."""
     turn = np.eye(4)
     turn[:3, :3] = opencv_from_axes(name)
     return _on_poses(lambda written: written @ turn)
@@ -254,7 +251,6 @@ def _exchanged(draft: Draft, other: Draft, rng: np.random.Generator) -> Draft:
 
 
 def _neighbours(*order: int, colour: bool = True, depth: bool = True) -> Change:
-    """Put neighbours near the middle into another order."""
 
     def changed(draft: Draft, other: Draft, rng: np.random.Generator) -> Draft:
         rows, first = np.arange(len(draft)), int(rng.integers(len(draft) // 3, 2 * len(draft) // 3))
@@ -336,7 +332,6 @@ def _along_ray(draft: Draft, other: Draft, rng: np.random.Generator) -> Draft:
 
 
 def _fitted(pictures: tuple[Picture, ...], like: tuple[Picture, ...]) -> tuple[Picture, ...]:
-    """Return pictures of another walk in the number and size of this one's."""
     import cv2
 
     size = (like[0].shape[1], like[0].shape[0])
@@ -397,7 +392,6 @@ def _black(draft: Draft, other: Draft, rng: np.random.Generator) -> Draft:
 
 
 def _bgr(chosen: Callable[[int, int, np.random.Generator], bool]) -> Change:
-    """Exchange red and blue in some of the pictures."""
 
     def changed(draft: Draft, other: Draft, rng: np.random.Generator) -> Draft:
         count = len(draft)
@@ -458,7 +452,6 @@ def _of_intrinsics() -> Iterator[Named]:
 
 
 def _mounted(*by_m: float) -> Change:
-    """Say that the colour camera is elsewhere."""
     moved = np.eye(4)
     moved[:3, 3] = by_m
     return lambda d, o, g: replace(d, rig=Rig(d.rig.rgb, d.rig.depth, d.rig.rgb_from_depth @ moved))

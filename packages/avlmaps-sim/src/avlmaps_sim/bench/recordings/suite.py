@@ -149,7 +149,6 @@ def _some(task: tuple[_Source, Sequence[int], int]) -> list[Case]:
 
 
 def _rendered(folder: Path, spec: str, sensor: SensorName, drift: bool) -> Path:
-    """Record a home, once."""
     path = folder / f"{spec.replace(':', '-')}-{sensor}{'-drift' if drift else ''}"
     if not (path / "recording.json").exists():
         faults = OdometryFaults() if drift else None
@@ -166,13 +165,11 @@ def _whole(path: Path) -> Draft:
 
 
 def _dense(path: Path, name: str) -> Draft:
-    """Return the beginning of a walk."""
     recording = open_recording(path)
     return Draft.of(recording, name, range(min(_FRAMES, len(recording))))
 
 
 def _windows(path: Path) -> Iterator[Draft]:
-    """Yield stretches of a walk, in steps of one to twelve frames."""
     recording = open_recording(path)
     for step in (1, 2, 3, 5, 8, 12):
         for first in np.linspace(0, len(recording) - _WINDOW * step, 2).round().astype(int).tolist():
@@ -204,7 +201,6 @@ def _rights(drafts: Sequence[Draft]) -> Table:
 
 
 def _cost(paths: Sequence[Path], out: Path) -> Table:
-    """Return how much processor time the check takes of a build with the embedded encoders."""
     columns = ["recording", "frames", "check, processor s", "whole build, processor s", "share %"]
     return {"columns": columns, "rows": [_cost_of(path, out) for path in paths[:1]]}
 
@@ -220,7 +216,6 @@ def _cost_of(path: Path, out: Path) -> list[str | int]:
 
 
 def _processor_s(work: Callable[[], object]) -> float:
-    """Return the processor time of this process and its children for some work."""
 
     def spent() -> float:
         times = os.times()

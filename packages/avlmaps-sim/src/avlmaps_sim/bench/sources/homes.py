@@ -158,7 +158,6 @@ def measure_home(job: HomeJob, open_spec: Callable[[str], Scene]) -> tuple[HomeO
 
 
 def _map_of(recorded: Path, path: Path) -> AVLMap:
-    """Return the map of a recording: its sounds and surfaces, without sources."""
     recording = open_recording(recorded)
     assert recording.audio is not None
     recording.audio = replace(recording.audio, microphones=None)
