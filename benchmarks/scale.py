@@ -3,10 +3,9 @@
     python benchmarks/scale.py --folder OUT --voxels 1000000 5000000 --against decabd78
     python benchmarks/scale.py --folder OUT --map home.avlmap --photo photo.png
 
-The map, by default that of the home house:7, is tiled to each size (``tiled.py``). "first" is a command on a map beside
-which nothing is stored yet (``maps.store.derived``), as an older or a copied one; "CPU s" is the same on a map as a
-build leaves it. With ``--against``, each command is run with the source of that commit, or in that folder, as well, one
-after the other, and the ratio is given.
+The map, by default that of the home house:7, is tiled to each size (``tiled.py``). With ``--against``, each command is
+run with the source of that commit, or in that folder, as well, one after the other, and the ratio is given; it
+must read the same schema.
 """
 
 import argparse
@@ -14,7 +13,6 @@ import os
 import re
 import resource
 import shlex
-import shutil
 import subprocess
 import sys
 import tarfile
@@ -23,8 +21,6 @@ from io import BytesIO
 from pathlib import Path
 
 import timing
-from avlmaps.maps.store.derived import DERIVED
-from avlmaps.query.avlmap import AVLMap
 from tiled import write_tiled
 
 # What is run, by its name; MAP, PHOTO and OUT are put in.
@@ -94,13 +90,6 @@ def rows_of(path: Path, chosen: argparse.Namespace, source: str | None, work: Pa
 
         if source is not None:
             row["CPU s before"], row["peak MB before"] = measured(source)
-        with_stored = path / DERIVED
-        if with_stored.exists():
-            shutil.move(with_stored, work / DERIVED)
-        row["first CPU s"], _ = measured(None)
-        shutil.rmtree(with_stored, ignore_errors=True)
-        if (work / DERIVED).exists():
-            shutil.move(work / DERIVED, with_stored)
         row["CPU s"], row["peak MB"] = measured(None)
         if source is not None:
             row["ratio"] = row["CPU s before"] / row["CPU s"]  # pyright: ignore[reportOperatorIssue]
@@ -144,7 +133,6 @@ def main() -> None:
             path = folder / f"{count}.avlmap"
             if not path.exists():
                 write_tiled(chosen.map, path, count)
-            AVLMap.open(path).prepare()
             rows = rows_of(path, chosen, source, work)
             timing.show(f"Questions to a map of {count:,} voxels", rows, {}, chosen.json)
 

@@ -22,9 +22,12 @@ from tiled import write_tiled
 
 OPEN = """
 import json, resource, sys, time
+from avlmaps.maps.store.folder import damaged_files
 from avlmaps.maps.store.reader import open_stored
 before = time.perf_counter()
-stored = open_stored(sys.argv[1], verify=sys.argv[2] == "verify")
+stored = open_stored(sys.argv[1])
+if sys.argv[2] == "verify":
+    damaged_files(stored.path)
 opened = time.perf_counter()
 rows = stored.voxels.feature[:: max(1, len(stored.voxels) // 5000)].astype("f4").sum()
 print(json.dumps({"open_s": opened - before, "rows_s": time.perf_counter() - opened,

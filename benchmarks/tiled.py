@@ -13,9 +13,10 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
+from avlmaps.maps.store.folder import write
 from avlmaps.maps.store.manifest import MapBounds
+from avlmaps.maps.store.map_data import MapData
 from avlmaps.maps.store.reader import StoredMap, open_stored
-from avlmaps.maps.store.writer import MapContent, write_map
 from avlmaps.maps.types import Keyframes, Voxels
 
 GAP = 4  # empty voxels between two copies
@@ -116,8 +117,7 @@ def write_tiled(source: Path, out: Path, count: int, seed: int = 0) -> None:
     counts = structs.replace(info.counts, voxels=len(voxels), keyframes=len(keyframes))
     box = MapBounds.of(voxels.index, info.voxel_size_m)
     info = structs.replace(info, counts=counts, bounding_box_m=box, build_key="")
-    content = MapContent(voxels, keyframes, stored.place_state, stored.sounds, stored.path / "sounds")
-    write_map(out, content, info)
+    write(out, MapData(info, voxels, keyframes, stored.sounds, stored.place_state))
 
 
 def main() -> None:

@@ -75,7 +75,7 @@ def build_map(
         overwrite=overwrite,
         progress=progress,
     )
-    return AVLMap(_asked_with(stored, encoders)).prepare()
+    return AVLMap(_asked_with(stored, encoders))
 
 
 def open_map(path: str | Path, *, encoders: "Encoders | None" = None) -> "AVLMap":

@@ -27,7 +27,7 @@ def drives(tmp_path_factory: pytest.TempPathFactory) -> list[StoredMap]:
 def of_another_file(stored: StoredMap) -> StoredMap:
     """Return a map whose recording has another fingerprint, as where it was driven live or read in another way."""
     recording = msgspec.structs.replace(stored.info.recording, fingerprint="0" * 64)
-    return replace(stored, info=msgspec.structs.replace(stored.info, recording=recording))
+    return replace(stored, data=replace(stored.data, info=msgspec.structs.replace(stored.info, recording=recording)))
 
 
 @pytest.mark.parametrize("again", [lambda stored: stored, of_another_file], ids=["itself", "read in another way"])
@@ -53,7 +53,8 @@ def test_a_day_is_that_of_the_clock_where_the_clock_can_be_right(
     drives: list[StoredMap], begins_s: float, day: str
 ) -> None:
     recording = msgspec.structs.replace(drives[0].info.recording, begins_s=begins_s)
-    (visit,) = visits_of(replace(drives[0], info=msgspec.structs.replace(drives[0].info, recording=recording)))
+    data = replace(drives[0].data, info=msgspec.structs.replace(drives[0].info, recording=recording))
+    (visit,) = visits_of(replace(drives[0], data=data))
     assert visit.day == day
 
 

@@ -11,8 +11,6 @@ from pathlib import Path
 import numpy as np
 from seeds import files_of, is_text, numbers_of
 
-from helpers.signing import signed
-
 Rng = np.random.Generator
 
 
@@ -221,33 +219,9 @@ def far_pose(rng: Rng, seed: Path) -> str:
     return f"far pose {file.name}:{at + 1}"
 
 
-def resigned(rng: Rng, seed: Path) -> str:
-    """Change an array of a map and sign it again."""
-    import hashlib
-
-    manifest = seed / "map.json"
-    if not seed.is_dir() or not manifest.is_file():
-        return flip(rng, seed)
-    info = json.loads(manifest.read_text())
-    names = [name for name, file in info["files"].items() if file["dtype"]]
-    name = names[int(rng.integers(len(names)))]
-    entry = info["files"][name]
-    array = np.load(seed / entry["path"])
-    odd = [np.nan, np.inf, 1e30, -1.0, 0.0, 2.0**31 - 1, -(2.0**31)]
-    if array.size:
-        with np.errstate(all="ignore"):
-            value = np.array(odd[int(rng.integers(len(odd)))])
-            array.reshape(-1)[int(rng.integers(array.size))] = value.astype(array.dtype)
-    np.save(seed / entry["path"], array)
-    content = (seed / entry["path"]).read_bytes()
-    entry.update(bytes=len(content), sha256=hashlib.sha256(content).hexdigest())
-    manifest.write_text(signed(json.dumps(info)))
-    return f"resigned {name}"
-
-
 MUTATORS: tuple[Callable[[Rng, Path], str], ...] = (
     flip, flip_header, truncate, empty, remove, swap, odd_number, unit, shuffle_lines, nested, odd_json, huge_png,
-    huge_npy, other_kind, garbage, insert, far_pose, resigned,
+    huge_npy, other_kind, garbage, insert, far_pose,
 )  # fmt: skip
 
 

@@ -10,8 +10,9 @@ import pytest
 
 from avlmaps.maps.build import build_map
 from avlmaps.maps.settings import BuildSettings
+from avlmaps.maps.store.folder import write
+from avlmaps.maps.store.map_data import MapData
 from avlmaps.maps.store.reader import open_stored
-from avlmaps.maps.store.writer import MapContent, write_map
 from avlmaps.maps.types import Keyframes, Voxels
 from avlmaps.perception.embedded.codes import features_of
 from avlmaps.recordings.open import open_recording
@@ -73,14 +74,8 @@ def _write_office(folder: Path) -> None:
         ground=None,
         build_key="0" * 64,
     )
-    content = MapContent(
-        voxels,
-        _keyframes(stored.keyframes, stored.encoders.views),
-        stored.place_state,
-        stored.sounds,
-        path / "sounds",
-    )
-    write_map(path, content, info)
+    keyframes = _keyframes(stored.keyframes, stored.encoders.views)
+    write(path, MapData(info, voxels, keyframes, stored.sounds, stored.place_state))
     open_stored(path)
 
 

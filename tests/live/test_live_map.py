@@ -38,7 +38,7 @@ def test_without_gates_the_end_is_the_build_of_the_same_frames_bit_by_bit(tmp_pa
     with LiveMap(tmp_path / "live", ENCODERS, up_in_world=UP, settings=settings, live=EVERY) as live:
         for one in recording:
             add(live, one)
-    made = open_stored(tmp_path / "live", verify=True)
+    made = open_stored(tmp_path / "live")
     for field in fields(made.voxels):
         np.testing.assert_array_equal(getattr(made.voxels, field.name), getattr(built.voxels, field.name))
     np.testing.assert_array_equal(made.keyframes.stamp_s, built.keyframes.stamp_s)
@@ -269,7 +269,7 @@ def test_a_thread_that_breaks_while_closing_is_told_and_its_map_is_written(tmp_p
             live.add_frame(one.rgb, one.depth_m, one.camera, one.world_from_camera, one.stamp_s)
     with pytest.raises(MapError, match=rf"\(ZeroDivisionError: division by zero\); .* with 3 frames, and {lost} that"):
         live.close()
-    assert live.close().stored.info.counts.frames == 3 == open_stored(tmp_path / "map", verify=True).info.counts.frames
+    assert live.close().stored.info.counts.frames == 3 == open_stored(tmp_path / "map").info.counts.frames
 
 
 def test_an_end_that_breaks_is_a_sentence_and_what_was_saved_stays(
@@ -284,7 +284,7 @@ def test_an_end_that_breaks_is_a_sentence_and_what_was_saved_stays(
         patch.setattr(GrowingMap, "stored", breaks)
         with pytest.raises(MapError, match=r"could not be finished \(ZeroDivisionError: division by zero\)"):
             live.close()
-    assert open_stored(tmp_path / "map", verify=True).info.counts.frames > 0
+    assert open_stored(tmp_path / "map").info.counts.frames > 0
     assert live.close().stored.info.counts.frames == 3
 
 
@@ -337,12 +337,12 @@ def test_a_sound_has_its_name_before_its_source_is_found(tmp_path: Path, monkeyp
             piece = slice(1600 * number, 1600 * (number + 1))
             live.add_audio(avlmaps.ChannelSound(two[:, piece], 16_000), 0.1 * number)
         named = snapshot_with(lambda stored: len(stored.sounds) == 1)
-        assert named.stored.arrays.sources_wait == 1 and not may_locate.is_set()
+        assert named.stored.data.sources_wait == 1 and not may_locate.is_set()
         assert "1 wait; ask again" in " ".join(named.ask("where does the last sound come from?").notes)
         with pytest.raises(avlmaps.QueryError, match="1 wait; ask again in a moment"):
             named.sources()
         may_locate.set()
-        located = snapshot_with(lambda stored: len(stored.sounds) == 1 and not stored.arrays.sources_wait)
+        located = snapshot_with(lambda stored: len(stored.sounds) == 1 and not stored.data.sources_wait)
         assert len(located.sources()) == 1 and not located.ask("where does the last sound come from?").notes
     sources = live.map.stored.sources()
     assert sources is not None and len(sources) == 1 and sources.heard.any()
@@ -438,7 +438,7 @@ def test_what_a_kill_leaves_is_a_whole_map(tmp_path: Path) -> None:
             time.sleep(float(rng.uniform(0.0, 0.5)))
             os.kill(child, signal.SIGKILL)
     for folder in folders:
-        left = open_stored(folder, verify=True)
+        left = open_stored(folder)
         assert len(left.voxels) > 0 and avlmaps.open_map(folder).object("red").peak >= 0.0
         with LiveMap(folder, ENCODERS, up_in_world=UP, overwrite=True) as again:  # the lock went with the process
             add(again, frame(0))

@@ -85,4 +85,4 @@ def test_the_command_serves_until_it_is_stopped(tmp_path: Path) -> None:
     process.send_signal(signal.SIGINT)
     assert process.wait(60) == 0
     process.stderr.close()
-    assert len(open_stored(tmp_path / "map", verify=True).voxels) > 0
+    assert len(open_stored(tmp_path / "map").voxels) > 0

@@ -76,11 +76,11 @@ def open_walk(audio: Path | None = None, *, seed: int = 0, bad: tuple[int, ...] 
 def content_of(path: Path) -> dict[str, bytes]:
     """Return every file of a map, and map.json without its timings."""
     files = {
-        str(file.relative_to(path)): file.read_bytes()
+        str(file.relative_to(path)).replace(".2.", "."): file.read_bytes()
         for file in path.rglob("*")
-        if file.is_file() and file.name not in (".lock", ".checked.json")
+        if file.is_file() and file.name != ".lock"
     }
-    manifest = json.loads(files.pop("map.json"))
+    manifest = json.loads(files.pop("map.json").replace(b".2.safetensors", b".safetensors"))
     manifest.pop("timings")
     return {**files, "map.json": json.dumps(manifest, sort_keys=True).encode()}
 

@@ -26,7 +26,7 @@ def kitchen(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> Stor
 
 @pytest.mark.shared
 def test_the_kitchen_is_of_a_kitchens_size_and_stands_upright(kitchen: StoredMap) -> None:
-    assert open_stored(kitchen.path, verify=True).info.counts.frames == 10
+    assert open_stored(kitchen.path).info.counts.frames == 10
     low, high = describe(kitchen)["bounding_box_m"]
     assert (np.subtract(high, low) > 1.5).all() and (np.subtract(high, low) < 9.0).all()
     assert np.degrees(np.arccos(kitchen.up_in_world @ (UP_IN_WORLD / np.linalg.norm(UP_IN_WORLD)))) < 5.0

@@ -12,7 +12,6 @@ from build_fakes import SETTINGS, Corners, Pixels, Places, Walk, _card
 from avlmaps.maps.build import build_map
 from avlmaps.maps.growing import GrowingMap
 from avlmaps.maps.pipeline.write import feature_doubts
-from avlmaps.maps.store.writer import MapContent
 from avlmaps.perception.encoders import Encoders
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.types import Frame
@@ -145,18 +144,16 @@ def test_pixels_that_say_the_same_everywhere_are_a_doubt(said: float, word: str)
 
 def test_views_and_sounds_that_are_all_the_same_are_a_doubt() -> None:
     stored = made(Words(), views=ConstantViews())
-    content = MapContent(stored.voxels, stored.keyframes, {}, stored.sounds, stored.path)
-    assert not list(feature_doubts(content, stored.info.models))  # of two keyframes nothing is known
+    voxels, keyframes, sounds = stored.voxels, stored.keyframes, stored.sounds
+    assert not list(feature_doubts(voxels, keyframes, sounds, stored.info.models))  # of two keyframes nothing is known
     models = {**stored.info.models, "sounds": replace_id(stored.info.models["views"])}
     same = np.tile(np.float32([0.6, 0.8, 0.0]), (9, 1))
-    content = replace(
-        content, keyframes=replace(stored.keyframes, view=same), sounds=replace(stored.sounds, feature=same)
-    )
-    views, sounds = feature_doubts(content, models)
+    alike = voxels, replace(keyframes, view=same), replace(sounds, feature=same), models
+    views, sounds = feature_doubts(*alike)
     assert "views by fake/views are the same in all 9 keyframes" in views
     assert "sounds by fake/ears are the same in all 9 stretches" in sounds
     same[4, 0] = 0.5
-    assert not list(feature_doubts(content, models))
+    assert not list(feature_doubts(*alike))
 
 
 def replace_id(model: Any) -> Any:
@@ -202,9 +199,8 @@ def test_a_masked_place_says_nothing_and_a_masked_keypoint_is_left_out() -> None
 
 def test_a_camera_that_stood_has_one_view() -> None:
     stored = made(Words(), views=ConstantViews())
-    content = MapContent(stored.voxels, stored.keyframes, {}, stored.sounds, stored.path)
     for said, count in ((0.6, 0), (0.0, 1)):
         view = np.full((9, 3), said, np.float32)
         pose = np.repeat(np.asarray(stored.keyframes.world_from_camera)[:1], 9, axis=0)
-        stood = replace(content, keyframes=replace(stored.keyframes, view=view, world_from_camera=pose))
-        assert len(list(feature_doubts(stood, stored.info.models))) == count
+        stood = replace(stored.keyframes, view=view, world_from_camera=pose)
+        assert len(list(feature_doubts(stored.voxels, stood, stored.sounds, stored.info.models))) == count

@@ -77,7 +77,7 @@ def test_it_ends_as_a_build_does_whatever_is_queried_on_the_way(tmp_path: Path, 
     require_same(asked.stored(final=True), built)
     saved = asked.save(tmp_path / "saved")
     require_same(saved, built)
-    require_same(open_stored(tmp_path / "saved", verify=True), built)
+    require_same(open_stored(tmp_path / "saved"), built)
     assert saved.info.counts == built.info.counts and saved.info.models == built.info.models
 
 

@@ -12,10 +12,9 @@ from build_fakes import SETTINGS, Walk, register_fakes
 from avlmaps.core.errors import MapError
 from avlmaps.core.files import linked_folder, write_bytes_atomically
 from avlmaps.maps.build import build_map
-from avlmaps.maps.repair import repair_map
-from avlmaps.maps.store.array_files import write_array
 from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.reader import open_stored
+from avlmaps.maps.store.tables import write_arrays
 
 PROFILE = register_fakes()
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="links need a privilege there")
@@ -24,7 +23,6 @@ WRITERS: dict[str, Callable[[Path], object]] = {
     "build": lambda path: build_map(Walk(6), path, PROFILE, SETTINGS, progress=False, overwrite=True),
     "the same build": lambda path: build_map(Walk(12), path, PROFILE, SETTINGS, progress=False),
     "fresh build": lambda path: build_map(Walk(6), path, PROFILE, SETTINGS, progress=False, resume=False),
-    "repair": lambda path: repair_map(path, Walk(12)),
 }
 
 
@@ -54,7 +52,7 @@ def content(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.parametrize("writer", WRITERS)
-@pytest.mark.parametrize("name", ["voxels", "keyframes", "sounds", "parts", "parts/fused-0123", ".repair", "notes"])
+@pytest.mark.parametrize("name", ["clips", "parts", "parts/fused-0123", "notes"])
 def test_a_linked_folder_is_refused_and_what_is_behind_it_stays(
     copied: Path, elsewhere: Path, name: str, writer: str
 ) -> None:
@@ -68,7 +66,7 @@ def test_a_linked_folder_is_refused_and_what_is_behind_it_stays(
     assert content(elsewhere) == before
 
 
-@pytest.mark.parametrize("name", [".lock", ".checked.json", "map.json", "voxels/old.npy", "parts/x"])
+@pytest.mark.parametrize("name", [".lock", "map.json", "voxels.safetensors", "parts/x"])
 def test_what_a_linked_file_points_to_stays(copied: Path, elsewhere: Path, name: str) -> None:
     before, link = content(elsewhere), copied / name
     link.parent.mkdir(exist_ok=True)
@@ -76,21 +74,20 @@ def test_what_a_linked_file_points_to_stays(copied: Path, elsewhere: Path, name:
     link.symlink_to(elsewhere / "a.jpg")
     WRITERS["build"](copied)
     assert content(elsewhere) == before
-    open_stored(copied, verify=True)
+    open_stored(copied)
 
 
 def test_a_map_may_itself_be_a_link(copied: Path, tmp_path: Path) -> None:
     (tmp_path / "link.avlmap").symlink_to(copied)
     WRITERS["build"](tmp_path / "link.avlmap")
-    assert open_stored(copied, verify=True).info.counts.frames == 6
+    assert open_stored(copied).info.counts.frames == 6
 
 
 def test_a_link_that_waits_under_a_temporary_name_is_not_written_through(tmp_path: Path, elsewhere: Path) -> None:
     before = content(elsewhere)
-    (tmp_path / "voxels").mkdir()
-    for partial in (f"voxels/.rgb.{os.getpid()}.partial", f".map.json.{os.getpid()}.partial"):
+    for partial in (f".voxels.{os.getpid()}.part.safetensors", f".map.json.{os.getpid()}.partial"):
         (tmp_path / partial).symlink_to(elsewhere / "a.jpg")
-    write_array(tmp_path, "voxels/rgb", np.arange(3))
+    write_arrays(tmp_path / "voxels.safetensors", {"rgb": np.arange(3)})
     write_bytes_atomically(tmp_path / "map.json", b"{}")
     assert content(elsewhere) == before and (tmp_path / "map.json").read_bytes() == b"{}"
 
@@ -113,7 +110,7 @@ def test_links_are_found_at_any_depth_and_files_are_none(tmp_path: Path, elsewhe
     assert linked_folder(tmp_path / "m") == deep / "link"
 
 
-@pytest.mark.parametrize("name", ["sounds/dog.wav", "voxels/game.vox", "keyframes/take-2.jpg", "parts/bolt/m8.stl"])
+@pytest.mark.parametrize("name", ["clips/dog.wav", "voxels.vox", "parts/bolt/m8.stl"])
 def test_a_folder_of_somebody_is_no_place_for_a_map(tmp_path: Path, name: str) -> None:
     (tmp_path / "own" / name).parent.mkdir(parents=True)
     (tmp_path / "own" / name).write_text("mine")
@@ -124,12 +121,13 @@ def test_a_folder_of_somebody_is_no_place_for_a_map(tmp_path: Path, name: str) -
 
 @pytest.mark.parametrize("writer", ["build", "the same build"])
 def test_a_file_that_somebody_put_into_a_map_stays(copied: Path, writer: str) -> None:
-    own = ("sounds/dog.wav", "keyframes/notes.txt", "parts/bolt/m8.stl", "voxels/old-0123456789abcdeg.npy")
+    own = ("clips/dog.wav", "keyframes.txt", "parts/bolt/m8.stl", "voxels/old-0123456789abcdeg.npy")
     for name in own:
         (copied / name).parent.mkdir(parents=True, exist_ok=True)
         (copied / name).write_text("mine")
-    (copied / "voxels/old-0123456789abcdef.npy").write_text("of a map before")
+    (copied / "clips").mkdir(exist_ok=True)
+    (copied / "clips/000000-0123456789abcdef.flac").write_text("of a map before")
     WRITERS[writer](copied)
     assert all((copied / name).read_text() == "mine" for name in own)
-    assert not (copied / "voxels/old-0123456789abcdef.npy").exists()
-    open_stored(copied, verify=True)
+    assert not (copied / "clips/000000-0123456789abcdef.flac").exists()
+    open_stored(copied)

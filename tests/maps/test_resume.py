@@ -76,7 +76,7 @@ def undisturbed(builder: Builder) -> Undisturbed:
 def check_between(path: Path, known: Undisturbed, *, had_old: bool) -> None:
     """After a kill the folder is the old map, whole, or the new one, whole; or, without an old one, says what it is."""
     try:
-        found = open_stored(path, verify=True)
+        found = open_stored(path)
     except MapError as fault:
         # Killed before its first file there is no folder; the error may then name the map of the round before.
         assert not had_old

@@ -5,36 +5,41 @@ import json
 import os
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import numpy as np
 import pytest
-from build_fakes import RIG, SETTINGS, Walk, register_fakes
+from build_fakes import RIG, SETTINGS, Walk, register_fakes, write_beeps
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
+from safetensors.numpy import load_file
 
-from avlmaps.core.errors import BackendError, MapError
+from avlmaps.core.columns import axes_of
+from avlmaps.core.errors import MapError
 from avlmaps.core.registry import Kind
-from avlmaps.core.version import __version__
 from avlmaps.maps.build import build_map
-from avlmaps.maps.repair import damaged_files, repair_map
-from avlmaps.maps.store import array_files, integrity
-from avlmaps.maps.store.array_files import SMALL_BYTES, read_array, sync_files, write_array
-from avlmaps.maps.store.array_validation import array_fields, check_order, validate_arrays
-from avlmaps.maps.store.checkpoints import DONE, save_checkpoint
+from avlmaps.maps.store import folder, tables
+from avlmaps.maps.store.checkpoints import load_checkpoint, save_checkpoint
+from avlmaps.maps.store.edits import read_edits
+from avlmaps.maps.store.folder import damaged_files, has_unfinished_build, read, write
 from avlmaps.maps.store.lock import EDITING, LOCK, is_locked, lock_folder
-from avlmaps.maps.store.reader import has_unfinished_build, open_stored
-from avlmaps.maps.types import HeardSounds, Voxels
+from avlmaps.maps.store.reader import open_stored
+from avlmaps.maps.store.tables import read_arrays, write_arrays
+from avlmaps.maps.types import Keyframes, Voxels
 
 PROFILE = register_fakes()
+OLD = Path(__file__).with_name("data") / "schema1"
 
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("maps") / "walk.avlmap"
-    build_map(Walk(12), path, PROFILE, SETTINGS, progress=False)
+    audio = write_beeps(path.parent / "beeps.wav")
+    build_map(Walk(12, audio=audio), path, PROFILE, SETTINGS, progress=False)
     return path
 
 
@@ -43,80 +48,47 @@ def copied(built: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(built, tmp_path / "walk.avlmap"))
 
 
-def refused(path: Path, *, verify: bool = False) -> str:
-    with pytest.raises(MapError) as fault:
-        open_stored(path, verify=verify)
-    return str(fault.value)
-
-
-def edit(path: Path, change: Callable[[dict], object]) -> None:
-    """Change what ``map.json`` says, as a writer would that is wrong: with the right size and no checksum."""
-    content = json.loads((path / "map.json").read_text())
-    change(content)
-    content.pop("checksum")
-    content["bytes"] = sum(file["bytes"] for file in content["files"].values())
-    (path / "map.json").write_text(json.dumps(content))
-
-
-def file_of(path: Path, name: str) -> Path:
-    return path / json.loads((path / "map.json").read_text())["files"][name]["path"]
+def same(one: object, other: object) -> bool:
+    """Return whether two dataclasses of arrays are equal, bit by bit."""
+    return all(np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True) for name in axes_of(type(one)))
 
 
 ARRAYS = hnp.arrays(
-    st.sampled_from([np.float16, np.float32, np.float64, np.int32, np.int64, np.uint8]),
+    st.sampled_from([np.float16, np.float32, np.float64, np.int32, np.int64, np.uint8, np.uint16, np.bool_]),
     hnp.array_shapes(min_dims=1, max_dims=3, min_side=0, max_side=6),
 )
 
 
-@given(ARRAYS)
-def test_arrays_come_back_bit_by_bit(tmp_path_factory: pytest.TempPathFactory, array: np.ndarray) -> None:
-    folder = tmp_path_factory.mktemp("shards")
-    back = read_array(folder, write_array(folder, "some/thing", array), verify=True)
-    assert back.dtype == array.dtype and back.shape == array.shape and back.tobytes() == array.tobytes()
+@given(st.dictionaries(st.text("abc._", min_size=1, max_size=4), ARRAYS, max_size=4), st.text(max_size=9))
+def test_arrays_come_back_bit_by_bit_and_are_what_the_package_reads(
+    tmp_path_factory: pytest.TempPathFactory, arrays: dict[str, np.ndarray], note: str
+) -> None:
+    path = tmp_path_factory.mktemp("tables") / "a.safetensors"
+    write_arrays(path, {name: array[::-1] for name, array in arrays.items()}, note)
+    back, said = read_arrays(path)
+    assert said == note and set(back) == set(arrays)
+    theirs = load_file(path)
+    for name, array in arrays.items():
+        assert back[name].dtype == array.dtype and back[name].shape == array.shape
+        assert back[name].tobytes() == array[::-1].tobytes() == theirs[name].tobytes()
 
 
-def test_the_name_of_a_file_follows_from_its_content(tmp_path: Path) -> None:
-    one, same, other = (write_array(tmp_path, "a", np.array([n])) for n in (1, 1, 2))
-    assert one == same and one.path != other.path
-    assert sorted(file.name for file in tmp_path.iterdir()) == sorted([one.path, other.path])
+def test_large_arrays_are_memory_mapped(tmp_path: Path) -> None:
+    write_arrays(tmp_path / "a.safetensors", {"large": np.zeros(1 << 21, np.uint8), "small": np.zeros(9)})
+    back, _ = read_arrays(tmp_path / "a.safetensors")
+    assert not back["large"].flags.writeable and not back["large"].flags.owndata and back["small"].flags.writeable
 
 
-def test_strided_and_big_endian_arrays_are_written_in_our_order(tmp_path: Path) -> None:
-    array = np.arange(24, dtype=">i4").reshape(4, 6)[::2, ::-3]
-    back = read_array(tmp_path, write_array(tmp_path, "a", array))
-    assert back.dtype.str == "<i4" and np.array_equal(back, array)
-
-
-def test_large_arrays_are_memory_mapped_and_small_ones_are_not(tmp_path: Path) -> None:
-    large = write_array(tmp_path, "large", np.zeros(SMALL_BYTES, np.uint8))
-    small = write_array(tmp_path, "small", np.zeros(10, np.uint8))
-    assert isinstance(read_array(tmp_path, large), np.memmap)
-    assert not isinstance(read_array(tmp_path, small), np.memmap)
-
-
-def test_objects_cannot_be_kept(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="holds Python objects"):
-        write_array(tmp_path, "a", np.array([{}], object))
-
-
-def test_a_full_disk_is_one_sentence_and_leaves_no_rubbish(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(_: int) -> None:
+def test_a_full_disk_is_one_sentence_and_leaves_the_map(copied: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(_: object) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    written = write_array(tmp_path / "written", "a", np.zeros(3))
-    monkeypatch.setattr(os, "fsync", full)
-    monkeypatch.setattr(array_files, "_hashed", lambda *_: full(0))
-    for folder, write in (
-        (tmp_path, lambda: write_array(tmp_path, "a", np.zeros(3))),
-        (tmp_path / "written", lambda: sync_files(tmp_path / "written", [written])),
-    ):
-        with pytest.raises(MapError) as fault:
-            write()
-        assert str(fault.value) == (
-            f"Cannot write {folder}: No space left on device; make room or choose another folder. What was "
-            "finished there stays, and a second try continues from it."
-        )
-    assert list(tmp_path.iterdir()) == [tmp_path / "written"]
+    before = {file: file.read_bytes() for file in copied.rglob("*") if file.is_file()}
+    data = read(copied)
+    monkeypatch.setattr(tables, "sync_file", full)
+    with pytest.raises(MapError, match=r"Cannot write .* No space left on device; make room or choose another folder"):
+        write(copied, data)
+    assert {file: file.read_bytes() for file in copied.rglob("*") if file.is_file()} == before
 
 
 def test_who_may_not_write_is_told_what_helps_a_build_and_what_helps_an_edit(tmp_path: Path) -> None:
@@ -127,26 +99,28 @@ def test_who_may_not_write_is_told_what_helps_a_build_and_what_helps_an_edit(tmp
 
 
 class Facts(msgspec.Struct):
-    """The facts of a stage that has none."""
+    """The facts of a stage."""
+
+    number: int
 
 
-def test_what_is_put_on_the_disk_is_every_file_before_its_manifest(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    synced: list[int] = []
-    monkeypatch.setattr(os, "fsync", lambda descriptor: synced.append(os.fstat(descriptor).st_ino))
-    save_checkpoint(tmp_path, "key", Facts(), {"a": np.zeros(3), "b/c": np.ones(2)})
-    done = synced.index((tmp_path / DONE).stat().st_ino)
-    files = [path for path in tmp_path.rglob("*") if path.name != DONE]
-    assert len(files) == 3 and {path.stat().st_ino for path in (tmp_path, *files)} <= set(synced[:done])
-    synced.clear()
-    write_array(tmp_path, "a", np.zeros(3))
-    assert synced == [next(tmp_path.glob("a-*")).stat().st_ino], "what takes a file's place is on the disk before"
+def test_a_stage_comes_back_with_its_files_or_not_at_all(tmp_path: Path) -> None:
+    (tmp_path / "clip.flac").write_bytes(b"fLaC")
+    files = {"clips/clip.flac": tmp_path / "clip.flac"}
+    save_checkpoint(tmp_path / "stage", "key", Facts(7), {"a": np.arange(3)}, files)
+    found = load_checkpoint(tmp_path / "stage", Facts, "key")
+    assert found.facts.number == 7 and found.arrays["a"].tolist() == [0, 1, 2]
+    assert [path.read_bytes() for path in found.files.values()] == [b"fLaC"]
+    with pytest.raises(MapError, match="another recording"):
+        load_checkpoint(tmp_path / "stage", Facts, "other")
+    found.files["clips/clip.flac"].unlink()
+    with pytest.raises(MapError, match="is missing"):
+        load_checkpoint(tmp_path / "stage", Facts, "key")
 
 
 def test_a_map_comes_back_with_all_that_it_is_of(built: Path) -> None:
-    stored = open_stored(built, verify=True)
-    assert len(stored.voxels) == stored.info.counts.voxels > 100
+    stored = open_stored(built)
+    assert len(stored.voxels) == stored.info.counts.voxels > 100 and len(stored.sounds) > 0
     assert stored.voxels.feature.shape == (len(stored.voxels), 4)
     assert stored.place_state["centres"].shape == (2, 3)
     assert (stored.rig.rgb, stored.rig.depth) == (RIG.rgb, RIG.depth) and stored.rig.registered
@@ -156,436 +130,165 @@ def test_a_map_comes_back_with_all_that_it_is_of(built: Path) -> None:
     assert stored.info.settings == SETTINGS.for_profile(0.6)
     for kind in (Kind.PIXELS, Kind.SOUNDS, Kind.LOCAL, Kind.PLACE):
         stored.require_model(kind)
-
-
-def test_a_map_says_nothing_of_where_its_recording_lay(built: Path) -> None:
+    files = {path.relative_to(built).as_posix() for path in built.rglob("*") if path.is_file() and path.name != LOCK}
+    assert files == {"map.json", *stored.info.files}
+    assert {"voxels.safetensors", "keyframes.safetensors", "sounds.safetensors"} < files
     assert "/nowhere/of/mine" not in (built / "map.json").read_text()
 
 
-def test_nothing_there(tmp_path: Path) -> None:
-    path = tmp_path / "none.avlmap"
-    assert refused(path) == f"{path} is not there, or is not a map's folder; make one with `avlmaps build`."
+def test_what_is_written_in_the_place_of_a_map_is_that_map(copied: Path) -> None:
+    before = read(copied)
+    for _ in range(3):
+        write(copied, replace(before, findings={"best": np.arange(4)}))
+        after = read(copied)
+        assert same(after.voxels, before.voxels) and same(after.keyframes, before.keyframes)
+        assert same(after.sounds, before.sounds) and after.findings["best"].tolist() == [0, 1, 2, 3]
+        assert all(clip.is_file() for clip in after.sounds.clips) and not damaged_files(copied)
+        assert len(list(copied.glob("*.safetensors"))) == 3
+    assert all(array[0] == before.voxels.index[0, 0] for array in before.voxels.index[:1])  # its old file is still read
 
 
-def test_a_file_in_place_of_a_folder(tmp_path: Path) -> None:
-    path = tmp_path / "file.avlmap"
-    path.write_text("hello")
-    assert refused(path) == f"{path} is not there, or is not a map's folder; make one with `avlmaps build`."
+def test_a_map_of_schema_1_comes_back_with_its_days_edits_submaps_and_sources(tmp_path: Path) -> None:
+    shutil.copytree(OLD, tmp_path / "m")
+    for round in ("as it was", "converted"):
+        data = read(tmp_path / "m")
+        assert data.info.schema_version == (1 if round == "as it was" else 2)
+        if round == "as it was":
+            listed = json.loads((OLD / "map.json").read_text())["files"]
+            arrays = {name: np.load(OLD / file["path"]) for name, file in listed.items() if file["dtype"]}
+        wholes = {"voxels": data.voxels, "keyframes": data.keyframes, "sounds": data.sounds}
+        wholes |= {"submaps": data.submaps, "sources": data.sources}
+        for section, whole in wholes.items():
+            for name in axes_of(type(whole)):
+                assert np.array_equal(getattr(whole, name), arrays[f"{section}/{name}"], equal_nan=True)
+        assert np.array_equal(data.place_state["centres"], arrays["keyframes/state/centres"])
+        assert data.life is not None and [stay.name for stay in data.life.stays] == ["chair"]
+        assert data.life.voxels(0).tolist() == arrays["life/index"].tolist()
+        assert [visit.day for visit in data.info.visits] == ["2026-11-25", "2026-11-26"]
+        assert [clip.read_bytes() for clip in data.sounds.clips] == [
+            (OLD / file["path"]).read_bytes() for file in listed.values() if not file["dtype"]
+        ]
+        assert [edit.name for edit in read_edits(tmp_path / "m")] == ["stool"]
+        assert not damaged_files(tmp_path / "m")
+        write(tmp_path / "m", data)
+    assert not {"voxels", "life", "submaps"} & {path.name for path in (tmp_path / "m").iterdir()}
 
 
-def test_a_folder_without_a_map(tmp_path: Path) -> None:
-    assert (
-        refused(tmp_path) == f"{tmp_path} is a folder without a map in it (no map.json); make one with `avlmaps build`."
-    )
+def refusal(path: Path) -> str:
+    with pytest.raises(MapError) as fault:
+        read(path)
+    return str(fault.value)
 
 
-def test_a_half_built_map(tmp_path: Path) -> None:
-    (tmp_path / "parts" / "fusion-1234").mkdir(parents=True)
-    assert has_unfinished_build(tmp_path)
-    assert refused(tmp_path) == (
-        f"{tmp_path} is a half-built map (its build was stopped); run the same `avlmaps build` again with --resume, "
-        "and it resumes from there."
-    )
+def edited(change: Callable[[dict[str, Any]], object]) -> Callable[[Path], None]:
+    """Return what changes ``map.json``."""
+
+    def work(path: Path) -> None:
+        content = json.loads((path / "map.json").read_text())
+        change(content)
+        (path / "map.json").write_text(json.dumps(content))
+
+    return work
 
 
-def test_a_map_that_is_being_built(tmp_path: Path) -> None:
-    with lock_folder(tmp_path):
-        assert is_locked(tmp_path)
-        assert refused(tmp_path) == f"{tmp_path} is being built at this moment; wait until the build has finished."
-    assert not is_locked(tmp_path)
+def with_arrays(section: str, **changed: np.ndarray | None) -> Callable[[Path], None]:
+    """Return what puts other arrays into a file, with the size that ``map.json`` says then."""
+
+    def work(path: Path) -> None:
+        file = path / f"{section}.safetensors"
+        arrays = load_file(file)
+        for name, array in changed.items():
+            arrays.pop(name)
+            arrays |= {} if array is None else {name: array}
+        write_arrays(file, arrays)
+        edited(lambda content: content["files"][file.name].update(bytes=file.stat().st_size))(path)
+
+    return work
 
 
-def test_two_builds_into_one_folder_are_refused(tmp_path: Path) -> None:
-    for holder, said in (
-        (os.getpid(), "this program at this moment; end that first"),
-        (1, "another process (1) at this moment; wait for it"),
+def overwritten(name: str, content: bytes) -> Callable[[Path], object]:
+    return lambda path: (path / name).write_bytes(content)
+
+
+def first_clip(path: Path) -> Path:
+    return next((path / "clips").iterdir())
+
+
+DAMAGED: dict[str, tuple[Callable[[Path], object], str]] = {
+    "no JSON": (overwritten("map.json", b"{"), "map.json is damaged"),
+    "no UTF-8": (overwritten("map.json", b'{"format": "\xff"}'), "map.json is damaged"),
+    "deep JSON": (overwritten("map.json", b"[" * 100_000), "map.json is damaged"),
+    "of no map": (overwritten("map.json", b"{}"), "map.json belongs to no map"),
+    "of tomorrow": (edited(lambda said: said.update(schema_version=3)), "has schema version 3"),
+    "a field is missing": (edited(lambda said: said.pop("rig")), "map.json is damaged: Object missing"),
+    "no camera": (edited(lambda said: said["rig"]["depth"].update(fx=-1.0)), "map.json is damaged: a camera needs"),
+    "no setting": (edited(lambda said: said["settings"]["frames"].update(step=0)), "map.json is damaged: frames.step"),
+    "no voxels": (edited(lambda said: said.update(voxel_size_m=0.0)), "map.json is damaged: voxel_size_m"),
+    "other counts": (edited(lambda said: said["counts"].update(voxels=7)), "its counts are not those of the files"),
+    "a file of others": (edited(lambda said: said["files"].update({"../x.npy": {"bytes": 1, "sha256": ""}})), "../x"),
+    "a section is missing": (edited(lambda said: said["files"].pop("sounds.safetensors")), "no file of sounds"),
+    "a file is missing": (lambda path: (path / "voxels.safetensors").unlink(), "voxels.safetensors is missing"),
+    "cut short": (lambda path: os.truncate(path / "voxels.safetensors", 99), "has 99 bytes"),
+    "a clip is missing": (lambda path: first_clip(path).unlink(), ".flac is missing"),
+    "a folder": (lambda path: ((path / "x").mkdir(), (path / "x").replace(first_clip(path).parent / "x")), ""),
+    "an array is missing": (with_arrays("voxels", hits=None), "voxels.safetensors is damaged: hits is missing"),
+    "another type": (with_arrays("voxels", rgb=np.zeros((3, 3))), "rgb is float64 of (3, 3)"),
+    "another length": (with_arrays("voxels", rgb=np.zeros((3, 3), np.uint8)), "rgb is uint8 of (3, 3)"),
+    "no offsets": (with_arrays("sounds", track_offsets=np.zeros(1, np.int64)), "track_offsets"),
+}
+
+
+@pytest.mark.parametrize("damage", [name for name, (_, said) in DAMAGED.items() if said])
+def test_a_damaged_map_is_one_error_with_the_files_name(copied: Path, damage: str) -> None:
+    work, said = DAMAGED[damage]
+    work(copied)
+    assert said in refusal(copied) and str(copied) in refusal(copied)
+
+
+def test_a_changed_byte_is_found_by_its_hash(copied: Path) -> None:
+    assert damaged_files(copied) == []
+    for file in (copied / "voxels.safetensors", first_clip(copied)):
+        content = bytearray(file.read_bytes())
+        content[-1] ^= 1
+        file.write_bytes(content)
+    assert len(damaged_files(copied)) == 2 and "checksum" in damaged_files(copied)[0]
+
+
+def test_no_map_is_one_sentence_that_says_what_is_there(tmp_path: Path, copied: Path) -> None:
+    (tmp_path / "file.avlmap").write_text("hello")
+    (tmp_path / "half" / "parts" / "fusion-1234").mkdir(parents=True)
+    (tmp_path / "empty").mkdir()
+    for name, said in (
+        ("none", "is not there, or is not a map's folder; make one"),
+        ("wolk.avlmap", "did you mean"),
+        ("file.avlmap", "is not there, or is not a map's folder"),
+        ("empty", "is a folder without a map in it"),
+        ("half", "is a half-built map"),
     ):
-        with lock_folder(tmp_path), pytest.raises(MapError) as fault:
-            (tmp_path / LOCK).write_text(f"{holder}\n")
-            build_map(Walk(4), tmp_path, PROFILE, SETTINGS, progress=False)
-        assert str(fault.value) == f"{tmp_path} is being built by {said}, or build into another folder."
-
-
-@pytest.mark.parametrize(("version", "how"), [(2, "upgrade avlmaps"), (0, "build the map again in its place")])
-def test_another_schema_version(copied: Path, version: int, how: str) -> None:
-    edit(copied, lambda content: content.update(schema_version=version, voxel_size_m="one day this may be a word"))
-    said = f"{copied}/map.json has schema version {version}, this avlmaps reads version 1; {how}."
-    assert refused(copied) == said
-
-
-def test_a_map_of_an_unknown_profile_opens_for_all_that_needs_no_model(copied: Path) -> None:
-    edit(copied, lambda content: content.update(profile="hearsay"))
-    stored = open_stored(copied)
-    assert stored.encoders.name == "hearsay" and len(stored.voxels)
-
-
-def test_a_map_of_an_unknown_backend_says_so_when_it_is_needed(copied: Path) -> None:
-    edit(copied, lambda content: content["models"]["pixels"].update(backend="hearsay"))
-    stored = open_stored(copied)
-    assert len(stored.voxels) > 0
-    with pytest.raises(BackendError, match="no pixels backend called 'hearsay'"):
-        stored.require_model(Kind.PIXELS)
-
-
-def test_another_model(copied: Path) -> None:
-    edit(copied, lambda content: content["models"]["sounds"].update(checksum="0123456789", id="fake/ears-0"))
-    stored = open_stored(copied)
-    with pytest.raises(MapError) as fault:
-        stored.require_model(Kind.SOUNDS)
-    assert str(fault.value).startswith(
-        f"{copied} was built with fake/ears-0 (checksum 01234567), this avlmaps has fake/ears"
-    )
-    assert "build it again from its recording. Its points" in str(fault.value)  # it is of this version
-    told = copied / "map.json"
-    told.write_text(told.read_text().replace(f'"{__version__}"', '"0.0.1"', 1))
-    with pytest.raises(MapError, match=r"build it again, or use avlmaps 0\.0\.1\. Its points"):
-        open_stored(copied).require_model(Kind.SOUNDS)
-    with pytest.raises(MapError, match="was built without a model for views"):
-        stored.require_model(Kind.VIEWS)
-
-
-@pytest.mark.parametrize(
-    ("content", "said"),
-    [
-        (b"", "is damaged: it is not JSON in UTF-8"),
-        (b"{", "is damaged: it is not JSON in UTF-8"),
-        (b'{"format": "\xff\xfe"}', "is damaged: it is not JSON in UTF-8"),
-        (b"[1, 2]", "is damaged: it is not JSON in UTF-8"),
-        (b"{}", "belongs to no map of avlmaps"),
-        (b'{"format": "avlmap", "schema_version": 1}', "is damaged: Object missing required field `avlmaps_version`"),
-    ],
-)
-def test_a_map_json_that_is_none(copied: Path, content: bytes, said: str) -> None:
-    (copied / "map.json").write_bytes(content)
-    assert refused(copied).startswith(f"{copied}/map.json {said}")
-
-
-MEND = "repair it with `avlmaps info MAP --repair --recording REC`, or restore it from a copy."
-
-
-def test_a_missing_file(copied: Path) -> None:
-    file = file_of(copied, "voxels/rgb")
-    file.unlink()
-    assert refused(copied) == f"{file} is missing from the map; {MEND}"
-
-
-def test_a_truncated_file(copied: Path) -> None:
-    file = file_of(copied, "voxels/feature")
-    size = file.stat().st_size
-    os.truncate(file, size - 7)
-    assert refused(copied) == f"{file} is damaged: it has {size - 7} bytes, {size} were written; {MEND}"
-
-
-def test_a_flipped_bit_in_a_small_file_is_always_seen(copied: Path) -> None:
-    file = file_of(copied, "keyframes/place")
-    flip(file)
-    assert refused(copied) == f"{file} is damaged: its checksum is not the one that was written; {MEND}"
-
-
-def test_a_flipped_bit_in_a_large_file_is_seen_where_it_is_read(copied: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("avlmaps.maps.store.array_files.SMALL_BYTES", 0)
-    file = file_of(copied, "voxels/feature")
-    flip(file)
-    said = f"{file} is damaged: its checksum is not the one that was written; {MEND}"
-    with pytest.raises(MapError) as fault:
-        open_stored(copied).voxels  # noqa: B018 - reading is what waits for the check
-    assert str(fault.value) == said
-    assert refused(copied, verify=True) == f"{file} is damaged: its checksum is not the one that was written; {MEND}"
-
-
-def flip(file: Path) -> None:
-    content = bytearray(file.read_bytes())
-    content[-1] ^= 1
-    file.write_bytes(content)
-
-
-def replace(path: Path, name: str, array: np.ndarray, *, as_told: bool = False) -> None:
-    """Put another array in a map, with a manifest that agrees (or tells the old type and shape)."""
-    written = write_array(path, name, array)
-
-    def change(content: dict) -> None:
-        entry = content["files"][name]
-        entry.update(path=written.path, bytes=written.bytes, sha256=written.sha256)
-        if not as_told:
-            entry.update(dtype=written.dtype, shape=written.shape)
-
-    edit(path, change)
-
-
-def test_a_file_that_is_not_what_the_manifest_tells(copied: Path) -> None:
-    replace(copied, "keyframes/stamp_s", np.zeros(5, np.float32), as_told=True)
-    file, count = file_of(copied, "keyframes/stamp_s"), open_count(copied)
-    assert refused(copied) == f"{file} is damaged: it holds float32 of (5,), the map says float64 of ({count},); {MEND}"
-
-
-def open_count(path: Path) -> int:
-    return json.loads((path / "map.json").read_text())["counts"]["keyframes"]
-
-
-def test_an_array_of_another_type_than_maps_have(copied: Path) -> None:
-    replace(copied, "voxels/rgb", np.zeros((3, 3), np.float32))
-    assert refused(copied) == (
-        f"{copied}/voxels, rgb is float32 of (3, 3); a map has uint8 of (n, 3) there; build the map again in its place."
-    )
-
-
-def test_arrays_of_different_lengths(copied: Path) -> None:
-    replace(copied, "voxels/rgb", np.zeros((3, 3), np.uint8))
-    assert refused(copied).startswith(f"{copied}/voxels, rgb has shape (3, 3); n is ")
-
-
-def test_a_pickle_is_never_opened(copied: Path) -> None:
-    file = file_of(copied, "keyframes/stamp_s")
-    np.save(file, np.array([print], object), allow_pickle=True)
-
-    def change(content: dict) -> None:
-        import hashlib
-
-        entry = content["files"]["keyframes/stamp_s"]
-        entry.update(bytes=file.stat().st_size, sha256=hashlib.sha256(file.read_bytes()).hexdigest())
-
-    edit(copied, change)
-    assert f"{file} is damaged: it is not an array that numpy can read" in refused(copied)
-
-
-@pytest.mark.parametrize("name", ["../secret.npy", "/etc/passwd", "voxels/../../x.npy", "C:/x.npy", "..\\x.npy", ""])
-def test_a_name_that_leads_out_of_the_folder(copied: Path, name: str) -> None:
-    edit(copied, lambda content: content["files"]["voxels/rgb"].update(path=name))
-    assert refused(copied) == f"{copied} names a file outside itself ({name}); do not use a map from that source."
-
-
-def test_offsets_that_do_not_divide_their_rows(copied: Path) -> None:
-    offsets = np.load(file_of(copied, "keyframes/offsets"))
-    offsets[1] = offsets[-1] + 1
-    replace(copied, "keyframes/offsets", offsets)
-    assert f"{copied}/keyframes, offsets do not divide" in refused(copied)
-
-
-def test_counts_that_are_not_those_of_the_arrays(copied: Path) -> None:
-    edit(copied, lambda content: content["counts"].update(keyframes=10_000))
-    assert refused(copied).startswith(f"{copied}/map.json is damaged: its counts are not those of the arrays")
-
-
-def test_a_missing_array(copied: Path) -> None:
-    edit(copied, lambda content: content["files"].pop("voxels/hits"))
-    assert refused(copied) == f"{copied}/voxels is damaged: it has no hits; build the map again in its place."
-
-
-def test_a_camera_that_is_none(copied: Path) -> None:
-    edit(copied, lambda content: content["rig"]["depth"].update(fx=-1.0))
-    assert refused(copied).startswith(f"{copied}/map.json is damaged: a camera needs finite numbers and positive focal")
-
-
-def test_settings_that_cannot_be(copied: Path) -> None:
-    edit(copied, lambda content: content["settings"]["frames"].update(step=0))
-    assert (
-        refused(copied) == f"{copied}/map.json is damaged: frames.step is 0; choose 1 or more; restore it from a copy."
-    )
-
-
-@given(hnp.arrays(np.int32, st.tuples(st.integers(0, 8), st.just(3)), elements=st.integers(-2, 2)))
-def test_the_order_of_voxels_is_told_exactly(index: np.ndarray) -> None:
-    rows = [tuple(row) for row in index.tolist()]
-    n = len(rows)
-    voxels = Voxels(index, *(np.zeros(0),) * 5)  # pyright: ignore[reportArgumentType]
-    if rows == sorted(set(rows)):
-        check_order(voxels, "here")
-    else:
-        with pytest.raises(MapError, match="not sorted"):
-            check_order(voxels, "here")
-    assert n == len(index)
+        assert said in refusal(tmp_path / name)
+    assert has_unfinished_build(tmp_path / "half")
+    with lock_folder(tmp_path / "empty"):
+        assert is_locked(tmp_path / "empty") and "is being built at this moment" in refusal(tmp_path / "empty")
+        with pytest.raises(MapError, match="by this program at this moment"), lock_folder(tmp_path / "empty"):
+            pass
+    assert not is_locked(tmp_path / "empty")
 
 
 def test_a_map_replaced_while_it_is_opened_is_opened_anew(copied: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Between reading map.json and the files, another build's commit removes the old files."""
-    from avlmaps.maps.store import reader as stored
+    """Between reading map.json and the files, another build replaces the map, and takes the old names again."""
+    other, opened, calls = read(copied), folder._read, list[int]()
+    other = replace(other, info=msgspec.structs.replace(other.info, build_key="another"))
 
-    opened, calls = stored._opened, []
-
-    def slow(path: Path, info: object, verify: bool) -> object:
+    def slow(path: Path, content: bytes) -> object:
         if not calls:
-            calls.append(build_map(Walk(12, seed=5), path, PROFILE, SETTINGS, progress=False, overwrite=True))
-        return opened(path, info, verify)  # pyright: ignore[reportArgumentType]
+            calls.extend(write(path, other).bytes for _ in range(2))
+        return opened(path, content)
 
-    monkeypatch.setattr(stored, "_opened", slow)
-    monkeypatch.setattr("avlmaps.maps.build.open_stored", lambda path: None)
-    assert open_stored(copied).info.recording.fingerprint == Walk(12, seed=5).fingerprint
-
-
-def test_sounds_without_any_are_whole() -> None:
-    empty = {
-        "onset_s": np.zeros(0),
-        "offset_s": np.zeros(0),
-        "track_offsets": np.zeros(1, np.int64),
-        "track": np.zeros((0, 3), np.float32),
-        "feature_offsets": np.zeros(1, np.int64),
-        "feature": np.zeros((0, 7), np.float32),
-        "clips": (),
-    }
-    assert len(validate_arrays(HeardSounds, empty, "here")) == 0
-    assert array_fields(HeardSounds) == [name for name in empty if name != "clips"]
+    monkeypatch.setattr(folder, "_read", slow)
+    assert read(copied).info.build_key == "another"
 
 
-def test_an_array_that_may_not_be_read_is_not_called_damaged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    info = write_array(tmp_path, "a", np.zeros(SMALL_BYTES, np.uint8))
-
-    def refuse(*arguments: object, **named: object) -> None:
-        raise PermissionError(errno.EACCES, "Permission denied")
-
-    monkeypatch.setattr("avlmaps.core.npy.open_regular", refuse)
-    with pytest.raises(MapError, match=r"cannot be read \(Permission denied\); check its permissions\.$"):
-        read_array(tmp_path, info)
-
-
-def test_an_array_of_another_type_than_the_map_says_is_damaged(tmp_path: Path) -> None:
-    info = msgspec.structs.replace(write_array(tmp_path, "a", np.zeros(3, np.float32)), dtype="nonsense")
-    with pytest.raises(MapError, match=r"is damaged: it holds float32 of \(3,\), the map says nonsense of \(3,\);"):
-        read_array(tmp_path, info)
-
-
-def test_a_map_written_before_there_were_scores_opens_without_them(copied: Path) -> None:
-    edit(copied, lambda content: content["files"].pop("keyframes/score"))
-    stored = open_stored(copied, verify=True)
-    assert stored.keyframes.score.shape == (0,) and stored.keyframes.score.dtype == np.float16
-    assert len(stored.keyframes.xy) > 0
-
-
-def test_scores_of_all_keypoints_come_back(copied: Path) -> None:
-    count = len(open_stored(copied).keyframes.xy)
-    score = np.linspace(0.0, 1.0, count).astype(np.float16)
-    replace(copied, "keyframes/score", score)
-    np.testing.assert_array_equal(open_stored(copied).keyframes.score, score)
-
-
-def test_scores_of_some_keypoints_only_are_a_damage(copied: Path) -> None:
-    count = len(open_stored(copied).keyframes.xy)
-    replace(copied, "keyframes/score", np.ones(count - 1, np.float16))
-    assert refused(copied) == (
-        f"{copied}/keyframes, score has {count - 1} rows; xy has {count}; build the map again in its place."
-    )
-
-
-def test_an_opened_map_is_checked_once_and_again_when_a_file_was_written(
-    copied: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("avlmaps.maps.store.array_files.SMALL_BYTES", 0)
-    read: list[Path] = []
-    real = integrity.open_regular
-    monkeypatch.setattr(integrity, "open_regular", lambda path, limit: (read.append(path), real(path, limit))[1])
-    assert open_stored(copied).integrity.faults == () and len(read) > 10  # a copy is read once
-    read.clear()
-    assert open_stored(copied).integrity.faults == () and not read
-    file = file_of(copied, "voxels/weight")
-    before = file.stat()
-    flip(file)
-    os.utime(file, ns=(before.st_atime_ns, before.st_mtime_ns))
-    assert [file.name in fault for fault in open_stored(copied).integrity.faults] == [True]
-
-
-def test_a_map_that_was_just_built_is_not_read_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("avlmaps.maps.store.array_files.SMALL_BYTES", 0)
-    monkeypatch.setattr(integrity, "open_regular", None)
-    assert build_map(Walk(8), tmp_path / "map", PROFILE, SETTINGS, progress=False).integrity.faults == ()
-
-
-def test_every_flipped_bit_in_a_large_file_is_seen(copied: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("avlmaps.maps.store.array_files.SMALL_BYTES", 0)
-    rng = np.random.default_rng(0)
-    for entry in json.loads((copied / "map.json").read_text())["files"].values():
-        file = copied / entry["path"]
-        whole = file.read_bytes()
-        if len(whole) <= 128:  # a header alone: an empty array has no bit to flip
-            continue
-        broken = bytearray(whole)
-        broken[rng.integers(128, len(whole))] ^= 1 << int(rng.integers(8))
-        file.write_bytes(broken)
-        with pytest.raises(MapError, match=r"is damaged: its checksum is not the one that was written|do not divide"):
-            open_stored(copied).voxels  # noqa: B018
-        file.write_bytes(whole)
-    assert len(open_stored(copied).voxels) > 0
-
-
-def test_a_file_that_is_cut_off_under_an_open_map_is_a_sentence_and_no_bus_error(
-    copied: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("avlmaps.maps.store.array_files.SMALL_BYTES", 0)
-    stored = open_stored(copied)
-    assert len(stored.voxels)
-    file = file_of(copied, "voxels/feature")
-    os.truncate(file, 4096)
-    with pytest.raises(MapError, match=r"was written while the map was open \(it had \d+ bytes, now 4096\)"):
-        stored.voxels  # noqa: B018
-
-
-def test_an_open_map_stays_readable_when_another_takes_its_place(copied: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("avlmaps.maps.store.array_files.SMALL_BYTES", 0)
-    stored = open_stored(copied)
-    count = len(stored.voxels)
-    build_map(Walk(6, seed=3), copied, PROFILE, SETTINGS, progress=False, overwrite=True)
-    assert len(stored.voxels) == count and np.isfinite(np.asarray(stored.voxels.weight)).all()
-
-
-@pytest.mark.parametrize("large", [False, True])
-@pytest.mark.parametrize(
-    "name", ["voxels/feature", "voxels/weight", "keyframes/world_from_camera", "keyframes/place", "sounds/track"]
-)
-def test_a_nan_with_the_right_checksum_is_refused(
-    copied: Path, name: str, large: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    array = np.load(file_of(copied, name))
-    if not array.size:
-        array = np.zeros((1, *array.shape[1:]), array.dtype)
-    array.reshape(-1)[-1] = np.nan
-    replace(copied, name, array)
-    monkeypatch.setattr("avlmaps.maps.store.array_files.SMALL_BYTES", 0 if large else SMALL_BYTES)
-    with pytest.raises(MapError, match=r"holds numbers that are NaN or infinite|divide|sounds"):
-        open_stored(copied).voxels  # noqa: B018
-
-
-def test_voxels_beyond_any_building_are_refused(copied: Path) -> None:
-    index = np.load(file_of(copied, "voxels/index"))
-    index[-1, 0] = 2_000_000
-    replace(copied, "voxels/index", index)
-    assert "voxels extend over 100,0" in refused(copied)
-
-
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes here")
-@pytest.mark.parametrize("name", ["voxels/rgb", "keyframes/thumbnails"])
-def test_a_pipe_in_place_of_a_file_is_refused(copied: Path, name: str) -> None:
-    file = file_of(copied, name)
-    file.unlink()
-    os.mkfifo(file)
-    assert refused(copied) == f"{file} cannot be read (it is a pipe, not a regular file); {MEND}"
-
-
-def test_json_nested_a_thousand_deep_is_a_sentence(copied: Path) -> None:
-    (copied / "map.json").write_bytes(b'{"a":' * 5000 + b"1" + b"}" * 5000)
-    assert "nested too deeply" in refused(copied)
-
-
-def test_a_sparse_map_json_of_20_gb_is_refused_by_its_size(copied: Path) -> None:
-    os.truncate(copied / "map.json", 20_000_000_000)
-    assert "it has 20,000,000,000 bytes, more than the 256,000,000 of the largest such file" in refused(copied)
-
-
-def test_a_repair_gives_back_what_was_built(copied: Path) -> None:
-    before = {file: file.read_bytes() for file in copied.rglob("*-*.*") if file.is_file()}
-    flip(file_of(copied, "voxels/feature"))
-    file_of(copied, "keyframes/xy").unlink()
-    assert set(damaged_files(copied)) == {"voxels/feature", "keyframes/xy"}
-    with pytest.raises(MapError, match=r"2 of \d+ files of .* are damaged \(keyframes/xy, voxels/feature\); give"):
-        repair_map(copied, None)
-    with pytest.raises(MapError, match="was built from another recording"):
-        repair_map(copied, Walk(12, seed=9))
-    done = repair_map(copied, Walk(12))
-    assert set(done.files) == {"voxels/feature", "keyframes/xy"}
-    assert not damaged_files(copied) and not (copied / ".repair").exists()
-    if not done.rebuilt:
-        assert all(file.read_bytes() == content for file, content in before.items())
-    assert repair_map(copied, None).files == ()
-
-
-def test_a_link_that_leads_nowhere_is_called_one(tmp_path: Path) -> None:
-    (tmp_path / "map").symlink_to("nowhere")
-    with pytest.raises(MapError, match=r"map: it is a symbolic link that leads nowhere; choose another folder"):
-        lock_folder(tmp_path / "map").__enter__()
+def test_types_say_what_they_are() -> None:
+    none = np.zeros(0)
+    assert "0 with features" in repr(Voxels(np.zeros((0, 3), np.int32), np.zeros((0, 4), np.float16), *(none,) * 4))  # pyright: ignore[reportArgumentType]
+    assert len(Keyframes.RAGGED) == 2

@@ -1,14 +1,15 @@
 """Where sounds came from, on the page: regions at their source, rays from where the robot heard it, and the clip."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from test_browser import browser, opened  # noqa: F401 - a fixture
 
+from avlmaps.maps.store.folder import write
 from avlmaps.maps.store.reader import open_stored
-from avlmaps.maps.store.writer import MapContent, write_map
 from avlmaps.maps.types import SourceEvidence
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.view.labels import SHARES, drawn_sources
@@ -26,11 +27,8 @@ def sounded(room: AVLMap, tmp_path_factory: pytest.TempPathFactory) -> Path:
         place, np.full(len(place), 1.0 / len(place), np.float32), heard, np.zeros_like(heard),
         np.zeros(len(heard), np.uint8), np.array([4], np.int64),
     )  # fmt: skip
-    content = MapContent(
-        stored.voxels, stored.keyframes, stored.place_state, stored.sounds, stored.path / "sounds", sources=evidence
-    )
     path = tmp_path_factory.mktemp("sounded") / "room.avlmap"
-    write_map(path, content, stored.info)
+    write(path, replace(stored.data, sources=evidence))
     return path
 
 

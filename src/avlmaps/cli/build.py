@@ -141,7 +141,6 @@ def build(verb: "Build") -> dict[str, Any]:
     from avlmaps.maps.pipeline.workers import ALONE
     from avlmaps.maps.settings import SUBMAP_FRAMES, BuildSettings, FrameSettings, FusionSettings, GravitySettings
     from avlmaps.perception.cache.feature_store import CacheSettings
-    from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.rules import build_settings
 
     begin = perf_counter()
@@ -208,7 +207,6 @@ def build(verb: "Build") -> dict[str, Any]:
 
         stored, done, found = close_loops(stored, recording=recording)
         answer["corrected"] = {**asdict(done), "loops": found.report()}
-    AVLMap(stored).prepare()
     return {**describe_map(stored), **answer, "elapsed_s": round(perf_counter() - begin, 3)}
 
 

@@ -1,4 +1,4 @@
-"""`avlmaps info`: describe a map or a recording, verify it, repair it."""
+"""`avlmaps info`: describe a map or a recording, verify it."""
 
 import shlex
 from collections.abc import Callable, Sequence
@@ -12,7 +12,7 @@ from tyro.conf import OmitArgPrefixes, Positional, arg
 from avlmaps.cli.output import UsageError, emit, ground_lines, size_of
 from avlmaps.cli.reading_options import Reading
 from avlmaps.cli.verb import Verb
-from avlmaps.core.errors import AvlmapsError
+from avlmaps.core.errors import AvlmapsError, MapError
 from avlmaps.core.progress import say
 from avlmaps.core.wording import place_text
 
@@ -44,29 +44,19 @@ class Info(Verb):
     """Format of the recording, if its files do not show it."""
     verify: bool = False
     """Check every file of a map against its checksum, or every picture of a recording."""
-    repair: bool = False
-    """Check every file of a map, and rebuild the damaged ones from --recording."""
-    recording: Annotated[Path | None, arg(metavar="REC")] = None
-    """Recording that the map was built from (--repair)."""
-    audio: Annotated[Path | None, arg(metavar="FILE")] = None
-    """Sound file that was given to `build --audio`, if any (--repair)."""
     verbose: bool = False
     """Print every detail."""
     plot: Annotated[Path | None, arg(metavar="FILE")] = None
     """Draw a top-down view with the path, the sounds, and the names of things and rooms into this picture."""
     reading: Annotated[Reading, OmitArgPrefixes] = field(default_factory=Reading)
-    """What you know better than the recording's files (REC, --repair)."""
+    """What you know better than the recording's files (REC)."""
 
     def run(self) -> None:
         """Describe it."""
-        if self.recording is not None and not self.repair:
-            raise UsageError("--recording belongs to --repair.")
-        repaired = repair(self) if self.repair else {}
         given = self.reading.corrections()
         answer = describe_path(
             self.path, self.format, verify=self.verify, plot=self.plot, corrections=given, more=self.more
         )
-        answer |= repaired
         emit(answer, info_lines(answer, verbose=self.verbose), self.json)
 
 
@@ -132,27 +122,17 @@ def _consistency_lines(found: dict[str, Any]) -> list[str]:
     return lines + [f"  {sentence}" for sentence in found["unchecked"]]
 
 
-def repair(verb: "Info") -> dict[str, Any]:
-    """Build the damaged files of a map again and name them."""
-    from avlmaps.maps.repair import repair_map
-    from avlmaps.recordings.open import open_recording
-
-    recording = None
-    if verb.recording is not None:
-        given = verb.reading.corrections()
-        recording = open_recording(verb.recording, format=verb.format, audio=verb.audio, corrections=given)
-    done = repair_map(verb.path, recording)
-    if not done.files:
-        say(f"every file of {verb.path} is whole; there is nothing to repair.")
-    elif done.rebuilt:
-        say(f"note: the whole map was built again: {verb.path} now differs in last bits from what it was.")
-    return {"repaired": list(done.files)}
-
-
 def _describe_map(path: Path, verify: bool, plot: Path | None) -> dict[str, Any]:
+    from avlmaps.maps.store.folder import damaged_files
     from avlmaps.maps.store.reader import open_stored
 
-    stored = open_stored(path, verify=verify)
+    if verify and (faults := damaged_files(path)):
+        for fault in faults:
+            say(f"damaged: {fault}")
+        raise MapError(
+            f"{len(faults)} of the files of {path} are not what was written; restore it from a copy, or build it again."
+        )
+    stored = open_stored(path)
     answer = describe_map(stored)
     if plot is not None:
         answer["plot"] = str(plot_named(stored, plot))
@@ -272,7 +252,7 @@ def _sound_line(sounds: list[dict[str, Any]]) -> list[str]:
 # What `build` and `info` print without --verbose: what there is, and what may be wrong with it.
 _BRIEF = frozenset({
     "path", "format", "frames", "bad_frames", "keyframes", "voxels", "sounds", "profile", "bytes", "ground",
-    "elapsed_s", "duration_s", "rgb", "depth", "audio", "topics", "consistency", "notices", "faults", "repaired",
+    "elapsed_s", "duration_s", "rgb", "depth", "audio", "topics", "consistency", "notices", "faults",
     "plot",
 })  # fmt: skip
 _BRIEF_LAYOUTS: dict[str, Callable[[Any], list[str]]] = {

@@ -190,8 +190,6 @@ class ShellSession:
     def info(self, rest: str) -> Reply:
         """Describe the map."""
         verb = read_verb(Info, [str(self.given.map), *_split(rest)], "info")
-        if verb.repair or verb.recording is not None:
-            raise UsageError("A map is not repaired while it is open; end the shell and run avlmaps info --repair.")
         answer = describe_path(verb.path, verb.format, verify=verb.verify, plot=verb.plot)
         return Reply(answer, info_lines(answer, verbose=verb.verbose))
 

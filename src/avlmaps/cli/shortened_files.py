@@ -14,8 +14,8 @@ from avlmaps.cli.output import error_answer, kind_of
 from avlmaps.core.errors import MapError
 
 _MESSAGE = (
-    "a file of the map was cut short while it was read; check the map with avlmaps info MAP --verify, and repair it "
-    "with avlmaps info MAP --repair --recording REC."
+    "a file of the map was cut short while it was read; check the map with avlmaps info MAP --verify, and restore "
+    "it from a copy, or build it again."
 )
 _SAID = f"avlmaps: {_MESSAGE}\n".encode()
 _JSON = (json.dumps({"error": error_answer(kind_of(MapError(_MESSAGE)), _MESSAGE)}) + "\n").encode()

@@ -1,9 +1,7 @@
 """Voxels, keyframes and sounds of two maps as those of one; the other's are laid on this one's world."""
 
 import math
-import shutil
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -155,18 +153,9 @@ def joined_sources(
     return carry_evidence(known, voxel_m, robot_m, stored.up_in_world), ""
 
 
-def joined_sounds(
-    stored: StoredMap, other: StoredMap, moved: Float[np.ndarray, "4 4"], shift_s: float, folder: Path
-) -> HeardSounds:
-    """Return the sounds of all days, and bring their clips together in a folder."""
+def joined_sounds(stored: StoredMap, other: StoredMap, moved: Float[np.ndarray, "4 4"], shift_s: float) -> HeardSounds:
+    """Return the sounds of all days."""
     old, new = stored.sounds, other.sounds
-    clips: list[str] = []
-    for number, (of, sound) in enumerate(
-        [*((stored, i) for i in range(len(old))), *((other, i) for i in range(len(new)))]
-    ):
-        source = of.clip_path(sound)
-        clips.append(f"{number:06d}{source.suffix}")
-        shutil.copyfile(source, folder / clips[-1])
     width = max(old.feature.shape[1], new.feature.shape[1])
     laid = replace(
         new,
@@ -176,4 +165,4 @@ def joined_sounds(
     )
     without = np.zeros((0, width), np.float32)
     parts = [each if len(each.feature) else replace(each, feature=without) for each in (old, laid)]
-    return concat(parts, clips=tuple(clips))
+    return concat(parts, clips=(*old.clips, *new.clips))

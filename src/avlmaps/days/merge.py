@@ -1,7 +1,6 @@
 """A map of another day becomes part of this one: found, laid on it, and what changed is known. ``merge_maps`` is it."""
 
 import math
-import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import UTC, date, datetime, time
@@ -29,11 +28,12 @@ from avlmaps.days.unnamed import changed_things
 from avlmaps.maps.growing import require_place
 from avlmaps.maps.store.checkpoints import key_of
 from avlmaps.maps.store.edits import Edit, World, carried_edits, read_edits, write_edits
+from avlmaps.maps.store.folder import write
 from avlmaps.maps.store.life import Life
 from avlmaps.maps.store.lock import EDITING, lock_folder
 from avlmaps.maps.store.manifest import Counts, MapBounds, MapInfo, RecordingInfo, RigInfo, Timings, Visit
+from avlmaps.maps.store.map_data import MapData
 from avlmaps.maps.store.reader import StoredMap, open_stored
-from avlmaps.maps.store.writer import MapContent, write_map
 from avlmaps.maps.types import Keyframes
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.contents import Thing
@@ -120,16 +120,15 @@ def merge_maps(
     kept = _still_there(stored, known, life, now, number, settings)
     voxels = joined_voxels(stored, kept, other, moved, visit.shift_s, life)
     keyframes = joined_keyframes(stored, other, moved, visit.shift_s)
-    with tempfile.TemporaryDirectory(prefix="avlmaps-clips-") as clips:
-        sounds = joined_sounds(stored, other, moved, visit.shift_s, Path(clips))
-        sources, why_not = joined_sources(stored, other, moved, voxels, keyframes)
-        content = MapContent(voxels, keyframes, stored.place_state, sounds, Path(clips), life, sources=sources)
-        info = _manifest(stored, other, content, visits, settings, perf_counter() - begin_s, why_not)
-        with lock_folder(out), lock_folder(out, EDITING):
-            edits = _edits(stored, other, read_edits(out), keyframes, moved)
-            write_map(out, content, info)
-            if edits:
-                write_edits(out, edits)
+    sounds = joined_sounds(stored, other, moved, visit.shift_s)
+    sources, why_not = joined_sources(stored, other, moved, voxels, keyframes)
+    data = MapData(stored.info, voxels, keyframes, sounds, stored.place_state, sources, life=life)
+    info = _manifest(stored, other, data, visits, settings, perf_counter() - begin_s, why_not)
+    with lock_folder(out), lock_folder(out, EDITING):
+        edits = _edits(stored, other, read_edits(out), keyframes, moved)
+        write(out, replace(data, info=info))
+        if edits:
+            write_edits(out, edits)
     return replace(open_stored(out), encoders=stored.encoders)
 
 
@@ -299,7 +298,7 @@ def _still_there(
 def _manifest(
     stored: StoredMap,
     other: StoredMap,
-    content: MapContent,
+    content: MapData,
     visits: tuple[Visit, ...],
     settings: MergeSettings,
     elapsed_s: float,
@@ -329,6 +328,5 @@ def _manifest(
         ),
         doubts=tuple(dict.fromkeys((*info.doubts, *other.info.doubts))),
         visits=visits,
-        files={},
         timings=Timings.now({"merging": elapsed_s}),
     )

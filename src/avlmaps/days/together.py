@@ -26,7 +26,7 @@ from avlmaps.maps.pipeline.cluster_jobs import (
     software,
 )
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
-from avlmaps.maps.store.manifest_file import MANIFEST
+from avlmaps.maps.store.folder import MANIFEST
 from avlmaps.maps.store.reader import StoredMap, open_stored
 from avlmaps.perception.cache.feature_store import DEFAULT_CACHE, CacheSettings
 from avlmaps.perception.encoders import Encoders

@@ -719,7 +719,7 @@ class LiveMap:
             return
         if not np.array_equal(heard.offset_s, stored.sounds.offset_s):
             newer = self._growing.with_sounds(stored, heard)  # a name need not wait for its source
-        elif stored.arrays.sources_wait:
+        elif stored.data.sources_wait:
             newer = self._growing.with_sources(stored)
         else:
             return

@@ -9,7 +9,6 @@ from threading import Condition, Lock, Thread
 from avlmaps.core.errors import MapError
 from avlmaps.maps.growing import write_stored
 from avlmaps.maps.store.reader import StoredMap
-from avlmaps.maps.store.writer import Written
 from avlmaps.maps.types import Submaps
 
 _REST_S = 1.0
@@ -73,7 +72,6 @@ class Saver:
         self._door = Condition()
         self._next: tuple[StoredMap, float, float] | None = None
         self._ended, self._from_s = False, float("-inf")
-        self._written: Written = {}
         self.thread = Thread(target=self._work, name="avlmaps-save", daemon=True)
         self.thread.start()
 
@@ -106,7 +104,7 @@ class Saver:
         Raises:
             MapError: it cannot be written; the one before is still there.
         """
-        write_stored(self._path, stored, self._written, submaps)
+        write_stored(self._path, stored, submaps)
 
     def _work(self) -> None:
         try:

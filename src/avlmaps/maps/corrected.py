@@ -23,10 +23,11 @@ from avlmaps.maps.fusion.sensor import NONE
 from avlmaps.maps.pipeline.sources import locate_sources
 from avlmaps.maps.pipeline.write import carving_doubts
 from avlmaps.maps.pose_correction import PoseCorrection
+from avlmaps.maps.store.folder import write
 from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.manifest import MapBounds, Removed, Timings, UpInfo
+from avlmaps.maps.store.map_data import MapData
 from avlmaps.maps.store.reader import StoredMap, open_stored
-from avlmaps.maps.store.writer import MapContent, as_written, write_map
 from avlmaps.maps.types import HeardSounds, Keyframes, SourceEvidence, Submaps
 from avlmaps.recordings.types import Recording
 
@@ -76,9 +77,6 @@ def correct_stored(
     motion = PoseCorrection.of(stamps_s, poses, frames_s, last)
     now = motion.moved(frames_s, last)
     with lock_folder(stored.path), silence_progress(True):
-        before = MapContent(
-            stored.voxels, stored.keyframes, stored.place_state, stored.sounds, stored.path / "sounds", submaps=submaps
-        )
         content, removed = _moved(stored, submaps, now)
         sources, sources_s = _sources(stored, content, Trajectory(frames_s, now), motion.turn, recording)
         content = replace(content, sources=sources)
@@ -91,10 +89,9 @@ def correct_stored(
         doubts = tuple(carving_doubts(removed, count))
         others = [one for one in info.notices if not one.startswith(MOVED) and one not in info.doubts]
         kept = [one for one in info.doubts if "seen through by other frames" not in one]
-        write_map(
+        write(
             stored.path,
-            content,
-            structs.replace(
+            replace(content, info=structs.replace(
                 info,
                 up=UpInfo.of(motion.turn @ info.up.vector(), info.up.known_from, info.up.support),
                 counts=structs.replace(info.counts, voxels=count),
@@ -102,11 +99,9 @@ def correct_stored(
                 removed=removed,
                 doubts=(*kept, *doubts),
                 notices=(*kept, *doubts, *others, said),
-                files={},
                 timings=Timings(finished=finished, elapsed_s=info.timings.elapsed_s + elapsed_s,
                                 stages_s={**info.timings.stages_s, "correcting": elapsed_s, **sources_s}),
-            ),
-            as_written(stored.path, before, info.files),
+            )),
         )  # fmt: skip
     opened = replace(open_stored(stored.path), encoders=stored.encoders)
     return opened, Corrected(median_m, most_m, info.counts.voxels, count, perf_counter() - begin_s)
@@ -114,7 +109,7 @@ def correct_stored(
 
 def _sources(
     stored: StoredMap,
-    content: MapContent,
+    content: MapData,
     walk: Trajectory,
     turn: Float[np.ndarray, "3 3"],
     recording: Recording | None,
@@ -143,7 +138,7 @@ def require_submaps(stored: StoredMap) -> Submaps:
     return submaps
 
 
-def _moved(stored: StoredMap, submaps: Submaps, now: Float[np.ndarray, "f 4 4"]) -> tuple[MapContent, Removed]:
+def _moved(stored: StoredMap, submaps: Submaps, now: Float[np.ndarray, "f 4 4"]) -> tuple[MapData, Removed]:
     """Return the content of a map whose frames have these poses, and what was no surface."""
     total = MovedSubmaps(submaps, now, stored.grid)
     sensor = NONE if stored.info.sensor is None else stored.info.sensor.model
@@ -158,9 +153,9 @@ def _moved(stored: StoredMap, submaps: Submaps, now: Float[np.ndarray, "f 4 4"])
         raise MapError("With the corrected poses every voxel is seen through or a speck; check the poses.")
     keyframes = moved_keyframes(stored.keyframes, np.asarray(submaps.stamp_s), now)
     sounds = _replaced(stored.sounds, WalkedTrack(np.asarray(submaps.stamp_s), now))
-    content = MapContent(
-        total.voxels(kept=kept), keyframes, stored.place_state, sounds, stored.path / "sounds", stored.life(),
-        replace(submaps, pose=now),
+    content = replace(
+        stored.data, voxels=total.voxels(kept=kept), keyframes=keyframes, sounds=sounds, sources=None,
+        submaps=replace(submaps, pose=now), findings={},
     )  # fmt: skip
     return content, Removed(**removed)
 

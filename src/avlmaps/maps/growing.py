@@ -41,12 +41,12 @@ from avlmaps.maps.pose_correction import PoseCorrection, moved_frame
 from avlmaps.maps.settings import SUBMAP_FRAMES, BuildSettings
 from avlmaps.maps.sources.growing import AT_ONCE, GrowingSources, require_fit
 from avlmaps.maps.store.checkpoints import key_of
-from avlmaps.maps.store.integrity import IntegrityCheck
+from avlmaps.maps.store.folder import MANIFEST, is_map_or_free
+from avlmaps.maps.store.folder import write as write_folder
 from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.manifest import BadFrame, GroundInfo, MapInfo, ModelInfo, SensorInfo, Timings, UpInfo
-from avlmaps.maps.store.manifest_file import MANIFEST
-from avlmaps.maps.store.reader import GIVEN_FEATURES, MapArrays, StoredMap, open_stored
-from avlmaps.maps.store.writer import MapContent, Written, is_map_or_free, write_map
+from avlmaps.maps.store.map_data import MapData
+from avlmaps.maps.store.reader import GIVEN_FEATURES, StoredMap, open_stored
 from avlmaps.maps.types import HeardSounds, SourceEvidence, Submaps
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.protocols import GroundReader
@@ -413,14 +413,10 @@ class GrowingMap:
             if self._finished_corrections != self._corrections:
                 return made
             sources, wait = self._known(sounds)
-        folder, counts = self._sounds.clips_folder, structs.replace(made.info.counts, sounds=len(sounds))
-        return replace(
-            made,
-            path=folder,
-            info=structs.replace(made.info, counts=counts),
-            arrays=replace(made.arrays, sounds=sounds, sources=sources, sources_wait=wait),
-            integrity=IntegrityCheck(folder, {}),
-        )
+        counts = structs.replace(made.info.counts, sounds=len(sounds))
+        info = structs.replace(made.info, counts=counts)
+        data = replace(made.data, info=info, sounds=sounds, sources=sources, sources_wait=wait)
+        return replace(made, path=self._sounds.clips_folder, data=data)
 
     def with_sources(self, made: StoredMap, *, final: bool = False) -> StoredMap:
         """Return a map with the next of its sounds located that wait for it, on its surfaces.
@@ -434,14 +430,14 @@ class GrowingMap:
             if heard is None or self._finished_corrections != self._corrections:
                 return made
             track, spans_s = heard
-            motion, voxels = self._walk.motion(), made.arrays.voxels
+            motion, voxels = self._walk.motion(), made.voxels
             walk = Trajectory(motion.stamps_s, motion.world_from_camera)
             voxel_m = GridSpec(self.settings.voxel_size_m).centre_of(np.asarray(voxels.index))
             find = self._sources.at_the_end if final else self._sources.until_now
             sources = find(track, walk, spans_s, voxel_m, made.up_in_world)
-            if sources is made.arrays.sources:
+            if sources is made.data.sources:
                 return made
-            return replace(made, arrays=replace(made.arrays, sources=sources, sources_wait=self._sources.waiting))
+            return replace(made, data=replace(made.data, sources=sources, sources_wait=self._sources.waiting))
 
     @property
     def doubts(self) -> tuple[str, ...]:
@@ -567,14 +563,10 @@ class GrowingMap:
                 self._upright = up, floor
                 if self._is_outgrown:
                     self._is_outgrown, self._ground = False, ground
-            content, info = self._content(plan, came, *self._upright, final, looks_s)
-        rig, grid = came.walk.rig, GridSpec(self.settings.voxel_size_m)
-        sources, wait = self._known(content.sounds)
-        arrays = MapArrays(content.voxels, content.keyframes, content.place_state, content.sounds, sources, wait)
-        up = self._upright[0].vector()
-        return StoredMap(
-            content.clips_folder, info, grid, up, arrays, self.encoders, rig, IntegrityCheck(content.clips_folder, {})
-        )
+            data = self._content(plan, came, *self._upright, final, looks_s)
+        sources, wait = self._known(data.sounds)
+        folder = HERE if self._sounds is None else self._sounds.clips_folder
+        return StoredMap(folder, replace(data, sources=sources, sources_wait=wait), self.encoders)
 
     def save(self, path: Path, *, overwrite: bool = False) -> StoredMap:
         """Write the map and open it.
@@ -718,7 +710,7 @@ class GrowingMap:
 
     def _content(
         self, plan: BuildPlan, came: "FrozenSums", up: UpInfo, ground: GroundInfo, final: bool, looks_s: float
-    ) -> tuple[MapContent, MapInfo]:
+    ) -> MapData:
         sensor, rig = self._sensor, came.walk.rig
         assert sensor is not None and self._free is not None
         begin = perf_counter()
@@ -738,16 +730,16 @@ class GrowingMap:
         keyframes, state = self._keyframes.keyframes(
             plan.rng(RANDOMNESS), came.keyframes, final=final, within_s=looks_s
         )
-        clips, sounds = HERE, silence(plan)
+        sounds = silence(plan)
         if self._sounds is not None and Kind.SOUNDS in self.encoders:
-            clips, sounds = self._sounds.clips_folder, self._sounds.heard(came.walk.motion(), final=final)
+            sounds = self._sounds.heard(came.walk.motion(), final=final)
         keyframes = with_clear_views(keyframes, [stack_views(clear, pose, self._free.shape)])
-        content = MapContent(merged.voxels, keyframes, state, sounds, clips)
         if final:
-            self._of_features = tuple(feature_doubts(content, plan.models))
+            self._of_features = tuple(feature_doubts(merged.voxels, keyframes, sounds, plan.models))
         timings = Timings.now({"growing": begin - self._begin_s, "merging": perf_counter() - begin})
         left_out = sorted(came.left_out, key=lambda frame: frame.index)
-        return content, manifest_of(plan, up, ground, content, merged, timings, len(came.walk), left_out)
+        info = manifest_of(plan, up, ground, merged, keyframes, sounds, timings, len(came.walk), left_out)
+        return MapData(info, merged.voxels, keyframes, sounds, state)
 
 
 def require_place(path: Path, overwrite: bool) -> None:
@@ -760,14 +752,9 @@ def require_place(path: Path, overwrite: bool) -> None:
         )
 
 
-def write_stored(
-    path: Path, made: StoredMap, written: Written | None = None, submaps: Submaps | None = None
-) -> MapInfo:
-    """Write a map of ``GrowingMap`` into its folder, whose lock the caller holds; see ``write_map``."""
-    content = MapContent(
-        made.voxels, made.keyframes, made.place_state, made.sounds, made.path, submaps=submaps, sources=made.sources()
-    )  # fmt: skip
-    return write_map(path, content, made.info, written)
+def write_stored(path: Path, made: StoredMap, submaps: Submaps | None = None) -> MapInfo:
+    """Write a map of ``GrowingMap`` into its folder, whose lock the caller holds."""
+    return write_folder(path, replace(made.data, submaps=submaps))
 
 
 @dataclass(frozen=True, slots=True)

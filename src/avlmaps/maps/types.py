@@ -1,6 +1,7 @@
 """The content of a map, in memory or memory-mapped: voxels, keyframes, sounds; all in the recording's world."""
 
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -100,7 +101,7 @@ class HeardSounds:
         track: where the robot was while it heard the sound, metres, world; at least one place for each sound.
         feature_offsets: (n + 1,) into ``feature``.
         feature: unit vectors, one a window.
-        clips: file names below the map's folder, FLAC.
+        clips: their files, FLAC.
     """
 
     RAGGED: ClassVar = (("track_offsets", "track"), ("feature_offsets", "feature"))
@@ -110,7 +111,7 @@ class HeardSounds:
     track: Float32[np.ndarray, "t 3"]
     feature_offsets: Int64[np.ndarray, " n1"]
     feature: Float32[np.ndarray, "w d"]
-    clips: tuple[str, ...]
+    clips: tuple[Path, ...]
 
     def __len__(self) -> int:
         return len(self.onset_s)

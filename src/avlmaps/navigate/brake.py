@@ -12,7 +12,7 @@ from avlmaps.core.errors import MapError, NavigationError
 from avlmaps.core.motion import Action, GroundPose, Moved
 from avlmaps.core.printable import printable
 from avlmaps.maps.store.edits import EDITS, in_force, read_edits
-from avlmaps.maps.store.integrity import stamp
+from avlmaps.maps.store.folder import stamp
 from avlmaps.navigate.bodies import Body
 from avlmaps.navigate.driver import Arrival, Driver, Holdable
 from avlmaps.query.avlmap import AVLMap

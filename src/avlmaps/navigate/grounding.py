@@ -14,7 +14,7 @@ from avlmaps.core.question import HeardAt
 from avlmaps.core.wording import place_text
 from avlmaps.language.program.vocabulary import Clip, Picture, Place, Target
 from avlmaps.language.storey_words import said_storeys
-from avlmaps.maps.store.integrity import stamp
+from avlmaps.maps.store.folder import stamp
 from avlmaps.maps.storeys import said_storeys as storeys_in_words
 from avlmaps.navigate.file_access import Readable
 from avlmaps.navigate.footprint import Outline

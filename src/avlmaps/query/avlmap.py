@@ -1,8 +1,7 @@
 """The map as a user meets it: four modalities, each a heatmap, and whole questions."""
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
@@ -34,9 +33,6 @@ from avlmaps.query.queryable import Attachment, Photo
 from avlmaps.query.room_names import numbered_rooms, region_named
 from avlmaps.query.room_regions import RoomRegions
 from avlmaps.query.rooms import NamedVoxels, RoomField, Rooms, rooms_of_cells, seen_twice, voting_rows
-from avlmaps.query.stored_instances import Search, place_of_instances, read_instances, write_instances
-from avlmaps.query.stored_names import read_closest, write_closest
-from avlmaps.query.stored_rooms import room_field_of, room_regions_of
 from avlmaps.query.things_in_rooms import ThingsInRooms
 from avlmaps.query.voxel_space import Space
 from avlmaps.query.words import ClosestWords, EncodedWord, Vocabulary
@@ -109,7 +105,6 @@ class AVLMap:
         self.settings = settings or QuerySettings()
         self._given_edits = edits
         self._rivals: tuple[tuple[str, ...], ClosestWords] | None = None
-        self._known_searches: Mapping[Search, Segmentation] | None = None
         self._to_edit: dict[str | None, Sequence[Thing]] = {}
 
     @classmethod
@@ -179,16 +174,12 @@ class AVLMap:
 
     def _seen_object(self, part: Part, vocabulary: Sequence[str] | None) -> NearThings:
         """Return the heat of an object as the encoder sees it."""
-        word, encoder = part.query, self.stored.encoders.pixels
+        encoder = self.stored.encoders.pixels
         # Of names, most voxels have too little of the word to be compared with all others.
         known = self._known_words if vocabulary is None else None
         rivals = self._rivals_of(encoder, vocabulary) if known is None else known
         voxels = self._feature_voxels(encoder, rivals, self.stored.voxels.rgb)
-        found = None
-        if vocabulary is None:  # of a name of the encoder, narrower names with it
-            stored = self._searched(only_stored=True)
-            found = stored.get((word, False)) or stored.get((word, True))
-        return object_factor(voxels, part, self.settings.heat, found)
+        return object_factor(voxels, part, self.settings.heat)
 
     @checked(QueryError)
     def instances(self, word: str, alone: bool = False) -> Instances:
@@ -223,22 +214,6 @@ class AVLMap:
         feature, settings = self.stored.voxels.feature, self.settings.objects
         return FeatureVoxels(self.space, feature, encoder, rivals, settings, rgb, lambda: self.things_in_rooms)
 
-    def prepare(self) -> "AVLMap":
-        """Store beside a large map what its questions need again, as the end of a build does; return the map.
-
-        Nothing is computed for a map that is small or in memory. What is stored already is not computed again.
-        """
-        from avlmaps.maps.store.derived import is_large
-
-        if is_large(self.stored.info):
-            with suppress(BackendError, MapError):  # no features of things, or those of another encoder
-                if self._known_words is not None:
-                    self.closest_words()
-                self._searched()
-            with suppress(MapError):
-                _ = self.room_regions
-        return self
-
     def rivals(self) -> ClosestWords:
         """Return ``closest_words``, by the name that they had before."""
         warnings.warn("AVLMap.rivals goes in the next release; use .closest_words.", DeprecationWarning, stacklevel=2)
@@ -252,11 +227,7 @@ class AVLMap:
         self.stored.require_model(Kind.PIXELS)
         feature, known = self.stored.voxels.feature, self._known_words if vocabulary is None else None
         if known is not None:
-            fresh = not known.is_whole
-            rivals = known.whole(feature)
-            if fresh:
-                write_closest(self.stored, known, (rivals.best, rivals.best_word, rivals.second, rivals.second_word))
-            return rivals
+            return known.whole(feature)
         names = tuple(encoder.vocabulary if vocabulary is None else vocabulary)
         if self._rivals is None or self._rivals[0] != names:
             self._rivals = names, ClosestWords.of(feature, encoder, names)
@@ -273,9 +244,6 @@ class AVLMap:
             return None
         self.stored.require_model(Kind.PIXELS)
         vocabulary = Vocabulary.encoded(encoder, encoder.vocabulary)
-        closest = read_closest(self.stored, vocabulary)
-        if closest is not None:
-            return KnownClosestWords.known_everywhere(vocabulary, closest)
         return KnownClosestWords.of(vocabulary, len(self.stored.voxels))
 
     @checked(QueryError)
@@ -322,10 +290,8 @@ class AVLMap:
         """Return ``things`` as the encoder sees them, without what people corrected."""
         from avlmaps.query.contents import find_things
 
-        known: Mapping[Search, Segmentation] = {} if names is not None else self._searched(watch)
-
         def instances_of(name: str, alone: bool) -> Instances:
-            return known[name, alone].instances if (name, alone) in known else self._search(name, alone).instances
+            return self._search(name, alone).instances
 
         return find_things(self.stored, self.space, instances_of, names, least_confidence, structure, watch)
 
@@ -339,29 +305,6 @@ class AVLMap:
             names = None if name is None else [name]
             self._to_edit[name] = self.unedited_things(names, _LEAST_EDITED) if is_seen else ()
         return self._to_edit[name]
-
-    def _searched(
-        self, watch: "Watch" = lambda stage, done, total: None, only_stored: bool = False
-    ) -> Mapping[Search, Segmentation]:
-        """Return what all searches of a list of things found in a large map, which is stored beside it.
-
-        Args:
-            watch: see ``contents.find_things``.
-            only_stored: return nothing where it is not stored, rather than search.
-        """
-        from avlmaps.query.contents import STRUCTURE, searches_for
-
-        vocabulary = self._known_words
-        if self._known_searches or vocabulary is None or (only_stored and self._known_searches is not None):
-            return self._known_searches or {}
-        encoder, settings = self.stored.encoders.pixels, self.settings
-        searches = searches_for([name for name in encoder.vocabulary if name not in STRUCTURE], encoder)
-        place = place_of_instances(self.stored, vocabulary, searches, [settings.objects, settings.areas])
-        known = None if place is None else read_instances(place, searches, len(self.space))
-        if known is None and place is not None and not only_stored:
-            known = write_instances(place, searches, self._search, watch)
-        self._known_searches = known or {}
-        return self._known_searches
 
     def changes(self, since: str | int = 1, *, first_seen: bool = False) -> "ChangesAnswer":
         """Return what is new, moved and gone after a day: a date, or the number of a visit from 1.
@@ -652,20 +595,7 @@ class AVLMap:
         known = [(floor.best.height_m, floor.cameras) for floor in ground.floors] if ground is not None else []
         places = area_anchors(stored.keyframes, settings)
         plan = FloorPlan.of(self.space, self.storeys or one_storey(known, cameras), places)
-        return None if plan is None else Rooms(plan, places, self._voting_voxels, settings.rooms, self._kept_field)
-
-    def _kept_field(
-        self,
-        called: str,
-        plan: FloorPlan,
-        kinds: tuple[str, ...],
-        share: Float[np.ndarray, "k n"],
-        find: Callable[[], RoomField],
-    ) -> RoomField:
-        """Return a field of rooms: of a large map that of all kinds is stored beside it."""
-        if kinds != area_names(self.stored.encoders.views):  # of a query for an area by any words
-            return find()
-        return room_field_of(self.stored, called, plan, kinds, share, self.settings.areas, find)
+        return None if plan is None else Rooms(plan, places, self._voting_voxels, settings.rooms)
 
     @cached_property
     def room_regions(self) -> RoomRegions | None:
@@ -675,7 +605,7 @@ class AVLMap:
             return None
         camera = self.stored.rig.depth
         width_rad = 2.0 * float(np.arctan2(camera.width, 2.0 * camera.fx))
-        regions = room_regions_of(self.stored, votes.plan, width_rad)
+        regions = RoomRegions.of(votes.plan, np.asarray(self.stored.keyframes.world_from_camera), width_rad)
         field = self._known_room_field
         return regions if field is None else regions.joined(seen_twice(field, regions))
 

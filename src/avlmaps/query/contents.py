@@ -23,7 +23,6 @@ from avlmaps.query.instances import Instances
 from avlmaps.query.modalities.area import AreaSettings, area_names, modes, pooled_name_shares
 from avlmaps.query.modalities.sound import sound_features
 from avlmaps.query.rooms import FEWEST_VIEWS, LEAST_PART
-from avlmaps.query.stored_instances import Search
 from avlmaps.query.voxel_space import Space
 
 if TYPE_CHECKING:
@@ -286,7 +285,7 @@ def find_things(
     return sorted(things, key=lambda thing: -thing.confidence)
 
 
-def searches_for(names: Sequence[str], encoder: PixelEncoder) -> list[Search]:
+def searches_for(names: Sequence[str], encoder: PixelEncoder) -> list[tuple[str, bool]]:
     """Return the searches that list things of some names: each for itself alone, and with the narrower names it has."""
     return [*((name, True) for name in names), *((name, False) for name in names if _is_wide(name, encoder))]
 

@@ -193,9 +193,6 @@ def rooms_of_cells(regions: RoomRegions, places: Float[np.ndarray, "k 3"]) -> In
     return np.where(is_room[regions.of_plan_cells], regions.of_plan_cells, nearest)
 
 
-KeptField = Callable[[str, FloorPlan, tuple[str, ...], Float[np.ndarray, "k n"], Callable[[], RoomField]], RoomField]
-
-
 @cache
 def _among(kinds: tuple[str, ...], names: tuple[str, ...]) -> Bool[np.ndarray, " n"]:
     find = lexicon().find
@@ -211,7 +208,6 @@ class Rooms:
         places: middle of what each keyframe saw, metres, world.
         named: returns the voxels whose names vote; None where the map's things have no names.
         settings: weights and distances.
-        kept: returns a field that was stored, or what the function that it is given finds.
     """
 
     def __init__(
@@ -220,28 +216,20 @@ class Rooms:
         places: Float[np.ndarray, "k 3"],
         named: Callable[[], NamedVoxels | None],
         settings: RoomSettings,
-        kept: KeptField | None = None,
     ) -> None:
         self.plan = plan
-        self._kept = kept
         self.settings = settings
         self._places = np.asarray(places, np.float64).reshape(-1, 3)
         self._named = named
         self._votes: dict[tuple[str, ...], Float32[np.ndarray, "c n"]] = {}
 
-    def field(self, kinds: Sequence[str], share: Float[np.ndarray, "k n"], called: str = "kinds") -> RoomField:
+    def field(self, kinds: Sequence[str], share: Float[np.ndarray, "k n"]) -> RoomField:
         """Return how likely each place is each kind of room.
 
         Args:
             kinds: kinds of room that compete.
             share: how likely each keyframe's view shows each of them; rows add up to 1.
-            called: what it is stored as.
         """
-        if self._kept is None:
-            return self._found(kinds, share)
-        return self._kept(called, self.plan, tuple(kinds), share, lambda: self._found(kinds, share))
-
-    def _found(self, kinds: Sequence[str], share: Float[np.ndarray, "k n"]) -> RoomField:
         settings = self.settings
         mass = np.zeros((len(self.plan), len(kinds) + 1))
         np.add.at(mass, self._place_cells, np.c_[share, np.ones(len(share))])

@@ -54,8 +54,8 @@ class Listening(Queryable, Protocol):
 def unknown_sources(stored: "StoredMap") -> str:
     """Return why a map does not know where sounds came from, and what to do."""
     what = f"{stored.path.name} does not know where sounds came from, only where the robot was"
-    if stored.arrays.sources_wait:
-        return f"Where the sounds came from is not found yet, {stored.arrays.sources_wait} wait; ask again in a moment."
+    if stored.data.sources_wait:
+        return f"Where the sounds came from is not found yet, {stored.data.sources_wait} wait; ask again in a moment."
     if stored.info.visits:
         return (
             f"{what}: it is of several days, and not all of them say where the microphones are, or they have other "

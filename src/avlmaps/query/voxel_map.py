@@ -207,7 +207,7 @@ class VoxelMap:
             MapError: there is nothing to write, the folder is something else or a map, or it cannot be written.
         """
         with self._lock:
-            return AVLMap(self._growing.save(lasting_path(path), overwrite=overwrite), self._query).prepare()
+            return AVLMap(self._growing.save(lasting_path(path), overwrite=overwrite), self._query)
 
     def __len__(self) -> int:
         """Return how many frames are in the map."""

@@ -20,8 +20,7 @@ from avlmaps.core.files import user_path
 from avlmaps.core.question import Modality, Part, Role
 from avlmaps.language.questions import parse_sentence
 from avlmaps.maps.store.edits import EDITS
-from avlmaps.maps.store.integrity import stamp
-from avlmaps.maps.store.manifest_file import MANIFEST
+from avlmaps.maps.store.folder import MANIFEST, stamp
 from avlmaps.maps.store.reader import open_stored
 from avlmaps.query.avlmap import AVLMap, QuerySettings
 from avlmaps.query.factors import NearAnchors

@@ -8,23 +8,20 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from jaxtyping import Float, Float32, Int
+from jaxtyping import Float, Float32
 
 from avlmaps.core.errors import MapError
 from avlmaps.core.poses import FRAME, from_rotation
 from avlmaps.maps.grid import index_ends
-from avlmaps.maps.store.derived import Derivation
 from avlmaps.query.topdown import camera_path
-from avlmaps.view.detail import Level, detail_order
+from avlmaps.view.detail import detail_order
 
 if TYPE_CHECKING:
-    from avlmaps.maps.store.reader import StoredMap
     from avlmaps.maps.storeys import Storeys
     from avlmaps.query.avlmap import AVLMap
 
 RECORD = np.dtype([("cell", "<u2", (3,)), ("seen", "<u2"), ("rgb", "u1", (3,)), ("spare", "u1")])
 """One voxel as the page reads it: where, when it was last seen (65535 is the end of the recording), its colour."""
-_ORDERED_BY = ("avlmaps.view.detail", "avlmaps.query.kernels", "avlmaps.maps.grid")
 _MOST_CELLS = 65535
 _NEAR_SHARE = 0.25  # of the map's extent: voxels up to this far out of the bulk of it count as the whole map
 _UNDER_CEILING_M = 0.1  # a storey is shown from below its floor to this far under its ceiling
@@ -54,7 +51,7 @@ class Layout:
         """
         self.avlmap = avlmap
         index = np.asarray(avlmap.space.index)
-        self.order, self.levels = detail_order(index) if most is None else _order_of_file(avlmap.stored, index, most)
+        self.order, self.levels = detail_order(index, most)
         self.low, self._high = index_ends(index) if len(index) else (np.zeros(3, np.int64),) * 2
         if int((self._high - self.low).max()) > _MOST_CELLS:
             span_m = float((self._high - self.low).max() * avlmap.space.grid.voxel_size_m)
@@ -148,24 +145,6 @@ class Layout:
         if not 0 <= number < len(keyframes):
             return None
         return keyframes.jpeg(number).tobytes() or None
-
-
-def _order_of_file(
-    stored: "StoredMap", index: Int[np.ndarray, "n 3"], most: int
-) -> tuple[Int[np.ndarray, " m"], tuple[Level, ...]]:
-    """Return ``detail_order`` of some of a map's voxels; of a large map it is stored beside it."""
-    place = Derivation.of(stored.path, stored.info, "drawn", ["voxels/index"], _ORDERED_BY, most)
-    arrays = None if place is None else place.read()
-    if arrays is not None and set(arrays) == {"order", "levels"}:
-        order, levels = arrays["order"], arrays["levels"]
-        fits = order.ndim == 1 and order.dtype == np.int32 and levels.ndim == 2 and levels.shape[1] == 2
-        if fits and len(order) and 0 <= int(order.min()) <= int(order.max()) < len(index):
-            return order, tuple(Level(count, edge) for count, edge in levels.tolist())
-    order, levels = detail_order(index, most)
-    if place is not None:
-        counted = np.array([[level.count, level.edge] for level in levels], np.int64)
-        place.write({"order": order.astype(np.int32), "levels": counted})
-    return order, levels
 
 
 def _storeys(storeys: "Storeys", low_m: float, high_m: float) -> list[dict[str, Any]]:

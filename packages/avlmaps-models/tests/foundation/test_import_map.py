@@ -88,7 +88,7 @@ def _own(scene: Path, path: Path) -> StoredMap:
 
 
 def test_the_map_is_whole_and_tells_what_it_is(imported: StoredMap, arrays: dict[str, np.ndarray]) -> None:
-    stored = open_stored(imported.path, verify=True)
+    stored = open_stored(imported.path)
     counts = stored.info.counts
     assert (counts.frames, counts.keyframes, counts.sounds) == (14, 14, 0)
     assert len(arrays["grid_pos"]) < counts.voxels < 1.2 * len(arrays["grid_pos"])
@@ -150,7 +150,7 @@ def test_lseg_itself_is_taken_though_its_weights_are_not_known(dim: int, importe
     layout = lseg_layout(LSegSizes(dim=dim))
     write_checkpoint(models / "demo_e200.ckpt", random_weights(layout, half=("clip_pretrained.",)))
     registry.forget_loaded()
-    stored = open_stored(imported.path, verify=True)
+    stored = open_stored(imported.path)
     if dim == 512:
         heat = AVLMap(stored).object("sofa", primary=True)
         assert heat.values.min() >= 0.0 and np.isfinite(heat.values).all()
@@ -462,7 +462,7 @@ def test_the_walks_below_are_heard_anew_where_they_were_walked(
 ) -> None:
     settings = ImportSettings(CELL_M, track="output_level_1.wav", hear_with="pitch")
     stored = import_reference_map(with_walks, tmp_path / "m.avlmap", settings, progress=False)
-    sounds = open_stored(stored.path, verify=True).sounds
+    sounds = open_stored(stored.path).sounds
     begin_s = stored.info.recording.duration_s
     second_s = begin_s + (14 * 12 - 1) / 25
     assert np.allclose(sounds.onset_s, [begin_s + 1.0, begin_s + 4.0, second_s + 2.0], atol=0.1)

@@ -399,7 +399,7 @@ def test_a_map_on_the_disk_locates_by_superglue_and_says_so_where_it_has_no_scor
     assert found.world_from_camera is not None
     assert np.linalg.norm(found.world_from_camera[:3, 3] - walk.frame(0).world_from_camera[:3, 3]) < 0.01
     keyframes = replace(stored.keyframes, score=np.zeros(0, np.float16))
-    before = replace(stored, arrays=replace(stored.arrays, keyframes=keyframes))
+    before = replace(stored, data=replace(stored.data, keyframes=keyframes))
     with pytest.raises(
         BackendError, match=r"needs the score of each keypoint; these came without\. Build the map again"
     ):

@@ -18,8 +18,8 @@ from avlmaps.live.settings import LiveSettings
 from avlmaps.maps.corrected import correct_stored
 from avlmaps.maps.sources.density import CandidateGrid, Density
 from avlmaps.maps.sources.settings import SourceSettings
+from avlmaps.maps.store.folder import write
 from avlmaps.maps.store.reader import StoredMap, open_stored
-from avlmaps.maps.store.writer import MapContent, write_map
 from avlmaps.maps.types import SourceEvidence
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.recordings.open import open_recording
@@ -54,18 +54,8 @@ def places(sources: SourceEvidence | None) -> np.ndarray:
 
 
 def without_sources(stored: StoredMap) -> StoredMap:
-    content = MapContent(
-        stored.voxels, stored.keyframes, stored.place_state, stored.sounds, stored.path / "sounds",
-        submaps=stored.submaps(),
-    )  # fmt: skip
-    write_map(stored.path, content, replace_files(stored))
+    write(stored.path, replace(stored.data, sources=None))
     return open_stored(stored.path)
-
-
-def replace_files(stored: StoredMap):
-    from msgspec import structs
-
-    return structs.replace(stored.info, files={})
 
 
 def test_a_live_map_ends_with_the_sources_of_the_build(heard: tuple[Path, Path], tmp_path: Path) -> None:
@@ -92,7 +82,7 @@ def sources_of_all_sounds(live: LiveMap, seconds: float = 120.0) -> SourceEviden
     """Wait until a snapshot has located all of its sounds."""
     until_s = time.monotonic() + seconds
     while time.monotonic() < until_s:
-        arrays = live.map.stored.arrays if live.generation else None
+        arrays = live.map.stored.data if live.generation else None
         found = None if arrays is None or arrays.sources_wait else arrays.sources
         if found is not None and found.heard.any(axis=1).all():
             return found
@@ -160,13 +150,7 @@ def test_a_merge_says_why_it_does_not_know(heard: tuple[Path, Path], copy: Store
     own = first.sources()
     assert own is not None
     stereo = replace(own, channels=np.array([2], np.int64))
-    write_map(
-        copy.path,
-        MapContent(
-            bare.voxels, bare.keyframes, bare.place_state, bare.sounds, bare.path / "sounds", sources=stereo
-        ),
-        replace_files(bare),
-    )  # fmt: skip
+    write(copy.path, replace(bare.data, sources=stereo))
     found, why = joined_sources(first, open_stored(copy.path), np.eye(4), first.voxels, first.keyframes)
     assert found is None and "4 microphones" in why and "2" in why
     merged = merge_maps(first, open_stored(copy.path), tmp_path / "both.avlmap", things_of=lambda _: [])

@@ -41,7 +41,7 @@ def detect_events(
         clips_folder: where each sound is written as FLAC, as it was heard, named by its onset; made if need be.
 
     Returns:
-        The sounds in the order of their onset; ``clips`` are file names in ``clips_folder``.
+        The sounds in the order of their onset; ``clips`` are files in ``clips_folder``.
 
     Raises:
         AudioError: the track cannot be read.
@@ -58,8 +58,8 @@ def detect_events(
     motion = WalkedTrack(recording.stamps_s, recording.world_from_camera)
     heard: list[StoredSound] = []
     for found, sound, feature in pieces:
-        clip = f"{found.onset_s:010.3f}.flac"
-        write_flac(clips_folder / clip, sound)
+        clip = clips_folder / f"{found.onset_s:010.3f}.flac"
+        write_flac(clip, sound)
         heard.append(StoredSound(found, track_of(motion, found), feature, clip))
     _tell_outside(recording, [one.segment for one in heard])
     return collect(heard, encoder.card.dim)
@@ -151,12 +151,12 @@ def track_of(walk: WalkedTrack, heard: Segment) -> Float32[np.ndarray, "places 3
 
 @dataclass(frozen=True, slots=True)
 class StoredSound:
-    """A sound as the map stores it: when, where the robot was, its features, and the name of its clip's file."""
+    """A sound as the map stores it: when, where the robot was, its features, and its clip's file."""
 
     segment: Segment
     track: Float32[np.ndarray, "places 3"]
     feature: Float32[np.ndarray, "windows d"]
-    clip: str
+    clip: Path
 
 
 def _cleaned(sound: Sound, track: AudioTrack, found: Sequence[Segment], index: int, settings: HearingSettings) -> Sound:

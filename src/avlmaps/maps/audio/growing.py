@@ -66,7 +66,7 @@ class GrowingSounds:
         self._loudest, self._window = 0.0, 0  # the window begins at this sample, at a step of the powers
         self._old: list[StoredSound] = []
         self._features: dict[_Key, Float32[np.ndarray, "windows d"]] = {}
-        self._clips: set[str] = set()
+        self._clips: set[Path] = set()
 
     @property
     def track(self) -> RawTrack | None:
@@ -175,8 +175,8 @@ class GrowingSounds:
         self, walk: WalkedTrack, found: Segment, sound: Sound, feature: Float32[np.ndarray, "windows d"]
     ) -> StoredSound:
         begin, end = self._samples(found.onset_s, found.offset_s)
-        clip = f"{begin:012d}-{end:012d}.flac"
+        clip = self.clips_folder / f"{begin:012d}-{end:012d}.flac"
         if clip not in self._clips:
-            write_flac(self.clips_folder / clip, sound)
+            write_flac(clip, sound)
             self._clips.add(clip)
         return StoredSound(found, track_of(walk, found), feature, clip)

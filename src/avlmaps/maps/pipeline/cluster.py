@@ -95,7 +95,7 @@ class ClusterWorkers(Workers):
             total = done + sum(counts)
             for number, result in progress(results, "fusing", total=total, done=done, size=lambda one: counts[one[0]]):
                 result.require()
-                for bad in load_part(orders[number].folder, plan.fusion_key, verify=False).info.bad_frames:
+                for bad in load_part(orders[number].folder, plan.fusion_key).info.bad_frames:
                     tolerance.meet(bad)
 
     def describe(self, plan: BuildPlan, work: KeyframeLots) -> None:

@@ -37,9 +37,9 @@ from avlmaps.maps.pipeline.keyframes import KeyframeLots, describe_lots
 from avlmaps.maps.pipeline.parts import load_part
 from avlmaps.maps.pipeline.plan import BuildPlan, Span, make_plan
 from avlmaps.maps.settings import BuildSettings
-from avlmaps.maps.store.array_files import explain_write_errors
 from avlmaps.maps.store.checkpoints import DONE, save_checkpoint
-from avlmaps.maps.store.reader import PARTS
+from avlmaps.maps.store.folder import PARTS
+from avlmaps.maps.store.tables import explain_write_errors
 from avlmaps.perception.cache.cached_encoders import with_cache
 from avlmaps.perception.cache.feature_store import CacheSettings
 from avlmaps.perception.encoders import Encoders
@@ -223,7 +223,7 @@ def add_job(job: AddJob) -> JobResult:
     def work(plan: BuildPlan, folder: Path) -> None:
         total: VoxelAccumulator | None = None
         for part in job.parts:
-            sums = _within(load_part(part, plan.fusion_key, verify=False).sums(), job.low, job.high)
+            sums = _within(load_part(part, plan.fusion_key).sums(), job.low, job.high)
             total = total or VoxelAccumulator(GridSpec(plan.settings.voxel_size_m), sums.feature_sum.shape[1])
             total.merge(sums)
         if total is not None:

@@ -58,7 +58,7 @@ def encode_and_fuse(plan: BuildPlan, given: Sequence[Path | str], sensor: Sensor
     bad = [frame for part in had for frame in part.info.bad_frames]
     done = sum(part.info.fused + len(part.info.bad_frames) for part in had)
     fuse(plan, jobs, sensor.model, bad, done)
-    own = [part or load_part(folder, plan.fusion_key, verify=False) for folder, part in finished.items()]
+    own = [part or load_part(folder, plan.fusion_key) for folder, part in finished.items()]
     parts = sorted([*brought, *own], key=lambda part: part.info.spans)
     check_disjoint(parts)
     return parts

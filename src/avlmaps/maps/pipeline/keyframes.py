@@ -20,7 +20,7 @@ from avlmaps.maps.keyframes.describe import describe_keyframe, learn_places, sel
 from avlmaps.maps.pipeline.parts import MapPart
 from avlmaps.maps.pipeline.plan import BUILD_VERSION, BuildPlan
 from avlmaps.maps.store import checkpoints
-from avlmaps.maps.store.array_validation import array_fields, validate_arrays
+from avlmaps.maps.store.tables import as_kind, fields_of
 from avlmaps.maps.types import Keyframes
 from avlmaps.perception.cache.cached_encoders import cache_note
 from avlmaps.perception.protocols import LocalFeatures, ViewEncoder
@@ -85,7 +85,7 @@ def describe_keyframes(
     missing = {folder: lot for folder, lot in lots.items() if checkpoints.find_checkpoint(folder, _Facts, key) is None}
     describe(plan, KeyframeLots(good, missing, len(chosen), _places(plan, key), local, key))
     kept = [checkpoints.load_checkpoint(folder, _Facts, key) for folder in lots]
-    pieces = [validate_arrays(Keyframes, lot.arrays, str(lot.folder)) for lot in kept]
+    pieces = [as_kind(Keyframes, lot.arrays, lot.folder) for lot in kept]
     return KeyframeResult(concat_keyframes(pieces), place_state, learning_s + sum(lot.facts.elapsed_s for lot in kept))
 
 
@@ -129,7 +129,7 @@ def describe_lots(plan: BuildPlan, work: KeyframeLots) -> None:
                 for index, frame, view in islice(ahead, len(lot))
             ]
             pieces = stack_keyframes(seen)
-            arrays = {name: getattr(pieces, name) for name in array_fields(Keyframes)}
+            arrays = fields_of(pieces)
             checkpoints.save_checkpoint(folder, work.key, _Facts(perf_counter() - begin), arrays)
         for _ in ahead:  # nothing is left; this completes the bar
             pass

@@ -108,7 +108,7 @@ def merge_parts(folders: Sequence[Path | str], out: Path | str) -> MapPart:
     """
     if not folders:
         raise MapError(f"There are no parts to merge into {out}; name the folders that build_part wrote.")
-    key = load_part(Path(folders[0]), verify=False).key
+    key = load_part(Path(folders[0])).key
     parts = sorted((load_part(Path(folder), key) for folder in folders), key=lambda part: part.info.spans)
     check_disjoint(parts)
     info = PartInfo(
@@ -141,9 +141,9 @@ def save_part(
     save_checkpoint(folder, key, info, arrays)
 
 
-def load_part(folder: Path, key: str | None = None, *, verify: bool = True) -> MapPart:
+def load_part(folder: Path, key: str | None = None) -> MapPart:
     """Read a part back; see ``load_checkpoint`` for the arguments and errors."""
-    found = load_checkpoint(folder, PartInfo, key, verify=verify)
+    found = load_checkpoint(folder, PartInfo, key)
     return MapPart(folder, found.facts, found.key)
 
 

@@ -15,10 +15,8 @@ from avlmaps.core.wording import option
 from avlmaps.maps.keyframes.describe import keyframes_by_motion
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.checkpoints import key_of, remove_stages
+from avlmaps.maps.store.folder import PARTS, is_map_or_free, read_info, sweep
 from avlmaps.maps.store.manifest import MapInfo, ModelInfo
-from avlmaps.maps.store.manifest_file import MANIFEST, parse_manifest, read_manifest
-from avlmaps.maps.store.reader import PARTS
-from avlmaps.maps.store.writer import is_map_or_free, sweep
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.protocols import PixelEncoder
 from avlmaps.recordings.content import LARGEST_BUDGET_BYTES
@@ -160,9 +158,8 @@ def claim(plan: BuildPlan, resume: bool, overwrite: bool) -> MapInfo | None:
     Raises:
         MapError: there is a finished map from something else, or a damaged one, and ``overwrite`` is not set.
     """
-    manifest = plan.path / MANIFEST
-    if manifest.is_file() and not overwrite:
-        there = parse_manifest(read_manifest(manifest), manifest)
+    there = None if overwrite else read_info(plan.path)
+    if there is not None:
         if there.build_key != plan.key:
             if _lacks_submaps_alone(plan, there):
                 raise MapError(

@@ -22,8 +22,9 @@ from avlmaps.maps.pipeline.parts import MapPart
 from avlmaps.maps.pipeline.plan import BuildPlan, strip_folder
 from avlmaps.maps.pipeline.sounds import SoundResult
 from avlmaps.maps.store import manifest
-from avlmaps.maps.store.writer import MapContent, write_map
-from avlmaps.maps.types import Keyframes, SourceEvidence, Voxels
+from avlmaps.maps.store.folder import write as write_folder
+from avlmaps.maps.store.map_data import MapData
+from avlmaps.maps.types import HeardSounds, Keyframes, SourceEvidence, Voxels
 from avlmaps.recordings.types import Recording
 
 # Below this share of agreeing surface the direction that was found is reported as a guess.
@@ -90,10 +91,6 @@ def write(
     """Write the map and, last of all, its manifest; then the parts go."""
     keyframes = with_clear_views(pictures.keyframes, [part.views() for part in parts])
     submaps = concat([part.submap() for part in parts]) if plan.settings.frames.per_submap else None
-    clips, evidence = heard.clips_folder, sources[0]
-    content = MapContent(
-        merged.voxels, keyframes, pictures.place_state, heard.sounds, clips, submaps=submaps, sources=evidence
-    )
     stages_s = {
         "up": up.elapsed_s,
         "ground": floor.elapsed_s,
@@ -107,7 +104,9 @@ def write(
     timings = manifest.Timings.now(stages_s)
     bad = sorted((frame for part in parts for frame in part.info.bad_frames), key=lambda frame: frame.index)
     fused = sum(part.info.fused for part in parts)
-    return write_map(plan.path, content, manifest_of(plan, up.up, floor.ground, content, merged, timings, fused, bad))
+    info = manifest_of(plan, up.up, floor.ground, merged, keyframes, heard.sounds, timings, fused, bad)
+    data = MapData(info, merged.voxels, keyframes, heard.sounds, pictures.place_state, sources[0], submaps=submaps)
+    return write_folder(plan.path, data)
 
 
 def with_clear_views(keyframes: Keyframes, views: Sequence[FreeViews]) -> Keyframes:
@@ -123,14 +122,17 @@ def manifest_of(
     plan: BuildPlan,
     up: manifest.UpInfo,
     ground: manifest.GroundInfo,
-    content: MapContent,
     merged: Merged,
+    keyframes: Keyframes,
+    sounds: HeardSounds,
     timings: manifest.Timings,
     fused: int,
     bad: Sequence[manifest.BadFrame] = (),
 ) -> manifest.MapInfo:
     """Return the content of ``map.json`` but for its list of files."""
-    doubts = (*plan.doubts, *carving_doubts(merged.removed, len(content.voxels)), *feature_doubts(content, plan.models))
+    voxels = merged.voxels
+    odd = feature_doubts(voxels, keyframes, sounds, plan.models)
+    doubts = (*plan.doubts, *carving_doubts(merged.removed, len(voxels)), *odd)
     return manifest.MapInfo(
         avlmaps_version=__version__,
         build_key=plan.key,
@@ -145,8 +147,8 @@ def manifest_of(
         removed=merged.removed,
         seed=plan.settings.seed,
         recording=_recording_info(plan.recording),
-        counts=manifest.Counts.of(fused, content.keyframes, content.voxels, content.sounds),
-        bounding_box_m=manifest.MapBounds.of(content.voxels.index, plan.settings.voxel_size_m),
+        counts=manifest.Counts.of(fused, keyframes, voxels, sounds),
+        bounding_box_m=manifest.MapBounds.of(voxels.index, plan.settings.voxel_size_m),
         bad_frames=tuple(bad),
         notices=(*doubts, *_notices(plan, up, ground, fused, len(bad))),
         doubts=doubts,
@@ -188,11 +190,13 @@ def carving_doubts(removed: manifest.Removed, voxels: int) -> Iterator[str]:
         )
 
 
-def feature_doubts(content: MapContent, models: Mapping[str, manifest.ModelInfo]) -> Iterator[str]:
+def feature_doubts(
+    voxels: Voxels, keyframes: Keyframes, heard: HeardSounds, models: Mapping[str, manifest.ModelInfo]
+) -> Iterator[str]:
     """Yield a sentence for each kind of feature that is zero, or the same, in all of a map."""
-    voxels, views, sounds = content.voxels, content.keyframes.view, content.sounds.feature
+    views, sounds = keyframes.view, heard.feature
     speaks = np.flatnonzero(np.asarray(voxels.weight) > 0.0)
-    pose = np.asarray(content.keyframes.world_from_camera)
+    pose = np.asarray(keyframes.world_from_camera)
     stood = not len(pose) or float(np.ptp(pose, axis=0).max()) < _STOOD  # what it sees is one picture
     kinds = (
         (Kind.PIXELS, voxels.feature, speaks if len(speaks) else np.arange(len(voxels)), "voxels", _FEWEST_VOXELS),

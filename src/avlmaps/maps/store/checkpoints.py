@@ -1,7 +1,7 @@
 """The result of a finished build stage, stored in a folder of its own so that a stopped build resumes from there.
 
-The arrays are written first and ``done.json`` last: without it the folder does not count. Its ``key`` is the hash of
-everything that the stage's outcome depends on; a checkpoint with another key is another stage's and is passed over.
+Its arrays are one file, written last and in one step: without it the folder does not count. Its note holds the key,
+the hash of everything that the stage's outcome depends on, and the facts; one with another key is passed over.
 """
 
 import hashlib
@@ -17,18 +17,10 @@ import msgspec
 import numpy as np
 
 from avlmaps.core.errors import MapError
-from avlmaps.core.files import MANIFEST_BYTES, decode_json, read_regular, write_bytes_atomically
-from avlmaps.maps.store.array_files import (
-    FileInfo,
-    explain_write_errors,
-    read_array,
-    sync_files,
-    verify_file,
-    write_array,
-    write_copy,
-)
+from avlmaps.core.files import decode_json
+from avlmaps.maps.store.tables import explain_write_errors, read_arrays, sync_file, write_arrays
 
-DONE = "done.json"
+DONE = "done.safetensors"
 # What a build names the folder of a stage: the stage and twelve digits of its key; clips wait for their stage.
 _STAGE = re.compile(r"[a-z_]+-[0-9a-f]{12}|clips|clips\.unfinished")
 
@@ -38,7 +30,7 @@ F = TypeVar("F", bound=msgspec.Struct)
 class _Done(msgspec.Struct, kw_only=True):
     key: str
     facts: msgspec.Raw
-    files: dict[str, FileInfo]
+    files: list[str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,40 +80,42 @@ def save_checkpoint(
     files: Mapping[str, Path] | None = None,
 ) -> None:
     """Write a finished stage; a kill at any instant leaves a checkpoint or none."""
-    written = {name: write_array(folder, name, array) for name, array in arrays.items()}
-    written |= {name: write_copy(folder, name, source) for name, source in (files or {}).items()}
-    done = _Done(key=key, facts=msgspec.Raw(msgspec.json.encode(facts)), files=written)
+    done = _Done(key=key, facts=msgspec.Raw(msgspec.json.encode(facts)), files=sorted(files or {}))
     with explain_write_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
-        sync_files(folder, written.values())
-        write_bytes_atomically(folder / DONE, msgspec.json.encode(done))
+        for name, source in (files or {}).items():
+            (folder / name).parent.mkdir(exist_ok=True)
+            shutil.copyfile(source, folder / name)
+            sync_file(folder / name)
+        write_arrays(folder / DONE, arrays, msgspec.json.encode(done).decode())
 
 
-def load_checkpoint(folder: Path, facts: type[F], key: str | None = None, *, verify: bool = False) -> Checkpoint[F]:
+def load_checkpoint(folder: Path, facts: type[F], key: str | None = None) -> Checkpoint[F]:
     """Read a finished stage.
 
     Args:
         folder: that ``save_checkpoint`` wrote.
         facts: type of its facts.
         key: that it must have; None takes any.
-        verify: compare large files with their checksums, too.
 
     Raises:
         MapError: it is not finished, damaged, or has another key.
     """
     path = folder / DONE
+    if not path.is_file():
+        raise MapError(f"{folder} holds no finished part of a map (no readable {DONE}).")
+    arrays, note = read_arrays(path)
     try:
-        done = decode_json(read_regular(path, MANIFEST_BYTES), _Done)
+        done: _Done = decode_json(note.encode(), _Done)
         said = decode_json(bytes(done.facts), facts)
-    except OSError as fault:
-        raise MapError(f"{folder} holds no finished part of a map (no readable {DONE}).") from fault
-    except (msgspec.DecodeError, UnicodeDecodeError) as fault:
+    except msgspec.DecodeError as fault:
         raise MapError(f"{path} is damaged ({fault}); remove {folder} and build it again.") from fault
     if key is not None and done.key != key:
         raise MapError(f"{folder} was made from another recording, with other settings or with other models.")
-    arrays = {name: read_array(folder, file, verify=verify) for name, file in done.files.items() if file.dtype}
-    others = {n: verify_file(folder, file, verify=verify) for n, file in sorted(done.files.items()) if not file.dtype}
-    return Checkpoint(folder, done.key, said, arrays, others)
+    files = {name: folder / name for name in done.files}
+    if lost := [path for path in files.values() if not path.is_file()]:
+        raise MapError(f"{lost[0]} is missing; remove {folder} and build it again.")
+    return Checkpoint(folder, done.key, said, arrays, files)
 
 
 def find_checkpoint(folder: Path, facts: type[F], key: str) -> Checkpoint[F] | None:

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from avlmaps.core.errors import MapError
-from avlmaps.maps.store.array_files import TO_BUILD, TO_EDIT, explain_write_errors, refuse_links
+from avlmaps.maps.store.tables import TO_BUILD, TO_EDIT, explain_write_errors, refuse_links
 
 LOCK = ".lock"
 EDITING = ".edits.lock"

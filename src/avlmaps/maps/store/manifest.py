@@ -11,11 +11,11 @@ from avlmaps.core.arrays import Float, Int32
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.maps.fusion.sensor import SensorModel
 from avlmaps.maps.settings import BuildSettings
-from avlmaps.maps.store.array_files import FileInfo
+from avlmaps.maps.store.tables import FileInfo
 from avlmaps.perception.models.names import public_choice, public_name
 from avlmaps.perception.protocols import ModelCard
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 
 Vector = tuple[float, float, float]
 
@@ -321,10 +321,9 @@ class MapInfo(msgspec.Struct, frozen=True, kw_only=True):
         bad_frames: frames that were left out: they could not be read, or an encoder failed on them.
         notices: a sentence for each thing worth knowing.
         doubts: those of them that say why the map may be wrong; every answer repeats them.
-        files: every file, by what it holds (``voxels/feature``); nothing else in the folder is part of the map.
+        files: every file by its place in the folder; nothing else in it is part of the map.
         bytes: size of all files.
         timings: when it was built and how long it took; the only part that differs when a build is repeated.
-        checksum: hex SHA-256 of all the rest but the timings; empty in maps of older releases.
         visits: the days of a map that was merged; none of one that was seen once.
     """
 
@@ -351,5 +350,4 @@ class MapInfo(msgspec.Struct, frozen=True, kw_only=True):
     timings: Timings
     sensor: SensorInfo | None = None
     removed: Removed = Removed()
-    checksum: str = ""
     visits: tuple[Visit, ...] = ()

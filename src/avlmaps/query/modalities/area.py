@@ -274,7 +274,7 @@ def area_factor(
         weights = np.zeros(0)
     else:
         shares = view_shares(view, encoder, part.query, settings)
-        kinds, weights = rooms.field(shares.kinds, shares.share, "kinds_asked"), shares.weights
+        kinds, weights = rooms.field(shares.kinds, shares.share), shares.weights
         kinds = settled(kinds)
         named = [1.0 if same_place(kind, part.query) else 0.0 for kind in kinds.kinds[len(weights) :]]
         weights = np.concatenate([weights, named])

@@ -23,6 +23,7 @@ from avlmaps.maps.fusion.voxel_sums import VoxelSums, VoxelTable
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.checkpoints import key_of
+from avlmaps.maps.store.folder import PARTS, is_map_or_free, read_info, write
 from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.manifest import (
     Counts,
@@ -32,9 +33,8 @@ from avlmaps.maps.store.manifest import (
     Timings,
     UpInfo,
 )
-from avlmaps.maps.store.manifest_file import MANIFEST, parse_manifest, read_manifest
-from avlmaps.maps.store.reader import PARTS, StoredMap, open_stored
-from avlmaps.maps.store.writer import MapContent, is_map_or_free, write_map
+from avlmaps.maps.store.map_data import MapData
+from avlmaps.maps.store.reader import StoredMap, open_stored
 from avlmaps.maps.types import Voxels
 from avlmaps_models.import_reference.frames import Walk, read_walk
 from avlmaps_models.import_reference.hdf5 import open_hdf5
@@ -125,10 +125,9 @@ def _with_own_cell_size(settings: ImportSettings, voxels: ReferenceVoxels) -> Im
 
 def _finished(path: Path, key: str, overwrite: bool) -> bool:
     """Return whether this very map is there; another one is refused unless it may be replaced."""
-    manifest = path / MANIFEST
-    if overwrite or not manifest.is_file():
+    there = None if overwrite else read_info(path)
+    if there is None:
         return False
-    there = parse_manifest(read_manifest(manifest), manifest)
     if there.build_key != key:
         raise MapError(
             f"{path} is a finished map already, of {there.recording.name}; give another {option('out')}, or replace it "
@@ -143,7 +142,7 @@ def _write(path: Path, source: Source, settings: ImportSettings, key: str, begin
     voxels, left_out = _converted(source.voxels, walk, settings, grid)
     clips = path / PARTS / "clips"
     heard = source.ears.detect_events(clips)
-    content = MapContent(voxels, walk.keyframes(grid.centre_of(voxels.index)), {}, heard, clips)
+    keyframes = walk.keyframes(grid.centre_of(voxels.index))
     elapsed_s = perf_counter() - begin
     info = MapInfo(
         avlmaps_version=__version__,
@@ -156,12 +155,12 @@ def _write(path: Path, source: Source, settings: ImportSettings, key: str, begin
         settings=BuildSettings(voxel_size_m=grid.voxel_size_m, hearing=HEARING).for_profile(WEIGHT_VARIANCE_M2),
         seed=0,
         recording=source.recording(),
-        counts=Counts.of(source.voxels.frames, content.keyframes, voxels, heard),
+        counts=Counts.of(source.voxels.frames, keyframes, voxels, heard),
         bounding_box_m=MapBounds.of(voxels.index, grid.voxel_size_m),
         notices=tuple(source.notices(len(voxels), left_out)),
         timings=Timings.now({"import": elapsed_s}),
     )
-    write_map(path, content, info)
+    write(path, MapData(info, voxels, keyframes, heard))
 
 
 def _converted(source: ReferenceVoxels, walk: Walk, settings: ImportSettings, grid: GridSpec) -> tuple[Voxels, int]:

@@ -114,9 +114,9 @@ def _find_walks(scene: Path, track: str) -> tuple[Recording, ...]:
 
 def _moved(found: HeardSounds, here: Path, clips_folder: Path, start_s: float) -> HeardSounds:
     """Return the sounds in the map's time, their clips under names that no other walk has."""
-    names = tuple(f"{here.name}-{clip}" for clip in found.clips)
+    names = tuple(clips_folder / f"{here.name}-{clip.name}" for clip in found.clips)
     for clip, name in zip(found.clips, names, strict=True):
-        (here / clip).rename(clips_folder / name)
+        clip.rename(name)
     return replace(found, onset_s=found.onset_s + start_s, offset_s=found.offset_s + start_s, clips=names)
 
 
