@@ -163,6 +163,68 @@ def write_scannet(path: Path, truth: Truth) -> Path:
     return path
 
 
+_HABITAT_FROM_WORLD = np.array([[0.0, -1, 0, 0], [0, 0, 1, 0], [-1, 0, 0, 0], [0, 0, 0, 1]])
+
+
+def write_hov_sg(path: Path, truth: Truth, kind: str = "hov-sg") -> Path:
+    """Poses in files: of HOV-SG 4x4 of a camera with y up, of VLMaps seven numbers of the base, in Habitat's axes."""
+    (path / "pose").mkdir(parents=True)
+    for i, pose in enumerate(truth.world_from_camera):
+        picture(path / f"rgb/{i:06d}.png", truth.rgb[i])
+        (path / "depth").mkdir(exist_ok=True)
+        np.save(path / f"depth/{i:06d}.npy", truth.depth_m[i])
+        habitat = _HABITAT_FROM_WORLD @ pose @ np.diag([1.0, -1.0, -1.0, 1.0])
+        if kind == "vlmaps":
+            base = habitat @ np.linalg.inv(np.array([[1.0, 0, 0, 0], [0, 1, 0, 1.5], [0, 0, 1, 0], [0, 0, 0, 1]]))
+            text = numbers([*base[:3, 3], *quaternion(base)])
+        else:
+            text = numbers(habitat)
+        (path / f"pose/{i:06d}.txt").write_text(text + "\n")
+    c = truth.rig.rgb
+    (path / "camera.json").write_text(json.dumps({"fx": c.fx, "fy": c.fy, "cx": c.cx, "cy": c.cy}))
+    return path
+
+
+def write_orb_slam(path: Path, truth: Truth) -> Path:
+    """Associations, ORB-SLAM's trajectory in the first camera's axes, and its settings."""
+    lines, trajectory = ["# associated"], list[str]()
+    for i, pose in enumerate(np.linalg.inv(truth.world_from_camera[0]) @ truth.world_from_camera):
+        stamp = f"{START_S + truth.stamps_s[i]:.6f}"
+        picture(path / f"rgb/{stamp}.png", truth.rgb[i])
+        depth_png(path / f"depth/{stamp}.png", truth.depth_m[i], 1000)
+        lines.append(f"{stamp} rgb/{stamp}.png {stamp} depth/{stamp}.png")
+        trajectory.append(f"{stamp} {numbers([*pose[:3, 3], *quaternion(pose)])}")
+    (path / "associations.txt").write_text("\n".join(lines) + "\n")
+    (path / "CameraTrajectory.txt").write_text("\n".join(trajectory) + "\n")
+    settings = zip(("fx", "fy", "cx", "cy"), shifted(truth.rig.rgb), strict=True)
+    body = "".join(f"Camera.{name}: {value:.6f}\n" for name, value in settings)
+    (path / "RealSense.yaml").write_text(f"%YAML:1.0\n\n{body}Camera.k1: 0.0\nDepthMapFactor: 1000.0\n")
+    return path
+
+
+def write_rtabmap_export(path: Path, truth: Truth, by_id: bool = False) -> Path:
+    """What rtabmap-export writes: poses of the base in a world with z up, and a calibration for each picture."""
+    fx, fy, cx, cy = shifted(truth.rig.rgb)
+    local = np.array([[0.0, 0, 1, 0.1], [-1, 0, 0, 0.02], [0, -1, 0, 0.9], [0, 0, 0, 1]])
+    placed = ", ".join(map(str, local[:3].ravel()))
+    calibration = (
+        f"%YAML:1.0\n---\ncamera_name: walk\nimage_width: {truth.rig.rgb.width}\nimage_height: "
+        f"{truth.rig.rgb.height}\ncamera_matrix:\n   rows: 3\n   cols: 3\n   data: [ {fx}, 0., {cx}, 0., "
+        f"{fy}, {cy}, 0., 0., 1. ]\nlocal_transform:\n   rows: 3\n   cols: 4\n   data: [ {placed} ]\n"
+    )
+    (path / "rtabmap_calib").mkdir(parents=True)
+    rows: list[str] = []
+    for i, pose in enumerate(truth.world_from_camera @ np.linalg.inv(local)):
+        stamp = f"{START_S + truth.stamps_s[i]:.6f}"
+        stem = str(10 + i) if by_id else stamp
+        picture(path / f"rtabmap_rgb/{stem}.jpg", truth.rgb[i])
+        depth_png(path / f"rtabmap_depth/{stem}.png", truth.depth_m[i])
+        (path / f"rtabmap_calib/{stem}.yaml").write_text(calibration)
+        rows.append(f"{stamp} {numbers([*pose[:3, 3], *quaternion(pose)])}{f' {10 + i}' if by_id else ''}")
+    (path / "rtabmap_poses.txt").write_text("#timestamp x y z qx qy qz qw\n" + "\n".join(rows) + "\n")
+    return path
+
+
 def write_scannet_resized(path: Path, truth: Truth) -> Path:
     """Colour resized after the export, as many do, with the intrinsics of its first size."""
     write_scannet(path, truth)
@@ -445,6 +507,13 @@ WRITTEN: dict[str, Written] = {
     "polycam": Written("polycam", write_polycam, _sized),
     "redwood": Written("redwood", write_redwood, knows_up=False),
     "icl-nuim": Written("icl-nuim", write_icl_nuim, icl_truth),
+    "hov-sg": Written("hov-sg", write_hov_sg, lambda: example_truth(rate_hz=30.0)),
+    "hov-sg, of VLMaps": Written(
+        "hov-sg", lambda path, truth: write_hov_sg(path, truth, "vlmaps"), lambda: example_truth(rate_hz=30.0)
+    ),
+    "orb-slam": Written("orb-slam", write_orb_slam, knows_up=False),
+    "rtabmap-export": Written("rtabmap-export", write_rtabmap_export),
+    "rtabmap-export, by ids": Written("rtabmap-export", lambda path, truth: write_rtabmap_export(path, truth, True)),
     "record3d": Written("record3d", write_r3d, _sized),
     "record3d, EXR and JPG": Written("record3d", write_record3d_exr, _sized),
     "rtabmap": Written("rtabmap", write_rtabmap),

@@ -157,7 +157,7 @@ LEFT_OUT = {
         "7.250 s after the last pose",
     ),
     "an encoding": (
-        lambda robot: (robot.be(0), robot.see(0, rgb=lambda f, s: ros.colour(f, s, "nv21"))), "have the encoding 'nv21'",
+        lambda robot: (robot.be(0), robot.see(0, rgb=lambda f, s: ros.colour(f, s, "nv21"))), "the encoding 'nv21'",
     ),
     "another size": (
         lambda robot: (

@@ -1,11 +1,14 @@
 """Files of other hands, each with its right value: what people who do this job really have."""
 
+import tarfile
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from avlmaps.core.errors import RecordingError
+from avlmaps.recordings.consistency.check import check_recording
+from avlmaps.recordings.consistency.verdict import Grade
 from avlmaps.recordings.open import open_recording
 
 ROUND4 = Path(__file__).resolve().parents[3] / "shared/field/round4"
@@ -27,3 +30,20 @@ def test_six_channels_are_not_believed_to_be_one() -> None:
     assert track.duration_s == pytest.approx(12.0, abs=0.2)
     power = [float(np.square(track.read(at_s, at_s + 0.2).samples).mean()) for at_s in np.arange(0.0, 11.0, 0.2)]
     assert 0.2 * int(np.argmax(power)) == pytest.approx(8.2, abs=0.61)
+
+
+def test_the_sound_of_an_archive_is_its_sound() -> None:
+    recording = open_recording(ROUND4 / "with_sound.r3d")
+    assert recording.audio is not None
+    assert recording.audio.start_s == recording.stamps_s[0]
+    assert recording.audio.duration_s == pytest.approx(recording.duration_s, abs=0.5)
+    assert float(np.abs(recording.audio.read().samples).max()) > 0.01
+
+
+def test_corrected_cameras_without_a_size_have_that_of_their_pictures(tmp_path: Path) -> None:
+    with tarfile.open(ROUND4 / "polycam_no_width.tgz") as packed:
+        packed.extractall(tmp_path, filter="data")
+    recording = open_recording(tmp_path / "polywh")
+    assert (recording.rig.rgb.width, recording.rig.rgb.height) == (128, 96)
+    assert recording.rig.rgb.fx == 92.0
+    assert check_recording(recording).grade is Grade.FINE

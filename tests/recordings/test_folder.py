@@ -278,7 +278,7 @@ def test_a_broken_frame_is_met_when_it_is_asked_for_and_named(tmp_path: Path):
     (path / "rgb/000003.png").unlink()
     (path / "frames.csv").write_text("".join(f"{i:06d},{i / 10}\n" for i in range(5)))
     recording = open_recording(path)
-    with pytest.raises(RecordingError, match=r"depth/000002.png is truncated \(100 bytes\)"):
+    with pytest.raises(RecordingError, match=r"depth/000002.png cannot be decoded \(100 bytes\)"):
         recording.frame(2)
     with pytest.raises(RecordingError, match=r"rgb/000003.png is missing"):
         recording.frame(3)

@@ -69,7 +69,7 @@ def _calibration(change: Callable[[bytes], bytes]) -> Callable[[Path], Any]:
          "outside of the video's 64x48"),
         ("redwood", _replace("trajectory.log", "0 0 1\n", ""), "lines, but each pose takes five"),
         ("redwood", _edit("intrinsic.json", lambda d: d.update(depth_unit=0.1)), "has the key 'depth_unit'"),
-        ("icl-nuim", lambda path: (path / "livingRoom0.gt.freiburg").unlink(), "has no poses: ICL-NUIM offers them by"),
+        ("icl-nuim", lambda path: (path / "livingRoom0.gt.freiburg").unlink(), "has no poses"),
         ("scannet", lambda path: np.savetxt(path / "intrinsic/intrinsic_color.txt", np.diag([900.0, 900, 1, 1])),
          "were they resized or cropped? Give the intrinsics of these pictures"),
         ("rtabmap", _calibration(lambda blob: blob[:12] + struct.pack("<i", 1) + blob[16:]), "with a stereo camera"),

@@ -12,10 +12,8 @@ from recording_scenes import CAMERA, pose_line, save_depth, shot, shots, write_f
 
 from avlmaps.core.errors import RecordingError
 from avlmaps.recordings.faults import stop_at_first
-from avlmaps.recordings.formats.columns import POSE, named_order, split_header
 from avlmaps.recordings.formats.file_recording import natural_key, order_notices
-from avlmaps.recordings.formats.json_files import unread_notice
-from avlmaps.recordings.formats.tables import read_table
+from avlmaps.recordings.formats.tables import POSE, named_order, read_table, split_header, unread_notice
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.validate import validate
 

@@ -48,7 +48,7 @@ def test_a_bag_is_known_by_its_name(tmp_path: Path, name: str):
 def test_a_named_format_is_taken_at_its_word(tmp_path: Path):
     path = write_folder(tmp_path / "walk")
     assert open_recording(path, format="folder").format == "folder"
-    with pytest.raises(RecordingError, match="walk holds no frame with its three files"):
+    with pytest.raises(RecordingError, match=r"no frame with all of its three files"):
         open_recording(path, format="7scenes")
 
 
@@ -130,7 +130,7 @@ def test_a_map_is_told_from_a_recording(tmp_path: Path):
         (("imu0/data.csv", "cam0/data.csv"), "an IMU and cameras without depth, from which no map is built"),
         (
             ("frame-000000.color.jpg", "frame-000000.depth.pgm", "_info.txt"),
-            "unpacked by ScanNet's C++ reader, whose .depth.pgm is not read",
+            "or unpacked by ScanNet's C++ reader: its .depth.pgm is not read",
         ),
         (("images/0.jpg", "sparse/0/cameras.bin"), "is a reconstruction of COLMAP"),
         (("scene_00_0000.depth", "scene_00_0000.png"), "is ICL-NUIM in POV-Ray's own files"),

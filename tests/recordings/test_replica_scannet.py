@@ -55,7 +55,7 @@ def test_replica_frames_beyond_the_trajectory_are_left_out_and_told(tmp_path: Pa
     (path / "traj.txt").write_text("\n".join((path / "traj.txt").read_text().splitlines()[:3]))
     recording = open_recording(path)
     assert len(recording) == 3
-    assert recording.notices[1] == "2 frame(s) have no line in traj.txt and are left out."
+    assert recording.notices[1] == "2 frame(s) lack one of colour, depth and pose and are left out."
 
 
 @pytest.mark.parametrize(
@@ -82,7 +82,7 @@ def test_damaged_replica_parameters_are_named(tmp_path: Path, content: str, sent
 def test_a_replica_scene_without_poses_is_told(tmp_path: Path):
     path = _write_replica(tmp_path / "room0", None)
     (path / "traj.txt").write_text("")
-    with pytest.raises(RecordingError, match=r"room0 has 5 frames in results/ and 0 poses in traj.txt."):
+    with pytest.raises(RecordingError, match=r"room0 has 5 colour pictures, 5 depth pictures and 0 poses"):
         open_recording(path)
 
 
@@ -139,5 +139,5 @@ def test_a_scannet_scene_without_a_whole_frame_is_told(tmp_path: Path):
     path = _write_scannet(tmp_path / "scene")
     for file in (path / "pose").iterdir():
         file.unlink()
-    with pytest.raises(RecordingError, match=r"holds no frame with all of color/N.jpg, depth/N.png and pose/N.txt."):
+    with pytest.raises(RecordingError, match=r"no frame with all of color/N.jpg, depth/N.png and pose/N.txt."):
         open_recording(path)

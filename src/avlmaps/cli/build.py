@@ -172,7 +172,7 @@ def build(verb: "Build") -> dict[str, Any]:
         raise UsageError("--corrected-poses and --close-loops both move the map; choose one of them.")
     poses = None
     if verb.corrected_poses is not None:
-        from avlmaps.recordings.pose_file import on_clock_of, read_pose_file
+        from avlmaps.recordings.formats.tables import on_clock_of, read_pose_file
 
         stamps_s, world_from_camera = read_pose_file(verb.corrected_poses)
         poses = on_clock_of(stamps_s, recording), world_from_camera

@@ -4,11 +4,10 @@ Runs of zeros and of depths alternate; depths are differences from the one befor
 sign are small numbers, and written in groups of three bits with a fourth that says whether more follow.
 """
 
-from typing import Any
-
 import numpy as np
 from jaxtyping import UInt16
-from numba import njit
+
+_MOST_GROUPS = 11  # 33 bits
 
 
 def decode_rvl(content: bytes, width: int, height: int) -> UInt16[np.ndarray, "h w"]:
@@ -18,46 +17,24 @@ def decode_rvl(content: bytes, width: int, height: int) -> UInt16[np.ndarray, "h
         ValueError: the content ends before the picture is whole.
     """
     words = np.frombuffer(content[: len(content) // 4 * 4], "<u4")
-    picture = np.zeros(width * height, np.uint16)
-    if not _decode(words, picture):
-        raise ValueError(f"{len(content)} bytes are too few for {width}x{height}")
+    groups = (words[:, None] >> np.arange(28, -1, -4, dtype=np.uint32) & 15).ravel().astype(np.int64)
+    last = np.flatnonzero(groups < 8)
+    first = np.concatenate([[0], last[:-1] + 1]) if len(last) else last
+    numbers = np.zeros(len(last), np.int64)
+    for group in range(_MOST_GROUPS):
+        there = first + group <= last
+        numbers[there] |= (groups[first[there] + group] & 7) << 3 * group
+    there, folded = np.zeros(width * height, bool), [np.zeros(0, np.int64)]
+    at, read = 0, 0
+    while at < len(there):
+        zeros, depths = numbers[read : read + 2].tolist() if read + 2 <= len(numbers) else (len(there), 1)
+        begin, at = at + zeros, at + zeros + depths
+        if at > len(there) or read + 2 + depths > len(numbers):
+            raise ValueError(f"{len(content)} bytes are too few for {width}x{height}")
+        there[begin:at] = True
+        folded.append(numbers[read + 2 : read + 2 + depths])
+        read += 2 + depths
+    steps = np.concatenate(folded)
+    picture = np.zeros(len(there), np.uint16)
+    picture[there] = np.cumsum(steps >> 1 ^ -(steps & 1)) & 0xFFFF
     return picture.reshape(height, width)
-
-
-@njit(cache=True)
-def _number(words: Any, state: Any) -> Any:  # pragma: no cover - compiled
-    """Return the next number; -1 at the end. ``state`` is the next word, the one at hand, and its groups left."""
-    value, shift = np.int64(0), 0
-    while True:
-        if state[2] == 0:
-            if state[0] >= len(words):
-                return np.int64(-1)
-            state[1], state[2] = np.int64(words[state[0]]), 8
-            state[0] += 1
-        group = state[1] >> 28 & 15
-        state[1] = state[1] << 4 & 0xFFFFFFFF
-        state[2] -= 1
-        value |= (group & 7) << shift
-        shift += 3
-        if not group & 8 or shift > 60:
-            return value
-
-
-@njit(cache=True)
-def _decode(words: Any, picture: Any) -> Any:  # pragma: no cover - compiled
-    state = np.zeros(3, np.int64)
-    at, before = 0, 0
-    while at < len(picture):
-        zeros = _number(words, state)
-        depths = _number(words, state)
-        if zeros < 0 or depths < 0 or at + zeros + depths > len(picture):
-            return False
-        at += zeros
-        for _ in range(depths):
-            folded = _number(words, state)
-            if folded < 0:
-                return False
-            before += (folded >> 1) ^ -(folded & 1)
-            picture[at] = before & 0xFFFF
-            at += 1
-    return True

@@ -211,8 +211,9 @@ def _examine_plain(path: Path) -> tuple[int, int]:
                 f"{path} is truncated or damaged: its header promises {count / rate_hz:.2f} s of sound, and it is "
                 "not as long; copy or convert it again."
             )
-        file.seek(0)
-        return rate_hz, sum(len(piece) for piece in file.blocks(_PIECE_SAMPLES, dtype="float32"))
+        whole: Any = file
+        whole.seek(0)
+        return rate_hz, sum(len(piece) for piece in whole.blocks(_PIECE_SAMPLES, dtype="float32"))
 
 
 def _is_short_wav(path: Path) -> bool:

@@ -104,9 +104,10 @@ def _opened(content: bytes) -> Any:
 
     if content[4:8] == b"ftyp" and content[8:12] in _HEIF_KINDS:
         with suppress(ImportError):
-            from pillow_heif import register_heif_opener
+            import pillow_heif
 
-            register_heif_opener()
+            library: Any = pillow_heif
+            library.register_heif_opener()
     return Image.open(BytesIO(content), formats=_FORMATS)
 
 
@@ -346,7 +347,7 @@ def decode_depth(path: Path, content: bytes) -> np.ndarray:
     raw = decode_picture(content, cv2.IMREAD_UNCHANGED)
     if raw is None:
         raise _undecodable(path, content)
-    if raw.dtype not in (np.uint16, np.float32) or raw.ndim != 2:
+    if str(raw.dtype) not in ("uint16", "float32") or raw.ndim != 2:
         kind = f"{raw.dtype.itemsize * 8}-bit with {raw.shape[2] if raw.ndim == 3 else 1} channel(s)"
         raise RecordingError(f"{path} is {kind}; depth must be a 16-bit PNG with one channel.")
     return raw

@@ -14,6 +14,7 @@ from fnmatch import fnmatch
 from functools import cache
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.registry import entry_points
@@ -41,7 +42,8 @@ class Format:
         name: its name on the command line.
         looks_for: what makes a folder or file this format, in words.
         matches: the same as a quick test.
-        opener: ``package.module:function``, called with the path (and ``report=`` if it reports faults one by one).
+        opener: ``package.module:function``, or a key of the module's ``OPENERS``; called with the path, and with
+            ``report=`` if it tells faults.
         tells_faults: whether the opener takes ``report``.
         has_topics: whether the opener takes topics by name, and several files of one recording.
     """
@@ -72,7 +74,8 @@ class Format:
             RecordingError: it cannot be used, or topics or further files are named and this format has none.
         """
         module, _, function = self.opener.partition(":")
-        opener = getattr(importlib.import_module(module), function)
+        found = importlib.import_module(module)
+        opener = getattr(found, function, None) or found.OPENERS[function]
         if self.has_topics:
             recording = opener(path, topics or {}, more)
         elif more:
@@ -134,18 +137,10 @@ def _is_folder(path: Path) -> bool:
     return (path / layout.DESCRIPTION).exists() or (path / layout.UNFINISHED).exists()
 
 
-def _is_seven_scenes(path: Path) -> bool:
-    return some_name(path, "frame-*.pose.txt", "frame-*.color.*")
-
-
-def _later(target: str) -> Callable[[Path], bool]:
-    """Return a test that is imported when it is needed."""
-
-    def matches(path: Path) -> bool:
-        module, _, function = target.partition(":")
-        return getattr(importlib.import_module(f"{_HERE}.{module}"), function)(path)
-
-    return matches
+def _called(target: str, path: Path) -> Any:
+    """Call a test that is imported when it is needed."""
+    module, _, function = target.partition(":")
+    return getattr(importlib.import_module(f"{_HERE}.{module}"), function)(path)
 
 
 def _is_rosbag(path: Path) -> bool:
@@ -165,16 +160,13 @@ FORMATS: tuple[Format, ...] = (
     Format(
         "7scenes",
         "frame-000000.color.jpg or .png, .depth.png and .pose.txt",
-        _is_seven_scenes,
-        f"{_HERE}.seven_scenes:open_seven_scenes",
+        lambda path: some_name(path, "frame-*.pose.txt", "frame-*.color.*"),
+        f"{_HERE}.layouts:7scenes",
     ),
-    Format("tum", "rgb.txt, depth.txt and groundtruth.txt", holds("rgb.txt", "depth.txt"), f"{_HERE}.tum:open_tum"),
-    Format("replica", "traj.txt and results/", holds("traj.txt", "results"), f"{_HERE}.replica:open_replica"),
+    Format("tum", "rgb.txt, depth.txt and groundtruth.txt", holds("rgb.txt", "depth.txt"), f"{_HERE}.listed:open_tum"),
+    Format("replica", "traj.txt and results/", holds("traj.txt", "results"), f"{_HERE}.layouts:replica"),
     Format(
-        "scannet",
-        "color/, depth/, pose/ and intrinsic/",
-        holds("color", "depth", "pose"),
-        f"{_HERE}.scannet:open_scannet",
+        "scannet", "color/, depth/, pose/ and intrinsic/", holds("color", "depth", "pose"), f"{_HERE}.layouts:scannet"
     ),
     Format(
         "avlmaps",
@@ -193,43 +185,61 @@ FORMATS: tuple[Format, ...] = (
     Format(
         "record3d",
         "a .r3d file, or EXR_RGBD/metadata.json with rgb/ and depth/",
-        _later("record3d:is_record3d"),
+        lambda path: _called("record3d:is_record3d", path),
         f"{_HERE}.record3d:open_record3d",
     ),
     Format(
         "stray-scanner",
         "odometry.csv, camera_matrix.csv, rgb.mp4 and depth/",
         holds("odometry.csv", "camera_matrix.csv"),
-        f"{_HERE}.stray_scanner:open_stray_scanner",
+        f"{_HERE}.scans:open_stray_scanner",
     ),
     Format(
         "nerfstudio",
         "transforms.json with depth_file_path",
         holds("transforms.json"),
-        f"{_HERE}.nerfstudio:open_nerfstudio",
+        f"{_HERE}.scans:open_nerfstudio",
     ),
     Format(
         "polycam",
         "keyframes/ with images/, depth/ and cameras/",
-        _later("polycam:is_polycam"),
-        f"{_HERE}.polycam:open_polycam",
+        lambda path: _called("scans:is_polycam", path),
+        f"{_HERE}.scans:open_polycam",
     ),
     Format(
         "redwood",
         "trajectory.log (or NAME-traj.txt), color/ and depth/",
-        _later("redwood:is_redwood"),
-        f"{_HERE}.redwood:open_redwood",
+        lambda path: (path / "depth").is_dir() and _called("layouts:find_redwood_log", path),
+        f"{_HERE}.layouts:redwood",
+    ),
+    Format(
+        "hov-sg",
+        "rgb/, depth/ and pose/ of numbered files (VLMaps, HOV-SG)",
+        holds("rgb", "depth", "pose"),
+        f"{_HERE}.layouts:hov-sg",
+    ),
+    Format(
+        "orb-slam",
+        "associations.txt and CameraTrajectory.txt, or another trajectory with stamps",
+        lambda path: bool(_called("listed:find_associations", path) and _called("listed:find_trajectory", path)),
+        f"{_HERE}.listed:open_orb_slam",
     ),
     Format(
         "icl-nuim",
         "associations.txt, rgb/, depth/ and a .gt.freiburg",
         holds("associations.txt", "rgb", "depth"),
-        f"{_HERE}.icl_nuim:open_icl_nuim",
+        f"{_HERE}.listed:open_icl_nuim",
+    ),
+    Format(
+        "rtabmap-export",
+        "NAME_rgb/, NAME_depth/, NAME_calib/ and NAME_poses.txt of rtabmap-export",
+        lambda path: bool(_called("listed:export_of", path)),
+        f"{_HERE}.listed:open_rtabmap_export",
     ),
     Format(
         "rtabmap",
         "a .db file of RTAB-Map",
-        _later("rtabmap:is_rtabmap"),
+        lambda path: _called("rtabmap:is_rtabmap", path),
         f"{_HERE}.rtabmap:open_rtabmap",
     ),
 )
@@ -277,3 +287,101 @@ def _brought(name: str, target: str) -> Format:
             "or remove the package that brings it."
         )
     return brought
+
+
+_EXPORT = "export its colour, depth and poses as a folder of recording.json, rgb/, depth/ and poses.csv"
+
+
+@dataclass(frozen=True, slots=True)
+class _Unreadable:
+    """Something that is recognised and not read.
+
+    Attributes:
+        matches: recognises it.
+        why: what it is, what is missing, and what to do: a sentence without its subject.
+    """
+
+    matches: Callable[[Path], bool]
+    why: str
+
+
+def _suffix(*suffixes: str) -> Callable[[Path], bool]:
+    return lambda path: path.is_file() and path.suffix.lower() in suffixes
+
+
+def _euroc(path: Path) -> bool:
+    """A folder of EuRoC's layout: an IMU, and cameras without depth or none at all."""
+    inside = path / "mav0" if (path / "mav0").is_dir() else path
+    return some_name(inside, "imu[0-9]*", "imu.csv") and not (inside / "depth").exists()
+
+
+def _euroc_cameras(path: Path) -> bool:
+    inside = path / "mav0" if (path / "mav0").is_dir() else path
+    return _euroc(path) and some_name(inside, "cam[0-9]*")
+
+
+_UNREADABLE = (
+    _Unreadable(
+        _euroc_cameras,
+        "is a recording of EuRoC's layout: an IMU and cameras without depth, from which no map is built; compute depth "
+        "from the stereo pair first, and give a folder of recording.json, rgb/, depth/ and poses.csv.",
+    ),
+    _Unreadable(
+        _euroc,
+        "holds measurements of an IMU and no pictures, from which no map can be built; record colour and depth "
+        "beside it.",
+    ),
+    _Unreadable(
+        _suffix(".sens"),
+        "is ScanNet's packed recording; unpack it with ScanNet's SensReader (color/, depth/, pose/, intrinsic/), and "
+        "open that folder.",
+    ),
+    _Unreadable(
+        lambda path: some_name(path, "frame-*.depth.pgm"),
+        "is of 3RScan, or unpacked by ScanNet's C++ reader: its .depth.pgm is not read; convert it to 16-bit .png, "
+        "or unpack the .sens with the Python reader (color/, depth/, pose/, intrinsic/).",
+    ),
+    _Unreadable(
+        _suffix(".svo", ".svo2"),
+        f"is a recording of a ZED camera, which its own SDK alone reads; {_EXPORT} with it, or record a ROS bag.",
+    ),
+    _Unreadable(
+        _suffix(".oni", ".klg", ".rrf", ".rrd", ".xef"),
+        f"is a packed recording that is not read; {_EXPORT}.",
+    ),
+    _Unreadable(
+        _suffix(".db"),
+        "is no database of RTAB-Map (it is no SQLite file); copy it again.",
+    ),
+    _Unreadable(
+        _suffix(".ply", ".pcd", ".las", ".laz", ".obj", ".glb", ".usdz", ".splat"),
+        "is a finished model, without the pictures that a map is built from; give the recording it was made of.",
+    ),
+    _Unreadable(
+        lambda path: some_name(path, "scene_*_*.depth"),
+        "is ICL-NUIM in POV-Ray's own files; download its TUM RGB-D compatible PNGs and open those.",
+    ),
+    _Unreadable(
+        _suffix(".zip", ".tar", ".tgz", ".gz", ".bz2", ".xz", ".7z", ".rar"),
+        "is an archive; unpack it, and give the folder or the file inside.",
+    ),
+    _Unreadable(
+        lambda path: some_name(path, "image_[0-9]*") or (path / "sequences").is_dir(),
+        f"is of KITTI's layout: cameras without depth, and poses of twelve numbers a line; {_EXPORT} (poses as stamp, "
+        "position and quaternion).",
+    ),
+    _Unreadable(
+        holds("lowres_wide", "lowres_depth"),
+        f"is of ARKitScenes' layout, which is not read; {_EXPORT}.",
+    ),
+    _Unreadable(
+        holds("images", "sparse"),
+        "is a reconstruction of COLMAP, whose scale is not metres and which has no depth; record with a depth "
+        f"camera, or {_EXPORT}.",
+    ),
+)
+
+
+def why_unreadable(path: Path) -> str:
+    """Return a sentence about a place that is recognised and not read, or nothing."""
+    return next((f"{path} {known.why}" for known in _UNREADABLE if known.matches(path)), "")

@@ -13,10 +13,9 @@ from avlmaps.recordings import layout
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.channels import with_microphones
 from avlmaps.recordings.corrections import Corrections, corrected
-from avlmaps.recordings.known_formats import FORMATS, LOOKED_AT, Format, formats, settle_sound
+from avlmaps.recordings.known_formats import FORMATS, LOOKED_AT, Format, formats, settle_sound, why_unreadable
 from avlmaps.recordings.microphones import microphones_named
 from avlmaps.recordings.types import Recording
-from avlmaps.recordings.unreadable import why_unreadable
 
 # Files that a map's folder holds and no recording's does.
 _MAP = "map.json"

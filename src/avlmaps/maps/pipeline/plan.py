@@ -19,7 +19,7 @@ from avlmaps.maps.store.folder import PARTS, is_map_or_free, read_info, sweep
 from avlmaps.maps.store.manifest import MapInfo, ModelInfo
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.protocols import PixelEncoder
-from avlmaps.recordings.content import LARGEST_BUDGET_BYTES
+from avlmaps.recordings.formats.file_recording import LARGEST_BUDGET_BYTES
 from avlmaps.recordings.types import Recording
 
 BUILD_VERSION = 6  # raise it when a stage comes to compute something else, so that no old checkpoint is taken for new

@@ -35,9 +35,8 @@ from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import DESCRIPTION_BYTES, decode_json, read_regular
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
-from avlmaps.recordings.formats.columns import POSE
-from avlmaps.recordings.formats.file_recording import FileRecording, Shots, find_audio, list_names
-from avlmaps.recordings.formats.tables import read_table
+from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names, open_audio
+from avlmaps.recordings.formats.tables import POSE, read_table
 from avlmaps.recordings.images import first_picture_size
 
 RATE_HZ = 25.0
@@ -125,11 +124,12 @@ def open_avlmaps(path: Path, report: Report = stop_at_first) -> FileRecording:
         stamps_s=np.array(numbers, np.float64) / given.rate_hz,
         world_from_camera=world_from_camera,
     )
-    rig = _rig(path, shots, given)
-    audio = find_audio(path) or next(iter(sorted(path.glob("output_level_*.wav"))), None)
+    rig = rig_of(path, shots, given)
+    level = next(iter(sorted(path.glob("output_level_*.wav"))), None)
+    audio, sound = (AudioTrack.open(level), ()) if level else open_audio(path)
     return FileRecording.settled(
-        path, "avlmaps", rig, shots, (*notices, notice), report, lambda _: path / "poses.txt",
-        up_in_world=np.array([0.0, 0.0, 1.0]), audio=AudioTrack.open(audio) if audio else None,
+        path, "avlmaps", rig, shots, (*notices, notice, *sound), report, lambda _: path / "poses.txt",
+        up_in_world=np.array([0.0, 0.0, 1.0]), audio=audio,
     )  # fmt: skip
 
 
@@ -191,7 +191,7 @@ def camera_poses(
     return WORLD_FROM_HABITAT @ habitat_from_body @ camera, notice
 
 
-def _rig(path: Path, shots: Shots, given: CameraFile) -> Rig:
+def rig_of(path: Path, shots: Shots, given: CameraFile) -> Rig:
     """Make the camera: 90 degrees of horizontal view, the middle of the picture, unless the file says otherwise."""
     width, height = first_picture_size(path, shots.colour)
     fx = given.fx if given.fx is not None else width / 2

@@ -84,7 +84,8 @@ class Bag:
         suffixes = {file.suffix.lower() for file in self.files}
         if len(suffixes) > 1:
             raise RecordingError(f"{path} and {self.files[-1]} are bags of two kinds; convert one of them first.")
-        self._container: Container = (McapContainer if suffixes == {".mcap"} else RosbagsContainer)(self.files)
+        kind = McapContainer if suffixes == {".mcap"} else RosbagsContainer
+        self._container: Container = kind(self.files)
 
     @property
     def topics(self) -> dict[str, str]:
@@ -371,9 +372,13 @@ class McapContainer:
         self.files = files
         self._decoders: dict[tuple[str, str, bytes], Callable[[bytes], Any]] = {}
 
-    @cached_property
+    @property
     def connections(self) -> Sequence[McapConnection]:
         """See ``Container``."""
+        return self._connections
+
+    @cached_property
+    def _connections(self) -> Sequence[McapConnection]:
         return [
             McapConnection(channel.topic, _msgtype(schema.name if schema else ""), file, channel, schema)
             for file in map(_McapFile, self.files)

@@ -1,32 +1,75 @@
-"""A recording whose pictures are files: what the readers of folders have in common."""
+"""Recordings whose pictures are files, or are unpacked on demand: what the readers have in common.
+
+The fingerprint covers the content of files, read whole where small and in samples where large: up to a budget, else in
+evenly spread blocks that add up to it, its end among them. The budget of a file is a share of
+``RECORDING_BUDGET_BYTES``. The end of a PNG holds a checksum of all its pixels, so that a changed depth picture is
+always another one; of larger JPEG, NPY and bags a change between the sampled blocks is not seen. Times of change make
+no difference, so that a copy is the same recording.
+"""
 
 import hashlib
 import os
 import re
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float, Float32, UInt8
 
 from avlmaps.core import poses, timeline
 from avlmaps.core.camera import Pinhole, Rig
-from avlmaps.core.errors import RecordingError
+from avlmaps.core.errors import AudioError, NoAudioStreamError, RecordingError
+from avlmaps.core.files import sampled_digest
+from avlmaps.core.wording import option
 from avlmaps.recordings import images
 from avlmaps.recordings.audio import AudioTrack
-from avlmaps.recordings.content import add_files, stamp_of
 from avlmaps.recordings.faults import Fault, Report
 from avlmaps.recordings.plausible import date_fault, plausible_walk
 from avlmaps.recordings.types import BaseHeight, Frame, Recording
 from avlmaps.recordings.video import VideoFrames
 
+RECORDING_BUDGET_BYTES = 1 << 30
+LEAST_BUDGET_BYTES = 4096
+LARGEST_BUDGET_BYTES = 1 << 24
 R = TypeVar("R", bound="ShotsRecording")
 _SHOWN = 3
+_TRACKS = ("audio", "sound")
+_SOUNDS = (
+    ".flac", ".wav", ".ogg", ".oga", ".opus", ".mp3", ".m4a", ".aac", ".aif", ".aiff", ".caf", ".w64", ".wma", ".mka",
+    ".amr", ".3gp",
+)  # fmt: skip
+_FILMS = (".mp4", ".mov", ".mkv", ".webm")
 _NUMBER = re.compile(r"([0-9]+(?:\.[0-9]+)?)")
+
+
+def budget_bytes(files: int) -> int:
+    """Return how much of each of a recording's files is read."""
+    return min(max(RECORDING_BUDGET_BYTES // max(files, 1), LEAST_BUDGET_BYTES), LARGEST_BUDGET_BYTES)
+
+
+def add_files(digest: Any, folder: Path, names: Sequence[str]) -> None:
+    """Add names and contents of files below a folder to a hash of ``hashlib``."""
+    budget, prefix = budget_bytes(len(names)), f"{folder}{os.sep}"  # joining a million paths the long way takes seconds
+    for name in names:
+        digest.update(f"{name}\0".encode(errors="surrogateescape"))
+        digest.update(sampled_digest(prefix + name, budget))
+
+
+def stamp_of(folder: Path, names: Sequence[str], files: Iterable[Path]) -> str:
+    """Return a hash over sizes and times of change of files, without opening them."""
+    digest, prefix = hashlib.sha256(), f"{folder}{os.sep}"
+    for path in (*(prefix + name for name in names), *map(str, files)):
+        try:
+            found = os.stat(path)  # noqa: PTH116
+            digest.update(f"{found.st_size} {found.st_mtime_ns} {found.st_ino}\n".encode())
+        except OSError:
+            digest.update(b"missing\n")
+    return digest.hexdigest()
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,8 +239,13 @@ class ShotsRecording(Recording):
         found = len(shots.names)
         shots, settled = settle(path, shots, report, pose_file)
         more["posed"] = more.get("posed", 1.0) * (len(shots.names) / found if found else 1.0)
-        more.setdefault("audio", open_audio(path))
-        told = tuple(dict.fromkeys((*notices, *settled)))  # of frames and of their poses the same may be said
+        sound: tuple[str, ...] = ()
+        if "audio" not in more:
+            more["audio"], sound = open_audio(path)
+        if more["audio"] is None and (video := more.get("video")) is not None:
+            with suppress(NoAudioStreamError):
+                more["audio"] = AudioTrack.open(video.path, start_s=-video.start_s)
+        told = tuple(dict.fromkeys((*notices, *settled, *sound)))  # of frames and of their poses the same may be said
         return cls(path=path, format=format, rig=rig, shots=shots, notices=told, **more)
 
     def frame(self, index: int) -> Frame:
@@ -300,6 +348,60 @@ class FileRecording(ShotsRecording):
         return [*video, *self.shots.colour, *self.shots.depth, *self.shots.confidence]
 
 
+@runtime_checkable
+class Pictures(Protocol):
+    """Where the pictures lie; each is found by the name that the shots have for it."""
+
+    def colour(self, name: str, camera: Pinhole) -> UInt8[np.ndarray, "h w 3"]:
+        """Decode a colour picture, or raise ``RecordingError``."""
+        ...
+
+    def depth(self, name: str, camera: Pinhole) -> Float32[np.ndarray, "h w"]:
+        """Decode a picture of z-depth in metres, 0 where there is none, or raise ``RecordingError``."""
+        ...
+
+
+@dataclass(eq=False, repr=False, kw_only=True)
+class StoredRecording(ShotsRecording):
+    """Frames whose pictures are unpacked on demand.
+
+    Attributes:
+        pictures: where they lie; ``colour`` and ``depth`` of the shots are names that it knows.
+        depth_unit_m: metres of one unit of the depth as stored; 1 for floats.
+    """
+
+    pictures: Pictures
+    depth_unit_m: float = 1.0
+
+    def _colour(self, index: int) -> UInt8[np.ndarray, "h w 3"]:
+        return self.pictures.colour(self.shots.colour[index], self.rig.rgb)
+
+    def _depth_m(self, index: int) -> Float32[np.ndarray, "h w"]:
+        return self.pictures.depth(self.shots.depth[index], self.rig.depth)
+
+    @property
+    def stored_depth_unit_m(self) -> float:
+        """Metres of one unit of the depth as stored."""
+        return self.depth_unit_m
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """A hex SHA-256 over poses, stamps, cameras and the files' content; see ``Recording.fingerprint``."""
+        digest = hashlib.sha256()
+        geometry_digest(digest, self)
+        for file in self._files():
+            add_files(digest, file.parent, [file.name])
+        return digest.hexdigest()
+
+    def change_stamp(self) -> str:
+        """Return a hash over the files' sizes and times of change; see ``Recording.change_stamp``."""
+        return stamp_of(self.path.parent, (), self._files())
+
+    def _files(self) -> list[Path]:
+        own = sorted(f for f in self.path.rglob("*") if f.is_file()) if self.path.is_dir() else [self.path]
+        return [*own, *([self.audio.path] if self.audio is not None else [])]
+
+
 def geometry_digest(digest: Any, recording: Recording, more: str = "") -> None:
     """Add a recording's format, cameras, up direction, stamps and poses to a hash of ``hashlib``."""
     digest.update(f"{recording.format} {_numbers(recording.rig)}{more}".encode())
@@ -370,13 +472,54 @@ def order_notices(names: Sequence[str], stamps_s: Float[np.ndarray, " n"]) -> tu
     )
 
 
-def open_audio(folder: Path) -> AudioTrack | None:
-    """Open the sound track that someone put beside a recording's files, where there is one."""
-    file = find_audio(folder)
-    return AudioTrack.open(file) if file else None
+def open_audio(folder: Path, start_s: float = 0.0) -> tuple[AudioTrack | None, tuple[str, ...]]:
+    """Open the sound track that someone put beside a recording's files, and say where it was not certain which.
+
+    A file that is called ``audio`` or ``sound``, in any case and container, is the track; else the only sound file that
+    is there, also in a folder ``audio`` or ``sound``.
+
+    Raises:
+        AudioError: the track that is called so cannot be read.
+    """
+    named, others = _sound_files(folder)
+    for inside in sorted(folder.iterdir()) if not named and not others and folder.is_dir() else ():
+        if inside.name.casefold() in _TRACKS and inside.is_dir():
+            named, others = _sound_files(inside)
+    if named:
+        return AudioTrack.open(named[0], start_s=start_s), ()
+    if len(others) == 1:
+        try:
+            track = AudioTrack.open(others[0], start_s=start_s)
+        except AudioError as error:
+            return None, (f"The recording has no sound track: {error}",)
+        return track, (f"{others[0].name} is taken for the sound track ({option('audio', 'FILE')} gives another).",)
+    if others:
+        names = _some([file.name for file in others])
+        said = f"There are {len(others)} sound files ({names}), and none is called audio: give one ({option('audio')})."
+        return None, (said,)
+    return None, ()
 
 
-def find_audio(folder: Path) -> Path | None:
-    """Return the folder's ``audio.flac``, ``audio.wav`` or ``audio.ogg``, the first that is there."""
+def _sound_files(folder: Path) -> tuple[list[Path], list[Path]]:
+    """Return the files that are called after a sound track, the likeliest first, and other sound files."""
+    try:
+        files = sorted(folder.iterdir())
+    except OSError:
+        return [], []
+    sounds = [file for file in files if file.suffix.lower() in _SOUNDS and not file.name.startswith(".")]
+    named = [file for file in files if file.stem.casefold() in _TRACKS and file.suffix.lower() in (*_SOUNDS, *_FILMS)]
     # A broken link or a folder of that name is found as well, and is then an error, not a recording without sound.
-    return next((p for p in (folder / f"audio.{kind}" for kind in ("flac", "wav", "ogg")) if os.path.lexists(p)), None)
+    return sorted(named, key=_likeliness), [file for file in sounds if file not in named]
+
+
+def likeliest_sound(names: Iterable[str]) -> str | None:
+    """Return which of some names of files in an archive is that of its sound track."""
+    files = [Path(name) for name in names]
+    named = [f for f in files if f.stem.casefold() in _TRACKS and f.suffix.lower() in (*_SOUNDS, *_FILMS)]
+    others = [f for f in files if f.suffix.lower() in _SOUNDS]
+    found = sorted(named, key=_likeliness)[:1] or (others if len(others) == 1 else [])
+    return found[0].as_posix() if found else None
+
+
+def _likeliness(file: Path) -> tuple[int, int]:
+    return _TRACKS.index(file.stem.casefold()), (*_SOUNDS, *_FILMS).index(file.suffix.lower())

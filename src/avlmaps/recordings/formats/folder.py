@@ -17,9 +17,8 @@ from avlmaps.recordings.channels import tracked
 from avlmaps.recordings.corrections import corrected
 from avlmaps.recordings.directions import DIRECTIONS, read_directions
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
-from avlmaps.recordings.formats.columns import NAMED_FILE, POSE, named_order, split_header
-from avlmaps.recordings.formats.file_recording import FileRecording, Shots, find_audio, list_names, settle
-from avlmaps.recordings.formats.tables import read_table, text_lines
+from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names, open_audio, settle
+from avlmaps.recordings.formats.tables import NAMED_FILE, POSE, named_order, read_table, split_header, text_lines
 from avlmaps.recordings.images import DisplayTurn, file_turn, first_picture_size
 from avlmaps.recordings.layout import Description
 from avlmaps.recordings.microphones import MicrophoneNumbers
@@ -58,7 +57,7 @@ def open_folder(path: Path, report: Report = stop_at_first) -> Recording:
     first_s = 0.0 if found.stamps_s is None else float(found.stamps_s[0]) - start_s
     audio_start_s = description.audio_start_s - (start_s if description.audio_start_s > _DATE_S else 0.0)
     up = description.up_in_world
-    heard = _open_audio(path, audio_start_s, video, first_s, description.placed)
+    heard, sound = _open_audio(path, audio_start_s, video, first_s, description.placed)
     audio, lone = _with_directions(path, heard, start_s)
     recording = FileRecording(
         path=path,
@@ -68,7 +67,7 @@ def open_folder(path: Path, report: Report = stop_at_first) -> Recording:
         depth_units=description.depth_units_per_m,
         up_in_world=None if up is None else np.array(up) / np.linalg.norm(up),
         audio=audio,
-        notices=(*_turned_notices(video), *notices, *more, *lone),
+        notices=(*_turned_notices(video), *notices, *more, *sound, *lone),
         video=video,
         trajectory=trajectory,
         begins_s=start_s + (description.begins_s or 0.0),
@@ -137,7 +136,7 @@ def _check_clocks(folder: Path, description: Description, found: "_Pictures", kn
 
 def _open_audio(
     path: Path, start_s: float, video: VideoFrames | None, first_s: float, microphones: MicrophoneNumbers | None
-) -> AudioTrack | None:
+) -> tuple[AudioTrack | None, tuple[str, ...]]:
     """Open the sound track: a file of its own, else the video's (most have none, which is not a fault).
 
     Args:
@@ -147,14 +146,16 @@ def _open_audio(
         first_s: when the video's first frame was taken, on the recording's clock.
         microphones: where those of the track's channels are, where the description says so.
     """
-    file = path / microphones.files[0] if microphones is not None and microphones.files else find_audio(path)
-    if file is not None:
-        track = AudioTrack.open(file, start_s=start_s)
-        return track if microphones is None else tracked(track, microphones, path)
+    if microphones is not None and microphones.files:
+        track, notices = AudioTrack.open(path / microphones.files[0], start_s=start_s), ()
+    else:
+        track, notices = open_audio(path, start_s)
+    if track is not None:
+        return track if microphones is None else tracked(track, microphones, path), notices
     if video is not None:
         with suppress(NoAudioStreamError):
-            return AudioTrack.open(video.path, start_s=start_s or first_s - video.start_s)
-    return None
+            return AudioTrack.open(video.path, start_s=start_s or first_s - video.start_s), notices
+    return None, notices
 
 
 def _turned_notices(video: VideoFrames | None) -> tuple[str, ...]:

@@ -8,8 +8,12 @@ belong together; depth is float32 metres of ``dw`` x ``dh``, compressed by LZFSE
 left out. The export has ``EXR_RGBD/metadata.json``, ``rgb/N.jpg`` and ``depth/N.exr``.
 """
 
+import shutil
+import tempfile
+import weakref
 import zipfile
 import zlib
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -20,22 +24,32 @@ from jaxtyping import Float, Float32, UInt8
 from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
-from avlmaps.core.files import MANIFEST_BYTES, PICTURE_BYTES
+from avlmaps.core.files import MANIFEST_BYTES, PICTURE_BYTES, SOUND_BYTES
 from avlmaps.core.lzfse import decompress
 from avlmaps.recordings import images
 from avlmaps.recordings.camera_axes import UP_IN_WORLD, from_opengl
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
-from avlmaps.recordings.formats.exr import read_channel
-from avlmaps.recordings.formats.file_recording import Shots, list_names, number_of, open_audio
-from avlmaps.recordings.formats.intrinsics import fitted, median_camera, resized_notice
-from avlmaps.recordings.formats.json_files import parse_json, read_json, unread_notice
-from avlmaps.recordings.formats.stored_recording import StoredRecording
+from avlmaps.recordings.formats.file_recording import (
+    Shots,
+    StoredRecording,
+    likeliest_sound,
+    list_names,
+    number_of,
+    open_audio,
+)
+from avlmaps.recordings.formats.tables import (
+    fitted,
+    median_camera,
+    parse_json,
+    read_json,
+    resized_notice,
+    unread_notice,
+)
 from avlmaps.recordings.plausible import pace_fault
 
 _FPS = 60.0
 # What the app writes beside; poses do not depend on initPose.
 _IDLE = ("initPose", "cameraType")
-_COLOUR = (".jpg", ".jpeg", ".png")
 
 
 class _Metadata(msgspec.Struct, frozen=True):
@@ -95,6 +109,12 @@ class _Files:
         except (zipfile.BadZipFile, OSError, EOFError, zlib.error, NotImplementedError, RuntimeError) as error:
             raise RecordingError(f"{name} in {self.path} cannot be read ({error}); share it again.") from None
 
+    def unpack_sound(self, folder: Path) -> None:
+        """Write the archive's sound track into a folder, where it has one."""
+        name = likeliest_sound(self._archive.namelist() if self._archive is not None else ())
+        if name is not None:
+            (folder / f"audio{Path(name).suffix.lower()}").write_bytes(self.read(name, SOUND_BYTES))
+
     def has(self, name: str) -> bool:
         if self._archive is None:
             return (self.path / name).is_file()
@@ -139,21 +159,35 @@ def _decompressed(files: _Files, name: str, content: bytes, most: int) -> bytes:
 def _depth(files: _Files, name: str, size: tuple[int, int]) -> Float32[np.ndarray, "h w"]:
     width, height = size
     if name.endswith(".exr"):
-        try:
-            depth_m = read_channel(files.read(name), images.MOST_PIXELS)
-        except ValueError as error:
-            raise RecordingError(
-                f"{files.path / name} cannot be read as OpenEXR: {error}; copy it again, or share the .r3d instead."
-            ) from None
+        depth_m = _exr(files, name)
         if depth_m.shape != (height, width):
             raise RecordingError(
                 f"{files.path / name} is {depth_m.shape[1]}x{depth_m.shape[0]}, the others {width}x{height}; every "
                 "picture of a recording must have one size."
             )
     else:
-        depth_m = _unfolded(files, name, 4 * width * height).view("<f4").reshape(height, width).copy()
-    depth_m[~(np.isfinite(depth_m) & (depth_m > 0.0))] = 0.0
-    return depth_m
+        depth_m = _unfolded(files, name, 4 * width * height).view("<f4").reshape(height, width)
+    return images.metres(depth_m, 1.0)
+
+
+def _exr(files: _Files, name: str) -> Float32[np.ndarray, "h w"]:
+    """Return the channel of an OpenEXR file that depth is found in, the likeliest first."""
+    import OpenEXR
+
+    library: Any = OpenEXR
+    try:
+        header = library.File(BytesIO(files.read(name)), header_only=True).header()
+        (x0, y0), (x1, y1) = header["dataWindow"]
+        if (int(x1) - int(x0) + 1) * (int(y1) - int(y0) + 1) > images.MOST_PIXELS:
+            raise ValueError("it is larger than any depth picture")
+        channels: dict[str, Any] = library.File(BytesIO(files.read(name)), separate_channels=True).channels()
+        likely = next((n for n in ("Z", "R", "Y", "A") if n in channels), next(iter(channels)))
+        return np.asarray(channels[likely].pixels, np.float32)
+    except (RuntimeError, ValueError, TypeError, KeyError, StopIteration, MemoryError) as error:
+        raise RecordingError(
+            f"{files.path / name} cannot be read as OpenEXR ({str(error).splitlines()[0][:120]}); copy it again, or "
+            "share the .r3d instead."
+        ) from None
 
 
 def open_record3d(path: Path, report: Report = stop_at_first) -> StoredRecording:
@@ -174,7 +208,7 @@ def open_record3d(path: Path, report: Report = stop_at_first) -> StoredRecording
     described, colour_in, depth_in = layout
     file = inside / described
     given, plain = _metadata(files, file, described)
-    colour = {number_of(name): name for name in files.names(colour_in, _COLOUR)}
+    colour = {number_of(name): name for name in files.names(colour_in, images.COLOUR_SUFFIXES)}
     depth = {number_of(name): name for name in files.names(depth_in, (".depth", ".exr"))}
     numbers = [n for n in range(len(given.poses)) if n in colour and n in depth]
     if not numbers:
@@ -187,20 +221,28 @@ def open_record3d(path: Path, report: Report = stop_at_first) -> StoredRecording
         left = max(len(given.poses), len(colour)) - len(numbers)
         notices.append(f"{left} frame(s) lack one of colour, depth and pose and are left out.")
         report(Fault(f"{inside}: {notices[-1]}", file, fatal=False))
+    given_s = _stamps(file, given, notices)
     shots = Shots(
         names=[str(n) for n in numbers],
         colour=[f"{colour_in}/{colour[n]}" for n in numbers],
         depth=[f"{depth_in}/{depth[n]}" for n in numbers],
-        stamps_s=_stamps(file, given, notices)[numbers],
+        stamps_s=given_s[numbers],
         world_from_camera=_poses(file, given)[numbers],
     )
     if fault := pace_fault(shots.stamps_s, "frames", 1.0 / _fps(given)):
         raise RecordingError(f"{file}: {fault}")
     rig, more = _rig(files, file, given, shots)
-    return StoredRecording.settled(
-        path, "record3d", rig, shots, (*notices, *more), report, lambda _: file, pictures=_Pictures(files),
-        up_in_world=UP_IN_WORLD.copy(), audio=open_audio(path) if path.is_dir() else None,
+    folder = Path(tempfile.mkdtemp(prefix="avlmaps-r3d-")) if path.is_file() else None
+    if folder is not None:
+        files.unpack_sound(folder)
+    audio, sound = open_audio(folder or path, float(given_s[0]))
+    recording = StoredRecording.settled(
+        path, "record3d", rig, shots, (*notices, *more, *sound), report, lambda _: file, pictures=_Pictures(files),
+        up_in_world=UP_IN_WORLD.copy(), audio=audio,
     )  # fmt: skip
+    if folder is not None:  # a track is read by pieces, for as long as the recording is open
+        weakref.finalize(recording, shutil.rmtree, folder, ignore_errors=True)
+    return recording
 
 
 def _metadata(files: _Files, file: Path, name: str) -> tuple[_Metadata, dict[str, Any]]:
@@ -252,7 +294,8 @@ def _rig(files: _Files, file: Path, given: _Metadata, shots: Shots) -> tuple[Rig
     rgb_size = images.picture_size(files.path / shots.colour[0], files.read(shots.colour[0]))
     depth_size = (given.dw, given.dh)
     if shots.depth[0].endswith(".exr"):
-        depth_size = _exr_size(files, shots.depth[0])
+        height, width = _exr(files, shots.depth[0]).shape
+        depth_size = (width, height)
     elif not (given.dw > 0 and given.dh > 0):
         depth_size = _size_like(files, shots.depth[0], camera)
     rig = Rig(fitted(camera, rgb_size, file, "colour"), fitted(camera, depth_size, file, "depth"))
@@ -264,13 +307,3 @@ def _size_like(files: _Files, name: str, camera: Pinhole) -> tuple[int, int]:
     count = len(_decompressed(files, name, files.read(name), 4 * camera.width * camera.height)) // 4
     width = max(1, round((count * camera.width / camera.height) ** 0.5))
     return width, count // width
-
-
-def _exr_size(files: _Files, name: str) -> tuple[int, int]:
-    try:
-        height, width = read_channel(files.read(name), images.MOST_PIXELS).shape
-    except ValueError as error:
-        raise RecordingError(
-            f"{files.path / name} cannot be read as OpenEXR: {error}; copy it again, or share the .r3d instead."
-        ) from None
-    return width, height

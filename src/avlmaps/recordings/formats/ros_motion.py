@@ -10,10 +10,9 @@ from avlmaps.core.errors import RecordingError
 from avlmaps.core.poses import MAX_ROTATION_FAULT, from_quaternion
 from avlmaps.recordings.faults import stop_at_first
 from avlmaps.recordings.formats.bags import Bag
-from avlmaps.recordings.formats.columns import POSE
 from avlmaps.recordings.formats.ros_messages import pose_of, stamp_of
 from avlmaps.recordings.formats.ros_transforms import TransformTree
-from avlmaps.recordings.formats.tables import read_table
+from avlmaps.recordings.formats.tables import POSE, read_table
 from avlmaps.recordings.types import BaseHeight
 
 _POSE_TYPES = (

@@ -25,8 +25,8 @@ from avlmaps.core.poses import apply, inverse
 from avlmaps.core.timeline import associate, gap_notices, in_order
 from avlmaps.core.wording import option
 from avlmaps.recordings.audio import AudioTrack
-from avlmaps.recordings.content import add_files, stamp_of
 from avlmaps.recordings.formats.bags import Bag
+from avlmaps.recordings.formats.file_recording import add_files, stamp_of
 from avlmaps.recordings.formats.ros_messages import (
     CLOUD_TYPES,
     PAIRING_TOLERANCE_S,

@@ -27,9 +27,8 @@ from avlmaps.core.files import SAMPLED_BYTES, checked_size
 from avlmaps.core.rvl import decode_rvl
 from avlmaps.recordings import images
 from avlmaps.recordings.faults import Fault, Report, readable, stop_at_first
-from avlmaps.recordings.formats.file_recording import Shots, settle
-from avlmaps.recordings.formats.intrinsics import fitted, resized_notice
-from avlmaps.recordings.formats.stored_recording import StoredRecording
+from avlmaps.recordings.formats.file_recording import Shots, StoredRecording, settle
+from avlmaps.recordings.formats.tables import fitted, resized_notice
 
 _SQLITE = b"SQLite format 3\0"
 _RVL = b"DEPTHRVL"
@@ -120,13 +119,9 @@ def _unpacked_depth(place: Path, content: bytes) -> Float32[np.ndarray, "h w"]:
     images.picture_size(place, content)
     raw = images.decode_picture(content, cv2.IMREAD_UNCHANGED)
     if raw is not None and raw.dtype == np.uint16 and raw.ndim == 2:
-        depth_m = raw.astype(np.float32) / np.float32(1000.0)
-        depth_m[raw == images.DEPTH_SATURATED] = 0.0
-        return depth_m
+        return images.metres(raw, 1000.0)
     if raw is not None and raw.dtype == np.uint8 and raw.ndim == 3 and raw.shape[2] == 4:
-        depth_m = np.ascontiguousarray(raw).view("<f4")[..., 0].copy()
-        depth_m[~(np.isfinite(depth_m) & (depth_m > 0.0))] = 0.0
-        return depth_m
+        return images.metres(np.ascontiguousarray(raw).view("<f4")[..., 0], 1.0)
     raise RecordingError(f"{place} is no depth picture (it may be the right picture of a stereo camera).")
 
 

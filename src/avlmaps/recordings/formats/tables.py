@@ -1,17 +1,123 @@
-"""Reading the small text files of recordings: numbers in lines, poses, lists; every fault with its line."""
+"""Reading the small files of recordings: numbers in lines, poses, lists, JSON, intrinsics; every fault with its line.
 
+The first line of a table, or the comment above it, may name its columns, in any order and with their units.
+"""
+
+import re
 from array import array
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, TypeVar
 
+import msgspec
 import numpy as np
 from jaxtyping import Float, Int
 
+from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import RecordingError
-from avlmaps.core.files import DESCRIPTION_BYTES, TABLE_BYTES, open_regular, read_regular
-from avlmaps.recordings.faults import Fault, Report, readable
-from avlmaps.recordings.formats.columns import is_header_in_comment, named_order, split_header
+from avlmaps.core.files import (
+    DESCRIPTION_BYTES,
+    MANIFEST_BYTES,
+    TABLE_BYTES,
+    decode_json,
+    open_regular,
+    read_regular,
+)
+from avlmaps.core.poses import MAX_ROTATION_FAULT, from_quaternion
+from avlmaps.recordings.faults import Fault, Report, readable, stop_at_first
+from avlmaps.recordings.types import Recording
+
+POSE = ("stamp_s", "tx", "ty", "tz", "qx", "qy", "qz", "qw")
+NAMED_FILE = ("name", "stamp_s")
+_TIME = frozenset(["t", "time", "timestamp", "timestamps", "stamp", "stamps", "ts", "sec", "secs", "second", "seconds"])
+_FILE = frozenset(["name", "names", "file", "files", "filename", "frame", "image", "picture", "rgb", "color", "colour"])
+_PLACE = frozenset(["t", "p", "pos", "position", "trans", "translation", "loc", "location", "xyz"])
+_TURN = frozenset(["q", "quat", "quaternion", "rot", "rotation", "orientation", "o", "r"])
+_SECONDS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
+_METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
+_UNIT = re.compile(r"\s*[\[(]\s*([^\])]*?)\s*[\])]\s*$")
+# A comment above the numbers is taken for their header where it names at least this share of them.
+_COMMENT_SHARE = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class ColumnOrder:
+    """Where each wanted column stands in the file, and the factor that takes it to seconds or metres."""
+
+    columns: tuple[int, ...]
+    factors: tuple[float, ...]
+
+    def applied(self, values: Float[np.ndarray, "n c"]) -> Float[np.ndarray, "n c"]:
+        """Return rows of the file in the wanted order and units."""
+        return values[:, self.columns] * np.array(self.factors)
+
+
+def split_header(text: str) -> list[str]:
+    """Return the fields of a line of names; a name may hold spaces where commas or semicolons part the names."""
+    text = text.lstrip("#%").strip()
+    separator = next((sign for sign in ";,\t" if sign in text), None)
+    return [field.strip() for field in text.split(separator)]
+
+
+def named_order(fields: Sequence[str], wanted: Sequence[str]) -> ColumnOrder:
+    """Return where the wanted columns stand.
+
+    Raises:
+        ValueError: a name is not known, comes twice, is missing, or has a unit that is none; the text says which.
+    """
+    found: dict[str, tuple[int, float]] = {}
+    for at, field in enumerate(fields):
+        column, factor = _column(field)
+        if column not in wanted:
+            raise ValueError(f"{field!r} is none of the columns {','.join(wanted)}, which may stand in any order")
+        if column in found:
+            raise ValueError(f"{fields[found[column][0]]!r} and {field!r} both name the column {column}")
+        found[column] = (at, factor)
+    if missing := [column for column in wanted if column not in found]:
+        raise ValueError(f"the column {missing[0]} is missing; {','.join(wanted)} are needed")
+    return ColumnOrder(tuple(found[column][0] for column in wanted), tuple(found[column][1] for column in wanted))
+
+
+def is_header_in_comment(fields: Sequence[str], wanted: Sequence[str]) -> bool:
+    """Return whether a comment is a list of columns: as many as are wanted, of which it names some."""
+    known = sum(_column_or_none(field) in wanted for field in fields)
+    return len(fields) == len(wanted) and known >= _COMMENT_SHARE * len(wanted)
+
+
+def _column_or_none(field: str) -> str:
+    try:
+        return _column(field)[0]
+    except ValueError:
+        return ""
+
+
+def _column(field: str) -> tuple[str, float]:
+    """Return the column that a name stands for (``""`` for none) and its unit as a factor."""
+    word, unit = field.strip(" '\"#%").lower(), ""
+    if bracket := _UNIT.search(word):
+        word, unit = word[: bracket.start()], bracket.group(1)
+    word = re.sub(r"[\s./-]+", "_", word).strip("_")
+    stem, _, suffix = word.rpartition("_")
+    if not unit and stem and suffix in {**_SECONDS, **_METRES}:
+        word, unit = stem, suffix
+    if word in _TIME:
+        return "stamp_s", _factor(field, unit, _SECONDS)
+    if word in _FILE:
+        return "name", 1.0
+    prefix, axis = word[:-1].strip("_"), word[-1:]
+    kinds = [kind for part in prefix.split("_") for kind, words in (("t", _PLACE), ("q", _TURN)) if part in words]
+    kind = kinds[0] if kinds else "q" if axis == "w" and not prefix else "t" if not prefix else ""
+    if not kind or axis not in ("xyz" if kind == "t" else "xyzw"):
+        return "", 1.0
+    return kind + axis, _factor(field, unit, _METRES) if kind == "t" else 1.0
+
+
+def _factor(field: str, unit: str, units: dict[str, float]) -> float:
+    if unit and unit not in units:
+        raise ValueError(f"{field!r} has the unit {unit!r}; known are {', '.join(units)}")
+    return units.get(unit, 1.0)
+
 
 # A line holds 16 numbers or a name; without a limit a file of zeros would be one line of gigabytes.
 _LINE_BYTES = 1 << 14
@@ -96,7 +202,11 @@ def read_table(
         first = False
         if len(row) not in columns or (width and len(row) != width):
             wanted = width or " or ".join(map(str, columns))
-            sentence = f"{path}, line {number}: there are {len(row)} numbers where {wanted} belong; fix the line."
+            kitti = ": 12 are a 3x4 matrix, as KITTI has poses; write stamps, positions and quaternions"
+            sentence = (
+                f"{path}, line {number}: there are {len(row)} numbers where {wanted} belong"
+                f"{kitti if len(row) == 12 else '; fix the line'}."
+            )
             report(Fault(sentence, path, number))
             continue
         width = len(row)
@@ -145,33 +255,183 @@ def _any_number(fields: list[str]) -> bool:
     return False
 
 
-def read_matrix(path: Path, rows: int, columns: int) -> Float[np.ndarray, "rows columns"]:
-    """Read one matrix written row by row; line breaks may stand anywhere.
+def read_numbers(path: Path) -> Float[np.ndarray, " n"]:
+    """Read all numbers of a small file; line breaks may stand anywhere.
 
     Raises:
-        RecordingError: the file is missing, is not text, or holds another count of numbers.
+        RecordingError: the file is missing, or is not text of numbers.
     """
     with readable(path, "the recording needs it"):
         content = read_regular(path, DESCRIPTION_BYTES)
     try:
-        fields = content.decode("utf-8-sig").replace(",", " ").split()
-        numbers = [_number(field) for field in fields]
+        return np.array([_number(field) for field in content.decode("utf-8-sig").replace(",", " ").split()])
     except UnicodeDecodeError:
         raise RecordingError(f"{path} is not UTF-8 text; save the file as UTF-8.") from None
     except ValueError as error:
         reason = str(error) if len(str(error)) < _QUOTED else f"{str(error)[:_QUOTED]}..."
         raise RecordingError(f"{path} does not hold numbers only ({reason}); fix the file.") from None
+
+
+def read_matrix(path: Path, rows: int, columns: int) -> Float[np.ndarray, "rows columns"]:
+    """Read one matrix written row by row; errors as of ``read_numbers``, and for another count of numbers."""
+    numbers = read_numbers(path)
     if len(numbers) != rows * columns:
         raise RecordingError(f"{path} holds {len(numbers)} numbers where {rows}x{columns} belong; fix the file.")
-    return np.array(numbers).reshape(rows, columns)
+    return numbers.reshape(rows, columns)
 
 
-def read_pose_files(files: Sequence[Path], report: Report) -> Float[np.ndarray, "n 4 4"]:
-    """Read one 4x4 pose from each file; a damaged file is reported, and its pose is NaN."""
-    poses = np.full((len(files), 4, 4), np.nan)
-    for i, file in enumerate(files):
-        try:
-            poses[i] = read_matrix(file, 4, 4)
-        except RecordingError as error:
-            report(Fault(str(error), file))
-    return poses
+def read_opencv_yaml(path: Path) -> Any:
+    """Return the nodes of a YAML file as OpenCV writes it: settings of ORB-SLAM, calibrations of RTAB-Map.
+
+    Raises:
+        RecordingError: it cannot be read, or is none.
+    """
+    import cv2
+
+    with readable(path, "the recording needs it"):
+        text = read_regular(path, DESCRIPTION_BYTES).decode(errors="replace")
+    body = text.split("\n", 1)[-1] if text.startswith("%YAML") else text
+    try:
+        return cv2.FileStorage(f"%YAML:1.0\n{body}", cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
+    except (cv2.error, SystemError) as error:
+        raise RecordingError(f"{path} is no YAML that OpenCV reads ({str(error).splitlines()[0]}); fix it.") from None
+
+
+T = TypeVar("T")
+# A key with such a word in it is about where a pixel lies in space; it is never passed over.
+_ABOUT_GEOMETRY = re.compile(
+    r"(^|_)(f|c|fl|focal|fov|k\d|p\d|w|h)(_?[xy])?($|_)|scale|depth|unit|dist|intrinsic|extrinsic|crop|resize"
+    r"|width|height|size|rotat|orient|transform|axes|convention|offset|delay|principal|center|centre|matrix|pose|model"
+)
+
+
+def read_json(file: Path, kind: type[T], limit_bytes: int = MANIFEST_BYTES) -> tuple[T, dict[str, Any]]:
+    """Return a JSON file as a type, and as it is (for its other keys).
+
+    Raises:
+        RecordingError: it is missing, damaged, or lacks what the type needs.
+    """
+    with readable(file, "the recording needs it"):
+        return parse_json(file, read_regular(file, limit_bytes), kind)
+
+
+def parse_json(file: Path, content: bytes, kind: type[T]) -> tuple[T, dict[str, Any]]:
+    """Return the content of a JSON file as a type, and as it is; errors as of ``read_json``."""
+    try:
+        plain = decode_json(content)
+        return msgspec.convert(plain, kind), plain
+    except (msgspec.DecodeError, msgspec.ValidationError, UnicodeDecodeError) as error:
+        raise RecordingError(f"{file} is not as it should be ({error}); fix the file.") from None
+
+
+def unread_notice(
+    file: Path, present: Mapping[str, Any], known: Collection[str], strict: bool = True
+) -> tuple[str, ...]:
+    """Return a notice that names the keys of a file that nothing reads, or nothing.
+
+    Args:
+        file: the file, for the sentence.
+        present: its keys.
+        known: those that are read, or say nothing.
+        strict: whether a key about the camera is refused; not where an app writes the file, whose later versions may
+            add some.
+
+    Raises:
+        RecordingError: one of them is about the camera, the depth or the poses: without it the map may be wrong.
+    """
+    unread = sorted(present.keys() - set(known))
+    telling = [key for key in unread if _ABOUT_GEOMETRY.search(key.lower())]
+    if telling and strict:
+        raise RecordingError(
+            f"{file} has the key {telling[0]!r}, which is not read here and may change the map; known are "
+            f"{', '.join(sorted(known))}. Write it as one of them, or remove it."
+        )
+    if telling:
+        return (f"{file.name} has keys that are not read and may change the map: {', '.join(telling[:8])}.",)
+    return (f"{file.name} has keys that are not read: {', '.join(unread[:8])}.",) if unread else ()
+
+
+# A focal length that wanders by more than this share is worth a notice.
+_WANDERS = 0.01
+
+
+def median_camera(
+    file: Path, fx_fy_cx_cy: Float[np.ndarray, "n 4"], width: int, height: int
+) -> tuple[Pinhole, tuple[str, ...]]:
+    """Return the camera that stands for all frames', and a notice where they differ much.
+
+    Raises:
+        RecordingError: the numbers are of no camera.
+    """
+    try:
+        fx, fy, cx, cy = (float(value) for value in np.median(fx_fy_cx_cy, axis=0))
+        camera = Pinhole(fx, fy, cx, cy, width, height)
+    except ValueError as error:
+        raise RecordingError(f"{file} holds no camera: {error}; fix the file.") from None
+    low, high = float(fx_fy_cx_cy[:, 0].min()), float(fx_fy_cx_cy[:, 0].max())
+    if high > low * (1.0 + _WANDERS):
+        return camera, (f"The focal length wanders between {low:.1f} and {high:.1f} pixels; {fx:.1f} is used for all.",)
+    return camera, ()
+
+
+def fitted(camera: Pinhole, size: tuple[int, int], file: Path, what: str) -> Pinhole:
+    """Return the camera at the size (width, height) that the pictures have.
+
+    Args:
+        camera: as the file says.
+        size: (width, height) of the pictures.
+        file: the file of the intrinsics.
+        what: which pictures, for the sentence.
+
+    Raises:
+        RecordingError: the pictures have another shape, so that they were cropped or turned.
+    """
+    width, height = size
+    if abs(width * camera.height - height * camera.width) > max(width, height, camera.width, camera.height):
+        raise RecordingError(
+            f"{file} is of pictures of {camera.width}x{camera.height}, but the {what} pictures are {width}x{height}, "
+            "of another shape: were they cropped or turned? Give the intrinsics of these pictures."
+        )
+    return camera.resized(width, height)
+
+
+def resized_notice(camera: Pinhole, size: tuple[int, int]) -> tuple[str, ...]:
+    """Return a notice where pictures have another size than their intrinsics, or nothing."""
+    if size == (camera.width, camera.height):
+        return ()
+    return (
+        f"The pictures are {size[0]}x{size[1]}; the intrinsics of {camera.width}x{camera.height} are scaled to them.",
+    )
+
+
+def read_pose_file(path: Path) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n 4 4"]]:
+    """Return the stamps and the poses (4x4, metres) of a table: stamp tx ty tz qx qy qz qw, or as its header says.
+
+    Raises:
+        RecordingError: it cannot be read, is empty, or a line is no pose; the error names the line.
+    """
+    table = read_table(path, (8,), stop_at_first, names=POSE)
+    if not len(table.values):
+        raise RecordingError(f"{path} holds no pose; it needs a line of stamp tx ty tz qx qy qz qw for each.")
+    length = np.linalg.norm(table.values[:, 4:], axis=1)
+    wrong = ~np.isfinite(table.values).all(axis=1) | ~(np.abs(length - 1.0) <= MAX_ROTATION_FAULT)
+    if wrong.any():
+        row = int(np.flatnonzero(wrong)[0])
+        raise RecordingError(
+            f"{path}, line {int(table.lines[row])}: this is no pose (NaN, or a quaternion of length {length[row]:.3g}, "
+            "where 1 belongs); fix or remove the line."
+        )
+    return table.values[:, 0], from_quaternion(table.values[:, 1:4], table.values[:, 4:])
+
+
+def on_clock_of(stamps_s: Float[np.ndarray, " n"], recording: Recording) -> Float[np.ndarray, " n"]:
+    """Return the stamps of a pose file on a recording's clock, which begins at its first frame.
+
+    SLAM writes the stamps of the files that it read: those are taken where more of them lie among the frames so.
+    """
+    first_s, last_s = recording.stamps_s[0], recording.stamps_s[-1]
+    inside, as_files = (
+        int(((stamps >= first_s - 1.0) & (stamps <= last_s + 1.0)).sum())
+        for stamps in (stamps_s, stamps_s - recording.begins_s)
+    )
+    return stamps_s - recording.begins_s if as_files > inside else stamps_s

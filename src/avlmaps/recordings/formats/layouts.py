@@ -1,0 +1,561 @@
+"""Folders of pictures as data sets and tools lay them out: each layout is a row of `LAYOUTS`.
+
+A row says where colour, depth and poses lie by patterns with one number in them, which count a frame; where the camera
+stands, how fast frames follow, and what is up. Facts of the data, and their sources:
+
+7scenes: 7-Scenes, 3DMatch: millimetres; 0 and 65535 say nothing was measured; full sequences run at 30 frames/s and
+    the number counts them; NaN where tracking was lost; rotations are off by some 1e-4; up is not known. Depth of the
+    Kinect was never registered to colour: its 585 is the depth camera's, colour fits 525 (measured).
+replica: Replica by NICE-SLAM: a row-major camera-to-world matrix a line; 6553.5 units a metre; z up; no clock.
+scannet: ScanNet out of .sens: own cameras for colour and depth; -inf where tracking was lost; z up; 30 frames/s;
+    colour is often resized while the intrinsics are those of 1296x968.
+hov-sg: VLMaps and HOV-SG, ``pose/N.txt``: seven numbers are VLMaps' (the robot's base in Habitat's axes, position,
+    then quaternion x y z w), sixteen HOV-SG's camera-to-world of a camera with y up that looks along -z. A view of 90
+    degrees where no file says otherwise.
+redwood: Redwood, Open3D: five lines a pose, three whole numbers and a matrix; millimetres; a PrimeSense by default;
+    names such as ``00012-000000366849.jpg`` carry microseconds; up is not known.
+"""
+
+import os
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+from jaxtyping import Float
+
+from avlmaps.core import poses
+from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.errors import RecordingError
+from avlmaps.core.files import DESCRIPTION_BYTES
+from avlmaps.recordings.camera_axes import from_opengl
+from avlmaps.recordings.faults import Fault, Report, stop_at_first
+from avlmaps.recordings.formats import avlmaps_layout
+from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names
+from avlmaps.recordings.formats.tables import (
+    fitted,
+    read_json,
+    read_matrix,
+    read_numbers,
+    read_table,
+    resized_notice,
+    text_lines,
+    unread_notice,
+)
+from avlmaps.recordings.images import COLOUR_SUFFIXES, DEPTH_SUFFIXES, first_picture_size
+from avlmaps.recordings.known_formats import why_unreadable
+
+RATE_HZ = 30.0
+_COLOUR = rf"({'|'.join(re.escape(suffix) for suffix in COLOUR_SUFFIXES)})"
+_DEPTH = rf"({'|'.join(re.escape(suffix) for suffix in DEPTH_SUFFIXES)})"
+Z_UP = (0.0, 0.0, 1.0)
+Poses = dict[int, Float[np.ndarray, "4 4"]]
+
+
+@dataclass(frozen=True, slots=True)
+class Cameras:
+    """The cameras of a layout, the units of depth in a metre, and a sentence for each thing that was assumed."""
+
+    rig: Rig
+    units_per_m: float = 1000.0
+    notices: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Pattern:
+    """Files of a folder whose names count frames: a regular expression whose first group is the number."""
+
+    folder: str
+    name: str
+
+    def files(self, path: Path) -> dict[int, str]:
+        """Return the files below a recording's folder by their numbers, in the order of these."""
+        inside = path / self.folder if self.folder else path
+        found = [(re.fullmatch(self.name, name, re.IGNORECASE), name) for name in list_names(inside, ("",))]
+        below = f"{self.folder}/" if self.folder else ""
+        return dict(sorted((int(match.group(1)), below + name) for match, name in found if match))
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """A layout of folders.
+
+    Attributes:
+        name: of the format.
+        colour: the colour pictures; depth: the depth pictures.
+        poses: gives the poses by number, NaN where there is none, and the file of each, of a folder.
+        cameras: gives the cameras of some shots.
+        files: what a frame needs, in words.
+        up: direction against gravity in the poses' world; None where it is not known.
+    """
+
+    name: str
+    colour: Pattern
+    depth: Pattern
+    poses: Callable[[Path, Sequence[int], Report], tuple[Poses, Callable[[int], Path], tuple[str, ...]]]
+    cameras: Callable[[Path, Shots], Cameras]
+    files: str
+    up: tuple[float, float, float] | None = None
+
+
+def open_layout(layout: Layout, path: Path, report: Report = stop_at_first) -> FileRecording:
+    """Open a folder in place.
+
+    Raises:
+        RecordingError: no frame is complete, or a file of poses or intrinsics is damaged.
+    """
+    colour = layout.colour.files(path)
+    depth = layout.depth.files(path)
+    known, file_of, notices = layout.poses(path, sorted(colour), report)
+    numbers = [number for number in colour if number in depth and number in known]
+    if not numbers:
+        raise RecordingError(
+            why_unreadable(path)
+            or f"{path} has {len(colour)} colour pictures, {len(depth)} depth pictures and {len(known)} poses, but no "
+            f"frame with all of {layout.files}."
+        )
+    if partial_frames := len((colour.keys() | depth.keys() | known.keys()) - set(numbers)):
+        notices = (*notices, f"{partial_frames} frame(s) lack one of colour, depth and pose and are left out.")
+        report(Fault(f"{path}: {notices[-1]}", path, fatal=False))
+    shots = Shots(
+        names=[_digits(colour[number]) for number in numbers],
+        colour=[colour[number] for number in numbers],
+        depth=[depth[number] for number in numbers],
+        stamps_s=(np.array(numbers, np.float64) - numbers[0]) / RATE_HZ,
+        world_from_camera=np.stack([known[number] for number in numbers]),
+    )
+    found = layout.cameras(path, shots)
+    return FileRecording.settled(
+        path, layout.name, found.rig, shots, (*notices, *found.notices), report, lambda i: file_of(numbers[i]),
+        depth_units=found.units_per_m, up_in_world=None if layout.up is None else np.array(layout.up),
+        posed=len(numbers) / len(colour),
+    )  # fmt: skip
+
+
+def _digits(file: str) -> str:
+    found = re.findall(r"\d+", Path(file).name.split(".")[0])
+    return found[-1] if found else Path(file).stem
+
+
+# Poses
+
+
+def _pose_files(
+    pattern: Pattern, path: Path, numbers: Sequence[int], report: Report
+) -> tuple[Poses, Callable[[int], Path], tuple[str, ...]]:
+    """Return the 4x4 poses of files of their own; a damaged one is reported and is NaN."""
+    files = pattern.files(path)
+    found: Poses = {}
+    for number, name in files.items():
+        try:
+            found[number] = read_matrix(path / name, 4, 4)
+        except RecordingError as error:
+            found[number] = np.full((4, 4), np.nan)
+            if number in numbers:
+                report(Fault(str(error), path / name))
+    return found, lambda number: path / files[number], ()
+
+
+def _rows(
+    name: str, path: Path, numbers: Sequence[int], report: Report
+) -> tuple[Poses, Callable[[int], Path], tuple[str, ...]]:
+    """Return the matrices of a table, whose lines count the frames from 0."""
+    table = read_table(path / name, (16,), report)
+    notice = "The recording has no clock; 30 frames/s are assumed."
+    return dict(enumerate(table.values.reshape(-1, 4, 4))), lambda _: path / name, (notice,)
+
+
+def _of_robot(
+    path: Path, numbers: Sequence[int], report: Report
+) -> tuple[Poses, Callable[[int], Path], tuple[str, ...]]:
+    """Return the poses of VLMaps' and HOV-SG's files, in a world with z up."""
+    files = Pattern("pose", r"(\d+)\.txt").files(path)
+    rows = {number: _numbers_of(path / name, report) for number, name in files.items()}
+    lengths = {len(row) for row in rows.values() if len(row)}
+    if len(lengths) > 1 or not lengths <= {7, 12, 16}:
+        raise RecordingError(
+            f"The files of {path / 'pose'} hold {' and '.join(map(str, sorted(lengths)))} numbers; each is a pose of "
+            "seven (x y z qx qy qz qw) or sixteen (a matrix)."
+        )
+    pose = np.full((len(rows), 4, 4), np.nan)
+    for at, row in enumerate(rows.values()):
+        if len(row) == 7 and abs(np.linalg.norm(row[3:]) - 1.0) <= poses.MAX_ROTATION_FAULT:
+            pose[at] = poses.from_quaternion(row[:3], row[3:])
+        elif len(row) in (12, 16):
+            pose[at] = np.vstack([row.reshape(-1, 4)[:3], [0.0, 0.0, 0.0, 1.0]])
+    if lengths == {7}:
+        given, _ = avlmaps_layout.read_camera_file(path / "camera.json")
+        pose, notice = avlmaps_layout.camera_poses(pose, given)
+    else:
+        pose, notice = _of_matrices(pose)
+    clock = "The recording has no clock; 30 frames/s are assumed."
+    return dict(zip(rows, pose, strict=True)), lambda number: path / files[number], (notice, clock)
+
+
+def _of_matrices(pose: Float[np.ndarray, "n 4 4"]) -> tuple[Float[np.ndarray, "n 4 4"], str]:
+    """Return camera poses in a world with z up, by which axis of the world the cameras' y axes lie along."""
+    usable = pose[np.isfinite(pose).all(axis=(1, 2))]
+    down = usable[:, :3, 1].mean(axis=0) if len(usable) else np.zeros(3)
+    axis = int(np.argmax(np.abs(down)))
+    begins_there = len(usable) > 0 and np.allclose(usable[0], np.eye(4), atol=1e-3)
+    if axis == 1 and down[1] > 0.0 and not begins_there:  # y up in Habitat's world, and in the camera
+        return avlmaps_layout.WORLD_FROM_HABITAT @ from_opengl(pose), (
+            "The poses are taken for those of a camera with y up that looks along -z, as HOV-SG's (their y axis points "
+            "up)."
+        )
+    if axis == 1:
+        turn = avlmaps_layout.WORLD_FROM_HABITAT @ np.diag([1.0, -1.0, -1.0, 1.0] if down[1] > 0.0 else [1.0] * 4)
+        return (
+            turn @ pose,
+            "The poses are taken for those of a camera with y down; turned so that z is up.",
+        )
+    return pose, "The poses are taken for those of a camera with y down, in a world with z up."
+
+
+def _numbers_of(file: Path, report: Report) -> Float[np.ndarray, " n"]:
+    try:
+        return read_numbers(file)
+    except RecordingError as error:
+        report(Fault(str(error), file))
+        return np.zeros(0)
+
+
+# Cameras
+
+
+def _kinect(path: Path, shots: Shots) -> Cameras:
+    """Return the cameras of camera-intrinsics.txt, or of the Kinect of 7-Scenes where there is none."""
+    rgb_size, depth_size = sizes(path, shots)
+    places = (path / "camera-intrinsics.txt", path.parent / "camera-intrinsics.txt")
+    file = next((place for place in places if place.is_file()), None)
+    notices: tuple[str, ...] = ()
+    if file is None:
+        notices = ("There is no camera-intrinsics.txt; those of 7-Scenes are assumed (focal length 585 at 640x480).",)
+        depth = Pinhole(585.0, 585.0, 320.0, 240.0, 640, 480).resized(*depth_size)
+    else:
+        k = read_matrix(file, 3, 3).tolist()
+        depth = pinhole(file, k[0][0], k[1][1], k[0][2], k[1][2], *depth_size)
+    if depth_size == (640, 480) and depth.fx == depth.fy == 585.0:
+        colour = Pinhole(525.0, 525.0, 320.0, 240.0, 640, 480).resized(*rgb_size)
+        notice = (
+            "The intrinsics are a Kinect's depth camera's (585); for the colour camera 525 is used, which fits better."
+        )
+        return Cameras(Rig(colour, depth), notices=(*notices, notice))
+    return Cameras(Rig(depth.resized(*rgb_size), depth), notices=notices)
+
+
+_REPLICA = {"w": 1200, "h": 680, "fx": 600.0, "fy": 600.0, "cx": 599.5, "cy": 339.5, "scale": 6553.5}
+_REPLICA_NAMES = {
+    "W": "w", "H": "h", "width": "w", "height": "h", "image_width": "w", "image_height": "h",
+    "png_depth_scale": "scale",
+}  # fmt: skip
+# What NICE-SLAM and what came after it do with the pictures when they read them; the files are whole.
+_REPLICA_IDLE = ("crop_edge", "crop_size", "near", "far", "fps")
+
+
+class _ReplicaCamera(msgspec.Struct, frozen=True):
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    w: int | None = None
+    h: int | None = None
+    scale: float | None = None
+
+
+def _replica(path: Path, shots: Shots) -> Cameras:
+    """Return the camera of cam_params.json (in a section of its own, or at the top), or of the published scenes."""
+    rgb_size, depth_size = sizes(path, shots)
+    places = (path / "cam_params.json", path.parent / "cam_params.json")
+    file = next((place for place in places if os.path.lexists(place)), None)
+    notices: tuple[str, ...] = ("There is no cam_params.json; the camera of the published scenes is assumed.",)
+    numbers: dict[str, Any] = dict(_REPLICA)
+    if file is not None:
+        plain = read_json(file, dict, DESCRIPTION_BYTES)[1]
+        section = next((name for name in ("camera", "cam", "camera_params") if isinstance(plain.get(name), dict)), "")
+        notices = unread_notice(file, plain, (section,)) if section else ()
+        numbers = {}
+        for key, value in (plain[section] if section else plain).items():
+            name = _REPLICA_NAMES.get(key, key)
+            if numbers.setdefault(name, value) != value:
+                raise RecordingError(f"{file} has {name} twice, as {numbers[name]} and as {value}; remove one of them.")
+        notices = (*notices, *unread_notice(file, numbers, (*_ReplicaCamera.__struct_fields__, *_REPLICA_IDLE)))
+    try:
+        given = msgspec.convert(numbers, _ReplicaCamera)
+    except msgspec.ValidationError as error:
+        raise RecordingError(f"{file} is not as it should be ({error}); fix the file.") from None
+    scale = _REPLICA["scale"] if given.scale is None else given.scale
+    if not scale > 0.0:
+        raise RecordingError(f"{file} holds no camera: scale is {scale}; it must be positive; fix the file.")
+    if given.scale is None:
+        notices = (*notices, f"cam_params.json has no scale of depth; {scale:g} units a metre are assumed.")
+    size = (given.w or rgb_size[0], given.h or rgb_size[1])
+    camera = pinhole(file or path, given.fx, given.fy, given.cx + 0.5, given.cy + 0.5, *size)
+    return Cameras(Rig(camera.resized(*rgb_size), camera.resized(*depth_size)), scale, notices)
+
+
+def _scannet(path: Path, shots: Shots) -> Cameras:
+    rgb_size, depth_size = sizes(path, shots)
+    inside = path / "intrinsic"
+    rgb, notices = _centred(inside / "intrinsic_color.txt", rgb_size, (1296, 968))
+    depth, more = _centred(inside / "intrinsic_depth.txt", depth_size, (640, 480))
+    body_from_rgb, body_from_depth = (
+        poses.orthonormalize(read_matrix(file, 4, 4), str(file)) if file.is_file() else np.eye(4)
+        for file in (inside / "extrinsic_color.txt", inside / "extrinsic_depth.txt")
+    )
+    return Cameras(Rig(rgb, depth, poses.inverse(body_from_rgb) @ body_from_depth), notices=(*notices, *more))
+
+
+def _centred(file: Path, size: tuple[int, int], own_size: tuple[int, int]) -> tuple[Pinhole, tuple[str, ...]]:
+    """Return a camera at its pictures' size; the intrinsics may be of the size that the camera itself has."""
+    k = read_matrix(file, 4, 4).tolist()
+    for width, height in (size, own_size):
+        camera = pinhole(file, k[0][0], k[1][1], k[0][2] + 0.5, k[1][2] + 0.5, width, height)
+        # A principal point is at most this share of the picture's size away from its middle.
+        if max(abs(camera.cx / width - 0.5), abs(camera.cy / height - 0.5)) <= 0.15:
+            return camera.resized(*size), resized_notice(camera, size)
+    raise RecordingError(
+        f"{file} has its centre at {k[0][2]:.1f}, {k[1][2]:.1f}, but the pictures are {size[0]}x{size[1]}; were they "
+        "resized or cropped? Give the intrinsics of these pictures."
+    )
+
+
+def _robot_camera(path: Path, shots: Shots) -> Cameras:
+    """Return the camera of a file beside the pictures, else one with a view of 90 degrees."""
+    if (path / "intrinsic").is_dir():
+        return _scannet(path, shots)
+    for name in _OPEN3D:
+        if os.path.lexists(path / name):
+            return _open3d(path, shots)
+    given, _ = avlmaps_layout.read_camera_file(path / "camera.json")
+    rig = avlmaps_layout.rig_of(path, shots, given)
+    if given.fx is not None:
+        return Cameras(rig)
+    return Cameras(
+        rig, notices=("No file says the camera; a view of 90 degrees is assumed (camera.json: fx fy cx cy).",)
+    )
+
+
+_OPEN3D = ("intrinsic.json", "camera_intrinsic.json", "intrinsics.json", "camera_primesense.json")
+# What Open3D's recorder writes beside; it says nothing that changes how pictures are read.
+_OPEN3D_IDLE = ("color_format", "depth_format", "device_name", "serial_number", "stream_length_usec", "fps")
+
+
+class _Open3dCamera(msgspec.Struct, frozen=True):
+    width: int
+    height: int
+    intrinsic_matrix: list[float]
+    depth_scale: float = 1000.0
+
+
+def _open3d(path: Path, shots: Shots) -> Cameras:
+    """Return the camera of intrinsic.json (column by column, the first pixel's centre at 0, 0), or a PrimeSense."""
+    file = next((path / name for name in _OPEN3D if os.path.lexists(path / name)), None)
+    if file is None:
+        notice = "There is no intrinsic.json; a PrimeSense is assumed (focal length 525 at 640x480), as Open3D does."
+        return fitted_cameras(path, shots, Pinhole(525.0, 525.0, 320.0, 240.0, 640, 480), path, 1000.0, (notice,))
+    given, plain = read_json(file, _Open3dCamera)
+    notices = unread_notice(file, plain, (*_Open3dCamera.__struct_fields__, *_OPEN3D_IDLE))
+    k = given.intrinsic_matrix
+    if len(k) != 9 or not given.depth_scale > 0.0:
+        raise RecordingError(
+            f"{file} holds no camera: intrinsic_matrix has {len(k)} numbers (9 belong), and depth_scale is "
+            f"{given.depth_scale} (positive); fix the file."
+        )
+    if k[6] == k[7] == 0.0:  # written by hand, row by row
+        k = [k[i] for i in (0, 3, 6, 1, 4, 7, 2, 5, 8)]
+    camera = pinhole(file, k[0], k[4], k[6] + 0.5, k[7] + 0.5, given.width, given.height)
+    more = resized_notice(camera, first_picture_size(path, shots.colour))
+    return fitted_cameras(path, shots, camera, file, given.depth_scale, (*notices, *more))
+
+
+def fitted_cameras(
+    path: Path, shots: Shots, camera: Pinhole, file: Path, units_per_m: float, notices: tuple[str, ...] = ()
+) -> Cameras:
+    """Return one camera for colour and depth, at the size that each has."""
+    rgb_size, depth_size = sizes(path, shots)
+    rig = Rig(fitted(camera, rgb_size, file, "colour"), fitted(camera, depth_size, file, "depth"))
+    return Cameras(rig, units_per_m, notices)
+
+
+def sizes(path: Path, shots: Shots) -> tuple[tuple[int, int], tuple[int, int]]:
+    """Return (width, height) of colour and of depth."""
+    rgb_size = first_picture_size(path, shots.colour)
+    return rgb_size, first_picture_size(path, shots.depth) if len(shots.depth) else rgb_size
+
+
+def pinhole(file: Path, fx: float, fy: float, cx: float, cy: float, width: int, height: int) -> Pinhole:
+    """Return a camera, or raise ``RecordingError`` that names the file whose numbers are of none."""
+    try:
+        return Pinhole(fx, fy, cx, cy, width, height)
+    except ValueError as error:
+        raise RecordingError(f"{file} holds no camera: {error}; fix the file.") from None
+
+
+_LAYOUTS = (
+    Layout(
+        "7scenes",
+        Pattern("", rf"frame-(\d+)\.color{_COLOUR}"),
+        Pattern("", r"frame-(\d+)\.depth\.png"),
+        partial(_pose_files, Pattern("", r"frame-(\d+)\.pose\.txt")),
+        _kinect,
+        "its three files (frame-000000.color.jpg or .png, .depth.png, .pose.txt)",
+    ),
+    Layout(
+        "replica",
+        Pattern("results", rf"frame(\d+){_COLOUR}"),
+        Pattern("results", r"depth(\d+)\.png"),
+        partial(_rows, "traj.txt"),
+        _replica,
+        "results/frameN.jpg, results/depthN.png and a line of traj.txt",
+        Z_UP,
+    ),
+    Layout(
+        "scannet",
+        Pattern("color", rf"(\d+){_COLOUR}"),
+        Pattern("depth", rf"(\d+){_DEPTH}"),
+        partial(_pose_files, Pattern("pose", r"(\d+)\.txt")),
+        _scannet,
+        "color/N.jpg, depth/N.png and pose/N.txt",
+        Z_UP,
+    ),
+    Layout(
+        "hov-sg",
+        Pattern("rgb", rf"(\d+){_COLOUR}"),
+        Pattern("depth", rf"(\d+){_DEPTH}"),
+        _of_robot,
+        _robot_camera,
+        "rgb/N.png, depth/N.png or .npy and pose/N.txt",
+        Z_UP,
+    ),
+)
+
+
+# Redwood's log, by the order or the numbers of pictures
+
+
+def find_redwood_log(path: Path) -> Path | None:
+    """Return a folder's log of poses, or None."""
+    for name in ("trajectory.log", "scene/trajectory.log"):
+        if os.path.lexists(path / name):
+            return path / name
+    return next(iter(sorted(path.glob("*-traj.txt"))), None) if path.is_dir() else None
+
+
+def open_redwood(path: Path, report: Report = stop_at_first) -> FileRecording:
+    """Open a scene of Redwood or Open3D in place."""
+    log = find_redwood_log(path)
+    folder = next((name for name in ("color", "rgb", "image") if (path / name).is_dir()), None)
+    if log is None or folder is None:
+        what = "trajectory.log" if log is None else "folder of colour pictures (color, rgb, image)"
+        raise RecordingError(f"{path} has no {what}; the recording needs it.")
+    colour, depth = list_names(path / folder, COLOUR_SUFFIXES), list_names(path / "depth", DEPTH_SUFFIXES)
+    ids, pose = _read_log(log, report)
+    if not (colour and depth and len(pose)):
+        raise RecordingError(f"{path} has {len(colour)} colour and {len(depth)} depth pictures and {len(pose)} poses.")
+    rows, notices = _matched(path, colour, depth, ids)
+    for sentence in notices:
+        report(Fault(f"{path}: {sentence}", log, fatal=False))
+    colour, depth = [colour[row[0]] for row in rows], [depth[row[1]] for row in rows]
+    stamps_s = _microseconds(depth)
+    if stamps_s is None:
+        notices.append("The recording has no clock; 30 frames/s are assumed.")
+        stamps_s = np.array([row[3] for row in rows], np.float64) / RATE_HZ
+    shots = Shots(
+        names=[name.rsplit(".", 1)[0] for name in colour],
+        colour=[f"{folder}/{name}" for name in colour],
+        depth=[f"depth/{name}" for name in depth],
+        stamps_s=stamps_s,
+        world_from_camera=pose[[row[2] for row in rows]],
+    )
+    found = _open3d(path, shots)
+    return FileRecording.settled(
+        path, "redwood", found.rig, shots, (*notices, *found.notices), report, lambda _: log,
+        depth_units=found.units_per_m,
+    )  # fmt: skip
+
+
+def _matched(
+    path: Path, colour: list[str], depth: list[str], ids: list[int]
+) -> tuple[list[tuple[int, int, int, int]], list[str]]:
+    """Return (row of colour, of depth, of the log, count) of each frame that has all three, and what was assumed.
+
+    Pictures are matched by the numbers that their names begin with, if these differ from one another, else in order.
+    The poses are matched by their own numbers where they skip frames, else in order.
+    """
+    numbered = [_first_numbers(names) for names in (colour, depth)]
+    if all(numbered) and (len(colour) != len(depth) or set(numbered[0]) & set(numbered[1])):
+        count = {number: at for at, number in enumerate(sorted({*numbered[0], *numbered[1]}))}
+        first = min(count)
+        gone = max(count) - first + 1 - len(count)  # numbers that neither has
+        if gone and len(ids) == len(count) + gone:
+            count = {number: number - first for number in count}
+        of_colour, of_depth = ({count[n]: at for at, n in enumerate(numbers)} for numbers in numbered)
+        how = "by the numbers in their names"
+    else:
+        of_colour, of_depth, how = dict(enumerate(range(len(colour)))), dict(enumerate(range(len(depth)))), "in order"
+    counts = range(1 + max(*of_colour, *of_depth))
+    by_id = len(set(ids)) == len(ids) and ids != list(range(len(ids))) and set(ids) <= set(counts)
+    of_pose = {number: at for at, number in enumerate(ids)} if by_id else dict(enumerate(range(len(ids))))
+    whole = sorted(of_colour.keys() & of_depth.keys() & of_pose.keys())
+    if not whole:
+        raise RecordingError(f"{path} has no frame with all of colour, depth and a pose.")
+    notices: list[str] = []
+    if not len(colour) == len(depth) == len(ids) == len(whole):
+        notices.append(
+            f"There are {len(colour)} colour pictures, {len(depth)} depth pictures and {len(ids)} poses; pictures are "
+            f"matched {how}, poses {'by their numbers in the log' if by_id else 'in order'}, and {len(whole)} frames "
+            "have all three."
+        )
+    elif by_id:
+        notices.append("The poses are not in the order of the pictures; they are matched by their numbers in the log.")
+    return [(of_colour[n], of_depth[n], of_pose[n], n) for n in whole], notices
+
+
+def _first_numbers(names: list[str]) -> list[int]:
+    found = [re.match(r"\D*(\d+)", name) for name in names]
+    numbers = [int(match.group(1)) for match in found if match]
+    return numbers if len(set(numbers)) == len(names) else []
+
+
+def _read_log(file: Path, report: Report) -> tuple[list[int], Float[np.ndarray, "n 4 4"]]:
+    """Read the numbers and the matrices of a log, which must be whole: after a lost line every pose is another's."""
+    lines = list(text_lines(file, report))
+    if len(lines) % 5:
+        raise RecordingError(
+            f"{file} has {len(lines)} lines, but each pose takes five (three whole numbers, then a 4x4 matrix); is it "
+            "cut off?"
+        )
+    pose, ids = np.full((len(lines) // 5, 4, 4), np.nan), [0] * (len(lines) // 5)
+    for at in range(0, len(lines), 5):
+        number, text = lines[at]
+        try:
+            ids[at // 5] = [int(word) for word in text.split()][: 3 if len(text.split()) == 3 else 0][0]
+            for row in range(4):
+                number, text = lines[at + 1 + row]
+                pose[at // 5, row] = [float(word) for word in text.split()]
+        except (ValueError, IndexError):
+            wanted = "three whole numbers" if number == lines[at][0] else "four numbers of a matrix"
+            raise RecordingError(
+                f"{file}, line {number}: {text[:40]!r} stands where {wanted} belong; fix it."
+            ) from None
+    return ids, pose
+
+
+def _microseconds(names: list[str]) -> Float[np.ndarray, " n"] | None:
+    """Return the stamps that names such as ``00012-000000366849.png`` carry, in seconds from the first; else None."""
+    parts = [name.split(".", 1)[0].split("-") for name in names]
+    if not all(len(p) == 2 and p[1].isascii() and p[1].isdigit() for p in parts):
+        return None
+    stamps_s = np.array([int(p[1]) for p in parts], np.float64) * 1e-6
+    return stamps_s - stamps_s[0] if (np.diff(stamps_s) > 0.0).all() else None
+
+
+OPENERS: dict[str, Callable[..., FileRecording]] = {
+    **{row.name: partial(open_layout, row) for row in _LAYOUTS},
+    "redwood": open_redwood,
+}

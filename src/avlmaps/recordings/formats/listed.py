@@ -1,0 +1,402 @@
+"""Pictures in lists, or named by stamps, with poses at their own stamps or numbers: TUM, ORB-SLAM, ICL-NUIM.
+
+tum: TUM RGB-D: three streams with stamps of their own; 5000 units a metre; poses of the colour camera; motion
+    capture's z is up in freiburg1 to freiburg3.
+orb-slam: ORB-SLAM's associations of colour and depth with its trajectory (TUM's columns); the settings' YAML has the
+    camera and DepthMapFactor; up is not known.
+icl-nuim: ICL-NUIM, "TUM compatible": 5000 units a metre; 30 frames/s; ``*.gt.freiburg`` begins with frame 1 or 2;
+    camera and world are left-handed with y up, so that both are mirrored.
+rtabmap-export: ``rtabmap-export --images --poses``: NAME_rgb/, NAME_depth/ (millimetres), NAME_calib/*.yaml and
+    NAME_poses.txt or NAME_camera_poses.txt; files are called by stamps or ids; z up.
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from avlmaps.core import poses, timeline
+from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.errors import RecordingError
+from avlmaps.recordings.faults import Fault, Report, stop_at_first
+from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names, natural_key
+from avlmaps.recordings.formats.layouts import Z_UP, Cameras, Poses, fitted_cameras, pinhole, sizes
+from avlmaps.recordings.formats.tables import POSE, read_opencv_yaml, read_table, resized_notice, text_lines
+from avlmaps.recordings.images import COLOUR_SUFFIXES, DEPTH_SUFFIXES
+from avlmaps.recordings.plausible import clock_fault, date_fault
+
+RATE_HZ = 30.0
+
+
+# Pictures in lists, with poses at their own stamps or numbers: TUM, ORB-SLAM, ICL-NUIM
+
+
+@dataclass(frozen=True, slots=True)
+class _Stream:
+    """Pictures in the order of time."""
+
+    stamps_s: Float[np.ndarray, " n"]
+    files: list[str]
+    notices: tuple[str, ...]
+
+
+TRAJECTORIES = ("groundtruth.txt", "CameraTrajectory.txt", "KeyFrameTrajectory.txt", "*[Tt]rajectory*.txt", "poses.txt")
+_PAIR_TOLERANCE_S = 0.02  # half the interval of a 30 Hz camera, and a little: as the benchmark's own association
+# fx, fy, cx, cy at 640x480, the first pixel's centre at (0, 0).
+_FREIBURG = {
+    "freiburg1": (517.3, 516.5, 318.6, 255.3),
+    "freiburg2": (520.9, 521.0, 325.1, 249.7),
+    "freiburg3": (535.4, 539.2, 320.1, 247.6),
+    "default": (525.0, 525.0, 319.5, 239.5),
+}
+
+
+def find_associations(path: Path) -> Path | None:
+    """Return the list of pictures that belong together, or None."""
+    return next(iter(sorted(path.glob("assoc*.txt"))), None) if path.is_dir() else None
+
+
+def find_trajectory(path: Path) -> Path | None:
+    """Return the file of poses with stamps beside lists of pictures, or None."""
+    return next((file for pattern in TRAJECTORIES for file in sorted(path.glob(pattern))), None)
+
+
+def open_tum(path: Path, report: Report = stop_at_first) -> FileRecording:
+    """Open a sequence of the TUM RGB-D benchmark, or one laid out like it, in place.
+
+    A colour and a depth picture make a frame where they are each other's nearest in time and at most 20 ms apart;
+    the frame's stamp is the depth picture's, and its pose is interpolated there.
+    """
+    colour, depth = (_stream(path / name, report) for name in ("rgb.txt", "depth.txt"))
+    of_colour, of_depth = timeline.associate(colour.stamps_s, depth.stamps_s, _PAIR_TOLERANCE_S)
+    if len(of_colour) == 0:
+        raise RecordingError(
+            f"{path}: no picture of rgb.txt ({len(colour.files)}) is within {_PAIR_TOLERANCE_S} s of one of depth.txt "
+            f"({len(depth.files)}); check that both use one clock."
+        )
+    notices = [*colour.notices, *depth.notices]
+    if unpaired := len(colour.files) - len(of_colour):
+        notices.append(f"{unpaired} colour picture(s) have no depth picture within {_PAIR_TOLERANCE_S} s; left out.")
+    rows: list[tuple[int, int]] = list(zip(of_colour.tolist(), of_depth.tolist(), strict=True))
+    files = [(colour.files[i], depth.files[j]) for i, j in rows]
+    start_s = min(colour.stamps_s[0], depth.stamps_s[0])
+    return _timed(path, "tum", depth.stamps_s[of_depth], files, float(start_s), notices, report)
+
+
+def open_orb_slam(path: Path, report: Report = stop_at_first) -> FileRecording:
+    """Open associated pictures with a trajectory of ORB-SLAM, or of another that writes TUM's columns, in place."""
+    listed = find_associations(path)
+    assert listed is not None
+    rows = _associations(listed, report)
+    order = timeline.in_order(np.array([row[0] for row in rows]), f"lines of {listed.name}")
+    at: list[int] = order.index.tolist()
+    kept = [rows[i] for i in at]
+    stamps_s = np.array([row[0] for row in kept])
+    if not kept:
+        raise RecordingError(f"{listed} lists no frame, so there is nothing to map.")
+    return _timed(path, "orb-slam", stamps_s, [row[1:] for row in kept], stamps_s[0], list(order.notices), report)
+
+
+def _timed(
+    path: Path,
+    name: str,
+    stamps_s: Float[np.ndarray, " n"],
+    files: list[tuple[str, str]],
+    start_s: float,
+    notices: list[str],
+    report: Report,
+) -> FileRecording:
+    """Return the recording of pictures with stamps, whose poses lie in a table with stamps."""
+    file = find_trajectory(path) or path / TRAJECTORIES[0]
+    trajectory, more = _trajectory(file, report)
+    known_s = trajectory.stamps_s
+    if fault := clock_fault(stamps_s, "pictures", known_s, f"poses of {file.name}"):
+        raise RecordingError(f"{path}: {fault}")
+    covered = trajectory.covers(stamps_s)
+    if not covered.any():
+        raise RecordingError(
+            f"{file} goes from {known_s[0]:.3f} to {known_s[-1]:.3f} s, but the pictures from {stamps_s[0]:.3f} to "
+            f"{stamps_s[-1]:.3f} s; check that both use one clock."
+        )
+    if not covered.all():
+        notices.append(f"{int((~covered).sum())} frame(s) lie outside {file.name} or in a gap of it; left out.")
+    rows, stamps_s = np.flatnonzero(covered).tolist(), stamps_s[covered]
+    shots = Shots(
+        names=[Path(files[i][0]).stem for i in rows],
+        colour=[files[i][0] for i in rows],
+        depth=[files[i][1] for i in rows],
+        stamps_s=stamps_s - start_s,
+        world_from_camera=trajectory.at(stamps_s),
+    )
+    found, up_in_world = _tum_camera(path, shots)
+    return FileRecording.settled(
+        path, name, found.rig, shots, (*notices, *more, *found.notices), report, None, depth_units=found.units_per_m,
+        up_in_world=up_in_world, begins_s=float(start_s), posed=float(covered.mean()),
+        trajectory=timeline.Trajectory(known_s - start_s, trajectory.world_from_body),
+    )  # fmt: skip
+
+
+def _stream(path: Path, report: Report) -> _Stream:
+    """Read a list of ``stamp file``, in the order of time."""
+    stamps: list[float] = []
+    files: list[str] = []
+    for number, text in text_lines(path, report):
+        stamp, *rest = re.split(r"[\s,;]+", text, maxsplit=1)
+        try:
+            if not rest or not rest[0]:
+                raise ValueError(text)
+            stamps.append(float(stamp))
+            files.append(rest[0] if "/" in rest[0] else rest[0].replace("\\", "/"))  # as Windows writes paths
+        except ValueError:
+            sentence = f"{path}, line {number}: {text[:40]!r} is not a stamp and a file; fix the line."
+            report(Fault(sentence, path, number))
+    if not files:
+        raise RecordingError(f"{path} lists no picture, so there is nothing to map.")
+    if fault := date_fault(np.array(stamps), f"the pictures of {path.name}"):
+        raise RecordingError(f"{path}: {fault}")
+    order = timeline.in_order(np.array(stamps), f"pictures of {path.name}")
+    return _Stream(np.array(stamps)[order.index], [files[i] for i in order.index], order.notices)
+
+
+def _trajectory(path: Path, report: Report) -> tuple[timeline.Trajectory, tuple[str, ...]]:
+    table = read_table(path, (8,), report, names=POSE)
+    values = table.values
+    norm = np.linalg.norm(values[:, 4:8], axis=1) if len(values) else np.zeros(0)
+    usable = np.isfinite(values).all(axis=1) & (np.abs(norm - 1.0) <= poses.MAX_ROTATION_FAULT)
+    for row in np.flatnonzero(~usable):
+        line = int(table.lines[row])
+        sentence = f"{path}, line {line}: this is not a pose (NaN, or a quaternion of length {norm[row]:.3g}); unused."
+        report(Fault(sentence, path, line, fatal=False))
+    lost, values = int((~usable).sum()), values[usable]
+    order = timeline.in_order(values[:, 0] if len(values) else np.zeros(0), f"poses of {path.name}")
+    values = values[order.index]
+    if len(values) == 0:
+        raise RecordingError(f"{path} holds no usable pose, so there is nothing to map.")
+    notices = (f"{lost} line(s) of {path.name} are no poses and not used.",) if lost else ()
+    gaps = timeline.gap_notices(values[:, 0], f"poses in {path.name}")
+    pose = poses.from_quaternion(values[:, 1:4], values[:, 4:8])
+    return timeline.Trajectory(values[:, 0], pose), (*notices, *order.notices, *gaps)
+
+
+def _tum_camera(path: Path, shots: Shots) -> tuple[Cameras, Float[np.ndarray, "3"] | None]:
+    """Return the camera of ORB-SLAM's settings beside the lists, else TUM's by the folder's name; and what is up."""
+    rgb_size, depth_size = sizes(path, shots)
+    for file in sorted((*path.glob("*.yaml"), *path.glob("*.yml"))):
+        if found := _orb_camera(file, rgb_size):
+            camera, units, notices = found
+            return Cameras(Rig(camera.resized(*rgb_size), camera.resized(*depth_size)), units, notices), None
+    name = path.resolve().name.lower()
+    key = next((k for k in _FREIBURG if k in name), "default")
+    fx, fy, cx, cy = _FREIBURG[key]
+    camera = Pinhole(fx, fy, cx + 0.5, cy + 0.5, 640, 480)
+    rig = Rig(camera.resized(*rgb_size), camera.resized(*depth_size))
+    if key == "default":
+        notice = "The folder is not called freiburg1, 2 or 3, so the default camera (525) is assumed; up is not known."
+        return Cameras(rig, 5000.0, (notice,)), None
+    return Cameras(rig, 5000.0), np.array(Z_UP)
+
+
+def _orb_camera(file: Path, size: tuple[int, int]) -> tuple[Pinhole, float, tuple[str, ...]] | None:
+    """Return the camera of ORB-SLAM's settings, units of depth, and notices; None where the file has none."""
+    settings = read_opencv_yaml(file)
+
+    def number(*names: str) -> float | None:
+        nodes = (settings.getNode(f"{part}.{name}") for part in ("Camera", "Camera1") for name in names)
+        return next((float(node.real()) for node in nodes if not node.empty()), None)
+
+    fx, fy, cx, cy = (number(name) for name in ("fx", "fy", "cx", "cy"))
+    if fx is None or fy is None or cx is None or cy is None:
+        return None
+    factors = (settings.getNode(name) for name in ("DepthMapFactor", "RGBD.DepthMapFactor"))
+    units = next((float(node.real()) for node in factors if not node.empty()), 5000.0)
+    if not units > 0.0:
+        raise RecordingError(f"{file} has the DepthMapFactor {units}; it must be positive: 1000 for millimetres.")
+    width, height = number("width") or size[0], number("height") or size[1]
+    camera = pinhole(file, fx, fy, cx + 0.5, cy + 0.5, round(width), round(height))
+    if any(abs(number(name) or 0.0) > 1e-9 for name in ("k1", "k2", "p1", "p2", "k3")):
+        more = "The pictures have lens distortion, which a pinhole leaves out; undistorted pictures make a better map."
+        return camera, units, (*resized_notice(camera, size), more)
+    return camera, units, resized_notice(camera, size)
+
+
+def _associations(file: Path, report: Report) -> list[tuple[float, str, str]]:
+    """Return (stamp or number, colour file, depth file) of each line, which may name either first."""
+    rows: list[tuple[float, str, str]] = []
+    for number, text in text_lines(file, report):
+        words = text.split()
+        try:
+            if len(words) != 4:
+                raise ValueError(text)
+            key, one, _, other = (
+                float(words[0]),
+                words[1].removeprefix("./"),
+                float(words[2]),
+                words[3].removeprefix("./"),
+            )
+        except ValueError:
+            sentence = f"{file}, line {number}: {text[:40]!r} is not a number, a file, the number again and a file."
+            report(Fault(sentence, file, number))
+            continue
+        one, other = one.removeprefix("./"), other.removeprefix("./")
+        rows.append((float(words[2]), other, one) if "depth" in one else (key, one, other))
+    return rows
+
+
+def open_icl_nuim(path: Path, report: Report = stop_at_first) -> FileRecording:
+    """Open a sequence of ICL-NUIM in place."""
+    listed = path / "associations.txt"
+    rows = [(int(key), colour, depth) for key, colour, depth in _associations(listed, report)]
+    if not rows:
+        raise RecordingError(f"{listed} lists no frame, so there is nothing to map.")
+    truth = next((f for kind in ("*.gt.freiburg", "*.gt.sim") for f in sorted(path.glob(kind))), None)
+    if truth is None:
+        raise RecordingError(
+            f"{path} has no poses: put ICL-NUIM's livingRoomN.gt.freiburg or trajN.gt.freiburg, or a trajectory with "
+            f"stamps (CameraTrajectory.txt), beside {listed.name}."
+        )
+    known = _sim(truth, rows) if truth.name.endswith(".sim") else _freiburg(truth, report)
+    posed = [row for row in rows if row[0] in known]
+    if not posed:
+        raise RecordingError(f"{truth} has a pose for none of the {len(rows)} frames of {listed.name}.")
+    notices: list[str] = []
+    if len(posed) < len(rows):
+        notices.append(f"{len(rows) - len(posed)} frame(s) have no pose in {truth.name} and are left out.")
+        report(Fault(f"{path}: {notices[-1]}", truth, fatal=False))
+    mirror, numbers = np.diag([1.0, -1.0, 1.0, 1.0]), np.array([row[0] for row in posed], np.float64)
+    shots = Shots(
+        names=[f"{number}" for number, _, _ in posed],
+        colour=[colour for _, colour, _ in posed],
+        depth=[depth for _, _, depth in posed],
+        stamps_s=(numbers - numbers[0]) / RATE_HZ,
+        world_from_camera=mirror @ np.stack([known[number] for number, _, _ in posed]) @ mirror,
+    )
+    found = fitted_cameras(path, shots, Pinhole(481.20, 480.00, 320.0, 240.0, 640, 480), path, 5000.0)
+    return FileRecording.settled(
+        path, "icl-nuim", found.rig, shots, notices, report, lambda _: truth, depth_units=found.units_per_m,
+        up_in_world=np.array([0.0, -1.0, 0.0]), posed=len(posed) / len(rows),
+    )  # fmt: skip
+
+
+def _freiburg(file: Path, report: Report) -> Poses:
+    rows = read_table(file, (8,), report, names=POSE).values
+    rows = rows[np.abs(np.linalg.norm(rows[:, 4:], axis=1) - 1.0) <= poses.MAX_ROTATION_FAULT]
+    found = poses.from_quaternion(rows[:, 1:4], rows[:, 4:])
+    return {int(row[0]): pose for row, pose in zip(rows, found, strict=True)}
+
+
+def _sim(file: Path, rows: list[tuple[int, str, str]]) -> Poses:
+    """Return the matrices in the order of the frames."""
+    faults: list[Fault] = []
+    table = read_table(file, (4,), faults.append)
+    if faults:
+        raise RecordingError(faults[0].sentence)
+    if len(table.values) != 3 * len(rows):
+        raise RecordingError(
+            f"{file} has {len(table.values)} lines, but {len(rows)} frames of associations.txt need three each; is it "
+            "the ground truth of another sequence, or cut off?"
+        )
+    found = np.tile(np.eye(4), (len(rows), 1, 1))
+    found[:, :3] = table.values.reshape(-1, 3, 4)
+    return {row[0]: pose for row, pose in zip(rows, found, strict=True)}
+
+
+# What rtabmap-export writes
+
+
+def export_of(path: Path) -> str:
+    """Return the name before _rgb, _depth and _calib in a folder of rtabmap-export; empty where it is none."""
+    folders = sorted(path.glob("*_rgb")) if path.is_dir() else []
+    names = [folder.name.removesuffix("_rgb") for folder in folders]
+    return next((name for name in names if (path / f"{name}_depth").is_dir()), "")
+
+
+def open_rtabmap_export(path: Path, report: Report = stop_at_first) -> FileRecording:
+    """Open what rtabmap-export wrote, in place."""
+    name = export_of(path)
+    kinds = {"rgb": COLOUR_SUFFIXES, "depth": DEPTH_SUFFIXES, "calib": (".yaml", ".yml")}
+    files = {kind: list_names(path / f"{name}_{kind}", suffixes) for kind, suffixes in kinds.items()}
+    stems = {kind: {file.rsplit(".", 1)[0]: file for file in of} for kind, of in files.items()}
+    whole = [stem for stem in stems["rgb"] if stem in stems["depth"]]
+    file = next((f for kind in ("camera_poses", "poses") if (f := path / f"{name}_{kind}.txt").is_file()), None)
+    if not whole or not files["calib"] or file is None:
+        raise RecordingError(
+            f"{path} has {len(files['rgb'])} pictures in {name}_rgb/, {len(files['depth'])} in {name}_depth/, "
+            f"{len(files['calib'])} calibrations and {'no ' if file is None else ''}poses; export it with "
+            "`rtabmap-export --images --poses --poses_camera`."
+        )
+    camera, base_from_camera = _exported_camera(path / f"{name}_calib" / files["calib"][0])
+    table = read_table(file, (8, 9, 12), report)
+    pose, own = _exported_poses(table.values)
+    if file.name.endswith("_poses.txt") and not file.name.endswith("camera_poses.txt"):
+        pose = pose @ base_from_camera
+    whole = sorted(whole, key=natural_key)
+    rows, stamps_s, notices = _exported_rows(path, whole, own)
+    if len(rows) < len(whole):
+        notices = (*notices, f"{len(whole) - len(rows)} frame(s) have no pose in {file.name} and are left out.")
+    shots = Shots(
+        names=[whole[frame] for frame, _ in rows],
+        colour=[f"{name}_rgb/{stems['rgb'][whole[frame]]}" for frame, _ in rows],
+        depth=[f"{name}_depth/{stems['depth'][whole[frame]]}" for frame, _ in rows],
+        stamps_s=stamps_s - stamps_s[0],
+        world_from_camera=pose[[row for _, row in rows]],
+    )
+    found = fitted_cameras(path, shots, camera, path / f"{name}_calib", 1000.0)
+    return FileRecording.settled(
+        path, "rtabmap-export", found.rig, shots, notices, report, lambda _: file, up_in_world=np.array(Z_UP),
+        begins_s=float(stamps_s[0]), posed=len(rows) / len(whole),
+    )  # fmt: skip
+
+
+def _exported_poses(values: Float[np.ndarray, "n c"]) -> tuple[Float[np.ndarray, "n 4 4"], Float[np.ndarray, "n k"]]:
+    """Return the poses of a table, and the columns beside: stamp and perhaps id; none of matrices."""
+    if values.shape[1] == 12:
+        pose = np.tile(np.eye(4), (len(values), 1, 1))
+        pose[:, :3] = values.reshape(-1, 3, 4)
+        return pose, np.zeros((len(values), 0))
+    usable = np.abs(np.linalg.norm(values[:, 4:8], axis=1) - 1.0) <= poses.MAX_ROTATION_FAULT
+    pose = poses.from_quaternion(values[:, 1:4], np.where(usable[:, None], values[:, 4:8], (0.0, 0.0, 0.0, 1.0)))
+    pose[~usable] = np.nan
+    return pose, values[:, [0, *range(8, values.shape[1])]]
+
+
+def _exported_rows(
+    path: Path, stems: Sequence[str], own: Float[np.ndarray, "n c"]
+) -> tuple[list[tuple[int, int]], Float[np.ndarray, " k"], tuple[str, ...]]:
+    """Return (picture, row of the poses) of each frame, its stamp, and notices: by stamps, by ids, else in order."""
+    keys = np.array([float(stem) if re.fullmatch(r"\d+(\.\d+)?", stem) else np.nan for stem in stems])
+    for column in range(own.shape[1]):
+        order = np.argsort(own[:, column], kind="stable")
+        a, b = timeline.associate(np.sort(keys), own[order, column], 1e-3)
+        if 2 * len(a) > min(len(keys), len(own)):
+            frames = np.argsort(keys, kind="stable")[a]
+            return list(zip(frames.tolist(), order[b].tolist(), strict=True)), own[order[b], 0], ()
+    if len(own) != len(stems):
+        raise RecordingError(
+            f"{path} has {len(stems)} pictures and {len(own)} poses, and the names of the pictures are neither stamps "
+            "nor ids of the poses; export both at once, with `--poses_format 10`."
+        )
+    every = range(len(stems))
+    stamps_s = own[:, 0] if own.shape[1] else np.array(every) / RATE_HZ
+    notices = () if own.shape[1] else ("The poses have no stamps; 30 frames/s are assumed.",)
+    return [(i, i) for i in every], stamps_s, notices
+
+
+def _exported_camera(file: Path) -> tuple[Pinhole, Float[np.ndarray, "4 4"]]:
+    content = read_opencv_yaml(file)
+
+    def matrix(name: str) -> list[float]:
+        node = content.getNode(name)
+        data = node.getNode("data") if not node.empty() and node.isMap() else node
+        return [float(data.at(i).real()) for i in range(data.size())] if not data.empty() and data.isSeq() else []
+
+    k, local = matrix("camera_matrix"), matrix("local_transform")
+    size = [round(content.getNode(name).real()) for name in ("image_width", "image_height")]
+    if len(k) != 9:
+        raise RecordingError(f"{file} has no camera_matrix of nine numbers; export the calibration again.")
+    base_from_camera = np.eye(4)
+    if len(local) == 12:
+        base_from_camera[:3] = np.array(local).reshape(3, 4)
+    return pinhole(file, k[0], k[4], k[2] + 0.5, k[5] + 0.5, size[0], size[1]), base_from_camera

@@ -1,0 +1,429 @@
+"""Scans of phones and their conversions: Polycam's raw export, Stray Scanner's folder, Nerfstudio's transforms.json.
+
+Polycam's raw export (an iPhone or iPad with LiDAR): ``keyframes/`` with images, depth and cameras.
+Facts of the data (nerfstudio's converter; Polycam's page on raw data): ``cameras/N.json`` has ``fx fy cx cy width
+height`` and ``t_00`` to ``t_23``, the rows of a camera-to-world matrix in ARKit's axes (camera: y up, looking along
+-z; world: y up). ``corrected_cameras/`` and ``corrected_images/`` are what remains after Polycam's own bundle
+adjustment, and go before. Depth is in 16-bit millimetres, and where ``confidence/`` is 0 it is left out.
+
+Stray Scanner (an iPhone or iPad with LiDAR): ``rgb.mp4``, ``depth/``, ``odometry.csv``, ``camera_matrix.csv``.
+Facts of the data (docs/format.md of the app, and its encoder): ``odometry.csv`` has a row a frame, with a stamp in
+seconds and a quaternion x y z w; the app turns ARKit's camera by half a turn, so that the poses are of a camera with
+y down and z forward in ARKit's world, which has y up. Depth is in 16-bit millimetres, 256x192; ``confidence/`` has 0
+(low), 1 and 2, and low depth is left out. ``camera_matrix.csv`` is of the video's size; newer versions add fx fy cx
+cy to each row.
+
+Nerfstudio's ``transforms.json`` with depth, as Polycam, Record3D and others are converted to it.
+Facts of the data (nerfstudio's page on data conventions): each frame has a ``file_path``, a ``depth_file_path`` and a
+camera-to-world ``transform_matrix`` of a camera with y up that looks along -z (OpenGL); ``fl_x`` and the like stand
+for all frames or in each; the centre of the first pixel is (0.5, 0.5). Depth is in 16-bit millimetres unless
+``depth_unit_scale_factor`` (metres of a unit) or ``integer_depth_scale`` says otherwise, or NPY in metres. The frames
+have no clock, and the world may be turned and moved, so that up is not known. Positions that were scaled
+(``applied_scale``) are scaled back to metres.
+"""
+
+import os
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+from jaxtyping import Float
+
+from avlmaps.core import poses
+from avlmaps.core.camera import Rig
+from avlmaps.core.errors import RecordingError
+from avlmaps.core.files import DESCRIPTION_BYTES
+from avlmaps.recordings.camera_axes import UP_IN_WORLD, from_opengl
+from avlmaps.recordings.faults import Fault, Report, stop_at_first
+from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names, number_of
+from avlmaps.recordings.formats.tables import (
+    fitted,
+    median_camera,
+    read_json,
+    read_matrix,
+    read_table,
+    resized_notice,
+    text_lines,
+    unread_notice,
+)
+from avlmaps.recordings.images import COLOUR_SUFFIXES, first_picture_size
+from avlmaps.recordings.plausible import pace_fault
+from avlmaps.recordings.video import VideoFrames
+
+DESCRIPTION = "transforms.json"
+# Pictures of a scan are chosen, not filmed; a second apart they satisfy every rule about speed.
+INTERVAL_S = 1.0
+_MILLIMETRE = 1e-3
+_PINHOLES = ("", "OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL")
+_DISTORTION = ("k1", "k2", "k3", "k4", "p1", "p2")
+_SUFFIXES = (*COLOUR_SUFFIXES, ".JPG", ".PNG")
+_IDLE = (
+    "aabb_scale", "applied_transform", "camera_angle_y", "ply_file_path", "frames", "orientation_override",
+    "auto_scale_poses_override", "crop", "train_filenames", "val_filenames", "test_filenames", "scale", "offset",
+)  # fmt: skip
+# Of a frame; other pictures of it (..._path) are not read either.
+_IDLE_OF_FRAME = ("camera_angle_y", "colmap_im_id", "time", "timestamp", "camera_id", "sharpness", "blur_score")
+
+
+class _Camera(msgspec.Struct, frozen=True):
+    fl_x: float | None = None
+    fl_y: float | None = None
+    cx: float | None = None
+    cy: float | None = None
+    w: float | None = None
+    h: float | None = None
+    k1: float = 0.0
+    k2: float = 0.0
+    k3: float = 0.0
+    k4: float = 0.0
+    p1: float = 0.0
+    p2: float = 0.0
+    camera_angle_x: float | None = None
+    camera_model: str = ""
+    is_fisheye: bool = False
+
+
+class _Frame(_Camera, frozen=True, kw_only=True):
+    file_path: str
+    transform_matrix: list[list[float]]
+    depth_file_path: str = ""
+
+
+class _Transforms(_Camera, frozen=True, kw_only=True):
+    frames: list[_Frame]
+    depth_unit_scale_factor: float | None = None
+    integer_depth_scale: float | None = None
+    applied_scale: float = 1.0
+
+
+def open_nerfstudio(path: Path, report: Report = stop_at_first) -> FileRecording:
+    """Open a scan in place.
+
+    Args:
+        path: the folder with ``transforms.json``.
+        report: called with every fault.
+
+    Raises:
+        RecordingError: the description is damaged, of a fisheye, or its frames have no depth.
+    """
+    file = path / DESCRIPTION
+    given, plain = read_json(file, _Transforms)
+    known = {name for kind in (_Transforms, _Camera) for name in kind.__struct_fields__}
+    notices = [*unread_notice(file, plain, (*known, *_IDLE)), *_unread_of_frames(file, plain), *_without_clock(given)]
+    frames = [frame for frame in given.frames if frame.depth_file_path]
+    if not frames:
+        raise RecordingError(
+            f"{file} names no depth (depth_file_path) for any of its {len(given.frames)} frames, and a map needs it; "
+            "convert the scan again with its depth (ns-process-data polycam --use-depth, or record3d)."
+        )
+    if len(frames) < len(given.frames):
+        notices.append(f"{len(given.frames) - len(frames)} frame(s) have no depth_file_path and are left out.")
+        report(Fault(f"{file}: {notices[-1]}", file, fatal=False))
+    units = _units_per_m(file, given)
+    colour = [_found(path, frame.file_path) for frame in frames]
+    shots = Shots(
+        names=[name.rsplit("/", 1)[-1].rsplit(".", 1)[0] for name in colour],
+        colour=colour,
+        depth=[_found(path, frame.depth_file_path) for frame in frames],
+        stamps_s=np.arange(len(frames)) * INTERVAL_S,
+        world_from_camera=_matrices(file, frames, given.applied_scale),
+    )
+    rig, more = _rig(file, given, frames, shots)
+    return FileRecording.settled(
+        path, "nerfstudio", rig, shots, (*notices, *more), report, lambda _: file, depth_units=units
+    )
+
+
+def _unread_of_frames(file: Path, plain: dict[str, Any]) -> tuple[str, ...]:
+    """Return a notice about keys of the frames that nothing reads; one about the camera is refused."""
+    present = {key: None for frame in plain["frames"] for key in frame if not key.endswith("_path")}
+    return unread_notice(file, present, (*_Frame.__struct_fields__, *_IDLE_OF_FRAME))
+
+
+def _without_clock(given: _Transforms) -> list[str]:
+    notices = ["The scan has no clock; its frames are taken to be one second apart."]
+    if given.applied_scale != 1.0:
+        notices.append(f"The positions were scaled by {given.applied_scale:g}; they are scaled back to metres.")
+    return notices
+
+
+def _units_per_m(file: Path, given: _Transforms) -> float:
+    """Return the units of a depth PNG in a metre."""
+    said = {given.integer_depth_scale, given.depth_unit_scale_factor} - {None}
+    if len(said) > 1:
+        raise RecordingError(
+            f"{file} says twice how long a unit of depth is: integer_depth_scale {given.integer_depth_scale} and "
+            f"depth_unit_scale_factor {given.depth_unit_scale_factor}; keep the right one."
+        )
+    metres = next((value for value in said if value is not None), _MILLIMETRE)
+    for name, value in (("a depth unit in metres", metres), ("applied_scale", given.applied_scale)):
+        if not (np.isfinite(value) and value > 0.0):
+            raise RecordingError(f"{file} says that {name} is {value}; it must be positive.")
+    return 1.0 / metres
+
+
+def _found(folder: Path, name: str) -> str:
+    """Return a picture's name below the folder, with the suffix that some converters leave out."""
+    name = name.replace("\\", "/").removeprefix("./")
+    if name.startswith("/") or ".." in name.split("/"):
+        raise RecordingError(f"{folder / DESCRIPTION} names {name!r}, which lies outside of its folder; move it there.")
+    if Path(name).suffix or os.path.lexists(folder / name):
+        return name
+    return next((name + suffix for suffix in _SUFFIXES if os.path.lexists(folder / (name + suffix))), name)
+
+
+def _matrices(file: Path, frames: list[_Frame], scale: float) -> Float[np.ndarray, "n 4 4"]:
+    pose = np.full((len(frames), 4, 4), np.nan)
+    for i, frame in enumerate(frames):
+        rows = frame.transform_matrix
+        if len(rows) not in (3, 4) or any(len(row) != 4 for row in rows):
+            shape = "x".join(map(str, (len(rows), len(rows[0]) if rows else 0)))
+            raise RecordingError(f"{file}: the transform_matrix of {frame.file_path!r} is {shape}; it must be 4x4.")
+        pose[i, 3] = (0.0, 0.0, 0.0, 1.0)
+        pose[i, : len(rows)] = rows
+    pose[:, :3, 3] /= scale
+    return from_opengl(pose)
+
+
+def _rig(file: Path, given: _Transforms, frames: list[_Frame], shots: Shots) -> tuple[Rig, tuple[str, ...]]:
+    models = {frame.camera_model or given.camera_model for frame in frames}
+    if any(camera_.is_fisheye for camera_ in (given, *frames)):
+        models = {"fisheye"}
+    if odd := sorted(models - set(_PINHOLES)):
+        raise RecordingError(
+            f"{file} is of the camera model {odd[0]!r}; pinholes are read ({', '.join(_PINHOLES[1:])}), so undistort "
+            "the pictures first."
+        )
+    rgb_size = first_picture_size(file.parent, shots.colour)
+    sizes = {(round(f.w or given.w or rgb_size[0]), round(f.h or given.h or rgb_size[1])) for f in frames}
+    if len(sizes) > 1:
+        shown = " and ".join(f"{width}x{height}" for width, height in sorted(sizes)[:2])
+        raise RecordingError(f"{file} has frames of {shown}; the frames of a recording must have one size.")
+    size = sizes.pop()
+    numbers = np.array([_numbers(file, frame, given, size) for frame in frames])
+    camera, notices = median_camera(file, numbers, *size)
+    if any(abs(getattr(camera_, name)) > 1e-9 for camera_ in (given, *frames) for name in _DISTORTION):
+        more = "The pictures have lens distortion, which a pinhole leaves out; undistorted pictures make a better map."
+        notices = (*notices, more)
+    depth_size = first_picture_size(file.parent, shots.depth)
+    rig = Rig(fitted(camera, rgb_size, file, "colour"), fitted(camera, depth_size, file, "depth"))
+    return rig, (*notices, *resized_notice(camera, rgb_size))
+
+
+def _numbers(file: Path, frame: _Frame, given: _Transforms, size: tuple[int, int]) -> list[float]:
+    """Return fx, fy, cx, cy of a frame: its own, else those of all; the centre of the picture where none is said."""
+
+    def said(name: str) -> Any:
+        own = getattr(frame, name)
+        return getattr(given, name) if own is None else own
+
+    fx, angle = said("fl_x"), said("camera_angle_x")
+    if fx is None and angle is not None and 0.0 < angle < np.pi:
+        fx = size[0] / 2.0 / np.tan(angle / 2.0)
+    if fx is None:
+        raise RecordingError(f"{file} has no focal length (fl_x, or camera_angle_x) for {frame.file_path!r}; add it.")
+    fy, cx, cy = said("fl_y"), said("cx"), said("cy")
+    return [fx, fx if fy is None else fy, size[0] / 2 if cx is None else cx, size[1] / 2 if cy is None else cy]
+
+
+# What the app writes beside; it says nothing about how the pictures are read.
+_POLYCAM_IDLE = (
+    "t_30", "t_31", "t_32", "t_33", "blur_score", "center_depth", "neighbors", "angular_velocity", "manual_keyframe",
+)  # fmt: skip
+_UNITS_S = (1.0, 1e-3, 1e-6, 1e-9)
+# Keyframes of a scan follow one another at such a pace, by which the unit of their stamps is known.
+_LEAST_INTERVAL_S, _MOST_INTERVAL_S = 0.02, 20.0
+
+
+class _PolycamCamera(msgspec.Struct, frozen=True):
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    t_00: float
+    t_01: float
+    t_02: float
+    t_03: float
+    t_10: float
+    t_11: float
+    t_12: float
+    t_13: float
+    t_20: float
+    t_21: float
+    t_22: float
+    t_23: float
+    width: int | None = None
+    height: int | None = None
+    timestamp: float | None = None
+
+
+def keyframes_of(path: Path) -> Path:
+    """Return the folder that holds the keyframes: the export's ``keyframes/``, or the folder itself."""
+    return path / "keyframes" if (path / "keyframes").is_dir() else path
+
+
+def is_polycam(path: Path) -> bool:
+    """Return whether a folder is a raw export."""
+    frames = keyframes_of(path)
+    return (frames / "cameras").is_dir() and (frames / "images").is_dir()
+
+
+def open_polycam(path: Path, report: Report = stop_at_first) -> FileRecording:
+    """Open a raw export in place.
+
+    Args:
+        path: the export, or its ``keyframes/``.
+        report: called with every fault.
+
+    Raises:
+        RecordingError: no frame is complete, or a camera is damaged.
+    """
+    frames = keyframes_of(path)
+    below = "keyframes/" if frames != path else ""
+    mended = all((frames / f"corrected_{kind}").is_dir() for kind in ("cameras", "images"))
+    cameras, images = ("corrected_cameras", "corrected_images") if mended else ("cameras", "images")
+    colour = _by_stem(frames / images, COLOUR_SUFFIXES)
+    depth, described = _by_stem(frames / "depth", (".png",)), _by_stem(frames / cameras, (".json",))
+    names = [stem for stem in described if stem in colour and stem in depth]
+    if not names:
+        raise RecordingError(f"{frames} holds no frame with all of {images}/N.jpg, depth/N.png and {cameras}/N.json.")
+    partial = len((colour.keys() | depth.keys() | described.keys()) - set(names))
+    notices = [f"{partial} frame(s) lack one of colour, depth and camera and are left out."] if partial else []
+    for sentence in notices:
+        report(Fault(f"{path}: {sentence}", path, fatal=False))
+    files = [frames / cameras / described[stem] for stem in names]
+    read = [read_json(file, _PolycamCamera, DESCRIPTION_BYTES) for file in files]
+    found = [camera for camera, _ in read]
+    present = {key: None for _, plain in read for key in plain}
+    notices += unread_notice(files[0], present, (*_PolycamCamera.__struct_fields__, *_POLYCAM_IDLE), strict=False)
+    sure = _by_stem(frames / "confidence", (".png",)) if (frames / "confidence").is_dir() else {}
+    shots = Shots(
+        names=names,
+        colour=[f"{below}{images}/{colour[stem]}" for stem in names],
+        depth=[f"{below}depth/{depth[stem]}" for stem in names],
+        stamps_s=_keyframe_stamps(found, names, notices),
+        world_from_camera=from_opengl(np.stack([_matrix(camera) for camera in found])),
+        confidence=[f"{below}confidence/{sure[s]}" for s in names] if all(s in sure for s in names) else (),
+    )
+    numbers = np.array([(c.fx, c.fy, c.cx, c.cy) for c in found])
+    rgb_size, depth_size = first_picture_size(path, shots.colour), first_picture_size(path, shots.depth)
+    # corrected cameras have no size: it is that of the corrected pictures
+    camera, more = median_camera(files[0], numbers, found[0].width or rgb_size[0], found[0].height or rgb_size[1])
+    rig = Rig(fitted(camera, rgb_size, files[0], "colour"), fitted(camera, depth_size, files[0], "depth"))
+    return FileRecording.settled(
+        path, "polycam", rig, shots, (*notices, *more, *resized_notice(camera, rgb_size)), report, files.__getitem__,
+        up_in_world=UP_IN_WORLD.copy(),
+    )  # fmt: skip
+
+
+def _by_stem(folder: Path, suffixes: tuple[str, ...]) -> dict[str, str]:
+    return {name.split(".", 1)[0]: name for name in list_names(folder, suffixes)}
+
+
+def _matrix(c: _PolycamCamera) -> Float[np.ndarray, "4 4"]:
+    return np.array([
+        [c.t_00, c.t_01, c.t_02, c.t_03],
+        [c.t_10, c.t_11, c.t_12, c.t_13],
+        [c.t_20, c.t_21, c.t_22, c.t_23],
+        [0.0, 0.0, 0.0, 1.0],
+    ])  # fmt: skip
+
+
+def _keyframe_stamps(cameras: list[_PolycamCamera], names: list[str], notices: list[str]) -> Float[np.ndarray, " n"]:
+    """Return seconds from the first frame, by the cameras' timestamps, else by names that are such, else by count."""
+    for stamps in ([c.timestamp for c in cameras], [float(n) if n.isascii() and n.isdigit() else None for n in names]):
+        known = np.array([stamp for stamp in stamps if stamp is not None], np.float64)
+        interval = float(np.median(np.diff(known))) if len(known) == len(cameras) > 1 else 0.0
+        unit_s = next((u for u in _UNITS_S if _LEAST_INTERVAL_S <= interval * u <= _MOST_INTERVAL_S), None)
+        if unit_s is not None and (
+            unit_s < 1.0 or np.any(known % 1.0 != 0.0)
+        ):  # whole numbers that only count are none
+            return (known - known[0]) * unit_s
+    notices.append("The scan has no clock; its frames are taken to be one second apart.")
+    return np.arange(len(cameras)) * INTERVAL_S
+
+
+_HEADER = ["timestamp", "frame", "x", "y", "z", "qx", "qy", "qz", "qw"]
+_MORE = ["fx", "fy", "cx", "cy"]
+
+
+def open_stray_scanner(path: Path, report: Report = stop_at_first) -> FileRecording:
+    """Open a recording in place.
+
+    Args:
+        path: the folder with ``rgb.mp4``, ``depth/``, ``odometry.csv`` and ``camera_matrix.csv``.
+        report: called with every fault.
+
+    Raises:
+        RecordingError: a file is missing or damaged, or no frame has all of colour, depth and pose.
+    """
+    rows = _odometry(path / "odometry.csv", report)
+    video = VideoFrames(path / "rgb.mp4")
+    depth = {number_of(name): name for name in list_names(path / "depth", (".png",))}
+    sure = {number_of(name): name for name in _confidence(path)}
+    numbers = rows[:, 1].astype(int)
+    whole = np.array([n in depth and 0 <= n < len(video) for n in numbers], bool)
+    notices: list[str] = []
+    if not whole.any():
+        raise RecordingError(f"{path} has no frame with all of a picture in rgb.mp4, depth/ and a row in odometry.csv.")
+    if not whole.all():
+        notices.append(
+            f"{int((~whole).sum())} row(s) of odometry.csv have no depth or no video frame and are left out."
+        )
+        report(Fault(f"{path}: {notices[-1]}", path / "odometry.csv", fatal=False))
+    rows, numbers = rows[whole], numbers[whole]
+    quaternion = rows[:, 5:9]
+    usable = np.abs(np.linalg.norm(quaternion, axis=1) - 1.0) <= poses.MAX_ROTATION_FAULT
+    pose = poses.from_quaternion(rows[:, 2:5], np.where(usable[:, None], quaternion, (0.0, 0.0, 0.0, 1.0)))
+    pose[~usable] = np.nan
+    shots = Shots(
+        names=[f"{n:06d}" for n in numbers],
+        colour=[],
+        depth=[f"depth/{depth[int(n)]}" for n in numbers],
+        stamps_s=rows[:, 0] - rows[0, 0],
+        world_from_camera=pose,
+        video_frames=numbers.tolist(),
+        confidence=[f"confidence/{sure[int(n)]}" for n in numbers] if all(int(n) in sure for n in numbers) else (),
+    )
+    if fault := pace_fault(shots.stamps_s, "rows of odometry.csv"):
+        raise RecordingError(f"{path}: {fault}")
+    rig, more = _stray_rig(path, rows, video, shots)
+    return FileRecording.settled(
+        path, "stray-scanner", rig, shots, (*notices, *more), report, lambda _: path / "odometry.csv",
+        up_in_world=UP_IN_WORLD.copy(), video=video,
+    )  # fmt: skip
+
+
+def _odometry(file: Path, report: Report) -> np.ndarray:
+    """Return the rows of the odometry; the header decides what they mean, and must be the app's."""
+    header = next(text_lines(file, report), (0, ""))[1].replace(" ", "").split(",")
+    if header not in (_HEADER, _HEADER + _MORE):
+        raise RecordingError(
+            f"{file} begins with {','.join(header)[:60]!r} where the header {','.join(_HEADER)} belongs; is it another "
+            "app's, or another version's?"
+        )
+    table = read_table(file, (len(header),), report, header=True)
+    finite = table.values[np.isfinite(table.values[:, :2]).all(axis=1)]
+    if len(finite) == 0:
+        raise RecordingError(f"{file} holds no pose, so there is nothing to map.")
+    return finite
+
+
+def _confidence(path: Path) -> list[str]:
+    return list_names(path / "confidence", (".png",)) if (path / "confidence").is_dir() else []
+
+
+def _stray_rig(path: Path, rows: np.ndarray, video: VideoFrames, shots: Shots) -> tuple[Rig, tuple[str, ...]]:
+    file, size = path / "camera_matrix.csv", (video.width, video.height)
+    k = read_matrix(file, 3, 3)
+    per_frame = rows[:, 9:13] if rows.shape[1] > len(_HEADER) else np.zeros((0, 4))
+    known = per_frame[np.isfinite(per_frame).all(axis=1) & (per_frame > 0.0).all(axis=1)]
+    numbers = known if len(known) else np.array([[k[0, 0], k[1, 1], k[0, 2], k[1, 2]]])
+    camera, notices = median_camera(file, numbers, *size)
+    if not (0.0 < camera.cx < camera.width and 0.0 < camera.cy < camera.height):
+        raise RecordingError(
+            f"{file} has its centre at {camera.cx:.1f}, {camera.cy:.1f}, outside of the video's {size[0]}x{size[1]}; "
+            "was the video resized? Give the matrix of its present size."
+        )
+    return Rig(camera, fitted(camera, first_picture_size(path, shots.depth), file, "depth")), notices
