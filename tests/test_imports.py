@@ -126,7 +126,7 @@ def test_a_circle_is_found_whenever_its_imports_are_carried_out(tmp_path: Path) 
 def test_all_distributions_are_read() -> None:
     graph = own_graph()
     assert len(graph) > 300
-    assert {name.partition(".")[0] for name in graph} == {"avlmaps", "avlmaps_sim", "avlmaps_models"}
+    assert {name.partition(".")[0] for name in graph} == {"avlmaps", "avlmaps_sim", "avlmaps_models", "avlmaps_ros"}
     assert (When.LOADED, "avlmaps.query.goals") in graph["avlmaps.query.heatmap"]
 
 

@@ -259,7 +259,7 @@ def test_a_real_robot_is_driven_over_rosbridge_and_let_go_at_the_end(
         asked.append((kind, url, frames is not None, obstacles is not None and settings is not None and guarded))
         return Far(GroundPose(4.4, 3.2))
 
-    monkeypatch.setattr("avlmaps.navigate.ros.open_ros_driver", connect)
+    monkeypatch.setattr("avlmaps_ros.open_ros_driver", connect)
     frames = tmp_path / "frames.json"
     frames.write_text('{"map_frame": "map"}')
     words = ("--robot", "nav2", "--ros", "ws://robot:9090", "--ros-frames", frames)

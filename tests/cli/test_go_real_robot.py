@@ -3,7 +3,6 @@
 import json
 import signal
 import socket
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from time import sleep
@@ -13,8 +12,6 @@ from typing import Any
 import pytest
 
 pytest.importorskip("roslibpy")
-sys.path.insert(0, str(Path(__file__).parents[1] / "navigate"))
-
 from ros_bridge import FakeRobot
 
 from avlmaps.cli.go import Go, drive

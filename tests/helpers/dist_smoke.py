@@ -1,10 +1,10 @@
-"""Build the three distributions and try them in empty environments: ``make dist-test``.
+"""Build the four distributions and try them in empty environments: ``make dist-test``.
 
     python tests/helpers/dist_smoke.py FOLDER [PYTHON ...]
 
 Each is built as a wheel, as an sdist, and as a wheel again out of that sdist; both wheels must hold the same files.
 Then, for the Python that runs this script and for each further one: ``avlmaps`` alone builds a map of a small
-recording, answers, writes a page, serves, and says what to install for the rest; all three, from the sdists, record in
+recording, answers, writes a page, serves, and says what to install for the rest; all four, from the sdists, record in
 a simulated home and drive there.
 
 The environments hold nothing but wheels. Their dependencies are links into the environment that runs this script, so
@@ -23,7 +23,10 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).parents[2]
-SOURCES = {"avlmaps": ROOT, **{name: ROOT / "packages" / name for name in ("avlmaps-sim", "avlmaps-models")}}
+SOURCES = {
+    "avlmaps": ROOT,
+    **{name: ROOT / "packages" / name for name in ("avlmaps-sim", "avlmaps-models", "avlmaps-ros")},
+}
 _SITE = "import sysconfig; print(sysconfig.get_path('purelib'))"
 _WALK = (
     "import sys; from pathlib import Path; from helpers.walked_room import write_walk; write_walk(Path(sys.argv[1]))"

@@ -2,7 +2,6 @@
 
 import json
 import signal
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -11,8 +10,6 @@ import httpx
 import pytest
 
 pytest.importorskip("roslibpy")
-sys.path.insert(0, str(Path(__file__).parents[1] / "navigate"))
-
 from ros_bridge import FakeRobot
 
 from avlmaps.core.motion import GroundPose

@@ -61,7 +61,7 @@ class Go(MapVerb):
     body: Literal["base", "drone"] = "base"
     """Body of the robot: a wheeled base and a drone have other obstacles."""
     robot: Literal["simulated", "nav2", "move_base"] = "simulated"
-    """Robot: a simulated body, or a real robot over rosbridge (pip install 'avlmaps[ros]') or, nav2, natively."""
+    """Robot: a simulated body, or a real robot over rosbridge (pip install avlmaps-ros) or, nav2, natively."""
     ros: Annotated[str, arg(metavar="URL")] = "ws://localhost:9090"
     """Address of rosbridge, for --robot nav2 and move_base; "native" joins the ROS 2 network of nav2 by rclpy."""
     ros_frames: Annotated[Path | None, arg(metavar="FILE")] = None
@@ -312,14 +312,11 @@ def simulated_robot(verb: "Go", avlmap: "AVLMap", start: "GroundPose | None") ->
 def _real(verb: "Go", avlmap: "AVLMap") -> Ready:
     from avlmaps.navigate.bodies import SHAPES
     from avlmaps.navigate.costmap import obstacles_for
-    from avlmaps.navigate.ros import Frames, RosSettings, open_ros_driver
+    from avlmaps.navigate.real_robots import find_robot
 
-    given = verb.ros_frames
-    frames = None if given is None else Frames.read(given)
-    settings = None if given is None else RosSettings.read(given)
+    robot = find_robot(verb.robot, verb.ros, verb.ros_frames)
     obstacles = obstacles_for(avlmap, SHAPES[verb.body])
-    kind = "nav2" if verb.robot == "nav2" else "move_base"
-    driver = open_ros_driver(kind, verb.ros, frames, obstacles, settings=settings, guarded=True)
+    driver = robot(obstacles)
     return Ready(driver, driver.pose, obstacles, lambda: None, driver.halt, lambda: driver.owes, driver.close)
 
 

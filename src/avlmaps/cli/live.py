@@ -210,7 +210,7 @@ def _recording(verb: Live) -> _Source:
 
 def _robot(verb: Live) -> _Source:
     """Return what gives the frames of a running robot; z is up in ROS's world (REP 103), and its stamps are dates."""
-    from avlmaps.live.ros_source import follow_ros2, open_ros2, ros_topics
+    from avlmaps.live.sources import join_source
 
     if verb.recording is not None or verb.as_fast_as_possible or verb.rate != 1.0 or verb.format != "auto":
         raise UsageError(
@@ -220,17 +220,13 @@ def _robot(verb: Live) -> _Source:
         raise UsageError(
             "--depth-unit, --intrinsics and the like are of a recording; leave them out with --source ros2."
         )
-    topics = ros_topics(topics_of(verb.topics))
-    if verb.same_device is not None and not topics.directions:
+    topics = topics_of(verb.topics)
+    if verb.same_device is not None and "directions" not in topics:
         raise UsageError(
             "--same-device is of a device that says directions; name its topic (--topics directions=TOPIC)."
         )
-    inbox = open_ros2(topics)  # before the map's folder is made
-
-    def play(live: "LiveMap", over: Callable[[], bool]) -> None:
-        follow_ros2(live, topics, verb.give_up_s, over=over, join=lambda _: inbox)
-
-    return _Source((0.0, 0.0, 1.0), 0.0, verb.microphones, play)
+    source = join_source(verb.source, topics)  # before the map's folder is made
+    return _Source((0.0, 0.0, 1.0), 0.0, verb.microphones, lambda live, over: source.play(live, verb.give_up_s, over))
 
 
 def _days_before(verb: Live) -> "StoredMap | None":

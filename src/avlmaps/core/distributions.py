@@ -8,7 +8,7 @@ from typing import Literal
 
 from avlmaps.core.extras import install_command
 
-What = Literal["verbs", "profiles", "backends"]
+What = Literal["verbs", "profiles", "backends", "robots", "sources"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,12 +20,16 @@ class Distribution:
         verbs: of the command line.
         profiles: their names.
         backends: ``kind:name``.
+        robots: what drives them.
+        sources: of live maps.
     """
 
     name: str
     verbs: tuple[str, ...] = ()
     profiles: tuple[str, ...] = ()
     backends: tuple[str, ...] = ()
+    robots: tuple[str, ...] = ()
+    sources: tuple[str, ...] = ()
 
 
 SIMULATOR = Distribution("avlmaps-sim", verbs=("demo", "record", "add-sounds", "bench"))
@@ -43,7 +47,8 @@ MODELS = Distribution(
         "matcher:lightglue-disk", "matcher:lightglue-aliked", "matcher:superglue",
     ),
 )  # fmt: skip
-OTHERS = (SIMULATOR, MODELS)
+ROS = Distribution("avlmaps-ros", robots=("nav2", "move_base"), sources=("ros2",))
+OTHERS = (SIMULATOR, MODELS, ROS)
 
 
 def how_to_get(what: What, name: str) -> str | None:

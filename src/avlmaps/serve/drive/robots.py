@@ -19,7 +19,7 @@ from avlmaps.query.avlmap import AVLMap
 
 if TYPE_CHECKING:
     from avlmaps.maps.obstacles import Obstacles
-    from avlmaps.navigate.ros.base import RosDriver
+    from avlmaps.navigate.real_robots import RealDriver
 
 _MOST_BYTES = 10_000
 
@@ -178,30 +178,23 @@ class RosMachine:
         Raises:
             NavigationError: the file of its frames cannot be read.
         """
-        from avlmaps.navigate.ros import Frames, RosSettings
+        from avlmaps.navigate.real_robots import find_robot
 
-        self._frames, self._settings, content = None, RosSettings(), b""
-        if read.ros_frames is not None:
-            file = folder / user_path(read.ros_frames)
-            self._frames, self._settings = Frames.read(file), RosSettings.read(file)
-            content = file.read_bytes()
+        file = None if read.ros_frames is None else folder / user_path(read.ros_frames)
+        self._robot = find_robot(read.robot, read.ros, file)
+        content = b"" if file is None else file.read_bytes()
         self.name, self.identity = f"{read.robot} robot", _identity(read, content)
         self.guess, self.map = read.guess, read.map
         self.shape = SHAPES[read.body]
-        self._read, self._version = read, ""
-        self._driver: RosDriver | None = None
+        self._version = ""
+        self._driver: RealDriver | None = None
         self._obstacles: Obstacles | None = None
 
     def prepare(self, avlmap: AVLMap, version: str) -> "Obstacles":
         """Connect; see `Machine`."""
         if self._obstacles is None or self._driver is None or version != self._version:
-            from avlmaps.navigate.ros import open_ros_driver
-
             obstacles, before = obstacles_for(avlmap, self.shape), self._driver
-            kind = "nav2" if self._read.robot == "nav2" else "move_base"
-            self._driver = open_ros_driver(
-                kind, self._read.ros, self._frames, obstacles, settings=self._settings, guarded=True
-            )
+            self._driver = self._robot(obstacles)
             if before is not None:  # until here a stop had one that could be used
                 before.close()
             self._obstacles, self._version = obstacles, version
@@ -212,7 +205,7 @@ class RosMachine:
         return self._opened.pose
 
     @property
-    def _opened(self) -> "RosDriver":
+    def _opened(self) -> "RealDriver":
         if self._driver is None:
             raise NavigationError("The robot is not connected; check that it runs, and plan again.")
         return self._driver

@@ -1,0 +1,498 @@
+"""The driver of a robot that plans and steers by itself: it sees each goal to its end, or calls it off.
+
+These are the laws of safety, over any transport (`session`): what was sent is watched; what is not watched any more is
+called off until the robot confirms it; only goals of ours are called off; and nothing new is sent before.
+"""
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from math import isfinite, pi
+from time import monotonic
+from typing import Self
+
+import numpy as np
+from jaxtyping import Float
+
+from avlmaps.core.errors import NavigationError
+from avlmaps.core.motion import GroundPose
+from avlmaps.navigate.driver import Arrival
+from avlmaps.navigate.interrupts import Halt
+from avlmaps_ros.contact import Contact
+from avlmaps_ros.goals import ActionGoal, End, MovementPlan, SentGoal, Stage, Tasks, Track
+from avlmaps_ros.guard import GoalGuard
+from avlmaps_ros.plans import LEAST_M, LONGEST_M, Standing, ahead_of, place_to_stand, plan_turn
+from avlmaps_ros.session import AGAIN_S, Opener, Session, call_off, ended_within
+from avlmaps_ros.tree import Sighting
+
+_LOOK_EVERY_S = 0.1
+_ASK_S = 1.5
+_REGULAR = 3
+_NEXT_LIST_S = 0.5
+_BEATS = 2.5  # heartbeats without one, after which nobody watches a goal
+_LEAP_M, _FASTEST_M_S = 0.5, 2.0  # a pose that moves by more than a robot drives has jumped
+_ASK_AFTER = 0.4  # of the time for which a server may be silent
+_IDLE = Halt(True, "no goal was active")
+_UNCONFIRMED = "the robot did not confirm that it gave up its goal"
+
+
+class RosDriver:
+    """Drives a robot that plans and steers by itself. One movement at a time; ``stop`` may come from any thread.
+
+    Attributes:
+        frames: the robot's frames, and how they lie to the map.
+        settings: names, patience, tolerances.
+        guard: a second process that cancels when this one dies; None where nobody started one.
+        elsewhere: returns why a place of another storey is not driven to, ``""`` for others; None for a map of one.
+        held: see `Holdable`.
+    """
+
+    def __init__(
+        self,
+        opener: Opener,
+        tasks: Tasks,
+        *,
+        standing: Standing | None = None,
+        level_from_world: Float[np.ndarray, "3 3"] | None = None,
+        clock: Callable[[], float] = monotonic,
+    ) -> None:
+        """Connect, and wait until the robot reports its pose.
+
+        Raises:
+            NavigationError: nobody answers there, or the robot does not report its pose.
+            BackendError: what the transport needs is not installed.
+        """
+        self.frames, self.settings, self._tasks = tasks.frames, tasks.settings, tasks
+        self._standing = standing
+        self._level_from_world = np.eye(3) if level_from_world is None else np.asarray(level_from_world, np.float64)
+        self._busy, self._halted, self._closing = threading.Lock(), threading.Event(), threading.Event()
+        self._goal: SentGoal | None = None
+        self._owed: SentGoal | None = None  # was sent, and its end is not confirmed
+        self._ours: deque[SentGoal] = deque(maxlen=50)
+        self._halt = _IDLE
+        self._clock = clock
+        self.guard: GoalGuard | None = None
+        self.elsewhere: Callable[[Float[np.ndarray, 3]], str] | None = None
+        self.held: Callable[[], str] = lambda: ""
+        self._absent: set[str] = set()
+        self._mute: set[str] = set()
+        self._contact = Contact(opener, self.frames, self.settings, clock)
+
+    # The Driver protocol.
+
+    @property
+    def pose(self) -> GroundPose:
+        """Where the robot is, level frame; where it was last known to be, when its pose is not reported any more."""
+        return self._contact.pose
+
+    def go_to(self, place: Float[np.ndarray, "3"], *, face: Float[np.ndarray, "3"] | None = None) -> Arrival:
+        """Drive to a place, or as near to it as the robot can stand and see it; see `Driver`."""
+        refused = "" if self.elsewhere is None else self.elsewhere(place)
+        if refused:
+            return self._move(lambda _: refused)
+        wanted = self._level(place)
+        looked_at = None if face is None else self._level(face)
+        return self._move(partial(self._plan_to, wanted=wanted, looked_at=looked_at))
+
+    def turn(self, angle_rad: float) -> Arrival:
+        """Turn on the spot, to the left by a positive angle."""
+        return self._move(lambda start: plan_turn(start, angle_rad, self.settings, self._tasks.turn))
+
+    def forward(self, distance_m: float) -> Arrival:
+        """Drive straight ahead; for a negative distance it turns round first, so that it sees where it goes."""
+        if not -LONGEST_M < distance_m <= -LEAST_M:
+            return self._move(lambda start: ahead_of(start, distance_m, self.settings, self._tasks.forward))
+        turned = self.turn(pi)
+        if not turned.reached:
+            return turned
+        driven = self.forward(-distance_m)
+        return replace(driven, path=np.concatenate([turned.path, driven.path]))
+
+    def stop(self) -> Arrival:
+        """Cancel every goal of the robot, also those of others, and report whether it stands still.
+
+        A lost connection is made again first. It takes at most four times ``cancel_timeout_s``.
+        """
+        self._halted.set()
+        track, contact, wait_s = Track(self.pose), self._contact, self.settings.cancel_timeout_s
+        if not contact.renewed_within(wait_s):
+            return self._arrival(False, track, f"{contact.loss()}, and it cannot be reached; use the robot's own stop")
+        idle = self._all_called_off(wait_s)
+        still = contact.stands_still(wait_s)
+        if idle and self._owed is not None:
+            self._settle(self._owed)
+        called = self._tasks.called
+        if not still:
+            return self._arrival(False, track, "The robot was stopped, but its pose changes or is lost")
+        if idle:
+            return self._arrival(True, track, "")
+        if idle is False:
+            return self._arrival(False, track, f"{called} does not give up its goal; the robot pauses")
+        if self._may_go_on():
+            return self._arrival(False, track, f"{called} does not answer, and was at a goal; the robot pauses")
+        return self._arrival(True, track, f"The robot stands, but {called} does not say that it has no goal")
+
+    def fault(self) -> str:
+        """Return why the robot cannot be driven now, in part of a sentence; "" where it can.
+
+        A lost connection is made again, and a guard that ended is started again.
+        """
+        try:
+            if why := self._unready():
+                return why[:1].lower() + why[1:]
+        except NavigationError as fault:
+            return str(fault)
+        if self.guard is not None and not self.guard.revived():
+            return "the guard, which cancels its goals when this program dies, cannot be started"
+        return ""
+
+    def halt(self) -> Halt:
+        """Return whether the robot stands after its last movement, whose goal was called off if it was interrupted.
+
+        Unlike ``stop`` it leaves goals of others alone. It waits at most ``cancel_timeout_s``.
+        """
+        if self._owed is not None:
+            return Halt(False, _UNCONFIRMED)
+        halt = self._halt
+        if not halt.stopped:
+            return halt
+        if self._contact.stands_still(self.settings.cancel_timeout_s):
+            pose = self.pose
+            return Halt(True, f"{halt.note}; the robot stands at ({pose.x_m:.2f}, {pose.y_m:.2f}) m")
+        moved = "a goal of another client drives the robot" if self._others() else "the robot is not seen to stand"
+        return Halt(False, f"{halt.note}, but {moved}")
+
+    @property
+    def owes(self) -> bool:
+        """Whether a goal was sent whose end the robot has not confirmed, so that it may still be driving."""
+        return self._owed is not None and self._owed.stage is not Stage.OVER
+
+    def close(self) -> None:
+        """End the connection; a goal that is not over is called off first, and else left to the guard."""
+        goal = self._unfinished
+        if goal is not None:
+            self._called_off(goal, self.settings.cancel_timeout_s)
+        self._closing.set()
+        self._contact.session.close()
+        if self.guard is not None:
+            self.guard.close(dismissed=goal is None or goal.stage is Stage.OVER)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    # One movement.
+
+    @property
+    def _unfinished(self) -> SentGoal | None:
+        """The goal of ours that is not over."""
+        goal = self._goal or self._owed
+        return None if goal is None or goal.stage is Stage.OVER else goal
+
+    def _may_go_on(self) -> bool:
+        """Return whether a goal, of ours or of others, is not over as far as is known."""
+        return self._unfinished is not None or any(self._contact.ear.servers.under_way().values())
+
+    def _level(self, place: Float[np.ndarray, "3"]) -> Float[np.ndarray, "2"]:
+        known = np.isfinite(place).all()  # NaN stays NaN, without a warning
+        return (self._level_from_world @ np.asarray(place, np.float64))[:2] if known else np.full(2, np.nan)
+
+    def _plan_to(
+        self, start: GroundPose, wanted: Float[np.ndarray, "2"], looked_at: Float[np.ndarray, "2"] | None
+    ) -> MovementPlan | str:
+        return place_to_stand(start, wanted, looked_at, self._standing, self.settings, self._tasks.pose)
+
+    def _move(self, planned: Callable[[GroundPose], MovementPlan | str]) -> Arrival:
+        if not self._busy.acquire(blocking=False):
+            return self._arrival(False, Track(self.pose), "The robot is still at another movement")
+        try:
+            self._halted.clear()
+            self._halt = _IDLE
+            if why := self._unready():
+                return self._arrival(False, Track(self.pose), why)
+            start = self.pose
+            plan = planned(start)
+            return self._arrival(False, Track(start), plan) if isinstance(plan, str) else self._done(plan, Track(start))
+        except NavigationError as fault:
+            return self._arrival(False, Track(self.pose), str(fault))
+        finally:
+            self._busy.release()
+
+    def _unready(self) -> str:
+        """Return why nothing may be sent now; "" where it may. Connect again, and call off what is owed, first.
+
+        Raises:
+            NavigationError: the robot is not there.
+        """
+        contact = self._contact
+        contact.renew()
+        if self._owed is not None and not self._called_off(self._owed, self.settings.cancel_timeout_s):
+            return "An earlier goal may still be driving the robot: it does not confirm the cancel"
+        if self._owed is not None:
+            self._settle(self._owed)
+        if contact.pose_within(self.settings.pose_max_age_s) is None:
+            late = contact.session.lost is None and contact.sighting() is not None
+            # A new connection has no queue, and takes the robot's clock as it is now.
+            if not (late and contact.replace() and contact.pose_within(self.settings.pose_max_age_s) is not None):
+                return f"Where the robot is is not known: {contact.unseen()}"
+        if self._others(_ASK_S):
+            return f"{self._tasks.called} is at a goal of another client; wait for its end, or stop it"
+        return ""
+
+    def _others(self, wait_s: float = 0.0) -> bool:
+        """Return whether a goal of others is under way, by lists and heartbeats, also after some time."""
+        contact, until_s, asked = self._contact, monotonic() + wait_s, False
+        every_s = contact.session.lists_every_s
+        while True:
+            names = frozenset(name for goal in self._ours for name in goal.names)
+            lists = contact.ear.servers.under_way(None if every_s is None else 10.0 * every_s)
+            servers = [server for server, goals in lists.items() if goals - names]
+            is_driven = bool(servers or contact.ear.beats.within(_BEATS * self.settings.heartbeat_s) - names)
+            if not is_driven or monotonic() >= until_s:
+                return is_driven
+            if not asked:  # a list may be the last of a server that is gone
+                asked = True
+                for server in servers:
+                    contact.session.ask(server)
+            with contact.session.heard:
+                contact.session.heard.wait(_LOOK_EVERY_S)
+
+    def _others_soon(self) -> bool:
+        """Return whether a goal of others took the place of ours, by the next list."""
+        session = self._contact.session
+        with session.heard:
+            return session.heard.wait_for(lambda: self._others(), _NEXT_LIST_S)
+
+    def _done(self, plan: MovementPlan, track: Track) -> Arrival:
+        """Do what was planned, and see whether it was done."""
+        end, note = End.SUCCEEDED, ""
+        for task in [task for task in plan.tasks if task.action not in self._absent] or plan.tasks[-1:]:
+            goal = self._pursue(task, track)
+            end, note = goal.end, goal.note
+            if end is not End.ABSENT or self._halted.is_set():
+                break
+            self._absent.add(task.action)
+        if end is not End.SUCCEEDED:
+            others = ". A goal of another client continues" if self._others_soon() else ""
+            return self._arrival(False, track, (note or f"{self._tasks.called} did not do it") + others)
+        called = self._tasks.called
+        now = self._contact.pose_from_now(self.settings.pose_max_age_s)
+        if now is None:
+            why = f"{called} says that it arrived, but its pose is not reported any more: {self._contact.unseen()}"
+            return self._arrival(False, track, why)
+        track.passed(now)
+        off = plan.off(now)
+        if off:
+            why = "its goal tolerance is loose, or the frames are wrong"
+            return self._arrival(False, track, f"{called} says that it arrived, but {off}; {why}")
+        return self._arrival(True, track, plan.note)
+
+    def _pursue(self, task: ActionGoal, track: Track) -> SentGoal:
+        """Send one goal and see it to its end, good or bad."""
+        listed = self._contact.ear.servers.list_of(task.action)
+        before = frozenset[str]() if listed is None else listed[1]
+        goal = SentGoal(task, self.settings.answer_timeout_s, before)
+        if self._is_absent(task.action):
+            goal.over(End.ABSENT, f"No action server takes the goal; start {self._tasks.called}, or name its namespace")
+            return goal
+        self._goal = goal
+        self._ours.append(goal)
+        try:
+            self._beat(goal)
+            self._contact.session.send(goal)
+            why, absent = self._watch(goal, track)
+            if goal.end is None:
+                self._give_up(goal, why, absent)
+        except BaseException:  # above all KeyboardInterrupt: nobody watches the robot any more
+            agreed = self._called_off(goal, self._patience_s(goal))
+            self._halt = Halt(agreed, "the active goal was cancelled" if agreed else _UNCONFIRMED)
+            raise
+        finally:
+            self._goal = None
+            if goal.stage is Stage.OVER:
+                self._settle(goal)
+            else:
+                self._owed = goal
+        return goal
+
+    def _settle(self, goal: SentGoal) -> None:
+        """Take note that nothing is left of a goal."""
+        goal.over(End.CANCELLED)
+        self._contact.session.beat(goal)
+        if self._owed is goal:
+            self._owed = None
+        if self.guard is not None and self._owed is None:
+            self.guard.rest()
+
+    def _is_absent(self, server: str) -> bool:
+        """Return whether a server is known not to be there, after asking where nobody has."""
+        session, servers = self._contact.session, self._contact.ear.servers
+        begun_s = self._clock()
+        served = servers.serves(server)
+        if (server not in self._mute and (served is None or not served[1])) and session.ask(server):
+            with session.heard:
+                session.heard.wait_for(lambda: (servers.serves(server) or (-1.0, True))[0] >= begun_s, _ASK_S)
+            served = servers.serves(server)
+            if served is None:  # the bridge may hand out no services
+                self._mute.add(server)
+        return served is not None and not served[1]
+
+    def _watch(self, goal: SentGoal, track: Track) -> tuple[str, bool]:
+        """Wait for a goal's end; else return why it is to be given up, and whether nobody is there to take it."""
+        begun_s, settings, session = monotonic(), self.settings, self._contact.session
+        sent_s = looked_s = beaten_s = asked_s = self._clock()
+        before, jump = self._contact.sighting(), ""
+        while not ended_within(goal, session, _LOOK_EVERY_S):
+            now_s = self._clock()
+            stood_s, looked_s = now_s - looked_s, now_s
+            if stood_s > settings.stall_s:
+                return f"The watch over the goal stood still for {stood_s:.1f} s", False
+            if now_s - beaten_s >= settings.heartbeat_s:
+                beaten_s = now_s
+                self._beat(goal)
+            track.passed(self.pose)
+            if jump:  # and the goal did not end at that
+                return jump, False
+            now = self._contact.sighting()
+            before, jump = now or before, _jump(before, now)
+            silent_s = self._silent_s(goal, sent_s, now_s)
+            if why := self._lost_sight(goal, silent_s):
+                return why, False
+            if goal.stage is Stage.SENT and monotonic() - begun_s > settings.answer_timeout_s:
+                says = f" The bridge says: {session.complaint}" if session.complaint else ""
+                within = f"within {settings.answer_timeout_s:g} s; is {self._tasks.called} running?{says}"
+                return f"Nothing answers at {goal.task.action} {within}", True
+            if monotonic() - begun_s > goal.task.limit_s:
+                return f"{self._tasks.called} was not done within {goal.task.limit_s:g} s", False
+            if silent_s > _ASK_AFTER * settings.server_max_age_s and now_s - asked_s > AGAIN_S:
+                asked_s = now_s
+                session.ask(goal.task.action)
+            session.remind(goal)
+        return "", False
+
+    def _lost_sight(self, goal: SentGoal, silent_s: float) -> str:
+        """Return why a goal cannot be watched any more, or must not continue; "" where it can."""
+        contact, settings = self._contact, self.settings
+        if contact.session.lost is not None:
+            return contact.loss()
+        if self._halted.is_set():
+            return "The robot was stopped"
+        if why := self.held():
+            return why
+        if contact.is_unseen_for(settings.pose_max_age_s):
+            return f"Where the robot is is not known any more: {contact.unseen()}"
+        if silent_s > settings.server_max_age_s:
+            since = f"for {silent_s:.1f} s" if isfinite(silent_s) else "and its action server is gone"
+            return f"{self._tasks.called} has said nothing of {goal.task.action} {since}; it may have ended"
+        return ""
+
+    def _silent_s(self, goal: SentGoal, sent_s: float, now_s: float) -> float:
+        """Return since when nothing shows that a server is there that had taken a goal."""
+        if goal.heard_s is None:
+            return 0.0
+        served = self._contact.ear.servers.serves(goal.task.action)
+        if served is None or served[0] <= max(sent_s, goal.heard_s):
+            return now_s - goal.heard_s
+        if not served[1]:
+            return float("inf")
+        # A server that listed a goal regularly and does so no more has lost it, also where it runs.
+        return now_s - (goal.heard_s if goal.shown >= _REGULAR else served[0])
+
+    # Calling off.
+
+    def _give_up(self, goal: SentGoal, why: str, absent: bool) -> None:
+        """Call a goal off, for as long as it could last, and say how it went."""
+        was_lost = self._contact.session.lost is not None
+        agreed = self._called_off(goal, goal.answer_s + 2.0 * AGAIN_S if absent else goal.task.limit_s)
+        servers = self._contact.ear.servers
+        if absent and not servers.has_shown(goal.task.action):
+            goal.over(End.ABSENT)
+        absent = absent and goal.stage is Stage.OVER
+        if absent:
+            goal.end = End.ABSENT
+        if agreed or absent:
+            goal.note = f"{why}; it was reached again and stopped" if was_lost and not absent else why
+        elif was_lost:
+            goal.note = f"{why}; it may still be driving: use its own stop"
+        else:
+            goal.note = f"{why}; it does not say that it gave up, and may still be driving"
+
+    def _called_off(self, goal: SentGoal, wait_s: float) -> bool:
+        """Cancel a goal until the robot confirms it; return whether it does.
+
+        A lost connection is made again for as long as it takes. A connection that stands and brings no confirmation is
+        replaced once: it may be stuck.
+        """
+        contact = self._contact
+        until_s, tries = monotonic() + wait_s, 0
+        while goal.end is None and tries < 2 and not self._closing.is_set() and (left_s := until_s - monotonic()) > 0.0:
+            if not contact.renewed_within(min(left_s, AGAIN_S)):
+                continue
+            if tries and not contact.replace():
+                continue
+            session = contact.session
+            patience_s = self._patience_s(goal) / 2.0
+            call_off(goal, session, min(until_s, monotonic() + patience_s), self._closing.is_set)
+            tries += session.lost is None
+        return goal.end is not None
+
+    def _patience_s(self, goal: SentGoal) -> float:
+        """Return how long the robot may take to confirm a cancel."""
+        wait_s = 2.0 * self.settings.cancel_timeout_s
+        return wait_s + (goal.answer_s if goal.stage is Stage.SENT else 0.0)
+
+    def _all_called_off(self, wait_s: float) -> bool | None:
+        """Cancel every goal until the servers say that they are at none; return what they said last.
+
+        A goal of ours that may still be accepted has to be over as well; it is waited for four times as long, on the
+        connection that will bring its result.
+        """
+        contact, since_s, idle = self._contact, self._clock(), None
+
+        def waits() -> bool:
+            goal = self._unfinished
+            return goal is not None and goal.stage is Stage.SENT
+
+        def is_idle(session: Session) -> bool | None:
+            return False if waits() else session.is_idle(since_s)
+
+        for replaced in (False, True):
+            if replaced and (waits() or not contact.replace()):
+                break
+            session, begun_s = contact.session, monotonic()
+            while session.lost is None and monotonic() - begun_s < (2.0 * wait_s if waits() else 0.5 * wait_s):
+                session.cancel_all()
+                if (goal := self._unfinished) is not None:
+                    session.cancel(goal)
+                with session.heard:
+                    session.heard.wait_for(lambda s=session: is_idle(s) or s.lost is not None, AGAIN_S)
+                idle = is_idle(session)
+                if idle:
+                    return True
+        return idle
+
+    def _beat(self, goal: SentGoal) -> None:
+        """Report that a goal is active and watched, to the guard and to the robot."""
+        if self.guard is not None:
+            self.guard.beat(goal)
+        self._contact.session.beat(goal)
+
+    def _arrival(self, reached: bool, track: Track, note: str) -> Arrival:
+        pose = self.pose
+        track.passed(pose)
+        ended = note.endswith((".", "?", ")"))
+        return Arrival(reached, pose, (), track.places, note if ended or not note else f"{note}.")
+
+
+def _jump(before: Sighting | None, now: Sighting | None) -> str:
+    """Return that a pose jumped from one sighting to the next; "" where a robot could have driven that distance."""
+    if before is None or now is None:
+        return ""
+    moved_m, took_s = now.pose.distance_m(before.pose), now.heard_s - before.taken_s
+    if moved_m <= _LEAP_M + _FASTEST_M_S * took_s:
+        return ""
+    return f"Its pose jumped by {moved_m:.1f} m within {took_s:.1f} s; check its localisation"

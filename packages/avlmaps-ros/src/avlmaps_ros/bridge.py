@@ -1,0 +1,141 @@
+"""A session over rosbridge: what Nav2 and move_base have in common there."""
+
+import threading
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import ClassVar
+
+import msgspec
+
+from avlmaps_ros.goals import SentGoal
+from avlmaps_ros.link import Link
+from avlmaps_ros.messages import Clock, Text
+from avlmaps_ros.session import Ear, heartbeat
+from avlmaps_ros.settings import RosSettings
+
+_ECHO_EVERY_S = 0.2
+_CLOCK_EVERY_S = 0.1
+
+
+class BridgeSession(ABC):
+    """One connection to rosbridge, over which topics come and go; nothing on it ever waits for a goal.
+
+    Attributes:
+        name: address of the bridge.
+        heard: notified whenever something arrived or changed.
+    """
+
+    tf_kind: ClassVar[str]
+    """The type of /tf."""
+    clock_kind: ClassVar[str]
+    """The type of /clock."""
+    text_kind: ClassVar[str]
+    """The type of heartbeats and echoes."""
+    lists_every_s: ClassVar[float | None]
+
+    def __init__(self, url: str, token: str | None, settings: RosSettings, ear: Ear, timeout_s: float) -> None:
+        """Connect.
+
+        Raises:
+            BackendError: roslibpy is not installed.
+            NavigationError: there is no bridge.
+        """
+        self.heard = threading.Condition()
+        self.settings, self.ear = settings, ear
+        self._ours: dict[str, SentGoal] = {}
+        self._url, self._token = url, token
+        self.link = Link(url, token, timeout_s, self.heard)
+        self.name = self.link.url
+        link, tree = self.link, ear.tree
+        self._beats, echo = self._named("avlmaps/heartbeat"), self._named("avlmaps/echo")
+        link.advertise(self._beats, self.text_kind)
+        if ear.wants_poses:
+            prefix = settings.tf_namespace
+            link.subscribe(f"{prefix}/tf", self.tf_kind, lambda told: tree.hear(told, static=False))
+            link.subscribe(f"{prefix}/tf_static", self.tf_kind, lambda told: tree.hear(told, static=True))
+            link.subscribe("/clock", self.clock_kind, lambda told: tree.tick(_seconds(told)), _CLOCK_EVERY_S)
+            link.subscribe(self._beats, self.text_kind, lambda told: ear.beats.hear(_text(told)))
+            link.advertise(echo, self.text_kind)
+            link.subscribe(echo, self.text_kind, lambda told: ear.echoes.back(_text(told)))
+            link.repeat(_ECHO_EVERY_S, lambda: link.publish(echo, {"data": ear.echoes.next()}))
+        self._greet()
+
+    @abstractmethod
+    def _greet(self) -> None:
+        """Subscribe and advertise what goals need."""
+
+    def _named(self, name: str) -> str:
+        return f"{self.settings.namespace}/{name}"
+
+    @property
+    def lost(self) -> str | None:
+        """Why the connection is over; None while it stands."""
+        return self.link.lost
+
+    @property
+    def complaint(self) -> str:
+        """The latest complaint of the bridge."""
+        complaints = self.link.complaints
+        binary = " (is it launched with bson_only_mode?)" if not complaints else ""
+        unread = f"{self.link.unread} messages came that cannot be read{binary}" if self.link.unread else ""
+        return complaints[-1] if complaints else unread
+
+    def ask(self, server: str) -> bool:
+        """Return False: this robot's servers list their goals by themselves."""
+        del server
+        return False
+
+    @abstractmethod
+    def send(self, goal: SentGoal) -> None:
+        """Send a goal."""
+
+    @abstractmethod
+    def remind(self, goal: SentGoal) -> None:
+        """Send a goal again where it may have been lost."""
+
+    @abstractmethod
+    def cancel(self, goal: SentGoal) -> None:
+        """Ask for the end of one goal."""
+
+    @abstractmethod
+    def cancel_all(self) -> None:
+        """Ask for the end of every goal."""
+
+    @abstractmethod
+    def is_idle(self, since_s: float) -> bool | None:
+        """Return whether the servers are at nothing."""
+
+    def beat(self, goal: SentGoal) -> None:
+        """Publish a heartbeat."""
+        self.link.publish(self._beats, {"data": heartbeat(goal)})
+
+    def close(self) -> None:
+        """End the connection."""
+        self.link.close()
+
+    # Our goals, as servers list them.
+
+    def _adopt(self, goal: SentGoal) -> None:
+        """Hear what becomes of a goal, also of one that another session sent."""
+        self._ours[goal.id] = goal
+
+    def _call_off(self, goal: SentGoal) -> None:
+        """Adopt a goal, and take note that it is being cancelled."""
+        self._adopt(goal)
+        goal.call_off(self.ear.clock())
+
+    def _each(self, take: Callable[[SentGoal], None]) -> None:
+        """Do something with each goal of ours that has not ended; forget the others."""
+        for name, goal in list(self._ours.items()):
+            if goal.end is None:
+                take(goal)
+            if goal.end is not None:
+                self._ours.pop(name, None)
+
+
+def _text(message: msgspec.Raw) -> str:
+    return msgspec.json.decode(message, type=Text).data
+
+
+def _seconds(message: msgspec.Raw) -> float:
+    return msgspec.json.decode(message, type=Clock).clock.seconds

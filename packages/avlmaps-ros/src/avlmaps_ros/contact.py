@@ -1,0 +1,192 @@
+"""The connection to one robot, made again when it was lost, and where the robot says that it is."""
+
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from time import monotonic, sleep
+
+from avlmaps.core.errors import NavigationError
+from avlmaps.core.motion import GroundPose, wrap_angle
+from avlmaps_ros.frames import Frames
+from avlmaps_ros.session import Ear, Opener, Session
+from avlmaps_ros.settings import RosSettings
+from avlmaps_ros.tree import Sighting
+
+STILL_M, STILL_RAD, STILL_S = 0.015, 0.02, 0.5
+
+
+class Stillness:
+    """Decides from sightings, one after the other, whether a body stands.
+
+    Two poses are compared that were taken at least `STILL_S` apart, and every pose between them. When a pose was taken
+    is known within bounds: the first no later than it was heard, the last no earlier than every moving transform in it
+    was made. So neither a slow transform nor a queue makes a moving body stand.
+    """
+
+    def __init__(self, begun_s: float) -> None:
+        self._begun_s = begun_s
+        self._first: Sighting | None = None
+
+    def shown(self, seen: Sighting | None) -> bool:
+        """Take in what is seen now; return whether the body stands. A robot that reports nothing does not."""
+        if seen is None or seen.taken_s <= self._begun_s:
+            return False
+        if self._first is None or _is_elsewhere(self._first.pose, seen.pose):
+            self._first = seen
+            return False
+        return seen.taken_s - self._first.heard_s >= STILL_S
+
+
+def _is_elsewhere(before: GroundPose, now: GroundPose) -> bool:
+    turned_rad = abs(wrap_angle(now.heading_rad - before.heading_rad))
+    return now.distance_m(before) > STILL_M or turned_rad > STILL_RAD
+
+
+_LOOK_EVERY_S = 0.02
+_AGAIN_S = 0.25
+_QUICK_S = 2.0
+
+
+class Contact:
+    """One robot, over one session after the other.
+
+    Attributes:
+        frames: the robot's frames, and how they lie to the map.
+        settings: patience and names.
+        session: the connection that stands, or stood last.
+        ear: what has arrived over that session.
+    """
+
+    def __init__(
+        self, opener: Opener, frames: Frames, settings: RosSettings, clock: Callable[[], float] = monotonic
+    ) -> None:
+        """Connect, and wait until the robot reports its pose.
+
+        Raises:
+            NavigationError: nobody answers there, or the robot does not report its pose.
+            BackendError: what the transport needs is not installed.
+        """
+        self.frames, self.settings = frames, settings
+        self._opener, self._clock = opener, clock
+        self._last: GroundPose | None = None
+        self._renewing = threading.Lock()
+        self.ear = Ear(clock)
+        self.session, self.ear = self._opened(settings.connect_timeout_s)
+        if self.pose_within(settings.pose_timeout_s) is None:
+            self.session.close()
+            raise NavigationError(
+                f"The robot at {self.session.name} does not report its pose: {self.unseen(closed=True)}; start its "
+                "localisation, give it its initial pose, and name its frames as docs/robots.md shows."
+            )
+
+    def _opened(self, within_s: float) -> tuple[Session, Ear]:
+        ear = Ear(self._clock)
+        ear.tree.take(self.ear.tree.fixed(), static=True)
+        return self._opener(ear, within_s), ear
+
+    def renew(self, within_s: float | None = None) -> None:
+        """Connect again where the connection was lost.
+
+        Args:
+            within_s: ``connect_timeout_s`` by default.
+
+        Raises:
+            NavigationError: the robot is not there.
+        """
+        with self._renewing:
+            if self.session.lost is not None:
+                self.session.close()
+                self.session, self.ear = self._opened(self.settings.connect_timeout_s if within_s is None else within_s)
+
+    def renewed_within(self, wait_s: float) -> bool:
+        """Connect again where the connection was lost, and try until some time is over; return whether it stands."""
+        until_s = monotonic() + wait_s
+        while self.session.lost is not None:
+            with suppress(NavigationError):
+                self.renew(min(_QUICK_S, self.settings.connect_timeout_s))
+                continue
+            if monotonic() >= until_s:
+                return False
+            sleep(_AGAIN_S)
+        return True
+
+    def replace(self) -> bool:
+        """Connect a second time and leave the first connection, which may be stuck; return whether that succeeded."""
+        with self._renewing:
+            before = self.session
+            try:
+                self.session, self.ear = self._opened(min(_QUICK_S, self.settings.connect_timeout_s))
+            except NavigationError:
+                return False
+        before.close()
+        return True
+
+    @property
+    def pose(self) -> GroundPose:
+        """Where the robot is, level frame; where it was last, when that is not reported any more."""
+        self._fresh()
+        assert self._last is not None, "the constructor waits for it"
+        return self._last
+
+    def pose_within(self, wait_s: float) -> GroundPose | None:
+        """Return the pose as soon as it is fresh; None where it is not by then."""
+        until_s = monotonic() + wait_s
+        while not self._fresh():
+            if self.session.lost is not None or monotonic() > until_s:
+                return None
+            sleep(_LOOK_EVERY_S)
+        return self._last
+
+    def pose_from_now(self, wait_s: float) -> GroundPose | None:
+        """Return a pose that was taken after this call; None where none is within that time."""
+        now_s, until_s = self._clock(), monotonic() + wait_s
+        while monotonic() < until_s and self.session.lost is None:
+            seen = self.sighting()
+            if seen is not None and seen.taken_s > now_s:
+                self._last = self.frames.to_level(seen.pose)
+                return self._last
+            sleep(_LOOK_EVERY_S)
+        return None
+
+    def stands_still(self, wait_s: float) -> bool:
+        """Return whether the robot is seen to come to stand within that time; see `Stillness`."""
+        still, until_s = Stillness(self._clock()), monotonic() + wait_s
+        while monotonic() < until_s and self.session.lost is None:
+            sleep(_LOOK_EVERY_S)
+            if still.shown(self.sighting()):
+                self._fresh()
+                return True
+        return False
+
+    def is_unseen_for(self, longest_s: float) -> bool:
+        """Return whether the pose is older than that."""
+        seen = self.sighting()
+        return seen is None or seen.age_s > longest_s
+
+    def unseen(self, closed: bool = False) -> str:
+        """Return why the pose is not known, in part of a sentence."""
+        if self.session.lost is not None and not closed:
+            return self.loss()
+        seen, tree = self.sighting(), self.ear.tree
+        if seen is not None:
+            late_s = seen.age_s - (self._clock() - seen.heard_s)
+            queued = "; they arrive late, behind a bridge or a network that is too slow" if late_s > 1.0 else ""
+            return f"its transforms are {seen.age_s:.1f} s old{queued}"
+        refused = f"; {tree.refused} transforms were NaN or no rotation" if tree.refused else ""
+        says = f"; {self.session.complaint}" if self.session.complaint else ""
+        return tree.why_not(self.frames.map_frame, self.frames.base_frame) + refused + says
+
+    def loss(self) -> str:
+        """Return that the connection was lost, and how."""
+        return f"The connection to the robot was lost ({(self.session.lost or '').rstrip('.')})"
+
+    def sighting(self) -> Sighting | None:
+        """Return the pose by the transforms now, in the robot's frame."""
+        return self.ear.tree.seen(self.frames.map_frame, self.frames.base_frame)
+
+    def _fresh(self) -> bool:
+        seen = self.sighting()
+        if seen is None or seen.age_s > self.settings.pose_max_age_s:
+            return False
+        self._last = self.frames.to_level(seen.pose)
+        return True

@@ -1,0 +1,181 @@
+"""The task of a ROS robot, and its state."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any, ClassVar
+from uuid import uuid4
+
+import numpy as np
+from jaxtyping import Float
+
+from avlmaps.core.motion import GroundPose
+from avlmaps_ros.frames import Frames
+from avlmaps_ros.settings import RosSettings
+
+_STEP_M = 0.05
+_MOST_PLACES = 20_000
+
+
+class Stage(StrEnum):
+    """How far a goal is, as far as we know."""
+
+    SENT = "sent"
+    """Its server may still accept it, at any moment; also one that does not know it now."""
+    ACCEPTED = "accepted"
+    OVER = "over"
+
+
+class End(StrEnum):
+    """How a goal ended."""
+
+    SUCCEEDED = "succeeded"
+    CANCELLED = "cancelled"
+    FAILED = "failed"
+    ABSENT = "absent"
+    """Nobody took it."""
+
+
+@dataclass(frozen=True, slots=True)
+class ActionGoal:
+    """One goal for one action server.
+
+    Attributes:
+        action: the server's name.
+        kind: the action's type.
+        arguments: the goal's message.
+        limit_s: how long it may take.
+    """
+
+    action: str
+    kind: str
+    arguments: dict[str, Any]
+    limit_s: float
+
+
+@dataclass(slots=True, eq=False)
+class SentGoal:
+    """A task that was sent. The transport's thread writes what comes of it; the first end stands.
+
+    A server that does not know a goal ends it only where it had accepted it. A goal that was only sent may be on its
+    way, or wait to be accepted: it is over by its own result, or when it was called off for the whole answer time.
+
+    Attributes:
+        task: the requested task.
+        answer_s: longest time from sending a goal until its server accepts it.
+        before: the goals that its server listed before it was sent, by the server's names.
+        id: our name for it, unlike any other client's.
+        alias: the server's name for it, where that is another and is known.
+        called_off_s: when it was first cancelled; None before.
+        heard_s: when the server last showed that it is at it, by the driver's clock; None before it did.
+        shown: how often it did.
+        end: how it ended; None while it has not.
+        note: why, where the robot says.
+    """
+
+    task: ActionGoal
+    answer_s: float = 10.0
+    before: frozenset[str] = frozenset()
+    id: str = field(default_factory=lambda: f"avlmaps-{uuid4().hex}")
+    alias: str = ""
+    called_off_s: float | None = None
+    heard_s: float | None = None
+    shown: int = 0
+    end: End | None = None
+    note: str = ""
+
+    @property
+    def stage(self) -> Stage:
+        """How far it is."""
+        if self.end is not None:
+            return Stage.OVER
+        return Stage.SENT if self.heard_s is None else Stage.ACCEPTED
+
+    @property
+    def names(self) -> frozenset[str]:
+        """Each name under which a server may list it."""
+        return frozenset(name for name in (self.id, self.alias) if name)
+
+    def show(self, now_s: float) -> None:
+        """Take note that the server is at it."""
+        self.heard_s = now_s
+        self.shown += 1
+
+    def over(self, end: End, note: str = "") -> None:
+        """Take note that it ended."""
+        if self.end is None:
+            self.note = note
+            self.end = end
+
+    def call_off(self, now_s: float) -> None:
+        """Take note that it is being cancelled."""
+        self.called_off_s = now_s if self.called_off_s is None else self.called_off_s
+
+    def unknown(self, now_s: float, note: str) -> None:
+        """Take note that its server does not know it, or is gone."""
+        cancelled_for_s = 0.0 if self.called_off_s is None else now_s - self.called_off_s
+        if self.stage is Stage.ACCEPTED or cancelled_for_s >= self.answer_s:
+            self.over(End.FAILED if self.called_off_s is None else End.CANCELLED, note)
+
+
+@dataclass(frozen=True, slots=True)
+class MovementPlan:
+    """The message to send for a movement, and the test whether it was made.
+
+    Attributes:
+        tasks: the first whose server is there is done.
+        off: given where the robot stands afterwards, how it is not as it should be; empty where it is.
+        note: something to say even so.
+    """
+
+    tasks: tuple[ActionGoal, ...]
+    off: Callable[[GroundPose], str]
+    note: str = ""
+
+
+class Track:
+    """The places that a robot passed, level frame, a few centimetres apart."""
+
+    def __init__(self, start: GroundPose) -> None:
+        self._places = [(start.x_m, start.y_m)]
+
+    def passed(self, pose: GroundPose) -> None:
+        """Add where it is now."""
+        x_m, y_m = self._places[-1]
+        if abs(pose.x_m - x_m) + abs(pose.y_m - y_m) >= _STEP_M:
+            self._places.append((pose.x_m, pose.y_m))
+        if len(self._places) > _MOST_PLACES:
+            del self._places[1::2]
+
+    @property
+    def places(self) -> Float[np.ndarray, "n 2"]:
+        """All of them, in order."""
+        return np.array(self._places, np.float64)
+
+
+class Tasks(ABC):
+    """Makes the tasks of one kind of robot.
+
+    Attributes:
+        frames: the robot's frames, and how they lie to the map.
+        settings: names, patience, speeds.
+    """
+
+    called: ClassVar[str]
+    """The program that drives the robot, as notes name it."""
+
+    def __init__(self, frames: Frames, settings: RosSettings) -> None:
+        self.frames, self.settings = frames, settings
+
+    @abstractmethod
+    def pose(self, pose: GroundPose) -> ActionGoal:
+        """Return the task of standing at a pose, level frame."""
+
+    def turn(self, start: GroundPose, angle_rad: float) -> tuple[ActionGoal, ...]:
+        """Return the tasks of a turn on the spot; the first whose server is there is done."""
+        return (self.pose(start.turned(angle_rad)),)
+
+    def forward(self, start: GroundPose, distance_m: float) -> tuple[ActionGoal, ...]:
+        """Return the tasks of a straight drive; the first whose server is there is done."""
+        return (self.pose(start.ahead(distance_m)),)

@@ -1,0 +1,190 @@
+"""The robot's own map or costmap: planning on it, "reachable" means what the robot's planner means."""
+
+from dataclasses import dataclass, replace
+from math import atan2, cos, isfinite, sin
+from threading import Condition
+from typing import Annotated
+
+import msgspec
+import numpy as np
+from jaxtyping import Int8
+
+from avlmaps.core.errors import NavigationError
+from avlmaps.core.motion import GroundPose
+from avlmaps.maps.obstacles import CellState, Obstacles
+from avlmaps_ros.frames import Frames
+from avlmaps_ros.messages import sanitize_line
+from avlmaps_ros.settings import RosSettings
+
+MOST_BYTES = 64_000_000
+"""Of a grid as a message of rosbridge, which writes it in digits."""
+_MOST_CELLS = 16_000_000
+_MAP_AT, _COSTMAP_AT = 65, 99  # map_server's threshold; the middle of a body touches something
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OwnGrid:
+    """A nav_msgs/OccupancyGrid.
+
+    Attributes:
+        values: (height, width) along the grid's y and x: 0 free to 100 occupied, -1 unknown.
+        cell_m: edge of a cell.
+        corner: of the grid, in its frame.
+        frame: name of that frame.
+        is_costmap: whether obstacles are already as much larger as the body is.
+    """
+
+    values: Int8[np.ndarray, "h w"]
+    cell_m: float
+    corner: GroundPose
+    frame: str
+    is_costmap: bool = False
+
+
+class _Position(msgspec.Struct):
+    x: float
+    y: float
+
+
+class _Turn(msgspec.Struct):
+    z: float
+    w: float
+
+
+class _Pose(msgspec.Struct):
+    position: _Position
+    orientation: _Turn
+
+
+class _Info(msgspec.Struct):
+    resolution: float
+    width: int
+    height: int
+    origin: _Pose
+
+
+class _Header(msgspec.Struct):
+    frame_id: str
+
+
+class _Grid(msgspec.Struct):
+    header: _Header
+    info: _Info
+    data: list[Annotated[int, msgspec.Meta(ge=-128, le=127)]]
+
+
+def grid_in(message: msgspec.Raw) -> OwnGrid:
+    """Read a grid as rosbridge writes it.
+
+    Raises:
+        ValueError: it is none.
+    """
+    read = msgspec.json.decode(message, type=_Grid)
+    origin = read.info.origin
+    return checked_grid(
+        np.array(read.data, np.int8), (read.info.height, read.info.width), read.info.resolution,
+        (origin.position.x, origin.position.y, 2.0 * atan2(origin.orientation.z, origin.orientation.w)),
+        read.header.frame_id,
+    )  # fmt: skip
+
+
+def checked_grid(
+    values: Int8[np.ndarray, " n"],
+    shape: tuple[int, int],
+    cell_m: float,
+    corner: tuple[float, float, float],
+    frame: str,
+) -> OwnGrid:
+    """Return a grid that came from outside.
+
+    Args:
+        values: row after row.
+        shape: its rows and columns.
+        cell_m: edge of a cell.
+        corner: x, y, metres, and direction of the grid's x axis, radians.
+        frame: name of its frame.
+
+    Raises:
+        ValueError: it is none.
+    """
+    rows, columns = shape
+    if not (rows > 0 and columns > 0 and rows * columns <= _MOST_CELLS and len(values) == rows * columns):
+        raise ValueError(f"a grid of {columns} x {rows} cells with {len(values)} values")
+    if not (0.001 <= cell_m <= 10.0 and all(isfinite(value) and abs(value) < 1e6 for value in corner)):
+        raise ValueError(f"a grid with cells of {cell_m} m at {corner}")
+    return OwnGrid(values.reshape(shape), float(cell_m), GroundPose(*corner), frame.lstrip("/"))
+
+
+def read_over_bridge(url: str, token: str | None, kind: str, settings: RosSettings) -> OwnGrid | None:
+    """Read a grid over a connection of its own; None where none arrives.
+
+    Raises:
+        BackendError: roslibpy is not installed.
+        NavigationError: there is no bridge.
+    """
+    from avlmaps_ros.link import Link
+
+    found: list[OwnGrid] = []
+    heard = Condition()
+    link = Link(url, token, settings.connect_timeout_s, heard, MOST_BYTES)
+    try:
+        link.subscribe(settings.map_topic, kind, lambda message: found.append(grid_in(message)))
+        with heard:
+            heard.wait_for(lambda: bool(found) or link.lost is not None, settings.pose_timeout_s)
+    finally:
+        link.close()
+    return found[-1] if found else None
+
+
+def on_own_map(ours: Obstacles, grid: OwnGrid, frames: Frames) -> Obstacles:
+    """Return the floor as the robot's own grid has it, in our level frame.
+
+    What blocks the view is as our map knows it, and where our map knows nothing, as the grid does.
+
+    Raises:
+        NavigationError: the grid is in another frame than the robot's goals.
+    """
+    if grid.frame != frames.map_frame:
+        raise NavigationError(
+            f"The robot's grid is in the frame {sanitize_line(grid.frame, 40)!r} and its goals are in "
+            f"{frames.map_frame!r}; name a map of that frame as map_topic."
+        )
+    rows, columns = grid.values.shape
+    corners = np.array([[0, 0], [columns, 0], [columns, rows], [0, rows]]) * grid.cell_m
+    level = frames.map_from_avlmap.inverse().points(_turned(corners, grid.corner))
+    low = level.min(axis=0)
+    nx, ny = (int(count) for count in np.ceil((level.max(axis=0) - low) / grid.cell_m - 1e-6))
+    middles = low + (np.stack(np.meshgrid(np.arange(nx), np.arange(ny), indexing="ij"), -1) + 0.5) * grid.cell_m
+    at = _COSTMAP_AT if grid.is_costmap else _MAP_AT
+    occupied, free = np.zeros((nx, ny), bool), np.zeros((nx, ny), bool)
+    for shift in (np.array([dx, dy]) * 0.25 * grid.cell_m for dx in (-1, 1) for dy in (-1, 1)):
+        values = _values_at(grid, frames.map_from_avlmap.points(middles + shift))
+        occupied |= values >= at
+        free |= (values >= 0) & (values < at)
+    states = np.where(occupied, CellState.OCCUPIED, np.where(free, CellState.FREE, CellState.UNKNOWN)).astype(np.uint8)
+    tall = None
+    if ours.tall is not None:
+        cells = np.floor((middles - ours.origin_m) / ours.cell_size_m).astype(np.int64)
+        inside = np.all((cells >= 0) & (cells < ours.states.shape), axis=-1)
+        cells = np.where(inside[..., None], cells, 0)
+        known = inside & (ours.states[cells[..., 0], cells[..., 1]] != CellState.UNKNOWN)
+        tall = np.where(known, ours.tall[cells[..., 0], cells[..., 1]], occupied)
+    theirs = replace(ours, origin_m=low, cell_size_m=grid.cell_m, states=states, tall=tall)
+    return theirs.without(ours.forbidden)
+
+
+def _turned(xy: np.ndarray, corner: GroundPose) -> np.ndarray:
+    c, s = cos(corner.heading_rad), sin(corner.heading_rad)
+    return xy @ np.array([[c, s], [-s, c]]) + (corner.x_m, corner.y_m)
+
+
+def _values_at(grid: OwnGrid, xy: np.ndarray) -> np.ndarray:
+    """Return the grid's values at places of its frame; -1 off the grid."""
+    c, s = cos(grid.corner.heading_rad), sin(grid.corner.heading_rad)
+    within = (xy - (grid.corner.x_m, grid.corner.y_m)) @ np.array([[c, -s], [s, c]])
+    cell = np.floor(within / grid.cell_m + 1e-9).astype(np.int64)
+    rows, columns = grid.values.shape
+    inside = (cell[..., 0] >= 0) & (cell[..., 0] < columns) & (cell[..., 1] >= 0) & (cell[..., 1] < rows)
+    values = np.full(inside.shape, -1, np.int16)
+    values[inside] = grid.values[cell[..., 1][inside], cell[..., 0][inside]]
+    return values
