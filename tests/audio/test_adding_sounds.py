@@ -168,7 +168,7 @@ def test_folders_without_clips_are_told(tmp_path: Path, clips: Path) -> None:
     (tmp_path / "index.csv").write_text("file,category\na.wav,tap\n")
     assert refusal(tmp_path) == "FOLDER/index.csv lacks the column path; add it, or remove the file."
     (tmp_path / "index.csv").write_text("path,category\na.wav,tap\n")
-    assert refusal(tmp_path) == "FOLDER/index.csv lists 1 files that do not exist, the first a.wav; fix the index."
+    assert refusal(tmp_path) == "The index of FOLDER lists 1 files that do not exist, the first a.wav; fix the index."
 
 
 def test_only_the_audible_part_of_a_clip_counts() -> None:

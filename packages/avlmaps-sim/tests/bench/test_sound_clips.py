@@ -9,7 +9,9 @@ import soundfile
 from avlmaps.core.errors import AudioError
 from avlmaps.perception.embedded.sounds import EmbeddedSounds
 from avlmaps_sim.bench import sound_clips
+from avlmaps_sim.bench.harness.clips import unheard_rows
 from avlmaps_sim.bench.sound_categories import ESC10, ESC50
+from avlmaps_sim.mixing.clips import find_clips
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +42,22 @@ def test_clips_of_recordings_that_taught_the_weights_are_left_out(encoder: Embed
     assert [clip.kind for clip in clips] == ["rooster", "rooster", ""]
 
 
+def test_esc50_as_it_is_downloaded_is_read_and_its_first_fold_is_unheard(
+    encoder: EmbeddedSounds, tmp_path: Path
+) -> None:
+    (tmp_path / "meta").mkdir()
+    (tmp_path / "audio").mkdir()
+    rows = [("1-100032-A-0.wav", 1, "dog"), ("1-1791-A-26.wav", 1, "laughing"), ("5-9032-A-0.wav", 5, "dog")]
+    for name, _, _ in rows:
+        soundfile.write(tmp_path / "audio" / name, 0.1 * np.random.default_rng(0).standard_normal(16_000), 16_000)
+    lines = ["filename,fold,target,category,esc10,src_file,take"]
+    lines += [f"{name},{fold},0,{category},False,1,A" for name, fold, category in rows]
+    (tmp_path / "meta" / "esc50.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    assert [clip.kind for clip in sound_clips.read_clips(tmp_path, encoder)] == ["dog bark", "laughing", "dog bark"]
+    assert {clip.category for clip in find_clips(tmp_path)} == {"dog bark", "laughing"}
+    assert [row["path"] for row in unheard_rows(tmp_path)] == ["audio/1-100032-A-0.wav", "audio/1-1791-A-26.wav"]
+
+
 def test_a_folder_gives_every_table(tmp_path: Path) -> None:
     write_clips(tmp_path, [("1-1-A-1.wav", "rooster"), ("1-2-A-1.wav", "door_wood_knock"), ("x.wav", "guitar")])
     tables = sound_clips.run(tmp_path)
@@ -66,15 +84,15 @@ def test_rooms_decay_as_they_should(rt60_s: float) -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("path,kind\na.wav,rain\n", "has no column category; add it to its first line."),
-        ("path,category\n", "names no clip; add a line for each."),
+        ("path,kind\na.wav,rain\n", "/index.csv lacks the column category; add it, or remove the file."),
+        ("path,category\n", " has no index.csv that names a clip, and is not ESC-50; add one."),
     ],
 )
 def test_a_bad_index_is_refused(encoder: EmbeddedSounds, tmp_path: Path, text: str, said: str) -> None:
     (tmp_path / "index.csv").write_text(text, encoding="utf-8")
     with pytest.raises(AudioError) as refused:
         sound_clips.read_clips(tmp_path, encoder)
-    assert str(refused.value) == f"{tmp_path / 'index.csv'} {said}"
+    assert str(refused.value) == f"{tmp_path}{said}"
 
 
 def test_a_folder_that_taught_the_weights_is_refused(encoder: EmbeddedSounds, tmp_path: Path) -> None:

@@ -4,7 +4,6 @@ The clips are those of ESC-10's folds 4 and 5 (the settings were chosen on folds
 collections, named in an ``index.csv``. Truth is the audible part of a clip, cut as ``add_sounds`` cuts it.
 """
 
-import csv
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
@@ -21,7 +20,7 @@ from avlmaps.maps.audio.settings import SegmentationSettings
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
 from avlmaps_sim.bench.harness.intervals import in_percent, poisson, wilson
 from avlmaps_sim.mixing.background import background
-from avlmaps_sim.mixing.clips import Clip, amplify, audible_part, find_clips, gain_for
+from avlmaps_sim.mixing.clips import Clip, amplify, audible_part, find_clips, gain_for, index_rows
 
 COLUMNS = (
     "clips",
@@ -121,11 +120,7 @@ def run(sounds_folder: Path, seed: int = 0, settings: SegmentationSettings | Non
 
 def clips_to_test(sounds_folder: Path) -> dict[str, list[Clip]]:
     """Return the clips to test with: those of the folds, and those of no fold."""
-    fold_of: dict[str, str] = {}
-    index = sounds_folder / "index.csv"
-    if index.is_file():
-        with index.open(newline="", encoding="utf-8") as stream:
-            fold_of = {row["path"]: row.get("fold") or "" for row in csv.DictReader(stream)}
+    fold_of = {row["path"]: row.get("fold", "") for row in index_rows(sounds_folder) or ()}
     clips = find_clips(sounds_folder)
     sets = {
         f"folds {' and '.join(_TEST_FOLDS)}": [clip for clip in clips if fold_of.get(clip.name) in _TEST_FOLDS],

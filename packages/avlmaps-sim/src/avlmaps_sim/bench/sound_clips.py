@@ -23,6 +23,7 @@ from avlmaps.perception.embedded.sounds import EmbeddedSounds
 from avlmaps.recordings.audio import AudioTrack, Sound
 from avlmaps_sim.bench.harness.intervals import wilson
 from avlmaps_sim.bench.sound_categories import CATEGORIES, ESC10
+from avlmaps_sim.mixing.clips import index_rows
 
 Table = dict[str, list[Any]]
 Features = Float32[np.ndarray, "windows d"]
@@ -56,22 +57,14 @@ def kind_names(encoder: EmbeddedSounds) -> dict[str, str]:
 
 
 def read_clips(folder: Path, encoder: EmbeddedSounds) -> list[NamedClip]:
-    """Read the index of a folder.
+    """Read the index of a folder, or that of ESC-50 as it is downloaded.
 
     Raises:
         AudioError: there is no index, it lacks a column, or names no clip.
     """
-    index = folder / "index.csv"
-    if not index.is_file():
-        raise AudioError(f"There is no {index}; the suite needs a folder of clips with an index.csv.")
-    with index.open(newline="", encoding="utf-8") as stream:
-        reader = csv.DictReader(stream)
-        missing = {"path", "category"} - set(reader.fieldnames or ())
-        if missing:
-            raise AudioError(f"{index} has no column {' and '.join(sorted(missing))}; add it to its first line.")
-        rows = list(reader)
+    rows = index_rows(folder)
     if not rows:
-        raise AudioError(f"{index} names no clip; add a line for each.")
+        raise AudioError(f"{folder} has no index.csv that names a clip, and is not ESC-50; add one.")
     kinds = kind_names(encoder)
     clips = []
     for row in rows:

@@ -12,6 +12,9 @@ from avlmaps.core.errors import AudioError
 from avlmaps.core.files import user_path
 from avlmaps.recordings.audio import AudioTrack, Sound, resample
 
+INDEX, ESC50_INDEX = "index.csv", "meta/esc50.csv"
+ESC50_UNHEARD = "1"  # the fold of ESC-50 that trained no weights
+_ESC50_CALLED = {"dog": "dog bark"}  # where our collections call a category otherwise
 SUFFIXES = {".wav", ".flac", ".ogg", ".oga", ".opus", ".mp3", ".m4a"}
 AUDIBLE_DB = -40.0  # below a clip's loudest 10 ms; what is quieter at its ends is cut off
 _ACTIVE_DB = -30.0  # below the loudest 10 ms; pauses inside a clip do not count for its loudness
@@ -39,8 +42,8 @@ class Clip:
 def find_clips(folder: Path, categories: Sequence[str] | None = None) -> tuple[Clip, ...]:
     """List the clips of a folder, sorted by category and name.
 
-    Categories come from an ``index.csv`` with the columns path and category, if there is one; else from the names of
-    the subfolders (underscores stand for spaces); else all files are of one category, named as the folder.
+    Categories come from the folder's index (``index_rows``), if there is one; else from the names of the subfolders
+    (underscores stand for spaces); else all files are of one category, named as the folder.
     ``categories`` are taken in any case, with spaces or underscores.
 
     Raises:
@@ -49,12 +52,12 @@ def find_clips(folder: Path, categories: Sequence[str] | None = None) -> tuple[C
     folder = user_path(folder)
     if not folder.is_dir():
         raise AudioError(f"There is no folder of clips at {folder}; give one with a subfolder for each category.")
-    index = folder / "index.csv"
-    clips = _indexed(index) if index.is_file() else _in_subfolders(folder)
+    rows = index_rows(folder)
+    clips = _in_subfolders(folder) if rows is None else _indexed(folder, rows)
     if not clips:
         raise AudioError(
-            f"{folder} holds no sound files; give a folder with a subfolder for each category, or with an index.csv "
-            "that has the columns path and category."
+            f"{folder} holds no sound files; give a folder with a subfolder for each category, with an index.csv that "
+            "has the columns path and category, or ESC-50 as it is downloaded."
         )
     if categories:
         known = {clip.category for clip in clips}
@@ -140,20 +143,46 @@ def _plain(category: str) -> str:
     return " ".join(category.replace("_", " ").lower().split())
 
 
-def _indexed(index: Path) -> list[Clip]:
+def index_rows(folder: Path) -> list[dict[str, str]] | None:
+    """Return the rows of a folder's index, with path, category and fold; None where it has none.
+
+    The index is ``index.csv``, or ``meta/esc50.csv`` of ESC-50 as it is downloaded, whose fold 1 trained no weights:
+    its rows have no fold.
+
+    Raises:
+        AudioError: the index is no table in UTF-8, or lacks a column.
+    """
+    esc50 = not (folder / INDEX).is_file()
+    index = folder / (ESC50_INDEX if esc50 else INDEX)
+    if not index.is_file():
+        return None
     try:
-        lines = index.read_text(encoding="utf-8-sig").splitlines()
-        reader = csv.DictReader(lines)
+        reader = csv.DictReader(index.read_text(encoding="utf-8-sig").splitlines())
         fields = set(reader.fieldnames or ())
+        rows = [{name: value or "" for name, value in row.items() if isinstance(name, str)} for row in reader]
     except (UnicodeDecodeError, csv.Error) as error:
         raise AudioError(f"{index} is not a CSV table in UTF-8 ({error}); save it as one.") from None
-    missing = {"path", "category"} - fields
-    if missing:
+    wanted = {"filename", "category", "fold"} if esc50 else {"path", "category"}
+    if missing := wanted - fields:
         raise AudioError(f"{index} lacks the column {' and '.join(sorted(missing))}; add it, or remove the file.")
-    rows = [(row["path"], _plain(row["category"] or "")) for row in reader if row["path"]]
-    clips = [Clip(index.parent / path, category, path) for path, category in rows]
+    if esc50:
+        rows = [
+            {
+                "path": f"audio/{row['filename']}",
+                "category": _ESC50_CALLED.get(row["category"], row["category"]),
+                "fold": row["fold"].replace(ESC50_UNHEARD, ""),
+            }
+            for row in rows
+        ]
+    return [row for row in rows if row["path"]]
+
+
+def _indexed(folder: Path, rows: Sequence[dict[str, str]]) -> list[Clip]:
+    clips = [Clip(folder / row["path"], _plain(row["category"]), row["path"]) for row in rows]
     if absent := [clip.name for clip in clips if not clip.path.is_file()]:
-        raise AudioError(f"{index} lists {len(absent)} files that do not exist, the first {absent[0]}; fix the index.")
+        raise AudioError(
+            f"The index of {folder} lists {len(absent)} files that do not exist, the first {absent[0]}; fix the index."
+        )
     return clips
 
 

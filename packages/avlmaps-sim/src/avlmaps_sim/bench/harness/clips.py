@@ -1,6 +1,6 @@
 """The clips of a folder that the shipped sound encoder was not trained on.
 
-A clip of an ``index.csv`` is unheard where it has no ``fold`` (every clip with one may have trained the weights) and
+A clip of a folder's index is unheard where it has no ``fold`` (every clip with one may have trained the weights) and
 where it was cut from none of the recordings that the weights' notes name: freesound's numbers, ``sources``, which the
 clips of ESC-50 carry in their file names.
 """
@@ -17,8 +17,8 @@ from pathlib import Path
 from avlmaps.core.errors import AudioError
 from avlmaps.core.files import write_bytes_atomically
 from avlmaps.core.wording import option
+from avlmaps_sim.mixing.clips import INDEX, index_rows
 
-INDEX = "index.csv"
 _SOURCE = re.compile(r"\d-(\d+)-[A-Z]")
 
 
@@ -30,23 +30,25 @@ def trained_sources() -> frozenset[int]:
 
 
 def unheard_rows(folder: Path) -> list[dict[str, str]]:
-    """Return the rows of ``index.csv`` that the shipped weights were not trained on.
+    """Return the rows of a folder's index that the shipped weights were not trained on.
 
     Raises:
         AudioError: there is no index, or no such row.
     """
-    index = folder / INDEX
-    if not index.is_file():
+    rows = index_rows(folder)
+    if rows is None:
         raise AudioError(
-            f"There is no {index}, so it is not known which clips the sound encoder was trained on; add an index.csv "
-            "with the columns path, category and fold (empty for a clip of no training), or choose "
+            f"{folder} has no {INDEX} and is not ESC-50, so it is not known which clips the sound encoder was trained "
+            f"on; add an {INDEX} with the columns path, category and fold (empty for a clip of no training), or choose "
             f"{option('sound-clips', 'all')}."
         )
-    with index.open(newline="", encoding="utf-8-sig") as stream:
-        rows = [row for row in csv.DictReader(stream) if row.get("path") and not _trained(row)]
-    if not rows:
-        raise AudioError(f"{index} names no clip that the sound encoder was not trained on; add some without a fold.")
-    return rows
+    unheard = [row for row in rows if not _trained(row)]
+    if not unheard:
+        raise AudioError(
+            f"The sound encoder was trained on all {len(rows)} clips that the index of {folder} names; add some "
+            "without a fold."
+        )
+    return unheard
 
 
 def _trained(row: dict[str, str]) -> bool:
