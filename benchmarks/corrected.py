@@ -38,10 +38,11 @@ from avlmaps_sim.sensor import drifted
 GRID, DIM, CLOSURES = GridSpec(0.05), 128, 30
 
 
-def drive(scene: str) -> tuple[list[Frame], np.ndarray, np.ndarray]:
+def drive(scene: str, size: tuple[int, int], most: int | None) -> tuple[list[Frame], np.ndarray, np.ndarray]:
     """Return frames of a drive there and back, their true poses, and poses that end a metre off."""
     with tempfile.TemporaryDirectory() as folder:
-        record_scene(open_scene(scene), Path(folder) / "rec", RecordSettings(hearing="none", workers=1), 0)
+        settings = RecordSettings(size=size, hearing="none", max_frames=most, workers=1)
+        record_scene(open_scene(scene), Path(folder) / "rec", settings, 0)
         recording = open_recording(Path(folder) / "rec")
         last = len(recording) - 1
         order = [*range(0, last + 1, 2), *range(last - 1 + last % 2, 0, -2)]
@@ -105,6 +106,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--scenes", nargs="+", default=["house:7"])
     parser.add_argument("--frames", nargs="+", type=int, default=[16, 32, 64, 128])
+    parser.add_argument("--size", nargs=2, type=int, default=[320, 240])
+    parser.add_argument("--most", type=int, help="frames of the drive")
     asked = parser.parse_args()
     features = np.random.default_rng(0).normal(size=(30, 40, DIM)).astype(np.float32)
     features /= np.linalg.norm(features, axis=2, keepdims=True)
@@ -112,7 +115,7 @@ def main() -> None:
           f"{'merge':>7}{'clean':>7}{'features':>10}{'share':>8}{'within 1':>10}{'double before':>15}{'after':>8}"
           )  # fmt: skip
     for scene in asked.scenes:
-        frames, true, off = drive(scene)
+        frames, true, off = drive(scene, (asked.size[0], asked.size[1]), asked.most)
         stamps = np.array([frame.stamp_s for frame in frames])
         nodes = np.unique([*range(0, len(frames), CLOSURES), len(frames) - 1])
         smooth = Trajectory(stamps[nodes], (true @ inverse(off))[nodes]).at(stamps) @ off

@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PARTS = {"page.py", "timing.py"}
 SCRIPTS = {
     "cold_start.py": "--map {MAP} --repeats 1",
-    "corrected.py": "--scenes house:1 --frames 16",
+    "corrected.py": "--scenes house:1 --frames 16 --size 80 60 --most 60",
     "fusion.py": "--frames 2 --repeats 1",
     "geometry.py": "--scenes house:4 --sensors kinect --frames 8",
     "locate.py": "--keyframes 4 --photos 2",
