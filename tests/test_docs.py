@@ -86,7 +86,7 @@ def test_the_reference_page_names_what_is_public() -> None:
 
 def test_the_architecture_page_names_files_that_are_there() -> None:
     page = (DOCS / "architecture.md").read_text(encoding="utf-8")
-    table = page.partition("## Where is")[2].partition("## Walls")[0]
+    table = page.partition("## Where is")[2].partition("## A map on disk")[0]
     files = re.findall(r"`([\w/]+(?:\.py|/))`", table)
     assert len(files) > 8
     for file in files:
