@@ -1,7 +1,6 @@
 """No module imports itself by way of others: neither at run time nor for types."""
 
 import ast
-import re
 from collections import Counter
 from collections.abc import Iterator
 from enum import StrEnum
@@ -128,17 +127,6 @@ def test_all_distributions_are_read() -> None:
     assert len(graph) > 300
     assert {name.partition(".")[0] for name in graph} == {"avlmaps", "avlmaps_sim", "avlmaps_models", "avlmaps_ros"}
     assert (When.LOADED, "avlmaps.query.goals") in graph["avlmaps.query.heatmap"]
-
-
-def test_nothing_imports_a_module_by_the_name_that_it_had() -> None:
-    from avlmaps.core.moved import MODULES
-
-    old = re.compile(rf"\b({'|'.join(map(re.escape, MODULES))})\b")
-    own = {ROOT / "src/avlmaps/core/moved.py", ROOT / "tests/core/test_moved.py", ROOT / "tests/helpers/dist_smoke.py"}
-    folders = ("src", "packages", "tests", "training", "benchmarks", "examples")
-    for path in sorted({path for folder in folders for path in (ROOT / folder).rglob("*.py")} - own):
-        found = old.search(path.read_text(encoding="utf-8"))
-        assert found is None, f"{path.relative_to(ROOT)} names {found and found[0]}"
 
 
 def test_no_two_files_of_tests_have_one_name_where_their_folders_are_no_packages() -> None:

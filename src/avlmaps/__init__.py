@@ -19,10 +19,7 @@ Importing the package loads nothing heavy; each public name is imported when it 
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from avlmaps.core import moved
 from avlmaps.core.version import __version__
-
-moved.install()
 
 if TYPE_CHECKING:
     from avlmaps.api import build_map, open_map
@@ -153,8 +150,6 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    if name in moved.NAMES:
-        return moved.moved_name(name)
     if name not in _HOMES:
         raise AttributeError(f"module 'avlmaps' has no attribute {name!r}")
     return getattr(importlib.import_module(_HOMES[name]), name)

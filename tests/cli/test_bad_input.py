@@ -56,7 +56,7 @@ def test_a_broken_package_does_not_hide_the_other_backends(answer, run, monkeypa
     assert "broken" in run("profiles")[1].split("in no profile:")[1]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
 def test_a_full_disk_under_standard_output_is_one_sentence(walk: Path) -> None:
     with Path("/dev/full").open("wb") as full:

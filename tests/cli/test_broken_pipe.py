@@ -56,7 +56,7 @@ def test_answers(words: list[str]) -> None:
     assert ended(*words) == (READER_GONE, b"")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_answers_about_a_map(built: Path) -> None:
     for words in (["info", built], ["things", built, "--json"], ["query", built, "--object", "red", "--json"]):
         status, said = ended(*words)

@@ -60,7 +60,7 @@ def test_a_map_that_is_not_there_is_built_first(answer, walk: Path, tmp_path: Pa
     assert made["corrected"]["most_m"] == pytest.approx(0.2)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_poses_may_have_the_dates_that_the_recording_has(answer, walk: Path, tmp_path: Path) -> None:
     dated = shutil.copytree(walk, tmp_path / "dated")
     for table, stamp in (("poses.csv", 0), ("frames.csv", 1)):
@@ -131,7 +131,7 @@ def there_and_back(path: Path, stray_m: float) -> tuple[Path, np.ndarray]:
     return path, true
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_drive_that_comes_back_is_put_right_by_its_own_pictures(answer, tmp_path: Path) -> None:
     recording, true = there_and_back(tmp_path / "rec", 0.36)
     right, _ = there_and_back(tmp_path / "right", 0.0)

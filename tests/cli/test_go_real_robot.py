@@ -19,7 +19,7 @@ from avlmaps.core.motion import GroundPose
 from avlmaps.navigate.interrupts import Halt, Interrupted
 from helpers.forked import Forked
 
-pytestmark = [pytest.mark.timeout(500), pytest.mark.slow]
+pytestmark = [pytest.mark.timeout(500), pytest.mark.nightly]
 
 SIGNALS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
 # No test uses this patience up, though the machine may stand still beneath it.

@@ -8,14 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from avlmaps.cli import usage
+from avlmaps.cli import verbs as usage
 from avlmaps.cli.build import Build
 from avlmaps.cli.go import Go
 from avlmaps.cli.output import UsageError
-from avlmaps.cli.usage import read_verb
 from avlmaps.cli.verb import Verb
-from avlmaps.cli.verbs import VERBS
+from avlmaps.cli.verbs import VERBS, read_verb
 from avlmaps.core import errors
+from avlmaps.core.progress import NOTICE
 
 ERRORS = (
     (("demo", "--out", "FILE/below"), 1, "system"),
@@ -95,8 +95,8 @@ def test_a_command_line_that_cannot_be_read_says_what_is_wrong(run) -> None:
         (("query",), "query needs MAP."),
         (("merge", "A"), "merge needs OTHER and --out MAP."),
         (("edit", "MAP", "--undo"), "--undo needs a value: ID."),
-        (("go", "MAP", "x", "--language"), "--language needs a value: learned|rules|chat."),
-        (("go", "MAP", "x", "--language", "x"), "--language takes learned, rules, chat; not 'x'."),
+        (("go", "MAP", "x", "--language"), "--language needs a value: learned|chat."),
+        (("go", "MAP", "x", "--language", "x"), "--language takes learned, chat; not 'x'."),
         (("build", "x", "--out", "y", "--voxel-size-m", "abc"), "--voxel-size-m takes a number, not 'abc'."),
         (("query", "MAP", "x", "--top", "1.5"), "--top takes a whole number, not '1.5'."),
         ((), "a verb comes first: demo"),
@@ -120,6 +120,20 @@ def test_what_a_verb_lacks_is_one_sentence(name: str) -> None:
         with pytest.raises(UsageError) as told:
             read_verb(verb, [option], name)
         assert str(told.value).startswith((f"{option} needs a value: {options[option]}.", f"{name} needs "))
+
+
+def test_a_sentence_without_a_map_or_without_quotes_is_told_so(built: Path, run) -> None:
+    for words, told in (
+        (("query", "the sofa"), "the map comes first: avlmaps query MAP 'the sofa'"),
+        (("query", built, "the", "red", "sofa"), f"put the sentence in quotes: avlmaps query {built} 'the red sofa'"),
+        (("go", "the sofa"), "the map comes first, and there is none at 'the sofa'"),
+    ):
+        status, out, err = run(*words)
+        assert (status, out) == (2, "") and told in err
+
+
+def test_profiles_fit_a_terminal_of_80_columns(run) -> None:
+    assert max(map(len, run("profiles")[1].splitlines())) <= 80
 
 
 def test_help_and_what_stands_behind_two_dashes_are_no_errors(run) -> None:
@@ -147,11 +161,13 @@ def test_each_error_of_the_family_has_a_kind_of_its_own() -> None:
     assert len({kind_named(name) for name in family}) == len(family) >= 9
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_cold_cache_is_announced_once_and_a_warm_one_not(tmp_path: Path) -> None:
     code = (
         "import numpy as np\n"
-        "from avlmaps.core.compiling import announce_compiling\n"
+        "from avlmaps.core import progress\n"
+        "from avlmaps.core.progress import announce_compiling\n"
+        "progress._UNSAID_S = 0.0\n"
         "from avlmaps.query.kernels import sorted_by_number\n"
         "with announce_compiling():\n"
         "    for kind in (np.int64, np.int32):\n"
@@ -162,7 +178,7 @@ def test_a_cold_cache_is_announced_once_and_a_warm_one_not(tmp_path: Path) -> No
         subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment).stderr
         for _ in range(2)
     ]
-    assert told == ["compiling once (up to a minute or two; later runs skip this)\n", ""]
+    assert told == [f"{NOTICE}\n", ""]
 
 
 def test_verbs_that_run_compiled_loops_say_so(run, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -45,7 +45,7 @@ def test_a_drive_updates_the_map_of_the_days_before(answer, dated: Path, built: 
     assert whole["frames"] == 2 * answer("info", built)["frames"] - 1
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_drive_whose_writer_stopped_updates_the_map_as_well(answer, dated: Path, built: Path, tmp_path: Path) -> None:
     (dated / DESCRIPTION).rename(dated / UNFINISHED)
     words = ("--into", shutil.copytree(built, tmp_path / "home.avlmap"), "--voxel-size-m", "0.1", "--give-up-s", "0.3")

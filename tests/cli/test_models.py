@@ -8,12 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from avlmaps.cli.model_options import models_in_force
+from avlmaps.cli.process import models_in_force
 from avlmaps.cli.query import Query
 from avlmaps.core.extras import install_command
 from avlmaps.core.registry import Backend, Kind, find, forget_loaded
-from avlmaps.perception.models.availability import availability, how_to_get, is_here
-from avlmaps.perception.models.published_models import published_models
+from avlmaps.perception.models.published_models import availability, how_to_get, is_here, published_models
 from avlmaps.perception.models.settings import ModelSettings, from_environment, model_settings, using_models
 from helpers.light_files import write_light
 
@@ -94,7 +93,7 @@ def test_a_wrong_choice_is_one_sentence(words, status: int, sentence: str, walk:
     assert not (tmp_path / "m.avlmap" / "map.json").exists()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_chosen_backends_build_the_map_and_info_tells_them(walk: Path, answer, tmp_path: Path) -> None:
     out, store = tmp_path / "m.avlmap", tmp_path / "store"
     words = ("--voxel-size-m", 0.1, "--frame-step", 4, "--model", "pixels=colours", "--feature-cache", store)
@@ -175,7 +174,7 @@ def test_profiles_prints_state_command_size_and_licence(empty: Path, every_packa
 
 
 def test_listing_the_profiles_loads_no_torch() -> None:
-    code = "import sys\nfrom avlmaps.cli.profiles import list_profiles\nlist_profiles()\nprint('torch' in sys.modules)"
+    code = "import sys\nfrom avlmaps.cli.models import list_profiles\nlist_profiles()\nprint('torch' in sys.modules)"
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert out.strip() == "False"
 

@@ -11,8 +11,7 @@ import pytest
 from avlmaps.api import build_map
 from avlmaps.cli.build import Build
 from avlmaps.cli.go import Chat
-from avlmaps.cli.reading_options import Reading
-from avlmaps.cli.verb import ModelVerb, Verb
+from avlmaps.cli.verb import ModelVerb, Reading, Verb
 from avlmaps.cli.verbs import VERBS
 from avlmaps.language.chat.settings import ChatSettings
 from avlmaps.live.replay import follow, replay
@@ -96,7 +95,6 @@ SAME: dict[str, Callable[[], Any]] = {
     "live.port": of(ServeSettings, "port"),
     "live.give_up_s": of(follow, "give_up_s"),
     "info.format": of(open_recording, "format"),
-    "info.audio": of(open_recording, "audio"),
     "add-sounds.format": of(open_recording, "format"),
     "calibrate.format": of(open_recording, "format"),
     "add-sounds.seed": of(add_sounds, "seed"),

@@ -20,7 +20,7 @@ from typing import Any
 import cv2
 import pytest
 
-from avlmaps.cli.shell_lines import LONGEST_LINE, PipedLines
+from avlmaps.cli.shell import LONGEST_LINE, PipedLines
 from avlmaps.core.extras import install_command
 from helpers.raycast import render
 from helpers.room import Room
@@ -266,14 +266,14 @@ def test_at_a_prompt_questions_completion_history_and_the_end(built: Path, tmp_p
     assert history.stat().st_mode & 0o077 == 0
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_ctrl_c_stops_an_answer_and_not_the_shell(built: Path, tmp_path: Path, terminals) -> None:
     slow = (
-        "import sys, time\nfrom avlmaps.cli import query\nreal = query.ask\n"
-        "def ask(verb, opened=None):\n"
+        "import sys, time\nfrom avlmaps.cli.query import Query\nreal = Query.answer\n"
+        "def ask(verb, avlmap):\n"
         "    if 'slow' in verb.sentence:\n        print('begun', flush=True); time.sleep(60)\n"
-        "    return real(verb, opened)\n"
-        "query.ask = ask\nfrom avlmaps.cli import main\nmain()"
+        "    return real(verb, avlmap)\n"
+        "Query.answer = ask\nfrom avlmaps.cli import main\nmain()"
     )
     shell = Terminal(built, "--no-history", state=tmp_path, code=slow)
     terminals.append(shell)
@@ -289,7 +289,7 @@ def test_ctrl_c_stops_an_answer_and_not_the_shell(built: Path, tmp_path: Path, t
     assert not (tmp_path / "avlmaps").exists()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_without_prompt_toolkit_a_terminal_gets_one_sentence_and_a_pipe_works(
     piped, built: Path, tmp_path: Path, terminals
 ) -> None:

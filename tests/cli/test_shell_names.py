@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps.cli.shell_names import completions
+from avlmaps.cli.shell_prompt import completions
 
 VERBS = ("go", "things", "locate")
 

@@ -10,7 +10,7 @@ import pytest
 _READS = """
 import sys, threading
 import numpy as np
-from avlmaps.cli.shortened_files import end_at_shortened_files
+from avlmaps.cli.process import end_at_shortened_files
 path, as_json, in_thread = sys.argv[1], sys.argv[2] == "json", sys.argv[3] == "thread"
 np.zeros(1 << 20).tofile(path)
 end_at_shortened_files(as_json=as_json)

@@ -23,7 +23,7 @@ def ran(*words: object, redirect: str = "", **surroundings: str) -> tuple[int, s
     return done.returncode, done.stdout.decode("utf-8", "replace"), done.stderr.decode("utf-8", "replace")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_an_answer_to_a_closed_output_is_lost_and_that_is_an_error(built: Path) -> None:
     for words in (["info", built], ["things", built, "--json"], ["query", built, "--object", "red"], ["--version"]):
         status, _, said = ran(*words, redirect=">&-")
@@ -48,7 +48,7 @@ def test_an_error_keeps_its_sentence_and_status_with_closed_streams() -> None:
     assert ran("info", "nothing.avlmap", redirect="<&- >&- 2>&-")[0] == 1
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("encoding", ["ascii", "cp1252"])
 def test_what_an_encoding_lacks_is_escaped(built: Path, tmp_path: Path, encoding: str) -> None:
     place = tmp_path / "Über ☃ 🪑.avlmap"
@@ -117,8 +117,7 @@ def test_a_fault_in_one_line_of_the_shell_ends_only_that_line(
 ) -> None:
     from io import StringIO
 
-    from avlmaps.cli.shell import answer_lines
-    from avlmaps.cli.shell_lines import PipedLines
+    from avlmaps.cli.shell import PipedLines, answer_lines
 
     class Session:
         def answer(self, line: str, confirms: Any) -> Any:

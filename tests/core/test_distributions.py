@@ -9,9 +9,8 @@ import pytest
 
 from avlmaps.cli import verbs
 from avlmaps.core import registry
-from avlmaps.core.distributions import MODELS, OTHERS, SIMULATOR, Distribution, how_to_get
 from avlmaps.core.errors import BackendError, NavigationError
-from avlmaps.core.extras import install_command
+from avlmaps.core.extras import MODELS, OTHERS, SIMULATOR, Distribution, how_to_get, install_command
 from avlmaps.core.registry import Kind
 from avlmaps.core.version import __version__
 from avlmaps.navigate import scenes

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import AvlmapsError, QueryError
-from avlmaps.core.printable import plot_text, printable, printable_json
+from avlmaps.core.printable import plot_text, printable, printable_json, shortened
 
 HOSTILE = ["\x1b[2J", "\x9b31m", "\x85", "\u202eevil", "\u2066x", "\u200b", "\ud800", "a\rb", "a\nb", "\U000e0041"]
 
@@ -73,3 +73,8 @@ def test_what_a_verb_prints_is_safe(capsys: pytest.CaptureFixture[str]) -> None:
     printed = capsys.readouterr()
     assert is_safe((printed.out + printed.err).replace("\n", ""))
     assert json.loads(printed.out.splitlines()[1]) == {"name": "\x9b2J\u202e"}
+
+
+def test_answers_have_no_digits_that_no_measurement_has() -> None:
+    told = shortened({"a": 0.1 + 0.2, "b": [1 / 3, (1e-9 / 3, 12345.123456789)], "c": "0.30000000000000004", "d": True})
+    assert told == {"a": 0.3, "b": [0.333333, [3.33333e-10, 12345.123457]], "c": "0.30000000000000004", "d": True}

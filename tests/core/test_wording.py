@@ -1,12 +1,8 @@
 """Options in sentences, as each front spells them."""
 
-import ast
-import re
 import subprocess
 import sys
-from collections.abc import Iterator
 from contextvars import copy_context
-from pathlib import Path
 from threading import Thread
 
 import numpy as np
@@ -71,38 +67,3 @@ def test_an_error_of_the_library_names_the_option_of_its_reader(tmp_path, spelli
     with options_as(spelling), pytest.raises(NoAudioStreamError) as raised:
         examine(path)
     assert said in str(raised.value)
-
-
-ROOT = Path(__file__).parents[2]
-_FLAG = re.compile(r"(?<![\w`-])--[a-z]")
-# A whole command names its own flags: `avlmaps build REC --resume`, python -m training.pixels --out DIR.
-_COMMAND = re.compile(r"(avlmaps[\w.-]* [a-z]|python -m |curl |ns-process-data |ROS's )")
-_COMMAND_LINE = re.compile(r"/(cli|verbs|demo)/|/(watchdog|import_map|wording)\.py")
-
-
-def sentences(tree: ast.AST) -> Iterator[tuple[int, str]]:
-    """Return the texts of a module that are no docstrings, and their lines."""
-    told = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
-    inner = {id(one) for node in ast.walk(tree) if isinstance(node, ast.JoinedStr) for one in node.values}
-    for node in ast.walk(tree):
-        if isinstance(node, ast.JoinedStr):
-            yield node.lineno, "".join(one.value for one in node.values if isinstance(one, ast.Constant))
-        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and not {id(node)} & (told | inner):
-            yield node.lineno, node.value
-
-
-def raw_flags(tree: ast.AST) -> list[int]:
-    return [line for line, text in sentences(tree) if _FLAG.search(text) and not _COMMAND.search(text)]
-
-
-def test_no_sentence_of_the_library_spells_a_flag_itself():
-    assert raw_flags(ast.parse('raise E(f"{path} is there; give another --out.")')) == [1]
-    sources = [*ROOT.glob("src/**/*.py"), *ROOT.glob("packages/*/src/**/*.py")]
-    assert len(sources) > 500
-    found = [
-        f"{path.relative_to(ROOT)}:{line}"
-        for path in sources
-        if not _COMMAND_LINE.search(path.as_posix())
-        for line in raw_flags(ast.parse(path.read_text(encoding="utf-8")))
-    ]
-    assert found == [], "write option(name, value) of avlmaps.core.wording"

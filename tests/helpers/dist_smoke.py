@@ -154,8 +154,6 @@ def together(python: Path, cwd: Path) -> None:
     drive = ("go", "home.avlmap", "turn left", "--scene", "house:7")
     assert answer(python, cwd, *drive)["ok"]
     assert answer(python, cwd, "import-map", "nowhere", "--out", "m", status=1)["error"]["kind"] == "map"
-    old = "import avlmaps.sim.mesh, avlmaps_sim.mesh; assert avlmaps.sim.mesh is avlmaps_sim.mesh"
-    run(python, "-W", "ignore::DeprecationWarning", "-c", old, cwd=cwd)
 
 
 def main() -> None:

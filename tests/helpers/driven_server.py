@@ -16,9 +16,8 @@ from avlmaps.navigate.driver import Arrival, Driver
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.serve.drive.agents import drive_agent_app
 from avlmaps.serve.drive.app import DriveService, drive_app
-from avlmaps.serve.drive.order_log import OrderLog
 from avlmaps.serve.drive.orders import Dispatcher
-from avlmaps.serve.drive.plans import MapNow
+from avlmaps.serve.drive.plans import MapNow, OrderLog
 from avlmaps.serve.service import Service
 from helpers.kinematic import KinematicDriver
 

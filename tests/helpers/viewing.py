@@ -11,8 +11,7 @@ import numpy as np
 import uvicorn
 
 from avlmaps.serve.app import create_app
-from avlmaps.serve.running import listening_socket
-from avlmaps.serve.service import Service
+from avlmaps.serve.service import Service, listening_socket
 from avlmaps.serve.settings import ServeSettings
 
 

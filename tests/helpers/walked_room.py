@@ -1,7 +1,10 @@
 """A short walk in the analytic room with one real-looking sound, as a recording on the disk."""
 
+import atexit
+import shutil
 from functools import cache
 from pathlib import Path
+from tempfile import mkdtemp
 
 import numpy as np
 
@@ -27,6 +30,26 @@ def _seen() -> list[tuple[np.ndarray, View]]:
     """Return the poses of the walk, each with what is seen from it."""
     room = Room()
     return [(pose, render(room.scene, CAMERA, pose)) for pose in room.walk()[100:196:4]]
+
+
+@cache
+def walked_map(walk: Path) -> Path:
+    """Return the map of a walk that lies beside it: about 3,000 voxels with one sound, made once a process."""
+    from avlmaps.maps.build import build_map
+    from avlmaps.maps.settings import BuildSettings
+    from avlmaps.recordings.open import open_recording
+
+    path = walk.parent / "room.avlmap"
+    build_map(open_recording(walk), path, "colours", BuildSettings(voxel_size_m=0.1), progress=False)
+    return path
+
+
+@cache
+def shared_walk() -> Path:
+    """Return a walk that tests share and leave as it is."""
+    folder = Path(mkdtemp(prefix="avlmaps-tests-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return write_walk(folder / "rec")
 
 
 def write_walk(path: Path) -> Path:

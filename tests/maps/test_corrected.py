@@ -30,6 +30,7 @@ from avlmaps.maps.fusion.submaps import in_steps, submap_of
 from avlmaps.maps.fusion.voxel_sums import VoxelSums
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.growing import GrowingMap
+from avlmaps.maps.pose_correction import PoseCorrection
 from avlmaps.maps.store.reader import StoredMap, open_stored
 from avlmaps.maps.types import Submaps
 from avlmaps.perception.encoders import Encoders
@@ -437,3 +438,13 @@ def test_sounds_wait_for_the_surfaces_of_corrected_poses(tmp_path: Path) -> None
     newer = growing.with_sounds(growing.stored(), heard)
     sources = newer.sources()
     assert sources is not None and len(sources) == len(newer.sounds) == 2
+
+
+def test_poses_that_began_before_the_frames_and_run_on_after_them_are_used_where_they_reach() -> None:
+    known_s = np.linspace(1.0, 3.0, 21)
+    known = np.tile(np.eye(4), (21, 1, 1))
+    stamps, given = np.linspace(0.0, 4.0, 17), np.tile(np.eye(4), (17, 1, 1))
+    given[:, 0, 3] = 0.01 * stamps
+    inside = (stamps > 0.5) & (stamps < 3.5)
+    whole, cut = (PoseCorrection.of(stamps[s], given[s], known_s, known) for s in (slice(None), inside))
+    np.testing.assert_allclose(whole.at(known_s), cut.at(known_s), atol=1e-12)

@@ -19,10 +19,8 @@ from avlmaps.core.registry import Backend, Kind, register
 from avlmaps.maps.build import build_map, build_part
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.perception.cache.cached_encoders import (
-    CachedFrameSounds,
-    CachedKeypoints,
-    CachedPixels,
     cache_note,
+    cached,
     with_cache,
 )
 from avlmaps.perception.cache.feature_store import CacheSettings, FeatureStore, key_of
@@ -63,6 +61,9 @@ class CountedViews:
         _count("views", len(frames))
         rows = np.stack([frame.rgb[:2, :2, 0].reshape(4) + 1.0 for frame in frames])
         return (rows / np.linalg.norm(rows, axis=1, keepdims=True)).astype(np.float32)
+
+    def encode_words(self, words: Sequence[str]) -> np.ndarray:
+        return np.tile(np.eye(4, dtype=np.float32)[0], (len(words), 1))
 
 
 class CountedCorners(Corners):
@@ -240,7 +241,7 @@ def test_keys_tell_types_shapes_and_order_apart() -> None:
 
 
 def test_all_that_an_encoder_may_look_at_is_in_the_key_and_nothing_else(tmp_path: Path) -> None:
-    encoder = CachedPixels(CountedPixels(), FeatureStore(tmp_path), half=False)
+    encoder = cached(Kind.PIXELS, CountedPixels(), FeatureStore(tmp_path))
 
     def encodes(frame: Frame) -> bool:
         before = COUNTS.get("pixels", 0)
@@ -292,7 +293,7 @@ def test_keypoints_come_back_as_they_were(tmp_path: Path, size: tuple[int, int],
             _count("local")
             return local
 
-    encoder, rgb = CachedKeypoints(Real(), FeatureStore(tmp_path)), np.zeros((24, 32, 3), np.uint8)
+    encoder, rgb = cached(Kind.LOCAL, Real(), FeatureStore(tmp_path)), np.zeros((24, 32, 3), np.uint8)
     first, second = encoder.encode(rgb), encoder.encode(rgb)
     assert COUNTS["local"] == 1
     for told in (first, second):
@@ -325,9 +326,12 @@ def test_encoders_keep_their_protocols_whatever_way_they_are_asked(tmp_path: Pat
 def test_an_encoder_of_steps_stays_one(tmp_path: Path) -> None:
     class Steps:
         card, vocabulary, hop_s = CARD, (), 0.04
-        encode = encode_words = score_words = score_sounds = None
 
-    assert isinstance(CachedFrameSounds(Steps(), FeatureStore(tmp_path)), FrameSoundEncoder)
+        def encode(self, *_: object) -> None: ...
+
+        encode_words = score_words = score_sounds = encode
+
+    assert isinstance(cached(Kind.SOUNDS, Steps(), FeatureStore(tmp_path)), FrameSoundEncoder)
 
 
 # Whole builds

@@ -146,6 +146,9 @@ class MeetingViews:
         rows = np.stack([[frame.index + 1.0, 1.0, 0.0, 0.0] for frame in frames])
         return (rows / np.linalg.norm(rows, axis=1, keepdims=True)).astype(np.float32)
 
+    def encode_words(self, words: Sequence[str]) -> np.ndarray:
+        return np.tile(np.eye(4, dtype=np.float32)[0], (len(words), 1))
+
 
 class MeetingCorners(Corners):
     def encode(self, rgb: np.ndarray):

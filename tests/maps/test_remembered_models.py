@@ -17,7 +17,7 @@ from avlmaps.maps.build import build_map
 from avlmaps.maps.store.manifest import ModelInfo
 from avlmaps.maps.store.reader import open_stored
 from avlmaps.perception.encoders import Encoders
-from avlmaps.perception.models.names import public_choice, public_name
+from avlmaps.perception.models.published_models import public_choice, public_name
 from avlmaps.perception.profiles import Profile, profile, register_profile
 
 PROFILE = register_fakes()

@@ -2,9 +2,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps.perception.embedded.codes import features_of, orthonormal_codes
-from avlmaps.perception.embedded.meanings import Meanings
-from avlmaps.perception.embedded.words import EmbeddedWords
+from avlmaps.perception.embedded.closed_set import features_of, orthonormal_codes
+from avlmaps.perception.embedded.words import EmbeddedWords, Meanings
 
 NAMES = ("sofa", "dining table", "coffee table", "toilet")
 MEANINGS = Meanings(

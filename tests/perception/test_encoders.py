@@ -1,17 +1,24 @@
 """Encoders as a value: names of the registry or objects, and what is made for an object that lacks it."""
 
-import warnings
+import importlib
+import json
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import avlmaps
 from avlmaps.core.errors import BackendError
-from avlmaps.core.registry import Kind
+from avlmaps.core.registry import Backend, Kind, register
 from avlmaps.perception.encoders import Encoders, encoders_of
 from avlmaps.perception.profiles import MODULES, Profile, profile, profiles
 from avlmaps.perception.protocols import PixelEncoder
+from helpers.walked_room import write_walk
 
 
 class Words:
@@ -104,9 +111,37 @@ def test_encoders_do_not_change() -> None:
         Encoders.named("embedded").name = "other"  # pyright: ignore[reportAttributeAccessIssue]
 
 
-def test_the_old_names_still_work_and_warn() -> None:
-    with pytest.warns(DeprecationWarning, match=r"Profile\.pixel_encoder\(\) goes in the next release"):
-        assert profile("embedded").pixel_encoder() is Encoders.named("embedded").pixels
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        assert Encoders.named("colours").pixels.card.dim > 0
+GUIDE = Path(__file__).parents[2] / "docs"
+
+
+def test_the_guides_encoder_answers_as_an_object_and_as_a_package(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It says nothing of what its protocol needs besides; that is made for it, whichever way it comes."""
+    (page,) = [one for one in GUIDE.rglob("*.md") if "class Hues" in one.read_text(encoding="utf-8")]
+    blocks = page.read_text(encoding="utf-8").split("```python\n")[1:]
+    (code,) = [block.partition("```")[0] for block in blocks if "class Hues" in block]
+    (tmp_path / "hues_of_the_guide.py").write_text(code.partition("encoders =")[0], encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    register(Backend(Kind.PIXELS, "hues", "hues_of_the_guide:Hues"))
+    walk = write_walk(tmp_path / "rec")
+    for number, pixels in enumerate((importlib.import_module("hues_of_the_guide").Hues(), "hues")):
+        encoders = Encoders.named("colours", pixels=pixels)
+        built = avlmaps.build_map(walk, tmp_path / f"{number}.avlmap", encoders=encoders)
+        assert built.ask("something red").text
+    assert encoders.pixels is encoders.pixels
+
+
+def test_a_package_that_lacks_what_nobody_can_make_is_named_by_the_build_and_by_the_check(
+    monkeypatch: pytest.MonkeyPatch, run: Any
+) -> None:
+    package = ModuleType("mute")
+    package.Mute = type("Mute", (), {"encode": lambda self, frame: None})  # pyright: ignore[reportAttributeAccessIssue]
+    monkeypatch.setitem(sys.modules, "mute", package)
+    register(Backend(Kind.PIXELS, "mute", "mute:Mute"))
+    with pytest.raises(BackendError, match=r"Mute .* has no encode_words"):
+        _ = Encoders.named("colours", pixels="mute").pixels
+    status, out, err = run("profiles", "--check", "mute", "mutual-ratio", "--json")
+    told = {one["name"]: one["fault"] for one in json.loads(out)["checks"]}
+    assert status == 1 and "encode_words" in told["mute"] and told["mutual-ratio"] == ""
+    assert "encode_words" in err

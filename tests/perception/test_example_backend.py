@@ -74,7 +74,7 @@ def test_it_is_found_held_to_its_protocol_and_makes_a_map_that_remembers_it(
     assert told["descriptors"][1] == 144
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_command_line_lists_it_and_a_map_without_it_is_told_plainly(
     installed: Path, mapped: tuple[Path, Path], tmp_path: Path
 ) -> None:

@@ -2,7 +2,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps.perception.embedded.matching import RATIO, MutualRatio, match_mutual
+from avlmaps.perception.embedded.keypoints import RATIO, MutualRatio, match_mutual
 from avlmaps.perception.protocols import LocalFeatures, Matcher
 
 

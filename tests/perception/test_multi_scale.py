@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.camera import Pinhole, Rig
-from avlmaps.perception.embedded.edge_aware import NEAR_M, REACH_CELLS, smoothed
-from avlmaps.perception.embedded.multi_scale import AUGMENTATIONS, see_multi_scale
+from avlmaps.perception.embedded.multi_scale import AUGMENTATIONS, NEAR_M, REACH_CELLS, see_multi_scale, smoothed
 from avlmaps.perception.embedded.pixels import EmbeddedPixels
 from avlmaps.perception.embedded.scene_network import PLAIN, Augmentation, load_network
 from avlmaps.recordings.types import Frame
@@ -46,7 +45,7 @@ def test_a_mirrored_view_is_a_plain_one_at_the_mirrored_frame(rendered: Frame, s
     assert np.abs(network.see(rendered, plain).category - other.category).max() > 0.05  # and it is another view
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_several_scales_give_distributions_on_the_grid_of_one(rendered: Frame) -> None:
     plain, often = EmbeddedPixels().see(rendered), EmbeddedPixels().see_multi_scale(rendered)
     assert often.category.shape == plain.category.shape and often.category.dtype == np.float32

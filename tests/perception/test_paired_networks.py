@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from avlmaps.core.camera import Pinhole, Rig
-from avlmaps.perception.embedded.codes import features_of
+from avlmaps.perception.embedded.closed_set import features_of
 from avlmaps.perception.embedded.paired_networks import (
     NO_SAY,
     SAME_SAY,
@@ -19,9 +19,8 @@ from avlmaps.perception.embedded.paired_networks import (
     mixed,
     share_of_second,
 )
-from avlmaps.perception.embedded.pixels import EmbeddedPixels, synthetic_pixels
+from avlmaps.perception.embedded.pixels import EmbeddedPixels, EmbeddedViews, synthetic_pixels
 from avlmaps.perception.embedded.scene_network import SYNTHETIC_WEIGHTS, SceneNetwork, Seen, load_network
-from avlmaps.perception.embedded.views import EmbeddedViews
 from avlmaps.recordings.types import Frame, Ground
 
 ALL = np.ones((2, 3), bool)

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from avlmaps.perception.embedded.rootsift import MAX_KEYPOINTS, MAX_SIDE_PX, RootSift, root_normalised
+from avlmaps.perception.embedded.keypoints import MAX_KEYPOINTS, MAX_SIDE_PX, RootSift, root_normalised
 from avlmaps.perception.protocols import LocalEncoder
 from helpers.picture_room import painting
 

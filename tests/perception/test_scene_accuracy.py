@@ -65,13 +65,13 @@ def home(request: pytest.FixtureRequest) -> Views:
     return views_of("house:1200003:held-out", request.param, 16)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("weights", WEIGHTS)
 def test_two_thirds_of_a_new_home_are_recognised_under_either_sensor(home: Views, weights: str) -> None:
     assert share_right(load_network(weights), home) > 0.66
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_scores_that_do_not_follow_the_picture_would_fail(home: Views) -> None:
     network = load_network(DEFAULT_WEIGHTS)
     shuffled = [(replace(a, depth_m=b.depth_m[:, ::-1].copy(), rgb=b.rgb), truth)
@@ -80,7 +80,7 @@ def test_scores_that_do_not_follow_the_picture_would_fail(home: Views) -> None:
 
 
 @pytest.mark.shared
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize(("weights", "least"), [(DEFAULT_WEIGHTS, 0.55), (SYNTHETIC_WEIGHTS, 0.33)])
 def test_real_frames_of_nyu_are_recognised(shared_data: Path, weights: str, least: float) -> None:
     folder = LabelledFolder(_shared(shared_data / "data" / "nyuv2"))

@@ -90,7 +90,7 @@ def named_first(encoder: EmbeddedSounds, seed: int = 7_654_321) -> float:
     return float(np.mean(encoder.score_words(features, names).argmax(axis=1) == own))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_sound_weights_name_new_sounds_and_shuffled_ones_do_not(monkeypatch: pytest.MonkeyPatch, tmp_path) -> None:
     encoder = EmbeddedSounds(folder=tmp_path)
     assert named_first(encoder) > LEAST_SOUNDS

@@ -14,7 +14,7 @@ from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Kind, load
 from avlmaps.perception.conformance import check
 from avlmaps.perception.embedded.paired_networks import load_pair
-from avlmaps.perception.embedded.pixels import synthetic_pixels
+from avlmaps.perception.embedded.pixels import open_trained, synthetic_pixels, trained_pixels, trained_views
 from avlmaps.perception.embedded.scene_network import (
     DEFAULT_WEIGHTS,
     SYNTHETIC_WEIGHTS,
@@ -23,9 +23,8 @@ from avlmaps.perception.embedded.scene_network import (
     checksum_of,
     load_network,
 )
-from avlmaps.perception.embedded.trained import open_trained, trained_pixels, trained_views
+from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.models.settings import ModelSettings, using_models
-from avlmaps.perception.profiles import profile
 from avlmaps.recordings.types import Frame
 
 SHIPPED = Path(str(files("avlmaps.perception.embedded") / "weights"))
@@ -62,7 +61,7 @@ def rewrite(folder: Path, name: str, content: bytes | None = None, **changes: ob
     path.write_bytes(msgspec.json.encode(notes))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_both_networks_are_the_pair_and_satisfy_the_protocols(eyes: Path) -> None:
     bring(eyes, DEFAULT_WEIGHTS, SYNTHETIC_WEIGHTS)
     assert open_trained().checksum == load_pair().checksum
@@ -92,7 +91,7 @@ def test_a_file_looks_alone_wherever_it_lies(eyes: Path) -> None:
 def test_the_profile_finds_them_and_says_whose_they_are(eyes: Path) -> None:
     bring(eyes, SYNTHETIC_WEIGHTS)
     rewrite(eyes, SYNTHETIC_WEIGHTS, id="own/pixels-1")
-    cards = profile("trained").cards()
+    cards = Encoders.named("trained").cards()
     assert (cards[Kind.PIXELS].id, cards[Kind.PIXELS].licence) == ("own/pixels-1", "your own")
     assert (cards[Kind.VIEWS].id, cards[Kind.VIEWS].licence) == ("own/views-1", "your own")
     assert cards[Kind.PIXELS].checksum == cards[Kind.VIEWS].checksum == trained_views().card.checksum

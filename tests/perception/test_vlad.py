@@ -2,7 +2,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps.perception.embedded.vlad import WORDS, Vlad, learned_words
+from avlmaps.perception.embedded.keypoints import WORDS, Vlad, learned_words
 from avlmaps.perception.protocols import LocalFeatures, PlaceEncoder
 
 NO_PICTURE = np.zeros((1, 1, 3), np.uint8)

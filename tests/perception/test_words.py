@@ -13,8 +13,14 @@ from hypothesis import strategies as st
 import avlmaps.perception.embedded as embedded
 from avlmaps.core.errors import QueryError
 from avlmaps.core.registry import Kind, load
-from avlmaps.perception.embedded.wordpieces import WordPieces, clean_phrase, head_of, replace_aliases
-from avlmaps.perception.embedded.words import EmbeddedWords, read_aliases
+from avlmaps.perception.embedded.words import (
+    EmbeddedWords,
+    WordPieces,
+    clean_phrase,
+    head_of,
+    read_aliases,
+    replace_aliases,
+)
 from avlmaps.perception.protocols import WordEncoder
 from avlmaps_sim.bench import words as bench
 

@@ -10,7 +10,7 @@ import pytest
 from avlmaps.core.poses import inverse, rotation_angle_rad
 from avlmaps.maps.keyframes.describe import KeyframeSettings, describe_keyframe, stack_keyframes
 from avlmaps.maps.pipeline.keyframes import concat_keyframes
-from avlmaps.perception.embedded.rootsift import RootSift
+from avlmaps.perception.embedded.keypoints import RootSift
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.protocols import LocalFeatures, ModelCard
 from avlmaps.query.locate import LocateSettings, locate, locate_features

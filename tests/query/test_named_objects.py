@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from avlmaps.core.question import Modality, Part, Role
 from avlmaps.maps.grid import GridSpec
-from avlmaps.perception.embedded.codes import features_of, orthonormal_codes
+from avlmaps.perception.embedded.closed_set import features_of, orthonormal_codes
 from avlmaps.perception.protocols import ModelCard, NamedPixelEncoder
 from avlmaps.query import known_words
 from avlmaps.query.colour_filter import colour_in

@@ -8,11 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.lexicon import EntryKind, lexicon
-from avlmaps.perception.embedded.pixels import EmbeddedPixels
-from avlmaps.perception.embedded.views import EmbeddedViews
-from avlmaps.perception.protocols import SurveyedEncoder
-from avlmaps.perception.room_contents import FURNISHED as FOLDER
-from avlmaps.perception.room_contents import RoomContents, read_room_contents
+from avlmaps.perception.embedded.pixels import EmbeddedPixels, EmbeddedViews
+from avlmaps.perception.protocols import FURNISHED as FOLDER
+from avlmaps.perception.protocols import RoomContents, SurveyedEncoder, read_room_contents
 from avlmaps.query.room_contents import commonness
 from avlmaps.query.room_contents import votes as votes_of
 

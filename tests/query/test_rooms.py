@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from query_fakes import FakePixels, FakeSounds, fake_encoders, fake_map, keyframes_at, voxels_of
 from walled_rooms import storeys_at, two_rooms, two_rooms_index
 
-from avlmaps.perception.protocols import ModelCard
-from avlmaps.perception.room_contents import RoomContents, read_room_contents
+from avlmaps.perception.protocols import ModelCard, RoomContents, read_room_contents
 from avlmaps.query.avlmap import AVLMap, QuerySettings
 from avlmaps.query.factors import NearAnchors
 from avlmaps.query.floor_plan import FloorPlan

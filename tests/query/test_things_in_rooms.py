@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from walled_rooms import storeys_at, two_rooms
 
 from avlmaps.core.arrays import Float
-from avlmaps.perception.room_contents import RoomContents, read_room_contents
+from avlmaps.perception.protocols import RoomContents, read_room_contents
 from avlmaps.query.floor_plan import FloorPlan
 from avlmaps.query.object_settings import ObjectSettings
 from avlmaps.query.room_contents import commonness

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps.cli.reading_options import Reading
-from avlmaps.cli.usage import CONFIG
+from avlmaps.cli.verb import Reading
+from avlmaps.cli.verbs import CONFIG
 from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.wording import Spelling, asked_as, options_as

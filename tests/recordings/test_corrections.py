@@ -11,7 +11,7 @@ from hypothesis import given
 from recording_scenes import CAMERA, shots, write_folder
 
 from avlmaps.cli.output import UsageError
-from avlmaps.cli.reading_options import Reading
+from avlmaps.cli.verb import Reading
 from avlmaps.core import poses
 from avlmaps.core.errors import RecordingError
 from avlmaps.recordings.camera_axes import NAMED, all_axes, opencv_from_axes

@@ -8,27 +8,22 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from avlmaps.maps.build import build_map
-from avlmaps.maps.settings import BuildSettings
-from avlmaps.recordings.open import open_recording
 from avlmaps.serve.app import create_app
 from avlmaps.serve.service import Service
 from avlmaps.serve.settings import ServeSettings
-from helpers.walked_room import write_walk
+from helpers.walked_room import shared_walk, walked_map
 
 
 @pytest.fixture(scope="session")
-def walk(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def walk() -> Path:
     """The recording of the map."""
-    return write_walk(tmp_path_factory.mktemp("served") / "rec")
+    return shared_walk()
 
 
 @pytest.fixture(scope="session")
 def room(walk: Path) -> Path:
     """A map of about 3,000 voxels with one sound."""
-    path = walk.parent / "room.avlmap"
-    build_map(open_recording(walk), path, "colours", BuildSettings(voxel_size_m=0.1), progress=False)
-    return path
+    return walked_map(walk)
 
 
 @pytest.fixture(scope="session")

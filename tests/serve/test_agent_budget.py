@@ -14,12 +14,10 @@ from hypothesis import strategies as st
 from mcp.client.client import Client
 from starlette.testclient import TestClient
 
-from avlmaps.cli.rooms import Rooms
-from avlmaps.cli.rooms import rooms as list_rooms
-from avlmaps.cli.things import Things, contents, contents_lines
+from avlmaps.cli.things import Rooms, Things
+from avlmaps.core.printable import shortened
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.serve.agent_answers import MOST_TOKENS, fitting, token_count
-from avlmaps.serve.agents import agent_server
+from avlmaps.serve.agents import MOST_TOKENS, agent_server, fitting, token_count
 from avlmaps.serve.app import create_app
 from avlmaps.serve.service import Service
 from helpers.agent_talk import texts, told
@@ -277,13 +275,14 @@ def test_a_program_lists_the_things_of_a_room_near_a_place_by_pages(service: Ser
 )
 def test_the_command_line_lists_what_the_server_lists(service: Service, options: dict[str, Any]) -> None:
     avlmap = service.shelf.get("office").avlmap
-    said = contents(Things(map=Path("office"), **options | {"name": tuple(options.get("name", ()))}), avlmap)
-    lines = contents_lines(said)
+    things = Things(map=Path("office"), **options | {"name": tuple(options.get("name", ()))})
+    said = shortened(things.answer(avlmap))
+    lines = things.lines(said)
     with TestClient(create_app(service), base_url="http://127.0.0.1:8750") as client:
         served = client.get("/maps/office/things", params=options).json()
         rooms = client.get("/maps/office/rooms").json()
     assert {key: said[key] for key in served} == served
     assert all(thing["name"] in line for thing, line in zip(said["things"], lines[1:], strict=False))
-    assert list_rooms(Rooms(map=Path("office")), avlmap) == rooms
+    assert shortened(Rooms(map=Path("office")).answer(avlmap)) == rooms
     named = {room["room"] for room in rooms["rooms"]}
     assert len(named) == len(rooms["rooms"]) and {one.get("room") for one in served["things"]} <= named | {None}

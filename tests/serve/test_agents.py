@@ -109,6 +109,30 @@ def test_goals_come_by_the_length_of_their_paths(talk: Any, room: Path, walk: Pa
     assert lengths == sorted(lengths)
 
 
+def test_sloppy_arguments_are_taken_as_they_are_meant(service: Service, walk: Path) -> None:
+    photo = base64.b64encode(sorted((walk / "rgb").iterdir())[5].read_bytes()).decode()
+    broken = "\r\n".join(photo[at : at + 76] for at in range(0, len(photo), 76))
+    alike = {
+        "ask": (
+            {"sentence": "the red thing", "top": 2},
+            {"sentence": "the red thing", "top": "2", "object": "", "primary": "", "near": None, "picture": "false"},
+        ),
+        "locate_photo": (
+            {"photo": photo}, {"photo": broken, "intrinsics": ""}, {"photo": f"data:image/png;base64,{broken}"},
+        ),
+        "describe_place": ({"x": 4.0, "y": 3.0}, {"x": "4.0", "y": "3", "z": ""}),
+    }  # fmt: skip
+
+    async def main() -> None:
+        async with Client(agent_server(service)) as client:
+            for tool, ways in alike.items():
+                answers = [await client.call_tool(tool, dict(way)) for way in ways]
+                assert not any(one.is_error for one in answers), answers
+                assert all(told(one) == told(answers[0]) for one in answers)
+
+    anyio.run(main)
+
+
 @pytest.mark.parametrize(
     ("tool", "arguments", "says"),
     [

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from avlmaps.cli.things import Things, contents
+from avlmaps.cli.things import Things
 from avlmaps.core.errors import QueryError
 from avlmaps.maps.sources.density import Spread
 from avlmaps.maps.store.life import Life, Stay
@@ -48,13 +48,17 @@ def two_days(room: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Days, "of", lambda *_: Days(visits, life))
 
 
+def listed(verb: Things) -> dict[str, Any]:
+    return verb.answer(verb.opened())
+
+
 @pytest.mark.usefixtures("two_days")
 @pytest.mark.parametrize(("at", "x"), [("2026-11-23", 0.25), ("2026-11-24", 0.25), ("1", 0.25), ("2", 1.25)])
 def test_the_things_of_a_day_are_one_answer_by_every_front(client: TestClient, room: Path, at: str, x: float) -> None:
     served = client.get("/maps/room/things", params={"at": at}).json()
     (thing,) = served["things"]
     assert thing["position"] == [x, 0.0, 0.3] and served["total"] == 1
-    assert contents(Things(map=room, at=at))["things"] == served["things"]
+    assert listed(Things(map=room, at=at))["things"] == served["things"]
     (near,) = client.get("/maps/room/things", params={"at": at, "near": f"{x},0,0"}).json()["things"]
     assert near["distance_m"] == 0.3
     assert not client.get("/maps/room/things", params={"at": at, "least": 0.9}).json()["things"]
@@ -69,7 +73,7 @@ def test_an_unknown_day_is_refused_with_one_sentence(client: TestClient, room: P
         refused = client.get(f"/maps/room/{address}", params={name: at})
         assert refused.status_code == 422 and why in refused.json()["error"]["message"]
     with pytest.raises(QueryError, match=why):
-        contents(Things(map=room, at=at))
+        listed(Things(map=room, at=at))
 
 
 @pytest.mark.usefixtures("two_days")

@@ -16,7 +16,7 @@ from mcp.client.client import Client
 from starlette.testclient import TestClient
 
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.serve.agent_answers import MOST_TOKENS, token_count
+from avlmaps.serve.agents import MOST_TOKENS, token_count
 from avlmaps.serve.app import create_app
 from avlmaps.serve.drive.agents import drive_agent_server
 from avlmaps.serve.drive.plans import DriveError, OrderPlan, PlanBook
@@ -346,7 +346,7 @@ def test_without_a_log_nothing_moves_and_a_stop_is_accepted(
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr("avlmaps.serve.drive.order_log.os.write", full)
+        patch.setattr("avlmaps.serve.drive.plans.os.write", full)
         refused = client.post("/drive/confirm", json={"token": token})
         assert refused.status_code == 503 and "No space left" in refused.json()["error"]["message"]
         assert client.post("/drive/stop").status_code == 200

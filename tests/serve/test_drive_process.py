@@ -15,7 +15,7 @@ from ros_bridge import FakeRobot
 from avlmaps.core.motion import GroundPose
 from helpers.forked import Forked
 
-pytestmark = [pytest.mark.timeout(280), pytest.mark.slow]
+pytestmark = [pytest.mark.timeout(280), pytest.mark.nightly]
 
 TOKEN = "a token of the tests"
 # No test uses this patience up, though the machine may stand still beneath it.

@@ -12,8 +12,8 @@ from starlette.testclient import TestClient
 
 from avlmaps.core.network import is_loopback
 from avlmaps.core.wording import Spelling, option, options_as
-from avlmaps.serve.errors import Privacy, without_folders
 from avlmaps.serve.guard import AccessGuard
+from avlmaps.serve.lanes import Privacy, without_folders
 from avlmaps.serve.settings import Limits, ServeError, ServeSettings
 
 TOKEN = "a-token-of-some-length"
@@ -97,7 +97,7 @@ def test_the_token_opens_and_health_needs_none() -> None:
 def test_no_other_text_opens(text: str) -> None:
     if text.strip() == TOKEN:
         return
-    from avlmaps.serve.errors import RequestError
+    from avlmaps.serve.lanes import RequestError
 
     with pytest.raises(RequestError) as fault:
         AccessGuard(behind, ServeSettings(token=TOKEN))._check_token(

@@ -6,8 +6,7 @@ import threading
 import pytest
 
 from avlmaps.core.wording import Spelling, asked_as, option, options_as
-from avlmaps.serve.errors import RequestError
-from avlmaps.serve.lanes import Cancellation, CancelledWorkError, Lane, watch_here
+from avlmaps.serve.lanes import Cancellation, CancelledWorkError, Lane, RequestError, watch_here
 
 
 @pytest.fixture

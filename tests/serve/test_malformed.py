@@ -8,10 +8,9 @@ from hypothesis import strategies as st
 from starlette.testclient import TestClient
 
 from avlmaps.query.given_places import place_of
-from avlmaps.serve.errors import RequestError
-from avlmaps.serve.requests import AskQuery, PathQuery, PlaceQuery, ThingsQuery, checked, checked_texts
+from avlmaps.serve.lanes import RequestError
+from avlmaps.serve.requests import AskQuery, PathQuery, PlaceQuery, ThingsQuery, Uploads, checked, checked_texts
 from avlmaps.serve.settings import Limits
-from avlmaps.serve.uploads import Uploads
 
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=20),

@@ -19,8 +19,7 @@ from avlmaps.maps.settings import BuildSettings
 from avlmaps.query.asking import AskError
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.recordings.open import open_recording
-from avlmaps.serve.agent_answers import compact, fitting
-from avlmaps.serve.agents import agent_server
+from avlmaps.serve.agents import agent_server, compact, fitting
 from avlmaps.serve.app import create_app
 from avlmaps.serve.service import Service
 from avlmaps.view.on_page import TOP

@@ -91,7 +91,7 @@ def test_a_process_answers_programs_and_agents_and_finishes_what_runs(start: Sta
     assert "Traceback" not in process.stderr.read()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_killed_server_starts_again_on_the_same_port_with_the_same_answers(start: Start) -> None:
     process, ready = start("--port", "0")
     port = ready["url"].rpartition(":")[2]
@@ -120,7 +120,7 @@ def own_certificate(folder: Path) -> tuple[Path, Path]:
     return files
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_with_tls_files_it_speaks_https_and_nothing_else(start: Start, tmp_path: Path) -> None:
     certificate, key = own_certificate(tmp_path)
     process, ready = start("--port", "0", "--tls-cert", certificate, "--tls-key", key)
@@ -146,7 +146,7 @@ def test_tls_files_that_are_none_are_one_sentence(
     assert "The TLS files cannot be used" in error
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_an_agent_is_served_by_standard_input_and_output(room: Path) -> None:
     async def conversation() -> Any:
         words = ["-m", "avlmaps", "serve", str(room), "--stdio"]
@@ -156,6 +156,23 @@ def test_an_agent_is_served_by_standard_input_and_output(room: Path) -> None:
             return told(await client.call_tool("ask", {"sentence": "the red thing"}))
 
     assert anyio.run(conversation)["goals"]
+
+
+@pytest.mark.slow
+def test_a_client_whose_input_ends_has_its_last_answer_and_may_name_a_photo(room: Path, walk: Path) -> None:
+    photo = sorted((walk / "rgb").iterdir())[5]
+    asked: list[dict[str, Any]] = [
+        {"id": 1, "method": "initialize", "params": {
+            "protocolVersion": "2025-06-18", "capabilities": {}, "clientInfo": {"name": "test", "version": "1"}}},
+        {"method": "notifications/initialized"},
+        {"id": 2, "method": "tools/call", "params": {"name": "locate_photo", "arguments": {"photo": str(photo)}}},
+    ]  # fmt: skip
+    lines = "\ufeff" + "".join(json.dumps({"jsonrpc": "2.0", **one}) + "\n" for one in asked)
+    words = [sys.executable, "-m", "avlmaps", "serve", str(room), "--stdio"]
+    done = subprocess.run(words, input=lines.encode(), capture_output=True, check=True, timeout=120)
+    answers = {one["id"]: one["result"] for one in map(json.loads, done.stdout.splitlines())}
+    assert answers.keys() == {1, 2}
+    assert json.loads(answers[2]["content"][0]["text"])["inliers"] > 0
 
 
 def failed(capsys: pytest.CaptureFixture[str], *words: object) -> tuple[int, str]:

@@ -37,7 +37,7 @@ def browser() -> Iterator:
 
 
 def opened(browser, url: str, width: int = 1000, height: int = 640):
-    page = browser.new_page(viewport={"width": width, "height": height})
+    page = browser.new_page(viewport={"width": width, "height": height}, reduced_motion="reduce")
     page.faults = []
     page.on("pageerror", lambda fault: page.faults.append(str(fault)))
     page.set_default_timeout(60_000)
@@ -95,13 +95,14 @@ def test_a_question_is_typed_and_its_goal_is_seen(page, room: AVLMap) -> None:
     assert f"{goal.position[0]:.2f}, {goal.position[1]:.2f}, {goal.position[2]:.2f}" in page.inner_text("#goals")
     marker = page.locator(".mark.goal", has_text="1").first
     assert marker.evaluate("element => getComputedStyle(element).visibility") == "visible"
+    shown = picture(page)  # the camera has come near by then
     x, y = map(int, goal_at(page))  # the canvas begins at the page's corner
-    shown = picture(page)
     around = shown[max(0, y - 25) : y + 25, max(0, x - 25) : x + 25]
     assert coloured(around) > 0.03, "there is heat round the goal's number"
     assert coloured(shown) < coloured(around), "and what is not it stays gray"
 
 
+@pytest.mark.nightly
 def test_a_wrong_question_is_told_on_the_page(page) -> None:
     page.fill("#sentence", "near near")
     page.keyboard.press("Enter")
@@ -110,6 +111,7 @@ def test_a_wrong_question_is_told_on_the_page(page) -> None:
     assert not page.locator("#ask button.main").is_disabled()
 
 
+@pytest.mark.nightly
 def test_a_click_names_the_voxel_and_two_clicks_measure(page) -> None:
     page.fill("#sentence", "the red thing")
     page.keyboard.press("Enter")
@@ -130,6 +132,7 @@ def test_a_click_names_the_voxel_and_two_clicks_measure(page) -> None:
     assert page.inner_text("#length") == ""
 
 
+@pytest.mark.nightly
 def test_colours_and_cuts_change_the_picture(page) -> None:
     shots = [picture(page)]
     for name in ("thing", "height"):
@@ -142,6 +145,7 @@ def test_colours_and_cuts_change_the_picture(page) -> None:
     assert gone > 0.02, "walls are cut away"
 
 
+@pytest.mark.nightly
 def test_the_keyboard_alone_moves_the_view(page) -> None:
     before = picture(page)
     page.focus("#canvas")
@@ -150,6 +154,7 @@ def test_the_keyboard_alone_moves_the_view(page) -> None:
     assert (picture(page) != before).any(axis=2).mean() > 0.05
 
 
+@pytest.mark.nightly
 def test_nothing_asked_gets_a_hint_and_no_request(page) -> None:
     requests = []
     page.on("request", lambda one: requests.append(one.url))
@@ -158,6 +163,7 @@ def test_nothing_asked_gets_a_hint_and_no_request(page) -> None:
     assert requests == []
 
 
+@pytest.mark.nightly
 def test_a_whole_map_stays_whole_in_a_window_of_another_shape(page) -> None:
     far = "avlmapsView.viewer.camera.distance"
     wide = page.evaluate(far)
@@ -171,6 +177,7 @@ def test_a_whole_map_stays_whole_in_a_window_of_another_shape(page) -> None:
     assert page.evaluate(far) == nearer, "a view that a person chose stays"
 
 
+@pytest.mark.nightly
 def test_a_phone_has_room_for_every_control_and_is_told_of_fingers(browser, served: Served) -> None:
     context = browser.new_context(viewport={"width": 320, "height": 568}, has_touch=True, is_mobile=True)
     phone = context.new_page()
@@ -181,6 +188,7 @@ def test_a_phone_has_room_for_every_control_and_is_told_of_fingers(browser, serv
     context.close()
 
 
+@pytest.mark.nightly
 def test_a_photo_is_asked_with_and_a_bad_one_refused(page, room: AVLMap, tmp_path: Path) -> None:
     from avlmaps.view.layout import Layout
 
@@ -196,6 +204,7 @@ def test_a_photo_is_asked_with_and_a_bad_one_refused(page, room: AVLMap, tmp_pat
     assert "there.jpg" in page.inner_text("#answer")
 
 
+@pytest.mark.nightly
 def test_a_command_is_planned_and_stepped_through(page) -> None:
     page.locator("#drive-section summary").first.click()
     page.fill("#command", "go to the red thing")
@@ -209,6 +218,7 @@ def test_a_command_is_planned_and_stepped_through(page) -> None:
     assert page.inner_text("#at-text").startswith("step 3 of ")
 
 
+@pytest.mark.nightly
 def test_controls_have_names_and_the_page_fits_a_phone(browser, served: Served) -> None:
     page = opened(browser, served.url, 390, 780)
     unnamed = page.evaluate(
@@ -222,6 +232,7 @@ def test_controls_have_names_and_the_page_fits_a_phone(browser, served: Served) 
     page.close()
 
 
+@pytest.mark.nightly
 def test_a_thing_is_renamed_where_it_is_clicked(browser, room: AVLMap, tmp_path: Path) -> None:
     place = Path(shutil.copytree(room.stored.path, tmp_path / "home.avlmap"))
     with contextmanager(serving)(place) as own:
@@ -244,6 +255,7 @@ def test_a_thing_is_renamed_where_it_is_clicked(browser, room: AVLMap, tmp_path:
     assert [edit.name for edit in read_edits(place)] == ["zorb"]
 
 
+@pytest.mark.nightly
 def test_the_file_opens_without_a_server(browser, room: AVLMap, tmp_path: Path) -> None:
     write_page(tmp_path / "room.html", [room], ["the red thing", "the blue thing"])
     page = opened(browser, (tmp_path / "room.html").as_uri())
@@ -279,6 +291,7 @@ def edges(shown: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("width", "height"), [(1300, 420), (390, 780)])
+@pytest.mark.nightly
 def test_the_whole_map_is_in_the_picture_from_its_side_and_as_a_plan(
     browser, served: Served, width: int, height: int
 ) -> None:
@@ -302,6 +315,7 @@ def test_the_whole_map_is_in_the_picture_from_its_side_and_as_a_plan(
     page.close()
 
 
+@pytest.mark.nightly
 def test_the_scale_is_as_long_as_it_says(page) -> None:
     page.click("#above")
     page.wait_for_selector("#canvas[data-state=whole]")
@@ -317,6 +331,7 @@ def test_the_scale_is_as_long_as_it_says(page) -> None:
     assert "level frame" in page.inner_text("#scale-text")
 
 
+@pytest.mark.nightly
 def test_a_pressed_button_can_be_read(page) -> None:
     page.click("#measure")
     shades = page.locator("#measure").evaluate(
@@ -327,6 +342,7 @@ def test_a_pressed_button_can_be_read(page) -> None:
 
 
 @pytest.mark.parametrize("width", [390, 700, 1000, 1280])
+@pytest.mark.nightly
 def test_nothing_at_the_foot_lies_over_anything_else(browser, served: Served, width: int) -> None:
     page = opened(browser, served.url, width, 700)
     page.wait_for_selector("#canvas[data-state=whole]")
@@ -346,6 +362,7 @@ def test_nothing_at_the_foot_lies_over_anything_else(browser, served: Served, wi
     page.close()
 
 
+@pytest.mark.nightly
 def test_a_reload_brings_back_the_view_and_the_question(page) -> None:
     page.fill("#sentence", "the red thing")
     page.keyboard.press("Enter")
@@ -364,6 +381,7 @@ def test_a_reload_brings_back_the_view_and_the_question(page) -> None:
 
 
 @pytest.mark.parametrize("hash_", ["#view=a,b,c,d,e,f,g&cut=x", "#view=0,0,-1,0,0,0,0&colour=none"])
+@pytest.mark.nightly
 def test_an_address_that_means_nothing_opens_the_whole_map(browser, served: Served, hash_: str) -> None:
     page, plain = opened(browser, served.url + hash_), opened(browser, served.url)
     assert camera(page)["numbers"] == camera(plain)["numbers"]
@@ -372,6 +390,7 @@ def test_an_address_that_means_nothing_opens_the_whole_map(browser, served: Serv
     plain.close()
 
 
+@pytest.mark.nightly
 def test_a_name_on_the_map_is_a_way_to_go_there(page) -> None:
     page.wait_for_selector("#canvas[data-state=whole]")
     mark = page.locator(".mark.thing:visible").first
@@ -383,6 +402,7 @@ def test_a_name_on_the_map_is_a_way_to_go_there(page) -> None:
     assert reached and after[2] < before[2]
 
 
+@pytest.mark.nightly
 def test_the_legend_lies_on_the_map_with_a_colour_for_each_kind(page) -> None:
     page.select_option("#colour", "thing")
     shades = page.locator("#legend li i").evaluate_all("all => all.map((e) => getComputedStyle(e).backgroundColor)")
@@ -395,6 +415,7 @@ def test_the_legend_lies_on_the_map_with_a_colour_for_each_kind(page) -> None:
     assert set(listed) <= set(shades)
 
 
+@pytest.mark.nightly
 def test_a_picture_is_saved(page, tmp_path: Path) -> None:
     page.fill("#sentence", "the red thing")
     page.keyboard.press("Enter")
@@ -406,11 +427,28 @@ def test_a_picture_is_saved(page, tmp_path: Path) -> None:
     assert download.value.suggested_filename == "room.png"
     saved = decoded(tmp_path / "map.png")
     box = page.locator("#canvas").bounding_box()
-    assert saved.shape[1] == round(box["width"]) and saved.shape[0] > box["height"]
-    x, y = (round(value) for value in goal_at(page))
+    larger = saved.shape[1] / box["width"]
+    assert saved.shape[1] == 3840 and saved.shape[0] > larger * box["height"]
+    x, y = (round(larger * value) for value in goal_at(page))
     assert saved[y - 12 : y + 12, x - 12 : x + 12].min() < 60, "the goal's number is in the picture"
+    page.wait_for_selector("#canvas[data-state=whole]")
+    assert page.evaluate("document.getElementById('canvas').width") == round(box["width"]), "the page is as it was"
 
 
+@pytest.mark.nightly
+def test_the_page_shows_what_was_edited_elsewhere_without_a_reload(browser, room: AVLMap, tmp_path: Path) -> None:
+    place = Path(shutil.copytree(room.stored.path, tmp_path / "home.avlmap"))
+    with contextmanager(serving)(place) as own:
+        page = opened(browser, own.url)
+        name = page.locator("#things li .named").first.text_content()
+        AVLMap.open(place).edit.rename(name, "zorb")
+        until(page, "document.documentElement.dataset.renewed !== undefined")
+        assert "zorb" in page.locator("#things").text_content()
+        assert page.faults == []
+        page.close()
+
+
+@pytest.mark.nightly
 def test_two_maps_are_seen_side_by_side_and_one_over_the_other(browser, room: AVLMap) -> None:
     for server in serving(room.stored.path, room.stored.path):
         page = opened(browser, server.url)

@@ -26,6 +26,7 @@ def firefox(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Firefox]:
 
 
 @pytest.mark.parametrize(("width", "height"), [(1000, 720), (500, 900)])
+@pytest.mark.nightly
 def test_a_question_is_answered_in_firefox(
     firefox: Firefox, served: Served, room: AVLMap, width: int, height: int
 ) -> None:

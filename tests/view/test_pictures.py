@@ -14,7 +14,7 @@ from test_browser import browser, opened  # noqa: F401 - a fixture
 from avlmaps.query.avlmap import AVLMap
 from helpers.viewing import decoded, serving
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.nightly]
 PICTURES = ("view-map", "view-query", "view-above", "view-things")
 
 

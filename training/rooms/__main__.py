@@ -11,7 +11,7 @@ from pathlib import Path
 from training.rooms.furnished import Surfaces, mean_surfaces, rooms_of, scenes, write_table
 from training.rooms.named import named_surfaces, naming_counts
 
-from avlmaps.perception.room_contents import TABLE
+from avlmaps.perception.protocols import TABLE
 from avlmaps_sim.scenes import open_scene
 
 _PERCEPTION = Path(__file__).parents[2] / "src/avlmaps/perception"

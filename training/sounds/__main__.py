@@ -21,7 +21,7 @@ from training.sounds.kinds import KINDS, NAMES, TEMPLATES
 from training.sounds.mixtures import MADE_EACH
 
 from avlmaps.core.progress import say
-from avlmaps.perception.embedded.sound_calibration import evidence_for
+from avlmaps.perception.embedded.sounds import evidence_for
 from avlmaps.perception.embedded.words import EmbeddedWords
 
 WEIGHTS = Path("src/avlmaps/perception/embedded/weights")

@@ -9,7 +9,7 @@ from scipy.optimize import minimize_scalar
 from training.sounds.fit import EncodeWords, targets
 from training.sounds.kinds import CALLED, KINDS, RECORDED
 
-from avlmaps.perception.embedded.sound_calibration import (
+from avlmaps.perception.embedded.sounds import (
     SoundCalibration,
     evidence_for,
     kinds_of_phrases,

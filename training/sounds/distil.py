@@ -32,7 +32,7 @@ from training.sounds.mixtures import Mixtures, Recipe, of_training, stored_mixtu
 from training.sounds.network import SoundNet
 
 from avlmaps.core.progress import say
-from avlmaps.perception.embedded.sound_calibration import typical_examples
+from avlmaps.perception.embedded.sounds import typical_examples
 from avlmaps.perception.embedded.words import EmbeddedWords
 
 ROOT = Path(__file__).resolve().parents[2]

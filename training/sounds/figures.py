@@ -11,7 +11,7 @@ from training.sounds.crossvalidate import LEFT_OUT, ROOM_S, Answers, Held
 from training.sounds.fit import EncodeWords
 from training.sounds.kinds import CALLED, ESC10, KINDS, NAMES, RECORDED
 
-from avlmaps.perception.embedded.sound_calibration import SoundCalibration, log_odds, sigmoid
+from avlmaps.perception.embedded.sounds import SoundCalibration, log_odds, sigmoid
 from avlmaps_sim.bench.harness.intervals import wilson
 
 Table = dict[str, Any]

@@ -28,8 +28,7 @@ from training.words.scores import Encode, ranked
 from training.words.student import Lessons, Schedule, Student, cut, encoder, train
 from training.words.teacher import Teacher
 
-from avlmaps.perception.embedded.wordpieces import WordPieces, clean_phrase, replace_aliases
-from avlmaps.perception.embedded.words import read_aliases
+from avlmaps.perception.embedded.words import WordPieces, clean_phrase, read_aliases, replace_aliases
 
 _EMBEDDED = Path(__file__).parents[2] / "src/avlmaps/perception/embedded"
 _HERE = Path(__file__).parent

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from avlmaps.perception.embedded.wordpieces import clean_phrase
+from avlmaps.perception.embedded.words import clean_phrase
 
 _DATA = Path(__file__).parents[1] / "data"
 HELDOUT = Path(__file__).parents[2] / "packages/avlmaps-sim/src/avlmaps_sim/bench/data/words_heldout.csv"

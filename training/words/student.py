@@ -8,7 +8,7 @@ import torch
 from jaxtyping import Float32
 from torch.nn import functional as nnf
 
-from avlmaps.perception.embedded.wordpieces import WordPieces, clean_phrase, replace_aliases
+from avlmaps.perception.embedded.words import WordPieces, clean_phrase, replace_aliases
 
 ROLES = 3
 

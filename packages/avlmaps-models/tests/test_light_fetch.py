@@ -1,7 +1,6 @@
 """`avlmaps profiles --fetch light`: whole or not at all, from a page on this machine or a folder; no network."""
 
 import json
-import shutil
 import threading
 from collections.abc import Callable, Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -13,7 +12,7 @@ import pytest
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Kind, find, forget_loaded, load
 from avlmaps.perception.conformance import example_frame
-from avlmaps.perception.models.availability import availability
+from avlmaps.perception.models.published_models import availability
 from avlmaps.perception.models.settings import ModelSettings, using_models
 from avlmaps_models.light import bundle as files
 from avlmaps_models.light import fetch
@@ -22,12 +21,10 @@ from helpers.light_files import write_light
 
 
 class Page:
-    """A server of a folder; a test may have it break off, forget ranges, or answer something else."""
+    """A server of a folder; a test may have it answer something else."""
 
     def __init__(self, folder: Path) -> None:
-        self.folder, self.asked = folder, list[tuple[str, str]]()
-        self.breaks_after: dict[str, int] = {}
-        self.ranges = True
+        self.folder, self.asked = folder, list[str]()
         self.moved = ""
         page = self
 
@@ -44,24 +41,19 @@ class Page:
         self.url = f"http://127.0.0.1:{self._server.server_address[1]}/files"
 
     def answer(self, handler: BaseHTTPRequestHandler) -> None:
-        name, wanted = handler.path.rpartition("/")[2], handler.headers.get("Range", "")
-        self.asked.append((name, wanted))
+        name = handler.path.rpartition("/")[2]
+        self.asked.append(name)
+        path = self.folder / name
         if self.moved:
             handler.send_response(302)
             handler.send_header("Location", self.moved + name)
             handler.end_headers()
-            return
-        path = self.folder / name
-        if not path.is_file():
+        elif not path.is_file():
             handler.send_error(404)
-            return
-        content = path.read_bytes()
-        start = int(wanted.removeprefix("bytes=").rstrip("-")) if wanted and self.ranges else 0
-        handler.send_response(206 if start else 200)
-        handler.send_header("Content-Length", str(len(content) - start))
-        handler.end_headers()
-        stop = self.breaks_after.pop(name, len(content))
-        handler.wfile.write(content[start:stop])
+        else:
+            handler.send_response(200)
+            handler.end_headers()
+            handler.wfile.write(path.read_bytes())
 
     def close(self) -> None:
         self._server.shutdown()
@@ -73,8 +65,6 @@ def page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Page]:
     monkeypatch.setenv("AVLMAPS_HOME", str(tmp_path / "home"))
     for name in ("AVLMAPS_MODELS", fetch.PLACE_VARIABLE, "http_proxy", "HTTP_PROXY"):
         monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr(fetch, "_BLOCK", 500)
-    monkeypatch.setattr(fetch.time, "sleep", lambda s: None)
     served = Page(write_light(tmp_path / "published"))
     yield served
     served.close()
@@ -111,7 +101,7 @@ def test_a_page_is_fetched_once_and_then_used(page: Page, models: Path) -> None:
     assert load(Kind.PIXELS, "light").encode(example_frame()).shape[2] == 8
     page.asked.clear()
     assert fetch_light(page.url).received_bytes == 0
-    assert page.asked == [(files.MANIFEST, "")]
+    assert page.asked == [files.MANIFEST]
 
 
 def test_files_that_were_damaged_since_are_fetched_again(page: Page, models: Path) -> None:
@@ -128,25 +118,6 @@ def test_a_folder_will_do_and_no_folder_of_models_is_the_users_own(page: Page, t
     assert found.folder == tmp_path / "home" / "models" / files.MODEL
     assert load(Kind.VIEWS, "light").card.dim == 8
     assert availability(find(Kind.SOUNDS, "light")).state == "ready"
-
-
-@pytest.mark.parametrize("ranges", [True, False])
-def test_a_connection_that_breaks_off_is_taken_up_where_it_stopped(page: Page, models: Path, ranges: bool) -> None:
-    page.breaks_after, page.ranges = {files.PICTURES: 3000}, ranges
-    found = fetch_light(page.url)
-    assert contents(found.folder) == contents(page.folder)
-    assert (files.PICTURES, "bytes=3000-") in page.asked
-    assert found.received_bytes == sum(note.bytes for note in found.manifest.files.values()), "no byte is kept twice"
-
-
-def test_a_stopped_fetch_goes_on_where_it_stopped(page: Page, models: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fetch, "_TRIES", 1)
-    page.breaks_after = {files.PICTURES: 3000}
-    assert "broke off after 3,000 bytes" in refused(page.url)
-    assert not (models / files.MODEL).exists(), "half a model is none"
-    assert fetch_light(page.url).folder == models / files.MODEL
-    assert (files.PICTURES, "bytes=3000-") in page.asked
-    assert contents(models / files.MODEL) == contents(page.folder)
 
 
 def test_another_content_is_refused_and_removed_and_the_old_files_stay(page: Page, models: Path) -> None:
@@ -206,9 +177,9 @@ def a_redirection_to_a_plain_page(page: Page) -> str:
 
 
 FAULTS: dict[Callable[[Page], str], str] = {
-    no_file: "the server answers 404",
-    no_manifest: "the server answers 404",
-    no_server: "no network, or no such host",
+    no_file: "404",
+    no_manifest: "404",
+    no_server: "cannot be read",
     no_manifest_of_ours: "is no manifest of the profile light",
     a_path_in_a_name: "names the files ../../evil",
     a_redirection_to_a_plain_page: "only https is",
@@ -223,14 +194,6 @@ FAULTS: dict[Callable[[Page], str], str] = {
 def test_each_fault_is_one_sentence(page: Page, models: Path, fault: Callable[[Page], str]) -> None:
     assert FAULTS[fault] in refused(fault(page))
     assert not (models / files.MODEL).exists()
-
-
-def test_too_little_room_is_said_before_anything_is_written(
-    page: Page, models: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(shutil, "disk_usage", lambda path: shutil._ntuple_diskusage(10**9, 10**9, 4_000_000))
-    assert "and 4 MB are free" in refused(page.url)
-    assert page.asked == [(files.MANIFEST, "")]
 
 
 def test_a_folder_that_cannot_be_written_is_one_sentence(page: Page, models: Path) -> None:

@@ -11,8 +11,7 @@ from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
 from avlmaps.cli.info import describe_map, info_lines
 from avlmaps.cli.output import UsageError, emit
-from avlmaps.cli.reading_options import Reading, topics_of
-from avlmaps.cli.verb import ModelVerb
+from avlmaps.cli.verb import ModelVerb, Reading, topics_of
 from avlmaps.core.files import user_path
 from avlmaps.core.progress import say
 
@@ -33,9 +32,9 @@ _OF_ONE_RECORDING = (
 class Build(ModelVerb):
     """Build a map from a recording. A build that was stopped resumes, and the map is the same.
 
-    Examples:
-    avlmaps build REC --out kitchen.avlmap
-    avlmaps build REC --out kitchen.avlmap --profile foundation --model pixels=clip-patches views=clip
+    Example: avlmaps build REC --out kitchen.avlmap
+
+    Example: avlmaps build REC --out kitchen.avlmap --profile foundation --model pixels=clip-patches views=clip
     """
 
     compiles: ClassVar[bool] = True
@@ -91,7 +90,7 @@ class Build(ModelVerb):
     """Stop when more than this share of the frames cannot be read; fewer are left out and reported."""
     max_depth_m: Annotated[float, arg(metavar="METRES")] = 10.0
     """Ignore depth beyond this, metres."""
-    camera_height_m: Annotated[float | None, arg(aliases=("--floor-height",), metavar="METRES")] = None
+    camera_height_m: Annotated[float | None, arg(metavar="METRES")] = None
     """Height of the depth camera over the floor in the first frame, metres. Default: found from the frames; give it
     where `build` reports the floor with a low confidence."""
     allow: Annotated[

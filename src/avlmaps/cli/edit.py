@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import arg
 
-from avlmaps.cli.output import UsageError, emit, table_lines
+from avlmaps.cli.output import UsageError, table_lines
 from avlmaps.cli.verb import MapVerb, OptionalText
 from avlmaps.core.wording import place_text
 
@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from avlmaps.maps.store.edits import Edit as EditMade
+    from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.editor import Editor
     from avlmaps.query.schema import EditsAnswer
 
@@ -62,23 +63,33 @@ class Edit(MapVerb):
     by: Annotated[OptionalText, arg(metavar="NAME")] = None
     """Who makes the edit."""
 
-    def run(self) -> None:
-        """Make the edit, or list all."""
-        answer = edited(self)
-        emit(answer, edit_lines(answer), self.json)
+    def answer(self, avlmap: "AVLMap") -> "EditsAnswer":
+        """Make the edit that the options say, and return all of the map; what it did, where one was made."""
+        from avlmaps.query.editor import edit_text
 
+        made = _made(self, avlmap.edit)
+        answer = avlmap.edit.history()
+        if made is not None:
+            answer["text"] = edit_text(made)
+        return answer
 
-def edited(verb: Edit) -> "EditsAnswer":
-    """Make the edit that the options say, and return all of the map; what the last one did, where one was made."""
-    from avlmaps.query.avlmap import AVLMap
-    from avlmaps.query.editor import edit_text
-
-    editor = AVLMap.open(verb.map).edit
-    made = _made(verb, editor)
-    answer = editor.history()
-    if made is not None:
-        answer["text"] = edit_text(made)
-    return answer
+    def lines(self, answer: "Mapping[str, Any]") -> "list[str]":
+        """Lay out edits as a table, and what the last one did."""
+        if "text" in answer:
+            lost = [one for one in answer["edits"] if one["state"] == "lost"]
+            more = [f"note: {len(lost)} edits find nothing to apply to; list them with --list"] if lost else []
+            return [answer["text"], *more]
+        if not answer["edits"]:
+            return ["nobody has edited this map"]
+        rows = [
+            (
+                one["id"], one["does"], ", ".join(one["of"]), one["name"],
+                place_text(one["position"]) if one["position"] else "", one["by"] or "a person", one["made"][:10],
+                one["state"] + (f": {one['why']}" if "why" in one else ""),
+            )
+            for one in answer["edits"]
+        ]  # fmt: skip
+        return table_lines(("id", "edit", "of", "name", "position", "by", "day", "state"), rows)
 
 
 def _made(verb: Edit, editor: "Editor") -> "EditMade | None":
@@ -141,22 +152,3 @@ def _box(text: str | None) -> tuple[float, ...]:
         return tuple(float(word) for word in text.split(","))
     except ValueError:
         raise UsageError(f"--box takes x0,y0,x1,y1 in metres, such as 1.0,2.0,2.5,4.0; not {text[:60]!r}.") from None
-
-
-def edit_lines(answer: "Mapping[str, Any]") -> "list[str]":
-    """Lay out edits as a table, and what the last one did."""
-    if "text" in answer:
-        lost = [one for one in answer["edits"] if one["state"] == "lost"]
-        more = [f"note: {len(lost)} edits find nothing to apply to; list them with --list"] if lost else []
-        return [answer["text"], *more]
-    if not answer["edits"]:
-        return ["nobody has edited this map"]
-    rows = [
-        (
-            one["id"], one["does"], ", ".join(one["of"]), one["name"],
-            place_text(one["position"]) if one["position"] else "", one["by"] or "a person", one["made"][:10],
-            one["state"] + (f": {one['why']}" if "why" in one else ""),
-        )
-        for one in answer["edits"]
-    ]  # fmt: skip
-    return table_lines(("id", "edit", "of", "name", "position", "by", "day", "state"), rows)

@@ -1,13 +1,14 @@
 """`avlmaps export`: write a map for other programs."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tyro.conf import arg
 
-from avlmaps.cli.output import UsageError, emit, size_of
-from avlmaps.cli.verb import MapVerb
+from avlmaps.cli.output import UsageError, size_of
+from avlmaps.cli.verb import MapVerb, shown_in
 from avlmaps.core.frames import FrameName
 
 if TYPE_CHECKING:
@@ -57,45 +58,45 @@ class Export(MapVerb):
 
     def run(self) -> None:
         """Write the file."""
-        answer = export(self)
-        emit(answer, export_lines(answer), self.json)
+        self.require()
+        super().run()
 
+    def require(self) -> None:
+        """Refuse options that do not fit the format, and a file that is there."""
+        kind = self.out.suffix.lower()
+        _require_sense(self, kind)
+        if kind != ".pgm":
+            _require_new([self.out], self.overwrite)
 
-def export_lines(answer: dict[str, Any]) -> list[str]:
-    """Lay out what `export` wrote."""
-    files = ", ".join(f"{name} ({size_of(Path(name).stat().st_size)})" for name in answer["files"])
-    storeys = answer.get("storeys", [])
-    several = [f"one grid for each storey of the map, lowest first: {', '.join(storeys)}"] if len(storeys) > 1 else []
-    axes = ", y up" if answer["files"][0].lower().endswith(".glb") and answer["frame"] == "level" else ""
-    return [f"wrote {files}, {answer['frame']} frame{axes}", *several]
+    def answer(self, avlmap: "AVLMap") -> dict[str, Any]:
+        """Write a map for other programs."""
+        from avlmaps.query.export import write_table
 
+        self.require()
+        kind, written = self.out.suffix.lower(), [self.out]
+        frame = FrameName(self.frame or ("level" if kind in _LEVEL else "recording"))
+        if kind == ".pgm":
+            return _write_grids(self, avlmap)
+        if kind == ".csv":
+            listed = shown_in(avlmap.contents(self.least).to_json(""), frame, avlmap)
+            write_table(self.out, listed["things"], listed["sounds"], frame)
+        elif kind in _LAYERED:
+            _write_layers(self, avlmap, kind, frame)
+        elif kind == ".openlex3d":
+            from avlmaps.query.export_openlex3d import write_openlex3d
 
-def export(verb: Export, opened: "AVLMap | None" = None) -> dict[str, Any]:
-    """Write a map for other programs."""
-    from avlmaps.query.avlmap import AVLMap
-    from avlmaps.query.export import write_table
-    from avlmaps.query.frames import answer_in
+            written = list(write_openlex3d(self.out, avlmap))
+        else:
+            _write_voxels(self, avlmap, kind, frame)
+        return {"map": str(self.map), "files": [str(path) for path in written], "frame": str(frame)}
 
-    kind = verb.out.suffix.lower()
-    _require_sense(verb, kind)
-    frame = FrameName(verb.frame or ("level" if kind in _LEVEL else "recording"))
-    if kind == ".pgm":
-        return _write_grids(verb, AVLMap.open(verb.map) if opened is None else opened)
-    written = [verb.out]
-    _require_new(written, verb.overwrite)
-    opened = AVLMap.open(verb.map) if opened is None else opened
-    if kind == ".csv":
-        listed = answer_in(opened.contents(verb.least).to_json(""), frame, opened.space.level_from_recording)
-        write_table(verb.out, listed["things"], listed["sounds"], frame)
-    elif kind in _LAYERED:
-        _write_layers(verb, opened, kind, frame)
-    elif kind == ".openlex3d":
-        from avlmaps.query.export_openlex3d import write_openlex3d
-
-        written = list(write_openlex3d(verb.out, opened))
-    else:
-        _write_voxels(verb, opened, kind, frame)
-    return {"map": str(verb.map), "files": [str(path) for path in written], "frame": str(frame)}
+    def lines(self, answer: Mapping[str, Any]) -> list[str]:
+        """Name what was written."""
+        files = ", ".join(f"{name} ({size_of(Path(name).stat().st_size)})" for name in answer["files"])
+        storeys = answer.get("storeys", [])
+        several = [f"one grid for each storey of the map, lowest first: {', '.join(storeys)}"] * (len(storeys) > 1)
+        axes = ", y up" if answer["files"][0].lower().endswith(".glb") and answer["frame"] == "level" else ""
+        return [f"wrote {files}, {answer['frame']} frame{axes}", *several]
 
 
 def _require_sense(verb: Export, kind: str) -> None:

@@ -1,4 +1,4 @@
-"""`avlmaps info`: describe a map or a recording, verify it."""
+"""`avlmaps info`: describe a map or a recording, and verify it."""
 
 import shlex
 from collections.abc import Callable, Sequence
@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from tyro.conf import OmitArgPrefixes, Positional, arg
 
 from avlmaps.cli.output import UsageError, emit, ground_lines, size_of
-from avlmaps.cli.reading_options import Reading
-from avlmaps.cli.verb import Verb
+from avlmaps.cli.verb import Reading, Verb
 from avlmaps.core.errors import AvlmapsError, MapError
 from avlmaps.core.progress import say
 from avlmaps.core.wording import place_text
@@ -252,8 +251,7 @@ def _sound_line(sounds: list[dict[str, Any]]) -> list[str]:
 # What `build` and `info` print without --verbose: what there is, and what may be wrong with it.
 _BRIEF = frozenset({
     "path", "format", "frames", "bad_frames", "keyframes", "voxels", "sounds", "profile", "bytes", "ground",
-    "elapsed_s", "duration_s", "rgb", "depth", "audio", "topics", "consistency", "notices", "faults",
-    "plot",
+    "elapsed_s", "duration_s", "rgb", "depth", "audio", "topics", "consistency", "notices", "faults", "plot",
 })  # fmt: skip
 _BRIEF_LAYOUTS: dict[str, Callable[[Any], list[str]]] = {
     "sounds": _sound_line,

@@ -10,8 +10,7 @@ from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
 from avlmaps.cli.info import describe_map, info_lines
 from avlmaps.cli.output import UsageError, emit
-from avlmaps.cli.reading_options import Reading, topics_of
-from avlmaps.cli.verb import ModelVerb, idle
+from avlmaps.cli.verb import ModelVerb, Reading, idle, topics_of
 from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
@@ -86,7 +85,7 @@ class Live(ModelVerb):
         answer = _live(self)
         lines = [*info_lines(answer, verbose=False), f"live: {answer['live']['summary']}"]
         if "into" in answer:
-            from avlmaps.cli.merge import merge_lines
+            from avlmaps.cli.days import merge_lines
 
             lines += merge_lines(answer["into"])
         emit(answer, lines, self.json)
@@ -244,7 +243,7 @@ def _days_before(verb: Live) -> "StoredMap | None":
 
 def _joined(first: "StoredMap", today: "StoredMap", day: str) -> dict[str, Any]:
     """Let a drive update the map of the days before, and return what changed."""
-    from avlmaps.cli.merge import merged_answer
+    from avlmaps.cli.days import merged_answer
     from avlmaps.days.merge import merge_maps
 
     return merged_answer(merge_maps(first, today, first.path, day=day, overwrite=True))

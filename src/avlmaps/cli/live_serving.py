@@ -12,8 +12,7 @@ from avlmaps.core.progress import say
 from avlmaps.live.live_map import LiveMap
 from avlmaps.live.replay import end_drive, end_now
 from avlmaps.maps.store.reader import StoredMap
-from avlmaps.serve.running import listening_socket, url_of
-from avlmaps.serve.service import Service
+from avlmaps.serve.service import Service, listening_socket, url_of
 from avlmaps.serve.settings import ServeSettings
 
 _NAME = "live"
@@ -97,7 +96,7 @@ def serve_while(live: LiveMap, drive: Callable[[Callable[[], bool]], None], port
             url = f"{url_of(settings, opened)}/maps/{quote(_NAME)}/view"
 
             def told() -> None:
-                say(f"The map is at {url}; load the page again to see how it has grown. Stop with Ctrl-C.")
+                say(f"The map is at {url}; the page grows with it. Stop with Ctrl-C.")
                 sys.stderr.flush()
                 if browse:
                     open_browser(url)

@@ -9,10 +9,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from avlmaps.cli import output
-from avlmaps.cli.address_space import require_address_space
-from avlmaps.cli.model_options import models_in_force
-from avlmaps.cli.pipes import READER_GONE, drop, reader_gone, settle_streams
-from avlmaps.cli.shortened_files import end_at_shortened_files
+from avlmaps.cli.process import (
+    READER_GONE,
+    drop,
+    end_at_shortened_files,
+    models_in_force,
+    reader_gone,
+    require_address_space,
+    settle_streams,
+)
 from avlmaps.core.errors import AvlmapsError, BackendError
 from avlmaps.core.printable import printable
 from avlmaps.core.progress import end_bars
@@ -94,8 +99,7 @@ def _usage(words: Sequence[str]) -> Iterator[None]:
         if stop.code in (0, None):
             sys.stderr.write(complaints.getvalue())
             raise
-        from avlmaps.cli.usage import meant
-        from avlmaps.cli.verbs import VERBS
+        from avlmaps.cli.verbs import VERBS, meant
 
         sentence = meant(words, complaints.getvalue(), VERBS)
         verb = f"{words[0]} " if words and words[0] in VERBS else ""
@@ -149,7 +153,7 @@ def _compiling(verb: "Verb") -> AbstractContextManager[None]:
     if not verb.compiles:
         return nullcontext()
     require_address_space()
-    from avlmaps.core.compiling import announce_compiling
+    from avlmaps.core.progress import announce_compiling
 
     return announce_compiling()
 

@@ -7,9 +7,8 @@ import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from avlmaps.cli.address_space import AddressSpaceError
 from avlmaps.core.errors import AvlmapsError
-from avlmaps.core.printable import printable, printable_json
+from avlmaps.core.printable import printable, printable_json, shortened
 from avlmaps.core.wording import place_text
 
 
@@ -21,6 +20,10 @@ def require_share(least: float, what: str) -> None:
     """Refuse a ``--least`` that is no probability or confidence."""
     if not 0.0 <= least <= 1.0:
         raise UsageError(f"--least takes a {what} from 0 to 1, not {least:g}.")
+
+
+class AddressSpaceError(MemoryError):
+    """The limit on this process's address space is too low; its sentence has the numbers."""
 
 
 class AnsweredError(Exception):
@@ -116,6 +119,7 @@ def emit(answer: Mapping[str, Any], lines: Iterable[str], as_json: bool) -> None
 
 def json_line(answer: Mapping[str, Any], encoding: str | None = "utf-8") -> str:
     """Return an answer as one line of JSON that an encoding can hold; what it lacks is escaped as JSON has it."""
+    answer = shortened(answer)
     line = printable_json(json.dumps(answer, allow_nan=False, ensure_ascii=False))
     try:
         line.encode(encoding or "utf-8")
@@ -163,7 +167,7 @@ def _size(sides: Sequence[float]) -> str:
     return " x ".join(f"{side:.2f}" for side in sides) if any(sides) else ""
 
 
-def query_lines(answer: dict[str, Any]) -> list[str]:
+def query_lines(answer: Mapping[str, Any]) -> list[str]:
     """Lay out the answer of `query`."""
     parts = ", ".join(f"{part['modality']} {part['query']!r} ({part['role']})" for part in answer["parts"])
     lines = [f"query: {parts}"] if parts else []

@@ -1,28 +1,33 @@
-"""`avlmaps query`: ask a map for places."""
+"""`avlmaps query` and `locate`: ask a map for places, and for the place of a photo."""
 
+import shlex
+from collections.abc import Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from tyro.conf import Positional, arg
 
-from avlmaps.cli.address_space import require_address_space
-from avlmaps.cli.locate import numbers_of
-from avlmaps.cli.output import UsageError, emit, query_lines
-from avlmaps.cli.verb import MapVerb, OptionalPath, OptionalText, idle
+from avlmaps.cli.output import UsageError, query_lines
+from avlmaps.cli.process import require_address_space
+from avlmaps.cli.verb import MapVerb, OptionalPath, OptionalText, idle, shown_in
 from avlmaps.core.frames import FrameName
+from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
-    from avlmaps.query.avlmap import AVLMap
+    from avlmaps.core.camera import Pinhole
+    from avlmaps.query.asking import Asked
+    from avlmaps.query.avlmap import AVLMap, QuerySettings
 
 
 @dataclass(frozen=True, kw_only=True)
 class Query(MapVerb):
     """Query a map with a sentence, or part by part; the product of the parts' heatmaps gives the goals.
 
-    Examples:
-    avlmaps query MAP "the red cabinet near the sound of a dog barking"
-    avlmaps query MAP --object "red cabinet" --sound-clip bark.ogg --plot heat.png
+    Example: avlmaps query MAP "the red cabinet near the sound of a dog barking"
+
+    Example: avlmaps query MAP --object "red cabinet" --sound-clip bark.ogg --plot heat.png
     """
 
     compiles: ClassVar[bool] = False  # `ask` announces loops where the question runs some
@@ -63,59 +68,150 @@ class Query(MapVerb):
     def run(self) -> None:
         """Answer the query."""
         require_address_space()
-        answer = ask(self)
-        emit(answer, query_lines(answer), self.json)
+        if not self.map.exists() and not self.sentence:
+            words = shlex.join(["MAP", str(self.map)])
+            raise UsageError(f"there is no map at {str(self.map)[:80]!r}; the map comes first: avlmaps query {words}")
+        self._asked()  # what does not fit together is said before a map is opened
+        super().run()
 
+    def opened(self) -> "AVLMap":
+        """Return the map."""
+        from avlmaps.query.avlmap import AVLMap
 
-def ask(verb: "Query", opened: "AVLMap | None" = None) -> dict[str, Any]:
-    """Query a map with a sentence or with parts.
+        return AVLMap.open(self.map, self._settings())
 
-    Raises:
-        UsageError: what is given does not fit together.
-    """
-    from avlmaps.core.compiling import announce_compiling
-    from avlmaps.core.question import Modality
-    from avlmaps.query.asking import Asked, AskError, Files, thing_alone
-    from avlmaps.query.asking import ask as ask_map
-    from avlmaps.query.avlmap import AVLMap, QuerySettings
+    def _settings(self) -> "QuerySettings":
+        from avlmaps.query.avlmap import QuerySettings
 
-    files = Files(None if verb.intrinsics is None else numbers_of(verb.intrinsics))
-    settings = QuerySettings(found_at=verb.found_at)
-    if verb.rules != "ours":
-        from avlmaps.query.rules import query_settings
+        settings = QuerySettings(found_at=self.found_at)
+        if self.rules != "ours":
+            from avlmaps.query.rules import query_settings
 
-        settings = query_settings(verb.rules, settings)
-    if verb.at is not None:
-        settings = replace(settings, sounds=replace(settings.sounds, at=verb.at))
-    if opened is not None and opened.settings != settings:
-        opened = AVLMap(opened.stored, settings)
-    if verb.top < 1:
-        raise UsageError(f"--top is {verb.top}; it must be 1 or more.")
-    photo, clip = (None if file is None else str(file) for file in (verb.image, verb.sound_clip))
-    primary = None if verb.primary is None else Modality(verb.primary)
-    try:
-        asked = Asked(
-            sentence=verb.sentence, object=verb.object, sound=verb.sound, area=verb.area, image=photo, clip=clip,
-            primary=primary, top=verb.top, near=verb.near,
-        )  # fmt: skip
-        opened = opened or AVLMap.open(verb.map, settings)
+            settings = query_settings(self.rules, settings)
+        return settings if self.at is None else replace(settings, sounds=replace(settings.sounds, at=self.at))
+
+    def _asked(self) -> "Asked":
+        """Return what is asked.
+
+        Raises:
+            UsageError: what is given does not fit together.
+        """
+        from avlmaps.core.question import Modality
+        from avlmaps.query.asking import Asked, AskError
+
+        if self.top < 1:
+            raise UsageError(f"--top is {self.top}; it must be 1 or more.")
+        photo, clip = (None if file is None else str(file) for file in (self.image, self.sound_clip))
+        try:
+            return Asked(
+                sentence=self.sentence, object=self.object, sound=self.sound, area=self.area, image=photo, clip=clip,
+                primary=None if self.primary is None else Modality(self.primary), top=self.top, near=self.near,
+            )  # fmt: skip
+        except AskError as error:
+            raise UsageError(str(error)) from None
+
+    def answer(self, avlmap: "AVLMap") -> dict[str, Any]:
+        """Query a map with a sentence or with parts.
+
+        Raises:
+            UsageError: what is given does not fit together.
+        """
+        from avlmaps.core.progress import announce_compiling
+        from avlmaps.core.question import Modality
+        from avlmaps.query.asking import AskError, Files, ask, thing_alone
+
+        files, asked = Files(None if self.intrinsics is None else numbers_of(self.intrinsics)), self._asked()
+        if avlmap.settings != (settings := self._settings()):
+            avlmap = type(avlmap)(avlmap.stored, settings)
         # A question about one thing runs no loops that are compiled, and loads nothing to announce them.
-        quick = verb.plot is None and thing_alone(asked, opened) is not None
-        with nullcontext() if quick else announce_compiling():
-            answer = ask_map(opened, asked, files)
-            drawn = {}
-            if verb.plot is not None and answer.heat is not None:
-                drawn = {"plot": str(answer.heat.plot(verb.plot, top=verb.top))}
-    except AskError as error:
-        raise UsageError(str(error)) from None
-    told: dict[str, Any] = {**answer.to_dict(), **drawn}
-    if verb.frame != FrameName.RECORDING:
-        from avlmaps.query.frames import answer_in
+        quick = self.plot is None and thing_alone(asked, avlmap) is not None
+        try:
+            with nullcontext() if quick else announce_compiling():
+                found = ask(avlmap, asked, files)
+                drawn = {}
+                if self.plot is not None and found.heat is not None:
+                    drawn = {"plot": str(found.heat.plot(self.plot, top=self.top))}
+        except AskError as error:
+            raise UsageError(str(error)) from None
+        told: dict[str, Any] = {**found.to_dict(), **drawn}
+        if self.frame != FrameName.RECORDING:
+            told = shown_in(told, self.frame, avlmap)
+        notes: list[str] = []
+        if not any(part["modality"] == Modality.SOUND for part in told["parts"]):
+            notes += idle(self, ["at"], "no sound is named")
+        if "plot" not in told:
+            notes += idle(self, ["plot"], "the answer has no heat to draw")
+        return {**told, "notes": [*told.get("notes", ()), *notes]} if notes else told
 
-        told = answer_in(told, FrameName(verb.frame), opened.space.level_from_recording)
-    notes: list[str] = []
-    if not any(part["modality"] == Modality.SOUND for part in told["parts"]):
-        notes += idle(verb, ["at"], "no sound is named")
-    if "plot" not in told:
-        notes += idle(verb, ["plot"], "the answer has no heat to draw")
-    return {**told, "notes": [*told.get("notes", ()), *notes]} if notes else told
+    def lines(self, answer: Mapping[str, Any]) -> list[str]:
+        """Lay out the answer."""
+        return query_lines(answer)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Locate(MapVerb):
+    """Find the 6-DoF pose of a photo's camera in the map, or report that the photo cannot be located.
+
+    Example: avlmaps locate home.avlmap photo.jpg
+    """
+
+    image: Annotated[Positional[Path], arg(metavar="PHOTO")]
+    """Photo to locate."""
+    intrinsics: Annotated[str | None, arg(metavar="FX,FY,CX,CY")] = None
+    """Intrinsics of the photo's camera, fx,fy,cx,cy in pixels. Default: by its EXIF, else the map's own colour camera,
+    with another focal length where that fits clearly better."""
+    frame: Annotated[Literal["recording", "level"], arg(metavar="recording|level")] = "recording"
+    """Frame of the pose: the recording's own, or the level one (z up)."""
+
+    def run(self) -> None:
+        """Locate the photo."""
+        if self.intrinsics is not None:
+            numbers_of(self.intrinsics)
+        super().run()
+
+    def answer(self, avlmap: "AVLMap") -> dict[str, Any]:
+        """Locate the photo in a map."""
+        from avlmaps.query.focal import focal_35mm_of
+        from avlmaps.query.modalities.image import read_picture
+        from avlmaps.query.schema import locate_answer
+
+        rgb = read_picture(self.image)
+        given = None if self.intrinsics is None else camera_of(self.intrinsics, rgb.shape[1], rgb.shape[0])
+        found = avlmap.locate(rgb, given, None if given is not None else focal_35mm_of(self.image))
+        if found.world_from_camera is not None and given is not None and found.camera != given:
+            say(f"note: the focal length {given.fx:g} does not fit the photo; {found.camera.fx:.1f} was used.")
+        return shown_in(locate_answer(found, avlmap.stored.info.doubts), self.frame, avlmap)
+
+    def lines(self, answer: Mapping[str, Any]) -> list[str]:
+        """Lay out the pose."""
+        pose, notes = answer["world_from_camera"], [f"note: {note}" for note in answer.get("notes", [])]
+        if pose is None:
+            few = f"not located: {answer['inliers']} points agree, too few to fix a place"
+            return [*notes, few]
+        rows = ["  " + " ".join(f"{value:9.4f}" for value in row) for row in pose]
+        return [
+            *notes,
+            f"located, {answer['inliers']} points agree; world_from_camera (frame: {answer['frame']}):",
+            *rows,
+        ]
+
+
+def camera_of(intrinsics: str, width: int, height: int) -> "Pinhole":
+    """Read ``fx,fy,cx,cy`` in pixels for a picture of this size."""
+    from avlmaps.core.camera import Pinhole
+
+    return Pinhole(*numbers_of(intrinsics), width=width, height=height)
+
+
+def numbers_of(intrinsics: str) -> tuple[float, float, float, float]:
+    """Read ``fx,fy,cx,cy`` in pixels."""
+    from avlmaps.core.camera import Pinhole
+
+    try:
+        fx, fy, cx, cy = (float(word) for word in intrinsics.split(","))
+        Pinhole(fx, fy, cx, cy, width=1, height=1)  # no camera has a focal length of 0, or NaN
+    except ValueError:
+        raise UsageError(
+            f"--intrinsics takes fx,fy,cx,cy in pixels, such as 525,525,320,240; not {intrinsics!r}."
+        ) from None
+    return fx, fy, cx, cy

@@ -29,12 +29,15 @@ class Serve(ModelVerb):
     It listens on this machine only, until --host says otherwise; then clients need a token. SIGTERM and Ctrl-C end it
     after the queries that are running. A map that is built again is picked up without a restart.
 
-    Examples:
-    avlmaps serve home.avlmap
-    curl -G http://127.0.0.1:8750/maps/home/ask --data-urlencode "sentence=the chair near the table"
-    avlmaps serve home.avlmap office=/data/day2.avlmap --host 0.0.0.0 --token-file token.txt
-    avlmaps serve home.avlmap --stdio
-    avlmaps serve home.avlmap --drive robot.json
+    Example: avlmaps serve home.avlmap
+
+    Example: curl -G http://127.0.0.1:8750/maps/home/ask --data-urlencode "sentence=the chair near the table"
+
+    Example: avlmaps serve home.avlmap office=/data/day2.avlmap --host 0.0.0.0 --token-file token.txt
+
+    Example: avlmaps serve home.avlmap --stdio
+
+    Example: avlmaps serve home.avlmap --drive robot.json
     """
 
     compiles: ClassVar[bool] = True
@@ -85,8 +88,7 @@ class Serve(ModelVerb):
 
 def serve(verb: "Serve") -> None:
     """Serve until the server is ended."""
-    from avlmaps.serve.running import listening_socket, read_token, run_http, url_of
-    from avlmaps.serve.service import Service
+    from avlmaps.serve.service import Service, listening_socket, read_token, run_http, url_of
     from avlmaps.serve.settings import ServeSettings
     from avlmaps.serve.shelf import named_maps
 

@@ -1,25 +1,66 @@
-"""`avlmaps shell`: one open map, and a prompt that answers line after line."""
+"""`avlmaps shell`: one open map, and a prompt or a pipe whose lines are answered one after the other."""
 
+import re
+import shlex
 import signal
 import sys
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
 from io import TextIOWrapper
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from threading import Lock
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Protocol, TextIO
 
 from tyro.conf import Positional, arg
 
-from avlmaps.cli.go import read_start
+from avlmaps.cli import go as going
+from avlmaps.cli.days import Changes
+from avlmaps.cli.export import Export
+from avlmaps.cli.info import Info, describe_path, info_lines, plot_named
 from avlmaps.cli.output import AnsweredError, UsageError, emit, error_answer, fault_sentence, kind_of
-from avlmaps.cli.shell_session import VERBS, WITH_FILES, Over, SessionSettings, ShellSession
-from avlmaps.cli.verb import ModelVerb
+from avlmaps.cli.query import Locate, Query
+from avlmaps.cli.things import Rooms, Sources, Things, sound_lines
+from avlmaps.cli.verb import MapVerb, ModelVerb
+from avlmaps.cli.verbs import read_verb
 from avlmaps.core.errors import AvlmapsError, BackendError
 from avlmaps.core.extras import install_command
+from avlmaps.core.files import user_path
+from avlmaps.core.frames import FrameName
 from avlmaps.core.printable import printable
 from avlmaps.core.progress import end_bars, say
 
 if TYPE_CHECKING:
-    from avlmaps.cli.shell_lines import Lines
+    from avlmaps.core.motion import GroundPose
+    from avlmaps.query.avlmap import AVLMap
+
+_HELP = """\
+A line is a question, as `avlmaps query` takes it, or begins with a verb:
+  the red cabinet near the sound of a dog    places in the map
+  query --object sofa --area kitchen         the same in parts, with the options of `avlmaps query`
+  things [--least 0.7] [--room kitchen] ...  the things, sounds and rooms of the map
+  sounds, sources, changes                   its sounds, where they came from, what changed
+  rooms [--plot FILE]                        its rooms
+  info [--verify]                            a description of the map
+  locate photo.jpg                           the pose of the camera that took a photo
+  go to the sofa, then turn left             the plan of a command; with --scene the simulated robot drives it
+  plot FILE                                  a picture of the last answer, or of the map
+  export FILE [--heat "the sofa"]            the map for other programs: .ply, .glb, ... (export --help)
+  help                                       this text; VERB --help lists the options of a verb
+  quit                                       the end, as Ctrl-D; Ctrl-C stops an answer"""
+_MAP_VERBS: dict[str, type[MapVerb]] = {
+    "query": Query, "things": Things, "rooms": Rooms, "sources": Sources, "changes": Changes, "locate": Locate,
+    "export": Export,
+}  # fmt: skip
+VERBS = (*_MAP_VERBS, "go", "sounds", "info", "plot", "help", "quit", "exit")
+WITH_FILES = ("locate", "plot", "export")
+_WITH_WORDS = ("query", "plot", "export")
+_PICTURE = re.compile(r"\.(jpe?g|png|webp|bmp|tiff?|ppm|pgm)['\"]?$", re.IGNORECASE)
+_FRAME = str(FrameName.RECORDING)
+_CONFIRM = "Drive this plan? [y/N]"
+_LEAST_COMPLETED = 0.3  # things with this confidence are completed
+LONGEST_LINE = 10_000
+"""Characters of a line; a sentence may have far fewer."""
+YES, _NO = frozenset({"y", "yes"}), frozenset({"n", "no", ""})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,9 +71,9 @@ class Shell(ModelVerb):
     (pip install 'avlmaps[shell]'). Questions from a pipe are answered line by line, with --json by one object for each
     line; the exit status is 1 if one of them failed.
 
-    Examples:
-    avlmaps shell home.avlmap
-    avlmaps shell home.avlmap --json < questions.txt
+    Example: avlmaps shell home.avlmap
+
+    Example: avlmaps shell home.avlmap --json < questions.txt
     """
 
     compiles: ClassVar[bool] = True
@@ -52,10 +93,10 @@ class Shell(ModelVerb):
 
     def run(self) -> None:
         """Answer line after line."""
-        start = read_start(self.start)
+        start = going.read_start(self.start)
         if start is not None and self.scene is None:
             raise UsageError("--start places the simulated robot; give its --scene as well.")
-        session = ShellSession(SessionSettings(self.map, self.scene, start, self.body, self.guess))
+        session = ShellSession(self, start)
         interactive = sys.stdin.isatty() and not self.json
         lines = _prompt(session, not self.no_history) if interactive else _piped()
         if interactive:
@@ -66,7 +107,250 @@ class Shell(ModelVerb):
             raise AnsweredError(f"{failed} of {answered} lines failed.")
 
 
-def answer_lines(session: ShellSession, lines: "Lines", as_json: bool) -> tuple[int, int]:
+class Over(Exception):  # noqa: N818 - no error: the user ends the shell
+    """The shell ends."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reply:
+    """The answer to a line, as JSON has it and for a person, and whether it did what the line asks for."""
+
+    answer: Mapping[str, Any]
+    lines: Iterable[str]
+    ok: bool = True
+
+
+class ShellSession:
+    """One map that stays open, and what was queried last."""
+
+    def __init__(self, given: Shell, start: "GroundPose | None" = None) -> None:
+        """Open the map.
+
+        Raises:
+            MapError: the map cannot be opened.
+        """
+        self.given, self._start = given, start
+        self._robot: going.Ready | None = None
+        self._last: Query | None = None
+        self._names: tuple[str, ...] | None = None
+        self._lock = Lock()
+        self._opened, self._seen = self._open()
+
+    def _open(self) -> "tuple[AVLMap, tuple[int, ...]]":
+        from avlmaps.query.avlmap import AVLMap
+
+        seen = self._signature()
+        return AVLMap.open(self.given.map), seen
+
+    def _signature(self) -> tuple[int, ...]:
+        """Return the state that changes when a build replaces the map."""
+        try:
+            found = (self.given.map / "map.json").stat()
+        except OSError:
+            return ()
+        return found.st_ino, found.st_mtime_ns, found.st_size
+
+    @property
+    def opened(self) -> "AVLMap":
+        """The map; opened again where it was replaced on disk since."""
+        if self._signature() not in (self._seen, ()):
+            self._opened, self._seen = self._open()
+            self._names, self._robot = None, None
+            say(f"note: {self.given.map} was replaced on disk and is opened again.")
+        return self._opened
+
+    def answer(self, line: str, confirms: Callable[[str], bool]) -> Reply:
+        """Answer a line.
+
+        Raises:
+            AvlmapsError: what the verb raises.
+            UsageError: the words do not fit together.
+        """
+        word, _, rest = line.partition(" ")
+        word, rest = word.lower(), rest.strip()
+        with self._lock:
+            if word == "go":
+                return self._go(line, rest, confirms)
+            if word not in VERBS or not _is_for_verb(word, rest):
+                return self._ask(Query(map=self.given.map, sentence=line))
+            if word == "query" and not rest.startswith(("-", "'", '"')):
+                return self._ask(Query(map=self.given.map, sentence=rest))
+            if word in _MAP_VERBS:
+                out = ["--out"] if word == "export" and rest[:1] not in ("", "-") else []
+                verb = read_verb(_MAP_VERBS[word], [str(self.given.map), *out, *_split(rest)], word)
+                return self._ask(verb)
+            return getattr(self, f"_{word}")(rest)
+
+    def names(self) -> tuple[str, ...]:
+        """Return the names of what the map holds, those of things first; none while a question is being answered."""
+        if self._names is None and self._lock.acquire(blocking=False):
+            try:
+                self._names = _names_in(self._opened)
+            except AvlmapsError:  # the map can be queried in part; the lexicon's names are still completed
+                self._names = ()
+            finally:
+                self._lock.release()
+        return self._names or ()
+
+    def _ask(self, verb: MapVerb) -> Reply:
+        answer = verb.answer(self.opened)
+        if isinstance(verb, Query):
+            self._last = verb
+        return Reply(answer, verb.lines(answer))
+
+    def _sounds(self, rest: str) -> Reply:
+        from avlmaps.query.selection import MapLists
+
+        if rest:
+            raise UsageError(f"sounds takes no words; {rest!r} is too much.")
+        sounds = MapLists(self.opened).sounds()
+        return Reply({"map": str(self.given.map), "frame": _FRAME, "sounds": sounds}, sound_lines(sounds))
+
+    def _info(self, rest: str) -> Reply:
+        verb = read_verb(Info, [str(self.given.map), *_split(rest)], "info")
+        answer = describe_path(verb.path, verb.format, verify=verb.verify, plot=verb.plot)
+        return Reply(answer, info_lines(answer, verbose=verb.verbose))
+
+    def _plot(self, rest: str) -> Reply:
+        """Draw the last answer, or the map."""
+        words = _split(rest)
+        if len(words) != 1 or words[0].startswith("-"):
+            raise UsageError("plot takes the name of a picture, such as: plot heat.png")
+        file = user_path(words[0])
+        if self._last is None:
+            plotted = str(plot_named(self.opened.stored, file))
+        else:
+            plotted = replace(self._last, plot=file).answer(self.opened).get("plot")
+            if plotted is None:
+                raise UsageError("The last answer has no heat to draw; ask another question.")
+        return Reply({"plot": plotted}, [f"wrote {plotted}"])
+
+    def _help(self, rest: str) -> Reply:
+        lines = _HELP.splitlines()
+        return Reply({"help": lines}, lines)
+
+    def _quit(self, rest: str) -> Reply:
+        raise Over
+
+    _exit = _quit
+
+    def _go(self, line: str, rest: str, confirms: Callable[[str], bool]) -> Reply:
+        """Plan a command, and drive it in the scene where there is one and the user confirms."""
+        if not rest:
+            raise UsageError("go takes a command, such as: go to the sofa, then turn left")
+        quoted = len(rest) > 1 and rest[0] == rest[-1] and rest[0] in "'\""
+        given = self.given
+        command = going.Go(
+            map=given.map, sentence=rest[1:-1] if quoted else line, scene=given.scene, body=given.body,
+            guess=given.guess,
+        )  # fmt: skip
+        avlmap = self.opened
+        translator = going.translator_for(command, avlmap)
+        translation = translator.program_for(command.sentence)
+        plan = going.plan_answer(command, translation, avlmap)
+        if going.failure(plan) is not None:
+            return _driven(plan)
+        if given.scene is None:
+            return Reply(plan, [*going.go_lines(plan), "planned only; --scene of avlmaps shell lets a robot drive"])
+        for text in going.go_lines(plan):
+            say(text)
+        if not confirms(_CONFIRM):
+            return Reply(plan, ["not driven"])
+        from avlmaps.navigate.interrupts import raised_signals
+
+        with raised_signals():
+            if self._robot is None:
+                self._robot = going.simulated_robot(command, avlmap, self._start)
+            here = replace(self._robot, start=self._robot.driver.pose)
+            return _driven(going.drive(command, avlmap, here, translator, translation))
+
+
+def _driven(answer: dict[str, Any]) -> Reply:
+    """Return the reply to a command that was planned or driven; why it failed goes to standard error as well."""
+    failed = going.failure(answer)
+    if failed is not None:
+        sys.stderr.write(f"avlmaps: {printable(failed['message'])}\n")
+    return Reply({**answer, "error": failed}, going.go_lines(answer), failed is None)
+
+
+def _is_for_verb(word: str, rest: str) -> bool:
+    """Return whether a line that begins with a verb is for it; "things near the sofa" is a question."""
+    if word in _WITH_WORDS or not rest or rest.startswith("-"):
+        return True
+    return word == "locate" and (bool(_PICTURE.search(rest.split(" -")[0])) or user_path(rest).is_file())
+
+
+def _split(rest: str) -> list[str]:
+    try:
+        return shlex.split(rest)
+    except ValueError as fault:
+        raise UsageError(f"The words cannot be separated ({fault}); close each quote.") from None
+
+
+def _names_in(opened: "AVLMap") -> tuple[str, ...]:
+    models = opened.stored.info.models
+    things = [t.name for t in opened.things(None, _LEAST_COMPLETED)] if "pixels" in models else []
+    rooms = [room.name for room in opened.rooms()] if "views" in models else []
+    sounds = [event.names[0] for event in opened.sounds() if event.names]
+    return tuple(dict.fromkeys([*things, *rooms, *sounds]))
+
+
+class Lines(Protocol):
+    """Gives the lines of a shell, one after the other."""
+
+    interactive: bool
+    """Whether a person types them: Ctrl-C then stops one answer and not the shell."""
+
+    def next(self) -> str | None:
+        """Return the next line; None at the end. Raises ``UsageError`` where it is too long."""
+        ...
+
+    def confirms(self, question: str) -> bool:
+        """Return whether the answer to a question is yes."""
+        ...
+
+
+def checked(line: str) -> str:
+    """Return a line without blanks round it; ``UsageError`` where it is too long."""
+    if len(line) >= LONGEST_LINE:
+        raise UsageError(f"A line has {LONGEST_LINE:,} characters or more; give a shorter one.")
+    return line.strip()
+
+
+class PipedLines:
+    """Lines of a file or a pipe.
+
+    The answer to a question is the next line where that is a yes or a no. Any other line means no, and is the next
+    line of the shell.
+    """
+
+    interactive = False
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+        self._kept: str | None = None
+
+    def next(self) -> str | None:
+        """Return the next line; None at the end; see `Lines`."""
+        if self._kept is not None:
+            line, self._kept = self._kept, None
+            return line
+        line = self._stream.readline(LONGEST_LINE)
+        if len(line) == LONGEST_LINE and not line.endswith("\n"):
+            while (rest := self._stream.readline(LONGEST_LINE)) and not rest.endswith("\n"):
+                pass
+        return checked(line) if line else None
+
+    def confirms(self, question: str) -> bool:
+        """Return whether the next line says yes."""
+        say(question)
+        line = self.next()
+        if line is not None and line.lower() not in YES | _NO:
+            self._kept = line
+        return line is not None and line.lower() in YES
+
+
+def answer_lines(session: ShellSession, lines: Lines, as_json: bool) -> tuple[int, int]:
     """Answer every line; an error is one sentence, and the next line follows.
 
     Returns:
@@ -85,9 +369,6 @@ def answer_lines(session: ShellSession, lines: "Lines", as_json: bool) -> tuple[
             failed, done = failed + (not reply.ok), done + reply.ok
         except Over:
             return failed, failed + done
-        except (AvlmapsError, UsageError) as error:
-            failed += 1
-            _report(error, str(error), as_json)
         except BrokenPipeError:
             raise
         except KeyboardInterrupt as stop:
@@ -97,7 +378,8 @@ def answer_lines(session: ShellSession, lines: "Lines", as_json: bool) -> tuple[
             _report(stop, str(stop) or "stopped", as_json)
         except Exception as fault:  # noqa: BLE001 - one line that fails must not end the others
             failed += 1
-            _report(fault, fault_sentence(fault), as_json)
+            known = isinstance(fault, AvlmapsError | UsageError)
+            _report(fault, str(fault) if known else fault_sentence(fault), as_json)
         sys.stdout.flush()
 
 
@@ -108,26 +390,24 @@ def _report(error: BaseException, sentence: str, as_json: bool) -> None:
     sys.stderr.write(f"avlmaps: {printable(sentence)}\n")
 
 
-def _piped() -> "Lines":
+def _piped() -> Lines:
     """Return the lines of standard input."""
-    from avlmaps.cli.shell_lines import PipedLines
-
     if isinstance(sys.stdin, TextIOWrapper):
         sys.stdin.reconfigure(errors="replace")  # a line that is not UTF-8 is not understood, and the next one is
     return PipedLines(sys.stdin)
 
 
-def _prompt(session: ShellSession, with_history: bool) -> "Lines":
+def _prompt(session: ShellSession, with_history: bool) -> Lines:
     """Return the lines that a person types.
 
     Raises:
         BackendError: prompt-toolkit is not installed.
     """
     try:
-        from avlmaps.cli.shell_names import NameCompleter
-        from avlmaps.cli.shell_prompt import PromptLines
+        from avlmaps.cli.shell_prompt import NameCompleter, PromptLines
     except ImportError:
         raise BackendError(
             f"A prompt on a terminal needs prompt-toolkit; get it with: {install_command('shell')}, or pipe lines in."
         ) from None
-    return PromptLines(NameCompleter(("go", *VERBS), WITH_FILES, session.names), with_history)
+    completer = NameCompleter(VERBS, WITH_FILES, session.names)
+    return PromptLines(completer, checked, lambda line: line.strip().lower() in YES, with_history)

@@ -1,18 +1,28 @@
-"""The prompt of `avlmaps shell`, with its history; needs prompt-toolkit."""
+"""The prompt of `avlmaps shell`, with its history and its completions; needs prompt-toolkit.
 
+Completed are verbs, names of things, sounds and rooms, and file names.
+"""
+
+import shlex
 import signal
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import cache
 from pathlib import Path
 
 from prompt_toolkit import PromptSession
-from prompt_toolkit.completion import Completer
+from prompt_toolkit.completion import CompleteEvent, Completer, Completion
+from prompt_toolkit.document import Document
 from prompt_toolkit.history import FileHistory, InMemoryHistory
 from prompt_toolkit.output import create_output
 
-from avlmaps.cli.shell_lines import YES, checked
-from avlmaps.core.files import state_file
+from avlmaps.core.files import state_file, user_path
+from avlmaps.core.lexicon import lexicon
+from avlmaps.core.printable import UNSAFE
 from avlmaps.core.progress import say
 
 _MOST_HISTORY_BYTES = 1_000_000
+_MOST_WORDS = 4  # of a name that is being typed
+_MOST_SHOWN = 40
 
 
 class PromptLines:
@@ -20,7 +30,14 @@ class PromptLines:
 
     interactive = True
 
-    def __init__(self, completer: Completer, with_history: bool = True) -> None:
+    def __init__(
+        self,
+        completer: Completer,
+        checked: Callable[[str], str],
+        is_yes: Callable[[str], bool],
+        with_history: bool = True,
+    ) -> None:
+        self._checked, self._is_yes = checked, is_yes
         output = create_output(always_prefer_tty=True)
         # A shell that starts a command in the background has SIGINT ignored; at a prompt Ctrl-C stops an answer.
         signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -39,12 +56,12 @@ class PromptLines:
                 continue
             except EOFError:
                 return None
-            return checked(line)
+            return self._checked(line)
 
     def confirms(self, question: str) -> bool:
         """Return whether the person says yes; Ctrl-C and Ctrl-D mean no."""
         try:
-            return self._confirmations.prompt(f"{question} ").strip().lower() in YES
+            return self._is_yes(self._confirmations.prompt(f"{question} "))
         except (KeyboardInterrupt, EOFError):
             return False
 
@@ -68,3 +85,64 @@ def _shorten(path: Path) -> None:
     """Drop the earlier half of a history; its entries begin with an empty line."""
     content = path.read_bytes()[-_MOST_HISTORY_BYTES // 2 :]
     path.write_bytes(content[max(content.find(b"\n\n"), 0) :])
+
+
+def completions(line: str, verbs: Sequence[str], file_verbs: Sequence[str], here: Iterable[str]) -> list[Completion]:
+    """Return the completions of a line, at most 40."""
+    first, blank, rest = line.lstrip().partition(" ")
+    if blank and first in file_verbs:
+        return list(_files(rest.lstrip()))[:_MOST_SHOWN]
+    begun = [] if blank else [verb for verb in verbs if verb.startswith(first.lower())]
+    found = [Completion(verb, -len(first), display_meta="verb") for verb in begun]
+    words = line.split(" ")
+    for count in range(min(_MOST_WORDS, len(words)), 0, -1):
+        named = list(_named(" ".join(words[-count:]), here))
+        if named:
+            found += named
+            break
+    return found[:_MOST_SHOWN] if line.strip() else []
+
+
+def _named(typed: str, here: Iterable[str]) -> Iterator[Completion]:
+    """Yield the names that begin so; those of this map first."""
+    if not typed.strip() or typed[0] == " ":
+        return
+    names = dict.fromkeys(_lexicon_names(), "") | dict.fromkeys(here, "in this map")
+    for name in sorted(names, key=lambda one: (not names[one], one)):
+        if name.startswith(typed.lower()) and not UNSAFE.search(name):
+            yield Completion(name, -len(typed), display_meta=names[name])
+
+
+@cache
+def _lexicon_names() -> tuple[str, ...]:
+    words = lexicon()
+    names = {name for entry in words.entries() for name in (entry.name, *entry.synonyms)}
+    return tuple(sorted(names | {*words.colours, *words.materials}))
+
+
+def _files(typed: str) -> Iterator[Completion]:
+    """Yield the files and folders whose names begin so, written as the shell reads them back."""
+    plain = typed.replace("\\ ", " ").strip("'\"")
+    folder, _, begin = plain.rpartition("/")
+    base = user_path(f"{folder}/" if plain.startswith("/") else folder or ".")
+    try:
+        entries = sorted(base.iterdir())
+    except OSError:
+        return
+    for entry in entries:
+        name = entry.name
+        if not name.startswith(begin) or UNSAFE.search(name) or (name.startswith(".") and not begin):
+            continue
+        whole = f"{folder}/{name}" if "/" in plain else name
+        yield Completion(shlex.quote(whole) + ("/" if entry.is_dir() else ""), -len(typed))
+
+
+class NameCompleter(Completer):
+    """Completes at the prompt."""
+
+    def __init__(self, verbs: Sequence[str], file_verbs: Sequence[str], here: Callable[[], Iterable[str]]) -> None:
+        self._verbs, self._file_verbs, self._here = verbs, file_verbs, here
+
+    def get_completions(self, document: Document, complete_event: CompleteEvent) -> Iterator[Completion]:
+        """Yield the completions of what stands before the cursor."""
+        yield from completions(document.text_before_cursor, self._verbs, self._file_verbs, tuple(self._here()))

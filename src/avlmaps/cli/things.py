@@ -1,4 +1,4 @@
-"""`avlmaps things`: list what a map holds."""
+"""`avlmaps things`, `rooms` and `sources`: list what a map holds."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tyro.conf import arg
 
-from avlmaps.cli.output import UsageError, emit, require_share, table_lines
-from avlmaps.cli.verb import MapVerb
+from avlmaps.cli.output import UsageError, require_share, table_lines
+from avlmaps.cli.verb import MapVerb, shown_in
 from avlmaps.core.frames import FrameName
 from avlmaps.core.progress import say
 from avlmaps.core.wording import place_text
@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.schema import ListedThing, RoomAnswer, SoundAnswer
+
+
+_FRAME = str(FrameName.RECORDING)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,60 +59,146 @@ class Things(MapVerb):
 
     def run(self) -> None:
         """List the map's contents."""
-        answer = contents(self)
-        emit(answer, contents_lines(answer), self.json)
+        self.require()
+        super().run()
+
+    def require(self) -> None:
+        """Raise a usage error for numbers that make no list."""
+        require_share(self.least, "confidence")
+        if min(self.page, 1 if self.top is None else self.top) < 1:
+            raise UsageError("--top and --page take a number from 1 on.")
+
+    def answer(self, avlmap: "AVLMap") -> dict[str, Any]:
+        """List the things, sounds and rooms of a map, or a page of some of its things."""
+        from avlmaps.query.export import write_table
+        from avlmaps.query.selection import MapLists, Wanted, page_of_things
+
+        self.require()
+        wanted = Wanted(
+            least=self.least, name=self.name, structure=self.structure, room=self.room, near=self._near(avlmap),
+            top=self.top, page=self.page, at=self.at,
+        )  # fmt: skip
+        if wanted.is_whole:
+            listed = avlmap.contents(self.least, self.name or None, self.structure).to_json(str(self.map))
+        else:
+            doubts = avlmap.doubts_of_things
+            listed = {
+                "map": str(self.map),
+                "frame": _FRAME,
+                **page_of_things(MapLists(avlmap), wanted),
+            }
+            listed |= {"notes": list(doubts)} if doubts else {}
+        answer = shown_in(listed, self.frame, avlmap)
+        if self.csv is not None:
+            say(f"wrote {write_table(self.csv, answer['things'], answer.get('sounds', []), answer['frame'])}")
+        return answer
+
+    def _near(self, avlmap: "AVLMap") -> "str | list[float] | None":
+        """Return what things are to be near to; a place in space in the recording's frame."""
+        from avlmaps.query.given_places import is_place, place_of
+
+        if self.near is None or not is_place(self.near):
+            return self.near
+        place = place_of(self.near)
+        in_space = len(place) == 3 and self.frame == FrameName.LEVEL
+        return (avlmap.space.world(place) if in_space else place).tolist()
+
+    def lines(self, answer: "Mapping[str, Any]") -> list[str]:
+        """Lay out three tables with an empty line between them, or a page of things."""
+        frame = answer["frame"]
+        lines = [f"note: {note}" for note in answer.get("notes", [])] + thing_lines(answer["things"], frame)
+        if "total" in answer:
+            page, pages, total = (answer[key] for key in ("page", "pages", "total"))
+            return [*lines, f"page {page} of {pages}, {total} things in all"] if pages > 1 else lines
+        lines += ["", *sound_lines(answer["sounds"], frame)] if answer["sounds"] else []
+        return [*lines, "", *room_lines(answer["rooms"], frame)] if answer["rooms"] else lines
 
 
-def contents(verb: Things, opened: "AVLMap | None" = None) -> dict[str, Any]:
-    """List the things, sounds and rooms of a map, or a page of some of its things."""
-    from avlmaps.core.poses import FRAME
-    from avlmaps.query.avlmap import AVLMap
-    from avlmaps.query.export import write_table
-    from avlmaps.query.frames import answer_in
-    from avlmaps.query.selection import MapLists, Wanted, page_of_things
+@dataclass(frozen=True, kw_only=True)
+class Rooms(MapVerb):
+    """List the rooms of a map: name, probability of the name, floor area and place of each.
 
-    require_share(verb.least, "confidence")
-    if min(verb.page, 1 if verb.top is None else verb.top) < 1:
-        raise UsageError("--top and --page take a number from 1 on.")
-    opened = AVLMap.open(verb.map) if opened is None else opened
-    wanted = Wanted(
-        least=verb.least, name=verb.name, structure=verb.structure, room=verb.room, near=_near(verb, opened),
-        top=verb.top, page=verb.page, at=verb.at,
-    )  # fmt: skip
-    if wanted.is_whole:
-        listed: Mapping[str, Any] = opened.contents(verb.least, verb.name or None, verb.structure).to_json(
-            str(verb.map)
-        )
-    else:
-        doubts = opened.doubts_of_things
-        listed = {"map": str(verb.map), "frame": FRAME, **page_of_things(MapLists(opened), wanted)}
-        listed |= {"notes": list(doubts)} if doubts else {}
-    answer = answer_in(listed, FrameName(verb.frame), opened.space.level_from_recording)
-    if verb.csv is not None:
-        say(f"wrote {write_table(verb.csv, answer['things'], answer.get('sounds', []), answer['frame'])}")
-    return answer
+    Example: avlmaps rooms home.avlmap --plot rooms.png
+    """
+
+    least: Annotated[float, arg(metavar="PROBABILITY")] = 0.0
+    """List rooms whose name has at least this probability, 0 to 1."""
+    frame: Annotated[Literal["recording", "level"], arg(metavar="recording|level")] = "recording"
+    """Frame of the positions: the recording's own, or the level one (z up)."""
+    plot: Annotated[Path | None, arg(metavar="FILE")] = None
+    """Draw a top-down view with the outline, name and area of each room into this picture."""
+
+    def answer(self, avlmap: "AVLMap") -> dict[str, Any]:
+        """List the rooms of a map."""
+        from avlmaps.query.plots import plot_map
+        from avlmaps.query.selection import MapLists
+
+        require_share(self.least, "probability")
+        doubts, rooms = avlmap.stored.info.doubts, MapLists(avlmap).rooms(self.least)
+        listed = {
+            "map": str(self.map),
+            "frame": _FRAME,
+            "rooms": rooms,
+            **({"notes": list(doubts)} if doubts else {}),
+        }
+        answer = shown_in(listed, self.frame, avlmap)
+        if self.plot is not None:
+            held = avlmap.rooms(self.least) if rooms else []
+            answer["plot"] = str(plot_map(avlmap.stored, self.plot, rooms=held))
+        return answer
+
+    def lines(self, answer: "Mapping[str, Any]") -> list[str]:
+        """Lay out rooms as a table."""
+        notes = [f"note: {note}" for note in answer.get("notes", [])]
+        drawn = [f"wrote {answer['plot']}"] if "plot" in answer else []
+        return [*notes, *room_lines(answer["rooms"], answer["frame"]), *drawn]
 
 
-def _near(verb: Things, opened: "AVLMap") -> "str | list[float] | None":
-    """Return what things are to be near to; a place in space in the recording's frame."""
-    from avlmaps.query.given_places import is_place, place_of
+@dataclass(frozen=True, kw_only=True)
+class Sources(MapVerb):
+    """List where the sounds of a map came from: a region with a probability, rooms and things that it may be.
 
-    if verb.near is None or not is_place(verb.near):
-        return verb.near
-    place = place_of(verb.near)
-    in_space = len(place) == 3 and verb.frame == FrameName.LEVEL
-    return (opened.space.world(place) if in_space else place).tolist()
+    The recording must say where its microphones are (docs/guides/where-sounds-come-from.md). Sounds of one kind from
+    one place are one source.
 
+    Example: avlmaps sources home.avlmap --sound "dog bark"
+    """
 
-def contents_lines(answer: "Mapping[str, Any]") -> list[str]:
-    """Lay out what `things` reports: three tables with an empty line between them, or a page of things."""
-    frame = answer["frame"]
-    lines = [f"note: {note}" for note in answer.get("notes", [])] + thing_lines(answer["things"], frame)
-    if "total" in answer:
-        page, pages, total = (answer[key] for key in ("page", "pages", "total"))
-        return [*lines, f"page {page} of {pages}, {total} things in all"] if pages > 1 else lines
-    lines += ["", *sound_lines(answer["sounds"], frame)] if answer["sounds"] else []
-    return [*lines, "", *room_lines(answer["rooms"], frame)] if answer["rooms"] else lines
+    sound: Annotated[tuple[str, ...], arg(metavar="NAME ...")] = ()
+    """List the sources of these sounds. Default: of every sound, by its likeliest name."""
+    prior: Literal["lexicon", "none"] = "lexicon"
+    """lexicon: things that usually make such a sound are likelier sources; none: by what the microphones say alone."""
+    least: Annotated[float, arg(metavar="CONFIDENCE")] = 0.0
+    """List sounds whose name has at least this confidence, 0 to 1."""
+    frame: Annotated[Literal["recording", "level"], arg(metavar="recording|level")] = "recording"
+    """Frame of the positions: the recording's own, or the level one (z up)."""
+
+    def answer(self, avlmap: "AVLMap") -> dict[str, Any]:
+        """Return the sources of a map's sounds."""
+        require_share(self.least, "confidence")
+        found = avlmap.sources(self.sound, prior=self.prior == "lexicon", least=self.least)
+        listed = {"map": str(self.map), "frame": _FRAME, "sources": [one.to_json() for one in found]}
+        return shown_in(listed, self.frame, avlmap)
+
+    def lines(self, answer: "Mapping[str, Any]") -> list[str]:
+        """Lay out sources as a table."""
+        if not answer["sources"]:
+            return ["no sounds"]
+        rows = [
+            (
+                one["name"] or "unnamed", f"{one['confidence']:.2f}", f"{one['probability']:.2f}",
+                place_text(one["position"]), f"{one['within_50_m']:.2f} m", f"{one['within_90_m']:.2f} m",
+                ", ".join(f"{room['name']} {room['probability']:.2f}" for room in one["rooms"][:2]),
+                ", ".join(f"{thing['name']} {thing['probability']:.2f}" for thing in one["things"]),
+                str(len(one["sounds"])) + (", moving" if one["moving"] else ""),
+            )
+            for one in answer["sources"]
+        ]  # fmt: skip
+        place = f"position ({answer['frame']} frame)"
+        head = (
+            "sound", "confidence", "probability", place, "50 % within", "90 % within", "room", "thing", "sounds",
+        )  # fmt: skip
+        return table_lines(head, rows)
 
 
 def thing_lines(things: "Sequence[ListedThing]", frame: str = FrameName.RECORDING) -> list[str]:

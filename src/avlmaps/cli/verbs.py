@@ -1,17 +1,24 @@
-"""The verbs of the command line, and the parser that reads their words."""
+"""The verbs of the command line, and how words become a verb's fields, for the command line and for the shell alike."""
 
-from collections.abc import Sequence
+import dataclasses
+import io
+import re
+import shlex
+from collections.abc import Mapping, Sequence
+from contextlib import redirect_stderr
 from functools import cache
 from importlib import import_module
-from typing import TYPE_CHECKING, Annotated, Any, Union
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar, Union, get_args, get_type_hints
 
 import tyro
 
-from avlmaps.cli.usage import CONFIG, at_home
+from avlmaps.cli.output import UsageError
 from avlmaps.cli.verb import Verb
-from avlmaps.core.distributions import OTHERS, how_to_get
 from avlmaps.core.errors import BackendError
+from avlmaps.core.extras import OTHERS, how_to_get
 from avlmaps.core.registry import brought, entry_points
+from avlmaps.core.suggestions import did_you_mean, nearest
 
 _DESCRIPTION = """Audio-Visual-Language Maps: one 3D map of what a robot saw and recorded, which you query with words.
 
@@ -24,6 +31,11 @@ _OWN = (
     "calibrate", "build", "live", "merge", "info", "query", "things", "rooms", "sources", "changes", "edit", "shell",
     "view", "export", "locate", "go", "serve", "teach-sound", "profiles",
 )  # fmt: skip
+# Of those that share a file.
+_FILES = {
+    "merge": "days", "changes": "days", "rooms": "things", "sources": "things", "locate": "query",
+    "profiles": "models", "teach-sound": "models",
+}  # fmt: skip
 # As help lists them: in the order in which a person comes to use them; other packages' own verbs follow.
 _ORDER = (
     "demo", "record", "add-sounds", "calibrate", "build", "live", "merge", "import-map", "info", "query", "things",
@@ -38,7 +50,7 @@ if TYPE_CHECKING:
 
 def _own(name: str) -> type[Verb]:
     """Load one of our verbs; the others stay where they are, since one command needs no other's modules."""
-    return getattr(import_module(f"avlmaps.cli.{name.replace('-', '_')}"), name.title().replace("-", ""))
+    return getattr(import_module(f"avlmaps.cli.{_FILES.get(name, name)}"), name.title().replace("-", ""))
 
 
 @cache
@@ -89,3 +101,133 @@ def _any_verb(verbs: dict[str, type[Verb]], shortly: bool) -> Any:
         return Annotated[verb, tyro.conf.subcommand(name, description=first_line if shortly else None)]
 
     return Union[tuple(described(name, verb) for name, verb in verbs.items())]  # noqa: UP007 - made at run time
+
+
+CONFIG = (tyro.conf.OmitArgPrefixes, tyro.conf.FlagCreatePairsOff, tyro.conf.HelptextFromCommentsOff)
+V = TypeVar("V", bound=Verb)
+Options = TypeVar("Options")
+_CHOICE = re.compile(
+    r"invalid choice '(?P<given>[^']*)' for argument '(?P<name>[^']*)'. Expected one of \((?P<known>[^)]*)\)"
+)
+_NO_VALUE = re.compile(r"Missing value for argument '(?P<name>[^']*)'")
+_NO_NUMBER = re.compile(
+    r"Error parsing (?P<name>--[\w-]+).*?: (?:could not convert|invalid literal).*?: (?P<given>'.*?')"
+)
+
+
+def usage_sentence(printed: str) -> str:
+    """Return the fault in the words, out of the frame that the parser prints."""
+    return " ".join(" ".join(_framed(printed)).split())
+
+
+def _framed(printed: str) -> list[str]:
+    """Return the lines of what is wrong: after a title and a rule, until the rule before help."""
+    # in a box the title lies in its upper edge
+    printed = re.sub(r"^╭─ [^\n]*╮$", "title\n────", printed.lstrip(), count=1, flags=re.MULTILINE)
+    parts = re.split(r"\n *[-─]{3,} *\n", re.sub("[╭╮╰╯│]", " ", printed))
+    return parts[min(1, len(parts) - 1)].splitlines()
+
+
+def meant(words: Sequence[str], printed: str, verbs: Mapping[str, type[Verb]]) -> str:
+    """Return the fault in a command line in one sentence, with the verb, option or value that was probably meant."""
+    sentence = usage_sentence(printed)
+    name = words[0] if words else ""
+    if not name or name.startswith("-"):
+        return f"a verb comes first: {', '.join(verbs)}."
+    if name not in verbs:
+        return f"there is no verb {name[:60]!r}{did_you_mean(name, verbs)} The verbs: {', '.join(verbs)}."
+    options = _options(verbs[name])
+    if found := _CHOICE.search(sentence):
+        known = [word for word in re.findall(r"'([^']*)'", found["known"]) if word != "None"]
+        return f"{found['name']} takes {', '.join(known)}; not {found['given']!r}{did_you_mean(found['given'], known)}"
+    given = [word.partition("=")[0] for word in _before_dashes(words[1:]) if re.match("--[a-z]", word)]
+    unknown = [word for word in given if word.replace("_", "-") not in options]
+    close = nearest(unknown[0].replace("_", "-"), tuple(options)) if unknown else None
+    if close is not None:
+        said = f"Unrecognized options: {unknown[0]}" if "Unrecognized" not in sentence else sentence
+        return f"{said.partition(' Perhaps you meant')[0].rstrip('.')}; did you mean {close}?"
+    plain = [word for word in words[1:] if not word.startswith("-")]
+    if sentence.startswith("Missing from"):
+        lacking = f"{name} needs {' and '.join(_missing(_framed(printed)[1:]))}"
+        if "sentence" in verbs[name].__dataclass_fields__ and plain and not Path(plain[0]).exists():
+            return f"{lacking}; the map comes first, and there is none at {plain[0][:80]!r}."
+        return f"{lacking}."
+    if "Unrecognized" in sentence and len(plain) > 2 and "sentence" in verbs[name].__dataclass_fields__:
+        return f"put the sentence in quotes: avlmaps {name} {shlex.join([plain[0], ' '.join(plain[1:])])}"
+    if found := _NO_VALUE.search(sentence):
+        return f"{found['name']} needs a value: {options.get(found['name']) or 'see its help'}."
+    if found := _NO_NUMBER.search(sentence):
+        kind = "a whole number" if "int()" in sentence else "a number"
+        return f"{found['name']} takes {kind}, not {found['given']}."
+    return sentence
+
+
+def _missing(lines: Sequence[str]) -> list[str]:
+    """Return the names out of a list of names, each with its help further to the right."""
+    margins = [len(line) - len(line.lstrip()) for line in lines]
+    names: list[str] = []
+    for line, margin in zip(lines, margins, strict=True):
+        if line.strip() and margin == min(margins):
+            if names and names[-1].endswith(","):  # a long one continues
+                names[-1] += line.strip()
+            else:
+                names.append(line.strip())
+    return names
+
+
+def _before_dashes(words: Sequence[str]) -> Sequence[str]:
+    return words[: words.index("--")] if "--" in words else words
+
+
+def _options(verb: type[Any]) -> dict[str, str]:
+    """Return the options of a verb as they are typed, those of its groups among them, and what each takes."""
+    options: dict[str, str] = {"--help": ""}
+    for field in dataclasses.fields(verb):
+        kind = get_type_hints(verb, include_extras=True)[field.name]
+        notes = getattr(kind, "__metadata__", ())
+        bare = kind.__origin__ if notes else kind
+        if dataclasses.is_dataclass(bare):
+            options |= _options(bare if isinstance(bare, type) else type(bare))
+        elif tyro.conf.Positional not in notes and "Positional" not in str(notes):
+            takes = next((note.metavar for note in notes if getattr(note, "metavar", None)), "")
+            takes = takes or "|".join(map(str, get_args(bare)))
+            own = next((note.name for note in notes if getattr(note, "name", None)), field.name.replace("_", "-"))
+            for name in (f"--{own}", *(alias for note in notes for alias in getattr(note, "aliases", None) or ())):
+                options[name] = takes
+    return options
+
+
+def at_home(given: Options) -> Options:
+    """Return a verb, or a group of its options, with the ~ of its paths as the user's home: shells leave --out=~/x."""
+    changed: dict[str, Any] = {}
+    for each in dataclasses.fields(given):  # pyright: ignore[reportArgumentType] - a dataclass
+        value = getattr(given, each.name)
+        found = tuple(map(_at_home, value)) if isinstance(value, tuple) else _at_home(value)
+        if found != value:
+            changed[each.name] = found
+    return dataclasses.replace(given, **changed) if changed else given  # pyright: ignore[reportArgumentType]
+
+
+def _at_home(value: Any) -> Any:
+    if isinstance(value, Path) and str(value).startswith("~"):
+        from avlmaps.core.files import user_path
+
+        return user_path(value)
+    return at_home(value) if dataclasses.is_dataclass(value) else value
+
+
+def read_verb(verb: type[V], words: Sequence[str], name: str) -> V:
+    """Read the words of one verb.
+
+    Raises:
+        UsageError: they cannot be read.
+        SystemExit: they request help, which is printed; its status is 0.
+    """
+    printed = io.StringIO()
+    try:
+        with redirect_stderr(printed):
+            return at_home(tyro.cli(verb, prog=name, args=list(words), config=CONFIG))
+    except SystemExit as stop:
+        if stop.code in (0, None):
+            raise
+    raise UsageError(meant([name, *words], printed.getvalue(), {name: verb}))

@@ -34,11 +34,13 @@ class View(MapVerb):
     of the address that it prints. Stop it with Ctrl-C. With --out it writes one file instead, which opens without
     avlmaps and without a network.
 
-    Examples:
-    avlmaps view home.avlmap
-    avlmaps view home.avlmap --scene house:7
-    avlmaps view before.avlmap after.avlmap
-    avlmaps view home.avlmap --out home.html --questions "the sofa" "the chair near the tv"
+    Example: avlmaps view home.avlmap
+
+    Example: avlmaps view home.avlmap --scene house:7
+
+    Example: avlmaps view before.avlmap after.avlmap
+
+    Example: avlmaps view home.avlmap --out home.html --questions "the chair near the tv"
     """
 
     other: Annotated[Positional[Path | None], arg(metavar="[MAP]")] = None
@@ -122,8 +124,7 @@ def _serve(verb: View) -> None:
     import secrets
 
     from avlmaps.core.network import is_loopback
-    from avlmaps.serve.running import listening_socket
-    from avlmaps.serve.service import Service
+    from avlmaps.serve.service import Service, listening_socket
     from avlmaps.serve.settings import Limits, ServeSettings
 
     token = None if is_loopback(verb.host) else secrets.token_urlsafe(24)
@@ -163,7 +164,7 @@ def require_port(port: int) -> None:
 def run_page(service: "Service", opened: "socket", started: "Callable[[], None]") -> None:
     """Serve maps to browsers until Ctrl-C, and close the service."""
     from avlmaps.serve.app import create_app
-    from avlmaps.serve.running import run_http
+    from avlmaps.serve.service import run_http
 
     try:
         with contextlib.suppress(KeyboardInterrupt):  # where signals do not reach the server's loop: Windows

@@ -1,5 +1,6 @@
-"""Running a producer ahead of its consumer in one thread, so that the slower of the two sets the pace."""
+"""How many cores a process may use, and running a producer ahead of its consumer in one thread."""
 
+import os
 import queue
 import threading
 from collections.abc import Generator, Iterable
@@ -57,3 +58,8 @@ def _hand_over(item: Any, ready: queue.Queue[Any], stop: threading.Event) -> Non
         except queue.Full:
             continue
         return
+
+
+def usable_cores() -> int:
+    """Return how many cores this process may use: those that it is bound to, or all where the system binds none."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

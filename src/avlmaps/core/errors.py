@@ -61,3 +61,13 @@ class NavigationError(AvlmapsError):
 
 class GoalNotFoundError(AvlmapsError):
     """The map does not hold the thing that a command names; skills raise it, and the trace records it."""
+
+
+class NonConformanceError(AssertionError):
+    """Something brought by a package breaks a promise; the sentence says which."""
+
+
+def hold(condition: object, promise: str) -> None:
+    """Raise ``NonConformanceError`` with a promise that does not hold."""
+    if not condition:
+        raise NonConformanceError(promise)

@@ -1,8 +1,10 @@
-"""The command that installs a group of further packages (an extra) for the avlmaps that runs here."""
+"""What is not installed: extras and the other distributions of this project, each with the command that installs it."""
 
 import shlex
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Literal
 from urllib.parse import unquote, urlsplit
 
 import msgspec
@@ -54,3 +56,54 @@ def _is_project(folder: Path) -> bool:
         return 'name = "avlmaps"' in (folder / "pyproject.toml").read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError):
         return False
+
+
+What = Literal["verbs", "profiles", "backends", "robots", "sources"]
+
+
+@dataclass(frozen=True, slots=True)
+class Distribution:
+    """One distribution beside ``avlmaps``.
+
+    Attributes:
+        name: as pip knows it.
+        verbs: of the command line.
+        profiles: their names.
+        backends: ``kind:name``.
+        robots: what drives them.
+        sources: of live maps.
+    """
+
+    name: str
+    verbs: tuple[str, ...] = ()
+    profiles: tuple[str, ...] = ()
+    backends: tuple[str, ...] = ()
+    robots: tuple[str, ...] = ()
+    sources: tuple[str, ...] = ()
+
+
+SIMULATOR = Distribution("avlmaps-sim", verbs=("demo", "record", "add-sounds", "bench"))
+MODELS = Distribution(
+    "avlmaps-models",
+    verbs=("import-map",),
+    profiles=("light", "foundation", "paper"),
+    backends=(
+        "pixels:light", "views:light", "sounds:light", "sounds:efficientat",
+        "pixels:tipsv2", "pixels:clip-patches", "pixels:regions", "pixels:lseg",
+        "views:siglip2", "views:clip", "views:clip-paper",
+        "sounds:clap", "sounds:pe-a-frame", "sounds:audioclip",
+        "local:disk", "local:aliked", "local:superpoint",
+        "place:megaloc", "place:netvlad",
+        "matcher:lightglue-disk", "matcher:lightglue-aliked", "matcher:superglue",
+    ),
+)  # fmt: skip
+ROS = Distribution("avlmaps-ros", robots=("nav2", "move_base"), sources=("ros2",))
+OTHERS = (SIMULATOR, MODELS, ROS)
+
+
+def how_to_get(what: What, name: str) -> str | None:
+    """Return the command that installs what brings a verb, a profile or a backend; None where no distribution does."""
+    for one in OTHERS:
+        if name in getattr(one, what):
+            return install_command(distribution=one.name)
+    return None

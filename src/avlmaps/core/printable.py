@@ -6,6 +6,8 @@ than it has. Everything that prints such text passes it through here.
 """
 
 import re
+from collections.abc import Mapping, Sequence
+from typing import Any, cast
 
 # All of Cc, Cs, Zl and Zp, and every Cf that is invisible or turns the direction of writing. The two joiners U+200C
 # and U+200D stay: Persian words, Indian scripts and emoji are spelt with them.
@@ -28,6 +30,17 @@ def printable(text: object, most: int | None = None) -> str:
     """
     safe = UNSAFE.sub(lambda found: _escaped(found.group()), str(text))
     return safe if most is None or len(safe) <= most else safe[: max(most - 1, 0)] + "…"
+
+
+def shortened(answer: Any) -> Any:
+    """Return JSON without digits that no measurement has: six of a small number, six after the point of others."""
+    if isinstance(answer, float):
+        return round(answer, 6) if abs(answer) >= 0.1 else float(f"{answer:.6g}")
+    if isinstance(answer, Mapping):
+        return {key: shortened(value) for key, value in cast("Mapping[Any, Any]", answer).items()}
+    if isinstance(answer, list | tuple):
+        return [shortened(value) for value in cast("Sequence[Any]", answer)]
+    return answer
 
 
 def printable_json(encoded: str) -> str:

@@ -14,9 +14,8 @@ from functools import cache
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
-from avlmaps.core.distributions import how_to_get
 from avlmaps.core.errors import AvlmapsError, BackendError
-from avlmaps.core.extras import install_command
+from avlmaps.core.extras import how_to_get, install_command
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint, EntryPoints
@@ -95,17 +94,17 @@ _BUILT_IN = (
     Backend(Kind.PIXELS, "colours", f"{_EMBEDDED}.colours:ColourWords"),
     Backend(Kind.PIXELS, "embedded", f"{_EMBEDDED}.pixels:EmbeddedPixels"),
     Backend(Kind.PIXELS, "embedded-synthetic", f"{_EMBEDDED}.pixels:synthetic_pixels"),
-    Backend(Kind.VIEWS, "embedded", f"{_EMBEDDED}.views:EmbeddedViews"),
-    Backend(Kind.VIEWS, "embedded-synthetic", f"{_EMBEDDED}.views:synthetic_views"),
+    Backend(Kind.VIEWS, "embedded", f"{_EMBEDDED}.pixels:EmbeddedViews"),
+    Backend(Kind.VIEWS, "embedded-synthetic", f"{_EMBEDDED}.pixels:synthetic_views"),
     Backend(Kind.SOUNDS, "embedded", f"{_EMBEDDED}.sounds:EmbeddedSounds"),
-    Backend(Kind.LOCAL, "rootsift", f"{_EMBEDDED}.rootsift:RootSift"),
-    Backend(Kind.PLACE, "vlad", f"{_EMBEDDED}.vlad:Vlad"),
-    Backend(Kind.MATCHER, "mutual-ratio", f"{_EMBEDDED}.matching:MutualRatio"),
+    Backend(Kind.LOCAL, "rootsift", f"{_EMBEDDED}.keypoints:RootSift"),
+    Backend(Kind.PLACE, "vlad", f"{_EMBEDDED}.keypoints:Vlad"),
+    Backend(Kind.MATCHER, "mutual-ratio", f"{_EMBEDDED}.keypoints:MutualRatio"),
 )
 
 _TRAINED = (
-    Backend(Kind.PIXELS, "trained", f"{_EMBEDDED}.trained:trained_pixels", model="eyes", licence="your own"),
-    Backend(Kind.VIEWS, "trained", f"{_EMBEDDED}.trained:trained_views", model="eyes", licence="your own"),
+    Backend(Kind.PIXELS, "trained", f"{_EMBEDDED}.pixels:trained_pixels", model="eyes", licence="your own"),
+    Backend(Kind.VIEWS, "trained", f"{_EMBEDDED}.pixels:trained_views", model="eyes", licence="your own"),
 )
 _registered: dict[tuple[Kind, str], Backend] = {(b.kind, b.name): b for b in (*_BUILT_IN, *_TRAINED)}
 

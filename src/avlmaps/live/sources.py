@@ -3,8 +3,8 @@
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Protocol
 
-from avlmaps.core.distributions import how_to_get
 from avlmaps.core.errors import BackendError
+from avlmaps.core.extras import how_to_get
 from avlmaps.core.registry import brought, entry_points
 
 if TYPE_CHECKING:

@@ -48,6 +48,9 @@ class PoseCorrection:
         """
         stamps, given = _checked(stamps_s, poses)
         there = Trajectory(known_s, known)
+        near = (stamps > known_s[0] - AWAY_S) & (stamps < known_s[-1] + AWAY_S)
+        if 2 * near.sum() > len(stamps):  # a tracker that began before the frames, or ran on after them
+            stamps, given = stamps[near], given[near]
         _require_stamps(stamps, known_s)
         before = there.at(np.clip(stamps, known_s[0], known_s[-1]))
         _require_walk(stamps, given, before)

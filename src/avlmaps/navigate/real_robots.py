@@ -3,8 +3,8 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
-from avlmaps.core.distributions import how_to_get
 from avlmaps.core.errors import BackendError
+from avlmaps.core.extras import how_to_get
 from avlmaps.core.registry import brought, entry_points
 from avlmaps.navigate.driver import Driver
 from avlmaps.navigate.interrupts import Halt

@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.core.distributions import SIMULATOR
 from avlmaps.core.errors import NavigationError
-from avlmaps.core.extras import install_command
+from avlmaps.core.extras import SIMULATOR, install_command
 from avlmaps.core.motion import GroundPose
 from avlmaps.core.registry import brought, entry_points
 from avlmaps.maps.obstacles import Obstacles

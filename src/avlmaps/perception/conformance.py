@@ -11,22 +11,13 @@ from typing import Any
 import numpy as np
 
 from avlmaps.core.camera import Pinhole, Rig
-from avlmaps.core.conformance import NonConformanceError, hold
-from avlmaps.core.errors import AvlmapsError
+from avlmaps.core.errors import AvlmapsError, NonConformanceError, hold
 from avlmaps.core.registry import Kind
 from avlmaps.perception import protocols
+from avlmaps.perception.protocols import PROTOCOLS
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.types import Frame
 
-PROTOCOLS: dict[Kind, type] = {
-    Kind.WORDS: protocols.WordEncoder,
-    Kind.PIXELS: protocols.PixelEncoder,
-    Kind.VIEWS: protocols.ViewEncoder,
-    Kind.SOUNDS: protocols.SoundEncoder,
-    Kind.LOCAL: protocols.LocalEncoder,
-    Kind.PLACE: protocols.PlaceEncoder,
-    Kind.MATCHER: protocols.Matcher,
-}
 PHRASES = ("red chair", "dog bark", "kitchen")
 
 
@@ -36,7 +27,8 @@ def check(kind: Kind, backend: Any) -> None:
     Raises:
         NonConformanceError: it breaks a promise.
     """
-    hold(isinstance(backend, PROTOCOLS[kind]), f"{backend!r} lacks a member of {PROTOCOLS[kind].__name__}")
+    lacking = [name for name in protocols.members_of(PROTOCOLS[kind]) if not hasattr(backend, name)]
+    hold(not lacking, f"{type(backend).__qualname__} lacks {', '.join(lacking)} of {PROTOCOLS[kind].__name__}")
     _check_card(backend.card)
     _CHECKS[kind](backend)
 

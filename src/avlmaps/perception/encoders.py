@@ -3,14 +3,15 @@
 A name is resolved where encoders are made, and its model is loaded when it is first used: a map opens without it.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from avlmaps.core.errors import BackendError
-from avlmaps.core.registry import Kind, find, load
+from avlmaps.core.registry import Backend, Kind, find, load
 from avlmaps.perception.profiles import GIVEN, MODULES, Profile, no_backend, profile
 from avlmaps.perception.protocols import (
+    PROTOCOLS,
     LocalEncoder,
     Matcher,
     ModelCard,
@@ -19,6 +20,9 @@ from avlmaps.perception.protocols import (
     SoundEncoder,
     ViewEncoder,
 )
+
+if TYPE_CHECKING:
+    from avlmaps.perception.cache.feature_store import FeatureStore
 
 _OWN = "own"
 
@@ -30,109 +34,70 @@ class Source:
     Attributes:
         kind: the module.
         name: what a map remembers it by: ``backend`` or ``backend@model``, or ``given:Class`` for an object.
+        given: the object, if it is one.
+        has_card: whether that brought a card of its own; one that was made knows its code and numbers, not all that
+            it may read, so that its features are not stored.
+        remembering: puts a store before the encoder, which rounds features of pixels by slow models to float16; None
+            gives it as it is.
+        store: that store; None stores none.
     """
 
     kind: Kind
     name: str
+    given: Any = None
+    has_card: bool = True
+    remembering: "Callable[..., Any] | None" = None
+    store: "FeatureStore | None" = None
 
     def load(self) -> Any:
-        """Return the encoder, the same object each time.
+        """Return the encoder, the same object each time where nothing is remembered.
 
         Raises:
-            BackendError: it is unknown, or a package or file that it needs is missing.
+            BackendError: it is unknown, a package or file that it needs is missing, or it lacks a method.
         """
-        if self.name.startswith(GIVEN):
-            raise BackendError(
-                f"The {self.kind} of this map were made by an object of the class "
-                f"{self.name.removeprefix(GIVEN)}, which it does not hold; open it in Python with "
-                f"encoders=avlmaps.Encoders({self.kind}=...)."
-            )
-        return load(self.kind, self.name)
+        encoder = self.given
+        if encoder is None:
+            if self.name.startswith(GIVEN):
+                raise BackendError(
+                    f"The {self.kind} of this map were made by an object of the class "
+                    f"{self.name.removeprefix(GIVEN)}, which it does not hold; open it in Python with "
+                    f"encoders=avlmaps.Encoders({self.kind}=...)."
+                )
+            encoder = load(self.kind, self.name)
+            if not isinstance(encoder, PROTOCOLS[self.kind]):
+                from avlmaps.perception.own_encoder import whole
+
+                encoder = whole(self.kind, encoder)
+        if self.remembering is None:
+            return encoder
+        return self.remembering(self.kind, encoder, self.store, half=self.is_slow)
+
+    @property
+    def _entry(self) -> Backend | None:
+        """What the registry knows of it; None for an object."""
+        return None if self.given is not None else find(self.kind, self.name.partition("@")[0])
 
     @property
     def chosen(self) -> str:
         """Its name with its model: ``name@model``, the default one if no other is chosen."""
-        name, _, model = self.name.partition("@")
-        model = model or find(self.kind, name).model
-        return f"{name}@{model}" if model else name
+        entry = self._entry
+        return f"{self.name}@{entry.model}" if entry and entry.model and "@" not in self.name else self.name
 
     @property
     def on_torch(self) -> bool:
-        """Whether it is a large model on torch, by the registry."""
-        return "torch" in find(self.kind, self.name.partition("@")[0]).needs
+        """Whether it is known as a large model on torch."""
+        return self._entry is not None and "torch" in self._entry.needs
 
     @property
     def is_slow(self) -> bool:
-        """Whether its features take longer to make than to store and read, by the registry."""
-        return find(self.kind, self.name.partition("@")[0]).is_slow
+        """Whether its features are known to take longer to make than to store and read."""
+        return self._entry is not None and self._entry.is_slow
 
     @property
     def keyframes_only(self) -> bool:
         """Whether only keyframes are given to it: the other frames add surfaces and colours."""
-        return find(self.kind, self.name.partition("@")[0]).keyframes_only
-
-    @property
-    def may_be_stored(self) -> bool:
-        """Whether its card distinguishes its features from another model's, so that they may be stored under it."""
-        return True
-
-    def note(self) -> str:
-        """Return what a progress bar says of its features; ``""`` for nothing."""
-        return ""
-
-
-@dataclass(frozen=True, slots=True)
-class GivenSource(Source):
-    """An object that was given.
-
-    Attributes:
-        encoder: it.
-        has_card: whether it brought a card of its own.
-    """
-
-    encoder: Any
-    has_card: bool
-
-    @classmethod
-    def of(cls, kind: Kind, encoder: object) -> "GivenSource":
-        """Return the source of an object; what its protocol needs and it does not say is made for it.
-
-        Raises:
-            BackendError: it lacks a method.
-        """
-        from avlmaps.perception.own_encoder import completed
-
-        name = GIVEN + type(encoder).__qualname__.rpartition(".")[2]
-        return cls(kind, name, completed(kind, encoder), hasattr(encoder, "card"))
-
-    def load(self) -> Any:
-        """Return the encoder."""
-        return self.encoder
-
-    @property
-    def chosen(self) -> str:
-        """Its name."""
-        return self.name
-
-    @property
-    def on_torch(self) -> bool:
-        """False: nothing is known of it."""
-        return False
-
-    @property
-    def is_slow(self) -> bool:
-        """False: nothing is known of it."""
-        return False
-
-    @property
-    def keyframes_only(self) -> bool:
-        """Its own word for it, an attribute of this name."""
-        return bool(getattr(self.encoder, "keyframes_only", False))
-
-    @property
-    def may_be_stored(self) -> bool:
-        """Whether it brought a card: one that was made knows its code and numbers, not all that it may read."""
-        return self.has_card
+        entry = self._entry
+        return bool(getattr(self.given, "keyframes_only", False)) if entry is None else entry.keyframes_only
 
 
 @dataclass(frozen=True, slots=True, init=False, repr=False)
@@ -319,4 +284,7 @@ def _source(kind: Kind, one: object) -> Source:
     if isinstance(one, str):
         find(kind, one.partition("@")[0])
         return Source(kind, one)
-    return GivenSource.of(kind, one)
+    from avlmaps.perception.own_encoder import completed
+
+    name = GIVEN + type(one).__qualname__.rpartition(".")[2]
+    return Source(kind, name, completed(kind, one), hasattr(one, "card"))

@@ -9,7 +9,7 @@ import dataclasses
 import hashlib
 import inspect
 import textwrap
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import cache
 from typing import Any
@@ -31,6 +31,7 @@ _NEEDED = {
 }
 _OF_WORDS = (Kind.PIXELS, Kind.VIEWS)
 _DEEPEST = 4
+_whole: dict[int, tuple[object, object]] = {}
 
 
 def completed(kind: Kind, encoder: object) -> Any:
@@ -58,21 +59,42 @@ def completed(kind: Kind, encoder: object) -> Any:
     missing = {attribute: value for attribute, value in made.items() if not hasattr(encoder, attribute)}
     if not hasattr(encoder, "card"):
         missing["card"] = made_card(kind, encoder)
-    return _Completed(encoder, missing) if missing else encoder
+    if not missing:
+        return encoder
+    return with_members(encoder, (name for name in dir(encoder) if not name.startswith("_")), missing)
 
 
-class _Completed:
-    """An encoder's own members beside those that were made; ``isinstance`` of its protocols sees both."""
+def whole(kind: Kind, encoder: object) -> Any:
+    """Return a package's encoder as ``completed`` does, the same object each time.
 
-    def __init__(self, encoder: object, made: Mapping[str, Any]) -> None:
-        for name in dir(encoder):
-            with suppress(AttributeError):  # of a property that does not hold yet
-                self.__dict__.update({} if name.startswith("_") else {name: getattr(encoder, name)})
-        self.__dict__.update(made)
+    Raises:
+        BackendError: it lacks a method that nobody can make for it; the sentence names it.
+    """
+    before, made = _whole.get(id(encoder), (None, None))
+    if before is not encoder:
+        made = completed(kind, encoder)
+        _whole[id(encoder)] = encoder, made
+    return made
+
+
+class _Members:
+    """An encoder's members, some of them others; in an object's own dictionary, where ``isinstance`` sees them."""
+
+    def __init__(self, encoder: object, members: Mapping[str, Any]) -> None:
+        self.__dict__.update(members)
         self._name = type(encoder).__qualname__
 
     def __repr__(self) -> str:
         return self._name
+
+
+def with_members(encoder: object, names: Iterable[str], others: Mapping[str, Any]) -> Any:
+    """Return an object with those of some members that an encoder has, and with others beside or instead of them."""
+    members: dict[str, Any] = {}
+    for name in names:
+        with suppress(AttributeError):  # it has none, or a property does not hold yet
+            members[name] = getattr(encoder, name)
+    return _Members(encoder, members | dict(others))
 
 
 def _made(kind: Kind, encoder: Any) -> dict[str, Any]:

@@ -1,23 +1,13 @@
 """Profiles: which backend serves which module. A map stores the name of its profile and every model's card."""
 
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from avlmaps.core.distributions import how_to_get
 from avlmaps.core.errors import BackendError
-from avlmaps.core.registry import Kind, brought, entry_points, find, load
+from avlmaps.core.extras import how_to_get
+from avlmaps.core.registry import Kind, brought, entry_points, find
 from avlmaps.core.suggestions import nearest
-from avlmaps.perception.protocols import (
-    LocalEncoder,
-    Matcher,
-    ModelCard,
-    PixelEncoder,
-    PlaceEncoder,
-    SoundEncoder,
-    ViewEncoder,
-)
 
 ENTRY_POINT_GROUP = "avlmaps.profiles"
 GIVEN = "given:"
@@ -74,52 +64,6 @@ class Profile:
         """Return the name of the backend for a module, ``""`` for none; of an object its class's."""
         chosen = getattr(self, kind.value)
         return chosen if isinstance(chosen, str) else GIVEN + type(chosen).__qualname__
-
-    def pixel_encoder(self) -> PixelEncoder:
-        """Return ``Encoders.named(name).pixels``: the name that it had before."""
-        return self._formerly("pixel_encoder()", Kind.PIXELS)
-
-    def view_encoder(self) -> ViewEncoder:
-        """Return ``Encoders.named(name).views``: the name that it had before."""
-        return self._formerly("view_encoder()", Kind.VIEWS)
-
-    def sound_encoder(self) -> SoundEncoder:
-        """Return ``Encoders.named(name).sounds``: the name that it had before."""
-        return self._formerly("sound_encoder()", Kind.SOUNDS)
-
-    def local_encoder(self) -> LocalEncoder:
-        """Return ``Encoders.named(name).local``: the name that it had before."""
-        return self._formerly("local_encoder()", Kind.LOCAL)
-
-    def place_encoder(self) -> PlaceEncoder:
-        """Return ``Encoders.named(name).place``: the name that it had before."""
-        return self._formerly("place_encoder()", Kind.PLACE)
-
-    def keypoint_matcher(self) -> Matcher:
-        """Return ``Encoders.named(name).matcher``: the name that it had before."""
-        return self._formerly("keypoint_matcher()", Kind.MATCHER)
-
-    def cards(self) -> dict[Kind, ModelCard]:
-        """Return the card of every model: the name of ``Encoders.named(name).cards()`` before."""
-        _warn("cards()", "cards()")
-        return {kind: self._load(kind).card for kind in MODULES if getattr(self, kind.value)}
-
-    def _formerly(self, name: str, kind: Kind) -> Any:
-        _warn(name, kind.value)
-        return self._load(kind)
-
-    def _load(self, kind: Kind) -> Any:
-        chosen = getattr(self, kind.value)
-        if chosen and not isinstance(chosen, str):
-            return chosen
-        if not chosen:
-            raise BackendError(no_backend(self.name, kind))
-        return load(kind, chosen)
-
-
-def _warn(old: str, new: str) -> None:
-    instead = f"avlmaps.Encoders.named(...).{new}"
-    warnings.warn(f"Profile.{old} goes in the next release; use {instead}.", DeprecationWarning, stacklevel=4)
 
 
 def no_backend(profile: str, kind: Kind) -> str:

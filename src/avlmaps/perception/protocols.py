@@ -3,16 +3,50 @@
 One conformance suite (``avlmaps.perception.conformance``) holds for every backend of a protocol, ours or others'.
 """
 
+import csv
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from avlmaps.core.arrays import Float, Float32, Int, UInt8
-from avlmaps.perception.room_contents import RoomContents
+from avlmaps.core.arrays import Float, Float32, Float64, Int, UInt8
+from avlmaps.core.registry import Kind
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.types import Frame
+
+TABLE = "room_contents.csv"
+FURNISHED = Path(__file__).parent
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RoomContents:
+    """The mean surface of each thing in a room of each kind.
+
+    Attributes:
+        things: names of the lexicon.
+        kinds: kinds of room, names of the lexicon.
+        surface_m2: of a thing (row) in a room of a kind (column).
+    """
+
+    things: tuple[str, ...]
+    kinds: tuple[str, ...]
+    surface_m2: Float64[np.ndarray, "t r"]
+
+
+@cache
+def read_room_contents(folder: Path = FURNISHED) -> RoomContents:
+    """Return the table that a folder holds: a row for each thing, a column for each kind of room.
+
+    Args:
+        folder: by default that of rooms as they are furnished, else that of an encoder.
+    """
+    text = (folder / TABLE).read_text(encoding="utf-8")
+    head, *rows = csv.reader(text.splitlines())
+    surface = np.array([[float(value) for value in row[1:]] for row in rows], np.float64)
+    return RoomContents(tuple(row[0] for row in rows), tuple(head[1:]), surface)
 
 
 @dataclass(frozen=True, slots=True)
@@ -330,3 +364,21 @@ class Pose:
 
     world_from_camera: Float[np.ndarray, "4 4"]
     inliers: int
+
+
+PROTOCOLS: dict[Kind, type] = {
+    Kind.WORDS: WordEncoder,
+    Kind.PIXELS: PixelEncoder,
+    Kind.VIEWS: ViewEncoder,
+    Kind.SOUNDS: SoundEncoder,
+    Kind.LOCAL: LocalEncoder,
+    Kind.PLACE: PlaceEncoder,
+    Kind.MATCHER: Matcher,
+}
+
+
+def members_of(protocol: type) -> tuple[str, ...]:
+    """Return the names of a protocol's members."""
+    bases = [base for base in protocol.__mro__ if getattr(base, "_is_protocol", False) and base is not Protocol]
+    names = {name for base in bases for name in (*vars(base), *vars(base).get("__annotations__", ()))}
+    return tuple(sorted(name for name in names if not name.startswith("_")))

@@ -17,8 +17,7 @@ from avlmaps.core.files import lasting_path, user_path
 from avlmaps.core.numbers import as_whole, checked, hold_numbers
 from avlmaps.core.question import HeardAt, Modality, Part, Question, Role
 from avlmaps.core.registry import Kind
-from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder, SurveyedEncoder
-from avlmaps.perception.room_contents import read_room_contents
+from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder, SurveyedEncoder, read_room_contents
 from avlmaps.query.factors import FOUND_AT, HeatSettings, NearThings
 from avlmaps.query.floor_plan import FloorPlan
 from avlmaps.query.heatmap import Heatmap

@@ -7,7 +7,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Float, Float64
 from avlmaps.core.lexicon import Entry, EntryKind, lexicon
-from avlmaps.perception.room_contents import RoomContents
+from avlmaps.perception.protocols import RoomContents
 
 # A kind of room in which a thing was never counted holds it as often as this share of the mean of all kinds.
 _ELSEWHERE = 0.1

@@ -8,7 +8,7 @@ import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Float32, Int
 from avlmaps.core.lexicon import EntryKind, lexicon
-from avlmaps.perception.room_contents import RoomContents
+from avlmaps.perception.protocols import RoomContents
 from avlmaps.query.factors import FOUND_AT, NearAnchors
 from avlmaps.query.floor_plan import CELL_M, FloorPlan
 from avlmaps.query.room_contents import votes

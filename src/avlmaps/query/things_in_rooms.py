@@ -3,7 +3,7 @@
 import numpy as np
 
 from avlmaps.core.arrays import Float, Float32, Int
-from avlmaps.perception.room_contents import RoomContents
+from avlmaps.perception.protocols import RoomContents
 from avlmaps.query.room_contents import commonness
 from avlmaps.query.rooms import RoomField
 

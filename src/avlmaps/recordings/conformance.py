@@ -20,9 +20,8 @@ import numpy as np
 
 from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole
-from avlmaps.core.conformance import NonConformanceError as NonConformanceError
-from avlmaps.core.conformance import hold
-from avlmaps.core.errors import AvlmapsError
+from avlmaps.core.errors import AvlmapsError, hold
+from avlmaps.core.errors import NonConformanceError as NonConformanceError
 from avlmaps.recordings.example_room import Truth
 from avlmaps.recordings.example_room import example_truth as example_truth
 from avlmaps.recordings.types import Recording

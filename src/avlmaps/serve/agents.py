@@ -7,11 +7,18 @@ import asyncio
 import base64
 import itertools
 import json
-from collections.abc import Sequence
+import re
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from copy import deepcopy
+from io import TextIOWrapper
 from typing import Any, cast
 
+import anyio
 import mcp_types as mcp
 import msgspec
+import numpy as np
+from anyio.abc import ObjectReceiveStream, ObjectSendStream
 from mcp.server import Server
 from mcp.server.context import ServerRequestContext
 from mcp.server.streamable_http_manager import StreamableHTTPASGIApp, StreamableHTTPSessionManager
@@ -19,11 +26,9 @@ from mcp.shared.exceptions import MCPError
 
 from avlmaps.core.suggestions import did_you_mean
 from avlmaps.core.version import __version__
-from avlmaps.serve.agent_answers import compact, fitting
-from avlmaps.serve.errors import RequestError
 from avlmaps.serve.guard import App, Receive, Scope, Send, refuse
-from avlmaps.serve.lanes import Cancellation, Lane, Report
-from avlmaps.serve.requests import NoQuery, checked
+from avlmaps.serve.lanes import Cancellation, Lane, Report, RequestError
+from avlmaps.serve.requests import CLIP, PHOTO, NoQuery, checked
 from avlmaps.serve.service import Service, error_response
 from avlmaps.serve.tools import TOOLS, AgentTool, ToolResult
 from avlmaps.serve.work import WorkInput, describe_map, encoded, list_maps
@@ -64,13 +69,14 @@ places in order, each with position, stop and confidence. Do not claim that anyt
 _MOST_ARGUMENT = 500
 # What of an argument's schema an agent can do without; a value that does not fit is answered with a sentence.
 _WORDLESS = ("title", "maxLength", "maxItems", "minimum", "exclusiveMinimum")
+_FILES = (PHOTO, CLIP)
 _MOST_ENUM = 6  # maps that every tool names in its schema
 
 
-def agent_server(service: Service, tools: Sequence[AgentTool] = TOOLS) -> Server[Any]:
-    """Return the MCP server of a service."""
+def agent_server(service: Service, tools: Sequence[AgentTool] = TOOLS, *, reads_files: bool = False) -> Server[Any]:
+    """Return the MCP server of a service; an agent on this machine may name files instead of sending them."""
     table = {tool.name: tool for tool in tools}
-    described = [_described(service, tool) for tool in tools]
+    described = [_described(service, tool, reads_files) for tool in tools]
 
     async def list_tools(ctx: ServerRequestContext[Any], params: Any) -> mcp.ListToolsResult:
         return mcp.ListToolsResult(tools=described)
@@ -82,7 +88,7 @@ def agent_server(service: Service, tools: Sequence[AgentTool] = TOOLS) -> Server
                 mcp.INVALID_PARAMS, f"There is no tool {params.name[:80]!r}; the tools are: {', '.join(table)}."
             )
         try:
-            return _result(await _called(service, tool, dict(params.arguments or {}), ctx))
+            return _result(await _called(service, tool, dict(params.arguments or {}), ctx, reads_files))
         except Exception as error:  # noqa: BLE001 - every fault gets its sentence, and unknown ones go to the log
             answer = json.loads(bytes(error_response(service, error).body))
             return mcp.CallToolResult(content=[mcp.TextContent(text=answer["error"]["message"])], is_error=True)
@@ -142,12 +148,57 @@ class _PostOnly:
 
 
 async def serve_stdio(service: Service, tools: Sequence[AgentTool] = TOOLS) -> None:
-    """Serve one agent by standard input and output until the input ends."""
+    """Serve one agent by standard input and output until the input ends and its last request is answered."""
     from mcp.server.stdio import stdio_server
 
-    server = agent_server(service, tools)
-    async with stdio_server() as (read, write):
-        await server.run(read, write, server.create_initialization_options())
+    server = agent_server(service, tools, reads_files=True)
+    text = TextIOWrapper(sys.stdin.buffer, encoding="utf-8-sig", errors="replace")  # some clients begin with a mark
+    async with stdio_server(anyio.wrap_file(text)) as (read, write):
+        open_requests: set[Any] = set()
+        asked = _Asked(read, open_requests, service.settings.limits.answer_s)
+        await server.run(asked, _Answered(write, open_requests), server.create_initialization_options())
+
+
+class _Asked(ObjectReceiveStream[Any]):
+    """An agent's messages. Their end waits for the answers of what was asked, which the SDK would give up."""
+
+    def __init__(self, stream: Any, open_requests: set[Any], longest_s: float) -> None:
+        self._stream, self._open, self._longest_s = stream, open_requests, longest_s
+
+    @property
+    def last_context(self) -> Any:
+        return self._stream.last_context
+
+    async def receive(self) -> Any:
+        try:
+            item = await self._stream.receive()
+        except anyio.EndOfStream:
+            with anyio.move_on_after(self._longest_s):
+                while self._open:
+                    await anyio.sleep(0.02)
+            raise
+        message = getattr(item, "message", None)
+        if hasattr(message, "method") and (number := getattr(message, "id", None)) is not None:
+            self._open.add(number)
+        return item
+
+    async def aclose(self) -> None:
+        await self._stream.aclose()
+
+
+class _Answered(ObjectSendStream[Any]):
+    """What an agent is sent."""
+
+    def __init__(self, stream: Any, open_requests: set[Any]) -> None:
+        self._stream, self._open = stream, open_requests
+
+    async def send(self, item: Any) -> None:
+        await self._stream.send(item)
+        if not hasattr(item.message, "method"):
+            self._open.discard(getattr(item.message, "id", None))
+
+    async def aclose(self) -> None:
+        await self._stream.aclose()
 
 
 def _resources(names: Sequence[str]) -> list[mcp.Resource]:
@@ -178,11 +229,15 @@ async def _resource(service: Service, uri: str) -> mcp.ReadResourceResult:
     return mcp.ReadResourceResult(contents=[contents])
 
 
-def _described(service: Service, tool: AgentTool) -> mcp.Tool:
+def _described(service: Service, tool: AgentTool, reads_files: bool) -> mcp.Tool:
+    schema = input_schema(tool, service.shelf.names)
+    for one in (schema["properties"].get(name) for name in _FILES if reads_files):
+        if one is not None:
+            one["description"] = one["description"].replace("base64", "path of a file, or base64", 1)
     return mcp.Tool(
         name=tool.name,
         description=tool.about,
-        input_schema=input_schema(tool, service.shelf.names),
+        input_schema=schema,
         annotations=mcp.ToolAnnotations(read_only_hint=tool.read_only, destructive_hint=tool.destructive),
     )
 
@@ -225,26 +280,36 @@ def _brief(schema: dict[str, Any]) -> dict[str, Any]:
 
 
 async def _called(
-    service: Service, tool: AgentTool, arguments: dict[str, Any], ctx: ServerRequestContext[Any]
+    service: Service, tool: AgentTool, arguments: dict[str, Any], ctx: ServerRequestContext[Any], reads_files: bool
 ) -> ToolResult:
     name = arguments.pop("map", None)
     if name is not None and not isinstance(name, str):
         name = str(name)
     served = service.shelf.get(name)
     query = _checked(tool, arguments)
-    files = any(getattr(query, field, None) is not None for field in ("photo", "clip"))
+    files = any(getattr(query, field, None) is not None for field in _FILES)
     lane: Lane = service.slow if tool.slow or files else service.quick
 
     def job(watch: Cancellation) -> ToolResult:
-        return tool.work(WorkInput(served, service.settings.limits, watch=watch), query)
+        return tool.work(WorkInput(served, service.settings.limits, watch=watch, reads_files=reads_files), query)
 
     return await lane.run(job, _reporter(ctx))
 
 
 def _checked(tool: AgentTool, arguments: dict[str, Any]) -> Any:
-    """Return the request of a tool; what does not fit is answered with the arguments that do."""
+    """Return the request of a tool; what does not fit is answered with the arguments that do.
+
+    Clients of language models send numbers as text, and null or "" for an argument that they leave out.
+    """
+    fields = msgspec.structs.fields(tool.query)
+    optional = {one.encode_name for one in fields if not one.required}
+    given = {
+        name: value
+        for name, value in arguments.items()
+        if value is not None and not (name in optional and isinstance(value, str) and not value.strip())
+    }
     try:
-        return checked({name: value for name, value in arguments.items() if value is not None}, tool.query)
+        return checked(given, tool.query, strict=False)
     except RequestError as fault:
         (schema,), components = msgspec.json.schema_components([tool.query])
         known = components[schema["$ref"].rpartition("/")[2]]["properties"]
@@ -252,8 +317,8 @@ def _checked(tool: AgentTool, arguments: dict[str, Any]) -> Any:
         reason = str(fault).removesuffix("; /openapi.json describes it.") + "."
         if unknown:
             reason = f"{tool.name} has no argument {unknown[0][:60]!r}{did_you_mean(unknown[0], [*known, 'map'])}"
-        fields = ", ".join(f"{name} ({_kind(one)})" for name, one in known.items())
-        raise RequestError(f"{reason} The arguments of {tool.name}: {fields}, map.") from None
+        takes = ", ".join(f"{name} ({_kind(one)})" for name, one in known.items())
+        raise RequestError(f"{reason} The arguments of {tool.name}: {takes}, map.") from None
 
 
 def _kind(schema: dict[str, Any]) -> str:
@@ -309,3 +374,83 @@ def _uri(name: str) -> str:
     from urllib.parse import quote
 
     return f"{_SCHEME}/{quote(name)}"
+
+
+MOST_TOKENS = 800
+"""Of one answer, unless its client wants more."""
+_TOKEN = re.compile(r" ?[A-Za-z]{1,9}|\d{1,3}|[^\sA-Za-z\d]{1,2}")
+_DECIMALS = 2
+_EXACT = {"world_from_camera": 4}  # decimals of a pose: 0.01 in a rotation is half a degree
+# What speaks of machines, or of how an answer is drawn.
+_LEFT_OUT = frozenset({"level_from_recording", "elapsed_ms", "color", "voxels", "hits", "clip", "intrinsics", "views"})
+_LEFT_OUT_KEY, _CUT = "left_out", " ..."
+
+
+def token_count(text: str) -> int:
+    """Return the number of tokens of a text; see the head of this file."""
+    return len(_TOKEN.findall(text))
+
+
+def compact(answer: Any, decimals: int = _DECIMALS, left_out: frozenset[str] = _LEFT_OUT) -> Any:
+    """Return JSON with numbers rounded and without keys that are empty, or of no use to an agent."""
+    if isinstance(answer, float):
+        rounded = round(answer, decimals)
+        return int(rounded) if rounded == int(rounded) else rounded
+    if isinstance(answer, Mapping):
+        kept = {
+            str(key): compact(value, _EXACT.get(str(key), decimals), left_out)
+            for key, value in answer.items()
+            if key not in left_out
+        }
+        return {key: value for key, value in kept.items() if value is not None and value not in ("", {})}
+    return [compact(value, decimals, left_out) for value in answer] if isinstance(answer, list | tuple) else answer
+
+
+def fitting(answer: dict[str, Any], most: int = MOST_TOKENS) -> dict[str, Any]:
+    """Return an answer of at most some tokens; ``left_out`` says how many entries of which lists are missing.
+
+    The longest list loses its end, wherever it stands in the answer; a path loses places between its ends, and where
+    no list is left the longest text is cut.
+    """
+    answer = deepcopy(answer)
+    gone: dict[str, int] = {}
+    while _size(answer) > most:
+        key, rows = max(_lists(answer), key=lambda one: _size(one[1]), default=("", []))
+        if not rows:
+            break
+        cut = max(1, len(rows) // 8)
+        if key.rpartition(".")[2] == "path":
+            kept = np.unique(np.linspace(0, len(rows) - 1, len(rows) - cut).round().astype(int))
+            rows[:] = [rows[at] for at in kept.tolist()]
+        else:
+            del rows[-cut:]
+        gone[key] = gone.get(key, 0) + cut
+        answer[_LEFT_OUT_KEY] = gone
+    while _size(answer) > most:
+        where, key = max(_texts(answer), key=lambda one: len(one[0][one[1]]))
+        where[key] = where[key][: len(where[key]) * 3 // 4].removesuffix(_CUT) + _CUT
+    return answer
+
+
+def _lists(answer: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, list[Any]]]:
+    """Yield the lists of an answer that can lose an entry, with their keys: ``last.lines``."""
+    for key, value in answer.items():
+        if isinstance(value, dict):
+            yield from _lists(value, f"{path}{key}.")
+        elif isinstance(value, list) and len(value) > (2 if key == "path" else 1):
+            yield f"{path}{key}", value
+
+
+def _texts(answer: dict[str, Any]) -> Iterator[tuple[dict[str, Any], str]]:
+    """Yield where the texts of an answer stand."""
+    for key, value in answer.items():
+        rows = value if isinstance(value, list) else [value]
+        for one in rows:
+            if isinstance(one, dict):
+                yield from _texts(one)
+        if isinstance(value, str):
+            yield answer, key
+
+
+def _size(value: Any) -> int:
+    return token_count(msgspec.json.encode(value).decode())

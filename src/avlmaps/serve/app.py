@@ -1,6 +1,7 @@
 """The HTTP application: routes of the operations, errors as JSON, progress as server-sent events."""
 
 import asyncio
+from codecs import BOM_UTF8
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontextmanager
 from typing import Any
@@ -16,16 +17,12 @@ from starlette.responses import HTMLResponse, Response, StreamingResponse
 from starlette.routing import BaseRoute, Mount, Route
 
 from avlmaps.core.version import __version__
-from avlmaps.serve.errors import RequestError
 from avlmaps.serve.guard import AccessGuard, App
-from avlmaps.serve.lanes import Cancellation, Report
-from avlmaps.serve.openapi import document
-from avlmaps.serve.operations import OPERATIONS, Operation
-from avlmaps.serve.page import CONTENT_POLICY, html_page
-from avlmaps.serve.requests import checked, checked_texts
+from avlmaps.serve.lanes import Cancellation, Report, RequestError
+from avlmaps.serve.openapi import CONTENT_POLICY, OPERATIONS, Operation, document, html_page
+from avlmaps.serve.requests import Uploads, checked, checked_texts
 from avlmaps.serve.service import JSON_TYPE, Service, error_response
 from avlmaps.serve.tools import TOOLS, AgentTool
-from avlmaps.serve.uploads import Uploads
 from avlmaps.serve.work import File, WorkInput, encoded, list_maps
 
 
@@ -270,7 +267,7 @@ def _object(body: bytes) -> dict[str, Any]:
     from avlmaps.core.files import decode_json
 
     try:
-        values = decode_json(body)
+        values = decode_json(body.removeprefix(BOM_UTF8))
     except (msgspec.DecodeError, UnicodeDecodeError) as fault:
         raise RequestError(f"The body is no JSON ({str(fault)[:200]}); send an object of values.") from None
     if not isinstance(values, dict):

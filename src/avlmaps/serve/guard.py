@@ -17,7 +17,7 @@ from urllib.parse import parse_qsl, quote, unquote, urlencode, urlsplit
 
 from avlmaps.core.network import is_loopback
 from avlmaps.core.wording import Spelling, asked_as, flag
-from avlmaps.serve.errors import RequestError
+from avlmaps.serve.lanes import RequestError
 from avlmaps.serve.settings import ServeSettings
 
 Scope = MutableMapping[str, Any]

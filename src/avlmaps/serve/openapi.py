@@ -1,16 +1,121 @@
-"""The OpenAPI 3.1 document of the server, made of the types of requests and answers."""
+"""The operations of the HTTP interface: one table that makes routes, the OpenAPI document and the page at the root."""
 
 import re
-from collections.abc import Iterable, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from html import escape
+from typing import Any, Literal
 
 import msgspec
 
 from avlmaps.core.version import __version__
-from avlmaps.query.schema import ErrorAnswer
-from avlmaps.serve import tiles
-from avlmaps.serve.operations import OPERATIONS, Operation
+from avlmaps.navigate.paths import PathAnswer
+from avlmaps.query.places import PlaceAnswer
+from avlmaps.query.schema import (
+    ChangesAnswer,
+    ContentsAnswer,
+    EditsAnswer,
+    ErrorAnswer,
+    LocateAnswer,
+    QueryAnswer,
+    RoomsAnswer,
+    SourcesAnswer,
+)
+from avlmaps.serve import requests, tiles, work
+from avlmaps.serve.tiles import TilesAnswer
 from avlmaps.serve.work import MapsAnswer
+
+
+@dataclass(frozen=True, slots=True)
+class Operation:
+    """One thing that a client can do with a map.
+
+    Attributes:
+        name: for the OpenAPI document, ``operationId``.
+        path: below ``/maps/{map}``; ``{name:count}`` and ``{name:index}`` are
+            whole numbers, the latter also below 0.
+        about: one sentence.
+        query: the type of the request.
+        answer: the type of the answer's JSON, or a media type.
+        work: makes the answer, in a thread.
+        lane: quick for queries in words, slow for all else.
+        body: what a POST may bring: nothing (then there is only GET), a query as JSON or a form, a command likewise
+            (then there is only POST), or a form or a photo as the body (likewise).
+        files: names of the files of a form.
+    """
+
+    name: str
+    path: str
+    about: str
+    query: type
+    answer: Any
+    work: Callable[[Any, Any], Any]
+    lane: Literal["quick", "slow"] = "quick"
+    body: Literal["none", "form", "command", "photo"] = "none"
+    files: tuple[str, ...] = ()
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """HTTP methods: GET with values in the address, POST with a body."""
+        if self.body == "none":
+            return ("GET",)
+        return ("GET", "POST") if self.body == "form" else ("POST",)
+
+
+OPERATIONS = (
+    Operation("describeMap", "", "Describe a map, as `avlmaps info` does.",
+              requests.NoQuery, dict, work.describe_map, "slow"),
+    Operation("listContents", "/contents", "List things, sounds and rooms, as `avlmaps things` does.",
+              requests.ThingsQuery, ContentsAnswer, work.list_contents, "slow"),
+    Operation("listThings", "/things", "List the things of a map, a room or a day, or near a place; a page of them.",
+              requests.ListedThingsQuery, work.ListedThingsAnswer, work.list_things, "slow"),
+    Operation("listSounds", "/sounds", "List the sounds of a map.",
+              requests.NoQuery, work.SoundsAnswer, work.list_sounds, "slow"),
+    Operation("getSound", "/sounds/{sound:count}/clip", "Return the clip of a sound, counted from 0.",
+              requests.NoQuery, "audio/flac", work.sound_clip, "slow"),
+    Operation("listRooms", "/rooms", "List the rooms of a map, as `avlmaps rooms` does.",
+              requests.RoomsQuery, RoomsAnswer, work.list_rooms, "slow"),
+    Operation("listSources", "/sources", "List where the sounds came from, as `avlmaps sources` does.",
+              requests.SourcesQuery, SourcesAnswer, work.list_sources, "slow"),
+    Operation("listChanges", "/changes", "List what is new, moved and gone since a day, as `avlmaps changes` does.",
+              requests.ChangesQuery, ChangesAnswer, work.list_changes, "slow"),
+    Operation("listEdits", "/edits", "List what people corrected, as `avlmaps edit --list` does.",
+              requests.NoQuery, EditsAnswer, work.list_edits, "slow"),
+    Operation("editMap", "/edit", "Correct the map, as `avlmaps edit` does; later queries know it.",
+              requests.EditQuery, EditsAnswer, work.edit, "slow", "command"),
+    Operation("ask", "/ask", "Query a map in a sentence or part by part, as `avlmaps query` does.",
+              requests.AskQuery, QueryAnswer, work.ask, "quick", "form", ("photo", "clip")),
+    Operation("locate", "/locate", "Return the camera pose of a photo, as `avlmaps locate` does.",
+              requests.LocateQuery, LocateAnswer, work.locate, "slow", "photo", ("photo",)),
+    Operation("describePlace", "/place", "Return what is at a place.", requests.PlaceQuery, PlaceAnswer, work.place),
+    Operation("findPath", "/path", "Return the path between two places for a robot's body.",
+              requests.PathQuery, PathAnswer, work.path, "slow"),
+    Operation("drawAnswer", "/picture", "Draw the answer of a query, or the map.",
+              requests.PictureQuery, "image/png", work.picture, "slow", "form", ("photo", "clip")),
+    Operation("listTiles", "/tiles", "List the tiles of a map's voxels, by level of detail.",
+              requests.NoQuery, TilesAnswer, work.tiles, "slow"),
+    Operation("getTile", "/tiles/{level:count}/{i:index}/{j:index}/{k:index}", "Return one tile of voxels.",
+              requests.TilesQuery, "application/octet-stream", work.tile, "slow"),
+    Operation("getKeyframe", "/keyframes/{keyframe:count}", "Return the picture of a keyframe, counted from 0.",
+              requests.NoQuery, "image/jpeg", work.keyframe),
+    Operation("view", "/view", "Show the map in a browser, as `avlmaps view` does.",
+              requests.ViewQuery, "text/html", work.viewer),
+    Operation("viewMap", "/view/map", "Return what the page of `view` needs to begin.",
+              requests.NoQuery, dict, work.drawn_map),
+    Operation("viewVoxels", "/view/voxels", "Return the voxels that the page draws, in the order of drawing.",
+              requests.NoQuery, "application/octet-stream", work.drawn_voxels),
+    Operation("viewLabels", "/view/labels", "Return the thing, the room and the name of each voxel that is drawn.",
+              requests.NoQuery, "application/octet-stream", work.drawn_labels, "slow"),
+    Operation("viewContents", "/view/contents", "Return things, sounds and rooms with the colours of the page.",
+              requests.NoQuery, dict, work.drawn_contents, "slow"),
+    Operation("viewVoxel", "/view/voxels/{voxel:count}", "Return what a voxel that is drawn is taken for.",
+              requests.NoQuery, dict, work.drawn_voxel),
+    Operation("askInView", "/view/ask", "Query a map, and return the answer with the heat of each voxel that is drawn.",
+              requests.AskQuery, "application/octet-stream", work.ask_in_view, "quick", "form", ("photo", "clip")),
+    Operation("rehearse", "/view/rehearse", "Plan a command on the map; no real robot moves.",
+              requests.RehearseQuery, dict, work.rehearse, "slow", "command", ("photo", "clip")),
+)  # fmt: skip
+
 
 _OF_FILES = ("intrinsics",)  # values that only a form with a photo can hold
 _DRAWS_MAP = ("drawAnswer",)  # what needs no query
@@ -177,3 +282,56 @@ def _numbers(path: str) -> list[tuple[str, dict[str, int]]]:
     """Return the numbers in a path, and the least that each can be."""
     found = re.findall(r"{(\w+):(count|index)}", path)
     return [(name, {"minimum": 0} if kind == "count" else {}) for name, kind in found]
+
+
+CONTENT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'; base-uri 'none'"
+_STYLE = """
+body{font:16px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem;color:#26292e;background:#fff}
+code,pre{font:14px/1.4 ui-monospace,monospace;background:#f6f5f1;border-radius:4px}
+code{padding:.1em .3em}pre{padding:.8em;overflow:auto}
+table{border-collapse:collapse;width:100%}th,td{text-align:left;padding:.3em .6em}
+th,td{border-top:1px solid #ddd;vertical-align:top}
+h2{margin-top:2rem}h3{margin-bottom:.2rem}
+@media(prefers-color-scheme:dark){body{background:#16181b;color:#e4e2dc}code,pre{background:#22252a}
+th,td{border-color:#3a3d42}}
+"""
+
+
+def html_page(address: str) -> str:
+    """Return the page of the server at an address, such as ``http://127.0.0.1:8750``."""
+    described = document([], "", False)
+    sections = "\n".join(
+        _section(path, method.upper(), operation)
+        for path, item in described["paths"].items()
+        for method, operation in item.items()
+    )
+    return f"""<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width,initial-scale=1">
+<title>avlmaps server</title><style>{_STYLE}</style></head><body>
+<h1>avlmaps server</h1>
+<p>Version {escape(__version__)}, {len(OPERATIONS)} operations on each map. The maps: <a href="maps">maps</a>.
+In the browser, a map is at <code>/maps/NAME/view</code>.
+For programs: <a href="openapi.json">openapi.json</a> (OpenAPI 3.1). For agents: MCP by streamable HTTP at
+<code>/mcp</code>.</p>
+<pre>curl -G {escape(address)}/maps/NAME/ask --data-urlencode "sentence=the chair near the table"
+curl -F photo=@photo.jpg {escape(address)}/maps/NAME/locate</pre>
+<p>Answers are the JSON that the command line prints under <code>--json</code>. Errors are
+<code>{{"error": {{"kind": ..., "message": ...}}}}</code>. Send <code>Accept: text/event-stream</code> for the
+progress of work that takes long.</p>
+<h2>Operations</h2>
+{sections}
+</body></html>
+"""
+
+
+def _section(path: str, method: str, operation: dict) -> str:
+    rows = "".join(
+        f"<tr><td><code>{escape(one['name'])}</code></td><td>{escape(one['in'])}</td>"
+        f"<td>{'required' if one['required'] else ''}</td><td>{escape(one.get('description', ''))}</td></tr>"
+        for one in operation.get("parameters", [])
+    )
+    table = f"<table><tr><th>value</th><th>in</th><th></th><th></th></tr>{rows}</table>" if rows else ""
+    bodies = ", ".join(operation.get("requestBody", {}).get("content", {}))
+    body = f"<p>Body: <code>{escape(bodies)}</code></p>" if bodies else ""
+    more = f"<pre>{escape(operation['description'])}</pre>" if "description" in operation else ""
+    return f"<h3><code>{method} {escape(path)}</code></h3><p>{escape(operation['summary'])}</p>{table}{body}{more}"

@@ -1,23 +1,33 @@
-"""What every part of the server shares: settings, maps, lanes, and how errors are written."""
+"""What every part of the server shares, and running it: uvicorn with a graceful end, the token, faults of starting."""
 
+import asyncio
+import contextlib
+import errno
 import logging
-from collections.abc import Callable, Mapping
+import os
+import signal
+import socket
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import FrameType
 from typing import TYPE_CHECKING
 
 from starlette.responses import Response
 
+from avlmaps.core.files import read_regular, user_path
+from avlmaps.core.wording import option
 from avlmaps.query.avlmap import QuerySettings
 from avlmaps.query.modalities.sound import SoundSettings
-from avlmaps.serve.errors import Privacy, RequestError
-from avlmaps.serve.lanes import Lane
-from avlmaps.serve.settings import ServeSettings
+from avlmaps.serve.guard import App
+from avlmaps.serve.lanes import Lane, Privacy, RequestError
+from avlmaps.serve.settings import ServeError, ServeSettings
 from avlmaps.serve.shelf import MapSource, Shelf
 from avlmaps.serve.work import encoded
 
 if TYPE_CHECKING:
     from avlmaps.view.route import MakeRobot
+
 
 JSON_TYPE = "application/json"
 log = logging.getLogger("avlmaps.serve")
@@ -80,3 +90,127 @@ def error_response(service: Service, error: BaseException) -> Response:
         log.error("%s", error, exc_info=error if status == 500 else None)
     headers = error.headers if isinstance(error, RequestError) else {}
     return Response(encoded(answer), status, headers, JSON_TYPE)
+
+
+TOKEN_VARIABLE = "AVLMAPS_TOKEN"
+_TOKEN_BYTES = 4096
+
+
+def read_token(path: Path | None) -> str | None:
+    """Return the token of a file, else that of the environment, else None.
+
+    Raises:
+        ServeError: the file cannot be read or is empty.
+    """
+    if path is None:
+        return os.environ.get(TOKEN_VARIABLE) or None
+    try:
+        token = read_regular(user_path(path), _TOKEN_BYTES).decode().strip()
+    except (OSError, UnicodeDecodeError) as error:
+        reason = (error.strerror if isinstance(error, OSError) else None) or "it is no text"
+        raise ServeError(f"The token file {path} cannot be read ({reason}); write the token into it as text.") from None
+    if not token:
+        raise ServeError(f"The token file {path} is empty; write the token into it as text.")
+    return token
+
+
+def listening_socket(settings: ServeSettings) -> socket.socket:
+    """Return a bound socket.
+
+    Raises:
+        ServeError: the port is taken, or the address is none of this machine's.
+    """
+    try:
+        found = socket.getaddrinfo(settings.host, settings.port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
+        family, kind, protocol, _, address = found[0]
+        opened = socket.socket(family, kind, protocol)
+    except OSError as error:
+        raise ServeError(
+            f"The server cannot listen on {settings.host} ({error.strerror}); check {option('host')}."
+        ) from None
+    try:
+        opened.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        opened.bind(address)
+    except OSError as error:
+        opened.close()
+        if error.errno == errno.EADDRINUSE:
+            raise ServeError(
+                f"Port {settings.port} of {settings.host} is taken by another program; choose one with "
+                f"{option('port', 'N')}, or {option('port', '0')} for any free one."
+            ) from None
+        what = "needs more rights" if error.errno == errno.EACCES else error.strerror
+        raise ServeError(f"The server cannot listen on {settings.host}:{settings.port} ({what}).") from None
+    return opened
+
+
+def url_of(settings: ServeSettings, opened: socket.socket) -> str:
+    """Return the address under which clients reach the server."""
+    host = f"[{settings.host}]" if ":" in settings.host else settings.host
+    return f"{settings.scheme}://{host}:{opened.getsockname()[1]}"
+
+
+def run_http(
+    app: App,
+    service: Service,
+    opened: socket.socket,
+    started: Callable[[], None],
+    ending: Callable[[], None] = lambda: None,
+) -> None:
+    """Serve until SIGTERM or SIGINT; what runs by then is finished, up to a time.
+
+    Args:
+        app: the ASGI application.
+        service: its service.
+        opened: a bound socket.
+        started: is called when the server answers.
+        ending: is called at the signal, before what runs is finished.
+
+    Raises:
+        ServeError: the TLS files cannot be used.
+    """
+    import ssl
+
+    import uvicorn
+
+    class Server(uvicorn.Server):
+        """Uvicorn that ends with its process still in hand: a signal ends the serving, and no more."""
+
+        @contextlib.contextmanager
+        def capture_signals(self) -> Iterator[None]:
+            loop = asyncio.get_running_loop()
+            for one in (signal.SIGINT, signal.SIGTERM):
+                with contextlib.suppress(NotImplementedError, RuntimeError):  # Windows, or a thread of a test
+                    loop.add_signal_handler(one, self.handle_exit, one, None)
+            yield
+
+        def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+            ending()
+            super().handle_exit(sig, frame)
+
+        async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+            await super().startup(sockets)
+            started()
+
+    settings = service.settings
+    config = uvicorn.Config(
+        app,
+        log_config=None,
+        log_level=logging.WARNING,
+        access_log=False,
+        server_header=False,
+        proxy_headers=False,
+        ws="none",
+        limit_concurrency=settings.limits.connections,
+        timeout_keep_alive=30,
+        timeout_graceful_shutdown=round(settings.limits.shutdown_s),
+        ssl_certfile=settings.tls_certificate,
+        ssl_keyfile=settings.tls_key,
+        lifespan="on",
+    )
+    try:
+        config.load()
+    except (OSError, ssl.SSLError) as error:
+        raise ServeError(
+            f"The TLS files cannot be used ({error.strerror or error}); give a PEM certificate and its key."
+        ) from None
+    asyncio.run(Server(config).serve(sockets=[opened]))

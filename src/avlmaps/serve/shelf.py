@@ -26,8 +26,7 @@ from avlmaps.query.avlmap import AVLMap, QuerySettings
 from avlmaps.query.factors import NearAnchors
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.queryable import Attachment
-from avlmaps.serve.errors import RequestError
-from avlmaps.serve.lanes import watch_here
+from avlmaps.serve.lanes import RequestError, watch_here
 from avlmaps.serve.settings import Limits, ServeError
 
 if TYPE_CHECKING:

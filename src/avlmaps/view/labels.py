@@ -10,7 +10,7 @@ from jaxtyping import Int, UInt8
 from avlmaps.core.arrays import Bool, Float
 from avlmaps.core.errors import AvlmapsError
 from avlmaps.maps.sources.candidates import CELL_M
-from avlmaps.query.contents import listed_rooms
+from avlmaps.query.contents import listed_rooms, numbered
 from avlmaps.query.export import heat_colors, shades_of
 from avlmaps.query.naming import VoxelNamer
 
@@ -85,7 +85,7 @@ class Labels:
         rooms: those with most views first.
         sources: where sounds came from, as the page draws it; none where the map does not know.
         names: of things, in the order of their colours; a voxel's first label counts into it from 1.
-        room_names: likewise, for the second label.
+        room_names: of each room, in the order of ``rooms``; the second label counts into it likewise.
         voxel_names: likewise, for the third label.
         voxels: (m, 4) the labels of each voxel that is drawn, in that order: thing, room, name, confidence of the name.
         notes: one sentence each on what could not be computed.
@@ -141,17 +141,14 @@ class Labels:
             ],
             "sources": list(self.sources),
             "rooms": [
-                row | {"label": self._room_label(room)}
-                for row, room in zip(listed_rooms(self.rooms, layout.avlmap.storeys), self.rooms, strict=True)
+                row | {"label": number if number <= _MOST else NONE}
+                for number, row in enumerate(listed_rooms(self.rooms, layout.avlmap.storeys), 1)
             ],
             "names": list(self.names),
             "room_names": list(self.room_names),
             "voxel_names": list(self.voxel_names),
             "notes": list(self.notes),
         }
-
-    def _room_label(self, room: "Room") -> int:
-        return 1 + self.room_names.index(room.name) if room.name in self.room_names else NONE
 
 
 def palettes(labels: Labels | None = None) -> dict[str, list[int]]:
@@ -197,16 +194,16 @@ def _room_labels(
     """Give each of some voxels the room that it lies in; without regions that whose views lie nearest on the ground."""
     from scipy.spatial import KDTree
 
-    names = tuple(sorted({room.name for room in rooms}))[:_MOST]
+    names = numbered([room.name for room in rooms])[:_MOST]
+    labels = [1 + k if k < _MOST else NONE for k in range(len(rooms))]
     if not names or not len(rows):
         return names, np.zeros(len(rows), np.uint8)
     space, regions = avlmap.space, avlmap.room_regions
     if regions is not None and len(regions):
-        label_of = [1 + names.index(room.name) if room.name in names else NONE for room in rooms]
         number = regions.listed_at([room.region for room in rooms], space.centres_of(rows))
-        return names, np.array([*label_of, NONE], np.uint8)[number]  # the last is that of no room
+        return names, np.array([*labels, NONE], np.uint8)[number]  # the last is that of no room
     places = np.concatenate([space.level(room.places)[:, :2] for room in rooms])
-    label = np.concatenate([np.full(room.views, 1 + names.index(room.name), np.uint8) for room in rooms])
+    label = np.concatenate([np.full(room.views, number, np.uint8) for number, room in zip(labels, rooms, strict=True)])
     if not _is_level(avlmap):
         return names, label[KDTree(places).query(space.level(space.centres_of(rows))[:, :2])[1]]
     ground = np.asarray(space.index)[rows, :2].astype(np.int64)

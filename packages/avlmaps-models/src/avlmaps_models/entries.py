@@ -4,7 +4,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from avlmaps.core.distributions import MODELS
+from avlmaps.core.extras import MODELS
 from avlmaps.core.registry import Backend, Kind
 from avlmaps.perception.models.published_models import Published
 from avlmaps.perception.profiles import Profile, profile

@@ -125,7 +125,7 @@ def test_a_row_of_other_weights_says_so_and_is_run_again():
 def test_every_command_of_the_page_is_one_that_the_command_line_reads(entry):
     import tyro
 
-    from avlmaps.cli.usage import CONFIG
+    from avlmaps.cli.verbs import CONFIG
     from avlmaps_sim.verbs.bench import Bench
 
     bench = tyro.cli(Bench, args=shlex.split(entry.command)[2:], config=CONFIG)

@@ -7,7 +7,7 @@ import pytest
 from training.rooms.furnished import kind_of_room, mean_surfaces, rooms_of, scenes, write_table
 from training.rooms.named import named_surfaces
 
-from avlmaps.perception.room_contents import read_room_contents
+from avlmaps.perception.protocols import read_room_contents
 from avlmaps_sim.scenes import open_scene
 
 

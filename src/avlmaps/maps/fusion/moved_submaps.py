@@ -9,8 +9,8 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
+from avlmaps.core.ahead import usable_cores
 from avlmaps.core.arrays import Bool, Float32, Float64, Int32, Int64, UInt16
-from avlmaps.core.cores import usable_cores
 from avlmaps.core.errors import MapError
 from avlmaps.core.poses import inverse
 from avlmaps.maps.fusion import submap_kernels as kernels

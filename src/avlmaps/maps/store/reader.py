@@ -22,7 +22,7 @@ from avlmaps.maps.store.manifest import GroundInfo, MapInfo
 from avlmaps.maps.store.map_data import MapData
 from avlmaps.maps.types import HeardSounds, Keyframes, SourceEvidence, Submaps, Voxels
 from avlmaps.perception.encoders import Encoders
-from avlmaps.perception.models.names import public_choice, public_name
+from avlmaps.perception.models.published_models import public_choice, public_name
 
 GIVEN_FEATURES = "given:features"  # backend of features that came without an encoder
 

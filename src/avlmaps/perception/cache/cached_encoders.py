@@ -4,8 +4,9 @@ Features of pixels by slow models pass through float16 with the store and withou
 bit, in both cases; all others are stored as they are.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
 from typing import Any, cast
 
 import numpy as np
@@ -15,58 +16,21 @@ from avlmaps.core.numbers import unmasked
 from avlmaps.core.registry import Kind
 from avlmaps.core.version import __version__
 from avlmaps.perception.cache.feature_store import CacheSettings, FeatureStore, key_of
-from avlmaps.perception.encoders import Encoders, Source
+from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.models.settings import precision_in_force
-from avlmaps.perception.protocols import BatchPixelEncoder, FrameSoundEncoder, LocalFeatures, PixelEncoder
+from avlmaps.perception.own_encoder import with_members
+from avlmaps.perception.protocols import (
+    PROTOCOLS,
+    BatchPixelEncoder,
+    FrameSoundEncoder,
+    LocalFeatures,
+    ModelCard,
+    PixelEncoder,
+    members_of,
+)
 from avlmaps.perception.user_folder import cache_folder
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.types import Frame
-
-
-@dataclass(frozen=True, slots=True)
-class CachedSource(Source):
-    """An encoder with a store of features before it.
-
-    Attributes:
-        real: where the encoder comes from.
-        store: where its features are stored; None stores none.
-    """
-
-    real: Source
-    store: FeatureStore | None
-
-    def load(self) -> Any:
-        """Return the encoder behind the store."""
-        encoder, store = self.real.load(), self.store
-        if self.kind is Kind.PIXELS:
-            return CachedPixels(encoder, store, self.is_slow)
-        if self.kind is Kind.SOUNDS and isinstance(encoder, FrameSoundEncoder):
-            return CachedFrameSounds(encoder, store)
-        return _CACHED[self.kind](encoder, store)
-
-    @property
-    def chosen(self) -> str:
-        """The name of the real one with its model."""
-        return self.real.chosen
-
-    @property
-    def on_torch(self) -> bool:
-        """Whether the real one is a large model on torch."""
-        return self.real.on_torch
-
-    @property
-    def is_slow(self) -> bool:
-        """Whether the features of the real one take longer to make than to store and read."""
-        return self.real.is_slow
-
-    @property
-    def keyframes_only(self) -> bool:
-        """Whether only keyframes are given to it."""
-        return self.real.keyframes_only
-
-    def note(self) -> str:
-        """Return how many features came from the store; ``""`` where none can."""
-        return "" if self.store is None else f"{self.store.found.get(self.kind, 0)} from the cache"
 
 
 def with_cache(used: Encoders, settings: CacheSettings) -> Encoders:
@@ -75,212 +39,128 @@ def with_cache(used: Encoders, settings: CacheSettings) -> Encoders:
     A matcher's matches are not stored, nor the features of an encoder whose card does not distinguish it from others.
     """
     slow = frozenset(kind for kind in used if used.sources[kind].is_slow)
-    storable = frozenset(kind for kind in used if kind is not Kind.MATCHER and used.sources[kind].may_be_stored)
+    storable = frozenset(kind for kind in used if kind is not Kind.MATCHER and used.sources[kind].has_card)
     kept = {"off": frozenset[Kind](), "auto": slow}.get(str(settings.place), frozenset(used)) & storable
     if not kept and Kind.PIXELS not in slow:
         return used
     folder = cache_folder() / "features" if isinstance(settings.place, str) else settings.place
     store = FeatureStore(folder, 1e9 * settings.limit_gb) if kept else None
-    stored = {kind: CachedSource(kind, used.name_of(kind), used.sources[kind], store) for kind in kept}
+    stored = {kind: replace(used.sources[kind], remembering=cached, store=store) for kind in kept}
     if Kind.PIXELS in slow and Kind.PIXELS not in kept:  # rounded as with the store
-        stored[Kind.PIXELS] = CachedSource(Kind.PIXELS, used.name_of(Kind.PIXELS), used.sources[Kind.PIXELS], None)
+        stored[Kind.PIXELS] = replace(used.sources[Kind.PIXELS], remembering=cached)
     return Encoders.of(used.name, {**used.sources, **stored}, used.weight_variance_m2)
 
 
 def cache_note(used: Encoders, kind: Kind) -> str:
     """Return how many features of a module came from the store, for a progress bar; ``""`` where none can."""
-    return used.sources[kind].note() if kind in used else ""
+    store = used.sources[kind].store if kind in used else None
+    return "" if store is None else f"{store.found.get(kind, 0)} from the cache"
 
 
-class _Remembering:
-    """An encoder in front of another one.
+class _Memory:
+    """What one model made before; without a store it forgets all."""
 
-    What is not remembered goes straight to that, written out for each protocol: ``isinstance`` sees no ``__getattr__``.
-    """
+    def __init__(self, kind: Kind, card: ModelCard, store: FeatureStore | None) -> None:
+        self.kind, self.card, self.store = kind, card, store
 
-    kind: Kind
-
-    def __init__(self, encoder: Any, store: FeatureStore | None) -> None:
-        self._encoder, self._store = encoder, store
-        self.card = encoder.card
-
-    def _key(self, *seen: np.ndarray | str | float | int | None) -> str:
+    def key(self, *seen: np.ndarray | str | float | int | None) -> str:
         """Return the key of what is seen, by this model, in this precision, by this release's code."""
+        if self.store is None:
+            return ""
         return key_of(__version__, self.kind, self.card.id, self.card.checksum, precision_in_force(), *seen)
 
-    def _get(self, key: str) -> np.ndarray | None:
-        return None if self._store is None else self._store.get(self.kind, self.card, key)
+    def get(self, key: str) -> np.ndarray | None:
+        return None if self.store is None else self.store.get(self.kind, self.card, key)
 
-    def _put(self, key: str, array: np.ndarray) -> None:
-        if self._store is not None:
-            self._store.put(self.kind, self.card, key, array)
+    def put(self, key: str, array: np.ndarray) -> None:
+        if self.store is not None:
+            self.store.put(self.kind, self.card, key, array)
 
-
-class CachedPixels(_Remembering):
-    """A ``BatchPixelEncoder`` that encodes each frame once; features of slow models are rounded to float16."""
-
-    kind = Kind.PIXELS
-
-    def __init__(self, encoder: PixelEncoder, store: FeatureStore | None, half: bool) -> None:
-        """Stand before an encoder.
-
-        Args:
-            encoder: the real one.
-            store: where its features are stored; None stores none.
-            half: round to float16.
-        """
-        super().__init__(encoder, store)
-        self._kept_as = np.float16 if half else np.float32
-
-    @property
-    def vocabulary(self) -> tuple[str, ...]:
-        """Names that compete with a queried word."""
-        return self._encoder.vocabulary
-
-    def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
-        """Return a unit vector for each word, or zero."""
-        return self._encoder.encode_words(words)
-
-    def understood(self, word: str) -> str:
-        """Return the part of the phrase that the encoder can act on."""
-        return self._encoder.understood(word)
-
-    @property
-    def batch(self) -> int:
-        """How many frames it likes to be given at once."""
-        return int(getattr(self._encoder, "batch", 1))
-
-    def encode(self, frame: Frame) -> Float32[np.ndarray, "hf wf d"]:
-        """Return the features of a frame."""
-        return self.encode_batch([frame])[0]
-
-    def encode_batch(self, frames: Sequence[Frame]) -> list[Float32[np.ndarray, "hf wf d"]]:
-        """Return the features of each frame; those that are not in the store are encoded together."""
-        keys = ["" if self._store is None else self._key(*_seen_in(frame)) for frame in frames]
-        kept = [self._known(key) for key in keys]
-        missing = [i for i, features in enumerate(kept) if features is None]
-        fresh = encode_batch(self._encoder, [frames[i] for i in missing])
-        for i in reversed(missing):  # a frame's features can take 150 MB: none is held twice for long
-            rounded = fresh.pop().astype(self._kept_as)
-            self._put(keys[i], rounded)
-            kept[i] = rounded.astype(np.float32, copy=False)
-        return [cast(np.ndarray, features) for features in kept]
-
-    def _known(self, key: str) -> Float32[np.ndarray, "hf wf d"] | None:
-        found = self._get(key)
-        if found is None or found.ndim != 3 or found.shape[2] != self.card.dim:
-            return None
-        return found.astype(np.float32, copy=False)
-
-
-class CachedViews(_Remembering):
-    """A view encoder that encodes each frame once."""
-
-    kind = Kind.VIEWS
-
-    def encode(self, frames: Sequence[Frame]) -> Float32[np.ndarray, "n d"]:
-        """Return a unit vector for each frame."""
-        keys = [self._key(*_seen_in(frame)) for frame in frames]
-        kept = [self._get(key) for key in keys]
-        missing = [i for i, features in enumerate(kept) if features is None]
-        if missing:
-            for i, row in zip(missing, unmasked(self._encoder.encode([frames[i] for i in missing])), strict=True):
-                kept[i] = row
-                self._put(keys[i], row)
-        rows = [cast(np.ndarray, row) for row in kept]
-        return np.stack(rows) if rows else np.zeros((0, self.card.dim), np.float32)
-
-    def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
-        """Return a unit vector for each phrase."""
-        return self._encoder.encode_words(words)
-
-
-class CachedSounds(_Remembering):
-    """A sound encoder that encodes each sound once."""
-
-    kind = Kind.SOUNDS
-
-    def encode(self, sound: Sound) -> Float32[np.ndarray, "windows d"]:
-        """Return a unit vector for each window of a sound."""
-        key = self._key(sound.samples, sound.rate_hz)
-        kept = self._get(key)
+    def once(self, make: Callable[[], np.ndarray], *seen: Any) -> Float32[np.ndarray, "..."]:
+        """Return what is made of what is seen, made once."""
+        key = self.key(*seen)
+        kept = self.get(key)
         if kept is None:
-            kept = np.asarray(unmasked(self._encoder.encode(sound)), np.float32)
-            self._put(key, kept)
-        return kept
-
-    @property
-    def vocabulary(self) -> tuple[str, ...]:
-        """The kinds of sound that it knows."""
-        return self._encoder.vocabulary
-
-    def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
-        """Return a unit vector for each phrase."""
-        return self._encoder.encode_words(words)
-
-    def score_words(
-        self, sounds: Sequence[Float32[np.ndarray, "windows d"]], words: Sequence[str]
-    ) -> Float32[np.ndarray, "sounds words"]:
-        """Return how likely each sound is what each phrase names."""
-        return self._encoder.score_words(sounds, words)
-
-    def score_sounds(
-        self, sounds: Sequence[Float32[np.ndarray, "windows d"]], asked: Float32[np.ndarray, "windows d"]
-    ) -> Float32[np.ndarray, " sounds"]:
-        """Return how likely each sound is of the same kind as the queried one."""
-        return self._encoder.score_sounds(sounds, asked)
-
-
-class CachedFrameSounds(CachedSounds):
-    """The same for an encoder that gives a vector for each step of time."""
-
-    @property
-    def hop_s(self) -> float:
-        """Seconds of a step."""
-        return self._encoder.hop_s
-
-
-class CachedPlaces(_Remembering):
-    """A place encoder that encodes each picture once (with the same keypoints, after the same learning)."""
-
-    kind = Kind.PLACE
-
-    def fit(self, local: Sequence[LocalFeatures], rng: np.random.Generator) -> dict[str, np.ndarray]:
-        """Learn what the encoder needs from the map's own keyframes."""
-        return self._encoder.fit(local, rng)
-
-    def encode(
-        self, rgb: UInt8[np.ndarray, "h w 3"], local: LocalFeatures, state: dict[str, np.ndarray]
-    ) -> Float32[np.ndarray, " d"]:
-        """Return a unit vector (zero where the picture has no keypoints)."""
-        learnt = [part for name in sorted(state) for part in (name, np.asarray(state[name]))]
-        points = (local.xy, local.descriptors, local.scale, local.score)
-        key = self._key(rgb, *points, *learnt)
-        kept = self._get(key)
-        if kept is None:
-            kept = np.asarray(unmasked(self._encoder.encode(rgb, local, state)), np.float32)
-            self._put(key, kept)
+            kept = np.asarray(unmasked(make()), np.float32)
+            self.put(key, kept)
         return kept
 
 
-class CachedKeypoints(_Remembering):
-    """A keypoint encoder that encodes each picture once; stored in float32, because keypoints are sub-pixel."""
+def cached(kind: Kind, encoder: Any, store: FeatureStore | None, *, half: bool = False) -> Any:
+    """Return an encoder that makes the features of each frame, picture or sound once.
 
-    kind = Kind.LOCAL
+    Args:
+        kind: the module.
+        encoder: the real one.
+        store: where its features are stored; None stores none.
+        half: features of pixels are rounded to float16.
+    """
+    memory = _Memory(kind, encoder.card, store)
+    names = members_of(FrameSoundEncoder if kind is Kind.SOUNDS else PROTOCOLS[kind])
+    if kind is Kind.PIXELS:
+        batch = partial(_pixels, encoder, memory, np.float16 if half else np.float32)
+        one_by_one = {"encode": lambda frame: batch([frame])[0], "encode_batch": batch}
+        return with_members(encoder, names, {**one_by_one, "batch": int(getattr(encoder, "batch", 1))})
+    return with_members(encoder, names, {"encode": partial(_ENCODE[kind], encoder, memory)})
 
-    def encode(self, rgb: UInt8[np.ndarray, "h w 3"]) -> LocalFeatures:
-        """Return the picture's keypoints."""
-        key = self._key(rgb)
-        kept = self._get(key)
-        if kept is not None and kept.dtype.names:
-            return _keypoints(kept, (rgb.shape[1], rgb.shape[0]))
-        local = self._encoder.encode(rgb)
-        if local.size in ((0, 0), (rgb.shape[1], rgb.shape[0])):
-            self._put(key, _as_rows(local))
-        return local
+
+def _pixels(
+    encoder: PixelEncoder, memory: _Memory, kept_as: type, frames: Sequence[Frame]
+) -> list[Float32[np.ndarray, "hf wf d"]]:
+    """Return the features of each frame; those that are not in the store are encoded together."""
+    keys = [memory.key(*_seen_in(frame)) for frame in frames]
+    kept = [memory.get(key) for key in keys]
+    fits = [one is not None and one.ndim == 3 and one.shape[2] == memory.card.dim for one in kept]
+    fresh = encode_batch(encoder, [frame for frame, here in zip(frames, fits, strict=True) if not here])
+    for i in reversed(np.flatnonzero(np.logical_not(fits))):  # 150 MB a frame: none is held twice for long
+        kept[i] = fresh.pop().astype(kept_as)
+        memory.put(keys[i], kept[i])
+    return [cast(np.ndarray, features).astype(np.float32, copy=False) for features in kept]
 
 
-_CACHED = {Kind.VIEWS: CachedViews, Kind.SOUNDS: CachedSounds, Kind.LOCAL: CachedKeypoints, Kind.PLACE: CachedPlaces}
+def _views(encoder: Any, memory: _Memory, frames: Sequence[Frame]) -> Float32[np.ndarray, "n d"]:
+    keys = [memory.key(*_seen_in(frame)) for frame in frames]
+    kept = [memory.get(key) for key in keys]
+    missing = [i for i, features in enumerate(kept) if features is None]
+    if missing:
+        for i, row in zip(missing, unmasked(encoder.encode([frames[i] for i in missing])), strict=True):
+            kept[i] = row
+            memory.put(keys[i], row)
+    rows = [cast(np.ndarray, row) for row in kept]
+    return np.stack(rows) if rows else np.zeros((0, memory.card.dim), np.float32)
+
+
+def _sounds(encoder: Any, memory: _Memory, sound: Sound) -> Float32[np.ndarray, "windows d"]:
+    return memory.once(lambda: encoder.encode(sound), sound.samples, sound.rate_hz)
+
+
+def _places(
+    encoder: Any, memory: _Memory, rgb: UInt8[np.ndarray, "h w 3"], local: LocalFeatures, state: dict[str, np.ndarray]
+) -> Float32[np.ndarray, " d"]:
+    """Return the vector of a picture with these keypoints, after this learning."""
+    learnt = [part for name in sorted(state) for part in (name, np.asarray(state[name]))]
+    points = (local.xy, local.descriptors, local.scale, local.score)
+    return memory.once(lambda: encoder.encode(rgb, local, state), rgb, *points, *learnt)
+
+
+def _keypoints_of(encoder: Any, memory: _Memory, rgb: UInt8[np.ndarray, "h w 3"]) -> LocalFeatures:
+    """Return a picture's keypoints; stored in float32, because they are sub-pixel."""
+    key = memory.key(rgb)
+    kept = memory.get(key)
+    if kept is not None and kept.dtype.names:
+        return _keypoints(kept, (rgb.shape[1], rgb.shape[0]))
+    local = encoder.encode(rgb)
+    if local.size in ((0, 0), (rgb.shape[1], rgb.shape[0])):
+        memory.put(key, _as_rows(local))
+    return local
+
+
+_ENCODE: dict[Kind, Callable[..., Any]] = {
+    Kind.VIEWS: _views,
+    Kind.SOUNDS: _sounds,
+    Kind.LOCAL: _keypoints_of,
+    Kind.PLACE: _places,
+}
 
 
 def encode_batch(encoder: PixelEncoder, frames: Sequence[Frame]) -> list[Float32[np.ndarray, "hf wf d"]]:

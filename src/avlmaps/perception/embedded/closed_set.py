@@ -1,17 +1,17 @@
 """Parts that the embedded pixel and view encoders share: names, their codes, and which of them a phrase means."""
 
+from collections.abc import Sequence
 from functools import cached_property
 from typing import ClassVar, cast
 
 import numpy as np
 
 from avlmaps.core import lexicon as words_known
-from avlmaps.core.arrays import Float32
+from avlmaps.core.arrays import Float, Float32
 from avlmaps.core.registry import Kind, load
-from avlmaps.perception.embedded.codes import word_codes
-from avlmaps.perception.embedded.meanings import Meanings
 from avlmaps.perception.embedded.paired_networks import PairedNetworks, load_pair
 from avlmaps.perception.embedded.scene_network import Notes, SceneNetwork, Seen
+from avlmaps.perception.embedded.words import Meanings
 from avlmaps.perception.models.remembered import Remembered, key_of
 from avlmaps.perception.protocols import ModelCard, WordEncoder
 from avlmaps.recordings.types import Frame
@@ -77,3 +77,21 @@ class NamedEncoder:
         A name takes in its narrower ones: an armchair answers to "chair".
         """
         return self.meanings.name_weights(word)
+
+
+def orthonormal_codes(words: Float[np.ndarray, "n d"]) -> Float32[np.ndarray, "n d"]:
+    """Return the orthonormal vectors nearest to linearly independent unit vectors, in the same order."""
+    left, _, right = np.linalg.svd(np.asarray(words, np.float64), full_matrices=False)
+    return (left @ right).astype(np.float32)
+
+
+def features_of(
+    probability: Float[np.ndarray, "*n k"], codes: Float32[np.ndarray, "k d"]
+) -> Float32[np.ndarray, "*n d"]:
+    """Return Σ √p·code for distributions over the names."""
+    return np.sqrt(np.maximum(probability, 0.0)).astype(np.float32) @ codes
+
+
+def word_codes(names: Sequence[str], words: WordEncoder) -> Float32[np.ndarray, "n d"]:
+    """Return the code of each name."""
+    return orthonormal_codes(words.encode(list(names)))

@@ -1,15 +1,26 @@
-"""The embedded pixel encoder: probabilities of categories for each pixel, in the space of words (see ``codes``)."""
+"""The eyes that ship, and those that you trained: objects and areas by the scene networks."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from avlmaps.core.arrays import Float, Float32
-from avlmaps.perception.embedded.closed_set import NamedEncoder
-from avlmaps.perception.embedded.codes import features_of
-from avlmaps.perception.embedded.scene_network import SYNTHETIC_WEIGHTS, Seen, load_network
-from avlmaps.perception.room_contents import RoomContents, read_room_contents
+from avlmaps.core.errors import BackendError
+from avlmaps.perception.embedded.closed_set import NamedEncoder, features_of
+from avlmaps.perception.embedded.paired_networks import PairedNetworks
+from avlmaps.perception.embedded.scene_network import (
+    DEFAULT_WEIGHTS,
+    SYNTHETIC_WEIGHTS,
+    Notes,
+    SceneNetwork,
+    Seen,
+    load_network,
+    read_network,
+)
+from avlmaps.perception.models.published_models import PUBLISHED, local_model
+from avlmaps.perception.protocols import ModelCard, RoomContents, read_room_contents
 from avlmaps.recordings.types import Frame
 
 # Beyond these an instance's size says no more for or against it.
@@ -84,3 +95,90 @@ class EmbeddedPixels(NamedEncoder):
 def synthetic_pixels() -> EmbeddedPixels:
     """Return the encoder whose weights saw rendered worlds alone."""
     return EmbeddedPixels(load_network(SYNTHETIC_WEIGHTS))
+
+
+class EmbeddedViews(NamedEncoder):
+    """Distinguishes kinds of room by the things in them."""
+
+    _names = "rooms"
+
+    def _card(self, notes: Notes, checksum: str, licence: str) -> ModelCard:
+        note = f"Knows these kinds of room: {', '.join(self.names)}."
+        return replace(super()._card(notes, checksum, licence), id=notes.id.replace("pixels", "views"), note=note)
+
+    def encode(self, frames: Sequence[Frame]) -> Float32[np.ndarray, "n d"]:
+        """Return a unit vector for each frame."""
+        rooms = [self.room(frame) for frame in frames]
+        return features_of(np.stack(rooms), self.codes) if rooms else np.zeros((0, self.card.dim), np.float32)
+
+    def encode_words(self, words: Sequence[str]) -> Float32[np.ndarray, "n d"]:
+        """Return a unit vector for each phrase; one that means no kind of room lies across all of them."""
+        vectors = np.zeros((len(words), self.card.dim), np.float32)
+        for row, word in enumerate(words):
+            weights = self.meanings.name_weights(word)
+            vector = features_of(weights / weights.sum(), self.codes) if weights.any() else self._across(word)
+            vectors[row] = vector / np.linalg.norm(vector)
+        return vectors
+
+    def _across(self, word: str) -> Float32[np.ndarray, " d"]:
+        vector = self._words.encode([word])[0]
+        rest = vector - self.codes.T @ (self.codes @ vector)
+        return rest if np.linalg.norm(rest) > 1e-3 else vector
+
+
+def synthetic_views() -> EmbeddedViews:
+    """Return the encoder whose weights saw rendered worlds alone."""
+    return EmbeddedViews(load_network(SYNTHETIC_WEIGHTS))
+
+
+# The name under which a folder of models holds them, unless another is chosen.
+MODEL = "eyes"
+_HOW_TO_GET = PUBLISHED[MODEL].get
+_REMEDY = f"train them again with {_HOW_TO_GET}"
+# Whose the weights are: nobody but who trained them knows under which terms the frames came.
+_LICENCE = "your own"
+
+
+def trained_pixels(model: str = MODEL) -> EmbeddedPixels:
+    """Return the pixel encoder of your own networks; see ``open_trained``."""
+    return EmbeddedPixels(open_trained(model), licence=_LICENCE)
+
+
+def trained_views(model: str = MODEL) -> EmbeddedViews:
+    """Return the view encoder of your own networks; see ``open_trained``."""
+    return EmbeddedViews(open_trained(model), licence=_LICENCE)
+
+
+def open_trained(model: str = MODEL) -> SceneNetwork | PairedNetworks:
+    """Return networks from a folder, or the one of a file ``NAME.onnx`` with ``NAME.json`` beside it.
+
+    Args:
+        model: the name of the folder or file in the folder of models, or a path.
+
+    Raises:
+        BackendError: they are not here, cannot be read, or do not go together.
+    """
+    place = local_model(model, _HOW_TO_GET)
+    if place.is_file():
+        return _read(place.parent, place.stem)
+    has_first, has_second = ((place / f"{name}.onnx").is_file() for name in (DEFAULT_WEIGHTS, SYNTHETIC_WEIGHTS))
+    if not has_first and not has_second:
+        raise BackendError(
+            f"{place} holds neither {DEFAULT_WEIGHTS}.onnx nor {SYNTHETIC_WEIGHTS}.onnx; get them with: {_HOW_TO_GET}"
+        )
+    if not has_first:
+        return _read(place, SYNTHETIC_WEIGHTS)
+    first = _read(place, DEFAULT_WEIGHTS)
+    second = _read(place, SYNTHETIC_WEIGHTS) if has_second else load_network(SYNTHETIC_WEIGHTS)
+    try:
+        return PairedNetworks(first, second)
+    except ValueError as fault:
+        beside = "beside it" if has_second else "that ships"
+        raise BackendError(
+            f"{place / DEFAULT_WEIGHTS}.onnx and the second network {beside} do not go together ({fault}) Give the "
+            "file itself as the model, to use it alone."
+        ) from fault
+
+
+def _read(folder: Path, name: str) -> SceneNetwork:
+    return read_network(folder, name, _REMEDY)

@@ -7,10 +7,13 @@ table; how well it does stands in ``training/words/README.md``.
 """
 
 import hashlib
+import re
+import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import cache, cached_property, lru_cache
 from io import BytesIO
+from operator import methodcaller
 from pathlib import Path
 from types import MappingProxyType
 
@@ -18,8 +21,8 @@ import numpy as np
 
 from avlmaps.core.arrays import Float32, Int8
 from avlmaps.core.errors import BackendError, QueryError
-from avlmaps.perception.embedded.wordpieces import WordPieces, clean_phrase, replace_aliases
-from avlmaps.perception.protocols import ModelCard
+from avlmaps.core.lexicon import Entry, EntryKind, lexicon, noun_of
+from avlmaps.perception.protocols import ModelCard, WordEncoder
 
 _REMEMBERED = 4096
 
@@ -76,7 +79,7 @@ def _shipped(name: str) -> bytes:
 
 
 @cache
-def _load() -> tuple[WordWeights, WordPieces, Mapping[str, str]]:
+def _load() -> "tuple[WordWeights, WordPieces, Mapping[str, str]]":
     blob, alias_text = _shipped("weights/words.npz"), _shipped("aliases.txt")
     with np.load(BytesIO(blob), allow_pickle=False) as arrays:
         weights = WordWeights(
@@ -201,3 +204,253 @@ def _unit(vector: Float32[np.ndarray, " d"]) -> Float32[np.ndarray, " d"]:
     if length == 0.0:  # a table could hold a zero row; a direction is still owed
         return np.full_like(vector, len(vector) ** -0.5)
     return vector / np.float32(length)
+
+
+# Said around what is meant: "please find a picture of the ..."; taken off the front, again and again.
+_FILLER = re.compile(
+    r"(?:(?:please|kindly|show me|find me|find|look for|a (?:picture|photo|photograph|image) of|an image of|"
+    r"(?:the|a) (?:sound|noise|sounds|noises) of|(?:sound|noise|sounds|noises) of|the|a|an|some|any)\s+)+"
+)
+_TRAILING = re.compile(r"(?:\s+please)+$")
+_WORD = re.compile(r"[^\W_]+|[^\w\s]")
+_LONGEST_ALIAS_WORDS = 5
+# A noun's head stands before these: "chest of drawers", "machine for dirty clothes".
+_PREPOSITIONS = "of for with to in on at from by under behind near that which where who into over"
+_AFTER_HEAD = frozenset(_PREPOSITIONS.split())
+LONGEST_PHRASE_WORDS = 64
+
+
+def clean_phrase(phrase: str) -> str:
+    """Return the phrase in lower case, without accents, punctuation, articles in front and filler words."""
+    text = phrase.casefold()
+    if not text.isascii():
+        text = unicodedata.normalize("NFKD", text)
+        text = "".join(letter for letter in text if not unicodedata.combining(letter))
+    text = re.sub(r"['’`]", "", text)
+    words = [word for word in _WORD.findall(text) if word[0].isalnum()]
+    text = " ".join(words[:LONGEST_PHRASE_WORDS])
+    front = _FILLER.match(text)
+    return _TRAILING.sub("", text[front.end() :] if front else text) or text
+
+
+def replace_aliases(words: list[str], aliases: Mapping[str, str]) -> list[str]:
+    """Return the words with the longest spans that are aliases put in their canonical form, from the left."""
+    replaced: list[str] = []
+    start = 0
+    while start < len(words):
+        for stop in range(min(len(words), start + _LONGEST_ALIAS_WORDS), start, -1):
+            canonical = aliases.get(" ".join(words[start:stop]))
+            if canonical is not None:
+                replaced += canonical.split()
+                start = stop
+                break
+        else:
+            replaced.append(words[start])
+            start += 1
+    return replaced
+
+
+class WordPieces:
+    """Cuts words into rows of a table: the longest known run of words, else the word's pieces, longest first.
+
+    Args:
+        entries: the rows' names in order: word pieces (``##ing`` continues a word), words and runs of words.
+    """
+
+    def __init__(self, entries: list[str]) -> None:
+        self.rows = dict(zip(entries, range(len(entries)), strict=True))
+        self.longest_run = max(map(methodcaller("count", " "), entries), default=0) + 1
+
+    def rows_of_word(self, word: str) -> list[int]:
+        """Return the rows of one word, greedily the longest piece first; none if a part of it is not known.
+
+        The teacher's pieces hold single letters of other scripts, which mean nothing: such words count as unknown.
+        """
+        if not word.isascii():
+            return []
+        rows: list[int] = []
+        start = 0
+        while start < len(word):
+            for stop in range(len(word), start, -1):
+                row = self.rows.get(("##" if start else "") + word[start:stop])
+                if row is not None:
+                    rows.append(row)
+                    start = stop
+                    break
+            else:
+                return []
+        return rows
+
+    def rows_and_roles(self, words: list[str]) -> tuple[list[int], list[int]]:
+        """Return the phrase's rows and the role of each: 0 before the head, 1 the head, 2 after it."""
+        rows: list[int] = []
+        roles: list[int] = []
+        head = head_of(words)
+        start = 0
+        while start < len(words):
+            for length in range(min(self.longest_run, len(words) - start), 1, -1):
+                row = self.rows.get(" ".join(words[start : start + length]))
+                if row is not None:
+                    found = [row]
+                    break
+            else:
+                length, found = 1, self.rows_of_word(words[start])
+            role = 0 if start + length <= head else 1 if start <= head else 2
+            rows += found
+            roles += [role] * len(found)
+            start += length
+        return rows, roles
+
+
+def head_of(words: list[str]) -> int:
+    """Return the index of the word that the phrase is about: the last one before the first preposition."""
+    for index, word in enumerate(words):
+        if index and word in _AFTER_HEAD:
+            return index - 1
+    return len(words) - 1
+
+
+# A phrase that starts with one of these describes, without a noun of its own.
+_DESCRIBES = frozenset({
+    "something", "anything", "somewhere", "anywhere", "someplace", "where", "place", "spot", "what", "thing", "things",
+    "one", "ones", "stuff", "whatever", "wherever",
+})  # fmt: skip
+_ARTICLES = frozenset({"a", "an", "the", "some", "any", "my", "our", "your", "his", "her", "their", "this", "that"})
+
+
+@dataclass(frozen=True)
+class Meanings:
+    """Finds the names that a phrase means, and the share of each.
+
+    Attributes:
+        names: what can be meant.
+        called: for each name the phrases that stand for it, itself among them.
+        kinds: what a wider word takes in: ``table`` is a dining table, a coffee table ...; and a name its narrower
+            names: an armchair is a ``chair``.
+        words: vectors of phrases.
+        kind: of entry that the names are.
+        temperature: a cosine lower by this than the best makes a name e times less meant.
+        least_cosine: of the best name for a description; below, it means none of them.
+        least_within: the same where the noun is known and only the choice between its names is open.
+        sure_cosine: of a noun that the lexicon lacks; below, it means none of the names.
+        least_share: names meant less than this beside the best one are left out.
+        narrower: a narrower name must be nearer by this cosine than the noun's own.
+        narrower_share: a name means its narrower ones by this much: the chair is rather a chair than an armchair.
+    """
+
+    names: tuple[str, ...]
+    called: tuple[tuple[str, ...], ...]
+    kinds: dict[str, tuple[str, ...]]
+    words: WordEncoder
+    kind: EntryKind = EntryKind.THING
+    temperature: float = 0.07
+    least_cosine: float = 0.5
+    least_within: float = 0.3
+    sure_cosine: float = 0.8
+    least_share: float = 0.2
+    narrower: float = 0.15
+    narrower_share: float = 0.8
+
+    def name_weights(self, phrase: str) -> Float32[np.ndarray, " k"]:
+        """Return for each name how much the phrase means it, 1 for the most meant; all zero where it means none."""
+        weights = out = self.own_weights(phrase)
+        entry = lexicon().find(_clean(phrase), self.kind)
+        if entry is not None and entry.is_compound(_clean(phrase)):
+            return weights
+        for name, weight in zip(self.names, weights, strict=True):
+            if weight > 0.0 and name in self.kinds:
+                out = np.maximum(out, self.narrower_share * weight * self._all_of(self.kinds[name]))
+        return out
+
+    def own_weights(self, phrase: str) -> Float32[np.ndarray, " k"]:
+        """Return the same without what is narrower than the names: an armchair is a name of its own."""
+        clean = _clean(phrase)
+        if clean in self._exactly:
+            return self._all_of(self._exactly[clean])
+        if clean in self.kinds:
+            return self._all_of(self.kinds[clean])
+        known = lexicon()
+        if senses := known.senses(clean, self.kind):
+            weights = (self._all_of(self.names_of(entry)) for entry in senses)
+            some = next((each for each in weights if each.any()), self._all_of(()))
+            return some if some.any() or not senses[0].generic else self._general(clean, senses[0])
+        if clean.partition(" ")[0] in _DESCRIBES:
+            return self._nearest(clean, self.names, self.least_cosine)
+        head = known.head(clean, self.kind)
+        if head is None:  # the words round it would make a sofa of a "sofa elephant"
+            return self._nearest(noun_of(clean), self.names, self.sure_cosine)
+        if head.generic:
+            return self._general(clean, head)
+        return self._described(clean, head)
+
+    def names_of(self, entry: Entry) -> tuple[str, ...]:
+        """Return the names that stand for an entry: its own, those that it takes in, its wider kind, or its likeness.
+
+        A treadmill is fitness equipment, a table one of the tables, a freezer looks like a refrigerator.
+        """
+        own = tuple(name for name, called in zip(self.names, self.called, strict=True) if entry.name in called)
+        if own or entry.name in self.kinds:
+            return own or self.kinds[entry.name]
+        members = tuple(each.name for each in lexicon().members(entry.name) if each.name in self.names)
+        if members and not entry.generic:
+            return members
+        for wide in (*(each.name for each in lexicon().wider(entry.name, self.kind)), *entry.like):
+            if wide in self.names:
+                return (wide,)
+        return ()
+
+    def _general(self, phrase: str, head: Entry) -> Float32[np.ndarray, " k"]:
+        """Return the meaning of a phrase about an appliance, a piece of furniture ...: the nearest name."""
+        near = self._nearest(phrase, self.names, self.least_cosine)
+        fitting = [entry.name for entry in lexicon().members(head.name) if entry.name in self.names]
+        return near if near.any() else self._nearest(phrase, fitting, self.least_within)
+
+    def _described(self, phrase: str, head: Entry) -> Float32[np.ndarray, " k"]:
+        """Return the meaning of a known noun with words round it: of several fitting names the nearest."""
+        fitting = self.names_of(head)
+        if len(fitting) > 1:
+            near = self._nearest(phrase, fitting, self.least_within)
+            return near if near.any() else self._all_of(fitting)
+        if head.name not in fitting:
+            return self._all_of(fitting)
+        narrow = [each.name for each in lexicon().members(head.name) if each.name in self.names]
+        cosine = self._cosines(phrase)
+        own = cosine[self.names.index(head.name)]
+        best = max(narrow, key=lambda name: cosine[self.names.index(name)], default=head.name)
+        clear = cosine[self.names.index(best)] > own + self.narrower
+        return self._all_of((best,) if clear else fitting)
+
+    def _all_of(self, names: Sequence[str]) -> Float32[np.ndarray, " k"]:
+        return np.array([name in names for name in self.names], np.float32)
+
+    def _nearest(self, phrase: str, among: Sequence[str], least: float) -> Float32[np.ndarray, " k"]:
+        cosine = np.where(self._all_of(among) > 0.0, self._cosines(phrase), -1.0)
+        best = float(cosine.max(initial=-1.0))
+        if best < least:
+            return np.zeros(len(self.names), np.float32)
+        share = np.exp((cosine - best) / self.temperature)
+        return np.where(share >= self.least_share, share, 0.0).astype(np.float32)
+
+    @cached_property
+    def _exactly(self) -> dict[str, list[str]]:
+        """The names that each phrase stands for."""
+        out: dict[str, list[str]] = {}
+        for name, called in zip(self.names, self.called, strict=True):
+            for phrase in called:
+                out.setdefault(phrase, []).append(name)
+        return out
+
+    @cached_property
+    def _flat(self) -> list[str]:
+        return [alias for called in self.called for alias in called]
+
+    def _cosines(self, phrase: str) -> Float32[np.ndarray, " k"]:
+        starts = np.cumsum([0, *(len(called) for called in self.called[:-1])])
+        vectors = self.words.encode([phrase, *self._flat])
+        return np.maximum.reduceat(vectors[1:] @ vectors[0], starts)
+
+
+def _clean(phrase: str) -> str:
+    """Return a phrase in small letters without the article before it."""
+    words = phrase.lower().split()
+    return " ".join(words[1:] if len(words) > 1 and words[0] in _ARTICLES else words)

@@ -1,8 +1,20 @@
-"""Where the models of the profiles are published and how large they are: for people, not for loading."""
+"""Models: how they are named, where their files lie and are published, and whether one is here."""
 
+import ntpath
+import os
+import posixpath
+from collections.abc import Iterator
 from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Literal
 
-from avlmaps.core.registry import brought, entry_points
+from avlmaps.core.errors import BackendError
+from avlmaps.core.files import user_path
+from avlmaps.core.registry import Backend, brought, entry_points, load
+from avlmaps.core.wording import option
+from avlmaps.perception.models.settings import model_settings
+from avlmaps.perception.user_folder import user_folder
 
 ENTRY_POINT_GROUP = "avlmaps.published_models"
 
@@ -40,3 +52,158 @@ def published_models() -> dict[str, Published]:
     for entry in entry_points(group=ENTRY_POINT_GROUP):
         found = {**brought(entry, "the list of published models"), **found}
     return found
+
+
+def public_name(model: str) -> str:
+    """Return a model's name without the folders of a path: ``/data/me/tips`` is ``tips``, ``google/tips`` stays.
+
+    A hub's id has at most one slash, so that anything with more, or that starts like a path, is one. What some backends
+    take behind a ``#`` stays.
+    """
+    place, mark, way = model.partition("#")
+    is_path = place.startswith(("/", "~", ".")) or "\\" in place or place.count("/") > 1 or ntpath.splitdrive(place)[0]
+    if is_path:
+        place = posixpath.basename(place.replace("\\", "/").rstrip("/"))
+    return f"{place}{mark}{way}"
+
+
+def public_choice(choice: str) -> str:
+    """Return a backend's choice (``name`` or ``name@model``) as a map remembers it: found again by the model's name."""
+    name, at, model = choice.partition("@")
+    return f"{name}{at}{public_name(model)}"
+
+
+def local_model(model: str, how_to_get: str) -> Path:
+    """Return the folder or file of a model that is never fetched.
+
+    Args:
+        model: its name in the folder of models, or a path.
+        how_to_get: the command that makes or brings it, for the error.
+
+    Raises:
+        BackendError: it is not here.
+    """
+    for place in places_of(model):
+        if place.exists():
+            return place
+    folder = model_settings().folder
+    looked = f"in {folder} and " if folder else f"in no folder of models, {option('models', 'DIR')} sets one, and "
+    raise BackendError(f"The model {model} is not here (looked {looked}for that path); get it with: {how_to_get}")
+
+
+def places_of(model: str) -> list[Path]:
+    """Return where a model may lie, the likeliest first."""
+    folder = model_settings().folder
+    inside = [folder / model, folder / model.replace("/", "--"), folder / Path(model).name] if folder else []
+    return [*inside, user_path(model)]
+
+
+def folders_of(model: str) -> list[Path]:
+    """Return where the folder of a model that no hub holds may lie, the likeliest first; the last is the user's own."""
+    return [*places_of(model), fetched_folder() / model]
+
+
+def fetched_folder() -> Path:
+    """Return the folder of models that avlmaps fetched itself where the settings name none; it need not exist yet."""
+    return user_folder() / "models"
+
+
+State = Literal["ready", "package missing", "weights missing", "broken"]
+
+
+@dataclass(frozen=True, slots=True)
+class Availability:
+    """The state of a backend.
+
+    Attributes:
+        state: ``ready`` says that it can be loaded (a small one: that it was).
+        model: which model it runs.
+        licence: of the weights.
+        note: what to do about it, or what to know of its limits.
+        dim: length of a feature; 0 where only loading would show it.
+    """
+
+    state: State
+    model: str = ""
+    licence: str = ""
+    note: str = ""
+    dim: int = 0
+
+
+def availability(backend: Backend, model: str = "") -> Availability:
+    """Return the state of a backend."""
+    model = model or backend.model
+    if backend.missing:
+        return Availability("package missing", model, backend.licence, backend.how_to_get)
+    if not model:
+        return _loaded(backend)
+    licence = backend.licence if model == backend.model else ""
+    needed = (model.partition("#")[0], *backend.also)
+    missing = [one for one in needed if not is_here(one)]
+    if not missing:
+        return Availability("ready", model, licence)
+    return Availability("weights missing", model, licence, "; ".join(map(how_to_get, missing)))
+
+
+def _loaded(backend: Backend) -> Availability:
+    try:
+        card = load(backend.kind, backend.name).card
+    except BackendError as fault:  # one broken package must not hide the others
+        return Availability("broken", note=str(fault))
+    return Availability("ready", card.id, card.licence, card.note, card.dim)
+
+
+def is_here(model: str) -> bool:
+    """Return whether a model's files lie where they would be loaded from."""
+    return any(place.exists() for place in _places(model))
+
+
+def how_to_get(model: str) -> str:
+    """Return the command that brings a model, and how much that is where it is known."""
+    known = _published(model)
+    command = known.get or f"hf download {model}"
+    return f"{command} ({_size(known.size_mb)})" if known.size_mb else command
+
+
+def _published(model: str) -> Published:
+    return published_models().get(model, Published())
+
+
+def _size(size_mb: float) -> str:
+    return f"{size_mb / 1000:.1f} GB" if size_mb >= 1000 else f"{size_mb:.0f} MB"
+
+
+def _places(model: str) -> Iterator[Path]:
+    known, folder = _published(model), model_settings().folder
+    if known.fetched or (user_path(model) / "manifest.json").is_file():
+        yield from (place / "manifest.json" for place in folders_of(model))
+        return
+    names = known.files or (model,)
+    for name in names:
+        if folder is not None:
+            yield from (folder / name, folder / name.replace("/", "--"), folder / Path(name).name)
+        yield user_path(name)
+        yield from (_torch_cache() / place / Path(name).name for place in ("checkpoints", "netvlad"))
+        if known.package and (package := find_spec(known.package)) is not None and package.origin:
+            yield Path(package.origin).parent / name
+    repository = known.repository or (model if not known.files and model.count("/") == 1 else "")
+    if not repository:
+        return
+    kept = _hub_cache() / f"models--{repository.replace('/', '--')}" / "snapshots"
+    for revision in sorted(kept.glob("*")) if kept.is_dir() else ():
+        # A snapshot of which only a configuration was ever fetched is not a model.
+        files = [revision / Path(name).name for name in known.files]
+        yield from files or (*revision.glob("*.safetensors"), *revision.glob("*.bin"))
+
+
+def _hub_cache() -> Path:
+    """Return where the hub's files are cached, by the environment variables that its own library obeys."""
+    if own := os.environ.get("HF_HUB_CACHE") or os.environ.get("HUGGINGFACE_HUB_CACHE"):
+        return user_path(own)
+    base = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache")
+    return user_path(os.environ.get("HF_HOME") or base / "huggingface") / "hub"
+
+
+def _torch_cache() -> Path:
+    base = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache")
+    return user_path(os.environ.get("TORCH_HOME") or base / "torch") / "hub"

@@ -11,11 +11,9 @@ from mcp.server.streamable_http_manager import StreamableHTTPASGIApp, Streamable
 from mcp.shared.exceptions import MCPError
 
 from avlmaps.core.version import __version__
-from avlmaps.serve.agent_answers import compact, fitting, token_count
-from avlmaps.serve.agents import brief_schema
+from avlmaps.serve.agents import brief_schema, compact, fitting, token_count
 from avlmaps.serve.drive.app import DriveService, encoded, error_json
-from avlmaps.serve.drive.plans import DriveError, Who
-from avlmaps.serve.drive.requests import ConfirmRequest, NothingRequest, PlanRequest
+from avlmaps.serve.drive.plans import ConfirmRequest, DriveError, NothingRequest, PlanRequest, Who
 from avlmaps.serve.guard import App
 
 INSTRUCTIONS = """These tools move a robot. plan_drive returns a plan and moves nothing. Show the person who gave the
@@ -77,8 +75,9 @@ def drive_agent_server(service: DriveService) -> Server[Any]:
         kind = next(tool[2] for tool in _TOOLS if tool[0] == params.name)
         try:
             # A stop is never refused for what came with it.
-            values = {} if work is stop else dict(params.arguments or {})
-            return _result(await work(msgspec.convert(values, kind, strict=True)))
+            given = {} if work is stop else dict(params.arguments or {})
+            values = {name: value for name, value in given.items() if value is not None}
+            return _result(await work(msgspec.convert(values, kind, strict=False)))
         except msgspec.ValidationError as fault:
             return _result(error_json(DriveError(f"The arguments do not fit: {str(fault)[:300]}.", 400, "usage")), True)
         except DriveError as error:

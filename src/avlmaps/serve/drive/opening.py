@@ -9,9 +9,8 @@ from typing import Any
 from avlmaps.core.wording import option
 from avlmaps.serve.drive.agents import drive_agent_app
 from avlmaps.serve.drive.app import DriveService, drive_app
-from avlmaps.serve.drive.order_log import OrderLog, default_log
 from avlmaps.serve.drive.orders import Dispatcher
-from avlmaps.serve.drive.plans import MapNow
+from avlmaps.serve.drive.plans import MapNow, OrderLog, default_log
 from avlmaps.serve.drive.robots import open_machine
 from avlmaps.serve.guard import App
 from avlmaps.serve.service import Service

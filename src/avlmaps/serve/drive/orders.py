@@ -30,8 +30,7 @@ from avlmaps.navigate.grounding import Heats
 from avlmaps.navigate.instruct import Outcome, given_by, instruct
 from avlmaps.navigate.rehearsal import NO_FILES, path_in_world, rehearse
 from avlmaps.navigate.skills import RobotSettings
-from avlmaps.serve.drive.order_log import OrderLog
-from avlmaps.serve.drive.plans import DriveError, MapNow, OrderPlan, PlanBook, Who
+from avlmaps.serve.drive.plans import DriveError, MapNow, OrderLog, OrderPlan, PlanBook, Who
 from avlmaps.serve.drive.robots import Machine
 
 log = logging.getLogger("avlmaps.serve.drive")
@@ -122,7 +121,8 @@ class Dispatcher:
         except NavigationError as error:
             raise _refusal(error) from None
         self._changed()
-        return {**plan.to_json(), "token": token, "expires_in_s": self._book.lifetime_s}
+        # The token stands before the path, which may be long.
+        return {"order": plan.order, "token": token, "expires_in_s": self._book.lifetime_s, **plan.to_json()}
 
     def _planned(self, words: str, program: str) -> OrderPlan:
         now = self._current()

@@ -1,14 +1,25 @@
 """Plans that wait for their confirmation, and the tokens that confirm them."""
 
 import hmac
+import json
+import os
 import secrets
+import threading
 from collections import OrderedDict
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated, Any
 
-from avlmaps.core.errors import AvlmapsError
+from msgspec import Meta, Struct
+
+from avlmaps.core.errors import AvlmapsError, NavigationError
+from avlmaps.core.files import state_file
 from avlmaps.core.motion import GroundPose
 from avlmaps.core.poses import FRAME
+from avlmaps.core.printable import printable_json
+from avlmaps.language.commands import MOST_CHARACTERS
 from avlmaps.navigate.grounding import Heats
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.serve.guard import token_digest
@@ -183,3 +194,78 @@ class PlanBook:
         """Forget every plan, also those that are still computed."""
         self.cleared += 1
         self._waiting.clear()
+
+
+Words = Annotated[str, Meta(max_length=MOST_CHARACTERS, description="A command, such as 'go to the sofa'.")]
+Program = Annotated[str, Meta(max_length=20_000, description="Skills as a program, instead of a command.")]
+Token = Annotated[str, Meta(min_length=1, max_length=200, description="The token of the plan that is confirmed.")]
+
+
+class PlanRequest(Struct, forbid_unknown_fields=True):
+    """A command or a program to plan; nothing moves."""
+
+    words: Words = ""
+    program: Program = ""
+
+
+class ConfirmRequest(Struct, forbid_unknown_fields=True):
+    """The token of a plan that a person has read."""
+
+    token: Token
+
+
+class NothingRequest(Struct, forbid_unknown_fields=True):
+    """Nothing is sent."""
+
+
+def default_log() -> Path:
+    """Return the log in the user's state folder."""
+    return state_file("orders.jsonl")
+
+
+class OrderLog:
+    """Appends entries; a line is whole or not there, also when several processes write."""
+
+    def __init__(self, path: Path) -> None:
+        """Open the log.
+
+        Raises:
+            NavigationError: it cannot be opened for writing.
+        """
+        self.path = path
+        self._lock = threading.Lock()
+        try:
+            path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            self._file = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
+        except OSError as error:
+            raise self._fault(error) from None
+
+    def write(self, event: str, entry: Mapping[str, Any]) -> None:
+        """Append an entry and wait until it is on the disk.
+
+        Raises:
+            NavigationError: it cannot be written; then nothing may move.
+        """
+        time = datetime.now(UTC).isoformat(timespec="milliseconds")
+        line = json.dumps({"time": time, "event": event, **entry}, ensure_ascii=False, allow_nan=False)
+        content = printable_json(line).encode() + b"\n"
+        try:
+            with self._lock:
+                if os.write(self._file, content) != len(content):
+                    raise OSError("the disk is full")
+                os.fsync(self._file)
+        except OSError as error:
+            raise self._fault(error) from None
+
+    def close(self) -> None:
+        """Close the file."""
+        with self._lock:
+            if self._file >= 0:
+                os.close(self._file)
+            self._file = -1  # the number may be another file's from now on
+
+    def _fault(self, error: OSError) -> NavigationError:
+        return NavigationError(
+            f"The log of orders {self.path.name} cannot be written ({error.strerror or error}), so nothing is driven; "
+            "check its folder and the space on the disk."
+        )

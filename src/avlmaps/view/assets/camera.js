@@ -118,12 +118,6 @@ class Camera {
     this.distance = Math.min(500, Math.max(0.15, this.distance * factor));
   }
 
-  /** Come near to a place, from where the eye is. */
-  approach(place, distance) {
-    this.target = place.slice();
-    this.distance = Math.min(this.distance, distance);
-  }
-
   /** Look as a robot's camera did. */
   standAt(frame) {
     this.flat = false;

@@ -9,17 +9,19 @@ class Marks {
   /** Replace the marks of a kind; `rank` says which stays where two would cover one another (the least). */
   set(kind, rank, marks) {
     for (const mark of this.kinds.get(kind)?.marks ?? []) mark.element.remove();
-    const made = marks.map((mark) => {
+    const made = [];
+    for (const mark of marks) {
       const element = document.createElement(mark.onClick ? "button" : "span");
       element.className = `mark ${kind}`;
       element.textContent = mark.text;
       element.tabIndex = -1;
+      element.style.zIndex = String(Math.round(1000 * (9 - rank)) - made.length); // the first one lies on top
       if (mark.title) element.title = mark.title;
       if (mark.tint) element.style.setProperty("--tint", mark.tint);
       if (mark.onClick) element.addEventListener("click", mark.onClick);
       this.box.append(element);
-      return { ...mark, element, size: null };
-    });
+      made.push({ ...mark, element, size: null });
+    }
     this.kinds.set(kind, { rank, marks: made });
   }
 

@@ -22,6 +22,9 @@ function made(tag, properties = {}, ...children) {
   return element;
 }
 
+const touched = window.matchMedia("(pointer: coarse)").matches;
+const CLICK = touched ? "Tap" : "Click";
+
 class Panel {
   constructor(source, told) {
     this.source = source;
@@ -40,15 +43,14 @@ class Panel {
   async start() {
     const names = this.maps.map((map) => map.name.replace(/\.avlmap$/, ""));
     $("name").textContent = names.join(" and ");
-    const shown = (map) => map.voxels < map.voxels_of_map
-      ? `${map.summary}; this file shows ${map.voxels.toLocaleString("en")} of them` : map.summary;
-    $("summary").textContent = this.maps.map(shown).join("; ");
+    this.summarise();
     document.title = `${names.join(" and ")} · avlmaps`;
     this.bindAsking();
     this.bindLook();
     this.bindPath();
     this.bindDrive();
     this.bindTools();
+    $("voxel").replaceChildren(made("p", { className: "soft", textContent: `${CLICK} on the map.` }));
     this.viewer.frameAll();
     this.restore();
     window.addEventListener("hashchange", () => location.hash === Address.own || this.restore());
@@ -62,6 +64,39 @@ class Panel {
     this.drawPath();
     await Promise.all(this.maps.map((_, k) => this.fill(k).catch((fault) => this.note(fault.message))));
     document.documentElement.dataset.ready = "yes";
+    if (this.source.live) this.source.watch(() => this.renew());
+  }
+
+  /** Show the maps as they are now: they grew, were built again, or were edited. */
+  async renew() {
+    const before = this.source.versions;
+    const told = await this.source.describe();
+    for (const [k, map] of told.maps.entries()) {
+      if (this.source.versions[k] === before[k]) continue;
+      const layer = new Layer(this.viewer.renderer.gl, map);
+      layer.setPalettes(told.palettes);
+      try {
+        await this.source.voxels(k, (bytes, start) => layer.addRecords(bytes, start));
+      } catch (fault) {
+        this.source.versions = before; // it changed meanwhile; the next look takes it
+        layer.free();
+        throw fault;
+      }
+      this.maps[k] = map;
+      this.viewer.replace(k, map, layer);
+    }
+    this.summarise();
+    this.limits();
+    this.drawPath();
+    await Promise.all(this.maps.map((_, k) => this.fill(k)));
+    document.documentElement.dataset.renewed = String(Number(document.documentElement.dataset.renewed ?? 0) + 1);
+    if (this.question) await this.ask(this.question, false);
+  }
+
+  summarise() {
+    const shown = (map) => map.voxels < map.voxels_of_map
+      ? `${map.summary}; this file shows ${map.voxels.toLocaleString("en")} of them` : map.summary;
+    $("summary").textContent = this.maps.map(shown).join("; ");
   }
 
   async load(k) {
@@ -109,6 +144,7 @@ class Panel {
   /** Bring back what the address says: the view, the cut, the question, the colours. */
   restore() {
     const { question, view, colour, cut } = Address.read();
+    this.viewer.flight = null;
     if (view.length && this.viewer.camera.restore(view)) this.viewer.moved();
     if (cut.length === 2 && cut.every(Number.isFinite)) {
       [$("low").value, $("high").value] = cut;
@@ -118,7 +154,7 @@ class Panel {
     if (known) this.colourBy(colour);
     if (question) {
       $("sentence").value = question;
-      this.ask(question, !known);
+      this.ask(question, !known, !view.length);
     } else if (!this.source.live && this.told.questions.length) {
       this.ask(this.told.questions[0].question, false);
     }
@@ -149,7 +185,8 @@ class Panel {
   async save() {
     const names = this.maps.map((map) => map.name.replace(/\.avlmap$/, ""));
     const asked = this.question && this.answers ? `: ${this.question}` : "";
-    const blob = await pictureOf($("canvas"), $("stage"), `${names.join(" and ")}${asked}. ${$("scale-text").textContent}`);
+    const caption = `${names.join(" and ")}${asked}. ${$("scale-text").textContent}`;
+    const blob = await this.viewer.drawnLarge(() => pictureOf($("canvas"), $("stage"), caption));
     saveAs(blob, `${names.join("-")}.png`);
   }
 
@@ -229,7 +266,7 @@ class Panel {
     }
   }
 
-  async ask(sentence, turnToHeat = true) {
+  async ask(sentence, turnToHeat = true, fly = turnToHeat) {
     const number = (this.askedNumber = (this.askedNumber ?? 0) + 1);
     $("ask").querySelector(".main").disabled = true;
     try {
@@ -244,8 +281,11 @@ class Panel {
       this.answers = told.answers;
       this.question = this.files.photo || this.files.clip ? "" : sentence; // files are not kept
       this.keep();
+      this.viewer.look.hottest = told.heat.reduce((a, b) => Math.max(a, b), 1) / 255;
       if (turnToHeat) this.colourBy("heat");
       this.showAnswer(sentence, told.answers, performance.now() - begun);
+      const k = told.answers.findIndex((answer) => answer.found && answer.goals.length);
+      if (fly && k >= 0) this.viewer.flyTo(this.toLevel(k, told.answers[k].goals[0].position), 5);
     } catch (fault) {
       this.forget();
       this.say(fault.message, "fault");
@@ -334,16 +374,8 @@ class Panel {
   // ---- what is shown ----
 
   bindLook() {
-    const low = Math.min(...this.maps.map((map) => map.low[2]));
-    const high = Math.max(...this.maps.map((map) => map.high[2]));
-    const ceiling = Math.max(...this.maps.map((map) => map.ceiling_m));
-    this.viewer.look.heights = [Math.min(...this.maps.map((map) => map.floor_m)), Math.max(high, low + 0.5)];
-    for (const [id, start] of [["high", Math.min(ceiling, high + 0.1)], ["low", low - 0.1]]) {
-      Object.assign($(id), { min: low - 0.1, max: high + 0.1, step: 0.05, value: start });
-      $(id).addEventListener("input", () => this.cut());
-    }
-    this.uncut = [Number($("low").value), Number($("high").value)];
-    this.cut();
+    for (const id of ["high", "low"]) $(id).addEventListener("input", () => this.cut());
+    this.limits();
     this.bindStoreys();
     $("colour").addEventListener("change", () => this.colourBy($("colour").value));
     for (const kind of ["things", "boxes", "sounds", "sources", "rooms", "path"]) {
@@ -364,6 +396,21 @@ class Panel {
       $("seam").style.left = `${100 * this.viewer.divide}%`;
       this.viewer.changed();
     });
+  }
+
+  /** Between which heights the map may be cut; where a person has cut it, it stays as it is. */
+  limits() {
+    const low = Math.min(...this.maps.map((map) => map.low[2]));
+    const high = Math.max(...this.maps.map((map) => map.high[2]));
+    const ceiling = Math.max(...this.maps.map((map) => map.ceiling_m));
+    this.viewer.look.heights = [Math.min(...this.maps.map((map) => map.floor_m)), Math.max(high, low + 0.5)];
+    const kept = this.isCut ? { high: $("high").value, low: $("low").value } : {};
+    const range = { min: low - 0.1, max: high + 0.1, step: 0.05 };
+    Object.assign($("high"), range, { value: Math.min(ceiling, high + 0.1) });
+    Object.assign($("low"), range, { value: low - 0.1 });
+    this.uncut = [Number($("low").value), Number($("high").value)];
+    for (const [id, value] of Object.entries(kept)) $(id).value = value;
+    this.cut();
   }
 
   /** One storey is shown by cutting away the others, and its own ceiling. */
@@ -417,11 +464,16 @@ class Panel {
       const canvas = made("canvas", { width: 256, height: 1 });
       const pen = canvas.getContext("2d");
       for (let k = 0; k < 256; k++) {
+        pen.fillStyle = "#aaa";
+        pen.fillRect(k, 0, 1, 1);
+        const share = Math.min(1, Math.max(0, (k / 255 - FAINT) / (GLOWING - FAINT)));
+        pen.globalAlpha = name === "heat" ? share * share * (3 - 2 * share) : 1; // as the shader mixes
         pen.fillStyle = shade(name, k);
         pen.fillRect(k, 0, 1, 1);
+        pen.globalAlpha = 1;
       }
       const [low, high] = this.viewer.look.heights;
-      const ends = name === "heat" ? ["0", "1"] : [metres(low), metres(high)];
+      const ends = name === "heat" ? ["0", this.viewer.look.hottest.toFixed(2)] : [metres(low), metres(high)];
       list.append(made("li", { className: "ramp" }, ends[0], canvas, ends[1]));
     } else if (name === "thing" || name === "room") {
       const names = this.contents[0]?.[name === "thing" ? "names" : "room_names"];
@@ -564,6 +616,7 @@ class Panel {
       $(`${id}-count`).textContent = `(${list.length})`;
     }
     if (!this.source.live) return;
+    $("questions").replaceChildren();
     const examples = [...new Set(things.map((thing) => thing.name))].slice(0, 3).map((name) => `the ${name}`);
     const [sound] = sounds.filter((one) => one.names.length);
     if (sound) examples.push(`the sound of ${sound.names[0]}`);
@@ -650,7 +703,7 @@ class Panel {
       event.preventDefault();
       try {
         const { text } = await this.source.rename(k, thing, place, to.value);
-        form.replaceWith(made("p", { id: "renamed", textContent: `${text} Load the page again to see it in the lists.` }));
+        form.replaceWith(made("p", { id: "renamed", textContent: text }));
       } catch (fault) {
         told.textContent = fault.message;
       }
@@ -684,7 +737,7 @@ class Panel {
     const text = along ? `${metres(length(along))}; level ${metres(Math.hypot(along[0], along[1]))}, ` +
       `up ${metres(along[2])}` : "";
     const pressed = $("measure").getAttribute("aria-pressed") === "true";
-    $("length").textContent = text || (pressed ? (from ? "Click the other end." : "Click one end.") : "");
+    $("length").textContent = text || (pressed ? (from ? `${CLICK} the other end.` : `${CLICK} one end.`) : "");
     this.viewer.fields.forEach(({ marks }, k) => {
       const mine = from?.k === k ? this.tape : [];
       marks.set("tape", 1, mine.map(({ place }, i) => ({ place, text: i ? metres(length(along)) : "•", always: true })));
@@ -701,6 +754,7 @@ class Panel {
     $("moment").max = Math.max(0, keyframes.length - 1);
     $("moment").addEventListener("input", () => this.showMoment(0, Number($("moment").value)));
     $("stand").addEventListener("click", () => {
+      this.viewer.flight = null;
       this.viewer.camera.standAt(this.maps[0].keyframes[this.moment ?? 0]);
       this.viewer.moved();
     });

@@ -74,6 +74,13 @@ class Layer {
     this.put(this.labelBuffer, bytes);
   }
 
+  /** Free what it holds on the graphics card. */
+  free() {
+    for (const buffer of [this.recordBuffer, this.labelBuffer, this.heatBuffer]) this.gl.deleteBuffer(buffer);
+    this.gl.deleteVertexArray(this.array);
+    this.gl.deleteTexture(this.palette);
+  }
+
   setHeat(bytes) {
     this.put(this.heatBuffer, bytes);
   }
@@ -148,10 +155,11 @@ class Renderer {
     this.frameMs = []; // of the latest moving pictures
     this.rest = null; // the picture that is being drawn at rest
     this.target = null;
+    this.scale = null; // pixels of the picture for one of the page, where it is to be saved
   }
 
   resize() {
-    const scale = Math.min(window.devicePixelRatio || 1, 2);
+    const scale = this.scale ?? Math.min(window.devicePixelRatio || 1, 2);
     const width = Math.max(1, Math.round(this.canvas.clientWidth * scale));
     const height = Math.max(1, Math.round(this.canvas.clientHeight * scale));
     if (this.canvas.width === width && this.canvas.height === height) return;
@@ -278,6 +286,7 @@ class Renderer {
     gl.uniform1f(places.mode, Math.max(0, COLOURS.indexOf(look.colour)));
     gl.uniform2f(places.cut, ...look.cut);
     gl.uniform2f(places.heights, ...look.heights);
+    gl.uniform1f(places.hottest, look.hottest);
     gl.uniform1i(places.palette, 0);
     if (places.ray) {
       const columns = [scaled(camera.right, camera.slope * camera.aspect), scaled(camera.up, camera.slope), camera.ahead];

@@ -1,6 +1,8 @@
 // Voxels are drawn as points: squares while the view moves, blocks (a ray meets a cube in each pixel) once it rests.
 
 const COLOURS = ["picture", "thing", "room", "height", "heat"];
+const FAINT = 0.02; // heat, as a share of the hottest, from which a voxel has a colour of heat
+const GLOWING = 0.4; // and from which it has no other
 
 const VOXEL_VERTEX = `#version 300 es
 layout(location = 0) in vec3 cell;
@@ -8,7 +10,7 @@ layout(location = 1) in vec3 rgb;
 layout(location = 2) in vec4 label;
 layout(location = 3) in float heat;
 uniform mat4 levelFromCells, clipFromLevel;
-uniform float edge, block, pixels, cellM, mode;
+uniform float edge, block, pixels, cellM, mode, hottest;
 uniform vec2 cut, heights;
 uniform sampler2D palette;
 flat out vec3 colour, middle;
@@ -19,7 +21,7 @@ void main() {
   middle = block > 1.0 ? (floor(cell / block) + 0.5) * block : cell + 0.5;
   vec4 level = levelFromCells * vec4(middle, 1.0);
   gl_Position = clipFromLevel * level;
-  gl_PointSize = clamp(pixels * cellM * edge / gl_Position.w, 1.5, 256.0);
+  gl_PointSize = clamp(pixels * cellM * edge / gl_Position.w, 1.5, 1024.0);
   if (level.z < cut.x || level.z > cut.y) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
   float light = dot(rgb, vec3(0.3, 0.59, 0.11));
   if (mode < 0.5) colour = rgb;
@@ -27,8 +29,9 @@ void main() {
   else if (mode < 2.5) colour = listed(1.0, label.y) * (0.6 + 0.5 * light);
   else if (mode < 3.5) colour = listed(2.0, 255.0 * clamp((level.z - heights.x) / (heights.y - heights.x), 0.0, 1.0));
   else {
-    vec3 cold = vec3(0.30 + 0.45 * light);
-    colour = mix(cold, listed(3.0, 255.0 * heat), smoothstep(0.0, 0.06, heat));
+    float warm = clamp(heat / max(hottest, 0.004), 0.0, 1.0);
+    vec3 cold = vec3(0.42 + 0.42 * light);
+    colour = mix(cold, listed(3.0, 255.0 * warm), smoothstep(${FAINT.toFixed(2)}, ${GLOWING.toFixed(2)}, warm));
   }
   colour = min(colour, vec3(1.0));
 }`;

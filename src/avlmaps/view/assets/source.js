@@ -1,5 +1,7 @@
 // Where the page has its map from: a server, or the page itself. Both offer the same.
 
+const WATCH_MS = 3000;
+
 async function answeredJson(response) {
   const told = await response.json().catch(() => ({}));
   if (!response.ok) throw new Error(told.error?.message ?? `The viewer answered ${response.status}.`);
@@ -20,6 +22,21 @@ class LiveSource {
     const told = await Promise.all(this.at.map((at) => fetch(`${at}/view/map`).then(answeredJson)));
     this.versions = told.map(({ version }) => version);
     return { ...told[0], maps: told.map(({ map }) => map) };
+  }
+
+  /** Call `changed` whenever a map has another content: it grew, was built again, or was edited. */
+  watch(changed) {
+    const list = this.at[0].replace(/\/[^/]*$/, "");
+    const names = this.at.map((at) => decodeURIComponent(at.replace(/^.*\//, "")));
+    let seen = null;
+    const look = async () => {
+      const told = document.hidden ? null : await fetch(list).then(answeredJson).catch(() => null);
+      const now = told && names.map((name) => told.maps.find((one) => one.name === name)?.version).join(" ");
+      if (now && seen !== null && now !== seen && !(await changed().then(() => true, () => false))) return;
+      seen = now ?? seen;
+    };
+    look();
+    setInterval(look, WATCH_MS);
   }
 
   /** Read voxels as they come; `onPart(bytes, start)` gets them piece by piece. */
@@ -97,7 +114,7 @@ class LiveSource {
     const bytes = new Uint8Array(await response.arrayBuffer());
     const size = new DataView(bytes.buffer).getUint32(0, true);
     const told = JSON.parse(new TextDecoder().decode(bytes.subarray(4, 4 + size)));
-    if (told.version !== this.versions[map]) throw new Error("The map was built again; load the page again.");
+    if (told.version !== this.versions[map]) throw new Error("The map has grown; ask again.");
     return { answer: told.answer, heat: bytes.subarray(4 + size) };
   }
 

@@ -1,6 +1,8 @@
 // The picture: layers, lines and marks under one camera, on one, two or a divided field.
 
 const REST_MS = 140;
+const FLIGHT_MS = 600;
+const SAVED_PIXELS = 3840; // width of a picture that is saved
 const PATH_TINT = [0.12, 0.44, 0.75];
 const INK_TINT = [0.09, 0.1, 0.11];
 const SOURCE_TINTS = { 0.5: [0.7, 0.26, 0.06], 0.9: [0.95, 0.6, 0.32] };
@@ -43,7 +45,8 @@ class Viewer {
     this.canvas = canvas;
     this.renderer = new Renderer(canvas);
     this.camera = new Camera();
-    this.look = { colour: "picture", cut: [-Infinity, Infinity], heights: [0, 2.5], background: [0.9, 0.9, 0.88] };
+    this.look = { colour: "picture", cut: [-Infinity, Infinity], heights: [0, 2.5], hottest: 1,
+      background: [0.9, 0.9, 0.88] };
     this.arrangement = "beside";
     this.divide = 0.5;
     this.fields = told.maps.map((map) => {
@@ -58,7 +61,10 @@ class Viewer {
     this.onMove = () => {};
     this.waiting = false;
     this.whole = null; // the view that was fitted to the picture last
-    steer(canvas, this.camera, () => this.moved(), (x, y) => this.clicked(x, y));
+    steer(canvas, this.camera, () => {
+      this.flight = null;
+      this.moved();
+    }, (x, y) => this.clicked(x, y));
     new ResizeObserver(() => this.resized()).observe(canvas);
     window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.changed());
   }
@@ -70,6 +76,7 @@ class Viewer {
     const least = lows.reduce((a, b) => a.map((value, k) => Math.min(value, b[k])));
     const most = highs.reduce((a, b) => a.map((value, k) => Math.max(value, b[k])));
     const [field] = this.places();
+    this.flight = null;
     if (asPlan) this.camera.frameAbove(least, most, field.aspect);
     else this.camera.frame(least, most, field.aspect);
     this.whole = { asPlan, view: this.camera.saved() };
@@ -176,8 +183,46 @@ class Viewer {
     if (hit) this.onClick(hit);
   }
 
+  /** Fly near to a place; at once where a person wants no motion. */
   flyTo(place, distance = 3.5) {
-    this.camera.approach(place, distance);
-    this.moved();
+    const { target, distance: away } = this.camera;
+    const begun = performance.now();
+    const still = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
+    const flight = (this.flight = {});
+    const step = () => {
+      if (this.flight !== flight) return;
+      const share = still ? 1 : Math.min(1, (performance.now() - begun) / FLIGHT_MS);
+      const eased = share * share * (3 - 2 * share);
+      this.camera.target = mix(target, place, eased);
+      this.camera.distance = away + (Math.min(away, distance) - away) * eased;
+      this.moved();
+      if (share < 1) requestAnimationFrame(step);
+    };
+    step();
+  }
+
+  /** Put another state of a map in the place of the one that is shown. */
+  replace(k, map, layer) {
+    this.fields[k].layer.free();
+    Object.assign(this.fields[k], { map, layer });
+    if (this.whole && `${this.camera.saved()}` === `${this.whole.view}`) this.frameAll(this.whole.asPlan);
+    else this.changed();
+  }
+
+  /** Draw the whole picture large, and give it to `use` before the page's own size is back. */
+  async drawnLarge(use) {
+    const most = this.renderer.gl.getParameter(this.renderer.gl.MAX_RENDERBUFFER_SIZE);
+    const { clientWidth, clientHeight } = this.canvas;
+    const own = Math.min(window.devicePixelRatio || 1, 2);
+    const scale = Math.max(own, Math.min(SAVED_PIXELS, most) / Math.max(clientWidth, clientHeight));
+    try {
+      this.renderer.scale = scale;
+      this.changed();
+      while (this.canvas.dataset.state !== "whole") await new Promise(requestAnimationFrame);
+      return await use();
+    } finally {
+      this.renderer.scale = null;
+      this.changed();
+    }
   }
 }

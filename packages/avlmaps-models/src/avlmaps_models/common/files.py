@@ -3,11 +3,10 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from avlmaps.core.distributions import MODELS
 from avlmaps.core.errors import BackendError
-from avlmaps.core.extras import install_command
+from avlmaps.core.extras import MODELS, install_command
 from avlmaps.core.wording import option
-from avlmaps.perception.models.files import places_of
+from avlmaps.perception.models.published_models import places_of
 from avlmaps.perception.models.settings import model_settings
 
 # The files of a model's folder that transformers or open_clip need; code and other formats stay where they are.

@@ -7,8 +7,7 @@ from typing import Annotated
 from tyro.conf import OmitArgPrefixes, Positional, arg
 
 from avlmaps.cli.output import emit, table_lines
-from avlmaps.cli.reading_options import Reading
-from avlmaps.cli.verb import Verb
+from avlmaps.cli.verb import Reading, Verb
 from avlmaps.core.wording import place_text
 
 

@@ -1,5 +1,6 @@
-"""`avlmaps merge`: another day, or another robot, becomes part of a map."""
+"""`avlmaps merge` and `changes`: another day, or another robot, becomes part of a map, and what changed."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -7,11 +8,58 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from tyro.conf import Positional, arg
 
-from avlmaps.cli.output import emit
-from avlmaps.cli.verb import ModelVerb
+from avlmaps.cli.output import emit, table_lines
+from avlmaps.cli.verb import MapVerb, ModelVerb
+from avlmaps.core.wording import place_text
 
 if TYPE_CHECKING:
     from avlmaps.maps.store.reader import StoredMap
+    from avlmaps.query.avlmap import AVLMap
+
+
+@dataclass(frozen=True, kw_only=True)
+class Changes(MapVerb):
+    """List what is new, moved and gone in a map of several days, each with the day on which it was noticed.
+
+    Gone means that a later day looked through its place from where it had been seen. Things whose place nobody looked
+    at again are counted as unknown, and stay where they were. `avlmaps merge` adds a day.
+
+    Example: avlmaps changes home.avlmap --since 2026-11-24
+    """
+
+    since: Annotated[str | None, arg(metavar="DAY")] = None
+    """List what changed after this day: a date such as 2026-11-24, or the number of a visit, from 1. Default: the
+    first."""
+    first_seen: bool = False
+    """List also what was seen first on a later day where nobody had looked before."""
+
+    def answer(self, avlmap: "AVLMap") -> Mapping[str, Any]:
+        """Return what changed in a map."""
+        return avlmap.changes(1 if self.since is None else self.since, first_seen=self.first_seen)
+
+    def lines(self, answer: Mapping[str, Any]) -> list[str]:
+        """Lay out the changes."""
+        return change_lines(answer)
+
+
+def change_lines(answer: Mapping[str, Any]) -> list[str]:
+    """Lay out changes as a table, and what is not known."""
+    from avlmaps.query.changes import said
+
+    unknown = answer["unknown"]
+    not_known = [f"{unknown} things are unknown: nobody looked at their place again"] if unknown else []
+    if not answer["changes"]:
+        return [f"nothing is known to have changed since {said(answer['since'])}", *not_known]
+    rows = [
+        (
+            one["kind"], one["name"], f"{one['confidence']:.2f}", place_text(one["position"]),
+            place_text(one["from"]) if one["from"] else "", one["room"] or "", said(one["noticed"]),
+            said(one["last_seen"]),
+        )
+        for one in answer["changes"]
+    ]  # fmt: skip
+    head = ("change", "thing", "confidence", "position", "from", "room", "noticed on", "last seen on")
+    return [*table_lines(head, rows), *not_known]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,8 +131,6 @@ def merged_answer(made: "StoredMap") -> dict[str, Any]:
 
 def merge_lines(answer: dict[str, Any]) -> list[str]:
     """Lay out what `merge` reports."""
-    from avlmaps.cli.changes import change_lines
-
     checks = answer["checks"]
     found = (
         f"found: {checks['agreeing']:.0f} of {checks['located']:.0f} located keyframes agree "
