@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Float, Float32, Int, UInt8
 
 from avlmaps.core.camera import Pinhole
-from avlmaps_sim import sensor_kernels
 from avlmaps_sim.render import View
+from avlmaps_sim.sensor_faults import ellipses, exposed, lost_depth, measured_depth, rows_of
 from avlmaps_sim.sensor_settings import (
     CLEAN,
     KINECT,
@@ -101,18 +101,18 @@ class Sensor:
         gauss, uniform = _numbers()
         scale = camera.width / _USUAL_WIDTH
         shift_px = camera.fx * faults.baseline_m
-        depth = np.empty_like(view.depth_m)
-        jitter = faults.jitter_px * scale
-        sensor_kernels.measure_depth(view.depth_m, gauss, np.ascontiguousarray(rows[:, :4]), jitter, shift_px,
-                                     faults.noise_px * scale, faults.step_px * scale, depth)  # fmt: skip
-        sensor_kernels.lose_depth(depth, view.strength, uniform, np.ascontiguousarray(rows[:, 4]), shift_px,
-                                  faults.edge_ratio, faults.edge_loss, faults.weakest, faults.min_m,
-                                  faults.max_m)  # fmt: skip
+        chance = np.stack([rows_of(gauss, rows[:, number], camera.width) for number in range(4)])
+        depth = measured_depth(
+            view.depth_m, chance, faults.jitter_px * scale, shift_px, faults.noise_px * scale, faults.step_px * scale
+        )
+        edge, span_m = (faults.edge_ratio, faults.edge_loss), (faults.min_m, faults.max_m)
+        kept = rows_of(uniform, rows[:, 4], camera.width)
+        depth[lost_depth(depth, view.strength, kept, shift_px, edge, faults.weakest, span_m)] = 0.0
         count = int(rng.poisson(faults.blobs))
         if count:
             middle = rng.random((count, 2)) * (camera.width, camera.height)
             radius = faults.blob_px * scale * rng.gamma(3.0, 1 / 3, (count, 2)) + 0.5
-            sensor_kernels.punch(depth, middle, radius)
+            depth[ellipses(depth.shape, middle, radius)] = 0.0
         return depth
 
     def _colour(
@@ -129,10 +129,10 @@ class Sensor:
             curve = value[:, None] * np.sqrt(gain)
             curve = np.where(curve > 200, 200 + 55 * np.tanh((curve - 200) / 70), curve)
             spread = faults.noise * (0.4 + 0.6 * np.sqrt(value / 128))
-            out = np.empty_like(rgb)
-            sensor_kernels.expose(picture, curve.astype(np.float32), _darker(width, height, faults.vignetting),
-                                  _numbers()[0], rows, spread.astype(np.float32), out)  # fmt: skip
-            picture = out
+            own = rows_of(_numbers()[0], rows[:, 0], 3 * width).reshape(height, width, 3)
+            common = rows_of(_numbers()[0], rows[:, 1], width)
+            darker = _darker(width, height, faults.vignetting)
+            picture = exposed(picture, curve.astype(np.float32), darker, (own, common), spread.astype(np.float32))
         if faults.jpeg_quality < 100:
             _, code = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, faults.jpeg_quality])
             picture = np.asarray(cv2.imdecode(code, cv2.IMREAD_COLOR), np.uint8)

@@ -220,6 +220,7 @@ def test_every_tenth_frame_of_ones_own_recording_is_a_photo_and_not_in_the_map(o
     assert max(photo.share.sum() for photo in photos) > 0.3
 
 
+@pytest.mark.nightly
 def test_ones_own_recording_with_boxes_runs_through_the_tables(own: Path, tmp_path: Path, monkeypatch):
     monkeypatch.setattr("avlmaps_sim.bench.harness.baselines._EXAMPLES", 2)
     settings = IndexingSettings(scenes=(str(own),), profile="colours", jobs=1, tasks_a_scene=3, rules="paper")
