@@ -242,7 +242,6 @@ def _days_before(verb: Live) -> "StoredMap | None":
 
 
 def _joined(first: "StoredMap", today: "StoredMap", day: str) -> dict[str, Any]:
-    """Let a drive update the map of the days before, and return what changed."""
     from avlmaps.cli.days import merged_answer
     from avlmaps.days.merge import merge_maps
 

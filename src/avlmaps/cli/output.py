@@ -163,7 +163,6 @@ def ground_lines(ground: Mapping[str, Any]) -> list[str]:
 
 
 def _size(sides: Sequence[float]) -> str:
-    """Return a size; nothing for what has none: a room, a sound."""
     return " x ".join(f"{side:.2f}" for side in sides) if any(sides) else ""
 
 

@@ -143,7 +143,6 @@ class ShellSession:
         return AVLMap.open(self.given.map), seen
 
     def _signature(self) -> tuple[int, ...]:
-        """Return the state that changes when a build replaces the map."""
         try:
             found = (self.given.map / "map.json").stat()
         except OSError:
@@ -391,7 +390,6 @@ def _report(error: BaseException, sentence: str, as_json: bool) -> None:
 
 
 def _piped() -> Lines:
-    """Return the lines of standard input."""
     if isinstance(sys.stdin, TextIOWrapper):
         sys.stdin.reconfigure(errors="replace")  # a line that is not UTF-8 is not understood, and the next one is
     return PipedLines(sys.stdin)

@@ -82,7 +82,6 @@ def _history() -> FileHistory | InMemoryHistory:
 
 
 def _shorten(path: Path) -> None:
-    """Drop the earlier half of a history; its entries begin with an empty line."""
     content = path.read_bytes()[-_MOST_HISTORY_BYTES // 2 :]
     path.write_bytes(content[max(content.find(b"\n\n"), 0) :])
 
@@ -104,7 +103,6 @@ def completions(line: str, verbs: Sequence[str], file_verbs: Sequence[str], here
 
 
 def _named(typed: str, here: Iterable[str]) -> Iterator[Completion]:
-    """Yield the names that begin so; those of this map first."""
     if not typed.strip() or typed[0] == " ":
         return
     names = dict.fromkeys(_lexicon_names(), "") | dict.fromkeys(here, "in this map")

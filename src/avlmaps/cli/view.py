@@ -174,7 +174,6 @@ def run_page(service: "Service", opened: "socket", started: "Callable[[], None]"
 
 
 def _named(verb: View) -> dict[str, Path]:
-    """Return the maps by names that an address can hold."""
     named: dict[str, Path] = {}
     for path in (verb.map, verb.other):
         if path is not None:
@@ -185,7 +184,6 @@ def _named(verb: View) -> dict[str, Path]:
 
 
 def _address(settings: "ServeSettings", port: int, names: list[str]) -> str:
-    """Return where a browser of this machine finds the page."""
     host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(settings.host, settings.host)
     words = {} if len(names) < 2 else {"other": names[1]}
     words |= {} if settings.token is None else {"token": settings.token}

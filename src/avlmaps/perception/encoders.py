@@ -74,7 +74,6 @@ class Source:
 
     @property
     def _entry(self) -> Backend | None:
-        """What the registry knows of it; None for an object."""
         return None if self.given is not None else find(self.kind, self.name.partition("@")[0])
 
     @property
@@ -280,7 +279,6 @@ def encoders_of(chosen: str | Profile | Encoders) -> Encoders:
 
 
 def _source(kind: Kind, one: object) -> Source:
-    """Return the source of a name, which must be known, or of an object."""
     if isinstance(one, str):
         find(kind, one.partition("@")[0])
         return Source(kind, one)

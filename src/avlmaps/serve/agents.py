@@ -322,7 +322,6 @@ def _checked(tool: AgentTool, arguments: dict[str, Any]) -> Any:
 
 
 def _kind(schema: dict[str, Any]) -> str:
-    """Return what an argument takes, in a few words."""
     low, high = schema.get("minimum"), schema.get("maximum")
     schema = _brief(schema)
     if "enum" in schema:
@@ -442,7 +441,6 @@ def _lists(answer: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, lis
 
 
 def _texts(answer: dict[str, Any]) -> Iterator[tuple[dict[str, Any], str]]:
-    """Yield where the texts of an answer stand."""
     for key, value in answer.items():
         rows = value if isinstance(value, list) else [value]
         for one in rows:

@@ -139,7 +139,6 @@ class AccessGuard:
             return False
 
     def _check_site(self, headers: dict[str, str], host: str) -> None:
-        """Refuse requests that a page of another site sends."""
         origin = headers.get("origin")
         same = origin is None or urlsplit(origin).netloc.lower() == host.lower()
         site, mode = headers.get("sec-fetch-site", "none"), headers.get("sec-fetch-mode", "navigate")
@@ -209,14 +208,12 @@ async def refuse(error: RequestError, send: Send) -> None:
 
 
 async def _enter(headers: list[tuple[bytes, bytes]], send: Send) -> None:
-    """Send a browser to the address without its token."""
     headers = [*headers, (b"content-length", b"0"), *HEADERS, _NO_STORE]
     await send({"type": "http.response.start", "status": 303, "headers": headers})
     await send({"type": "http.response.body", "body": b""})
 
 
 def _kept(headers: dict[str, str]) -> str:
-    """Return the token that a browser stores, "" for none."""
     try:
         kept = SimpleCookie(headers.get("cookie", "")).get(_COOKIE)
     except CookieError:
@@ -238,7 +235,6 @@ def _length(text: str) -> int:
 
 
 def _host_name(host: str) -> str:
-    """Return the name in a Host header, without its port and in lower case."""
     host = host.strip().lower()
     if host.startswith("["):
         return host[1:].partition("]")[0]

@@ -279,7 +279,6 @@ def _in_form(described: dict[str, Any]) -> dict[str, Any]:
 
 
 def _numbers(path: str) -> list[tuple[str, dict[str, int]]]:
-    """Return the numbers in a path, and the least that each can be."""
     found = re.findall(r"{(\w+):(count|index)}", path)
     return [(name, {"minimum": 0} if kind == "count" else {}) for name, kind in found]
 

@@ -85,6 +85,5 @@ def _mark(picture: UInt8[np.ndarray, "h w 3"], at: tuple[int, int], text: str) -
 
 
 def _heat_colours(heat: Float[np.ndarray, "h w"]) -> Float[np.ndarray, "h w 3"]:
-    """Return the colours of heat, as the plots have them."""
     levels = np.clip(255.0 * (0.15 + 0.8 * heat), 0, 255).astype(np.uint8)
     return cv2.applyColorMap(levels, cv2.COLORMAP_INFERNO)[..., ::-1].astype(np.float64)

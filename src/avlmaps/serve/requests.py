@@ -236,7 +236,6 @@ def checked(values: Mapping[str, Any], kind: type[T], *, strict: bool = True) ->
 
 
 def _whole(value: Any) -> Any:
-    """Return 3 for 3.0: both are one whole number in JSON."""
     return int(value) if isinstance(value, float) and value.is_integer() and abs(value) < 2**53 else value
 
 

@@ -340,7 +340,6 @@ def _describe_map(task: WorkInput, query: MapQuery) -> ToolResult:
 
 
 def _marked(task: WorkInput, query: Any, places: Sequence[Sequence[float]]) -> bytes | None:
-    """Return a picture of some places where the query wants one."""
     if not query.picture:
         return None
     return small_picture(task.map, places=[np.array(place) for place in places[:_MOST_MARKS]])

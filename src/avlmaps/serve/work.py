@@ -171,7 +171,6 @@ Noted = TypeVar("Noted", ContentsAnswer, ListedThingsAnswer, SoundsAnswer, Rooms
 
 
 def _noted(task: WorkInput, answer: Noted) -> Noted:
-    """Add what is doubtful about the map to an answer."""
     opened = task.map.avlmap
     if doubts := opened.doubts_of_things if "things" in answer else opened.stored.info.doubts:
         answer["notes"] = [without_folders(doubt) for doubt in doubts]
@@ -437,7 +436,6 @@ def rehearse(task: WorkInput, query: RehearseQuery) -> dict[str, Any]:
 
 
 def _without(told: Any, folder: str) -> Any:
-    """Return JSON whose texts do not name a folder of this machine."""
     if isinstance(told, str):
         return told.replace(folder, "")
     if isinstance(told, dict):

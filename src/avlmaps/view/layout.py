@@ -158,7 +158,6 @@ def _storeys(storeys: "Storeys", low_m: float, high_m: float) -> list[dict[str, 
 
 
 def _floor_m(level: Float[np.ndarray, "n 3"], cameras: Float[np.ndarray, "k 3"]) -> float:
-    """Return the most crowded height under the cameras: the floor."""
     heights = level[:, 2]
     below = heights[heights < np.median(cameras[:, 2])] if len(cameras) else heights
     if not len(below):

@@ -146,7 +146,6 @@ def _packed(content: bytes) -> str:
 
 
 def _pictures(one: MapOnPage) -> dict[str, str]:
-    """Return some keyframes' pictures, evenly over the walk, by their numbers."""
     count = len(one.avlmap.stored.keyframes)
     chosen = np.unique(np.linspace(0, count - 1, min(count, _MOST_PICTURES)).round().astype(int)) if count else ()
     pictures = {str(number): one.layout.thumbnail(int(number)) for number in chosen}

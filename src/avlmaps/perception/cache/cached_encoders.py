@@ -137,7 +137,6 @@ def _sounds(encoder: Any, memory: _Memory, sound: Sound) -> Float32[np.ndarray, 
 def _places(
     encoder: Any, memory: _Memory, rgb: UInt8[np.ndarray, "h w 3"], local: LocalFeatures, state: dict[str, np.ndarray]
 ) -> Float32[np.ndarray, " d"]:
-    """Return the vector of a picture with these keypoints, after this learning."""
     learnt = [part for name in sorted(state) for part in (name, np.asarray(state[name]))]
     points = (local.xy, local.descriptors, local.scale, local.score)
     return memory.once(lambda: encoder.encode(rgb, local, state), rgb, *points, *learnt)
@@ -181,7 +180,6 @@ def _seen_in(frame: Frame) -> list[np.ndarray | str | float | None]:
 
 
 def _as_rows(local: LocalFeatures) -> np.ndarray:
-    """Pack keypoints into rows; what is not known has no column."""
     columns = [("xy", local.xy), ("descriptors", local.descriptors)]
     columns += [(name, getattr(local, name)) for name in ("scale", "score") if len(getattr(local, name))]
     layout = [(name, "<f4", column.shape[1:]) for name, column in columns]

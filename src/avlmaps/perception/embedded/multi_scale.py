@@ -90,5 +90,4 @@ def smoothed(
 
 
 def _overlap(size: int, shift: int) -> slice:
-    """Return the cells of a row that have a neighbour ``shift`` cells on."""
     return slice(max(0, -shift), max(0, min(size, size - shift)))

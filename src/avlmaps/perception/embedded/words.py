@@ -433,7 +433,6 @@ class Meanings:
 
     @cached_property
     def _exactly(self) -> dict[str, list[str]]:
-        """The names that each phrase stands for."""
         out: dict[str, list[str]] = {}
         for name, called in zip(self.names, self.called, strict=True):
             for phrase in called:
@@ -451,6 +450,5 @@ class Meanings:
 
 
 def _clean(phrase: str) -> str:
-    """Return a phrase in small letters without the article before it."""
     words = phrase.lower().split()
     return " ".join(words[1:] if len(words) > 1 and words[0] in _ARTICLES else words)

@@ -100,7 +100,6 @@ class DriveService:
 
 
 async def _in(threads: ThreadPoolExecutor, work: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-    """Do work in one of some threads, with the context of who asks for it."""
     context = copy_context()
     return await asyncio.get_running_loop().run_in_executor(threads, lambda: context.run(work))
 
