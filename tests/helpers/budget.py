@@ -47,15 +47,10 @@ def counts(root: Path = ROOT) -> Counts:
 
 def code_counts(sources: Iterable[str]) -> dict[str, int]:
     """Count modules: lines of code (no blanks, comments, docstrings, imports), lines, files, longest file, kernels."""
-    texts = list(sources)
-    lines = [len(_non_blank(text)) for text in texts]
-    return {
-        "code": sum(map(_lines_of_code, texts)),
-        "non_blank": sum(lines),
-        "files": len(texts),
-        "longest": max(lines, default=0),
-        "kernels": sum(map(_kernels, texts)),
-    }
+    each = [_counted(text) for text in sources]
+    code, lines, kernels = (sum(column) for column in zip(*each, strict=True)) if each else (0, 0, 0)
+    longest = max((one[1] for one in each), default=0)
+    return {"code": code, "non_blank": lines, "files": len(each), "longest": longest, "kernels": kernels}
 
 
 def above(found: Counts, budget: Counts) -> list[str]:
@@ -86,23 +81,19 @@ def _non_blank(text: str) -> list[str]:
     return [line for line in text.splitlines() if line.strip()]
 
 
-def _lines_of_code(text: str) -> int:
+def _counted(text: str) -> tuple[int, int, int]:
+    """Return lines of code, lines that are not blank, and kernels of a module."""
     passed: set[int] = set()
+    kernels = 0
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Import | ast.ImportFrom) or (
             isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
         ):
             passed |= set(range(node.lineno, (node.end_lineno or node.lineno) + 1))
-    numbered = enumerate(text.splitlines(), start=1)
-    return sum(bool(line.strip()) and line.strip()[0] != "#" and number not in passed for number, line in numbered)
-
-
-def _kernels(text: str) -> int:
-    functions = (node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.FunctionDef))
-    return sum(
-        any(word in ast.dump(decorator) for decorator in function.decorator_list for word in COMPILERS)
-        for function in functions
-    )
+        elif isinstance(node, ast.FunctionDef):
+            kernels += any(word in ast.dump(one) for one in node.decorator_list for word in COMPILERS)
+    lines = [(number, line.strip()) for number, line in enumerate(text.splitlines(), start=1) if line.strip()]
+    return sum(line[0] != "#" and number not in passed for number, line in lines), len(lines), kernels
 
 
 def _seconds(limit_s: float) -> int:
