@@ -24,9 +24,8 @@ from avlmaps.core.poses import inverse
 from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
 from avlmaps.maps.fusion.free_space import FreeViewCollector, FreeViews, clean, count_where_it_matters
-from avlmaps.maps.fusion.moved_submaps import MovedSubmaps
 from avlmaps.maps.fusion.sensor import PERFECT
-from avlmaps.maps.fusion.submaps import submap_of
+from avlmaps.maps.fusion.submaps import MovedSubmaps, submap_of
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.types import Submaps
 from avlmaps.recordings.open import open_recording

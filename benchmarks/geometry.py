@@ -20,11 +20,11 @@ use_one_thread()
 import numpy as np  # noqa: E402
 from scipy.spatial import KDTree  # noqa: E402
 
+from avlmaps.maps.estimate import estimate_sensor  # noqa: E402
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator  # noqa: E402
 from avlmaps.maps.fusion.free_space import FreeViewCollector, clean  # noqa: E402
 from avlmaps.maps.fusion.sensor import NONE, SensorModel  # noqa: E402
 from avlmaps.maps.grid import GridSpec  # noqa: E402
-from avlmaps.maps.pipeline.estimate import estimate_sensor  # noqa: E402
 from avlmaps.maps.settings import BuildSettings  # noqa: E402
 from avlmaps.recordings.open import open_recording  # noqa: E402
 from avlmaps.recordings.types import Recording  # noqa: E402

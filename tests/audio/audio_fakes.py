@@ -7,7 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from avlmaps.core.camera import Pinhole, Rig
-from avlmaps.perception.protocols import ModelCard
+from avlmaps.maps.audio import events
+from avlmaps.maps.audio.settings import HearingSettings
+from avlmaps.maps.types import HeardSounds
+from avlmaps.perception.protocols import ModelCard, SoundEncoder
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
 from avlmaps.recordings.types import Frame, Recording
 
@@ -54,6 +57,14 @@ def straight_walk(seconds: float, speed_m_s: float, audio: AudioTrack | None = N
     stamps_s = np.arange(0.0, seconds + 1e-9, 1.0 / rate_hz)
     position = np.stack([speed_m_s * stamps_s, np.zeros_like(stamps_s), np.zeros_like(stamps_s)], axis=1)
     return FakeWalk(stamps_s, position, audio)
+
+
+def detect_events(walk: FakeWalk, encoder: SoundEncoder, settings: HearingSettings, clips: Path) -> HeardSounds:
+    """Return the sounds of a walk's track."""
+    if walk.audio is None:
+        return events.collect([], encoder.card.dim)
+    walked = events.WalkedTrack(walk.stamps_s, walk.world_from_camera)
+    return events.detect_events(walk.audio, walked, encoder, settings, clips)
 
 
 class FakeEncoder:

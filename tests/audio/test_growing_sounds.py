@@ -63,14 +63,14 @@ def test_however_the_track_is_cut_the_sounds_are_those_of_the_whole_track(
     track: AudioTrack, tmp_path_factory: pytest.TempPathFactory, cuts: list[int], asked: int
 ) -> None:
     walk = straight_walk(30.0, 0.3, track)
-    whole = detect_events(walk, FakeEncoder(), PLAIN, tmp_path_factory.mktemp("clips"))
+    whole = detect_events(track, walk, FakeEncoder(), PLAIN, tmp_path_factory.mktemp("clips"))
     sounds = GrowingSounds(FakeEncoder(), PLAIN)
     for number, piece in enumerate(np.split(SAMPLES, sorted(cuts))):
         sounds.add(Sound(piece, RATE_HZ))
         if number == asked:
-            sounds.heard(walk, final=False)  # a question changes nothing
-    require_same(sounds.heard(walk, final=True), whole)
+            sounds.heard(walk)  # a question changes nothing
     assert sounds.track is not None
+    require_same(detect_events(sounds.track, walk, FakeEncoder(), PLAIN, tmp_path_factory.mktemp("clips")), whole)
     assert segment(sounds.track) == segment(track) and len(whole) == 4
 
 
@@ -87,13 +87,13 @@ def test_a_sound_is_listed_within_a_second_of_its_end() -> None:
     listed: dict[int, float] = {}
     for at in range(0, len(SAMPLES), step):
         sounds.add(Sound(SAMPLES[at : at + step], RATE_HZ))
-        heard = sounds.heard(walk, final=False)
+        heard = sounds.heard(walk)
         for number, end_s in enumerate((3.5, 10.0, 21.0)):
             if np.any(np.abs(heard.offset_s - end_s) < 0.1):
                 listed.setdefault(number, (at + step) / RATE_HZ - end_s)
     assert sorted(listed) == [0, 1, 2]  # the second, before the third tone made it longer
     assert all(ENDED_S <= late_s <= 1.0 for late_s in listed.values())
-    assert sounds.heard(walk, final=False).offset_s[1] == pytest.approx(11.0, abs=0.1)
+    assert sounds.heard(walk).offset_s[1] == pytest.approx(11.0, abs=0.1)
 
 
 @pytest.mark.slow
@@ -105,14 +105,11 @@ def test_the_window_of_a_long_track_moves_on_and_keeps_what_was_heard(
     walk, sounds, encoder = straight_walk(240.0, 0.1), GrowingSounds(FakeEncoder(), PLAIN), FakeEncoder()
     for at in range(0, len(samples), 5 * RATE_HZ):
         sounds.add(Sound(samples[at : at + 5 * RATE_HZ], RATE_HZ))
-        live = sounds.heard(walk, final=False)
+        live = sounds.heard(walk)
     held_s = 0.01 * sum(map(len, sounds._powers))
     assert held_s < 100.0 and len(live) == 24
-    whole = detect_events(
-        straight_walk(240.0, 0.1, track_of(tmp_path / "a.flac", samples)), encoder, PLAIN, tmp_path / "clips"
-    )
+    whole = detect_events(track_of(tmp_path / "a.flac", samples), walk, encoder, PLAIN, tmp_path / "clips")
     np.testing.assert_allclose(live.onset_s, whole.onset_s, atol=0.03)
-    require_same(sounds.heard(walk, final=True), whole)
 
 
 # The clock of a microphone
@@ -207,6 +204,6 @@ def test_channels_stay_beside_one_another_however_the_track_is_cut(
 
 def test_a_track_alone_on_a_walk_without_sounds_has_none(tmp_path: Path) -> None:
     walk = FakeWalk(np.array([0.0, 1.0]), np.zeros((2, 3)))
-    assert len(GrowingSounds(FakeEncoder(), PLAIN).heard(walk, final=True)) == 0
+    assert len(GrowingSounds(FakeEncoder(), PLAIN).heard(walk)) == 0
     silent = grown([], np.zeros(RATE_HZ, np.float32))
-    assert len(silent.heard(walk, final=False)) == len(silent.heard(walk, final=True)) == 0
+    assert len(silent.heard(walk)) == 0

@@ -2,12 +2,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from audio_fakes import RATE_HZ, FakeEncoder, FakeWalk, quiet, straight_walk, tone, track_of
+from audio_fakes import RATE_HZ, FakeEncoder, FakeWalk, detect_events, quiet, straight_walk, tone, track_of
 from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import AudioError, BackendError
-from avlmaps.maps.audio.events import detect_events
 from avlmaps.maps.audio.events import track_of as places_of
 from avlmaps.maps.audio.segmentation import Segment, segment
 from avlmaps.maps.audio.settings import HearingSettings, SegmentationSettings

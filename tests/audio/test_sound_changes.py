@@ -6,13 +6,12 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
-from audio_fakes import RATE_HZ, FakeEncoder, quiet, straight_walk, tone, track_of
+from audio_fakes import RATE_HZ, FakeEncoder, detect_events, quiet, straight_walk, tone, track_of
 from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import AudioError, BackendError
 from avlmaps.maps.audio.change_points import frames_of_track, split_at_changes
-from avlmaps.maps.audio.events import detect_events
 from avlmaps.maps.audio.settings import HearingSettings, SoundChangeSettings
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.perception.protocols import FrameSoundEncoder, ModelCard

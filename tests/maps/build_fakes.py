@@ -13,7 +13,7 @@ import numpy as np
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.registry import Backend, Kind, register
-from avlmaps.maps.keyframes.describe import KeyframeSettings
+from avlmaps.maps.keyframes.choose import KeyframeSettings
 from avlmaps.maps.settings import BuildSettings, FrameSettings
 from avlmaps.perception.profiles import Profile, register_profile
 from avlmaps.perception.protocols import LocalFeatures, ModelCard

@@ -10,8 +10,8 @@ import pytest
 from build_fakes import SETTINGS, Corners, Pixels, Places, Walk, _card
 
 from avlmaps.maps.build import build_map
-from avlmaps.maps.growing import GrowingMap
-from avlmaps.maps.pipeline.write import feature_doubts
+from avlmaps.maps.finish import feature_doubts
+from avlmaps.maps.mapper import Mapper
 from avlmaps.perception.encoders import Encoders
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.types import Frame
@@ -94,10 +94,10 @@ class ConstantViews:
 
 
 def made(pixels: Any = None, features: Any = None, **others: Any) -> Any:
-    growing = GrowingMap(SETTINGS, Encoders("fake", pixels=pixels, **others), WALK.up_in_world)
+    mapper = Mapper(SETTINGS, Encoders("fake", pixels=pixels, **others), WALK.up_in_world)
     for frame in WALK.frames():
-        growing.add(frame, None if features is None else features(frame))
-    return growing.stored()
+        mapper.add(frame, None if features is None else mapper.checked(features(frame), frame))
+    return mapper.snapshot()
 
 
 def require_same_voxels(one: Any, other: Any) -> None:
@@ -148,7 +148,8 @@ def test_views_and_sounds_that_are_all_the_same_are_a_doubt() -> None:
     assert not list(feature_doubts(voxels, keyframes, sounds, stored.info.models))  # of two keyframes nothing is known
     models = {**stored.info.models, "sounds": replace_id(stored.info.models["views"])}
     same = np.tile(np.float32([0.6, 0.8, 0.0]), (9, 1))
-    alike = voxels, replace(keyframes, view=same), replace(sounds, feature=same), models
+    alike = voxels, replace(keyframes, view=same, world_from_camera=WALK.world_from_camera), sounds
+    alike = *alike[:2], replace(sounds, feature=same), models
     views, sounds = feature_doubts(*alike)
     assert "views by fake/views are the same in all 9 keyframes" in views
     assert "sounds by fake/ears are the same in all 9 stretches" in sounds
@@ -163,15 +164,15 @@ def replace_id(model: Any) -> Any:
     return structs.replace(model, id="fake/ears")
 
 
-def test_the_end_of_a_growing_map_doubts_features_and_a_silent_microphone() -> None:
-    growing = GrowingMap(SETTINGS, Encoders("fake", pixels=Constant(1.0)), WALK.up_in_world, looks_later=True)
+def test_the_end_of_a_mapper_map_doubts_features_and_a_silent_microphone() -> None:
+    mapper = Mapper(SETTINGS, Encoders("fake", pixels=Constant(1.0)), WALK.up_in_world, behind=True)
     for frame in WALK.frames():
-        growing.add(frame)
-        growing.add_audio(Sound(np.zeros(1600, np.float32), 16_000))
-    growing.stored()
-    assert not growing.doubts
-    growing.stored(final=True)
-    silent, features = growing.doubts
+        mapper.add(frame)
+        mapper.add_sound(Sound(np.zeros(1600, np.float32), 16_000))
+    mapper.snapshot()
+    assert not mapper.doubts
+    mapper.finish()
+    silent, features = mapper.doubts
     assert silent.startswith("The sound is silent throughout: every sample is 0. Check the microphone")
     assert features.startswith("The features of pixels by fake/pixels are the same")
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from build_fakes import SETTINGS, Walk, register_fakes
+from build_fakes import SETTINGS, register_fakes
 
 from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole
@@ -17,15 +17,12 @@ from avlmaps.live.live_map import LiveMap
 from avlmaps.live.replay import end_drive, replay
 from avlmaps.live.settings import LiveSettings
 from avlmaps.maps.build import build_map
-from avlmaps.maps.pipeline.check import checked, doubts_of_channels, judge
-from avlmaps.maps.pipeline.plan import make_plan
-from avlmaps.maps.pipeline.write import carving_doubts
+from avlmaps.maps.check import doubts_of_channels, judge
+from avlmaps.maps.finish import carving_doubts
 from avlmaps.maps.store.manifest import Removed
 from avlmaps.maps.store.reader import open_stored
-from avlmaps.perception.encoders import encoders_of
 from avlmaps.query.contents import Contents
 from avlmaps.recordings import channels
-from avlmaps.recordings.audio import Sound, write_flac
 from avlmaps.recordings.channels import ChannelSound, write_channels
 from avlmaps.recordings.consistency.verdict import Grade, Reason
 from avlmaps.recordings.layout import DESCRIPTION
@@ -143,15 +140,3 @@ def test_a_live_map_ends_with_the_doubts_about_channels_that_a_build_has(
 def test_much_that_is_seen_through_is_doubtful() -> None:
     assert not list(carving_doubts(Removed(seen_through=80), 920))
     assert "25%" in next(carving_doubts(Removed(seen_through=250), 750))
-
-
-def test_a_stopped_build_that_goes_on_with_another_track_doubts_that_one(tmp_path: Path) -> None:
-    said: list[tuple[str, ...]] = []
-    for name, level in (("silent", 0.0), ("noise", 0.1)):
-        samples = level * np.random.default_rng(0).standard_normal(40_000)
-        write_flac(tmp_path / f"{name}.flac", Sound(samples.astype(np.float32), 16_000))
-        walk = Walk(audio=tmp_path / f"{name}.flac")
-        plan = make_plan(walk, tmp_path / "map", encoders_of(PROFILE), SETTINGS)
-        said.append(checked(plan, [reason.value for reason in Reason]).doubts)
-    assert [any("silent" in one for one in doubts) for doubts in said] == [True, False]
-    assert not any(str(tmp_path) in one for one in said[0])  # a map may travel

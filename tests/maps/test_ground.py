@@ -222,7 +222,7 @@ def test_the_floor_is_never_above_a_level_that_is_seen_through(
 @pytest.fixture(scope="module")
 def kitchen(shared_data: Path) -> tuple[list[Sight], np.ndarray]:
     """Every fourth frame of the red kitchen as evidence, and up."""
-    from avlmaps.maps.pipeline.estimate import estimate_up
+    from avlmaps.maps.estimate import estimate_up
     from avlmaps.maps.settings import DEFAULTS
     from avlmaps.recordings.open import open_recording
 

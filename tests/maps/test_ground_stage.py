@@ -11,7 +11,7 @@ from build_fakes import SETTINGS, Walk, register_fakes
 from avlmaps.cli.output import ground_lines
 from avlmaps.core.errors import MapError
 from avlmaps.maps.build import build_map, describe
-from avlmaps.maps.pipeline.estimate import estimate_ground, ground_notices
+from avlmaps.maps.estimate import estimate_ground, ground_notices
 from avlmaps.maps.settings import DEFAULTS, BuildSettings, GravitySettings
 from avlmaps.maps.store.manifest import FloorGuess, FloorInfo, GroundInfo, UpInfo
 from avlmaps.maps.store.reader import StoredMap, open_stored
@@ -114,7 +114,7 @@ def built(path: Path) -> StoredMap:
 def test_a_map_keeps_the_floor_and_describes_it(tmp_path: Path) -> None:
     stored = built(tmp_path / "a.avlmap")
     info = stored.info.ground
-    assert info is not None and stored.info.timings.stages_s["ground"] > 0.0
+    assert info is not None and stored.info.timings.stages_s["frames"] > 0.0
     said = json.loads(json.dumps(describe(stored)))["ground"]
     assert said["camera_height_m"] == info.main().best.camera_height_m
     assert 0.0 <= said["confidence"] <= 1.0 and said["known_from"] == "surfaces"

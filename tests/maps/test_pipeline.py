@@ -7,15 +7,14 @@ from threading import Condition, current_thread, main_thread
 
 import numpy as np
 import pytest
-from build_fakes import SETTINGS, Corners, Pixels, Walk, register_fakes
+from build_fakes import SETTINGS, Pixels, Walk, register_fakes
 from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.ahead import run_ahead
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Backend, Kind, register
-from avlmaps.maps.build import build_map
-from avlmaps.maps.pipeline.encode_fuse import encode_frames
+from avlmaps.maps.build import build_map, encode_frames
 from avlmaps.maps.store.manifest import BadFrame
 from avlmaps.perception.profiles import Profile, profile
 from avlmaps.recordings.types import Frame
@@ -135,39 +134,6 @@ def test_frames_are_read_and_encoded_while_others_are_fused(monkeypatch: pytest.
             begun.meet("encode", 0)
             begun.meet("read", 1)
     assert begun.met == [True, True, True]
-
-
-class MeetingViews:
-    card = Pixels.card
-
-    def encode(self, frames: Sequence[Frame]) -> np.ndarray:
-        if ToldWalk.begun("view", frames[0].index):
-            ToldWalk.begun.meet("read", frames[0].index)
-        rows = np.stack([[frame.index + 1.0, 1.0, 0.0, 0.0] for frame in frames])
-        return (rows / np.linalg.norm(rows, axis=1, keepdims=True)).astype(np.float32)
-
-    def encode_words(self, words: Sequence[str]) -> np.ndarray:
-        return np.tile(np.eye(4, dtype=np.float32)[0], (len(words), 1))
-
-
-class MeetingCorners(Corners):
-    def encode(self, rgb: np.ndarray):
-        if ToldWalk.begun("describe", 0):
-            ToldWalk.begun.meet("view", 0)
-        return super().encode(rgb)
-
-
-def test_keyframes_are_read_and_looked_at_while_others_are_described(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    begun = Begun()
-    monkeypatch.setattr(ToldWalk, "begun", begun)
-    register(Backend(Kind.VIEWS, "meeting", f"{__name__}:MeetingViews"))
-    register(Backend(Kind.LOCAL, "meeting", f"{__name__}:MeetingCorners"))
-    stored = build_map(ToldWalk(12), tmp_path / "map", Profile("meeting", views="meeting", local="meeting"), SETTINGS)
-    assert begun.met == [True, True]
-    frame = np.round(stored.keyframes.stamp_s / 0.1).astype(int)  # views stand with their own frames
-    assert np.allclose(stored.keyframes.view[:, 0] / stored.keyframes.view[:, 1], frame + 1, rtol=1e-5)
 
 
 def test_producers_in_a_row_stop_with_their_consumer() -> None:

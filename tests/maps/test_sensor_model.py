@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import MapError
 from avlmaps.maps.fusion.accumulator import FusionSettings, VoxelAccumulator
-from avlmaps.maps.fusion.carving_kernels import drop_flying
+from avlmaps.maps.fusion.kernels import drop_flying
 from avlmaps.maps.fusion.sensor import (
     KINECT,
     MODELS,

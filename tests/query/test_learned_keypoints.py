@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from avlmaps.core.columns import concat
 from avlmaps.core.poses import inverse, rotation_angle_rad
-from avlmaps.maps.keyframes.describe import KeyframeSettings, describe_keyframe, stack_keyframes
-from avlmaps.maps.pipeline.keyframes import concat_keyframes
+from avlmaps.maps.keyframes.choose import KeyframeSettings
+from avlmaps.maps.keyframes.describe import describe_keyframe, stack_keyframes
 from avlmaps.perception.embedded.keypoints import RootSift
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.protocols import LocalFeatures, ModelCard
@@ -91,27 +92,19 @@ def test_keypoints_without_scores_reach_a_matcher_without_any_and_with_the_size_
 
 
 def test_a_map_of_pictures_with_and_without_scores_has_none() -> None:
-    seen = [
-        describe_keyframe(
-            WALK.frame(i), encoders_of(Scored(told=i > 0), None), {"centres": np.zeros((64, 128), np.float32)}
-        )
-        for i in range(3)
-    ]
+    seen = [describe_keyframe(WALK.frame(i), encoders_of(Scored(told=i > 0), None)) for i in range(3)]
     assert stack_keyframes(seen).score.shape == (0,)
     pieces = [stack_keyframes(seen[:1]), stack_keyframes(seen[1:])]
     assert len(pieces[1].score) == len(pieces[1].xy) > 0
-    whole = concat_keyframes(pieces)
+    whole = concat(pieces)
     assert whole.score.shape == (0,) and len(whole.xy) == sum(len(piece.xy) for piece in pieces)
 
 
 def test_scores_stay_with_their_keypoints_when_lots_are_joined() -> None:
-    seen = [
-        describe_keyframe(WALK.frame(i), encoders_of(Scored(), None), {"centres": np.zeros((64, 128), np.float32)})
-        for i in range(3)
-    ]
+    seen = [describe_keyframe(WALK.frame(i), encoders_of(Scored(), None)) for i in range(3)]
     blank = replace(seen[0], local=LocalFeatures(np.zeros((0, 2), np.float32), np.zeros((0, 128), np.float32)))
     blank = replace(blank, points_world=np.zeros((0, 3), np.float32))
-    whole = concat_keyframes([stack_keyframes([seen[0]]), stack_keyframes([blank]), stack_keyframes(seen[1:])])
+    whole = concat([stack_keyframes([seen[0]]), stack_keyframes([blank]), stack_keyframes(seen[1:])])
     np.testing.assert_array_equal(whole.score, score_of(whole.xy).astype(np.float16))
 
 
@@ -134,7 +127,7 @@ def test_planted_matches_of_few_or_many_keypoints_are_believed_by_the_same_rules
     xy = rng.uniform((8, 8), (312, 232), (4 * count, 2)).astype(np.float32)
     kept = LocalFeatures(xy, np.zeros((len(xy), 4), np.float32))
     used = Encoders(local=SimpleNamespace(encode=lambda rgb: kept), matcher=Planted())
-    seen = describe_keyframe(frame, used, {}, KeyframeSettings(max_depth_m=20.0))
+    seen = describe_keyframe(frame, used, KeyframeSettings(max_depth_m=20.0))
     good = np.flatnonzero(np.isfinite(seen.points_world[:, 0]))[:count]
     seen = replace(
         seen,

@@ -11,8 +11,8 @@ from avlmaps.cli.build import Build, _openings
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.poses import from_quaternion
-from avlmaps.maps.pipeline import sources
-from avlmaps.maps.pipeline.plan import audio_key
+from avlmaps.maps import located as sources
+from avlmaps.maps.plan import audio_key
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.directions import DIRECTIONS, DirectionTrack, read_directions, write_directions
 from avlmaps.recordings.open import open_recording

@@ -23,7 +23,7 @@ from avlmaps.core.errors import MapError
 from avlmaps.core.lexicon import Entry, EntryKind, lexicon
 from avlmaps.core.registry import Kind
 from avlmaps.maps.build import build_map
-from avlmaps.maps.keyframes.describe import KeyframeSettings
+from avlmaps.maps.keyframes.choose import KeyframeSettings
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.reader import StoredMap
 from avlmaps.perception.embedded.pixels import LARGEST_LOG_AREA, SMALLEST_LOG_AREA, EmbeddedPixels

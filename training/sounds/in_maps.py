@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from avlmaps.core.question import Modality, Part, Role
-from avlmaps.maps.audio.events import detect_events
+from avlmaps.maps.audio.events import WalkedTrack, detect_events
 from avlmaps.maps.audio.settings import HearingSettings
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.types import HeardSounds
@@ -106,12 +106,15 @@ def as_a_map_cuts(sounds: Sequence[Sound], work: Path) -> tuple[list[Sound], np.
     track = clean + 0.1 * 10.0 ** (NOISE_DB / 20.0) * pink / pink.std()
     work.mkdir(parents=True, exist_ok=True)
     write_flac(work / "pieces.flac", Sound((0.5 * track).astype(np.float32), rate_hz))
-    still = SimpleNamespace(
-        audio=AudioTrack.open(work / "pieces.flac"),
-        stamps_s=np.array([0.0, at]), world_from_camera=np.stack([np.eye(4)] * 2),
-    )  # fmt: skip
+    still = WalkedTrack(np.array([0.0, at]), np.stack([np.eye(4)] * 2))
     listener = Listener()
-    heard = detect_events(still, listener, HearingSettings(), work / "pieces")  # pyright: ignore[reportArgumentType]
+    heard = detect_events(
+        AudioTrack.open(work / "pieces.flac"),
+        still,
+        listener,
+        HearingSettings(),
+        work / "pieces",  # pyright: ignore[reportArgumentType]
+    )
     cut, which = [], []
     for number, (begin, end) in enumerate(spans):
         shared = np.minimum(heard.offset_s, end) - np.maximum(heard.onset_s, begin)
@@ -132,11 +135,15 @@ def walk_of(spec: str, recorded: Recorded, clips: Path | None, work: Path) -> Wa
     assert isinstance(track, Sound)
     file = work / f"{job.folder.name}.flac"
     write_flac(file, track)
-    walked = SimpleNamespace(
-        audio=AudioTrack.open(file), stamps_s=trip.stamps_s, world_from_camera=trip.world_from_camera
-    )
+    walked = WalkedTrack(trip.stamps_s, trip.world_from_camera)
     listener = Listener()
-    heard = detect_events(walked, listener, HearingSettings(), work / "clips")  # pyright: ignore[reportArgumentType]
+    heard = detect_events(
+        AudioTrack.open(file),
+        walked,
+        listener,
+        HearingSettings(),
+        work / "clips",  # pyright: ignore[reportArgumentType]
+    )
     robot = trip.world_from_camera[:, :3, 3]
     events = [(s.onset_s, s.offset_s, Event(called(s.source.category), s.robot, _places(trip, s))) for s in soundings]
     eye_m = float(np.median(robot[:, 2]))

@@ -18,7 +18,7 @@ from avlmaps.core.progress import say
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Sequence
 
-    from avlmaps.maps.pipeline.ray_pool import RayPool
+    from avlmaps.maps.ray_pool import RayPool
     from avlmaps.perception.encoders import Encoders
     from avlmaps.recordings.types import Recording
 
@@ -136,8 +136,7 @@ class Build(ModelVerb):
 def build(verb: "Build") -> dict[str, Any]:
     """Build a map and describe it."""
     from avlmaps.maps.build import build_map
-    from avlmaps.maps.pipeline.cluster import ClusterWorkers
-    from avlmaps.maps.pipeline.workers import ALONE
+    from avlmaps.maps.cluster import ClusterWorkers
     from avlmaps.maps.settings import SUBMAP_FRAMES, BuildSettings, FrameSettings, FusionSettings, GravitySettings
     from avlmaps.perception.cache.feature_store import CacheSettings
     from avlmaps.query.rules import build_settings
@@ -190,7 +189,7 @@ def build(verb: "Build") -> dict[str, Any]:
                 used,
                 resolved,
                 cache=cache,
-                workers=ALONE if pool is None else ClusterWorkers(pool, openings[0], cache),
+                workers=None if pool is None else ClusterWorkers(pool, openings[0], cache),
                 allow=verb.allow,
                 resume=not verb.fresh,
                 overwrite=verb.overwrite,
@@ -235,7 +234,7 @@ def _openings(verb: "Build") -> "list[Callable[[], Recording]]":
     openings: list[Callable[[], Recording]] = [partial(open_one, group) for group in groups]
     if verb.same_device is None:
         return openings
-    from avlmaps.maps.pipeline.sources import open_with_device
+    from avlmaps.maps.located import open_with_device
 
     return [partial(open_with_device, one, verb.same_device.absolute()) for one in openings]
 
@@ -248,7 +247,7 @@ def _pool(verb: "Build") -> "Generator[RayPool | None]":
         return
     if len(verb.ray) > 1:
         raise UsageError(f"--ray takes one address and got {' '.join(verb.ray)}; give recordings before it.")
-    from avlmaps.maps.pipeline.ray_pool import RayPool
+    from avlmaps.maps.ray_pool import RayPool
 
     with RayPool(*verb.ray) as pool:
         say(f"note: the cluster has {pool.cores} cores (machines: {pool.machines}).")

@@ -90,7 +90,7 @@ def describe_path(
 
 def _consistency(recording: "Recording") -> dict[str, Any] | None:
     """Check a recording against itself, on a sample; None where none of the sample can be read."""
-    from avlmaps.maps.pipeline.check import judge
+    from avlmaps.maps.check import judge
 
     try:
         verdict = judge(recording)

@@ -10,7 +10,7 @@ from urllib.parse import quote
 from avlmaps.cli.view import open_browser, require_port, run_page
 from avlmaps.core.progress import say
 from avlmaps.live.live_map import LiveMap
-from avlmaps.live.replay import end_drive, end_now
+from avlmaps.live.replay import end_drive
 from avlmaps.maps.store.reader import StoredMap
 from avlmaps.serve.service import Service, listening_socket, url_of
 from avlmaps.serve.settings import ServeSettings
@@ -53,16 +53,9 @@ class LiveFeed:
         return not self._thread.is_alive()
 
     def end(self) -> None:
-        """Let it end after the frame that it has, wait until the map is closed, and raise what went wrong.
-
-        Ctrl-C meanwhile leaves out the frames that wait on the disk.
-        """
+        """Let it end after the frame that it has, wait until the map is closed, and raise what went wrong."""
         self._over.set()
-        try:
-            self._thread.join()
-        except KeyboardInterrupt:
-            end_now(self._live)
-            self._thread.join()
+        self._thread.join()
         if self._fault is not None:
             raise self._fault
 

@@ -111,7 +111,7 @@ def joined_keyframes(stored: StoredMap, other: StoredMap, moved: Float[np.ndarra
 
 def _concatenated(one: Keyframes, other: Keyframes) -> Keyframes:
     """Put keyframes one after the other."""
-    from avlmaps.maps.pipeline.keyframes import concat_keyframes
+    from avlmaps.core.columns import concat
 
     shapes = {part.clear_mm.shape[1:] for part in (one, other) if len(part)}
     if len(shapes) > 1:  # another camera: pictures of the larger shape hold both, and blocks beyond are unknown
@@ -119,7 +119,8 @@ def _concatenated(one: Keyframes, other: Keyframes) -> Keyframes:
         one, other = (
             replace(part, clear_mm=_padded(np.asarray(part.clear_mm), rows, columns)) for part in (one, other)
         )
-    return concat_keyframes([part for part in (one, other) if len(part)])
+    parts = [part for part in (one, other) if len(part)]
+    return concat(parts) if parts else one
 
 
 def _padded(clear_mm: np.ndarray, rows: int, columns: int) -> np.ndarray:

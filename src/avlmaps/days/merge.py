@@ -25,7 +25,7 @@ from avlmaps.days.join import NO_SOURCES, joined_keyframes, joined_sounds, joine
 from avlmaps.days.settings import MergeSettings
 from avlmaps.days.surfaces import Occupied, resampled
 from avlmaps.days.unnamed import changed_things
-from avlmaps.maps.growing import require_place
+from avlmaps.maps.build import require_place
 from avlmaps.maps.store.checkpoints import key_of
 from avlmaps.maps.store.edits import Edit, World, carried_edits, read_edits, write_edits
 from avlmaps.maps.store.folder import write

@@ -1,6 +1,5 @@
 """Several recordings of one place become one map: each is built by itself, then found in the first and merged."""
 
-import secrets
 import shutil
 from collections.abc import Sequence
 from contextlib import closing
@@ -11,18 +10,16 @@ from avlmaps.core.errors import MapError
 from avlmaps.core.files import user_path
 from avlmaps.core.progress import progress, say
 from avlmaps.days.merge import merge_maps, merged_key
-from avlmaps.maps.build import build_map
-from avlmaps.maps.growing import require_place
-from avlmaps.maps.pipeline.cluster import ClusterWorkers, Pool
-from avlmaps.maps.pipeline.cluster_jobs import (
+from avlmaps.maps.build import build_map, require_place
+from avlmaps.maps.cluster import (
+    ClusterWorkers,
     JobResult,
     Models,
+    Pool,
     Reopen,
     done_by,
     reopened,
     require_same_software,
-    require_seen,
-    show_token,
     software,
 )
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
@@ -43,7 +40,6 @@ class BuildJob:
     allow: tuple[str, ...]
     overwrite: bool
     software: dict[str, str]
-    token: Path
 
 
 def build_together(
@@ -82,7 +78,6 @@ def build_job(job: BuildJob) -> JobResult:
 
     def work(host: str) -> None:
         require_same_software(job.software, host)
-        require_seen(job.token, host)
         recording = reopened(job.reopen, host)
         build_map(recording, job.path, job.models.encoders(), job.settings, cache=job.models.cache, allow=job.allow,
                   overwrite=job.overwrite)  # fmt: skip
@@ -101,19 +96,14 @@ def _build_each(
     overwrite: bool,
 ) -> None:
     """Let each recording be built by one worker."""
-    token = paths[0].parent.absolute() / f".cluster-{secrets.token_hex(8)}"
-    show_token(token)
     models, known = Models.of(encoders, cache), software()
     jobs = [
-        BuildJob(reopen, path.absolute(), models, settings, allow, overwrite, known, token)
+        BuildJob(reopen, path.absolute(), models, settings, allow, overwrite, known)
         for reopen, path in zip(recordings, paths, strict=True)
     ]
-    try:
-        with closing(pool.run(build_job, jobs)) as results:
-            for _, result in progress(results, "building", total=len(jobs), unit="recording"):
-                result.require()
-    finally:
-        token.unlink(missing_ok=True)
+    with closing(pool.run(build_job, jobs)) as results:
+        for _, result in progress(results, "building", total=len(jobs), unit="recording"):
+            result.require()
 
 
 def merge_in_turn(days: Sequence[StoredMap], scratch: Path, out: Path, *, overwrite: bool = False) -> StoredMap:

@@ -1,18 +1,16 @@
-"""A map that grows while a robot drives: frames in, questions at any moment, saved all along.
+"""A map that is made while a robot drives: frames in, questions at any moment, saved all along.
 
-Four threads work. The caller's puts frames into a short queue. One fuses them, and nobody else touches the growing
-map; on request it freezes what came, which takes no longer than a frame. One works behind: it makes a map of
-what was frozen (keyframes, places and sounds are described there), and puts it in the place of the last snapshot. One
-writes these maps into the folder. A question uses the snapshot that there is; nothing that comes later changes it.
+Two threads work on one ``Mapper``. The caller's puts frames into a short queue. One fuses them. One works behind: it
+makes snapshots (keyframes are described there, sounds found and located), and saves them. A question uses the snapshot
+that there is; nothing that comes later changes it.
 """
 
 import contextlib
 import time
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator
 from concurrent.futures import Future
 from dataclasses import replace
-from functools import partial
 from math import isfinite
 from pathlib import Path
 from threading import Condition, Event, Lock, Thread
@@ -24,23 +22,23 @@ import numpy as np
 from avlmaps.core.errors import AudioError, AvlmapsError, BackendError, MapError, RecordingError
 from avlmaps.core.files import lasting_path
 from avlmaps.core.numbers import as_number
-from avlmaps.core.progress import progress
-from avlmaps.live.gates import LATER_SHARE, EncodingGate, Gates
-from avlmaps.live.kept_back import KeptBack
+from avlmaps.live.gates import Gates
 from avlmaps.live.pose_check import PoseCheck
-from avlmaps.live.saver import Saver, Unsaved
 from avlmaps.live.settings import LiveSettings
 from avlmaps.live.status import LiveStatus, Tally, memory_mb
-from avlmaps.maps.growing import FrozenSums, GrowingMap, require_place
-from avlmaps.maps.keyframes.describe import KeyframeSettings
-from avlmaps.maps.pipeline.sources import device_of
+from avlmaps.maps.build import require_place
+from avlmaps.maps.keyframes.choose import KeyframeSettings
+from avlmaps.maps.located import device_of
+from avlmaps.maps.mapper import Mapper
 from avlmaps.maps.settings import BuildSettings
+from avlmaps.maps.store.folder import write
 from avlmaps.maps.store.lock import lock_folder
+from avlmaps.maps.store.map_data import MapData
 from avlmaps.maps.store.reader import StoredMap, open_stored
 from avlmaps.perception.encoders import Encoders, encoders_of
 from avlmaps.perception.profiles import Profile
 from avlmaps.query.avlmap import AVLMap, QuerySettings
-from avlmaps.query.voxel_map import direction, require_kinds
+from avlmaps.query.voxel_map import IN_MEMORY, direction, require_kinds
 from avlmaps.recordings.directions import given_directions
 from avlmaps.recordings.given_frame import given_frame
 from avlmaps.recordings.memory import next_of
@@ -54,19 +52,10 @@ if TYPE_CHECKING:
 # A keyframe takes as long as three frames; with gates there are half as many as in a build.
 SPARSE = BuildSettings(keyframes=KeyframeSettings(translation_m=0.2, rotation_deg=14.0))
 _STEP_S = 0.1
-_IDLE_S = 0.05
-_LOOK_S = 0.1  # at how far the end is
 _MOST_DOUBTS = 100
-_CHANGES = "fused", "corrected", "encoded later"  # what is counted where the map has become another
-_STILL = 1e-3  # times what it is worth: a frame in which the camera stood makes room for every other
-_CALM_S = 0.5  # without a frame, before frames on the disk are looked at
-_LOOKS_S = 0.3  # for keyframes, in each snapshot
-_MOST_LATE = 24  # late frames in memory, until the thread that fuses writes them to the disk
 _LISTEN_S = 0.25  # from one look for sounds that ended to the next
 _REST_S = 1.0  # between two snapshots, at most, where one takes longer than that
 
-
-_Came = tuple[FrozenSums, float]  # what was frozen, and when
 _Correction = tuple[Any, Any, "Future[tuple[float, float]]"]  # stamps, poses, and what it did
 
 
@@ -138,40 +127,34 @@ class LiveMap:
         self._held.enter_context(lock_folder(self.path))
         chosen = settings or (SPARSE if self.settings.gates else BuildSettings())
         wait = self.settings.first_frames if self.settings.gates else None
-        self._growing = GrowingMap(chosen, used, direction(up_in_world), wait=wait, looks_later=True, begins_s=began_s)
+        self._mapper = Mapper(
+            chosen, used, direction(up_in_world), first_frames=wait, behind=True, begins_s=began_s
+        )  # fmt: skip
         if array is not None:
-            self._growing.place_microphones(array)
-        if known_rad is not None:
-            self._growing.know_device(known_rad)
+            self._mapper.place_microphones(array)
+        self._mapper.sources.known_rad = known_rad
         self._gates = Gates(self.settings, chosen.fusion.max_depth_m)
-        self._encoding = EncodingGate(self.settings, self._growing.settings.fusion)
-        keeps = self.settings.gates and not chosen.frames.per_submap  # corrected poses would not reach them
-        self._kept = KeptBack(self.settings.kept_frames if keeps else 0)
         self._check, self._tally = PoseCheck(), Tally()
-        self._queue: deque[tuple[Frame, float]] = deque()
-        self._late: deque[Frame] = deque()  # older than those in the queue, to be stored
-        self._in_hand_s: float | None = None  # when the frame arrived that is being fused
-        self._unsaved, self._unsaved_sounds = Unsaved(), Unsaved()
-        self._is_known = False  # the last frame brought nothing new, and there are frames to look at again
-        self._is_pressed = False  # whether the frames come by the clock, and are late if we are slow
         self._door, self._ears = Condition(), Lock()
+        # Under the door: what came and waits, and whether that ends.
+        self._queue: deque[tuple[Frame, float]] = deque()
+        self._to_correct: deque[_Correction] = deque()
+        self._in_hand_s: float | None = None  # when the frame arrived that is being fused
+        self._closing, self._fuser_ended = False, False
+        self._is_pressed = False  # whether the frames come by the clock, and are late if we are slow
         self._last: Frame | None = None
+        self._new_s: float | None = None  # when the oldest came that is in no snapshot,
+        self._shown_s: float | None = None  # and that is in no save
+        self._saved_s = float("nan")  # up to when the last save holds what came
         self._fault: BackendError | None = None
         self._broken: BaseException | None = None
         self._is_told = False  # a call raised what broke
         self._doubts: list[str] = []
-        self._asked: Future[_Came | None] | None = None  # what the thread behind waits for; under the door
-        self._fuser_ended = False  # under the door
-        self._to_correct: deque[_Correction] = deque()  # under the door
         self._snapshot: tuple[AVLMap, float] | None = None
-        self._generation, self._listened_s = 0, 0.0
-        self._closing, self._closed, self._leaves_kept = False, False, False
-        self._ending = Lock()
-        self._final: AVLMap | None = None  # what ``close`` returned
-        self._saver = Saver(self.path, self.settings.save_s, self._doubt, self._break)
-        self._fuser = Thread(target=self._fuse_and_answer, name="avlmaps-fuse", daemon=True)
-        self._stop_behind = Event()
-        self._behind = Thread(target=self._work_behind, name="avlmaps-behind", daemon=True)
+        self._generation, self._closed, self._final = 0, False, None
+        self._ending, self._stop_behind = Lock(), Event()
+        self._fuser = Thread(target=self._in_thread, args=(self._fuse_all,), name="avlmaps-fuse", daemon=True)
+        self._behind = Thread(target=self._in_thread, args=(self._publish_all,), name="avlmaps-behind", daemon=True)
         self._fuser.start()
         self._behind.start()
 
@@ -220,9 +203,8 @@ class LiveMap:
             self._last = frame
             if len(self._queue) >= self.settings.most_waiting:
                 self._tally.drop("late")
-                self._late.append(self._queue.popleft()[0])
-                if len(self._late) > (_MOST_LATE if self._kept.most else 0):
-                    self._late.popleft()
+                late = self._queue.popleft()[0]
+                self._mapper.pass_by(late.stamp_s, late.world_from_camera)
             self._queue.append((frame, arrived_s))
             self._is_pressed = not wait
             self._door.notify_all()
@@ -231,7 +213,7 @@ class LiveMap:
     @property
     def microphones(self) -> Microphones | None:
         """Where those of the sound's channels are; None where that is not known."""
-        return self._growing.microphones
+        return self._mapper.sources.microphones
 
     def place_microphones(self, microphones: Any) -> None:
         """Say where the microphones are, where that was not known at the beginning.
@@ -247,7 +229,7 @@ class LiveMap:
         self._require_open()
         array = given_microphones(microphones)
         with self._ears:
-            self._growing.place_microphones(array)
+            self._mapper.place_microphones(array)
 
     def add_audio(self, chunk: Any, stamp_s: Any = None) -> None:
         """Add a piece of the microphone's sound; see ``VoxelMap.add_audio``.
@@ -262,7 +244,7 @@ class LiveMap:
             MapError: the map is closed.
         """
         with self._hearing():
-            self._growing.add_audio(chunk, stamp_s)
+            self._mapper.add_sound(chunk, stamp_s)
 
     def add_directions(self, stamp_s: Any, azimuth_rad: Any, elevation_rad: Any = None, confidence: Any = None) -> None:
         """Add what a device said of where sounds come from: one direction, or some.
@@ -280,7 +262,7 @@ class LiveMap:
             MapError: the map is closed.
         """
         with self._hearing():
-            self._growing.add_directions(given_directions(stamp_s, azimuth_rad, elevation_rad, confidence))
+            self._mapper.add_directions(given_directions(stamp_s, azimuth_rad, elevation_rad, confidence))
 
     @contextlib.contextmanager
     def _hearing(self) -> Generator[None]:
@@ -348,21 +330,18 @@ class LiveMap:
     @property
     def doubts(self) -> tuple[str, ...]:
         """One sentence for each thing that is not as it should be: poses that do not fit, saves that failed."""
-        return (*self._doubts, *self._growing.doubts)
+        return (*self._doubts, *self._mapper.doubts)
 
     def status(self) -> LiveStatus:
         """Return how the map fares."""
-        snapshot, track, now_s = self._snapshot, self._growing.sound_track, time.perf_counter()
+        snapshot, track, now_s = self._snapshot, self._mapper.sound_track, time.perf_counter()
         counts = snapshot[0].stored.info.counts if snapshot is not None else None
         p50_ms, p95_ms = self._tally.quantiles_ms()
         return LiveStatus(
             frames_in=self._tally.of("came"),
             fused=self._tally.of("fused"),
             encoded=self._tally.of("encoded"),
-            encoded_later=self._tally.of("encoded later"),
-            kept=len(self._kept),
             dropped=self._tally.dropped(),
-            late_kept=self._tally.of("late kept"),
             refused=self._tally.of("refused"),
             waiting=len(self._queue),
             frame_ms_p50=p50_ms,
@@ -371,20 +350,15 @@ class LiveMap:
             keyframes=counts.keyframes if counts else 0,
             sounds=counts.sounds if counts else 0,
             snapshot_age_s=now_s - snapshot[1] if snapshot is not None else float("nan"),
-            saved_age_s=now_s - self._saver.saved_s,
+            saved_age_s=now_s - self._saved_s,
             unsaved_s=self._unsaved_s(now_s),
             memory_mb=memory_mb(),
             sound_gaps=0 if track is None else track.gaps,
             doubts=self.doubts,
         )
 
-    def close(self, *, kept: bool = True) -> AVLMap:
+    def close(self) -> AVLMap:
         """Fuse what waits and end as a build does: find up, the floor, places and sounds, write the map and open it.
-
-        Args:
-            kept: encode the frames first that wait on the disk (``status().kept``), a sixth of a second each. False
-                leaves them out: what they alone have seen, and their part of the features. So it ends a ``close`` that
-                another thread is in, or that was interrupted.
 
         Raises:
             MapError: no frame came, or the map cannot be finished: the last save is still there, and closing may be
@@ -393,28 +367,23 @@ class LiveMap:
             BackendError: an encoder is missing, or broke its protocol.
         """
         with self._door:
-            self._closing, self._leaves_kept = True, self._leaves_kept or not kept
+            self._closing = True
             self._door.notify_all()
         with self._ending:
             self._final = self._end() if self._final is None else self._final
             return self._final
 
     def _end(self) -> AVLMap:
-        if waiting := self._to_look_at():
-            for _ in progress(self._looks_until_the_end(), "encoding what waited", total=waiting):
-                pass
         self._fuser.join()
-        lost = len(self._queue) + (self._in_hand_s is not None) + self._to_look_at()
-        self._kept.close()
+        lost = len(self._queue) + (self._in_hand_s is not None)
         self._stop_behind.set()
         self._behind.join()
-        self._saver.close()
         if not self._closed:
             try:
-                if len(self._growing):
-                    self._saver.write(self._growing.stored(final=True), self._growing.submaps())
+                if len(self._mapper):
+                    write(self.path, self._mapper.finish())
             except BaseException as fault:
-                if not len(self._growing) or not self.path.is_dir():
+                if not len(self._mapper) or not self.path.is_dir():
                     self._held.close()
                 if isinstance(fault, AvlmapsError) or not isinstance(fault, Exception):
                     raise
@@ -424,28 +393,19 @@ class LiveMap:
                 ) from fault
             self._closed = True
             self._held.close()
-        if not len(self._growing):
+        if not len(self._mapper):
             raise MapError(f"No frame came, so that there is no map in {self.path}; add frames before it is closed.")
-        stored = replace(open_stored(self.path), encoders=self._growing.encoders)
+        stored = replace(open_stored(self.path), encoders=self._mapper.encoders)
         self._snapshot = AVLMap(stored, self._query), time.perf_counter()
         self._generation += 1
         if self._broken is not None and not self._is_told:
             self._is_told = True
             raise MapError(
                 f"A thread of the live map broke ({type(self._broken).__name__}: {self._broken}); the map {self.path} "
-                f"is whole, with {len(self._growing)} frames, and {lost} that waited are left out. Closing it again "
+                f"is whole, with {len(self._mapper)} frames, and {lost} that waited are left out. Closing it again "
                 "returns it; please report this fault."
             ) from self._broken
         return self._snapshot[0]
-
-    def _looks_until_the_end(self) -> Iterator[None]:
-        """Yield once for each frame on the disk that was looked at, until the thread that fuses has ended."""
-        before = self._to_look_at()
-        while self._fuser.is_alive():
-            self._fuser.join(_LOOK_S)
-            left = self._to_look_at()
-            yield from [None] * (before - left)
-            before = left
 
     def __enter__(self) -> "LiveMap":
         return self
@@ -454,7 +414,7 @@ class LiveMap:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         try:
-            self.close(kept=not isinstance(error, KeyboardInterrupt))
+            self.close()
         except AvlmapsError:
             if error is None:
                 raise
@@ -475,10 +435,7 @@ class LiveMap:
         if self._closed:
             return 0.0
         with self._door:
-            since_s = [self._in_hand_s, *(arrived_s for _, arrived_s in self._queue)]
-        since_s += [
-            self._unsaved.since_s(self._saver.saved_s), self._unsaved_sounds.since_s(self._saver.heard_s),
-        ]  # fmt: skip
+            since_s = [self._new_s, self._shown_s, self._in_hand_s, *(arrived_s for _, arrived_s in self._queue)]
         return now_s - min((one for one in since_s if one is not None), default=now_s)
 
     def _require_open(self) -> None:
@@ -494,169 +451,92 @@ class LiveMap:
         if fault is not None:
             raise fault
 
+    def _in_thread(self, work: Callable[[], None]) -> None:
+        """Work; what breaks that is raised at every frame to come."""
+        try:
+            work()
+        except BaseException as fault:
+            self._broken = fault
+            raise
+
     # The thread that fuses
 
-    def _fuse_and_answer(self) -> None:
-        """Fuse until the map is closed; however that ends, who asks gets an answer."""
+    def _fuse_all(self) -> None:
         try:
-            self._fuse_all()
-        except BaseException as fault:
-            self._break(fault)
-            raise
+            while self._fuse_next():
+                pass
         finally:
             with self._door:
                 self._fuser_ended = True
-                self._answer(None)
                 for _, _, answer in self._to_correct:
                     answer.set_exception(MapError(f"The live map {self.path} was closed before; begin another."))
                 self._to_correct.clear()
                 self._door.notify_all()
 
-    def _fuse_all(self) -> None:
-        is_calm = False  # no frame came for a while
-        while True:
-            with self._door:
-                while not (self._queue or self._closing or self._to_correct or self._asked):
-                    if self._to_look_at() and self._growing.sums and (is_calm or self._is_known):
-                        break
-                    is_calm = not self._door.wait(_CALM_S if len(self._kept) else None) or is_calm
-                frame, arrived_s = self._queue.popleft() if self._queue else (None, 0.0)
-                self._in_hand_s = None if frame is None else arrived_s
-                late, self._late = self._late, deque()
-                self._door.notify_all()
-            if frame is not None:
-                is_calm = False
-                self._fuse_after(late, frame, arrived_s)
-            elif self._to_correct:
-                self._correct()
-            elif is_calm or self._is_known or self._closing:
-                self._look_again()
-            if self._asked is not None:  # set by the thread behind alone, which waits for the answer
-                self._freeze()
-            if frame is None and self._closing and not (self._queue or self._to_correct or self._to_look_at()):
-                return
-
-    def _fuse_after(self, late: Iterable[Frame], frame: Frame, arrived_s: float) -> None:
-        """Fuse a frame, and store those before it that came late."""
-        for one in late:
-            self._growing.pass_by(one.stamp_s, one.world_from_camera)
-        self._fuse(frame, arrived_s)
-        for one in late:
-            if self._keep(one, is_fused=False, times=_STILL if self._gates.is_still(one) else 1.0):
-                self._tally.note("late kept")
+    def _fuse_next(self) -> bool:
+        """Fuse the next frame, or correct poses; return whether there is more to come."""
+        with self._door:
+            self._door.wait_for(lambda: self._queue or self._to_correct or self._closing)
+            if not (self._queue or self._to_correct):
+                return False
+            frame, arrived_s = self._queue.popleft() if self._queue else (None, 0.0)
+            self._in_hand_s = None if frame is None else arrived_s
+            self._door.notify_all()
+        if frame is not None:
+            self._fuse(frame, arrived_s)
+        else:
+            self._correct()
+        return True
 
     def _fuse(self, frame: Frame, arrived_s: float) -> None:
-        growing, number = self._growing, self._growing.next_index
+        mapper, number = self._mapper, self._mapper.next_index
         try:
-            track = growing.sound_track
+            track = mapper.sound_track
             heard = (None, 0.0) if track is None else (track.end_s, track.gap_s)
             for doubt in self._check.add(frame, *heard, arrived_s if self._is_pressed else None):
                 self._doubt(doubt)
-                growing.doubt(doubt)
-            reason = self._gates.reason_against(frame, growing.sums) if self.settings.gates else None
-            self._is_known = reason is not None and len(self._kept) > 0
+                mapper.doubt(doubt)
+            reason = self._gates.reason_against(frame, mapper) if self.settings.gates else None
             if reason is not None:
-                growing.pass_by(frame.stamp_s, frame.world_from_camera)
+                mapper.pass_by(frame.stamp_s, frame.world_from_camera)
                 self._tally.drop(reason)
-                self._keep(frame, is_fused=False, times=1.0 if reason == "known" else _STILL)
-            else:
-                encode = not self.settings.gates or (
-                    self._has_time(arrived_s)
-                    and self._encoding.opens(frame, len(self._queue) if self._is_pressed else 0)
-                )
-                named = replace(frame, index=number, name=f"{number:06d}")
-                growing.add(named, encode=encode)
-                self._unsaved.note(arrived_s)
+            else:  # the encoder takes most of the time: where another frame waits, this one adds its surface alone
+                encode = not (self.settings.gates and self._is_pressed and self._queue)
+                mapper.add(replace(frame, index=number, name=f"{number:06d}"), encode=encode)
+                self._came(arrived_s)
                 self._tally.note("fused")
                 if encode:
                     self._tally.note("encoded")
-                else:
-                    self._keep(named, is_fused=True)
         except BackendError as fault:
             self._tally.drop("wrong")
             self._fault = fault
-            if growing.next_index == number:  # else it waits, or was listed
-                growing.leave_out(str(fault))
-                growing.pass_by(frame.stamp_s, frame.world_from_camera)
+            if mapper.next_index == number:  # else it waits, or was listed
+                mapper.leave_out(number, str(fault))
+                mapper.pass_by(frame.stamp_s, frame.world_from_camera)
         except AvlmapsError as fault:
             self._tally.drop("wrong")
             self._doubt(str(fault))
         self._in_hand_s = None
         self._tally.took(time.perf_counter() - arrived_s)
 
-    def _has_time(self, arrived_s: float) -> bool:
-        """Return whether a frame may be encoded at once."""
-        return not self._is_pressed or time.perf_counter() - arrived_s <= self.settings.fresh_s
-
-    def _keep(self, frame: Frame, *, is_fused: bool, times: float = 1.0) -> bool:
-        """Keep a frame until there is time, where looking at it will bring something; return whether it is stored."""
-        if not self._kept.most or not self._growing.looks_again:
-            return False
-        worth = self._encoding.worth_later(frame)
-        try:
-            return self._kept.keep(frame, times * worth if worth > LATER_SHARE else 0.0, is_fused=is_fused)
-        except MapError as fault:
-            self._doubt(str(fault))
-            return False
-
-    def _to_look_at(self) -> int:
-        """Return how many frames on the disk are to be looked at before the end."""
-        return 0 if self._leaves_kept else len(self._kept)
-
-    def _look_again(self) -> None:
-        """Encode the frame that is worth most of those on the disk, unless it brings nothing any more."""
-        self._is_known = False
-        if not (self._growing.sums or self._closing):  # they add to the first frames, which wait for one another
-            return
-        came_s, taken = time.perf_counter(), None
-        try:
-            if not self._growing.sums:  # the drive is over before all of these came
-                self._growing.settle()
-            taken = self._kept.take() if self._growing.sums else None
-            if taken is not None and self._encoding.opens_again(taken[0]):
-                self._growing.look_again(taken[0], is_fused=taken[1])
-                self._unsaved.note(came_s)
-                self._tally.note("encoded later")
-        except AvlmapsError as fault:
-            self._doubt(str(fault))
-            if taken is not None and not taken[1]:
-                self._growing.leave_out(str(fault))
-        if not self._growing.sums:  # no first frame was right
-            self._kept.close()
-
     def _correct(self) -> None:
         with self._door:
             stamps_s, poses, answer = self._to_correct.popleft()
         try:
-            moved = self._growing.correct_poses(stamps_s, poses)
+            moved = self._mapper.correct_poses(stamps_s, poses)
         except BaseException as fault:
             answer.set_exception(fault)
             if not isinstance(fault, AvlmapsError):
                 raise
             return
-        self._unsaved.note(time.perf_counter())
+        self._came(time.perf_counter())
         self._tally.note("corrected")
         self._check = PoseCheck()  # the next pose is of the corrected world, which is no jump
         answer.set_result(moved)
 
-    def _freeze(self) -> None:
-        try:
-            came = self._growing.freeze(), time.perf_counter()
-            self._unsaved.freeze(came[1])
-        except MapError:  # up and the floor are not found yet
-            came = None
+    def _came(self, arrived_s: float) -> None:
         with self._door:
-            self._answer(came)
-
-    def _answer(self, came: "_Came | None") -> None:
-        """Give the thread behind what it waits for, if it does; under the door."""
-        if self._asked is not None:
-            self._asked.set_result(came)
-            self._asked = None
-
-    def _break(self, fault: BaseException) -> None:
-        """Note what broke a thread; it is raised at every frame to come."""
-        self._broken = fault
+            self._new_s = arrived_s if self._new_s is None else min(self._new_s, arrived_s)
 
     def _doubt(self, sentence: str) -> None:
         if len(self._doubts) < _MOST_DOUBTS and sentence not in self._doubts:
@@ -664,73 +544,50 @@ class LiveMap:
 
     # The thread behind
 
-    def _work_behind(self) -> None:
-        """Make snapshots and saves until the map is closed; what breaks this is raised at every frame to come."""
-        try:
-            self._publish_all()
-        except BaseException as fault:
-            self._break(fault)
-            raise
-
     def _publish_all(self) -> None:
-        from_s, known = 0.0, (0,) * len(_CHANGES)
-        while not self._stop_behind.wait(_IDLE_S):
-            begin_s, state = time.perf_counter(), tuple(map(self._tally.of, _CHANGES))
-            if state == known or begin_s < from_s:
-                self._try(self._publish_sounds)
-            elif (came := self._what_came()) is not None and not (self._closing and not self._to_look_at()):
-                known = state
-                self._try(partial(self._publish, *came))
+        """Make snapshots and saves until the map is closed."""
+        next_s = save_s = 0.0
+        while not self._stop_behind.wait(_LISTEN_S):
+            begin_s = time.perf_counter()
+            if self._mapper.start is None or (self._closing and self._fuser_ended):
+                continue
+            try:
+                absorb = self._new_s is not None and begin_s >= next_s
+                self._publish(begin_s, absorb=absorb)
                 end_s = time.perf_counter()
-                from_s = max(begin_s + self.settings.snapshot_s, end_s + min(end_s - begin_s, _REST_S))
+                if absorb:
+                    next_s = max(begin_s + self.settings.snapshot_s, end_s + min(end_s - begin_s, _REST_S))
+                if self._shown_s is not None and end_s >= save_s:
+                    self._save()
+                    save_s = max(end_s + self.settings.save_s, time.perf_counter() + _REST_S)
+            except AvlmapsError as fault:
+                self._doubt(str(fault))
 
-    def _try(self, work: Callable[[], None]) -> None:
-        try:
-            work()
-        except AvlmapsError as fault:
-            self._doubt(str(fault))
-
-    def _what_came(self) -> "_Came | None":
-        """Let the thread that fuses freeze what came; None where there is nothing, or it has ended."""
+    def _publish(self, now_s: float, *, absorb: bool) -> None:
+        """Make a snapshot, and put it in the place of the last one if something came."""
+        before = None if self._snapshot is None else self._snapshot[0].stored.data
+        if before is None and not absorb:
+            return
+        if absorb:
+            with self._door:
+                new_s, self._new_s = self._new_s, None
+                self._shown_s = min(one for one in (self._shown_s, new_s, now_s) if one is not None)
+        made = self._mapper.snapshot(absorb=absorb)
+        if before is not None and all(
+            getattr(made, name) is getattr(before, name) for name in ("voxels", "sounds", "sources")
+        ):
+            return
         with self._door:
-            if self._fuser_ended:
-                return None
-            self._asked = answer = Future()
-            self._door.notify_all()
-        return answer.result()
+            self._shown_s = now_s if self._shown_s is None else self._shown_s
+        self._show(made, now_s if absorb or self._snapshot is None else self._snapshot[1])
 
-    def _publish(self, came: FrozenSums, came_s: float) -> None:
-        heard_s = time.perf_counter()
-        with self._growing.finishing:
-            if not self._growing.is_current(came):  # poses were corrected since: the next one has them
-                return
-            stored = self._growing.finish(came, looks_s=_LOOKS_S)
-        self._saver.offer(stored, came_s, heard_s)
-        self._show(stored, came_s)
+    def _save(self) -> None:
+        assert self._snapshot is not None
+        write(self.path, self._snapshot[0].stored.data)
+        self._saved_s, self._shown_s = self._snapshot[1], None
 
-    def _publish_sounds(self) -> None:
-        """Put sounds that ended since the last snapshot into it: a person asks for them at once."""
-        now_s, snapshot = time.perf_counter(), self._snapshot
-        if snapshot is None or now_s < self._listened_s + _LISTEN_S:
-            return
-        self._listened_s = now_s
-        stored, heard = snapshot[0].stored, self._growing.heard()
-        if heard is None:
-            return
-        if not np.array_equal(heard.offset_s, stored.sounds.offset_s):
-            newer = self._growing.with_sounds(stored, heard)  # a name need not wait for its source
-        elif stored.data.sources_wait:
-            newer = self._growing.with_sources(stored)
-        else:
-            return
-        if newer is not stored:
-            self._unsaved_sounds.note(now_s)
-            self._unsaved_sounds.freeze(now_s)
-            self._saver.offer(newer, snapshot[1], now_s)
-            self._show(newer, snapshot[1])
-
-    def _show(self, stored: StoredMap, came_s: float) -> None:
-        made = AVLMap(stored, self._query)
+    def _show(self, data: MapData, came_s: float) -> None:
+        made = AVLMap(StoredMap(IN_MEMORY, data, self._mapper.encoders), self._query)
         if self._generation:
             _warm(made)
         else:  # it loads and compiles what every question needs, which takes longer than the next snapshot may wait

@@ -84,26 +84,10 @@ def follow(
 
 
 def end_drive(live: LiveMap, tell: Callable[[str], None] = say) -> None:
-    """Close a map, and report what that finds odd; where Ctrl-C comes meanwhile, without the frames that wait."""
+    """Close a map, and report what that finds odd."""
     told = set(live.doubts)
-    if waiting := live.status().kept:
-        tell(f"{waiting} frames wait that there was no time for. What is saved stays; Ctrl-C leaves them out.")
-    try:
-        live.close()
-    except KeyboardInterrupt:
-        end_now(live, tell)
+    live.close()
     tell_doubts(live, told, tell)
-
-
-def end_now(live: LiveMap, tell: Callable[[str], None] = say) -> None:
-    """Close a map without the frames that wait on the disk, also one that another thread closes."""
-    left = live.status().kept
-    live.close(kept=False)
-    if left:
-        tell(
-            f"note: Stopped by Ctrl-C: {left} frames that waited are left out. The map is finished; it lacks what they "
-            "alone have seen, and their part of the features."
-        )
 
 
 def _add(live: LiveMap, frame: Frame, *, wait: bool = False) -> None:

@@ -18,11 +18,8 @@ class LiveStatus:
         frames_in: frames that came, refused ones left out.
         fused: frames that are in the map's sums.
         encoded: of these, how many were given to the encoder; the others added their surface and colours.
-        encoded_later: frames that were given to it when there was time, also such that a gate had dropped.
-        kept: frames that wait on the disk for that.
         dropped: frames that are not, by reason: ``late`` (others were waiting), ``still`` (the camera did not move),
             ``known`` (no new surface), ``wrong`` (an encoder failed on it).
-        late_kept: of the late frames, how many were put on the disk, to come into the map when there is time.
         refused: frames and pieces of sound that were no such thing, or out of order.
         waiting: frames that wait.
         frame_ms_p50: milliseconds from a frame's arrival until it is in the sums or dropped by a gate, median.
@@ -32,8 +29,7 @@ class LiveStatus:
         sounds: of the last snapshot.
         snapshot_age_s: since what the last snapshot holds came; NaN without one.
         saved_age_s: since what the last save holds came; NaN without one. It grows also while nothing new comes.
-        unsaved_s: since the oldest frame or sound came that a kill would lose now; 0 where there is none. Frames that
-            wait on the disk are not counted here, but by ``kept``: a kill loses them as well.
+        unsaved_s: since the oldest frame or sound came that a kill would lose now; 0 where there is none.
         memory_mb: resident memory of the process; 0 where the system does not say.
         sound_gaps: gaps in the sound, which are silent.
         doubts: one sentence for each thing that is not as it should be.
@@ -42,10 +38,7 @@ class LiveStatus:
     frames_in: int
     fused: int
     encoded: int
-    encoded_later: int
-    kept: int
     dropped: dict[str, int]
-    late_kept: int
     refused: int
     waiting: int
     frame_ms_p50: float
@@ -69,11 +62,9 @@ class LiveStatus:
     def __str__(self) -> str:
         dropped = ", ".join(f"{count} {reason}" for reason, count in sorted(self.dropped.items()))
         took = "" if np.isnan(self.frame_ms_p95) else f", p95 {self.frame_ms_p95:.0f} ms"
-        stored = f"; {self.late_kept} of the late ones stored" if self.late_kept else ""
         return (
-            f"{self.frames_in} frames came, {self.fused} fused, {self.encoded} of them encoded, "
-            f"{self.encoded_later} later "
-            f"({dropped or 'none'} dropped{stored}){took}; "
+            f"{self.frames_in} frames came, {self.fused} fused, {self.encoded} of them encoded "
+            f"({dropped or 'none'} dropped){took}; "
             f"{self.voxels} voxels, {self.keyframes} keyframes, {self.sounds} sounds; {self.memory_mb:.0f} MB"
         )
 

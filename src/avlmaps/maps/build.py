@@ -1,33 +1,56 @@
-"""From a recording to a map. ``build_map`` is the whole of it; each stage stores what it finished."""
+"""From a recording to a map: a ``Mapper`` takes its frames, and what each stretch of them brings is stored."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Sequence
+from contextlib import closing
+from dataclasses import fields
+from itertools import islice
 from pathlib import Path
+from typing import Protocol
 
-from avlmaps.core.errors import MapError
+import msgspec
+import numpy as np
+
+from avlmaps.core.ahead import run_ahead
+from avlmaps.core.arrays import Float32
+from avlmaps.core.errors import MapError, RecordingError
 from avlmaps.core.files import user_path
-from avlmaps.core.progress import silence_progress
+from avlmaps.core.progress import progress, silence_progress
 from avlmaps.core.registry import Kind
-from avlmaps.maps.grid import GridSpec
-from avlmaps.maps.pipeline.check import checked
-from avlmaps.maps.pipeline.encode_fuse import encode_and_fuse, fuse_spans
-from avlmaps.maps.pipeline.estimate import attach_estimated_ground, estimate_sensor, find_floor, find_sensor, find_up
-from avlmaps.maps.pipeline.keyframes import describe_keyframes
-from avlmaps.maps.pipeline.parts import MapPart, load_part, merge_parts
-from avlmaps.maps.pipeline.plan import claim, fusion_key, make_plan, require_unchanged
-from avlmaps.maps.pipeline.sounds import detect_sounds
-from avlmaps.maps.pipeline.sources import locate_sources
-from avlmaps.maps.pipeline.workers import ALONE, Workers
-from avlmaps.maps.pipeline.write import surfaces, write
+from avlmaps.core.wording import option
+from avlmaps.maps.check import doubts_of
+from avlmaps.maps.estimate import Start
+from avlmaps.maps.fusion.free_space import FreeViews
+from avlmaps.maps.fusion.voxel_sums import VoxelSums
+from avlmaps.maps.gravity.floor import GroundedRecording
+from avlmaps.maps.mapper import Mapper, MapState
+from avlmaps.maps.perceived import encode_pixels
+from avlmaps.maps.plan import BuildPlan, Span, claim, make_plan, require_unchanged, strip_folder
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
+from avlmaps.maps.store.checkpoints import find_checkpoint, load_checkpoint, save_checkpoint
+from avlmaps.maps.store.folder import MANIFEST, is_map_or_free, write
 from avlmaps.maps.store.lock import lock_folder
+from avlmaps.maps.store.manifest import BadFrame
 from avlmaps.maps.store.reader import StoredMap, describe, open_stored
-from avlmaps.perception.cache.cached_encoders import with_cache
+from avlmaps.maps.types import Keyframes
+from avlmaps.perception.cache.cached_encoders import cache_note, with_cache
 from avlmaps.perception.cache.feature_store import DEFAULT_CACHE, CacheSettings
 from avlmaps.perception.encoders import Encoders, encoders_of
 from avlmaps.perception.profiles import Profile
-from avlmaps.recordings.types import Recording
+from avlmaps.perception.protocols import BatchPixelEncoder, PixelEncoder
+from avlmaps.recordings.types import Frame, Recording
 
-__all__ = ["BuildSettings", "CacheSettings", "build_map", "build_part", "describe", "merge_parts", "open_stored"]
+__all__ = ["BuildSettings", "CacheSettings", "build_map", "describe", "open_stored"]
+
+_MOST_HELD = 4  # frames in memory for each that is encoded
+EncodedFrame = tuple[Frame | BadFrame, Float32[np.ndarray, "hf wf d"] | None]
+
+
+class Workers(Protocol):
+    """Who maps stretches of a recording: a cluster."""
+
+    def map_spans(self, plan: BuildPlan, start: Start, jobs: dict[Path, Span]) -> Iterator[Path]:
+        """Store what each stretch of frames brings in its folder (``map_span``); yield each that is done."""
+        ...
 
 
 def build_map(
@@ -37,8 +60,7 @@ def build_map(
     settings: BuildSettings = DEFAULTS,
     *,
     cache: CacheSettings = DEFAULT_CACHE,
-    parts: Sequence[Path | str] = (),
-    workers: Workers = ALONE,
+    workers: Workers | None = None,
     allow: Sequence[str] = (),
     resume: bool = True,
     overwrite: bool = False,
@@ -46,8 +68,8 @@ def build_map(
 ) -> StoredMap:
     """Build a map of a recording, or finish one that was begun.
 
-    A build that is killed at any instant continues from its last finished part when it is started again, and ends with
-    the same map, bit by bit. A finished map in the folder stays whole and readable until the new one replaces it.
+    A build that is killed at any instant continues from its last finished stretch of frames when it is started again,
+    and ends with the same map. A finished map in the folder stays whole and readable until the new one replaces it.
 
     Args:
         recording: from ``open_recording``.
@@ -55,8 +77,7 @@ def build_map(
         profile: which models perceive: encoders, a profile, or a profile's name.
         settings: all that can be chosen.
         cache: whether features are stored, so that another build of the same frames encodes nothing again.
-        parts: folders of ``build_part`` from other machines; their frames are not fused again.
-        workers: who fuses frames, describes keyframes and adds parts up: this process, or a cluster.
+        workers: who maps the stretches; this process if None.
         allow: names of reasons for which the recording is not refused (``recordings.consistency.verdict.Reason``).
         resume: continue with what a stopped build had finished; otherwise begin again.
         overwrite: replace a finished map there that came from another recording, or with other settings.
@@ -71,55 +92,209 @@ def build_map(
     plan = make_plan(recording, user_path(path), with_cache(encoders_of(profile), cache), settings)
     with silence_progress(not progress), lock_folder(plan.path):
         if claim(plan, resume, overwrite) is None:
-            plan = checked(plan, allow)
-            up = find_up(plan)
-            plan, floor = find_floor(plan, up.up)
-            sensor = find_sensor(plan)
-            fused = encode_and_fuse(plan, parts, sensor, workers.fuse)
-            keyframes = describe_keyframes(plan, fused, workers.describe)  # their keypoints, places and views
-            sounds = detect_sounds(plan)
-            views = [part.views() for part in fused]
-            merged = surfaces(plan, workers.add_up(plan, fused), views, sensor)  # late: the sums fill the memory
-            grid = GridSpec(plan.settings.voxel_size_m)
-            sources = locate_sources(plan.recording, up.up.vector(), sounds.sounds, merged.voxels, grid)
+            doubts = doubts_of(recording, allow)
+            start = Start.of(recording, plan.settings)
+            _map_frames(plan, start, workers)
+            mapper = Mapper.of_recording(
+                recording, plan.settings, plan.encoders, start, plan.keyframes, plan.key, doubts
+            )
+            for folder in plan.spans():
+                mapper.add_state(_load_state(folder, plan))
+            made = mapper.finish()
             require_unchanged(plan, stamp)
-            write(plan, up, floor, fused, keyframes, sounds, merged, sources)
+            write(plan.path, made)
     return open_stored(plan.path)
 
 
-def build_part(
-    recording: Recording,
-    start: int,
-    stop: int,
-    out: Path | str,
-    profile: str | Profile | Encoders = "embedded",
-    settings: BuildSettings = DEFAULTS,
-    cache: CacheSettings = DEFAULT_CACHE,
-) -> MapPart:
-    """Fuse the frames ``start`` to ``stop - 1`` and keep their sums in a folder, as one machine's part of a map.
+def require_place(path: Path, overwrite: bool) -> None:
+    """Raise ``MapError`` where no map can go: on something else, or on a map that is not to be replaced."""
+    if not is_map_or_free(path):
+        raise MapError(f"{path} is there already and is not a map; give another path, nothing in it was touched.")
+    if (path / MANIFEST).is_file() and not overwrite:
+        raise MapError(
+            f"{path} is a finished map already; give another path, or replace it with {option('overwrite')}."
+        )
 
-    Args:
-        recording: what all machines read.
-        start: first frame, from 0.
-        stop: one past the last frame.
-        out: the part's folder; a part that is there already, of the same frames and settings, is returned.
-        profile: which models perceive.
-        settings: the same on all machines.
-        cache: whether features are stored for another build.
+
+def map_span(plan: BuildPlan, start: Start, frames: Iterable[EncodedFrame], folder: Path) -> None:
+    """Map a stretch of frames and store what it brings.
 
     Raises:
-        MapError: there are no such frames, or too many of them cannot be read.
+        BackendError: an encoder failed.
+        MapError: the folder cannot be written.
     """
-    out, used = user_path(out), with_cache(encoders_of(profile), cache)
-    settings = settings.for_profile(used.weight_variance_m2)
-    if not 0 <= start < stop <= len(recording):
-        raise MapError(f"There are no frames {start} to {stop}; {recording.path} has frames 0 to {len(recording)}.")
-    key, span = fusion_key(recording, settings, used), (start, stop, settings.frames.step)
-    if out.exists() and any(out.iterdir()):
-        part = load_part(out, key)
-        if part.info.spans != (span,):
-            raise MapError(f"{out} holds a part of other frames; give another folder, or remove it first.")
-        return part
-    known = attach_estimated_ground(recording, settings) if Kind.PIXELS in used else recording
-    fuse_spans(known, [(span, out)], used, settings, estimate_sensor(recording, settings).model)
-    return load_part(out, key)
+    mapper = Mapper.of_recording(plan.recording, plan.settings, plan.encoders, start, plan.keyframes)
+    for frame, features in frames:
+        if isinstance(frame, BadFrame):
+            mapper.leave_out(frame.index, frame.why)
+        else:
+            mapper.add(frame, features, encode=False)
+    _save_state(folder, plan, mapper.state())
+
+
+def spans_of_frames(plan: BuildPlan, start: Start, spans: Sequence[Span]) -> Generator[EncodedFrame]:
+    """Yield the frames of stretches with their features, decoded and encoded ahead, each in a thread of its own."""
+    encoders = plan.encoders
+    encoder = encoders.pixels if Kind.PIXELS in encoders else None
+    grounded = GroundedRecording(plan.recording, start.ground)
+    chosen = plan.keyframes if encoders.keyframes_only else None
+    return encode_frames(grounded, [range(*span) for span in spans], encoder, chosen)
+
+
+def _map_frames(plan: BuildPlan, start: Start, workers: Workers | None) -> None:
+    """Map all frames that no stored state covers yet."""
+    spans, step = plan.spans(), plan.settings.frames.step
+    jobs = {folder: span for folder, span in spans.items() if find_checkpoint(folder, _Facts, plan.key) is None}
+    bad = sum(len(_bad_of(folder, plan)) for folder in spans if folder not in jobs)
+    tolerance = _Tolerance(plan, bad)
+    total = len(range(0, len(plan.recording), step))
+    done = total - sum(len(range(*span)) for span in jobs.values())
+    if not jobs:
+        return
+    if workers is not None:
+        ended = workers.map_spans(plan, start, jobs)
+        for folder in progress(ended, "fusing", total=total, done=done, size=lambda at: len(range(*jobs[at]))):
+            for one in _bad_of(folder, plan):
+                tolerance.meet(one)
+        return
+    with closing(spans_of_frames(plan, start, list(jobs.values()))) as ahead:
+        note = lambda: cache_note(plan.encoders, Kind.PIXELS)  # noqa: E731
+        seen = tolerance.watch(progress(ahead, "fusing", total=total, done=done, note=note))
+        for folder, span in jobs.items():
+            map_span(plan, start, islice(seen, len(range(*span))), folder)
+        for _ in seen:  # nothing is left; this completes the bar
+            pass
+
+
+class _Tolerance:
+    """Counts the frames that cannot be read, and says when there are too many."""
+
+    def __init__(self, plan: BuildPlan, known: int) -> None:
+        frames = plan.settings.frames
+        self._total = len(range(0, len(plan.recording), frames.step))
+        self._allowed = int(frames.max_bad_share * self._total) if frames.on_bad == "skip" else 0
+        self._met = known
+
+    def watch(self, frames: Iterable[EncodedFrame]) -> Iterator[EncodedFrame]:
+        """Yield frames, and count those that cannot be read."""
+        for frame, features in frames:
+            if isinstance(frame, BadFrame):
+                self.meet(frame)
+            yield frame, features
+
+    def meet(self, bad: BadFrame) -> None:
+        """Take note of one more; raise ``RecordingError`` when there are more than allowed."""
+        self._met += 1
+        if self._met <= self._allowed:
+            return
+        if self._allowed == 0:
+            raise RecordingError(bad.why)
+        raise RecordingError(
+            f"{self._met} of {self._total} frames cannot be read, more than the {self._allowed} that may be left out; "
+            f"fix the recording or allow more ({option('max-bad-share')}). The last: {bad.why}"
+        )
+
+
+class _Facts(msgspec.Struct):
+    bad: tuple[BadFrame, ...]
+
+
+_ARRAYS = {"sums": VoxelSums, "views": FreeViews, "keyframes": Keyframes}
+
+
+def _save_state(folder: Path, plan: BuildPlan, state: MapState) -> None:
+    arrays = {"stamp_s": state.stamp_s, "pose": state.pose}
+    for name, kind in _ARRAYS.items():
+        arrays |= {f"{name}_{one.name}": getattr(getattr(state, name), one.name) for one in fields(kind)}
+    save_checkpoint(folder, plan.key, _Facts(state.bad), arrays)
+
+
+def _load_state(folder: Path, plan: BuildPlan) -> MapState:
+    found = load_checkpoint(folder, _Facts, plan.key)
+
+    def part(name: str) -> dict[str, np.ndarray]:
+        return {one.name: found.arrays[f"{name}_{one.name}"] for one in fields(_ARRAYS[name])}
+
+    return MapState(
+        VoxelSums(**part("sums")), FreeViews(**part("views")), Keyframes(**part("keyframes")),
+        found.arrays["stamp_s"], found.arrays["pose"], found.facts.bad,
+    )  # fmt: skip
+
+
+def _bad_of(folder: Path, plan: BuildPlan) -> tuple[BadFrame, ...]:
+    return load_checkpoint(folder, _Facts, plan.key).facts.bad
+
+
+def encode_frames(
+    recording: Recording,
+    stretches: Sequence[Sequence[int]],
+    encoder: PixelEncoder | None,
+    chosen: Collection[int] | None = None,
+) -> Generator[EncodedFrame]:
+    """Yield the frames with their features, in order; one that cannot be read yields its fault in its place.
+
+    Args:
+        recording: where the frames are.
+        stretches: numbers of frames; no batch reaches from one stretch into the next, so that a build that continues
+            from a stretch encodes the same batches as one that was never stopped.
+        encoder: None yields frames alone.
+        chosen: numbers of the frames to encode, the others coming alone; None encodes all.
+    """
+    every = [index for stretch in stretches for index in stretch]
+    size = 1 if encoder is None else batch_of(encoder)
+    with closing(run_ahead(decode_frames(recording, every), max(2, size))) as frames:
+        if encoder is None:
+            yield from ((frame, None) for frame in frames)
+            return
+        lengths = [len(stretch) for stretch in stretches]
+        with closing(run_ahead(encode_batches(frames, lengths, encoder, size, chosen))) as seen:
+            yield from seen
+
+
+def decode_frames(recording: Recording, indices: Iterable[int]) -> Generator[Frame | BadFrame]:
+    """Read frames; for one that cannot be read, yield the sentence that says why."""
+    for index in indices:
+        try:
+            yield recording.frame(index)
+        except RecordingError as fault:
+            yield BadFrame(index=index, why=strip_folder(str(fault), recording))
+
+
+def encode_batches(
+    frames: Iterator[Frame | BadFrame],
+    lengths: Sequence[int],
+    encoder: PixelEncoder,
+    size: int,
+    chosen: Collection[int] | None = None,
+) -> Generator[EncodedFrame]:
+    """Add features to frames, or to the chosen ones, at most ``size`` of them at once, stretch by stretch."""
+
+    def counts(frame: Frame | BadFrame) -> bool:
+        return isinstance(frame, Frame) and (chosen is None or frame.index in chosen)
+
+    for length in lengths:
+        stretch = islice(frames, length)
+        while group := _next_group(stretch, size, counts):
+            wanted = [frame for frame in group if isinstance(frame, Frame) and counts(frame)]
+            features = iter(encode_pixels(encoder, wanted))
+            for frame in group:
+                yield frame, (next(features) if counts(frame) else None)
+
+
+def _next_group(
+    frames: Iterator[Frame | BadFrame], size: int, counts: Callable[[Frame | BadFrame], bool]
+) -> list[Frame | BadFrame]:
+    """Take ``size`` frames that count, and the others among them; where none waits, one that does not goes alone."""
+    group: list[Frame | BadFrame] = []
+    good = 0
+    for frame in frames:
+        group.append(frame)
+        good += counts(frame)
+        if good == size or not good or len(group) >= _MOST_HELD * size:
+            break
+    return group
+
+
+def batch_of(encoder: PixelEncoder) -> int:
+    """Return how many frames an encoder is to be given at once."""
+    return max(1, encoder.batch) if isinstance(encoder, BatchPixelEncoder) else 1

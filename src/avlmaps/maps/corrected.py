@@ -17,11 +17,11 @@ from avlmaps.core.timeline import Trajectory
 from avlmaps.core.wording import option
 from avlmaps.maps.audio.events import WalkedTrack, track_of
 from avlmaps.maps.audio.segmentation import Segment
+from avlmaps.maps.finish import carving_doubts
 from avlmaps.maps.fusion.free_space import FreeViews, clean, count_where_it_matters
-from avlmaps.maps.fusion.moved_submaps import MovedSubmaps
 from avlmaps.maps.fusion.sensor import NONE
-from avlmaps.maps.pipeline.sources import locate_sources
-from avlmaps.maps.pipeline.write import carving_doubts
+from avlmaps.maps.fusion.submaps import MovedSubmaps
+from avlmaps.maps.located import locate_sources
 from avlmaps.maps.pose_correction import PoseCorrection
 from avlmaps.maps.store.folder import write
 from avlmaps.maps.store.lock import lock_folder

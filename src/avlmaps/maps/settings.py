@@ -7,7 +7,7 @@ from avlmaps.core.errors import MapError
 from avlmaps.core.numbers import hold_numbers
 from avlmaps.maps.audio.settings import HearingSettings
 from avlmaps.maps.fusion.sensor import FusionSettings
-from avlmaps.maps.keyframes.describe import KeyframeSettings
+from avlmaps.maps.keyframes.choose import KeyframeSettings
 
 SUBMAP_FRAMES = 32
 """Frames of a submap: fewer follow corrections more closely and take more room (docs/guides/map-while-you-drive.md)."""

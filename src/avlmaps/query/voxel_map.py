@@ -12,8 +12,12 @@ from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import MapError
 from avlmaps.core.files import lasting_path
 from avlmaps.core.numbers import as_number
-from avlmaps.maps.growing import GrowingMap
+from avlmaps.maps.build import require_place
+from avlmaps.maps.mapper import Mapper
 from avlmaps.maps.settings import BuildSettings
+from avlmaps.maps.store.folder import write
+from avlmaps.maps.store.lock import lock_folder
+from avlmaps.maps.store.reader import StoredMap, open_stored
 from avlmaps.perception.encoders import Encoders, encoders_of
 from avlmaps.perception.profiles import Profile
 from avlmaps.query.avlmap import AVLMap, QuerySettings
@@ -26,16 +30,16 @@ if TYPE_CHECKING:
     from avlmaps.query.locate import Located
 
 _STEP_S = 0.1
+IN_MEMORY = Path("the frames")  # as sentences name a map that has no folder
 
 
 class VoxelMap:
     """A map in memory: ``add`` frames, ``ask``, ``save``. It is the map that ``build_map`` makes of the same frames.
 
-    Up, the floor and the depth camera's error are found in the first 60 frames, which are fused then; of a longer walk,
-    up and the floor again each time it has doubled. A map of more frames than that can hence differ a little from a
-    build's. A question before changes nothing of that, but fuses those frames again. A question after new frames
-    computes the voxels again. Sounds are found while they happen, and in ``save`` as a build finds them. Threads may
-    add and ask.
+    Up, the floor and the depth camera's error are found in the first 60 frames, which are fused then, or with the first
+    question; up and the floor again when a question comes after the walk has doubled, and in ``save``. The map of a
+    longer walk can hence differ a little from a build's. A question after new frames computes the voxels again. Sounds
+    are found while they happen, and in ``save`` as a build finds them. Threads may add and ask.
     """
 
     def __init__(
@@ -66,7 +70,7 @@ class VoxelMap:
         require_kinds(("settings", settings, BuildSettings), ("query", query, QuerySettings))
         chosen = replace(settings or BuildSettings(), voxel_size_m=edge_m)
         used = encoders_of("embedded" if encoders is None else encoders)
-        self._growing = GrowingMap(chosen, used, direction(up_in_world))
+        self._mapper = Mapper(chosen, used, direction(up_in_world))
         self._query = query
         self._map: AVLMap | None = None
         self._lock = RLock()
@@ -90,12 +94,12 @@ class VoxelMap:
             BackendError: so are the features, or what the encoder gave.
         """
         with self._lock:
-            index, last_s = self._growing.next_index, self._growing.last_stamp_s
+            index, last_s = self._mapper.next_index, self._mapper.last_stamp_s
             if stamp_s is None:
                 stamp_s = 0.0 if last_s is None else last_s + _STEP_S
             frame = given_frame(index, rgb, depth_m, camera, world_from_camera, stamp_s)
-            self._growing.add(frame, features)
             self._map = None
+            self._mapper.add(frame, None if features is None else self._mapper.checked(features, frame))
 
     def add_audio(self, chunk: Any, stamp_s: Any = None) -> None:
         """Add a piece of the microphone's sound. What is refused leaves the map as it was.
@@ -112,7 +116,7 @@ class VoxelMap:
             AudioError: it is no sound, is of another rate, repeats what came, or is of another clock.
         """
         with self._lock:
-            self._growing.add_audio(chunk, stamp_s)
+            self._mapper.add_sound(chunk, stamp_s)
             self._map = None
 
     def correct_poses(self, stamps_s: Any, poses: Any) -> tuple[float, float]:
@@ -133,7 +137,7 @@ class VoxelMap:
             RecordingError: a pose is no rigid motion.
         """
         with self._lock:
-            moved = self._growing.correct_poses(stamps_s, poses)
+            moved = self._mapper.correct_poses(stamps_s, poses)
             self._map = None
             return moved
 
@@ -146,7 +150,7 @@ class VoxelMap:
         """
         with self._lock:
             if self._map is None:
-                self._map = AVLMap(self._growing.stored(), self._query)
+                self._map = AVLMap(StoredMap(IN_MEMORY, self._mapper.snapshot(), self._mapper.encoders), self._query)
             return self._map
 
     @property
@@ -207,15 +211,21 @@ class VoxelMap:
             MapError: there is nothing to write, the folder is something else or a map, or it cannot be written.
         """
         with self._lock:
-            return AVLMap(self._growing.save(lasting_path(path), overwrite=overwrite), self._query)
+            place = lasting_path(path)
+            require_place(place, overwrite)
+            made = self._mapper.finish()
+            with lock_folder(place):
+                write(place, made)
+            stored = replace(open_stored(place), encoders=self._mapper.encoders)
+            return AVLMap(stored, self._query)
 
     def __len__(self) -> int:
         """Return how many frames are in the map."""
-        return len(self._growing)
+        return len(self._mapper)
 
     def __repr__(self) -> str:
-        encoders = self._growing.encoders
-        return f"VoxelMap({len(self)} frames, voxels of {self._growing.settings.voxel_size_m:g} m, {encoders!r})"
+        encoders = self._mapper.encoders
+        return f"VoxelMap({len(self)} frames, voxels of {self._mapper.settings.voxel_size_m:g} m, {encoders!r})"
 
 
 def require_kinds(*given: tuple[str, object, type]) -> None:

@@ -20,22 +20,22 @@ from avlmaps.maps.audio.settings import HearingSettings, SoundChangeSettings
 from avlmaps.maps.types import HeardSounds
 from avlmaps.perception.protocols import FrameSoundEncoder, SoundEncoder
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
-from avlmaps.recordings.types import Recording
 
 _NEAR_M = 1e-4  # places nearer than this are one
 _EDGE_S = 0.05  # quiet is only what is this far from a sound
 
 
 def detect_events(
-    recording: Recording, encoder: SoundEncoder, settings: HearingSettings, clips_folder: Path
+    track: AudioTrack, walk: "WalkedTrack", encoder: SoundEncoder, settings: HearingSettings, clips_folder: Path
 ) -> HeardSounds:
-    """Find the sounds of a recording, encode each whole, and return the robot's path during each.
+    """Find the sounds of a track, encode each whole, and return the robot's path during each.
 
     An encoder with a feature for each short step of time encodes the whole track, which is then divided where the
     features change (``maps.audio.change_points``); only digital silence, samples that are all zero, is left out.
 
     Args:
-        recording: the walk; without a track it has no sounds.
+        track: the sound.
+        walk: where the robot was.
         encoder: gives a sound one feature or more, one for each window or step of it.
         settings: how.
         clips_folder: where each sound is written as FLAC, as it was heard, named by its onset; made if need be.
@@ -48,20 +48,17 @@ def detect_events(
         BackendError: the encoder's features are not what its card says, or it has none for each step and ``cut`` is
             ``changes``.
     """
-    if recording.audio is None:
-        return collect([], encoder.card.dim)
     clips_folder.mkdir(parents=True, exist_ok=True)
     if cuts_by_changes(encoder, settings):
-        pieces = by_changes(recording.audio, cast("FrameSoundEncoder", encoder), settings.changes)
+        pieces = by_changes(track, cast("FrameSoundEncoder", encoder), settings.changes)
     else:
-        pieces = _by_energy(recording.audio, encoder, settings)
-    motion = WalkedTrack(recording.stamps_s, recording.world_from_camera)
+        pieces = _by_energy(track, encoder, settings)
     heard: list[StoredSound] = []
     for found, sound, feature in pieces:
         clip = clips_folder / f"{found.onset_s:010.3f}.flac"
         write_flac(clip, sound)
-        heard.append(StoredSound(found, track_of(motion, found), feature, clip))
-    _tell_outside(recording, [one.segment for one in heard])
+        heard.append(StoredSound(found, track_of(walk, found), feature, clip))
+    _tell_outside(walk, [one.segment for one in heard])
     return collect(heard, encoder.card.dim)
 
 
@@ -213,8 +210,8 @@ def collect(heard: Sequence[StoredSound], dim: int) -> HeardSounds:
     )
 
 
-def _tell_outside(recording: Recording, found: Sequence[Segment]) -> None:
-    first_s, last_s = float(recording.stamps_s[0]), float(recording.stamps_s[-1])
+def _tell_outside(walk: WalkedTrack, found: Sequence[Segment]) -> None:
+    first_s, last_s = float(walk.stamps_s[0]), float(walk.stamps_s[-1])
     outside = [one for one in found if one.offset_s < first_s or one.onset_s > last_s]
     if outside:
         say(

@@ -86,12 +86,11 @@ class GrowingSounds:
             self._loudest = max(self._loudest, float(powers.mean(axis=1).max()))
             self._powers.append(powers)
 
-    def heard(self, walk: WalkedTrack, *, final: bool) -> HeardSounds:
-        """Return the sounds until now.
+    def heard(self, walk: WalkedTrack) -> HeardSounds:
+        """Return the sounds that are over.
 
         Args:
             walk: where the robot was.
-            final: as if the track were over, and as a build finds them; else those that are over.
 
         Raises:
             AudioError: the samples cannot be read.
@@ -102,10 +101,8 @@ class GrowingSounds:
         dim = self._encoder.card.dim if self._encoder is not None else 0
         if track is None or self._encoder is None:
             return collect([], dim)
-        if final:
-            return collect(self._pieces(track, walk, final=True), dim)
         recent = track.since(self._window)
-        pieces = self._pieces(recent, walk, final=False, powers=powers)
+        pieces = self._pieces(recent, walk, powers)
         if recent.duration_s > 2.0 * _WINDOW_S:
             pieces = self._let_go(track, pieces)
         return collect([*self._old, *pieces], dim)
@@ -125,20 +122,18 @@ class GrowingSounds:
                 self._powers = [np.concatenate(self._powers)[steps:]]
         return left
 
-    def _pieces(
-        self, track: RawTrack, walk: WalkedTrack, *, final: bool, powers: Sequence[np.ndarray] = ()
-    ) -> list[StoredSound]:
-        over_s = np.inf if final else track.end_s - ENDED_S
+    def _pieces(self, track: RawTrack, walk: WalkedTrack, powers: Sequence[np.ndarray]) -> list[StoredSound]:
+        over_s = track.end_s - ENDED_S
         if self._by_changes:
             encoder = cast(FrameSoundEncoder, self._encoder)
             every = by_changes(track, encoder, self._settings.changes)
-            return [self._heard(walk, *piece) for piece in every if final or piece[0].offset_s <= over_s]
+            return [self._heard(walk, *piece) for piece in every if piece[0].offset_s <= over_s]
         found = self._segments(track, powers)
         pieces: list[StoredSound] = []
         for i, one in enumerate(found):
             if one.offset_s <= over_s:
                 sound = track.read(one.onset_s, one.offset_s)
-                pieces.append(self._heard(walk, one, sound, self._feature(sound, track, found, i, final=final)))
+                pieces.append(self._heard(walk, one, sound, self._feature(sound, track, found, i)))
         return pieces
 
     def _segments(self, track: RawTrack, powers: Sequence[np.ndarray]) -> list[Segment]:
@@ -148,7 +143,7 @@ class GrowingSounds:
         return segment_powers(lambda: (one for one in powers if len(one)), track, settings, self._loudest)
 
     def _feature(
-        self, sound: Sound, track: AudioTrack, found: list[Segment], index: int, *, final: bool
+        self, sound: Sound, track: AudioTrack, found: list[Segment], index: int
     ) -> Float32[np.ndarray, "windows d"]:
         """Return the features of a sound; those of the same samples in the same quiet are known."""
         here = found[index]
@@ -158,7 +153,7 @@ class GrowingSounds:
         if key in self._features:
             return self._features[key]
         settled = index + 1 < len(found) or track.end_s >= quiet[1][0] + self._settings.quiet_s
-        if not final and not settled and extent in self._features:  # with what follows the background is known better
+        if not settled and extent in self._features:  # with what follows the background is known better
             return self._features[extent]
         assert self._encoder is not None
         feature = feature_of(sound, track, found, index, self._encoder, self._settings)

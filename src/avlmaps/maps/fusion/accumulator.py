@@ -9,23 +9,20 @@ parts of a recording add up to the map of the whole.
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Float16, Float32, Float64, Int32
+from jaxtyping import Bool, Float, Float16, Float32, Float64, Int32, Int64
 
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import BackendError, MapError, RecordingError
-from avlmaps.maps.fusion import add_kernels as sums
-from avlmaps.maps.fusion import measure_kernels as kernels
-from avlmaps.maps.fusion.carving_kernels import drop_flying
-from avlmaps.maps.fusion.moved_submaps import MovedSubmaps
+from avlmaps.maps.fusion import kernels
 from avlmaps.maps.fusion.sensor import NONE, FusionSettings, SensorModel
-from avlmaps.maps.fusion.submap_kernels import SPREAD_COLUMNS, add_spread, finish_spread
-from avlmaps.maps.fusion.voxel_kernels import look_up_views
-from avlmaps.maps.fusion.voxel_sums import VoxelSums, VoxelTable, VoxelViews, with_rows
+from avlmaps.maps.fusion.voxel_sums import VoxelSums, VoxelTable, VoxelViews
 from avlmaps.maps.grid import GridSpec
-from avlmaps.maps.types import Submaps, Voxels
+from avlmaps.maps.types import Voxels
 from avlmaps.recordings.types import Frame
 
 FARTHEST_VOXEL = (1 << 31) - 2 * kernels.REACH_VOXELS  # indices are int32
+
+_FIRST_SLOTS = 1 << 14  # of the hash table of a frame's voxels
 
 __all__ = ["FusionSettings", "VoxelAccumulator", "VoxelSums"]
 
@@ -106,6 +103,29 @@ def _starts(row: Int32[np.ndarray, " n"], columns: int) -> Int32[np.ndarray, " n
     return np.where(row >= 0, row * np.int32(columns), -1).astype(np.int32)
 
 
+class _Scratch:
+    """Working memory of the compiled loops, for pictures of one size: no frame has more voxels or pairs than pixels."""
+
+    def __init__(self, height: int, width: int) -> None:
+        pixels = height * width
+        whole, real = np.dtype(np.int64), np.dtype(np.float64)
+        row = whole, real, whole, np.dtype(np.int32), np.dtype(np.int32)
+        self.row: kernels.Row = tuple(np.empty(width, dtype) for dtype in row)  # pyright: ignore[reportAttributeAccessIssue]
+        self.voxels: kernels.FrameVoxels = (
+            np.empty(_FIRST_SLOTS, np.int64), np.empty(_FIRST_SLOTS, np.int32), np.empty(pixels, np.int64),
+            np.empty((pixels, kernels.SUM_COLUMNS)),
+        )  # fmt: skip
+        self.pairs: kernels.Pairs = (
+            np.empty(pixels, np.int32), np.empty(pixels), np.empty(pixels, np.int32), np.empty(pixels, np.int32),
+            np.empty(kernels.RECENT_PAIRS, np.int32), np.empty(pixels, np.int32),
+        )  # fmt: skip
+
+    def enlarge(self) -> None:
+        """Double the hash table of the frame's voxels."""
+        slots = 2 * len(self.voxels[0])
+        self.voxels = np.empty(slots, np.int64), np.empty(slots, np.int32), *self.voxels[2:]
+
+
 class VoxelAccumulator:
     """Adds up frames, or the sums of parts, into sparse voxels without bounds.
 
@@ -139,11 +159,11 @@ class VoxelAccumulator:
         self.dim = dim
         self.settings = settings or FusionSettings()
         self.sensor = sensor
-        self._table = VoxelTable(dim)
+        self.frames = 0
+        self._with_spread = with_spread
+        self._table = VoxelTable(dim, with_spread=with_spread)
         self._lookup: tuple[Rig, int, int, PixelLookup] | None = None
-        self._scratch = kernels.make_scratch(1, 1)
-        self._spread = np.zeros((0, SPREAD_COLUMNS)) if with_spread else None
-        self._frames = 0
+        self._scratch = _Scratch(1, 1)
 
     def __len__(self) -> int:
         """Return how many voxels there are."""
@@ -173,28 +193,21 @@ class VoxelAccumulator:
         lookup = self._lookup_for(frame.rig, feature_rows, feature_columns)
         pose = self._pose_of(frame)
         depth, limits = self._depth_of(frame), self._limits()
-        traced = kernels.trace(
-            depth,
-            (lookup.x, lookup.y),
-            pose,
-            limits,
-            np.require(frame.rgb, np.uint8, ["C", "W"]).reshape(-1, 3),
-            lookup.tables,
-            lookup.projection,
-            self._scratch,
-        )
-        points, voxels, pairs = (int(count) for count in traced)
-        table = self._table
-        table.reserve(voxels)
-        stamp_s = float(frame.stamp_s)
-        known = sums.commit(voxels, self._scratch, pose[2], stamp_s, table.slots, table.geometry, table.count)
-        table.count = int(known)
-        if self._spread is not None:
-            self._spread = with_rows(self._spread, len(table.weight))
-            rays = lookup.x, lookup.y
-            add_spread(depth, rays, pose, limits[:3], float(self._frames), table.slots, table.index, self._spread)
-        self._frames += 1
-        faults = sums.flush(voxels, pairs, self._scratch, cells, table.feature_sum, table.weight) if pairs else 0
+        rays, colours = (lookup.x, lookup.y), np.require(frame.rgb, np.uint8, ["C", "W"]).reshape(-1, 3)
+        while True:
+            held = self._scratch
+            traced = kernels.trace(
+                depth, rays, pose, limits, colours, lookup.tables, lookup.projection, held.row, held.voxels, held.pairs
+            )
+            points, voxels, pairs = (int(count) for count in traced)
+            if pairs >= 0:
+                break
+            held.enlarge()
+        table, rows = self._table, self._commit(voxels, pose[2], float(frame.stamp_s))
+        if self._with_spread:
+            kernels.add_spread(depth, rays, pose, limits[:3], float(self.frames), held.voxels, rows, table.spread)
+        self.frames += 1
+        faults = kernels.add_features(rows, held.pairs, cells, table.feature_sum, table.weight) if pairs else 0
         if faults:
             raise BackendError(
                 f"The pixel encoder gave NaN or infinite features for frame {frame.name} (in {faults} voxels); "
@@ -210,37 +223,31 @@ class VoxelAccumulator:
         """
         self._table.add(part)
 
-    def spread(self) -> Float32[np.ndarray, "n 10"]:
-        """Return how the points lie within each voxel, sorted by index; see ``Submaps.spread``."""
-        if self._spread is None:
-            raise ValueError("this map was begun without with_spread")
-        rows = self._table.sort_rows()
-        found = np.empty((len(rows), SPREAD_COLUMNS), np.float32)
-        finish_spread(self._spread[rows], self._table.hits[rows], found)
-        return found
-
-    @classmethod
-    def of_submaps(cls, submaps: Submaps, pose: Float64[np.ndarray, "f 4 4"], grid: GridSpec) -> "VoxelAccumulator":
-        """Return the map of submaps whose frames have these poses.
-
-        Raises:
-            MapError: the poses lie too far from the world's origin for voxels.
-        """
-        total = cls(grid, submaps.feature.shape[1])
-        total._table = MovedSubmaps(submaps, pose, grid).table()
-        return total
-
     def views_at(self, index: Int32[np.ndarray, "n 3"]) -> Int32[np.ndarray, " n"]:
         """Return how many frames have a pixel in each of some voxels."""
-        found, table = np.zeros(len(index), np.int32), self._table
-        look_up_views(np.ascontiguousarray(index), table.slots, table.index, table.views, found)
-        return found
+        row = self._table.find(index)
+        return np.where(row >= 0, self._table.views[row], 0)
 
-    def copy(self) -> "VoxelAccumulator":
-        """Return an accumulator of the same sums, which grows by itself."""
-        other = VoxelAccumulator(self.grid, self.dim, self.settings, self.sensor)
-        other._table = self._table.copy()
-        return other
+    @classmethod
+    def of_table(cls, table: VoxelTable, grid: GridSpec) -> "VoxelAccumulator":
+        """Return the accumulator of a table."""
+        total = cls(grid, table.dim)
+        total._table = table
+        return total
+
+    def _commit(self, voxels: int, origin: Int64[np.ndarray, "3"], stamp_s: float) -> Int32[np.ndarray, " voxels"]:
+        """Add colour and hits of a traced frame to the map, and return the map's row of each of its voxels."""
+        _, _, voxel_key, voxel_sum = self._scratch.voxels
+        key, own, table = voxel_key[:voxels], voxel_sum[:voxels], self._table
+        lowest = (1 << kernels.OFFSET_BITS) - 1
+        offset = [key >> 2 * kernels.OFFSET_BITS, (key >> kernels.OFFSET_BITS) & lowest, key & lowest]
+        rows = table.enter(np.stack(offset, axis=1) + (origin - kernels.REACH_VOXELS), stamp_s)
+        table.rgb_sum[rows] += own[:, : kernels.RGB_WEIGHT]
+        table.rgb_weight[rows] += own[:, kernels.RGB_WEIGHT]
+        table.hits[rows] += own[:, kernels.HITS].astype(np.int64)
+        table.views[rows] += 1
+        table.sharp[rows] += own[:, kernels.SHARP].astype(np.int64)
+        return rows
 
     def sums(self, feature_out: Float32[np.ndarray, "n d"] | None = None) -> VoxelSums:
         """Return a copy of the sums, sorted by index.
@@ -266,7 +273,7 @@ class VoxelAccumulator:
         return self._table.voxels(feature_out, kept)
 
     def _limits(self) -> kernels.Limits:
-        """Return the limits for `fusion_kernels.trace`."""
+        """Return the limits for `kernels.trace`."""
         settings, sensor, half = self.settings, self.sensor, 0.5 * self.grid.voxel_size_m
         farthest = min(settings.max_depth_m, sensor.farthest_m(self.grid.voxel_size_m))
         noise = sensor.noise_m / half, sensor.noise_per_m / half
@@ -281,7 +288,7 @@ class VoxelAccumulator:
         kept = np.empty_like(depth)
         slope = np.tan(np.deg2rad(sensor.steepest_deg))
         steps = slope / camera.fx, slope / camera.fy
-        drop_flying(depth, steps, sensor.noise, sensor.edge_sigmas, kept)
+        kernels.drop_flying(depth, steps, sensor.noise, sensor.edge_sigmas, kept)
         return kept
 
     def _cells(self, features: np.ndarray | None) -> tuple[Float32[np.ndarray, "cells d"], tuple[int, int]]:
@@ -306,7 +313,7 @@ class VoxelAccumulator:
                 f"A depth of {self.settings.max_depth_m} m spans {reach:.0f} voxels of {self.grid.voxel_size_m} m, and "
                 f"a frame takes fewer than {kernels.REACH_VOXELS - 1}; choose larger voxels or a smaller depth."
             )
-        self._scratch = kernels.make_scratch(rig.depth.height, rig.depth.width)
+        self._scratch = _Scratch(rig.depth.height, rig.depth.width)
         self._lookup = rig, feature_rows, feature_columns, lookup
         return lookup
 

@@ -10,22 +10,20 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int32, Int64, UInt16
+from jaxtyping import Bool, Float32, Float64, Int32, Int64, UInt8, UInt16
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.progress import progress, silence_progress
-from avlmaps.maps.fusion import carving_kernels
-from avlmaps.maps.fusion.carving_kernels import clear_blocks
-from avlmaps.maps.fusion.measure_kernels import SHARP_UNITS
+from avlmaps.maps.fusion.kernels import SHARP_UNITS, count_frames, find_rows
 from avlmaps.maps.fusion.sensor import SensorModel
-from avlmaps.maps.fusion.through_kernels import chunks_of, count_frames
-from avlmaps.maps.fusion.voxel_kernels import rehash
-from avlmaps.maps.fusion.voxel_sums import VoxelViews
+from avlmaps.maps.fusion.voxel_sums import VoxelViews, hash_of
 from avlmaps.maps.grid import GridSpec
 from avlmaps.recordings.types import Frame
 
 BLOCKS_WIDE = 80
 _BATCH_FRAMES = 64
+_FARTHEST_MM = 65535.0
+_CUBE_SHIFT = 3  # the edge of a cube is 2 to the power of this, voxels
 _SPARSE = 4  # frames
 
 
@@ -64,28 +62,22 @@ class FreeViewCollector:
         """Add a frame."""
         if not self._sensor.carve:
             return
-        clear = np.zeros(self._shape, np.uint16)
-        depth = np.require(frame.depth_m, np.float32, ["C", "W"])
-        clear_blocks(depth, self._size, self._sensor.noise, self._sensor.clear_sigmas, clear)
-        self._clear.append(clear)
+        self._clear.append(clear_blocks(frame.depth_m, self._size, self._sensor))
         self._pose.append(np.array(frame.world_from_camera, np.float64))
-
-    def place(self, poses: Float64[np.ndarray, "k 4 4"]) -> None:
-        """Give the frames until now other poses: those of as many, or of none where nothing is collected."""
-        self._pose = list(poses[: len(self._clear)])
 
     def views(self) -> FreeViews:
         """Return the collected evidence."""
-        return stack_views(*self.collected(), self._shape)
+        return stack_views(self._clear, self._pose, self._shape)
 
-    def collected(self) -> tuple[list[np.ndarray], list[np.ndarray]]:
-        """Return the clear pictures and the poses, one each a frame, in lists that frames to come do not change."""
-        return list(self._clear), list(self._pose)
 
-    @property
-    def shape(self) -> tuple[int, int]:
-        """Rows and columns of blocks."""
-        return self._shape
+def clear_blocks(depth_m: Float32[np.ndarray, "h w"], size: int, sensor: SensorModel) -> UInt16[np.ndarray, "r c"]:
+    """Return how far every ray of each block of pixels is free, millimetres rounded down; 0 where one has no depth."""
+    z = np.asarray(depth_m, np.float64)
+    free = np.where(z > 0.0, (z - sensor.clear_sigmas * (sensor.noise_m + sensor.noise_per_m * z * z)) * 1000.0, 0.0)
+    rows, columns = -(-z.shape[0] // size), -(-z.shape[1] // size)
+    spare = (0, rows * size - z.shape[0]), (0, columns * size - z.shape[1])
+    whole = np.pad(free, spare, constant_values=_FARTHEST_MM).reshape(rows, size, columns, size)
+    return np.clip(np.nan_to_num(whole.min(axis=(1, 3)), nan=0.0), 0.0, _FARTHEST_MM).astype(np.uint16)
 
 
 class ThroughCounts:
@@ -144,20 +136,54 @@ def count_through(
 
     A frame does when every ray that may meet the voxel is free for a voxel's edge behind it; a pixel without depth in
     the block of such a ray makes that unknown, and the frame does not count.
+
+    A frame sees a small part of a map. Voxels are grouped into cubes, and a cube whose sphere lies outside of the
+    picture, or farther than anything that the frame sees, is passed over.
     """
     intrinsics = (float(camera.fx), float(camera.fy), float(camera.cx), float(camera.cy), camera.width, camera.height)
-    chunks = chunks_of(np.ascontiguousarray(index, np.int32))
-    through = np.zeros(len(index), np.int32)  # in the order of the chunks
+    cube = np.asarray(index, np.int32) >> _CUBE_SHIFT
+    order = np.lexsort(cube.T)
+    grouped = np.ascontiguousarray(index[order], np.int32)
+    first = np.ones(len(order), bool)
+    first[1:] = (np.diff(cube[order], axis=0) != 0).any(axis=1)
+    starts = np.append(np.flatnonzero(first), len(order))
+    middle_m = ((cube[order][first] << _CUBE_SHIFT) + (1 << _CUBE_SHIFT) / 2) * grid.voxel_size_m
+    reach_m = np.sqrt(3.0) * (1 << _CUBE_SHIFT) / 2 * grid.voxel_size_m
+    through = np.zeros(len(index), np.int32)
     batches = [
         (part, slice(first, first + _BATCH_FRAMES)) for part in parts for first in range(0, len(part), _BATCH_FRAMES)
     ]
     frames = sum(map(len, parts))
     for part, some in progress(batches, "carving", total=frames, size=lambda one: len(one[0].clear_pose[one[1]])):
         clear, pose = np.array(part.clear_mm[some]), np.array(part.clear_pose[some], np.float64)
-        count_frames(chunks, grid.voxel_size_m, clear, block_size(camera), intrinsics, pose, through)
+        visible = _visible(middle_m, reach_m, camera, clear, pose)
+        count_frames(
+            grouped, starts, visible, grid.voxel_size_m, clear, block_size(camera), intrinsics, pose, through
+        )  # fmt: skip
     counts = np.empty_like(through)
-    counts[chunks[0]] = through
+    counts[order] = through
     return counts
+
+
+def _visible(
+    middle_m: Float64[np.ndarray, "c 3"],
+    reach_m: float,
+    camera: Pinhole,
+    clear_mm: UInt16[np.ndarray, "k rows columns"],
+    pose: Float64[np.ndarray, "k 4 4"],
+) -> UInt8[np.ndarray, "k c"]:
+    """Return which spheres each view may see through: not behind it, beyond an edge of its picture, or too far."""
+    visible = np.empty((len(pose), len(middle_m)), np.uint8)
+    for number, (view, clear) in enumerate(zip(pose, clear_mm, strict=True)):
+        across, down, ahead = view[:3, :3].T @ (middle_m - view[:3, 3]).T
+        inside = (ahead > -reach_m) & (ahead < clear.max(initial=0) / 1000.0 + reach_m)
+        for off, focal, centre, length in (
+            (across, camera.fx, camera.cx, camera.width), (down, camera.fy, camera.cy, camera.height)
+        ):  # fmt: skip
+            for edge, side in ((centre, 1.0), (length - centre, -1.0)):
+                inside &= side * focal * off + edge * ahead > -reach_m * np.hypot(focal, edge)
+        visible[number] = inside
+    return visible
 
 
 def count_where_it_matters(
@@ -238,26 +264,45 @@ def smear_reach(evidence: VoxelViews, sensor: SensorModel) -> Float64[np.ndarray
 
 
 def _smeared(evidence: VoxelViews, count: _Count, sensor: SensorModel) -> Bool[np.ndarray, " n"]:
+    """Return which voxels have a much better seen one within their reach."""
     smeared = np.zeros(len(evidence), bool)
-    if sensor.smear_sigmas > 0.0:
-        carving_kernels.mark_smeared(
-            evidence.index, evidence.sharp, smear_reach(evidence, sensor), sensor.smear_ratio, _table(evidence), smeared
-        )
+    if sensor.smear_sigmas == 0.0 or not len(evidence):
+        return smeared
+    reach, table = smear_reach(evidence, sensor), hash_of(evidence.index)
+    most = int(MOST_REACH)
+    for step in np.argwhere(np.ones((2 * most + 1,) * 3)) - most:
+        distance = float(np.linalg.norm(step))
+        open_ = np.flatnonzero((reach >= distance) & ~smeared) if 0.0 < distance <= MOST_REACH else ()
+        if len(open_):
+            row = _rows_of(evidence.index[open_] + step, evidence, table)
+            smeared[open_] = (row >= 0) & (evidence.sharp[row] >= sensor.smear_ratio * evidence.sharp[open_])
     return smeared
 
 
 def _specks(evidence: VoxelViews, count: _Count, sensor: SensorModel) -> Bool[np.ndarray, " n"]:
+    """Return which voxels are in a small group of voxels that touch, at a corner at least, and that few frames hit."""
     if sensor.speck_voxels == 0 or len(evidence) == 0:
         return np.zeros(len(evidence), bool)
-    of = np.empty(len(evidence), np.int64)
-    carving_kernels.group(evidence.index, _table(evidence), of)
-    size = np.bincount(of, minlength=len(evidence))
-    often = np.zeros(len(evidence), np.int32)
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    table = hash_of(evidence.index)
+    touching: list[np.ndarray] = []
+    for step in (np.argwhere(np.ones((3, 3, 3))) - 1)[14:]:  # the other neighbours meet this one as theirs
+        row = _rows_of(evidence.index + step, evidence, table)
+        touching.append(np.stack([np.flatnonzero(row >= 0), row[row >= 0]]))
+    one, other = np.concatenate(touching, axis=1)
+    edges = coo_matrix((np.ones(len(one), bool), (one, other)), shape=(len(evidence), len(evidence)))
+    groups, of = connected_components(edges, directed=False)
+    often = np.zeros(groups, np.int32)
     np.maximum.at(often, of, evidence.views)
-    return (size[of] <= sensor.speck_voxels) & (often[of] <= SPECK_VIEWS)
+    return (np.bincount(of)[of] <= sensor.speck_voxels) & (often[of] <= SPECK_VIEWS)
 
 
-def _table(evidence: VoxelViews) -> Int32[np.ndarray, " slots"]:
-    table = np.full(1 << (2 * len(evidence) + 1).bit_length(), -1, np.int32)
-    rehash(table, evidence.index, len(evidence))
-    return table
+def _rows_of(
+    index: Int32[np.ndarray, "m 3"], evidence: VoxelViews, table: Int32[np.ndarray, " slots"]
+) -> Int32[np.ndarray, " m"]:
+    """Return the row of each voxel, -1 where it is not there."""
+    found = np.empty(len(index), np.int32)
+    find_rows(np.ascontiguousarray(index, np.int32), table, evidence.index, len(evidence), False, found)
+    return found

@@ -1,17 +1,18 @@
-"""Sums over voxels: the sums of fusion, in a table that grows in place, and in a sorted form that can be stored."""
+"""Sums over voxels: in a table that grows in place, and in a sorted form that can be stored."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32, Int64
 
 from avlmaps.core.columns import take
 from avlmaps.core.errors import MapError
-from avlmaps.maps.fusion import voxel_kernels as kernels
+from avlmaps.maps.fusion.kernels import find_rows
 from avlmaps.maps.types import Voxels
 
 BLOCK_BYTES = 1 << 22  # merging and finishing go through features in blocks of this size, which stay in the cache
 SMALLEST_ROOM = 4096  # rows
+SPREAD_COLUMNS = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +31,7 @@ class VoxelSums:
         views: how many frames have a pixel in it.
         sharp: sum over its pixels of how exact their depths are, 1 / (1 + (σ / half a voxel)²), in units of 1/256.
         last_seen_s: when a pixel last fell into it.
+        spread: sums of where its points lie in it, see `kernels.add_spread`; no columns where that is not needed.
     """
 
     index: Int32[np.ndarray, "n 3"]
@@ -41,24 +43,7 @@ class VoxelSums:
     views: Int32[np.ndarray, " n"]
     sharp: Int64[np.ndarray, " n"]
     last_seen_s: Float64[np.ndarray, " n"]
-
-    def __post_init__(self) -> None:
-        count = len(self.index)
-        expected = {
-            "index": (np.int32, (count, 3)),
-            "feature_sum": (np.float32, (count, self.feature_sum.shape[-1])),
-            "weight": (np.float64, (count,)),
-            "rgb_sum": (np.float64, (count, 3)),
-            "rgb_weight": (np.float64, (count,)),
-            "hits": (np.int64, (count,)),
-            "views": (np.int32, (count,)),
-            "sharp": (np.int64, (count,)),
-            "last_seen_s": (np.float64, (count,)),
-        }
-        for name, (dtype, shape) in expected.items():
-            array = getattr(self, name)
-            if array.shape != shape or array.dtype != dtype:
-                raise ValueError(f"{name} is {array.dtype} of {array.shape}; it must be {np.dtype(dtype)} of {shape}")
+    spread: Float64[np.ndarray, "n_or_0 s"] = field(default_factory=lambda: np.zeros((0, 0)))
 
     def __len__(self) -> int:
         return len(self.index)
@@ -66,11 +51,8 @@ class VoxelSums:
 
 def features_alone(sums: VoxelSums) -> VoxelSums:
     """Return sums of which the features alone are added where they are merged: all else is there already."""
-    count = len(sums)
-    return replace(
-        sums, rgb_sum=np.zeros((count, 3)), rgb_weight=np.zeros(count), hits=np.zeros(count, np.int64),
-        views=np.zeros(count, np.int32), sharp=np.zeros(count, np.int64),
-    )  # fmt: skip
+    zero = {name: np.zeros_like(getattr(sums, name)) for name in ("rgb_sum", "rgb_weight", "hits", "views", "sharp")}
+    return replace(sums, **zero, spread=np.zeros((len(sums), 0)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +76,7 @@ class VoxelTable:
     """Sums over an unbounded set of voxels, in the order in which they were first met, found by a hash of the index.
 
     Rows are added in place: the arrays grow by an eighth through ``realloc``, which moves pages, not bytes, so that
-    memory stays at the size of the map. Private to `avlmaps.maps`; kernels write into its arrays.
+    memory stays at the size of the map.
 
     Attributes:
         dim: length of a feature.
@@ -102,9 +84,8 @@ class VoxelTable:
         slots: hash table of rows, -1 free; its length is a power of two and at least twice the count.
     """
 
-    def __init__(self, dim: int) -> None:
-        self.dim = dim
-        self.count = 0
+    def __init__(self, dim: int, *, with_spread: bool = False) -> None:
+        self.dim, self.count = dim, 0
         self.slots = np.full(2 * SMALLEST_ROOM, -1, np.int32)
         self.feature_sum = np.zeros((SMALLEST_ROOM, dim), np.float32)
         self.weight = np.zeros(SMALLEST_ROOM)
@@ -115,31 +96,34 @@ class VoxelTable:
         self.views = np.zeros(SMALLEST_ROOM, np.int32)
         self.sharp = np.zeros(SMALLEST_ROOM, np.int64)
         self.last_seen_s = np.zeros(SMALLEST_ROOM)
+        self.spread = np.zeros((SMALLEST_ROOM, SPREAD_COLUMNS if with_spread else 0))
 
-    @property
-    def geometry(self) -> kernels.Geometry:
-        """All sums but the features', as the kernels take them."""
-        return self.index, self.rgb_sum, self.rgb_weight, self.hits, self.views, self.sharp, self.last_seen_s
+    def find(self, index: Int32[np.ndarray, "n 3"]) -> Int32[np.ndarray, " n"]:
+        """Return the row of each voxel, -1 where it is not there."""
+        found = np.empty(len(index), np.int32)
+        find_rows(np.ascontiguousarray(index, np.int32), self.slots, self.index, self.count, False, found)
+        return found
 
-    def copy(self) -> "VoxelTable":
-        """Return a table of the same sums."""
-        other = VoxelTable(self.dim)
-        other.count, other.slots = self.count, self.slots.copy()
-        rows = max(self.count, SMALLEST_ROOM)
-        for field in fields(VoxelSums):
-            setattr(other, field.name, getattr(self, field.name)[:rows].copy())
-        return other
+    def enter(self, index: Int32[np.ndarray, "n 3"], last_seen_s: float | np.ndarray) -> Int32[np.ndarray, " n"]:
+        """Return the row of each voxel, which all differ; those that are new become the last. Note when it was seen."""
+        self._reserve(len(index))
+        found, known = np.empty(len(index), np.int32), self.count
+        wanted = np.array(index, np.int32, order="C")  # never read-only, which would compile the loop again
+        self.count = int(find_rows(wanted, self.slots, self.index, self.count, True, found))
+        before = np.where(found < known, self.last_seen_s[found], -np.inf)
+        self.last_seen_s[found] = np.maximum(before, last_seen_s)
+        return found
 
-    def reserve(self, extra: int) -> None:
+    def _reserve(self, extra: int) -> None:
         """Make room for this many new voxels."""
         needed = self.count + extra
         if needed > len(self.weight):
             rows = max(needed, len(self.weight) + len(self.weight) // 8, 2 * SMALLEST_ROOM)
-            for array in (self.feature_sum, self.weight, *self.geometry):
+            for name in _FIELDS:
+                array = getattr(self, name)
                 array.resize((rows, *array.shape[1:]), refcheck=False)
         if 2 * needed > len(self.slots):
-            self.slots = np.full(1 << (4 * needed - 1).bit_length(), -1, np.int32)
-            kernels.rehash(self.slots, self.index, self.count)
+            self.slots = hash_of(self.index[: self.count], 1 << (4 * needed - 1).bit_length())
 
     def add(self, part: VoxelSums) -> None:
         """Add the sums of a part, block by block, so that a memory-mapped part is never whole in memory.
@@ -147,22 +131,18 @@ class VoxelTable:
         Raises:
             MapError: its features have another length.
         """
-        self._require_alike(part)
-        for rows in blocks(len(part), self.dim):
-            # Copies: of a bounded size, and never read-only (which would compile the kernel a second time).
-            arrays = (part.index, part.rgb_sum, part.rgb_weight, part.hits, part.views, part.sharp)
-            every = (*arrays, part.last_seen_s, part.feature_sum, part.weight)
-            block = tuple(np.array(array[rows], order="C") for array in every)
-            self.reserve(len(block[0]))
-            count = kernels.add_rows(block, self.slots, self.geometry, self.feature_sum, self.weight, self.count)
-            self.count = int(count)
-
-    def _require_alike(self, part: VoxelSums) -> None:
         if part.feature_sum.shape[1] != self.dim:
             raise MapError(
                 f"The part's features have {part.feature_sum.shape[1]} numbers and this map's {self.dim}; "
                 "merge only maps that were built with the same profile."
             )
+        summed = [name for name in _FIELDS if name not in ("index", "last_seen_s")]
+        if not part.spread.shape[1] or not self.spread.shape[1]:
+            summed.remove("spread")
+        for block in blocks(len(part), self.dim):
+            rows = self.enter(part.index[block], part.last_seen_s[block])
+            for name in summed:
+                getattr(self, name)[rows] += getattr(part, name)[block]
 
     def sort_rows(self) -> Int64[np.ndarray, " n"]:
         """Return the rows in the order of their index (x, then y, then z)."""
@@ -174,7 +154,7 @@ class VoxelTable:
         feature_sum = feature_array(feature_out, (self.count, self.dim), np.float32)
         for block in blocks(self.count, self.dim):
             feature_sum[block] = self.feature_sum[rows[block]]
-        others = [field.name for field in fields(VoxelSums) if field.name != "feature_sum"]
+        others = [name for name in _FIELDS if name != "feature_sum"]
         return VoxelSums(feature_sum=feature_sum, **{name: getattr(self, name)[rows] for name in others})
 
     def evidence(self) -> VoxelViews:
@@ -187,12 +167,8 @@ class VoxelTable:
         rows = self.sort_rows()
         rows = rows if kept is None else rows[kept]
         feature = feature_array(feature_out, (len(rows), self.dim), np.float16)
-        parts = blocks(len(rows), self.dim)
-        buffer = np.empty((parts[0].stop if parts else 0, self.dim), np.uint16)
-        for block in parts:
-            unit = buffer[: block.stop - block.start]
-            kernels.unit_rows(self.feature_sum, rows[block], unit)
-            feature[block] = unit.view(np.float16)
+        for block in blocks(len(rows), self.dim):
+            feature[block] = unit_rows(self.feature_sum[rows[block]])
         rgb_weight = self.rgb_weight[rows, None]
         rgb = np.divide(self.rgb_sum[rows], rgb_weight, out=np.zeros((len(rows), 3)), where=rgb_weight > 0.0)
         return Voxels(
@@ -203,6 +179,24 @@ class VoxelTable:
             last_seen_s=self.last_seen_s[rows],
             hits=self.hits[rows],
         )
+
+
+_FIELDS = tuple(field.name for field in fields(VoxelSums))
+
+
+def hash_of(index: Int32[np.ndarray, "n 3"], slots: int = 0) -> Int32[np.ndarray, " slots"]:
+    """Return the hash table of voxels, which all differ; ``slots`` is its length if it is to have room for more."""
+    table = np.full(slots or 1 << (2 * len(index) + 1).bit_length(), -1, np.int32)
+    wanted = np.array(index, np.int32, order="C")
+    find_rows(wanted, table, wanted.copy(), 0, True, np.empty(len(wanted), np.int32))
+    return table
+
+
+def unit_rows(sums: Float32[np.ndarray, "n d"]) -> Float32[np.ndarray, "n d"]:
+    """Return rows scaled to length 1; a zero row stays zero."""
+    square = np.einsum("ij,ij->i", sums, sums, dtype=np.float64)
+    scale = np.divide(1.0, np.sqrt(square), out=np.zeros_like(square), where=square > 0.0)
+    return sums * scale[:, None].astype(np.float32)
 
 
 def sorted_rows(index: Int32[np.ndarray, "n 3"]) -> Int64[np.ndarray, " n"]:
@@ -216,13 +210,6 @@ def sorted_rows(index: Int32[np.ndarray, "n 3"]) -> Int64[np.ndarray, " n"]:
         return np.lexsort(wide.T[::-1])
     i, j, k = (wide - low).T
     return np.argsort((i * span[1] + j) * span[2] + k)
-
-
-def with_rows(array: np.ndarray, rows: int) -> np.ndarray:
-    """Return an array with at least as many rows, the new ones of zeros."""
-    if len(array) >= rows:
-        return array
-    return np.concatenate([array, np.zeros((rows - len(array), *array.shape[1:]), array.dtype)])
 
 
 def blocks(count: int, dim: int) -> list[slice]:

@@ -1,172 +1,23 @@
 """Keyframes: which frames stand for the walk, and what the map stores of them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from avlmaps.core.arrays import Float, Float16, Float32, Int, UInt8
+from avlmaps.core.arrays import Float, Float16, Float32, UInt8
 from avlmaps.core.columns import offsets_of
-from avlmaps.core.numbers import hold_numbers, unmasked
-from avlmaps.core.poses import apply, inverse, rotation_angle_rad
-from avlmaps.core.progress import progress
+from avlmaps.core.numbers import unmasked
+from avlmaps.core.poses import apply, inverse
 from avlmaps.core.registry import Kind
+from avlmaps.maps.keyframes.choose import DEFAULT_KEYFRAMES, KeyframeSettings
+from avlmaps.maps.perceived import as_row, perceiving
 from avlmaps.maps.types import Keyframes
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.protocols import LocalFeatures
 from avlmaps.recordings.images import depth_in_colour
-from avlmaps.recordings.types import Frame, Recording
-
-LEARN_FROM_KEYFRAMES = 64
-_BLOCK = 256
-
-
-@dataclass(frozen=True, slots=True)
-class KeyframeSettings:
-    """When a frame becomes a keyframe."""
-
-    translation_m: float = 0.1
-    """Distance that the camera moved since the last keyframe, metres."""
-
-    rotation_deg: float = 7.0
-    """Or angle that it turned, degrees."""
-
-    max_gap_s: float = 5.0
-    """Or time that went by, seconds; a robot that stands still adds a keyframe now and then."""
-
-    thumbnail_width_px: int = 320
-    """Width of the thumbnails that the map stores."""
-
-    max_depth_m: float = 6.0
-    """Keypoints farther away get no 3D point: the depth of most sensors is poor out there."""
-
-    def __post_init__(self) -> None:
-        hold_numbers(self, ValueError)
-        for name in ("translation_m", "rotation_deg", "max_gap_s", "thumbnail_width_px", "max_depth_m"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name} is {getattr(self, name):g}; it must be positive")
-
-
-def select_keyframes(recording: Recording, settings: KeyframeSettings = KeyframeSettings()) -> Int[np.ndarray, " k"]:
-    """Choose keyframes by motion: see ``keyframes_by_motion``. Reads no picture."""
-    return keyframes_by_motion(recording.stamps_s, recording.world_from_camera, settings)
-
-
-def keyframes_by_motion(
-    stamps_s: Float[np.ndarray, " n"],
-    world_from_camera: Float[np.ndarray, "n 4 4"],
-    settings: KeyframeSettings = KeyframeSettings(),
-) -> Int[np.ndarray, " k"]:
-    """Return rising frame numbers: the first, the last, and enough between them to cover the walk.
-
-    Every frame lies within the settings' distance, angle and time of the last keyframe before it. Where the camera
-    goes beyond them, the frame in the second half of the stretch that moved least becomes the keyframe, because a
-    camera that moves less blurs less.
-    """
-    count = len(stamps_s)
-    if count == 0:
-        return np.zeros(0, np.int64)
-    speed = _apparent_motion(stamps_s, world_from_camera)
-    chosen = [0]
-    while chosen[-1] < count - 1:
-        last = chosen[-1]
-        beyond = _first_beyond(last, stamps_s, world_from_camera, settings)
-        if beyond is None:
-            chosen.append(count - 1)
-            break
-        chosen.append(_least_moved(last, beyond, speed))
-    return np.array(chosen, np.int64)
-
-
-def next_keyframe(
-    stamps_s: Float[np.ndarray, " n"], world_from_camera: Float[np.ndarray, "n 4 4"], settings: KeyframeSettings
-) -> int | None:
-    """Return the keyframe that follows frame 0 as soon as no later frame can change it; None until then."""
-    beyond = _first_beyond(0, stamps_s, world_from_camera, settings)
-    if beyond is None or beyond + 1 >= len(stamps_s):  # how fast a frame moves is known with the one after it
-        return None
-    return _least_moved(0, beyond, _apparent_motion(stamps_s, world_from_camera))
-
-
-def _least_moved(last: int, beyond: int, speed: Float[np.ndarray, " n"]) -> int:
-    """Return the frame that moved least in the second half of the stretch from a keyframe to one beyond its limits."""
-    start = max(last + 1, (last + beyond + 1) // 2)
-    return start + int(np.argmin(speed[start : beyond + 1]))
-
-
-def _first_beyond(
-    last: int,
-    stamps_s: Float[np.ndarray, " n"],
-    world_from_camera: Float[np.ndarray, "n 4 4"],
-    settings: KeyframeSettings,
-) -> int | None:
-    """Return the first frame after ``last`` that breaks a limit; looks ahead block by block."""
-    for start in range(last + 1, len(stamps_s), _BLOCK):
-        poses = world_from_camera[start : start + _BLOCK]
-        moved_m = np.linalg.norm(poses[:, :3, 3] - world_from_camera[last, :3, 3], axis=1)
-        turned_rad = rotation_angle_rad(poses, np.broadcast_to(world_from_camera[last], poses.shape))
-        beyond = (moved_m > settings.translation_m) | (turned_rad > np.deg2rad(settings.rotation_deg))
-        beyond |= stamps_s[start : start + _BLOCK] - stamps_s[last] > settings.max_gap_s
-        if beyond.any():
-            return start + int(np.argmax(beyond))
-    return None
-
-
-def _apparent_motion(
-    stamps_s: Float[np.ndarray, " n"], world_from_camera: Float[np.ndarray, "n 4 4"]
-) -> Float[np.ndarray, " n"]:
-    """Return about how fast the picture moves, rad/s: turning, and going past things that are 2 m away."""
-    speed = np.zeros(len(stamps_s))
-    if len(stamps_s) > 1:
-        turned_rad = rotation_angle_rad(world_from_camera[1:], world_from_camera[:-1])
-        moved_m = np.linalg.norm(np.diff(world_from_camera[:, :3, 3], axis=0), axis=1)
-        between = (turned_rad + moved_m / 2.0) / np.maximum(np.diff(stamps_s), 1e-9)
-        speed[:-1] += between
-        speed[1:] += between
-        speed[1:-1] /= 2.0
-    return speed
-
-
-def perceive_keyframes(
-    recording: Recording,
-    indices: Sequence[int] | Int[np.ndarray, " k"],
-    encoders: Encoders,
-    rng: "np.random.Generator",
-    settings: KeyframeSettings = KeyframeSettings(),
-) -> tuple[Keyframes, dict[str, np.ndarray]]:
-    """Encode the chosen frames: local, place and view features, 3D points, thumbnails.
-
-    Returns:
-        The keyframes, and the arrays that the place encoder learned; the map must keep them.
-    """
-    place_state, known = learn_places(recording, indices, encoders, rng)
-    seen = [
-        describe_keyframe(recording.frame(int(index)), encoders, place_state, settings, known.get(int(index)))
-        for index in progress(indices, "seeing", total=len(indices), unit="keyframe")
-    ]
-    return stack_keyframes(seen), place_state
-
-
-def learn_places(
-    recording: Recording, indices: Sequence[int] | Int[np.ndarray, " k"], encoders: Encoders, rng: "np.random.Generator"
-) -> tuple[dict[str, np.ndarray], dict[int, LocalFeatures]]:
-    """Let the place encoder learn from keyframes spread over the walk.
-
-    Returns:
-        What it learned, and the local features of those frames by their number, to save doing them twice.
-    """
-    if Kind.LOCAL not in encoders or Kind.PLACE not in encoders:
-        return {}, {}
-    encoder = encoders.local
-    chosen = [int(indices[int(i)]) for i in learn_from(len(indices))]
-    local = {i: encoder.encode(recording.frame(i).rgb.copy()) for i in chosen}
-    return encoders.place.fit(list(local.values()), rng), local
-
-
-def learn_from(keyframes: int) -> Int[np.ndarray, " k"]:
-    """Return the numbers of the keyframes that places are learnt from: up to 64, spread evenly."""
-    return np.unique(np.linspace(0, keyframes - 1, min(keyframes, LEARN_FROM_KEYFRAMES)).round().astype(int))
+from avlmaps.recordings.types import Frame
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,24 +46,27 @@ class DescribedKeyframe:
 
 
 def describe_keyframe(
-    frame: Frame,
-    encoders: Encoders,
-    place_state: dict[str, np.ndarray],
-    settings: KeyframeSettings = KeyframeSettings(),
-    local: LocalFeatures | None = None,
+    frame: Frame, encoders: Encoders, settings: KeyframeSettings = DEFAULT_KEYFRAMES
 ) -> DescribedKeyframe:
-    """Run encoders on one frame."""
-    if local is None:
+    """Run encoders on one frame; its place is described later.
+
+    Raises:
+        BackendError: an encoder fails, or gives something else than its protocol says.
+    """
+    with perceiving("An encoder of keyframes", frame.name):
         local = encoders.local.encode(frame.rgb.copy()) if Kind.LOCAL in encoders else _no_features()
-    place = np.zeros(0, np.float32)
-    if Kind.LOCAL in encoders and Kind.PLACE in encoders:
-        place = unmasked(encoders.place.encode(frame.rgb.copy(), local, place_state))
+        local = replace(local, descriptors=local.descriptors.astype(np.float16).astype(np.float32))  # as it is stored
+        view = np.zeros(0, np.float32)
+        if Kind.VIEWS in encoders:
+            (found,) = unmasked(encoders.views.encode([frame.copy()]))
+            card = encoders.card(Kind.VIEWS)
+            view = as_row(found, card.dim, f"The view encoder {card.id}", frame)
     return DescribedKeyframe(
         stamp_s=frame.stamp_s,
         world_from_camera=frame.world_from_camera,
         centre=middle_of_view(frame),
-        view=unmasked(encoders.views.encode([frame.copy()]))[0] if Kind.VIEWS in encoders else np.zeros(0, np.float32),
-        place=place,
+        view=view,
+        place=np.zeros(0, np.float32),
         local=local,
         points_world=lift_keypoints(local.xy, frame, settings.max_depth_m),
         thumbnail=_thumbnail(frame.rgb, settings.thumbnail_width_px),
@@ -235,6 +89,22 @@ def stack_keyframes(seen: Sequence[DescribedKeyframe]) -> Keyframes:
         thumbnails=np.frombuffer(b"".join(one.thumbnail for one in seen), np.uint8),
         score=_scores([one.local for one in seen]),
     )
+
+
+def unstack_keyframes(stacked: Keyframes, size: tuple[int, int]) -> list[DescribedKeyframe]:
+    """Return the keyframes of a map's arrays, whose colour pictures have this width and height."""
+    found: list[DescribedKeyframe] = []
+    for row in range(len(stacked)):
+        own = slice(*(int(edge) for edge in stacked.offsets[row : row + 2]))
+        score = stacked.score[own].astype(np.float32) if len(stacked.score) else np.zeros(0, np.float32)
+        local = LocalFeatures(stacked.xy[own], stacked.descriptors[own].astype(np.float32), size=size, score=score)
+        found.append(
+            DescribedKeyframe(
+                float(stacked.stamp_s[row]), stacked.world_from_camera[row], stacked.centre[row], stacked.view[row],
+                stacked.place[row], local, stacked.points_world[own], stacked.jpeg(row).tobytes(),
+            )
+        )  # fmt: skip
+    return found
 
 
 def _scores(local: Sequence[LocalFeatures]) -> Float16[np.ndarray, " m_or_0"]:

@@ -18,7 +18,7 @@ from avlmaps.core.progress import progress as shown
 from avlmaps.core.progress import say, silence_progress
 from avlmaps.core.version import __version__
 from avlmaps.core.wording import option
-from avlmaps.maps.fusion.measure_kernels import SHARP_UNITS
+from avlmaps.maps.fusion.kernels import SHARP_UNITS
 from avlmaps.maps.fusion.voxel_sums import VoxelSums, VoxelTable
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.settings import BuildSettings

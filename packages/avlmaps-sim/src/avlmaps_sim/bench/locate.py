@@ -11,7 +11,8 @@ from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.poses import inverse, rotation_angle_rad
 from avlmaps.core.progress import progress
 from avlmaps.core.registry import Kind
-from avlmaps.maps.keyframes.describe import KeyframeSettings, perceive_keyframes, select_keyframes
+from avlmaps.maps.keyframes.album import perceive_keyframes
+from avlmaps.maps.keyframes.choose import KeyframeSettings, select_keyframes
 from avlmaps.maps.types import Keyframes
 from avlmaps.perception.encoders import Encoders
 from avlmaps.query.locate import Located, LocateSettings, locate

@@ -114,12 +114,13 @@ def _home(sheet: Sheet, home: TopView, evidence: "Evidence") -> str:
 def _strip(recording: "Recording", avlmap: "AVLMap", moments: int) -> Strip:
     """Encode some moments of the walk again, as the map's own pixel encoder does."""
     from avlmaps.core.progress import progress
-    from avlmaps.maps.pipeline.estimate import attach_estimated_ground
+    from avlmaps.maps.estimate import Start
+    from avlmaps.maps.gravity.floor import GroundedRecording
     from avlmaps.maps.settings import DEFAULTS
     from avlmaps.perception.embedded.pixels import EmbeddedPixels
 
     encoder = EmbeddedPixels()
-    whole = attach_estimated_ground(recording, DEFAULTS)
+    whole = GroundedRecording(recording, Start.of(recording, DEFAULTS).ground)
     index = np.unique(np.linspace(0, len(recording) - 1, moments).round().astype(int))
     frames = []
     for number in progress(index, "looking again"):

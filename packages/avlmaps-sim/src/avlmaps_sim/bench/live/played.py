@@ -20,14 +20,13 @@ from avlmaps.perception.encoders import Encoders
 from avlmaps.recordings.types import Frame, Recording
 
 QUESTIONS = ("the sofa", "the door", "a plant", "where can I sit?", "the table", "the chair near the table")
-_THREADS = {"fusing": "avlmaps-fuse", "snapshots": "avlmaps-behind", "saving": "avlmaps-save"}
+_THREADS = {"fusing": "avlmaps-fuse", "snapshots": "avlmaps-behind"}
 
 
 @dataclass
 class Played:
     """What a drive took.
 
-    ``close_s`` goes mostly to frames that waited on the disk, of which ``encoded_later`` were encoded after all.
     ``processor_ms`` is that of a frame, by thread; ``all`` has reading and questions in it. A kill would have lost
     things of at most ``unsaved_s``. Each lap has voxels, keyframes, frames fused until then, and resident MB.
     """
@@ -35,7 +34,6 @@ class Played:
     frames: int = 0
     seconds: float = 0.0
     close_s: float = 0.0
-    encoded_later: int = 0
     status: LiveStatus | None = None
     asked_ms: list[float] = field(default_factory=list)
     processor_ms: dict[str, float] = field(default_factory=dict)
@@ -83,7 +81,7 @@ def play(
         person.join()
         end_s = time.perf_counter()
         live.close()
-        found.close_s, found.encoded_later = time.perf_counter() - end_s, live.status().encoded_later
+        found.close_s = time.perf_counter() - end_s
     return found
 
 

@@ -86,9 +86,9 @@ def run_live(
     tables = {
         "pace": _table(
             "recording|pace|frames|s|frames/s|fused|encoded|late|frame to map ms p50|p95|questions|question ms p50|p95"
-            "|most unsaved s|load of the machine|close s|encoded later|late stored", pace,
+            "|most unsaved s|load of the machine|close s", pace,
         ),
-        "processor time a frame, ms": _table("recording|pace|all|fusing|snapshots|saving", processor),
+        "processor time a frame, ms": _table("recording|pace|all|fusing|snapshots", processor),
         "laps over the same surface": _table("recording|lap|voxels|keyframes|fused until then|MB", laps),
         "the end beside the build of all frames": _table(
             "recording|gates|pace|late|voxels live|build|equal bit by bit|things in both|in one alone|within a voxel"
@@ -120,8 +120,7 @@ def _pace(found: Played) -> list[object]:
         found.frames, round(found.seconds, 1), round(found.frames / found.seconds, 1), status.fused, status.encoded,
         status.dropped.get("late", 0), _whole(status.frame_ms_p50), _whole(status.frame_ms_p95), len(found.asked_ms),
         *(round(float(np.percentile(asked, p)), 1) for p in (50, 95)), round(found.unsaved_s, 1),
-        round(found.load, 1), round(found.close_s, 1), found.encoded_later,
-        status.late_kept,
+        round(found.load, 1), round(found.close_s, 1),
     ]  # fmt: skip
 
 
@@ -130,7 +129,7 @@ def _whole(ms: float) -> float:
 
 
 def _processor(found: Played) -> list[float]:
-    return [round(found.processor_ms[name], 1) for name in ("all", "fusing", "snapshots", "saving")]
+    return [round(found.processor_ms[name], 1) for name in ("all", "fusing", "snapshots")]
 
 
 def _kills(recording: Path, path: Path, profile: str, kills: int, seed: int, work: Path) -> list[float]:

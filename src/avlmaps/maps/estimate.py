@@ -2,21 +2,17 @@
 
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import replace
-from time import perf_counter
+from dataclasses import dataclass
 from typing import Literal
 
-import msgspec
 import numpy as np
 
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.wording import option
 from avlmaps.maps.fusion.sensor import FRAMES, MODELS, SensorModel, measure_noise, nearest_model
-from avlmaps.maps.gravity.floor import FoundFloor, GroundedRecording, find_ground
+from avlmaps.maps.gravity.floor import FoundFloor, find_ground
 from avlmaps.maps.gravity.floor_choice import Expected, FloorEvidence
-from avlmaps.maps.pipeline.plan import BUILD_VERSION, BuildPlan
 from avlmaps.maps.settings import BuildSettings
-from avlmaps.maps.store.checkpoints import Computed, key_of, load_or_compute
 from avlmaps.maps.store.manifest import FloorGuess, FloorInfo, GroundInfo, SensorInfo, UpInfo
 from avlmaps.recordings.types import Frame, Ground, Recording
 
@@ -26,65 +22,28 @@ _MUCH_BELOW = 0.1  # a floor that the user gave gets one when more surface than 
 _RANDOMNESS = 1  # number of the stage as a source of randomness (keyframes have 2)
 
 
-class EstimatedUp(msgspec.Struct, frozen=True):
-    """The up direction, and the seconds it took."""
+@dataclass(frozen=True, slots=True)
+class Start:
+    """What is found in some frames before any is fused.
+
+    Attributes:
+        up: the up direction.
+        floors: where the floors are, for the manifest.
+        ground: up and the floor under each camera height, for encoders.
+        sensor: the depth camera.
+    """
 
     up: UpInfo
-    elapsed_s: float
-
-
-class EstimatedFloor(msgspec.Struct, frozen=True):
-    """The floors, whether each frame that was to be looked at could be, and the seconds it took."""
-
-    ground: GroundInfo
-    whole: bool
-    elapsed_s: float
-
-
-class _EstimatedSensor(msgspec.Struct, frozen=True):
+    floors: GroundInfo
+    ground: Ground
     sensor: SensorInfo
 
-
-def find_up(plan: BuildPlan) -> EstimatedUp:
-    """Return the up direction, from the recording or from the planes in view."""
-    if plan.recording.up_in_world is not None:
-        return EstimatedUp(UpInfo.of(plan.recording.up_in_world, "recording", 1.0), 0.0)
-    key = key_of("up", BUILD_VERSION, plan.recording.fingerprint, plan.settings.gravity, plan.settings.seed)
-
-    def compute() -> Computed[EstimatedUp]:
-        begin = perf_counter()
-        return Computed(EstimatedUp(estimate_up(plan.recording, plan.settings), perf_counter() - begin))
-
-    return load_or_compute(plan.folder("up", key), key, EstimatedUp, compute).facts
-
-
-def find_floor(plan: BuildPlan, up: UpInfo) -> tuple[BuildPlan, EstimatedFloor]:
-    """Return the plan with up and the floor in the recording's frames, and the floors."""
-    recording = plan.recording
-    key = key_of("ground", BUILD_VERSION, recording.fingerprint, recording.base_height, plan.settings.gravity, up)
-
-    def compute() -> Computed[EstimatedFloor]:
-        begin = perf_counter()
-        ground, info = estimate_ground(recording, plan.settings, up)
-        arrays = {name: getattr(ground, name) for name in ("up_in_world", "camera_m", "floor_m")}
-        whole = len(ground.camera_m) == len(spread(recording, plan.settings.gravity.frames))
-        return Computed(EstimatedFloor(info, whole, perf_counter() - begin), arrays)
-
-    # A frame that could not be read then may be readable now.
-    found = load_or_compute(plan.folder("ground", key), key, EstimatedFloor, compute, usable=lambda facts: facts.whole)
-    return replace(plan, recording=GroundedRecording(recording, Ground(**found.arrays))), found.facts
-
-
-def find_sensor(plan: BuildPlan) -> SensorInfo:
-    """Return the depth camera, as the settings name it or as the frames show it."""
-    if plan.settings.fusion.sensor != "auto":
-        return estimate_sensor(plan.recording, plan.settings)
-    key = key_of("sensor", BUILD_VERSION, plan.recording.fingerprint)
-
-    def compute() -> Computed[_EstimatedSensor]:
-        return Computed(_EstimatedSensor(estimate_sensor(plan.recording, plan.settings)))
-
-    return load_or_compute(plan.folder("sensor", key), key, _EstimatedSensor, compute).facts.sensor
+    @classmethod
+    def of(cls, recording: Recording, settings: BuildSettings) -> "Start":
+        """Return what the frames of a recording show."""
+        up = estimate_up(recording, settings)
+        ground, floors = estimate_ground(recording, settings, up)
+        return cls(up, floors, ground, estimate_sensor(recording, settings))
 
 
 def estimate_up(recording: Recording, settings: BuildSettings) -> UpInfo:
@@ -193,11 +152,6 @@ def ground_notices(ground: GroundInfo) -> Iterator[str]:
             f"{main.below:.0%} of what is in view lies below the floor that was given ({main.camera_height_m:.2f} m "
             f"under the camera); check {option('camera-height-m')}."
         )
-
-
-def attach_estimated_ground(recording: Recording, settings: BuildSettings) -> Recording:
-    """Return the recording with up and the floor in its frames; the same on every machine."""
-    return GroundedRecording(recording, estimate_ground(recording, settings, estimate_up(recording, settings))[0])
 
 
 def estimate_sensor(recording: Recording, settings: BuildSettings) -> SensorInfo:

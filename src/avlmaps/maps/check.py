@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-import msgspec
 import numpy as np
 
 from avlmaps.core.errors import AudioError, RecordingError
@@ -12,9 +11,8 @@ from avlmaps.core.timeline import Trajectory
 from avlmaps.core.wording import option
 from avlmaps.maps.audio.segmentation import segment
 from avlmaps.maps.gravity.up import some_frames, tilted_parts, up_doubts
-from avlmaps.maps.pipeline.plan import BUILD_VERSION, BuildPlan, audio_key, strip_folder
+from avlmaps.maps.plan import strip_folder
 from avlmaps.maps.sources.wiring import check_wiring
-from avlmaps.maps.store.checkpoints import Computed, key_of, load_or_compute
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.channels import useless_channels
 from avlmaps.recordings.consistency.check import check_recording
@@ -23,13 +21,8 @@ from avlmaps.recordings.layout import DESCRIPTION
 from avlmaps.recordings.types import Recording
 
 
-class _Doubts(msgspec.Struct):
-    sentences: tuple[str, ...]
-    whole: bool
-
-
-def checked(plan: BuildPlan, allowed: Sequence[str]) -> BuildPlan:
-    """Return the plan with what is doubtful about its recording, each of which is said.
+def doubts_of(recording: Recording, allowed: Sequence[str]) -> tuple[str, ...]:
+    """Return what is doubtful about a recording, one sentence each, and say it.
 
     Raises:
         RecordingError: the recording cannot be right, or a reason has no such name.
@@ -38,34 +31,21 @@ def checked(plan: BuildPlan, allowed: Sequence[str]) -> BuildPlan:
     for name in allowed:
         if name not in known:
             raise RecordingError(f"There is nothing called {name!r} to allow; known are: {', '.join(known)}.")
-    sound = audio_key(plan.recording)  # which is no part of the fingerprint
-    key = key_of("doubts", BUILD_VERSION, plan.recording.fingerprint, sorted(allowed), sound)
-
-    def compute() -> Computed[_Doubts]:
-        return Computed(_doubts(plan.recording, allowed))
-
-    # A frame that could not be read then may be readable now.
-    found = load_or_compute(plan.folder("doubts", key), key, _Doubts, compute, usable=lambda facts: facts.whole)
-    doubts = found.facts.sentences
-    for doubt in doubts:
-        say(f"note: {doubt}")
-    return replace(plan, doubts=doubts)
-
-
-def _doubts(recording: Recording, allowed: Sequence[str]) -> _Doubts:
     try:
         useless = _useless(recording)
         verdict = judge(recording, useless)
     except RecordingError:  # no frame of the sample can be read; how many may be lost is decided later
-        return _Doubts((), whole=False)
+        return ()
     refused = verdict.refused(tuple(allowed))
     if refused is not None:
         raise RecordingError(
             f"{recording.path} cannot be right. {refused} To build it as it is: "
             f"{option('allow', refused.reason.value)}."
         )
-    sentences = (*verdict.sentences(), *useless)
-    return _Doubts(tuple(strip_folder(one, recording) for one in sentences), whole=not verdict.unread)
+    doubts = tuple(strip_folder(one, recording) for one in (*verdict.sentences(), *useless))
+    for doubt in doubts:
+        say(f"note: {doubt}")
+    return doubts
 
 
 def judge(recording: Recording, useless: Sequence[str] | None = None) -> Verdict:

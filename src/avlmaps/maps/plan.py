@@ -1,7 +1,6 @@
 """The plan of a build: what it is made of, which frames it fuses, and where it stores what it has finished."""
 
 import hashlib
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -10,19 +9,17 @@ import numpy as np
 from avlmaps.core.errors import MapError
 from avlmaps.core.files import sampled_digest
 from avlmaps.core.progress import say
-from avlmaps.core.registry import Kind
 from avlmaps.core.wording import option
-from avlmaps.maps.keyframes.describe import keyframes_by_motion
+from avlmaps.maps.keyframes.choose import keyframes_by_motion
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.checkpoints import key_of, remove_stages
 from avlmaps.maps.store.folder import PARTS, is_map_or_free, read_info, sweep
 from avlmaps.maps.store.manifest import MapInfo, ModelInfo
 from avlmaps.perception.encoders import Encoders
-from avlmaps.perception.protocols import PixelEncoder
 from avlmaps.recordings.formats.file_recording import LARGEST_BUDGET_BYTES
 from avlmaps.recordings.types import Recording
 
-BUILD_VERSION = 6  # raise it when a stage comes to compute something else, so that no old checkpoint is taken for new
+BUILD_VERSION = 7  # raise it when a stage comes to compute something else, so that no old checkpoint is taken for new
 
 Span = tuple[int, int, int]  # (first, last + 1, step) of frames
 
@@ -38,8 +35,7 @@ class BuildPlan:
         settings: all that can be chosen.
         models: the models' cards, by module.
         key: hash of all ingredients; two builds with one key make one map.
-        fusion_key: hash of those that the sums over frames depend on.
-        doubts: what is odd about the recording, one sentence each.
+        keyframes: numbers of the frames that become keyframes.
     """
 
     recording: Recording
@@ -48,16 +44,17 @@ class BuildPlan:
     settings: BuildSettings
     models: dict[str, ModelInfo]
     key: str
-    fusion_key: str
-    doubts: tuple[str, ...] = ()
+    keyframes: frozenset[int]
 
-    def folder(self, stage: str, key: str) -> Path:
-        """Return where a stage stores what it finished, one folder for each key."""
-        return self.path / PARTS / f"{stage}-{key[:12]}"
-
-    def rng(self, stage: int) -> np.random.Generator:
-        """Return a stage's own source of randomness, the same in every run, independent of the other stages."""
-        return np.random.default_rng([self.settings.seed, stage])
+    def spans(self) -> dict[Path, Span]:
+        """Return the stretches of frames that are fused one after the other, by the folders of what they bring."""
+        count, step = len(self.recording), self.settings.frames.step
+        stride = self.settings.frames.summed * step
+        key = key_of("frames", self.key, self.recording.base_height)
+        home = self.path / PARTS / f"frames-{key[:12]}"
+        return {
+            home / f"{start:08d}": (start, min(start + stride, count), step) for start in range(0, count, stride)
+        }  # fmt: skip
 
 
 def make_plan(recording: Recording, path: Path, encoders: Encoders, settings: BuildSettings) -> BuildPlan:
@@ -74,56 +71,17 @@ def make_plan(recording: Recording, path: Path, encoders: Encoders, settings: Bu
             f"{path} is there already and is not a map; give another {option('out')}, nothing in it was touched."
         )
     settings = settings.for_profile(encoders.weight_variance_m2)
-    models = {kind.value: ModelInfo.of(encoders.sources[kind].chosen, card) for kind, card in encoders.cards().items()}
+    models = models_of(encoders)
     key = key_of("map", BUILD_VERSION, recording.fingerprint, audio_key(recording), encoders.name, models, settings)
-    return BuildPlan(recording, path, encoders, settings, models, key, fusion_key(recording, settings, encoders))
-
-
-def pixel_encoder_of(encoders: Encoders) -> PixelEncoder | None:
-    """Return the pixel encoder, None where there is none (the map is then one of surfaces and colours)."""
-    return encoders.pixels if Kind.PIXELS in encoders else None
-
-
-def fusion_key(recording: Recording, settings: BuildSettings, encoders: Encoders) -> str:
-    """Return the hash of all that the sums of a frame depend on; parts are only ever added to parts of the same key."""
-    encoder = pixel_encoder_of(encoders)
-    card = None if encoder is None else encoder.card
-    ground = (settings.gravity, settings.seed, recording.base_height) if encoder is not None else None
-    basis = recording.fingerprint, settings.voxel_size_m, settings.fusion, card, ground
-    if settings.frames.per_submap:
-        basis = *basis, settings.frames.per_submap
-    chosen = (settings.keyframes, settings.frames.step) if encoders.keyframes_only else ()
-    return key_of("fusion", BUILD_VERSION, *basis, *chosen)
-
-
-def encoded_frames(recording: Recording, settings: BuildSettings, encoders: Encoders) -> frozenset[int] | None:
-    """Return the numbers of the frames whose pixels are encoded, None for all.
-
-    For a pixel encoder that is given keyframes alone they are those of every ``frames.step``-th frame of the whole
-    recording, by motion: the same on every machine that fuses a part of it, and known before a picture is read.
-    """
-    if not encoders.keyframes_only:
-        return None
     numbers = np.arange(0, len(recording), settings.frames.step)
-    stamps, poses = recording.stamps_s[numbers], recording.world_from_camera[numbers]
-    return frozenset(numbers[keyframes_by_motion(stamps, poses, settings.keyframes)].tolist())
+    stamps_s, poses = recording.stamps_s[numbers], recording.world_from_camera[numbers]
+    keyframes = numbers[keyframes_by_motion(stamps_s, poses, settings.keyframes)]
+    return BuildPlan(recording, path, encoders, settings, models, key, frozenset(keyframes.tolist()))
 
 
-def plan_spans(frames: int, settings: BuildSettings, covered: Sequence[Span] = ()) -> list[Span]:
-    """Return the stretches to fuse one after the other, each of ``frames.summed`` frames or fewer."""
-    wanted = np.zeros(frames, bool)
-    wanted[:: settings.frames.step] = True
-    for start, stop, step in covered:
-        wanted[start:stop:step] = False
-    spans: list[Span] = []
-    stride = settings.frames.summed * settings.frames.step
-    for start in range(0, frames, stride):
-        left = np.flatnonzero(wanted[start : start + stride])
-        for run in np.split(left, np.flatnonzero(np.diff(left) > settings.frames.step) + 1):
-            if len(run):
-                first, last = start + int(run[0]), start + int(run[-1])
-                spans.append((first, last + 1, settings.frames.step))
-    return spans
+def models_of(encoders: Encoders) -> dict[str, ModelInfo]:
+    """Return the cards of encoders, by module."""
+    return {kind.value: ModelInfo.of(encoders.sources[kind].chosen, card) for kind, card in encoders.cards().items()}
 
 
 def audio_key(recording: Recording) -> list[str | float] | None:

@@ -1,4 +1,4 @@
-"""The last stages: the parts become the voxels of the map, and all of it is written."""
+"""From the sums of all frames to the voxels of a map, and what its manifest says."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -9,22 +9,18 @@ from time import perf_counter
 import numpy as np
 
 from avlmaps.core.arrays import Float, Int
-from avlmaps.core.columns import concat
+from avlmaps.core.camera import Rig
 from avlmaps.core.errors import MapError
 from avlmaps.core.registry import Kind
 from avlmaps.core.version import __version__
 from avlmaps.core.wording import option
+from avlmaps.maps.estimate import Start, ground_notices
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
 from avlmaps.maps.fusion.free_space import FreeViews, ThroughCounts, clean
-from avlmaps.maps.pipeline.estimate import EstimatedFloor, EstimatedUp, ground_notices
-from avlmaps.maps.pipeline.keyframes import KeyframeResult
-from avlmaps.maps.pipeline.parts import MapPart
-from avlmaps.maps.pipeline.plan import BuildPlan, strip_folder
-from avlmaps.maps.pipeline.sounds import SoundResult
+from avlmaps.maps.plan import strip_folder
+from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store import manifest
-from avlmaps.maps.store.folder import write as write_folder
-from avlmaps.maps.store.map_data import MapData
-from avlmaps.maps.types import HeardSounds, Keyframes, SourceEvidence, Voxels
+from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
 from avlmaps.recordings.types import Recording
 
 # Below this share of agreeing surface the direction that was found is reported as a guess.
@@ -49,64 +45,65 @@ class Merged:
     elapsed_s: float
 
 
+@dataclass(frozen=True, slots=True)
+class About:
+    """What a map says of where it comes from.
+
+    Attributes:
+        recording: what was recorded.
+        rig: its cameras.
+        has_sound: whether it has a sound track.
+        profile: which models perceive.
+        models: their cards, by module.
+        settings: all that was chosen.
+        key: hash of everything that went in.
+        doubts: what is odd about the recording, one sentence each.
+    """
+
+    recording: manifest.RecordingInfo
+    rig: Rig
+    has_sound: bool
+    profile: str
+    models: dict[str, manifest.ModelInfo]
+    settings: BuildSettings
+    key: str
+    doubts: tuple[str, ...]
+
+
 def surfaces(
-    plan: BuildPlan,
     total: VoxelAccumulator,
     views: Sequence[FreeViews],
+    about: About,
     sensor: manifest.SensorInfo,
     counts: ThroughCounts | None = None,
 ) -> Merged:
     """Return the voxels of the sums that are a surface.
 
+    Args:
+        total: the sums.
+        views: where the frames saw freely; with ``counts`` one.
+        about: of the map.
+        sensor: the depth camera.
+        counts: of the last time, of the same map with fewer frames.
+
     Raises:
         MapError: there is none.
     """
-    begin, grid = perf_counter(), total.grid
+    begin, grid, name, fusion = perf_counter(), total.grid, about.recording.name, about.settings.fusion
     if len(total) == 0:
-        farthest = min(plan.settings.fusion.max_depth_m, sensor.model.farthest_m(grid.voxel_size_m))
+        farthest = min(fusion.max_depth_m, sensor.model.farthest_m(grid.voxel_size_m))
         raise MapError(
-            f"No pixel of {plan.recording.path} has a depth between {plan.settings.fusion.min_depth_m} and "
-            f"{farthest:.4g} m, so that the map would be empty; check the recording's depth scale."
+            f"No pixel of {name} has a depth between {fusion.min_depth_m} and {farthest:.4g} m, so that the map would "
+            "be empty; check the recording's depth scale."
         )
     count = None if counts is None else partial(counts.count, views=views[0])
-    kept, removed = clean(total.evidence(), views, plan.recording.rig.depth, grid, sensor.model, count)
+    kept, removed = clean(total.evidence(), views, about.rig.depth, grid, sensor.model, count)
     if not kept.any():
         raise MapError(
-            f"Every voxel of {plan.recording.path} is seen through or a speck, so that the map would be empty; check "
-            f"its poses and its depth scale, or use every depth as it is ({option('sensor', 'none')})."
+            f"Every voxel of {name} is seen through or a speck, so that the map would be empty; check its poses and "
+            f"its depth scale, or use every depth as it is ({option('sensor', 'none')})."
         )
     return Merged(total.voxels(kept=kept), sensor, manifest.Removed(**removed), perf_counter() - begin)
-
-
-def write(
-    plan: BuildPlan,
-    up: EstimatedUp,
-    floor: EstimatedFloor,
-    parts: Sequence[MapPart],
-    pictures: KeyframeResult,
-    heard: SoundResult,
-    merged: Merged,
-    sources: tuple[SourceEvidence | None, float] = (None, 0.0),
-) -> manifest.MapInfo:
-    """Write the map and, last of all, its manifest; then the parts go."""
-    keyframes = with_clear_views(pictures.keyframes, [part.views() for part in parts])
-    submaps = concat([part.submap() for part in parts]) if plan.settings.frames.per_submap else None
-    stages_s = {
-        "up": up.elapsed_s,
-        "ground": floor.elapsed_s,
-        "fusion": sum(part.info.elapsed_s for part in parts),
-        "keyframes": pictures.elapsed_s,
-        "sounds": heard.elapsed_s,
-        "merging": merged.elapsed_s,
-    }
-    if sources[0] is not None:
-        stages_s["sources"] = sources[1]
-    timings = manifest.Timings.now(stages_s)
-    bad = sorted((frame for part in parts for frame in part.info.bad_frames), key=lambda frame: frame.index)
-    fused = sum(part.info.fused for part in parts)
-    info = manifest_of(plan, up.up, floor.ground, merged, keyframes, heard.sounds, timings, fused, bad)
-    data = MapData(info, merged.voxels, keyframes, heard.sounds, pictures.place_state, sources[0], submaps=submaps)
-    return write_folder(plan.path, data)
 
 
 def with_clear_views(keyframes: Keyframes, views: Sequence[FreeViews]) -> Keyframes:
@@ -119,9 +116,8 @@ def with_clear_views(keyframes: Keyframes, views: Sequence[FreeViews]) -> Keyfra
 
 
 def manifest_of(
-    plan: BuildPlan,
-    up: manifest.UpInfo,
-    ground: manifest.GroundInfo,
+    about: About,
+    start: Start,
     merged: Merged,
     keyframes: Keyframes,
     sounds: HeardSounds,
@@ -131,32 +127,34 @@ def manifest_of(
 ) -> manifest.MapInfo:
     """Return the content of ``map.json`` but for its list of files."""
     voxels = merged.voxels
-    odd = feature_doubts(voxels, keyframes, sounds, plan.models)
-    doubts = (*plan.doubts, *carving_doubts(merged.removed, len(voxels)), *odd)
+    odd = feature_doubts(voxels, keyframes, sounds, about.models)
+    found = *carving_doubts(merged.removed, len(voxels)), *odd
+    doubts, voxel_size_m = (*about.doubts, *found), about.settings.voxel_size_m
     return manifest.MapInfo(
         avlmaps_version=__version__,
-        build_key=plan.key,
-        voxel_size_m=plan.settings.voxel_size_m,
-        up=up,
-        ground=ground,
-        rig=manifest.RigInfo.of(plan.recording.rig),
-        profile=plan.encoders.name,
-        models=plan.models,
-        settings=plan.settings,
+        build_key=about.key,
+        voxel_size_m=voxel_size_m,
+        up=start.up,
+        ground=start.floors,
+        rig=manifest.RigInfo.of(about.rig),
+        profile=about.profile,
+        models=about.models,
+        settings=about.settings,
         sensor=merged.sensor,
         removed=merged.removed,
-        seed=plan.settings.seed,
-        recording=_recording_info(plan.recording),
+        seed=about.settings.seed,
+        recording=about.recording,
         counts=manifest.Counts.of(fused, keyframes, voxels, sounds),
-        bounding_box_m=manifest.MapBounds.of(voxels.index, plan.settings.voxel_size_m),
-        bad_frames=tuple(bad),
-        notices=(*doubts, *_notices(plan, up, ground, fused, len(bad))),
+        bounding_box_m=manifest.MapBounds.of(voxels.index, voxel_size_m),
+        bad_frames=tuple(sorted(bad, key=lambda frame: frame.index)),
+        notices=(*doubts, *_notices(about, start.up, start.floors, fused, len(bad))),
         doubts=doubts,
         timings=timings,
     )
 
 
-def _recording_info(recording: Recording) -> manifest.RecordingInfo:
+def recording_info(recording: Recording) -> manifest.RecordingInfo:
+    """Return what a map says of its recording."""
     return manifest.RecordingInfo(
         name=recording.path.name,
         format=recording.format,
@@ -168,7 +166,7 @@ def _recording_info(recording: Recording) -> manifest.RecordingInfo:
     )
 
 
-def _notices(plan: BuildPlan, up: manifest.UpInfo, ground: manifest.GroundInfo, fused: int, bad: int) -> Iterator[str]:
+def _notices(about: About, up: manifest.UpInfo, ground: manifest.GroundInfo, fused: int, bad: int) -> Iterator[str]:
     if up.known_from == "camera":
         yield "The up direction is a guess from how the camera was held: too little smooth surface is in view."
     elif up.support < _GUESS:
@@ -176,7 +174,7 @@ def _notices(plan: BuildPlan, up: manifest.UpInfo, ground: manifest.GroundInfo, 
     yield from ground_notices(ground)
     if bad:
         yield f"{bad} of {fused + bad} frames were left out (bad_frames in map.json says why)."
-    if plan.recording.audio is None:
+    if not about.has_sound:
         yield "The recording has no sound track, so that the map holds no sounds."
 
 

@@ -1,0 +1,236 @@
+"""A build on a cluster: each stretch of frames is a job, whose result any machine stores on the storage they share.
+
+A worker opens the recording and makes the build's plan itself, of what it sees, its own code and its own weights, and
+refuses to work where that plan is another one. What it makes is stored beside and renamed when it is whole: a worker
+that dies leaves nothing that counts, and two that do the same job leave one result.
+"""
+
+import hashlib
+import secrets
+import shutil
+import socket
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import closing, suppress
+from dataclasses import dataclass
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+from typing import Protocol, TypeVar
+
+from avlmaps.core.errors import AvlmapsError, BackendError, MapError, RecordingError
+from avlmaps.core.progress import silence_progress
+from avlmaps.core.version import __version__
+from avlmaps.maps.build import map_span, spans_of_frames
+from avlmaps.maps.estimate import Start
+from avlmaps.maps.plan import BuildPlan, Span, make_plan
+from avlmaps.maps.settings import BuildSettings
+from avlmaps.maps.store.checkpoints import DONE
+from avlmaps.maps.store.tables import explain_write_errors
+from avlmaps.perception.cache.cached_encoders import with_cache
+from avlmaps.perception.cache.feature_store import DEFAULT_CACHE, CacheSettings
+from avlmaps.perception.encoders import Encoders
+from avlmaps.perception.models.settings import ModelSettings, model_settings, use_models
+from avlmaps.perception.profiles import GIVEN
+from avlmaps.recordings.types import Recording
+
+J = TypeVar("J")
+A = TypeVar("A")
+Reopen = Callable[[], Recording]
+"""Opens the recording on a machine: ``functools.partial(open_recording, "/shared/REC")``."""
+_COMPUTING = ("numpy", "numba", "onnxruntime", "opencv-python-headless", "scipy", "torch", "transformers")
+
+
+class Pool(Protocol):
+    """Processes that do jobs: Ray's, or any others that can be given a function and a value."""
+
+    @property
+    def cores(self) -> int:
+        """How many jobs it does at once."""
+        ...
+
+    def run(self, function: Callable[[J], A], jobs: Sequence[J]) -> Generator[tuple[int, A]]:
+        """Do each job once, or again where its worker died; yield number and result of each as it is done."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Models:
+    """The models that perceive, by their names, which mean the same on every machine."""
+
+    profile: str
+    names: dict[str, str]
+    weight_variance_m2: float
+    cache: CacheSettings
+    settings: ModelSettings
+
+    @classmethod
+    def of(cls, encoders: Encoders, cache: CacheSettings) -> "Models":
+        """Return the names of encoders.
+
+        Raises:
+            BackendError: one of them is an object, which has none.
+        """
+        names = {kind.value: encoders.name_of(kind) for kind in encoders}
+        own = [module for module, name in names.items() if name.startswith(GIVEN)]
+        if own:
+            raise BackendError(
+                f"The encoder of {own[0]} is an object of this process, and other machines have none; register it as a "
+                "backend that they can import, and give its name."
+            )
+        return cls(encoders.name, names, encoders.weight_variance_m2, cache, model_settings())
+
+    def encoders(self) -> Encoders:
+        """Return the encoders on a worker; it loads models as the build does from then on."""
+        if self.settings != model_settings():
+            use_models(self.settings)
+        return Encoders.of(
+            self.profile, Encoders.remembered(self.profile, self.names).sources, self.weight_variance_m2
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class SpanJob:
+    """A stretch of frames whose state is to be stored in a folder, and by what a worker knows that it sees the same."""
+
+    reopen: Reopen
+    path: Path
+    models: Models
+    settings: BuildSettings
+    start: Start
+    span: Span
+    folder: Path
+    key: str
+    software: dict[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class JobResult:
+    """What became of a job: the class and the sentence of the error that a user can fix, empty for none."""
+
+    error: str = ""
+    why: str = ""
+
+    def require(self) -> None:
+        """Raise the error again on this side."""
+        if self.error:
+            raise _ERRORS.get(self.error, MapError)(self.why)
+
+
+_ERRORS: dict[str, type[AvlmapsError]] = {one.__name__: one for one in (BackendError, MapError, RecordingError)}
+
+
+class ClusterWorkers:
+    """Gives a build's stretches of frames to a pool of workers; see ``build.Workers``."""
+
+    def __init__(self, pool: Pool, reopen: Reopen, cache: CacheSettings = DEFAULT_CACHE) -> None:
+        """Use a pool; ``reopen`` opens the recording on a worker, as it was opened here."""
+        self._pool, self._reopen, self._cache = pool, reopen, cache
+
+    def map_spans(self, plan: BuildPlan, start: Start, jobs: dict[Path, Span]) -> Iterator[Path]:
+        """Let each stretch be mapped by a worker.
+
+        Raises:
+            MapError: a worker sees another recording or map, runs another avlmaps, or dies again and again.
+            BackendError: it has other weights, or lacks a model.
+        """
+        models, path, known = Models.of(plan.encoders, self._cache), plan.path.absolute(), software()
+        folders = [folder.absolute() for folder in jobs]
+        orders = [
+            SpanJob(self._reopen, path, models, plan.settings, start, span, folder, plan.key, known)
+            for folder, span in zip(folders, jobs.values(), strict=True)
+        ]
+        with closing(self._pool.run(span_job, orders)) as results:
+            for number, result in results:
+                result.require()
+                if not (folders[number] / DONE).is_file():
+                    raise MapError(
+                        f"A worker does not see {path} as this machine does; the map must lie on storage that all "
+                        "machines of the cluster share, at the same path."
+                    )
+                yield list(jobs)[number]
+
+
+def span_job(job: SpanJob) -> JobResult:
+    """Map a stretch of frames on a worker."""
+
+    def work(host: str) -> None:
+        plan, attempt = _plan_of(job, host), job.folder.with_name(f"{job.folder.name}.{secrets.token_hex(4)}")
+        try:
+            with closing(spans_of_frames(plan, job.start, [job.span])) as frames:
+                map_span(plan, job.start, frames, attempt)
+            with explain_write_errors(job.folder), suppress(OSError):  # another worker was taken for dead, and did it
+                attempt.rename(job.folder)
+        finally:
+            shutil.rmtree(attempt, ignore_errors=True)
+
+    return done_by(work)
+
+
+def done_by(work: Callable[[str], None]) -> JobResult:
+    """Do a job, of the worker's name, and return what became of it; errors of users become values."""
+    try:
+        with silence_progress():
+            work(socket.gethostname())
+    except AvlmapsError as fault:
+        return JobResult(type(fault).__name__, str(fault))
+    return JobResult()
+
+
+_known: dict[str, BuildPlan] = {}  # the last plan that this worker made, by its key
+
+
+def _plan_of(job: SpanJob, host: str) -> BuildPlan:
+    """Return the plan of the build, made from what this worker sees, once.
+
+    Raises:
+        MapError: it sees another recording, or computes by other software or weights.
+    """
+    if job.key not in _known:
+        require_same_software(job.software, host)
+        recording = reopened(job.reopen, host)  # first: it may register what its models are
+        encoders = with_cache(job.models.encoders(), job.models.cache)
+        plan = make_plan(recording, job.path, encoders, job.settings)
+        if plan.key != job.key:
+            raise MapError(
+                f"The worker on {host} would build another map: its recording, its sound track or its models are not "
+                "those of this machine. The recording must lie on storage that all machines of the cluster share, and "
+                "the same models must be on all."
+            )
+        _known.clear()
+        _known[job.key] = plan
+    return _known[job.key]
+
+
+def reopened(reopen: Reopen, host: str) -> Recording:
+    """Return the recording as a worker opens it; raises ``MapError`` where it cannot."""
+    try:
+        return reopen()
+    except AvlmapsError as fault:
+        raise MapError(
+            f"The worker on {host} cannot open the recording: {str(fault).rstrip('.')}. A recording must lie on "
+            "storage that all machines of the cluster see at the same path."
+        ) from fault
+
+
+@cache
+def software() -> dict[str, str]:
+    """Return what computes here: a hash of this avlmaps' code, and the versions of what it computes by."""
+    package, code = Path(__file__).parents[1], hashlib.sha256()
+    for path in sorted(package.rglob("*.py")):
+        code.update(path.relative_to(package).as_posix().encode() + b"\0" + path.read_bytes())
+    found = {"avlmaps": f"{__version__} ({code.hexdigest()[:12]})"}
+    for name in _COMPUTING:
+        with suppress(metadata.PackageNotFoundError):  # without models on torch nothing of it is there
+            found[name] = metadata.version(name)
+    return found
+
+
+def require_same_software(wanted: dict[str, str], host: str) -> None:
+    """Raise ``MapError`` where this worker computes by other software than the machine that gave the job."""
+    own = software()
+    for name, version in wanted.items():
+        if own.get(name) != version:
+            raise MapError(
+                f"The worker on {host} runs {name} {own.get(name, 'none')} and this machine {version}; install the "
+                "same on all machines of the cluster."
+            )

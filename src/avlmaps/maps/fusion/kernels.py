@@ -1,0 +1,440 @@
+"""The compiled loops of a map: all that is done for every pixel, or for every pair of a voxel and a frame.
+
+`trace` walks a depth picture, finds the voxel of every pixel and adds up, for each voxel that the frame touches, colour
+and hits, and for each *pair* of a voxel and a cell of the feature map the weight. A frame of 300 thousand pixels has
+some 3,400 voxels and 33 thousand pairs, so that `add_features` reads a feature once for a pair instead of for a pixel.
+"""
+
+import numpy as np
+from jaxtyping import Float32, Float64, Int8, Int32, Int64, UInt8, UInt16
+from numba import njit
+
+from avlmaps.core.kernel_types import Options, Real, Whole
+
+# No "nnan" among them: NaN must stay visible. "reassoc" lets sums over a row be vectorised.
+OPTIONS: Options = {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": {"contract", "nsz", "reassoc"}}
+
+# A voxel within one frame is named by one integer: three offsets from the camera's voxel, 21 bits each.
+OFFSET_BITS = 21
+REACH_VOXELS = 1 << (OFFSET_BITS - 1)
+# Remembers which pair was used last for a (voxel, cell). A miss costs a second pair and no error.
+RECENT_PAIRS = 1 << 13
+# Columns of what a frame adds to each voxel.
+RED, GREEN, BLUE, RGB_WEIGHT, HITS, SHARP = range(6)
+SUM_COLUMNS = 8  # one cache line
+# How exact a hit is, from 0 to 1, is counted in these units: sums of whole numbers are the same in any order.
+SHARP_UNITS = 256
+
+# exp(-e) = table[n] · exp(-r) with n = floor(64 e) and r in [0, 1/64); five terms are right to 2e-14, and four
+# times faster than a call of exp, because the loop is vectorised.
+STEPS = 64
+GREATEST_EXPONENT = 30.0 * np.log(10.0)
+_EXPONENTIALS = np.exp(-np.arange(STEPS * (int(GREATEST_EXPONENT) + 1) + 1) / STEPS)
+
+Pose = tuple[np.ndarray, np.ndarray, np.ndarray]
+Limits = tuple[float, float, float, float, float, float]
+Projection = tuple[bool, np.ndarray, tuple[float, float, float, float], tuple[int, int], tuple[int, int]]
+# Of the pixels of a row: key (of its voxel), weight, sharp (how exact), picture (its colour pixel), cell.
+Row = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+# Of the frame's voxels: a hash table (key of each slot, its voxel), the key of each, and its sums.
+FrameVoxels = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+# Of each pair as it was met: its cell, its weight, the pair of the same voxel before; the last of each voxel; those
+# that were used last, and the voxel of each pair.
+Pairs = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+
+
+@njit(**OPTIONS)
+def find_rows(
+    wanted: Int32[np.ndarray, "n 3"],
+    slots: Int32[np.ndarray, " slots"],
+    index: Int32[np.ndarray, "rows 3"],
+    count: Whole,
+    enter: bool,
+    found: Int32[np.ndarray, " n"],
+):
+    """Write the row of each voxel, -1 where it is not in the table; return how many voxels the table has.
+
+    Args:
+        wanted: which voxels.
+        slots: hash table of rows, -1 free; its length is a power of two.
+        index: of the rows.
+        count: how many there are.
+        enter: give a voxel that is not there the next row; there is room.
+        found: filled in.
+    """
+    mask = np.int64(slots.shape[0] - 1)
+    count = np.int64(count)
+    for n in range(wanted.shape[0]):
+        i, j, k = np.int64(wanted[n, 0]), np.int64(wanted[n, 1]), np.int64(wanted[n, 2])
+        mixed = i * np.int64(73856093) ^ j * np.int64(19349669) ^ k * np.int64(83492791)
+        mixed = mixed * np.int64(-7046029254386353131)
+        slot = (mixed ^ (mixed >> 29)) & mask
+        row = np.int64(slots[slot])
+        while row >= 0 and (index[row, 0] != i or index[row, 1] != j or index[row, 2] != k):
+            slot = (slot + 1) & mask
+            row = np.int64(slots[slot])
+        if row < 0 and enter:
+            row = count
+            slots[slot] = row
+            index[row, 0], index[row, 1], index[row, 2] = i, j, k
+            count += 1
+        found[n] = row
+    return count
+
+
+@njit(**OPTIONS)
+def trace(
+    depth: Float32[np.ndarray, "h w"],
+    rays: tuple[np.ndarray, np.ndarray],
+    pose: Pose,
+    limits: Limits,
+    rgb: UInt8[np.ndarray, "pixels 3"],
+    tables: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
+    projection: Projection,
+    row: Row,
+    voxels: FrameVoxels,
+    pairs: Pairs,
+):
+    """Measure one frame: its voxels, with what they get of colour and hits, and its pairs of voxel and cell.
+
+    Args:
+        depth: metres.
+        rays: (x (w,), y (h,)), camera-frame direction of each column and row at z = 1.
+        pose: (rotation (3, 3), translation (3,), the camera's voxel (3,) int64).
+        limits: (voxel size, least and greatest depth in metres, 1 / (2 variance), error of a depth in half voxels at
+            0 m and its growth with the depth's square).
+        rgb: colours of the picture's pixels.
+        tables: see `accumulator.PixelLookup`.
+        projection: likewise.
+        row: working memory.
+        voxels: receives the voxels.
+        pairs: receives the pairs.
+
+    Returns:
+        Counts of points, of voxels and of pairs; no voxels where there are too many for the table.
+    """
+    keys, weights, sharp, picture, cells = row
+    slot_key, slot_voxel, voxel_key, voxel_sum = voxels
+    pair_cell, pair_weight, pair_before, last_pair, recent, pair_voxel = pairs
+    (x, y), (rotation, translation, origin) = rays, pose
+    voxel_size, nearest, farthest, falloff, noise, noise_growth = limits
+    projected, to_rgb, (fx, fy, cx, cy), (height, width), (cell_rows, cell_columns) = projection
+    columns_of, rows_of, cell_columns_of, cell_rows_of = tables
+    half, mask = np.int64(REACH_VOXELS), np.int64(slot_key.shape[0] - 1)
+    slot_key[:] = -1
+    recent[:] = -1
+    points = count = paired = voxel = np.int64(0)
+    last_key = np.int64(-1)
+    for v in range(depth.shape[0]):
+        bx = rotation[0, 1] * y[v] + rotation[0, 2]
+        by = rotation[1, 1] * y[v] + rotation[1, 2]
+        bz = rotation[2, 1] * y[v] + rotation[2, 2]
+        for u in range(depth.shape[1]):
+            z = np.float64(depth[v, u])
+            valid = (z >= nearest) & (z <= farthest)
+            z = z if valid else 0.0
+            px = translation[0] + z * (rotation[0, 0] * x[u] + bx)
+            py = translation[1] + z * (rotation[1, 0] * x[u] + by)
+            pz = translation[2] + z * (rotation[2, 0] * x[u] + bz)
+            i = np.int64(np.floor(px / voxel_size)) - origin[0]
+            j = np.int64(np.floor(py / voxel_size)) - origin[1]
+            k = np.int64(np.floor(pz / voxel_size)) - origin[2]
+            packed = ((i + half) << (2 * OFFSET_BITS)) | ((j + half) << OFFSET_BITS) | (k + half)
+            keys[u] = packed if valid else -1
+            exponent = min(z * z * (x[u] * x[u] + y[v] * y[v] + 1.0) * falloff, GREATEST_EXPONENT)
+            step = np.int32(exponent * STEPS)
+            r = exponent - step * (1.0 / STEPS)
+            series = 1.0 - r * (1.0 - r * (1 / 2 - r * (1 / 6 - r * (1 / 24 - r * (1 / 120)))))
+            error = noise + noise_growth * z * z
+            exact = 1.0 / (1.0 + error * error)
+            weights[u] = _EXPONENTIALS[np.uint32(step)] * series * exact
+            sharp[u] = np.int64(SHARP_UNITS * exact + 0.5)
+        for u in range(depth.shape[1]):
+            if not projected:
+                has = (columns_of[u] >= 0) & (rows_of[v] >= 0)
+                picture[u] = columns_of[u] + rows_of[v] if has else -1
+                has = (cell_columns_of[u] >= 0) & (cell_rows_of[v] >= 0)
+                cells[u] = cell_columns_of[u] + cell_rows_of[v] if has else -1
+                continue
+            z = np.float64(depth[v, u])
+            ahead = z * (to_rgb[2, 0] * x[u] + to_rgb[2, 1] * y[v] + to_rgb[2, 2]) + to_rgb[2, 3]
+            across = z * (to_rgb[0, 0] * x[u] + to_rgb[0, 1] * y[v] + to_rgb[0, 2]) + to_rgb[0, 3]
+            down = z * (to_rgb[1, 0] * x[u] + to_rgb[1, 1] * y[v] + to_rgb[1, 2]) + to_rgb[1, 3]
+            column, line = fx * across / ahead + cx, fy * down / ahead + cy
+            inside = (ahead > 0.0) & (column >= 0.0) & (column < width) & (line >= 0.0) & (line < height)
+            column, line = (column, line) if inside else (0.0, 0.0)
+            picture[u] = np.int32(line) * np.int32(width) + np.int32(column) if inside else -1
+            cell_row, cell_column = np.int32(line * (cell_rows / height)), np.int32(column * (cell_columns / width))
+            cells[u] = cell_row * np.int32(cell_columns) + cell_column if inside and cell_columns > 0 else -1
+        u = np.int64(0)
+        while u < depth.shape[1]:
+            key, cell = keys[u], cells[u]
+            if key < 0:
+                u += 1
+                continue
+            if key != last_key:
+                last_key = key
+                slot = ((key * np.int64(-7046029254386353131)) >> 40) & mask
+                while slot_key[slot] != key and slot_key[slot] != -1:
+                    slot = (slot + 1) & mask
+                if slot_key[slot] == -1:
+                    if 2 * count >= mask:
+                        return points, np.int64(0), np.int64(-1)
+                    slot_key[slot], slot_voxel[slot], voxel_key[count], last_pair[count] = key, count, key, -1
+                    voxel_sum[count] = 0.0
+                    count += 1
+                voxel = np.int64(slot_voxel[slot])
+            start, exact_sum = u, np.int64(0)
+            total = red = green = blue = seen = 0.0
+            while u < depth.shape[1] and keys[u] == key and cells[u] == cell:
+                weight, pixel = weights[u], picture[u]
+                total += weight
+                exact_sum += sharp[u]
+                if pixel >= 0:
+                    seen += weight
+                    red += weight * rgb[pixel, 0]
+                    green += weight * rgb[pixel, 1]
+                    blue += weight * rgb[pixel, 2]
+                u += 1
+            points += u - start
+            voxel_sum[voxel, RED] += red
+            voxel_sum[voxel, GREEN] += green
+            voxel_sum[voxel, BLUE] += blue
+            voxel_sum[voxel, RGB_WEIGHT] += seen
+            voxel_sum[voxel, HITS] += u - start
+            voxel_sum[voxel, SHARP] += exact_sum
+            if cell < 0:
+                continue
+            place = (np.int64(cell) * 5 + voxel * 1237) & (RECENT_PAIRS - 1)
+            pair = np.int64(recent[place])
+            if pair >= 0 and pair_voxel[pair] == voxel and pair_cell[pair] == cell:
+                pair_weight[pair] += total
+                continue
+            recent[place], pair_voxel[paired], pair_cell[paired], pair_weight[paired] = paired, voxel, cell, total
+            pair_before[paired], last_pair[voxel] = last_pair[voxel], paired
+            paired += 1
+    return points, count, paired
+
+
+@njit(**OPTIONS)
+def add_features(
+    rows: Int32[np.ndarray, " voxels"],
+    pairs: Pairs,
+    features: Float32[np.ndarray, "cells d"],
+    feature_sum: Float32[np.ndarray, "rows d"],
+    weight: Float64[np.ndarray, " rows"],
+):
+    """Add the features of a traced frame to the map; return how many voxels were left out as theirs are not finite.
+
+    Each sum is formed in the first-level cache before its row is touched: reading a frame's features from memory, and
+    reading and writing rows of 2 KB, is what limits fusion.
+
+    Args:
+        rows: of the map, for each of the frame's voxels.
+        pairs: as `trace` left them.
+        features: of the cells; one that is all zero adds neither itself nor weight.
+        feature_sum: added to.
+        weight: added to.
+    """
+    pair_cell, pair_weight, pair_before, last_pair = pairs[:4]
+    dim, faults = features.shape[1], 0
+    total = np.empty(dim, np.float32)
+    live, share = np.empty(pair_cell.shape[0] + 4, np.int64), np.empty(pair_cell.shape[0] + 4, np.float32)
+    for voxel in range(rows.shape[0]):
+        count, amount, pair = 0, 0.0, last_pair[voxel]
+        while pair >= 0:
+            cell, column = pair_cell[pair], 0
+            while column < dim and features[cell, column] == 0.0:  # nearly always the first number decides
+                column += 1
+            if column < dim:
+                amount += pair_weight[pair]
+                live[count], share[count] = cell, pair_weight[pair]
+                count += 1
+            pair = pair_before[pair]
+        total[:] = 0.0
+        live[:count], share[:count] = live[:count][::-1].copy(), share[:count][::-1].copy()  # as they lie in memory
+        live[count : count + 3], share[count : count + 3] = live[0], 0.0
+        for n in range(0, count, 4):  # four at once: the sum is read and written a quarter as often
+            a, b, c, d = live[n], live[n + 1], live[n + 2], live[n + 3]
+            of_a, of_b, of_c, of_d = share[n], share[n + 1], share[n + 2], share[n + 3]
+            for column in range(dim):
+                ab = of_a * features[a, column] + of_b * features[b, column]
+                total[column] += ab + of_c * features[c, column] + of_d * features[d, column]
+        if amount == 0.0:
+            continue
+        size = np.float32(0.0)
+        for column in range(dim):
+            size += abs(total[column])
+        if not size < np.inf:
+            faults += 1
+            continue
+        weight[rows[voxel]] += amount
+        for column in range(dim):
+            feature_sum[rows[voxel], column] += total[column]
+    return faults
+
+
+@njit(**OPTIONS)
+def add_spread(
+    depth: Float32[np.ndarray, "h w"],
+    rays: tuple[np.ndarray, np.ndarray],
+    pose: Pose,
+    limits: tuple[float, float, float],
+    number: Real,
+    voxels: FrameVoxels,
+    rows: Int32[np.ndarray, " voxels"],
+    spread: Float64[np.ndarray, "rows columns"],
+):
+    """Add where the points of a traced frame lie within their voxels.
+
+    Args:
+        depth: as `trace` took it.
+        rays: likewise.
+        pose: likewise.
+        limits: (voxel size, least and greatest depth), metres.
+        number: of the frame in its submap, from 0.
+        voxels: as `trace` left them.
+        rows: of the map, for each of the frame's voxels.
+        spread: x, y, z from the middle of the voxel, their products xx, xy, xz, yy, yz, zz, and the number; added to.
+    """
+    (x, y), (rotation, translation, origin), (size, nearest, farthest) = rays, pose, limits
+    slot_key, slot_voxel = voxels[:2]
+    half, mask = np.int64(REACH_VOXELS), np.int64(slot_key.shape[0] - 1)
+    for v in range(depth.shape[0]):
+        for u in range(depth.shape[1]):
+            z = np.float64(depth[v, u])
+            if not ((z >= nearest) & (z <= farthest)):
+                continue
+            px = (translation[0] + z * (rotation[0, 0] * x[u] + rotation[0, 1] * y[v] + rotation[0, 2])) / size
+            py = (translation[1] + z * (rotation[1, 0] * x[u] + rotation[1, 1] * y[v] + rotation[1, 2])) / size
+            pz = (translation[2] + z * (rotation[2, 0] * x[u] + rotation[2, 1] * y[v] + rotation[2, 2])) / size
+            i, j, k = np.int64(np.floor(px)), np.int64(np.floor(py)), np.int64(np.floor(pz))
+            key = (i - origin[0] + half) << (2 * OFFSET_BITS)
+            key |= ((j - origin[1] + half) << OFFSET_BITS) | (k - origin[2] + half)
+            slot = ((key * np.int64(-7046029254386353131)) >> 40) & mask
+            while slot_key[slot] != key and slot_key[slot] != -1:
+                slot = (slot + 1) & mask
+            if slot_key[slot] == -1:  # rounded into another voxel than by `trace`
+                continue
+            row, a, b, c = rows[slot_voxel[slot]], px - i - 0.5, py - j - 0.5, pz - k - 0.5
+            spread[row, 0] += a
+            spread[row, 1] += b
+            spread[row, 2] += c
+            spread[row, 3] += a * a
+            spread[row, 4] += a * b
+            spread[row, 5] += a * c
+            spread[row, 6] += b * b
+            spread[row, 7] += b * c
+            spread[row, 8] += c * c
+            spread[row, 9] += number
+
+
+@njit(**OPTIONS)
+def drop_flying(
+    depth: Float32[np.ndarray, "h w"],
+    slope: tuple[float, float],
+    noise: tuple[float, float],
+    edge_sigmas: Real,
+    out: Float32[np.ndarray, "h w"],
+):
+    """Copy a depth picture without the pixels that lie between a nearer and a farther surface; those become 0.
+
+    Args:
+        depth: metres.
+        slope: by how much the depth changes from one column, and from one row, to the next on the most grazing surface
+            at 1 m, metres.
+        noise: (σ at 0 m, its growth with z²).
+        edge_sigmas: a neighbour is on another surface when it is this many σ off.
+        out: filled in.
+    """
+    height, width = depth.shape
+    for v in range(height):
+        for u in range(width):
+            z = depth[v, u]
+            out[v, u] = z
+            sigma = edge_sigmas * (noise[0] + noise[1] * z * z)
+            for axis in range(2 if z > 0.0 else 0):
+                near_before = far_before = near_after = far_after = False
+                for step in range(1, 3):
+                    off = sigma + step * slope[axis] * z
+                    if axis == 0:
+                        before, after = depth[v, max(u - step, 0)], depth[v, min(u + step, width - 1)]
+                    else:
+                        before, after = depth[max(v - step, 0), u], depth[min(v + step, height - 1), u]
+                    near_before |= (before > 0.0) & (before < z - off)
+                    far_before |= before > z + off
+                    near_after |= (after > 0.0) & (after < z - off)
+                    far_after |= after > z + off
+                if (near_before & far_after) | (near_after & far_before):
+                    out[v, u] = 0.0
+
+
+@njit(**OPTIONS)
+def count_frames(
+    index: Int32[np.ndarray, "n 3"],
+    starts: Int64[np.ndarray, " cubes1"],
+    visible: UInt8[np.ndarray, "k cubes"],
+    voxel_size: Real,
+    clear: UInt16[np.ndarray, "k rows columns"],
+    size: Whole,
+    camera: tuple[float, float, float, float, int, int],
+    pose: Float64[np.ndarray, "k 4 4"],
+    through: Int32[np.ndarray, " n"],
+):
+    """Add to each voxel how many views see through it: all rays that may meet it are free for an edge behind it.
+
+    Args:
+        index: voxels, cube by cube.
+        starts: where the voxels of each cube begin, and where the last end.
+        visible: which cubes each view may see through.
+        voxel_size: metres.
+        clear: millimetres up to which each block of pixels is free.
+        size: edge of a block, pixels.
+        camera: (fx, fy, cx, cy, width, height).
+        pose: world_from_camera.
+        through: added to.
+    """
+    fx, fy, cx, cy, width, height = camera
+    ball = 0.5 * np.sqrt(3.0) * voxel_size  # the sphere round a voxel
+    behind = ball + voxel_size
+    for frame in range(clear.shape[0]):
+        x0, y0, z0, tx = pose[frame, 0, 0], pose[frame, 1, 0], pose[frame, 2, 0], pose[frame, 0, 3]
+        x1, y1, z1, ty = pose[frame, 0, 1], pose[frame, 1, 1], pose[frame, 2, 1], pose[frame, 1, 3]
+        x2, y2, z2, tz = pose[frame, 0, 2], pose[frame, 1, 2], pose[frame, 2, 2], pose[frame, 2, 3]
+        for cube in range(visible.shape[1]):
+            for n in range(starts[cube], starts[cube + 1] if visible[frame, cube] else starts[cube]):
+                x = (index[n, 0] + 0.5) * voxel_size - tx
+                y = (index[n, 1] + 0.5) * voxel_size - ty
+                z = (index[n, 2] + 0.5) * voxel_size - tz
+                depth = x2 * x + y2 * y + z2 * z
+                if depth <= 2.0 * ball:
+                    continue
+                a, b = (x0 * x + y0 * y + z0 * z) / depth, (x1 * x + y1 * y + z1 * z) / depth
+                u, v = fx * a + cx, fy * b + cy
+                # a rectangle that holds the picture of the sphere round the voxel
+                wide, high = fx * ball * (1.0 + abs(a)) / (depth - ball), fy * ball * (1.0 + abs(b)) / (depth - ball)
+                if u - wide < 0.0 or v - high < 0.0 or u + wide >= width or v + high >= height:
+                    continue
+                far, free = np.int64((depth + behind) * 1000.0) + 1, True
+                if clear[frame, np.int64(v) // size, np.int64(u) // size] < far:
+                    continue
+                for i in range(np.int64(v - high) // size, np.int64(v + high) // size + 1):
+                    for j in range(np.int64(u - wide) // size, np.int64(u + wide) // size + 1):
+                        free &= clear[frame, i, j] >= far
+                through[n] += free
+
+
+@njit(**OPTIONS)
+def sum_moved(
+    starts: Int64[np.ndarray, " rows1"],
+    source: Int32[np.ndarray, " pairs"],
+    weight: Float32[np.ndarray, " pairs"],
+    feature: Int8[np.ndarray, "n d"],
+    out: Float32[np.ndarray, "rows d"],
+):
+    """Write weighted sums of the features of voxels that move: those of row ``r`` are ``starts[r]:starts[r + 1]``."""
+    for row in range(out.shape[0]):
+        out[row] = 0.0
+        for pair in range(starts[row], starts[row + 1]):
+            for column in range(out.shape[1]):
+                out[row, column] += weight[pair] * np.float32(feature[source[pair], column])
