@@ -283,7 +283,7 @@ def _specks(evidence: VoxelViews, count: _Count, sensor: SensorModel) -> Bool[np
     """Return which voxels are in a small group of voxels that touch, at a corner at least, and that few frames hit."""
     if sensor.speck_voxels == 0 or len(evidence) == 0:
         return np.zeros(len(evidence), bool)
-    from scipy.sparse import coo_matrix
+    from scipy.sparse import csr_matrix
     from scipy.sparse.csgraph import connected_components
 
     table = hash_of(evidence.index)
@@ -292,7 +292,7 @@ def _specks(evidence: VoxelViews, count: _Count, sensor: SensorModel) -> Bool[np
         row = _rows_of(evidence.index + step, evidence, table)
         touching.append(np.stack([np.flatnonzero(row >= 0), row[row >= 0]]))
     one, other = np.concatenate(touching, axis=1)
-    edges = coo_matrix((np.ones(len(one), bool), (one, other)), shape=(len(evidence), len(evidence)))
+    edges = csr_matrix((np.ones(len(one), bool), (one, other)), shape=(len(evidence), len(evidence)))
     groups, of = connected_components(edges, directed=False)
     often = np.zeros(groups, np.int32)
     np.maximum.at(often, of, evidence.views)
