@@ -28,8 +28,8 @@ from avlmaps.maps.fusion.submaps import MovedSubmaps, in_steps, submap_of
 from avlmaps.maps.fusion.voxel_sums import VoxelSums
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.mapper import Mapper
-from avlmaps.maps.store.folder import write
 from avlmaps.maps.pose_correction import PoseCorrection
+from avlmaps.maps.store.folder import write
 from avlmaps.maps.store.reader import StoredMap, open_stored
 from avlmaps.maps.types import Submaps
 from avlmaps.perception.encoders import Encoders
