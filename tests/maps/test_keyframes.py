@@ -193,9 +193,9 @@ def test_what_is_kept_of_a_keyframe_fits_together() -> None:
     np.testing.assert_array_equal(keyframes.stamp_s, recording.stamps_s[chosen])
     np.testing.assert_array_equal(keyframes.world_from_camera, recording.world_from_camera[chosen])
     assert keyframes.view.shape == (count, 0)
-    assert keyframes.place.shape == (count, 64 * 128)
+    assert keyframes.place.shape == (count, 64 * 64)
     assert keyframes.xy.shape == (rows, 2)
-    assert keyframes.descriptors.shape == (rows, 128)
+    assert keyframes.descriptors.shape == (rows, 64)
     assert keyframes.descriptors.dtype == np.float16
     assert keyframes.points_world.shape == (rows, 3)
     assert np.isfinite(keyframes.points_world[:, 0]).mean() > 0.6

@@ -152,9 +152,9 @@ _EMBEDDED = Profile(
     pixels="embedded",
     views="embedded",
     sounds="embedded",
-    local="rootsift",
-    place="vlad",
-    matcher="mutual-ratio",
+    local="xfeat",
+    place="xfeat",
+    matcher="xfeat",
     about="small models shipped with the package: no download, no GPU; its eyes learnt from rendered worlds and from "
     "frames of NYU Depth V2, a data set for research that states no licence",
     # A small network knows a sofa from two metres better than a cushion's width of it from half a metre: with nearly

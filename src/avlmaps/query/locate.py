@@ -29,6 +29,7 @@ from avlmaps.query.focal import (
 _SAME_ASPECT = 0.01
 # The score of a pose whose place the points do not fix.
 _UNSURE = 0.49
+_OF_ONE_SCALE = 0.85
 _SAME_SIDE = 0.25  # cosine: no descriptor bears a change of view by more than 75 degrees
 
 
@@ -201,8 +202,11 @@ def locate(
     """
     start_s = time.perf_counter()
     camera, source = _camera_of(rgb, camera, stored.rig.rgb, focal_35mm)
-    local = stored.encoders.local.encode(rgb.copy())  # an encoder may write into what it is given
-    place = unmasked(stored.encoders.place.encode(rgb.copy(), local, stored.place_state))
+    seen, scale = _as_large_as_in_the_map(rgb, camera, stored.rig.rgb)
+    local = stored.encoders.local.encode(seen.copy())  # an encoder may write into what it is given
+    place = unmasked(stored.encoders.place.encode(seen.copy(), local, stored.place_state))
+    if scale != 1.0:
+        local = replace(local, xy=(local.xy / scale).astype(np.float32), size=(camera.width, camera.height))
     found = locate_features(stored, local, place, camera, rng, settings, source)
     return replace(found, elapsed_ms=1e3 * (time.perf_counter() - start_s))
 
@@ -414,6 +418,22 @@ def _camera_of(
         return own.resized(width, height), "map"
     focal = 0.5 * (own.fx + own.fy) * float(np.hypot(width, height) / np.hypot(own.width, own.height))
     return Pinhole(focal, focal, 0.5 * width, 0.5 * height, width, height), "assumed"
+
+
+def _as_large_as_in_the_map(
+    rgb: UInt8[np.ndarray, "h w 3"], camera: Pinhole, own: Pinhole
+) -> tuple[UInt8[np.ndarray, "hs ws 3"], float]:
+    """Return a picture in which things have about as many pixels as in the map's, and its scale.
+
+    Learned keypoints know a thing again at about the size at which they saw it. No picture is made larger.
+    """
+    scale = own.fx / camera.fx
+    if scale > _OF_ONE_SCALE:
+        return rgb, 1.0
+    import cv2
+
+    size = (max(1, round(camera.width * scale)), max(1, round(camera.height * scale)))
+    return cv2.resize(rgb, size, interpolation=cv2.INTER_AREA).astype(np.uint8), scale
 
 
 def _spread(xy: Float[np.ndarray, "n 2"], camera: Pinhole) -> float:

