@@ -2,7 +2,6 @@
 
 import os
 import socket
-import struct
 from pathlib import Path
 
 import msgspec
@@ -10,10 +9,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from hypothesis.extra import numpy as hnp
 
 from avlmaps.core.files import checked_size, decode_json, open_regular, read_regular, sampled_digest
-from avlmaps.core.npy import load_npy, npy_header
 
 needs_pipes = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes here")
 
@@ -87,48 +84,3 @@ def test_a_digest_of_a_large_file_sees_its_end_its_size_and_a_change_all_over(tm
         digests.add(sampled_digest(path, 4096))
     path.unlink()
     assert len({*digests, sampled_digest(path, 4096)}) == 5
-
-
-@given(hnp.arrays(st.sampled_from(["<f4", "<f2", "<i8", "u1"]), hnp.array_shapes(min_dims=0, max_dims=3, min_side=0)))
-def test_arrays_come_back(tmp_path_factory: pytest.TempPathFactory, array: np.ndarray) -> None:
-    path = tmp_path_factory.mktemp("npy") / "a.npy"
-    for order in "CF":
-        np.save(path, np.asarray(array, order=order))
-        for mapped in (False, True):
-            back = load_npy(path, 10_000, mapped=mapped)
-            assert back.dtype == array.dtype and back.shape == array.shape
-            assert np.ascontiguousarray(back).tobytes() == np.ascontiguousarray(array).tobytes()
-
-
-@pytest.mark.parametrize(
-    ("shape", "said"),
-    [
-        ("(1000000000, 1000000000)", "promises float32 of (1000000000, 1000000000)"),
-        ("(-1, 5)", "its shape (-1, 5) is none"),
-        ("(5, 'a')", ""),
-        ("(" * 500 + "5" + ")" * 500, ""),
-        ("(5,", ""),
-    ],
-)
-def test_a_header_that_is_not_true_takes_no_memory(tmp_path: Path, shape: str, said: str) -> None:
-    header = f"{{'descr': '<f4', 'fortran_order': False, 'shape': {shape}, }}\n".encode()
-    (tmp_path / "a.npy").write_bytes(b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header + bytes(40))
-    for mapped in (False, True):
-        with pytest.raises(ValueError) as fault:
-            load_npy(tmp_path / "a.npy", 10_000, mapped=mapped)
-        assert said in str(fault.value)
-    with pytest.raises(ValueError):
-        npy_header(tmp_path / "a.npy", 10_000)
-
-
-def test_objects_and_truncated_arrays_are_refused(tmp_path: Path) -> None:
-    np.save(tmp_path / "a.npy", np.array([{}], object), allow_pickle=True)
-    with pytest.raises(ValueError, match="which are not numbers"):
-        load_npy(tmp_path / "a.npy", 10_000)
-    np.save(tmp_path / "b.npy", np.zeros(100))
-    os.truncate(tmp_path / "b.npy", 500)
-    with pytest.raises(ValueError, match="928 bytes in all, and the file has 500"):
-        load_npy(tmp_path / "b.npy", 10_000)
-    (tmp_path / "c.npy").touch()
-    with pytest.raises(ValueError):
-        load_npy(tmp_path / "c.npy", 10_000)

@@ -18,8 +18,7 @@ import numpy as np
 from avlmaps.core.arrays import Float, Float32, UInt8
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
-from avlmaps.core.files import PICTURE_BYTES, open_regular, read_regular
-from avlmaps.core.npy import load_npy, npy_header
+from avlmaps.core.files import PICTURE_BYTES, checked_size, open_regular, read_regular
 from avlmaps.core.poses import apply
 from avlmaps.recordings.faults import readable
 
@@ -165,7 +164,7 @@ def picture_size(path: Path, content: bytes | None = None) -> tuple[int, int]:
     """
     if path.suffix == ".npy":
         with _whole_npy(path):
-            height, width = _depth_shape(path, npy_header(path, PICTURE_BYTES))
+            height, width = _depth_shape(path, _mapped(path))
         size: tuple[int, int] | None = (width, height)
     else:
         content = _head(path) if content is None else content
@@ -353,11 +352,11 @@ def decode_depth(path: Path, content: bytes) -> np.ndarray:
     return raw
 
 
-def _depth_shape(path: Path, header: Any) -> tuple[int, int]:
-    shape = header.shape[:2] if len(header.shape) == 3 and header.shape[2] == 1 else header.shape
-    if len(shape) != 2 or header.dtype.kind not in "fiu":
+def _depth_shape(path: Path, stored: np.ndarray) -> tuple[int, int]:
+    shape = stored.shape[:2] if stored.ndim == 3 and stored.shape[2] == 1 else stored.shape
+    if len(shape) != 2 or stored.dtype.kind not in "fiu":
         raise RecordingError(
-            f"{path} holds {header.dtype} of {tuple(shape)}; depth must be numbers of (height, width): save it in that "
+            f"{path} holds {stored.dtype} of {tuple(shape)}; depth must be numbers of (height, width): save it in that "
             "shape."
         )
     return shape
@@ -365,10 +364,17 @@ def _depth_shape(path: Path, header: Any) -> tuple[int, int]:
 
 def _npy_depth(path: Path, camera: Pinhole) -> Float32[np.ndarray, "h w"]:
     with _whole_npy(path):
-        shape = _depth_shape(path, npy_header(path, PICTURE_BYTES))
+        mapped = _mapped(path)
+        shape = _depth_shape(path, mapped)
         _check_size(path, shape, camera)
-        raw = load_npy(path, PICTURE_BYTES).reshape(shape)
+        raw = np.array(mapped).reshape(shape)
     return metres(raw if raw.dtype.kind == "f" else raw.astype(np.float32), 1.0)
+
+
+def _mapped(path: Path) -> np.ndarray:
+    """Return an NPY file's array without reading it; what its header promises must be there."""
+    checked_size(path, PICTURE_BYTES)
+    return np.load(path, mmap_mode="r", allow_pickle=False)
 
 
 @contextmanager
@@ -376,8 +382,9 @@ def _whole_npy(path: Path) -> Generator[None]:
     with readable(path, _RESTORE):
         try:
             yield
-        except ValueError as error:
-            raise RecordingError(f"{path} is not a whole NPY file ({error}); copy it again.") from None
+        except (ValueError, EOFError, SyntaxError, TypeError, OverflowError) as error:
+            reason = str(error).splitlines()[0].rstrip(".") if str(error) else "it is empty"
+            raise RecordingError(f"{path} is not a whole NPY file ({reason}); copy it again.") from None
 
 
 def _check_size(path: Path, shape: tuple[int, ...], camera: Pinhole) -> None:

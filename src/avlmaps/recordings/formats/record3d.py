@@ -25,7 +25,6 @@ from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import MANIFEST_BYTES, PICTURE_BYTES, SOUND_BYTES
-from avlmaps.core.lzfse import decompress
 from avlmaps.recordings import images
 from avlmaps.recordings.camera_axes import UP_IN_WORLD, from_opengl
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
@@ -48,6 +47,7 @@ from avlmaps.recordings.formats.tables import (
 from avlmaps.recordings.plausible import pace_fault
 
 _FPS = 60.0
+_END, _HEAD_BYTES = b"bvx$", 4096  # of an LZFSE stream
 # What the app writes beside; poses do not depend on initPose.
 _IDLE = ("initPose", "cameraType")
 
@@ -150,10 +150,16 @@ def _unfolded(files: _Files, name: str, size: int) -> UInt8[np.ndarray, " n"]:
 
 
 def _decompressed(files: _Files, name: str, content: bytes, most: int) -> bytes:
+    import lzfse
+
+    library: Any = lzfse
     try:
-        return decompress(content, most)
-    except ValueError as error:
-        raise RecordingError(f"{name} in {files.path} cannot be read: {error}; share or copy it again.") from None
+        if not content.endswith(_END) or len(content) > most + _HEAD_BYTES:
+            raise ValueError("it is cut off, or longer than what it holds")
+        return library.decompress(content)
+    except (library.error, ValueError, MemoryError) as error:
+        reason = str(error) or "it is no LZFSE stream"
+        raise RecordingError(f"{name} in {files.path} cannot be read: {reason}; share or copy it again.") from None
 
 
 def _depth(files: _Files, name: str, size: tuple[int, int]) -> Float32[np.ndarray, "h w"]:

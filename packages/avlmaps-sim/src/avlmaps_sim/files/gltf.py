@@ -36,6 +36,9 @@ _UNREADABLE = {
     "EXT_mesh_gpu_instancing": "gltf-transform uninstance",
 }
 _LARGEST_PICTURE = 4096
+# Surfaces of a building along its up axis are this many times those along the other; a normal that is along an axis.
+_CLEARLY, _ALONG = 1.15, 0.98
+_ROOM_M2, _CLOSED = 12.0, 0.25
 _Z_FROM_Y = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 _NAMED_PART = re.compile(r"^(?P<category>[^#/]+)#(?P<number>[^/#]+)(?:/.*)?$")
 _BROKEN = (ValueError, KeyError, IndexError, TypeError, AttributeError, OSError, struct.error, ZeroDivisionError)
@@ -60,15 +63,16 @@ def load_gltf(path: Path, up_axis: Axis = "auto") -> Scene:
     Args:
         path: ``.glb`` or ``.gltf``.
         up_axis: which of the file's axes is up. ``auto`` takes the side-car, then ``extras`` of the asset, then
-            what is called floor (it lies flat), then glTF's own rule, y.
+            the ``up`` of Habitat's ``.stage_config.json``, then what is called floor (it lies flat), then the largest
+            level surfaces.
 
     Raises:
-        SceneError: a file is missing, truncated or not glTF.
+        SceneError: a file is missing, truncated or not glTF, or two axes fit equally.
     """
     parts = read_parts(path)
     beside = path.with_suffix(".objects.json")
     notes = read_json(beside) if beside.exists() else {}
-    axis = _up(up_axis, notes, header_of(path), parts)
+    axis = up_axis if up_axis != "auto" else _up(path, notes, parts)
     builder = SceneBuilder(path.stem)
     things: dict[tuple[str, str], list[Mesh]] = {}
     for part in parts:
@@ -258,14 +262,43 @@ def _srgb(linear: np.ndarray) -> np.ndarray:
     return np.where(linear < 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
 
 
-def _up(wanted: Axis, notes: dict[str, Any], header: dict[str, Any], parts: Sequence[MeshPart]) -> str:
-    if wanted != "auto":
-        return wanted
-    extras = header.get("asset", {}).get("extras")
+def _up(path: Path, notes: dict[str, Any], parts: Sequence[MeshPart]) -> str:
+    extras = header_of(path).get("asset", {}).get("extras")
     for said in (notes.get("up"), extras.get("up") if isinstance(extras, dict) else None):
         if str(said).lower().lstrip("+") in ("y", "z"):
             return str(said).lower().lstrip("+")
-    return up_of([part.mesh for part in parts if part.category == "floor"])
+    if said := _up_of_stage(path):
+        return said
+    floors = [part.mesh for part in parts if part.category == "floor"]
+    area_m2 = _facing_m2([part.mesh for part in parts])
+    # Of a thing, and where sides are open, so that none is surely the floor, glTF's own rule.
+    if floors or max(area_m2) < _ROOM_M2 or min(area_m2) < _CLOSED * max(area_m2):
+        return up_of(floors)
+    if max(area_m2[1:]) < _CLEARLY * min(area_m2[1:]):
+        raise SceneError(
+            f"{path} may stand on its y or its z axis: {area_m2[1]:.0f} m2 of its surfaces face along y and "
+            f'{area_m2[2]:.0f} m2 along z, and nothing is called floor; write {{"up": "z"}} '
+            f'or {{"up": "y"}} into {path.with_suffix(".objects.json").name} beside it'
+        )
+    return "z" if area_m2[2] > area_m2[1] else "y"
+
+
+def _up_of_stage(path: Path) -> str:
+    """Return the up axis that a ``.stage_config.json`` of Habitat says of a file, or nothing."""
+    for file in sorted(path.parent.glob("*.stage_config.json")):
+        stage = read_json(file)
+        up, asset = stage.get("up"), Path(str(stage.get("render_asset", ""))).name
+        if path.name in (asset, f"{file.name.removesuffix('.stage_config.json')}.glb") and isinstance(up, list):
+            return "xyz"[int(np.argmax(np.abs(np.array(up, np.float64))))] if len(up) == 3 else ""
+    return ""
+
+
+def _facing_m2(meshes: Sequence[Mesh]) -> Float[np.ndarray, "3"]:
+    """Return the area of surfaces that face along each axis, within a few degrees."""
+    facing = np.zeros(3)
+    for mesh in meshes:
+        facing += ((np.abs(mesh.normals()) > _ALONG) * mesh.areas_m2()[:, None]).sum(axis=0)
+    return facing
 
 
 def up_of(floors: Sequence[Mesh]) -> str:
