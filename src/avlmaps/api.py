@@ -54,6 +54,7 @@ def build_map(
     from avlmaps.maps.build import build_map as build
     from avlmaps.maps.settings import DEFAULTS, BuildSettings
     from avlmaps.query.avlmap import AVLMap
+    from avlmaps.query.findings import with_findings
     from avlmaps.query.voxel_map import require_kinds
     from avlmaps.recordings.open import open_recording
     from avlmaps.recordings.types import Recording
@@ -75,7 +76,7 @@ def build_map(
         overwrite=overwrite,
         progress=progress,
     )
-    return AVLMap(_asked_with(stored, encoders))
+    return with_findings(AVLMap(_asked_with(stored, encoders)))
 
 
 def open_map(path: str | Path, *, encoders: "Encoders | None" = None) -> "AVLMap":

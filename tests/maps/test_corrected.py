@@ -170,22 +170,6 @@ def test_a_second_correction_replaces_the_first(tmp_path: Path) -> None:
     require_same_voxels(plain, back)
 
 
-def test_files_that_a_correction_does_not_change_stay_where_they_are(tmp_path: Path) -> None:
-    stored, walk = built(tmp_path, Walk(audio=write_beeps(tmp_path / "beeps.flac"))), Walk()
-    before = {name: (file, (stored.path / file.path).stat()) for name, file in stored.info.files.items()}
-    after, _ = correct_stored(stored, walk.stamps_s, motion(20.0, (1.3, 0.2, 0.1)) @ walk.world_from_camera)
-    moved = {"voxels/index", "submaps/pose", "keyframes/world_from_camera", "sounds/track"}
-    for name, file in after.info.files.items():
-        was, then = before[name]
-        if name in moved:
-            assert file != was
-        elif name.startswith(("submaps/", "sounds/clips/", "keyframes/thumb", "keyframes/state/")):
-            assert file == was
-            assert (after.path / file.path).stat().st_ino == then.st_ino  # a file that is written again is another
-    assert moved <= set(after.info.files)
-    open_stored(after.path)
-
-
 def test_a_strayed_map_becomes_that_of_the_right_poses(tmp_path: Path) -> None:
     walk = Walk()
     right = np.array(build_map(walk, tmp_path / "right", encoders(), WITH).voxels.index)

@@ -144,7 +144,7 @@ def test_what_is_written_in_the_place_of_a_map_is_that_map(copied: Path) -> None
         assert same(after.voxels, before.voxels) and same(after.keyframes, before.keyframes)
         assert same(after.sounds, before.sounds) and after.findings["best"].tolist() == [0, 1, 2, 3]
         assert all(clip.is_file() for clip in after.sounds.clips) and not damaged_files(copied)
-        assert len(list(copied.glob("*.safetensors"))) == 3
+        assert len(list(copied.glob("*.safetensors"))) == 4
     assert all(array[0] == before.voxels.index[0, 0] for array in before.voxels.index[:1])  # its old file is still read
 
 

@@ -168,7 +168,7 @@ def test_distances_of_things_are_between_their_nearest_points() -> None:
 
 def test_a_stricter_map_stops_what_another_lets_pass() -> None:
     strict = furnished_robot()
-    strict = Robot(AVLMap(strict.asked.stored, QuerySettings(found_at=1.0)), strict.driver)
+    strict = Robot(AVLMap(strict.asked.stored, settings=QuerySettings(found_at=1.0)), strict.driver)
     with pytest.raises(GoalNotFoundError, match="best guess"):
         strict.move_to_object("chair")
 

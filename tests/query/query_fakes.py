@@ -140,7 +140,7 @@ def fake_map(
         require_model=lambda kind: None,
         sources=lambda: None,
         knows_sources=False,
-        data=SimpleNamespace(sources_wait=0),
+        data=SimpleNamespace(sources_wait=0, findings={}),
         clip_path=lambda sound: Path(f"fake.avlmap/{sound}.flac"),
     )
 

@@ -190,7 +190,7 @@ def test_what_keypoints_cannot_locate_is_guessed_by_its_colours(
         return ByColour(better, 0.8, 0, 0.3, confidence)
 
     monkeypatch.setattr(Panoramas, "likeliest", likeliest)
-    asked = AVLMap(heard.stored, replace(heard.settings, by_colour=by_colour))
+    asked = AVLMap(heard.stored, settings=replace(heard.settings, by_colour=by_colour))
     heat = asked.image(np.zeros((48, 64, 3), np.uint8), primary=True)
     found = by_colour and confidence >= 0.5
     assert (heat.found, heat.goals()[0].position) == (found, (1.0, 2.0, 1.5) if by_colour else (3.0, 2.0, 1.5))
@@ -221,7 +221,7 @@ def test_an_area_is_told_from_other_areas() -> None:
     m = AVLMap(stored)
     assert m.area("kitchen").found
     assert m.area("kitchen", primary=True).goals()[0].position == pytest.approx(tuple(stored.keyframes.centre[0]))
-    from_camera = AVLMap(stored, QuerySettings(areas=AreaSettings(anchor="camera")))
+    from_camera = AVLMap(stored, settings=QuerySettings(areas=AreaSettings(anchor="camera")))
     assert from_camera.area("kitchen", primary=True).goals()[0].position == pytest.approx((1.0, 1.0, 1.4))
     nowhere = AVLMap(furnished_map(keyframes=keyframes_at(places[1:], view[1:]), views=FakeViews())).area("kitchen")
     assert not nowhere.found

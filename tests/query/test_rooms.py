@@ -193,7 +193,7 @@ def home(
     encoders = fake_encoders(encoder, FakeSounds(), OpenViews())
     stored = fake_map(voxels, keyframes=keyframes_at(places, view), encoders=encoders)
     stored.info.models = ("views", "pixels")
-    return AVLMap(stored, settings)
+    return AVLMap(stored, settings=settings)
 
 
 def test_a_bed_makes_the_bedroom() -> None:

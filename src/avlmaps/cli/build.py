@@ -139,6 +139,8 @@ def build(verb: "Build") -> dict[str, Any]:
     from avlmaps.maps.cluster import ClusterWorkers
     from avlmaps.maps.settings import SUBMAP_FRAMES, BuildSettings, FrameSettings, FusionSettings, GravitySettings
     from avlmaps.perception.cache.feature_store import CacheSettings
+    from avlmaps.query.avlmap import AVLMap
+    from avlmaps.query.findings import with_findings
     from avlmaps.query.rules import build_settings
 
     begin = perf_counter()
@@ -205,6 +207,7 @@ def build(verb: "Build") -> dict[str, Any]:
 
         stored, done, found = close_loops(stored, recording=recording)
         answer["corrected"] = {**asdict(done), "loops": found.report()}
+    stored = with_findings(AVLMap(stored)).stored
     return {**describe_map(stored), **answer, "elapsed_s": round(perf_counter() - begin, 3)}
 
 

@@ -100,6 +100,8 @@ def merge(verb: Merge) -> dict[str, Any]:
     """Merge two maps and return by what the place was found, and what changed."""
     from avlmaps.days.merge import merge_maps
     from avlmaps.maps.store.reader import open_stored
+    from avlmaps.query.avlmap import AVLMap
+    from avlmaps.query.findings import with_findings
 
     begin_s = perf_counter()
     made = merge_maps(
@@ -107,6 +109,7 @@ def merge(verb: Merge) -> dict[str, Any]:
         first_day=verb.first_day or "",
         overwrite=verb.overwrite,
     )  # fmt: skip
+    made = with_findings(AVLMap(made)).stored
     return {**merged_answer(made), "elapsed_s": round(perf_counter() - begin_s, 3)}
 
 

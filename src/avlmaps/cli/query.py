@@ -122,7 +122,7 @@ class Query(MapVerb):
 
         files, asked = Files(None if self.intrinsics is None else numbers_of(self.intrinsics)), self._asked()
         if avlmap.settings != (settings := self._settings()):
-            avlmap = type(avlmap)(avlmap.stored, settings)
+            avlmap = type(avlmap)(avlmap.stored, settings=settings)
         # A question about one thing runs no loops that are compiled, and loads nothing to announce them.
         quick = self.plot is None and thing_alone(asked, avlmap) is not None
         try:

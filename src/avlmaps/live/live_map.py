@@ -34,7 +34,7 @@ from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.folder import write
 from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.map_data import MapData
-from avlmaps.maps.store.reader import StoredMap, open_stored
+from avlmaps.maps.store.reader import open_stored
 from avlmaps.perception.encoders import Encoders, encoders_of
 from avlmaps.perception.profiles import Profile
 from avlmaps.query.avlmap import AVLMap, QuerySettings
@@ -396,7 +396,7 @@ class LiveMap:
         if not len(self._mapper):
             raise MapError(f"No frame came, so that there is no map in {self.path}; add frames before it is closed.")
         stored = replace(open_stored(self.path), encoders=self._mapper.encoders)
-        self._snapshot = AVLMap(stored, self._query), time.perf_counter()
+        self._snapshot = AVLMap(stored, settings=self._query), time.perf_counter()
         self._generation += 1
         if self._broken is not None and not self._is_told:
             self._is_told = True
@@ -587,7 +587,7 @@ class LiveMap:
         self._saved_s, self._shown_s = self._snapshot[1], None
 
     def _show(self, data: MapData, came_s: float) -> None:
-        made = AVLMap(StoredMap(IN_MEMORY, data, self._mapper.encoders), self._query)
+        made = AVLMap(data, self._mapper.encoders, path=IN_MEMORY, settings=self._query)
         if self._generation:
             _warm(made)
         else:  # it loads and compiles what every question needs, which takes longer than the next snapshot may wait

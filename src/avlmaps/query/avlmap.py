@@ -18,6 +18,7 @@ from avlmaps.core.numbers import as_whole, checked, hold_numbers
 from avlmaps.core.question import HeardAt, Modality, Part, Question, Role
 from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder, SurveyedEncoder, read_room_contents
+from avlmaps.query import findings
 from avlmaps.query.factors import FOUND_AT, HeatSettings, NearThings
 from avlmaps.query.floor_plan import FloorPlan
 from avlmaps.query.heatmap import Heatmap
@@ -39,12 +40,15 @@ from avlmaps.recordings.audio import Sound
 
 if TYPE_CHECKING:
     from avlmaps.maps.store.edits import Edit
+    from avlmaps.maps.store.map_data import MapData
     from avlmaps.maps.store.reader import StoredMap
     from avlmaps.maps.storeys import Storeys
+    from avlmaps.perception.encoders import Encoders
     from avlmaps.query.answer import Answer
     from avlmaps.query.contents import Contents, Room, SoundEvent, Thing, Watch
     from avlmaps.query.editor import Editor
     from avlmaps.query.edits import Edited
+    from avlmaps.query.heat_cache import HeatCache
     from avlmaps.query.locate import Located
     from avlmaps.query.photometric import Panoramas
     from avlmaps.query.schema import ChangesAnswer, LastSeenAnswer
@@ -91,18 +95,29 @@ class AVLMap:
     """
 
     def __init__(
-        self, stored: "StoredMap", settings: QuerySettings | None = None, edits: "Sequence[Edit] | None" = None
+        self,
+        data: "MapData | StoredMap",
+        encoders: "Encoders | None" = None,
+        *,
+        path: Path | None = None,
+        settings: QuerySettings | None = None,
+        edits: "Sequence[Edit] | None" = None,
+        heats: "HeatCache | None" = None,
     ) -> None:
         """Take a map.
 
         Args:
-            stored: the map as it lies on the disk.
+            data: the map.
+            encoders: the models to ask with; by default those that it names.
+            path: its folder, where people's edits are; None of a map in memory.
             settings: how to query.
             edits: what people corrected; None for those in the map's folder, none for what the encoders say alone.
+            heats: remembers the heat of words, for a map that many query; files then come as attachments alone.
         """
-        self.stored = stored
+        self.stored = _opened_map(data, encoders, path)
         self.settings = settings or QuerySettings()
         self._given_edits = edits
+        self._heats = heats
         self._rivals: tuple[tuple[str, ...], ClosestWords] | None = None
         self._to_edit: dict[str | None, Sequence[Thing]] = {}
 
@@ -115,7 +130,26 @@ class AVLMap:
         """
         from avlmaps.maps.store.reader import open_stored
 
-        return cls(open_stored(lasting_path(path)), settings)
+        return cls(open_stored(lasting_path(path)), settings=settings)
+
+    @property
+    def data(self) -> "MapData":
+        """The map as a value."""
+        return self.stored.data
+
+    @property
+    def encoders(self) -> "Encoders":
+        """The models that it is asked with."""
+        return self.stored.encoders
+
+    @property
+    def path(self) -> Path:
+        """Its folder; of a map in memory a name."""
+        return self.stored.path
+
+    def of_data(self, data: "MapData") -> Self:
+        """Return this map with other content."""
+        return type(self)(data, self.encoders, path=self.path, settings=self.settings, edits=self._given_edits)
 
     @cached_property
     def edited(self) -> "Edited":
@@ -135,6 +169,7 @@ class AVLMap:
     def forget_edits(self) -> None:
         """Read what people corrected again at the next question."""
         # What lists things weighs them by what they are called.
+        self._heats = None if self._heats is None else self._heats.anew()
         for name in ("edited", "room_field", "source_map", "numbered_rooms"):
             self.__dict__.pop(name, None)
 
@@ -243,7 +278,27 @@ class AVLMap:
             return None
         self.stored.require_model(Kind.PIXELS)
         vocabulary = Vocabulary.encoded(encoder, encoder.vocabulary)
+        closest = findings.names_from(self.stored.data.findings, findings.key_of(vocabulary.digest))
+        if closest is not None:
+            return KnownClosestWords.known_everywhere(vocabulary, closest)
         return KnownClosestWords.of(vocabulary, len(self.stored.voxels))
+
+    def found_names(self) -> dict[str, np.ndarray]:
+        """Return the names closest to each voxel, for ``findings``; none of an encoder of any words."""
+        known = self._known_words
+        if known is None:
+            return {}
+        words = known.whole(self.stored.voxels.feature)
+        closest = words.best, words.best_word, words.second, words.second_word
+        return findings.names_to_arrays(closest, findings.key_of(known.digest))
+
+    def found_rooms(self) -> dict[str, np.ndarray]:
+        """Return the rooms and their kinds, for ``findings``; none where there is no floor plan."""
+        if self.room_votes is None:
+            return {}
+        found = findings.regions_to_arrays(self._seen_regions(self.room_votes))
+        field = self._known_room_field
+        return found if field is None else found | findings.field_to_arrays(field, self.settings.areas)
 
     @checked(QueryError)
     def things(
@@ -602,11 +657,15 @@ class AVLMap:
         votes = self.room_votes
         if votes is None:
             return None
-        camera = self.stored.rig.depth
-        width_rad = 2.0 * float(np.arctan2(camera.width, 2.0 * camera.fx))
-        regions = RoomRegions.of(votes.plan, np.asarray(self.stored.keyframes.world_from_camera), width_rad)
+        known = findings.regions_from(self.stored.data.findings, votes.plan)
+        regions = self._seen_regions(votes) if known is None else known
         field = self._known_room_field
         return regions if field is None else regions.joined(seen_twice(field, regions))
+
+    def _seen_regions(self, votes: Rooms) -> RoomRegions:
+        camera = self.stored.rig.depth
+        width_rad = 2.0 * float(np.arctan2(camera.width, 2.0 * camera.fx))
+        return RoomRegions.of(votes.plan, np.asarray(self.stored.keyframes.world_from_camera), width_rad)
 
     @cached_property
     def room_field(self) -> RoomField | None:
@@ -629,8 +688,11 @@ class AVLMap:
             return None
         encoder = self.stored.encoders.views
         self.stored.require_model(Kind.VIEWS)
-        view = np.asarray(self.stored.keyframes.view)
-        return votes.field(area_names(encoder), name_shares(view, encoder, self.settings.areas))
+        kinds = area_names(encoder)
+        known = findings.field_from(self.stored.data.findings, votes.plan, kinds, self.settings.areas)
+        if known is not None:
+            return known
+        return votes.field(kinds, name_shares(np.asarray(self.stored.keyframes.view), encoder, self.settings.areas))
 
     @cached_property
     def things_in_rooms(self) -> ThingsInRooms | None:
@@ -747,6 +809,13 @@ class AVLMap:
         self, part: Part, intrinsics: Pinhole | None = None, attachments: "Mapping[str, Attachment] | None" = None
     ) -> Heatmap:
         """Return the heat of one part of a question; see ``ask``."""
+        if self._heats is None:
+            return self._found_heat(part, intrinsics, attachments)
+        return self._heats.heat(part, lambda: self._found_heat(part, intrinsics, attachments or {}))
+
+    def _found_heat(
+        self, part: Part, intrinsics: Pinhole | None, attachments: "Mapping[str, Attachment] | None"
+    ) -> Heatmap:
         primary = part.role is Role.PRIMARY
         if part.is_file and attachments is not None:
             return self._heat_of_attachment(part, intrinsics, attachments)
@@ -849,6 +918,16 @@ class AVLMap:
             top=top, at=at, near=near,
         )  # fmt: skip
         return ask(self, asked, files)
+
+
+def _opened_map(data: "MapData | StoredMap", encoders: "Encoders | None", path: Path | None) -> "StoredMap":
+    """Return a map with its folder and the encoders that it is asked with."""
+    from avlmaps.maps.store.map_data import MapData
+    from avlmaps.maps.store.reader import StoredMap, encoders_of_map
+
+    if not isinstance(data, MapData):
+        return data if encoders is None else replace(data, encoders=encoders)
+    return StoredMap(path or Path("a map in memory"), data, encoders or encoders_of_map(data.info))
 
 
 def _require_place(at: Any) -> None:

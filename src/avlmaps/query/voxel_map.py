@@ -15,12 +15,12 @@ from avlmaps.core.numbers import as_number
 from avlmaps.maps.build import require_place
 from avlmaps.maps.mapper import Mapper
 from avlmaps.maps.settings import BuildSettings
-from avlmaps.maps.store.folder import write
+from avlmaps.maps.store.folder import read, write
 from avlmaps.maps.store.lock import lock_folder
-from avlmaps.maps.store.reader import StoredMap, open_stored
 from avlmaps.perception.encoders import Encoders, encoders_of
 from avlmaps.perception.profiles import Profile
 from avlmaps.query.avlmap import AVLMap, QuerySettings
+from avlmaps.query.findings import with_findings
 from avlmaps.recordings.given_frame import given_frame
 
 if TYPE_CHECKING:
@@ -150,7 +150,7 @@ class VoxelMap:
         """
         with self._lock:
             if self._map is None:
-                self._map = AVLMap(StoredMap(IN_MEMORY, self._mapper.snapshot(), self._mapper.encoders), self._query)
+                self._map = AVLMap(self._mapper.snapshot(), self._mapper.encoders, path=IN_MEMORY, settings=self._query)
             return self._map
 
     @property
@@ -216,8 +216,7 @@ class VoxelMap:
             made = self._mapper.finish()
             with lock_folder(place):
                 write(place, made)
-            stored = replace(open_stored(place), encoders=self._mapper.encoders)
-            return AVLMap(stored, self._query)
+            return with_findings(AVLMap(read(place), self._mapper.encoders, path=place, settings=self._query))
 
     def __len__(self) -> int:
         """Return how many frames are in the map."""

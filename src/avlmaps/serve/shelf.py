@@ -14,18 +14,15 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Protocol, TypeVar, cast
 
-from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import AvlmapsError, BackendError, QueryError
 from avlmaps.core.files import user_path
-from avlmaps.core.question import Modality, Part, Role
+from avlmaps.core.question import Modality, Part
 from avlmaps.language.questions import parse_sentence
 from avlmaps.maps.store.edits import EDITS
 from avlmaps.maps.store.folder import MANIFEST, stamp
 from avlmaps.maps.store.reader import open_stored
 from avlmaps.query.avlmap import AVLMap, QuerySettings
-from avlmaps.query.factors import NearAnchors
-from avlmaps.query.heatmap import Heatmap
-from avlmaps.query.queryable import Attachment
+from avlmaps.query.heat_cache import HeatCache
 from avlmaps.serve.lanes import RequestError, watch_here
 from avlmaps.serve.settings import Limits, ServeError
 
@@ -47,56 +44,6 @@ _WARM = (
 _LONGEST_NAME = 100
 
 
-class CachedMap(AVLMap):
-    """A map that remembers the heat of words, up to a size, and reports each part of a question as a step."""
-
-    def __init__(self, stored: "StoredMap", settings: QuerySettings | None, cache_bytes: int) -> None:
-        super().__init__(stored, settings)
-        self._kept: OrderedDict[Part, tuple[Heatmap, int]] = OrderedDict()
-        self._kept_bytes, self._cache_bytes = 0, cache_bytes
-        self._lock = threading.Lock()
-
-    def forget_edits(self) -> None:
-        """Read what people corrected again at the next question; heat of before does not count."""
-        super().forget_edits()
-        self._kept, self._kept_bytes, self._lock = OrderedDict(), 0, threading.Lock()
-
-    def heat(
-        self, part: Part, intrinsics: Pinhole | None = None, attachments: Mapping[str, Attachment] | None = None
-    ) -> Heatmap:
-        """Return the heat of one part of a question; files are taken from the attachments only."""
-        watch_here().step(f"heat of the {part.modality}")
-        if part.is_file:
-            return super().heat(part, intrinsics, attachments or {})
-        with self._lock:
-            kept = self._kept.get(part)
-            if kept is not None:
-                self._kept.move_to_end(part)
-        if kept is not None:
-            heat = kept[0]
-            if part.role is Role.CONTEXT:  # queried again: its heat everywhere serves every further query
-                _ = heat.values
-            return heat
-        heat = super().heat(part, intrinsics)
-        self._keep(part, heat)
-        return heat
-
-    def _keep(self, part: Part, heat: Heatmap) -> None:
-        size = sum(_bytes_of(len(self.space), factor) for factor in heat.factors)
-        with self._lock:
-            if part in self._kept or size > self._cache_bytes:
-                return
-            self._kept[part] = heat, size
-            self._kept_bytes += size
-            while self._kept_bytes > self._cache_bytes:
-                self._kept_bytes -= self._kept.popitem(last=False)[1][1]
-
-
-def _bytes_of(voxels: int, factor: object) -> int:
-    """Return about how much a factor holds once it was used: heat, mask or winner, and its twin with unsure things."""
-    return voxels * 12 if isinstance(factor, NearAnchors) else voxels * 12 + 4096
-
-
 class ServedMap:
     """One map of a server, and what is computed from it once.
 
@@ -105,7 +52,7 @@ class ServedMap:
         avlmap: the map.
     """
 
-    def __init__(self, name: str, avlmap: CachedMap, robot: "MakeRobot | None" = None) -> None:
+    def __init__(self, name: str, avlmap: AVLMap, robot: "MakeRobot | None" = None) -> None:
         self.name, self._robot = name, robot
         self.avlmap = avlmap
         self._once = threading.RLock()
@@ -344,7 +291,8 @@ class Shelf:
         self._note = note
 
         def make(name: str, stored: "StoredMap") -> ServedMap:
-            return ServedMap(name, CachedMap(stored, settings, cache_bytes), robot)
+            cache = HeatCache(cache_bytes, lambda part: watch_here().step(f"heat of the {part.modality}"))
+            return ServedMap(name, AVLMap(stored, settings=settings, heats=cache), robot)
 
         sources = {name: _Folder(one) if isinstance(one, Path) else one for name, one in maps.items()}
         self._slots = {name: _Slot(name, source, make, warm) for name, source in sources.items()}

@@ -148,7 +148,7 @@ def test_an_answer_at_the_source_believes_no_more_than_its_region(mapped: tuple[
         assert near.probability == pytest.approx(same.probability, abs=2e-3) and near.probability < same.confidence
         assert near.spread is not None and "comes from" in answer.text
     assert avlmap.ask(sound=best.name).goals[0].spread is None
-    heat = AVLMap(avlmap.stored, QuerySettings(found_at=1.0)).sound(best.name, primary=True, at="source")
+    heat = AVLMap(avlmap.stored, settings=QuerySettings(found_at=1.0)).sound(best.name, primary=True, at="source")
     with pytest.raises(GoalNotFoundError, match="the source of"):
         things_in(heat)
     assert things_in(heat, guess=True)[0].spread is not None
@@ -169,7 +169,11 @@ def test_commands_and_questions_choose_the_same_place(mapped: tuple[Path, Path])
     avlmap = AVLMap.open(mapped[1])
     name = max(avlmap.sources(), key=lambda one: one.probability).name
     paper = AVLMap.open(mapped[1], query_settings("paper"))
-    for known, at in ((avlmap, "source"), (paper, None), (AVLMap(avlmap.stored, QuerySettings(sounds=ROBOT)), None)):
+    for known, at in (
+        (avlmap, "source"),
+        (paper, None),
+        (AVLMap(avlmap.stored, settings=QuerySettings(sounds=ROBOT)), None),
+    ):
         said = f"where the sound of {name} comes from"
         plan = LearnedTranslator(given_by(known)).program_for(f"go to {said}")
         assert ('at="source"' in plan.program) == (at == "source") and plan.notes == ()

@@ -1,12 +1,13 @@
-"""A map's folder: ``map.json``, three files of arrays, the clips, and what people edit.
+"""A map's folder: ``map.json``, files of arrays, the clips, and what people edit.
 
 New files are written beside the old ones under free names, then ``map.json`` is replaced in one step, then the old
 files go. So a kill at any instant leaves the old map or the new one.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -30,7 +31,7 @@ from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.store.checkpoints import remove_stages, stage_folders
 from avlmaps.maps.store.edits import EDITS
 from avlmaps.maps.store.life import life_arrays, read_life
-from avlmaps.maps.store.lock import EDITING, LOCK, is_locked
+from avlmaps.maps.store.lock import EDITING, LOCK, is_locked, lock_folder
 from avlmaps.maps.store.manifest import SCHEMA_VERSION, MapInfo
 from avlmaps.maps.store.map_data import MapData
 from avlmaps.maps.store.tables import (
@@ -49,11 +50,12 @@ from avlmaps.maps.types import HeardSounds, Keyframes, SourceEvidence, Submaps, 
 MANIFEST = "map.json"
 PARTS = "parts"
 SECTIONS = ("voxels", "keyframes", "sounds")
+NAMES = "names"  # what was found by the names of the encoders; a map may lack it
 CLIPS = "clips"
-_LIFE, _SUBMAPS, _FINDINGS, _STATE, _SOURCES = "life.", "submaps.", "findings.", "state.", "sources."
-_TABLE = re.compile(rf"({'|'.join(SECTIONS)})(\.2)?\.safetensors")
+_LIFE, _SUBMAPS, _STATE, _SOURCES = "life.", "submaps.", "state.", "sources."
+_TABLE = re.compile(rf"({'|'.join((*SECTIONS, NAMES))})(\.2)?\.safetensors")
 _CLIP = re.compile(r"\d{6}-[0-9a-f]{16}\.\w+")
-_PARTIAL = re.compile(rf"\.({re.escape(MANIFEST)}|{'|'.join(SECTIONS)})\..*(partial|part\.safetensors)")
+_PARTIAL = re.compile(rf"\.({re.escape(MANIFEST)}|{'|'.join((*SECTIONS, NAMES))})\..*(partial|part\.safetensors)")
 _MOST_CLIP_BYTES = 1 << 40
 # Folders and files of a map of schema 1.
 _OLD_SECTIONS = (*SECTIONS, "life", "submaps", "sources", ".derived")
@@ -142,7 +144,7 @@ def write(path: Path, data: MapData) -> MapInfo:
     with explain_write_errors(path):
         path.mkdir(parents=True, exist_ok=True)
         for section, arrays in _sections(data).items():
-            name = section + SUFFIX if section + SUFFIX not in taken else f"{section}.2{SUFFIX}"
+            name = _free_name(section, taken)
             write_arrays(path / name, arrays)
             files[name] = FileInfo.of(path / name)
         for number, clip in enumerate(data.sounds.clips):
@@ -150,10 +152,31 @@ def write(path: Path, data: MapData) -> MapInfo:
             name = f"{CLIPS}/{number:06d}-{file.sha256[:16]}{clip.suffix}"
             _copy_clip(clip, path / name, file.bytes)
             files[name] = file
-        size = sum(file.bytes for file in files.values())
-        info = msgspec.structs.replace(data.info, schema_version=SCHEMA_VERSION, files=files, bytes=size)
-        content = msgspec.json.format(msgspec.json.encode(info), indent=2)
-        write_bytes_atomically(path / MANIFEST, content + b"\n")
+        return _commit(path, data.info, files)
+
+
+def add_findings(path: Path, findings: Mapping[str, np.ndarray]) -> None:
+    """Store what was found in the map of a folder; a kill at any instant leaves the map with it or without.
+
+    Raises:
+        MapError: there is no map, another process writes it, or the folder cannot be written.
+    """
+    with lock_folder(path), explain_write_errors(path):
+        info = _info(path, _manifest(path))
+        if info.schema_version == 1:
+            write(path, replace(read(path), findings=dict(findings)))
+            return
+        name = _free_name(NAMES, info.files)
+        write_arrays(path / name, findings)
+        files = {other: file for other, file in info.files.items() if not other.startswith(NAMES)}
+        _commit(path, info, {**files, name: FileInfo.of(path / name)})
+
+
+def _commit(path: Path, info: MapInfo, files: dict[str, FileInfo]) -> MapInfo:
+    """Make a folder the map of these files, in one step, and remove those of the map before."""
+    size = sum(file.bytes for file in files.values())
+    info = msgspec.structs.replace(info, schema_version=SCHEMA_VERSION, files=files, bytes=size)
+    write_bytes_atomically(path / MANIFEST, msgspec.json.format(msgspec.json.encode(info), indent=2) + b"\n")
     sweep(path, info)
     return info
 
@@ -297,7 +320,7 @@ def assembled(
         _optional(SourceEvidence, sounds, at_sounds, _SOURCES),
         submaps=_optional(Submaps, voxels, at_voxels, _SUBMAPS),
         life=read_life(life, f"{at_voxels}", len(info.visits)) if life else None,
-        findings=_named(voxels, _FINDINGS),
+        findings=dict(tables[NAMES][1]) if NAMES in tables else {},
     )
 
 
@@ -315,10 +338,14 @@ def _sections(data: MapData) -> dict[str, dict[str, np.ndarray]]:
     voxels, keyframes, sounds = fields_of(data.voxels), fields_of(data.keyframes), fields_of(data.sounds)
     voxels |= {} if data.submaps is None else fields_of(data.submaps, _SUBMAPS)
     voxels |= {} if data.life is None else {_LIFE + name: array for name, array in life_arrays(data.life).items()}
-    voxels |= {_FINDINGS + name: array for name, array in data.findings.items()}
     keyframes |= {_STATE + name: array for name, array in data.place_state.items()}
     sounds |= {} if data.sources is None else fields_of(data.sources, _SOURCES)
-    return dict(zip(SECTIONS, (voxels, keyframes, sounds), strict=True))
+    found = {NAMES: dict(data.findings)} if data.findings else {}
+    return {**dict(zip(SECTIONS, (voxels, keyframes, sounds), strict=True)), **found}
+
+
+def _free_name(section: str, taken: Container[str]) -> str:
+    return section + SUFFIX if section + SUFFIX not in taken else f"{section}.2{SUFFIX}"
 
 
 def _listed(path: Path) -> frozenset[str]:

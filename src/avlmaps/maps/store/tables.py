@@ -16,7 +16,7 @@ import numpy as np
 
 from avlmaps.core.columns import axes_of, ragged
 from avlmaps.core.errors import MapError
-from avlmaps.core.files import checked_size, linked_folder, open_regular, replacing, sha256_of_file
+from avlmaps.core.files import checked_size, linked_folder, open_new, open_regular, replacing, sha256_of_file
 
 SUFFIX = ".safetensors"
 TO_BUILD = "choose another folder. What was finished there stays, and a second try continues from it."
@@ -79,13 +79,15 @@ def write_arrays(path: Path, arrays: Mapping[str, np.ndarray], note: str = "") -
 
     whole = {name: np.ascontiguousarray(array).reshape(array.shape) for name, array in arrays.items()}
     with replacing(path) as part:
-        part.unlink(missing_ok=True)  # a link would be written through
+        open_new(part).close()  # not through a link; and with the mode of other files, which the package's lack
+        mode = part.stat().st_mode
         try:
             save_file(whole, part, {_NOTE: note} if note else None)
         except SafetensorError as fault:
             code = re.search(r"os error (\d+)", str(fault))
             number = int(code[1]) if code else errno.EIO
             raise OSError(number, os.strerror(number), str(path)) from fault
+        part.chmod(mode)
         sync_file(part)
 
 
@@ -99,8 +101,9 @@ def read_arrays(path: Path) -> tuple[dict[str, np.ndarray], str]:
 
     try:
         checked_size(path, _MOST_BYTES)
-        with safe_open(path, "np") as file:  # holds the header against the file's size
-            metadata: dict[str, str] = file.metadata() or {}  # pyright: ignore[reportUnknownMemberType, reportUnknownVariableType]
+        opening: Any = safe_open(path, "np")  # holds the header against the file's size
+        with opening as file:
+            metadata: dict[str, str] = file.metadata() or {}
         with open_regular(path, _MOST_BYTES) as stream:
             header = int.from_bytes(stream.read(8), "little")
             entries: dict[str, Any] = msgspec.json.decode(stream.read(header))

@@ -1,0 +1,121 @@
+"""What the end of a build finds in a map by its encoders' names, stored with the map: closest names and rooms.
+
+``MapData.findings`` holds it. Each finding has a key of what it was found with; a map with other encoders or settings
+than those is looked through again.
+"""
+
+import hashlib
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+import numpy as np
+
+from avlmaps.core.arrays import Int
+from avlmaps.core.errors import BackendError, MapError
+from avlmaps.core.version import __version__
+from avlmaps.query.floor_plan import FloorPlan
+from avlmaps.query.room_regions import RoomRegions
+from avlmaps.query.rooms import RoomField
+from avlmaps.query.scores import Closest
+from avlmaps.query.storey_grid import StoreyGrid
+
+if TYPE_CHECKING:
+    from avlmaps.query.avlmap import AVLMap
+    from avlmaps.query.modalities.area import AreaSettings
+
+Findings = Mapping[str, np.ndarray]
+_CLOSEST = ("best", "best_word", "second", "second_word")
+
+
+def with_findings(avlmap: "AVLMap") -> "AVLMap":
+    """Return a map on the disk with its findings: those that it has, or what is found now and stored in its folder."""
+    from avlmaps.maps.store.folder import add_findings, read
+
+    stored = avlmap.stored
+    found = {} if stored.data.findings else findings_of(avlmap)
+    if not found:
+        return avlmap
+    add_findings(stored.path, found)
+    return avlmap.of_data(read(stored.path))
+
+
+def findings_of(avlmap: "AVLMap") -> dict[str, np.ndarray]:
+    """Return what the encoders that are here find in a map; nothing of one that is not here, or another one."""
+    found = dict[str, np.ndarray]()
+    with suppress(BackendError, MapError):
+        found |= avlmap.found_names()
+    with suppress(BackendError, MapError):
+        found |= avlmap.found_rooms()
+    return found
+
+
+def key_of(*ingredients: Any) -> np.ndarray:
+    """Return a hash as bytes; another release of avlmaps finds its own."""
+    said = msgspec.json.encode((__version__, ingredients), order="deterministic")
+    return np.frombuffer(hashlib.sha256(said).digest(), np.uint8)
+
+
+def _plan_key(plan: FloorPlan) -> np.ndarray:
+    return key_of(plan.wall.shape, plan.origin_m.tolist())
+
+
+def _known(findings: Findings, name: str, key: np.ndarray) -> bool:
+    return name in findings and np.array_equal(findings[name], key)
+
+
+def names_to_arrays(closest: Closest, key: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the two words closest to each voxel as arrays."""
+    return {"names.key": key, **{f"names.{name}": array for name, array in zip(_CLOSEST, closest, strict=True)}}
+
+
+def names_from(findings: Findings, key: np.ndarray) -> Closest | None:
+    """Return the two words closest to each voxel; None where other words were compared."""
+    if not _known(findings, "names.key", key):
+        return None
+    best, best_word, second, second_word = (findings[f"names.{name}"] for name in _CLOSEST)
+    return best, best_word, second, second_word
+
+
+def regions_to_arrays(regions: RoomRegions) -> dict[str, np.ndarray]:
+    """Return the rooms of all storeys as arrays."""
+    arrays = {
+        "rooms.key": _plan_key(regions.plan),
+        "rooms.count": np.array([regions.count]),
+        "rooms.beside": regions.beside,
+    }
+    for number, (grid, label) in enumerate(zip(regions.grids, regions.labels, strict=True)):
+        arrays[f"rooms.{number}.frame"] = np.array([grid.heading_rad, *grid.origin_m, grid.cell_m])
+        arrays[f"rooms.{number}.cells"] = np.stack([grid.wall, grid.free, grid.stood])
+        arrays[f"rooms.{number}.label"] = label
+    return arrays
+
+
+def regions_from(findings: Findings, plan: FloorPlan) -> RoomRegions | None:
+    """Return the rooms of all storeys; None where they were found otherwise."""
+    if not _known(findings, "rooms.key", _plan_key(plan)):
+        return None
+    grids: list[StoreyGrid] = []
+    labels: list[Int[np.ndarray, "nx ny"]] = []
+    for number in range(len(plan.storeys)):
+        frame, cells, label = (findings[f"rooms.{number}.{name}"] for name in ("frame", "cells", "label"))
+        grids.append(StoreyGrid(float(frame[0]), frame[1:3], float(frame[3]), *cells))
+        labels.append(label)
+    return RoomRegions(plan, tuple(grids), tuple(labels), int(findings["rooms.count"][0]), findings["rooms.beside"])
+
+
+def field_to_arrays(field: RoomField, settings: "AreaSettings") -> dict[str, np.ndarray]:
+    """Return the kinds of rooms as arrays."""
+    key = key_of(_plan_key(field.plan).tolist(), field.kinds, asdict(settings))
+    return {"kinds.key": key, "kinds.share": field.share, "kinds.views": np.ascontiguousarray(field.views)}
+
+
+def field_from(
+    findings: Findings, plan: FloorPlan, kinds: tuple[str, ...], settings: "AreaSettings"
+) -> RoomField | None:
+    """Return how likely each cell is each kind of room; None where that was found otherwise."""
+    if not _known(findings, "kinds.key", key_of(_plan_key(plan).tolist(), kinds, asdict(settings))):
+        return None
+    return RoomField(plan, kinds, findings["kinds.share"], findings["kinds.views"])
