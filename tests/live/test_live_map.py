@@ -364,7 +364,7 @@ def test_channels_that_are_not_the_microphones_and_directions_out_of_order_cost_
         assert live.status().refused == 9
         live.add_audio(four)
         live.add_directions(0.5, 1.0)
-        track = live._mapper.sound_track
+        track = live._mapper.hearing.came
         assert track is not None and (track.end_s, track.channels) == (0.2, 4)
         assert not live.doubts
 
@@ -384,7 +384,7 @@ def test_one_channel_of_several_microphones_is_a_doubt_and_several_without_place
     with LiveMap(tmp_path / "two", ENCODERS, up_in_world=UP, live=EVERY) as live:
         add(live, frame(0))
         live.add_audio(avlmaps.ChannelSound(np.array([[0.5] * 9, [0.1] * 9], np.float32), 16_000))
-        track = live._mapper.sound_track
+        track = live._mapper.hearing.came
         assert track is not None and track.track is not None and track.channels == 1
         np.testing.assert_allclose(track.track.read().samples, 0.3, atol=1e-6)
     with pytest.raises(avlmaps.RecordingError, match="no microphones called 'cube9'"):

@@ -12,6 +12,7 @@ from build_fakes import SETTINGS, Corners, Pixels, Places, Walk, _card
 from avlmaps.maps.build import build_map
 from avlmaps.maps.finish import feature_doubts
 from avlmaps.maps.mapper import Mapper
+from avlmaps.maps.perceived import given_features
 from avlmaps.perception.encoders import Encoders
 from avlmaps.recordings.audio import Sound
 from avlmaps.recordings.types import Frame
@@ -96,7 +97,7 @@ class ConstantViews:
 def made(pixels: Any = None, features: Any = None, **others: Any) -> Any:
     mapper = Mapper(SETTINGS, Encoders("fake", pixels=pixels, **others), WALK.up_in_world)
     for frame in WALK.frames():
-        mapper.add(frame, None if features is None else mapper.checked(features(frame), frame))
+        mapper.add(frame, None if features is None else given_features(features(frame), mapper.dim, frame))
     return mapper.snapshot()
 
 

@@ -375,7 +375,7 @@ def test_a_mapper_map_follows_while_its_first_frames_wait(tmp_path: Path) -> Non
     beeps = AudioTrack.open(write_beeps(tmp_path / "beeps.flac")).read().samples
     mapper, other = (Mapper(WITH, encoders(), walk.up_in_world) for _ in range(2))
     for one in (mapper, other):
-        one.place_microphones(microphones_named("stereo"))
+        one.hearing.place_microphones(microphones_named("stereo"))
     for frame in walk.frames():
         mapper.add(frame)
         other.add(replace(frame, world_from_camera=shift @ frame.world_from_camera))

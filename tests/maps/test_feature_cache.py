@@ -16,7 +16,7 @@ from hypothesis.extra import numpy as some
 
 from avlmaps.core.errors import BackendError
 from avlmaps.core.registry import Backend, Kind, register
-from avlmaps.maps.build import build_map, build_part
+from avlmaps.maps.build import build_map
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.perception.cache.cached_encoders import (
     cache_note,
@@ -379,12 +379,6 @@ def test_the_keys_of_builds_do_not_know_of_the_cache(torch_like: Profile, tmp_pa
         for i, cache in enumerate((CacheSettings("off"), CacheSettings()))
     ]
     assert infos[0].build_key == infos[1].build_key
-
-
-def test_a_part_on_another_machine_keeps_features_too(torch_like: Profile, tmp_path: Path) -> None:
-    build_part(Walk(), 0, 8, tmp_path / "p", torch_like, SETTINGS)
-    build_part(Walk(), 0, 8, tmp_path / "q", torch_like, SETTINGS)
-    assert COUNTS["pixels"] == 8
 
 
 def test_the_bar_says_how_many_came_from_the_cache(

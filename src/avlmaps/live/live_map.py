@@ -131,8 +131,8 @@ class LiveMap:
             chosen, used, direction(up_in_world), first_frames=wait, behind=True, begins_s=began_s
         )  # fmt: skip
         if array is not None:
-            self._mapper.place_microphones(array)
-        self._mapper.sources.known_rad = known_rad
+            self._mapper.hearing.place_microphones(array)
+        self._mapper.hearing.sources.known_rad = known_rad
         self._gates = Gates(self.settings, chosen.fusion.max_depth_m)
         self._check, self._tally = PoseCheck(), Tally()
         self._door, self._ears = Condition(), Lock()
@@ -213,7 +213,7 @@ class LiveMap:
     @property
     def microphones(self) -> Microphones | None:
         """Where those of the sound's channels are; None where that is not known."""
-        return self._mapper.sources.microphones
+        return self._mapper.hearing.sources.microphones
 
     def place_microphones(self, microphones: Any) -> None:
         """Say where the microphones are, where that was not known at the beginning.
@@ -229,7 +229,7 @@ class LiveMap:
         self._require_open()
         array = given_microphones(microphones)
         with self._ears:
-            self._mapper.place_microphones(array)
+            self._mapper.hearing.place_microphones(array)
 
     def add_audio(self, chunk: Any, stamp_s: Any = None) -> None:
         """Add a piece of the microphone's sound; see ``VoxelMap.add_audio``.
@@ -262,7 +262,7 @@ class LiveMap:
             MapError: the map is closed.
         """
         with self._hearing():
-            self._mapper.add_directions(given_directions(stamp_s, azimuth_rad, elevation_rad, confidence))
+            self._mapper.hearing.add_directions(given_directions(stamp_s, azimuth_rad, elevation_rad, confidence))
 
     @contextlib.contextmanager
     def _hearing(self) -> Generator[None]:
@@ -334,7 +334,7 @@ class LiveMap:
 
     def status(self) -> LiveStatus:
         """Return how the map fares."""
-        snapshot, track, now_s = self._snapshot, self._mapper.sound_track, time.perf_counter()
+        snapshot, track, now_s = self._snapshot, self._mapper.hearing.came, time.perf_counter()
         counts = snapshot[0].stored.info.counts if snapshot is not None else None
         p50_ms, p95_ms = self._tally.quantiles_ms()
         return LiveStatus(
@@ -491,7 +491,7 @@ class LiveMap:
     def _fuse(self, frame: Frame, arrived_s: float) -> None:
         mapper, number = self._mapper, self._mapper.next_index
         try:
-            track = mapper.sound_track
+            track = mapper.hearing.came
             heard = (None, 0.0) if track is None else (track.end_s, track.gap_s)
             for doubt in self._check.add(frame, *heard, arrived_s if self._is_pressed else None):
                 self._doubt(doubt)

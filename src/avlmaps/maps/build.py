@@ -2,12 +2,11 @@
 
 from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Sequence
 from contextlib import closing
-from dataclasses import fields
 from itertools import islice
 from pathlib import Path
+from time import perf_counter
 from typing import Protocol
 
-import msgspec
 import numpy as np
 
 from avlmaps.core.ahead import run_ahead
@@ -19,19 +18,16 @@ from avlmaps.core.registry import Kind
 from avlmaps.core.wording import option
 from avlmaps.maps.check import doubts_of
 from avlmaps.maps.estimate import Start
-from avlmaps.maps.fusion.free_space import FreeViews
-from avlmaps.maps.fusion.voxel_sums import VoxelSums
 from avlmaps.maps.gravity.floor import GroundedRecording
-from avlmaps.maps.mapper import Mapper, MapState
+from avlmaps.maps.map_state import bad_frames, is_stored, load_state, save_state
+from avlmaps.maps.mapper import Mapper
 from avlmaps.maps.perceived import encode_pixels
 from avlmaps.maps.plan import BuildPlan, Span, claim, make_plan, require_unchanged, strip_folder
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
-from avlmaps.maps.store.checkpoints import find_checkpoint, load_checkpoint, save_checkpoint
 from avlmaps.maps.store.folder import MANIFEST, is_map_or_free, write
 from avlmaps.maps.store.lock import lock_folder
 from avlmaps.maps.store.manifest import BadFrame
 from avlmaps.maps.store.reader import StoredMap, describe, open_stored
-from avlmaps.maps.types import Keyframes
 from avlmaps.perception.cache.cached_encoders import cache_note, with_cache
 from avlmaps.perception.cache.feature_store import DEFAULT_CACHE, CacheSettings
 from avlmaps.perception.encoders import Encoders, encoders_of
@@ -88,7 +84,7 @@ def build_map(
         RecordingError: too many frames cannot be read, none has depth, or the recording contradicts itself.
         BackendError: the profile is not known, or a package for it is missing.
     """
-    stamp = recording.change_stamp()
+    began_s, stamp = perf_counter(), recording.change_stamp()
     plan = make_plan(recording, user_path(path), with_cache(encoders_of(profile), cache), settings)
     with silence_progress(not progress), lock_folder(plan.path):
         if claim(plan, resume, overwrite) is None:
@@ -98,8 +94,9 @@ def build_map(
             mapper = Mapper.of_recording(
                 recording, plan.settings, plan.encoders, start, plan.keyframes, plan.key, doubts
             )
+            mapper.began_s = began_s
             for folder in plan.spans():
-                mapper.add_state(_load_state(folder, plan))
+                mapper.add_state(load_state(folder, plan.key))
             made = mapper.finish()
             require_unchanged(plan, stamp)
             write(plan.path, made)
@@ -129,7 +126,7 @@ def map_span(plan: BuildPlan, start: Start, frames: Iterable[EncodedFrame], fold
             mapper.leave_out(frame.index, frame.why)
         else:
             mapper.add(frame, features, encode=False)
-    _save_state(folder, plan, mapper.state())
+    save_state(folder, plan.key, mapper.state())
 
 
 def spans_of_frames(plan: BuildPlan, start: Start, spans: Sequence[Span]) -> Generator[EncodedFrame]:
@@ -144,8 +141,8 @@ def spans_of_frames(plan: BuildPlan, start: Start, spans: Sequence[Span]) -> Gen
 def _map_frames(plan: BuildPlan, start: Start, workers: Workers | None) -> None:
     """Map all frames that no stored state covers yet."""
     spans, step = plan.spans(), plan.settings.frames.step
-    jobs = {folder: span for folder, span in spans.items() if find_checkpoint(folder, _Facts, plan.key) is None}
-    bad = sum(len(_bad_of(folder, plan)) for folder in spans if folder not in jobs)
+    jobs = {folder: span for folder, span in spans.items() if not is_stored(folder, plan.key)}
+    bad = sum(len(bad_frames(folder, plan.key)) for folder in spans if folder not in jobs)
     tolerance = _Tolerance(plan, bad)
     total = len(range(0, len(plan.recording), step))
     done = total - sum(len(range(*span)) for span in jobs.values())
@@ -154,7 +151,7 @@ def _map_frames(plan: BuildPlan, start: Start, workers: Workers | None) -> None:
     if workers is not None:
         ended = workers.map_spans(plan, start, jobs)
         for folder in progress(ended, "fusing", total=total, done=done, size=lambda at: len(range(*jobs[at]))):
-            for one in _bad_of(folder, plan):
+            for one in bad_frames(folder, plan.key):
                 tolerance.meet(one)
         return
     with closing(spans_of_frames(plan, start, list(jobs.values()))) as ahead:
@@ -193,36 +190,6 @@ class _Tolerance:
             f"{self._met} of {self._total} frames cannot be read, more than the {self._allowed} that may be left out; "
             f"fix the recording or allow more ({option('max-bad-share')}). The last: {bad.why}"
         )
-
-
-class _Facts(msgspec.Struct):
-    bad: tuple[BadFrame, ...]
-
-
-_ARRAYS = {"sums": VoxelSums, "views": FreeViews, "keyframes": Keyframes}
-
-
-def _save_state(folder: Path, plan: BuildPlan, state: MapState) -> None:
-    arrays = {"stamp_s": state.stamp_s, "pose": state.pose}
-    for name, kind in _ARRAYS.items():
-        arrays |= {f"{name}_{one.name}": getattr(getattr(state, name), one.name) for one in fields(kind)}
-    save_checkpoint(folder, plan.key, _Facts(state.bad), arrays)
-
-
-def _load_state(folder: Path, plan: BuildPlan) -> MapState:
-    found = load_checkpoint(folder, _Facts, plan.key)
-
-    def part(name: str) -> dict[str, np.ndarray]:
-        return {one.name: found.arrays[f"{name}_{one.name}"] for one in fields(_ARRAYS[name])}
-
-    return MapState(
-        VoxelSums(**part("sums")), FreeViews(**part("views")), Keyframes(**part("keyframes")),
-        found.arrays["stamp_s"], found.arrays["pose"], found.facts.bad,
-    )  # fmt: skip
-
-
-def _bad_of(folder: Path, plan: BuildPlan) -> tuple[BadFrame, ...]:
-    return load_checkpoint(folder, _Facts, plan.key).facts.bad
 
 
 def encode_frames(

@@ -9,6 +9,7 @@ from avlmaps.core.errors import AudioError, RecordingError
 from avlmaps.core.progress import say
 from avlmaps.core.timeline import Trajectory
 from avlmaps.core.wording import option
+from avlmaps.maps.audio.events import WalkedTrack
 from avlmaps.maps.audio.segmentation import segment
 from avlmaps.maps.gravity.up import some_frames, tilted_parts, up_doubts
 from avlmaps.maps.plan import strip_folder
@@ -18,6 +19,7 @@ from avlmaps.recordings.channels import useless_channels
 from avlmaps.recordings.consistency.check import check_recording
 from avlmaps.recordings.consistency.verdict import Finding, Grade, Reason, Verdict
 from avlmaps.recordings.layout import DESCRIPTION
+from avlmaps.recordings.plausible import pace_fault, plausible_walk
 from avlmaps.recordings.types import Recording
 
 
@@ -67,6 +69,14 @@ def judge(recording: Recording, useless: Sequence[str] | None = None) -> Verdict
     wired, unsure = ([], []) if array is None else _of_microphones(array, recording.walk, useless)
     findings = (*verdict.findings, *tilted, *wired)
     return replace(verdict, findings=findings, unchecked=(*verdict.unchecked, *unsure) if not findings else ())
+
+
+def doubts_of_walk(walk: WalkedTrack, held: Recording) -> tuple[str, ...]:
+    """Return what is odd about poses and stamps, and about some frames beside one another."""
+    names = [f"{stamp_s:.2f} s" for stamp_s in walk.stamps_s.tolist()]
+    found = plausible_walk(walk.stamps_s, walk.world_from_camera[:, :3, 3], names, strays_are="check the poses")
+    odd = *found.notices, found.fault, pace_fault(walk.stamps_s, "frames"), *judge(held).sentences()
+    return tuple(sentence for sentence in odd if sentence)
 
 
 def doubts_of_channels(track: AudioTrack, walk: Trajectory, name: str) -> tuple[str, ...]:

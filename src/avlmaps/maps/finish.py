@@ -1,5 +1,6 @@
 """From the sums of all frames to the voxels of a map, and what its manifest says."""
 
+import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -14,12 +15,14 @@ from avlmaps.core.errors import MapError
 from avlmaps.core.registry import Kind
 from avlmaps.core.version import __version__
 from avlmaps.core.wording import option
+from avlmaps.maps.audio.events import WalkedTrack
 from avlmaps.maps.estimate import Start, ground_notices
 from avlmaps.maps.fusion.accumulator import VoxelAccumulator
 from avlmaps.maps.fusion.free_space import FreeViews, ThroughCounts, clean
 from avlmaps.maps.plan import strip_folder
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store import manifest
+from avlmaps.maps.store.reader import GIVEN_FEATURES
 from avlmaps.maps.types import HeardSounds, Keyframes, Voxels
 from avlmaps.recordings.types import Recording
 
@@ -163,6 +166,26 @@ def recording_info(recording: Recording) -> manifest.RecordingInfo:
         duration_s=recording.duration_s,
         notices=tuple(strip_folder(notice, recording) for notice in recording.notices),
         begins_s=recording.begins_s,
+    )
+
+
+def walked_info(walk: WalkedTrack, fused: int, begins_s: float) -> manifest.RecordingInfo:
+    """Return what a map says of frames that came from no file."""
+    digest = hashlib.sha256(walk.stamps_s.tobytes() + walk.world_from_camera.tobytes()).hexdigest()
+    return manifest.RecordingInfo(
+        name="the frames",
+        format="memory",
+        fingerprint=digest,
+        frames=fused,
+        duration_s=float(np.ptp(walk.stamps_s)) if len(walk.stamps_s) else 0.0,
+        begins_s=begins_s,
+    )
+
+
+def given_model(dim: int) -> manifest.ModelInfo:
+    """Return the card of features that came without an encoder."""
+    return manifest.ModelInfo(
+        backend=GIVEN_FEATURES, id="features", dim=dim, licence="unknown", checksum="", prompts=()
     )
 
 

@@ -69,6 +69,18 @@ def as_grid(features: Any, dim: int | None, who: str, frame: Frame) -> np.ndarra
     return array
 
 
+def given_features(features: Any, dim: int | None, frame: Frame) -> np.ndarray:
+    """Return a copy of the features that a program gives with a frame.
+
+    Raises:
+        BackendError: they have another form, are not finite, or not of unit length or zero.
+    """
+    who = "The features that were given are"
+    grid = as_grid(features, dim, who, frame)
+    require_unit(grid, who, frame)
+    return np.array(grid)
+
+
 def require_unit(features: np.ndarray, who: str, frame: Frame) -> None:
     """Raise ``BackendError`` where features are not finite, or not of unit length or zero."""
     lengths = np.sqrt(np.einsum("ijk,ijk->ij", features, features, dtype=np.float64))

@@ -1,5 +1,7 @@
 """Where a robot was, and some frames that are spread over its way, while more come."""
 
+from threading import Lock
+
 import numpy as np
 
 from avlmaps.core.arrays import Float
@@ -10,24 +12,26 @@ from avlmaps.recordings.types import Frame, Recording
 
 
 class Walked:
-    """Stamps and poses that become more; another thread may read them meanwhile."""
+    """Stamps and poses that become more, from several threads."""
 
     def __init__(self) -> None:
         self._stamps_s, self._poses, self._count = np.zeros(64), np.zeros((64, 4, 4)), 0
+        self._lock = Lock()
 
     def append(self, stamp_s: float, pose: Float[np.ndarray, "4 4"]) -> None:
         """Take note of one; a frame that was dropped may come a little late."""
-        if self._count == len(self._stamps_s):
-            self._stamps_s = np.concatenate([self._stamps_s, np.zeros(self._count)])
-            self._poses = np.concatenate([self._poses, np.zeros((self._count, 4, 4))])
-        self._stamps_s[self._count], self._poses[self._count] = stamp_s, pose
-        self._count += 1  # last of all: who reads meanwhile sees whole poses alone
+        with self._lock:
+            if self._count == len(self._stamps_s):
+                self._stamps_s = np.concatenate([self._stamps_s, np.zeros(self._count)])
+                self._poses = np.concatenate([self._poses, np.zeros((self._count, 4, 4))])
+            self._stamps_s[self._count], self._poses[self._count] = stamp_s, pose
+            self._count += 1
 
     def until_now(self) -> WalkedTrack:
         """Return those until now, in the order of time."""
-        count = self._count
-        order = np.argsort(self._stamps_s[:count], kind="stable")
-        return WalkedTrack(self._stamps_s[order], self._poses[order])
+        with self._lock:
+            order = np.argsort(self._stamps_s[: self._count], kind="stable")
+            return WalkedTrack(self._stamps_s[order], self._poses[order])
 
     def move(self, step: PoseCorrection) -> None:
         """Move all by a correction of the poses."""

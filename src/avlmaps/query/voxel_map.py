@@ -14,6 +14,7 @@ from avlmaps.core.files import lasting_path
 from avlmaps.core.numbers import as_number
 from avlmaps.maps.build import require_place
 from avlmaps.maps.mapper import Mapper
+from avlmaps.maps.perceived import given_features
 from avlmaps.maps.settings import BuildSettings
 from avlmaps.maps.store.folder import read, write
 from avlmaps.maps.store.lock import lock_folder
@@ -99,7 +100,7 @@ class VoxelMap:
                 stamp_s = 0.0 if last_s is None else last_s + _STEP_S
             frame = given_frame(index, rgb, depth_m, camera, world_from_camera, stamp_s)
             self._map = None
-            self._mapper.add(frame, None if features is None else self._mapper.checked(features, frame))
+            self._mapper.add(frame, None if features is None else given_features(features, self._mapper.dim, frame))
 
     def add_audio(self, chunk: Any, stamp_s: Any = None) -> None:
         """Add a piece of the microphone's sound. What is refused leaves the map as it was.

@@ -1,0 +1,194 @@
+"""What a map hears: sounds and their sources, of a track that comes piece by piece or that is there as a whole."""
+
+import tempfile
+import weakref
+from collections.abc import Callable
+from math import isfinite
+from pathlib import Path
+from shutil import rmtree
+from typing import Any
+
+import numpy as np
+
+from avlmaps.core.arrays import Float
+from avlmaps.core.errors import AudioError
+from avlmaps.core.numbers import as_number
+from avlmaps.core.registry import Kind
+from avlmaps.core.timeline import Trajectory
+from avlmaps.maps.audio.events import WalkedTrack, collect, detect_events
+from avlmaps.maps.audio.growing import GrowingSounds
+from avlmaps.maps.audio.settings import HearingSettings
+from avlmaps.maps.check import doubts_of_channels
+from avlmaps.maps.sources.growing import GrowingSources, require_fit
+from avlmaps.maps.types import HeardSounds, SourceEvidence
+from avlmaps.perception.encoders import Encoders
+from avlmaps.recordings.audio import AudioTrack, Sound
+from avlmaps.recordings.channels import ChannelSound, level_faults
+from avlmaps.recordings.directions import DirectionTrack
+from avlmaps.recordings.growing_track import LONGEST_GAP_S, GrowingTrack
+from avlmaps.recordings.microphones import Microphones
+from avlmaps.recordings.plausible import date_fault
+
+
+class Hearing:
+    """Takes sound and what devices say of it. One thread may add sound while another asks.
+
+    Attributes:
+        whole: the sound of a recording, which comes as a whole; None where it comes piece by piece.
+        sources: what is known of the microphones, and of where sounds came from.
+    """
+
+    def __init__(
+        self, encoders: Encoders, settings: HearingSettings, whole: AudioTrack | None, *, name_first: bool
+    ) -> None:
+        """Begin without sound, or with all of it.
+
+        Args:
+            encoders: that of sounds is used.
+            settings: how.
+            whole: the sound of a recording.
+            name_first: a sound has its name in one snapshot, and its place in a later one.
+        """
+        self.whole, self.sources = whole, GrowingSources(1 if name_first else None)
+        self._encoders, self._settings, self._name_first = encoders, settings, name_first
+        self._sounds: GrowingSounds | None = None
+        self._heard: HeardSounds | None = None
+        self._named = 0
+
+    @property
+    def came(self) -> GrowingTrack | None:
+        """The track that came until now, None without one."""
+        return None if self._sounds is None else self._sounds.growing
+
+    @property
+    def track(self) -> AudioTrack | None:
+        """The sound until now."""
+        return self.whole if self.whole is not None or self._sounds is None else self._sounds.track
+
+    def place_microphones(self, microphones: Microphones) -> None:
+        """Say where the microphones of the channels are, before the first piece of sound.
+
+        Raises:
+            AudioError: sound came before.
+        """
+        if self._sounds is not None:
+            raise AudioError("Sound came before its microphones were described; describe them before the first piece.")
+        self.sources.microphones = microphones
+
+    def add(self, chunk: Any, stamp_s: Any, walk: Callable[[], WalkedTrack]) -> None:
+        """Add a piece of sound; see ``GrowingTrack.add``.
+
+        Several channels become one, their mean, where nobody said where their microphones are, as in a build.
+
+        Raises:
+            AudioError: it is no sound, has another rate or other channels, repeats what came, or is of another clock.
+        """
+        if isinstance(chunk, ChannelSound):
+            require_fit(self.sources.microphones, len(chunk.samples))
+            if self.sources.microphones is None:
+                chunk = Sound(chunk.samples.mean(axis=0), chunk.rate_hz)
+        if self.came is None or self.came.end_s is None:
+            _require_clock(walk().stamps_s, as_number(stamp_s))
+        if self._sounds is None:
+            encoder = self._encoders.sounds if Kind.SOUNDS in self._encoders else None
+            self._sounds = GrowingSounds(encoder, self._settings)
+        self._sounds.add(chunk, stamp_s)
+
+    def add_directions(self, said: DirectionTrack) -> None:
+        """Add what a device said of where sounds come from, in the order of time.
+
+        Raises:
+            RecordingError: it is not later than what came.
+        """
+        self.sources.add_directions(said)
+
+    def forget(self) -> None:
+        """Place every sound again: the poses have changed."""
+        self._heard = None
+        self.sources.forget()
+
+    def sounds(self, walk: WalkedTrack, *, final: bool) -> HeardSounds:
+        """Return the sounds that are over, or all of them as a build finds them.
+
+        Raises:
+            AudioError: the samples cannot be read.
+            BackendError: the encoder's features are not what its card says.
+        """
+        track, has_encoder = self.track, Kind.SOUNDS in self._encoders
+        dim = self._encoders.card(Kind.SOUNDS).dim if has_encoder else 0
+        if track is None or not has_encoder or not len(walk.stamps_s):
+            return collect([], dim)
+        if final:
+            folder = Path(tempfile.mkdtemp(prefix="avlmaps-sounds-"))
+            weakref.finalize(self, rmtree, folder, ignore_errors=True)
+            return detect_events(track, walk, self._encoders.sounds, self._settings, folder)
+        assert self._sounds is not None
+        heard = self._sounds.heard(walk)
+        if self._heard is None or not np.array_equal(heard.offset_s, self._heard.offset_s):
+            self._heard = heard  # else the arrays are those of before
+        return self._heard
+
+    def located(
+        self,
+        sounds: HeardSounds,
+        walk: Trajectory,
+        voxel_m: Callable[[], Float[np.ndarray, "n 3"]],
+        up_in_world: Float[np.ndarray, "3"],
+        *,
+        final: bool,
+    ) -> SourceEvidence | None:
+        """Return where sounds came from, as far as that is known by now, or at the end."""
+        track = self._placed()
+        if track is None or not len(sounds):
+            return None
+        spans_s = list(zip(sounds.onset_s.tolist(), sounds.offset_s.tolist(), strict=True))
+        if final:
+            return self.sources.at_the_end(track, walk, spans_s, voxel_m(), up_in_world)
+        known, named = self.sources.known(spans_s), self._named
+        self._named = len(sounds)
+        if not self.sources.waiting or (self._name_first and named != len(sounds)):
+            return known
+        return self.sources.until_now(track, walk, spans_s, voxel_m(), up_in_world)
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What is left out of the evidence of sources, and why."""
+        microphones = self.sources.microphones
+        few = (
+            f"The sound has one channel, and {len(microphones)} microphones are described; where sounds came from is "
+            "not known: give all channels (avlmaps.ChannelSound)."
+            if self.came is not None and self.came.channels == 1 and microphones is not None and len(microphones) > 1
+            else ""
+        )
+        return tuple(one for one in (few, self.sources.doubt) if one)
+
+    def doubts_at_the_end(self, walk: Trajectory) -> tuple[str, ...]:
+        """Check the sound, and the channels of an array along the whole drive, as a build does."""
+        track = self._placed()
+        if track is not None and track.microphones is not None and len(track.microphones) > 1:
+            return doubts_of_channels(track, walk, "the sound")
+        if self.came is None or self.came.track is None or self.came.gaps:  # silence fills gaps
+            return ()
+        silent, _ = level_faults(self.came.track, "The sound")
+        return tuple(f"{one} Check the microphone: nothing that sounded then is in the map." for one in silent)
+
+    def _placed(self) -> AudioTrack | None:
+        """Return the sound with what shows where it came from; None where nothing does."""
+        if self.whole is not None:
+            return None if self.whole.microphones is None and self.whole.directions is None else self.whole
+        raw = None if self._sounds is None else self._sounds.track
+        return None if raw is None else self.sources.track(raw, raw.channels)
+
+
+def _require_clock(came_s: Float[np.ndarray, " n"], at_s: float | None) -> None:
+    """Raise ``AudioError`` where the first piece of sound is of another clock than the frames before it."""
+    if at_s is None or not isfinite(at_s):
+        return  # None, or refused with what it is
+    fault = date_fault(np.array([at_s]), "pieces of sound")
+    if not fault and len(came_s) and not -LONGEST_GAP_S < at_s - came_s[0] < np.ptp(came_s) + LONGEST_GAP_S:
+        fault = (
+            f"The first piece of sound is of {at_s:.6g} s, more than {LONGEST_GAP_S:.0f} s from the frames "
+            f"({came_s[0]:.6g} to {came_s[-1]:.6g} s); give stamps of the frames' clock."
+        )
+    if fault:
+        raise AudioError(fault)
