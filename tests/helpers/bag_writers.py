@@ -13,7 +13,7 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from avlmaps.recordings.example_room import Truth
+from avlmaps.recordings.conformance import Truth
 from helpers.format_writers import START_S, encoded, quaternion, rvl, shifted, units
 
 OPTICAL, LINK, BASE = "camera_color_optical_frame", "camera_link", "base_link"

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from avlmaps.core.camera import Pinhole
-from avlmaps.recordings.example_room import Truth, example_truth
+from avlmaps.recordings.conformance import Truth, example_truth
 
 START_S = 1_700_000_000.0
 HALF_TURN = np.diag([1.0, -1.0, -1.0, 1.0])

@@ -27,8 +27,7 @@ from avlmaps.maps.store.reader import StoredMap, open_stored
 from avlmaps.maps.types import Keyframes
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.open import open_recording
-from avlmaps.recordings.subset import Subset
-from avlmaps.recordings.types import Frame
+from avlmaps.recordings.types import Frame, Subset
 
 PROFILE = register_fakes()
 

@@ -10,7 +10,7 @@ from avlmaps.maps.settings import BuildSettings, FrameSettings
 from avlmaps.maps.store.reader import StoredMap, open_stored
 from avlmaps.perception.profiles import Profile, register_profile
 from avlmaps.recordings.open import open_recording
-from avlmaps.recordings.subset import Subset
+from avlmaps.recordings.types import Subset
 
 # Normal of the floor and the table, measured on all 500 frames; the world is the first camera's.
 UP_IN_WORLD = np.array([0.0, -0.892, -0.452])

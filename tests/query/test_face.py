@@ -22,7 +22,7 @@ from avlmaps.core.question import Question
 from avlmaps.maps.settings import GravitySettings
 from avlmaps.query.asking import _OF_A_LIST
 from avlmaps.query.export_layers import layers_of
-from avlmaps.recordings.example_room import example_truth
+from avlmaps.recordings.conformance import example_truth
 from avlmaps.recordings.memory import MemoryRecording
 from helpers.raycast import render
 from helpers.room import Room

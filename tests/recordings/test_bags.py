@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from avlmaps.core.errors import RecordingError
-from avlmaps.recordings.conformance import check, check_damage
-from avlmaps.recordings.example_room import example_truth
+from avlmaps.recordings.conformance import check, check_damage, example_truth
 from avlmaps.recordings.open import find_format, open_recording
 from helpers.bag_writers import (
     BAGS,

@@ -16,20 +16,17 @@ from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.wording import Spelling, asked_as, options_as
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
-from avlmaps.recordings.camera_axes import opencv_from_axes
 from avlmaps.recordings.channels import level_faults
+from avlmaps.recordings.conformance import example_truth, see
 from avlmaps.recordings.consistency.agreement import NOTHING
-from avlmaps.recordings.consistency.causes import cause_of
 from avlmaps.recordings.consistency.check import check_recording, pose_at
 from avlmaps.recordings.consistency.edges import find_edges, shift_of
-from avlmaps.recordings.consistency.levels import find_levels
-from avlmaps.recordings.consistency.planes import offset_in_planes
+from avlmaps.recordings.consistency.flats import find_levels, offset_in_planes
 from avlmaps.recordings.consistency.sample import Sample, choose_pairs, draw_sample
 from avlmaps.recordings.consistency.single_frames import of_sound
-from avlmaps.recordings.consistency.suspects import Suspect, Trials, suspected_rig
+from avlmaps.recordings.consistency.suspects import Suspect, Trials, cause_of, suspected_rig
 from avlmaps.recordings.consistency.verdict import Grade, Reason, Verdict
-from avlmaps.recordings.corrections import Corrections, PoseKind
-from avlmaps.recordings.example_room import example_truth, see
+from avlmaps.recordings.corrections import Corrections, PoseKind, opencv_from_axes
 from avlmaps.recordings.memory import MemoryRecording, is_of_program
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Frame, Recording

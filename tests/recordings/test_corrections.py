@@ -14,8 +14,16 @@ from avlmaps.cli.output import UsageError
 from avlmaps.cli.verb import Reading
 from avlmaps.core import poses
 from avlmaps.core.errors import RecordingError
-from avlmaps.recordings.camera_axes import NAMED, all_axes, opencv_from_axes
-from avlmaps.recordings.corrections import Corrections, GivenCamera, PoseKind, corrected, reread_poses
+from avlmaps.recordings.corrections import (
+    NAMED,
+    Corrections,
+    GivenCamera,
+    PoseKind,
+    all_axes,
+    corrected,
+    opencv_from_axes,
+    reread_poses,
+)
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.validate import validate
 from avlmaps_sim.mixing.copying import write_recording

@@ -14,8 +14,7 @@ import pytest
 
 from avlmaps.core.errors import RecordingError
 from avlmaps.recordings import known_formats
-from avlmaps.recordings.conformance import NonConformanceError, check, check_damage
-from avlmaps.recordings.example_room import Truth, example_truth
+from avlmaps.recordings.conformance import NonConformanceError, Truth, check, check_damage, example_truth
 from avlmaps.recordings.known_formats import FORMATS, Format, formats, register
 from avlmaps.recordings.open import find_format, open_recording
 

@@ -13,8 +13,7 @@ import pytest
 
 from avlmaps.cli.info import describe_path
 from avlmaps.core.errors import RecordingError
-from avlmaps.recordings.conformance import check
-from avlmaps.recordings.example_room import Truth, example_truth
+from avlmaps.recordings.conformance import Truth, check, example_truth
 from avlmaps.recordings.open import open_recording
 from helpers.bag_writers import BAGS, split_ros1
 from helpers.format_writers import HALF_TURN, WRITTEN, numbers, write_icl_nuim, write_nerfstudio

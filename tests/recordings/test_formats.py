@@ -9,7 +9,7 @@ from avlmaps.recordings.corrections import Corrections, corrected
 from avlmaps.recordings.formats.tables import on_clock_of
 from avlmaps.recordings.known_formats import FORMATS
 from avlmaps.recordings.open import find_format, open_recording
-from avlmaps.recordings.subset import Subset
+from avlmaps.recordings.types import Subset
 from helpers.format_writers import START_S, WRITTEN
 
 

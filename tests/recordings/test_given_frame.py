@@ -5,7 +5,7 @@ import pytest
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import RecordingError
-from avlmaps.recordings.given_frame import given_frame
+from avlmaps.recordings.memory import given_frame
 
 CAMERA = Pinhole(30.0, 30.0, 16.0, 12.0, 32, 24)
 

@@ -10,9 +10,7 @@ import pytest
 
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.recordings.consistency.check import check_recording
-from avlmaps.recordings.consistency.flats import find_flats
-from avlmaps.recordings.consistency.levels import find_levels
-from avlmaps.recordings.consistency.right_angles import RightAngles
+from avlmaps.recordings.consistency.flats import RightAngles, find_flats, find_levels
 from avlmaps.recordings.consistency.sample import Sample, draw_sample
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Recording

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from avlmaps.core.errors import RecordingError
-from avlmaps.recordings.example_room import Truth, example_truth
-from avlmaps.recordings.formats.ros_motion import _tree_of_file  # pyright: ignore[reportPrivateUsage]
+from avlmaps.recordings.conformance import Truth, example_truth
+from avlmaps.recordings.formats.ros_transforms import _tree_of_file  # pyright: ignore[reportPrivateUsage]
 from avlmaps.recordings.open import open_recording
 from helpers.format_writers import (
     icl_truth,

@@ -40,8 +40,7 @@ from avlmaps.perception.profiles import Profile
 from avlmaps.query.avlmap import AVLMap, QuerySettings
 from avlmaps.query.voxel_map import IN_MEMORY, direction, require_kinds
 from avlmaps.recordings.directions import given_directions
-from avlmaps.recordings.given_frame import given_frame
-from avlmaps.recordings.memory import next_of
+from avlmaps.recordings.memory import given_frame, next_of
 from avlmaps.recordings.microphones import Microphones, given_microphones
 from avlmaps.recordings.plausible import date_fault
 from avlmaps.recordings.types import Frame

@@ -11,8 +11,13 @@ from math import inf
 import numpy as np
 
 from avlmaps.core.poses import rotation_angle_rad
-from avlmaps.recordings.consistency.agreement import compare, without_occluded
-from avlmaps.recordings.consistency.limits import LEAST_AGREEING, can_be_judged, geometry_agrees
+from avlmaps.recordings.consistency.agreement import (
+    LEAST_AGREEING,
+    can_be_judged,
+    compare,
+    geometry_agrees,
+    without_occluded,
+)
 from avlmaps.recordings.consistency.sample import Surfaces, draw_pairs
 from avlmaps.recordings.growing_track import LONGEST_GAP_S
 from avlmaps.recordings.memory import MemoryRecording

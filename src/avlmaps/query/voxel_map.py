@@ -22,7 +22,7 @@ from avlmaps.perception.encoders import Encoders, encoders_of
 from avlmaps.perception.profiles import Profile
 from avlmaps.query.avlmap import AVLMap, QuerySettings
 from avlmaps.query.findings import with_findings
-from avlmaps.recordings.given_frame import given_frame
+from avlmaps.recordings.memory import given_frame
 
 if TYPE_CHECKING:
     from avlmaps.query.answer import Answer

@@ -146,7 +146,6 @@ class AudioTrack:
         return Sound(samples, self.rate_hz)
 
     def _samples(self, begin: int, end: int) -> np.ndarray:
-        """Read samples of the track, all of which it says that it has; a damaged file may have fewer."""
         from avlmaps.recordings import containers
 
         piece = containers.read_piece(self.path, begin, end, self.rate_hz, self.channel)
@@ -221,7 +220,6 @@ def _write_block(file: Any, block: Sound, rate_hz: int) -> None:
 
 
 def _checked(samples: Float[np.ndarray, " n"], path: Path, rate_hz: int, at: int) -> Float[np.ndarray, " n"]:
-    """Return the samples within [-1, 1], or say which are not numbers or come from another scale."""
     finite = np.isfinite(samples)
     if not finite.all():
         where_s = (at + int(np.argmin(finite))) / rate_hz
@@ -236,7 +234,6 @@ def _checked(samples: Float[np.ndarray, " n"], path: Path, rate_hz: int, at: int
 
 
 def _regrouped(pieces: Iterable[Float[np.ndarray, " _"]], size: int) -> Iterator[Float[np.ndarray, " _"]]:
-    """Cut a stream of pieces of any length into blocks of one size; the last may be shorter."""
     waiting: list[np.ndarray] = []
     length = 0
     for piece in pieces:

@@ -217,7 +217,6 @@ def _silent(samples: Float[np.ndarray, "k m n"], track: AudioTrack, name: str) -
 
 
 def _has_pauses(track: AudioTrack, before_s: float, behind_s: float) -> bool:
-    """Return whether a track is digitally silent for `_PAUSE_S` before one of its times or behind another."""
     size = round(_PAUSE_S * track.rate_hz)
     for number, block in enumerate(track.blocks(_PAUSES * _PAUSE_S)):
         begin_s = _PAUSE_S * (number * _PAUSES + np.arange(len(block.samples) // size))
@@ -238,7 +237,6 @@ def _dead(samples: Float[np.ndarray, "k m n"], track: AudioTrack, name: str = ""
 
 
 def _copied(samples: Float[np.ndarray, "k m n"], track: AudioTrack, name: str = "") -> list[str]:
-    """Name a channel that holds another's sound: two microphones never hear quite the same."""
     power = (samples**2).mean(axis=(0, 2))
     said: list[str] = []
     for one, other in itertools.combinations(range(len(power)), 2):

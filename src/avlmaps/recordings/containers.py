@@ -56,11 +56,7 @@ def truncation_error(path: Path, found_s: float, promised_s: float) -> AudioErro
 
 
 def examine(path: Path) -> tuple[int, int]:
-    """Return samples a second and the number of samples.
-
-    Raises:
-        AudioError: there is no such file, it cannot be read, has no audio stream or no samples, or is truncated.
-    """
+    """Return samples a second and the number of samples."""
     try:
         checked_media(path)
     except OSError as error:
@@ -135,11 +131,7 @@ def cancelling_channel(path: Path, count: int, rate_hz: int) -> int | None:
 
 
 def read_all_channels(path: Path, begin: int, end: int, rate_hz: int) -> Float32[np.ndarray, "n channels"]:
-    """Return the samples ``begin:end`` of every channel; fewer where the file ends before.
-
-    Raises:
-        AudioError: the file cannot be read.
-    """
+    """Return the samples ``begin:end`` of every channel; fewer where the file ends before."""
     if _is_plain(path):
         return _channels(path, begin, end, rate_hz)
     pieces: list[Float32[np.ndarray, "n channels"]] = []
@@ -152,7 +144,6 @@ def read_all_channels(path: Path, begin: int, end: int, rate_hz: int) -> Float32
 
 
 def _channels(path: Path, begin: int, end: int, rate_hz: int) -> Float32[np.ndarray, "n channels"]:
-    """Return samples of all channels from ``begin`` on; about as many as are wanted of files that FFmpeg reads."""
     if _is_plain(path):
         with _opened_plain(path) as file:
             try:
@@ -217,7 +208,6 @@ def _examine_plain(path: Path) -> tuple[int, int]:
 
 
 def _is_short_wav(path: Path) -> bool:
-    """Return whether a WAV file has fewer bytes than its header promises, which libsndfile would pass over."""
     with path.open("rb") as file:
         head = file.read(12)
     promised = int.from_bytes(head[4:8], "little")
@@ -270,7 +260,6 @@ def _end_of_packets(container: Any, audio: Any) -> float:
 def _decoded(
     path: Path, from_s: float, channel: int | None = None
 ) -> Iterator[tuple[float, Float32[np.ndarray, " _"]]]:
-    """Yield (time of the first sample since the container's start, mono samples) from a while before ``from_s`` on."""
     for time_s, samples in _frames(path, from_s):
         yield time_s, _mono(samples, channel)
 
@@ -324,11 +313,6 @@ def checked_media(path: Path) -> int:
 
     The decoders of the other formats (Ogg, MP3, Matroska, WebM, AVI) look for the next packet in all that follows:
     20 GB of zeros, as a full disk or a broken copy leaves them, keep a processor busy for minutes.
-
-    Raises:
-        FileNotFoundError: there is no such file.
-        OSError: it is no regular file, is too large, or ends in 64 MB of zeros and its format has no index;
-            ``strerror`` is the reason in words.
     """
     size = checked_size(path, SOUND_BYTES)
     if size >= _MOST_ZEROS_BYTES and not _is_indexed(path) and _ends_in_zeros(path, size):

@@ -158,7 +158,6 @@ class GrowingTrack:
 
 
 def _silence(channels: int, count: int, rate_hz: int) -> Iterator[ChannelSound]:
-    """Yield silence in pieces: ten minutes of eight channels are a gigabyte."""
     step = _SILENCE_S * rate_hz
     for at in range(0, count, step):
         yield ChannelSound(np.zeros((channels, min(step, count - at)), np.float32), rate_hz)

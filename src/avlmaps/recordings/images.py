@@ -98,7 +98,6 @@ def exif_turn(content: bytes) -> DisplayTurn:
 
 
 def _opened(content: bytes) -> Any:
-    """Open a picture by its header alone; HEIC as well where pillow-heif is installed."""
     from PIL import Image
 
     if content[4:8] == b"ftyp" and content[8:12] in _HEIF_KINDS:
@@ -111,21 +110,13 @@ def _opened(content: bytes) -> Any:
 
 
 def read_bytes(path: Path) -> bytes:
-    """Return a file's content.
-
-    Raises:
-        RecordingError: it is missing or cannot be read.
-    """
+    """Return a file's content."""
     with readable(path, _RESTORE):
         return read_regular(path, PICTURE_BYTES)
 
 
 def check_whole(path: Path, content: bytes) -> None:
-    """Refuse a picture that is cut off or damaged as far as its outside shows it, and files that are no pictures.
-
-    Raises:
-        RecordingError: the file is truncated, damaged, empty or of a kind that is not read.
-    """
+    """Refuse a picture that is cut off or damaged as far as its outside shows it, and files that are no pictures."""
     again = f"({len(content)} bytes); copy it again or leave that frame out."
     if not content:
         raise RecordingError(f"{path} is empty {again}")
@@ -157,11 +148,7 @@ def _unknown_kind(path: Path, content: bytes) -> str:
 
 
 def picture_size(path: Path, content: bytes | None = None) -> tuple[int, int]:
-    """Return (width, height) of a picture or an NPY file from its header alone.
-
-    Raises:
-        RecordingError: the file is missing, has no such header, or is of a size that no camera has.
-    """
+    """Return (width, height) of a picture or an NPY file from its header alone."""
     if path.suffix == ".npy":
         with _whole_npy(path):
             height, width = _depth_shape(path, _mapped(path))
@@ -194,11 +181,7 @@ def encoded_size(content: bytes) -> tuple[int, int] | None:
 
 
 def first_picture_size(folder: Path, names: Sequence[str]) -> tuple[int, int]:
-    """Return the size that most of a few pictures have, so that one broken file does not decide for all.
-
-    Raises:
-        RecordingError: none of the few has a size; the sentence is about the first.
-    """
+    """Return the size that most of a few pictures have, so that one broken file does not decide for all."""
     sizes: Counter[tuple[int, int]] = Counter()
     for at in _some(len(names)):
         with suppress(RecordingError):
@@ -220,9 +203,6 @@ def read_colour(path: Path, camera: Pinhole) -> UInt8[np.ndarray, "h w 3"]:
     """Read a colour picture as RGB, as the sensor delivered it.
 
     A turn that EXIF requests is heeded only where the turned picture alone has the camera's size.
-
-    Raises:
-        RecordingError: the file is missing, truncated, no picture or not of the camera's size.
     """
     return decode_colour(path, read_bytes(path), camera)
 
@@ -313,9 +293,6 @@ def read_depth(path: Path, camera: Pinhole, units_per_m: float) -> Float32[np.nd
         path: a 16-bit PNG, a TIFF or an NPY file.
         camera: the depth camera.
         units_per_m: units of whole numbers in a metre.
-
-    Raises:
-        RecordingError: the file is missing, truncated, of another kind or not of the camera's size.
     """
     if path.suffix == ".npy":
         return _npy_depth(path, camera)
@@ -372,7 +349,6 @@ def _npy_depth(path: Path, camera: Pinhole) -> Float32[np.ndarray, "h w"]:
 
 
 def _mapped(path: Path) -> np.ndarray:
-    """Return an NPY file's array without reading it; what its header promises must be there."""
     checked_size(path, PICTURE_BYTES)
     return np.load(path, mmap_mode="r", allow_pickle=False)
 
@@ -396,11 +372,7 @@ def _check_size(path: Path, shape: tuple[int, ...], camera: Pinhole) -> None:
 
 
 def check_picture(path: Path, camera: Pinhole) -> None:
-    """Check a picture's wholeness and size without decoding it.
-
-    Raises:
-        RecordingError: as reading it would, if the file's outside already shows the fault.
-    """
+    """Check a picture's wholeness and size without decoding it."""
     if path.suffix == ".npy":
         width, height = picture_size(path)
         _check_size(path, (height, width), camera)

@@ -69,9 +69,6 @@ class Format:
             report: called with every fault.
             topics: names by what they are for.
             more: further files of the same recording.
-
-        Raises:
-            RecordingError: it cannot be used, or topics or further files are named and this format has none.
         """
         module, _, function = self.opener.partition(":")
         found = importlib.import_module(module)
@@ -96,11 +93,7 @@ class Format:
 
 
 def settle_sound(recording: Recording) -> None:
-    """Hold a recording's sound track against its frames, and add what is worth knowing of it to the notices.
-
-    Raises:
-        RecordingError: not one moment of the track lies among the frames.
-    """
+    """Hold a recording's sound track against its frames, and add what is worth knowing of it to the notices."""
     track = recording.audio
     if track is None:
         return
@@ -138,7 +131,6 @@ def _is_folder(path: Path) -> bool:
 
 
 def _called(target: str, path: Path) -> Any:
-    """Call a test that is imported when it is needed."""
     module, _, function = target.partition(":")
     return getattr(importlib.import_module(f"{_HERE}.{module}"), function)(path)
 
@@ -253,11 +245,7 @@ def register(format: Format) -> None:
 
 
 def formats() -> tuple[Format, ...]:
-    """Return every format that is known: built in, registered, or brought by another package.
-
-    Raises:
-        RecordingError: another package's format cannot be loaded.
-    """
+    """Return every format that is known: built in, registered, or brought by another package."""
     own = {known.name: known for known in (*_brought_formats(), *_registered.values(), *FORMATS)}
     return (*FORMATS, *(known for name, known in own.items() if name not in _BUILT_IN))
 
@@ -310,7 +298,6 @@ def _suffix(*suffixes: str) -> Callable[[Path], bool]:
 
 
 def _euroc(path: Path) -> bool:
-    """A folder of EuRoC's layout: an IMU, and cameras without depth or none at all."""
     inside = path / "mav0" if (path / "mav0").is_dir() else path
     return some_name(inside, "imu[0-9]*", "imu.csv") and not (inside / "depth").exists()
 

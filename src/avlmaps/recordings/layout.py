@@ -116,20 +116,12 @@ class Description(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
         return self.microphones or None
 
     def corrections(self) -> Corrections:
-        """Return how the poses are to be read.
-
-        Raises:
-            RecordingError: it cannot be so.
-        """
+        """Return how the poses are to be read."""
         kinds = (self.poses,) if isinstance(self.poses, PoseKind) else self.poses
         return Corrections(poses=kinds, camera_axes=self.camera_axes, pose_delay_s=self.pose_delay_s)
 
     def rig(self) -> Rig:
-        """Return the cameras.
-
-        Raises:
-            ValueError: a number is not possible (a focal length of 0, a matrix that is not 4x4).
-        """
+        """Return the cameras."""
         rgb = self.intrinsics.rgb.camera()
         depth = self.intrinsics.depth.camera() if self.intrinsics.depth else rgb
         if self.intrinsics.rgb_from_depth is None:
@@ -149,12 +141,7 @@ class _Version(msgspec.Struct):
 
 
 def read_description(folder: Path, report: Report) -> Description:
-    """Read ``recording.json``.
-
-    Raises:
-        RecordingError: it is missing, not UTF-8, not JSON, of another version, or a field has the wrong type or
-            an impossible value; a caller that listens to faults has received it before.
-    """
+    """Read ``recording.json``."""
     path = folder / DESCRIPTION
     try:
         description = decode_description(path)
@@ -168,11 +155,7 @@ def read_description(folder: Path, report: Report) -> Description:
 
 
 def decode_description(path: Path) -> Description:
-    """Read a description, also that of a recording which is being written.
-
-    Raises:
-        RecordingError: it is missing, cannot be read, or is none.
-    """
+    """Read a description, also that of a recording which is being written."""
     try:
         with readable(path, "every recording in this format has one"):
             content = read_regular(path, DESCRIPTION_BYTES).removeprefix(b"\xef\xbb\xbf")
@@ -198,14 +181,12 @@ def decode_description(path: Path) -> Description:
 
 
 def _known_keys(where: str) -> str:
-    """Return the keys of the object that a decoding error points to."""
     kind = Intrinsics if where.endswith("intrinsics`") else CameraNumbers if "intrinsics." in where else Description
     kind = MicrophoneNumbers if "microphones" in where else kind
     return ", ".join(kind.__struct_fields__)
 
 
 def _lower(message: str) -> str:
-    """Begin a message in the middle of a sentence, unless it begins with a name like JSON."""
     return message if message[1:2].isupper() else message[:1].lower() + message[1:]
 
 

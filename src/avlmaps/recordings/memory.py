@@ -1,17 +1,25 @@
-"""A recording whose frames are in memory: a program's own loop, a test, the frames that a growing map still holds."""
+"""A recording whose frames are in memory: a program's own loop, a test, the frames that a growing map still holds.
+
+A frame out of a program's arrays: what does not fit is refused in a sentence with what is wanted and what came.
+"""
 
 import hashlib
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
+from math import isfinite
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from avlmaps.core.arrays import Float
-from avlmaps.core.camera import Rig
+from avlmaps.core.arrays import Float, UInt8
+from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
+from avlmaps.core.numbers import as_number
+from avlmaps.core.poses import orthonormalize
 from avlmaps.core.wording import in_python
+from avlmaps.recordings.plausible import MAX_FROM_ORIGIN_M, date_fault
 from avlmaps.recordings.types import Frame, Recording
 
 
@@ -97,3 +105,136 @@ def next_of(frame: Frame, last_stamp_s: float | None, rig: Rig) -> Frame:
             f"{rig.depth.height}); a map has one."
         )
     return replace(frame, rig=rig)
+
+
+# A picture whose middle depth is farther than this was given in millimetres: 0.2 m of them are more.
+FARTHEST_MIDDLE_M = 200.0
+_FARTHEST_MIDDLE_CM = 900.0  # and in centimetres it would be a room
+# One that has no depth beyond this was given in kilometres, or divided twice.
+_NEAREST_FARTHEST_M = 0.02
+
+_EXACT = 1e-12
+
+
+def given_frame(
+    index: int,
+    rgb: Any,
+    depth_m: Any,
+    camera: Any,
+    world_from_camera: Any,
+    stamp_s: Any,
+) -> Frame:
+    """Return a frame of a program's arrays, which are copied.
+
+    Args:
+        index: its number, for errors.
+        rgb: colour picture, (h, w, 3) uint8.
+        depth_m: z-depth in metres, (hd, wd); 0, NaN or infinity where there is none. It covers the same view as the
+            picture, at any resolution, unless the camera is a rig.
+        camera: a ``Pinhole`` of the colour picture, or a ``Rig`` of both cameras.
+        world_from_camera: 4x4 pose of the depth camera; its rotation is made orthonormal within rounding.
+        stamp_s: seconds.
+
+    Raises:
+        RecordingError: one of them does not fit.
+    """
+    name = f"frame {index}"
+    colours, depths = _colours(name, rgb), _depths(name, depth_m)
+    rig = _rig(name, camera, colours, depths)
+    given = _numbers(name, "world_from_camera", world_from_camera).astype(np.float64)
+    pose = orthonormalize(given, name)
+    away_m = float(np.abs(pose[:3, 3]).max())
+    if away_m > MAX_FROM_ORIGIN_M:
+        raise RecordingError(
+            f"The pose of {name} lies {away_m:,.6g} m from the origin, where places are no longer exact to a "
+            "millimetre; subtract the first position from all of them."
+        )
+    if np.abs(pose - given).max() < _EXACT:  # that of a recording's frame stays bit by bit what it was
+        pose = given
+    at_s = as_number(stamp_s)
+    if at_s is None or not isfinite(at_s):
+        raise RecordingError(f"stamp_s of {name} must be a finite number of seconds, not {stamp_s!r}.")
+    if fault := date_fault(np.array([at_s]), "frames"):
+        raise RecordingError(fault)
+    return Frame(index, name, at_s, colours, depths, pose, rig)
+
+
+def _numbers(name: str, what: str, given: Any) -> np.ndarray:
+    try:
+        array = np.ma.filled(given, 0) if np.ma.isMaskedArray(given) else np.asarray(given)
+    except (ValueError, TypeError, RuntimeError) as fault:  # rows of several lengths, or a tensor of a GPU
+        raise RecordingError(
+            f"{what} of {name} must be an array of numbers, not {type(given).__name__} ({fault})."
+        ) from None
+    if array.dtype.kind not in "fiu":
+        raise RecordingError(
+            f"{what} of {name} must be an array of numbers, not {type(given).__name__} ({array.dtype})."
+        )
+    return array
+
+
+def _colours(name: str, given: Any) -> UInt8[np.ndarray, "h w 3"]:
+    rgb = _numbers(name, "rgb", given)
+    if rgb.ndim != 3 or rgb.shape[2] != 3 or 0 in rgb.shape or rgb.dtype != np.uint8:
+        hint = "; colours from 0 to 1 times 255" if rgb.dtype.kind == "f" else ""
+        hint = "; leave the fourth channel out" if rgb.ndim == 3 and rgb.shape[2] == 4 else hint
+        hint = "; put the channels last: rgb.transpose(1, 2, 0)" if rgb.ndim == 3 and rgb.shape[0] == 3 else hint
+        raise RecordingError(f"rgb of {name} must be uint8 of shape (h, w, 3), not {rgb.dtype} of {rgb.shape}{hint}.")
+    return np.array(rgb, order="C")
+
+
+def _depths(name: str, given: Any) -> Float[np.ndarray, "hd wd"]:
+    depth = _numbers(name, "depth_m", given)
+    if depth.ndim == 3 and depth.shape[2] == 1:
+        depth = depth[:, :, 0]
+    if depth.ndim != 2 or 0 in depth.shape:
+        raise RecordingError(f"depth_m of {name} must have shape (h, w), not {depth.shape}.")
+    if depth.dtype.kind != "f":
+        raise RecordingError(
+            f"depth_m of {name} must be floats in metres, not {depth.dtype} up to {depth.max()}; millimetres are "
+            "divided by 1000.0."
+        )
+    depth = np.array(depth, np.float32, order="C")
+    depth[~np.isfinite(depth)] = 0.0
+    seen = depth[depth != 0.0]
+    if (seen < 0.0).any():
+        raise RecordingError(f"depth_m of {name} holds negative depths, down to {seen.min():.4g} m; 0 says none.")
+    middle_m, farthest_m = (float(np.median(seen)), float(seen.max())) if len(seen) else (1.0, 1.0)
+    if middle_m > FARTHEST_MIDDLE_M or farthest_m < _NEAREST_FARTHEST_M:
+        unit = "millimetres" if middle_m > _FARTHEST_MIDDLE_CM else "centimetres, or millimetres of what is near"
+        raise RecordingError(
+            f"depth_m of {name} must be in metres; its median is {middle_m:,.4g} and its largest {farthest_m:,.4g}"
+            f"{f', which looks like {unit}' if middle_m > FARTHEST_MIDDLE_M else ''}."
+        )
+    return depth
+
+
+def _rig(name: str, camera: Any, rgb: np.ndarray, depth: np.ndarray) -> Rig:
+    (height, width), (depth_height, depth_width) = rgb.shape[:2], depth.shape
+    if isinstance(camera, Rig):
+        wanted = (camera.rgb.width, camera.rgb.height), (camera.depth.width, camera.depth.height)
+        if wanted != ((width, height), (depth_width, depth_height)):
+            raise RecordingError(
+                f"The rig of {name} has pictures of {_size(wanted[0])} and depths of {_size(wanted[1])}; rgb has "
+                f"{_size((width, height))} and depth_m {_size((depth_width, depth_height))}."
+            )
+        return camera
+    if not isinstance(camera, Pinhole):
+        raise RecordingError(
+            f"camera of {name} must be an avlmaps.Pinhole(fx, fy, cx, cy, width, height) or an avlmaps.Rig, not "
+            f"{type(camera).__name__}."
+        )
+    if (camera.width, camera.height) != (width, height):
+        raise RecordingError(
+            f"rgb of {name} has {_size((width, height))} pixels, its camera {_size((camera.width, camera.height))}."
+        )
+    if abs(depth_width * height - depth_height * width) > max(width, height, depth_width, depth_height):
+        raise RecordingError(
+            f"depth_m of {name} has {_size((depth_width, depth_height))} pixels, rgb {_size((width, height))}: not one "
+            "view; give an avlmaps.Rig with both cameras."
+        )
+    return Rig(camera, camera.resized(depth_width, depth_height))
+
+
+def _size(size: tuple[int, int]) -> str:
+    return f"{size[0]}x{size[1]}"

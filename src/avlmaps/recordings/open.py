@@ -97,7 +97,6 @@ def find_format(path: Path, name: str = "auto") -> Format:
 
 
 def _recognised(path: Path) -> Format | None:
-    """Return the first format that a place is of; what is built in goes before what other packages bring."""
     own = next((f for f in FORMATS if f.matches(path)), None)
     return own or next((f for f in formats() if f.matches(path)), None)
 

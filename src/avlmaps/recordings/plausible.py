@@ -50,7 +50,6 @@ def date_fault(stamps_s: Float[np.ndarray, " n"], what: str) -> str:
 
 
 def _unit_of(apart: float, usual_s: float = _USUAL_PACE_S) -> str:
-    """Return the unit in which stamps are this far apart that usually are some seconds apart."""
     return min(_UNITS, key=lambda unit: abs(np.log(apart / unit[0] / usual_s)))[1]
 
 
@@ -168,7 +167,6 @@ def plausible_walk(
 
 
 def _edges(stamps_s: Float[np.ndarray, " n"], positions_m: Float[np.ndarray, "n 3"]) -> Int[np.ndarray, " e"]:
-    """Return where stretches begin, and the number of frames."""
     moved_m = np.linalg.norm(np.diff(positions_m, axis=0), axis=1)
     jumps = np.flatnonzero(moved_m > np.maximum(MAX_JUMP_M, MAX_SPEED_M_S * np.diff(stamps_s)))
     return np.concatenate([[0], jumps + 1, [len(stamps_s)]])

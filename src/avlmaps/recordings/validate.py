@@ -101,7 +101,6 @@ def _check_files(recording: FileRecording, index: int, report: Report) -> None:
 
 
 def _check_frame(recording: Recording, index: int, report: Report) -> None:
-    """Decode a frame; where that fails, check its files one by one and report each."""
     try:
         depth_m = recording.frame(index).depth_m
     except RecordingError as error:
@@ -131,8 +130,6 @@ class _Counting:
 
 
 def _check_truth(folder: Path, report: Report) -> None:
-    """Check the files of truth, which mapping never reads, so that nobody finds out when an evaluation fails."""
-
     def unhurried(fault: Fault) -> None:
         report(Fault(fault.sentence, fault.file, fault.line, fatal=False))
 

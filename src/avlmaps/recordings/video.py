@@ -53,11 +53,7 @@ class VideoFrames:
         return len(self.stamps_s)
 
     def picture(self, index: int) -> UInt8[np.ndarray, "h w 3"]:
-        """Decode one frame; continuing in order is fast, a jump costs a seek to the key frame before it.
-
-        Raises:
-            RecordingError: the frame cannot be decoded.
-        """
+        """Decode one frame; continuing in order is fast, a jump costs a seek to the key frame before it."""
         from av.error import FFmpegError
 
         with self._lock:

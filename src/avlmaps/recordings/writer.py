@@ -22,8 +22,7 @@ from avlmaps.recordings import layout
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
 from avlmaps.recordings.channels import ChannelSound, write_channels
 from avlmaps.recordings.directions import DIRECTIONS, DirectionTrack, write_directions
-from avlmaps.recordings.given_frame import FARTHEST_MIDDLE_M
-from avlmaps.recordings.memory import same_rig
+from avlmaps.recordings.memory import FARTHEST_MIDDLE_M, same_rig
 from avlmaps.recordings.microphones import MicrophoneNumbers, Microphones
 from avlmaps.recordings.types import BaseHeight, Frame
 
@@ -201,7 +200,6 @@ class RecordingWriter:
         write_directions(self.path / DIRECTIONS, directions)
 
     def _take_channels(self, files: tuple[Path, ...]) -> None:
-        """Copy the files of the channels, each under a name of its own."""
         assert self._microphones is not None
         names = [f"audio.{number + 1}{path.suffix.lower()}" for number, path in enumerate(files)]
         for path, name in zip(files, names, strict=True):
@@ -209,7 +207,6 @@ class RecordingWriter:
         self._microphones = msgspec.structs.replace(self._microphones, files=names)
 
     def _require_possible(self) -> None:
-        """Raise ``RecordingError`` where readers would refuse what is written, before a frame is."""
         if not isinstance(self.rig, Rig):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise RecordingError(
                 f"rig must be an avlmaps.Rig, not {type(self.rig).__name__}; of one camera Rig(camera, camera)."
@@ -239,7 +236,6 @@ class RecordingWriter:
         self._stamps_s.append(float(stamp_s))
 
     def _finish(self) -> None:
-        """Write the description, which makes the folder a recording, and take the marker away."""
         if not self._stamps_s:
             raise RecordingError(f"{self.path} got no frame, so there is no recording to finish.")
         if self.trajectory is not None:
@@ -254,7 +250,6 @@ class RecordingWriter:
         (self.path / layout.UNFINISHED).unlink()
 
     def _description(self) -> bytes:
-        """Return the content of the description of the frames until now."""
         return msgspec.json.format(msgspec.json.encode(self._described()), indent=2) + b"\n"
 
     def _described(self) -> layout.Description:
@@ -345,6 +340,5 @@ def take_file(source: Path, target: Path, link: bool) -> None:
 
 
 def _middle_m(depth_m: Float[np.ndarray, "h w"]) -> float:
-    """Return the median of the depths that are known; 0 where none is."""
     known = depth_m[np.isfinite(depth_m) & (depth_m > 0.0)]
     return float(np.median(known)) if len(known) else 0.0

@@ -5,8 +5,7 @@ import pytest
 
 from avlmaps.perception.encoders import Encoders
 from avlmaps.recordings.open import open_recording
-from avlmaps.recordings.subset import Subset
-from avlmaps.recordings.types import Recording
+from avlmaps.recordings.types import Recording, Subset
 from avlmaps_sim.bench.locate import COLUMNS, MapOfPictures, errors_of, foreign_errors, map_of, run
 from helpers.picture_room import RoomWalk
 

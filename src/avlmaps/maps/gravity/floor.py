@@ -21,8 +21,7 @@ from avlmaps.maps.gravity.floor_choice import (
     stood_over,
 )
 from avlmaps.maps.gravity.patches import Sight, Voxelised, sight_of
-from avlmaps.recordings.subset import Subset
-from avlmaps.recordings.types import Frame, Ground, Recording
+from avlmaps.recordings.types import Frame, Ground, Recording, Subset
 
 _BAND_M = 0.12  # cameras of one group differ in height by no more than this
 _STOREY_M = 0.6  # a camera's view counts for others whose height differs by no more than this

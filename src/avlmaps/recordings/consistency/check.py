@@ -11,14 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from avlmaps.core.errors import RecordingError
-from avlmaps.recordings.consistency import limits
+from avlmaps.recordings.consistency import agreement as limits
 from avlmaps.recordings.consistency.agreement import APART_SAME_M, FEWEST_POINTS, Agreement, compare, without_occluded
-from avlmaps.recordings.consistency.blind_spots import blind_spots
-from avlmaps.recordings.consistency.causes import cause_of
 from avlmaps.recordings.consistency.edges import DepthEdges, Shift, find_edges, shift_of
-from avlmaps.recordings.consistency.jumps import find_exchanged, find_jump, find_parts
-from avlmaps.recordings.consistency.levels import Levels, Tilt, find_levels
-from avlmaps.recordings.consistency.right_angles import RightAngles
+from avlmaps.recordings.consistency.flats import Levels, RightAngles, Tilt, find_levels
+from avlmaps.recordings.consistency.jumps import blind_spots, find_exchanged, find_jump, find_parts
 from avlmaps.recordings.consistency.sample import Sample, Surfaces, draw_sample, steps_between_all
 from avlmaps.recordings.consistency.single_frames import (
     of_colour,
@@ -30,7 +27,16 @@ from avlmaps.recordings.consistency.single_frames import (
     of_sound,
     warmth_of,
 )
-from avlmaps.recordings.consistency.suspects import PoseAt, Suspect, Trial, Trials, find_cause, find_closer, find_offset
+from avlmaps.recordings.consistency.suspects import (
+    PoseAt,
+    Suspect,
+    Trial,
+    Trials,
+    cause_of,
+    find_cause,
+    find_closer,
+    find_offset,
+)
 from avlmaps.recordings.consistency.verdict import Finding, Grade, Reason, Verdict
 from avlmaps.recordings.corrections import NONE, CorrectedRecording, uncorrected
 from avlmaps.recordings.memory import is_of_program
@@ -40,11 +46,7 @@ _STANDS = 0.01  # steps between poses that are one
 
 
 def check_recording(recording: Recording) -> Verdict:
-    """Check a recording against itself.
-
-    Raises:
-        RecordingError: it has no frame that can be read.
-    """
+    """Check a recording against itself."""
     if len(recording) == 0:
         raise RecordingError(f"{recording.path} has no frames with a pose; there is nothing to check.")
     sample = draw_sample(recording)
@@ -109,7 +111,6 @@ class _Found:
 
 
 def _most_unlike(after: Agreement, apart: Agreement) -> Agreement | None:
-    """Return the pairs that do not look alike: those that follow one another if they do not, else those from apart."""
     return next((one for one in (after, apart) if limits.can_be_judged(one) and limits.unlike(one)), None)
 
 
@@ -209,7 +210,6 @@ def _shift_words(shift: Shift, recording: Recording) -> tuple[str, str]:
 
 
 def _tilt_words(tilt: Tilt) -> str:
-    """Return how the camera sits otherwise in its mount; less than a degree is left out."""
     parts = (
         (tilt.down_deg, "farther down", "farther up"),
         (tilt.right_deg, "lower on its right", "lower on its left"),
@@ -255,7 +255,6 @@ def _other_cause(recording: Recording, sample: Sample, found: _Found) -> str:
 
 
 def _cause(recording: Recording, found: _Found, median_m: float) -> str:
-    """Return what makes the recording agree with itself, or nothing."""
     best = find_cause(found.trials, lambda trial: _explains(trial, found))
     if best is None:
         return ""
@@ -276,7 +275,6 @@ def _words(recording: Recording, best: Trial, median_m: float, gain: str) -> str
 
 
 def _gain(found: _Found, best: Trial) -> str:
-    """Return how much better it agrees, in parentheses."""
     for before, after, right in (
         (found.after, best.agreement, limits.geometry_agrees(found.after)),
         (found.apart, best.apart, limits.apart_agrees(found.apart)),
@@ -292,7 +290,6 @@ def _gain(found: _Found, best: Trial) -> str:
 
 
 def _explains(trial: Trial, found: _Found) -> bool:
-    """Return whether a suspect makes the pairs agree, clearly better than they did."""
     after, apart = trial.agreement, trial.apart
     if not limits.can_be_judged(after) or not limits.geometry_agrees(after) or not limits.apart_agrees(apart):
         return False

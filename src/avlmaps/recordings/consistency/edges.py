@@ -86,7 +86,6 @@ class Shift:
 
 
 def _near(columns: float, rows: float) -> Bool[np.ndarray, "k k"]:
-    """Return which shifts are hardly others than this one."""
     return np.hypot(_SHIFTS[None, :] - columns, _SHIFTS[:, None] - rows) <= _NONE
 
 
@@ -125,7 +124,6 @@ def find_edges(sample: Sample) -> DepthEdges:
 def _shifted(
     gradient: Float32[np.ndarray, "h w"], x: np.ndarray, y: np.ndarray, columns: np.ndarray, rows: np.ndarray
 ) -> tuple[Float[np.ndarray, "r c"], Float[np.ndarray, "r c"]]:
-    """Return the sum of the gradient at points that are shifted, and how many lie in the picture then."""
     height, width = gradient.shape
     u, v = np.floor(x[:, None] + columns).astype(int), np.floor(y[:, None] + rows).astype(int)
     inside = ((v >= 0) & (v < height))[:, :, None] & ((u >= 0) & (u < width))[:, None, :]
@@ -158,13 +156,11 @@ def shift_of(edges: DepthEdges, sample: Sample) -> Shift | None:
 
 
 def _stands_out(gradient: Float[np.ndarray, "k k"], around: Bool[np.ndarray, "k k"]) -> bool:
-    """Return whether the largest gradient is clearly larger than that around a place."""
     here, most = max(float(gradient[around].max()), 0.0), float(gradient.max())
     return most >= max(_LEAST_RATIO * here, here + _LEAST_GAIN * float(gradient.std()), _LEAST_GRADIENT)
 
 
 def _edge_pixels(depth_m: Float32[np.ndarray, "h w"]) -> tuple[np.ndarray, np.ndarray]:
-    """Return rows and columns of pixels before a step of depth, evenly spread; in front, where the edge belongs to."""
     edge = np.zeros(depth_m.shape, bool)
     for axis in (0, 1):
         first, second = (np.moveaxis(depth_m, axis, 0)[part] for part in (slice(1, None), slice(None, -1)))
@@ -179,7 +175,6 @@ def _edge_pixels(depth_m: Float32[np.ndarray, "h w"]) -> tuple[np.ndarray, np.nd
 
 
 def _gradient(grey: Float32[np.ndarray, "h w"]) -> Float32[np.ndarray, "h w"]:
-    """Return the gradient of brightness, of which strong edges count no more than others."""
     import cv2
 
     smooth = cv2.GaussianBlur(grey, (0, 0), 1.0)

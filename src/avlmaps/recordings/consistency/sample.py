@@ -80,11 +80,7 @@ class Sample:
 
 
 def draw_sample(recording: Recording) -> Sample:
-    """Choose frames by their poses and read them; frames that cannot be read are left out.
-
-    Raises:
-        RecordingError: none of them can be read.
-    """
+    """Choose frames by their poses and read them; frames that cannot be read are left out."""
     return draw_pairs(recording, *choose_pairs(recording.world_from_camera))
 
 
@@ -95,9 +91,6 @@ def draw_pairs(recording: Recording, pairs: Int[np.ndarray, "p 2"], follows: Boo
         recording: of the frames.
         pairs: numbers of frames.
         follows: whether those of a pair follow one another.
-
-    Raises:
-        RecordingError: none of them can be read.
     """
     index = np.unique(pairs) if len(pairs) else np.arange(min(len(recording), 1))
     rig = _small_rig(recording.rig)
@@ -166,7 +159,6 @@ def choose_pairs(pose: Float[np.ndarray, "n 4 4"]) -> tuple[Int[np.ndarray, "p 2
 
 
 def _spread(n: int) -> list[int]:
-    """Return numbers below n, each far from those before it: the middle of the largest gap, again and again."""
     order: dict[int, None] = {}
     parts = 1
     while len(order) < min(n, PAIRS):
@@ -250,7 +242,6 @@ def _nearest(depth_m: Float32[np.ndarray, "h w"], camera: Pinhole) -> Float32[np
 def _colour(
     rgb: np.ndarray, camera: Pinhole
 ) -> tuple[Float32[np.ndarray, "hs ws"], Float32[np.ndarray, "hs ws"], float]:
-    """Return the brightness of a picture, its red less its blue, and its warmth."""
     import cv2
 
     small = cv2.resize(rgb, (camera.width, camera.height), interpolation=cv2.INTER_AREA)
@@ -302,7 +293,6 @@ class Surfaces:
 
 
 def _around(depth_m: Float32[np.ndarray, "f h w"]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the least and greatest depth of each 3x3 pixels; 0 where too few have one, and at the edge."""
     near, far = np.zeros_like(depth_m), np.zeros_like(depth_m)
     height, width = depth_m.shape[1:]
     if min(height, width) < 3:

@@ -144,7 +144,6 @@ def of_depth(sample: Sample, surfaces: Surfaces, median_m: float, of_program: bo
 
 
 def _flat_depth(sample: Sample, there: np.ndarray) -> Iterator[Finding]:
-    """Find depth that is one number: a constant, or the same picture in every frame although the camera moves."""
     if len(sample) < 3:
         return
     spread = [float(np.ptp(d[t])) / float(d[t].mean()) for d, t in zip(sample.depth_m, there, strict=True) if t.any()]
@@ -158,7 +157,6 @@ def _flat_depth(sample: Sample, there: np.ndarray) -> Iterator[Finding]:
 
 
 def _cut_off(sample: Sample, there: np.ndarray) -> Iterator[Finding]:
-    """Find depths that end at one number, as where a range is cut off or "nothing" is written as the farthest."""
     most_m = float(sample.depth_m.max())
     shares = [float((d[t] == most_m).mean()) for d, t in zip(sample.depth_m, there, strict=True) if t.any()]
     share = float(np.median(shares))
@@ -169,7 +167,6 @@ def _cut_off(sample: Sample, there: np.ndarray) -> Iterator[Finding]:
 
 
 def _wrapped(sample: Sample, there: np.ndarray) -> Iterator[Finding]:
-    """Find depths that begin again at 0, as those of 16 bits do of which 8 are stored."""
     most_m = float(sample.depth_m.max())
     far, near = sample.depth_m > _NEARLY_MOST * most_m, there & (sample.depth_m < _MEASURED_BY_NONE_M)
     beside = np.zeros(len(sample), np.int64)
@@ -186,7 +183,6 @@ def _wrapped(sample: Sample, there: np.ndarray) -> Iterator[Finding]:
 
 
 def _frozen(sample: Sample, pictures: np.ndarray, reason: Reason) -> Iterator[Finding]:
-    """Find pictures that stay the same although the camera moves; those of one value are none."""
     moved = np.array([steps_between_all(sample.world_from_camera[pair])[0] for pair in sample.pairs])
     if (moved > 0.3).sum() < 3:
         return
@@ -253,7 +249,6 @@ def warmth_of(sample: Sample) -> float:
 
 
 def _as_if_bgr(sample: Sample) -> Iterator[Finding]:
-    """Find pictures in which blue outweighs red as in no room: wood, skin and lamps are redder than blue."""
     warmth = warmth_of(sample)
     if warmth < -LEAST_WARMTH:
         sentence = (
@@ -307,7 +302,6 @@ def of_sound(recording: Recording) -> Iterator[Finding]:
 
 
 def _skipped(recording: Recording, missing_s: float) -> tuple[int, float] | None:
-    """Return the frame before the one long time without any that the sound lacks at its end, and how long that is."""
     apart_s, pose = np.diff(recording.stamps_s), recording.world_from_camera
     at = int(np.argmax(apart_s))
     gap_s = float(apart_s[at] - np.median(apart_s))

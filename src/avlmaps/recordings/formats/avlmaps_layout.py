@@ -77,11 +77,7 @@ def reference_map_from_world(first_habitat_from_base: Float[np.ndarray, "4 4"]) 
 
 
 def read_habitat_poses(path: Path, report: Report = stop_at_first) -> Float[np.ndarray, "n 4 4"]:
-    """Read ``poses.txt``: a line holds px py pz qx qy qz qw, or a 4x4 matrix row by row.
-
-    Raises:
-        RecordingError: the file is missing or damaged.
-    """
+    """Read ``poses.txt``: a line holds px py pz qx qy qz qw, or a 4x4 matrix row by row."""
     table = read_table(path, (7, 16), report, names=POSE[1:])
     values = table.values
     if values.shape[1] == 16:
@@ -101,15 +97,7 @@ def read_habitat_poses(path: Path, report: Report = stop_at_first) -> Float[np.n
 
 
 def open_avlmaps(path: Path, report: Report = stop_at_first) -> FileRecording:
-    """Open a scene of the data set, or one of its ``audio_video`` sequences, in place.
-
-    Args:
-        path: the folder with ``poses.txt`` and ``rgb/``.
-        report: called with every fault.
-
-    Raises:
-        RecordingError: poses and pictures do not match, or a file is damaged.
-    """
+    """Open a scene of the data set, or one of its ``audio_video`` sequences, in place."""
     given, notices = read_camera_file(path / "camera.json")
     habitat_from_body = read_habitat_poses(path / "poses.txt", report)
     colour = _numbered(path / "rgb", (".png", ".jpg"))
@@ -136,7 +124,6 @@ def open_avlmaps(path: Path, report: Report = stop_at_first) -> FileRecording:
 def _complete(
     path: Path, colour: dict[int, str], depth: dict[int, str], poses_count: int, report: Report
 ) -> tuple[list[int], list[str]]:
-    """Return the numbers that have all they need, and the notices about the others."""
     numbers = [n for n in sorted(colour) if n < poses_count and (not depth or n in depth)]
     if not numbers:
         raise RecordingError(
@@ -159,11 +146,7 @@ def _numbered(folder: Path, suffixes: tuple[str, ...]) -> dict[int, str]:
 
 
 def read_camera_file(path: Path) -> tuple[CameraFile, list[str]]:
-    """Return the content of ``camera.json``, or the defaults where there is none, and the notices about it.
-
-    Raises:
-        RecordingError: the file is damaged.
-    """
+    """Return the content of ``camera.json``, or the defaults where there is none, and the notices about it."""
     if not os.path.lexists(path):
         return CameraFile(), [f"The stamps are counted at {RATE_HZ:g} frames/s, since poses.txt has none."]
     try:

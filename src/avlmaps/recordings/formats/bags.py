@@ -1,8 +1,14 @@
 """The messages of a bag by topic, with their stamps, of one file or several.
 
 ROS 1 and ROS 2 bags are read by `rosbags`, MCAP files by `mcap`: their messages may be of ROS or of Foxglove.
+
+Foxglove's messages, in each of their codings, as the ROS messages that they correspond to.
+
+Foxglove's schemas (its public page) come as JSON, protobuf and ROS messages, with the same names of fields. A stamp
+is {sec, nsec}, {seconds, nanos} or {sec, nanosec}; bytes in JSON are base64.
 """
 
+import base64
 import heapq
 import os
 import re
@@ -14,15 +20,144 @@ from dataclasses import dataclass
 from functools import cached_property
 from operator import itemgetter
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from types import SimpleNamespace
+from typing import Any, Protocol, cast, runtime_checkable
 
 import numpy as np
 
 from avlmaps.core.errors import AvlmapsError, RecordingError
 from avlmaps.core.files import DESCRIPTION_BYTES, SAMPLED_BYTES, checked_size, decode_json
 from avlmaps.recordings.faults import readable
-from avlmaps.recordings.formats import foxglove
 from avlmaps.recordings.formats.ros_messages import header_stamp_s
+
+_IMAGE, _COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
+_TF = "tf2_msgs/msg/TFMessage"
+ROS_TYPES = {
+    "RawImage": _IMAGE,
+    "CompressedImage": _COMPRESSED,
+    "CameraCalibration": "sensor_msgs/msg/CameraInfo",
+    "FrameTransform": _TF,
+    "FrameTransforms": _TF,
+    "PoseInFrame": "geometry_msgs/msg/PoseStamped",
+    "PointCloud": "sensor_msgs/msg/PointCloud2",
+}
+# Types of a point's fields: Foxglove's number to that of ROS (PointField).
+_FIELD_TYPES = {1: 2, 2: 1, 3: 4, 4: 3, 5: 6, 6: 5, 7: 7, 8: 8}
+
+
+def ros_type(schema: str) -> str:
+    """Return the ROS type that a schema of Foxglove corresponds to, or nothing."""
+    package, _, name = schema.replace("/msg/", "/").replace("/", ".").rpartition(".")
+    return ROS_TYPES.get(name, "") if package in ("foxglove", "foxglove_msgs") else ""
+
+
+def plain(value: Any) -> Any:
+    """Return what JSON holds with members in place of keys."""
+    if isinstance(value, dict):
+        return SimpleNamespace(**{str(key): plain(inner) for key, inner in cast("dict[str, Any]", value).items()})
+    return [plain(inner) for inner in cast("list[Any]", value)] if isinstance(value, list) else value
+
+
+def stamp_s(message: Any) -> float:
+    """Return the stamp of a message, or of the first of its transforms, in seconds."""
+    inner = getattr(message, "transforms", None)
+    stamp = _stamp(getattr(inner[0] if inner else message, "timestamp", None))
+    return stamp.sec + stamp.nanosec * 1e-9
+
+
+def to_ros(schema: str, message: Any) -> Any:
+    """Return a message as that of ROS."""
+    kind = ros_type(schema)
+    return _ADAPTED[kind](message, kind)
+
+
+def _stamp(stamp: Any) -> SimpleNamespace:
+    seconds = getattr(stamp, "sec", getattr(stamp, "seconds", 0))
+    nanoseconds = next((getattr(stamp, n) for n in ("nsec", "nanosec", "nanos") if hasattr(stamp, n)), 0)
+    return SimpleNamespace(sec=int(seconds), nanosec=int(nanoseconds))
+
+
+def _header(message: Any, frame: str) -> SimpleNamespace:
+    return SimpleNamespace(stamp=_stamp(getattr(message, "timestamp", None)), frame_id=frame)
+
+
+def _bytes(data: Any) -> np.ndarray:
+    raw = base64.b64decode(data, validate=True) if isinstance(data, str) else data
+    return np.asarray(raw, np.uint8) if isinstance(raw, np.ndarray) else np.frombuffer(bytes(raw), np.uint8)
+
+
+def _image(m: Any, kind: str) -> SimpleNamespace:
+    return SimpleNamespace(
+        __msgtype__=kind, header=_header(m, m.frame_id), height=int(m.height), width=int(m.width), encoding=m.encoding,
+        is_bigendian=0, step=int(m.step), data=_bytes(m.data),
+    )  # fmt: skip
+
+
+def _compressed(m: Any, kind: str) -> SimpleNamespace:
+    return SimpleNamespace(__msgtype__=kind, header=_header(m, m.frame_id), format=m.format, data=_bytes(m.data))
+
+
+def _calibration(m: Any, kind: str) -> SimpleNamespace:
+    def matrix(name: str) -> np.ndarray:
+        value = getattr(m, name, None)
+        return np.array(getattr(m, name.lower(), ()) if value is None else value, np.float64)
+
+    d, k, r, p = (matrix(name) for name in "DKRP")
+    return SimpleNamespace(
+        __msgtype__=kind, header=_header(m, m.frame_id), height=int(m.height), width=int(m.width),
+        distortion_model=getattr(m, "distortion_model", ""), d=d, k=k, r=r if r.shape == (9,) else np.eye(3).ravel(),
+        p=p if p.shape == (12,) else np.zeros(12),
+    )  # fmt: skip
+
+
+def _transforms(m: Any, kind: str) -> SimpleNamespace:
+    several = m.transforms if hasattr(m, "transforms") else [m]
+    return SimpleNamespace(
+        __msgtype__=kind,
+        transforms=[
+            SimpleNamespace(
+                header=_header(t, t.parent_frame_id),
+                child_frame_id=t.child_frame_id,
+                transform=SimpleNamespace(
+                    translation=_numbers(t.translation, "xyz"), rotation=_numbers(t.rotation, "xyzw")
+                ),
+            )
+            for t in several
+        ],
+    )
+
+
+def _pose(m: Any, kind: str) -> SimpleNamespace:
+    pose = SimpleNamespace(position=_numbers(m.pose.position, "xyz"), orientation=_numbers(m.pose.orientation, "xyzw"))
+    return SimpleNamespace(__msgtype__=kind, header=_header(m, m.frame_id), pose=pose)
+
+
+def _numbers(value: Any, names: str) -> SimpleNamespace:
+    return SimpleNamespace(**{name: float(getattr(value, name)) for name in names})
+
+
+def _cloud(m: Any, kind: str) -> SimpleNamespace:
+    data, stride = _bytes(m.data), int(m.point_stride)
+    fields = [
+        SimpleNamespace(name=f.name, offset=int(f.offset), datatype=_FIELD_TYPES.get(int(f.type), 0), count=1)
+        for f in m.fields
+    ]
+    count = len(data) // stride if stride > 0 else 0
+    return SimpleNamespace(
+        __msgtype__=kind, header=_header(m, m.frame_id), height=1, width=count, fields=fields, is_bigendian=False,
+        point_step=stride, row_step=stride * count, data=data, origin=getattr(m, "pose", None),
+    )  # fmt: skip
+
+
+_ADAPTED: dict[str, Callable[[Any, str], SimpleNamespace]] = {
+    _IMAGE: _image,
+    _COMPRESSED: _compressed,
+    "sensor_msgs/msg/CameraInfo": _calibration,
+    _TF: _transforms,
+    "geometry_msgs/msg/PoseStamped": _pose,
+    "sensor_msgs/msg/PointCloud2": _cloud,
+}
+
 
 # Kinds of files that a bag's folder may hold without a metadata.yaml, the first that is there counts.
 SUFFIXES = (".bag", ".mcap", ".db3")
@@ -146,11 +281,7 @@ class Bag:
 
 
 def bag_files(path: Path) -> list[Path]:
-    """Return the files of a bag, in the order of the numbers in their names; a ROS 2 bag's folder counts as one.
-
-    Raises:
-        RecordingError: a folder holds no bag, or something that is no regular file.
-    """
+    """Return the files of a bag, in the order of the numbers in their names; a ROS 2 bag's folder counts as one."""
     if not os.path.lexists(path):
         raise RecordingError(f"There is no bag at {path}.")
     inside = sorted((entry for entry in path.iterdir() if not entry.is_dir()), key=_by_numbers) if path.is_dir() else []
@@ -168,7 +299,6 @@ def bag_files(path: Path) -> list[Path]:
 
 
 def _by_numbers(file: Path) -> list[tuple[int, str]]:
-    """Return a key by which ``walk_2`` goes before ``walk_10``."""
     return [(int(word), "") if word.isdigit() else (-1, word) for word in re.findall(r"[0-9]+|[^0-9]+", file.name)]
 
 
@@ -206,7 +336,6 @@ class RosbagsContainer:
         return header_stamp_s(self._plain(raw), self._reader.is2)
 
     def _plain(self, raw: bytes) -> bytes:
-        """Decompress a message of a ``.db3`` without the metadata.yaml that says that messages are compressed."""
         if not self._reader.is2 or raw[:4] != _ZSTD:
             return raw
         import zstandard
@@ -362,7 +491,7 @@ class McapConnection:
     @property
     def is_foxglove(self) -> bool:
         """Whether its messages are Foxglove's."""
-        return self.schema is not None and bool(foxglove.ros_type(self.schema.name))
+        return self.schema is not None and bool(ros_type(self.schema.name))
 
 
 class McapContainer:
@@ -403,14 +532,14 @@ class McapContainer:
     def message(self, connection: McapConnection, raw: bytes) -> Any:
         """See ``Container``."""
         decoded = self._decoded(connection, raw)
-        return foxglove.to_ros(connection.schema.name, decoded) if connection.is_foxglove else decoded
+        return to_ros(connection.schema.name, decoded) if connection.is_foxglove else decoded
 
     def stamp_s(self, connection: McapConnection, raw: bytes) -> float:
         """See ``Container``."""
         encoding = connection.channel.message_encoding
         if encoding in ("ros1", "cdr") and not connection.is_foxglove:
             return header_stamp_s(raw, encoding == "cdr")
-        return foxglove.stamp_s(self._decoded(connection, raw))
+        return stamp_s(self._decoded(connection, raw))
 
     def _decoded(self, connection: McapConnection, raw: bytes) -> Any:
         schema = connection.schema
@@ -421,7 +550,7 @@ class McapContainer:
 
 
 def _msgtype(schema: str) -> str:
-    if known := foxglove.ros_type(schema):
+    if known := ros_type(schema):
         return known
     name = _full_name(schema)
     return "tf2_msgs/msg/TFMessage" if name == "tf/msg/tfMessage" else name
@@ -435,7 +564,7 @@ def _full_name(schema: str) -> str:
 def _decoder(connection: McapConnection) -> Callable[[bytes], Any]:
     encoding, schema, topic = connection.channel.message_encoding, connection.schema, connection.topic
     if encoding == "json":
-        return lambda raw: foxglove.plain(decode_json(raw))
+        return lambda raw: plain(decode_json(raw))
     if encoding not in ("protobuf", "ros1", "cdr"):
         raise RecordingError(
             f"The messages of {topic} are coded as {encoding!r}, which is not read; ROS 1, CDR (ROS 2), JSON and "

@@ -166,7 +166,6 @@ def settle(
 
 
 def _orthonormal(shots: Shots, report: Report, pose_files: Sequence[Path]) -> Shots:
-    """Make the rotations orthonormal at once; where one is none, report that one and continue with the others."""
     labels = [f"frame {name}" for name in shots.names]
     try:
         mended = poses.orthonormalize_all(shots.world_from_camera, labels)
@@ -425,11 +424,7 @@ def number_of(name: str) -> int:
 
 
 def list_names(folder: Path, suffixes: tuple[str, ...]) -> list[str]:
-    """Return the names of a folder's files with one of the suffixes, in the order of the numbers in them.
-
-    Raises:
-        RecordingError: the folder is missing or cannot be listed.
-    """
+    """Return the names of a folder's files with one of the suffixes, in the order of the numbers in them."""
     try:
         with os.scandir(folder) as entries:
             names = [entry.name for entry in entries if entry.name.lower().endswith(suffixes)]
@@ -477,9 +472,6 @@ def open_audio(folder: Path, start_s: float = 0.0) -> tuple[AudioTrack | None, t
 
     A file that is called ``audio`` or ``sound``, in any case and container, is the track; else the only sound file that
     is there, also in a folder ``audio`` or ``sound``.
-
-    Raises:
-        AudioError: the track that is called so cannot be read.
     """
     named, others = _sound_files(folder)
     for inside in sorted(folder.iterdir()) if not named and not others and folder.is_dir() else ():
@@ -501,7 +493,6 @@ def open_audio(folder: Path, start_s: float = 0.0) -> tuple[AudioTrack | None, t
 
 
 def _sound_files(folder: Path) -> tuple[list[Path], list[Path]]:
-    """Return the files that are called after a sound track, the likeliest first, and other sound files."""
     try:
         files = sorted(folder.iterdir())
     except OSError:

@@ -33,15 +33,7 @@ _MAX_QUATERNION_FAULT = 0.05
 
 
 def open_folder(path: Path, report: Report = stop_at_first) -> Recording:
-    """Open a recording in our own format.
-
-    Args:
-        path: the folder.
-        report: called with every fault; by default the first fatal one ends the opening.
-
-    Raises:
-        RecordingError: the recording is unfinished or damaged so that it cannot be used.
-    """
+    """Open a recording in our own format."""
     if not (path / layout.DESCRIPTION).exists() and (path / layout.UNFINISHED).exists():
         sentence = f"{path} was never finished: its writer stopped before the end; record it again."
         report(Fault(sentence, path / layout.UNFINISHED))
@@ -78,7 +70,6 @@ def open_folder(path: Path, report: Report = stop_at_first) -> Recording:
 
 
 def _with_directions(path: Path, audio: AudioTrack | None, start_s: float) -> tuple[AudioTrack | None, tuple[str, ...]]:
-    """Return the track with what a device said of directions, where that lies beside it; and a notice or none."""
     file = path / DIRECTIONS
     if not file.exists():
         return audio, ()
@@ -116,7 +107,6 @@ def _check_sizes(folder: Path, description: Description, found: "_Pictures") -> 
 
 
 def _check_clocks(folder: Path, description: Description, found: "_Pictures", known: "_Poses") -> None:
-    """Raise ``RecordingError`` where the stamps of poses or frames are in another unit than seconds."""
     poses_s = np.sort(known.stamps_s[np.isfinite(known.stamps_s)])
     interval_s = 1.0 / description.pose_rate_hz if description.pose_rate_hz else None
     fault = ""
@@ -137,15 +127,7 @@ def _check_clocks(folder: Path, description: Description, found: "_Pictures", kn
 def _open_audio(
     path: Path, start_s: float, video: VideoFrames | None, first_s: float, microphones: MicrophoneNumbers | None
 ) -> tuple[AudioTrack | None, tuple[str, ...]]:
-    """Open the sound track: a file of its own, else the video's (most have none, which is not a fault).
-
-    Args:
-        path: the folder.
-        start_s: when the track begins, as the description says; 0 where it says nothing.
-        video: the pictures, where they are a video.
-        first_s: when the video's first frame was taken, on the recording's clock.
-        microphones: where those of the track's channels are, where the description says so.
-    """
+    """Open the sound track: a file of its own, else the video's (most have none, which is not a fault)."""
     if microphones is not None and microphones.files:
         track, notices = AudioTrack.open(path / microphones.files[0], start_s=start_s), ()
     else:
@@ -159,7 +141,6 @@ def _open_audio(
 
 
 def _turned_notices(video: VideoFrames | None) -> tuple[str, ...]:
-    """Return a notice where a video is stored otherwise than it is shown, or nothing."""
     if video is None or not video.turn:
         return ()
     if video.shown:
@@ -226,7 +207,6 @@ def _read_poses(folder: Path, report: Report) -> _Poses:
 
 
 def _find_video(folder: Path, description: Description) -> VideoFrames | None:
-    """Open ``rgb.mp4`` (or another container) where there is no ``rgb/``."""
     files = [folder / f"rgb{suffix}" for suffix in layout.VIDEO_SUFFIXES]
     file = next((f for f in files if os.path.lexists(f)), None)
     if file is None or (folder / "rgb").is_dir():
@@ -284,7 +264,6 @@ def _find_pictures(
 
 
 def _listed(path: Path, found: dict[str, str], report: Report) -> Iterator[tuple[str, float]]:
-    """Yield the name and the stamp of each line; a name may have its file's extension."""
     files = {file: stem for stem, file in found.items()}
     at, factor, first = (0, 1), 1.0, True
     for number, text in text_lines(path, report):

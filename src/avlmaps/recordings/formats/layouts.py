@@ -32,7 +32,7 @@ from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import DESCRIPTION_BYTES
-from avlmaps.recordings.camera_axes import from_opengl
+from avlmaps.recordings.corrections import from_opengl
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
 from avlmaps.recordings.formats import avlmaps_layout
 from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names
@@ -103,11 +103,7 @@ class Layout:
 
 
 def open_layout(layout: Layout, path: Path, report: Report = stop_at_first) -> FileRecording:
-    """Open a folder in place.
-
-    Raises:
-        RecordingError: no frame is complete, or a file of poses or intrinsics is damaged.
-    """
+    """Open a folder in place."""
     colour = layout.colour.files(path)
     depth = layout.depth.files(path)
     known, file_of, notices = layout.poses(path, sorted(colour), report)
@@ -147,7 +143,6 @@ def _digits(file: str) -> str:
 def _pose_files(
     pattern: Pattern, path: Path, numbers: Sequence[int], report: Report
 ) -> tuple[Poses, Callable[[int], Path], tuple[str, ...]]:
-    """Return the 4x4 poses of files of their own; a damaged one is reported and is NaN."""
     files = pattern.files(path)
     found: Poses = {}
     for number, name in files.items():
@@ -163,7 +158,6 @@ def _pose_files(
 def _rows(
     name: str, path: Path, numbers: Sequence[int], report: Report
 ) -> tuple[Poses, Callable[[int], Path], tuple[str, ...]]:
-    """Return the matrices of a table, whose lines count the frames from 0."""
     table = read_table(path / name, (16,), report)
     notice = "The recording has no clock; 30 frames/s are assumed."
     return dict(enumerate(table.values.reshape(-1, 4, 4))), lambda _: path / name, (notice,)
@@ -197,7 +191,6 @@ def _of_robot(
 
 
 def _of_matrices(pose: Float[np.ndarray, "n 4 4"]) -> tuple[Float[np.ndarray, "n 4 4"], str]:
-    """Return camera poses in a world with z up, by which axis of the world the cameras' y axes lie along."""
     usable = pose[np.isfinite(pose).all(axis=(1, 2))]
     down = usable[:, :3, 1].mean(axis=0) if len(usable) else np.zeros(3)
     axis = int(np.argmax(np.abs(down)))
@@ -311,7 +304,6 @@ def _scannet(path: Path, shots: Shots) -> Cameras:
 
 
 def _centred(file: Path, size: tuple[int, int], own_size: tuple[int, int]) -> tuple[Pinhole, tuple[str, ...]]:
-    """Return a camera at its pictures' size; the intrinsics may be of the size that the camera itself has."""
     k = read_matrix(file, 4, 4).tolist()
     for width, height in (size, own_size):
         camera = pinhole(file, k[0][0], k[1][1], k[0][2] + 0.5, k[1][2] + 0.5, width, height)
@@ -325,7 +317,6 @@ def _centred(file: Path, size: tuple[int, int], own_size: tuple[int, int]) -> tu
 
 
 def _robot_camera(path: Path, shots: Shots) -> Cameras:
-    """Return the camera of a file beside the pictures, else one with a view of 90 degrees."""
     if (path / "intrinsic").is_dir():
         return _scannet(path, shots)
     for name in _OPEN3D:
@@ -547,7 +538,6 @@ def _read_log(file: Path, report: Report) -> tuple[list[int], Float[np.ndarray, 
 
 
 def _microseconds(names: list[str]) -> Float[np.ndarray, " n"] | None:
-    """Return the stamps that names such as ``00012-000000366849.png`` carry, in seconds from the first; else None."""
     parts = [name.split(".", 1)[0].split("-") for name in names]
     if not all(len(p) == 2 and p[1].isascii() and p[1].isdigit() for p in parts):
         return None

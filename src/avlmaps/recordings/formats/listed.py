@@ -182,7 +182,6 @@ def _trajectory(path: Path, report: Report) -> tuple[timeline.Trajectory, tuple[
 
 
 def _tum_camera(path: Path, shots: Shots) -> tuple[Cameras, Float[np.ndarray, "3"] | None]:
-    """Return the camera of ORB-SLAM's settings beside the lists, else TUM's by the folder's name; and what is up."""
     rgb_size, depth_size = sizes(path, shots)
     for file in sorted((*path.glob("*.yaml"), *path.glob("*.yml"))):
         if found := _orb_camera(file, rgb_size):
@@ -288,7 +287,6 @@ def _freiburg(file: Path, report: Report) -> Poses:
 
 
 def _sim(file: Path, rows: list[tuple[int, str, str]]) -> Poses:
-    """Return the matrices in the order of the frames."""
     faults: list[Fault] = []
     table = read_table(file, (4,), faults.append)
     if faults:
@@ -351,7 +349,6 @@ def open_rtabmap_export(path: Path, report: Report = stop_at_first) -> FileRecor
 
 
 def _exported_poses(values: Float[np.ndarray, "n c"]) -> tuple[Float[np.ndarray, "n 4 4"], Float[np.ndarray, "n k"]]:
-    """Return the poses of a table, and the columns beside: stamp and perhaps id; none of matrices."""
     if values.shape[1] == 12:
         pose = np.tile(np.eye(4), (len(values), 1, 1))
         pose[:, :3] = values.reshape(-1, 3, 4)
@@ -365,7 +362,6 @@ def _exported_poses(values: Float[np.ndarray, "n c"]) -> tuple[Float[np.ndarray,
 def _exported_rows(
     path: Path, stems: Sequence[str], own: Float[np.ndarray, "n c"]
 ) -> tuple[list[tuple[int, int]], Float[np.ndarray, " k"], tuple[str, ...]]:
-    """Return (picture, row of the poses) of each frame, its stamp, and notices: by stamps, by ids, else in order."""
     keys = np.array([float(stem) if re.fullmatch(r"\d+(\.\d+)?", stem) else np.nan for stem in stems])
     for column in range(own.shape[1]):
         order = np.argsort(own[:, column], kind="stable")

@@ -26,7 +26,7 @@ from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import MANIFEST_BYTES, PICTURE_BYTES, SOUND_BYTES
 from avlmaps.recordings import images
-from avlmaps.recordings.camera_axes import UP_IN_WORLD, from_opengl
+from avlmaps.recordings.corrections import UP_IN_WORLD, from_opengl
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
 from avlmaps.recordings.formats.file_recording import (
     Shots,
@@ -72,7 +72,6 @@ def is_record3d(path: Path) -> bool:
 
 
 def _layout(path: Path) -> tuple[str, str, str] | None:
-    """Return the names of the metadata, and of the folders of colour and depth."""
     for names in (("metadata.json", "rgb", "depth"), ("metadata", "rgbd", "rgbd")):
         if (path / names[0]).is_file() and (path / names[1]).is_dir() and (path / names[2]).is_dir():
             return names
@@ -139,7 +138,6 @@ class _Pictures:
 
 
 def _unfolded(files: _Files, name: str, size: int) -> UInt8[np.ndarray, " n"]:
-    """Return the bytes of a file that is compressed by LZFSE, or as long as it is unfolded."""
     content = files.read(name)
     raw = content if len(content) == size else _decompressed(files, name, content, size)
     if len(raw) != size:
@@ -177,7 +175,6 @@ def _depth(files: _Files, name: str, size: tuple[int, int]) -> Float32[np.ndarra
 
 
 def _exr(files: _Files, name: str) -> Float32[np.ndarray, "h w"]:
-    """Return the channel of an OpenEXR file that depth is found in, the likeliest first."""
     import OpenEXR
 
     library: Any = OpenEXR
@@ -197,15 +194,7 @@ def _exr(files: _Files, name: str) -> Float32[np.ndarray, "h w"]:
 
 
 def open_record3d(path: Path, report: Report = stop_at_first) -> StoredRecording:
-    """Open a recording in place.
-
-    Args:
-        path: a ``.r3d``, or the folder of one that was unpacked, or of an export.
-        report: called with every fault.
-
-    Raises:
-        RecordingError: it is damaged, or no frame has colour, depth and pose.
-    """
+    """Open a recording in place."""
     inside = path / "EXR_RGBD" if (path / "EXR_RGBD").is_dir() else path
     layout = ("metadata", "rgbd", "rgbd") if path.is_file() else _layout(inside)
     if layout is None:
@@ -309,7 +298,6 @@ def _rig(files: _Files, file: Path, given: _Metadata, shots: Shots) -> tuple[Rig
 
 
 def _size_like(files: _Files, name: str, camera: Pinhole) -> tuple[int, int]:
-    """Return the size of depth, of the colour camera's shape, that has as many pixels as were stored."""
     count = len(_decompressed(files, name, files.read(name), 4 * camera.width * camera.height)) // 4
     width = max(1, round((count * camera.width / camera.height) ** 0.5))
     return width, count // width

@@ -68,11 +68,7 @@ def stamp_of(message: Any) -> float:
 
 
 def colour_of(message: Any, name: str, camera: Pinhole | None = None) -> UInt8[np.ndarray, "h w 3"]:
-    """Return the colour picture of an Image or a CompressedImage.
-
-    Raises:
-        RecordingError: its encoding is not one of a colour picture, or its bytes are cut short.
-    """
+    """Return the colour picture of an Image or a CompressedImage."""
     if _is_compressed(message):
         return _decoded(message.data, name, camera, colour=True)[..., ::-1]
     require_encoding(message, name, colour=True)
@@ -89,11 +85,7 @@ def colour_of(message: Any, name: str, camera: Pinhole | None = None) -> UInt8[n
 
 
 def require_encoding(message: Any, name: str, *, colour: bool) -> None:
-    """Refuse pictures whose encoding is not read, before all of them would fail one by one.
-
-    Raises:
-        RecordingError: the encoding is none of colour, or of depth.
-    """
+    """Refuse pictures whose encoding is not read, before all of them would fail one by one."""
     if message is None or _is_compressed(message):
         return
     known = _COLOUR_ENCODINGS if colour else _DEPTH_ENCODINGS
@@ -112,16 +104,11 @@ def is_grey(message: Any, topic: str) -> bool:
 
 
 def _is_compressed(message: Any) -> bool:
-    """Return whether a picture is a CompressedImage, of a bag or of rclpy."""
     return hasattr(message, "format") and not hasattr(message, "encoding")
 
 
 def depth_of(message: Any, name: str, camera: Pinhole | None = None) -> Float32[np.ndarray, "h w"]:
-    """Return z-depth in metres, 0 where there is none, of an Image or a `compressedDepth` CompressedImage.
-
-    Raises:
-        RecordingError: its encoding is not one of a depth picture, or its bytes are cut short.
-    """
+    """Return z-depth in metres, 0 where there is none, of an Image or a `compressedDepth` CompressedImage."""
     if _is_compressed(message):
         return _decompressed_depth(message, name, camera)
     require_encoding(message, name, colour=False)
@@ -167,7 +154,6 @@ def _decoded(content: Any, name: str, camera: Pinhole | None, colour: bool) -> n
 
 
 def _decompressed_depth(message: Any, name: str, camera: Pinhole | None) -> Float32[np.ndarray, "h w"]:
-    """Undo `compressed_depth_image_transport`: a 12-byte header, then PNG or RVL; of 32FC1 the inverse, quantised."""
     raw = np.asarray(message.data, np.uint8)
     inside = raw[12:] if "compressedDepth" in message.format else raw
     if "rvl" in message.format.lower():
@@ -185,7 +171,6 @@ def _decompressed_depth(message: Any, name: str, camera: Pinhole | None) -> Floa
 
 
 def _rvl(content: bytes, name: str, camera: Pinhole | None) -> np.ndarray:
-    """Decode RVL: columns and rows as int32, then the picture."""
     from avlmaps.core.rvl import decode_rvl
 
     width, height = struct.unpack_from("<ii", content) if len(content) >= 8 else (0, 0)
@@ -212,9 +197,6 @@ def camera_of(info: Any, name: str, rectified: bool = False) -> tuple[Pinhole, b
         info: the message.
         name: its topic, for sentences.
         rectified: whether the images are: they are those of the matrix P, without distortion, not of K.
-
-    Raises:
-        RecordingError: the calibration is empty, or of no camera.
     """
     k = np.asarray(getattr(info, "k", None) if hasattr(info, "k") else info.K, np.float64)
     d = np.asarray(getattr(info, "d", None) if hasattr(info, "d") else info.D, np.float64)
@@ -253,11 +235,7 @@ def cloud_camera(rgb: Pinhole) -> Pinhole:
 
 
 def points_of(message: Any, name: str) -> Float[np.ndarray, "n 3"]:
-    """Return the finite points of a PointCloud2, in its frame, metres.
-
-    Raises:
-        RecordingError: it has no x, y and z, or fewer bytes than it says.
-    """
+    """Return the finite points of a PointCloud2, in its frame, metres."""
     fields = {field.name: field for field in message.fields}
     step, count = int(message.point_step), int(message.width) * int(message.height)
     content = np.asarray(message.data, np.uint8)

@@ -125,11 +125,7 @@ class Pcm:
 
     @classmethod
     def parse_rate(cls, words: str) -> "Pcm":
-        """Read ``16000`` or ``16000,2`` (samples a second, channels).
-
-        Raises:
-            RecordingError: it is not that, or no sound has such numbers.
-        """
+        """Read ``16000`` or ``16000,2`` (samples a second, channels)."""
         rate, _, channels = words.partition(",")
         if not (rate.strip().isdecimal() and (not channels or channels.strip().isdecimal())):
             raise RecordingError(f"audio_pcm takes samples a second and channels, such as 16000,1; not {words!r}.")
@@ -226,10 +222,6 @@ def extract_audio(
 
     Returns:
         The track, or None with a sentence that says why there is none; and the notices.
-
-    Raises:
-        RecordingError: nothing says how the samples are coded, or what is said cannot be.
-        AudioError: what was gathered cannot be read as sound, or cannot be written.
     """
     first = next(iter(sound.messages()), None)
     if first is None:
@@ -299,9 +291,6 @@ def require_pace(topic: str, said: Pcm, lengths_s: Float[np.ndarray, " n"], time
 
     Lost messages leave gaps between others that follow on one another; a wrong rate or number of channels makes all of
     them longer or shorter than the time until the next.
-
-    Raises:
-        RecordingError: they do not agree.
     """
     lasts_s, came_s = float(lengths_s.sum()), float(np.ptp(times_s)) + float(lengths_s.mean())
     if len(times_s) < _FEWEST_MESSAGES or came_s < _SHORTEST_S:
@@ -320,7 +309,6 @@ def require_pace(topic: str, said: Pcm, lengths_s: Float[np.ndarray, " n"], time
 
 
 def _fits(total: float) -> str:
-    """Return which rates and channels have as many samples a second in all as came."""
     found = [
         f"{rate},{channels}"
         for rate in _USUAL_RATES_HZ
@@ -391,7 +379,6 @@ def _compressed(
 def _joined(
     tracks: list[AudioTrack], topic: str, folder: Path, notices: tuple[str, ...]
 ) -> tuple[AudioTrack, tuple[str, ...]]:
-    """Write tracks one after the other, each at its time."""
     target = folder / "audio.flac"
     rate_hz, start_s = tracks[0].rate_hz, tracks[0].start_s
     silence_s = np.array([0.0, *(max(b.start_s - a.end_s, 0.0) for a, b in pairwise(tracks))])
@@ -446,11 +433,7 @@ def _plain(messages: Iterable[Any], pcm: Pcm) -> Iterator[tuple[Pcm, np.ndarray]
 
 
 def sampled_pieces(messages: Iterable[Any], topic: str) -> Iterator[tuple[Pcm, np.ndarray]]:
-    """Yield of each AudioStamped its numbers and its samples, (n, channels) in [-1, 1].
-
-    Raises:
-        RecordingError: its format is none of samples, or no sound has such numbers.
-    """
+    """Yield of each AudioStamped its numbers and its samples, (n, channels) in [-1, 1]."""
     for message in messages:
         audio, info = message.audio.audio_data, message.audio.info
         if int(info.format) not in _SAMPLES:
@@ -479,9 +462,6 @@ def directions_of(
         topic: for sentences.
         messages: gives (received ns, message) of each.
         clock: of the pictures; numbers have no stamp of their own.
-
-    Raises:
-        RecordingError: there is no message, or they hold no angles.
     """
     received: list[float] = []
     stamped: list[float] = []

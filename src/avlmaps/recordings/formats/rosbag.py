@@ -44,7 +44,6 @@ from avlmaps.recordings.formats.ros_messages import (
     require_encoding,
     shared_namespace,
 )
-from avlmaps.recordings.formats.ros_motion import base_height, find_motion, is_tf, no_pose, read_tf
 from avlmaps.recordings.formats.ros_sound import (
     DIRECTION_TYPES,
     STAMPED,
@@ -54,7 +53,7 @@ from avlmaps.recordings.formats.ros_sound import (
     directions_of,
     extract_audio,
 )
-from avlmaps.recordings.formats.ros_transforms import TransformTree
+from avlmaps.recordings.formats.ros_transforms import TransformTree, base_height, find_motion, is_tf, no_pose, read_tf
 from avlmaps.recordings.plausible import plausible_walk
 from avlmaps.recordings.types import Frame, Recording
 
@@ -67,16 +66,7 @@ CLOUD_TOLERANCE_S = 0.06
 
 
 def open_rosbag(path: Path, topics: Mapping[str, str] | None = None, more: Sequence[Path] = ()) -> "RosbagRecording":
-    """Open a ROS 1 ``.bag``, a ROS 2 bag's folder, an ``.mcap`` or a ``.db3`` file, or the files of one walk.
-
-    Args:
-        path: the file or folder; a folder may hold the files that one recording was split into.
-        topics: names by what they are for, see ``RosTopics``; the others are found by type.
-        more: further files of the same walk.
-
-    Raises:
-        RecordingError: it cannot be read, has no depth or colour images, no calibration or no poses.
-    """
+    """Open a ROS 1 ``.bag``, a ROS 2 bag's folder, an ``.mcap`` or a ``.db3`` file, or the files of one walk."""
     known = [f.name for f in fields(RosTopics)]
     for name in topics or {}:
         if name not in known:
@@ -231,11 +221,7 @@ class RosbagRecording(Recording):
         return extract_audio(sound, info, folder, pcm)
 
     def _with_directions(self, topic: str, clock: PictureClock) -> tuple[AudioTrack, tuple[str, ...]]:
-        """Return the track with the directions on a topic.
-
-        Raises:
-            RecordingError: there is no such topic of angles, no sound beside it, or they are of another clock.
-        """
+        """Return the track with the directions on a topic."""
         known = self._bag.topics_of(DIRECTION_TYPES)
         if topic not in known:
             has = ", ".join(known) or "none"
@@ -273,7 +259,6 @@ def _image_topics(bag: Bag, topics: RosTopics) -> tuple[str, str]:
 
 
 def _other_topics(bag: Bag) -> str:
-    """Return a sentence about what a bag without images holds, or nothing."""
     types = sorted(set(bag.topics.values()))
     if bag.topics_of(_IMAGE_TYPES) or not types:
         return ""
@@ -281,7 +266,6 @@ def _other_topics(bag: Bag) -> str:
 
 
 def _other_cameras(bag: Bag, rgb_topic: str, depth_topic: str) -> tuple[str, ...]:
-    """Return a notice where a bag has depth images of other cameras than the chosen one, or nothing."""
     images = [topic for topic in bag.topics_of(_IMAGE_TYPES) if "depth" in topic.lower()]
     own = shared_namespace(rgb_topic, depth_topic)
     others = [topic for topic in images if shared_namespace(topic, depth_topic) < max(own, 1)]
@@ -333,7 +317,6 @@ def _read_rig(bag: Bag, rgb_topic: str, depth_topic: str, mounts: TransformTree)
 
 
 def _info_topic(bag: Bag, image_topic: str) -> str:
-    """Return the calibration published beside an image topic, or one of another name for its frame, or nothing."""
     infos = bag.topics_of(_INFO_TYPES)
     if beside := info_beside(image_topic, infos):
         return beside
@@ -345,7 +328,6 @@ def _info_topic(bag: Bag, image_topic: str) -> str:
 
 
 def _stamps(bag: Bag, topic: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return the header stamps (s) and receive times (ns) of a topic, where its driver set stamps at all."""
     stamps_s, received_ns = bag.stamps(topic)
     if len(stamps_s) > 1 and not stamps_s.any():
         raise RecordingError(
@@ -358,7 +340,6 @@ def _stamps(bag: Bag, topic: str) -> tuple[np.ndarray, np.ndarray]:
 def _clouds_in_cameras(
     bag: Bag, topic: str, camera_frame: str, tree: TransformTree, stamps_s: np.ndarray, world_from_camera: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return ``camera_from_cloud`` of each cloud, taken at its own stamp, and where it is known."""
     first = bag.first(topic)
     frame = first.header.frame_id if first else ""
     if tree.root(frame) != tree.root(camera_frame):

@@ -147,15 +147,7 @@ class _Calibration:
 
 
 def open_rtabmap(path: Path, report: Report = stop_at_first) -> StoredRecording:
-    """Open a database in place.
-
-    Args:
-        path: the ``.db`` file.
-        report: called with every fault.
-
-    Raises:
-        RecordingError: it is no such database, is damaged, or has no node with colour, depth, calibration and pose.
-    """
+    """Open a database in place."""
     database = _Database(path)
     version = _version(database)
     optimised = _optimised(database)
@@ -235,13 +227,11 @@ def _version(database: _Database) -> tuple[int, ...]:
 
 
 def _uncompressed(blob: bytes, kind: str) -> np.ndarray:
-    """Undo zlib; the last twelve bytes say rows, columns and type of the matrix."""
     raw = zlib.decompressobj().decompress(blob, _MOST_POSES_BYTES)
     return np.frombuffer(raw, kind)
 
 
 def _optimised(database: _Database) -> dict[int, np.ndarray]:
-    """Return the optimised poses of the base by node; empty where the database has none."""
     columns = {row[1] for row in database.rows("PRAGMA table_info(Admin)")}
     if not {"opt_ids", "opt_poses"} <= columns:
         return {}
@@ -257,7 +247,6 @@ def _optimised(database: _Database) -> dict[int, np.ndarray]:
 
 
 def _transform(blob: bytes) -> Float[np.ndarray, "4 4"]:
-    """Return a 3x4 transform of float32; NaN where there is none."""
     if len(blob) != 4 * _TRANSFORM_NUMBERS:
         return np.full((4, 4), np.nan)
     return _matrix(np.frombuffer(blob, "<f4"))
@@ -314,7 +303,6 @@ def _pinhole(path: Path, node: int, numbers: tuple[float, ...], size: tuple[int,
 
 
 def _rig(path: Path, database: _Database, shots: Shots, camera: Pinhole) -> tuple[Rig, float, tuple[str, ...]]:
-    """Return the cameras, the unit of depth in metres, and the notices."""
     first = shots.names[0]
     rgb_size = images.picture_size(path / f"node {first}, colour", database.blob("image", first))
     blob = database.blob("depth", first)

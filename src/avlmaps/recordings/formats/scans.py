@@ -34,7 +34,7 @@ from avlmaps.core import poses
 from avlmaps.core.camera import Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import DESCRIPTION_BYTES
-from avlmaps.recordings.camera_axes import UP_IN_WORLD, from_opengl
+from avlmaps.recordings.corrections import UP_IN_WORLD, from_opengl
 from avlmaps.recordings.faults import Fault, Report, stop_at_first
 from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list_names, number_of
 from avlmaps.recordings.formats.tables import (
@@ -98,15 +98,7 @@ class _Transforms(_Camera, frozen=True, kw_only=True):
 
 
 def open_nerfstudio(path: Path, report: Report = stop_at_first) -> FileRecording:
-    """Open a scan in place.
-
-    Args:
-        path: the folder with ``transforms.json``.
-        report: called with every fault.
-
-    Raises:
-        RecordingError: the description is damaged, of a fisheye, or its frames have no depth.
-    """
+    """Open a scan in place."""
     file = path / DESCRIPTION
     given, plain = read_json(file, _Transforms)
     known = {name for kind in (_Transforms, _Camera) for name in kind.__struct_fields__}
@@ -136,7 +128,6 @@ def open_nerfstudio(path: Path, report: Report = stop_at_first) -> FileRecording
 
 
 def _unread_of_frames(file: Path, plain: dict[str, Any]) -> tuple[str, ...]:
-    """Return a notice about keys of the frames that nothing reads; one about the camera is refused."""
     present = {key: None for frame in plain["frames"] for key in frame if not key.endswith("_path")}
     return unread_notice(file, present, (*_Frame.__struct_fields__, *_IDLE_OF_FRAME))
 
@@ -149,7 +140,6 @@ def _without_clock(given: _Transforms) -> list[str]:
 
 
 def _units_per_m(file: Path, given: _Transforms) -> float:
-    """Return the units of a depth PNG in a metre."""
     said = {given.integer_depth_scale, given.depth_unit_scale_factor} - {None}
     if len(said) > 1:
         raise RecordingError(
@@ -164,7 +154,6 @@ def _units_per_m(file: Path, given: _Transforms) -> float:
 
 
 def _found(folder: Path, name: str) -> str:
-    """Return a picture's name below the folder, with the suffix that some converters leave out."""
     name = name.replace("\\", "/").removeprefix("./")
     if name.startswith("/") or ".." in name.split("/"):
         raise RecordingError(f"{folder / DESCRIPTION} names {name!r}, which lies outside of its folder; move it there.")
@@ -212,8 +201,6 @@ def _rig(file: Path, given: _Transforms, frames: list[_Frame], shots: Shots) -> 
 
 
 def _numbers(file: Path, frame: _Frame, given: _Transforms, size: tuple[int, int]) -> list[float]:
-    """Return fx, fy, cx, cy of a frame: its own, else those of all; the centre of the picture where none is said."""
-
     def said(name: str) -> Any:
         own = getattr(frame, name)
         return getattr(given, name) if own is None else own
@@ -270,15 +257,7 @@ def is_polycam(path: Path) -> bool:
 
 
 def open_polycam(path: Path, report: Report = stop_at_first) -> FileRecording:
-    """Open a raw export in place.
-
-    Args:
-        path: the export, or its ``keyframes/``.
-        report: called with every fault.
-
-    Raises:
-        RecordingError: no frame is complete, or a camera is damaged.
-    """
+    """Open a raw export in place."""
     frames = keyframes_of(path)
     below = "keyframes/" if frames != path else ""
     mended = all((frames / f"corrected_{kind}").is_dir() for kind in ("cameras", "images"))
@@ -331,7 +310,6 @@ def _matrix(c: _PolycamCamera) -> Float[np.ndarray, "4 4"]:
 
 
 def _keyframe_stamps(cameras: list[_PolycamCamera], names: list[str], notices: list[str]) -> Float[np.ndarray, " n"]:
-    """Return seconds from the first frame, by the cameras' timestamps, else by names that are such, else by count."""
     for stamps in ([c.timestamp for c in cameras], [float(n) if n.isascii() and n.isdigit() else None for n in names]):
         known = np.array([stamp for stamp in stamps if stamp is not None], np.float64)
         interval = float(np.median(np.diff(known))) if len(known) == len(cameras) > 1 else 0.0
@@ -349,15 +327,7 @@ _MORE = ["fx", "fy", "cx", "cy"]
 
 
 def open_stray_scanner(path: Path, report: Report = stop_at_first) -> FileRecording:
-    """Open a recording in place.
-
-    Args:
-        path: the folder with ``rgb.mp4``, ``depth/``, ``odometry.csv`` and ``camera_matrix.csv``.
-        report: called with every fault.
-
-    Raises:
-        RecordingError: a file is missing or damaged, or no frame has all of colour, depth and pose.
-    """
+    """Open a recording in place."""
     rows = _odometry(path / "odometry.csv", report)
     video = VideoFrames(path / "rgb.mp4")
     depth = {number_of(name): name for name in list_names(path / "depth", (".png",))}
@@ -396,7 +366,6 @@ def open_stray_scanner(path: Path, report: Report = stop_at_first) -> FileRecord
 
 
 def _odometry(file: Path, report: Report) -> np.ndarray:
-    """Return the rows of the odometry; the header decides what they mean, and must be the app's."""
     header = next(text_lines(file, report), (0, ""))[1].replace(" ", "").split(",")
     if header not in (_HEADER, _HEADER + _MORE):
         raise RecordingError(

@@ -61,11 +61,7 @@ def split_header(text: str) -> list[str]:
 
 
 def named_order(fields: Sequence[str], wanted: Sequence[str]) -> ColumnOrder:
-    """Return where the wanted columns stand.
-
-    Raises:
-        ValueError: a name is not known, comes twice, is missing, or has a unit that is none; the text says which.
-    """
+    """Return where the wanted columns stand."""
     found: dict[str, tuple[int, float]] = {}
     for at, field in enumerate(fields):
         column, factor = _column(field)
@@ -220,7 +216,6 @@ def read_table(
 def _in_order(
     path: Path, heading: tuple[int, str] | None, table: Float[np.ndarray, "n c"], names: Sequence[str], report: Report
 ) -> Float[np.ndarray, "n c"]:
-    """Return a table's columns as its heading names them."""
     if heading is None or (len(table) and table.shape[1] != len(names)):
         return table
     number, text = heading
@@ -241,7 +236,6 @@ def _fields(text: str) -> list[str]:
 
 
 def _number(field: str) -> float:
-    """Parse a number; what Windows printed for NaN and infinity (``-1.#IND``) is NaN."""
     return float("nan") if ".#" in field else float(field)
 
 
@@ -256,11 +250,7 @@ def _any_number(fields: list[str]) -> bool:
 
 
 def read_numbers(path: Path) -> Float[np.ndarray, " n"]:
-    """Read all numbers of a small file; line breaks may stand anywhere.
-
-    Raises:
-        RecordingError: the file is missing, or is not text of numbers.
-    """
+    """Read all numbers of a small file; line breaks may stand anywhere."""
     with readable(path, "the recording needs it"):
         content = read_regular(path, DESCRIPTION_BYTES)
     try:
@@ -281,11 +271,7 @@ def read_matrix(path: Path, rows: int, columns: int) -> Float[np.ndarray, "rows 
 
 
 def read_opencv_yaml(path: Path) -> Any:
-    """Return the nodes of a YAML file as OpenCV writes it: settings of ORB-SLAM, calibrations of RTAB-Map.
-
-    Raises:
-        RecordingError: it cannot be read, or is none.
-    """
+    """Return the nodes of a YAML file as OpenCV writes it: settings of ORB-SLAM, calibrations of RTAB-Map."""
     import cv2
 
     with readable(path, "the recording needs it"):
@@ -306,11 +292,7 @@ _ABOUT_GEOMETRY = re.compile(
 
 
 def read_json(file: Path, kind: type[T], limit_bytes: int = MANIFEST_BYTES) -> tuple[T, dict[str, Any]]:
-    """Return a JSON file as a type, and as it is (for its other keys).
-
-    Raises:
-        RecordingError: it is missing, damaged, or lacks what the type needs.
-    """
+    """Return a JSON file as a type, and as it is (for its other keys)."""
     with readable(file, "the recording needs it"):
         return parse_json(file, read_regular(file, limit_bytes), kind)
 
@@ -335,9 +317,6 @@ def unread_notice(
         known: those that are read, or say nothing.
         strict: whether a key about the camera is refused; not where an app writes the file, whose later versions may
             add some.
-
-    Raises:
-        RecordingError: one of them is about the camera, the depth or the poses: without it the map may be wrong.
     """
     unread = sorted(present.keys() - set(known))
     telling = [key for key in unread if _ABOUT_GEOMETRY.search(key.lower())]
@@ -358,11 +337,7 @@ _WANDERS = 0.01
 def median_camera(
     file: Path, fx_fy_cx_cy: Float[np.ndarray, "n 4"], width: int, height: int
 ) -> tuple[Pinhole, tuple[str, ...]]:
-    """Return the camera that stands for all frames', and a notice where they differ much.
-
-    Raises:
-        RecordingError: the numbers are of no camera.
-    """
+    """Return the camera that stands for all frames', and a notice where they differ much."""
     try:
         fx, fy, cx, cy = (float(value) for value in np.median(fx_fy_cx_cy, axis=0))
         camera = Pinhole(fx, fy, cx, cy, width, height)
@@ -382,9 +357,6 @@ def fitted(camera: Pinhole, size: tuple[int, int], file: Path, what: str) -> Pin
         size: (width, height) of the pictures.
         file: the file of the intrinsics.
         what: which pictures, for the sentence.
-
-    Raises:
-        RecordingError: the pictures have another shape, so that they were cropped or turned.
     """
     width, height = size
     if abs(width * camera.height - height * camera.width) > max(width, height, camera.width, camera.height):
@@ -405,11 +377,7 @@ def resized_notice(camera: Pinhole, size: tuple[int, int]) -> tuple[str, ...]:
 
 
 def read_pose_file(path: Path) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n 4 4"]]:
-    """Return the stamps and the poses (4x4, metres) of a table: stamp tx ty tz qx qy qz qw, or as its header says.
-
-    Raises:
-        RecordingError: it cannot be read, is empty, or a line is no pose; the error names the line.
-    """
+    """Return the stamps and the poses (4x4, metres) of a table: stamp tx ty tz qx qy qz qw, or as its header says."""
     table = read_table(path, (8,), stop_at_first, names=POSE)
     if not len(table.values):
         raise RecordingError(f"{path} holds no pose; it needs a line of stamp tx ty tz qx qy qz qw for each.")

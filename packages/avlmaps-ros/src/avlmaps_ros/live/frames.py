@@ -24,8 +24,7 @@ from avlmaps.recordings.formats.ros_messages import (
     pose_of,
     stamp_of,
 )
-from avlmaps.recordings.formats.ros_motion import body_of
-from avlmaps.recordings.formats.ros_transforms import HOLD_S, TransformTree
+from avlmaps.recordings.formats.ros_transforms import HOLD_S, TransformTree, body_of
 
 Kind = Literal["rgb", "depth", "rgb_info", "depth_info", "tf", "tf_static", "pose"]
 

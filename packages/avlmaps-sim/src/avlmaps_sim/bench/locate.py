@@ -16,8 +16,7 @@ from avlmaps.maps.keyframes.choose import KeyframeSettings, select_keyframes
 from avlmaps.maps.types import Keyframes
 from avlmaps.perception.encoders import Encoders
 from avlmaps.query.locate import Located, LocateSettings, locate
-from avlmaps.recordings.subset import Subset
-from avlmaps.recordings.types import Recording
+from avlmaps.recordings.types import Recording, Subset
 from avlmaps_sim.bench.harness.intervals import in_percent, wilson
 
 COLUMNS = (

@@ -8,8 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from avlmaps.core.poses import apply, inverse
-from avlmaps.recordings.subset import Subset
-from avlmaps.recordings.types import Frame, Recording
+from avlmaps.recordings.types import Frame, Recording, Subset
 from avlmaps_sim.bench.harness.workplace import SceneJob, Workplace
 
 _FARTHEST_M = 20.0

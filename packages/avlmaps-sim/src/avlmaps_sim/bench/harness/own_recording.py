@@ -19,8 +19,7 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 
 from avlmaps.core.poses import apply
-from avlmaps.recordings.subset import Subset
-from avlmaps.recordings.types import Recording
+from avlmaps.recordings.types import Recording, Subset
 from avlmaps_sim.bench.harness.evidence import Photo
 from avlmaps_sim.bench.harness.settings import TaskError
 from avlmaps_sim.mesh import Triple

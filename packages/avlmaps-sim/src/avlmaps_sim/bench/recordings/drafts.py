@@ -12,7 +12,7 @@ from avlmaps.core.arrays import Float
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.files import write_bytes_atomically
 from avlmaps.core.poses import from_quaternion, to_quaternion
-from avlmaps.recordings.example_room import see
+from avlmaps.recordings.conformance import see
 from avlmaps.recordings.types import Recording
 
 Picture = Any  # uint8 h w 3, or uint16 h w

@@ -8,7 +8,7 @@ import numpy as np
 
 from avlmaps.core import poses
 from avlmaps.core.camera import Pinhole, Rig
-from avlmaps.recordings.camera_axes import opencv_from_axes
+from avlmaps.recordings.corrections import opencv_from_axes
 from avlmaps_sim.bench.recordings.drafts import Draft, Picture
 
 Change = Callable[[Draft, Draft, np.random.Generator], Draft]
