@@ -33,6 +33,7 @@ def test_a_name_that_the_system_refuses_is_told_without_its_number_for_it(built:
     assert "File name too long; check the path" in err
 
 
+@pytest.mark.nightly
 def test_a_truncated_photo_is_told_in_our_words_alone(built: Path, walk: Path, tmp_path: Path) -> None:
     photo = tmp_path / "photo.png"
     photo.write_bytes(next((walk / "rgb").iterdir()).read_bytes()[:1500])

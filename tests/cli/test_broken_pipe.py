@@ -32,11 +32,13 @@ def ended(*words: object, reads: int = 0, buffered: bool = True) -> tuple[int, b
     return process.returncode, said
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("words", [["--help"], ["bench", "--help"], ["--version"]])
 def test_help(words: list[str]) -> None:
     assert ended(*words) == (READER_GONE, b"")
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("words", "status"), [(["bench", "--nothing"], 2), (["info", "nothing.avlmap"], 1)])
 @pytest.mark.parametrize("buffered", [True, False])
 def test_an_error_keeps_its_status_and_its_sentence(words: list[str], status: int, buffered: bool) -> None:
@@ -45,6 +47,7 @@ def test_an_error_keeps_its_status_and_its_sentence(words: list[str], status: in
     assert b"Traceback" not in said and b"BrokenPipe" not in said and b"Exception ignored" not in said
 
 
+@pytest.mark.nightly
 def test_help_that_is_read_in_part() -> None:
     """The pipe may hold the rest before its reader goes; either end is a quiet one."""
     status, said = ended("bench", "--help", reads=64)
@@ -70,6 +73,7 @@ def test_a_table_written_to_a_pipe(built: Path, tmp_path: Path) -> None:
     assert (tmp_path / "things.csv").read_text().startswith("kind,name")
 
 
+@pytest.mark.nightly
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="the system has no full device")
 @pytest.mark.parametrize("words", [["--help"], ["profiles", "--json"], ["info", "nothing.avlmap", "--json"]])
 def test_a_full_disk_is_one_sentence(words: list[str]) -> None:

@@ -53,7 +53,7 @@ def test_a_finished_map_follows_poses_of_a_file(answer, walk: Path, copied: Path
     assert "corrected after it was built" in " ".join(answer("info", copied)["notices"])
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_map_that_is_not_there_is_built_first(answer, walk: Path, tmp_path: Path) -> None:
     file = moved_file(walk, tmp_path / "poses.txt", 0.2)
     made = answer("build", walk, "--out", tmp_path / "map", "--corrected-poses", file, *BUILT)
@@ -92,6 +92,7 @@ def test_a_wrong_file_is_refused_in_a_sentence(run, walk: Path, copied: Path, tm
     assert "Traceback" not in err
 
 
+@pytest.mark.nightly
 def test_a_map_without_submaps_is_not_replaced(run, walk: Path, built: Path, tmp_path: Path) -> None:
     path = shutil.copytree(built, tmp_path / "plain")
     file = moved_file(walk, tmp_path / "poses.txt", 0.2)

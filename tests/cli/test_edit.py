@@ -43,6 +43,7 @@ def test_a_name_holds_in_every_front_until_it_is_undone(home: Path, run, tmp_pat
     assert json.loads(run("things", home, "--json", "--least", "0.2")[1])["things"] == things
 
 
+@pytest.mark.nightly
 def test_edits_are_there_in_another_build_of_the_map(home: Path, walk: Path, run) -> None:
     assert run("edit", home, "--pin", "my pad", "--at", "0.5,0.5,0.1")[0] == 0
     log = (home / EDITS).read_bytes()

@@ -12,7 +12,9 @@ from avlmaps.maps.store.reader import open_stored
 from avlmaps.recordings.layout import DESCRIPTION, UNFINISHED
 
 
-@pytest.mark.parametrize("pace", [["--as-fast-as-possible", "--every-frame"], ["--rate", "50"]])
+@pytest.mark.parametrize(
+    "pace", [["--as-fast-as-possible", "--every-frame"], pytest.param(["--rate", "50"], marks=pytest.mark.nightly)]
+)
 def test_a_recording_is_played_into_a_map(
     answer, walk: Path, tmp_path: Path, pace: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -31,7 +33,7 @@ def test_a_recording_is_played_into_a_map(
 WHOLE = ("--profile", "colours", "--as-fast-as-possible", "--every-frame")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_drive_updates_the_map_of_the_days_before(answer, dated: Path, built: Path, tmp_path: Path) -> None:
     home = shutil.copytree(built, tmp_path / "home.avlmap")
     words = ("--into", home, "--voxel-size-m", "0.1", *WHOLE)
@@ -53,12 +55,14 @@ def test_a_drive_whose_writer_stopped_updates_the_map_as_well(answer, dated: Pat
     assert made["into"]["days"][-1]["day"] == "2023-11-14", "by its clock"
 
 
+@pytest.mark.nightly
 def test_a_drive_that_is_in_the_map_already_is_not_joined_again(run, walk: Path, built: Path, tmp_path: Path) -> None:
     words = ("--into", shutil.copytree(built, tmp_path / "home.avlmap"), "--voxel-size-m", "0.1", *WHOLE)
     code, _, err = run("live", walk, "--out", tmp_path / "today.avlmap", *words)
     assert code == 1 and "the same drive as visit 1" in err
 
 
+@pytest.mark.nightly
 def test_a_drive_that_cannot_be_joined_leaves_the_map_as_it_was(run, dated: Path, built: Path, tmp_path: Path) -> None:
     home = shutil.copytree(built, tmp_path / "home.avlmap")
     before = (home / "map.json").read_bytes()

@@ -53,6 +53,7 @@ def write_eyes(folder: Path, temperature: float) -> None:
     (folder / f"{SYNTHETIC_WEIGHTS}.json").write_bytes(msgspec.json.encode(notes))
 
 
+@pytest.mark.nightly
 def test_a_map_is_built_with_them_and_queried(walk: Path, models: Path, run, answer, tmp_path: Path) -> None:
     listed = {one["name"]: one for one in answer("profiles", "--models", models)["profiles"]}
     assert [b["state"] for b in listed["trained"]["backends"][:2]] == ["ready", "ready"]

@@ -83,6 +83,7 @@ def test_parts_are_fused_and_drawn(built: Path, answer, tmp_path: Path) -> None:
     assert picture is not None and picture.std() > 10
 
 
+@pytest.mark.nightly
 def test_each_plot_says_what_it_wrote(built: Path, run, answer, tmp_path: Path) -> None:
     for number, words in enumerate((("query", built, "--object", "red"), ("info", built))):
         plot = tmp_path / f"{number}.png"
@@ -262,6 +263,7 @@ def test_adding_sounds_without_progress_says_nothing(walk: Path, tmp_path: Path,
     assert capsys.readouterr() == ("", "")
 
 
+@pytest.mark.nightly
 def test_info_and_build_end_with_what_to_do_next_in_three_lines(built: Path, walk: Path, run) -> None:
     for place, offered in ((built, "query"), (walk, "build")):
         lines = run("info", place)[1].splitlines()

@@ -28,7 +28,7 @@ def test_a_damaged_map_is_found_out(built: Path, tmp_path: Path, run: Run) -> No
     assert name in said
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_cameras_height_puts_the_floor_where_it_says(walk: Path, tmp_path: Path, answer: Answer) -> None:
     made = answer(
         "build", walk, "--out", tmp_path / "told.avlmap", "--voxel-size-m", "0.1", "--profile", "colours",

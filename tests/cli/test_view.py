@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.nightly)])
 def test_it_serves_until_it_is_stopped(built: Path, number: signal.Signals) -> None:
     words = [sys.executable, "-m", "avlmaps", "view", str(built), "--port", "0", "--no-browser", "--json"]
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ) as viewer:

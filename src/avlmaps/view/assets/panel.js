@@ -23,6 +23,7 @@ function made(tag, properties = {}, ...children) {
 }
 
 const touched = window.matchMedia("(pointer: coarse)").matches;
+const RETRIES = 8;
 const CLICK = touched ? "Tap" : "Click";
 
 class Panel {
@@ -56,20 +57,40 @@ class Panel {
     window.addEventListener("hashchange", () => location.hash === Address.own || this.restore());
     try {
       await Promise.all(this.maps.map((_, k) => this.load(k)));
-      $("loading").hidden = true;
     } catch (fault) {
-      this.fault(fault);
-      return;
+      if (!(await this.takenAgain())) {
+        this.fault(fault);
+        return;
+      }
     }
+    $("loading").hidden = true;
     this.drawPath();
     await Promise.all(this.maps.map((_, k) => this.fill(k).catch((fault) => this.note(fault.message))));
     document.documentElement.dataset.ready = "yes";
     if (this.source.live) this.source.watch(() => this.renew());
   }
 
+  /** A map that grows may be another one by the time its voxels come: take it as it is then. */
+  async takenAgain() {
+    for (let tries = 0; this.source.live && tries < RETRIES; tries++) {
+      if (await this.replaced([]).then(() => true, () => false)) return true;
+    }
+    return false;
+  }
+
   /** Show the maps as they are now: they grew, were built again, or were edited. */
   async renew() {
-    const before = this.source.versions;
+    await this.replaced(this.source.versions);
+    this.summarise();
+    this.limits();
+    this.drawPath();
+    await Promise.all(this.maps.map((_, k) => this.fill(k)));
+    document.documentElement.dataset.renewed = String(Number(document.documentElement.dataset.renewed ?? 0) + 1);
+    if (this.question) await this.ask(this.question, false);
+  }
+
+  /** Take the voxels of each map that has another version than before. */
+  async replaced(before) {
     const told = await this.source.describe();
     for (const [k, map] of told.maps.entries()) {
       if (this.source.versions[k] === before[k]) continue;
@@ -77,6 +98,7 @@ class Panel {
       layer.setPalettes(told.palettes);
       try {
         await this.source.voxels(k, (bytes, start) => layer.addRecords(bytes, start));
+        if (layer.loaded !== layer.count) throw new Error("The map has grown meanwhile.");
       } catch (fault) {
         this.source.versions = before; // it changed meanwhile; the next look takes it
         layer.free();
@@ -85,12 +107,6 @@ class Panel {
       this.maps[k] = map;
       this.viewer.replace(k, map, layer);
     }
-    this.summarise();
-    this.limits();
-    this.drawPath();
-    await Promise.all(this.maps.map((_, k) => this.fill(k)));
-    document.documentElement.dataset.renewed = String(Number(document.documentElement.dataset.renewed ?? 0) + 1);
-    if (this.question) await this.ask(this.question, false);
   }
 
   summarise() {
@@ -109,6 +125,7 @@ class Panel {
       this.viewer.changed();
       document.documentElement.dataset.drawn ??= String(Math.round(performance.now()));
     });
+    if (layer.loaded !== layer.count) throw new Error("The map has grown meanwhile.");
     this.viewer.changed();
   }
 
@@ -116,7 +133,8 @@ class Panel {
     this.contents[k] = await this.source.contents(k);
     const { layer } = this.viewer.fields[k];
     this.alike();
-    layer.setLabels(await this.source.labels(k));
+    const labels = await this.source.labels(k);
+    if (labels.length === 4 * layer.count) layer.setLabels(labels); // else the map has grown, and is taken again soon
     if (k === 0) this.list();
     for (const note of this.contents[k].notes) this.note(note);
     this.marks();
@@ -197,7 +215,8 @@ class Panel {
   }
 
   note(text) {
-    $("notes").append(made("li", { textContent: text }));
+    const said = [...$("notes").children].some((one) => one.textContent === text);
+    if (!said) $("notes").append(made("li", { textContent: text }));
   }
 
   toLevel(k, place) {
