@@ -16,6 +16,9 @@ from avlmaps_sim.render import Renderer
 from avlmaps_sim.scenes import open_scene
 from avlmaps_sim.views import random_views
 
+pytestmark = pytest.mark.nightly
+
+
 CAMERA = Pinhole(277.0, 277.0, 160.0, 120.0, 320, 240)
 GRID = Pinhole(8.0, 8.0, 6.0, 5.0, 12, 10)
 

@@ -71,7 +71,7 @@ def untrained(network: SceneNetwork) -> SceneNetwork:
     return SceneNetwork(lambda: content, network.notes)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_pixel_and_view_weights_recognise_new_homes_and_shuffled_ones_do_not(views: Views) -> None:
     pixels, rooms = accuracy(load_network(), views)
     assert pixels > LEAST_PIXELS

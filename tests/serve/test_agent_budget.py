@@ -27,6 +27,9 @@ BUDGET, MOST_OF_TOOLS = 8_000, 1_500
 UPSTAIRS = {kind for kind, floor, *_ in ROOMS if floor == 1}
 
 
+pytestmark = pytest.mark.nightly  # its office of 110 things takes a quarter of a minute
+
+
 @pytest.fixture(scope="module")
 def office(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return office_of(tmp_path_factory)

@@ -18,7 +18,7 @@ from helpers.injections import MARKS, ORDERS, injections
 COUNT = 220
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_injected_strings_move_nothing_and_confirm_nothing(service: Service, tmp_path: Path) -> None:
     with injected_server(tmp_path, service) as (campaign, driven):
         report = campaign.run(COUNT, seed=1)

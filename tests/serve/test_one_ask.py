@@ -13,6 +13,7 @@ from starlette.testclient import TestClient
 
 from avlmaps.cli import main
 from avlmaps.core.errors import QueryError
+from avlmaps.core.printable import shortened
 from avlmaps.core.question import Modality, Part, Question
 from avlmaps.maps.build import build_map
 from avlmaps.maps.settings import BuildSettings
@@ -69,7 +70,7 @@ def home_service(home: Path) -> Iterator[Service]:
 
 def plain(answer: dict[str, Any]) -> dict[str, Any]:
     """Return an answer as JSON has it, without its time."""
-    return json.loads(json.dumps(answer)) | {"elapsed_ms": None}
+    return json.loads(json.dumps(shortened(answer))) | {"elapsed_ms": None}
 
 
 def by_command_line(home: Path, query: dict[str, str], capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:

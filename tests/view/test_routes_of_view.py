@@ -80,6 +80,7 @@ def test_what_is_not_there_is_not_found(call: Call, path: str) -> None:
     assert answer.status_code == 404 and set(answer.json()) == {"error"}
 
 
+@pytest.mark.nightly
 def test_memory_stays_flat_over_many_questions(room: AVLMap) -> None:
     page = MapOnPage(AVLMap(room.stored))
     words = ["the red thing", "the blue thing near the red thing", "the sound of rain", "how many red things are there"]
