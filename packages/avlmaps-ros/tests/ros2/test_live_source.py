@@ -22,7 +22,7 @@ from helpers.walked_room import write_walk
 
 pytestmark = [pytest.mark.timeout(240), pytest.mark.xdist_group("live source")]
 
-PUBLISHER = Path(__file__).parent / "publisher.py"
+PUBLISHER, CAMERA = (Path(__file__).parent / name for name in ("publisher.py", "camera.py"))
 ROOT = Path(__file__).parents[4]
 
 
@@ -40,11 +40,12 @@ def built(walk, tmp_path_factory) -> AVLMap:
 
 def mapped(
     out: Path,
-    walk: Path | None,
+    walk: Path | int | None,
     *published: str,
     words: tuple[str, ...] = (),
     give_up_s: float = 4.0,
     stop_after_s: float | None = None,
+    publisher: Path = PUBLISHER,
 ) -> tuple[int, str, str]:
     """Return the exit code and what is said while a recording is published; Ctrl-C comes so long after it began."""
     paths = os.pathsep.join(path for path in (str(ROOT / "tests"), os.environ.get("PYTHONPATH", "")) if path)
@@ -55,8 +56,8 @@ def mapped(
         env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # ignored where the tests run behind
     )  # fmt: skip
-    publisher = (
-        None if walk is None else subprocess.Popen([sys.executable, PUBLISHER, walk, *published], env=environment)
+    publishes = (
+        None if walk is None else subprocess.Popen([sys.executable, publisher, str(walk), *published], env=environment)
     )
     begun = ""
     try:
@@ -69,9 +70,9 @@ def mapped(
         said, noted = live.communicate(timeout=200.0)
     finally:
         live.kill()
-        if publisher is not None:
-            publisher.kill()
-            publisher.wait()
+        if publishes is not None:
+            publishes.kill()
+            publishes.wait()
     return live.returncode, said, begun + noted
 
 
@@ -151,3 +152,21 @@ def test_what_keeps_a_robot_from_being_mapped_is_said(walk: Path, tmp_path: Path
     assert expected in noted + said
     assert "No frame came from ROS 2 within 9 s" in noted + said
     assert not (tmp_path / "live.avlmap" / "map.json").exists()
+
+
+@pytest.mark.parametrize("frames", [60, pytest.param(500, marks=pytest.mark.nightly)])
+def test_every_raw_picture_of_a_reliable_camera_comes(tmp_path: Path, frames: int) -> None:
+    code, said, noted = mapped(tmp_path / "live.avlmap", frames, give_up_s=20.0, publisher=CAMERA)
+    assert code == 0, noted
+    assert json.loads(said)["live"]["frames_in"] == frames, noted
+    assert "never arrived" not in noted and "no pose of their moment" not in noted
+
+
+def test_pictures_that_a_camera_does_not_send_again_are_counted(tmp_path: Path) -> None:
+    frames = 60
+    code, said, noted = mapped(tmp_path / "live.avlmap", frames, "--best-effort", give_up_s=20.0, publisher=CAMERA)
+    assert code == 0, noted
+    came = json.loads(said)["live"]["frames_in"]
+    lost = [int(line.split()[1]) for line in noted.splitlines() if "frames never arrived" in line]
+    unpaired = [int(line.split()[1]) for line in noted.splitlines() if "had no colour picture" in line]
+    assert came + sum(lost) + sum(unpaired) >= 0.9 * frames, noted

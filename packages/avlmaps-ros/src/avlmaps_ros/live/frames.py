@@ -31,13 +31,15 @@ Kind = Literal["rgb", "depth", "rgb_info", "depth_info", "tf", "tf_static", "pos
 PARTNER_WITHIN_S = 1.0
 """A depth picture waits this long for the colour picture of its moment."""
 POSE_WITHIN_S = 0.5
-"""A pair of pictures waits this long for the pose of its moment."""
+"""A pair of pictures waits this long for the pose of its moment, while no older pose comes."""
 LATER_POSE_WITHIN_S = 0.1
 """... and this long for a pose after it, between which and the one before it lies."""
 SETTLED_S = 2.0
 """A calibration or a mount that has not come by then is taken to be missing."""
-_HELD = 30  # pictures and pairs that wait, at most
+_HELD = 60  # pictures and pairs that wait, at most
 _FORGET_EVERY = 500  # transforms
+PAUSE_S, LEAST_GAPS = 3.0, 10
+"""A longer time without a picture is a pause; from fewer gaps no period is known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +95,20 @@ class RosFrames:
         self._pictures: dict[str, deque[_Picture]] = {"rgb": deque(maxlen=_HELD), "depth": deque(maxlen=_HELD)}
         self._pairs: deque[_Pair] = deque(maxlen=_HELD)
         self._first_s: float | None = None
+        self._moved_s = float("-inf")  # when the last pose came
+        self._gaps_s: list[float] = []  # from one stamp of a depth picture to the next
+
+    @property
+    def never_arrived(self) -> tuple[int, int]:
+        """How many depth pictures are missing by the stamps of the others, and how many were sent with them.
+
+        The camera's period is the time that few gaps are shorter than. A long gap is a pause, not a loss.
+        """
+        gaps_s = np.array([gap_s for gap_s in self._gaps_s if 0.0 < gap_s < PAUSE_S])
+        if len(gaps_s) < LEAST_GAPS:
+            return 0, len(self._gaps_s)
+        lost = int((np.rint(gaps_s / np.quantile(gaps_s, 0.05)) - 1).clip(0).sum())
+        return lost, len(self._gaps_s) + 1 + lost
 
     def take(self, kind: Kind, message: Any, now_s: float) -> None:
         """Take a message.
@@ -108,9 +124,11 @@ class RosFrames:
             case "rgb_info" | "depth_info":
                 self._infos[kind] = message
             case "tf" | "tf_static":
+                self._moved_s = now_s if kind == "tf" else self._moved_s
                 for transform in message.transforms:
                     self._move(transform.header.frame_id, transform.child_frame_id, transform, kind == "tf_static")
             case "pose":
+                self._moved_s = now_s
                 self._take_pose(message)
 
     def ready(self, now_s: float) -> list[RosFrame]:
@@ -126,7 +144,7 @@ class RosFrames:
             rig, pose = self._rig_of(pair, now_s), None
             if rig is not None:
                 pose = self._pose_of(pair, now_s)
-            if pose is None and now_s - pair.came_s <= POSE_WITHIN_S:
+            if pose is None and self._may_be_placed(pair, now_s):
                 break
             self._pairs.popleft()
             if rig is None or pose is None:
@@ -135,6 +153,14 @@ class RosFrames:
             elif (frame := self._read(pair, rig, pose)) is not None:
                 found.append(frame)
         return found
+
+    def _may_be_placed(self, pair: _Pair, now_s: float) -> bool:
+        """Return whether the pose of a pair may come yet: those that came are older, and came a moment ago."""
+        newest_s = self._tree.newest_s(pair.depth.message.header.frame_id)
+        if newest_s is None:
+            return now_s - pair.came_s <= POSE_WITHIN_S
+        is_passed = newest_s > pair.depth.stamp_s + POSE_WITHIN_S
+        return not is_passed and now_s - max(pair.came_s, self._moved_s) <= POSE_WITHIN_S
 
     def missing(self) -> str:
         """Return what there is too little of for a frame, as part of a sentence."""
@@ -180,6 +206,8 @@ class RosFrames:
 
     def _take_picture(self, kind: Literal["rgb", "depth"], message: Any, now_s: float) -> None:
         stamp_s = stamp_of(message)
+        if kind == "depth" and kind in self._last_s:
+            self._gaps_s.append(stamp_s - self._last_s[kind])
         self._last_s[kind] = stamp_s
         if stamp_s <= 0.0:
             self._once(f"The pictures on {self._topics[kind]} have no stamps; let their driver set them.")
@@ -218,6 +246,8 @@ class RosFrames:
             waited = now_s - depth.came_s > PARTNER_WITHIN_S
             if near and (newest_s >= depth.stamp_s or waited):
                 nearest = min(near, key=lambda one: abs(one.stamp_s - depth.stamp_s))
+                if len(self._pairs) == self._pairs.maxlen:
+                    self.unplaced += 1
                 self._pairs.append(_Pair(nearest, depth, now_s))
                 self._first_s = now_s if self._first_s is None else self._first_s
             elif waited or newest_s > depth.stamp_s + PAIRING_TOLERANCE_S:

@@ -14,7 +14,7 @@ from avlmaps.live.replay import tell_doubts
 from avlmaps.recordings.formats.ros_messages import RosTopics, stamp_of
 from avlmaps.recordings.formats.ros_sound import Pcm
 from avlmaps_ros.live.directions import RosDirections
-from avlmaps_ros.live.frames import RosFrames
+from avlmaps_ros.live.frames import RosFrame, RosFrames
 from avlmaps_ros.live.sound import RosSound
 
 _LOOK_S = 0.05
@@ -25,14 +25,13 @@ class Inbox(Protocol):
     """What stores messages until they are taken: `ros2.Ros2Inbox`."""
 
     chosen: dict[str, str]
-    lost: int
     fault: str
 
     def __enter__(self) -> "Inbox": ...
     def __exit__(self, *_: object) -> None: ...
 
     def take(self, wait_s: float) -> list[tuple[str, Any, float]]:
-        """Return what arrived since the last call: what it is for, the message, when it came."""
+        """Return what arrived since the last call, or the first of it: what it is for, the message, when it came."""
         ...
 
     def described(self) -> str:
@@ -126,7 +125,7 @@ class _Source:
         self._said = RosDirections(topics.directions, tell)
         self._waiting: list[tuple[str, Any, float]] = []  # until the pictures' topics are known
         self._ahead_s: float | None = None
-        self._doubts, self._lost = set[str](), 0
+        self._doubts = set[str]()
         self._refused, self._once = "", Once(tell)
 
     def step(self) -> int:
@@ -140,21 +139,27 @@ class _Source:
             arrived, self._waiting = self._waiting, []
         frames, came = self._frames, 0
         assert frames is not None
-        for kind, message, now_s in arrived:
-            self._take(kind, message, now_s)
-        for frame in frames.ready(monotonic()):
+        for kind, message, came_s in arrived:
+            self._take(kind, message, came_s)
+            if kind == "depth":
+                came += self._add(frames.ready(came_s))
+        # What waits, waits by the time of arrival: more may be on its way here although it came in time.
+        came += self._add(frames.ready(arrived[-1][2] if arrived else monotonic()))
+        self.frames_in += came
+        tell_doubts(self._live, self._doubts, self._tell)
+        return came
+
+    def _add(self, frames: list[RosFrame]) -> int:
+        """Give frames to the map; return how many it takes."""
+        added = 0
+        for frame in frames:
             try:
                 self._live.add_frame(frame.rgb, frame.depth_m, frame.rig, frame.world_from_camera, frame.stamp_s)
-                came += 1
+                added += 1
             except RecordingError as fault:
                 self._refused = str(fault)
                 self._once(self._refused)
-        self.frames_in += came
-        if self._inbox.lost > self._lost:
-            self._live.count_late(self._inbox.lost - self._lost)
-            self._lost = self._inbox.lost
-        tell_doubts(self._live, self._doubts, self._tell)
-        return came
+        return added
 
     def missing(self) -> str:
         """Return what there is too little of, as part of a sentence."""
@@ -186,6 +191,12 @@ class _Source:
         ):
             if count:
                 self._tell(f"note: {count} {what} and are left out.")
+        lost, sent = frames.never_arrived
+        if lost:
+            self._tell(
+                f"note: {lost} of about {sent} frames never arrived, by the stamps of those that did; use compressed "
+                "topics, publishers that are reliable, or a faster network."
+            )
 
     def _begin(self) -> None:
         chosen = self._inbox.chosen
