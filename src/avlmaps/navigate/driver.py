@@ -14,7 +14,6 @@ from avlmaps.core.errors import NavigationError
 from avlmaps.core.motion import FORWARD_M, TURN_RAD, Action, GroundPose, Moved, wrap_angle
 from avlmaps.core.printable import printable
 from avlmaps.maps.obstacles import Obstacles
-from avlmaps.navigate import grid_kernels
 from avlmaps.navigate.bodies import BASE, Body, BodyShape
 from avlmaps.navigate.contact_map import ContactMap
 from avlmaps.navigate.controller import (
@@ -27,6 +26,7 @@ from avlmaps.navigate.controller import (
     turns_for,
 )
 from avlmaps.navigate.costmap import CostSettings, costmap_of
+from avlmaps.navigate.grid_graphs import rooms
 from avlmaps.navigate.planner import Planner, PlanSettings, Stop
 
 _SAMPLE_M = 0.02  # places along a straight move that are looked at
@@ -353,9 +353,7 @@ class MapDriver:
         part = np.linspace(0.0, 1.0, count)[:, None]
         xy = (1 - part) * [start.x_m, start.y_m] + part * [end.x_m, end.y_m]
         cell_m = costmap.cell_size_m
-        room_m = cell_m * grid_kernels.room_along(
-            costmap.in_cells(xy), costmap.occupied, costmap.radius_m / cell_m + 1.0
-        )
+        room_m = cell_m * rooms(costmap.in_cells(xy), costmap.occupied, costmap.radius_m / cell_m + 1.0)
         if room_m.min() >= costmap.radius_m - 1e-6:
             return True
         return bool(room_m[0] < costmap.radius_m and room_m.min() >= room_m[0] - 1e-6 and room_m[-1] > room_m[0])
@@ -389,8 +387,7 @@ class MapDriver:
                 return False
             costmap = self.planner.costmap
             reach = (costmap.radius_m + settings.slow_room_m) / costmap.cell_size_m
-            x, y = costmap.in_cells(self._xy)
-            room = grid_kernels.room_at(x, y, costmap.occupied, reach) * costmap.cell_size_m
+            room = float(rooms(costmap.in_cells(self._xy)[None], costmap.occupied, reach)[0]) * costmap.cell_size_m
             speed = controller.speed_m_s + settings.speed_m_s2 * settings.tick_s
             ahead_m = speed * settings.tick_s + 0.5 * speed**2 / settings.speed_m_s2
             along = self.pose.turned(0.5 * controller.turn_rad_s * ahead_m / max(speed, 0.05))

@@ -8,14 +8,15 @@ So a path is found wherever there is one; its cost was never above 1.1 times the
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Float64, Int
-from scipy.sparse import csgraph, csr_array
 
-from avlmaps.navigate import grid_kernels
 from avlmaps.navigate.costmap import Costmap
+from avlmaps.navigate.grid_graphs import BLOCK, BlockGraph, CellGraph, farthest_opaque
+from avlmaps.navigate.grid_kernels import line_cost, shortcuts
 
 _EVERY = 8  # cells of a straight run of a path from which shortcuts may begin
 _WINDOW = 24  # such points that a shortcut may leap
@@ -98,12 +99,12 @@ class Planner:
         return int(np.count_nonzero(self.costmap.passable)) <= self.settings.exact_cells
 
     @cached_property
-    def _cells(self) -> "_CellGraph":
-        return _CellGraph.of(self.costmap.passable, self.costmap)
+    def _cells(self) -> "CellGraph":
+        return CellGraph.of(self.costmap.passable, self.costmap.cost)
 
     @cached_property
-    def _blocks(self) -> "_BlockGraph":
-        return _BlockGraph.of(self.costmap)
+    def _blocks(self) -> "BlockGraph":
+        return BlockGraph.of(self.costmap.passable, self.costmap.cost)
 
     def way(self, start: Float[np.ndarray, "2"], goal: Float[np.ndarray, "2"]) -> PlannedPath | None:
         """Return the cheapest path between two places, None where there is none.
@@ -137,11 +138,10 @@ class Planner:
             return start if part is None or at == part else None
         mask = costmap.passable if part is None else self._part == part
         cells, _ = self._near(mask, start, self.settings.escape_m)
-        x, y = costmap.in_cells(start)
         # An obstacle of the map under its middle does not hold it back, a wall beside it does.
         within = bool(costmap.holds(start)) and bool(costmap.occupied[tuple(costmap.cell_of(start))])
         own = costmap.radius_m / costmap.cell_size_m if within else 1.0
-        ways_out = cells[grid_kernels.mark_visible(x, y, cells, costmap.occupied, own)]
+        ways_out = cells[farthest_opaque(costmap.in_cells(start), cells, costmap.occupied) <= own]
         return costmap.middle_of(ways_out[0]) if len(ways_out) else None
 
     def stop_for(self, start: Float[np.ndarray, "2"], place: Float[np.ndarray, "2"]) -> Stop | None:
@@ -162,11 +162,11 @@ class Planner:
             return None
         order = np.argsort(distance_m + self.settings.roomy_m * (costmap.cost[tuple(cells.T)] - 1.0), kind="stable")
         cells, distance_m = cells[order], distance_m[order]
-        x, y = costmap.in_cells(place)
         stands = bool(costmap.is_passable(place))
         things = 1 if costmap.free[tuple(costmap.cell_of(place))] else None  # on free floor there is no thing
+        hidden_m = farthest_opaque(costmap.in_cells(place), cells, costmap.opaque) * costmap.cell_size_m
         for own_m in self.settings.own_m[:things]:
-            seen = grid_kernels.mark_visible(x, y, cells, costmap.opaque, own_m / costmap.cell_size_m)
+            seen = hidden_m <= own_m
             if seen.any():
                 best = int(np.argmax(seen))
                 return Stop(costmap.middle_of(cells[best]), float(distance_m[best]), open=stands)
@@ -190,12 +190,12 @@ class Planner:
         (ax, ay), (bx, by) = one, other
         most = self.settings.direct * float(np.hypot(bx - ax, by - ay))  # a cell costs at least 1
         passable, cost = self.costmap.passable, self.costmap.cost
-        return bool(grid_kernels.line_cost(ax, ay, bx, by, passable, cost, most) <= most)
+        return bool(line_cost(ax, ay, bx, by, passable, cost, most) <= most)
 
     def _search(self, first: Int[np.ndarray, "2"], last: Int[np.ndarray, "2"]) -> Int[np.ndarray, "n 2"]:
         """Return the cells of the cheapest path between two cells of one connected part."""
         for corridor in () if self._is_small else self._corridors(first, last):
-            cells = _CellGraph.of(corridor, self.costmap).path(first, last)
+            cells = CellGraph.of(corridor, self.costmap.cost).path(first, last)
             if cells is not None:  # parts of blocks also touch where the cells beside the corner lie in other blocks
                 return cells
         cells = self._cells.path(first, last)
@@ -207,7 +207,7 @@ class Planner:
         self, first: Int[np.ndarray, "2"], last: Int[np.ndarray, "2"]
     ) -> Iterator[Bool[np.ndarray, "nx ny"]]:
         """Yield the cells around the cheapest path over blocks: as wide as is cheap to search, then wider."""
-        passable, size = self.costmap.passable, grid_kernels.BLOCK
+        passable, size = self.costmap.passable, BLOCK
         blocks = self._blocks.path(first, last)
         nx, ny = passable.shape
         way = np.zeros((-(-nx // size), -(-ny // size)), np.uint8)
@@ -229,67 +229,14 @@ class Planner:
         turns = np.r_[True, (step[1:] != step[:-1]).any(axis=1), True] if len(step) else np.ones(len(corners), bool)
         turns |= np.arange(len(corners)) % _EVERY == 0
         thinned = np.ascontiguousarray(corners[turns])
-        return thinned[grid_kernels.shortcuts(thinned, passable, cost, _WINDOW)]
+        return thinned[shortcuts(thinned, passable, cost, _WINDOW)]
 
     def _measured(self, points: Float[np.ndarray, "n 2"], before: Float[np.ndarray, "2"] | None) -> PlannedPath:
         costmap = self.costmap
-        cost = grid_kernels.path_cost(points, costmap.passable, costmap.cost)
+        passable, cells_cost = costmap.passable, costmap.cost
+        cost = sum(line_cost(a[0], a[1], b[0], b[1], passable, cells_cost, np.inf) for a, b in pairwise(points))
         xy = costmap.origin_m + points * costmap.cell_size_m
         if before is not None:
             xy = np.concatenate([[before], xy])
         length_m = float(np.linalg.norm(np.diff(xy, axis=0), axis=1).sum())
         return PlannedPath(xy, float(cost) * costmap.cell_size_m, length_m)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _CellGraph:
-    """Cells joined with their sixteen neighbours; a step cuts no corner."""
-
-    number: Int[np.ndarray, "nx ny"]
-    cells: Int[np.ndarray, "n 2"]
-    weights: csr_array
-
-    @classmethod
-    def of(cls, mask: Bool[np.ndarray, "nx ny"], costmap: Costmap) -> "_CellGraph":
-        number, cells = grid_kernels.number_cells(mask)
-        return cls(number, cells, _sparse(*grid_kernels.cell_graph(number, cells, costmap.cost)))
-
-    def path(self, first: Int[np.ndarray, "2"], last: Int[np.ndarray, "2"]) -> Int[np.ndarray, "k 2"] | None:
-        nodes = _path(self.weights, int(self.number[tuple(first)]), int(self.number[tuple(last)]))
-        return None if nodes is None else self.cells[nodes]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _BlockGraph:
-    """The connected parts of blocks of cells, joined where they touch."""
-
-    node: Int[np.ndarray, "nx ny"]
-    middle: Float64[np.ndarray, "parts 2"]
-    weights: csr_array
-
-    @classmethod
-    def of(cls, costmap: Costmap) -> "_BlockGraph":
-        node, middle, mean = grid_kernels.block_parts(costmap.passable, costmap.cost)
-        return cls(node, middle, _sparse(*grid_kernels.block_graph(node, middle, mean)))
-
-    def path(self, first: Int[np.ndarray, "2"], last: Int[np.ndarray, "2"]) -> Int[np.ndarray, "k 2"]:
-        """Return the blocks of the cheapest path; those of its ends alone where there is none."""
-        ends = int(self.node[tuple(first)]), int(self.node[tuple(last)])
-        parts = _path(self.weights, *ends)
-        return (self.middle[list(ends) if parts is None else parts] / grid_kernels.BLOCK).astype(np.int64)
-
-
-def _sparse(starts: np.ndarray, columns: np.ndarray, weights: np.ndarray) -> csr_array:
-    count = len(starts) - 1
-    return csr_array((weights, columns, starts), shape=(count, count))
-
-
-def _path(weights: csr_array, first: int, last: int) -> Int[np.ndarray, " k"] | None:
-    """Return the nodes of the cheapest path, None where there is none."""
-    cost, before = csgraph.dijkstra(weights, indices=first, return_predecessors=True)
-    if not np.isfinite(cost[last]):
-        return None  # SciPy's word for no predecessor is a negative number, which would index from the end
-    nodes = [last]
-    while nodes[-1] != first:
-        nodes.append(int(before[nodes[-1]]))
-    return np.array(nodes[::-1])
