@@ -24,7 +24,7 @@ from avlmaps.recordings.formats.ros_messages import (
     pose_of,
     stamp_of,
 )
-from avlmaps.recordings.formats.ros_transforms import HOLD_S, TransformTree, body_of
+from avlmaps.recordings.formats.ros_transforms import TransformTree, body_of
 
 Kind = Literal["rgb", "depth", "rgb_info", "depth_info", "tf", "tf_static", "pose"]
 
@@ -38,6 +38,8 @@ SETTLED_S = 2.0
 """A calibration or a mount that has not come by then is taken to be missing."""
 _HELD = 60  # pictures and pairs that wait, at most
 _FORGET_EVERY = 500  # transforms
+KEPT_S = 30.0
+"""Transforms are kept this long: pictures may come late, since they are sent again where a part was lost."""
 PAUSE_S, LEAST_GAPS = 3.0, 10
 """A longer time without a picture is a pause; from fewer gaps no period is known."""
 
@@ -234,7 +236,7 @@ class RosFrames:
         self._tree.add(parent, child, pose_of(message), stamp_s, static)
         self._moved += 1
         if self._moved % _FORGET_EVERY == 0 and not static:
-            self._tree.forget(stamp_s - 2.0 * HOLD_S)
+            self._tree.forget(stamp_s - KEPT_S)
 
     def _pair(self, now_s: float) -> None:
         """Put depth pictures and the colour pictures of their moments together."""

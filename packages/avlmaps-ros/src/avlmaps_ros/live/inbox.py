@@ -40,6 +40,8 @@ _LOOK_EVERY_S = 0.5
 _SETTLED_S = 1.0  # from the first topic of pictures until the others are discovered as well
 _MOST_BYTES = 500_000_000  # that wait for the map; pictures beyond are left out
 _AT_ONCE = 50
+_BEST_EFFORT = ("tf", "pose")
+"""Small and many: a lost one is interpolated, and must not hold up those after it until it is sent again."""
 
 Arrived = tuple[str, Any, float]  # what it is for, the message, when it came (monotonic)
 
@@ -135,8 +137,8 @@ def receive(pipe: Connection, topics: RosTopics) -> None:
 class _Receiver:
     """A node that takes messages as they are and hands them on, in the order in which they came.
 
-    It subscribes as publishers offer: reliably where they do, so that no part of a picture is lost for good, and
-    latched where they latch.
+    It subscribes as publishers offer: to pictures and sounds reliably where they do, so that no part of one is lost for
+    good, and latched where they latch.
     """
 
     def __init__(self, pipe: Connection, topics: RosTopics) -> None:
@@ -277,7 +279,8 @@ class _Receiver:
         offered = [one.qos_profile for one in self._node.get_publishers_info_by_topic(topic)]
         if latched is None:
             latched = bool(offered) and all(one.durability == DurabilityPolicy.TRANSIENT_LOCAL for one in offered)
-        reliable = latched or all(one.reliability == ReliabilityPolicy.RELIABLE for one in offered)
+        offers = all(one.reliability == ReliabilityPolicy.RELIABLE for one in offered)
+        reliable = latched or (offers and kind not in _BEST_EFFORT)
         qos = QoSProfile(
             depth=depth,
             reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
