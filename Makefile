@@ -122,9 +122,14 @@ $(TORCH)/.ready: requirements/lock.txt requirements/foundation.txt $(PROJECTS)
 python312:  ## Say which Python 3.12 `make test-ros2` takes; fail where there is none.
 	@$(if $(PYTHON312),echo $(PYTHON312),echo "no Python 3.12 was found; say where one is with: make PYTHON312=/path/to/python3.12" >&2; exit 1)
 
+# An unmodified rosbridge needs its own messages, built once.
+BRIDGED = $(if $(ROSBRIDGE),$(ROS2)/bin/python $(ROBOTS)/tests/ros2/build_interfaces.py $(ROSBRIDGE)/rosbridge_msgs)
+
 # These robots move in real time: what fails beside other processes is run once more, alone.
-test-ros2: $(ROS2)/.ready  ## Run the tests against real ROS 2 (rclpy from wheels, in a virtual environment of its own, 1 GB).
-	$(ROS2)/bin/python -m pytest -n 2 --dist loadgroup $(ROBOTS)/tests/ros2 || $(ROS2)/bin/python -m pytest --last-failed -n 0 $(ROBOTS)/tests/ros2
+test-ros2: $(ROS2)/.ready  ## Test against real ROS 2 (rclpy from wheels, in an environment of its own, 1 GB; ROSBRIDGE=DIR too).
+	$(BRIDGED)
+	export AVLMAPS_ROSBRIDGE=$(ROSBRIDGE); $(ROS2)/bin/python -m pytest -n 2 --dist loadgroup $(ROBOTS)/tests/ros2 \
+	  || $(ROS2)/bin/python -m pytest --last-failed -n 0 $(ROBOTS)/tests/ros2
 
 test-cluster: $(CLUSTER)/.ready  ## Build on a Ray cluster of two workers and kill them (in a virtual environment of its own, 1 GB).
 	$(CLUSTER)/bin/python -m pytest -rs tests/maps/test_cluster.py tests/maps/test_ray.py
@@ -133,8 +138,9 @@ $(CLUSTER)/.ready: requirements/lock.txt requirements/cluster.txt $(PROJECTS)
 	$(call ENVIRONMENT,$(PYTHON),cluster)
 	touch $@
 
-faults-ros2: $(ROS2)/.ready  ## Break a native drive on ROS 2 in 200 random ways (an hour): ros2_faults.jsonl.
-	$(ROS2)/bin/python $(ROBOTS)/tests/ros2/faults.py --cases $(or $(CASES),200) --seed $(or $(SEED),1)
+faults-ros2: $(ROS2)/.ready  ## Break a drive on ROS 2 in 200 random ways (ROSBRIDGE=DIR too; an hour): ros2_faults.jsonl.
+	$(BRIDGED)
+	AVLMAPS_ROSBRIDGE=$(ROSBRIDGE) $(ROS2)/bin/python $(ROBOTS)/tests/ros2/faults.py --cases $(or $(CASES),200) --seed $(or $(SEED),1)
 
 # Message packages that the wheels lack are built from definitions of the tests' own, with the wheels' rosidl tools.
 INTERFACES := $(wildcard $(ROBOTS)/tests/ros2/interfaces/*) $(wildcard examples/ros2/avlmaps_msgs)
