@@ -11,7 +11,7 @@ of these, "merge" moves and adds up the rows of submaps, "clean" finds what is n
 
 import argparse
 import tempfile
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from time import process_time
 
@@ -66,11 +66,11 @@ def fused(frames: list[Frame], poses: np.ndarray, features: np.ndarray, step: in
             total.add(placed, features)
             free.add(placed)
         stamps = np.array([frame.stamp_s for frame in some])
-        parts.append(submap_of(total.sums(), total.spread(), stamps, at, free.views().clear_mm))
+        parts.append(submap_of(total.sums(), stamps, at, free.views().clear_mm))
     return concat(parts)
 
 
-def surface(total: VoxelAccumulator, clear_mm: np.ndarray, poses: np.ndarray, rig: Rig) -> np.ndarray:
+def surface(total: MovedSubmaps, clear_mm: np.ndarray, poses: np.ndarray, rig: Rig) -> np.ndarray:
     """Return the voxels that are a surface."""
     evidence = total.evidence()
     kept, _ = clean(evidence, [FreeViews(clear_mm, poses)], rig.depth, GRID, PERFECT)
@@ -120,16 +120,16 @@ def main() -> None:
         smooth = Trajectory(stamps[nodes], (true @ inverse(off))[nodes]).at(stamps) @ off
         for name, corrected in (("graph", smooth), ("true", true)):
             again = fused(frames, corrected, features, len(frames))
-            whole = VoxelAccumulator.of_submaps(again, corrected, GRID)
+            whole = MovedSubmaps(again, corrected, GRID)
             wanted = surface(whole, again.clear_mm, corrected, frames[0].rig)
             for step in asked.frames:
                 submaps = fused(frames, off, features, step)
-                before = surface(VoxelAccumulator.of_submaps(submaps, off, GRID), submaps.clear_mm, off, frames[0].rig)
+                before = surface(MovedSubmaps(submaps, off, GRID), submaps.clear_mm, off, frames[0].rig)
                 found, stages_s = followed(submaps, corrected, frames[0].rig)
                 took_s, area = stages_s.sum(), len(wanted) * GRID.voxel_size_m**2
                 merge, cleaned, featured = 1e4 * stages_s / area
                 share, near, after = compared(found, wanted)
-                size = sum(np.asarray(getattr(submaps, field)).nbytes for field in Submaps.__dataclass_fields__)
+                size = sum(np.asarray(getattr(submaps, one.name)).nbytes for one in fields(Submaps))
                 print(f"{scene:<10}{name:<8}{step:>7}{area:>6.0f}{len(submaps.index):>11,}{size / 1e6:>7.0f}"
                       f"{took_s:>7.2f}{1e4 * took_s / area:>15.1f}{merge:>7.1f}{cleaned:>7.1f}{featured:>10.1f}"
                       f"{share:>8.1%}{near:>10.2%}{compared(before, wanted)[2]:>15.1%}{after:>8.2%}",

@@ -7,7 +7,7 @@ lacks some boxes of voxels, so that no two are the same; keyframes go with their
 """
 
 import argparse
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import msgspec
@@ -95,7 +95,8 @@ def _rows(offsets: np.ndarray, which: np.ndarray) -> np.ndarray:
 
 def _joined(frames: list[Keyframes]) -> Keyframes:
     """Return all keyframes in the order of time; ``offsets`` of each hold the lengths of its ragged rows."""
-    columns = {name: np.concatenate([getattr(one, name) for one in frames]) for name in Keyframes.__dataclass_fields__}
+    names = [field.name for field in fields(Keyframes)]
+    columns = {name: np.concatenate([getattr(one, name) for one in frames]) for name in names}
     order = np.argsort(columns["stamp_s"], kind="stable")
     for lengths, ragged in (("offsets", ("xy", "descriptors", "points_world", "score")),
                             ("thumbnail_offsets", ("thumbnails",))):  # fmt: skip
