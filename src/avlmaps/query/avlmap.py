@@ -1,9 +1,8 @@
 """The map as a user meets it: four modalities, each a heatmap, and whole questions."""
 
-import warnings
 from collections.abc import Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -213,7 +212,9 @@ class AVLMap:
         known = self._known_words if vocabulary is None else None
         rivals = self._rivals_of(encoder, vocabulary) if known is None else known
         voxels = self._feature_voxels(encoder, rivals, self.stored.voxels.rgb)
-        return object_factor(voxels, part, self.settings.heat)
+        known = self._known_searches if vocabulary is None else {}  # of a name of the encoder, narrower names with it
+        found = known.get((part.query, False)) or known.get((part.query, True))
+        return object_factor(voxels, part, self.settings.heat, found)
 
     @checked(QueryError)
     def instances(self, word: str, alone: bool = False) -> Instances:
@@ -227,6 +228,9 @@ class AVLMap:
         return self.edited.instances(self._search(word, alone).instances, word)
 
     def _search(self, word: str, alone: bool) -> Segmentation:
+        known = self._known_searches.get((word, alone))
+        if known is not None:
+            return known
         encoder = self.stored.encoders.pixels
         everywhere = self._rivals_of(encoder, None)
         rivals = everywhere if self._known_words is None else self._known_words  # which knows all of them now
@@ -236,22 +240,11 @@ class AVLMap:
             encoded = EncodedWord.of(encoder, word)
         return confident_instances(self._feature_voxels(encoder, rivals), encoded)
 
-    @checked(QueryError)
-    def pieces(self, word: str, alone: bool = False) -> Instances:
-        """Return ``instances``, by the name that they had before."""
-        warnings.warn("AVLMap.pieces goes in the next release; use .instances.", DeprecationWarning, stacklevel=2)
-        return self.instances(word, alone)
-
     def _feature_voxels(
         self, encoder: PixelEncoder, rivals: Vocabulary, rgb: UInt8[np.ndarray, "n 3"] | None = None
     ) -> FeatureVoxels:
         feature, settings = self.stored.voxels.feature, self.settings.objects
         return FeatureVoxels(self.space, feature, encoder, rivals, settings, rgb, lambda: self.things_in_rooms)
-
-    def rivals(self) -> ClosestWords:
-        """Return ``closest_words``, by the name that they had before."""
-        warnings.warn("AVLMap.rivals goes in the next release; use .closest_words.", DeprecationWarning, stacklevel=2)
-        return self.closest_words()
 
     def closest_words(self) -> ClosestWords:
         """Return the two words of the encoder's vocabulary closest to each voxel; the first query works them out."""
@@ -291,6 +284,26 @@ class AVLMap:
         words = known.whole(self.stored.voxels.feature)
         closest = words.best, words.best_word, words.second, words.second_word
         return findings.names_to_arrays(closest, findings.key_of(known.digest))
+
+    def found_things(self) -> dict[str, np.ndarray]:
+        """Return the instances of all names of the vocabulary, for ``findings``."""
+        from avlmaps.query.contents import STRUCTURE, searches_for
+
+        if self._known_words is None:
+            return {}
+        encoder = self.stored.encoders.pixels
+        searches = searches_for([name for name in encoder.vocabulary if name not in STRUCTURE], encoder)
+        return findings.searches_to_arrays({one: self._search(*one) for one in searches}, self._key_of_searches)
+
+    @property
+    def _key_of_searches(self) -> np.ndarray:
+        words, settings = self._known_words, self.settings
+        return findings.key_of(words and words.digest, asdict(settings.objects), asdict(settings.areas))
+
+    @cached_property
+    def _known_searches(self) -> Mapping[tuple[str, bool], Segmentation]:
+        stored = self.stored.data.findings
+        return findings.searches_from(stored, self._key_of_searches) if stored else {}
 
     def found_rooms(self) -> dict[str, np.ndarray]:
         """Return the rooms and their kinds, for ``findings``; none where there is no floor plan."""

@@ -1,4 +1,4 @@
-"""What the end of a build finds in a map by its encoders' names, stored with the map: closest names and rooms.
+"""What the end of a build finds in a map by its encoders' names, stored with the map: closest names, things, rooms.
 
 ``MapData.findings`` holds it. Each finding has a key of what it was found with; a map with other encoders or settings
 than those is looked through again.
@@ -17,6 +17,7 @@ from avlmaps.core.arrays import Int
 from avlmaps.core.errors import BackendError, MapError
 from avlmaps.core.version import __version__
 from avlmaps.query.floor_plan import FloorPlan
+from avlmaps.query.instances import Instances, Segmentation
 from avlmaps.query.room_regions import RoomRegions
 from avlmaps.query.rooms import RoomField
 from avlmaps.query.scores import Closest
@@ -27,6 +28,11 @@ if TYPE_CHECKING:
     from avlmaps.query.modalities.area import AreaSettings
 
 Findings = Mapping[str, np.ndarray]
+Search = tuple[str, bool]
+"""A name, and whether it stands for itself alone, without narrower ones."""
+_OF_INSTANCES = {
+    "rows": np.int32, "instance": np.int32, "margin": np.float32, "score": np.float32, "confidence": np.float32,
+}  # fmt: skip
 _CLOSEST = ("best", "best_word", "second", "second_word")
 
 
@@ -49,6 +55,8 @@ def findings_of(avlmap: "AVLMap") -> dict[str, np.ndarray]:
         found |= avlmap.found_names()
     with suppress(BackendError, MapError):
         found |= avlmap.found_rooms()
+    with suppress(BackendError, MapError):
+        found |= avlmap.found_things()
     return found
 
 
@@ -77,6 +85,33 @@ def names_from(findings: Findings, key: np.ndarray) -> Closest | None:
         return None
     best, best_word, second, second_word = (findings[f"names.{name}"] for name in _CLOSEST)
     return best, best_word, second, second_word
+
+
+def searches_to_arrays(searches: Mapping[Search, Segmentation], key: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the instances of names as arrays, those of one name after those of another."""
+    names = np.frombuffer(msgspec.json.encode(list(searches)), np.uint8)
+    found = [(len(one.instances.rows), len(one.instances), one.won, one.best) for one in searches.values()]
+    arrays = {"things.key": key, "things.names": names, "things.counts": np.array(found, np.float64).reshape(-1, 4)}
+    for name, kind in _OF_INSTANCES.items():
+        parts = [np.asarray(getattr(one.instances, name), kind) for one in searches.values()]
+        arrays[f"things.{name}"] = np.concatenate([np.zeros(0, kind), *parts])
+    return arrays
+
+
+def searches_from(findings: Findings, key: np.ndarray) -> dict[Search, Segmentation]:
+    """Return the instances of names; none where they were found otherwise."""
+    if not _known(findings, "things.key", key):
+        return {}
+    names = msgspec.json.decode(findings["things.names"].tobytes(), type=list[Search])
+    counts, columns = findings["things.counts"], [findings[f"things.{name}"] for name in _OF_INSTANCES]
+    ends = np.cumsum(counts[:, :2].astype(np.int64), axis=0)
+    begins = ends - counts[:, :2].astype(np.int64)
+    found = dict[Search, Segmentation]()
+    for name, (row, first), (stop, last), (_, _, won, best) in zip(names, begins, ends, counts.tolist(), strict=True):
+        *of_voxels, confidence = columns
+        instances = Instances(*(column[row:stop] for column in of_voxels), confidence[first:last])
+        found[name] = Segmentation(instances, int(won), best)
+    return found
 
 
 def regions_to_arrays(regions: RoomRegions) -> dict[str, np.ndarray]:
