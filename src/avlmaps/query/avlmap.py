@@ -1,40 +1,39 @@
 """The map as a user meets it: four modalities, each a heatmap, and whole questions."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from copy import copy
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from avlmaps.core.arrays import Float, Float16, Int, Int32, UInt8
+from avlmaps.core.arrays import Float, Float16, Int32, UInt8
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import BackendError, MapError, QueryError
 from avlmaps.core.files import lasting_path, user_path
 from avlmaps.core.numbers import as_whole, checked, hold_numbers
 from avlmaps.core.question import HeardAt, Modality, Part, Question, Role
 from avlmaps.core.registry import Kind
-from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder, SurveyedEncoder, read_room_contents
-from avlmaps.query import findings
-from avlmaps.query.factors import FOUND_AT, HeatSettings, NearThings
-from avlmaps.query.floor_plan import FloorPlan
+from avlmaps.perception.protocols import read_room_contents
+from avlmaps.query.factors import FOUND_AT, HeatSettings
 from avlmaps.query.heatmap import Heatmap
-from avlmaps.query.instances import FeatureVoxels, Instances, Segmentation, confident_instances
-from avlmaps.query.known_words import KnownClosestWords
-from avlmaps.query.modalities.area import AreaSettings, area_anchors, area_factor, area_names, name_shares
+from avlmaps.query.instances import Instances
+from avlmaps.query.map_names import MapNames
+from avlmaps.query.map_rooms import MapRooms
+from avlmaps.query.modalities.area import AreaSettings, area_factor
 from avlmaps.query.modalities.image import image_factor, read_picture, require_fitting
-from avlmaps.query.modalities.object import object_factor
 from avlmaps.query.modalities.sound import SoundSettings, read_clip, require_audible, sound_factor, sound_features
 from avlmaps.query.object_settings import ObjectSettings
 from avlmaps.query.queryable import Attachment, Photo
 from avlmaps.query.room_names import numbered_rooms, region_named
 from avlmaps.query.room_regions import RoomRegions
-from avlmaps.query.rooms import NamedVoxels, RoomField, Rooms, rooms_of_cells, seen_twice, voting_rows
+from avlmaps.query.rooms import RoomField, Rooms
 from avlmaps.query.things_in_rooms import ThingsInRooms
 from avlmaps.query.voxel_space import Space
-from avlmaps.query.words import ClosestWords, EncodedWord, Vocabulary
+from avlmaps.query.words import ClosestWords
 from avlmaps.recordings.audio import Sound
 
 if TYPE_CHECKING:
@@ -117,7 +116,6 @@ class AVLMap:
         self.settings = settings or QuerySettings()
         self._given_edits = edits
         self._heats = heats
-        self._rivals: tuple[tuple[str, ...], ClosestWords] | None = None
         self._to_edit: dict[str | None, Sequence[Thing]] = {}
 
     @classmethod
@@ -202,19 +200,8 @@ class AVLMap:
             return Heatmap.of(pinned, self.settings.found_at)
         if self.edited.is_room(word):
             return self.area(word, primary)
-        factor = self.edited.object_factor(part, self.settings.heat, lambda: self._seen_object(part, vocabulary))
+        factor = self.edited.object_factor(part, self.settings.heat, lambda: self._names.heat(part, vocabulary))
         return Heatmap.of(factor, self.settings.found_at)
-
-    def _seen_object(self, part: Part, vocabulary: Sequence[str] | None) -> NearThings:
-        """Return the heat of an object as the encoder sees it."""
-        encoder = self.stored.encoders.pixels
-        # Of names, most voxels have too little of the word to be compared with all others.
-        known = self._known_words if vocabulary is None else None
-        rivals = self._rivals_of(encoder, vocabulary) if known is None else known
-        voxels = self._feature_voxels(encoder, rivals, self.stored.voxels.rgb)
-        known = self._known_searches if vocabulary is None else {}  # of a name of the encoder, narrower names with it
-        found = known.get((part.query, False)) or known.get((part.query, True))
-        return object_factor(voxels, part, self.settings.heat, found)
 
     @checked(QueryError)
     def instances(self, word: str, alone: bool = False) -> Instances:
@@ -225,93 +212,23 @@ class AVLMap:
             alone: take one of the encoder's names for itself, without the narrower ones that it takes in: then an
                 armchair is no "chair".
         """
-        return self.edited.instances(self._search(word, alone).instances, word)
-
-    def _search(self, word: str, alone: bool) -> Segmentation:
-        known = self._known_searches.get((word, alone))
-        if known is not None:
-            return known
-        encoder = self.stored.encoders.pixels
-        everywhere = self._rivals_of(encoder, None)
-        rivals = everywhere if self._known_words is None else self._known_words  # which knows all of them now
-        if alone and isinstance(encoder, NamedPixelEncoder) and word in encoder.names:
-            encoded = EncodedWord.of_name(encoder, word)
-        else:
-            encoded = EncodedWord.of(encoder, word)
-        return confident_instances(self._feature_voxels(encoder, rivals), encoded)
-
-    def _feature_voxels(
-        self, encoder: PixelEncoder, rivals: Vocabulary, rgb: UInt8[np.ndarray, "n 3"] | None = None
-    ) -> FeatureVoxels:
-        feature, settings = self.stored.voxels.feature, self.settings.objects
-        return FeatureVoxels(self.space, feature, encoder, rivals, settings, rgb, lambda: self.things_in_rooms)
+        return self.edited.instances(self._names.search(word, alone).instances, word)
 
     def closest_words(self) -> ClosestWords:
         """Return the two words of the encoder's vocabulary closest to each voxel; the first query works them out."""
-        return self._rivals_of(self.stored.encoders.pixels, None)
-
-    def _rivals_of(self, encoder: PixelEncoder, vocabulary: Sequence[str] | None) -> ClosestWords:
-        self.stored.require_model(Kind.PIXELS)
-        feature, known = self.stored.voxels.feature, self._known_words if vocabulary is None else None
-        if known is not None:
-            return known.whole(feature)
-        names = tuple(encoder.vocabulary if vocabulary is None else vocabulary)
-        if self._rivals is None or self._rivals[0] != names:
-            self._rivals = names, ClosestWords.of(feature, encoder, names)
-        return self._rivals[1]
+        return self._names.closest_words()
 
     @cached_property
-    def _known_words(self) -> KnownClosestWords | None:
-        """The names of an encoder that has a list of them, and those closest to the voxels that queries needed.
+    def _names(self) -> MapNames:
+        return MapNames(self.stored, self.space, self.settings, lambda: self.things_in_rooms)
 
-        None for an encoder of any words, and where names of an encoder do not compete.
-        """
-        encoder = self.stored.encoders.pixels
-        if not isinstance(encoder, NamedPixelEncoder) or not {*encoder.names} <= {*encoder.vocabulary, "other"}:
-            return None
-        self.stored.require_model(Kind.PIXELS)
-        vocabulary = Vocabulary.encoded(encoder, encoder.vocabulary)
-        closest = findings.names_from(self.stored.data.findings, findings.key_of(vocabulary.digest))
-        if closest is not None:
-            return KnownClosestWords.known_everywhere(vocabulary, closest)
-        return KnownClosestWords.of(vocabulary, len(self.stored.voxels))
-
-    def found_names(self) -> dict[str, np.ndarray]:
-        """Return the names closest to each voxel, for ``findings``; none of an encoder of any words."""
-        known = self._known_words
-        if known is None:
-            return {}
-        words = known.whole(self.stored.voxels.feature)
-        closest = words.best, words.best_word, words.second, words.second_word
-        return findings.names_to_arrays(closest, findings.key_of(known.digest))
-
-    def found_things(self) -> dict[str, np.ndarray]:
-        """Return the instances of all names of the vocabulary, for ``findings``."""
-        from avlmaps.query.contents import STRUCTURE, searches_for
-
-        if self._known_words is None:
-            return {}
-        encoder = self.stored.encoders.pixels
-        searches = searches_for([name for name in encoder.vocabulary if name not in STRUCTURE], encoder)
-        return findings.searches_to_arrays({one: self._search(*one) for one in searches}, self._key_of_searches)
-
-    @property
-    def _key_of_searches(self) -> np.ndarray:
-        words, settings = self._known_words, self.settings
-        return findings.key_of(words and words.digest, asdict(settings.objects), asdict(settings.areas))
-
-    @cached_property
-    def _known_searches(self) -> Mapping[tuple[str, bool], Segmentation]:
-        stored = self.stored.data.findings
-        return findings.searches_from(stored, self._key_of_searches) if stored else {}
-
-    def found_rooms(self) -> dict[str, np.ndarray]:
-        """Return the rooms and their kinds, for ``findings``; none where there is no floor plan."""
-        if self.room_votes is None:
-            return {}
-        found = findings.regions_to_arrays(self._seen_regions(self.room_votes))
-        field = self._known_room_field
-        return found if field is None else found | findings.field_to_arrays(field, self.settings.areas)
+    def found(self) -> dict[str, np.ndarray]:
+        """Return what a build stores of the names and rooms that the encoders here see; see ``findings``."""
+        found = dict[str, np.ndarray]()
+        for part in (lambda: self._names.found(), lambda: self._rooms.found()):
+            with suppress(BackendError, MapError):  # no features of these, or those of another encoder
+                found |= part()
+        return found
 
     @checked(QueryError)
     def things(
@@ -358,7 +275,7 @@ class AVLMap:
         from avlmaps.query.contents import find_things
 
         def instances_of(name: str, alone: bool) -> Instances:
-            return self._search(name, alone).instances
+            return self._names.search(name, alone).instances
 
         return find_things(self.stored, self.space, instances_of, names, least_confidence, structure, watch)
 
@@ -608,27 +525,18 @@ class AVLMap:
         settings, number = self.settings, region_named(self, word)
         factor = area_factor(
             self.space, self.stored.keyframes, encoder, part, settings.areas, settings.heat, self.room_votes,
-            self._settled if number is None else partial(self._with_room, number), self._room_of_places,
+            self._settled if number is None else partial(self._with_room, number), self._rooms.room_of_places,
         )  # fmt: skip
         return Heatmap.of(factor, settings.found_at)
 
     def _settled(self, field: RoomField) -> RoomField:
         """Return a field in which a room is of one kind, and those that people named are so."""
         assert self.room_regions is not None
-        return self.edited.room_field(field.settled(self.room_regions, self._room_of_cells))
+        return self.edited.room_field(field.settled(self.room_regions, self._rooms.room_of_cells))
 
     def _with_room(self, number: int, field: RoomField) -> RoomField:
         """Return the field with one room as a kind of its own behind all others."""
-        return self._settled(field).with_certain([("", self._room_of_cells == number)])
-
-    def _room_of_places(self, places: Float[np.ndarray, "k 3"]) -> Int[np.ndarray, " k"]:
-        assert self.room_votes is not None
-        return self._room_of_cells[self.room_votes.plan.cells_of(places)]
-
-    @cached_property
-    def _room_of_cells(self) -> Int[np.ndarray, " c"]:
-        assert self.room_regions is not None
-        return rooms_of_cells(self.room_regions, area_anchors(self.stored.keyframes, self.settings.areas))
+        return self._settled(field).with_certain([("", self._rooms.room_of_cells == number)])
 
     @cached_property
     def storeys(self) -> "Storeys | None":
@@ -647,38 +555,18 @@ class AVLMap:
         return None if found is None else replace(found, up=(x, y, z))
 
     @cached_property
+    def _rooms(self) -> MapRooms:
+        return MapRooms(self.stored, self.space, self.settings.areas, lambda: self.storeys)
+
+    @cached_property
     def room_votes(self) -> Rooms | None:
-        """The votes on the kind of room of each place; None where the settings score keyframes instead.
-
-        A map that has no floor plan (no voxels, no keyframes, kilometres of extent) has none either.
-        """
-        from avlmaps.maps.storeys import one_storey
-
-        settings, stored = self.settings.areas, self.stored
-        if not settings.by_room or not len(stored.keyframes):
-            return None
-        cameras = self.space.level(np.asarray(stored.keyframes.world_from_camera, np.float64)[:, :3, 3])[:, 2]
-        ground = stored.info.ground
-        known = [(floor.best.height_m, floor.cameras) for floor in ground.floors] if ground is not None else []
-        places = area_anchors(stored.keyframes, settings)
-        plan = FloorPlan.of(self.space, self.storeys or one_storey(known, cameras), places)
-        return None if plan is None else Rooms(plan, places, self._voting_voxels, settings.rooms)
+        """The votes on the kind of room of each place; None where the settings score keyframes instead."""
+        return self._rooms.votes
 
     @cached_property
     def room_regions(self) -> RoomRegions | None:
         """The rooms that walls and doorways bound; None where there is no floor plan."""
-        votes = self.room_votes
-        if votes is None:
-            return None
-        known = findings.regions_from(self.stored.data.findings, votes.plan)
-        regions = self._seen_regions(votes) if known is None else known
-        field = self._known_room_field
-        return regions if field is None else regions.joined(seen_twice(field, regions))
-
-    def _seen_regions(self, votes: Rooms) -> RoomRegions:
-        camera = self.stored.rig.depth
-        width_rad = 2.0 * float(np.arctan2(camera.width, 2.0 * camera.fx))
-        return RoomRegions.of(votes.plan, np.asarray(self.stored.keyframes.world_from_camera), width_rad)
+        return self._rooms.regions
 
     @cached_property
     def room_field(self) -> RoomField | None:
@@ -690,53 +578,14 @@ class AVLMap:
             BackendError: the map's profile has no view encoder.
             MapError: the map was built with another encoder than is installed.
         """
-        seen = self._seen_room_field
+        seen = self._rooms.field
         return None if seen is None else self._settled(seen)
-
-    @cached_property
-    def _seen_room_field(self) -> RoomField | None:
-        """The same as the view encoder sees it."""
-        votes = self.room_votes
-        if votes is None:
-            return None
-        encoder = self.stored.encoders.views
-        self.stored.require_model(Kind.VIEWS)
-        kinds = area_names(encoder)
-        known = findings.field_from(self.stored.data.findings, votes.plan, kinds, self.settings.areas)
-        if known is not None:
-            return known
-        return votes.field(kinds, name_shares(np.asarray(self.stored.keyframes.view), encoder, self.settings.areas))
 
     @cached_property
     def things_in_rooms(self) -> ThingsInRooms | None:
         """The evidence of rooms on the things in them; None for a map whose rooms are not known."""
-        field = self._known_room_field
+        field = self._rooms.known_field
         return None if field is None else ThingsInRooms(field, read_room_contents())
-
-    @property
-    def _known_room_field(self) -> RoomField | None:
-        try:
-            return self._seen_room_field
-        except (BackendError, MapError):  # no features of views, or those of another encoder
-            return None
-
-    def _voting_voxels(self) -> NamedVoxels | None:
-        """Return the voxels whose names vote on kinds of room; None where the map holds no probabilities of names."""
-        from avlmaps.query.naming import VoxelNamer
-
-        try:
-            namer = VoxelNamer(self.stored)
-        except (BackendError, MapError):  # no features of things, or those of another encoder: views vote alone
-            return None
-        if not namer.calibrated or not namer.names:
-            return None
-        feature = self.stored.voxels.feature
-        rows, every = voting_rows(np.asarray(self.stored.voxels.index), len(namer.names) * feature.shape[1])
-        area_m2 = every * self.space.grid.voxel_size_m**2
-        encoder = self.stored.encoders.pixels
-        surveyed = encoder.room_contents if isinstance(encoder, SurveyedEncoder) else None
-        contents = surveyed or read_room_contents()
-        return NamedVoxels(rows, namer.names, namer.confidences(rows), area_m2, contents)
 
     @checked(QueryError)
     def image(

@@ -6,7 +6,6 @@ than those is looked through again.
 
 import hashlib
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +13,6 @@ import msgspec
 import numpy as np
 
 from avlmaps.core.arrays import Int
-from avlmaps.core.errors import BackendError, MapError
 from avlmaps.core.version import __version__
 from avlmaps.query.floor_plan import FloorPlan
 from avlmaps.query.instances import Instances, Segmentation
@@ -41,23 +39,11 @@ def with_findings(avlmap: "AVLMap") -> "AVLMap":
     from avlmaps.maps.store.folder import add_findings, read
 
     stored = avlmap.stored
-    found = {} if stored.data.findings else findings_of(avlmap)
+    found = {} if stored.data.findings else avlmap.found()
     if not found:
         return avlmap
     add_findings(stored.path, found)
     return avlmap.of_data(read(stored.path))
-
-
-def findings_of(avlmap: "AVLMap") -> dict[str, np.ndarray]:
-    """Return what the encoders that are here find in a map; nothing of one that is not here, or another one."""
-    found = dict[str, np.ndarray]()
-    with suppress(BackendError, MapError):
-        found |= avlmap.found_names()
-    with suppress(BackendError, MapError):
-        found |= avlmap.found_rooms()
-    with suppress(BackendError, MapError):
-        found |= avlmap.found_things()
-    return found
 
 
 def key_of(*ingredients: Any) -> np.ndarray:
@@ -108,8 +94,8 @@ def searches_from(findings: Findings, key: np.ndarray) -> dict[Search, Segmentat
     begins = ends - counts[:, :2].astype(np.int64)
     found = dict[Search, Segmentation]()
     for name, (row, first), (stop, last), (_, _, won, best) in zip(names, begins, ends, counts.tolist(), strict=True):
-        *of_voxels, confidence = columns
-        instances = Instances(*(column[row:stop] for column in of_voxels), confidence[first:last])
+        rows, instance, margin, score = (column[row:stop] for column in columns[:-1])
+        instances = Instances(rows, instance, margin, score, columns[-1][first:last])
         found[name] = Segmentation(instances, int(won), best)
     return found
 
