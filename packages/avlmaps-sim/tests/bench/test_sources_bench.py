@@ -7,12 +7,8 @@ import numpy as np
 import pytest
 
 from avlmaps.core.errors import AvlmapsError
-from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.sources.correlation import SPEED_M_S
-from avlmaps.maps.sources.level import against_1_m_db
-from avlmaps.maps.types import SourceEvidence
-from avlmaps.recordings.audio import AudioTrack
-from avlmaps.recordings.channels import ChannelSound, read_channels, with_microphones, write_channels
+from avlmaps.recordings.channels import ChannelSound, read_channels
 from avlmaps.recordings.microphones import microphones_named
 from avlmaps_sim.bench.sources.calibrated import Wrong, calibrated
 from avlmaps_sim.bench.sources.homes import (
@@ -25,7 +21,6 @@ from avlmaps_sim.bench.sources.homes import (
     matched,
     nearest_held,
 )
-from avlmaps_sim.bench.sources.loudness import loudness_known
 from avlmaps_sim.bench.sources.measured import (
     SOURCE_M,
     MeasuredRoom,
@@ -34,7 +29,7 @@ from avlmaps_sim.bench.sources.measured import (
     table,
     walks_of_ratios,
 )
-from avlmaps_sim.bench.sources.suite import table_of_homes, table_of_lengths, table_of_mended, table_of_regions
+from avlmaps_sim.bench.sources.suite import table_of_homes, table_of_mended, table_of_regions
 from avlmaps_sim.bench.sources.sweep import USUAL, _trial, surfaces
 from avlmaps_sim.hearing import AcousticSettings
 from avlmaps_sim.truth import HeardEvent
@@ -77,15 +72,6 @@ def test_the_table_counts_what_was_placed() -> None:
     assert last["by"] == "room's middle" and last["in 90 % region %"] == ""
 
 
-def test_the_regions_are_counted_by_the_length_of_the_sound() -> None:
-    placed = [Placed("mono", 0.1, True, 0.4, seconds=2.0), Placed("mono", 0.3, True, 0.5, seconds=2.5),
-              Placed("mono", 0.3, True, 0.9, seconds=8.0)]  # fmt: skip
-    made = table_of_lengths([HomeOutcome("house:1", 3, 3, tuple(placed))])
-    assert [(row[1], row[2], row[4], row[6]) for row in made["rows"]] == [
-        ("1 to 3", 2, 50.0, 100.0), ("6 and more", 1, 0.0, 0.0)
-    ]  # fmt: skip
-
-
 def test_the_regions_are_counted_by_what_they_promise() -> None:
     placed = [Placed("mono", 0.1, True, begin) for begin in (0.0, 0.45, 0.5, 0.93)]
     made = table_of_regions([HomeOutcome("house:1", 4, 4, (*placed, Placed("nearest thing", 1.0, True)))])
@@ -93,38 +79,6 @@ def test_the_regions_are_counted_by_what_they_promise() -> None:
     held = dict(zip(made["columns"], row, strict=True))
     assert (held["by"], held["sounds"], held["in 10 % region %"]) == ("mono", 4, 25.0)
     assert [held[f"in {share} % region %"] for share in (40, 50, 90, 95)] == [25.0, 50.0, 75.0, 100.0]
-
-
-def heard_while_driving(folder: Path, source_m: np.ndarray) -> tuple[AudioTrack, Trajectory]:
-    """Return noise that falls with the distance from a source, as one microphone hears it on a straight drive."""
-    rate_hz, array = 16_000, microphones_named("mono")
-    stamps_s = np.linspace(0.0, 4.0, 41)
-    poses = np.tile(np.eye(4), (41, 1, 1))
-    poses[:, :3, :3] = [[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]
-    poses[:, 0, 3] = np.linspace(0.0, 2.0, 41)
-    walk, at_s = Trajectory(stamps_s, poses), np.arange(4 * rate_hz) / rate_hz
-    away = np.linalg.norm(array.in_world_m(walk.at(at_s[::160]))[:, 0] - source_m, axis=1)
-    rng = np.random.default_rng(0)
-    heard = 1e-5 * rng.standard_normal(len(at_s))
-    loud = at_s > 1.0
-    heard[loud] += (0.02 * rng.standard_normal(len(at_s)) * 10.0 ** (against_1_m_db(np.repeat(away, 160), 0.6) / 20.0))[
-        loud
-    ]
-    write_channels(folder / "mono.flac", ChannelSound(heard[None].astype(np.float32), rate_hz))
-    return with_microphones(AudioTrack.open(folder / "mono.flac"), array), walk
-
-
-@pytest.mark.parametrize("away_m", [0.5, 2.0])
-def test_a_known_loudness_tells_near_from_far(away_m: float, tmp_path: Path) -> None:
-    true = np.array([1.0, away_m, 0.0])
-    track, walk = heard_while_driving(tmp_path, true)
-    place = np.array([[1.0, y, 0.0] for y in (0.5, 2.0)], np.float32)
-    none = np.zeros((1, 2), np.float16)
-    before = SourceEvidence(place, np.full(2, 0.5, np.float32), none, none, np.zeros(1, np.uint8), np.ones(1, np.int64))
-    after = loudness_known(track, walk, (1.0, 4.0), true, before, 0, np.random.default_rng(1))
-    assert int(np.argmax(after.heard[0])) == int(away_m > 1.0)
-    assert after.heard[0].min() > -4.0, "in a room it says little"
-    assert not before.heard.any()
 
 
 def test_what_was_mended_is_told_and_refusals_are_counted() -> None:

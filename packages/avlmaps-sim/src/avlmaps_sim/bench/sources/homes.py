@@ -35,7 +35,6 @@ from avlmaps.recordings.types import Recording
 from avlmaps_sim.bench.harness.factors import outline_away_m
 from avlmaps_sim.bench.sources.arrays import ARRAYS, RECORDED, track_of
 from avlmaps_sim.bench.sources.calibrated import Wrong, calibrated
-from avlmaps_sim.bench.sources.loudness import loudness_known
 from avlmaps_sim.hearing.acoustic import AcousticSettings
 from avlmaps_sim.hearing.directions import said_directions
 from avlmaps_sim.hearing.impulse import Acoustics
@@ -45,8 +44,6 @@ from avlmaps_sim.truth import HeardEvent, Truth, read_truth
 
 SNR_DB = 20.0
 DEVICE, GIVEN, REFINED = "a device's directions", "square4, put wrong", "square4, put wrong, calibrated"
-LOUDNESS = "mono, loudness known"
-"""What the loudness of a sound would be worth, were it known: see ``loudness.py``."""
 WAYS = (*ARRAYS, DEVICE)
 """What places sounds with and without the lexicon; the other two show what calibration is worth."""
 _OUTLIERS = 0.03
@@ -227,10 +224,6 @@ class _Home:
                     name = f"{way}, lexicon" if prior else way
                     one = known.joined([row], event.category, prior)
                     placed.append(self._placed(name, known, one, event, true[index], truth, things, each_s))
-                if way == "mono":
-                    louder = loudness_known(track, walk, spans[row], true[index], evidence, row, rng)
-                    one = SourceMap.of(self.avlmap, louder).joined([row], event.category, prior=False)
-                    placed.append(self._placed(LOUDNESS, known, one, event, true[index], truth, things, each_s))
         for index, row in pairs:
             robot = heard.track[heard.track_offsets[row] : heard.track_offsets[row + 1]]
             placed += baselines(played.events[index], true[index], truth.areas, things, robot)

@@ -12,17 +12,15 @@ from avlmaps_sim.bench.harness.intervals import in_percent, median_interval, wil
 from avlmaps_sim.bench.harness.workers import side_by_side
 from avlmaps_sim.bench.output import Table
 from avlmaps_sim.bench.sources import measured, sweep
-from avlmaps_sim.bench.sources.homes import GIVEN, LOUDNESS, REFINED, WAYS, HomeJob, HomeOutcome, Placed, measure_home
-from avlmaps_sim.bench.sources.loudness import KNOWN_DB
+from avlmaps_sim.bench.sources.homes import GIVEN, REFINED, WAYS, HomeJob, HomeOutcome, Placed, measure_home
 from avlmaps_sim.scenes import open_scene
 
 HOMES = tuple(f"house:{seed}:held-out" for seed in range(1_000_000, 1_000_010))
 _ROWS = (
-    *(name for way in WAYS for name in (way, f"{way}, lexicon")), LOUDNESS, GIVEN, REFINED,
+    *(name for way in WAYS for name in (way, f"{way}, lexicon")), GIVEN, REFINED,
     "robot's place (the paper)", "nearest thing", "room's middle",
 )  # fmt: skip
 _PROMISED = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
-_LENGTHS_S = ((0.0, 1.0), (1.0, 3.0), (3.0, 6.0), (6.0, np.inf))
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +55,7 @@ def run_sources(settings: SourcesBench, out: Path, seed: int) -> dict[str, Table
     )
     homes = [outcome for own in each for outcome in own]
     tables: dict[str, Table] = {
-        "homes": table_of_homes(homes), "regions": table_of_regions(homes), "by length": table_of_lengths(homes),
+        "homes": table_of_homes(homes), "regions": table_of_regions(homes),
         "mended": table_of_mended(homes),
     }  # fmt: skip
     if room is not None:
@@ -79,8 +77,7 @@ def table_of_homes(homes: Sequence[HomeOutcome]) -> Table:
     ]  # fmt: skip
     note = (
         f"{heard} of {count} sounds of {len(specs)} homes were detected; the others count nowhere. Kinds are drawn "
-        'for each home, in two sets on each walk. "said": the mean probability of the truth within 0.5 m. "loudness '
-        f'known": that at 1 m by the truth, but for {KNOWN_DB:g} dB: a bound, which no option reaches.'
+        'for each home, in two sets on each walk. "said": the mean probability of the truth within 0.5 m.'
     )
     return {"columns": columns, "rows": [row for row in rows if row[1]], "note": note}
 
@@ -96,26 +93,6 @@ def table_of_regions(homes: Sequence[HomeOutcome]) -> Table:
             rows.append([way, len(own), *(round(percent, 1) for percent in held)])
     columns = ["by", "sounds", *(f"in {100.0 * share:g} % region %" for share in _PROMISED)]
     return {"columns": columns, "rows": rows, "note": f"A region is of whole cells of {CELL_M:g} m, at least one."}
-
-
-def table_of_lengths(homes: Sequence[HomeOutcome]) -> Table:
-    """Return how often the regions hold the truth, by the length of the sound."""
-    every = [one for home in homes for one in home.placed if one.array in WAYS]
-    rows: list[list[object]] = []
-    for way in WAYS:
-        for low, high in _LENGTHS_S:
-            own = [one for one in every if one.array == way and low <= one.seconds < high]
-            if not own:
-                continue
-            in_50, in_90 = (sum(one.is_in(share) for one in own) for share in (0.5, 0.9))
-            rows.append([
-                way, f"{low:g} to {high:g}" if np.isfinite(high) else f"{low:g} and more", len(own),
-                round(float(np.median([one.error_m for one in own])), 2),
-                round(100.0 * in_50 / len(own), 1), in_percent(wilson(in_50, len(own))),
-                round(100.0 * in_90 / len(own), 1), in_percent(wilson(in_90, len(own))),
-            ])  # fmt: skip
-    columns = ["by", "seconds", "sounds", "median error m", "in 50 % region %", "95 %", "in 90 % region %", "95 %"]
-    return {"columns": columns, "rows": rows}
 
 
 def table_of_mended(homes: Sequence[HomeOutcome]) -> Table:
