@@ -213,3 +213,22 @@ def test_a_goal_after_the_end_of_ours_is_not_taken_for_it():
     watch.beat("avlmaps-0a over", 1.0)
     watch.active("navigate_to_pose", ["ff"], 1.5)
     assert not watch.due(9.0)
+
+
+def test_the_watchdog_of_the_package_needs_nothing_but_ros():
+    """As ``pip install --no-deps`` puts it on a robot."""
+    hidden = "import sys; sys.modules.update(dict.fromkeys(['numpy', 'msgspec', 'jaxtyping', 'roslibpy', 'avlmaps']))"
+    done = subprocess.run([sys.executable, "-c", f"{hidden}; import avlmaps_ros.watchdog"], check=False)
+    assert done.returncode == 0
+
+
+def test_a_ros_that_lacks_a_package_is_told_in_one_sentence(monkeypatch, capsys):
+    def lacks(*_: object) -> None:
+        raise ImportError("No module named 'std_msgs'")
+
+    monkeypatch.setattr(watchdog, "find_spec", lambda _: object())
+    monkeypatch.setattr(watchdog, "run_ros2", lacks)
+    with pytest.raises(SystemExit) as ended:
+        main(["avlmaps-watchdog"])
+    assert ended.value.code == 2
+    assert "lacks a package of ROS (No module named 'std_msgs')" in capsys.readouterr().err

@@ -1,10 +1,22 @@
-"""Driving real robots: Nav2 (ROS 2) and move_base (ROS 1) over rosbridge, Nav2 natively too."""
+"""Driving real robots: Nav2 (ROS 2) and move_base (ROS 1) over rosbridge, Nav2 natively too.
 
-from avlmaps_ros.base import RosDriver
-from avlmaps_ros.frames import Frames, GroundTransform
-from avlmaps_ros.opening import MoveBaseDriver, Nav2Driver, open_ros_driver
-from avlmaps_ros.settings import RosSettings
-from avlmaps_ros.transports import RosKind
+Each public name is imported when it is first used: the watchdog runs where there is nothing but ROS.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from avlmaps_ros.base import RosDriver
+    from avlmaps_ros.frames import Frames, GroundTransform
+    from avlmaps_ros.opening import MoveBaseDriver, Nav2Driver, open_ros_driver
+    from avlmaps_ros.settings import RosSettings
+    from avlmaps_ros.transports import RosKind
+
+_PLACES = {
+    "Frames": "frames", "GroundTransform": "frames", "MoveBaseDriver": "opening", "Nav2Driver": "opening",
+    "RosDriver": "base", "RosKind": "transports", "RosSettings": "settings", "open_ros_driver": "opening",
+}  # fmt: skip
 
 __all__ = [
     "Frames",
@@ -16,3 +28,9 @@ __all__ = [
     "RosSettings",
     "open_ros_driver",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _PLACES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_PLACES[name]}"), name)
