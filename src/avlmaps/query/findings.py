@@ -13,6 +13,7 @@ import msgspec
 import numpy as np
 
 from avlmaps.core.arrays import Int
+from avlmaps.core.errors import MapError
 from avlmaps.core.version import __version__
 from avlmaps.query.floor_plan import FloorPlan
 from avlmaps.query.instances import Instances, Segmentation
@@ -35,14 +36,20 @@ _CLOSEST = ("best", "best_word", "second", "second_word")
 
 
 def with_findings(avlmap: "AVLMap") -> "AVLMap":
-    """Return a map on the disk with its findings: those that it has, or what is found now and stored in its folder."""
+    """Return a map on the disk with its findings: those that it has, or what is found now and stored in its folder.
+
+    Where the folder cannot be written, the map is returned as it is, and what a question needs is found then.
+    """
     from avlmaps.maps.store.folder import add_findings, read
 
     stored = avlmap.stored
     found = {} if stored.data.findings else avlmap.found()
     if not found:
         return avlmap
-    add_findings(stored.path, found)
+    try:
+        add_findings(stored.path, found)
+    except MapError:
+        return avlmap
     return avlmap.of_data(read(stored.path))
 
 
