@@ -1,5 +1,8 @@
 """The gate: what is no order, to the robot, now, moves nothing, whoever would read it."""
 
+import csv
+from pathlib import Path
+
 import pytest
 
 from avlmaps.language.chat import ChatSettings, ChatTranslator
@@ -7,6 +10,7 @@ from avlmaps.language.commands import UnclearError, read_command
 from avlmaps.language.gate import no_order
 from avlmaps.language.learned_translator import LearnedTranslator
 
+HELD_OUT = Path(__file__).parent / "commands" / "gate_held_out.tsv"
 NO_ORDERS = {
     "cancelled": ["cancel the visit to the sofa", "never mind going to the bed", "Don't bother driving to the desk."],
     "postponed": ["postpone the drive to the sofa", "I may send you to the kitchen later"],
@@ -15,6 +19,7 @@ NO_ORDERS = {
     "other": ["Alexa, go to the kitchen", "the other robot should go to the bed"],
     "wished": ["I wish you could go to the bed", "You should have gone to the kitchen."],
     "sarcastic": ["as if you could go to the bed", "Good luck going to the sofa"],
+    "unsure": ["Tomorrow is kitchen day for you, little robot", "Granddad keeps yelling go to the shed"],
     "crossed": ["go to the sofa ❌", "👎 go to the bed"],
 }
 ORDERS = [
@@ -52,3 +57,10 @@ def test_an_order_passes(text: str) -> None:
 def test_no_model_is_asked_to_write_a_danger(text: str) -> None:
     with pytest.raises(UnclearError, match="hurt"):
         ChatTranslator(ChatSettings(base_url="http://127.0.0.1:9", model="none")).program_for(text)
+
+
+def test_sentences_that_the_network_never_saw_are_told_apart() -> None:
+    with HELD_OUT.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file, delimiter="\t"))
+    closed = [row["is"] for row in rows if no_order(row["sentence"]) is not None]
+    assert closed.count("no") >= 90 and closed.count("order") <= 5  # of 100 and 60; 93 and 3 when it was fitted

@@ -45,11 +45,20 @@ READ = {
     "what areas are there": (Listed.NAMES, "rooms", False),
     "what was the first sound you you heard today": (Listed.SOUND_BY_TIME, "", True),
     "which room is the biggest question mark": (Listed.ROOM_BY_SIZE, "", False),
+    "when did you hear the phone?": (Listed.HEARD, "phone", False),
+    "when did the phone ring": (Listed.HEARD, "phone ring", False),
+    "at what time was the doorbell heard": (Listed.HEARD, "doorbell", False),
+    "how often did you hear a dog barking": (Listed.HEARD, "dog barking", False),
+    "what did you hear in the kitchen?": (Listed.HEARD, "kitchen", False),
+    "list the sounds in the bathroom": (Listed.HEARD, "bathroom", False),
+    "in which room did you hear the siren": (Listed.HEARD, "siren", False),
+    "did the glass break before the phone rang?": (Listed.HEARD, "glass break", False),
 }
 OTHER = [
     "the chair near the sofa", "bed", "where is the kitchen", "what is in the fridge?", "how many chairs are there",
     "where can I sit?", "the sound of a dog", "what is near this photo", "the room near the sound of water",
     "all objects within 3 m of the desk", "the room that has the sofa", "what is the state of the lamp",
+    "when did the parcel come", "did you eat before lunch", "what did you hear in the story",
     "the biggest chair", "is there a sofa in the kitchen?", "what is the color of the sofa",
 ]  # fmt: skip
 
@@ -59,7 +68,7 @@ def test_a_question_to_the_lists_is_read(text: str) -> None:
     found = read_list(text)
     assert found is not None
     assert (found.of, found.name, found.first) == READ[text]
-    assert found.counts == text.startswith("how many")
+    assert found.counts == text.startswith(("how many", "how often"))
 
 
 @pytest.mark.parametrize("text", OTHER)

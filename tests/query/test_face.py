@@ -92,6 +92,17 @@ def test_a_place_to_count_from_leaves_a_list_in_its_own_order(m: avlmaps.AVLMap)
         assert near.notes == (*alone.notes, _OF_A_LIST)
 
 
+def test_what_was_heard_and_when_is_answered_with_times(m: avlmaps.AVLMap) -> None:
+    sounds = sorted(m.sounds(), key=lambda sound: sound.onset_s)
+    assert sounds
+    for sound in sounds:
+        answer = m.ask(f"when did you hear {sound.names[0]}")
+        assert answer.count and f"at {sound.onset_s:.1f} s" in answer.text
+        assert m.ask(f"how often did you hear {sound.names[0]}?").count == answer.count
+    other = m.ask("when did you hear a volcano")
+    assert not other.found and other.count == 0 and sounds[0].names[0] in other.text
+
+
 def test_heat_is_an_array_and_has_arithmetic(m: avlmaps.AVLMap) -> None:
     chair, sound = m.object("chair"), m.sound("dog bark")
     heat = 0.7 * chair + 0.3 * sound

@@ -21,15 +21,12 @@ from avlmaps.language.intents import (
     on_targets,
     targets_of,
 )
-from avlmaps.language.learned.decision import Decision, Weighed, decided
+from avlmaps.language.learned.decision import Weighed, decided
 from avlmaps.language.learned.forbidden import forbidden, is_stop
-from avlmaps.language.learned.limits import ReadingLimits
 from avlmaps.language.learned.name_resolver import EXAMPLE, REFUSALS, NameResolver, weighed
-from avlmaps.language.learned.parts import by_parts
 from avlmaps.language.learned.reader import LearnedReader, learned_reader
-from avlmaps.language.lexer import Token, tokenise
+from avlmaps.language.lexer import tokenise
 from avlmaps.language.own_names import StandIns, stand_ins
-from avlmaps.language.rephrase import behind_remark
 from avlmaps.language.sentence import Attachments, Sentence
 from avlmaps.language.storey_words import SaidStorey, said_storeys
 from avlmaps.language.verbalise import verbalise
@@ -69,7 +66,7 @@ class Command:
         intents: what to do; one refusal or question where the robot may not drive.
         notes: one sentence each: how words were taken, and what has no effect.
         readings: all readings that were weighed, the likeliest first.
-        why: ``read``, ``parts``, ``danger``, ``stop``, ``unsure``, ``words`` where single words decide, or ``gate``
+        why: ``read``, ``danger``, ``stop``, ``unsure``, ``words`` where single words decide, or ``gate``
             where the sentence may be no order.
     """
 
@@ -140,11 +137,6 @@ def _read(text: str, given: Attachments | None) -> Command:
     if stop is not None:
         stop = Refuse(stop.reason, REFUSALS[stop.reason]) if isinstance(stop, Refuse) else stop
         return Command((stop,), (), (), "words")
-    order = behind_remark(sentence.tokens)
-    if order is not None:
-        said = _read(text[order:], given)
-        remark = f"'{text[:order].strip(' ,;.:')}' is taken as a remark: it is not where to go."
-        return replace(said, notes=(remark, *said.notes))
     storeys = said_storeys(text)
     if storeys:
         named = _on_storey(text, storeys, given)
@@ -158,7 +150,7 @@ def _read(text: str, given: Attachments | None) -> Command:
     if not readings:
         question = Clarify(f"I do not understand this. Say it like: {EXAMPLE}.")
         return Command((question,), (), (), "unsure")
-    answer = answered(sentence, readings, reader, reader.limits)
+    answer = decided(readings, reader.limits)
     notes = (*sentence.notes, *_without_effect(sentence), *answer.notes, *_lost_sides(answer.intents, sentence))
     return Command(answer.intents, tuple(dict.fromkeys(notes)), readings, answer.why)
 
@@ -190,19 +182,6 @@ def _on_storey(text: str, storeys: Sequence[SaidStorey], given: Attachments | No
 def weighed_readings(sentence: Sentence, reader: LearnedReader) -> tuple[Weighed, ...]:
     """Return the readings of a command, checked, the likeliest first; none where it has no word or too many."""
     return tuple(weighed(read, NameResolver(sentence)) for read in reader.command(sentence.tokens))
-
-
-def answered(sentence: Sentence, readings: Sequence[Weighed], reader: LearnedReader, limits: ReadingLimits) -> Decision:
-    """Return what to do of the readings of a command; where none is likely enough, its sentences are read apart."""
-    answer = decided(readings, limits)
-    if answer.why != "unsure":
-        return answer
-
-    def read(part: list[Token]) -> list[Weighed]:
-        return [weighed(each, NameResolver(sentence, part)) for each in reader.command(part)]
-
-    same = by_parts(sentence.tokens, readings, read)
-    return answer if same is None else Decision(same.intents, "parts", same.notes)
 
 
 def _without_effect(sentence: Sentence) -> list[str]:

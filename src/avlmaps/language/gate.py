@@ -1,9 +1,11 @@
 """Whether a sentence is an order, to the robot, now: decided before anything that could move it.
 
-`gate.toml` has a row for each plain case ("cancel ...", "my brother went ..."). Asking back costs a second, and a drive
-costs more.
+`gate.toml` has a row for each plain case ("cancel ...", "my brother went ..."). Of the others a small network says how
+likely one is no order: three layers of a model of English, fitted to such sentences (`training/language/gate`). Asking
+back costs a second and a drive costs more, so the limit is below one half.
 """
 
+import json
 import re
 import tomllib
 from collections.abc import Sequence
@@ -11,7 +13,18 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 
+import numpy as np
+
+from avlmaps.core.errors import BackendError
 from avlmaps.language.lexer import tokenise
+from avlmaps.language.rephrase import said_to_it
+from avlmaps.perception.embedded.words import WordPieces
+from avlmaps.perception.models.networks import open_network
+
+_ORDER = "order"
+_UNSURE = "Is this an order, to me, now?"
+_MOST_PIECES = 64
+_WORD = re.compile(r"[a-z]+|\d+|[^\w\s]")
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,12 +33,14 @@ class NoOrder:
 
     Attributes:
         kind: the kind of its row: ``cancelled``, ``postponed``, ``asked``, ``reported``, ``other`` (said to somebody
-            else), ``wished``, ``sarcastic`` or ``crossed``.
+            else), ``wished``, ``sarcastic`` or ``crossed``; ``unsure`` where the network says so.
         answer: one sentence that says why nothing is driven.
+        probability: that it is no order.
     """
 
     kind: str
     answer: str
+    probability: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,11 +52,17 @@ class _Row:
 
 def no_order(text: str) -> NoOrder | None:
     """Return why a sentence may be no order, to the robot, now; None where it is one."""
-    said = " ".join(token.text for token in tokenise(text))
-    for row in _rows():
-        if row.says.search(said):
-            return NoOrder(row.kind, row.answer)
-    return None
+    tokens = tokenise(text)
+    said = " ".join(token.text for token in tokens)
+    # What is said of the robot ("send the rover to the door") is judged as if it were said to it.
+    ordered = " ".join(token.text for token in said_to_it(tokens))
+    closed = (NoOrder(row.kind, row.answer) for row in _rows() if row.kind != _ORDER and row.says.search(said))
+    found = next(closed, None)
+    if found is not None or any(row.says.search(ordered) for row in _rows() if row.kind == _ORDER):
+        return found
+    judge = _judge()
+    probability = judge.probability(text if ordered == said else ordered)
+    return NoOrder("unsure", _UNSURE, probability) if probability > judge.limit else None
 
 
 @cache
@@ -58,3 +79,36 @@ def _rows() -> Sequence[_Row]:
         return re.compile(row)
 
     return [_Row(kind, of["answer"], compiled(row)) for kind, of in book.items() for row in of["rows"]]
+
+
+class _Judge:
+    """The network that says how likely a sentence is no order.
+
+    Attributes:
+        limit: from this probability on, a person is asked.
+    """
+
+    def __init__(self) -> None:
+        folder = files("avlmaps.language.learned").joinpath("weights")
+        try:
+            facts = json.loads(folder.joinpath("gate.json").read_text(encoding="utf-8"))
+            self._network = open_network(folder.joinpath("gate.onnx").read_bytes())
+        except (OSError, ValueError) as fault:
+            raise BackendError(f"The gate of commands lacks its files ({fault}); install the package again.") from fault
+        self._pieces, self.limit = WordPieces(facts["pieces"]), float(facts["limit"])
+
+    def probability(self, text: str) -> float:
+        """Return how likely a sentence is no order; pictures in it say nothing."""
+        rows = self._pieces.rows
+        plain = text.lower().replace("’", "'").encode("ascii", "ignore").decode()
+        found = [row for word in _WORD.findall(plain) for row in self._pieces.rows_of_word(word) or [rows["[UNK]"]]]
+        if not found:
+            return 0.0
+        line = np.array([[rows["[CLS]"], *found[:_MOST_PIECES], rows["[SEP]"]]], np.int64)
+        (logit,) = self._network.run(None, {"pieces": line})
+        return float(1.0 / (1.0 + np.exp(-logit[0])))
+
+
+@cache
+def _judge() -> _Judge:
+    return _Judge()

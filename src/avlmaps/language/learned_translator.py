@@ -10,7 +10,7 @@ from avlmaps.language.verbalise import verbalise
 
 __all__ = ["LearnedTranslator", "UnclearError", "command_to_program", "explanation"]
 _WHY = {
-    "read": "a reading that is likely enough", "parts": "its sentences, each certain alone",
+    "read": "a reading that is likely enough",
     "danger": "a refusal for safety",
     "stop": "the likeliest reading, which stops",
     "words": "single words, which no reading can outweigh",

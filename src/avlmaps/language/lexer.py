@@ -263,11 +263,6 @@ def is_unit(tokens: Sequence[Token], at: int) -> bool:
     return at < len(tokens) and any(_unit(list(tokens), at, units) for units in (LENGTHS, _ANGLES, _TIMES))
 
 
-def is_run_on(token: Token) -> bool:
-    """Return whether a token is figures that are no one number: "1.2.3", "1-2", "1,000"."""
-    return token.kind == "word" and token.text[:1].isdigit() and token.text[-1:].isdigit()
-
-
 def is_measure(tokens: list[Token], at: int) -> bool:
     """Return whether a distance, an angle or a time begins at a token."""
     return any(read(tokens, at) for read in (length_at, angle_at, duration_at))

@@ -5,13 +5,13 @@ knows a map.
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.language.lexer import without_spoken_end
-from avlmaps.language.names import mended
+from avlmaps.language.names import mended, sounding_words
 from avlmaps.language.own_names import OwnName, stand_ins
 
 NUMBERS = {
@@ -20,7 +20,7 @@ NUMBERS = {
 }  # fmt: skip
 SUPPORTED = (
     "where things, sounds, rooms and photos are, how many there are, what is in a room or next to a thing, which room "
-    "a thing or a photo is in, the largest or smallest room, the first or last sound, and of a map of several days "
+    "a thing or a photo is in, the largest or smallest room, when and how often a sound was heard, and of several days "
     "what is new, gone or moved, where a thing was last seen and what is usual"
 )
 """What a map answers, for the sentence that refuses another question."""
@@ -37,6 +37,7 @@ class Listed(StrEnum):
     NAMES = "all rooms, sounds or things"
     CHANGES = "what is new, gone or moved"
     LAST_SEEN = "where a thing was last seen"
+    HEARD = "when, where and how often a sound was heard"
     USUAL = "what is usually somewhere, or where a thing usually is"
 
 
@@ -51,7 +52,9 @@ class ListQuestion:
         counts: whether only the number is sought.
         since: the day after which changes count, as it was said; "" for the first.
         change: ``new``, ``gone`` or ``moved``; "" for any change.
-        how: of ``USUAL``, ``on``, ``in`` or ``near`` the name; "" where the thing of that name usually is.
+        how: of ``USUAL``, ``on``, ``in`` or ``near`` the name; "" where the thing of that name usually is. Of ``HEARD``
+            ``before`` or ``after`` another sound, ``in`` the room of that name; "" for a sound's times.
+        other: of ``HEARD``, the other sound.
     """
 
     of: Listed
@@ -61,6 +64,7 @@ class ListQuestion:
     since: str = ""
     change: str = ""
     how: str = ""
+    other: str = ""
 
 
 _POLITE = re.compile(
@@ -128,7 +132,22 @@ _USUAL_THING = (
     rf"{_ARTICLE}(?P<seen>.+)",
     rf"where (?:does|do) {_ARTICLE}(?P<seen>.+?) {_USUALLY} (?:stand|lie|live|hang|go|belong|sit|stay)",
 )
+_DID_HEAR = r"(?:(?:did|have|do|could) (?:you|we|i) (?:hear|heard|record|recorded|notice)|was heard|were heard)"
+_ROOM_WHERE = r"(?:in |from )?(?:which|what) rooms?"
+_TIMES = r"(?:when|at (?:what|which) times?|(?P<counts>how often|how many times))"
+_OF_HEARD = (
+    rf"{_TIMES} {_DID_HEAR} {_ARTICLE}(?P<heard>.+)",
+    rf"{_TIMES} (?:was|were|is) {_ARTICLE}(?P<heard>.+?) (?:heard|recorded|audible|to be heard)",
+    rf"{_TIMES} did {_ARTICLE}(?P<sounded>.+)",
+    rf"{_ROOM_WHERE} {_DID_HEAR} {_ARTICLE}(?P<heard>.+?)(?: in)?",
+    rf"{_ROOM_WHERE} (?:was|were) {_ARTICLE}(?P<heard>.+?) (?:heard|recorded)(?: in)?",
+    rf"did (?:you hear )?{_ARTICLE}(?P<heard>.+?) (?P<how>before|after) {_ARTICLE}(?P<other>.+)",
+    rf"(?:what|which)(?: sounds?| noises?)? {_DID_HEAR} (?:{_IN}) {_ARTICLE}(?P<room>.+)",
+    rf"(?:what|which)(?: sounds?| noises?)? (?:is|are|was|were) heard (?:{_IN}) {_ARTICLE}(?P<room>.+)",
+    rf"(?:all )?(?:the )?(?:sounds?|noises?)(?: is)?(?: (?:you )?heard)? (?:{_IN}|of|from) {_ARTICLE}(?P<room>.+)",
+)
 _PATTERNS: tuple[tuple[Listed, str], ...] = (
+    *((Listed.HEARD, pattern) for pattern in _OF_HEARD),
     (Listed.USUAL, rf"what(?: {_STUFF})? (?:is|are|stands|lies) {_USUALLY}{_PUT} {_HOW_USUAL} {_ARTICLE}(?P<place>.+)"),
     (Listed.USUAL, rf"what(?: {_STUFF})? {_USUALLY} (?:is|are|stands|lies){_PUT} {_HOW_USUAL} {_ARTICLE}(?P<place>.+)"),
     (
@@ -198,7 +217,7 @@ _NO_NAMES = frozenset({"i", "you", "we", "have", "has", "do", "is", "are", "was"
 _PHOTO = re.compile(r"\b(?:photo|picture|image|snapshot|photograph|pic)\b")
 
 
-def read_list(text: str, own: Sequence[OwnName] = ()) -> ListQuestion | None:
+def read_list(text: str, own: Sequence[OwnName] = ()) -> ListQuestion | None:  # noqa: C901 - a case for each kind
     """Return the question to the lists that a sentence is; None where it is another one."""
     stand = stand_ins(text, own)
     if stand.own:
@@ -210,6 +229,11 @@ def read_list(text: str, own: Sequence[OwnName] = ()) -> ListQuestion | None:
         if found is None:
             continue
         said = found.groupdict()
+        if of is Listed.HEARD:
+            question = _heard(said)
+            if question is None:
+                continue
+            return question
         how = _how_of(said.get("how") or "")
         if of is Listed.CHANGES or how == "in":
             said["room"] = said.pop("place")
@@ -228,6 +252,25 @@ def read_list(text: str, own: Sequence[OwnName] = ()) -> ListQuestion | None:
         change = next((one for one, words in _CHANGED.items() if re.fullmatch(words, said.get("change") or "")), "")
         return ListQuestion(of, name, bool(said.get("first")), bool(said.get("counts")), since, change, how)
     return None
+
+
+def _heard(said: Mapping[str, str | None]) -> ListQuestion | None:
+    """Return the question about a sound, or about the sounds of a room; None where it is about neither."""
+    room = said.get("room")
+    if room:
+        known = lexicon().find(mended(room) or room, EntryKind.ROOM) is not None
+        return ListQuestion(Listed.HEARD, mended(room) or room, how="in") if known else None
+    name, other = said.get("heard") or said.get("sounded") or "", said.get("other") or ""
+    if _TAIL.search(f"{name} {other}") is not None:  # "... near the buffet" is read by the networks
+        return None
+    verbs = said.get("sounded") or other  # "when did the phone ring", and no "when did the parcel come"
+    if verbs and not all(sounding_words().intersection(one.split()) or _is_sound(one) for one in (name, other) if one):
+        return None
+    return ListQuestion(Listed.HEARD, name, counts=bool(said.get("counts")), how=said.get("how") or "", other=other)
+
+
+def _is_sound(name: str) -> bool:
+    return lexicon().head(name, EntryKind.SOUND) is not None
 
 
 def _how_of(said: str) -> str:

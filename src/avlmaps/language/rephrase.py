@@ -1,11 +1,10 @@
 """Words of a command in the order and the person that the networks know: what is said of the robot is said to it.
 
-Eight forms are rewritten, token by token, before a command is read:
+Seven forms are rewritten, token by token, before a command is read:
 
 - what another person should make the robot do: "send the robot to the lab", "tell it to turn left";
 - a time before an order: "in five minutes go to the door", "go to the door in five minutes";
 - a loop as programs have it: "for i in range(3): go to the door";
-- what a thing does by which it is found: "the thing that rings", "the ringing device" are "whatever is ringing";
 - a label as data sets have it: "the object of class lamp", "the sound labelled glass breaking";
 - a point of the compass between the eight: "north north east" is "compass bearing 22.5";
 - parts of turns: "turn one and a half times" is "turn 540 degrees";
@@ -18,7 +17,7 @@ from functools import cache
 
 from avlmaps.language import lexer
 from avlmaps.language.lexer import Token
-from avlmaps.language.names import describes, is_entry, sounding_forms, sounding_thing, third_forms
+from avlmaps.language.names import is_entry
 from avlmaps.language.word_classes import listed, load_word_classes
 
 _ROBOTS = frozenset({"robot", "bot", "machine", "rover", "droid", "vehicle", "unit", "roomba", "turtlebot", "agent"})
@@ -51,45 +50,16 @@ _LABELLED = frozenset({"labelled", "labeled", "tagged", "named", "called", "titl
 _LABELS = frozenset({"class", "type", "label", "category", "tag", "name"})
 _SOUNDS = frozenset({"sound", "noise"})
 _ANY = frozenset({"anything", "something", "one"})
-_WHATEVER = frozenset({"what", "whatever", "whoever"})
-_RELATIVE = frozenset({"that", "which", "who"})
 _CUTS = frozenset({"then", "finally"})
 # Who says what they heard, saw or think, and how: "I think I heard the kettle; go to the kitchen".
-_SPEAKERS = frozenset({"i", "we", "he", "she", "they", "someone", "somebody", "everyone", "everybody"})
-_FAR = 4  # words from who speaks to what they do: "my wife must have heard"
-_ASKED_FOR = _BEFORE | {"can", "could", "would", "will", "so", "kindly", "robot", "maybe", "perhaps", "dear", ","}
 
 
 def rephrased(tokens: Sequence[Token]) -> tuple[list[Token], list[str]]:
     """Return tokens with these forms rewritten, and one sentence for each that a person should know of."""
     notes: list[str] = []
-    found = _unlabelled(_looped(_sounding(_in_degrees(_on_compass(_joined(tokens))))))
-    found = _said_to_it(_other(found, notes))
+    found = _unlabelled(_looped(_in_degrees(_on_compass(_joined(tokens)))))
+    found = said_to_it(_other(found, notes))
     return _waiting_first(found, notes), notes
-
-
-def behind_remark(tokens: Sequence[Token]) -> int | None:
-    """Return where the order begins, in characters, behind what a person heard, saw or thinks; None without both.
-
-    What somebody heard is where to go only where the order names no place of its own: "I heard the phone, go there".
-    """
-    begin = next((at for at, token in enumerate(tokens) if token.text not in _BEFORE | {"well", ",", "robot"}), 0)
-    if begin >= len(tokens) or tokens[begin].text not in _SPEAKERS:
-        begin = begin + 1 if [token.text for token in tokens[begin : begin + 1]] == ["my"] else len(tokens)
-    told = next(
-        (at for at in range(begin, min(begin + _FAR, len(tokens))) if tokens[at].text in listed("remarks")), None
-    )
-    if told is None:
-        return None
-    for at in range(told + 1, len(tokens)):
-        if tokens[at].kind != "punct" and tokens[at].text != "so":
-            continue
-        first = next((i for i in range(at + 1, len(tokens)) if tokens[i].text not in _ASKED_FOR), len(tokens))
-        rest = [token.text for token in tokens[first:]]
-        if rest[:1] and rest[0] in order_words():
-            own = listed("pointing").isdisjoint(rest) and any(map(is_entry, rest))
-            return tokens[first].start if own else None
-    return None
 
 
 def _joined(tokens: Sequence[Token]) -> list[Token]:
@@ -238,39 +208,6 @@ def _named_before(tokens: Sequence[Token]) -> list[str]:
 _NEXT_TO = (["next", "to"], ["close", "to"], ["right", "beside"], ["adjacent", "to"])
 
 
-def _sounding(tokens: Sequence[Token]) -> list[Token]:
-    """Return tokens with "the thing that rings" as "whatever is ringing": rings are things, too."""
-    found: list[Token] = []
-    for token in tokens:
-        before = [one.text for one in found[-2:]]
-        relates = before[-1:] and (
-            before[-1] in _WHATEVER or (before[-1] in _RELATIVE and before[0] in listed("generic"))
-        )
-        relates = relates or (before[-1:] and before[-1] in _RELATIVE and before[0] in listed("nameless"))
-        if relates and token.text in third_forms():
-            found += [_word(token, "is"), _word(token, sounding_forms()[token.text])]
-        else:
-            found.append(token)
-        found = _nameless(found)
-    return found
-
-
-def _nameless(tokens: list[Token]) -> list[Token]:
-    """Return tokens at the end of which "the beeping device", "the thing that is beeping" are "whatever is beeping"."""
-    last = [token.text for token in tokens[-4:]]
-    if sounding_thing(*last[-2:]):
-        begin, sound = len(tokens) - 2, tokens[-2]
-    elif last[1:2] and last[1] in _RELATIVE and last[2:3] == ["is"] and sounding_thing(last[-1], last[0]):
-        begin, sound = len(tokens) - 4, tokens[-1]
-    else:
-        return tokens
-    before = tokens[begin - 1].text if begin else ""
-    if describes(before):  # "the blue beeping thing"
-        return tokens
-    begin -= before in _ARTICLES | {"an", "some", "any"}
-    return [*tokens[:begin], _word(sound, "whatever"), _word(sound, "is"), sound]
-
-
 def _word(like: Token, text: str, kind: str = "word") -> Token:
     return replace(like, text=text, kind=kind)
 
@@ -295,7 +232,8 @@ def order_words() -> frozenset[str]:
     return frozenset(begins - {"the", "a", "be", "is", "to", "you", "your", "in", "on", "and", "with"})
 
 
-def _said_to_it(tokens: list[Token]) -> list[Token]:
+def said_to_it(tokens: list[Token]) -> list[Token]:
+    """Return tokens with what is said of the robot said to it: "send the robot to the lab", "tell it to turn left"."""
     found: list[Token] = []
     at = 0
     while at < len(tokens):

@@ -9,10 +9,12 @@ import numpy as np
 
 from avlmaps.core.arrays import Bool, Float
 from avlmaps.core.errors import QueryError
+from avlmaps.core.inflection import stem_of
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import HeardAt
 from avlmaps.core.wording import the_room
 from avlmaps.language.list_questions import Listed, ListQuestion
+from avlmaps.language.names import sounding_forms
 from avlmaps.query.answer import Answer
 from avlmaps.query.changes import (
     ChangeKind,
@@ -32,7 +34,7 @@ from avlmaps.query.wording import in_words, placed
 
 if TYPE_CHECKING:
     from avlmaps.maps.store.life import Stay
-    from avlmaps.query.contents import Thing
+    from avlmaps.query.contents import SoundEvent, Thing
     from avlmaps.query.queryable import Queryable
 
 BESIDE_M = 1.0  # from box to box, horizontally
@@ -41,6 +43,8 @@ _HANGS = ("wall", "ceiling", "built in")  # such lies on nothing, even over a ta
 _MOST_NAMED = 12
 _LEAST_M2 = 1.0  # of a room; less is a corner that views disagree about
 _NO_SIZE = (0.0, 0.0, 0.0)
+_LIKELY = 0.3  # of a sound's second name
+_ROUND_SOUNDS = frozenset({"the", "a", "an", "of", "sound", "noise", "someone", "somebody", "my", "your", "go", "off"})
 _MOST_SOURCES = 5  # of sounds by time; each costs a density
 
 
@@ -63,6 +67,8 @@ def answer_list(
             return _changes(avlmap, question, top)
         case Listed.LAST_SEEN:
             return _last_seen(avlmap, question.name, top)
+        case Listed.HEARD:
+            return _heard(avlmap, question, top)
         case Listed.USUAL:
             return _usual(avlmap, question, top, ask)
         case Listed.CONTENTS | Listed.BESIDE | Listed.ROOM_OF:
@@ -106,13 +112,67 @@ def _sounds_by_time(avlmap: "Queryable", first: bool) -> tuple[list[Goal], str]:
     sounds = sorted(avlmap.sounds(), key=lambda sound: sound.onset_s if first else -sound.onset_s)
     if not sounds:
         return [], "The map holds no sounds."
-    goals = [
-        Goal(sound.position, score, _NO_SIZE, {}, score, sound.names[0] if sound.names else "sound")
-        for sound in sounds
-        for score in [float(sound.confidences[0]) if sound.confidences else 0.0]
-    ]
+    goals = list(map(_sound_goal, sounds))
     which = "first" if first else "last"
     return goals, placed(f"the {which} sound is the {goals[0].name} at {sounds[0].onset_s:.1f} s, heard", goals[0])
+
+
+def _sound_goal(sound: "SoundEvent") -> Goal:
+    score = float(sound.confidences[0]) if sound.confidences else 0.0
+    return Goal(sound.position, score, _NO_SIZE, {}, score, sound.names[0] if sound.names else "sound")
+
+
+def _heard(avlmap: "Queryable", question: ListQuestion, top: int) -> Answer:
+    """Return when, where and how often a sound was heard, which came first, or what was heard in a room."""
+    sounds = sorted(avlmap.sounds(), key=lambda sound: sound.onset_s)
+    room_of = room_namer(avlmap)
+    if question.how == "in":
+        places = np.array([sound.position for sound in sounds]).reshape(-1, 3)
+        inside = _inside(Whereabouts.of(avlmap), question.name, places) if sounds else []
+        sounds = [sound for sound, is_in in zip(sounds, inside, strict=True) if is_in]
+        told = ", ".join(f"{_sound_goal(sound).name} at {sound.onset_s:.1f} s" for sound in sounds)
+        text = f"In the {question.name} were heard: {told}." if sounds else f"No sound was in the {question.name}."
+        return _answer(avlmap, [_sound_goal(sound) for sound in sounds][:top], text, count=len(sounds))
+    found = [sound for sound in sounds if _is_called(sound, question.name)]
+    goals = [_sound_goal(sound) for sound in found][:top]
+    if not found:
+        names = counted([_sound_goal(sound).name for sound in sounds]) if sounds else "none"
+        return _answer(avlmap, [], f"No {question.name} was heard; the map's sounds: {names}.", count=0)
+    if question.how:
+        others = [sound for sound in sounds if _is_called(sound, question.other)]
+        if not others:
+            return _answer(avlmap, [], f"No {question.other} was heard.")
+        one, other = found[0].onset_s, others[0].onset_s
+        is_so = one < other if question.how == "before" else one > other
+        text = f"{'Yes' if is_so else 'No'}: {question.name} at {one:.1f} s, {question.other} at {other:.1f} s."
+        return _answer(avlmap, goals, text)
+    rooms = [room_of(sound.position) for sound in found]
+    times = [
+        f"at {sound.onset_s:.1f} s{f' in the {room}' if room else ''}" for sound, room in zip(found, rooms, strict=True)
+    ]
+    often = "once" if len(found) == 1 else f"{len(found)} times"
+    text = f"{goals[0].name.capitalize()} was heard {often}: {', '.join(times)}."
+    return _answer(avlmap, goals, text, count=len(found))
+
+
+def _is_called(sound: "SoundEvent", words: str) -> bool:
+    """Return whether one of the likely names of a sound is meant by words: "the phone ring" is "telephone ringing"."""
+    wanted, meant = _stems(words), lexicon().find(words, EntryKind.SOUND)
+    for name, confidence in zip(sound.names, sound.confidences, strict=False):
+        if confidence < _LIKELY and name != sound.names[0]:
+            continue
+        if meant is not None and lexicon().find(name, EntryKind.SOUND) == meant:
+            return True
+        own = _stems(name)
+        if wanted and (wanted <= own or own <= wanted):
+            return True
+    return False
+
+
+def _stems(words: str) -> frozenset[str]:
+    forms = sounding_forms()  # "rang" is "ringing"
+    plain = (word for word in words.lower().replace("telephone", "phone").split() if word not in _ROUND_SOUNDS)
+    return frozenset(stem_of(forms.get(word, word)) for word in plain)
 
 
 def _sources_by_time(avlmap: "Queryable", first: bool) -> tuple[list[Goal], str]:

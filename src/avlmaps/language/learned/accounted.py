@@ -8,15 +8,14 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from avlmaps.language import lexer
-from avlmaps.language.intents import Clarify, RefusalReason, Refuse
+from avlmaps.language.intents import RefusalReason, Refuse
 from avlmaps.language.learned.linear import amount_end
-from avlmaps.language.learned.said import BREAKS, DETERMINERS, LOOKS, PREPOSITIONS, Claimed, Said, words
+from avlmaps.language.learned.said import BREAKS, LOOKS, PREPOSITIONS, Said, words
 from avlmaps.language.lexer import Token
 from avlmaps.language.names import class_words
 
 _CLAUSES = frozenset({"then", "and", "so", "because", "but", "as", "for"})
 _EVENTS = frozenset({"before", "after", "when", "whenever", "once", "while", "whilst", "until", "till"})
-_STAYS = frozenset({"wait", "stay", "remain", "hold", "stand", "still", "put", "pause", "rest"})
 _OVER = frozenset({"over", "across", "onto", "under", "beneath", "underneath", "against", "through", "into", "via"})
 _IS = frozenset({"is", "are", "was", "were", "lies", "sits", "stands", "hides"})
 _BELOW = frozenset({"under", "beneath", "underneath"})
@@ -76,22 +75,6 @@ def _is_put_off(tokens: Sequence[Token]) -> bool:
 
 def _is_to_be_so(after: Sequence[str]) -> bool:
     return any(verb in ("is", "are") and state in words().lists["passable"] for verb, state in pairwise(after))
-
-
-def unaccounted(said: Claimed) -> Clarify | None:
-    """Return the question for a part of the order that the reading has nothing of: "via the garden"."""
-    for at, text in enumerate(said.texts):
-        if at in said.used or text not in words().lists["telling"] | _EVENTS:
-            continue
-        scope = said.scope(at + 1, (BREAKS - _EVENTS) | PREPOSITIONS)
-        about = [said.texts[i] for i in sorted(scope)]
-        if scope & said.used or not set(about) - (DETERMINERS | words().lists["empty"]):
-            continue
-        if text in _EVENTS and not (about[0] in words().lists["doers"] and _STAYS.isdisjoint(said.texts[:at])):
-            continue
-        phrase = said.said(at, scope)
-        return Clarify(f"What is '{phrase}' for? Say where to go, step by step, and nothing else.")
-    return None
 
 
 def has_strange_words(tokens: Sequence[Token], used: frozenset[int]) -> bool:

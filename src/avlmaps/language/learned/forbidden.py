@@ -33,7 +33,7 @@ def forbidden(tokens: Sequence[Token]) -> Clarify | Refuse | None:
         return Refuse(RefusalReason.CONDITION)
     if said.spans("risks") or said.spans("questions"):
         return Refuse(RefusalReason.QUESTION)
-    return circumstance(said) or _timed(said) or _signed(said) or _run_on(said) or _scaled(said)
+    return circumstance(said) or _timed(said) or _signed(said) or _scaled(said)
 
 
 def is_stop(tokens: Sequence[Token]) -> bool:
@@ -124,19 +124,6 @@ def _signed(said: Said) -> Clarify | None:
         left, right = ("turn left", "turn right") if turns else ("move back", "move forward")
         choices = (f"{left} {number}", f"{right} {number}")
         return Clarify(f"What does the sign of {sign}{number} mean? Say {choices[0]} or {choices[1]}.", choices)
-    return None
-
-
-def _run_on(said: Said) -> Clarify | None:
-    """Return the question for figures that are no one number: "1.2.3 m", "1-2 m", "1,000 m", "1 to 2 m"."""
-    tokens = list(said.tokens)
-    for at, token in enumerate(tokens):
-        if lexer.is_run_on(token):
-            return Clarify(f"Which number is '{token.raw}'? Say one, without other marks than a point.")
-        for end, _ in lexer.number_at(tokens, at):
-            if said.texts[end : end + 1] == ("to",) and lexer.is_measure(tokens, end + 1):
-                phrase = " ".join(said.texts[at : amount_end(tokens, end + 1)])
-                return Clarify(f"How much is '{phrase}'? Say one number.")
     return None
 
 

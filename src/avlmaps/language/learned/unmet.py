@@ -28,20 +28,16 @@ from avlmaps.language.intents import (
     Turn,
     VisitEach,
 )  # fmt: skip
-from avlmaps.language.learned.accounted import unaccounted
 from avlmaps.language.learned.answerable import unanswerable
 from avlmaps.language.learned.linear import amount_end
-from avlmaps.language.learned.reported import reported
 from avlmaps.language.learned.said import BREAKS, DETERMINERS, HEARD, LOOKS, PREPOSITIONS, Claimed, Said, words
 from avlmaps.language.learned.ways import directions
 from avlmaps.language.lexer import Token
-from avlmaps.language.names import past_forms, sounding_forms
 from avlmaps.language.rephrase import compass_point
 from avlmaps.perception.embedded.words import is_word
 
 _MOTIONS = frozenset({"go", "drive", "head", "move", "turn", "face", "visit", "come", "do"})
 _ANYTHING = frozenset({"something", "anything", "somewhere", "anywhere", "someplace"})
-_NO_SOUNDS = frozenset({"went", "gone", "going", "snapped", "snapping", "called", "fell", "fallen", "played"})
 _ONLY_ORDERS = frozenset({("skip",), ("skipping",), ("avoid",), ("avoiding",), ("exclude",), ("bypass",), ("never",)})
 _ORDINALS = frozenset({"second", "third", "fourth", "fifth", "last", "next", "previous"})
 _NUMBERED = frozenset({"floor", "class", "storey", "story", "level", "hand"})
@@ -373,20 +369,6 @@ def _unread(said: Claimed) -> Clarify | None:
     return None
 
 
-def _unheard(said: Claimed) -> Clarify | None:
-    """Return the question for a sound that no step uses: "the chair where someone coughed" is not any chair."""
-    kinds = {each.kind for target in said.targets for each in (target, *target.near)}
-    if not kinds.isdisjoint({TargetKind.SOUND, TargetKind.CLIP}):
-        return None
-    for at, text in enumerate(said.texts):
-        before = said.texts[max(0, at - 4) : at]
-        rang = text in past_forms() or (text in sounding_forms().values() and before[-1:] in (("was",), ("were",)))
-        if rang and text not in _NO_SOUNDS and at not in said.used and "where" in before:
-            phrase = " ".join(said.texts[max(0, at - 2) : at + 1])
-            return Clarify(f"What is '{phrase}' for? Say it like: the chair near the sound of {text}.")
-    return None
-
-
 def _amounts(said: Claimed) -> Clarify | None:
     """Return the question for a distance, an angle or a time with its unit that no step uses."""
     tokens = list(said.tokens)
@@ -473,12 +455,12 @@ def _is_count(tokens: list[Token], at: int) -> bool:
 
 _RULES: tuple[Callable[[Claimed], Clarify | Refuse | None], ...] = (
     _away, _picked, _beside_one, _compass, _leaving, _outside, _through, _edges, _no_thing, _excluded, _changed, _ways,
-    _superlatives, _nameless, _unread, _unheard, _amounts, _sides, unaccounted, reported,
+    _superlatives, _nameless, _unread, _amounts, _sides,
 )  # fmt: skip
 
 
 _ASKED: tuple[Callable[[Claimed], Clarify | Refuse | None], ...] = (
-    _picked, _beside_one, _excluded, _changed, _superlatives, _nameless, _unread, _unheard, _amounts, _qualities,
+    _picked, _beside_one, _excluded, _changed, _superlatives, _nameless, _unread, _amounts, _qualities,
 )  # fmt: skip
 
 

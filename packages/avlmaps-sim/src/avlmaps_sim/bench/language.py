@@ -138,6 +138,7 @@ def _list_json(listed: ListQuestion) -> dict[str, Any]:
     """Return a question to the lists as lists of questions have it."""
     name = listed.name
     told: dict[Listed, dict[str, Any]] = {
+        Listed.HEARD: {"heard": name, **({"how": listed.how} if listed.how else {})},
         Listed.ROOM_BY_SIZE: {"rooms": "smallest" if listed.first else "biggest"},
         Listed.SOUND_BY_TIME: {"sounds": "first" if listed.first else "last"},
         Listed.CONTENTS: {"in": {"area": name}},
