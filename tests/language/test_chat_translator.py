@@ -134,9 +134,9 @@ def test_a_program_that_moves_nothing_is_corrected(server: ChatServer) -> None:
 def test_a_model_that_insists_on_asking_alone_is_sent_back_once(server: ChatServer) -> None:
     asks = 'p = robot.get_pos("sofa")'
     server.answer(_block(asks))
-    assert _translator(server).program_for("tell where the sofa is").program == asks
+    assert _translator(server).program_for("find the sofa").program == asks
     assert len(server.asked) == 2
-    assert _translator(server, rounds=0).program_for("tell where the sofa is").program == asks
+    assert _translator(server, rounds=0).program_for("find the sofa").program == asks
     assert len(server.asked) == 3
 
 
