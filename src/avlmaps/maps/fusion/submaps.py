@@ -13,16 +13,13 @@ from avlmaps.core.arrays import Bool, Float, Float32, Float64, Int, Int8, Int32,
 from avlmaps.core.columns import offsets_of
 from avlmaps.core.errors import MapError
 from avlmaps.core.poses import inverse
-from avlmaps.maps.fusion.kernels import sum_moved
+from avlmaps.maps.fusion.kernels import fall_into_cells, sum_moved
 from avlmaps.maps.fusion.voxel_sums import VoxelSums, VoxelTable, VoxelViews, blocks, unit_rows
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.types import Submaps, Voxels
 
 FARTHEST = float((1 << 31) - (1 << 22))  # voxels; indices are int32
 _MOST = (1 << 31) - 1
-_STEPS = 4  # samples along each axis, at most
-_EVEN = 12.0**0.5  # an even spread over a length has a standard deviation of the length over this
-_WITHIN = 0.4999  # voxels: samples go no farther from the middle
 _LEAST_HITS = 0.5  # a voxel gets less than this part of a hit from one that moves: it has none
 _CELLS = 64  # a voxel that moves meets at most three along each axis; four are counted, as a power of two
 _CHUNK = 1 << 15  # voxels whose samples are in memory
@@ -161,22 +158,30 @@ class MovedSubmaps:
                 f"{FARTHEST:.3g}; move the world's origin nearer to the map."
             )
         base = np.floor(middle).astype(np.int64)
-        count, samples = _cells_of(lies, motion[:, :, :3], middle - base)
-        sliver = count * hits[:, None] < _LEAST_HITS * samples[:, None]
+        count = np.zeros((len(lies), _CELLS), np.int32)
+        fall_into_cells(lies, np.ascontiguousarray(motion[:, :, :3]), middle - base, count)
+        sliver = count * hits[:, None] < _LEAST_HITS * count.sum(axis=1)[:, None]
         some = np.any(~sliver & (count > 0), axis=1)
         count[sliver & some[:, None]] = 0
         source, cell = np.nonzero(count)
         share = count[source, cell] / count.sum(axis=1)[source]
         target = base[source] + np.stack([cell >> 4, (cell >> 2) & 3, cell & 3], axis=1) - 1
         distinct, of = _unique_rows(target)
-        to = table.enter(distinct, -np.inf)[of]
-        row = source + chunk.start
-        np.maximum.at(table.last_seen_s, to, np.asarray(submaps.last_seen_s)[row])
-        for sums, values in ((table.weight, submaps.weight), (table.rgb_weight, submaps.rgb_weight)):
-            np.add.at(sums, to, share * np.asarray(values[chunk])[source])
+        rows, row = table.enter(distinct, -np.inf), source + chunk.start
+
+        def summed(values: np.ndarray) -> np.ndarray:
+            return np.bincount(of, share * np.asarray(values)[source], minlength=len(distinct))
+
+        last_seen_s = np.full(len(distinct), -np.inf)
+        np.maximum.at(last_seen_s, of, np.asarray(submaps.last_seen_s)[row])
+        table.last_seen_s[rows] = np.maximum(table.last_seen_s[rows], last_seen_s)
+        table.weight[rows] += summed(submaps.weight[chunk])
+        table.rgb_weight[rows] += summed(submaps.rgb_weight[chunk])
         for colour in range(3):
-            np.add.at(table.rgb_sum[:, colour], to, share * np.asarray(submaps.rgb_sum[chunk, colour])[source])
-        np.add.at(table.sharp, to, (share * np.asarray(submaps.sharp[chunk])[source] + 0.5).astype(np.int64))
+            table.rgb_sum[rows, colour] += summed(submaps.rgb_sum[chunk, colour])
+        sharp = np.floor(share * np.asarray(submaps.sharp[chunk])[source] + 0.5)
+        table.sharp[rows] += np.bincount(of, sharp, minlength=len(distinct)).astype(np.int64)
+        to = rows[of]
         return to, row.astype(np.int32), share.astype(np.float32)
 
     def _features(self, rows: Int[np.ndarray, " k"]) -> Float32[np.ndarray, "k d"]:
@@ -194,33 +199,6 @@ class MovedSubmaps:
         summed = np.empty((len(rows), feature.shape[1]), np.float32)
         sum_moved(starts, np.ascontiguousarray(own), weight.astype(np.float32), feature, summed)
         return summed
-
-
-def _cells_of(
-    lies: Float64[np.ndarray, "n 10"], turn: Float64[np.ndarray, "n 3 3"], off: Float64[np.ndarray, "n 3"]
-) -> tuple[Int[np.ndarray, "n cells"], Int[np.ndarray, " n"]]:
-    """Return how many samples of each voxel fall into each of the cells around where its middle falls, and of how many.
-
-    Args:
-        lies: how its points lie in it, see ``_spread_of``.
-        turn: rotation of each.
-        off: where its middle falls, from the lowest corner of that voxel.
-    """
-    mean, (xx, yx, yy, zx, zy, zz) = lies[:, :3], lies[:, 3:9].T
-    sigma = np.stack([np.sqrt(xx**2 + yx**2 + zx**2), np.hypot(yy, zy), zz], axis=1)
-    steps = np.clip(np.ceil(sigma * _EVEN * _STEPS - 0.2), 1, _STEPS).astype(np.int64)
-    zero = np.zeros_like(xx)
-    factor = np.stack([np.stack(row, axis=1) for row in ((xx, zero, zero), (yx, yy, zero), (zx, zy, zz))], axis=1)
-    count = np.zeros((len(lies), _CELLS), np.int32)
-    for kind in np.unique(steps, axis=0):
-        rows = np.flatnonzero((steps == kind).all(axis=1))
-        lattice = _EVEN * ((np.indices(tuple(kind.tolist())).reshape(3, -1).T + 0.5) / kind - 0.5)
-        within = np.clip(mean[rows, None] + np.einsum("nij,sj->nsi", factor[rows], lattice), -_WITHIN, _WITHIN)
-        place = np.floor(np.einsum("nij,nsj->nsi", turn[rows], within) + off[rows, None]).astype(np.int64) + 1
-        cell = (place[..., 0] << 4 | place[..., 1] << 2 | place[..., 2]) & (_CELLS - 1)
-        flat = (np.arange(len(rows))[:, None] * _CELLS + cell).ravel()
-        count[rows] = np.bincount(flat, minlength=len(rows) * _CELLS).reshape(-1, _CELLS)
-    return count, steps.prod(axis=1)
 
 
 def _unique_rows(index: Int[np.ndarray, "n 3"]) -> tuple[Int32[np.ndarray, "m 3"], Int[np.ndarray, " n"]]:
