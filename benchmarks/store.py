@@ -22,12 +22,12 @@ from tiled import write_tiled
 
 OPEN = """
 import json, resource, sys, time
-from avlmaps.maps.store.folder import damaged_files
-from avlmaps.maps.store.reader import open_stored
+from pathlib import Path
+from avlmaps.maps.store.folder import damaged_files, read
 before = time.perf_counter()
-stored = open_stored(sys.argv[1])
+stored = read(sys.argv[1])
 if sys.argv[2] == "verify":
-    damaged_files(stored.path)
+    damaged_files(Path(sys.argv[1]))
 opened = time.perf_counter()
 rows = stored.voxels.feature[:: max(1, len(stored.voxels) // 5000)].astype("f4").sum()
 print(json.dumps({"open_s": opened - before, "rows_s": time.perf_counter() - opened,

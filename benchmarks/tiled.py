@@ -13,10 +13,9 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from avlmaps.maps.store.folder import write
+from avlmaps.maps.store.folder import read, write
 from avlmaps.maps.store.manifest import MapBounds
 from avlmaps.maps.store.map_data import MapData
-from avlmaps.maps.store.reader import StoredMap, open_stored
 from avlmaps.maps.types import Keyframes, Voxels
 
 GAP = 4  # empty voxels between two copies
@@ -25,7 +24,7 @@ HOLE = 8  # voxels a side of the largest
 EVERY = 4  # keyframes that are copied, every fourth
 
 
-def tiled(source: StoredMap, count: int, seed: int = 0) -> tuple[Voxels, Keyframes]:
+def tiled(source: MapData, count: int, seed: int = 0) -> tuple[Voxels, Keyframes]:
     """Return the voxels and keyframes of a building of ``count`` voxels."""
     rng = np.random.default_rng(seed)
     index = np.asarray(source.voxels.index, np.int64)
@@ -112,7 +111,7 @@ def _joined(frames: list[Keyframes]) -> Keyframes:
 
 def write_tiled(source: Path, out: Path, count: int, seed: int = 0) -> None:
     """Write the map."""
-    stored = open_stored(source)
+    stored = read(source)
     voxels, keyframes = tiled(stored, count, seed)
     info, structs = stored.info, msgspec.structs
     counts = structs.replace(info.counts, voxels=len(voxels), keyframes=len(keyframes))

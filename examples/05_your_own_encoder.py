@@ -25,4 +25,4 @@ class Hues:
 
 encoders = avlmaps.Encoders.named("colours", pixels=Hues())
 m = avlmaps.build_map(sys.argv[1], sys.argv[2], encoders=encoders, progress=False, overwrite=True)
-print(m.object("red").probability, m.stored.info.models["pixels"].id)
+print(m.object("red").probability, m.data.info.models["pixels"].id)

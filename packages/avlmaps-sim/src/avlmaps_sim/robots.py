@@ -54,7 +54,7 @@ def robot_in(avlmap: AVLMap, scene: Scene, shape: BodyShape = BASE, start: Groun
     from avlmaps_sim.body import SimulatedBody
 
     obstacles = obstacles_for(avlmap, shape)
-    cameras = _on_storey(np.asarray(avlmap.stored.keyframes.world_from_camera), obstacles)
+    cameras = _on_storey(np.asarray(avlmap.data.keyframes.world_from_camera), obstacles)
     floor = _floor(scene, cameras)
     _require_same_frame(avlmap, scene, cameras, floor)
     if start is None:
@@ -82,7 +82,7 @@ def _floor(scene: Scene, cameras: Float[np.ndarray, "k 4 4"]) -> int | None:
 
 
 def _require_same_frame(avlmap: AVLMap, scene: Scene, cameras: Float[np.ndarray, "k 4 4"], floor: int | None) -> None:
-    off_deg = float(np.rad2deg(np.arccos(np.clip(avlmap.stored.up_in_world[2], -1.0, 1.0))))
+    off_deg = float(np.rad2deg(np.arccos(np.clip(avlmap.data.up_in_world[2], -1.0, 1.0))))
     if off_deg > _LEVEL_DEG:
         raise SceneError(
             f"The map's world is tilted by {off_deg:.0f}° against the scene's; drive in the scene whose recording the "

@@ -14,6 +14,7 @@ from avlmaps.language.learned_translator import LearnedTranslator
 from avlmaps.language.translator import Translation
 from avlmaps.maps.grid import GridSpec
 from avlmaps.navigate.driver import Arrival
+from avlmaps.perception.encoders import Encoders
 from avlmaps.query.avlmap import AVLMap
 from avlmaps_sim.bench.harness.evidence import Box
 from avlmaps_sim.bench.harness.true_voxels import TrueVoxels
@@ -73,7 +74,8 @@ def known() -> KnownScene:
     up = np.array([0.0, 0.0, 1.0])
     voxels_seen = SimpleNamespace(index=index, hits=np.full(len(index), 9))
     keyframes = SimpleNamespace(world_from_camera=np.eye(4)[None])
-    stored = SimpleNamespace(grid=GRID, voxels=voxels_seen, keyframes=keyframes, up_in_world=up)
+    data = SimpleNamespace(grid=GRID, voxels=voxels_seen, keyframes=keyframes, up_in_world=up)
+    stored = SimpleNamespace(**vars(data), data=data, encoders=Encoders(), path=Path("home.avlmap"))
     events = tuple(
         HeardEvent(float(i), i + 1.0, name, "", (x, y, 1.3), (x, y, 1.3), -1) for i, (name, x, y) in enumerate(HEARD)
     )

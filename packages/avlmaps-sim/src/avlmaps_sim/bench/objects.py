@@ -96,7 +96,7 @@ def measure(avlmap: "AVLMap", things: Sequence[SceneObject], same: Mapping[str, 
     name = [same.get(thing.category, thing.category) for thing in things]
     seen = [number for number, rows in enumerate(inside) if len(rows) >= FEWEST_VOXELS]
     present = {name[number] for number in seen}
-    vocabulary = [word for word in avlmap.stored.encoders.pixels.vocabulary if word not in STRUCTURE]
+    vocabulary = [word for word in avlmap.encoders.pixels.vocabulary if word not in STRUCTURE]
     words = sorted({same.get(word, word) for word in vocabulary} | (present - set(STRUCTURE)))
     answers = cache(lambda name, word: name == word or lexicon().is_a(name, word, EntryKind.THING))
     said, held, best, reached = [], np.zeros(len(centres), bool), {}, {}

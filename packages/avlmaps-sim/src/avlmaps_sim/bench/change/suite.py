@@ -133,10 +133,10 @@ def _seen_names(place: Workplace) -> set[str]:
 
 def _true_things(places: Sequence[Workplace]) -> ThingsOf:
     """Return what lists the true things of any of these days' maps."""
-    of = {place.avlmap.stored.path: place for place in places}
+    of = {place.avlmap.path: place for place in places}
 
     def things(avlmap: AVLMap) -> list[Thing]:
-        place = of[avlmap.stored.path]
+        place = of[avlmap.path]
         label, found = place.label, list[Thing]()
         for number, thing in enumerate(place.truth.objects):
             rows = np.flatnonzero(label == number)
@@ -145,7 +145,7 @@ def _true_things(places: Sequence[Workplace]) -> ThingsOf:
             points = avlmap.space.centres_of(rows)
             middle = points[np.argmin(np.linalg.norm(points - points.mean(axis=0), axis=1))]
             size = np.ptp(points, axis=0) + avlmap.space.grid.voxel_size_m
-            r, g, b = (int(v) for v in np.asarray(avlmap.stored.voxels.rgb)[rows].mean(axis=0).round())
+            r, g, b = (int(v) for v in np.asarray(avlmap.data.voxels.rgb)[rows].mean(axis=0).round())
             found.append(Thing(thing.category, 1.0, plain_point(middle), plain_point(size), (r, g, b), rows, points))
         return found
 

@@ -76,4 +76,4 @@ class TurnedPlace(Workplace):
     def label(self) -> Int[np.ndarray, " n"]:
         """The true thing of each voxel of the map, -1 for none."""
         points = apply(inverse(self.turn), self.avlmap.space.centres)
-        return self._true_voxels.label(self.avlmap.stored.grid.index_of(points))
+        return self._true_voxels.label(self.avlmap.data.grid.index_of(points))

@@ -52,7 +52,7 @@ def judged_job(job: SceneJob, most: int) -> list[Judged]:
 
 def judged(place: Workplace, tasks: Sequence[Task]) -> list[Judged]:
     """Return the answers of a scene's map to its labelled queries."""
-    encoders = place.avlmap.stored.encoders
+    encoders = place.avlmap.encoders
     names = [name for name in encoders.pixels.vocabulary if lexicon().find(name, EntryKind.THING) is not None]
     sounds = [entry.name for entry in lexicon().entries(EntryKind.SOUND)] if place.has((Kind.SOUNDS,)) else []
     rooms = area_names(encoders.views) if place.has((Kind.VIEWS,)) else ()

@@ -72,22 +72,20 @@ class WeakHearing:
         scores = weak_ear(self._seed).scores(self._clips, name)
         part = Part(Modality.SOUND, name, role)
         factor = sound_factor(
-            avlmap.space, avlmap.stored.sounds, scores, part, SoundSettings(), avlmap.settings.heat
+            avlmap.space, avlmap.data.sounds, scores, part, SoundSettings(), avlmap.settings.heat
         )  # fmt: skip
         return Heatmap.of(factor)
 
     @cached_property
     def _clips(self) -> list[Sound]:
-        stored = self._avlmap.stored
-        return [AudioTrack.open(stored.clip_path(i)).read() for i in range(len(stored.sounds))]
+        return [AudioTrack.open(clip).read() for clip in self._avlmap.data.sounds.clips]
 
 
 def alike_keyframe(avlmap: AVLMap, rgb: UInt8[np.ndarray, "h w 3"], name: str, role: Role) -> Heatmap:
     """Return the heat around the place where the keyframe most like a picture was taken."""
-    stored = avlmap.stored
-    local = stored.encoders.local.encode(rgb)
-    place = stored.encoders.place.encode(rgb, local, stored.place_state)
-    best = int(np.argmax(np.asarray(stored.keyframes.place, np.float32) @ place))
-    pose = np.asarray(stored.keyframes.world_from_camera[best], np.float64)
+    keyframes, used = avlmap.data.keyframes, avlmap.encoders
+    place = used.place.encode(rgb, used.local.encode(rgb), avlmap.data.place_state)
+    best = int(np.argmax(np.asarray(keyframes.place, np.float32) @ place))
+    pose = np.asarray(keyframes.world_from_camera[best], np.float64)
     part = Part(Modality.IMAGE, name, role, is_file=True)
     return Heatmap.of(true_places(avlmap.space, part, avlmap.settings.heat.falloff_per_m(role), [pose[None, :3, 3]]))

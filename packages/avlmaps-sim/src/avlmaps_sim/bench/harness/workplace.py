@@ -178,7 +178,7 @@ class Workplace:
 
     @cached_property
     def _true_voxels(self) -> TrueVoxels:
-        grid = self.avlmap.stored.grid
+        grid = self.avlmap.data.grid
         path = self.job.folder / f"true-voxels-{round(grid.voxel_size_m * 1000)}mm.npz"
         if not path.exists():
             made = TrueVoxels.of(self.scene, grid)
@@ -193,18 +193,18 @@ class Workplace:
         """Middles of the voxels that the walls of a simulated scene pass through, metres."""
         true = self._true_voxels
         walls = np.array([thing.category in ("wall", "column") for thing in self.truth.objects])
-        return self.avlmap.stored.grid.centre_of(true.index[walls[true.instance]])
+        return self.avlmap.data.grid.centre_of(true.index[walls[true.instance]])
 
     @cached_property
     def label(self) -> Int[np.ndarray, " n"]:
         """The true thing of each voxel of the map, -1 for none."""
         if self.own is not None:
-            return self.own.label(self.avlmap.space.centres, self.avlmap.stored.up_in_world)
-        return self._true_voxels.label(np.asarray(self.avlmap.stored.voxels.index))
+            return self.own.label(self.avlmap.space.centres, self.avlmap.data.up_in_world)
+        return self._true_voxels.label(np.asarray(self.avlmap.data.voxels.index))
 
     def has(self, kinds: Sequence[Kind]) -> bool:
         """Return whether the map's profile has models for all of these."""
-        return all(kind in self.avlmap.stored.encoders for kind in kinds)
+        return all(kind in self.avlmap.encoders for kind in kinds)
 
     def photo(self, world_from_camera: Float[np.ndarray, "4 4"]) -> UInt8[np.ndarray, "h w 3"]:
         """Return the photo taken from a pose, drawn if need be."""

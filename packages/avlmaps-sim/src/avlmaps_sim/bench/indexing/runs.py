@@ -165,7 +165,7 @@ def _made(todo: _Todo) -> list[Task]:
 def scene_tasks(job: SceneJob, open_spec: Callable[[str], Scene], most: int) -> list[Task]:
     """Record and map a scene, and make its tasks: the same for a seed, whichever are taken."""
     place = Workplace(job, open_spec)
-    path = job.folder / f"tasks-{_key(job, _MAKING, place.avlmap.stored.info.build_key, most)}.json"
+    path = job.folder / f"tasks-{_key(job, _MAKING, place.avlmap.data.info.build_key, most)}.json"
     if not path.exists():
         evidence, rng = place.evidence, job.rng
         photos = place.photos(_PHOTOS_A_TASK * most)
@@ -186,7 +186,7 @@ def _run_scene(todo: _Todo) -> SceneOutcome:
     """Put a scene's tasks to every configuration that the profile has the models for, unless that is done."""
     begin = perf_counter()
     place = Workplace(todo.job, todo.open_spec)
-    info = place.avlmap.stored.info
+    info = place.avlmap.data.info
     fingerprint = sha256(msgspec.json.encode(todo.tasks)).hexdigest()
     path = todo.job.folder / f"answers-{_key(todo.job, _QUERYING, info.build_key, fingerprint)}.json"
     if not path.exists():

@@ -87,9 +87,11 @@ class QueriedScene:
 
         def make() -> Heatmap:
             part, _ = self._part(Modality.AREA, task.context, role)
-            stored = self.avlmap.stored
-            encoder, heat = stored.encoders.views, self.avlmap.settings.heat
-            return Heatmap.of(area_factor(self.space, stored.keyframes, encoder, part, PAPER_AREAS, heat))
+            own = self.avlmap
+            factor = area_factor(
+                self.space, own.data.keyframes, own.encoders.views, part, PAPER_AREAS, own.settings.heat
+            )
+            return Heatmap.of(factor)
 
         return self._once(("paper area", task.context, role), make)
 
@@ -134,7 +136,7 @@ class QueriedScene:
     ) -> Heatmap | None:
         def make() -> Heatmap:
             part, _ = self._part(Modality.AREA, task.context, role)
-            encoder, rows = self.avlmap.stored.encoders.views, features()
+            encoder, rows = self.avlmap.encoders.views, features()
             _, scores = area_scores(rows, encoder, task.context, self.avlmap.settings.areas)
             heat = np.where(rows.any(axis=1), scores, 0.0).astype(np.float32)
             return Heatmap.of(VoxelHeat(self.space, part, heat, bool((heat >= 0.5).any())))

@@ -35,7 +35,7 @@ _Rows = Callable[[Frame, int], tuple[Float32[np.ndarray, "r d"], Int[np.ndarray,
 
 def view_features(avlmap: AVLMap, recording: Recording) -> Float32[np.ndarray, "n d"]:
     """Return for each voxel the mean view feature of the keyframes that saw it, unit length; zero where none did."""
-    views = avlmap.stored.keyframes.view
+    views = avlmap.data.keyframes.view
 
     def rows(frame: Frame, keyframe: int) -> tuple[Float32[np.ndarray, "r d"], Int[np.ndarray, "h w"]]:
         return np.asarray(views[keyframe], np.float32)[None], np.zeros(frame.depth_m.shape, np.int64)
@@ -45,7 +45,7 @@ def view_features(avlmap: AVLMap, recording: Recording) -> Float32[np.ndarray, "
 
 def region_features(avlmap: AVLMap, recording: Recording) -> Float32[np.ndarray, "n d"]:
     """Return for each voxel the mean feature of the regions that showed it, unit length; zero for one never shown."""
-    views, encoder = avlmap.stored.keyframes.view, avlmap.stored.encoders.views
+    views, encoder = avlmap.data.keyframes.view, avlmap.encoders.views
 
     def rows(frame: Frame, keyframe: int) -> tuple[Float32[np.ndarray, "r d"], Int[np.ndarray, "h w"]]:
         whole = np.asarray(views[keyframe], np.float32)
@@ -113,7 +113,7 @@ def mixed(whole: Float32[np.ndarray, " d"], regions: Float32[np.ndarray, "r d"])
 
 def _spread(avlmap: AVLMap, recording: Recording, rows_of: _Rows) -> Float32[np.ndarray, "n d"]:
     """Add up rows over the voxels that their pixels lie in: each row counts once a voxel and keyframe."""
-    stored = avlmap.stored
+    stored = avlmap.data
     key = _packed(np.asarray(stored.voxels.index, np.int64))
     total = np.zeros((len(key), stored.keyframes.view.shape[1]), np.float32)
     frame_of = np.searchsorted(recording.stamps_s, np.asarray(stored.keyframes.stamp_s) - 1e-6)

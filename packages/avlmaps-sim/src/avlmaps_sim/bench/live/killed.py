@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from avlmaps.live.live_map import LiveMap
-from avlmaps.maps.store.reader import open_stored
+from avlmaps.maps.store.folder import read
 from avlmaps.recordings.open import open_recording
 
 _WAITS_S = 60.0
@@ -43,7 +43,7 @@ def lost_s(recording: Path, path: Path, profile: str, rng: np.random.Generator, 
     lines += process.stdout.readlines()
     process.stdout.close()
     process.wait()
-    left = open_stored(path)
+    left = read(path)
     counted = [line.split() for line in lines if line.endswith("\n")]
     later = [float(words[0]) for words in counted if int(words[1]) > left.info.counts.frames]
     return max(0.0, killed_s - later[0]) if later else 0.0

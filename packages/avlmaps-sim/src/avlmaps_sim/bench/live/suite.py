@@ -15,7 +15,7 @@ from avlmaps.core.progress import say
 from avlmaps.core.wording import option
 from avlmaps.live.settings import LiveSettings
 from avlmaps.maps.build import build_map
-from avlmaps.maps.store.reader import StoredMap
+from avlmaps.maps.store.map_data import MapData
 from avlmaps.perception.encoders import Encoders
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.recordings.open import open_recording
@@ -174,14 +174,14 @@ def _ends(name: str, recording: Recording, place: Path, used: Encoders, rate: fl
 
 
 def _compared(live: AVLMap, built: AVLMap) -> list[object]:
-    counts: list[object] = [len(live.stored.voxels), len(built.stored.voxels)]
+    counts: list[object] = [len(live.data.voxels), len(built.data.voxels)]
     apart_m, alone = _goals(live, built)
     near = [sum(m <= limit + 1e-6 for m in apart_m) for limit in (_VOXEL_M, 0.1)]
     median = round(float(np.median(apart_m)), 3) if apart_m else float("nan")
-    return [*counts, _equality(live.stored, built.stored), len(apart_m), alone, *near, median]
+    return [*counts, _equality(live.data, built.data), len(apart_m), alone, *near, median]
 
 
-def _equality(one: StoredMap, other: StoredMap) -> str:
+def _equality(one: MapData, other: MapData) -> str:
     names = [field.name for field in fields(one.voxels)]
     differ = [name for name in names if not np.array_equal(getattr(one.voxels, name), getattr(other.voxels, name))]
     if len(differ) == len(names):
@@ -193,7 +193,7 @@ def _goals(one: AVLMap, other: AVLMap) -> tuple[list[float], int]:
     """Return how far the goals of each name that both find are apart, and how many names one finds alone."""
     apart_m: list[float] = []
     alone = 0
-    for word in one.stored.encoders.pixels.vocabulary:
+    for word in one.encoders.pixels.vocabulary:
         answers = [avlmap.ask(word).to_dict() for avlmap in (one, other)]
         found = [bool(answer["found"]) for answer in answers]
         alone += found[0] != found[1]

@@ -64,7 +64,7 @@ class Perceived(AVLMap):
     """
 
     def __init__(self, scene: KnownScene, senses: Senses) -> None:
-        super().__init__(scene.avlmap.stored, scene.avlmap.settings)
+        super().__init__(scene.avlmap.stored, settings=scene.avlmap.settings)
         self.space = scene.avlmap.space  # so that heat of all senses multiplies
         self._scene, self._senses = scene, senses
 

@@ -174,7 +174,7 @@ def _sent(todo: _Todo) -> SceneFacts:
     done = journal.read()
     place = NavigationPlace(todo.job, settings, todo.open_spec)
     pairs = [(mission, one) for mission, one in _pairs(todo.missions) if place.work.has(one.needs)]
-    built = place.work.avlmap.stored.info.build_key
+    built = place.work.avlmap.data.info.build_key
     keyed = [(_key(settings, built, mission.fingerprint, one), mission, one) for mission, one in pairs]
     if any(key not in done for key, _, _ in keyed):
         pilot = place.pilot(list(todo.missions), translator_named(settings.language))
@@ -182,7 +182,7 @@ def _sent(todo: _Todo) -> SceneFacts:
             if key not in done:
                 done[key] = pilot.run(mission, one, key)
                 journal.add(done[key])
-    info = place.work.avlmap.stored.info.counts
+    info = place.work.avlmap.data.info.counts
     sounds = (info.sounds, len(place.work.truth.events))
     episodes = tuple(done[key] for key, _, _ in keyed)
     clips = tuple((event.category, event.clip) for event in place.work.truth.events)

@@ -100,7 +100,7 @@ class NavigationPlace:
     def pilot(self, missions: list[Mission], translator: Translator | None) -> Pilot:
         """Return the runner of missions."""
         avlmap = self.work.avlmap
-        if not np.allclose(avlmap.stored.up_in_world, (0.0, 0.0, 1.0), atol=1e-9):
+        if not np.allclose(avlmap.data.up_in_world, (0.0, 0.0, 1.0), atol=1e-9):
             raise BackendError(f"The map of {self.job.spec} is not level; its stops cannot be compared with the truth.")
         photos: dict[str, Float[np.ndarray, "4 4"]] = {}
         names: dict[str, tuple[str, ...]] = {}

@@ -53,7 +53,7 @@ def run_rooms(settings: IndexingSettings | None, out: Path) -> Any:
 def _scene(job: SceneJob) -> dict[str, Judged]:
     place = Workplace(job, open_scene)
     avlmap, truth = place.avlmap, place.truth
-    cameras = np.asarray(avlmap.stored.keyframes.world_from_camera, np.float64)[:, :3, 3]
+    cameras = np.asarray(avlmap.data.keyframes.world_from_camera, np.float64)[:, :3, 3]
     out: dict[str, Judged] = {}
     for name, join in TABLES.items():
         floors = floors_of(truth.areas, place.wall_points, avlmap.space.centres, cameras, join)

@@ -146,7 +146,7 @@ def measure_home(job: HomeJob, open_spec: Callable[[str], Scene]) -> tuple[HomeO
     home = _Home(job, scene, settings, recording_path, avlmap)
     outcomes: list[HomeOutcome] = []
     for number in range(_SETS):
-        facts = (_RECIPE, __version__, avlmap.stored.info.build_key, _CODE, number)
+        facts = (_RECIPE, __version__, avlmap.data.info.build_key, _CODE, number)
         done = folder / f"outcome-{sha256(repr(facts).encode()).hexdigest()[:12]}.msgpack"
         if not done.exists():
             write_bytes_atomically(done, msgspec.msgpack.encode(home.outcome(folder / f"sounds-{number}", number)))
@@ -206,7 +206,7 @@ class _Home:
         placed: list[Placed] = []
         for way, track in tracks.items():
             begin = perf_counter()
-            evidence = find_sources(track, walk, spans, self.avlmap.points, self.avlmap.stored.up_in_world)
+            evidence = find_sources(track, walk, spans, self.avlmap.points, self.avlmap.data.up_in_world)
             each_s = (perf_counter() - begin) / max(len(spans), 1)
             if evidence is None:
                 continue
@@ -237,7 +237,7 @@ class _Home:
         assert isinstance(track, ChannelSound)
         write_channels(folder / "track.flac", track)
         recording.audio = AudioTrack.open(folder / "track.flac", own.start_s)
-        encoder, hearing = self.avlmap.stored.encoders.sounds, self.avlmap.stored.info.settings.hearing
+        encoder, hearing = self.avlmap.encoders.sounds, self.avlmap.data.info.settings.hearing
         heard = detect_events(recording, encoder, hearing, folder / "clips")
         events = tuple(
             HeardEvent(one.onset_s, one.offset_s, one.source.category, one.source.clip, one.robot, one.source.position,
