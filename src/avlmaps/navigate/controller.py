@@ -94,7 +94,6 @@ def still(before: GroundPose, now: GroundPose) -> bool:
 def _farthest(
     route: RouteProgress, lookaheads_m: tuple[float, ...], pose: GroundPose, safe: Safe | None
 ) -> tuple[float, float]:
-    """Return the first place at these distances along a path to which a body can go straight; else the last."""
     places = [route.at(route.along_m + lookahead_m) for lookahead_m in lookaheads_m]
     return next((place for place in places if safe is None or safe(pose, GroundPose(*place))), places[-1])
 

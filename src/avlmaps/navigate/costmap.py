@@ -1,9 +1,13 @@
 """The cost of a metre: where a body's middle may be, how much room it has there, and the price of less room.
 
+And what a driver finds: where its body has been, and what it ran into that the map does not know (`ContactMap`), which
+is stored beside the map and never in it.
+
 Everything is in the level frame. A grid's cell (i, j) covers ``origin_m + [i, i + 1) x [j, j + 1) · cell_size_m``.
 """
 
 from dataclasses import dataclass
+from math import atan2, cos, sin
 from typing import TYPE_CHECKING
 
 import cv2
@@ -11,6 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, Float64, Int
 
 from avlmaps.core.errors import MapError, NavigationError
+from avlmaps.core.motion import GroundPose
 from avlmaps.maps.obstacles import MIN_HITS, CellState, Obstacles, find_obstacles, floor_height
 from avlmaps.maps.storeys import said_storeys
 from avlmaps.navigate.bodies import BASE, BodyShape
@@ -19,6 +24,8 @@ from avlmaps.query.contents import require_known
 if TYPE_CHECKING:
     from avlmaps.query.avlmap import AVLMap
 
+_LOST_M = 0.002  # a movement must fall short by this to show where it was stopped
+_WIDER_RAD = (0.0, 0.5, -0.5, 1.0, -1.0)  # how far beside the likeliest point it looks for one that can be
 _FAR_CELLS = 2.0**40  # farther off no grid reaches
 _HALF_DIAGONAL = np.sqrt(0.5)  # of a cell: an obstacle in one may stand in its nearest corner
 
@@ -234,7 +241,6 @@ def costmap_of(
 
 
 def _distance(mask: Bool[np.ndarray, "nx ny"]) -> Float32[np.ndarray, "nx ny"]:
-    """Return the distance, in cells, from each cell's middle to that of the nearest true one; inf without any."""
     if not mask.any():
         return np.full(mask.shape, np.inf, np.float32)
     return cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
@@ -249,3 +255,64 @@ def _small_holes(known: Bool[np.ndarray, "nx ny"], width: float) -> Bool[np.ndar
     disc = (away <= radius + 0.01).astype(np.uint8)
     around = np.pad(known.astype(np.uint8), 2 * radius)
     return cv2.morphologyEx(around, cv2.MORPH_CLOSE, disc)[2 * radius : -2 * radius, 2 * radius : -2 * radius] > 0
+
+
+class ContactMap:
+    """Cells that the body found occupied, and cells that it stood on.
+
+    Attributes:
+        cells: where it touched something.
+    """
+
+    def __init__(self, obstacles: Obstacles, radius_m: float) -> None:
+        self._obstacles = obstacles
+        self._radius_m = radius_m
+        self._known = obstacles.states == CellState.OCCUPIED
+        self._been = np.zeros(obstacles.states.shape, bool)
+        self.cells = np.zeros(obstacles.states.shape, bool)
+        reach = int(radius_m / obstacles.cell_size_m) + 1
+        self._disc = np.mgrid[-reach : reach + 1, -reach : reach + 1].reshape(2, -1).T
+
+    def mark_free(self, pose: GroundPose) -> None:
+        """Note that the body stood somewhere: every cell wholly under it is free."""
+        cell_m = self._obstacles.cell_size_m
+        at = (np.array([pose.x_m, pose.y_m]) - self._obstacles.origin_m) / cell_m
+        cells = np.floor(at).astype(np.int64) + self._disc
+        under = np.hypot(*(np.abs(cells + 0.5 - at) + 0.5).T) * cell_m <= self._radius_m
+        cells = self._on_grid(cells[under])
+        self._been[tuple(cells.T)] = True
+        self.cells[tuple(cells.T)] = False
+
+    def mark_contact(self, before: GroundPose, planned: GroundPose, now: GroundPose) -> bool:
+        """Mark the obstacle that stopped a movement, as far as the poses show it.
+
+        A body that slides loses just the part of its way that leads into the thing, one that stops all of it. Where
+        the likeliest point cannot be, since the map has something there or the body has been there, points beside
+        it are taken.
+
+        Returns:
+            Whether that is something new.
+        """
+        lost = np.array([planned.x_m - now.x_m, planned.y_m - now.y_m])
+        if np.hypot(*lost) < _LOST_M:
+            lost = np.array([planned.x_m - before.x_m, planned.y_m - before.y_m])
+        towards = atan2(lost[1], lost[0])
+        return any(self._mark(now, towards + beside) for beside in _WIDER_RAD)
+
+    def _mark(self, now: GroundPose, towards_rad: float) -> bool:
+        cell_m = self._obstacles.cell_size_m
+        ahead = np.array([cos(towards_rad), sin(towards_rad)])
+        touch = np.array([now.x_m, now.y_m]) + (self._radius_m + 0.3 * cell_m) * ahead
+        across = np.array([-ahead[1], ahead[0]])
+        points = touch + np.outer(np.array([0.0, -1.0, 1.0, -2.0, 2.0]) * 0.7 * cell_m, across)
+        cells = np.floor((points - self._obstacles.origin_m) / cell_m).astype(np.int64)
+        cells = self._on_grid(cells)
+        i, j = cells.T
+        if len(cells) and self._known[tuple(cells[0])]:
+            return False  # the map foretold it
+        new = ~self._known[i, j] & ~self.cells[i, j] & ~self._been[i, j]
+        self.cells[i[new], j[new]] = True
+        return bool(new.any())
+
+    def _on_grid(self, cells: np.ndarray) -> np.ndarray:
+        return cells[np.all((cells >= 0) & (cells < self.cells.shape), axis=1)]

@@ -15,7 +15,6 @@ from avlmaps.core.motion import FORWARD_M, TURN_RAD, Action, GroundPose, Moved, 
 from avlmaps.core.printable import printable
 from avlmaps.maps.obstacles import Obstacles
 from avlmaps.navigate.bodies import BASE, Body, BodyShape
-from avlmaps.navigate.contact_map import ContactMap
 from avlmaps.navigate.controller import (
     ActionController,
     StallDetector,
@@ -25,7 +24,7 @@ from avlmaps.navigate.controller import (
     still,
     turns_for,
 )
-from avlmaps.navigate.costmap import CostSettings, costmap_of
+from avlmaps.navigate.costmap import ContactMap, CostSettings, costmap_of
 from avlmaps.navigate.grid_graphs import rooms
 from avlmaps.navigate.planner import Planner, PlanSettings, Stop
 
@@ -447,7 +446,6 @@ class MapDriver:
         return left_rad
 
     def _most_turns(self, angle_rad: float) -> int:
-        """Return how many movements a turn may take, however the body turns."""
         if self.settings.mode == "actions":
             return len(turns_for(angle_rad)) + _EXTRA_TURNS
         velocities = self.settings.velocities
@@ -473,7 +471,6 @@ class MapDriver:
         return self._noted(trip, before, planned, moved)
 
     def _is_held(self, trip: _Trip) -> bool:
-        """Return whether the movement must end, which is then its fault."""
         why = self.held()
         trip.fault = why or trip.fault
         return bool(why)
@@ -506,13 +503,11 @@ class MapDriver:
 
 
 def _posed(pose: GroundPose) -> GroundPose:
-    """Return what a body said, if it is a pose."""
     if not isinstance(pose, GroundPose):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise TypeError(f"{type(pose).__name__} is no GroundPose")
     return pose
 
 
 def _moved(moved: Moved) -> Moved:
-    """Return the same of what it did."""
     _posed(moved.pose)
     return moved

@@ -70,7 +70,6 @@ def offered_by(command: str, roots: Sequence[Path] | None = None) -> Readable:
 
 
 def _is_within(path: Path, root: Path) -> bool:
-    """Return whether a path, with every link followed, lies in a folder."""
     try:
         return path.resolve().is_relative_to(root.resolve())
     except (OSError, ValueError, RuntimeError):  # a name too long or that no file can have, a loop of links
@@ -78,7 +77,6 @@ def _is_within(path: Path, root: Path) -> bool:
 
 
 def _size_of(path: Path) -> int | None:
-    """Return how many bytes a file has, None where there is none of that name."""
     try:
         return path.stat().st_size if path.is_file() else None
     except (OSError, ValueError):  # a name that is too long, or that no file can have

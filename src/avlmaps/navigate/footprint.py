@@ -136,7 +136,6 @@ def to_the_left(direction: Float[np.ndarray, "2"]) -> Float[np.ndarray, "2"]:
 
 
 def _middle_of(points: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "2"]:
-    """Return the middle of the two points that lie farthest apart along the points' own main axis."""
     spread = points - points.mean(axis=0)
     axis = np.linalg.eigh(spread.T @ spread)[1][:, -1]
     along = spread @ axis

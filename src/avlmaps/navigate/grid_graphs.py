@@ -93,7 +93,6 @@ class BlockGraph:
 
 
 def _numbered(mask: Bool[np.ndarray, "nx ny"]) -> tuple[Int[np.ndarray, "nx ny"], Int[np.ndarray, "n 2"]]:
-    """Return the number of each true cell, -1 elsewhere, and the true cells."""
     return np.where(mask, np.cumsum(mask).reshape(mask.shape) - 1, -1), np.argwhere(mask)
 
 

@@ -121,7 +121,6 @@ class Seeker:
         return heat
 
     def _known(self, key: tuple[object, ...], heat_of: Callable[[], Heatmap]) -> Heatmap:
-        """Return what the map answers, asking it once."""
         if key not in self.heats:
             self.heats[key] = heat_of()
         return self.heats[key]

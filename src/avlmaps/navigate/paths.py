@@ -198,7 +198,6 @@ class PathFinder:
         return {"position": self._world(at), "beside_m": route.stop.beside_m, "seen": bool(route.stop.seen)}
 
     def _forbidden(self, spot: Spot) -> str:
-        """Return why no body goes to a place that a person forbade; ``""`` for other places."""
         obstacles = self.obstacles(spot.storey)
         return obstacles.forbids(self.avlmap.space.world(np.append(spot.xy, obstacles.floor_m)))
 
@@ -210,14 +209,12 @@ class PathFinder:
 
 
 def _climb(before: Route, points: Float[np.ndarray, "n 3"], storeys: tuple[int, int]) -> Route:
-    """Return the route from the stop before stairs to their other end."""
     points = np.concatenate([before.points[-1:], points])
     length_m = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
     return Route(before.stop, points, length_m, length_m, storeys)
 
 
 def _joined(legs: "list[Route]") -> Route:
-    """Return routes one after the other; each begins where the one before ends."""
     points = np.concatenate([legs[0].points[:1], *(leg.points[1:] for leg in legs)])
     storeys = tuple(dict.fromkeys(number for leg in legs for number in leg.storeys))
     length_m = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())

@@ -89,7 +89,6 @@ class Planner:
 
     @cached_property
     def _part(self) -> Int[np.ndarray, "nx ny"]:
-        """The connected part that each cell belongs to, 0 where none can pass. Corners are not cut, so four sides."""
         if not self.costmap.passable.size:
             return np.zeros(self.costmap.passable.shape, np.int32)
         return cv2.connectedComponents(self.costmap.passable.astype(np.uint8), connectivity=4, ltype=cv2.CV_32S)[1]
@@ -186,7 +185,6 @@ class Planner:
         return cells[order], distance_m[order]
 
     def _is_direct(self, one: Float[np.ndarray, "2"], other: Float[np.ndarray, "2"]) -> bool:
-        """Return whether the straight line between two places, in cells, costs hardly more than any way must."""
         (ax, ay), (bx, by) = one, other
         most = self.settings.direct * float(np.hypot(bx - ax, by - ay))  # a cell costs at least 1
         passable, cost = self.costmap.passable, self.costmap.cost

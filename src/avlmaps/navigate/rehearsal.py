@@ -93,7 +93,6 @@ def unfound(
 def _asked_of(
     program: str, avlmap: AVLMap, command: str, start: GroundPose, guess: bool, heats: Heats | None = None
 ) -> tuple[Robot, Trace]:
-    """Run a program with a robot that stays where it is, so that all its goals are looked up and nothing moves."""
     standing, settings, files = _StandingDriver(start), RobotSettings(guess), offered_by(command)
     robot = Robot(avlmap, standing, settings, files, pause=lambda _: None, heats=heats)
     return robot, run_program(parse_program(program), robot)

@@ -295,7 +295,6 @@ class Robot:
         return Place(*_triple(self.asked.space.world(level)))
 
     def _towards(self, thing: Destination) -> Float[np.ndarray, "2"]:
-        """Return the direction in which the robot sees a thing; straight ahead where it stands in its middle."""
         bearing = bearing_rad(self._here, thing.outline.centre)
         bearing = self.driver.pose.heading_rad if bearing is None else bearing
         return np.array([np.cos(bearing), np.sin(bearing)])
@@ -309,13 +308,11 @@ class Robot:
     def _go(
         self, skill: str, thing: Destination, goal: Float[np.ndarray, "3"], face: Float[np.ndarray, "3"] | None = None
     ) -> None:
-        """Drive to a place of the level frame, and look at another once there."""
         world = self.asked.space.world
         looked_at = None if face is None else world(face)
         self._done(skill, thing.name, goal, [self.driver.go_to(world(goal), face=looked_at)])
 
     def _turn_to_see(self, skill: str, target: Target, at_rad: float) -> None:
-        """Turn until a thing is seen at an angle from straight ahead, counter-clockwise."""
         thing = self.seeker.referent(target, self._here)
         bearing = bearing_rad(self._here, thing.outline.centre)
         heading = self.driver.pose.heading_rad if bearing is None else bearing - at_rad

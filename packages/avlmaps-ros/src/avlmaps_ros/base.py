@@ -189,12 +189,10 @@ class RosDriver:
 
     @property
     def _unfinished(self) -> SentGoal | None:
-        """The goal of ours that is not over."""
         goal = self._goal or self._owed
         return None if goal is None or goal.stage is Stage.OVER else goal
 
     def _may_go_on(self) -> bool:
-        """Return whether a goal, of ours or of others, is not over as far as is known."""
         return self._unfinished is not None or any(self._contact.ear.servers.under_way().values())
 
     def _level(self, place: Float[np.ndarray, "3"]) -> Float[np.ndarray, "2"]:
@@ -262,7 +260,6 @@ class RosDriver:
                 contact.session.heard.wait(_LOOK_EVERY_S)
 
     def _others_soon(self) -> bool:
-        """Return whether a goal of others took the place of ours, by the next list."""
         session = self._contact.session
         with session.heard:
             return session.heard.wait_for(lambda: self._others(), _NEXT_LIST_S)
@@ -441,7 +438,6 @@ class RosDriver:
         return goal.end is not None
 
     def _patience_s(self, goal: SentGoal) -> float:
-        """Return how long the robot may take to confirm a cancel."""
         wait_s = 2.0 * self.settings.cancel_timeout_s
         return wait_s + (goal.answer_s if goal.stage is Stage.SENT else 0.0)
 
@@ -476,7 +472,6 @@ class RosDriver:
         return idle
 
     def _beat(self, goal: SentGoal) -> None:
-        """Report that a goal is active and watched, to the guard and to the robot."""
         if self.guard is not None:
             self.guard.beat(goal)
         self._contact.session.beat(goal)

@@ -116,11 +116,9 @@ class BridgeSession(ABC):
     # Our goals, as servers list them.
 
     def _adopt(self, goal: SentGoal) -> None:
-        """Hear what becomes of a goal, also of one that another session sent."""
         self._ours[goal.id] = goal
 
     def _call_off(self, goal: SentGoal) -> None:
-        """Adopt a goal, and take note that it is being cancelled."""
         self._adopt(goal)
         goal.call_off(self.ear.clock())
 

@@ -117,7 +117,6 @@ class MoveBaseSession(BridgeSession):
         self._each(lambda goal: self._note(goal, state) if goal.id == state.goal_id.id else None)
 
     def _note(self, goal: SentGoal, state: GoalState) -> None:
-        """Take in how a goal stands."""
         if state.status in _UNDER_WAY:
             goal.show(self.ear.clock())
         else:

@@ -202,7 +202,6 @@ class NativeSession:
             self._notify()
 
     def _patience_s(self) -> float:
-        """Return how long a server may take to be discovered: what was there before us shows soon after we join."""
         return max(_LEAST_DISCOVERY_S, _DISCOVERY_S - (monotonic() - self._joined_s))
 
     def _when(
@@ -390,12 +389,10 @@ def _digits(goal: SentGoal) -> str:
 
 
 def _uuid(goal: SentGoal) -> GoalUuid:
-    """Return a goal's id in ROS 2: the hexadecimal digits at the end of ours."""
     return GoalUuid(uuid=list(UUID(hex=_digits(goal)).bytes))
 
 
 def _end_of(response: Any) -> tuple[End, str]:
-    """Read the response of an action's result service."""
     code, text = getattr(response.result, "error_code", 0), getattr(response.result, "error_msg", "")
     return nav2_tasks.end_of(response.status, code, sanitize_line(text))
 

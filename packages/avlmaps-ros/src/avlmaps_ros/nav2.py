@@ -135,25 +135,21 @@ class Nav2Session(BridgeSession):
         self._each(take)
 
     def _recognise(self, goal: SentGoal) -> None:
-        """Take the only new goal of its server for ours."""
         new = self._new(goal)
         if not goal.alias and len(new) == 1:
             goal.alias = next(iter(new))
             goal.show(self.ear.clock())
 
     def _new(self, goal: SentGoal) -> frozenset[str]:
-        """Return the goals under way that may be ours: its server did not list them before, and no other of ours is."""
         listed = self.ear.servers.list_of(goal.task.action)
         known = {one.alias for one in self._ours.values()}
         return frozenset() if listed is None else listed[1] - goal.before - known
 
     def _is_unlisted(self, goal: SentGoal) -> bool:
-        """Return whether no goal is listed that may be ours; a server that had no goal yet lists nothing."""
         listed = self.ear.servers.list_of(goal.task.action) is not None
         return (listed or goal.stage is Stage.SENT) and not self._new(goal)
 
     def _over_soon(self, goal: SentGoal, status: int) -> None:
-        """Take a goal for over by its list, unless its result comes before, which says more."""
         wait_s = RESULT_WITHIN_S if goal.id == self._sent else 0.0
         self.link.later(wait_s, lambda: goal.over(*nav2_tasks.end_listed(status)))
 

@@ -197,7 +197,6 @@ class LiveTree:
 
 
 def _is_overtaken(before: _Edge, stamp_s: float, now_s: float) -> bool:
-    """Return whether a newer transform came before; one that is long past does not count: clocks are set back."""
     return 0.0 < stamp_s < before.stamp_s and now_s - before.heard_s < _OVERTAKEN_S
 
 

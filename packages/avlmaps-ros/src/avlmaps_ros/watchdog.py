@@ -83,7 +83,6 @@ class Watch:
         return found
 
     def _own_parts(self, begun: list[str]) -> None:
-        """Take parts that begin while all goals under way are ours for parts of the newest of these."""
         self._own()
         whole = {goal: at_s for name, goals in self._goals.items() if name not in PARTS for goal, at_s in goals.items()}
         if whole and all(goal in self._owner for goal in whole):

@@ -269,7 +269,6 @@ class _Receiver:
             self._subscribe("audio", wanted, self._known[wanted], depth=200)
 
     def _choose_sound_info(self) -> None:
-        """Take the AudioInfo of the sound's own namespace rather than another."""
         found = sorted(name for name, kind in self._known.items() if kind == _SOUND_INFO)
         if found and self._known.get(self._chosen["audio"]) != _SOUNDS[0]:  # AudioStamped says by itself
             info = max(found, key=lambda name: len(os.path.commonpath([name, self._chosen["audio"]])))
@@ -302,5 +301,4 @@ class _Receiver:
 
 
 def _namespace(pose: str, name: str) -> str:
-    """Return the namespace of a named topic of transforms (``/robot1/tf``), or nothing."""
     return pose.rsplit("/", 1)[0] if pose.rsplit("/", 1)[-1] == name else ""
