@@ -35,12 +35,11 @@ def _seen() -> list[tuple[np.ndarray, View]]:
 @cache
 def walked_map(walk: Path) -> Path:
     """Return the map of a walk that lies beside it: about 3,000 voxels with one sound, made once a process."""
-    from avlmaps.maps.build import build_map
+    from avlmaps.api import build_map
     from avlmaps.maps.settings import BuildSettings
-    from avlmaps.recordings.open import open_recording
 
     path = walk.parent / "room.avlmap"
-    build_map(open_recording(walk), path, "colours", BuildSettings(voxel_size_m=0.1), progress=False)
+    build_map(walk, path, "colours", BuildSettings(voxel_size_m=0.1), progress=False)
     return path
 
 

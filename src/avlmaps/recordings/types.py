@@ -12,9 +12,8 @@ from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
-from jaxtyping import Int
 
-from avlmaps.core.arrays import Bool, Float, UInt8
+from avlmaps.core.arrays import Bool, Float, Int, UInt8
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.timeline import Trajectory
 from avlmaps.recordings.audio import AudioTrack
