@@ -190,7 +190,7 @@ ENTRIES = (
         Figure("ESC-50 fold 1, 400 clips, 50 names", "", r"fold 1.*first name right (\S+), own name says yes (\S+)",
                "first name right {1}, own name says yes {2}"),
         Figure("85 more clips: first name right", "", r"more clips: first name right (\S+)", "{1}"),
-        Figure("sentences of a writer who had read none of ours", "",
+        Figure("sentences of a writer who had read none of ours, before the gate", "",
                r"right (\d+ %), asked back acceptably (\d+ %), asked back wrongly (\d+ %), misread (\d+ %)"
                r".*driven (.+)",
                "right {1}, asked back acceptably {2}, wrongly {3}, misread {4}; no orders, yet driven: {5}"))),
