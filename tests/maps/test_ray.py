@@ -57,7 +57,7 @@ def pool() -> Iterator[RayPool]:
 
 
 def build(path: Path, pool: RayPool, audio: Path, slow_s: float = 0.0) -> dict[str, bytes]:
-    workers = ClusterWorkers(pool, partial(open_walk, audio, slow_s=slow_s), slab_bytes=1)
+    workers = ClusterWorkers(pool, partial(open_walk, audio, slow_s=slow_s))
     build_map(open_walk(audio), path, PROFILE, SETTINGS, workers=workers, progress=False)
     return content_of(path)
 
