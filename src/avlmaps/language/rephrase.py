@@ -17,7 +17,7 @@ from functools import cache
 
 from avlmaps.language import lexer
 from avlmaps.language.lexer import Token
-from avlmaps.language.names import is_entry
+from avlmaps.language.names import describes, is_entry, sounding_forms, sounding_thing, third_forms
 from avlmaps.language.word_classes import listed, load_word_classes
 
 _ROBOTS = frozenset({"robot", "bot", "machine", "rover", "droid", "vehicle", "unit", "roomba", "turtlebot", "agent"})
@@ -50,6 +50,8 @@ _LABELLED = frozenset({"labelled", "labeled", "tagged", "named", "called", "titl
 _LABELS = frozenset({"class", "type", "label", "category", "tag", "name"})
 _SOUNDS = frozenset({"sound", "noise"})
 _ANY = frozenset({"anything", "something", "one"})
+_WHATEVER = frozenset({"what", "whatever", "whoever"})
+_RELATIVE = frozenset({"that", "which", "who"})
 _CUTS = frozenset({"then", "finally"})
 # Who says what they heard, saw or think, and how: "I think I heard the kettle; go to the kitchen".
 
@@ -57,7 +59,7 @@ _CUTS = frozenset({"then", "finally"})
 def rephrased(tokens: Sequence[Token]) -> tuple[list[Token], list[str]]:
     """Return tokens with these forms rewritten, and one sentence for each that a person should know of."""
     notes: list[str] = []
-    found = _unlabelled(_looped(_in_degrees(_on_compass(_joined(tokens)))))
+    found = _unlabelled(_looped(_sounding(_in_degrees(_on_compass(_joined(tokens))))))
     found = said_to_it(_other(found, notes))
     return _waiting_first(found, notes), notes
 
@@ -206,6 +208,39 @@ def _named_before(tokens: Sequence[Token]) -> list[str]:
 
 
 _NEXT_TO = (["next", "to"], ["close", "to"], ["right", "beside"], ["adjacent", "to"])
+
+
+def _sounding(tokens: Sequence[Token]) -> list[Token]:
+    """Return tokens with "the thing that rings" as "whatever is ringing": rings are things, too."""
+    found: list[Token] = []
+    for token in tokens:
+        before = [one.text for one in found[-2:]]
+        relates = before[-1:] and (
+            before[-1] in _WHATEVER or (before[-1] in _RELATIVE and before[0] in listed("generic"))
+        )
+        relates = relates or (before[-1:] and before[-1] in _RELATIVE and before[0] in listed("nameless"))
+        if relates and token.text in third_forms():
+            found += [_word(token, "is"), _word(token, sounding_forms()[token.text])]
+        else:
+            found.append(token)
+        found = _nameless(found)
+    return found
+
+
+def _nameless(tokens: list[Token]) -> list[Token]:
+    """Return tokens at the end of which "the beeping device", "the thing that is beeping" are "whatever is beeping"."""
+    last = [token.text for token in tokens[-4:]]
+    if sounding_thing(*last[-2:]):
+        begin, sound = len(tokens) - 2, tokens[-2]
+    elif last[1:2] and last[1] in _RELATIVE and last[2:3] == ["is"] and sounding_thing(last[-1], last[0]):
+        begin, sound = len(tokens) - 4, tokens[-1]
+    else:
+        return tokens
+    before = tokens[begin - 1].text if begin else ""
+    if describes(before):  # "the blue beeping thing"
+        return tokens
+    begin -= before in _ARTICLES | {"an", "some", "any"}
+    return [*tokens[:begin], _word(sound, "whatever"), _word(sound, "is"), sound]
 
 
 def _word(like: Token, text: str, kind: str = "word") -> Token:
