@@ -96,7 +96,7 @@ def test_a_build_killed_at_random_instants_ends_with_the_same_map(
     builder: Builder, undisturbed: Undisturbed, had_old: bool
 ) -> None:
     rng, kills, rounds = np.random.default_rng(20), 0, 0
-    while kills < 6:
+    while kills < 3:
         path = builder.folder / f"random-{had_old}-{rounds}.avlmap"
         begin(path, undisturbed, had_old=had_old)
         while builder.build(path, NEW, delay_s=rng.uniform(0.0, undisturbed.seconds))[0] != 0:
