@@ -185,12 +185,12 @@ ENTRIES = (
           "avlmaps bench navigation --sounds SOUNDS --series sounds-1 sounds-2 sounds-3 pairs --out OUT",
           tuple(Figure(f"{one.label}; recorded sounds", one.table, one.row, one.form) for one in _missions(3)), 4.0),
     Entry("outside", "not of this repository", (
-        Figure("NYUv2, 654 test frames: pixel accuracy, class accuracy, mean IoU", "",
+        Figure("another hand: NYUv2, 654 test frames: pixel accuracy, class accuracy, mean IoU", "",
                r"accuracy (\S+), class accuracy (\S+), mean IoU (\S+)", "{1}, {2}, {3}"),
-        Figure("ESC-50 fold 1, 400 clips, 50 names", "", r"fold 1.*first name right (\S+), own name says yes (\S+)",
+        Figure("another hand: ESC-50 fold 1, 400 clips, 50 names", "", r"fold 1.*first name right (\S+), own name says yes (\S+)",
                "first name right {1}, own name says yes {2}"),
-        Figure("85 more clips: first name right", "", r"more clips: first name right (\S+)", "{1}"),
-        Figure("sentences of a writer who had read none of ours, before the gate", "",
+        Figure("another hand: 85 more clips, first name right", "", r"more clips: first name right (\S+)", "{1}"),
+        Figure("another hand: sentences of a writer who had read none of ours, before the gate", "",
                r"right (\d+ %), asked back acceptably (\d+ %), asked back wrongly (\d+ %), misread (\d+ %)"
                r".*driven (.+)",
                "right {1}, asked back acceptably {2}, wrongly {3}, misread {4}; no orders, yet driven: {5}"))),
