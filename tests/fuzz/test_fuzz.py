@@ -25,6 +25,7 @@ def seeds(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("block", range(BLOCKS))
 def test_broken_inputs_end_in_a_plausible_map_or_in_one_sentence(
     block: int, seeds: dict[str, Path], tmp_path: Path
@@ -36,6 +37,7 @@ def test_broken_inputs_end_in_a_plausible_map_or_in_one_sentence(
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_a_wrong_recording_is_refused_or_doubted_or_makes_a_right_map(tmp_path: Path) -> None:
     lines = [run_mistake(number, tmp_path) for number in MISTAKES]
     assert not [line for line in lines if line["verdict"] == "finding"], report(lines)

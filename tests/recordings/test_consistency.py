@@ -103,38 +103,48 @@ def test_the_remedy_that_is_named_puts_the_recording_right(name: str, right: Dra
     assert again.grade is Grade.FINE, (geometry.remedy, again.sentences())
 
 
+@pytest.mark.parametrize("late", [1, -2])
+def test_depth_that_is_frames_late_is_said_to_be(late: int, right: Draft, tmp_path: Path) -> None:
+    order = np.clip(np.arange(len(right)) - late, 0, len(right) - 1)
+    said = " ".join(verdict(replace(right, depth=tuple(right.depth[i] for i in order)), tmp_path).sentences())
+    assert f"epth pictures look {abs(late)} frame(s) {'late' if late > 0 else 'early'}" in said
+
+
 def test_a_wrong_option_is_found_out(right: Draft, tmp_path: Path) -> None:
     found = verdict(right, tmp_path, Corrections(camera_axes="opengl", depth_unit_m=0.001))
     assert found.grade is Grade.IMPOSSIBLE
     assert "Corrections.camera_axes=opencv" in found.findings[0].remedy
 
 
+MISTAKES = [
+    ("colour mirrored", Reason.COLOUR),
+    ("depth constant", Reason.DEPTH),
+    ("depth of noise", Reason.DEPTH),
+    ("colour 10 frames late", Reason.COLOUR),
+    ("principal point at the corner", Reason.INTRINSICS),
+    ("poses jump by 0.5 m", Reason.GEOMETRY),
+    ("poses turn by 20 degrees", Reason.GEOMETRY),
+    ("positions x0.5", Reason.GEOMETRY),
+    ("two neighbours exchanged", Reason.GEOMETRY),
+    ("principal point off by a sixteenth", Reason.GEOMETRY),
+    ("half of the pictures BGR", Reason.COLOUR),
+    ("all pictures BGR", Reason.COLOUR),
+    ("colour camera 0.3 m beside", Reason.COLOUR),
+    ("colour shifted by a sixteenth", Reason.COLOUR),
+    ("poses jump by 2.5 m", Reason.MOTION),
+    ("a third of the pictures black", Reason.COLOUR),
+    ("camera tilted by 8 degrees in its mount", Reason.GEOMETRY),
+    ("camera rolled by 8 degrees, the other way", Reason.GEOMETRY),
+    ("cut to 16:9, with the old middle", Reason.GEOMETRY),
+    ("depth in cm, of which 8 bits are stored", Reason.DEPTH),
+    ("frames sorted as text", Reason.GEOMETRY),
+    ("every second pose is the one before", Reason.GEOMETRY),
+]
+
+
 @pytest.mark.parametrize(
     ("name", "reason"),
-    [
-        ("colour mirrored", Reason.COLOUR),
-        ("depth constant", Reason.DEPTH),
-        ("depth of noise", Reason.DEPTH),
-        ("colour 10 frames late", Reason.COLOUR),
-        ("principal point at the corner", Reason.INTRINSICS),
-        ("poses jump by 0.5 m", Reason.GEOMETRY),
-        ("poses turn by 20 degrees", Reason.GEOMETRY),
-        ("positions x0.5", Reason.GEOMETRY),
-        ("two neighbours exchanged", Reason.GEOMETRY),
-        ("principal point off by a sixteenth", Reason.GEOMETRY),
-        ("half of the pictures BGR", Reason.COLOUR),
-        ("all pictures BGR", Reason.COLOUR),
-        ("colour camera 0.3 m beside", Reason.COLOUR),
-        ("colour shifted by a sixteenth", Reason.COLOUR),
-        ("poses jump by 2.5 m", Reason.MOTION),
-        ("a third of the pictures black", Reason.COLOUR),
-        ("camera tilted by 8 degrees in its mount", Reason.GEOMETRY),
-        ("camera rolled by 8 degrees, the other way", Reason.GEOMETRY),
-        ("cut to 16:9, with the old middle", Reason.GEOMETRY),
-        ("depth in cm, of which 8 bits are stored", Reason.DEPTH),
-        ("frames sorted as text", Reason.GEOMETRY),
-        ("every second pose is the one before", Reason.GEOMETRY),
-    ],
+    [pytest.param(*case, marks=pytest.mark.nightly) if row % 4 else case for row, case in enumerate(MISTAKES)],
 )
 def test_a_mistake_is_named(name: str, reason: Reason, right: Draft, tmp_path: Path) -> None:
     situation = next(one for one in situations() if one.name == name)
@@ -157,6 +167,7 @@ def test_its_very_cause_is_said(name: str, said: str, right: Draft, tmp_path: Pa
 
 
 @pytest.mark.parametrize(("seed", "late"), [(15, -3), (15, 0), (15, 3), (23, -3), (23, 0), (23, 3)])
+@pytest.mark.nightly
 def test_late_colour_shows_where_the_camera_turns_evenly(seed: int, late: int, tmp_path: Path) -> None:
     draft = RoomWalk("even", seed=seed, round_rad_s=0.0, even=True).draft()
     order = np.clip(np.arange(len(draft)) + late, 0, len(draft) - 1)
@@ -430,6 +441,7 @@ def test_pairs_are_of_the_recording_in_the_order_of_time(count: int) -> None:
     assert len({tuple(pair) for pair in pairs.tolist()}) == len(pairs)
 
 
+@pytest.mark.nightly
 def test_the_bench_knows_a_right_map_from_a_wrong_one(right: Draft) -> None:
     """A world that is turned and moved holds the same map; colours of other frames do not."""
     judge = Judge(right)
@@ -444,6 +456,7 @@ def test_the_bench_knows_a_right_map_from_a_wrong_one(right: Draft) -> None:
     ("degrees", "by_m", "said"),
     [(0, 0.0, ""), (0, 0.8, "origins|jump"), (90, 0.0, "origins|do not agree"), (180, 0.0, "origins|do not agree")],
 )
+@pytest.mark.nightly
 def test_a_second_part_with_another_origin_is_doubted(
     degrees: int, by_m: float, said: str, right: Draft, tmp_path: Path
 ) -> None:

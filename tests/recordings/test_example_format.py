@@ -104,6 +104,7 @@ def test_a_package_that_cannot_be_imported_is_named(monkeypatch: pytest.MonkeyPa
         known_formats.forget_brought()
 
 
+@pytest.mark.nightly
 def test_an_installed_package_brings_its_format(tmp_path: Path) -> None:
     source = tmp_path / "source"
     shutil.copytree(SOURCE, source, ignore=shutil.ignore_patterns("__pycache__"))

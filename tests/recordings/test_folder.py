@@ -375,6 +375,7 @@ def test_a_copy_takes_its_sound_track_along(tmp_path: Path):
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_opening_five_thousand_frames_opens_few_pictures_and_takes_little_memory(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

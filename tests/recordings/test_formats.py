@@ -37,6 +37,7 @@ def test_the_date_of_the_first_frame_is_kept_and_poses_of_a_file_may_have_it(tmp
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", WRITTEN)
+@pytest.mark.nightly
 def test_a_damaged_file_is_a_sentence_or_fewer_frames(tmp_path: Path, name: str) -> None:
     written = WRITTEN[name]
     path = written.write(tmp_path / "walk", written.truth())

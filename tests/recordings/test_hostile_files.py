@@ -50,6 +50,7 @@ def test_one_broken_header_does_not_decide_for_all(tmp_path: Path) -> None:
     assert recording.frame(1).depth_m.shape == (48, 64)
 
 
+@pytest.mark.nightly
 def test_every_flipped_bit_of_a_png_header_is_a_sentence(tmp_path: Path) -> None:
     save_depth(tmp_path / "d.png", shots(1)[0].depth_mm)
     whole = (tmp_path / "d.png").read_bytes()

@@ -10,7 +10,7 @@ from recording_scenes import write_folder
 
 from avlmaps.core.errors import RecordingError
 from avlmaps.recordings.open import open_recording
-from avlmaps.recordings.plausible import clock_fault, date_fault, pace_fault, plausible_walk
+from avlmaps.recordings.plausible import clock_fault, date_fault, pace_fault, plausible_walk, repeat_fault
 
 FRAMES_S = np.arange(150) / 30.0
 
@@ -131,3 +131,18 @@ def test_a_far_pose_of_a_folder_is_a_notice(tmp_path: Path) -> None:
     (path / "poses.csv").write_text("\n".join([*lines[:4], f"{stamp},1e6,{rest}", *lines[5:]]))
     recording = open_recording(path)
     assert len(recording) == 7 and "000003" in recording.notices[0] and "1,000,000 m" in recording.notices[0]
+
+
+@pytest.mark.parametrize(
+    ("stamps_s", "said"),
+    [
+        (np.floor(np.arange(60) / 10.0), "whole seconds"),
+        ((1.7e9 + np.arange(60) / 10.0).astype(np.float32).astype(np.float64), "single precision"),
+        (np.tile(np.arange(20) / 7.0, 3), ""),
+        (np.arange(60.0), ""),
+    ],
+    ids=["whole", "single precision", "a looped bag", "one a second"],
+)
+def test_stamps_that_lost_their_fractions_are_named(stamps_s: np.ndarray, said: str) -> None:
+    found = repeat_fault(stamps_s, "frames")
+    assert said in found and bool(found) == bool(said)

@@ -155,6 +155,7 @@ def test_the_check_of_a_recording_says_it(name: str, cause: str, walk: Draft, tm
     assert re.search(cause, " ".join(sentences)), sentences
 
 
+@pytest.mark.nightly
 def test_a_lens_is_said_also_where_a_shorter_focal_length_would_let_frames_agree(tmp_path: Path) -> None:
     walk = RoomWalk("right round", seed=60, frames=24, rate_hz=2.5, noise=0.0019).draft(CAMERA)
     lens = next(one for one in situations() if one.name.startswith("lenses as they are"))

@@ -35,6 +35,8 @@ _UNITS = ((1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds"))
 _ALIKE = 4.0
 _SPARSE = 30.0
 _SHOWN = 3
+_FEWEST_STAMPS = 4
+_SINGLE_S = float(1 << 24)  # beyond it single precision has no whole seconds
 
 
 def date_fault(stamps_s: Float[np.ndarray, " n"], what: str) -> str:
@@ -51,6 +53,22 @@ def date_fault(stamps_s: Float[np.ndarray, " n"], what: str) -> str:
 
 def _unit_of(apart: float, usual_s: float = _USUAL_PACE_S) -> str:
     return min(_UNITS, key=lambda unit: abs(np.log(apart / unit[0] / usual_s)))[1]
+
+
+def repeat_fault(stamps_s: Float[np.ndarray, " n"], what: str) -> str:
+    """Return a sentence where most stamps are those of others because their fractions were lost, else nothing."""
+    finite = stamps_s[np.isfinite(stamps_s)]
+    repeated = len(finite) - len(np.unique(finite))
+    if len(finite) < _FEWEST_STAMPS or repeated <= 0.5 * len(finite):
+        return ""
+    whole, single = bool((finite % 1.0 == 0.0).all()), bool((finite.astype(np.float32) == finite).all())
+    if not (whole or single):
+        return ""
+    lost = "whole seconds" if whole and float(np.abs(finite).max()) < _SINGLE_S else "stored in single precision"
+    return (
+        f"{repeated} of the {len(finite)} {what} have the stamp of another, and all look {lost}; write them in double "
+        "precision, with fractions of a second."
+    )
 
 
 def clock_fault(a_s: Float[np.ndarray, " n"], a: str, b_s: Float[np.ndarray, " m"], b: str) -> str:

@@ -16,7 +16,7 @@ from avlmaps.recordings.consistency.agreement import APART_SAME_M, FEWEST_POINTS
 from avlmaps.recordings.consistency.edges import DepthEdges, Shift, find_edges, shift_of
 from avlmaps.recordings.consistency.flats import Levels, RightAngles, Tilt, find_levels
 from avlmaps.recordings.consistency.jumps import blind_spots, find_exchanged, find_jump, find_parts
-from avlmaps.recordings.consistency.sample import Sample, Surfaces, draw_sample, steps_between_all
+from avlmaps.recordings.consistency.sample import Sample, Surfaces, draw_sample, small_frame, steps_between_all
 from avlmaps.recordings.consistency.single_frames import (
     of_colour,
     of_depth,
@@ -28,6 +28,7 @@ from avlmaps.recordings.consistency.single_frames import (
     warmth_of,
 )
 from avlmaps.recordings.consistency.suspects import (
+    FramesAt,
     PoseAt,
     Suspect,
     Trial,
@@ -266,7 +267,8 @@ def _cause(recording: Recording, found: _Found, median_m: float) -> str:
 
 def _trials(recording: Recording, sample: Sample) -> Trials:
     given = recording.given if isinstance(recording, CorrectedRecording) else NONE
-    return Trials(sample, pose_at(recording, sample), given)
+    pace_s = float(np.median(np.diff(recording.stamps_s))) if len(recording) > 1 else 0.0
+    return Trials(sample, pose_at(recording, sample), given, frames_at(recording, sample), pace_s)
 
 
 def _words(recording: Recording, best: Trial, median_m: float, gain: str) -> str:
@@ -302,6 +304,24 @@ def _explains(trial: Trial, found: _Found) -> bool:
     if not limits.apart_agrees(found.apart):
         return limits.can_be_judged(apart) and apart.same_share > 0.5 * (1.0 + found.apart.same_share)
     return True
+
+
+def frames_at(recording: Recording, sample: Sample) -> FramesAt:
+    """Return a function that reads the pictures of frames that come so many after the sample's."""
+
+    def at(late: int) -> tuple[np.ndarray, np.ndarray] | None:
+        rows = np.clip(sample.index + late, 0, len(recording) - 1)
+        if len(np.unique(rows)) < 0.5 * len(rows):
+            return None
+        try:
+            frames = [small_frame(recording.frame(int(row)), sample.rig) for row in rows]
+        except RecordingError:
+            return None
+        there = sample.index + late == rows  # beyond the ends nothing is known
+        depth_m = np.stack([depth_m if own else 0.0 * depth_m for (depth_m, _), own in zip(frames, there, strict=True)])
+        return depth_m, np.stack([grey for _, grey in frames])
+
+    return at
 
 
 def pose_at(recording: Recording, sample: Sample) -> PoseAt:

@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float, Float32, Int
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.poses import rotation_angle_rad
-from avlmaps.recordings.types import Recording
+from avlmaps.recordings.types import Frame, Recording
 
 WIDTH = 128
 POINTS = 320
@@ -128,6 +128,11 @@ def draw_pairs(recording: Recording, pairs: Int[np.ndarray, "p 2"], follows: Boo
         follows=follows[kept],
         unread=len(index) - len(read),
     )
+
+
+def small_frame(frame: Frame, rig: Rig) -> tuple[Float32[np.ndarray, "h w"], Float32[np.ndarray, "hc wc"]]:
+    """Return the depth and the brightness of a frame at the size of a sample's cameras."""
+    return _nearest(frame.depth_m, rig.depth), _colour(frame.rgb, rig.rgb)[0]
 
 
 def choose_pairs(pose: Float[np.ndarray, "n 4 4"]) -> tuple[Int[np.ndarray, "p 2"], Bool[np.ndarray, " p"]]:

@@ -5,6 +5,7 @@ A suspect in words: what the recording looks like, and how to read it instead.
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import cache
 from itertools import permutations, product
 
 import numpy as np
@@ -27,6 +28,8 @@ from avlmaps.recordings.corrections import (
 
 # Poses of the sample's frames at their stamps plus a delay; None where the trajectory does not reach.
 PoseAt = Callable[[float], Float[np.ndarray, "f 4 4"] | None]
+# Depth and brightness of the frames that come so many later than the sample's; None where they cannot be read.
+FramesAt = Callable[[int], tuple[np.ndarray, np.ndarray] | None]
 # A frame of usual size has its depths compared with `SAME_M`; of a scene of another size it is this share.
 _FLOOR_SHARE, _APART_FLOOR_SHARE = SAME_M / 2.5, APART_SAME_M / 2.5
 UNITS = (0.5, 2.0, 0.25, 4.0, 0.2, 5.0, 0.1, 10.0, 0.01, 100.0, 0.001, 1000.0)
@@ -37,6 +40,7 @@ _ROLLED_DEG = (-8.0, -4.0, 4.0, 8.0)
 _OFF_CENTRE, _BESIDE_CENTRE = (-0.12, -0.06, 0.06, 0.12), (-0.03, 0.0, 0.03)
 _FOCAL = (0.5, 0.67, 0.8, 0.9, 1.12, 1.25, 1.5, 2.0)
 _DELAYS_S = tuple(sign * step / 20.0 for step in range(1, 21) for sign in (1.0, -1.0))
+_MOST_LATE, _LONGEST_DELAY_S, _MORE_ALIKE = 8, 5.0, 0.002
 _POSES: tuple[tuple[PoseKind, ...], ...] = (
     (PoseKind.CAMERA_FROM_WORLD,),
     (PoseKind.WXYZ,),
@@ -110,6 +114,8 @@ class Suspect:
         turn_depth: how depth pictures are turned.
         along_ray: whether the depth is the distance along the ray.
         farther_m: what is added to the depth before it is scaled.
+        depth_late: by how many frames depth pictures come after what they belong to.
+        colour_late: the same of colour pictures.
         turned_back: whether the rotations alone are those of camera_from_world.
         places: which axes of the positions are x, y and z of the rotations, counted from 1, negative where they point
             the other way; None where they are the same.
@@ -126,6 +132,8 @@ class Suspect:
     turn_depth: PictureTurn | None = None
     along_ray: bool = False
     farther_m: float = 0.0
+    depth_late: int = 0
+    colour_late: int = 0
     turned_back: bool = False
     places: tuple[int, int, int] | None = None
 
@@ -150,22 +158,34 @@ class Trial:
         known = self.offs[np.isfinite(self.offs)]
         return float(known.mean()) if len(known) else float("inf")
 
+    @property
+    def likeness(self) -> float:
+        """Mean correlation of brightness of both kinds of pairs; 0 where nothing varies."""
+        known = [found.likeness for found in (self.agreement, self.apart) if np.isfinite(found.likeness)]
+        return float(np.mean(known)) if known else 0.0
+
 
 class Trials:
     """Tries suspects on one sample."""
 
-    def __init__(self, sample: Sample, pose_at: PoseAt, given: Corrections = NONE) -> None:
+    def __init__(
+        self, sample: Sample, pose_at: PoseAt, given: Corrections = NONE, frames_at: FramesAt = lambda _: None,
+        pace_s: float = 0.0,
+    ) -> None:  # fmt: skip
         """Begin.
 
         Args:
             sample: that does not agree as it is.
             pose_at: the uncorrected poses at other times.
             given: what was corrected already; suspects replace what they name.
+            frames_at: the pictures of frames that come later or earlier.
+            pace_s: the usual time from a frame to the next.
         """
         few = [_some(np.flatnonzero(kind)) for kind in (sample.follows, ~sample.follows)]
         self.sample, self._pose_at, self.given = sample.only(np.concatenate(few)), pose_at, given
-        self._depth: dict[tuple[PictureTurn | None, bool, float], tuple[np.ndarray, Surfaces]] = {}
-        self._kinds: dict[tuple[PictureTurn | None, PictureTurn | None, bool, float], tuple[Sample, Sample]] = {}
+        self._frames_at, self.pace_s = cache(frames_at), pace_s
+        self._depth: dict[tuple[PictureTurn | None, bool, float, int], tuple[np.ndarray, Surfaces]] = {}
+        self._kinds: dict[Suspect, tuple[Sample, Sample]] = {}
         self._delayed: dict[float, np.ndarray | None] = {}
         usual = sample.depth_m[sample.depth_m > 0.0]
         self._median_m = float(np.median(usual)) if len(usual) else 1.0
@@ -187,7 +207,8 @@ class Trials:
             self._delayed[delay_s] = self._pose_at(delay_s)
         pose = self._delayed[delay_s]
         rig = suspected_rig(self.sample.rig, suspect)
-        if rig is None or pose is None:
+        late = suspect.depth_late or suspect.colour_late
+        if rig is None or pose is None or (late and self._frames_at(late) is None):
             return Trial(suspect, NOTHING, NOTHING, 0.0)
         pose = _replaced(reread_poses(pose, given), suspect) @ _rolled(suspect.rolled_deg)
         surfaces, median_m = self._measured(suspect)[1], self._median_m * suspect.scale
@@ -202,9 +223,10 @@ class Trials:
         return int(trial.agreement.points.sum() + trial.apart.points.sum())
 
     def _measured(self, suspect: Suspect) -> tuple[np.ndarray, Surfaces]:
-        key = (suspect.turn_depth, suspect.along_ray, suspect.farther_m)
+        key = (suspect.turn_depth, suspect.along_ray, suspect.farther_m, suspect.depth_late)
         if key not in self._depth:
-            depth_m = self.sample.depth_m
+            later = self._frames_at(suspect.depth_late) if suspect.depth_late else None
+            depth_m = self.sample.depth_m if later is None else later[0]
             if suspect.turn_depth is not None:
                 depth_m = suspect.turn_depth(depth_m)
             if suspect.along_ray:
@@ -216,9 +238,14 @@ class Trials:
         return self._depth[key]
 
     def _turned(self, suspect: Suspect) -> tuple[Sample, Sample]:
-        key = (suspect.turn_colour, suspect.turn_depth, suspect.along_ray, suspect.farther_m)
+        key = Suspect(
+            turn_colour=suspect.turn_colour, turn_depth=suspect.turn_depth, along_ray=suspect.along_ray,
+            farther_m=suspect.farther_m, depth_late=suspect.depth_late, colour_late=suspect.colour_late,
+        )  # fmt: skip
         if key not in self._kinds:
-            grey = self.sample.grey if suspect.turn_colour is None else suspect.turn_colour(self.sample.grey)
+            later = self._frames_at(suspect.colour_late) if suspect.colour_late else None
+            grey = self.sample.grey if later is None else later[1]
+            grey = grey if suspect.turn_colour is None else suspect.turn_colour(grey)
             sample = replace(self.sample, depth_m=self._measured(suspect)[0], grey=grey)
             self._kinds[key] = sample.only(sample.follows), sample.only(~sample.follows)
         return self._kinds[key]
@@ -285,12 +312,18 @@ def find_closer(trials: Trials) -> Trial | None:
     as_it_is = trials.run(Suspect(), colour=False)
     if not _LEAST_OFF < as_it_is.off < float("inf"):
         return None
-    suspects = (*_scales(), *_farther(), *_delays(), *_focal(), *_mounts())
+    suspects = (*_scales(), *_farther(), *_delays(trials.pace_s), *_focal(), *_mounts())
     tried = (trials.run(suspect, colour=False) for suspect in suspects)
     closer = [trial for trial in tried if _is_less_off(trial, as_it_is)]
     if not closer:
         return None
     best = _refined(trials, trials.run(min(closer, key=lambda trial: trial.off).suspect))
+    delay_s = best.suspect.given.pose_delay_s
+    late = -round(delay_s / trials.pace_s) if delay_s and trials.pace_s > 0.0 else 0
+    if late:  # depth that is late looks like poses that are early, but for colour
+        depth = trials.run(Suspect(depth_late=late))
+        alike = depth.likeness > best.likeness + _MORE_ALIKE
+        best = depth if alike and depth.off <= _AS_GOOD * best.off else best
     return best if is_closer(best, as_it_is) else None
 
 
@@ -327,10 +360,13 @@ def find_cause(trials: Trials, enough: Callable[[Trial], bool]) -> Trial | None:
         trials: of the sample.
         enough: whether a sample agrees.
     """
-    single = [trials.run(suspect) for suspect in (*_undone(trials.given), *_single())]
+    single = [trials.run(suspect) for suspect in (*_undone(trials.given), *_single(trials.pace_s))]
     # a delay, scale or focal length between the steps that were tried may fit where none of the steps does
     single += [_refined(trials, max(kind, key=lambda trial: trial.score)) for kind in _by_kind(single)]
     best = _best([trial for trial in single if enough(trial)])
+    if best is None or best.suspect.given.pose_delay_s:  # pictures that are late look like poses that are early
+        late = [trial for trial in map(trials.run, _late_pictures()) if enough(trial)]
+        best = _best([*late, *([best] if best is not None else [])])
     if best is not None:
         return _refined(trials, best)
     posed = [trials.run(suspect) for suspect in _posed()]
@@ -365,12 +401,12 @@ def _undone(given: Corrections) -> Iterator[Suspect]:
         yield Suspect(Corrections(camera_axes="opencv"))
 
 
-def _single() -> Iterator[Suspect]:
+def _single(pace_s: float) -> Iterator[Suspect]:
     yield from (Suspect(Corrections(poses=kinds)) for kinds in _POSES)
     yield from (Suspect(Corrections(camera_axes=name)) for name in NAMED if name != "opencv")
     yield from _scales()
     yield from _intrinsics()
-    yield from _delays()
+    yield from _delays(pace_s)
     yield from (Suspect(Corrections(camera_axes=axes)) for axes in all_axes() if axes not in NAMED.values())
     yield Suspect(along_ray=True)
     yield from (Suspect(turn_colour=turn) for turn in TURNS)
@@ -399,8 +435,16 @@ def _farther() -> Iterator[Suspect]:
     yield from (Suspect(farther_m=by_m) for by_m in _FARTHER_M)
 
 
-def _delays() -> Iterator[Suspect]:
-    yield from (Suspect(Corrections(pose_delay_s=delay_s)) for delay_s in _DELAYS_S)
+def _delays(pace_s: float) -> Iterator[Suspect]:
+    """Yield delays of up to a second, and beyond it of whole frames where these come seldom."""
+    whole = (sign * step * pace_s for step in range(1, _MOST_LATE + 1) for sign in (1.0, -1.0))
+    delays_s = (*_DELAYS_S, *(delay_s for delay_s in whole if 1.0 < abs(delay_s) <= _LONGEST_DELAY_S))
+    yield from (Suspect(Corrections(pose_delay_s=round(delay_s, 3))) for delay_s in delays_s)
+
+
+def _late_pictures() -> Iterator[Suspect]:
+    for late in (1, -1, 2, -2, 3, -3):
+        yield from (Suspect(depth_late=late), Suspect(colour_late=late))
 
 
 def _intrinsics() -> Iterator[Suspect]:
@@ -541,6 +585,9 @@ def _measured_otherwise(suspect: Suspect) -> list[str]:
     if suspect.farther_m:
         large = "large" if suspect.farther_m < 0.0 else "small"
         said.append(f"the depth looks {abs(suspect.farther_m):.2g} m too {large} everywhere")
+    for what, late in (("depth", suspect.depth_late), ("colour", suspect.colour_late)):
+        if late:
+            said.append(f"the {what} pictures look {abs(late)} frame(s) {'late' if late > 0 else 'early'}")
     if suspect.along_ray:
         said.append("the depth looks like the distance along the ray, not along the camera's axis")
     return said
@@ -635,18 +682,27 @@ def _named(axes: str | None) -> str | None:
     return next((name for name, letters in NAMED.items() if letters == axes), axes)
 
 
-def _by_hand(suspect: Suspect, median_m: float) -> str:
-    """Return what no option does."""
+def _pictures_by_hand(suspect: Suspect) -> list[str]:
     todo: list[str] = []
-    if suspect.scale != 1.0 and not _is_depth(suspect.scale, median_m):
-        alone = _is_positions(suspect.scale, median_m)
-        todo.append(f"{'' if alone else 'or '}multiply the positions by {1.0 / suspect.scale:.3g}")
     if suspect.turn_colour is not None and suspect.turn_depth is not None:
         todo.append("turn the pictures as the poses have them")
     elif suspect.turn_colour is not None:
         todo.append("turn the colour pictures as the depth is")
     elif suspect.turn_depth is not None:
         todo.append("turn the depth pictures as the colour is")
+    for what, late in (("depth", suspect.depth_late), ("colour", suspect.colour_late)):
+        if late:
+            todo.append(f"pair each frame with the {what} picture {abs(late)} {'later' if late > 0 else 'earlier'}")
+    return todo
+
+
+def _by_hand(suspect: Suspect, median_m: float) -> str:
+    """Return what no option does."""
+    todo: list[str] = []
+    if suspect.scale != 1.0 and not _is_depth(suspect.scale, median_m):
+        alone = _is_positions(suspect.scale, median_m)
+        todo.append(f"{'' if alone else 'or '}multiply the positions by {1.0 / suspect.scale:.3g}")
+    todo += _pictures_by_hand(suspect)
     if suspect.rolled_deg:
         todo.append("correct the transform from what the poses are of to the camera")
     if suspect.farther_m:

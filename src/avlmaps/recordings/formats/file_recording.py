@@ -29,7 +29,7 @@ from avlmaps.core.wording import option
 from avlmaps.recordings import images
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.faults import Fault, Report
-from avlmaps.recordings.plausible import date_fault, plausible_walk
+from avlmaps.recordings.plausible import date_fault, plausible_walk, repeat_fault
 from avlmaps.recordings.types import BaseHeight, Frame, Recording
 from avlmaps.recordings.video import VideoFrames
 
@@ -142,7 +142,7 @@ def settle(
     # Names of files; the numbers of a database's nodes have no dot.
     if twins := sorted(name for name in set(shots.colour) & set(shots.depth) if "." in name):
         report(Fault(f"{path} names {twins[0]} as colour and as depth; each frame needs a picture of both.", path))
-    if fault := date_fault(shots.stamps_s, "frames"):
+    if fault := date_fault(shots.stamps_s, "frames") or repeat_fault(shots.stamps_s, "frames"):
         report(Fault(f"{path}: {fault}", path))
     disagreement = order_notices(shots.names, shots.stamps_s)
     order = timeline.in_order(shots.stamps_s, "frames")

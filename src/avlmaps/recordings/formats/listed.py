@@ -26,7 +26,7 @@ from avlmaps.recordings.formats.file_recording import FileRecording, Shots, list
 from avlmaps.recordings.formats.layouts import Z_UP, Cameras, Poses, fitted_cameras, pinhole, sizes
 from avlmaps.recordings.formats.tables import POSE, read_opencv_yaml, read_table, resized_notice, text_lines
 from avlmaps.recordings.images import COLOUR_SUFFIXES, DEPTH_SUFFIXES
-from avlmaps.recordings.plausible import clock_fault, date_fault
+from avlmaps.recordings.plausible import clock_fault, date_fault, repeat_fault
 
 RATE_HZ = 30.0
 
@@ -155,7 +155,8 @@ def _stream(path: Path, report: Report) -> _Stream:
             report(Fault(sentence, path, number))
     if not files:
         raise RecordingError(f"{path} lists no picture, so there is nothing to map.")
-    if fault := date_fault(np.array(stamps), f"the pictures of {path.name}"):
+    what = f"pictures of {path.name}"
+    if fault := date_fault(np.array(stamps), f"the {what}") or repeat_fault(np.array(stamps), what):
         raise RecordingError(f"{path}: {fault}")
     order = timeline.in_order(np.array(stamps), f"pictures of {path.name}")
     return _Stream(np.array(stamps)[order.index], [files[i] for i in order.index], order.notices)

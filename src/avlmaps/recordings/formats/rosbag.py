@@ -54,7 +54,7 @@ from avlmaps.recordings.formats.ros_sound import (
     extract_audio,
 )
 from avlmaps.recordings.formats.ros_transforms import TransformTree, base_height, find_motion, is_tf, no_pose, read_tf
-from avlmaps.recordings.plausible import plausible_walk
+from avlmaps.recordings.plausible import plausible_walk, repeat_fault
 from avlmaps.recordings.types import Frame, Recording
 
 _IMAGE_TYPES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
@@ -334,6 +334,8 @@ def _stamps(bag: Bag, topic: str) -> tuple[np.ndarray, np.ndarray]:
             f"All {len(stamps_s)} header stamps of {topic} in {bag.path} are zero, so that nothing says where its "
             "camera was; let its driver set them, and record again."
         )
+    if fault := repeat_fault(stamps_s, f"messages of {topic}"):
+        raise RecordingError(f"{bag.path}: {fault}")
     return stamps_s, received_ns
 
 
