@@ -365,7 +365,8 @@ def find_cause(trials: Trials, enough: Callable[[Trial], bool]) -> Trial | None:
     single += [_refined(trials, max(kind, key=lambda trial: trial.score)) for kind in _by_kind(single)]
     best = _best([trial for trial in single if enough(trial)])
     if best is None or best.suspect.given.pose_delay_s:  # pictures that are late look like poses that are early
-        late = [trial for trial in map(trials.run, _late_pictures()) if enough(trial)]
+        as_it_is = trials.run(Suspect(), colour=False)
+        late = [one for one in map(trials.run, _late_depth()) if enough(one) and is_closer(one, as_it_is)]
         best = _best([*late, *([best] if best is not None else [])])
     if best is not None:
         return _refined(trials, best)
@@ -442,9 +443,8 @@ def _delays(pace_s: float) -> Iterator[Suspect]:
     yield from (Suspect(Corrections(pose_delay_s=round(delay_s, 3))) for delay_s in delays_s)
 
 
-def _late_pictures() -> Iterator[Suspect]:
-    for late in (1, -1, 2, -2, 3, -3):
-        yield from (Suspect(depth_late=late), Suspect(colour_late=late))
+def _late_depth() -> Iterator[Suspect]:
+    yield from (Suspect(depth_late=late) for late in (1, -1, 2, -2, 3, -3))
 
 
 def _intrinsics() -> Iterator[Suspect]:
