@@ -1,4 +1,3 @@
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -13,7 +12,6 @@ from avlmaps.core.question import Modality, Part, Question, Role
 from avlmaps.query import locate as locate_module
 from avlmaps.query.avlmap import AVLMap, QuerySettings
 from avlmaps.query.modalities.area import AreaSettings
-from avlmaps.query.photometric import ByColour, Panoramas, Start
 from avlmaps.recordings.audio import AudioTrack, Sound
 
 CHAIR = Part(Modality.OBJECT, "chair")
@@ -174,31 +172,6 @@ def test_a_guess_heats_its_place_and_is_not_found(heard: AVLMap, monkeypatch: py
     assert (heat.found, heat.goals()[0].position) == (False, (3.0, 2.0, 1.5))
     told = "the picture could not be located (7 points agree); the heat is that of the best guess"
     assert heat.factors[0].note == told
-
-
-@pytest.mark.parametrize(("by_colour", "confidence"), [(True, 0.2), (True, 0.8), (False, 0.8)])
-def test_what_keypoints_cannot_locate_is_guessed_by_its_colours(
-    heard: AVLMap, monkeypatch: pytest.MonkeyPatch, by_colour: bool, confidence: float
-) -> None:
-    guess, better = np.eye(4), np.eye(4)
-    guess[:3, 3], better[:3, 3] = [3.0, 2.0, 1.5], [1.0, 2.0, 1.5]
-    locating(monkeypatch, None, inliers=7, guess=guess)
-    started: list[list[Start]] = []
-
-    def likeliest(panoramas: Panoramas, rgb: np.ndarray, camera: Pinhole, starts: list[Start]) -> ByColour:
-        started.append(starts)
-        return ByColour(better, 0.8, 0, 0.3, confidence)
-
-    monkeypatch.setattr(Panoramas, "likeliest", likeliest)
-    asked = AVLMap(heard.stored, settings=replace(heard.settings, by_colour=by_colour))
-    heat = asked.image(np.zeros((48, 64, 3), np.uint8), primary=True)
-    found = by_colour and confidence >= 0.5
-    assert (heat.found, heat.goals()[0].position) == (found, (1.0, 2.0, 1.5) if by_colour else (3.0, 2.0, 1.5))
-    note = "best guess, whose confidence is 0.80 by its colours" if found else "best guess"
-    assert heat.factors[0].note.endswith(note)
-    if found:
-        assert heat.goals()[0].score == pytest.approx(0.8)
-    assert [start.world_from_camera.tolist() for starts in started for start in starts] == [guess.tolist()] * by_colour
 
 
 def test_pictures_that_cannot_be_asked_with_are_refused(heard: AVLMap, tmp_path: Path) -> None:

@@ -209,7 +209,6 @@ def _counted(
 def _from_where_it_was_seen(
     points: Float[np.ndarray, "n 3"], before: Sequence[DayViews], views: DayViews, settings: ChangeSettings
 ) -> Bool[np.ndarray, " k"]:
-    """Return which views look at a thing from about where one saw it before."""
     middle = points.mean(axis=0)
     known = [day.directions(middle)[day.show(points)] for day in before]
     seen_from = np.concatenate([np.zeros((0, 3)), *known])

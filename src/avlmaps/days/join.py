@@ -42,7 +42,6 @@ def joined_voxels(
 
 
 def _sums(voxels: Voxels, rows: Int[np.ndarray, " k"]) -> VoxelSums:
-    """Return sums whose means are some of a map's voxels."""
     hits = np.asarray(voxels.hits)[rows]
     weight = np.asarray(voxels.weight, np.float64)[rows]
     feature = np.asarray(voxels.feature)[rows].astype(np.float32) * weight[:, None].astype(np.float32)
@@ -110,7 +109,6 @@ def joined_keyframes(stored: StoredMap, other: StoredMap, moved: Float[np.ndarra
 
 
 def _concatenated(one: Keyframes, other: Keyframes) -> Keyframes:
-    """Put keyframes one after the other."""
     from avlmaps.core.columns import concat
 
     shapes = {part.clear_mm.shape[1:] for part in (one, other) if len(part)}

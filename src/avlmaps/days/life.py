@@ -139,7 +139,6 @@ def _still_absent(
     grid: GridSpec,
     settings: ChangeSettings,
 ) -> Stay:
-    """Return a stay that is gone with the new day, where that looked through its place again; others as they are."""
     if stay.gone is None:
         return stay
     views = [one for one in before[stay.first : stay.gone] if len(one)]
@@ -192,7 +191,6 @@ def _matched(
 
 
 def _far(stay: Stay, thing: SeenThing) -> float:
-    """Return how far the middles of two that overlap can be, metres."""
     return float(np.linalg.norm(stay.size) + np.linalg.norm(thing.size)) / 2 + 0.2
 
 

@@ -199,7 +199,6 @@ def _closures(stored: StoredMap, poses: Float[np.ndarray, "k 4 4"], settings: Lo
 
 
 def _odometry(poses: Float[np.ndarray, "k 4 4"], settings: LoopSettings) -> Edges:
-    """Return the motions from each keyframe to the next, and how well odometry knows them."""
     row: Int[np.ndarray, " e"] = np.arange(len(poses) - 1)
     step = inverse(poses[:-1]) @ poses[1:]
     way = np.linalg.norm(step[:, :3, 3], axis=1) + rotation_angle_rad(step, np.tile(np.eye(4), (len(step), 1, 1)))
@@ -210,7 +209,6 @@ def _odometry(poses: Float[np.ndarray, "k 4 4"], settings: LoopSettings) -> Edge
 def _upright(
     found: Float[np.ndarray, "k 4 4"], before: Float[np.ndarray, "k 4 4"], up: Float[np.ndarray, "3"]
 ) -> Float[np.ndarray, "k 4 4"]:
-    """Return poses turned about the first one, so that up stays where it was: what was seen again says little of it."""
     tipped = mean_rotation(found @ inverse(before)) @ up
     to_level = rotation_to_level(up).T @ rotation_to_level(rotation_to_level(up) @ tipped) @ rotation_to_level(up)
     return from_rotation(to_level, found[0, :3, 3] - to_level @ found[0, :3, 3]) @ found

@@ -204,7 +204,6 @@ def _when(stamp_s: float) -> str:
 
 
 def _seen(thing: Thing, stored: StoredMap, map_from_own: Float[np.ndarray, "4 4"], shift_s: float) -> lives.SeenThing:
-    """Return a thing of a map in the grid of the map of all days."""
     index = np.asarray(stored.voxels.index)[thing.rows]
     if not np.array_equal(map_from_own, np.eye(4)):
         index, *_ = resampled(index, stored.grid, map_from_own)
@@ -215,20 +214,17 @@ def _seen(thing: Thing, stored: StoredMap, map_from_own: Float[np.ndarray, "4 4"
 
 
 def _look(stored: StoredMap, rows: Int[np.ndarray, " r"]) -> Float[np.ndarray, " d"] | None:
-    """Return how some voxels look together, unit norm; None where they have no features."""
     total = np.asarray(stored.voxels.feature)[rows].astype(np.float64).sum(axis=0)
     length = float(np.linalg.norm(total))
     return total / length if length > 0.0 else None
 
 
 def _looks(life: Life, stored: StoredMap, known: Occupied) -> dict[int, Float[np.ndarray, " d"]]:
-    """Return how the things look that are there still, by the number of their stay."""
     looks = {number: _look(stored, rows) for number, rows in _rows_there(life, known).items()}
     return {number: look for number, look in looks.items() if look is not None}
 
 
 def _rows_there(life: Life, known: Occupied) -> dict[int, Int[np.ndarray, " r"]]:
-    """Return the voxels of what is not gone, by the number of its stay."""
     return {number: _rows_of(number, life, known) for number, stay in enumerate(life.stays) if stay.gone is None}
 
 
@@ -246,7 +242,6 @@ def same_thing(one: str, other: str) -> bool:
 def _with_vanished(
     life: Life, stored: StoredMap, known: Occupied, now: Day, visits: Sequence[Visit], settings: MergeSettings
 ) -> Life:
-    """Return a life with the surface that the new day looks through and that no thing owns, as things of their own."""
     index, grid = np.asarray(stored.voxels.index), stored.grid
     surface = now.has_surface(grid.centre_of(index))
     loose, through = ~surface, now.views.through(index, grid) >= settings.changes.through_views
@@ -266,7 +261,6 @@ def _unnamed_new(
     moved: Float[np.ndarray, "4 4"],
     settings: MergeSettings,
 ) -> list[Thing]:
-    """Return the new day's surface where the earlier days saw freely and that no thing owns, as things of their own."""
     grid = other.grid
     points = apply(moved, grid.centre_of(np.asarray(other.voxels.index)))
     index = grid.index_of(points)

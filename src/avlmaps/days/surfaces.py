@@ -94,7 +94,6 @@ def refine(
 def _step(
     at: Float[np.ndarray, "n 3"], normal: Float[np.ndarray, "n 3"], off_m: Float[np.ndarray, " n"], weight: np.ndarray
 ) -> Float[np.ndarray, "4 4"]:
-    """Return the small rigid motion that takes most of the distances away: Gauss and Newton's step."""
     middle = at.mean(axis=0)
     slope = np.concatenate([np.cross(at - middle, normal), normal], axis=1)
     square = (slope * weight[:, None]).T @ slope + 1e-9 * np.eye(6)

@@ -134,7 +134,6 @@ def merge_in_turn(days: Sequence[StoredMap], scratch: Path, out: Path, *, overwr
 
 
 def _finished(path: Path, key: str) -> StoredMap | None:
-    """Return the map that is there, if it is the one of this key."""
     if not (path / MANIFEST).is_file():
         return None
     try:

@@ -18,7 +18,10 @@ _PICTURE = frozenset({
     "selfie", "screenshot", "polaroid",
 })  # fmt: skip
 _SOUND = frozenset({"recording", "recorded", "clip", "sound", "audio", "noise", "tape", "recordings", "memo"})
-_SIDE = re.compile(r"\b((?:left|right|north|south|east|west|in front) of|behind|opposite)\b")
+_SIDE = re.compile(
+    r"\b((?:left|right|north|south|east|west|in front) of|behind|opposite|"
+    r"across from|underneath|under|beneath|below|above|over)\b"
+)
 _POINTS = frozenset({"this", "these", "attached", "attachment", "here", "file", "sent", "enclosed", "uploaded"})
 
 

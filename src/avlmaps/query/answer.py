@@ -1,16 +1,23 @@
 """The answer of a query: goals, and the outcome of each part; with their JSON (a contract of the command line)."""
 
 from dataclasses import dataclass, field
+from html import escape
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from avlmaps.core.errors import QueryError
 from avlmaps.core.poses import FRAME
 from avlmaps.core.question import Part, Question
+from avlmaps.core.wording import place_text
 from avlmaps.query.goals import Goal
 from avlmaps.query.heatmap import Heatmap
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
     from avlmaps.maps.storeys import Storeys
     from avlmaps.query.schema import AlternativeAnswer, DayAnswer, PartOutcome, QueryAnswer, UsualAnswer
 
@@ -94,6 +101,7 @@ class Answer:
         storeys: of a map of several.
         when: the day of each goal, in an answer about several days: when a change was noticed, or a thing last seen.
         usual: on how many days each goal was there, in an answer about what is usual.
+        alike: number of places that fit as well as the likeliest, itself among them; 0 where nothing is found.
         text: the answer in one sentence: where the first goal is, or which part failed and what the best guess is.
     """
 
@@ -110,11 +118,32 @@ class Answer:
     storeys: "Storeys | None" = field(default=None, repr=False, compare=False)
     when: "tuple[DayAnswer, ...]" = ()
     usual: "tuple[UsualAnswer, ...]" = ()
+    alike: int = 0
 
     def __repr__(self) -> str:
         counted = "" if self.count is None else f", count={self.count}"
         said = f"found={self.found}, probability={self.probability:.2f}{counted}, {len(self.goals)} goals"
         return f"Answer({said}: {self.text!r})"
+
+    def plot(self, path: str | Path | None = None, *, ax: "Axes | None" = None) -> "Path | Figure":
+        """Draw the answer's heat and goals, as ``Heatmap.plot`` does.
+
+        Raises:
+            QueryError: the answer is from a list and has no heat, or the picture cannot be written there.
+        """
+        if self.heat is None:
+            raise QueryError("The answer comes from a list of the map, and has no heat to draw; plot the map instead.")
+        top = max(len(self.goals), 1)
+        return self.heat.plot(top=top, ax=ax) if path is None else self.heat.plot(path, top=top)
+
+    def _repr_html_(self) -> str:
+        head = "<tr><th></th><th>position (m)</th><th>probability</th></tr>"
+        rows = "".join(
+            f"<tr><td>{number} {escape(goal.name)}</td><td>{place_text(goal.position)}</td>"
+            f"<td>{goal.probability:.2f}</td></tr>"
+            for number, goal in enumerate(self.goals, 1)
+        )
+        return f"<p>{escape(self.text)}</p><table>{head}{rows}</table>"
 
     def to_dict(self) -> "QueryAnswer":
         """Return the answer with the keys of the contract; positions are in the frame that ``frame`` names."""
@@ -137,6 +166,8 @@ class Answer:
             goal["usual"] = usual
         if self.count is not None:
             answer["count"] = self.count
+        if self.alike > 1:
+            answer["alike"] = self.alike
         if self.notes:
             answer["notes"] = list(self.notes)
         if self.alternatives:

@@ -3,15 +3,17 @@
 The questions of a sentence are alternatives: the likeliest answer counts, and the others are named beside it.
 """
 
+import itertools
+import re
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from avlmaps.core.arrays import Float
+from avlmaps.core.arrays import Bool, Float
 from avlmaps.core.errors import QueryError
 from avlmaps.core.files import user_path
 from avlmaps.core.lexicon import EntryKind, lexicon
@@ -21,7 +23,7 @@ from avlmaps.perception.protocols import NamedPixelEncoder
 from avlmaps.query.answer import Alternative, Answer, PartAnswer
 from avlmaps.query.factors import Factor, NearAnchors, NearThings
 from avlmaps.query.given_places import distance_m, place_given
-from avlmaps.query.goals import Goal
+from avlmaps.query.goals import Goal, alike
 from avlmaps.query.heatmap import Heatmap, product
 from avlmaps.query.room_names import own_names
 from avlmaps.query.wording import UNDERSTOOD_ONLY, absent_text, found_text, placed
@@ -33,10 +35,21 @@ if TYPE_CHECKING:
     from avlmaps.maps.storeys import Storeys
     from avlmaps.query.queryable import Attachment, Queryable
 
+_MOST_ALIKE = 10  # goals that are looked at for others that fit as well
 # For a count, up to this many instances are taken; those that are found count.
 MOST_GOALS = 200
 # Each way to name a storey has one of these: floor, storey, story, stories, level, upstairs.
 _STOREY_STEMS = ("floor", "stor", "level", "stair")
+AS_NEAR = "distance counts, the side does not."
+_BETWEEN = re.compile(r"\bbetween\b", re.IGNORECASE)
+# "There is no chair in the kitchen, right?"
+_STATED = re.compile(
+    r"(?:so,? |and )?there (?P<verb>is|are)(?P<no>n't| not| no)?(?: any)? (?P<what>.+?),? "
+    r"(?:right|correct|yes|no|true|is (?:that|this) (?:right|so|true|correct)|isn't (?:it|there|that so)|is there|"
+    r"are there|aren't there)[ ?.!]*",
+    re.IGNORECASE,
+)
+_ASIDE_M = 0.5  # how far from the line between two things what is between them may lie
 _EXAMPLE = "the red cabinet near the sound of a dog barking"
 _OF_A_LIST = "The question has an order of its own, so that no place to count from (near) changes it."
 
@@ -173,7 +186,6 @@ def ask(avlmap: "Queryable", asked: Asked, files: Files | None = None) -> Answer
 
 
 def _asks_for_list(avlmap: "Queryable", asked: Asked) -> bool:
-    """Return whether a question is for a list of the map, which has an order of its own: the largest room."""
     from avlmaps.language.list_questions import read_list
 
     return bool(asked.sentence.strip()) and read_list(asked.sentence, own_names(avlmap, asked.sentence)) is not None
@@ -207,7 +219,6 @@ def nearest_first(avlmap: "Queryable", answer: Answer, place: Float[np.ndarray, 
 
 
 def _ask_of_storeys(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
-    """Answer what may name a storey, or be a question about storeys."""
     from avlmaps.language.storey_words import asks_how_many_storeys, said_storeys
     from avlmaps.query.on_storeys import answer_on_storey, how_many
 
@@ -241,8 +252,10 @@ def _ask(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
     return _answer_sentence(avlmap, asked, files)
 
 
-def answer_question(avlmap: "Queryable", question: Question, top: int = 3, files: Files | None = None) -> Answer:
-    """Answer a question whose parts are known.
+def answer_question(
+    avlmap: "Queryable", question: Question, top: int = 3, files: Files | None = None, *, between: bool = False
+) -> Answer:
+    """Answer a question whose parts are known; ``between`` says that the goals lie between its first two other things.
 
     Raises:
         AskError: intrinsics come without a photo, or no goal is wanted.
@@ -254,22 +267,30 @@ def answer_question(avlmap: "Queryable", question: Question, top: int = 3, files
     camera = files.camera_of(question)
     heats = [avlmap.heat(part, camera, files.attachments) for part in question.parts]
     heat = product(heats)
-    goals, found = tuple(heat.goals(top)), heat.found
+    if between:
+        heat = heat.only(lies_between(heat))
+    several, found = tuple(heat.goals(max(top, _MOST_ALIKE))), heat.found
+    goals, equal = several[:top], alike(several, heat.found_at)
     said = (replace(part, at=factor.part.at) for part, factor in zip(question.parts, heat.factors, strict=True))
     question = Question(tuple(said))
     parts = tuple(_part_answer(*both, heat) for both in zip(question.parts, heat.factors, strict=True))
     alone = () if found or len(heats) == 1 else (_alone(question, heats),)
-    text = found_text(parts, goals[0]) if found else absent_text(parts, goals, next(iter(alone), None))
+    text = found_text(parts, goals[0], alike=equal) if found else absent_text(parts, goals, next(iter(alone), None))
+    if between:
+        a, b = (part.query for part in question.parts if part.role is Role.CONTEXT and part.modality is Modality.OBJECT)
+        text = text.replace(f"near the {a} near the {b}", f"between the {a} and the {b}")
     elapsed_ms = 1e3 * (time.perf_counter() - begin)
     named = {kind: [part.query for part in question.parts if part.modality is kind] for kind in Modality}
     places = [goal.position for goal in goals] if found else []
     said = avlmap.edited.said_of(places, named[Modality.OBJECT], named[Modality.AREA])
     notes = (*avlmap.stored.info.doubts, *said)
-    return Answer(goals, found, parts, elapsed_ms, heat, heat.probability, text=text, alternatives=alone, notes=notes)
+    return Answer(
+        goals, found, parts, elapsed_ms, heat, heat.probability, text=text, alternatives=alone, notes=notes,
+        alike=len(equal) if found else 0,
+    )  # fmt: skip
 
 
 def _part_answer(part: Part, factor: Factor, whole: Heatmap) -> PartAnswer:
-    """Return the outcome of a part: where the whole is found all its parts are, however unlikely each is alone."""
     own = _probability(factor)
     if not whole.found or factor.found:
         return PartAnswer(part, _peak(factor), factor.found, factor.understood, factor.note, own)
@@ -278,7 +299,6 @@ def _part_answer(part: Part, factor: Factor, whole: Heatmap) -> PartAnswer:
 
 
 def _alone(question: Question, heats: Sequence[Heatmap]) -> Alternative:
-    """Return what is sought by itself, without what it is near."""
     part, heat = next(both for both in zip(question.parts, heats, strict=True) if both[0].role is Role.PRIMARY)
     return Alternative(Question.of([part]), heat.probability, heat.found, tuple(heat.goals(1)))
 
@@ -302,7 +322,6 @@ def thing_alone(asked: Asked, avlmap: "Queryable") -> Question | None:
 
 
 def _answer_sentence(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
-    """Answer a sentence; one that asks where a sound came from means its source, where the map knows that."""
     from avlmaps.language.source_words import asks_for_source
     from avlmaps.query.sound_sources import no_sources
 
@@ -323,6 +342,12 @@ def _answer_said(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
         return answer_list(
             avlmap, listed, asked.top, lambda words: _answer_words(avlmap, asked, words, files), asked.at
         )
+    stated = _STATED.fullmatch(asked.sentence.strip())
+    if numbered is None and stated is not None:
+        verb, what = stated["verb"].lower(), stated["what"]
+        answer = _answer_read(avlmap, replace(asked, sentence=f"{verb} there {what}"), files)
+        is_right = answer.found != bool(stated["no"])
+        return replace(answer, text=f"{'Yes' if is_right else 'No'}. {answer.text}")
     if numbered is None:
         return _answer_read(avlmap, asked, files)
     number, what = numbered
@@ -334,7 +359,6 @@ def _answer_said(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
 
 
 def _answer_words(avlmap: "Queryable", asked: Asked, words: str, files: Files) -> Answer:
-    """Answer what a question to the lists names: the photo that came along, or a thing, a sound or a room in words."""
     from avlmaps.language.list_questions import speaks_of_photo
 
     if asked.image is not None and asked.clip is None and speaks_of_photo(words):
@@ -356,25 +380,54 @@ def _answer_read(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
                 "The sentence does not speak of the file; say 'near where this photo was taken' or 'near the sound of "
                 "this recording' in it, or take the sentence or the file away."
             )
-        answers.append((question, answer_question(avlmap, question, MOST_GOALS if counted else asked.top, files)))
+        most = MOST_GOALS if counted else asked.top
+        answers.append((question, answer_question(avlmap, question, most, files, between=_is_between(asked, question))))
     answers.sort(key=lambda one: (one[1].found, one[1].probability), reverse=True)
     best, others = answers[0][1], answers[1:]
     alternatives = tuple(Alternative(question, one.probability, one.found, one.goals[:1]) for question, one in others)
     if counted and any(one.part.role is Role.PRIMARY and one.part.modality is Modality.AREA for one in best.parts):
         best = replace(best, goals=_one_a_room(avlmap, best.goals))
     count = sum(goal.probability >= avlmap.settings.found_at for goal in best.goals) if counted else None
+    text = found_text(best.parts, best.goals[0], count) if best.found and counted else best.text
+    sides = " ".join(note for note in notes if note.endswith(AS_NEAR)) if best.found else ""
     return replace(
         best,
         goals=best.goals[: asked.top],
         count=count,
         notes=(*notes, *best.notes),
         alternatives=(*best.alternatives, *alternatives),
-        text=found_text(best.parts, best.goals[0], count) if best.found else best.text,
+        text=f"{text} {sides}".rstrip(),
     )
 
 
+def _is_between(asked: Asked, question: Question) -> bool:
+    things = [part for part in question.parts if part.modality is Modality.OBJECT and part.role is Role.CONTEXT]
+    return len(things) == 2 and _BETWEEN.search(asked.sentence) is not None
+
+
+def lies_between(heat: Heatmap) -> "Callable[[Float[np.ndarray, 'n 3']], Bool[np.ndarray, ' n']]":
+    """Return which places lie between an instance of one thing of context and one of another, on the plan."""
+    marks = [factor for factor in heat.factors if isinstance(factor, NearThings) and factor is not heat.lead]
+    one, other = ([_middle(factor, number) for number in range(len(factor.confidence))] for factor in marks[:2])
+
+    def between(places: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, " n"]:
+        level, out = heat.space.level(places)[:, :2], np.zeros(len(places), bool)
+        for a, b in itertools.product(one, other):
+            along = b - a
+            length_m = float(np.linalg.norm(along))
+            share = (level - a) @ along / max(length_m**2, 1e-9)
+            aside_m = np.abs((level - a) @ np.array([-along[1], along[0]])) / max(length_m, 1e-9)
+            out |= (share > 0.0) & (share < 1.0) & (aside_m <= max(length_m / 4.0, _ASIDE_M))
+        return out
+
+    return between
+
+
+def _middle(factor: NearThings, number: int) -> Float[np.ndarray, "2"]:
+    return factor.space.level(factor.anchors[factor.instance == number].mean(axis=0))[:2]
+
+
 def _one_a_room(avlmap: "Queryable", goals: Sequence[Goal]) -> tuple[Goal, ...]:
-    """Return the first goal in each room: a room has goals where it was seen from several sides, and counts once."""
     from avlmaps.query.whereabouts import NOWHERE, Whereabouts
 
     rooms: list[int] = Whereabouts.of(avlmap).rooms_of(np.array([goal.position for goal in goals])).tolist()
@@ -394,7 +447,6 @@ def _placed(question: Question, at: HeardAt | None) -> Question:
 
 
 def _questions(asked: Asked, own: "tuple[OwnName, ...]") -> tuple[tuple[Question, ...], tuple[str, ...], bool]:
-    """Return the questions that a sentence is read as, how its words were taken, and whether it asks how many."""
     from avlmaps.language.intents import Ask
     from avlmaps.language.list_questions import said_alternatives
 
@@ -410,7 +462,6 @@ def _questions(asked: Asked, own: "tuple[OwnName, ...]") -> tuple[tuple[Question
 def _read(
     sentence: str, image: str | None, clip: str | None, own: "tuple[OwnName, ...]", at: HeardAt | None
 ) -> "AskedSentence":
-    """Return the reading of a sentence; it depends on nothing but the words, and agents repeat theirs."""
     from avlmaps.language.questions import read_question
     from avlmaps.language.sentence import Attachments
 
@@ -418,7 +469,6 @@ def _read(
 
 
 def _probability(factor: Factor) -> float:
-    """Return how likely the map holds a part, by itself: the confidence of its best instance or place."""
     if not factor.is_named:
         return 0.0
     if isinstance(factor, NearAnchors):
@@ -427,7 +477,6 @@ def _probability(factor: Factor) -> float:
 
 
 def _peak(factor: Factor) -> float:
-    """Return the highest heat: 1 on an object, the best score at a place, which may be far from any voxel."""
     if isinstance(factor, NearThings):
         return float(factor.mask.any())
     return float(factor.scores.max(initial=0.0)) if isinstance(factor, NearAnchors) else 0.0

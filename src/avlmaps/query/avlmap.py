@@ -37,6 +37,8 @@ from avlmaps.query.words import ClosestWords
 from avlmaps.recordings.audio import Sound
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from avlmaps.maps.store.edits import Edit
     from avlmaps.maps.store.map_data import MapData
     from avlmaps.maps.store.reader import StoredMap
@@ -48,7 +50,6 @@ if TYPE_CHECKING:
     from avlmaps.query.edits import Edited
     from avlmaps.query.heat_cache import HeatCache
     from avlmaps.query.locate import Located
-    from avlmaps.query.photometric import Panoramas
     from avlmaps.query.schema import ChangesAnswer, LastSeenAnswer
     from avlmaps.query.sound_sources import SoundSource, SourceMap
 
@@ -69,8 +70,6 @@ class QuerySettings:
     """From a sound's scores to heat."""
     areas: AreaSettings = field(default_factory=AreaSettings)
     """From views to heat."""
-    by_colour: bool = True
-    """A picture that keypoints cannot locate is guessed by its colours; else by the few keypoints that there are."""
     found_at: float = FOUND_AT
     """A query is found where its first goal is right with at least this probability, all parts together; in [0, 1]."""
     seed: int = 0
@@ -239,16 +238,23 @@ class AVLMap:
         watch: "Watch" = lambda stage, done, total: None,
         *,
         at: str | int | None = None,
+        room: str | None = None,
     ) -> list["Thing"]:
         """Return the things of the map, most confident first; see ``contents.find_things``.
+
+        With ``room``, those in a room by its name, or in all rooms of a kind, as ``rooms`` lists them.
 
         With ``at``, of a map of several days, those that were there on that day: a date, or the number of a visit from
         1. What moved or went since is where it was; ``rows`` holds what is left of it, ``heard`` what was heard from
         it on that day, where the map knows where its sounds came from.
 
         Raises:
-            QueryError: the map was not seen on such a day, or on one day alone.
+            QueryError: there is no such room, or the map was not seen on such a day, or on one day alone.
         """
+        if room is not None:
+            from avlmaps.query.whereabouts import Whereabouts
+
+            return Whereabouts.of(self).things_in(room, self.things(names, least_confidence, structure, watch, at=at))
         if at is not None:
             from avlmaps.query.changes import Days, things_at
             from avlmaps.query.sound_sources import with_heard_then
@@ -339,6 +345,10 @@ class AVLMap:
         things = self.things(names, least_confidence, structure) if "pixels" in models else []
         rooms = self.rooms() if "views" in models else []
         things = with_heard(self, things, are_all=not names)
+        if rooms:
+            from avlmaps.query.whereabouts import Whereabouts
+
+            things = Whereabouts.of(self).with_rooms(things)
         return Contents(things, self.sounds(), rooms, self.doubts_of_things, self.storeys)
 
     @property
@@ -395,6 +405,34 @@ class AVLMap:
     def voxel_index(self) -> Int32[np.ndarray, "n 3"]:
         """Which voxels: voxel i covers [i·s, (i+1)·s) along each axis; read-only, not copied from the disk."""
         return _read_only(self.stored.voxels.index)
+
+    def plot(self, path: str | Path | None = None, *, names: bool = True) -> "Path | Figure":
+        """Draw the map from above with its walk and sounds, and by default the names of its things and rooms.
+
+        Raises:
+            QueryError: the picture cannot be written there.
+        """
+        from avlmaps.query.plots import draw_map, save
+
+        models = self.stored.info.models
+        things = self.things() if names and "pixels" in models else ()
+        figure = draw_map(self.stored, things, self.rooms() if names and "views" in models else ())
+        return figure if path is None else save(figure, path)
+
+    def _repr_png_(self) -> bytes:
+        """Return the picture that a notebook shows."""
+        from avlmaps.query.plots import png_of
+
+        figure = self.plot(names=False)
+        assert not isinstance(figure, Path)
+        return png_of(figure)
+
+    def __dir__(self) -> list[str]:
+        """Return the names that a person uses; the others serve answers, lists and fronts."""
+        inside = ("as_edited_now", "forget_edits", "things_to_edit", "unedited_things", "things_in_rooms", "stored",
+                  "room_votes", "room_field", "room_regions", "numbered_rooms", "source_map", "sees", "heat",
+                  "closest_words", "doubts_of_drives", "doubts_of_things")  # fmt: skip
+        return [name for name in super().__dir__() if not name.startswith("_") and name not in inside]
 
     def to_open3d(self) -> "Any":
         """Return the voxels as an ``open3d.geometry.PointCloud``.
@@ -608,25 +646,7 @@ class AVLMap:
         part, photo = Part(Modality.IMAGE, called, _role(primary), is_file=True), _photo(picture, intrinsics)
         rgb = photo.rgb
         located = self._located(rgb, intrinsics, _GUESS_FROM, photo.focal_35mm)
-        if located.world_from_camera is None and self.settings.by_colour:
-            located = self._guessed_by_colour(rgb, located)
         return Heatmap.of(image_factor(self.space, located, part, self.settings.heat), self.settings.found_at)
-
-    def _guessed_by_colour(self, rgb: UInt8[np.ndarray, "h w 3"], located: "Located") -> "Located":
-        from avlmaps.query.photometric import Start
-
-        starts = [] if located.guess is None else [Start(located.guess, located.guess_inliers)]
-        guess = self._panoramas.likeliest(rgb, located.camera, starts)
-        if guess is None:
-            return located
-        return replace(located, guess=guess.world_from_camera, guess_confidence=guess.confidence)
-
-    @cached_property
-    def _panoramas(self) -> "Panoramas":
-        from avlmaps.query.photometric import Panoramas
-
-        stored = self.stored
-        return Panoramas(self.space, stored.voxels.rgb, stored.keyframes)
 
     @checked(QueryError)
     def locate(

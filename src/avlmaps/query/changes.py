@@ -11,6 +11,7 @@ from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.poses import FRAME
 from avlmaps.core.wording import the_room
+from avlmaps.query.factors import FOUND_AT
 
 if TYPE_CHECKING:
     from avlmaps.maps.store.life import Life, Stay
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
     from avlmaps.query.schema import ChangeAnswer, ChangesAnswer, DayAnswer, LastSeenAnswer
     from avlmaps.query.voxel_space import Space
 
+SOMETHING = "something"
+"""A thing that changed and is of no name with a probability of ``FOUND_AT``."""
 ChangeKind = Literal["new", "gone", "moved", "first seen"]
 RoomOf = Callable[[tuple[float, float, float]], str | None]
 """Returns the name of the room that holds a place."""
@@ -162,7 +165,7 @@ def changes_answer(
         listed.append(
             {
                 "kind": one.kind,
-                "name": stay.name,
+                "name": stay.name if stay.confidence >= FOUND_AT else SOMETHING,
                 "confidence": stay.confidence,
                 "position": list(stay.position),
                 "from": None if before is None or after is None else list(before.position),
@@ -291,4 +294,6 @@ def last_seen_text(answer: "LastSeenAnswer") -> str:
 
 
 def _article(name: str) -> str:
+    if name == SOMETHING:
+        return name
     return f"{'an' if name[:1] in 'aeiou' else 'a'} {name}"

@@ -47,11 +47,16 @@ def colour_in(phrase: str) -> ColourPhrase | None:
 
 def has_colour(rgb: UInt8[np.ndarray, "n 3"], said: ColourPhrase) -> Bool[np.ndarray, " n"]:
     """Return which voxels' colours are closer to the queried one than to any other term."""
+    return colour_margin(rgb, said) > 0.0
+
+
+def colour_margin(rgb: UInt8[np.ndarray, "n 3"], said: ColourPhrase) -> Float32[np.ndarray, " n"]:
+    """Return by how much each voxel's colour is closer to the queried one than to any other term."""
     words = colour_words()
     colour = words.encode_colours(rgb)
     terms = words.encode_words(COLOURS)
     own = terms @ said.feature >= 0.5
-    return (colour @ said.feature) > np.where(own, -1.0, colour @ terms.T).max(axis=1)
+    return (colour @ said.feature - np.where(own, -1.0, colour @ terms.T).max(axis=1)).astype(np.float32)
 
 
 def colour_share(

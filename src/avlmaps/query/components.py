@@ -55,7 +55,6 @@ def connected(count: int, a: Int[np.ndarray, " e"], b: Int[np.ndarray, " e"]) ->
 
 
 def _join(root: Int64[np.ndarray, " n"], a: Int[np.ndarray, " e"], b: Int[np.ndarray, " e"]) -> None:
-    """Give the nodes that edges join one root: of all that are joined, the first node."""
     while True:
         one, other = root[a], root[b]
         apart = one != other
@@ -68,7 +67,6 @@ def _join(root: Int64[np.ndarray, " n"], a: Int[np.ndarray, " e"], b: Int[np.nda
 
 
 def _numbered(root: Int64[np.ndarray, " n"]) -> Int64[np.ndarray, " n"]:
-    """Return the number of each node's root among all roots."""
     return (np.cumsum(root == np.arange(len(root))) - 1)[root]
 
 

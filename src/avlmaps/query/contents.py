@@ -40,6 +40,7 @@ Watch = Callable[[str, int, int], object]
 STRUCTURE = ("wall", "floor", "ceiling", "column", "stairs", "railing")
 # A claim that shares this part of its voxels with a more confident thing names the same thing again.
 _SAME_SHARE = 0.5
+_FEWEST_VOXELS = 2  # a lone voxel is no thing
 # Of a room as many names are listed as are at least so likely.
 _MOST_ROOM_NAMES, _LEAST_ROOM_NAME = 3, 0.1
 UNKNOWN = "room"
@@ -60,6 +61,7 @@ class Thing:
         points: middles of its voxels, metres, recording frame.
         edited: who corrected it and when, in words; empty for what nobody corrected.
         heard: sounds that may have come from it; only lists of all that a map holds, or held on a day, know them.
+        room: the name of its room; only lists of contents, and those of a room, know it.
     """
 
     name: str
@@ -71,6 +73,7 @@ class Thing:
     points: Float[np.ndarray, "m 3"] = field(repr=False)
     edited: str = ""
     heard: "tuple[HeardFromAnswer, ...]" = ()
+    room: str | None = None
 
     def to_json(self) -> "ThingAnswer":
         """Return the thing as ``avlmaps things --json`` prints it."""
@@ -86,6 +89,8 @@ class Thing:
             answer["edited"] = self.edited
         if self.heard:
             answer["heard"] = list(self.heard)
+        if self.room is not None:
+            answer["room"] = self.room
         return answer
 
 
@@ -167,6 +172,11 @@ class Room:
         if self.edited:
             answer["edited"] = self.edited
         return answer
+
+    @property
+    def polygon(self) -> Float[np.ndarray, "c 2"]:
+        """The corners of its outline, x and y, metres, recording frame."""
+        return self.outline[:, :2]
 
     def may_be(self, kind: Callable[[str], bool]) -> bool:
         """Return whether the room is of a kind, or a part of it is: an open plan has several names."""
@@ -278,7 +288,7 @@ def find_things(
     things: list[Thing] = []
     # A confident "armchair" stays one, though "chair" takes it in and is more confident still.
     for _, doubt, _, name, rows in sorted(claims, key=lambda claim: claim[:4]):
-        if owned[rows].mean() >= _SAME_SHARE:
+        if owned[rows].mean() >= _SAME_SHARE or len(rows) < _FEWEST_VOXELS:
             continue
         owned[rows] = True
         things.append(thing_of(stored, space, name, -doubt, rows))
@@ -291,14 +301,12 @@ def searches_for(names: Sequence[str], encoder: PixelEncoder) -> list[tuple[str,
 
 
 def _is_wide(name: str, encoder: PixelEncoder) -> bool:
-    """Return whether a name of an encoder takes in others."""
     if not isinstance(encoder, NamedPixelEncoder) or name not in encoder.names:
         return False
     return bool(np.count_nonzero(encoder.name_weights(name)) > 1)
 
 
 def _confident(found: Instances, least: float) -> Iterator[tuple[float, Int[np.ndarray, " m"]]]:
-    """Yield the confidence and the voxels of each instance of at least some confidence."""
     order = np.argsort(found.instance, kind="stable")
     bounds = np.searchsorted(found.instance[order], np.arange(len(found) + 1))
     for number in np.flatnonzero(found.confidence >= least):
@@ -384,7 +392,6 @@ def find_rooms(
 def _rooms_by_floor(
     field: "RoomField", regions: "RoomRegions", places: Float[np.ndarray, "k 3"], own: Int[np.ndarray, " k"]
 ) -> Iterator[Room]:
-    """Yield the regions into which views looked, by the region that each view's place lies in."""
     share, has_parts = field.of_rooms(regions), field.parts_of_rooms(regions)
     for number in np.unique(own[own >= 0]).tolist():
         seen = places[own == number]
@@ -424,7 +431,6 @@ def _rooms_of_views(
 def _groups_of_views(
     points: Float[np.ndarray, "k 2"], share: Float[np.ndarray, "k n"], link_m: float
 ) -> Int[np.ndarray, " k"]:
-    """Return the number of the group of each view: those of one likeliest name side by side."""
     likeliest = share.argmax(axis=1)
     out = np.zeros(len(points), np.int64)
     count = 0
@@ -437,5 +443,4 @@ def _groups_of_views(
 
 
 def _middle(points: Float[np.ndarray, "m 3"]) -> tuple[float, float, float]:
-    """Return the point nearest to the mean: a place that exists, also for a ring of points."""
     return plain_point(points[np.argmin(np.linalg.norm(points - points.mean(axis=0), axis=1))])

@@ -33,7 +33,6 @@ def map_answer(avlmap: AVLMap, note: Callable[[AvlmapsError], object] = lambda _
 
 
 def _lost_edits(avlmap: AVLMap) -> list[str]:
-    """Return a sentence for each edit that finds nothing to apply to; why nobody knows where a model is not here."""
     try:
         return [str(one) for one in avlmap.edited.lost]
     except AvlmapsError as error:

@@ -47,7 +47,6 @@ def without_leaves(
 def _between_doors(
     wall: Bool[np.ndarray, "r c"], screen: Bool[np.ndarray, "r c"], cell_m: float
 ) -> Bool[np.ndarray, "r c"]:
-    """Return the cells of screens that are pieces of a wall along a row, with a doorway on either side."""
     row, start, end = _runs(_as_rows(wall))
     alone = _sums(dilated(screen, 3, 1))
     is_wall = alone[row, end] - alone[row, start] < 0.5 * (end - start)
@@ -57,7 +56,6 @@ def _between_doors(
 
 
 def _shadows(unseen: Bool[np.ndarray, "nx ny"], cell_m: float) -> Bool[np.ndarray, "nx ny"]:
-    """Return small unseen places behind what stands about; the insides of walls are narrower."""
     piece = pieces(unseen)
     small = extents(piece)[:, 2] * cell_m**2 <= _SHADOW_M2
     return (small & of_pieces(piece, distance(unseen) * cell_m >= _SHADOW_M / 2.0))[piece]
@@ -79,7 +77,6 @@ def without_posts(
 
 
 def _short(cells: Bool[np.ndarray, "nx ny"], most: float) -> Bool[np.ndarray, "nx ny"]:
-    """Return the pieces of cells that are no longer than ``most`` cells."""
     rows, columns, _ = extents(piece := pieces(cells, diagonally=True)).T
     return (np.hypot(rows, columns) <= most)[piece] & cells
 
@@ -209,7 +206,6 @@ def _pillars(
     wall: Bool[np.ndarray, " q"],
     most: float,
 ) -> Bool[np.ndarray, " q"]:
-    """Return the runs that lie between two walls of their row, each within ``most`` cells: pieces between doorways."""
     out = np.zeros(len(row), bool)
     near = (row[1:] == row[:-1]) & (start[1:] - end[:-1] <= most)
     out[1:-1] = near[:-1] & near[1:] & wall[:-2] & wall[2:]
@@ -240,24 +236,20 @@ def _leads_somewhere(
 
 
 def _as_rows(wall: Bool[np.ndarray, "r c"]) -> Bool[np.ndarray, "r c"]:
-    """Return walls a cell thicker to both sides, with holes of up to four cells along the rows closed."""
     return bridged(dilated(wall, 3, 1), 5)
 
 
 def _runs(cells: Bool[np.ndarray, "r c"]) -> tuple[Int[np.ndarray, " q"], Int[np.ndarray, " q"], Int[np.ndarray, " q"]]:
-    """Return row, start and end (exclusive) of each run of cells along the rows."""
     change = np.diff(np.pad(cells, ((0, 0), (1, 1))).astype(np.int8), axis=1)
     row, start = np.nonzero(change == 1)
     return row, start, np.nonzero(change == -1)[1]
 
 
 def _sums(cells: Bool[np.ndarray, "r c"]) -> Int[np.ndarray, "r c1"]:
-    """Return how many cells of a row lie before each place."""
     return np.pad(np.cumsum(cells, axis=1, dtype=np.int64), ((0, 0), (1, 0)))
 
 
 def _nearest(cells: Bool[np.ndarray, "r c"]) -> tuple[Int[np.ndarray, "r c"], Int[np.ndarray, "r c"]]:
-    """Return the column of the nearest of some cells at or before each one and at or after it; −1 and c for none."""
     count = int(cells.shape[1])
     column = np.arange(count)
     before = np.maximum.accumulate(np.where(cells, column, -1), axis=1)

@@ -256,12 +256,10 @@ class Editor:
         return things[0]
 
     def _away_m(self, thing: "Thing", place: Float[np.ndarray, " n"]) -> float:
-        """Return how far a thing's voxels lie from a place: in space, or level where the place has no height."""
         points = thing.points if len(place) == 3 else self._map.space.level(thing.points)[:, :2]
         return float(np.linalg.norm(points - place, axis=1).min())
 
     def _require_here(self, level: Float[np.ndarray, "n 2"], what: str) -> None:
-        """Raise ``QueryError`` where the box round level points is far outside of the map."""
         centres = self._map.space.level_centres()[:, :2]
         if not len(centres):
             return
@@ -300,7 +298,6 @@ class Editor:
         return EditedSpot(middle=middle, corners=tuple(map(plain_point, points))).anchored(self._map.stored.keyframes)
 
     def _floor_m(self) -> float:
-        """Return the level height of the floor on which the map's walk began."""
         space, cameras = self._map.space, np.asarray(self._map.stored.keyframes.world_from_camera)[:1, :3, 3]
         if self._map.storeys is not None and len(cameras):
             storey = int(self._map.storeys.of_places(cameras)[0])
@@ -397,7 +394,6 @@ def edit_text(edit: Edit) -> str:
 
 
 def _gap_m(one: "Thing", other: "Thing") -> float:
-    """Return how far apart two things are, from voxel to voxel."""
     from scipy.spatial import KDTree
 
     return float(np.min(KDTree(one.points).query(other.points)[0]))
@@ -411,7 +407,6 @@ def _name(name: str) -> str:
 
 
 def _own_name(name: str) -> str:
-    """Return a name by which things, rooms and places are meant in sentences."""
     from avlmaps.language.own_names import is_reserved
 
     word = _name(name)
@@ -421,7 +416,6 @@ def _own_name(name: str) -> str:
 
 
 def _corners(box: Sequence[float]) -> list[Float[np.ndarray, "2"]]:
-    """Return the corners of a box, level x and y."""
     if not np.iterable(box):
         raise QueryError(f"A box is x0,y0,x1,y1 in metres of the level frame, two opposite corners; not {box!r}.")
     if len(box) != 4 or not all(math.isfinite(value) and abs(value) <= 1e5 for value in box):

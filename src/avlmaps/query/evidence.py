@@ -70,14 +70,12 @@ def logit(probability: float) -> float:
 
 
 def _mean_heat(region: Factor, lead: Factor, instance: int, position: Float[np.ndarray, "3"]) -> float:
-    """Return the mean heat of a region over the thing, as ``goals.share_voxels`` counts it; of a place that there."""
     if not isinstance(lead, NearThings) or not region.regional:
         return float(region.at(position[None])[0])
     return float(region.among(lead.mask)[lead.mask][lead.instance == instance].mean(dtype=np.float64))
 
 
 def _mark(factor: Factor, position: Float[np.ndarray, "3"]) -> float:
-    """Return how likely that which a goal is near is what was named: of the instance that the heat there comes from."""
     if not len(factor.anchors):
         return 0.0
     away = np.linalg.norm(factor.anchors - position, axis=1)

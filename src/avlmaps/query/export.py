@@ -151,7 +151,6 @@ def voxel_mesh(
 
 
 def _keys(index: Int[np.ndarray, "m 3"], of: Int[np.ndarray, "n 3"]) -> Int[np.ndarray, " m"]:
-    """Return one number for each index, distinct within one step of the box of ``of``."""
     if not len(of):
         return np.zeros(len(index), np.int64)
     low = of.min(axis=0) - 1
@@ -199,7 +198,6 @@ def write_glb(
 
 
 def _in_frame(points: Float[np.ndarray, "n 3"], space: "Space | None", frame: FrameName) -> Float[np.ndarray, "n 3"]:
-    """Return points of the recording frame in a frame."""
     if frame is FrameName.RECORDING:
         return points
     if space is None:

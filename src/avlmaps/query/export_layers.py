@@ -158,7 +158,6 @@ def _heard(sound: "SoundEvent", placed: Callable[[np.ndarray], np.ndarray]) -> E
 
 
 def _stored_camera(rgb: Pinhole, pictures: tuple[bytes, ...]) -> Pinhole:
-    """Return the colour camera at the size of the stored pictures."""
     import cv2
 
     for picture in pictures:

@@ -268,7 +268,6 @@ def _highest_cones(
     scores: Float[np.ndarray, " a"],
     falloff_per_m: float,
 ) -> Float[np.ndarray, " m"]:
-    """Return max over anchors of s − ε·d, floored at 0, of many points and anchors, horizontal coordinates."""
     from avlmaps.query.kernels import cone_heat, undominated
 
     order = np.argsort(-scores, kind="stable")

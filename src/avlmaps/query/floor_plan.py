@@ -155,7 +155,6 @@ class FloorPlan:
 
     @cached_property
     def _neighbours(self) -> Int[np.ndarray, "2 e"]:
-        """Pairs of open cells side by side on a storey, each pair once."""
         cells = np.arange(len(self)).reshape(self.wall.shape)
         free = self.open
         pairs: list[Int[np.ndarray, "2 e"]] = []
@@ -198,7 +197,6 @@ class FloorPlan:
 
     @cached_property
     def _doors(self) -> "list[tuple[tuple[slice, ...], tuple[slice, ...], Float32[np.ndarray, 's nx ny 1']]]":
-        """For both axes: each cell, its neighbour, and the share of its mass that one step of the walk moves there."""
         sides = [(np.s_[:, 1:], np.s_[:, :-1]), (np.s_[:, :, 1:], np.s_[:, :, :-1])]
         return [
             (one, other, (_TO_NEIGHBOUR * (self.open[one] & self.open[other])[..., None]).astype(np.float32))
@@ -207,7 +205,6 @@ class FloorPlan:
 
 
 def _ends(space: Space, places: Float[np.ndarray, "k 3"] | None) -> tuple[Int[np.ndarray, "2"], Int[np.ndarray, "2"]]:
-    """Return the lowest and the highest cell, of the level frame, in which a voxel of the map or a place lies."""
     low, high = np.full(2, np.inf), np.full(2, -np.inf)
     if space.is_level:
         low, high = (space.grid.centre_of(end)[:2] for end in index_ends(np.asarray(space.index)))
@@ -221,7 +218,6 @@ def _ends(space: Space, places: Float[np.ndarray, "k 3"] | None) -> tuple[Int[np
 
 
 def _without_gaps(seen: Bool[np.ndarray, "s nx ny"]) -> Bool[np.ndarray, "s nx ny"]:
-    """Fill what was not seen between seen cells, up to ``_GAP_M`` wide: under tables, and behind what stands there."""
     reach = int(_GAP_M / 2 / CELL_M + 1e-3)
     edge = ((0, 0), (reach, reach), (reach, reach))
     grown = _grown(np.pad(seen, edge), reach)
@@ -229,7 +225,6 @@ def _without_gaps(seen: Bool[np.ndarray, "s nx ny"]) -> Bool[np.ndarray, "s nx n
 
 
 def _grown(cells: Bool[np.ndarray, "s nx ny"], reach: int) -> Bool[np.ndarray, "s nx ny"]:
-    """Return which cells lie within ``reach`` cells of a held one."""
     out = cells.copy()
     _, nx, ny = cells.shape
     for di, dj in _rings(reach):
@@ -240,7 +235,6 @@ def _grown(cells: Bool[np.ndarray, "s nx ny"], reach: int) -> Bool[np.ndarray, "
 
 
 def _rings(reach: int) -> list[tuple[int, int]]:
-    """Return the steps, rows and columns, to all other cells within ``reach`` cells, nearest first."""
     span = range(-reach, reach + 1)
     steps = [(di, dj) for di in span for dj in span if 0 < di * di + dj * dj <= reach * reach]
     return sorted(steps, key=lambda step: step[0] ** 2 + step[1] ** 2)

@@ -151,7 +151,6 @@ def _settled(
     rng: np.random.Generator,
     settings: PoseSettings,
 ) -> tuple[Pinhole, Estimate]:
-    """Refine the focal length and estimate the pose in turns until neither moves."""
     for _ in range(_ROUNDS):
         refined = refine_focal(xy, points_world, camera, estimate[0].world_from_camera, settings)
         again = estimate_pose(xy, points_world, refined, rng, settings)

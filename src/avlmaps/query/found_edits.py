@@ -106,7 +106,6 @@ class FoundEdits:
         return tuple(sorted(claims, key=lambda one: int(one.rows[0])))
 
     def _made(self, edit: Edit, targets: Sequence[Claim]) -> list[Claim]:
-        """Return what an edit makes of things."""
         if edit.does == "rename":
             return [replace(one, name=edit.name, confidence=1.0, is_named=True, edit=edit) for one in targets]
         if edit.does == "split":
@@ -118,7 +117,6 @@ class FoundEdits:
         return [Claim(edit.name or first.name, rows, sure, named, edit)]
 
     def _pieces(self, rows: Int[np.ndarray, " m"], edit: Edit) -> list[Int[np.ndarray, " m"]]:
-        """Return the parts of a thing that a cut makes; the thing where it makes none."""
         space = self._map.space
         level = space.level(space.centres_of(rows))
         cut = self._cut_of(edit)
@@ -133,7 +131,6 @@ class FoundEdits:
         return [rows[which == number] for number in np.unique(which)]
 
     def _cut_of(self, edit: Edit) -> Float[np.ndarray, "k 2"]:
-        """Return the points of a cut, level x and y, in the world as it is now."""
         if not edit.cut:
             return np.zeros((0, 2))
         spot = edit.at[0]
@@ -217,7 +214,6 @@ class FoundEdits:
         return tuple(self._lost[edit.id] for edit in self.edits if edit.id in self._lost)
 
     def _of(self, *does: str) -> list[Edit]:
-        """Return the edits of some kinds whose places are in the map's world."""
         wanted = [edit for edit in self.edits if edit.does in does]
         own: list[Edit] = []
         for edit in wanted:
@@ -232,7 +228,6 @@ class FoundEdits:
 
 
 def _without_specks(which: Int[np.ndarray, " m"], level: Float[np.ndarray, "m 3"]) -> Int[np.ndarray, " m"]:
-    """Return pieces of which those that are specks belong to the nearest large one."""
     from scipy.spatial import KDTree
 
     count = np.bincount(which)

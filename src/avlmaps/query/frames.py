@@ -52,7 +52,6 @@ def _moved(key: str, value: Any, level_from_recording: Float[np.ndarray, "4 4"],
 
 
 def _spoken(answer: dict[str, Any], spoken: Mapping[str, str]) -> dict[str, Any]:
-    """Return an answer whose sentences name the places as its positions do."""
     texts = {key: value for key, value in answer.items() if key in ("text", "notes")}
     for key, value in texts.items():
         parts = [value] if isinstance(value, str) else value

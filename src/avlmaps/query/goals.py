@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from avlmaps.maps.sources.density import Spread
     from avlmaps.query.schema import GoalAnswer
 
+ALIKE = 0.05
+"""Goals whose probabilities differ by no more fit equally: no calibration tells them apart."""
 # Two sounds heard at one place are one place to go to.
 SEPARATION_M = 1.0
 # Heat that differs by less is a plateau, whose middle is taken.
@@ -73,6 +75,13 @@ class Goal:
             goal["within_50_m"] = round(self.spread.within_50_m, 2)
             goal["within_90_m"] = round(self.spread.within_90_m, 2)
         return goal
+
+
+def alike(goals: Sequence[Goal], found_at: float) -> list[Goal]:
+    """Return the goals that are found and fit as well as the likeliest."""
+    found = [goal for goal in goals if goal.probability >= found_at and goal.probability > 0.0]
+    most = max((goal.probability for goal in found), default=0.0)
+    return [goal for goal in found if goal.probability >= most - ALIKE - 1e-9]
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,7 +150,6 @@ def share_voxels(
 def _peak_in_regions(
     lead: NearThings, others: Float32[np.ndarray, " n"], regions: Sequence[Factor]
 ) -> Float[np.ndarray, " i"]:
-    """Return the highest heat that each instance has without the regions', times the mean of theirs over its voxels."""
     count = len(lead.confidence)
     near = np.flatnonzero(others > 0.0)
     peak = _highest(lead.instance[lead.anchor_of(near)], others[near].astype(np.float64), count)
@@ -197,7 +205,6 @@ def _position(factors: Sequence[Factor], lead: Factor, shares: Shares, instance:
 
 
 def _place_on_thing(lead: NearThings, shares: Shares, instance: int) -> Float[np.ndarray, "3"]:
-    """Return the voxel in the middle of the hot part of a thing, never one beside it."""
     share = np.flatnonzero(shares.instance == instance)
     on_it = share[lead.mask[shares.rows[share]]]
     if not len(on_it):  # the context reaches beside the thing, and ends before it

@@ -59,12 +59,14 @@ class Heat(ABC):
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.name!r}, {len(self):,} voxels)"
 
-    def max(self) -> float:
-        """Return the highest heat; 0 for an empty map."""
+    def max(self, **of_numpy: Any) -> float:
+        """Return the highest heat; 0 for an empty map. ``np.max(heat)`` calls it, with keywords of its own."""
+        del of_numpy
         return float(self.values.max()) if len(self) else 0.0
 
-    def min(self) -> float:
+    def min(self, **of_numpy: Any) -> float:
         """Return the lowest heat; 0 for an empty map."""
+        del of_numpy
         return float(self.values.min()) if len(self) else 0.0
 
     def argmax(self) -> int:
@@ -98,12 +100,17 @@ class Heat(ABC):
             return Blend(self.space, (*self._terms, *other._terms))
         if isinstance(other, Real) and other == 0:  # of sum([...])
             return self
-        return self.values + other if isinstance(other, np.ndarray) else NotImplemented
+        return self.values + other if isinstance(other, Real | np.ndarray) else NotImplemented
 
     __radd__ = __add__
 
     def __sub__(self, other: object) -> Any:
+        if isinstance(other, Real | np.ndarray):
+            return self.values - other
         return self + -1.0 * other if isinstance(other, Heat) else NotImplemented
+
+    def __rsub__(self, other: object) -> Any:
+        return other - self.values if isinstance(other, Real | np.ndarray) else NotImplemented
 
     def __neg__(self) -> "Blend":
         return -1.0 * self

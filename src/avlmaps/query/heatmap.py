@@ -16,6 +16,7 @@ from avlmaps.query.heat import Heat
 from avlmaps.query.voxel_space import Space
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
@@ -53,7 +54,6 @@ class Heatmap(Heat):
 
     @cached_property
     def _of_things(self) -> Float32[np.ndarray, " n"]:
-        """The product without what only says in which region a place lies."""
         return product_of([factor for factor in self.factors if not _is_region(factor, self.lead)])
 
     @overload
@@ -85,7 +85,6 @@ class Heatmap(Heat):
         return product(uncertain).only(self.where)
 
     def _in_company(self) -> "Heatmap":
-        """Return the heatmap as it counts in a product; that of several things is one already."""
         return Heatmap.of(self.factors[0].for_product(), self.found_at) if len(self.factors) == 1 else self
 
     @property
@@ -102,6 +101,11 @@ class Heatmap(Heat):
     def name(self) -> str:
         """What was queried: ``chair * dog bark``."""
         return " * ".join(factor.part.query for factor in self.factors)
+
+    def _repr_png_(self) -> bytes:
+        from avlmaps.query.plots import png_of
+
+        return png_of(self.plot())
 
     @property
     def peak(self) -> float:
@@ -159,19 +163,23 @@ class Heatmap(Heat):
     @overload
     def plot(self, path: str | Path, *, top: int = 3) -> Path: ...
     @overload
-    def plot(self, path: None = None, *, top: int = 3) -> "Figure": ...
-    def plot(self, path: str | Path | None = None, *, top: int = 3) -> "Path | Figure":
+    def plot(self, path: None = None, *, top: int = 3, ax: "Axes | None" = None) -> "Figure": ...
+    def plot(self, path: str | Path | None = None, *, top: int = 3, ax: "Axes | None" = None) -> "Path | Figure":
         """Draw the map from above, each factor's heat and the product, with the goals numbered.
 
         Args:
             path: the picture to write; without one, the figure is returned, for a notebook to show.
             top: how many goals are numbered.
+            ax: draw the product alone into these axes.
 
         Raises:
             QueryError: the picture cannot be written there.
         """
-        from avlmaps.query.plots import draw_heat, save
+        from avlmaps.query.plots import draw_heat, draw_heat_into, save
 
+        if ax is not None:
+            draw_heat_into(ax, self.space, self.shown, self.goals(top))
+            return ax.get_figure(root=True)
         figure = draw_heat(self.factors, self.shown, self.found, self.goals(top))
         return figure if path is None else save(figure, path)
 

@@ -323,10 +323,8 @@ def fitting(settings: ObjectSettings, encoder: PixelEncoder) -> ObjectSettings:
 
 
 def _points(space: Space, found: Instances) -> Float[np.ndarray, "a 3"]:
-    """Return the middles of the instances' voxels, metres, level frame."""
     return space.level(space.grid.centre_of(np.asarray(space.index)[found.rows]))
 
 
 def _reach(space: Space, link_m: float) -> int:
-    """Return how many voxels apart, along each axis, two of one instance may be."""
     return max(1, round(link_m / space.grid.voxel_size_m))

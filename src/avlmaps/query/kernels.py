@@ -44,7 +44,6 @@ def undominated(horizontal: Float64[np.ndarray, "n 2"], score: Float64[np.ndarra
 
 @njit(cache=True, nogil=True)
 def _circle(points: Float64[np.ndarray, "m 2"], first: Whole, last: Whole):
-    """Return centre and radius of a circle round the bounding box of some points."""
     low_x = high_x = points[first, 0]
     low_y = high_y = points[first, 1]
     for i in range(first + 1, last):
@@ -183,7 +182,6 @@ def _box_gap(
     low_b: Int64[np.ndarray, "3"],
     high_b: Int64[np.ndarray, "3"],
 ):
-    """Return the smallest and the largest squared distance between points of two boxes, in voxels."""
     least, most = 0, 0
     for k in range(3):
         gap = max(low_b[k] - high_a[k], low_a[k] - high_b[k], 0)
@@ -203,7 +201,6 @@ def _nearest_in(
     zs: Int32[np.ndarray, " k"],
     best: Whole,
 ):
-    """Return the smaller of ``best`` and the squared distance to the nearest of some voxels."""
     for k in range(len(xs)):
         dx, dy, dz = xs[k] - x, ys[k] - y, zs[k] - z
         best = min(best, dx * dx + dy * dy + dz * dz)
@@ -220,7 +217,6 @@ def _first_at(
     zs: Int32[np.ndarray, " k"],
     squared: Whole,
 ):
-    """Return the first of some voxels at a squared distance; one is there."""
     k = 0
     while (xs[k] - x) ** 2 + (ys[k] - y) ** 2 + (zs[k] - z) ** 2 != squared:
         k += 1
@@ -229,7 +225,6 @@ def _first_at(
 
 @njit(cache=True, nogil=True)
 def _before(rising: Int64[np.ndarray, " n"], value: Whole):
-    """Return how many numbers of a rising sequence are below a value."""
     low, high = 0, len(rising)
     while low < high:
         middle = (low + high) // 2

@@ -79,7 +79,6 @@ def answer_list(
 def _answer(
     avlmap: "Queryable", goals: Sequence[Goal], text: str, subject: Answer | None = None, count: int | None = None
 ) -> Answer:
-    """Return goals as an answer: found, like any other, where the first is likely enough."""
     probability = goals[0].probability if goals else 0.0
     found = bool(goals) and probability >= avlmap.settings.found_at
     parts, heat = ((), None) if subject is None else (subject.parts, subject.heat)
@@ -88,7 +87,6 @@ def _answer(
 
 
 def _rooms_by_size(avlmap: "Queryable", first: bool) -> tuple[list[Goal], str]:
-    """Return the rooms by the area of their regions, the largest first."""
     where = Whereabouts.of(avlmap)
     areas = where.areas_m2()
     if not len(areas):
@@ -108,7 +106,6 @@ def _room_goal(where: Whereabouts, number: int) -> Goal:
 
 
 def _sounds_by_time(avlmap: "Queryable", first: bool) -> tuple[list[Goal], str]:
-    """Return the sounds by their onset, the last first."""
     sounds = sorted(avlmap.sounds(), key=lambda sound: sound.onset_s if first else -sound.onset_s)
     if not sounds:
         return [], "The map holds no sounds."
@@ -205,7 +202,6 @@ def _sources_by_time(avlmap: "Queryable", first: bool) -> tuple[list[Goal], str]
 
 
 def _names(avlmap: "Queryable", question: ListQuestion, top: int) -> Answer:
-    """Return all rooms, sounds or things, and how many there are."""
     if question.name == "rooms":
         where = Whereabouts.of(avlmap)
         goals = [_room_goal(where, number) for number in range(len(where.rooms))]
@@ -247,7 +243,6 @@ def _changes(avlmap: "Queryable", question: ListQuestion, top: int) -> Answer:
 
 
 def _last_seen(avlmap: "Queryable", name: str, top: int) -> Answer:
-    """Return where a thing was last seen, and on which day."""
     entry = lexicon().head(name, EntryKind.THING)
     if entry is None:
         raise QueryError(f"{name!r} is no thing that is known; name a thing, such as: where was the bag last seen?")
@@ -307,7 +302,6 @@ def lies(avlmap: "Queryable", how: str, stay: "Stay", mark: Goal) -> bool:
 
 
 def _about(avlmap: "Queryable", question: ListQuestion, top: int, ask: Callable[[str], Answer]) -> Answer:
-    """Answer what is in a room, or beside a thing, or in which room something is; as likely as that is found."""
     subject = ask(question.name)
     if not subject.found:
         return replace(subject, goals=())
@@ -350,7 +344,6 @@ def _has_room(avlmap: "Queryable", name: str) -> bool:
 
 
 def _inside(where: Whereabouts, name: str, points: Float[np.ndarray, "m 3"]) -> Bool[np.ndarray, " m"]:
-    """Return which points (metres, recording frame) lie in the room of that name and number, or in one of the kind."""
     number = where.one_named(name)
     if number is not None and where.names[number] != where.rooms[number].name:
         return where.rooms_of(points) == number
@@ -380,7 +373,6 @@ def _things_beside(avlmap: "Queryable", subject: Answer) -> tuple[list[Goal], st
 def _gap_m(
     a: Float[np.ndarray, "3"], size_a: Float[np.ndarray, "3"], b: Float[np.ndarray, "3"], size_b: Float[np.ndarray, "3"]
 ) -> float:
-    """Return the horizontal gap between two boxes about their middles, level frame."""
     apart = np.abs(a - b)[:2] - (size_a + size_b)[:2] / 2.0
     return float(np.linalg.norm(np.maximum(apart, 0.0)))
 
@@ -388,7 +380,6 @@ def _gap_m(
 def _overlap(
     a: Float[np.ndarray, "3"], size_a: Float[np.ndarray, "3"], b: Float[np.ndarray, "3"], size_b: Float[np.ndarray, "3"]
 ) -> bool:
-    """Return whether two boxes are mostly one: each middle lies in the other box."""
     apart = np.abs(a - b)
     return bool((apart <= size_a / 2.0).all() and (apart <= size_b / 2.0).all())
 

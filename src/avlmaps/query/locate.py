@@ -11,7 +11,7 @@ from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import MapError
 from avlmaps.core.numbers import unmasked
 from avlmaps.core.poses import rotation_angle_rad
-from avlmaps.core.wording import option
+from avlmaps.core.wording import option, place_text
 from avlmaps.maps.types import Keyframes
 from avlmaps.perception.encoders import Encoders
 from avlmaps.perception.pose import PoseSettings, estimate_pose
@@ -30,6 +30,8 @@ _SAME_ASPECT = 0.01
 # The score of a pose whose place the points do not fix.
 _UNSURE = 0.49
 _OF_ONE_SCALE = 0.85
+# Another place fits as well where this share of the points agrees there, so far away; so many keyframes are looked at.
+_AS_WELL, _ELSEWHERE_M, _MOST_ALIKE = 0.6, 2.0, 40
 _SAME_SIDE = 0.25  # cosine: no descriptor bears a change of view by more than 75 degrees
 
 
@@ -129,12 +131,11 @@ class Located:
         camera: the camera that the pose holds for; another than the given one where its focal length was refined.
         guess: where it was not located, the likeliest pose nevertheless, if requested: not to be relied on.
         guess_inliers: keypoints that agree with the guess; 0 where it is only the place of a keyframe.
-        guess_confidence: the probability that the place of the guess is right, where something tried it; 0.5 and more
-            is as good as located for a query, not for a pose.
         focal_from: where the focal length of ``camera`` is from.
         uncertainty: how well the pose is known, where the focal length was found with it.
         centred: whether the picture has another shape than the map's own, so that its middle is taken for the axis of
             its camera.
+        elsewhere: a pose in another part of the map that fits as well, if there is one: either may be right.
     """
 
     world_from_camera: Float[np.ndarray, "4 4"] | None
@@ -145,10 +146,10 @@ class Located:
     camera: Pinhole
     guess: Float[np.ndarray, "4 4"] | None = None
     guess_inliers: int = 0
-    guess_confidence: float = 0.0
     focal_from: FocalSource = "map"
     uncertainty: Uncertainty | None = None
     centred: bool = False
+    elsewhere: Float[np.ndarray, "4 4"] | None = None
 
     def __repr__(self) -> str:
         place = "nowhere"
@@ -158,7 +159,18 @@ class Located:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """A sentence on the focal length, where it was found with the pose."""
+        """What to know of the pose: that another place fits as well, and how the focal length was found."""
+        return (*self._of_place, *self._of_focal)
+
+    @property
+    def _of_place(self) -> tuple[str, ...]:
+        if self.elsewhere is None:
+            return ()
+        place = place_text(self.elsewhere[:3, 3])
+        return (f"Another place fits equally: {place}, which looks the same; the photo does not tell them apart.",)
+
+    @property
+    def _of_focal(self) -> tuple[str, ...]:
         if self.uncertainty is None:
             return ()
         focal = f"{self.camera.fx:.0f} ± {self.uncertainty.focal * self.camera.fx:.0f} pixels"
@@ -237,9 +249,10 @@ def locate_features(
         guess, guess_inliers = _guess(
             stored, local, alike(stored.keyframes, place, settings.guess_references), camera, rng, settings
         )
+    other = None if fit is None or fit.score < 0.5 or unsure else _elsewhere(stored, local, place, fit, rng, settings)
     if fit is None:
         return Located(None, 0, None, 0.0, 0.0, camera, guess, guess_inliers, focal_from=source)
-    score = min(fit.score, _UNSURE) if unsure else fit.score
+    score = min(fit.score, _UNSURE) if unsure else fit.score if other is None else 0.5
     return Located(
         world_from_camera=fit.world_from_camera if score >= 0.5 else None,
         inliers=fit.inliers,
@@ -252,7 +265,28 @@ def locate_features(
         focal_from=source if fit.uncertainty is None else "photo",
         uncertainty=uncertainty,
         centred=source == "assumed",
+        elsewhere=other,
     )
+
+
+def _elsewhere(
+    stored: LocatableMap,
+    local: LocalFeatures,
+    place: Float32[np.ndarray, " d"],
+    fit: "_Fit",
+    rng: np.random.Generator,
+    settings: LocateSettings,
+) -> Float[np.ndarray, "4 4"] | None:
+    likely = alike(stored.keyframes, place, _MOST_ALIKE)
+    seen = np.asarray(stored.keyframes.centre, np.float64)
+    far = likely[np.linalg.norm(seen[likely] - seen[fit.keyframe], axis=1) > _ELSEWHERE_M]
+    for keyframe in far[: settings.references].tolist():
+        again = _fit(stored, local, np.array([keyframe]), fit.camera, rng, settings)
+        if again is not None and again.score >= 0.5 and again.inliers >= _AS_WELL * fit.inliers:
+            moved_m = np.linalg.norm(again.world_from_camera[:3, 3] - fit.world_from_camera[:3, 3])
+            if moved_m > _ELSEWHERE_M:
+                return again.world_from_camera
+    return None
 
 
 def _guess(
@@ -263,7 +297,6 @@ def _guess(
     rng: np.random.Generator,
     settings: LocateSettings,
 ) -> tuple[Float[np.ndarray, "4 4"] | None, int]:
-    """Return the pose on which most keypoints of one keyframe agree, and how many; else of the most alike, and 0."""
     if not len(references):
         return None, 0
     fits = [_fit(stored, local, references[i : i + 1], camera, rng, settings) for i in range(len(references))]
@@ -347,7 +380,6 @@ def _fit(
 def _from_the_nearest(
     stored: LocatableMap, local: LocalFeatures, fit: _Fit, rng: np.random.Generator, settings: LocateSettings
 ) -> _Fit:
-    """Match the keyframe nearest to a pose alone, with the refined camera; return the old fit where that is weak."""
     closest = np.array([nearest(stored.keyframes, fit.world_from_camera)])
     if np.array_equal(closest, fit.references):
         return fit
@@ -381,7 +413,6 @@ def _matched_points(stored: LocatableMap, local: LocalFeatures, references: Int[
 
 
 def _kept_features(keyframes: Keyframes, rows: slice, camera: Pinhole) -> LocalFeatures:
-    """Return a keyframe's keypoints as they were found: with scores where the map has any, and its picture's size."""
     return LocalFeatures(
         xy=keyframes.xy[rows],
         descriptors=keyframes.descriptors[rows].astype(np.float32),
@@ -406,7 +437,6 @@ def _seen_from_the_same_side(
 def _camera_of(
     rgb: UInt8[np.ndarray, "h w 3"], camera: Pinhole | None, own: Pinhole, focal_35mm: float | None
 ) -> tuple[Pinhole, FocalSource]:
-    """Return the camera that a picture is taken for, and where its focal length is from."""
     height, width = rgb.shape[:2]
     if camera is not None:
         if (camera.width, camera.height) != (width, height):
@@ -437,7 +467,6 @@ def _as_large_as_in_the_map(
 
 
 def _spread(xy: Float[np.ndarray, "n 2"], camera: Pinhole) -> float:
-    """Return two standard deviations along x times the same along y, as a part of the picture."""
     if len(xy) < 2:
         return 0.0
     deviation = 2.0 * xy.std(axis=0)
@@ -445,5 +474,4 @@ def _spread(xy: Float[np.ndarray, "n 2"], camera: Pinhole) -> float:
 
 
 def _confidence(value: float | int, threshold: float | int) -> float:
-    """Return a number in [0, 1) that rises with the value and is 0.5 at the threshold."""
     return value / (value + threshold)

@@ -114,7 +114,6 @@ def keyframes_that_saw(stored: "StoredMap", space: "Space", row: int) -> Int[np.
 
 
 def _is_free(space: "Space", start: Float[np.ndarray, "3"], end: Float[np.ndarray, "3"]) -> bool:
-    """Return whether no voxel of the map lies on the line between a camera and a voxel."""
     voxel_m = space.grid.voxel_size_m
     whole_m = float(np.linalg.norm(end - start))
     if whole_m <= _OWN_VOXELS * voxel_m:

@@ -56,7 +56,6 @@ def answer_on_storey(
 
 
 def _no_such(storeys: Storeys | None, word: SaidStorey, notes: tuple[str, ...], whole: Answer | None) -> Answer:
-    """Return that a map has no such storey, with what the whole map holds as a guess."""
     whole = whole or Answer((), False, (), 0.0)
     holds = _sentence(said_storeys(storeys).replace("it", "the map", 1))
     guess = f"; without that the best guess is at {place_of(whole.goals[0])}" if whole.goals else ""
@@ -96,7 +95,6 @@ def _restricted(
 
 
 def _absent(whole: Answer, word: SaidStorey, here: Sequence[Goal], storeys: Storeys | None) -> str:
-    """Return that nothing is found on a storey, the best guess there, and where else something is found."""
     what = in_words([one.part for one in whole.parts]).removeprefix("the ")
     text = f"No {what} is found {at_storey(word)}"
     if here:

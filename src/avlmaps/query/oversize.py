@@ -126,7 +126,6 @@ def _connected(index: Int[np.ndarray, "a 3"], rows: Int[np.ndarray, " m"], reach
 def _nearest(
     points_level: Float[np.ndarray, "a 3"], rows: Int[np.ndarray, " m"], pieces: Sequence[Int[np.ndarray, " p"]]
 ) -> Int[np.ndarray, " m"]:
-    """Return for each voxel of an instance the number of the piece that is near; their count where none is."""
     from scipy.spatial import KDTree  # most queries cut nothing and need not load it
 
     owner = np.repeat(np.arange(len(pieces)), [len(piece) for piece in pieces])

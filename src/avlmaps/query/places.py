@@ -117,7 +117,6 @@ def describe_place(avlmap: "AVLMap", point: Float[np.ndarray, "3"], radius_m: fl
 
 
 def _names(avlmap: "AVLMap", rows: Int[np.ndarray, " m"]) -> list[NameScore]:
-    """Return the names with the highest mean confidence over some voxels."""
     if not len(rows) or "pixels" not in avlmap.stored.info.models:
         return []
     namer, said = VoxelNamer(avlmap.stored), avlmap.edited.named_at(rows)
@@ -156,7 +155,6 @@ def _rooms(avlmap: "AVLMap", point: Float[np.ndarray, "3"]) -> list[NameScore]:
 
 
 def _views(avlmap: "AVLMap", row: int) -> list[ViewOfPlace]:
-    """Return the keyframes that saw a voxel."""
     keyframes = avlmap.stored.keyframes
     point = avlmap.space.centres[row]
     cameras = np.asarray(keyframes.world_from_camera, np.float64)[:, :3, 3]

@@ -4,6 +4,7 @@
 # pyright: reportUnknownMemberType=false
 
 from collections.abc import Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -75,6 +76,21 @@ def draw_heat(
     _draw_goals(axes[-1], space, goals)
     finish(figure, axes, with_heat=True)
     return figure
+
+
+def draw_heat_into(ax: "Axes", space: Space, shown: Float32[np.ndarray, " n"], goals: Sequence[Goal] = ()) -> None:
+    """Draw heat over the map, and the goals numbered, into axes of the caller's."""
+    view = TopDown.of(space)
+    draw_ground(ax, view, space)
+    _draw_heat(ax, view, shown)
+    _draw_goals(ax, space, goals)
+
+
+def png_of(figure: "Figure") -> bytes:
+    """Return a figure as the bytes of a PNG, as notebooks show it."""
+    written = BytesIO()
+    figure.savefig(written, format="png", bbox_inches="tight")
+    return written.getvalue()
 
 
 def plot_map(
@@ -207,7 +223,6 @@ def recording_axis(direction: Float[np.ndarray, "3"]) -> tuple[str, int] | None:
 
 
 def _draw_recording_axes(ax: "Axes", space: Space) -> None:
-    """Draw where the recording's axes point in the top-down view; the one along the line of sight is left out."""
     for column, letter in enumerate("xyz"):
         right, up = (float(value) for value in space.level_from_world[:2, column])
         if np.hypot(right, up) < 0.3:
@@ -220,7 +235,6 @@ def _draw_recording_axes(ax: "Axes", space: Space) -> None:
 
 
 def _draw_heat(ax: "Axes", view: TopDown, values: Float32[np.ndarray, " n"]) -> None:
-    """Lay the heat over the ground. Its colour is absolute; it is the more opaque the nearer it is to the peak."""
     from matplotlib import colormaps
 
     heat = view.heat(values)
@@ -231,7 +245,6 @@ def _draw_heat(ax: "Axes", view: TopDown, values: Float32[np.ndarray, " n"]) -> 
 
 
 def _draw_anchors(ax: "Axes", factor: Factor) -> None:
-    """Mark where the heat of a sound, an area or an image falls from."""
     if not isinstance(factor, NearAnchors) or not len(factor.anchors):
         return
     anchors = factor.space.level(factor.anchors)
@@ -246,7 +259,6 @@ def _draw_anchors(ax: "Axes", factor: Factor) -> None:
 
 
 def _draw_goals(ax: "Axes", space: Space, goals: Sequence[Goal]) -> None:
-    """Number the goals, and write their positions, in the picture's frame, and probabilities into the legend."""
     frame = picture_frame(space)
     named = " (level frame)" if frame is FrameName.LEVEL else ""
     levels = [space.level(np.array(goal.position)) for goal in goals]

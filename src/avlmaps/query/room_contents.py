@@ -15,7 +15,6 @@ _ELSEWHERE = 0.1
 
 @cache
 def _log_ratios(contents: RoomContents) -> Float64[np.ndarray, "t r"]:
-    """Return by how much, in nats, a thing of the table speaks for each kind of room rather than for any."""
     return _nats_of(contents, contents.surface_m2)
 
 
@@ -86,7 +85,6 @@ def _not_against(
 def _for_kinds(
     nats: Float64[np.ndarray, " r"], kinds: Sequence[str], contents: RoomContents
 ) -> Float[np.ndarray, " n"]:
-    """Return what a table says for each of some kinds of room; see ``votes``."""
     columns = _columns(tuple(kinds), contents)
     return np.array([nats.mean() if column is None else nats[column] for column in columns])
 

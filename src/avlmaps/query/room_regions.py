@@ -71,7 +71,6 @@ def rooms_of_storey(grid: StoreyGrid) -> StoreyRooms:
 def _whole(
     free: Bool[np.ndarray, "nx ny"], wall: Bool[np.ndarray, "nx ny"], cell_m: float
 ) -> Bool[np.ndarray, "nx ny"]:
-    """Return the free floor without gaps: narrow ones, and those that floor and walls enclose."""
     reach = _GAP_M / cell_m
     edge = int(np.ceil(reach)) + 1
     wide = distance(np.pad(~free, edge, constant_values=True), beyond=True) <= reach
@@ -142,7 +141,6 @@ def _parted(
 
 
 def _grown(label: Int[np.ndarray, "nx ny"], over: Bool[np.ndarray, "nx ny"], reach: float) -> Int[np.ndarray, "nx ny"]:
-    """Return labels that take in cells up to ``reach`` cells away, each that of the nearest."""
     nearest, away = nearest_label(label)
     return np.where((label == 0) & over & (away <= reach + 1e-3), nearest, label)
 
@@ -302,7 +300,6 @@ class RoomRegions:
 
     @cached_property
     def _boxes(self) -> tuple[Int[np.ndarray, " r"], Int[np.ndarray, "r 2"], Int[np.ndarray, "r 2"]]:
-        """Of each room, its storey, and the first cell and the one behind the last along both axes."""
         count = len(self)
         storey, low, high = np.zeros(count, np.int64), np.full((count, 2), 2**62), np.zeros((count, 2), np.int64)
         for number, label in enumerate(self.labels):

@@ -52,7 +52,7 @@ def query_settings(rules: Rules, settings: QuerySettings | None = None) -> Query
     settings = settings or QuerySettings()
     if rules == "ours":
         return settings
-    return replace(settings, objects=PAPER_OBJECTS, sounds=PAPER_SOUNDS, areas=PAPER_AREAS, by_colour=False)
+    return replace(settings, objects=PAPER_OBJECTS, sounds=PAPER_SOUNDS, areas=PAPER_AREAS)
 
 
 def rules_of(built_with: BuildSettings) -> Rules:

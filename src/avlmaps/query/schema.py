@@ -103,6 +103,7 @@ class QueryAnswer(TypedDict):
     level_from_recording: Matrix | None
     notes: NotRequired[Annotated[list[str], Meta(description="how words were read; why the map may be wrong")]]
     count: NotRequired[Annotated[int, Meta(description="the number of things, for a sentence such as 'how many'")]]
+    alike: NotRequired[Annotated[int, Meta(description="places that fit as well as the likeliest, if several do")]]
     alternatives: NotRequired[
         Annotated[list[AlternativeAnswer], Meta(description="the other things that the sentence may mean")]
     ]
@@ -128,6 +129,7 @@ class ThingAnswer(TypedDict):
     color: Annotated[list[int], Meta(min_length=3, max_length=3, description="mean RGB, 0 to 255")]
     voxels: int
     storey: NotRequired[Storey]
+    room: NotRequired[Annotated[str | None, Meta(description="the room that it is in")]]
     edited: NotRequired[Edited]
     heard: NotRequired[
         Annotated[list[HeardFromAnswer], Meta(description="sounds that may have come from it, likeliest first")]
@@ -212,9 +214,8 @@ class EditsAnswer(TypedDict):
 
 
 class ListedThing(ThingAnswer):
-    """A thing, with its room and its distance where those are queried."""
+    """A thing, with its distance where that is queried."""
 
-    room: NotRequired[str | None]
     distance_m: NotRequired[float]
 
 

@@ -180,13 +180,13 @@ def selected(lists: MapLists, wanted: Wanted) -> tuple[list[Selected], NearAnswe
     Raises:
         QueryError: there is no such room, or no such thing to be near to.
     """
-    found = things_with_rooms(lists, wanted)
+    found, numbers = things_with_rooms(lists, wanted), None
     if wanted.room is not None:
         numbers = set(lists.where.numbers_of(wanted.room))
         found = [one for one in found if one.room in numbers]
     if wanted.near is None:
         return found, None
-    place, about = _near(lists, wanted.near, wanted.at)
+    place, about = _near(lists, wanted.near, wanted.at, numbers)
     itself = None if about is None else about["position"]
     level = lists.avlmap.space.level
     found = [
@@ -212,16 +212,16 @@ def page_of(rows: Sequence[Row], top: int, page: int, of: str) -> tuple[list[Row
 
 
 def _row(one: Selected, room: str | None) -> ListedThing:
-    row = ListedThing(**one.thing, room=room)
+    row = ListedThing(**{**one.thing, "room": room})
     if one.away_m is not None:
         row["distance_m"] = round(one.away_m, 3)
     return row
 
 
 def _near(
-    lists: MapLists, near: str | Sequence[float], at: str | None
+    lists: MapLists, near: str | Sequence[float], at: str | None, rooms: set[int] | None
 ) -> tuple[Float[np.ndarray, " n"], NearAnswer | None]:
-    """Return the place that is meant, and the thing there if one is named."""
+    """Return the place that is meant, and the thing there if one is named; where the rooms hold one, that."""
     if is_place(near):
         return place_given(near), None
     name = str(near)
@@ -231,5 +231,8 @@ def _near(
         why = "" if known else f": {unknown_note(name)}"
         raise QueryError(f"The map shows no {name[:60]!r} to be near to{why}; give a place as x,y,z, or another name.")
     best = things[0]
+    if rooms is not None:
+        own = lists.where.rooms_of(np.array([thing["position"] for thing in things])).tolist()
+        best = next((thing for thing, room in zip(things, own, strict=True) if room in rooms), best)
     about: NearAnswer = {"name": best["name"], "confidence": best["confidence"], "position": best["position"]}
     return np.array(best["position"]), about

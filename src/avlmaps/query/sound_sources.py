@@ -323,7 +323,6 @@ def list_joined(
 
 
 def _by_kind(avlmap: Listening, names: Sequence[str]) -> dict[str, dict[int, float]]:
-    """Return for each kind its sounds, with the confidence of the name."""
     kinds: dict[str, dict[int, float]] = {}
     if not names:
         for number, event in enumerate(avlmap.sounds()):
@@ -468,11 +467,9 @@ def _with_heard(
 
 
 def _others(every: Sequence[Thing], listed: Sequence[Thing]) -> list[Thing]:
-    """Return the things that share less than half of their voxels with those listed."""
     taken = np.concatenate([thing.rows for thing in listed])
     return [thing for thing in every if np.isin(thing.rows, taken).mean() < 0.5]
 
 
 def _visit_of(visits: "Sequence[Visit]", onset_s: float) -> int:
-    """Return the number of the visit in which a sound began, from 0."""
     return max((n for n, visit in enumerate(visits) if visit.begin_s <= onset_s + 1e-6), default=0)

@@ -156,14 +156,12 @@ def _heading_of_columns(column: Int[np.ndarray, "c 2"], cell_m: float) -> float:
 
 
 def _packed(xy: Float[np.ndarray, "m 2"], cell_m: float) -> float:
-    """Return the sum of squares of the numbers of places in rows and in columns of two cells."""
     rows = np.floor(xy / (2.0 * cell_m) + 0.5).astype(np.int64)
     counts = [np.bincount(axis - axis.min()).astype(np.float64) for axis in rows.T]
     return float(sum(np.square(count).sum() for count in counts))
 
 
 def _heading(level: Float[np.ndarray, "n 3"], floor_m: float, voxel_size_m: float) -> float:
-    """Return the heading of the walls of a storey; see ``wall_heading``."""
     from avlmaps.query.storey_kernels import SIDE, mark_columns, turned_ends
 
     cell_m = float(voxel_size_m)
@@ -179,12 +177,10 @@ def _heading(level: Float[np.ndarray, "n 3"], floor_m: float, voxel_size_m: floa
 
 
 def _layers(voxel_size_m: float) -> int:
-    """Return how many layers of voxels lie between the heights at which walls are seen."""
     return max(1, int(np.ceil((WALL_M[1] - WALL_M[0]) / voxel_size_m)))
 
 
 def _walls(held: Bool[np.ndarray, "nx ny layers"]) -> Bool[np.ndarray, "nx ny"]:
-    """Return the cells where voxels fill half of the heights of walls, and fainter ones that touch these."""
     from avlmaps.query.storey_kernels import held_share
 
     share = np.empty(held.shape[:2])

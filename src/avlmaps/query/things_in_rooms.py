@@ -43,7 +43,6 @@ class ThingsInRooms:
         return np.clip(mean, _LEAST_NATS, _MOST_NATS)
 
     def _of_cells(self, names: tuple[str, ...]) -> Float32[np.ndarray, " c"] | None:
-        """Return the same for each cell of the floor plan: the mean over the kinds of room that it may be."""
         nats = commonness(names, self._field.kinds, self._contents)
         if nats is None:
             return None

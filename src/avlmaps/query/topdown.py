@@ -71,7 +71,6 @@ def camera_path(space: Space) -> Float[np.ndarray, "k 3"]:
 
 
 def _ceiling_m(space: Space, level: Float[np.ndarray, "n 3"]) -> float:
-    """Return the height above which voxels are left out: a little over the camera, or none where it is not known."""
     cameras = camera_path(space)
     return float(cameras[:, 2].max()) + _HEADROOM_M if len(cameras) else float(level[:, 2].max())
 

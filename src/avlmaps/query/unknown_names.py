@@ -24,7 +24,6 @@ def unknown_note(phrase: str, kind: EntryKind = EntryKind.THING) -> str:
 
 
 def _respelt(phrase: str, noun: str, kind: EntryKind) -> tuple[str, str]:
-    """Return the misspelt words of a phrase and the known name that was probably meant, or ``""`` for that."""
     known = lexicon()
     before = phrase.lower().split()[: phrase.split().index(noun)]
     nouns = [(noun, near) for near in known.suggest(noun, kind)]

@@ -111,7 +111,6 @@ def usual_text(found: Sequence[Usual], where: str) -> str:
 
 
 def _listed(some: Sequence[Usual], *, counted: bool = True) -> str:
-    """Return names with their days; what has both in common is counted."""
     number = Counter((one.stay.name, f" ({one.counted})" if counted else "") for one in some)
     return ", ".join(f"{name if n == 1 else f'{n} {plural_of(name)}'}{days}" for (name, days), n in number.items())
 

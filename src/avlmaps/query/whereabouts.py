@@ -1,7 +1,7 @@
 """The floors and rooms of a map as names, and which of them a point lies in: building, floor, room, things."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +10,7 @@ from avlmaps.core.arrays import Bool, Float, Int
 from avlmaps.core.errors import QueryError
 
 if TYPE_CHECKING:
-    from avlmaps.query.contents import Room
+    from avlmaps.query.contents import Room, Thing
     from avlmaps.query.floor_plan import FloorPlan
     from avlmaps.query.queryable import Queryable
     from avlmaps.query.room_regions import RoomRegions
@@ -90,8 +90,22 @@ class Whereabouts:
         own = self.regions.listed_at([room.region for room in self.rooms], points)
         return np.where(own == NOWHERE, number[nearest], own)
 
+    def with_rooms(self, things: "Sequence[Thing]") -> "list[Thing]":
+        """Return things that know their rooms."""
+        rooms = self.rooms_of(np.array([thing.position for thing in things]).reshape(-1, 3)).tolist()
+        named = [self.names[room] if room != NOWHERE else None for room in rooms]
+        return [replace(thing, room=name) for thing, name in zip(things, named, strict=True)]
+
+    def things_in(self, asked: str, things: "Sequence[Thing]") -> "list[Thing]":
+        """Return the things in a room by its name, or in all rooms of a kind.
+
+        Raises:
+            QueryError: there is no such room.
+        """
+        meant = {self.names[number] for number in self.numbers_of(asked)}
+        return [thing for thing in self.with_rooms(things) if thing.room in meant]
+
     def _by_storey(self, level: Float[np.ndarray, "m 3"], points: Float[np.ndarray, "m 3"]) -> np.ndarray:
-        """Return level x and y, and a third number that puts other storeys farther away than any place of the same."""
         return np.c_[level[:, :2], 1e4 * self.floors_of(points)]
 
     def areas_m2(self) -> Float[np.ndarray, " r"]:

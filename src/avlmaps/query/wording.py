@@ -1,5 +1,6 @@
 """The answer of a query in one sentence: where the first goal is, or which part failed and what the best guess is."""
 
+import re
 from collections.abc import Sequence
 
 from avlmaps.core.inflection import singulars_of
@@ -9,6 +10,9 @@ from avlmaps.core.wording import place_text, the_room
 from avlmaps.query.answer import Alternative, PartAnswer
 from avlmaps.query.goals import Goal
 
+WHICH = "Say which is meant, such as by what it is near."
+_MOST_NAMED = 3
+_HEAD = re.compile(r" (?:with|of|from|for|in|on) ")  # what is before it is the thing: "shelf with books"
 UNDERSTOOD_ONLY = "understood only"
 _PHOTO, _CLIP = "the place of the photo", "a sound like the clip"
 
@@ -19,10 +23,15 @@ def in_words(parts: Sequence[Part]) -> str:
     return " ".join([_named(lead), *(_context_words(part) for part in parts if part is not lead)])
 
 
-def found_text(parts: Sequence[PartAnswer], goal: Goal, count: int | None = None) -> str:
+def found_text(parts: Sequence[PartAnswer], goal: Goal, count: int | None = None, alike: Sequence[Goal] = ()) -> str:
     """Return where the first goal of an answer that is found is, how many there are, and which words were no help."""
     if count is not None:
         text = f"Counted: {count}. The most likely is at {_likely(goal)}."
+    elif len(alike) > 1:
+        places = " and ".join(f"at {place_of(one)}" for one in alike[:_MOST_NAMED])
+        more = f" and {len(alike) - _MOST_NAMED} more" if len(alike) > _MOST_NAMED else ""
+        known = f"{places}{more}, probability {alike[0].probability:.2f}"
+        text = f"{len(alike)} places fit {in_words([one.part for one in parts])} equally: {known}. {WHICH}"
     else:
         text = _sentence(f"{in_words([one.part for one in parts])} is most likely at {_likely(goal)}")
     halves = (one.note.split("; ")[0] for one in parts if one.note.startswith(UNDERSTOOD_ONLY))
@@ -63,7 +72,6 @@ def _not_found(part: Part) -> str:
 
 
 def _bare(part: Part) -> str:
-    """Return the name of a part without an article."""
     if part.is_file:
         return (_PHOTO if part.modality is Modality.IMAGE else _CLIP).split(" ", 1)[1]
     name = part.query.removeprefix("the ").removeprefix("a ").removeprefix("an ")
@@ -71,8 +79,7 @@ def _bare(part: Part) -> str:
 
 
 def _is(part: Part) -> str:
-    """Return the verb of a part: "no chairs are", "no chair is"."""
-    last = part.query.split()[-1:] if part.modality is Modality.OBJECT else []
+    last = _HEAD.split(part.query)[0].split()[-1:] if part.modality is Modality.OBJECT else []
     entry = lexicon().find(last[0], EntryKind.THING) if last and singulars_of(last[0]) else None
     return "is" if entry is None else "are"
 
@@ -95,7 +102,6 @@ def place_of(goal: Goal) -> str:
 
 
 def _likely(goal: Goal) -> str:
-    """Return the place of a goal and its probability; of a source the circles that hold it as well."""
     known = f"{place_of(goal)}, probability {goal.probability:.2f}"
     if goal.spread is None:
         return known

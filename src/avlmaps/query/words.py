@@ -209,7 +209,6 @@ def _beaten(
     silent: Bool[np.ndarray, " v"],
     least_score: float,
 ) -> Float32[np.ndarray, " m"]:
-    """Return by how much scores of voxels beat the best rival there; features are read where a third word may be."""
     floor = float(np.float32(-np.inf if rivals.has_other else least_score))
     closest = rivals.best, rivals.best_word, rivals.second, rivals.second_word
     out, unsure = scores.margins(score, closest, silent, floor)

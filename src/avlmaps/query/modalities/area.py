@@ -191,12 +191,10 @@ def same_place(area: str, asked: str) -> bool:
 
 
 def _cosine(rows: Float[np.ndarray, "n d"], row: Float[np.ndarray, " d"]) -> Float[np.ndarray, " n"]:
-    """Return the cosine of each row with one; 0 where either is zero."""
     return rows @ row / np.maximum(np.linalg.norm(rows, axis=1) * np.linalg.norm(row), 1e-12)
 
 
 def _named_shares(view: Float32[np.ndarray, "k d"], encoder: NamedViewEncoder) -> Float[np.ndarray, "k n"]:
-    """Return the probability of each of the encoder's names for each view."""
     return np.square(np.asarray(view, np.float64).reshape(-1, encoder.codes.shape[1]) @ encoder.codes.T)
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 # A guess stays a guess, however few keypoints agree with it.
-_LEAST_CERTAINTY = 0.01
+_LEAST_CERTAINTY, _MOST_OF_A_GUESS = 0.01, 0.49
 
 
 def read_picture(path: Path) -> UInt8[np.ndarray, "h w 3"]:
@@ -66,7 +66,7 @@ def image_factor(space: Space, located: "Located", part: Part, heat: HeatSetting
     """
     is_located = located.world_from_camera is not None
     pose = located.world_from_camera if is_located else located.guess
-    confidence = 1.0 if is_located else max(located.score, located.guess_confidence, _LEAST_CERTAINTY)
+    confidence = 1.0 if is_located else max(min(located.score, _MOST_OF_A_GUESS), _LEAST_CERTAINTY)
     found = pose is not None and confidence >= FOUND_AT
     anchors = np.zeros((0, 3)) if pose is None else np.asarray(pose, np.float64)[None, :3, 3]
     note = "" if is_located else f"the picture could not be located ({located.inliers} points agree)"
@@ -74,8 +74,6 @@ def image_factor(space: Space, located: "Located", part: Part, heat: HeatSetting
         note += f"; {located.notes[0][:1].lower()}{located.notes[0][1:].rstrip('.')}"
     if pose is not None and not is_located:
         note += "; the heat is that of the best guess"
-    if found and not is_located:
-        note += f", whose confidence is {confidence:.2f} by its colours"
     return NearAnchors(
         space,
         part,

@@ -12,7 +12,7 @@ from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import Part
 from avlmaps.core.spelling import squeezed
 from avlmaps.perception.protocols import NamedPixelEncoder
-from avlmaps.query.colour_filter import ColourPhrase, colour_in, colour_share, has_colour
+from avlmaps.query.colour_filter import ColourPhrase, colour_in, colour_margin, colour_share
 from avlmaps.query.factors import FOUND_AT, HeatSettings, NearThings
 from avlmaps.query.instances import (
     FeatureVoxels,
@@ -107,13 +107,11 @@ class _Search:
         return self.searched or segment(self.voxels, self.word, self._scored(1.0))
 
     def _uncertain(self, settings: ObjectSettings) -> Segmentation:
-        """Return the confident instances, and those that the context of a query may select."""
         scored = self._scored(settings.share_in_company)
         voxels = replace(self.voxels, settings=settings)
         return self._coloured(segment(voxels, self.word, scored, self._confident))
 
     def _coloured(self, found: Segmentation) -> Segmentation:
-        """Return instances with a confidence that falls as their voxels lack the colour that was named."""
         if self.colour is None or self.voxels.rgb is None:
             return found
         one = found.instances
@@ -144,9 +142,9 @@ def colour_factor(
 ) -> NearThings:
     """Return the heat of everything that has a colour."""
     space, settings = voxels.space, voxels.settings
-    rows = np.flatnonzero(has_colour(np.asarray(rgb), colour))
-    sure = np.ones(len(rows), np.float32)
-    found = link(space, Scored(rows, sure, sure), settings.link_m)
+    fit = colour_margin(np.asarray(rgb), colour)
+    rows = np.flatnonzero(fit > 0.0)
+    found = link(space, Scored(rows, fit[rows], np.ones(len(rows), np.float32)), settings.link_m)
     confidence = margin_confidence(found.margin, found.instance, space.grid.voxel_size_m, settings)
     found = replace(found, confidence=confidence).only(confidence >= settings.least_confidence)
     note = "" if found.best >= FOUND_AT else f"nothing of some size is {colour.text}"
@@ -161,13 +159,11 @@ def _mask(count: int, found: Instances) -> np.ndarray:
 
 
 def _is_colour_alone(understood: str, name: str) -> bool:
-    """Return whether an encoder understands of a name that speaks of a thing ("red elephant") nothing but a colour."""
     said, taken = colour_in(name), colour_in(understood) if understood else None
     return said is not None and bool(said.thing) and taken is not None and not taken.thing
 
 
 def _is_whole(understood: str, name: str) -> bool:
-    """Return whether what an encoder understands of a name is all of it: itself, a synonym, or its narrower kinds."""
     if squeezed(understood) == squeezed(name):
         return True
     entry = lexicon().find(name, EntryKind.THING)
