@@ -209,7 +209,7 @@ def test_two_doubtful_things_are_not_found_by_each_other() -> None:
 
 @pytest.mark.parametrize("found_at", [0.0, 0.3, 0.9, 1.0])
 def test_the_limit_of_found_is_a_setting(found_at: float) -> None:
-    m = AVLMap(furnished_map(sounds=sounds_of([track(0.5, 0.5)], [0.9])), QuerySettings(found_at=found_at))
+    m = AVLMap(furnished_map(sounds=sounds_of([track(0.5, 0.5)], [0.9])), settings=QuerySettings(found_at=found_at))
     for heat in (m.object("chair", primary=True), m.sound("dog"), m.object("chair", primary=True) * m.sound("dog")):
         assert heat.found == (heat.probability >= found_at)
     answer = m.ask(Question.of([Part(Modality.OBJECT, "chair"), Part(Modality.SOUND, "dog")]))
@@ -219,7 +219,7 @@ def test_the_limit_of_found_is_a_setting(found_at: float) -> None:
 
 @pytest.mark.parametrize("found_at", [0.0, 1e-9, 0.5])
 def test_where_there_is_no_goal_nothing_is_found_at_any_limit(found_at: float) -> None:
-    m = AVLMap(furnished_map(sounds=sounds_of([], [])), QuerySettings(found_at=found_at))
+    m = AVLMap(furnished_map(sounds=sounds_of([], [])), settings=QuerySettings(found_at=found_at))
     answer = m.ask(Question.of([Part(Modality.SOUND, "dog")]))
     assert not answer.goals and not answer.found and answer.text == "No sound of dog is found."
 
@@ -274,7 +274,7 @@ def test_two_kitchens_are_two_goals() -> None:
     view[:, 1] = 1.0
     view[[1, 2, 8, 9]] = [1.0, 0.0]
     from_cameras = QuerySettings(areas=AreaSettings(anchor="camera", extent="cones"))
-    m = AVLMap(furnished_map(keyframes=keyframes_at(places, view), views=FakeViews()), from_cameras)
+    m = AVLMap(furnished_map(keyframes=keyframes_at(places, view), views=FakeViews()), settings=from_cameras)
     goals = m.area("kitchen", primary=True).goals(top=2)
     assert sorted(goal.position[0] for goal in goals) == pytest.approx([1.25, 4.75], abs=0.3)
     assert all(goal.position[2] == pytest.approx(1.4) for goal in goals)

@@ -11,14 +11,14 @@ from jaxtyping import Float
 
 from avlmaps.core.errors import GoalNotFoundError, ProgramError
 from avlmaps.core.question import HeardAt
-from avlmaps.core.wording import option, place_text
+from avlmaps.core.wording import place_text
 from avlmaps.language.program.vocabulary import Clip, Picture, Place, Target
 from avlmaps.language.storey_words import said_storeys
 from avlmaps.maps.store.folder import stamp
 from avlmaps.maps.storeys import said_storeys as storeys_in_words
 from avlmaps.navigate.file_access import Readable
 from avlmaps.navigate.footprint import Outline
-from avlmaps.navigate.instances import Destination, alike, likely, nearest, same_thing, tells_one, things_in
+from avlmaps.navigate.instances import Destination, likely, nearest, same_thing, tells_one, things_in
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.on_storeys import at_storey, storeys_meant
@@ -172,26 +172,13 @@ class Seeker:
         things, _ = self._candidates(target)
         return self._chosen(things[0], len(things))
 
-    def referent(self, target: Target, here: Float[np.ndarray, "2"], *, any_of: bool = False) -> Destination:
+    def referent(self, target: Target, here: Float[np.ndarray, "2"]) -> Destination:
         """Return the thing that a target refers to for a robot: the best where it says which one, else the nearest.
 
-        Args:
-            target: what is meant.
-            here: where the robot is.
-            any_of: whether the nearest is wanted, of several that fit equally; else they are asked about.
-
         Raises:
-            GoalNotFoundError: there is none, or several fit equally and nobody chose.
+            GoalNotFoundError: there is none.
         """
         things, one = self._candidates(target)
-        equal = [] if one or any_of or self.guess else alike(things)
-        if len(equal) > 1:
-            places = " and ".join(f"at {place_text(self.avlmap.space.world(thing.place))}" for thing in equal[:3])
-            more = f" and {len(equal) - 3} more" if len(equal) > 3 else ""
-            raise GoalNotFoundError(
-                f"{len(equal)} places fit {equal[0].name} equally: {places}{more}. Which one? Say what it is near, say "
-                f"the nearest {equal[0].name.strip(chr(39))}, or let the robot choose ({option('guess')})."
-            )
         return self._chosen(things[0] if one else nearest(things, here), len(things))
 
     def pair(self, a: Target, b: Target, here: Float[np.ndarray, "2"]) -> tuple[Destination, Destination]:

@@ -145,7 +145,7 @@ class Robot:
 
     def get_nearest_pos(self, target: Target) -> Place:
         """Return the place of the nearest object of that name, or the best of a heatmap; it means the same later."""
-        return self.seeker.place_of_thing(self.seeker.referent(target, self._here, any_of=True))
+        return self.seeker.place_of_thing(self.seeker.referent(target, self._here))
 
     def get_all_pos(self, target: Target) -> list[Place]:
         """Return the places of all objects of that name that the map is confident of, the nearest first; [] of none."""
@@ -160,7 +160,7 @@ class Robot:
 
     def get_distance(self, a: Target, b: Target) -> float:
         """Return how many metres of floor are between the nearest points of two things."""
-        one, other = (self.seeker.referent(target, self._here, any_of=True) for target in (a, b))
+        one, other = (self.seeker.referent(target, self._here) for target in (a, b))
         near, far = one.outline.gap_to(other.outline)
         return float(np.linalg.norm(near - far))
 

@@ -212,7 +212,8 @@ def page_of(rows: Sequence[Row], top: int, page: int, of: str) -> tuple[list[Row
 
 
 def _row(one: Selected, room: str | None) -> ListedThing:
-    row = ListedThing(**{**one.thing, "room": room})
+    row = ListedThing(**one.thing)
+    row["room"] = room
     if one.away_m is not None:
         row["distance_m"] = round(one.away_m, 3)
     return row

@@ -92,7 +92,7 @@ class Whereabouts:
 
     def with_rooms(self, things: "Sequence[Thing]") -> "list[Thing]":
         """Return things that know their rooms."""
-        rooms = self.rooms_of(np.array([thing.position for thing in things]).reshape(-1, 3)).tolist()
+        rooms: list[int] = self.rooms_of(np.array([thing.position for thing in things]).reshape(-1, 3)).tolist()
         named = [self.names[room] if room != NOWHERE else None for room in rooms]
         return [replace(thing, room=name) for thing, name in zip(things, named, strict=True)]
 

@@ -200,7 +200,7 @@ class _Writer:
         """Return a skill's argument for a target: a phrase, a heatmap's best place, or its variable."""
         if target.kind is TargetKind.HERE:
             return "robot.current_pos()"
-        if target in self.names or self.repeats[target] > 1 or target.pick is not Pick.ANY:
+        if target in self.names or self.repeats[target] > 1 or target.pick in (Pick.OTHER, Pick.FARTHEST):
             return self.bound(target)
         if target.kind is TargetKind.OBJECT and not target.near:
             return _quoted(target.name)
