@@ -88,7 +88,7 @@ def test_a_camera_refuses_what_is_no_number(given: Any, place: int):
 def test_settings_and_sounds_hold_numbers_of_python(given: Any):
     assert BuildSettings(voxel_size_m=given, frames=FrameSettings(step=given)) == BuildSettings(2.0, FrameSettings(2))
     assert type(BuildSettings(voxel_size_m=given).voxel_size_m) is float
-    assert type(LiveSettings(snapshot_s=given, looks=given).looks) is int
+    assert type(LiveSettings(snapshot_s=given, known_views=given).known_views) is int
     assert type(require_rate(given)) is int
 
 

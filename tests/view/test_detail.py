@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps.view.detail import detail_order
+from avlmaps.view.layout import detail_order
 
 
 @st.composite

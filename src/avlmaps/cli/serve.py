@@ -15,7 +15,7 @@ from avlmaps.core.extras import install_command
 from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
-    from avlmaps.serve.drive.opening import Driving
+    from avlmaps.serve.drive.agents import Driving
     from avlmaps.serve.service import Service
 
 _PACKAGES = ("mcp", "mcp_types")
@@ -149,7 +149,7 @@ def serve(verb: "Serve") -> None:
 def _driving(verb: "Serve", service: "Service") -> "Driving | None":
     if verb.drive is None:
         return None
-    from avlmaps.serve.drive.opening import open_driving
+    from avlmaps.serve.drive.agents import open_driving
 
     try:
         return open_driving(verb.drive, service, verb.drive_log)

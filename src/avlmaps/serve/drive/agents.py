@@ -1,6 +1,9 @@
-"""The tools with which an agent drives: apart from the read-only tools, at an address of their own."""
+"""The tools with which an agent drives, at an address of their own, and opening a driving server beside one of maps."""
 
 from collections.abc import Awaitable, Callable
+from contextlib import AbstractAsyncContextManager
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, cast
 
 import mcp_types as mcp
@@ -11,10 +14,24 @@ from mcp.server.streamable_http_manager import StreamableHTTPASGIApp, Streamable
 from mcp.shared.exceptions import MCPError
 
 from avlmaps.core.version import __version__
+from avlmaps.core.wording import option
 from avlmaps.serve.agents import brief_schema, compact, fitting, token_count
-from avlmaps.serve.drive.app import DriveService, encoded, error_json
-from avlmaps.serve.drive.plans import ConfirmRequest, DriveError, NothingRequest, PlanRequest, Who
+from avlmaps.serve.drive.app import DriveService, drive_app, encoded, error_json
+from avlmaps.serve.drive.orders import Dispatcher
+from avlmaps.serve.drive.plans import (
+    ConfirmRequest,
+    DriveError,
+    MapNow,
+    NothingRequest,
+    OrderLog,
+    PlanRequest,
+    Who,
+    default_log,
+)
+from avlmaps.serve.drive.robots import open_machine
 from avlmaps.serve.guard import App
+from avlmaps.serve.service import Service
+from avlmaps.serve.settings import ServeError
 
 INSTRUCTIONS = """These tools move a robot. plan_drive returns a plan and moves nothing. Show the person who gave the
 order the reading and the path, and call confirm_drive only after that person agrees to this very plan. Names of things,
@@ -117,4 +134,65 @@ def _described(name: str, about: str, kind: type[msgspec.Struct], read_only: boo
         description=about,
         input_schema=brief_schema(kind),
         annotations=mcp.ToolAnnotations(read_only_hint=read_only, destructive_hint=destructive),
+    )
+
+
+PATH = "/drive"
+
+
+@dataclass(frozen=True, slots=True)
+class Driving:
+    """What a server of maps needs to drive as well.
+
+    Attributes:
+        robot: as people know it.
+        log: file of the log.
+        mounts: the applications by path.
+        lifespans: what is open while the server runs.
+        dispatcher: decides what moves.
+        ending: is called when a signal ends the server; it stops the robot at once.
+    """
+
+    robot: str
+    log: Path
+    mounts: dict[str, App]
+    lifespans: tuple[Callable[[], AbstractAsyncContextManager[Any]], ...]
+    dispatcher: Dispatcher
+    ending: Callable[[], None]
+
+
+def open_driving(robot_file: Path, service: Service, log: Path | None = None) -> Driving:
+    """Connect to a robot and return the driving server.
+
+    Args:
+        robot_file: ROBOT.json.
+        service: the server of maps.
+        log: file of the log; in the user's state folder if None.
+
+    Raises:
+        ServeError: a real robot would be driven without a token.
+        NavigationError: the robot's file cannot be read, the robot cannot be reached or stopped, or the log cannot be
+            written.
+        RequestError: there is no such map.
+    """
+    machine = open_machine(robot_file)
+    if machine.is_real and service.settings.token is None:
+        raise ServeError(
+            f"Driving a {machine.name} needs a token, also on this machine; give {option('token-file', 'FILE')} or set "
+            "AVLMAPS_TOKEN."
+        )
+
+    def current() -> MapNow:
+        served = service.shelf.get(machine.map)
+        return MapNow(served.name, served.version, served.avlmap)
+
+    current()
+    path = default_log() if log is None else log
+    dispatcher = Dispatcher(machine, current, OrderLog(path))
+    dispatcher.connect()
+    drive = DriveService(dispatcher)
+    agents, running = drive_agent_app(drive)
+    # `running` is inside: the tools end before the robot is stopped.
+    return Driving(
+        machine.name, path, {PATH: drive_app(drive, agents)}, (drive.lifespan, running), dispatcher, drive.end
     )
