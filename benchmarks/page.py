@@ -187,7 +187,8 @@ ENTRIES = (
     Entry("outside", "not of this repository", (
         Figure("another hand: NYUv2, 654 test frames: pixel accuracy, class accuracy, mean IoU", "",
                r"accuracy (\S+), class accuracy (\S+), mean IoU (\S+)", "{1}, {2}, {3}"),
-        Figure("another hand: ESC-50 fold 1, 400 clips, 50 names", "", r"fold 1.*first name right (\S+), own name says yes (\S+)",
+        Figure("another hand: ESC-50 fold 1, 400 clips, 50 names", "",
+               r"fold 1.*first name right (\S+), own name says yes (\S+)",
                "first name right {1}, own name says yes {2}"),
         Figure("another hand: 85 more clips, first name right", "", r"more clips: first name right (\S+)", "{1}"),
         Figure("another hand: sentences of a writer who had read none of ours, before the gate", "",
