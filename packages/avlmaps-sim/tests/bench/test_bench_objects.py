@@ -59,6 +59,10 @@ class AskedMap:
     space: Space = field(default_factory=lambda: Space(GridSpec(SIZE_M), INDEX, np.array([0.0, 0.0, 1.0])))
 
     @property
+    def encoders(self):
+        return self.stored.encoders
+
+    @property
     def stored(self):
         encoder = SimpleNamespace(vocabulary=("chair", "bed", "toilet", "wall"), encode_words=codes_of)
         return SimpleNamespace(

@@ -176,12 +176,14 @@ def test_what_stands_on_another_storey_is_no_rival():
     assert task.targets == (evidence.box(1),)
 
 
-def test_a_sound_heard_at_two_places_of_which_one_is_near_an_object_makes_a_task_for_that_place():
+def test_a_sound_heard_at_three_places_of_which_one_is_near_an_object_makes_a_task_for_that_place():
     near, far = (4.6, 0.5, 1.3), (-5.0, 0.0, 1.3)
     passing = tuple((x, 0.5, 1.3) for x in (4.4, 4.6, 4.8))
-    events = (Event("snoring", far), Event("snoring", near, passing), Event("doorbell", near))
+    twice = (Event("snoring", far), Event("snoring", near, passing))
+    assert sound_tasks(evidence_of([(5.5, 0)], twice), np.random.default_rng(0), 10) == [], "a coin would do"
+    events = (*twice, Event("snoring", (0.0, 5.0, 1.3)), Event("doorbell", near))
     (task,) = sound_tasks(evidence_of([(5.5, 0)], events), np.random.default_rng(0), 10)
-    assert (task.category, task.context, task.rivals) == ("snoring", "chair", 1)
+    assert (task.category, task.context, task.rivals) == ("snoring", "chair", 2)
     assert (task.sound_name, task.object_name) == ("snoring", "chair")
     assert task.sentence == "the sound of snoring near the chair"
     assert task.off_m((4.8, 0.5, 0.0)) == 0.0  # anywhere along the way on which the sound was heard
@@ -192,8 +194,8 @@ def test_a_sound_heard_at_two_places_of_which_one_is_near_an_object_makes_a_task
     "places",
     [
         [(0.5, 0.5)],  # heard once: no context is needed
-        [(0.5, 0.5), (0.0, 1.0)],  # both are near the chair
-        [(6.0, 0.0), (9.0, 0.0)],  # none is
+        [(0.5, 0.5), (0.0, 1.0), (9.0, 0.0)],  # two are near the chair
+        [(6.0, 0.0), (9.0, 0.0), (12.0, 0.0)],  # none is
     ],
 )
 def test_no_task_for_a_sound_is_made_where_the_object_does_not_tell_its_places_apart(places):
@@ -303,7 +305,10 @@ def all_tasks(home: _Perfect) -> list[Task]:
 
 @pytest.mark.parametrize("swap", [False, True])
 def test_true_perception_answers_every_task_within_a_voxel(swap: bool):
-    places = (("snoring", (1.5, 1.5, 1.3)), ("doorbell", (8.0, 2.0, 1.3)), ("doorbell", (3.5, 0.6, 1.3)))
+    places = (
+        ("snoring", (1.5, 1.5, 1.3)), ("doorbell", (8.0, 2.0, 1.3)), ("doorbell", (3.5, 0.6, 1.3)),
+        ("doorbell", (5.5, 4.8, 1.3)),
+    )  # fmt: skip
     made = perfect(home(swap), tuple(heard(*one) for one in places))
     tasks = all_tasks(made)
     assert {task.kind for task in tasks} == set(TaskKind)
