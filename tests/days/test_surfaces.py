@@ -62,6 +62,7 @@ def test_the_identity_changes_no_voxel() -> None:
 
 
 @given(st.floats(-3.1, 3.1), st.tuples(*[st.floats(-5, 5)] * 3))
+@pytest.mark.nightly
 def test_a_turned_surface_is_whole_and_not_thicker_than_two(yaw: float, shift: tuple) -> None:
     index, transform = room(), turned(yaw, shift)
     filled, cell, source, part = resampled(index, GRID, transform)

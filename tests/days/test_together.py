@@ -108,6 +108,7 @@ def test_another_place_is_refused_and_what_was_merged_stays(out: Path, monkeypat
     assert not out.exists() and (out.parent / "all-recordings" / "first-0002.avlmap" / "map.json").is_file()
 
 
+@pytest.mark.nightly
 def test_another_map_is_replaced_only_where_one_says_so(out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(together, "merge_maps", Merges())
     shutil.copytree(out.parent / "all-recordings" / "0003.avlmap", out)

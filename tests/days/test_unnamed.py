@@ -26,6 +26,7 @@ def found(stored: StoredMap, loose: np.ndarray, through: np.ndarray, owned: list
     return changed_things(stored, flags[0], flags[1], owned, SETTINGS)
 
 
+@pytest.mark.nightly
 def test_what_rays_pass_through_in_part_is_one_thing_with_the_name_of_its_voxels(office: tuple) -> None:
     stored, chair = office
     (thing,) = found(stored, chair, chair[::3], [])

@@ -68,6 +68,7 @@ def watching() -> Watching:
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_a_matcher_is_given_the_scores_and_the_sizes_of_both_pictures(watching: Watching) -> None:
     stored = stored_by(Scored(), watching)
     large = WALK.room.render(WALK.world_from_camera[4], CAMERA.resized(480, 360))[0]
@@ -80,6 +81,7 @@ def test_a_matcher_is_given_the_scores_and_the_sizes_of_both_pictures(watching: 
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_keypoints_without_scores_reach_a_matcher_without_any_and_with_the_size_of_the_picture(
     watching: Watching,
 ) -> None:

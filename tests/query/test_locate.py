@@ -171,6 +171,7 @@ def test_the_pose_is_that_of_the_camera_that_took_the_photo() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_pictures_of_other_places_are_refused(stored: MapOfPictures) -> None:
     other = RoomWalk(frames=40, seed=99)
     pictures = [other.frame(i).rgb for i in range(0, 40, 7)]
@@ -183,12 +184,14 @@ def test_pictures_of_other_places_are_refused(stored: MapOfPictures) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_the_mirrored_room_is_another_place(stored: MapOfPictures) -> None:
     for index in range(0, 30, 6):
         mirrored = np.ascontiguousarray(WALK.frame(index).rgb[:, ::-1])
         assert locate(stored, mirrored, None, rng()).world_from_camera is None
 
 
+@pytest.mark.nightly
 def test_one_known_poster_in_another_place_is_no_place(stored: MapOfPictures, photo: np.ndarray) -> None:
     elsewhere = Room(seed=99).render(PHOTO_FROM)[0]
     elsewhere[100:145, 130:190] = photo[100:145, 130:190]
@@ -218,6 +221,7 @@ def test_one_keyframe_is_enough_for_a_map(stored: MapOfPictures) -> None:
     assert_at(locate(single, WALK.frame(0).rgb, None, rng()), WALK.world_from_camera[0])
 
 
+@pytest.mark.nightly
 def test_a_dark_and_blurred_photo_is_located_or_refused_but_never_wrong(
     stored: MapOfPictures, photo: np.ndarray
 ) -> None:

@@ -56,6 +56,7 @@ def test_each_row_is_evidence_again() -> None:
         assert [getattr(row.evidence, name) for name in NUMBERS] == pytest.approx(list(row.numbers))
 
 
+@pytest.mark.nightly
 def test_on_homes_left_out_it_says_more_than_the_rate_alone() -> None:
     rows = read_rows()
     probability, weight = held_out(rows), balanced(rows)
@@ -67,6 +68,7 @@ def test_on_homes_left_out_it_says_more_than_the_rate_alone() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_those_who_are_certain_are_mostly_right() -> None:
     rows = read_rows()
     probability, right = held_out(rows), np.array([row.right for row in rows])

@@ -179,7 +179,9 @@ class Heatmap(Heat):
 
         if ax is not None:
             draw_heat_into(ax, self.space, self.shown, self.goals(top))
-            return ax.get_figure(root=True)
+            figure = ax.get_figure(root=True)
+            assert figure is not None  # axes that are drawn into have one
+            return figure
         figure = draw_heat(self.factors, self.shown, self.found, self.goals(top))
         return figure if path is None else save(figure, path)
 
