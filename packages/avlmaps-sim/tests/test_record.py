@@ -47,6 +47,7 @@ def test_people_read_a_table_of_what_sounds_where(run, tmp_path: Path) -> None:
     assert lines[-1].startswith(f"wrote {tmp_path / 'rec'}: 4 frames, ")
 
 
+@pytest.mark.nightly
 def test_directions_that_a_device_says_become_sources_of_the_map(answer, run, tmp_path: Path) -> None:
     rec, path = tmp_path / "rec", tmp_path / "flat.avlmap"
     few = ("--size", "64x48", "--fps", "4", "--max-frames", "30", "--workers", "1", "--sources", "2", "--seed", "1")
