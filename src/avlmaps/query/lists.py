@@ -125,7 +125,7 @@ def _heard(avlmap: "Queryable", question: ListQuestion, top: int) -> Answer:
     room_of = room_namer(avlmap)
     if question.how == "in":
         places = np.array([sound.position for sound in sounds]).reshape(-1, 3)
-        inside = _inside(Whereabouts.of(avlmap), question.name, places) if sounds else []
+        inside = _inside(Whereabouts.of(avlmap), question.name, places) if sounds else np.zeros(0, bool)
         sounds = [sound for sound, is_in in zip(sounds, inside, strict=True) if is_in]
         told = ", ".join(f"{_sound_goal(sound).name} at {sound.onset_s:.1f} s" for sound in sounds)
         text = f"In the {question.name} were heard: {told}." if sounds else f"No sound was in the {question.name}."
