@@ -53,8 +53,7 @@ def build_map(
     """
     from avlmaps.maps.build import build_map as build
     from avlmaps.maps.settings import DEFAULTS, BuildSettings
-    from avlmaps.query.avlmap import AVLMap
-    from avlmaps.query.findings import with_findings
+    from avlmaps.query.avlmap import AVLMap, with_findings
     from avlmaps.query.voxel_map import require_kinds
     from avlmaps.recordings.open import open_recording
     from avlmaps.recordings.types import Recording

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from avlmaps.maps.store.folder import damaged_files, read
-from avlmaps.query.avlmap import AVLMap, QuerySettings
-from avlmaps.query.findings import with_findings
+from avlmaps.query.avlmap import AVLMap, QuerySettings, with_findings
 from avlmaps.query.modalities.area import AreaSettings
 from avlmaps.query.room_regions import RoomRegions
 from avlmaps.query.rooms import Rooms

@@ -139,8 +139,7 @@ def build(verb: "Build") -> dict[str, Any]:
     from avlmaps.maps.cluster import ClusterWorkers
     from avlmaps.maps.settings import SUBMAP_FRAMES, BuildSettings, FrameSettings, FusionSettings, GravitySettings
     from avlmaps.perception.cache.feature_store import CacheSettings
-    from avlmaps.query.avlmap import AVLMap
-    from avlmaps.query.findings import with_findings
+    from avlmaps.query.avlmap import AVLMap, with_findings
     from avlmaps.query.rules import build_settings
 
     begin = perf_counter()

@@ -100,8 +100,7 @@ def merge(verb: Merge) -> dict[str, Any]:
     """Merge two maps and return by what the place was found, and what changed."""
     from avlmaps.days.merge import merge_maps
     from avlmaps.maps.store.reader import open_stored
-    from avlmaps.query.avlmap import AVLMap
-    from avlmaps.query.findings import with_findings
+    from avlmaps.query.avlmap import AVLMap, with_findings
 
     begin_s = perf_counter()
     made = merge_maps(

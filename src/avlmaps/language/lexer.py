@@ -6,11 +6,11 @@ of picture and sound files, and media in curly braces as the paper writes them.
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import degrees
 from unicodedata import normalize
 
 from avlmaps.language.numbers import SMALL, TENS, spelled
+from avlmaps.language.token import Token
 
 _CHARACTERS = str.maketrans("‘’“”–—−‐‑﹣－…º", "''\"\"-------.°")
 _IMAGES = r"\.(?:png|jpe?g|bmp|webp|tiff?|gif)"
@@ -66,25 +66,6 @@ _SIZES = frozenset({
     "whole", "full", "good", "solid", "giant", "baby", "large", "huge", "quick", "slow", "more", "further", "big",
     "small", "little", "long", "short", "tiny", "another",
 })  # fmt: skip
-
-
-@dataclass(frozen=True, slots=True)
-class Token:
-    """A word, figure, file name or mark.
-
-    Attributes:
-        text: lower case, clitics apart ("don't" is ``do`` and ``not``); the path of a file.
-        raw: as it was written.
-        kind: ``word``, ``number``, ``image``, ``clip`` or ``punct``.
-        start: where it begins in the sentence.
-        end: where it ends.
-    """
-
-    text: str
-    raw: str
-    kind: str
-    start: int
-    end: int
 
 
 def tokenise(sentence: str) -> list[Token]:

@@ -10,7 +10,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from avlmaps.language.lexer import Token
+    from avlmaps.language.token import Token
 
 
 _DIGITS = {

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from copy import copy
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -14,23 +14,22 @@ from avlmaps.core.arrays import Float, Float16, Int32, UInt8
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import BackendError, MapError, QueryError
 from avlmaps.core.files import lasting_path, user_path
-from avlmaps.core.numbers import as_whole, checked, hold_numbers
+from avlmaps.core.numbers import as_whole, checked
 from avlmaps.core.question import HeardAt, Modality, Part, Question, Role
 from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import read_room_contents
-from avlmaps.query.factors import FOUND_AT, HeatSettings
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.instances import Instances
 from avlmaps.query.map_names import MapNames
 from avlmaps.query.map_rooms import MapRooms
-from avlmaps.query.modalities.area import AreaSettings, area_factor
+from avlmaps.query.modalities.area import area_factor
 from avlmaps.query.modalities.image import image_factor, read_picture, require_fitting
-from avlmaps.query.modalities.sound import SoundSettings, read_clip, require_audible, sound_factor, sound_features
-from avlmaps.query.object_settings import ObjectSettings
+from avlmaps.query.modalities.sound import read_clip, require_audible, sound_factor, sound_features
 from avlmaps.query.queryable import Attachment, Photo
 from avlmaps.query.room_names import numbered_rooms, region_named
 from avlmaps.query.room_regions import RoomRegions
 from avlmaps.query.rooms import RoomField, Rooms
+from avlmaps.query.settings import QuerySettings
 from avlmaps.query.things_in_rooms import ThingsInRooms
 from avlmaps.query.voxel_space import Space
 from avlmaps.query.words import ClosestWords
@@ -56,29 +55,6 @@ if TYPE_CHECKING:
 # Keyframes that are matched one by one for a picture that cannot be located: more of them guess no better (measured).
 _GUESS_FROM = 20
 _LEAST_EDITED = 0.2  # a person may name what the map is not certain of
-
-
-@dataclass(frozen=True, slots=True)
-class QuerySettings:
-    """Everything about a query that can be chosen."""
-
-    heat: HeatSettings = field(default_factory=HeatSettings)
-    """How fast heat falls."""
-    objects: ObjectSettings = field(default_factory=ObjectSettings)
-    """From a word to instances."""
-    sounds: SoundSettings = field(default_factory=SoundSettings)
-    """From a sound's scores to heat."""
-    areas: AreaSettings = field(default_factory=AreaSettings)
-    """From views to heat."""
-    found_at: float = FOUND_AT
-    """A query is found where its first goal is right with at least this probability, all parts together; in [0, 1]."""
-    seed: int = 0
-    """Seed of what is drawn at random when a picture is located."""
-
-    def __post_init__(self) -> None:
-        hold_numbers(self, QueryError)
-        if not 0.0 <= self.found_at <= 1.0:
-            raise QueryError(f"A query cannot be found at a probability of {self.found_at:g}; it lies between 0 and 1.")
 
 
 class AVLMap:
@@ -838,3 +814,21 @@ def _read_only(array: np.ndarray) -> np.ndarray:
 
 def _role(primary: bool) -> Role:
     return Role.PRIMARY if primary else Role.CONTEXT
+
+
+def with_findings(avlmap: AVLMap) -> AVLMap:
+    """Return a map on the disk with its findings: those that it has, or what is found now and stored in its folder.
+
+    Where the folder cannot be written, the map is returned as it is, and what a question needs is found then.
+    """
+    from avlmaps.maps.store.folder import add_findings, read
+
+    stored = avlmap.stored
+    found = {} if stored.data.findings else avlmap.found()
+    if not found:
+        return avlmap
+    try:
+        add_findings(stored.path, found)
+    except MapError:
+        return avlmap
+    return avlmap.of_data(read(stored.path))

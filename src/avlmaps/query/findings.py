@@ -13,7 +13,6 @@ import msgspec
 import numpy as np
 
 from avlmaps.core.arrays import Int
-from avlmaps.core.errors import MapError
 from avlmaps.core.version import __version__
 from avlmaps.query.floor_plan import FloorPlan
 from avlmaps.query.instances import Instances, Segmentation
@@ -23,7 +22,6 @@ from avlmaps.query.scores import Closest
 from avlmaps.query.storey_grid import StoreyGrid
 
 if TYPE_CHECKING:
-    from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.modalities.area import AreaSettings
 
 Findings = Mapping[str, np.ndarray]
@@ -33,24 +31,6 @@ _OF_INSTANCES = {
     "rows": np.int32, "instance": np.int32, "margin": np.float32, "score": np.float32, "confidence": np.float32,
 }  # fmt: skip
 _CLOSEST = ("best", "best_word", "second", "second_word")
-
-
-def with_findings(avlmap: "AVLMap") -> "AVLMap":
-    """Return a map on the disk with its findings: those that it has, or what is found now and stored in its folder.
-
-    Where the folder cannot be written, the map is returned as it is, and what a question needs is found then.
-    """
-    from avlmaps.maps.store.folder import add_findings, read
-
-    stored = avlmap.stored
-    found = {} if stored.data.findings else avlmap.found()
-    if not found:
-        return avlmap
-    try:
-        add_findings(stored.path, found)
-    except MapError:
-        return avlmap
-    return avlmap.of_data(read(stored.path))
 
 
 def key_of(*ingredients: Any) -> np.ndarray:

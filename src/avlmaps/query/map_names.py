@@ -22,7 +22,7 @@ from avlmaps.query.words import ClosestWords, EncodedWord, Vocabulary
 
 if TYPE_CHECKING:
     from avlmaps.maps.store.reader import StoredMap
-    from avlmaps.query.avlmap import QuerySettings
+    from avlmaps.query.settings import QuerySettings
 
 
 class MapNames:

@@ -283,7 +283,7 @@ def _read(path: Path, content: bytes) -> MapData:
     if info.schema_version == 1:
         from avlmaps.maps.store.schema1 import read_schema1
 
-        return read_schema1(path, info, content)
+        return assembled(info, *read_schema1(path, content))
     tables = dict[str, tuple[Path, dict[str, np.ndarray]]]()
     for name, file in info.files.items():
         _require_size(path / name, file)

@@ -8,9 +8,6 @@ import numpy as np
 
 from avlmaps.core.errors import MapError
 from avlmaps.core.files import checked_size, decode_json
-from avlmaps.maps.store.folder import SECTIONS, assembled
-from avlmaps.maps.store.manifest import MapInfo
-from avlmaps.maps.store.map_data import MapData
 from avlmaps.maps.store.tables import RESTORE, FileInfo
 
 _MOST_BYTES = 1 << 42
@@ -19,7 +16,7 @@ _CLIP = "sounds/clips/"
 # What a file was called in ``map.json``, and the section and prefix that its array has now.
 _PLACES = {
     "keyframes/state/": ("keyframes", "state."),
-    **{f"{section}/": (section, "") for section in SECTIONS},
+    **{f"{section}/": (section, "") for section in ("voxels", "keyframes", "sounds")},
     "life/": ("voxels", "life."),
     "submaps/": ("voxels", "submaps."),
     "sources/": ("sounds", "sources."),
@@ -52,14 +49,14 @@ def files_of(content: bytes, where: Path) -> dict[str, FileInfo]:
     return {file.path: FileInfo(bytes=file.bytes, sha256=file.sha256) for file in files.files.values()}
 
 
-def read_schema1(path: Path, info: MapInfo, content: bytes) -> MapData:
-    """Return a map of schema 1.
+def read_schema1(path: Path, content: bytes) -> tuple[dict[str, tuple[Path, dict[str, np.ndarray]]], tuple[Path, ...]]:
+    """Return the arrays of a map of schema 1, by the sections of schema 2 with their folders, and its clips.
 
     Raises:
         MapError: a file is missing or damaged.
     """
     listed: _Files = decode_json(content, _Files)
-    tables = {section: (path / section, dict[str, np.ndarray]()) for section in SECTIONS}
+    tables = {section: (path / section, dict[str, np.ndarray]()) for section in ("voxels", "keyframes", "sounds")}
     clips: list[Path] = []
     for name, file in sorted(listed.files.items()):
         if name.startswith(_CLIP):
@@ -68,7 +65,7 @@ def read_schema1(path: Path, info: MapInfo, content: bytes) -> MapData:
         folder = next(folder for folder in _PLACES if name.startswith(folder))
         section, prefix = _PLACES[folder]
         tables[section][1][prefix + name.removeprefix(folder)] = _array(path / file.path, file.bytes)
-    return assembled(info, tables, tuple(clips))
+    return tables, tuple(clips)
 
 
 def _array(path: Path, size: int) -> np.ndarray:
