@@ -149,15 +149,13 @@ def test_a_video_that_was_cut_off_is_told(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("suffix", ["wav", "flac"])
-def test_a_truncated_file_tells_how_much_is_missing(tmp_path: Path, suffix: str) -> None:
+def test_a_truncated_file_is_told(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"a.{suffix}"
     soundfile.write(path, np.random.default_rng(0).uniform(-0.5, 0.5, 4 * RATE_HZ), RATE_HZ)
     content = path.read_bytes()
     path.write_bytes(content[: len(content) // 2])
     said = refusal(path)
-    assert said.startswith("FILE is truncated: it should last 4.00 s and breaks off at ")
-    assert said.endswith("copy or convert it again.")
-    assert 1.5 < float(said.split("breaks off at ")[1].split(" s")[0]) < 2.5
+    assert said.startswith("FILE is truncated or damaged: its length does not fit the sound that its header promises;")
 
 
 def test_samples_that_are_no_numbers_are_told_with_their_time(tmp_path: Path) -> None:

@@ -47,6 +47,6 @@ def test_a_wrong_recording_is_refused_or_doubted_or_makes_a_right_map(tmp_path: 
 def test_a_change_that_cannot_read_what_another_left_does_not_end_the_campaign(
     seeds: dict[str, Path], tmp_path: Path
 ) -> None:
-    line = run_case(94, seeds, tmp_path)  # JSON nested too deep to be read, and then to be signed again
-    assert "(resigned cannot)" in str(line["done"])
+    line = run_case(275, seeds, tmp_path)  # a pose put into JSON where no pose is, and then a change of JSON
+    assert "(odd_json cannot)" in str(line["done"])
     assert line["verdict"] == "sentence"

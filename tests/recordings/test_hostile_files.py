@@ -217,7 +217,7 @@ def test_a_flac_with_far_more_bytes_than_its_samples_take_is_a_sentence(tmp_path
     os.truncate(path, (100 << 20) - 1)
     with path.open("ab") as stream:
         stream.write(b"x")
-    with pytest.raises(AudioError, match=r"header promises 1\.00 s"):
+    with pytest.raises(AudioError, match="its length does not fit the sound that its header promises"):
         AudioTrack.open(path, 0.0)
 
 

@@ -199,8 +199,8 @@ def _examine_plain(path: Path) -> tuple[int, int]:
             return rate_hz, count
         if known:
             raise AudioError(
-                f"{path} is truncated or damaged: its header promises {count / rate_hz:.2f} s of sound, and it is "
-                "not as long; copy or convert it again."
+                f"{path} is truncated or damaged: its length does not fit the sound that its header promises; "
+                "copy or convert it again."
             )
         whole: Any = file
         whole.seek(0)
