@@ -121,7 +121,8 @@ class Mapper:
         self._album = KeyframeAlbum(encoders, self.settings.keyframes)
         self._surfaces: Merged | None = None
         self._through: ThroughCounts | None = None
-        self._looked_at = 0  # how many frames had come when up and the floor were last found
+        # How many frames had come when up and the floor were last found, and when contradictions were last looked for.
+        self._looked_at = self._checked = 0
         self.hearing = Hearing(encoders, self.settings.hearing, None, name_first=behind)
         self._found: tuple[str, ...] = ()  # by the check of the frames that are held
         self._at_the_end: tuple[str, ...] = ()
@@ -426,8 +427,11 @@ class Mapper:
                 raise faults[0]
             if absorb:
                 self._absorb()
-                if len(self) >= 2 * self._looked_at and self._recording is None:
-                    self._look_again()
+                if self._recording is None:
+                    if len(self) >= 2 * self._looked_at:
+                        self._look_again()
+                    elif not self._behind and len(self) >= 2 * max(self._checked, 1):
+                        self._check()
             return self._made(final=False)
 
     def finish(self) -> MapData:
@@ -460,6 +464,12 @@ class Mapper:
         up = estimate_up(held, self.settings)
         ground, floors = estimate_ground(held, self.settings, up)
         self.start = replace(self.start, up=up, ground=ground, floors=floors)
+        self._check()
+
+    def _check(self) -> None:
+        """Find what is odd about the walk, and where the frames that are held contradict one another."""
+        with self._adding:
+            held, self._checked = self._held.recording(self._up), len(self)
         self._found = doubts_of_walk(self._walked.until_now(), held) if len(held) > 1 else ()
 
     def _made(self, *, final: bool) -> MapData:
