@@ -1,5 +1,6 @@
 """Several recordings of one place become one map: each is built by itself, then found in the first and merged."""
 
+import secrets
 import shutil
 from collections.abc import Sequence
 from contextlib import closing
@@ -21,17 +22,22 @@ from avlmaps.maps.cluster import (
     reopened,
     require_same_software,
     software,
+    unseen,
 )
 from avlmaps.maps.settings import DEFAULTS, BuildSettings
 from avlmaps.maps.store.folder import MANIFEST
 from avlmaps.maps.store.reader import StoredMap, open_stored
+from avlmaps.maps.store.tables import explain_write_errors
 from avlmaps.perception.cache.feature_store import DEFAULT_CACHE, CacheSettings
 from avlmaps.perception.encoders import Encoders
 
 
 @dataclass(frozen=True, slots=True)
 class BuildJob:
-    """A whole recording that one worker is to build a map of; the fields are the arguments of ``build_map``."""
+    """A whole recording that one worker is to build a map of; the fields are the arguments of ``build_map``.
+
+    A worker that sees the file ``token`` sees the folder that this machine made, and not another at the same path.
+    """
 
     reopen: Reopen
     path: Path
@@ -40,6 +46,7 @@ class BuildJob:
     allow: tuple[str, ...]
     overwrite: bool
     software: dict[str, str]
+    token: Path
 
 
 def build_together(
@@ -78,6 +85,8 @@ def build_job(job: BuildJob) -> JobResult:
 
     def work(host: str) -> None:
         require_same_software(job.software, host)
+        if not job.token.is_file():
+            raise unseen(f"The worker on {host}", job.token.parent)
         recording = reopened(job.reopen, host)
         build_map(recording, job.path, job.models.encoders(), job.settings, cache=job.models.cache, allow=job.allow,
                   overwrite=job.overwrite)  # fmt: skip
@@ -96,14 +105,21 @@ def _build_each(
     overwrite: bool,
 ) -> None:
     """Let each recording be built by one worker."""
-    models, known = Models.of(encoders, cache), software()
-    jobs = [
-        BuildJob(reopen, path.absolute(), models, settings, allow, overwrite, known)
-        for reopen, path in zip(recordings, paths, strict=True)
-    ]
-    with closing(pool.run(build_job, jobs)) as results:
-        for _, result in progress(results, "building", total=len(jobs), unit="recording"):
-            result.require()
+    token = paths[0].parent.absolute() / f".cluster-{secrets.token_hex(8)}"
+    with explain_write_errors(token.parent):
+        token.parent.mkdir(parents=True, exist_ok=True)
+        token.touch()
+    try:
+        models, known = Models.of(encoders, cache), software()
+        jobs = [
+            BuildJob(reopen, path.absolute(), models, settings, allow, overwrite, known, token)
+            for reopen, path in zip(recordings, paths, strict=True)
+        ]
+        with closing(pool.run(build_job, jobs)) as results:
+            for _, result in progress(results, "building", total=len(jobs), unit="recording"):
+                result.require()
+    finally:
+        token.unlink(missing_ok=True)
 
 
 def merge_in_turn(days: Sequence[StoredMap], scratch: Path, out: Path, *, overwrite: bool = False) -> StoredMap:

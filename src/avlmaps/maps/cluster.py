@@ -143,10 +143,7 @@ class ClusterWorkers:
             for number, result in results:
                 result.require()
                 if not (folders[number] / DONE).is_file():
-                    raise MapError(
-                        f"A worker does not see {path} as this machine does; the map must lie on storage that all "
-                        "machines of the cluster share, at the same path."
-                    )
+                    raise unseen("A worker", path)
                 yield list(jobs)[number]
 
 
@@ -210,6 +207,14 @@ def reopened(reopen: Reopen, host: str) -> Recording:
             f"The worker on {host} cannot open the recording: {str(fault).rstrip('.')}. A recording must lie on "
             "storage that all machines of the cluster see at the same path."
         ) from fault
+
+
+def unseen(worker: str, folder: Path) -> MapError:
+    """Return the error of a worker that has another folder, or none, where this machine has that of the map."""
+    return MapError(
+        f"{worker} does not see {folder} as this machine does; the map must lie on storage that all machines of the "
+        "cluster share, at the same path."
+    )
 
 
 @cache
