@@ -41,5 +41,6 @@ def test_a_recording_passes_through_few_files_of_maps(tmp_path: Path) -> None:
     finally:
         sys.setprofile(None)
         threading.setprofile(None)
-    assert entered.done and {"build.py", "pipeline/write.py", "audio/segmentation.py"} <= entered.files
+    through = {"build.py", "mapper.py", "finish.py", "store/folder.py", "audio/segmentation.py"}
+    assert entered.done and through <= entered.files
     assert len(entered.files) <= MOST, f"{len(entered.files)} files of maps/ for one build: {sorted(entered.files)}"

@@ -125,7 +125,7 @@ def test_without_the_scale_nothing_would_be_found() -> None:
     """What the scale is for: at the temperature that suits other encoders, all names look alike."""
     assert not _map(OpenViews(), ["kitchen", "living room"]).area("kitchen").found
     fixed = AreaSettings(temperature=0.01)
-    m = AVLMap(_map(OpenViews(), ["kitchen", "living room"]).stored, QuerySettings(areas=fixed))
+    m = AVLMap(_map(OpenViews(), ["kitchen", "living room"]).stored, settings=QuerySettings(areas=fixed))
     assert m.area("kitchen").found
 
 
