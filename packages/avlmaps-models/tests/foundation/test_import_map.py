@@ -220,7 +220,8 @@ def test_the_same_files_give_the_same_map_and_are_not_read_twice(scene: Path, im
     again = import_reference_map(scene, imported.path, SETTINGS)
     assert (imported.path / "map.json").read_bytes() == before and "nothing to do" in capsys.readouterr().err
     anew = import_reference_map(scene, imported.path, SETTINGS, overwrite=True, progress=False)
-    assert anew.info.files == again.info.files
+    files = {name.replace(".2.", "."): file for name, file in anew.info.files.items()}  # of the second time
+    assert files == again.info.files
     with pytest.raises(MapError, match="is a finished map already, of 5LpN3gDmAk7_1; give another path"):
         import_reference_map(scene, imported.path, ImportSettings(cell_size_m=0.2))
 

@@ -72,7 +72,7 @@ def test_disk_tells_what_kornia_finds_with_pixel_centres_at_one_half(models: Pat
         assert score == pytest.approx(1 / (1 + np.exp(-heat[int(y), int(x)])), abs=1e-4)
 
 
-def test_aliked_tells_what_kornia_finds_and_stays_sub_pixel(models: Path) -> None:
+def test_aliked_tells_all_that_kornia_finds_and_stays_sub_pixel(models: Path) -> None:
     write_aliked(models)
     rgb = picture(150, 100)
     found = load(Kind.LOCAL, "aliked").encode(rgb)
@@ -80,9 +80,13 @@ def test_aliked_tells_what_kornia_finds_and_stays_sub_pixel(models: Path) -> Non
     network.load_state_dict(torch.load(models / "aliked-n16.pth", weights_only=True), strict=False)
     with torch.no_grad():
         expected = network(as_tensor(rgb))[0]
-    np.testing.assert_allclose(found.xy - 0.5, expected.keypoints.numpy(), atol=1e-3)
-    np.testing.assert_allclose(found.descriptors, expected.descriptors.numpy(), atol=1e-4)
-    np.testing.assert_allclose(found.score, expected.keypoint_scores.numpy(), atol=1e-5)
+    # Kornia takes strict maxima alone; the published suppression leaves others besides.
+    apart = np.linalg.norm(expected.keypoints.numpy()[:, None] - (found.xy - 0.5), axis=2)
+    same = apart.argmin(axis=1)
+    assert len(found.xy) > len(same) > 100 and len(set(same.tolist())) == len(same)
+    np.testing.assert_allclose(found.xy[same] - 0.5, expected.keypoints.numpy(), atol=1e-3)
+    np.testing.assert_allclose(found.descriptors[same], expected.descriptors.numpy(), atol=1e-4)
+    np.testing.assert_allclose(found.score[same], expected.keypoint_scores.numpy(), atol=1e-5)
     assert (np.abs(found.xy - 0.5 - np.round(found.xy - 0.5)) > 1e-3).mean() > 0.5
 
 
