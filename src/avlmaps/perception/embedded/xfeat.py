@@ -19,7 +19,7 @@ from avlmaps.perception.protocols import LocalFeatures, ModelCard
 
 DIM = 64
 MAX_KEYPOINTS = 1500
-MAX_SIDE_PX = 1280
+MIN_SIDE_PX, MAX_SIDE_PX = 640, 1280  # keypoints are whole pixels, so that a small picture is looked at enlarged
 LEAST_HEAT = 0.05
 RATIO = 0.9  # learned descriptors differ less from the second nearest than RootSIFT's
 _STEP_PX, _CELL_PX, _WINDOW_PX = 32, 8, 5
@@ -33,9 +33,9 @@ class XFeat:
     def __init__(self) -> None:
         graph = _WEIGHTS.read_bytes()
         self._network = open_network(graph)
-        constants = f"xfeat-1 keypoints={MAX_KEYPOINTS} side={MAX_SIDE_PX} heat={LEAST_HEAT}"
+        constants = f"xfeat-2 keypoints={MAX_KEYPOINTS} side={MIN_SIDE_PX}-{MAX_SIDE_PX} heat={LEAST_HEAT}"
         self.card = ModelCard(
-            id="xfeat-1",
+            id="xfeat-2",
             dim=DIM,
             licence="Apache-2.0",
             checksum=hashlib.sha256(graph + constants.encode()).hexdigest(),
@@ -45,11 +45,11 @@ class XFeat:
     def encode(self, rgb: UInt8[np.ndarray, "h w 3"]) -> LocalFeatures:
         """Return at most ``MAX_KEYPOINTS`` keypoints, the strongest first; none for a blank or tiny picture."""
         gray = rgb.mean(axis=2, dtype=np.float32)
-        shrink = min(1.0, MAX_SIDE_PX / max(gray.shape))
-        height, width = (int(side * shrink) // _STEP_PX * _STEP_PX for side in gray.shape)
+        scale = np.clip(max(gray.shape), MIN_SIDE_PX, MAX_SIDE_PX) / max(gray.shape)
+        height, width = (int(side * scale) // _STEP_PX * _STEP_PX for side in gray.shape)
         if not height or not width:
             return LocalFeatures(np.zeros((0, 2), np.float32), np.zeros((0, DIM), np.float32))
-        seen = cv2.resize(gray, (width, height), interpolation=cv2.INTER_AREA if shrink < 1.0 else cv2.INTER_LINEAR)
+        seen = cv2.resize(gray, (width, height), interpolation=cv2.INTER_AREA if scale < 1.0 else cv2.INTER_LINEAR)
         descriptors, heat, reliability = (out[0] for out in self._network.run(None, {"gray": seen[None, None]}))
         heat = heat[0]
         peak = (heat == cv2.dilate(heat, np.ones((_WINDOW_PX, _WINDOW_PX)))) & (heat > LEAST_HEAT)
