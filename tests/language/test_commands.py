@@ -23,16 +23,17 @@ from avlmaps.language.verbalise import verbalise
 from avlmaps_sim.bench.language import counts, judge, read_list
 
 LISTS = Path(__file__).parent / "commands"
-# Of every other command of each development list as many are right at least, and read as something else at most.
+# Of every other command of each development list as many are right at least, and read as something else at most. The
+# gate asks back in a few orders of free.tsv and paraphrases_4 that sound like talk: "I'll meet you in the gym".
 REACHED = {
-    "commands.tsv": (175, 4), "free.tsv": (348, 8), "paraphrases.jsonl": (29, 1), "paraphrases_2.jsonl": (38, 2),
-    "paraphrases_3.jsonl": (39, 2), "paraphrases_4.jsonl": (37, 2),
+    "commands.tsv": (175, 4), "free.tsv": (328, 8), "paraphrases.jsonl": (29, 1), "paraphrases_2.jsonl": (38, 2),
+    "paraphrases_3.jsonl": (39, 2), "paraphrases_4.jsonl": (36, 2),
 }  # fmt: skip
 
 
 # Of every other sentence of many speakers: as many are right at least, and misread at most.
 SPEAKERS = {
-    "speakers_commands.jsonl": (266, 4),
+    "speakers_commands.jsonl": (265, 4),
     "speakers_commands_2.jsonl": (54, 2),
     "speakers_commands_3.jsonl": (34, 2),
     "speakers_commands_4.jsonl": (31, 2),
@@ -45,7 +46,18 @@ SPEAKERS = {
 }
 
 
-@pytest.mark.slow
+@pytest.mark.parametrize("name", [*SPEAKERS, *NAMES])
+def test_a_sample_of_each_list_is_understood(name: str) -> None:
+    if name in SPEAKERS:
+        found = counts([judge(row) for row in read_list(LISTS / name)[::16]])
+    else:
+        found = {what: len(said) for what, said in counted(list(rows(name))[::16]).items()}
+    count = sum(found.values())
+    assert found["right"] >= 0.8 * count - 1, found
+    assert found.get("misread", 0) + found.get("other", 0) <= 1 + 0.05 * count, found
+
+
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", SPEAKERS)
 def test_many_speakers_stay_understood(name: str) -> None:
     found = counts([judge(row) for row in read_list(LISTS / name)[::2]])
@@ -53,7 +65,7 @@ def test_many_speakers_stay_understood(name: str) -> None:
     assert found["misread"] <= SPEAKERS[name][1]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", NAMES)
 def test_the_development_lists_stay_understood(name: str) -> None:
     found = counted(list(rows(name))[::2])
@@ -68,8 +80,9 @@ def test_a_sentence_has_its_intents(row: dict[str, object]) -> None:
     assert judged.outcome == "right", json.dumps(judged.got)
 
 
-def test_every_program_that_is_written_can_run() -> None:
-    for command, _ in [*rows("paraphrases_3.jsonl"), *rows("paraphrases_2.jsonl")]:
+@pytest.mark.parametrize("step", [8, pytest.param(1, marks=pytest.mark.nightly)])
+def test_every_program_that_is_written_can_run(step: int) -> None:
+    for command, _ in [*rows("paraphrases_3.jsonl"), *rows("paraphrases_2.jsonl")][::step]:
         read = read_command(command)
         if read.stops is None:
             parse_program(write_program(read.intents))
@@ -249,24 +262,38 @@ def test_nonsense_is_no_goal(text: str) -> None:
     assert read_command(text).stops is not None
 
 
-REMARKS = st.sampled_from([
+REMARKS = [
     "I think I heard the kettle whistling", "my wife thinks she heard the phone", "we saw a mouse near the sofa",
     "I know the charger is in the office", "I can smell smoke", "well, I thought I saw a cat under the bed",
-])  # fmt: skip
-BEHIND = st.sampled_from(["go to the kitchen", "drive to the table", "go to the door, then turn left 90 degrees"])
+]  # fmt: skip
+JOINTS = ["; ", ", ", ". ", "; would you ", ", please ", " so "]
+BEHIND = ["go to the kitchen", "drive to the table", "go to the door, then turn left 90 degrees"]
+REMARKED = [(remark, joint, order) for remark in REMARKS for joint in JOINTS for order in BEHIND]
 
 
-@given(REMARKS, st.sampled_from(["; ", ", ", ". ", "; would you ", ", please ", " so "]), BEHIND)
-def test_what_somebody_heard_is_no_goal_where_the_order_has_its_own(remark: str, joint: str, order: str) -> None:
-    said = read_command(f"{remark}{joint}{order}")
-    assert said.intents == read_command(order).intents
-    assert any("taken as a remark" in note for note in said.notes)
+@pytest.mark.parametrize("step", [11, pytest.param(1, marks=pytest.mark.nightly)])
+def test_what_somebody_heard_is_no_goal_where_the_order_has_its_own(step: int) -> None:
+    asked = 0
+    for remark, joint, order in REMARKED[::step]:
+        said, ordered = read_command(f"{remark}{joint}{order}"), read_command(order).intents
+        assert any("taken as a remark" in note for note in said.notes)
+        if said.why == "gate":  # a person is asked whether it is an order, and never for another place
+            asked += 1
+            assert read_command(said.stops.choices[0]).intents == ordered  # type: ignore[union-attr]
+        else:
+            assert said.intents == ordered
+    assert asked <= 1 + 12 / step  # 13 of 108
 
 
-@pytest.mark.parametrize("command", ["I heard the phone in the hall, go there", "I think I heard the doorbell"])
-def test_what_somebody_heard_is_the_goal_where_the_order_has_none(command: str) -> None:
-    (step,) = read_command(command).intents
+def test_what_somebody_heard_is_the_goal_where_the_order_has_none() -> None:
+    (step,) = read_command("I heard the phone in the hall, go there").intents
     assert isinstance(step, Go) and step.to.kind is TargetKind.SOUND
+
+
+def test_what_somebody_heard_is_offered_where_there_is_no_order() -> None:
+    said = read_command("I think I heard the doorbell")
+    assert said.why == "gate" and said.stops is not None
+    assert said.stops.choices == ("go to where doorbell was heard",)  # type: ignore[union-attr]
 
 
 def test_a_danger_behind_a_remark_stays_one() -> None:

@@ -54,6 +54,9 @@ _WHATEVER = frozenset({"what", "whatever", "whoever"})
 _RELATIVE = frozenset({"that", "which", "who"})
 _CUTS = frozenset({"then", "finally"})
 # Who says what they heard, saw or think, and how: "I think I heard the kettle; go to the kitchen".
+_SPEAKERS = frozenset({"i", "we", "he", "she", "they", "someone", "somebody", "everyone", "everybody"})
+_FAR = 4  # words from who speaks to what they do: "my wife must have heard"
+_ASKED_FOR = _BEFORE | {"can", "could", "would", "will", "so", "kindly", "robot", "maybe", "perhaps", "dear", ","}
 
 
 def rephrased(tokens: Sequence[Token]) -> tuple[list[Token], list[str]]:
@@ -62,6 +65,30 @@ def rephrased(tokens: Sequence[Token]) -> tuple[list[Token], list[str]]:
     found = _unlabelled(_looped(_sounding(_in_degrees(_on_compass(_joined(tokens))))))
     found = said_to_it(_other(found, notes))
     return _waiting_first(found, notes), notes
+
+
+def behind_remark(tokens: Sequence[Token]) -> int | None:
+    """Return where the order begins, in characters, behind what a person heard, saw or thinks; None without both.
+
+    What somebody heard is where to go only where the order names no place of its own: "I heard the phone, go there".
+    """
+    begin = next((at for at, token in enumerate(tokens) if token.text not in _BEFORE | {"well", ",", "robot"}), 0)
+    if begin >= len(tokens) or tokens[begin].text not in _SPEAKERS:
+        begin = begin + 1 if [token.text for token in tokens[begin : begin + 1]] == ["my"] else len(tokens)
+    told = next(
+        (at for at in range(begin, min(begin + _FAR, len(tokens))) if tokens[at].text in listed("remarks")), None
+    )
+    if told is None:
+        return None
+    for at in range(told + 1, len(tokens)):
+        if tokens[at].kind != "punct" and tokens[at].text != "so":
+            continue
+        first = next((i for i in range(at + 1, len(tokens)) if tokens[i].text not in _ASKED_FOR), len(tokens))
+        rest = [token.text for token in tokens[first:]]
+        if rest[:1] and rest[0] in order_words():
+            own = listed("pointing").isdisjoint(rest) and any(map(is_entry, rest))
+            return tokens[first].start if own else None
+    return None
 
 
 def _joined(tokens: Sequence[Token]) -> list[Token]:
