@@ -54,8 +54,9 @@ class Go(MapVerb):
     """Command for the robot."""
     scene: Annotated[str | None, arg(metavar="SCENE")] = None
     """Scene in which the simulated body drives: house:SEED, office:SEED or a file, as for `avlmaps record`."""
-    language: Literal["learned", "chat"] = "learned"
-    """Translator of the sentence: the reader that ships, or a chat model ('avlmaps[chat]')."""
+    language: Literal["learned", "rules", "chat"] = "learned"
+    """Translator of the sentence: the reader that ships (also by its former name, rules), or a chat model
+    ('avlmaps[chat]')."""
     chat: Annotated[Chat, OmitArgPrefixes] = field(default_factory=Chat)
     """Chat model."""
     body: Literal["base", "drone"] = "base"
