@@ -6,6 +6,7 @@ is refused by its line. What is left means what Python means by it.
 """
 
 import ast
+import keyword
 import re
 
 from avlmaps.core.errors import ProgramError
@@ -337,7 +338,11 @@ def _sign(line: int, node: ast.AST) -> str:
 
 def _no_part(line: int, node: ast.AST) -> ProgramError:
     name = type(node).__name__
-    return refused(line, f"`{name}` is not part of a program; {_REMEDIES.get(name, 'call skills and work out values')}")
+    word = name.removeprefix("Async").removesuffix("From").lower()
+    written = word if keyword.iskeyword(word) else name
+    return refused(
+        line, f"`{written}` is not part of a program; {_REMEDIES.get(name, 'call skills and work out values')}"
+    )
 
 
 def _too_deep(line: int) -> ProgramError:
