@@ -10,8 +10,8 @@ import pytest
 from avlmaps.core.extras import install_command
 from avlmaps.core.motion import Action, Moved
 from avlmaps.core.question import Part
-from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.factors import NearThings
+from avlmaps.query.map_names import MapNames
 from avlmaps_sim.body import SimulatedBody
 from avlmaps_sim.materials import material
 from avlmaps_sim.scene import Scene, SceneBuilder
@@ -79,13 +79,13 @@ def test_nothing_moves_where_a_later_goal_is_not_in_the_map(run, built: Path, in
 
 def test_a_drive_looks_up_each_goal_once(run, built: Path, in_room: None, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[str] = []
-    seen = AVLMap._seen_object
+    seen = MapNames.heat
 
-    def counted(self: AVLMap, part: Part, vocabulary: None) -> NearThings:
+    def counted(self: MapNames, part: Part, vocabulary: None) -> NearThings:
         asked.append(part.query)
         return seen(self, part, vocabulary)
 
-    monkeypatch.setattr(AVLMap, "_seen_object", counted)
+    monkeypatch.setattr(MapNames, "heat", counted)
     status, _, err = run("go", built, "go to the red thing, then turn left", "--scene", "room")
     assert status == 0, err
     assert asked == ["red thing"]
@@ -187,6 +187,11 @@ def test_a_place_of_sounds_is_said_to_be_idle_where_no_sound_is_named(answer, at
     ]
     assert answer("go", "nowhere.avlmap", "go to the barking", *given)["notes"] == []
     assert answer("go", "nowhere.avlmap", "go to the chair", "--dry-run")["notes"] == []
+
+
+def test_the_reader_that_ships_has_its_former_name_too(answer) -> None:
+    said = answer("go", "nowhere.avlmap", "go to the chair", "--dry-run", "--language", "rules")
+    assert said == answer("go", "nowhere.avlmap", "go to the chair", "--dry-run")
 
 
 @pytest.mark.parametrize(
