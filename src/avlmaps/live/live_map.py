@@ -293,16 +293,6 @@ class LiveMap:
             self._door.notify_all()
         return answer.result()
 
-    def count_late(self, frames: int) -> None:
-        """Count frames that were dropped as late before they came here: by a source that could not read them in time.
-
-        Args:
-            frames: how many.
-        """
-        for _ in range(frames):
-            self._tally.note("came")
-            self._tally.drop("late")
-
     @property
     def map(self) -> AVLMap:
         """The last snapshot, to be queried in every way; it does not change.
