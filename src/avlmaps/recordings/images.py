@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from importlib import import_module
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -102,10 +103,7 @@ def _opened(content: bytes) -> Any:
 
     if content[4:8] == b"ftyp" and content[8:12] in _HEIF_KINDS:
         with suppress(ImportError):
-            import pillow_heif
-
-            library: Any = pillow_heif
-            library.register_heif_opener()
+            import_module("pillow_heif").register_heif_opener()
     return Image.open(BytesIO(content), formats=_FORMATS)
 
 
