@@ -413,7 +413,7 @@ for folder in sys.argv[1:]:
 """
 
 
-@pytest.mark.nightly  # red: fed without any pause, the map was not saved once in a minute
+@pytest.mark.nightly
 def test_what_a_kill_leaves_is_a_whole_map(tmp_path: Path) -> None:
     rng, folders = np.random.default_rng(1), [tmp_path / "map0", tmp_path / "map1"]
     command = [sys.executable, "-c", KILLED.format(path=[str(Path(__file__).parent)]), *map(str, folders)]

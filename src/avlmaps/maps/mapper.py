@@ -58,6 +58,7 @@ from avlmaps.recordings.types import Frame, Recording
 
 _PLACES = 2  # number of what learns places as a source of randomness (gravity has 1)
 _MOST_DOUBTS = 5
+_MOST_UNDESCRIBED = 8  # keyframes that wait for the thread behind
 
 
 class Mapper:
@@ -202,8 +203,8 @@ class Mapper:
             else:
                 self._fuse(frame, features, encode)
                 self._came(frame)
-        if not self._behind:
-            self._describe()
+        if len(self._undescribed) > (_MOST_UNDESCRIBED if self._behind else 0):
+            self._describe()  # else frames that come faster than keyframes are looked at would pile up
 
     def pass_by(self, stamp_s: float, world_from_camera: Float[np.ndarray, "4 4"]) -> None:
         """Take note of where the robot was in a frame that is not added: sounds are placed by it."""
@@ -313,9 +314,9 @@ class Mapper:
             self._book.add_whole(submap_of(state.sums, state.stamp_s, state.pose, np.asarray(state.views.clear_mm)))
 
     def _describe(self) -> None:
-        """Look at the keyframes that nobody looked at yet; one that an encoder fails on is left out."""
+        """Look at the keyframes that wait now; one that an encoder fails on is left out."""
         with self.finishing:
-            while self._undescribed:
+            for _ in range(len(self._undescribed)):
                 self._album.add(self._undescribed.pop(0))
 
     def _absorb(self) -> None:
