@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from test_surfaces import turned
 
 from avlmaps.core.poses import inverse
-from avlmaps.days.align import (
+from avlmaps.days.find import (
+    LEAST_SHARE,
     NotTheSamePlaceError,
     Votes,
     consensus,
@@ -16,9 +17,8 @@ from avlmaps.days.align import (
     spread_out,
     supporters,
 )
-from avlmaps.days.settings import AlignSettings
 
-SETTINGS, NAMES = AlignSettings(), ("a.avlmap", "b.avlmap")
+NAMES = ("a.avlmap", "b.avlmap")
 TRUE = turned(1.1, (3.0, -2.0, 0.1))
 
 
@@ -36,10 +36,10 @@ def votes(right: int, wrong: int, rng: np.random.Generator, spacing_m: float = 0
 @given(st.integers(6, 20), st.integers(0, 8), st.integers(0, 1000))
 def test_the_agreeing_votes_win_and_give_the_transform(right: int, wrong: int, seed: int) -> None:
     given_votes = votes(right, wrong, np.random.default_rng(seed))
-    agree = supporters(given_votes.map_from_other, given_votes.camera, SETTINGS)
+    agree = supporters(given_votes.map_from_other, given_votes.camera)
     assert agree[:right].sum() >= 0.8 * right and agree[right:].sum() == 0
-    if agree.sum() >= SETTINGS.least_share * len(given_votes):
-        found, checks = consensus(given_votes, SETTINGS, NAMES)
+    if agree.sum() >= LEAST_SHARE * len(given_votes):
+        found, checks = consensus(given_votes, NAMES)
         assert np.abs(found - TRUE).max() < 0.15 and checks["agreeing"] == agree.sum()
 
 
@@ -48,13 +48,13 @@ def test_too_few_that_agree_are_refused_with_the_numbers(right: int, wrong: int)
     rng = np.random.default_rng(3)
     none = Votes(np.zeros((0, 4, 4)), np.zeros((0, 4, 4)), 60)
     with pytest.raises(NotTheSamePlaceError, match=r"of \d+ keyframes of b\.avlmap \d+ were located in a\.avlmap"):
-        consensus(votes(right, wrong, rng) if right + wrong else none, SETTINGS, NAMES)
+        consensus(votes(right, wrong, rng) if right + wrong else none, NAMES)
 
 
 def test_one_thing_seen_from_one_corner_is_no_proof() -> None:
     """Ten keyframes agree, all within a metre: a sofa that stands in two homes does that."""
     with pytest.raises(NotTheSamePlaceError, match="single thing"):
-        consensus(votes(10, 0, np.random.default_rng(1), spacing_m=0.1), SETTINGS, NAMES)
+        consensus(votes(10, 0, np.random.default_rng(1), spacing_m=0.1), NAMES)
 
 
 def test_the_mean_of_equal_transforms_is_that_transform() -> None:
@@ -64,9 +64,9 @@ def test_the_mean_of_equal_transforms_is_that_transform() -> None:
 
 def test_a_map_is_not_tipped_over() -> None:
     up = np.array([0.0, 0.0, 1.0])
-    require_upright(TRUE, up, up, SETTINGS)
+    require_upright(TRUE, up, up)
     with pytest.raises(NotTheSamePlaceError, match=r"90\.0 degrees"):
-        require_upright(TRUE, up, np.array([1.0, 0.0, 0.0]), SETTINGS)
+        require_upright(TRUE, up, np.array([1.0, 0.0, 0.0]))
 
 
 @given(st.integers(1, 500), st.integers(1, 80))

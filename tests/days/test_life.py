@@ -6,7 +6,7 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
-from test_evidence import BACK, BOX, FRONT, GRID, MIDDLE, NOTHING, SETTINGS, day, views
+from test_evidence import BACK, BOX, FRONT, GRID, MIDDLE, NOTHING, day, views
 
 from avlmaps.core.errors import MapError
 from avlmaps.days.evidence import DayViews
@@ -27,7 +27,7 @@ def after(life: Life, things: list[SeenThing], now: DayViews, known: np.ndarray 
     before = [views(FRONT, MIDDLE, 1.9)] * visit
     at_s = [1e5 * (number + 1) for number in range(visit + 1)]
     surface = np.concatenate([NOTHING, *(one.index for one in things)])
-    return lived_on(life, things, day(now, surface), before, Occupied.of(known, GRID), visit, at_s, GRID, SETTINGS)
+    return lived_on(life, things, day(now, surface), before, Occupied.of(known, GRID), visit, at_s, GRID)
 
 
 def test_a_thing_seen_again_lives_on() -> None:
@@ -51,7 +51,7 @@ def test_a_perception_that_misses_a_thing_does_not_lose_it() -> None:
     life = begun([thing()])
     before = [views(FRONT, MIDDLE, 1.9)]
     now = day(views(FRONT, MIDDLE, 1.8), BOX)  # its surface, and no name
-    (stay,) = lived_on(life, [], now, before, Occupied.of(BOX, GRID), 1, [1e5, 2e5], GRID, SETTINGS).stays
+    (stay,) = lived_on(life, [], now, before, Occupied.of(BOX, GRID), 1, [1e5, 2e5], GRID).stays
     assert (stay.last, stay.looked, stay.gone) == (1, 1, None)
 
 
@@ -61,7 +61,7 @@ def moved_to(other: SeenThing) -> tuple:
     before = [views(wide, (0.65, 0.15, 0.15), 6.0)]
     life = begun([thing()])
     now = day(views(wide, (0.65, 0.15, 0.15), 6.0), other.index)
-    return lived_on(life, [other], now, before, Occupied.of(BOX, GRID), 1, [1e5, 2e5], GRID, SETTINGS).stays
+    return lived_on(life, [other], now, before, Occupied.of(BOX, GRID), 1, [1e5, 2e5], GRID).stays
 
 
 def test_an_alike_thing_elsewhere_is_the_one_that_is_gone() -> None:
@@ -87,9 +87,7 @@ def followed(cosine: float, visit: int = 1, named: float = 0.2) -> bool:
     new = replace(thing(BOX + AWAY, "chair"), confidence=named, feature=look)
     at_s = [1e5 * (number + 1) for number in range(visit + 1)]
     now = day(views(wide, place, 6.0), new.index)
-    stays = lived_on(
-        life, [new], now, before, Occupied.of(BOX, GRID), visit, at_s, GRID, SETTINGS, features=features
-    ).stays
+    stays = lived_on(life, [new], now, before, Occupied.of(BOX, GRID), visit, at_s, GRID, features=features).stays
     return stays[0].moved_to == 1 and stays[1].moved_from == 0
 
 

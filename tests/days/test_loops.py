@@ -10,8 +10,7 @@ from avlmaps.core.camera import Pinhole, Rig
 from avlmaps.core.errors import MapError
 from avlmaps.core.poses import inverse
 from avlmaps.days import loops
-from avlmaps.days.loops import LoopSettings, find_loops
-from avlmaps.days.pose_graph import motions
+from avlmaps.days.loops import find_loops, motions
 from avlmaps.maps.types import Keyframes
 from avlmaps.query.locate import Located
 
@@ -138,14 +137,15 @@ def test_a_drive_that_came_nowhere_again_says_so(located) -> None:
         find_loops(map_)
 
 
-def test_a_drive_is_not_bent_against_its_odometry(located) -> None:
+def test_a_drive_is_not_bent_against_its_odometry(located, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(loops, "MOST_STRAIN", 0.1)
     true = drive()
     map_ = stored(true)
     shifted = true.copy()
     shifted[COUNT // 2 :, 0, 3] += 0.45
     located(map_, shifted)
     with pytest.raises(MapError, match="contradict its odometry"):
-        find_loops(map_, replace(LoopSettings(), most_strain=0.1))
+        find_loops(map_)
 
 
 def test_some_keyframes_have_their_own_keypoints_and_pictures() -> None:

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.poses import inverse
-from avlmaps.days.pose_graph import Edges, crosses, motions, optimise
+from avlmaps.days.loops import Edges, crosses, motions, optimise
 
 COUNT = 24
 

@@ -10,7 +10,7 @@ import pytest
 
 from avlmaps.core.errors import MapError
 from avlmaps.days import together
-from avlmaps.days.align import NotTheSamePlaceError
+from avlmaps.days.find import NotTheSamePlaceError
 from avlmaps.days.merge import merged_key
 from avlmaps.days.together import build_together
 from avlmaps.maps.store.reader import StoredMap, open_stored

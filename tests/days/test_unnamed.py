@@ -3,14 +3,11 @@
 import numpy as np
 import pytest
 
-from avlmaps.days.settings import ChangeSettings
-from avlmaps.days.unnamed import changed_things
+from avlmaps.days.life import CONFIDENT_AT, LEAST_VOXELS, changed_things
 from avlmaps.maps.store.reader import StoredMap, open_stored
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.contents import Thing
 from helpers.office import office_of
-
-SETTINGS = ChangeSettings()
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +20,7 @@ def office(tmp_path_factory: pytest.TempPathFactory) -> tuple[StoredMap, np.ndar
 def found(stored: StoredMap, loose: np.ndarray, through: np.ndarray, owned: list[np.ndarray]) -> list[Thing]:
     flags = np.zeros((2, len(stored.voxels)), bool)
     flags[0, loose], flags[1, through] = True, True
-    return changed_things(stored, flags[0], flags[1], owned, SETTINGS)
+    return changed_things(stored, flags[0], flags[1], owned)
 
 
 @pytest.mark.nightly
@@ -31,7 +28,7 @@ def test_what_rays_pass_through_in_part_is_one_thing_with_the_name_of_its_voxels
     stored, chair = office
     (thing,) = found(stored, chair, chair[::3], [])
     assert np.array_equal(thing.rows, chair) and thing.name == "office chair"
-    assert thing.confidence < SETTINGS.confident_at, "no list was sure of it"
+    assert thing.confidence < CONFIDENT_AT, "no list was sure of it"
 
 
 def test_of_a_group_that_was_hardly_looked_at_the_looked_at_part_is_the_thing(office: tuple) -> None:
@@ -50,7 +47,7 @@ def test_no_ray_no_thing_and_no_sheet_and_no_part_of_what_changed_itself(office:
     high = np.asarray(stored.voxels.index)[chair, 2]
     sheet = chair[high == high.max()]
     assert found(stored, chair, chair[:0], []) == []
-    assert len(sheet) >= SETTINGS.least_voxels and found(stored, sheet, sheet, []) == []
+    assert len(sheet) >= LEAST_VOXELS and found(stored, sheet, sheet, []) == []
     upper, lower = chair[high > np.median(high)], chair[high <= np.median(high)]
     assert len(found(stored, chair, upper, [])) == 1
     assert found(stored, chair, upper, [lower]) == [], "the lower half has a name, and changed as well"

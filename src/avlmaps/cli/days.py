@@ -114,7 +114,7 @@ def merge(verb: Merge) -> dict[str, Any]:
 
 def merged_answer(made: "StoredMap") -> dict[str, Any]:
     """Return what is known of a merged map's last day."""
-    from avlmaps.days.join import NO_SOURCES
+    from avlmaps.days.merge import NO_SOURCES
     from avlmaps.query.changes import Days, changes_answer
 
     days = Days.of(made)

@@ -8,12 +8,13 @@ thing is gone is the mean of a Beta distribution:
 
     P(gone) = (1 + k₋) / (2 + k₋ + k₊)                                                                             (1)
 
-A thing is *gone* where P(gone) ≥ ``gone_at`` and (n₊ + n₋)/n ≥ ``least_coverage``; it is *there* where P(gone) < ½
+A thing is *gone* where P(gone) ≥ ``GONE_AT`` and (n₊ + n₋)/n ≥ ``LEAST_COVERAGE``; it is *there* where P(gone) < ½
 under the same coverage; otherwise it is *unknown*. What nobody looked at has k₊ = k₋ = 0 and P(gone) = ½: "not seen"
 never becomes "gone". Evidence of presence against evidence of free space, per thing, is the practice of
 Panoptic Multi-TSDFs (Schmid et al. 2022), POCD (Qian et al. 2022) and Khronos (Schmid et al. 2024).
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -25,11 +26,15 @@ from avlmaps.core.camera import Pinhole
 from avlmaps.core.columns import take
 from avlmaps.core.poses import apply, inverse
 from avlmaps.core.progress import silence_progress
-from avlmaps.days.settings import ChangeSettings
 from avlmaps.days.surfaces import Occupied
 from avlmaps.maps.fusion.free_space import FreeViews, block_size, count_through
 from avlmaps.maps.grid import GridSpec
 
+LEAST_COVERAGE = 0.15  # a verdict needs this part of a thing's voxels looked at
+GONE_AT = 0.7  # gone where it is gone with this probability
+PATCH_M = 0.15  # voxels of one patch of this edge are not independent: together they count as one look
+THROUGH_VIEWS = 2  # keyframes that see through a voxel, at least: one may have a wrong pose
+ANGLE_RAD = math.radians(70.0)  # a view counts where it looks from within this angle of a view that saw the thing
 _MOST_SAMPLES = 48  # voxels of a thing by which it is decided which views show it
 _BEFORE_M = 0.3  # a view shows what lies up to this far behind where its blocks are free
 _LEAST_SEEN = 0.2  # of these samples
@@ -63,17 +68,17 @@ class VoxelEvidence:
         """Return the part of the voxels that was looked at, in [0, 1]."""
         return (self.surface + self.through) / max(self.voxels, 1)
 
-    def p_gone(self, voxel_size_m: float, settings: ChangeSettings) -> float:
+    def p_gone(self, voxel_size_m: float) -> float:
         """Return the probability that the thing is gone: equation (1)."""
-        patches = min((voxel_size_m / settings.patch_m) ** 2, 1.0)
+        patches = min((voxel_size_m / PATCH_M) ** 2, 1.0)
         return (1.0 + patches * self.through) / (2.0 + patches * (self.through + self.surface))
 
-    def verdict(self, voxel_size_m: float, settings: ChangeSettings) -> DayVerdict:
+    def verdict(self, voxel_size_m: float) -> DayVerdict:
         """Return what follows."""
-        if self.coverage() < settings.least_coverage:
+        if self.coverage() < LEAST_COVERAGE:
             return DayVerdict.UNKNOWN
-        p_gone = self.p_gone(voxel_size_m, settings)
-        if p_gone >= settings.gone_at:
+        p_gone = self.p_gone(voxel_size_m)
+        if p_gone >= GONE_AT:
             return DayVerdict.GONE
         return DayVerdict.THERE if p_gone < 0.5 else DayVerdict.UNKNOWN
 
@@ -153,41 +158,31 @@ class Day:
 
 
 def seen_again(
-    index: Int[np.ndarray, "n 3"],
-    grid: GridSpec,
-    before: Sequence[DayViews],
-    known: Occupied,
-    day: Day,
-    settings: ChangeSettings,
+    index: Int[np.ndarray, "n 3"], grid: GridSpec, before: Sequence[DayViews], known: Occupied, day: Day
 ) -> VoxelEvidence:
     """Return what a day says of a thing's voxels.
 
     ``before`` are the views of the days on which it was there: near to those a view must look from. Beside what else
     ``known``, the surface of the map until then, has, new surface says nothing of the thing.
     """
-    allowed = _from_where_it_was_seen(grid.centre_of(np.asarray(index)), before, day.views, settings)
+    allowed = _from_where_it_was_seen(grid.centre_of(np.asarray(index)), before, day.views)
     through = np.zeros(len(index), bool)
-    if allowed.sum() >= settings.through_views:
-        through = day.views.only(allowed).through(index, grid) >= settings.through_views
+    if allowed.sum() >= THROUGH_VIEWS:
+        through = day.views.only(allowed).through(index, grid) >= THROUGH_VIEWS
     own = known.alone(index)
     return _counted(through, day.has_surface(grid.centre_of(np.asarray(index))), own)
 
 
 def seen_before(
-    index: Int[np.ndarray, "n 3"],
-    grid: GridSpec,
-    before: Sequence[DayViews],
-    known: Occupied,
-    day: Day,
-    settings: ChangeSettings,
+    index: Int[np.ndarray, "n 3"], grid: GridSpec, before: Sequence[DayViews], known: Occupied, day: Day
 ) -> DayVerdict:
     """Return what earlier days say of the place of a thing: gone says that they looked through it.
 
     ``before`` are the views of all earlier days, ``known`` is the surface as those who looked last left it.
     """
-    through = np.sum([day.through(index, grid) for day in before], axis=0) >= settings.through_views
+    through = np.sum([day.through(index, grid) for day in before], axis=0) >= THROUGH_VIEWS
     seen = _counted(through, known.near(grid.centre_of(np.asarray(index))), day.surface.alone(index))
-    return seen.verdict(grid.voxel_size_m, settings)
+    return seen.verdict(grid.voxel_size_m)
 
 
 def _counted(
@@ -207,7 +202,7 @@ def _counted(
 
 
 def _from_where_it_was_seen(
-    points: Float[np.ndarray, "n 3"], before: Sequence[DayViews], views: DayViews, settings: ChangeSettings
+    points: Float[np.ndarray, "n 3"], before: Sequence[DayViews], views: DayViews
 ) -> Bool[np.ndarray, " k"]:
     middle = points.mean(axis=0)
     known = [day.directions(middle)[day.show(points)] for day in before]
@@ -215,4 +210,4 @@ def _from_where_it_was_seen(
     if not len(seen_from):
         return np.zeros(len(views), bool)
     alike = (views.directions(middle) @ seen_from.T).max(axis=1)
-    return alike >= np.cos(settings.angle_rad)
+    return alike >= math.cos(ANGLE_RAD)

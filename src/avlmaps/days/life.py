@@ -1,10 +1,11 @@
 """What became of each thing: it is the one of an earlier day, it is gone, it moved, or nobody knows.
 
 First the things of the new day are matched with those that were there; then what was not matched is judged by the
-evidence at its place (``evidence``); then the new ones are matched with those that are gone (moved).
+evidence at its place (``evidence``); then the new ones are matched with those that are gone (moved). Surface that only
+one of two days has, in groups of a thing's size, are things without a name of a list (``changed_things``).
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -12,12 +13,30 @@ import msgspec
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from avlmaps.core.arrays import Float, Int
+from avlmaps.core.arrays import Bool, Float, Int
+from avlmaps.core.poses import plain_point
+from avlmaps.core.timeline import DAY_S
 from avlmaps.days.evidence import Day, DayVerdict, DayViews, seen_again, seen_before
-from avlmaps.days.settings import ChangeSettings
 from avlmaps.days.surfaces import AROUND, Occupied, packed
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.store.life import Life, Stay
+from avlmaps.maps.store.reader import StoredMap
+from avlmaps.query.avlmap import AVLMap
+from avlmaps.query.components import linked
+from avlmaps.query.contents import STRUCTURE, Thing
+from avlmaps.query.naming import VoxelNamer
+
+# A thing is the one of an earlier day where this part of the smaller of the two lies in the other; with another name,
+# where the second part does, and the smaller is this part of the larger.
+OVERLAP, SAME_PLACE = 0.25, 0.6
+REACH_M = 20.0  # what moved farther is not recognised
+WITHIN_S = 30 * DAY_S  # nor what comes back after more time
+LEAST_LIKENESS = 0.3  # of size, colour and looks together, for a thing to be the one that is gone from elsewhere
+LIKENESS_UNNAMED = 0.5  # where the names differ and one of them has little confidence
+CONFIDENT_AT = 0.5  # a name of less confidence does not speak against another
+LEAST_VOXELS = 12  # surface without a name is a changed thing from this number of voxels that rays pass through
+MOST_M = 2.0  # longer ones are no thing that somebody carries
+LOWEST_VOXELS = 2.5  # nor is what is flatter: a table's top of which one day saw a little more
 
 _DARK = 20.0  # of 255: what is darker has hardly a hue
 _NAMED = 0.3  # a name that fits is worth this much likeness
@@ -65,7 +84,6 @@ def lived_on(
     visit: int,
     at_s: Sequence[float],
     grid: GridSpec,
-    settings: ChangeSettings,
     same: SameName = lambda one, other: one == other,
     features: Mapping[int, Float[np.ndarray, " d"]] = MappingProxyType({}),
 ) -> Life:
@@ -77,11 +95,10 @@ def lived_on(
     """
     voxels = [life.voxels(number) for number in range(len(life))]
     stays = [
-        _still_absent(stay, own, day, before, known, visit, grid, settings)
-        for stay, own in zip(life.stays, voxels, strict=True)
+        _still_absent(stay, own, day, before, known, visit, grid) for stay, own in zip(life.stays, voxels, strict=True)
     ]
     present = [number for number, stay in enumerate(stays) if stay.gone is None]
-    matched = _matched(present, stays, voxels, things, settings, same)
+    matched = _matched(present, stays, voxels, things, same)
     for number in present:
         stay = stays[number]
         if (thing := matched.get(number)) is not None:
@@ -98,8 +115,8 @@ def lived_on(
             )
             continue
         views = [one for one in before[stay.first : visit] if len(one)]
-        seen = seen_again(voxels[number], grid, views, known, day, settings)
-        match seen.verdict(grid.voxel_size_m, settings):
+        seen = seen_again(voxels[number], grid, views, known, day)
+        match seen.verdict(grid.voxel_size_m):
             case DayVerdict.THERE:
                 there_on = (*stay.there_on, visit)
                 stays[number] = msgspec.structs.replace(
@@ -114,19 +131,19 @@ def lived_on(
     looks = dict(features)
     for number in sorted(set(range(len(things))) - set(matched.values())):
         thing = things[number]
-        then = seen_before(thing.index, grid, before, known, day, settings)
+        then = seen_before(thing.index, grid, before, known, day)
         if then is not DayVerdict.THERE:
             new.append(len(stays))
         if thing.feature is not None:
             looks[len(stays)] = thing.feature
         stay = _stay(thing, visit, appeared=then is DayVerdict.GONE)
         if stay.appeared:
-            each = [seen_before(thing.index, grid, [views], known, day, settings) for views in before]
+            each = [seen_before(thing.index, grid, [views], known, day) for views in before]
             absent_on = tuple(one for one, verdict in enumerate(each) if verdict is DayVerdict.GONE)
             stay = msgspec.structs.replace(stay, absent_on=absent_on)
         stays.append(stay)
         voxels.append(thing.index)
-    return Life.of(_moved(stays, new, looks, visit, at_s, settings, same), voxels)
+    return Life.of(_moved(stays, new, looks, visit, at_s, same), voxels)
 
 
 def _still_absent(
@@ -137,13 +154,12 @@ def _still_absent(
     known: Occupied,
     visit: int,
     grid: GridSpec,
-    settings: ChangeSettings,
 ) -> Stay:
     if stay.gone is None:
         return stay
     views = [one for one in before[stay.first : stay.gone] if len(one)]
-    seen = seen_again(voxels, grid, views, known, day, settings)
-    if seen.verdict(grid.voxel_size_m, settings) is not DayVerdict.GONE:
+    seen = seen_again(voxels, grid, views, known, day)
+    if seen.verdict(grid.voxel_size_m) is not DayVerdict.GONE:
         return stay
     return msgspec.structs.replace(stay, absent_on=(*stay.absent_on, visit))
 
@@ -161,7 +177,6 @@ def _matched(
     stays: Sequence[Stay],
     voxels: Sequence[Int[np.ndarray, "v 3"]],
     things: Sequence[SeenThing],
-    settings: ChangeSettings,
     same: SameName,
 ) -> dict[int, int]:
     """Return for stays the thing of the new day that stands where they do, each thing once.
@@ -179,8 +194,8 @@ def _matched(
             smaller, larger = sorted((len(own[row]), len(thing.index)))
             part = min(shared / max(smaller, 1), 1.0)
             if same(stays[number].name, thing.name):
-                value[row, column] = 1.0 + part if part >= settings.overlap else 0.0
-            elif part >= settings.same_place and smaller >= settings.same_place * larger:
+                value[row, column] = 1.0 + part if part >= OVERLAP else 0.0
+            elif part >= SAME_PLACE and smaller >= SAME_PLACE * larger:
                 value[row, column] = part
     rows, columns = linear_sum_assignment(-value)
     return {
@@ -200,7 +215,6 @@ def _moved(
     looks: Mapping[int, Float[np.ndarray, " d"]],
     visit: int,
     at_s: Sequence[float],
-    settings: ChangeSettings,
     same: SameName,
 ) -> list[Stay]:
     """Join what appeared with what is gone from elsewhere: the pairs that are most alike, in name second.
@@ -211,7 +225,7 @@ def _moved(
     gone = [
         number
         for number, stay in enumerate(stays)
-        if stay.gone is not None and stay.moved_to is None and at_s[visit] - at_s[stay.last] <= settings.within_s
+        if stay.gone is not None and stay.moved_to is None and at_s[visit] - at_s[stay.last] <= WITHIN_S
     ]
     value = np.zeros((len(gone), len(new)))
     for row, one in enumerate(gone):
@@ -219,13 +233,13 @@ def _moved(
             alike, now = likeness(stays[one], stays[other]), stays[one].gone == visit
             if one in looks and other in looks:
                 alike *= look_alike(looks[one], looks[other])
-            unsure = min(stays[one].confidence, stays[other].confidence) < settings.confident_at
+            unsure = min(stays[one].confidence, stays[other].confidence) < CONFIDENT_AT
             if unsure and not now:
                 continue
             named = same(stays[one].name, stays[other].name)
             clear = named and now and stays[other].appeared
-            fits = alike >= (settings.least_likeness if clear else settings.likeness_unnamed)
-            if (named or unsure) and fits and _apart_m(stays[one], stays[other]) <= settings.reach_m:
+            fits = alike >= (LEAST_LIKENESS if clear else LIKENESS_UNNAMED)
+            if (named or unsure) and fits and _apart_m(stays[one], stays[other]) <= REACH_M:
                 value[row, column] = alike + _NAMED * named
     for row, column in zip(*linear_sum_assignment(-value), strict=True):
         if value[row, column] > 0.0:
@@ -258,3 +272,62 @@ def likeness(one: Stay, other: Stay) -> float:
     off = float(np.square((size[:, 0] - size[:, 1]) / 0.5).sum())
     off += float(((bright[0] - bright[1]) / 60.0) ** 2 + np.square((hue[0] - hue[1]) / 0.25).mean())
     return float(np.exp(-0.5 * off))
+
+
+_MOSTLY = 0.5  # a thing changed where the other days have no surface at this part of its voxels
+_LOOKED = 0.25  # rays pass through this part of a group of voxels that is one thing
+_BESIDE = 2  # voxels: so near to each other two are of one thing
+
+
+def changed_things(
+    stored: StoredMap,
+    loose: Bool[np.ndarray, " n"],
+    through: Bool[np.ndarray, " n"],
+    owned: Sequence[Int[np.ndarray, " r"]],
+) -> list[Thing]:
+    """Return what changed, each as a thing with the likeliest name of its voxels together.
+
+    Voxels that touch are one thing where rays of another day pass through enough of them. Of a group that is too large
+    for a thing, or hardly looked at, those alone that rays pass through are. What lies beside a thing that changed
+    itself is a part of it.
+    """
+    index = np.asarray(stored.voxels.index)
+    changed = [rows for rows in owned if loose[rows].sum() > _MOSTLY * len(rows)]
+    parts_of = Occupied.of(
+        np.concatenate([np.zeros((0, 3), np.int32), *(index[rows] for rows in changed)]), stored.grid
+    )
+    loose = loose.copy()
+    for rows in owned:
+        loose[rows] = False
+    if "pixels" not in stored.info.models or not (loose & through).any():
+        return []
+    avlmap, namer = AVLMap(stored, edits=()), VoxelNamer(stored)
+    voxel_m = stored.grid.voxel_size_m
+    named = np.array([name not in (*STRUCTURE, "other") for name in namer.names])
+
+    def size_m(own: Int[np.ndarray, " k"]) -> Float[np.ndarray, "3"]:
+        return np.ptp(avlmap.space.level(avlmap.space.centres_of(own)), axis=0) + voxel_m
+
+    def groups(rows: Int[np.ndarray, " r"]) -> Iterator[Int[np.ndarray, " k"]]:
+        which = linked(index[rows], _BESIDE)
+        enough = np.bincount(which, weights=through[rows]) >= LEAST_VOXELS
+        yield from (rows[which == number] for number in np.flatnonzero(enough))
+
+    found: list[Thing] = []
+    for whole in groups(np.flatnonzero(loose)):
+        is_thing = size_m(whole).max() <= MOST_M and through[whole].mean() >= _LOOKED
+        for own in [whole] if is_thing else groups(whole[through[whole]]):
+            points, size = avlmap.space.centres_of(own), size_m(own)
+            if size[2] < LOWEST_VOXELS * voxel_m or size.max() > MOST_M or not named.any():
+                continue
+            if parts_of.near(points, _BESIDE + 0.5).any():
+                continue
+            share = np.where(named, namer.confidences(own).mean(axis=0), -1.0)
+            best = int(share.argmax())
+            r, g, b = (int(value) for value in np.asarray(stored.voxels.rgb)[own].mean(axis=0).round())
+            middle = points[np.argmin(np.linalg.norm(points - points.mean(axis=0), axis=1))]
+            likely = round(min(float(share[best]), CONFIDENT_AT - 0.01), 3)
+            found.append(
+                Thing(namer.names[best], likely, plain_point(middle), plain_point(size), (r, g, b), own, points)
+            )
+    return found

@@ -3,20 +3,24 @@
 Keyframes are located in much earlier ones that look alike. Each that is located is a *closure*: a measured motion from
 the earlier keyframe to the later one. A pose graph of odometry and closures gives corrected poses, which the map then
 follows. Where closures are few or contradict each other, nothing is done.
+
+The graph minimises Σ ρ(|Σᵢⱼ⁻½ log(Zᵢⱼ⁻¹ Tᵢ⁻¹ Tⱼ)|²) over the poses T, where Zᵢⱼ is a measured motion from pose i to
+pose j. Odometry counts in full; ρ is Cauchy's function for closures, so that a wrong one hardly counts (Gauss and
+Newton's steps; sparse, by SciPy).
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from avlmaps.core.arrays import Float, Int
+from avlmaps.core.arrays import Bool, Float, Int
 from avlmaps.core.camera import Rig
+from avlmaps.core.columns import take
 from avlmaps.core.errors import MapError
 from avlmaps.core.poses import from_rotation, inverse, mean_rotation, rotation_angle_rad, rotation_to_level
 from avlmaps.core.progress import progress
-from avlmaps.core.registry import Kind
-from avlmaps.days.align import local_features, spread_out
-from avlmaps.days.pose_graph import Edges, optimise
+from avlmaps.days.find import NEEDED, local_features, spread_out
 from avlmaps.maps.corrected import Corrected, correct_stored, require_submaps
 from avlmaps.maps.store.reader import StoredMap
 from avlmaps.maps.types import Keyframes
@@ -24,39 +28,126 @@ from avlmaps.perception.encoders import Encoders
 from avlmaps.query.locate import LocateSettings, locate_features
 from avlmaps.recordings.types import Recording
 
-_NEEDED = (Kind.LOCAL, Kind.PLACE, Kind.MATCHER)
+MOST_TRIED = 150  # keyframes that are looked for among earlier ones, spread over the drive
+CANDIDATES = 10  # earlier keyframes that look the most alike, which each is located in, one by one until one is right
+LEAST_SCORE = 0.55  # a located keyframe counts from this score on. Measured: wrong ones by half a metre reach 0.53
+LATER_S, WAY_M = 10.0, 3.0  # a keyframe is earlier where it was taken this long, and this way of the robot, before
+LEAST_CLOSURES = 4  # fewer close nothing
+AGREE_M, AGREE_RAD = 0.1, math.radians(3.0)  # a closure agrees with the corrected poses within these
+LEAST_SHARE = 0.7  # this part of the closures must agree
+KNOWN_M, KNOWN_RAD = 0.02, 0.006  # how well a located keyframe is known
+STRAYS = 0.015  # how far odometry strays, metres and radians, for the root of a metre (and of a radian turned)
+MOST_STRAIN = 4.0  # of its standard deviations (root mean square) by which odometry is bent
+_STEPS, _STILL = 60, 1e-7
 
 
-@dataclass(frozen=True, slots=True)
-class LoopSettings:
-    """When a drive counts as come back."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Edges:
+    """Measured motions.
 
-    tried: int = 150
-    """Keyframes that are looked for among earlier ones, at most, spread over the drive."""
-    candidates: int = 10
-    """Earlier keyframes that look the most alike, which each is located in, one by one until one is right."""
-    least_score: float = 0.55
-    """A located keyframe counts from this score on. Measured: wrong ones by half a metre reach 0.53."""
-    later_s: float = 10.0
-    """A keyframe is earlier where it was taken this long before, ..."""
-    way_m: float = 3.0
-    """... and the robot drove this far since."""
-    least: int = 4
-    """Fewer closures close nothing."""
-    agree_m: float = 0.1
-    """A closure agrees with the corrected poses within this, ..."""
-    agree_rad: float = float(np.deg2rad(3.0))
-    """... and this angle."""
-    least_share: float = 0.7
-    """This part of the closures must agree."""
-    known_m: float = 0.02
-    """How well a located keyframe is known."""
-    known_rad: float = 0.006
-    """And its angle."""
-    strays: float = 0.015
-    """How far odometry strays, metres and radians, for the root of a metre (and of a radian turned)."""
-    most_strain: float = 4.0
-    """Odometry may be bent by this many of its standard deviations (root mean square) before it is refused."""
+    Attributes:
+        first: pose i of each.
+        second: pose j of each.
+        measured: (e, 4, 4) pose j in the frame of pose i, metres.
+        sigma_m: standard deviation of its translation.
+        sigma_rad: of its rotation.
+        is_closure: whether it may be wrong altogether.
+    """
+
+    first: Int[np.ndarray, " e"]
+    second: Int[np.ndarray, " e"]
+    measured: Float[np.ndarray, "e 4 4"]
+    sigma_m: Float[np.ndarray, " e"]
+    sigma_rad: Float[np.ndarray, " e"]
+    is_closure: Bool[np.ndarray, " e"]
+
+    def __len__(self) -> int:
+        return len(self.first)
+
+    def only(self, kept: Bool[np.ndarray, " e"]) -> "Edges":
+        """Return some of them."""
+        return take(self, kept)
+
+    def errors(self, poses: Float[np.ndarray, "n 4 4"]) -> Float[np.ndarray, "e 6"]:
+        """Return how far each is from what the poses say: translation (3, metres), rotation (3, radians)."""
+        found = inverse(poses[self.first]) @ poses[self.second]
+        off = inverse(self.measured) @ found
+        return np.concatenate([off[:, :3, 3], rotation_vectors(off)], axis=1)
+
+
+def optimise(poses: Float[np.ndarray, "n 4 4"], edges: Edges) -> Float[np.ndarray, "n 4 4"]:
+    """Return the poses that fit the edges best; the first stays where it is."""
+    from scipy.sparse import csc_matrix
+    from scipy.sparse.linalg import spsolve
+
+    count, found = len(poses), poses.copy()
+    scale = 1.0 / np.repeat(np.stack([edges.sigma_m, edges.sigma_rad], axis=1), 3, axis=1)
+    row = np.arange(6 * len(edges)).reshape(-1, 6)
+    columns = [6 * ends[:, None] + np.arange(6) for ends in (edges.first, edges.second)]
+    free = np.arange(6 * count - 6)
+    damping = csc_matrix((np.full(len(free), 1e-9), (free, free)), shape=(len(free), len(free)))
+    for _ in range(_STEPS):
+        error = edges.errors(found) * scale
+        weight = np.where(edges.is_closure, 1.0 / (1.0 + (error**2).sum(axis=1) / 6.0), 1.0)
+        root = np.sqrt(weight)[:, None]
+        of_first, of_second = _slopes(found, edges)
+        values = [slope * (scale * root)[:, :, None] for slope in (of_first, of_second)]
+        slope = csc_matrix(
+            (
+                np.concatenate([one.ravel() for one in values]),
+                (
+                    np.concatenate([np.repeat(row, 6, axis=1).ravel()] * 2),
+                    np.concatenate([np.tile(column, (1, 6)).ravel() for column in columns]),
+                ),
+            ),
+            shape=(6 * len(edges), 6 * count),
+        )[:, 6:]
+        step = -spsolve(slope.T @ slope + damping, slope.T @ (error * root).ravel()).reshape(-1, 6)
+        found[1:] = found[1:] @ motions(step)
+        if np.abs(step).max(initial=0.0) < _STILL:
+            break
+    return found
+
+
+def _slopes(poses: Float[np.ndarray, "n 4 4"], edges: Edges) -> tuple[np.ndarray, np.ndarray]:
+    """Return how errors change with small motions of both poses, in their own frames: (e, 6, 6) each.
+
+    Of the rotation's logarithm the slope is taken at 0, which is exact where the edges fit.
+    """
+    off = inverse(edges.measured) @ inverse(poses[edges.first]) @ poses[edges.second]
+    between = inverse(poses[edges.second]) @ poses[edges.first]  # of a motion of i, seen from j
+    second = np.zeros((len(edges), 6, 6))
+    second[:, :3, :3], second[:, 3:, 3:] = off[:, :3, :3], np.eye(3)
+    carried = np.zeros((len(edges), 6, 6))
+    turn = between[:, :3, :3]
+    carried[:, :3, :3], carried[:, 3:, 3:] = turn, turn
+    carried[:, :3, 3:] = crosses(between[:, :3, 3]) @ turn
+    return -second @ carried, second
+
+
+def crosses(vectors: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3 3"]:
+    """Return the matrices of the cross product with each vector."""
+    out = np.zeros((len(vectors), 3, 3))
+    x, y, z = vectors.T
+    out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = -z, y, -x
+    return out - np.swapaxes(out, 1, 2)
+
+
+def rotation_vectors(transforms: Float[np.ndarray, "n 4 4"]) -> Float[np.ndarray, "n 3"]:
+    """Return the rotations as axis times angle, radians."""
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_matrix(transforms[:, :3, :3]).as_rotvec()
+
+
+def motions(steps: Float[np.ndarray, "n 6"]) -> Float[np.ndarray, "n 4 4"]:
+    """Return small motions: a translation, metres, and a rotation as axis times angle."""
+    from scipy.spatial.transform import Rotation
+
+    out = np.tile(np.eye(4), (len(steps), 1, 1))
+    out[:, :3, :3] = Rotation.from_rotvec(steps[:, 3:]).as_matrix()
+    out[:, :3, 3] = steps[:, :3]
+    return out
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,13 +174,8 @@ class Loops:
 
     def report(self) -> dict[str, float]:
         """Return the numbers."""
-        return {
-            "tried": self.tried,
-            "closures": self.closures,
-            "agreeing": self.agreeing,
-            "apart_before_m": round(self.apart_before_m, 4),
-            "apart_m": round(self.apart_m, 4),
-        }
+        names = ("tried", "closures", "agreeing", "apart_before_m", "apart_m")
+        return {name: round(getattr(self, name), 4) for name in names}
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,9 +188,7 @@ class _Earlier:
     rig: Rig
 
 
-def close_loops(
-    stored: StoredMap, settings: LoopSettings = LoopSettings(), recording: Recording | None = None
-) -> tuple[StoredMap, Corrected, Loops]:
+def close_loops(stored: StoredMap, recording: Recording | None = None) -> tuple[StoredMap, Corrected, Loops]:
     """Find where the drive came back, correct the poses by it, and make the map follow them, in its folder.
 
     Raises:
@@ -112,48 +196,48 @@ def close_loops(
             contradict each other. It stays as it was.
     """
     require_submaps(stored)  # before the long search
-    found = find_loops(stored, settings)
+    found = find_loops(stored)
     moved, done = correct_stored(stored, found.stamps_s, found.poses, recording)
     return moved, done, found
 
 
-def find_loops(stored: StoredMap, settings: LoopSettings = LoopSettings()) -> Loops:
+def find_loops(stored: StoredMap) -> Loops:
     """Return corrected poses of the keyframes of a map; see ``close_loops``. The map is not touched."""
-    for kind in _NEEDED:
+    for kind in NEEDED:
         stored.require_model(kind)
     keyframes = stored.keyframes
     poses = np.asarray(keyframes.world_from_camera, np.float64)
-    closures, tried = _closures(stored, poses, settings)
-    if len(closures) < settings.least:
+    closures, tried = _closures(stored, poses)
+    if len(closures) < LEAST_CLOSURES:
         raise MapError(
             f"The drive of {stored.path} is not seen to come back: of {tried} keyframes {len(closures)} were located "
-            f"in earlier ones (at least {settings.later_s:g} s and {settings.way_m:g} m before); {settings.least} are "
+            f"in earlier ones (at least {LATER_S:g} s and {WAY_M:g} m before); {LEAST_CLOSURES} are "
             "needed. The map stays as it was."
         )
-    odometry = _odometry(poses, settings)
+    odometry = _odometry(poses)
     found = optimise(poses, _joined(odometry, closures))
-    agree = _agreeing(closures, found, settings)
+    agree = _agreeing(closures, found)
     if 0 < agree.sum() < len(agree):
         found = optimise(poses, _joined(odometry, closures.only(agree)))
-        agree = _agreeing(closures, found, settings)
+        agree = _agreeing(closures, found)
     found = _upright(found, poses, stored.up_in_world)
     strain = odometry.errors(found) / np.repeat(np.stack([odometry.sigma_m, odometry.sigma_rad], axis=1), 3, axis=1)
     bent = float(np.sqrt(np.mean(strain**2))) if len(odometry) else 0.0
     before, after = (np.linalg.norm(closures.errors(of)[:, :3], axis=1) for of in (poses, found))
     said = (
         f"{len(closures)} keyframes of {tried} were located in earlier ones, {np.median(before):.2f} m from where the "
-        f"poses put them (median); {int(agree.sum())} agree with each other within {settings.agree_m:g} m"
+        f"poses put them (median); {int(agree.sum())} agree with each other within {AGREE_M:g} m"
     )
-    if agree.sum() < max(settings.least, settings.least_share * len(agree)):
+    if agree.sum() < max(LEAST_CLOSURES, LEAST_SHARE * len(agree)):
         raise MapError(
             f"The loops of {stored.path} contradict each other: {said}, and "
-            f"{int(np.ceil(max(settings.least, settings.least_share * len(agree))))} must. Rooms that look alike do "
+            f"{int(np.ceil(max(LEAST_CLOSURES, LEAST_SHARE * len(agree))))} must. Rooms that look alike do "
             "that; the map stays as it was."
         )
-    if bent > settings.most_strain:
+    if bent > MOST_STRAIN:
         raise MapError(
             f"The loops of {stored.path} contradict its odometry: {said}, but the drive would be bent by {bent:.1f} "
-            f"standard deviations ({settings.most_strain:g} at most). The map stays as it was."
+            f"standard deviations ({MOST_STRAIN:g} at most). The map stays as it was."
         )
     return Loops(
         np.asarray(keyframes.stamp_s), found, tried, len(closures), int(agree.sum()), float(np.median(before)),
@@ -161,7 +245,7 @@ def find_loops(stored: StoredMap, settings: LoopSettings = LoopSettings()) -> Lo
     )  # fmt: skip
 
 
-def _closures(stored: StoredMap, poses: Float[np.ndarray, "k 4 4"], settings: LoopSettings) -> tuple[Edges, int]:
+def _closures(stored: StoredMap, poses: Float[np.ndarray, "k 4 4"]) -> tuple[Edges, int]:
     """Return what was seen again, and how many keyframes were looked for."""
     keyframes, rng = stored.keyframes, np.random.default_rng(0)
     stamps_s, place = np.asarray(keyframes.stamp_s), np.asarray(keyframes.place)
@@ -170,22 +254,20 @@ def _closures(stored: StoredMap, poses: Float[np.ndarray, "k 4 4"], settings: Lo
     second: list[int] = []
     measured: list[np.ndarray] = []
     tried = 0
-    rows = np.sort(spread_out(len(keyframes), settings.tried))
+    rows = np.sort(spread_out(len(keyframes), MOST_TRIED))
     for row in progress(rows.tolist(), "looking back", total=len(rows), unit="keyframe"):
-        earlier = np.flatnonzero(
-            (stamps_s <= stamps_s[row] - settings.later_s) & (way_m <= way_m[row] - settings.way_m)
-        )
+        earlier = np.flatnonzero((stamps_s <= stamps_s[row] - LATER_S) & (way_m <= way_m[row] - WAY_M))
         if not len(earlier):
             continue
         tried += 1
-        alike = earlier[np.argsort(-(place[earlier] @ place[row]), kind="stable")[: settings.candidates]]
+        alike = earlier[np.argsort(-(place[earlier] @ place[row]), kind="stable")[:CANDIDATES]]
         local = local_features(stored, row)
         for other in alike.tolist():
             there = _Earlier(keyframes.take(np.array([other])), stored.place_state, stored.encoders, stored.rig)
             chosen = LocateSettings(refine_focal=False)
             located = locate_features(there, local, place[row], stored.rig.rgb, rng, chosen)
             found = located.world_from_camera
-            if found is not None and located.score >= settings.least_score:
+            if found is not None and located.score >= LEAST_SCORE:
                 first.append(other)
                 second.append(row)
                 measured.append(inverse(poses[other]) @ found @ stored.rig.rgb_from_depth)
@@ -193,16 +275,16 @@ def _closures(stored: StoredMap, poses: Float[np.ndarray, "k 4 4"], settings: Lo
     count = len(first)
     edges = Edges(
         np.array(first, np.int64), np.array(second, np.int64), np.array(measured).reshape(-1, 4, 4),
-        np.full(count, settings.known_m), np.full(count, settings.known_rad), np.ones(count, bool),
+        np.full(count, KNOWN_M), np.full(count, KNOWN_RAD), np.ones(count, bool),
     )  # fmt: skip
     return edges, tried
 
 
-def _odometry(poses: Float[np.ndarray, "k 4 4"], settings: LoopSettings) -> Edges:
+def _odometry(poses: Float[np.ndarray, "k 4 4"]) -> Edges:
     row: Int[np.ndarray, " e"] = np.arange(len(poses) - 1)
     step = inverse(poses[:-1]) @ poses[1:]
     way = np.linalg.norm(step[:, :3, 3], axis=1) + rotation_angle_rad(step, np.tile(np.eye(4), (len(step), 1, 1)))
-    sigma = settings.strays * np.sqrt(way + 0.01)
+    sigma = STRAYS * np.sqrt(way + 0.01)
     return Edges(row, row + 1, step, sigma, sigma, np.zeros(len(row), bool))
 
 
@@ -218,7 +300,7 @@ def _joined(one: Edges, other: Edges) -> Edges:
     return Edges(*(np.concatenate([getattr(of, name) for of in (one, other)]) for name in Edges.__dataclass_fields__))
 
 
-def _agreeing(closures: Edges, poses: Float[np.ndarray, "k 4 4"], settings: LoopSettings) -> np.ndarray:
+def _agreeing(closures: Edges, poses: Float[np.ndarray, "k 4 4"]) -> np.ndarray:
     error = closures.errors(poses)
-    near = np.linalg.norm(error[:, :3], axis=1) <= settings.agree_m
-    return near & (np.linalg.norm(error[:, 3:], axis=1) <= settings.agree_rad)
+    near = np.linalg.norm(error[:, :3], axis=1) <= AGREE_M
+    return near & (np.linalg.norm(error[:, 3:], axis=1) <= AGREE_RAD)

@@ -11,50 +11,60 @@ import msgspec
 import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Int
+from avlmaps.core.columns import concat
 from avlmaps.core.errors import MapError
 from avlmaps.core.files import user_path
 from avlmaps.core.lexicon import EntryKind, lexicon
-from avlmaps.core.poses import apply, inverse, plain_point
+from avlmaps.core.poses import apply, inverse, plain_point, rotation_angle_rad
 from avlmaps.core.timeline import DAY_S, is_in_future
 from avlmaps.core.version import __version__
 from avlmaps.core.wording import option
 from avlmaps.days import life as lives
-from avlmaps.days.evidence import Day, DayViews
-from avlmaps.days.find import DEFAULTS, clock_s, find_other, require_another_drive, views_of, visit_of_stamps, visits_of
-from avlmaps.days.join import NO_SOURCES, joined_keyframes, joined_sounds, joined_sources, joined_voxels
-from avlmaps.days.settings import MergeSettings
+from avlmaps.days.evidence import THROUGH_VIEWS, Day, DayViews
+from avlmaps.days.find import (
+    clock_s,
+    find_other,
+    local_features,
+    require_another_drive,
+    thumbnail,
+    views_of,
+    visit_of_stamps,
+    visits_of,
+)
+from avlmaps.days.life import changed_things
 from avlmaps.days.surfaces import Occupied, resampled
-from avlmaps.days.unnamed import changed_things
 from avlmaps.maps.build import require_place
+from avlmaps.maps.fusion.voxel_sums import VoxelSums, VoxelTable
+from avlmaps.maps.sources.carried import carry_evidence
 from avlmaps.maps.store.checkpoints import key_of
 from avlmaps.maps.store.edits import Edit, World, carried_edits, read_edits, write_edits
 from avlmaps.maps.store.folder import write
-from avlmaps.maps.store.life import Life
+from avlmaps.maps.store.life import PEOPLE, Life
 from avlmaps.maps.store.lock import EDITING, lock_folder
 from avlmaps.maps.store.manifest import Counts, MapBounds, MapInfo, RecordingInfo, RigInfo, Timings, Visit
 from avlmaps.maps.store.map_data import MapData
 from avlmaps.maps.store.reader import StoredMap, open_stored
-from avlmaps.maps.types import Keyframes
+from avlmaps.maps.types import HeardSounds, Keyframes, SourceEvidence, Voxels
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.contents import Thing
 
 ThingsOf = Callable[[AVLMap], Sequence[Thing]]
 
+_LEAST_CONFIDENCE = 0.5  # things of less are not followed
+_REVISION = 1  # a map that was merged by other rules is merged again
+NO_SOURCES = "The map of all days does not know where sounds came from"
+_NEAR_M, _NEAR_RAD = 0.15, math.radians(10.0)  # a keyframe of the new day takes the place of one so near
 
-def default_things(least: float) -> ThingsOf:
-    """Return how the things of a map are listed: as its pixel encoder names them."""
 
-    def things(avlmap: AVLMap) -> Sequence[Thing]:
-        return avlmap.things(least_confidence=least) if "pixels" in avlmap.stored.info.models else []
-
-    return things
+def default_things(avlmap: AVLMap) -> Sequence[Thing]:
+    """Return the things of a map as its pixel encoder names them."""
+    return avlmap.things(least_confidence=_LEAST_CONFIDENCE) if "pixels" in avlmap.stored.info.models else []
 
 
 def merge_maps(
     stored: StoredMap,
     other: StoredMap,
     out: Path | str,
-    settings: MergeSettings = DEFAULTS,
     *,
     day: str = "",
     first_day: str = "",
@@ -70,7 +80,6 @@ def merge_maps(
         stored: the map, of one day or of several.
         other: of a later day, of one recording.
         out: folder of the new map.
-        settings: everything else.
         day: when the other was recorded, as ``2026-11-25``; where its stamps are of a clock it is known.
         first_day: likewise of a map of one day.
         overwrite: replace a map at ``out``.
@@ -92,11 +101,10 @@ def merge_maps(
     require_another_drive(stored, other, visits)
     visit = _visit(other, visits[-1], day)  # before the search, which takes long
     known = Occupied.of(np.asarray(stored.voxels.index), stored.grid)
-    found = find_other(stored, other, settings, known)
-    moved, number = found.map_from_other, len(visits)
-    visit = msgspec.structs.replace(visit, map_from_recording=_rows(moved), checks=found.checks)
+    (moved, checks), number = find_other(stored, other, known), len(visits)
+    visit = msgspec.structs.replace(visit, map_from_recording=_rows(moved), checks=checks)
     visits = (*visits, visit)
-    listed = things_of or default_things(settings.least_confidence)
+    listed = things_of or default_things
     grid = stored.grid
     before = views_of(stored)
     laid, *_ = resampled(np.asarray(other.voxels.index), grid, moved)
@@ -111,19 +119,19 @@ def merge_maps(
     )
     things = list(listed(AVLMap(other, edits=())))
     if things_of is None:  # a list of names misses small things, whose surface changes nevertheless
-        life = _with_vanished(life, stored, known, now, visits, settings)
-        things += _unnamed_new(other, things, before, known, moved, settings)
+        life = _with_vanished(life, stored, known, now, visits)
+        things += _unnamed_new(other, things, before, known, moved)
     new = [_seen(one, other, moved, visit.shift_s) for one in things]
     at_s = [one.end_s for one in visits]
     looks = _looks(life, stored, known)
-    life = lives.lived_on(life, new, now, before, known, number, at_s, grid, settings.changes, same_thing, looks)
-    kept = _still_there(stored, known, life, now, number, settings)
+    life = lives.lived_on(life, new, now, before, known, number, at_s, grid, same_thing, looks)
+    kept = _still_there(stored, known, life, now, number)
     voxels = joined_voxels(stored, kept, other, moved, visit.shift_s, life)
     keyframes = joined_keyframes(stored, other, moved, visit.shift_s)
     sounds = joined_sounds(stored, other, moved, visit.shift_s)
     sources, why_not = joined_sources(stored, other, moved, voxels, keyframes)
     data = MapData(stored.info, voxels, keyframes, sounds, stored.place_state, sources, life=life)
-    info = _manifest(stored, other, data, visits, settings, perf_counter() - begin_s, why_not)
+    info = _manifest(stored, other, data, visits, perf_counter() - begin_s, why_not)
     with lock_folder(out), lock_folder(out, EDITING):
         edits = _edits(stored, other, read_edits(out), keyframes, moved)
         write(out, replace(data, info=info))
@@ -146,9 +154,9 @@ def _edits(
     return tuple(sorted(known.values(), key=lambda edit: edit.made))
 
 
-def merged_key(first: str, other: str, settings: MergeSettings = DEFAULTS) -> str:
+def merged_key(first: str, other: str) -> str:
     """Return the build key of the map that two maps of these build keys become."""
-    return key_of("days", first, other, settings)
+    return key_of("days", first, other, _REVISION)
 
 
 def _dated(visits: tuple[Visit, ...], first_day: str, stored: StoredMap) -> tuple[Visit, ...]:
@@ -173,7 +181,6 @@ def _date(said: str) -> date:
 
 
 def _visit(other: StoredMap, last: Visit, day: str) -> Visit:
-    """Return the entry of a new day, whose time follows that of the last one, and whose place is to be found."""
     (own,) = visits_of(other)
     own_s, last_s = clock_s(own.recording, own.begin_s), clock_s(last.recording, last.begin_s - last.shift_s)
     if not day and last.day and own_s is not None and last_s is not None and own_s + own.end_s - own.begin_s < last_s:
@@ -239,13 +246,11 @@ def same_thing(one: str, other: str) -> bool:
     return one == other or words.is_a(one, other, EntryKind.THING) or words.is_a(other, one, EntryKind.THING)
 
 
-def _with_vanished(
-    life: Life, stored: StoredMap, known: Occupied, now: Day, visits: Sequence[Visit], settings: MergeSettings
-) -> Life:
+def _with_vanished(life: Life, stored: StoredMap, known: Occupied, now: Day, visits: Sequence[Visit]) -> Life:
     index, grid = np.asarray(stored.voxels.index), stored.grid
     surface = now.has_surface(grid.centre_of(index))
-    loose, through = ~surface, now.views.through(index, grid) >= settings.changes.through_views
-    things = changed_things(stored, loose, through, [*_rows_there(life, known).values()], settings.changes)
+    loose, through = ~surface, now.views.through(index, grid) >= THROUGH_VIEWS
+    things = changed_things(stored, loose, through, [*_rows_there(life, known).values()])
     stamps = np.array([float(np.max(np.asarray(stored.voxels.last_seen_s)[one.rows])) for one in things])
     seen_on = visit_of_stamps(visits[:-1], stamps).tolist()
     begun = [lives.begun([_seen(one, stored, np.eye(4), 0.0)], on) for one, on in zip(things, seen_on, strict=True)]
@@ -259,18 +264,15 @@ def _unnamed_new(
     before: Sequence[DayViews],
     known: Occupied,
     moved: Float[np.ndarray, "4 4"],
-    settings: MergeSettings,
 ) -> list[Thing]:
     grid = other.grid
     points = apply(moved, grid.centre_of(np.asarray(other.voxels.index)))
     index = grid.index_of(points)
-    through = np.sum([views.through(index, grid) for views in before], axis=0) >= settings.changes.through_views
-    return changed_things(other, ~known.near(points), through, [thing.rows for thing in things], settings.changes)
+    through = np.sum([views.through(index, grid) for views in before], axis=0) >= THROUGH_VIEWS
+    return changed_things(other, ~known.near(points), through, [thing.rows for thing in things])
 
 
-def _still_there(
-    stored: StoredMap, known: Occupied, life: Life, now: Day, visit: int, settings: MergeSettings
-) -> Bool[np.ndarray, " n"]:
+def _still_there(stored: StoredMap, known: Occupied, life: Life, now: Day, visit: int) -> Bool[np.ndarray, " n"]:
     """Return which voxels of the map are surface still.
 
     One goes where two views of the new day see through it and nothing is beside it; of what is gone every voxel goes
@@ -278,7 +280,7 @@ def _still_there(
     """
     index, grid = np.asarray(stored.voxels.index), stored.grid
     surface = now.has_surface(grid.centre_of(index))
-    through = now.views.through(index, grid) >= settings.changes.through_views
+    through = now.views.through(index, grid) >= THROUGH_VIEWS
     goes = through & ~surface
     for number, stay in enumerate(life.stays):
         rows = _rows_of(number, life, known)
@@ -294,7 +296,6 @@ def _manifest(
     other: StoredMap,
     content: MapData,
     visits: tuple[Visit, ...],
-    settings: MergeSettings,
     elapsed_s: float,
     notice: str,
 ) -> MapInfo:
@@ -311,7 +312,7 @@ def _manifest(
     return msgspec.structs.replace(
         info,
         avlmaps_version=__version__,
-        build_key=merged_key(info.build_key, other.info.build_key, settings),
+        build_key=merged_key(info.build_key, other.info.build_key),
         recording=recording,
         counts=Counts.of(frames, content.keyframes, content.voxels, content.sounds),
         rig=RigInfo.of(stored.rig),
@@ -324,3 +325,147 @@ def _manifest(
         visits=visits,
         timings=Timings.now({"merging": elapsed_s}),
     )
+
+
+def joined_voxels(
+    stored: StoredMap,
+    kept: Bool[np.ndarray, " n"],
+    other: StoredMap,
+    moved: Float[np.ndarray, "4 4"],
+    shift_s: float,
+    life: Life,
+) -> Voxels:
+    """Return what is left of the map's voxels, and the other's laid on its grid; where both are, their means."""
+    table = VoxelTable(stored.voxels.feature.shape[1])
+    table.add(_sums(stored.voxels, np.flatnonzero(kept)))
+    index, cell, source, part = resampled(np.asarray(other.voxels.index), other.grid, moved)
+    table.add(_spread(other.voxels, index, cell, source, part, shift_s))
+    people = [life.voxels(number) for number, stay in enumerate(life.stays) if stay.name in PEOPLE]
+    if not people:
+        return table.voxels()
+    sums = table.evidence().index
+    crowd = Occupied.of(np.concatenate(people), stored.grid)
+    return table.voxels(kept=crowd.row_of(sums) < 0)
+
+
+def _sums(voxels: Voxels, rows: Int[np.ndarray, " k"]) -> VoxelSums:
+    hits = np.asarray(voxels.hits)[rows]
+    weight = np.asarray(voxels.weight, np.float64)[rows]
+    feature = np.asarray(voxels.feature)[rows].astype(np.float32) * weight[:, None].astype(np.float32)
+    rgb = np.asarray(voxels.rgb)[rows].astype(np.float64) * hits[:, None]
+    return VoxelSums(
+        np.ascontiguousarray(np.asarray(voxels.index)[rows]), feature, weight, rgb, hits.astype(np.float64),
+        hits.astype(np.int64), np.minimum(hits, 1).astype(np.int32), np.zeros(len(rows), np.int64),
+        np.asarray(voxels.last_seen_s, np.float64)[rows],
+    )  # fmt: skip
+
+
+def _spread(
+    voxels: Voxels,
+    index: Int[np.ndarray, "m 3"],
+    cell: Int[np.ndarray, " k"],
+    source: Int[np.ndarray, " k"],
+    part: Float[np.ndarray, " k"],
+    shift_s: float,
+) -> VoxelSums:
+    from scipy import sparse
+
+    count = len(index)
+    share = sparse.csr_matrix((part, (cell, source)), shape=(count, len(voxels)))
+    own = _sums(voxels, np.arange(len(voxels)))
+    last = np.full(count, -np.inf)
+    np.maximum.at(last, cell, own.last_seen_s[source])
+    hits = np.maximum(np.rint(share @ own.hits), 1).astype(np.int64)
+    return VoxelSums(
+        np.ascontiguousarray(index, np.int32), np.asarray(share @ own.feature_sum, np.float32), share @ own.weight,
+        share @ own.rgb_sum, share @ own.rgb_weight, hits, np.ones(count, np.int32), np.zeros(count, np.int64),
+        last + shift_s,
+    )  # fmt: skip
+
+
+def joined_keyframes(stored: StoredMap, other: StoredMap, moved: Float[np.ndarray, "4 4"], shift_s: float) -> Keyframes:
+    """Return the keyframes of all days; one of the new day takes the place of older ones from about where it is.
+
+    Their places are described again, in the words that this map's place encoder learned.
+    """
+    from scipy.spatial import KDTree
+
+    old, new = stored.keyframes, other.keyframes
+    pose = moved @ np.asarray(new.world_from_camera, np.float64)
+    before = np.asarray(old.world_from_camera, np.float64)
+    near = KDTree(pose[:, :3, 3]).query_ball_point(before[:, :3, 3], _NEAR_M)
+    kept = [
+        row
+        for row, rivals in enumerate(near)
+        if not any(rotation_angle_rad(before[row], pose[rival]) <= _NEAR_RAD for rival in rivals)
+    ]
+    encoder = stored.encoders.place
+    place = [
+        encoder.encode(thumbnail(other, row), local_features(other, row), stored.place_state) for row in range(len(new))
+    ]
+    turned = replace(
+        new,
+        stamp_s=np.asarray(new.stamp_s) + shift_s,
+        world_from_camera=pose,
+        centre=apply(moved, np.asarray(new.centre, np.float64)).astype(np.float32),
+        place=np.asarray(place, np.float32).reshape(len(new), -1),
+        points_world=apply(moved, np.asarray(new.points_world, np.float64)).astype(np.float32),
+    )
+    return _concatenated(old.take(np.array(kept, np.int64)), turned)
+
+
+def _concatenated(one: Keyframes, other: Keyframes) -> Keyframes:
+    shapes = {part.clear_mm.shape[1:] for part in (one, other) if len(part)}
+    if len(shapes) > 1:  # another camera: pictures of the larger shape hold both, and blocks beyond are unknown
+        rows, columns = (max(shape[axis] for shape in shapes) for axis in (0, 1))
+        one, other = (
+            replace(part, clear_mm=_padded(np.asarray(part.clear_mm), rows, columns)) for part in (one, other)
+        )
+    parts = [part for part in (one, other) if len(part)]
+    return concat(parts) if parts else one
+
+
+def _padded(clear_mm: np.ndarray, rows: int, columns: int) -> np.ndarray:
+    out = np.zeros((len(clear_mm), rows, columns), np.uint16)
+    out[:, : clear_mm.shape[1], : clear_mm.shape[2]] = clear_mm
+    return out
+
+
+def joined_sources(
+    stored: StoredMap, other: StoredMap, moved: Float[np.ndarray, "4 4"], voxels: Voxels, keyframes: Keyframes
+) -> tuple[SourceEvidence | None, str]:
+    """Return the evidence of where the sounds of all days came from; or why there is none, in a sentence."""
+    parts = [(of.sources(), where) for of, where in ((stored, np.eye(4)), (other, moved)) if len(of.sounds)]
+    known = [(evidence, where) for evidence, where in parts if evidence is not None]
+    if not known:
+        return None, ""
+    if len(known) < len(parts):
+        of = next(of for of in (stored, other) if len(of.sounds) and of.sources() is None)
+        return None, (
+            f"{NO_SOURCES}: {of.path.name} was built without the places of its microphones; give them (microphones in "
+            "recording.json), build it again and merge again."
+        )
+    counts = [int(evidence.channels[0]) for evidence, _ in known]
+    if len(set(counts)) > 1:
+        return None, (
+            f"{NO_SOURCES}: {stored.path.name} was heard with {counts[0]} microphones and {other.path.name} with "
+            f"{counts[1]}; query where sounds came from in each day's own map, or record with the same array."
+        )
+    voxel_m = stored.grid.centre_of(np.asarray(voxels.index))
+    robot_m = np.asarray(keyframes.world_from_camera, np.float64)[:, :3, 3]
+    return carry_evidence(known, voxel_m, robot_m, stored.up_in_world), ""
+
+
+def joined_sounds(stored: StoredMap, other: StoredMap, moved: Float[np.ndarray, "4 4"], shift_s: float) -> HeardSounds:
+    """Return the sounds of all days."""
+    old, new = stored.sounds, other.sounds
+    width = max(old.feature.shape[1], new.feature.shape[1])
+    laid = replace(
+        new,
+        onset_s=np.asarray(new.onset_s) + shift_s,
+        offset_s=np.asarray(new.offset_s) + shift_s,
+        track=apply(moved, np.asarray(new.track, np.float64)).astype(np.float32),
+    )
+    without = np.zeros((0, width), np.float32)
+    parts = [each if len(each.feature) else replace(each, feature=without) for each in (old, laid)]
+    return concat(parts, clips=(*old.clips, *new.clips))

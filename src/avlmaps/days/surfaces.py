@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import KDTree
+from scipy.spatial.transform import Rotation
 
 from avlmaps.core.arrays import Bool, Float, Int
 from avlmaps.core.poses import apply, from_rotation
@@ -25,33 +26,25 @@ SURFACE_REACH_VOXELS = 1.15
 _OFFSET = 1 << 20
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Surface:
-    """Points of flat surface.
+def flat_surface(
+    points: Float[np.ndarray, "m 3"], most: int, rng: np.random.Generator
+) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3"]]:
+    """Return points of flat surface, metres, and their unit normals.
 
-    Attributes:
-        point: metres, moved along the normal into the plane of their neighbours: the grid's steps are smoothed away.
-        normal: unit vectors.
+    Each point is moved along its normal into the plane of its neighbours, so that the grid's steps are smoothed away.
     """
-
-    point: Float[np.ndarray, "n 3"]
-    normal: Float[np.ndarray, "n 3"]
-
-    @classmethod
-    def of(cls, points: Float[np.ndarray, "m 3"], most: int, rng: np.random.Generator) -> "Surface":
-        """Return the flat surface at some points."""
-        if len(points) < _NEIGHBOURS:
-            return cls(np.zeros((0, 3)), np.zeros((0, 3)))
-        chosen = points if len(points) <= most else points[np.sort(rng.choice(len(points), most, replace=False))]
-        _, near = KDTree(points).query(chosen, _NEIGHBOURS)
-        around = points[near]
-        middle = around.mean(axis=1)
-        apart = around - middle[:, None]
-        values, vectors = np.linalg.eigh(np.einsum("nki,nkj->nij", apart, apart))
-        flat = values[:, 0] <= _FLAT * np.maximum(values[:, 1], 1e-12)
-        normal = vectors[:, :, 0]
-        off = np.einsum("ni,ni->n", chosen - middle, normal)
-        return cls((chosen - off[:, None] * normal)[flat], normal[flat])
+    if len(points) < _NEIGHBOURS:
+        return np.zeros((0, 3)), np.zeros((0, 3))
+    chosen = points if len(points) <= most else points[np.sort(rng.choice(len(points), most, replace=False))]
+    _, near = KDTree(points).query(chosen, _NEIGHBOURS)
+    around = points[near]
+    middle = around.mean(axis=1)
+    apart = around - middle[:, None]
+    values, vectors = np.linalg.eigh(np.einsum("nki,nkj->nij", apart, apart))
+    flat = values[:, 0] <= _FLAT * np.maximum(values[:, 1], 1e-12)
+    normal = vectors[:, :, 0]
+    off = np.einsum("ni,ni->n", chosen - middle, normal)
+    return (chosen - off[:, None] * normal)[flat], normal[flat]
 
 
 def refine(
@@ -68,21 +61,23 @@ def refine(
         map_from_other: a first transform, right within a quarter of a metre.
         rng: draws the points that are compared.
     """
-    still, moving = Surface.of(points, _MOST_POINTS, rng), Surface.of(other, _MOST_MOVING, rng)
-    if not (len(still.point) and len(moving.point)):
+    (still, still_normal), (moving, moving_normal) = (
+        flat_surface(of, most, rng) for of, most in ((points, _MOST_POINTS), (other, _MOST_MOVING))
+    )
+    if not (len(still) and len(moving)):
         return map_from_other, float("nan")
-    tree, found = KDTree(still.point), map_from_other
+    tree, found = KDTree(still), map_from_other
     off_m = np.zeros(0)
     for reach_m in np.geomspace(*_REACHES_M, _ROUNDS):
-        at = apply(found, moving.point)
+        at = apply(found, moving)
         apart_m, nearest = tree.query(at, distance_upper_bound=2.0 * reach_m)
         near = np.flatnonzero(np.isfinite(apart_m))
-        normal = still.normal[nearest[near]]
-        alike = np.abs(np.einsum("ni,ni->n", normal, moving.normal[near] @ found[:3, :3].T)) > 0.8
+        normal = still_normal[nearest[near]]
+        alike = np.abs(np.einsum("ni,ni->n", normal, moving_normal[near] @ found[:3, :3].T)) > 0.8
         near, normal = near[alike], normal[alike]
         if len(near) < 6:
             break
-        off_m = np.einsum("ni,ni->n", normal, at[near] - still.point[nearest[near]])
+        off_m = np.einsum("ni,ni->n", normal, at[near] - still[nearest[near]])
         weight = np.square(np.clip(1.0 - np.square(off_m / reach_m), 0.0, None))
         step = _step(at[near], normal, off_m, weight)
         found = step @ found
@@ -98,10 +93,7 @@ def _step(
     slope = np.concatenate([np.cross(at - middle, normal), normal], axis=1)
     square = (slope * weight[:, None]).T @ slope + 1e-9 * np.eye(6)
     turn = -np.linalg.solve(square, slope.T @ (weight * off_m))
-    angle = float(np.linalg.norm(turn[:3]))
-    axis = turn[:3] / angle if angle > 0.0 else np.array([0.0, 0.0, 1.0])
-    cross = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
-    rotation = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
+    rotation = Rotation.from_rotvec(turn[:3]).as_matrix()
     return from_rotation(rotation, turn[3:] + middle - rotation @ middle)
 
 

@@ -104,7 +104,6 @@ def _build_each(
     allow: tuple[str, ...],
     overwrite: bool,
 ) -> None:
-    """Let each recording be built by one worker."""
     token = paths[0].parent.absolute() / f".cluster-{secrets.token_hex(8)}"
     with explain_write_errors(token.parent):
         token.parent.mkdir(parents=True, exist_ok=True)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from avlmaps.core.errors import MapError
-from avlmaps.days.align import NotTheSamePlaceError
+from avlmaps.days.find import NotTheSamePlaceError
 from avlmaps.days.merge import merge_maps
 from avlmaps.maps.store.reader import open_stored
 from avlmaps.query.asking import Asked, ask

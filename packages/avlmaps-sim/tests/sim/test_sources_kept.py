@@ -10,8 +10,7 @@ import pytest
 
 from avlmaps.core.errors import QueryError
 from avlmaps.core.poses import apply
-from avlmaps.days.join import joined_sources
-from avlmaps.days.merge import merge_maps
+from avlmaps.days.merge import joined_sources, merge_maps
 from avlmaps.live.live_map import LiveMap
 from avlmaps.live.replay import replay
 from avlmaps.live.settings import LiveSettings

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core.poses import apply, inverse, plain_point, rotation_angle_rad
-from avlmaps.days.align import NotTheSamePlaceError
+from avlmaps.days.find import NotTheSamePlaceError
 from avlmaps.days.merge import ThingsOf, default_things, merge_maps
 from avlmaps.maps.store.life import Stay
 from avlmaps.query.avlmap import AVLMap
@@ -120,7 +120,7 @@ def _home(job: SceneJob, days: int, open_spec: Callable[[str], Scene]) -> dict[s
     def noticeable(day: int, true: tuple[Happened, ...]) -> list[Happened]:
         return _noticeable(true, places[: day + 1])
 
-    for way, things_of in ((TRUE, _true_things(places)), (OURS, default_things(0.5))):
+    for way, things_of in ((TRUE, _true_things(places)), (OURS, default_things)):
         results[way] = _lived(job.spec, places, changes, seen, things_of, way, noticeable)
     return results
 
