@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from avlmaps.core import errors, progress
-from avlmaps.language.program.trace import told
+from avlmaps.language.program.interpreter import told
 from helpers.plain_numbers import assert_plain
 
 

@@ -69,7 +69,7 @@ class _Calls:
 
 
 def _method(skill: Skill) -> Any:
-    names = [parameter.name for parameter in skill.parameters]
+    names = list(skill.parameters)
 
     def call(robot: _Calls, *values: Any, **named: Any) -> Any:
         given = dict(zip(names, values, strict=False)) | named

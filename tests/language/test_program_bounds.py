@@ -10,7 +10,7 @@ import pytest
 
 from avlmaps.core.errors import ProgramError
 from avlmaps.language.program import Budget, parse_program, run_program
-from avlmaps.language.program.check import _Kinds
+from avlmaps.language.program.parser import _Checker
 from avlmaps.language.program.values import Sizes
 from helpers.recording_robot import RecordingRobot
 
@@ -22,14 +22,14 @@ TESTS = Path(__file__).parents[1]
 )
 def test_each_part_of_a_program_is_checked_as_often_at_every_depth(level: str, monkeypatch: pytest.MonkeyPatch) -> None:
     seen = 0
-    usual = _Kinds.of
+    usual = _Checker.value
 
-    def counted(self: _Kinds, part: object) -> object:
+    def counted(self: _Checker, part: object, deep: int = 0) -> object:
         nonlocal seen
         seen += 1
-        return usual(self, part)  # type: ignore[arg-type]
+        return usual(self, part, deep)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(_Kinds, "of", counted)
+    monkeypatch.setattr(_Checker, "value", counted)
     text = "x"
     for _ in range(10 if level.count("{}") > 1 else 20):
         text = level.format(*[text, "x"][: level.count("{}")])

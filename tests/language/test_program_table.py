@@ -9,10 +9,8 @@ from typing import Protocol
 import pytest
 
 from avlmaps.language.program import SKILLS, parse_program, run_program, skill_lines
-from avlmaps.language.program.calls import BUILTINS
-from avlmaps.language.program.table import skills_of
-from avlmaps.language.program.value_types import ValueType
-from avlmaps.language.program.vocabulary import RobotSkills
+from avlmaps.language.program.parser import BUILTINS
+from avlmaps.language.program.vocabulary import RobotSkills, ValueType, skills_of
 from helpers.recording_robot import RecordingRobot
 
 PAGE = Path(__file__).parents[2] / "docs" / "programs.md"
@@ -23,18 +21,18 @@ def test_every_skill_of_the_vocabulary_is_in_the_table_and_nothing_else() -> Non
     assert list(SKILLS) == declared
     for name, skill in SKILLS.items():
         method = getattr(RobotSkills, name)
-        assert [each.name for each in skill.parameters] == list(inspect.signature(method).parameters)[1:]
+        assert list(skill.parameters) == list(inspect.signature(method).parameters)[1:]
         assert skill.doc == " ".join(inspect.getdoc(method).split())  # type: ignore[union-attr]
 
 
 def test_a_signature_reads_as_it_is_written() -> None:
     assert SKILLS["move_north"].signature == "move_north(target: str | Place | Heat, distance_m: float = 0.5) -> None"
     assert SKILLS["get_contour"].signature == "get_contour(target: str | Place | Heat) -> list[Place]"
-    assert SKILLS["get_map"].parameters[1].kinds == {ValueType.STRING, ValueType.CLIP, ValueType.NOTHING}
+    assert SKILLS["get_map"].parameters["sound"].kinds == {ValueType.STRING, ValueType.CLIP, ValueType.NOTHING}
 
 
 def test_only_alternatives_must_be_given_one_at_a_time() -> None:
-    assert {name for name, skill in SKILLS.items() if skill.takes_exactly_one} == {"get_map", "get_major_map"}
+    assert {name for name, skill in SKILLS.items() if skill.alternatives} == {"get_map", "get_major_map"}
 
 
 def test_lines_for_a_prompt_hold_every_signature_and_what_it_does() -> None:

@@ -1,5 +1,6 @@
 """From a command to a program by a chat model, corrected where it cannot be used or where it failed."""
 
+import ast
 import re
 from collections.abc import Sequence
 
@@ -18,7 +19,7 @@ from avlmaps.language.chat.replay import ChatRequest, Message, Replay
 from avlmaps.language.chat.settings import ChatSettings
 from avlmaps.language.commands import check_order
 from avlmaps.language.program import SKILLS, Program, parse_program
-from avlmaps.language.program.syntax import Constant, SkillCall, expressions_of, parts_of
+from avlmaps.language.program.parser import called
 from avlmaps.language.translator import Translation
 
 _MOST_SAID_CHARACTERS = 4000
@@ -165,16 +166,15 @@ def check_files(program: Program, command: str) -> None:
     Raises:
         ProgramError: it does, or its file's name is not written out.
     """
-    for top in expressions_of(program.statements):
-        for part in parts_of(top):
-            if not (isinstance(part, SkillCall) and part.skill in _LOADERS):
-                continue
-            path = part.arguments[0].value
-            name = path.value if isinstance(path, Constant) else None
-            if not isinstance(name, str) or not name.strip():
-                raise ProgramError(f"Line {part.line}: `{part.skill}` takes the file's name written out in quotes.")
-            if not _names_file(command, name.removeprefix("./")):
-                raise ProgramError(f"Line {part.line}: the file {name!r} is not named in the command.")
+    for call in program.calls:
+        if called(call) not in _LOADERS:
+            continue
+        path = (*call.args, *(each.value for each in call.keywords))[0]
+        name = path.value if isinstance(path, ast.Constant) else None
+        if not isinstance(name, str) or not name.strip():
+            raise ProgramError(f"Line {call.lineno}: `{called(call)}` takes the file's name written out in quotes.")
+        if not _names_file(command, name.removeprefix("./")):
+            raise ProgramError(f"Line {call.lineno}: the file {name!r} is not named in the command.")
 
 
 def _names_file(command: str, name: str) -> bool:

@@ -3,12 +3,10 @@
 ``parse_program`` refuses everything that is no part of a program; ``run_program`` runs the rest within a budget.
 """
 
-from avlmaps.language.program.budget import Budget
-from avlmaps.language.program.interpreter import run_program
-from avlmaps.language.program.parser import parse_program
-from avlmaps.language.program.syntax import Program
-from avlmaps.language.program.table import ROBOT, SKILLS, Parameter, Skill, skill_lines
-from avlmaps.language.program.trace import Step, Trace
+from avlmaps.language.program.interpreter import Step, Trace, run_program
+from avlmaps.language.program.parser import Program, parse_program
+from avlmaps.language.program.values import Budget
+from avlmaps.language.program.vocabulary import ROBOT, SKILLS, Parameter, Skill, skill_lines
 
 __all__ = [
     "ROBOT",

@@ -1,27 +1,126 @@
-"""Runs a parsed program over a vocabulary. Nothing but the skills of the table is ever called or looked up."""
+"""Runs a parsed program over a vocabulary, and its trace. Nothing but the skills of the table is ever called."""
 
-from collections.abc import Callable
+import ast
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from enum import Enum, auto
 from time import monotonic
 from typing import Any
 
 from avlmaps.core.errors import AvlmapsError, ProgramError
-from avlmaps.language.program import syntax, value_types, values
-from avlmaps.language.program.budget import Budget, refused
-from avlmaps.language.program.calls import check_exactly_one, parameter_of
-from avlmaps.language.program.check import check_argument, grown, misfit
-from avlmaps.language.program.table import SKILLS
-from avlmaps.language.program.trace import Step, Trace, told
-from avlmaps.language.program.value_types import ValueType
-from avlmaps.language.program.values import Value
-from avlmaps.language.program.vocabulary import RobotSkills
+from avlmaps.language.program import values
+from avlmaps.language.program.parser import (
+    SIGNS,
+    Program,
+    branches_of,
+    called,
+    check_argument,
+    check_exactly_one,
+    given_to,
+    grown,
+    misfit,
+    target_names,
+)
+from avlmaps.language.program.values import Budget, Value, refused
+from avlmaps.language.program.vocabulary import SKILLS, RobotSkills, ValueType
 
 # Between two skills the clock is read once in this many steps.
 _STEPS_BETWEEN_LOOKS = 256
 
 
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One call of a skill.
+
+    Attributes:
+        skill: its name.
+        arguments: what each parameter was given, as JSON has it: text, numbers, {"place": [x, y, z]} in metres,
+            {"heat": the calls that made it}, {"picture": file} and {"clip": file}.
+        result: what it returned, shown in the same way; None where it failed.
+        line: of the program, from 1.
+        elapsed_s: how long it took.
+        error: why it failed, in one sentence; None where it did not.
+    """
+
+    skill: str
+    arguments: Mapping[str, Any]
+    result: Any
+    line: int
+    elapsed_s: float
+    error: str | None = None
+
+    @property
+    def text(self) -> str:
+        """The call as a person reads it."""
+        return f"{self.skill}({', '.join(f'{name}={told(given)}' for name, given in self.arguments.items())})"
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the step as JSON has it."""
+        return asdict(self) | {"elapsed_s": round(self.elapsed_s, 3)}
+
+
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """The trace of one run of a program.
+
+    Attributes:
+        steps: the skills that it called, in their order, a failed one last.
+        error: why it stopped early, in one sentence that names the line; None where it ran to its end.
+        error_type: the class of that error, such as "GoalNotFoundError" or "ProgramError".
+        elapsed_s: how long the run took.
+    """
+
+    steps: tuple[Step, ...]
+    error: str | None
+    error_type: str | None
+    elapsed_s: float
+
+    @property
+    def ok(self) -> bool:
+        """Whether the program ran to its end."""
+        return self.error is None
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the trace as JSON has it."""
+        return {
+            "ok": self.ok,
+            "error": self.error,
+            "error_type": self.error_type,
+            "steps": [step.to_json() for step in self.steps],
+            "elapsed_s": round(self.elapsed_s, 3),
+        }
+
+    def lines(self) -> list[str]:
+        """Return the trace as lines for people: every call, what it returned, and the error at the end."""
+        lines = []
+        for step in self.steps:
+            is_heat = isinstance(step.result, dict) and "heat" in step.result
+            came = "" if step.result is None else " -> a Heat" if is_heat else f" -> {told(step.result)}"
+            lines.append(f"line {step.line}: {step.text}{came}" + (" failed" if step.error else ""))
+        return lines + ([self.error] if self.error else [])
+
+
+def told(content: Any) -> str:
+    """Return a value of a trace as a person reads it."""
+    match content:
+        case {"place": coordinates}:
+            return f"({', '.join(f'{value:.2f}' for value in coordinates)})"
+        case {"heat": how}:
+            return how
+        case {"picture": path}:
+            return f"picture {path!r}"
+        case {"clip": path}:
+            return f"clip {path!r}"
+        case list():
+            few = ", ".join(told(each) for each in content[:3])
+            return f"[{few}, ... {len(content)} in all]" if len(content) > 3 else f"[{few}]"
+        case float():  # NumPy's are floats, too, and write their type into their repr
+            return repr(float(content))
+    return repr(content)
+
+
 def run_program(
-    program: syntax.Program,
+    program: Program,
     vocabulary: RobotSkills,
     budget: Budget | None = None,
     on_step: Callable[[Step], None] | None = None,
@@ -72,37 +171,30 @@ class _Next(Enum):
     AFTER_LOOP = auto()
 
 
-_AFTER_WORD = {"pass": _Next.STATEMENT, "break": _Next.AFTER_LOOP, "continue": _Next.ROUND}
-
-
 class _Run:
     """One run: the values of its names, and what is left of its budget."""
 
     def __init__(
         self, vocabulary: RobotSkills, budget: Budget, on_step: Callable[[Step], None], clock: Callable[[], float]
     ) -> None:
-        self.vocabulary = vocabulary
-        self.budget = budget
-        self.on_step = on_step
-        self.clock = clock
+        self.vocabulary, self.budget, self.on_step, self.clock = vocabulary, budget, on_step, clock
         self.started = clock()
         self.names: dict[str, Any] = {}
         self.steps: list[Step] = []
-        self.worked_out = 0
-        self.made = 0
+        self.computed = self.made = 0
         self.sizes = values.Sizes()
 
     # ---- the budget
 
     def step(self, line: int, count: int = 1) -> None:
         """Count computed parts; stop the program that has used them up."""
-        before = self.worked_out
-        self.worked_out += count
-        if self.worked_out > self.budget.steps:
+        before = self.computed
+        self.computed += count
+        if self.computed > self.budget.steps:
             raise refused(
                 line, f"the program takes more than {self.budget.steps} steps; shorten its loops or raise the budget"
             )
-        if before // _STEPS_BETWEEN_LOOKS != self.worked_out // _STEPS_BETWEEN_LOOKS:
+        if before // _STEPS_BETWEEN_LOOKS != self.computed // _STEPS_BETWEEN_LOOKS:
             self.look_at_clock(line)
 
     def keep(self, line: int, elements: int) -> None:
@@ -115,10 +207,6 @@ class _Run:
                 "raise the budget",
             )
 
-    def keep_value(self, line: int, value: Value) -> None:
-        """Count the elements of a value that was made."""
-        self.keep(line, self.sizes.of(line, value))
-
     def look_at_clock(self, line: int) -> None:
         """Stop the program whose time is over."""
         if self.clock() - self.started > self.budget.seconds:
@@ -126,183 +214,178 @@ class _Run:
 
     # ---- statements
 
-    def block(self, statements: tuple[syntax.Statement, ...]) -> _Next:
+    def block(self, statements: Sequence[ast.stmt]) -> _Next:
         for statement in statements:
             after = self.statement(statement)
             if after is not _Next.STATEMENT:
                 return after
         return _Next.STATEMENT
 
-    def statement(self, statement: syntax.Statement) -> _Next:
-        self.step(statement.line)
-        match statement:
-            case syntax.Assign():
-                self.give(statement.line, statement.target, self.value(statement.value))
-            case syntax.Update():
-                self.update(statement)
-            case syntax.Perform():
-                self.value(statement.call)
-            case syntax.If():
-                return self.block(self.chosen_block(statement))
-            case syntax.For():
-                return self.loop(statement)
-            case syntax.Word():
-                return _AFTER_WORD[statement.word]
+    def statement(self, node: ast.stmt) -> _Next:
+        self.step(node.lineno)
+        match node:
+            case ast.Assign(targets=[target]):
+                self.give(target, self.value(node.value))
+            case ast.AugAssign(target=ast.Name(id=name)):
+                before, value = self.name(node.lineno, name), self.value(node.value)
+                sign = SIGNS[type(node.op)]
+                if sign == "+" and values.kind_of(before) is values.kind_of(value) is ValueType.LIST:
+                    raise grown(node.lineno, name)
+                self.names[name] = self.arithmetic(node.lineno, sign, before, value)
+            case ast.Expr():
+                self.value(node.value)
+            case ast.If():
+                chosen, otherwise = branches_of(node)
+                return self.block(next((each.body for each in chosen if self.truth(each.test)), otherwise))
+            case ast.For():
+                self.loop(node)
+            case ast.Break():
+                return _Next.AFTER_LOOP
+            case ast.Continue():
+                return _Next.ROUND
         return _Next.STATEMENT
 
-    def chosen_block(self, statement: syntax.If) -> tuple[syntax.Statement, ...]:
-        for branch in statement.branches:
-            if self.truth(branch.test):
-                return branch.body
-        return statement.otherwise
-
-    def loop(self, statement: syntax.For) -> _Next:
-        through = self.value(statement.through)
-        value_types.check_walked(statement.line, values.kind_of(through))
+    def loop(self, node: ast.For) -> None:
+        through = self.value(node.iter)
+        values.check_kind(node.lineno, "walk", values.kind_of(through))
         for element in through:
-            self.step(statement.line)
-            self.give(statement.line, statement.target, element)
-            if self.block(statement.body) is _Next.AFTER_LOOP:
-                break
-        return _Next.STATEMENT
+            self.step(node.lineno)
+            self.give(node.target, element)
+            if self.block(node.body) is _Next.AFTER_LOOP:
+                return
 
-    def give(self, line: int, target: syntax.AssignmentTarget, value: Any) -> None:
-        if not target.unpacks:
-            self.names[target.names[0]] = value
-            return
-        value_types.check_unpacked(line, values.kind_of(value))
-        if len(value) != len(target.names):
-            raise misfit(line, target, len(value))
-        self.names.update(zip(target.names, value, strict=True))
-
-    def update(self, statement: syntax.Update) -> None:
-        before = self.value(syntax.Name(statement.name, statement.line))
-        value = self.value(statement.value)
-        if statement.operator == "+" and values.kind_of(before) is values.kind_of(value) is ValueType.LIST:
-            raise grown(statement)
-        self.names[statement.name] = self.arithmetic(statement.line, statement.operator, before, value)
+    def give(self, target: ast.expr, value: Any) -> None:
+        names = target_names(target)
+        if isinstance(target, ast.Name):
+            value = [value]
+        else:
+            values.check_kind(target.lineno, "unpack", values.kind_of(value))
+        if len(value) != len(names):
+            raise misfit(target.lineno, len(names), len(value))
+        self.names.update(zip(names, value, strict=True))
 
     # ---- expressions
 
-    def value(self, part: syntax.Expression) -> Any:
-        self.step(part.line)
-        return _EVALUATE[type(part)](self, part)
+    def value(self, node: ast.expr) -> Any:  # noqa: C901 - one case for each form
+        line = node.lineno
+        self.step(line)
+        match node:
+            case ast.Constant():
+                return node.value
+            case ast.Name(id=name):
+                return self.name(line, name)
+            case ast.List() | ast.Tuple():
+                elements = [self.value(each) for each in node.elts]
+                made = elements if isinstance(node, ast.List) else tuple(elements)
+                self.keep(line, self.sizes.of(line, made))
+                return made
+            case ast.UnaryOp(op=ast.Not()):
+                return not self.truth(node.operand)
+            case ast.UnaryOp():
+                number = self.value(node.operand)
+                values.check_kind(line, "sign", values.kind_of(number))
+                return -number if isinstance(node.op, ast.USub) else number
+            case ast.BinOp():
+                left, right = self.value(node.left), self.value(node.right)
+                return self.arithmetic(line, SIGNS[type(node.op)], left, right)
+            case ast.Compare():
+                return self.comparison(node)
+            case ast.BoolOp():
+                return self.logical(node)
+            case ast.IfExp():
+                return self.value(node.body if self.truth(node.test) else node.orelse)
+            case ast.Subscript():
+                of, index = self.value(node.value), self.value(node.slice)
+                values.check_kind(line, "index of", values.kind_of(of))
+                values.check_kind(line, "index", values.kind_of(index))
+                return values.element_of(line, of, index)
+            case ast.Call() if called(node) in SKILLS:
+                return self.skill_call(node)
+            case ast.Call():
+                return self.function_call(node)
 
-    def truth(self, part: syntax.Expression) -> bool:
-        value = self.value(part)
-        value_types.check_truth(part.line, values.kind_of(value))
+    def name(self, line: int, name: str) -> Value:
+        if name not in self.names:
+            raise refused(line, f"`{name}` has no value yet; give it one before, on every way that leads here")
+        return self.names[name]
+
+    def truth(self, node: ast.expr) -> bool:
+        value = self.value(node)
+        values.check_kind(node.lineno, "truth", values.kind_of(value))
         return bool(value)
 
-    def constant(self, part: syntax.Constant) -> Value:
-        return part.value
-
-    def name(self, part: syntax.Name) -> Value:
+    def arithmetic(self, line: int, sign: str, left: Any, right: Any) -> Value:
         try:
-            return self.names[part.name]
-        except KeyError:
-            raise refused(
-                part.line, f"`{part.name}` has no value yet; give it one before, on every way that leads here"
-            ) from None
-
-    def collection(self, part: syntax.Collection) -> Value:
-        elements = [self.value(element) for element in part.elements]
-        made = elements if part.is_list else tuple(elements)
-        self.keep_value(part.line, made)
-        return made
-
-    def unary(self, part: syntax.Unary) -> Value:
-        if part.operator == "not":
-            return not self.truth(part.operand)
-        return values.signed(part.line, part.operator, self.value(part.operand))
-
-    def binary(self, part: syntax.Binary) -> Value:
-        left = self.value(part.left)
-        return self.arithmetic(part.line, part.operator, left, self.value(part.right))
-
-    def arithmetic(self, line: int, operator: str, left: Any, right: Any) -> Value:
-        try:
-            made = values.combined(line, operator, left, right, self.budget.factors)
+            made = values.combined(line, sign, left, right, self.budget.factors)
         except ProgramError:
             raise
         except AvlmapsError as fault:
-            raise _SkillFailedError(line, f"`{operator}`", fault) from fault
+            raise _SkillFailedError(line, f"`{sign}`", fault) from fault
         if isinstance(made, (str, list, tuple)):
-            self.keep_value(line, made)
+            self.keep(line, self.sizes.of(line, made))
         elif isinstance(made, values.Made):
             self.keep(line, len(made.how))
             self.look_at_clock(line)
         return made
 
-    def comparison(self, part: syntax.Comparison) -> bool:
-        left = self.value(part.first)
-        for operator, operand in zip(part.operators, part.rest, strict=True):
-            right = self.value(operand)
-            value_types.check_comparison(part.line, operator, values.kind_of(left), values.kind_of(right))
+    def comparison(self, node: ast.Compare) -> bool:
+        left = self.value(node.left)
+        for op, operand in zip(node.ops, node.comparators, strict=True):
+            right, sign = self.value(operand), SIGNS[type(op)]
+            values.check_comparison(node.lineno, sign, values.kind_of(left), values.kind_of(right))
             for value in (left, right):
-                self.step(part.line, self.sizes.of(part.line, value))
-            if not _COMPARE[operator](left, right):
+                self.step(node.lineno, self.sizes.of(node.lineno, value))
+            if not _COMPARE[sign](left, right):
                 return False
             left = right
         return True
 
-    def logical(self, part: syntax.Logical) -> Value:
-        stops_at = part.operator == "or"
-        for operand in part.operands[:-1]:
+    def logical(self, node: ast.BoolOp) -> Value:
+        stops_at = isinstance(node.op, ast.Or)
+        for operand in node.values[:-1]:
             value = self.value(operand)
-            value_types.check_truth(operand.line, values.kind_of(value))
+            values.check_kind(operand.lineno, "truth", values.kind_of(value))
             if bool(value) is stops_at:
                 return value
-        return self.value(part.operands[-1])
+        return self.value(node.values[-1])
 
-    def conditional(self, part: syntax.Conditional) -> Value:
-        return self.value(part.chosen if self.truth(part.test) else part.otherwise)
-
-    def element(self, part: syntax.Element) -> Value:
-        of, index = self.value(part.of), self.value(part.index)
-        value_types.check_indexed(part.line, values.kind_of(of), values.kind_of(index))
-        return values.element_of(part.line, of, index)
-
-    def builtin_call(self, part: syntax.BuiltinCall) -> Value:
-        arguments = [self.value(argument) for argument in part.arguments]
-        kinds = tuple(values.kind_of(argument) for argument in arguments)
-        value_types.check_function(part.line, part.function, kinds)
-        if part.function in ("min", "max") and kinds[0] in value_types.COLLECTIONS:
-            self.step(part.line, len(arguments[0]))
-        return values.call_function(part.line, part.function, arguments)
+    def function_call(self, node: ast.Call) -> Value:
+        name, arguments = called(node), [self.value(each) for each in node.args]
+        kinds = tuple(values.kind_of(each) for each in arguments)
+        values.check_function(node.lineno, name, kinds)
+        if name in ("min", "max") and len(kinds) == 1:
+            self.step(node.lineno, len(arguments[0]))
+        return values.call_function(node.lineno, name, arguments)
 
     # ---- skills
 
-    def skill_call(self, part: syntax.SkillCall) -> Value:
-        skill = SKILLS[part.skill]
-        arguments = {argument.parameter: self.value(argument.value) for argument in part.arguments}
+    def skill_call(self, node: ast.Call) -> Value:
+        """Call a skill, the one place where a program reaches anything."""
+        line, skill = node.lineno, SKILLS[called(node)]
+        arguments = {name: self.value(each) for name, each in given_to(skill, node).items()}
         for name, value in arguments.items():
-            check_argument(part.line, skill, parameter_of(skill, name), values.kind_of(value))
-        check_exactly_one(part.line, skill, sum(arguments.get(name) is not None for name in skill.alternatives))
-        self.look_at_clock(part.line)
+            check_argument(line, skill, skill.parameters[name], values.kind_of(value))
+        check_exactly_one(line, skill, sum(arguments.get(name) is not None for name in skill.alternatives))
+        self.look_at_clock(line)
         if len(self.steps) == self.budget.skill_calls:
             raise refused(
-                part.line,
+                line,
                 f"the program calls more than {self.budget.skill_calls} skills; shorten its loops or raise the budget",
             )
         seen = {name: values.shown(value) for name, value in arguments.items()}
-        self.keep(part.line, values.size_of_shown(seen))
-        return self.perform(part, arguments, seen)
-
-    def perform(self, part: syntax.SkillCall, arguments: dict[str, Any], seen: dict[str, Any]) -> Value:
-        """Call the skill, the one place where a program reaches anything."""
-        skill, began = SKILLS[part.skill], self.clock()
-        given = {name: values.handed_on(value) for name, value in arguments.items()}
+        self.keep(line, values.size_of_shown(seen))
+        began = self.clock()
         try:
+            given = {name: values.handed_on(value) for name, value in arguments.items()}
             returned = getattr(self.vocabulary, skill.name)(**given)
         except AvlmapsError as fault:
-            self.record(Step(skill.name, seen, None, part.line, self.clock() - began, str(fault)))
-            raise _SkillFailedError(part.line, skill.name, fault) from fault
+            self.record(Step(skill.name, seen, None, line, self.clock() - began, str(fault)))
+            raise _SkillFailedError(line, skill.name, fault) from fault
         how = f"{skill.name}({', '.join(f'{name}={told(value)}' for name, value in seen.items())})"
         result = values.adopted(skill, returned, how)
         content = values.shown(result)
-        self.record(Step(skill.name, seen, content, part.line, self.clock() - began))
-        self.keep_value(part.line, result)
-        self.keep(part.line, values.size_of_shown(content))
+        self.record(Step(skill.name, seen, content, line, self.clock() - began))
+        self.keep(line, self.sizes.of(line, result) + values.size_of_shown(content))
         return result
 
     def record(self, step: Step) -> None:
@@ -310,19 +393,6 @@ class _Run:
         self.on_step(step)
 
 
-_EVALUATE: dict[type, Callable[[_Run, Any], Value]] = {
-    syntax.Constant: _Run.constant,
-    syntax.Name: _Run.name,
-    syntax.Collection: _Run.collection,
-    syntax.Unary: _Run.unary,
-    syntax.Binary: _Run.binary,
-    syntax.Comparison: _Run.comparison,
-    syntax.Logical: _Run.logical,
-    syntax.Conditional: _Run.conditional,
-    syntax.Element: _Run.element,
-    syntax.SkillCall: _Run.skill_call,
-    syntax.BuiltinCall: _Run.builtin_call,
-}
 _COMPARE: dict[str, Callable[[Any, Any], bool]] = {
     "==": lambda left, right: left == right,
     "!=": lambda left, right: left != right,

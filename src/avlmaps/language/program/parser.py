@@ -2,40 +2,49 @@
 
 What Python's parser must not see is refused before it: characters that hide what a line does, names that only look like
 others, numbers and strings in unusual forms, brackets that nest without end. A program without a part on the whitelist
-is refused by its line. What is left means what Python means by it.
+is refused by its line, and so is one that must fail wherever it gets to: a robot that has begun to move should not stop
+half way for a slip that could be seen from the start. What is left means what Python means by it.
 """
 
 import ast
 import keyword
 import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import nullcontext, suppress
+from dataclasses import dataclass, field
+from enum import Enum, auto
 
 from avlmaps.core.errors import ProgramError
 from avlmaps.core.printable import UNSAFE, printable
-from avlmaps.language.program import syntax
-from avlmaps.language.program.budget import bounded, refused
-from avlmaps.language.program.calls import (
-    BUILTINS,
-    RESERVED,
-    bind_builtin,
-    bind_skill,
-    check_assignable,
-    skill_named,
-    unknown_function,
+from avlmaps.core.suggestions import nearest
+from avlmaps.language.program.values import (
+    bounded,
+    check_comparison,
+    check_function,
+    check_kind,
+    kind_of,
+    kind_of_result,
+    refused,
 )
-from avlmaps.language.program.check import check
-from avlmaps.language.program.table import ROBOT, SKILLS
+from avlmaps.language.program.vocabulary import ROBOT, SKILLS, Parameter, Skill, ValueType
 
 MOST_CHARACTERS = 20_000
 LONGEST_NAME = 64
 DEEPEST_BLOCK = 10
 DEEPEST = 50
 """How deep an expression may nest: far beyond what anyone writes, far within what recursion can take."""
-
+# How few and how many arguments each function takes; None is no limit.
+BUILTINS: Mapping[str, tuple[int, int | None]] = {
+    "len": (1, 1), "min": (1, None), "max": (1, None), "abs": (1, 1), "range": (1, 3), "round": (1, 2),
+}  # fmt: skip
+SIGNS: Mapping[type, str] = {
+    ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.FloorDiv: "//", ast.Mod: "%", ast.USub: "-",
+    ast.UAdd: "+", ast.Not: "not", ast.And: "and", ast.Or: "or", ast.Eq: "==", ast.NotEq: "!=", ast.Lt: "<",
+    ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.In: "in", ast.NotIn: "not in", ast.Is: "is", ast.IsNot: "is not",
+}  # fmt: skip
+_MOST_PASSES = 6
 _LONGEST_NUMBER = 40
-_DIGITS = r"[0-9](?:_?[0-9])*"
-_NUMBER = re.compile(
-    rf"0(?:_?0)*|[1-9](?:_?[0-9])*|(?:{_DIGITS}\.(?:{_DIGITS})?|\.{_DIGITS})(?:[eE][+-]?{_DIGITS})?|{_DIGITS}[eE][+-]?{_DIGITS}"
-)
+_NUMBER = re.compile(r"(?:[0-9][0-9_]*(?:\.[0-9_]*)?|\.[0-9_]+)(?:[eE][+-]?[0-9_]+)?")
 _PIECE = re.compile(
     r"""
     (?P<comment>\#[^\n]*)
@@ -46,15 +55,9 @@ _PIECE = re.compile(
     re.VERBOSE,
 )
 _PREFIXES = re.compile(rf"(?:[-+~][ \t]*){{{DEEPEST},}}|(?:not[ \t]+){{{DEEPEST},}}")
-_ESCAPE = re.compile(r"\\(?:x[0-9a-fA-F]{2}|u[0-9a-fA-F]{4}|U[0-9a-fA-F]{8}|.)")
-_SIGNS: dict[type, str] = {
-    ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.FloorDiv: "//", ast.Mod: "%", ast.USub: "-",
-    ast.UAdd: "+", ast.Not: "not", ast.And: "and", ast.Or: "or", ast.Eq: "==", ast.NotEq: "!=", ast.Lt: "<",
-    ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.In: "in", ast.NotIn: "not in", ast.Is: "is", ast.IsNot: "is not",
-    ast.Pass: "pass", ast.Break: "break", ast.Continue: "continue",
-}  # fmt: skip
+_ESCAPE = re.compile(r"\\(?:x[0-9a-fA-F]{2}|u[0-9a-fA-F]{4}|U[0-9a-fA-F]{8}|[\\'\"nt])|\\(?P<odd>.)")
 # What is no part of a program, and what is to be written instead.
-_INSTEAD: dict[str, str] = {
+_INSTEAD = {
     "While": "count with a bounded loop, such as `for i in range(10):`",
     "Import ImportFrom": "the skills and `len, min, max, abs, range, round` are all there is",
     "With AsyncWith AsyncFor Await": "call skills one after the other",
@@ -73,7 +76,31 @@ _INSTEAD: dict[str, str] = {
 _REMEDIES = {name: remedy for names, remedy in _INSTEAD.items() for name in names.split()}
 
 
-def parse_program(text: str) -> syntax.Program:
+@dataclass(frozen=True, slots=True, eq=False)
+class Program:
+    """A program that was parsed and checked.
+
+    Attributes:
+        statements: its lines and blocks, in their order: nodes of Python's own kind, all of them on the whitelist.
+        text: what was parsed.
+    """
+
+    statements: Sequence[ast.stmt]
+    text: str = field(repr=False)
+
+    @property
+    def calls(self) -> Iterator[ast.Call]:
+        """All calls, in no order."""
+        return (node for statement in self.statements for node in ast.walk(statement) if isinstance(node, ast.Call))
+
+    @property
+    def skills(self) -> tuple[str, ...]:
+        """The skills that the program calls, each once, in the order of its text."""
+        named = sorted(self.calls, key=lambda call: (call.lineno, call.col_offset))
+        return tuple(dict.fromkeys(name for name in map(called, named) if name in SKILLS))
+
+
+def parse_program(text: str) -> Program:
     """Return the program that a text is, with every check that can be made before it runs.
 
     Args:
@@ -88,11 +115,11 @@ def parse_program(text: str) -> syntax.Program:
         )
     plain = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
     _check_text(plain)
-    statements = _Reader().block(_tree(plain).body)
+    statements = _tree(plain).body
     if not statements:
         raise ProgramError("The program is empty; write at least one line, such as `robot.move_to('chair')`.")
-    check(statements)
-    return syntax.Program(statements, text)
+    _Checker().check(statements)
+    return Program(statements, text)
 
 
 def _tree(text: str) -> ast.Module:
@@ -125,8 +152,10 @@ def _check_text(text: str) -> None:  # noqa: C901 - one case for each kind of pi
                     raise refused(line, "strings have one quote on each side; write a comment with #")
             case "open":
                 raise refused(line, f"the string that starts with {said} does not end on its line; close it")
-            case "number":
-                _check_number(line, said)
+            case "number" if len(said) > _LONGEST_NUMBER:
+                raise refused(line, f"the number `{said[:12]}...` has more than {_LONGEST_NUMBER} characters; round it")
+            case "number" if not _NUMBER.fullmatch(said):
+                raise refused(line, f"`{said}` is no number; write it in plain digits, such as 12 or 0.5")
             case "name" if len(said) > LONGEST_NAME:
                 raise refused(line, f"the name `{said[:20]}...` is longer than {LONGEST_NAME} letters; shorten it")
             case "name" if said.startswith("__"):
@@ -147,142 +176,233 @@ def _check_text(text: str) -> None:  # noqa: C901 - one case for each kind of pi
         raise _too_deep(text.count("\n", 0, found.start()) + 1)
 
 
-def _check_number(line: int, text: str) -> None:
-    if len(text) > _LONGEST_NUMBER:
-        raise refused(line, f"the number `{text[:12]}...` has more than {_LONGEST_NUMBER} characters; round it")
-    if not _NUMBER.fullmatch(text):
-        raise refused(line, f"`{text}` is no number; write it in plain digits, such as 12 or 0.5")
-
-
 def _check_string(line: int, text: str) -> None:
     prefix = text[: min(text.index(quote) for quote in "'\"" if quote in text)]
-    if prefix in ("r", "R"):
+    if prefix not in ("", "r", "R"):
+        raise refused(
+            line, f"a string has no `{printable(prefix, 40)}` before its quote; write it plainly, or join with +"
+        )
+    odd = next((found["odd"] for found in _ESCAPE.finditer(text) if found["odd"]), None) if not prefix else None
+    if odd is not None:
+        raise refused(
+            line, f"the string has a backslash before {odd!r}, which makes no character; write `\\\\` for a backslash"
+        )
+
+
+def called(call: ast.Call) -> str:
+    """Return the name of the skill or function that a call on the whitelist calls."""
+    return call.func.attr if isinstance(call.func, ast.Attribute) else call.func.id  # type: ignore[attr-defined]
+
+
+def given_to(skill: Skill, call: ast.Call) -> dict[str, ast.expr]:
+    """Return the arguments of a call by the names of their parameters."""
+    return dict(zip(skill.parameters, call.args, strict=False)) | {
+        each.arg: each.value for each in call.keywords if each.arg
+    }
+
+
+def branches_of(node: ast.If) -> tuple[list[ast.If], list[ast.stmt]]:
+    """Return an `if` with its `elif`s, which Python nests in each other, and the block of its `else`."""
+    found = [node]
+    while len(node.orelse) == 1 and isinstance(inner := node.orelse[0], ast.If) and inner.col_offset == node.col_offset:
+        node = inner
+        found.append(node)
+    return found, node.orelse
+
+
+def check_argument(line: int, skill: Skill, parameter: Parameter, kind: ValueType) -> None:
+    """Refuse a skill an argument of a kind that its parameter does not take."""
+    if kind in parameter.kinds:
         return
-    if prefix:
-        told = printable(prefix, 40)
-        raise refused(line, f"a string has no `{told}` before its quote; write it plainly, or join with +")
-    for found in _ESCAPE.finditer(text):
-        escape = found.group()
-        code = int(escape[2:], 16) if len(escape) > 2 else 0
-        if escape[1] in "\\'\"nt":
-            continue
-        if not (0x20 <= code <= 0x10FFFF and not 0xD800 <= code <= 0xDFFF):
-            raise refused(
-                line, f"the string has a backslash before {escape[1:]!r}, which makes no character; write `\\\\` for a "
-                "backslash",
-            )  # fmt: skip
-        if UNSAFE.match(chr(code)):
-            raise refused(
-                line, f"the string has `{escape}`, which is not seen or turns the direction of writing; leave it out"
-            )
+    takes = [str(each) for each in ValueType if each in parameter.kinds]
+    wanted = takes[0] if len(takes) == 1 else f"{', '.join(takes[:-1])} or {takes[-1]}"
+    makers = [f"`{other.name}`" for other in SKILLS.values() if {other.returns} == parameter.kinds]
+    made = f"; {' or '.join(makers)} gives one" if makers else ""
+    raise refused(
+        line, f"`{skill.name}` takes {wanted} as its `{parameter.name}`, not {kind}; it is {skill.signature}{made}"
+    )
 
 
-class _Reader:
-    """Makes the parts of a program out of Python's nodes."""
+def check_exactly_one(line: int, skill: Skill, given: int) -> None:
+    """Refuse none, or several, of what are alternatives."""
+    if skill.alternatives and given != 1:
+        many = "none" if given == 0 else given
+        raise refused(line, f"`{skill.name}` takes exactly one of {_listed(skill.alternatives, 'or')}, not {many}")
+
+
+def grown(line: int, name: str) -> ProgramError:
+    """Return the refusal of `+=` on a list, which in Python changes it under all of its names."""
+    return refused(line, f"a list is not changed but made again; write `{name} = {name} + [...]`")
+
+
+def misfit(line: int, names: int, values: int) -> ProgramError:
+    """Return the refusal of an assignment of more or fewer values than names."""
+    return refused(line, f"{names} names cannot take {values} values; give one value to each")
+
+
+def target_names(target: ast.expr) -> list[str]:
+    """Return the names on the left side of an assignment."""
+    return [
+        each.id for each in (target.elts if isinstance(target, ast.Tuple) else [target]) if isinstance(each, ast.Name)
+    ]
+
+
+class Unsure(Enum):
+    """The possible kinds of a value where that is not one kind."""
+
+    ANYTHING = auto()
+    NOT_YET = auto()
+
+
+Guess = ValueType | Unsure
+
+
+class _Checker:
+    """Goes through a program until the kinds of its names rest, and refuses what is wrong on the last pass.
+
+    A name has a kind where every line that gives it a value gives it one of that kind.
+    """
 
     def __init__(self) -> None:
-        self.loops = self.blocks = 0
+        self.kinds: dict[str, Guess] = {}
+        self.given: set[str] = set()  # the names that a line before gave a value
+        self.is_last = False
 
-    def block(self, nodes: list[ast.stmt]) -> tuple[syntax.Statement, ...]:
-        if self.blocks > DEEPEST_BLOCK:
+    def check(self, statements: Sequence[ast.stmt]) -> None:
+        """Refuse a program that has a part that is none, or that must fail wherever it gets to what is wrong.
+
+        Raises:
+            ProgramError: it does; the line is named.
+        """
+        for _ in range(_MOST_PASSES):
+            before, self.given = dict(self.kinds), set()
+            self.block(statements)
+            if self.kinds == before:
+                break
+        else:
+            self.kinds = dict.fromkeys(self.kinds, Unsure.ANYTHING)
+        self.given, self.is_last = set(), True
+        self.block(statements)
+
+    def block(self, nodes: Sequence[ast.stmt], deep: int = 0, *, in_loop: bool = False) -> None:
+        if deep > DEEPEST_BLOCK:
             raise refused(nodes[0].lineno, f"blocks nest more than {DEEPEST_BLOCK} deep; write a flatter program")
-        self.blocks += 1
-        found = tuple(map(self.statement, nodes))
-        self.blocks -= 1
-        return found
+        for node in nodes:
+            # With kinds that are not settled a fault may be none; what is one still is on the last pass.
+            with nullcontext() if self.is_last else suppress(ProgramError):
+                self.statement(node, deep + 1, in_loop)
 
-    def statement(self, node: ast.stmt) -> syntax.Statement:  # noqa: C901 - one case for each form
+    def statement(self, node: ast.stmt, deep: int, in_loop: bool) -> None:  # noqa: C901 - one case for each form
         line = node.lineno
         match node:
             case ast.Assign(targets=[target]):
-                return syntax.Assign(_target(target), self.value(node.value), line)
+                self.assign(target, node.value)
             case ast.Assign():
                 raise refused(line, "a line has one `=`; give each name its value on a line of its own")
             case ast.AugAssign(target=ast.Name(id=name)):
-                return syntax.Update(check_assignable(line, name), _sign(line, node.op), self.value(node.value), line)
+                _check_assignable(line, name)
+                before, sign = self.name(line, name), _sign(line, node.op)
+                made = self.arithmetic(line, sign, before, self.value(node.value))
+                if sign == "+" and made is ValueType.LIST and self.is_last:
+                    raise grown(line, name)
+                self.join(name, made)
             case ast.AugAssign():
                 raise refused(line, "an update such as `+=` is of one name; write it out with `=`")
             case ast.Expr():
-                call = self.value(node.value)
-                if isinstance(call, syntax.SkillCall):
-                    return syntax.Perform(call, line)
-                raise refused(line, "the line works out a value and does nothing with it; name it or call a skill")
+                self.value(node.value)
+                if not (isinstance(node.value, ast.Call) and called(node.value) in SKILLS):
+                    raise refused(line, "the line works out a value and does nothing with it; name it or call a skill")
             case ast.For(orelse=[]):
-                return self.loop(node)
+                self.loop(node, deep)
             case ast.For():
                 raise refused(line, "`else` belongs to no `if`; put it right under its block")
             case ast.If():
-                return self.choice(node)
+                chosen, otherwise = branches_of(node)
+                for each in chosen:
+                    self.needed(each.test, "truth")
+                    self.block(each.body, deep, in_loop=in_loop)
+                if otherwise:
+                    self.block(otherwise, deep, in_loop=in_loop)
+            case ast.Break() | ast.Continue() if not in_loop:
+                word = type(node).__name__.lower()
+                raise refused(line, f"`{word}` is in no loop; put it into the block of a `for`")
             case ast.Pass() | ast.Break() | ast.Continue():
-                word = _SIGNS[type(node)]
-                if word != "pass" and not self.loops:
-                    raise refused(line, f"`{word}` is in no loop; put it into the block of a `for`")
-                return syntax.Word(word, line)
+                pass
             case _:
                 raise _no_part(line, node)
 
-    def loop(self, node: ast.For) -> syntax.For:
-        target, through = _target(node.target), self.value(node.iter)
-        self.loops += 1
-        body = self.block(node.body)
-        self.loops -= 1
-        return syntax.For(target, through, body, node.lineno)
+    def loop(self, node: ast.For, deep: int) -> None:
+        kind, names = self.needed(node.iter, "walk"), _checked_target(node.target)
+        counts = kind is ValueType.RANGE and isinstance(node.target, ast.Name)
+        for name in names:
+            self.join(name, ValueType.NUMBER if counts else Unsure.ANYTHING)
+        # Any round but the first may use what a later line of the body gave.
+        self.given.update(*(_names_given(inner) for inner in ast.walk(node)))
+        self.block(node.body, deep, in_loop=True)
 
-    def choice(self, node: ast.If) -> syntax.If:
-        line, branches = node.lineno, [syntax.Branch(self.value(node.test), self.block(node.body), node.lineno)]
-        # Python nests each `elif` in the one before; an `if` in a block of `else` begins further right.
-        while (
-            len(node.orelse) == 1
-            and isinstance(inner := node.orelse[0], ast.If)
-            and inner.col_offset == node.col_offset
-        ):
-            node = inner
-            branches.append(syntax.Branch(self.value(node.test), self.block(node.body), node.lineno))
-        return syntax.If(tuple(branches), self.block(node.orelse) if node.orelse else (), line)
+    def assign(self, target: ast.expr, value: ast.expr) -> None:
+        names, kind = _checked_target(target), self.value(value)
+        kinds: list[Guess] = [kind]
+        if isinstance(target, ast.Tuple) and isinstance(value, ast.List | ast.Tuple):
+            kinds = [self.value(each) for each in value.elts]
+            if len(kinds) != len(names):
+                raise misfit(target.lineno, len(names), len(kinds))
+        elif isinstance(target, ast.Tuple):
+            if isinstance(kind, ValueType):
+                check_kind(target.lineno, "unpack", kind)
+            kinds = [Unsure.ANYTHING] * len(names)
+        for name, one in zip(names, kinds, strict=True):
+            self.join(name, one)
 
-    def value(self, node: ast.expr, deep: int = 0) -> syntax.Expression:  # noqa: C901 - one case for each form
-        """Return an expression.
+    def join(self, name: str, kind: Guess) -> None:
+        self.kinds[name] = _joined(self.kinds.get(name, Unsure.NOT_YET), kind)
+        self.given.add(name)
 
-        Raises:
-            ProgramError: it has a part that is no part of a program, or nests too deep.
-        """
+    def needed(self, node: ast.expr, use: str, deep: int = 0) -> Guess:
+        """Return the kind of an expression; refuse one that does not serve a use."""
+        kind = self.value(node, deep)
+        if isinstance(kind, ValueType):
+            check_kind(node.lineno, use, kind)
+        return kind
+
+    def value(self, node: ast.expr, deep: int = 0) -> Guess:  # noqa: C901 - one case for each form
+        """Return the kind of an expression; refuse what is no part of a program, or cannot be."""
         line, deep = node.lineno, deep + 1
         if deep > DEEPEST:
             raise _too_deep(line)
         match node:
-            case ast.Constant(value=None | bool() | str()):
-                return syntax.Constant(node.value, line)  # type: ignore[arg-type]
-            case ast.Constant(value=int() | float() as number):
-                return syntax.Constant(bounded(line, number), line)
-            case ast.Name(id=name) if name == ROBOT:
-                raise refused(line, f"`{ROBOT}` is no value; write `{ROBOT}.SKILL(...)`")
-            case ast.Name(id=name) if name in RESERVED:
-                raise refused(line, f"`{name}` is called, not handed on; write `{name}(...)`")
+            case ast.Constant(value=None | bool() | str() | int() | float() as value):
+                return _constant(line, value)
             case ast.Name(id=name):
-                return syntax.Name(name, line)
+                return self.name(line, name)
             case ast.List() | ast.Tuple():
-                elements = tuple(self.value(each, deep) for each in node.elts)
-                return syntax.Collection(elements, isinstance(node, ast.List), line)
+                for each in node.elts:
+                    self.value(each, deep)
+                return ValueType.LIST if isinstance(node, ast.List) else ValueType.TUPLE
+            case ast.UnaryOp(op=ast.Not()):
+                self.needed(node.operand, "truth", deep)
+                return ValueType.TRUTH
             case ast.UnaryOp():
-                return syntax.Unary(_sign(line, node.op), self.value(node.operand, deep), line)
+                _sign(line, node.op)
+                self.needed(node.operand, "sign", deep)
+                return ValueType.NUMBER
             case ast.BinOp():
-                left, right = self.value(node.left, deep), self.value(node.right, deep)
-                return syntax.Binary(_sign(line, node.op), left, right, line)
+                sign = _sign(line, node.op)
+                return self.arithmetic(line, sign, self.value(node.left, deep), self.value(node.right, deep))
             case ast.Compare():
-                first, rest = self.value(node.left, deep), tuple(self.value(each, deep) for each in node.comparators)
-                signs = tuple(_sign(line, each) for each in node.ops)
-                nothing = syntax.Constant(None, line)
-                for sign, left, right in zip(signs, (first, *rest), rest, strict=False):
-                    if sign.startswith("is") and nothing not in (left, right):
-                        raise refused(line, f"`{sign}` compares with None alone; use `==` or `!=`")
-                return syntax.Comparison(first, signs, rest, line)
+                return self.comparison(node, deep)
             case ast.BoolOp():
-                return syntax.Logical(_sign(line, node.op), tuple(self.value(each, deep) for each in node.values), line)
+                kinds = [self.needed(each, "truth", deep) for each in node.values[:-1]]
+                for kind in (*kinds[1:], self.value(node.values[-1], deep)):
+                    kinds[0] = _joined(kinds[0], kind)
+                return kinds[0]
             case ast.IfExp():
-                test, chosen = self.value(node.test, deep), self.value(node.body, deep)
-                return syntax.Conditional(test, chosen, self.value(node.orelse, deep), line)
+                self.needed(node.test, "truth", deep)
+                return _joined(self.value(node.body, deep), self.value(node.orelse, deep))
             case ast.Subscript():
-                return syntax.Element(self.value(node.value, deep), self.value(node.slice, deep), line)
+                self.needed(node.value, "index of", deep)
+                self.needed(node.slice, "index", deep)
+                return Unsure.ANYTHING
             case ast.Call():
                 return self.call(node, deep)
             case ast.Attribute():
@@ -290,50 +410,164 @@ class _Reader:
             case _:
                 raise _no_part(line, node)
 
-    def call(self, node: ast.Call, deep: int) -> syntax.SkillCall | syntax.BuiltinCall:
+    def name(self, line: int, name: str) -> Guess:
+        if name == ROBOT:
+            raise refused(line, f"`{ROBOT}` is no value; write `{ROBOT}.SKILL(...)`")
+        if name in SKILLS or name in BUILTINS:
+            raise refused(line, f"`{name}` is called, not handed on; write `{name}(...)`")
+        if name not in self.given and self.is_last:
+            raise _without_value(line, name, self.given, later=name in self.kinds)
+        return self.kinds.get(name, Unsure.NOT_YET)
+
+    def comparison(self, node: ast.Compare, deep: int) -> Guess:
+        parts = [node.left, *node.comparators]
+        kinds = [self.value(each, deep) for each in parts]
+        for at, each in enumerate(node.ops):
+            sign, left, right = _sign(node.lineno, each), kinds[at], kinds[at + 1]
+            if sign.startswith("is") and not any(_is_none(part) for part in parts[at : at + 2]):
+                raise refused(node.lineno, f"`{sign}` compares with None alone; use `==` or `!=`")
+            if isinstance(left, ValueType) and isinstance(right, ValueType):
+                check_comparison(node.lineno, sign, left, right)
+        return ValueType.TRUTH
+
+    def arithmetic(self, line: int, sign: str, left: Guess, right: Guess) -> Guess:
+        if isinstance(left, ValueType) and isinstance(right, ValueType):
+            return kind_of_result(line, sign, left, right)
+        return Unsure.NOT_YET if Unsure.NOT_YET in (left, right) else Unsure.ANYTHING
+
+    def call(self, node: ast.Call, deep: int) -> Guess:
         line = node.lineno
         match node.func:
             case ast.Attribute(value=ast.Name(id=robot), attr=name) if robot == ROBOT:
-                skill_named(line, name)
-            case ast.Name(id=name) if name in SKILLS or name in BUILTINS:
-                pass
+                return self.skill(node, _skill_named(line, name), deep)
+            case ast.Name(id=name) if name in SKILLS:
+                return self.skill(node, SKILLS[name], deep)
+            case ast.Name(id=name) if name in BUILTINS:
+                return self.function(node, name, deep)
             case ast.Name(id=name):
-                raise unknown_function(line, name)
+                close = nearest(name, [*SKILLS, *BUILTINS])
+                other = f"call a skill of `{ROBOT}`, or one of {', '.join(BUILTINS)}."
+                raise ProgramError(
+                    f"Line {line}: there is no function `{name}`; {f'did you mean `{close}`?' if close else other}"
+                )
             case ast.Attribute() as asked:
                 raise _attribute(line, asked)
             case _:
                 raise refused(line, f"only skills and functions are called; write `{ROBOT}.SKILL(...)`")
-        positional = [self.value(each, deep) for each in node.args]
-        named: list[tuple[str, syntax.Expression]] = []
-        for each in node.keywords:
-            if each.arg is None:
-                raise refused(line, "`**` is not part of a program; write each argument")
-            named.append((each.arg, self.value(each.value, deep)))
-        if name in SKILLS:
-            return bind_skill(line, SKILLS[name], positional, named)
-        return bind_builtin(line, name, positional, named)
+
+    def function(self, node: ast.Call, name: str, deep: int) -> Guess:
+        line, (fewest, most) = node.lineno, BUILTINS[name]
+        if node.keywords:
+            raise refused(line, f"`{name}` takes nothing by name; give it values alone")
+        if len(node.args) < fewest or (most is not None and len(node.args) > most):
+            takes = "1 or more" if most is None else str(fewest) if fewest == most else f"{fewest} to {most}"
+            raise refused(line, f"`{name}` takes {takes} arguments, not {len(node.args)}")
+        kinds = [self.value(each, deep) for each in node.args]
+        known = tuple(kind for kind in kinds if isinstance(kind, ValueType))
+        if len(known) == len(kinds):
+            check_function(line, name, known)
+        return ValueType.RANGE if name == "range" else ValueType.NUMBER
+
+    def skill(self, node: ast.Call, skill: Skill, deep: int) -> Guess:
+        _check_bound(node.lineno, skill, node)
+        kinds = {name: self.value(each, deep) for name, each in given_to(skill, node).items()}
+        for name, kind in kinds.items():
+            if isinstance(kind, ValueType):
+                check_argument(node.lineno, skill, skill.parameters[name], kind)
+        chosen = [kind for name, kind in kinds.items() if name in skill.alternatives]
+        surely = sum(isinstance(kind, ValueType) and kind is not ValueType.NOTHING for kind in chosen)
+        if surely > 1 or all(kind is ValueType.NOTHING for kind in chosen):
+            check_exactly_one(node.lineno, skill, surely)
+        return skill.returns
 
 
-def _target(node: ast.expr) -> syntax.AssignmentTarget:
-    """Return the left side of an assignment: one name, or several."""
-    match node:
-        case ast.Name(id=name):
-            return syntax.AssignmentTarget((check_assignable(node.lineno, name),), unpacks=False)
-        case ast.Tuple(elts=[_, *_]) if all(isinstance(each, ast.Name) for each in node.elts):
-            names = tuple(check_assignable(node.lineno, each.id) for each in node.elts if isinstance(each, ast.Name))
-            return syntax.AssignmentTarget(names, unpacks=True)
-        case ast.Subscript():
-            raise refused(node.lineno, "a list is not changed but made again, as in `a = a + [b]`")
-        case _:
-            raise refused(
-                node.lineno, "only a name is given a value, or several as in `a, b = 1, 2`; put it left of the `=`"
-            )
+def _check_bound(line: int, skill: Skill, node: ast.Call) -> None:
+    """Refuse a call with too many or too few arguments, twice the same, or a name that the skill does not have."""
+    names = [*list(skill.parameters)[: len(node.args)], *(each.arg for each in node.keywords)]
+    missing = [each.name for each in skill.parameters.values() if each.default is None and each.name not in names]
+    strange = next((name for name in names if name not in skill.parameters), "")
+    if any(each.arg is None for each in node.keywords):
+        raise refused(line, "`**` is not part of a program; write each argument")
+    if len(node.args) > len(skill.parameters):
+        wrong = f"takes {len(skill.parameters)} arguments, not {len(node.args)}"
+    elif strange:
+        close = nearest(strange, skill.parameters)
+        wrong = f"takes no `{strange}`" + (f", did you mean `{close}`" if close else "")
+    elif len(set(names)) < len(names):
+        wrong = f"is given its `{next(name for name in names if names.count(name) > 1)}` twice"
+    elif missing:
+        wrong = f"needs its {_listed(missing)}"
+    else:
+        return
+    raise refused(line, f"`{skill.name}` {wrong}; it is {skill.signature}")
+
+
+def _constant(line: int, value: object) -> ValueType:
+    if isinstance(value, str) and (found := UNSAFE.search(value.replace("\n", "").replace("\t", ""))):
+        raise refused(
+            line, f"a string has the character U+{ord(found.group()):04X}, which is not seen or turns the direction of "
+            "writing; leave it out"
+        )  # fmt: skip
+    kind = kind_of(value)  # type: ignore[arg-type]
+    if kind is ValueType.NUMBER:
+        bounded(line, value)  # type: ignore[arg-type]
+    return kind
+
+
+def _is_none(node: ast.expr) -> bool:
+    return isinstance(node, ast.Constant) and node.value is None
+
+
+def _joined(first: Guess, second: Guess) -> Guess:
+    if Unsure.NOT_YET in (first, second):
+        return second if first is Unsure.NOT_YET else first
+    return first if first is second else Unsure.ANYTHING
+
+
+def _names_given(node: ast.AST) -> list[str]:
+    targets = (
+        node.targets
+        if isinstance(node, ast.Assign)
+        else [node.target]
+        if isinstance(node, ast.For | ast.AugAssign)
+        else []
+    )
+    return [name for target in targets for name in target_names(target)]
+
+
+def _check_assignable(line: int, name: str) -> str:
+    if name == ROBOT or name in SKILLS or name in BUILTINS:
+        what = "the robot" if name == ROBOT else "the name of a skill" if name in SKILLS else "the name of a function"
+        raise refused(line, f"`{name}` is {what} and cannot be given a value; choose another name")
+    return name
+
+
+def _checked_target(node: ast.expr) -> list[str]:
+    """Return the names on the left side of an assignment: one, or several."""
+    line = node.lineno
+    if isinstance(node, ast.Subscript):
+        raise refused(line, "a list is not changed but made again, as in `a = a + [b]`")
+    parts = node.elts if isinstance(node, ast.Tuple) else [node, node]
+    if len(parts) < 2 or not all(isinstance(each, ast.Name) for each in parts):
+        raise refused(line, "only a name is given a value, or several as in `a, b = 1, 2`; put it left of the `=`")
+    return [_check_assignable(line, name) for name in target_names(node)]
+
+
+def _without_value(line: int, name: str, given: set[str], *, later: bool) -> ProgramError:
+    if later:
+        return refused(line, f"`{name}` is used before it has a value; give it one on a line above")
+    if name in ("true", "false", "none", "null"):
+        return refused(line, f"`{name}` has no value; write True, False or None")
+    close = nearest(name, sorted(given))
+    if close:
+        return ProgramError(f"Line {line}: `{name}` has no value; did you mean `{close}`?")
+    return refused(line, f"`{name}` has no value; give it one on a line above, or put a phrase in quotes")
 
 
 def _sign(line: int, node: ast.AST) -> str:
-    if type(node) not in _SIGNS:
+    if type(node) not in SIGNS:
         raise _no_part(line, node)
-    return _SIGNS[type(node)]
+    return SIGNS[type(node)]
 
 
 def _no_part(line: int, node: ast.AST) -> ProgramError:
@@ -349,14 +583,27 @@ def _too_deep(line: int) -> ProgramError:
     return refused(line, f"an expression nests more than {DEEPEST} deep; give its parts names on lines before")
 
 
+def _skill_named(line: int, name: str) -> Skill:
+    if name in SKILLS:
+        return SKILLS[name]
+    close = nearest(name, SKILLS)
+    advice = f"did you mean `{close}`?" if close else f"the skills are {', '.join(SKILLS)}."
+    raise ProgramError(f"Line {line}: the robot has no skill `{name}`; {advice}")
+
+
 def _attribute(line: int, node: ast.Attribute) -> ProgramError:
     if node.attr in ("append", "extend", "insert"):
         return refused(line, f"`.{node.attr}` does not work on a value; write `name = name + [element]`")
     if isinstance(node.value, ast.Name) and node.value.id == ROBOT:
-        skill_named(line, node.attr)
-        return refused(line, f"`{ROBOT}.{node.attr}` is called, not handed on; write `{ROBOT}.{node.attr}(...)`")
+        name = _skill_named(line, node.attr).name
+        return refused(line, f"`{ROBOT}.{name}` is called, not handed on; write `{ROBOT}.{name}(...)`")
     return refused(
         line,
         f"`.{node.attr}` does not work on a value; the only dot is that of `{ROBOT}.SKILL(...)`, and a Place is added, "
         "subtracted and scaled whole",
     )
+
+
+def _listed(names: Sequence[str], last: str = "and") -> str:
+    quoted = [f"`{name}`" for name in names]
+    return quoted[0] if len(quoted) == 1 else f"{', '.join(quoted[:-1])} {last} {quoted[-1]}"

@@ -1,16 +1,53 @@
-"""The values of a running program: their kinds, their sizes, their arithmetic, and how a trace shows them."""
+"""The values of a running program: their kinds and sizes, what operators make of them, and how a trace shows them.
 
-from dataclasses import dataclass
+The check before a run and the run itself both ask here what goes with what, so that they cannot disagree.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
 from types import NoneType
 from typing import Any
 
-from avlmaps.language.program.budget import bounded, refused
-from avlmaps.language.program.table import Skill
-from avlmaps.language.program.value_types import ValueType, check_sign, kind_of_result
-from avlmaps.language.program.vocabulary import Clip, Heat, Picture, Place
+from avlmaps.core.errors import ProgramError
+from avlmaps.language.program.vocabulary import Clip, Heat, Picture, Place, Skill, ValueType
 
+LARGEST = 10**15
+"""No number in a program is further from zero: below it, whole numbers and floats are both exact."""
 DEEPEST_VALUE = 20
 """How deep lists and tuples nest in each other."""
+
+
+def refused(line: int, text: str) -> ProgramError:
+    """Return the error that says what is wrong on a line of a program."""
+    return ProgramError(f"Line {line}: {text}.")
+
+
+def bounded(line: int, value: int | float) -> int | float:
+    """Return a number, unless it is too far from zero, infinite or not a number."""
+    if not -LARGEST <= value <= LARGEST:  # not a number is on neither side
+        raise refused(line, "a number came out beyond 1e15 in size; programs reckon in metres and degrees")
+    return value
+
+
+@dataclass(frozen=True, slots=True)
+class Budget:
+    """The limits of one run of a program; running past any of them stops it."""
+
+    steps: int = 100_000
+    """Parts of the program that are computed; going through a collection counts each of its elements."""
+    skill_calls: int = 200
+    """Skills called."""
+    elements: int = 200_000
+    """Elements of collections and characters of strings made, also those in the trace; never given back."""
+    factors: int = 16
+    """Heatmaps multiplied into one."""
+    seconds: float = 1800.0
+    """Wall time, the skills' own included; looked at before each skill and now and then between."""
+
+    def __post_init__(self) -> None:
+        for limit in fields(self):
+            if not getattr(self, limit.name) > 0:
+                raise ValueError(f"a budget needs some {limit.name}, not {getattr(self, limit.name)}")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,24 +68,96 @@ class Made:
 Value = None | bool | int | float | str | list[Any] | tuple[Any, ...] | range | Place | Picture | Clip | Made
 
 _KINDS: dict[type, ValueType] = {
-    NoneType: ValueType.NOTHING,
-    bool: ValueType.TRUTH,
-    int: ValueType.NUMBER,
-    float: ValueType.NUMBER,
-    str: ValueType.STRING,
-    list: ValueType.LIST,
-    tuple: ValueType.TUPLE,
-    range: ValueType.RANGE,
-    Place: ValueType.PLACE,
-    Picture: ValueType.PICTURE,
-    Clip: ValueType.CLIP,
-    Made: ValueType.HEAT,
+    NoneType: ValueType.NOTHING, bool: ValueType.TRUTH, int: ValueType.NUMBER, float: ValueType.NUMBER,
+    str: ValueType.STRING, list: ValueType.LIST, tuple: ValueType.TUPLE, range: ValueType.RANGE,
+    Place: ValueType.PLACE, Picture: ValueType.PICTURE, Clip: ValueType.CLIP, Made: ValueType.HEAT,
+}  # fmt: skip
+_NUMBER, _PLACE, _HEAT = ValueType.NUMBER, ValueType.PLACE, ValueType.HEAT
+_COLLECTIONS = frozenset({ValueType.LIST, ValueType.TUPLE, ValueType.RANGE})
+# Neither true nor false: a program that asks one means a comparison that it did not write.
+_WITHOUT_TRUTH = frozenset({_PLACE, _HEAT, ValueType.PICTURE, ValueType.CLIP})
+_NUMBERS = {(_NUMBER, _NUMBER): _NUMBER}
+_SAME = {(kind, kind): kind for kind in (_NUMBER, _PLACE, ValueType.STRING, ValueType.LIST, ValueType.TUPLE)}
+_SCALED = {(_PLACE, _NUMBER): _PLACE}
+# Of each operator: the kinds of its two sides and of its result, in words, and what it does.
+_ARITHMETIC: dict[str, tuple[dict[tuple[ValueType, ValueType], ValueType], str, Callable[[Any, Any], Any]]] = {
+    "+": (_SAME, "two numbers, Places, strings, lists or tuples", lambda left, right: left + right),
+    "-": (_NUMBERS | {(_PLACE, _PLACE): _PLACE}, "two numbers or two Places", lambda left, right: left - right),
+    "*": (
+        _NUMBERS | _SCALED | {(_NUMBER, _PLACE): _PLACE, (_HEAT, _HEAT): _HEAT},
+        "two numbers, a Place and a number, or two Heats",
+        lambda left, right: left * right,
+    ),
+    "/": (_NUMBERS | _SCALED, "two numbers, or a Place and a number", lambda left, right: left / right),
+    "//": (_NUMBERS, "two numbers", lambda left, right: left // right),
+    "%": (_NUMBERS, "two numbers", lambda left, right: left % right),
 }
+# What a part of a program needs of a kind, and the refusal of another one.
+_NEEDS: dict[str, tuple[frozenset[ValueType], str]] = {
+    "truth": (
+        frozenset(ValueType) - _WITHOUT_TRUTH, "{0} is neither true nor false; compare it or a number with something"
+    ),
+    "sign": (frozenset({_NUMBER}), "a sign goes before a number, not {0}; write -1 * a Place"),
+    "walk": (_COLLECTIONS, "`for` goes through a list, a tuple or a range, not {0}; count with `range(10)`"),
+    "unpack": (_COLLECTIONS, "{0} cannot be taken apart into names; give it one name and use it whole"),
+    "index of": (
+        frozenset({ValueType.LIST, ValueType.TUPLE}),
+        "{0} has no elements to pick with [...]; only a list or a tuple has",
+    ),
+    "index": (frozenset({_NUMBER}), "an element is picked by a whole number in [...], not by {0}"),
+    "len": (_COLLECTIONS | {ValueType.STRING}, "`len` counts a list, a tuple, a range or a string, not {0}"),
+    "all of": (_COLLECTIONS, "`min` and `max` take several numbers or a list of them, not {0} alone"),
+    "number": (frozenset({_NUMBER}), "`min`, `max`, `abs`, `range` and `round` take numbers, not {0}"),
+    "in": (_COLLECTIONS, "`in` looks through a list, a tuple or a range, not {0}"),
+    "compared": (frozenset(ValueType) - {_HEAT}, "a Heat cannot be compared; multiply Heats and hand them to a skill"),
+}  # fmt: skip
 
 
 def kind_of(value: Value) -> ValueType:
     """Return the kind of a value; its type decides, and no subclass passes for another."""
     return _KINDS[type(value)]
+
+
+def check_kind(line: int, use: str, kind: ValueType) -> None:
+    """Refuse a kind of value for a use; see the table of uses."""
+    takes, refusal = _NEEDS[use]
+    if kind not in takes:
+        raise refused(line, refusal.format(kind))
+
+
+def check_comparison(line: int, sign: str, left: ValueType, right: ValueType) -> None:
+    """Refuse a comparison that has no meaning for these two kinds."""
+    if sign in ("in", "not in"):
+        check_kind(line, "in", right)
+        check_kind(line, "compared", left)
+    elif sign in ("==", "!="):
+        check_kind(line, "compared", left)
+        check_kind(line, "compared", right)
+    elif sign in ("<", "<=", ">", ">=") and not (left is right and left in (_NUMBER, ValueType.STRING)):
+        raise refused(line, f"`{sign}` compares two numbers or two strings, not {left} and {right}")
+
+
+def check_function(line: int, function: str, kinds: tuple[ValueType, ...]) -> None:
+    """Refuse a function what it cannot work with."""
+    if function == "len":
+        check_kind(line, "len", kinds[0])
+    elif function in ("min", "max") and len(kinds) == 1:
+        check_kind(line, "all of", kinds[0])
+    else:
+        for kind in kinds:
+            check_kind(line, "number", kind)
+
+
+def kind_of_result(line: int, sign: str, left: ValueType, right: ValueType) -> ValueType:
+    """Return the kind that an arithmetic operator makes of two.
+
+    Raises:
+        ProgramError: it does not take these.
+    """
+    results, takes, _ = _ARITHMETIC[sign]
+    if (left, right) not in results:
+        raise refused(line, f"`{sign}` takes {takes}, not {left} and {right}")
+    return results[left, right]
 
 
 class Sizes:
@@ -77,10 +186,9 @@ class Sizes:
             return known[1:]
         size, depth = len(value), 0
         for each in value:
-            kind = type(each)
-            if kind is str:
+            if type(each) is str:
                 size += len(each)
-            elif kind is list or kind is tuple:
+            elif type(each) in (list, tuple):
                 inside, levels = self._inside(line, each)
                 size += inside
                 depth = max(depth, levels)
@@ -90,53 +198,29 @@ class Sizes:
         return size, depth + 1
 
 
-def combined(line: int, operator: str, left: Any, right: Any, factors: int) -> Value:
-    """Return the result of an arithmetic operator on two values.
+def combined(line: int, sign: str, left: Any, right: Any, factors: int) -> Value:
+    """Return the result of an arithmetic operator on two values; ``factors`` are the most Heats in one product.
 
     Raises:
         ProgramError: they are of no kinds that it takes, it divides by zero, or the result is too large.
     """
-    kind = kind_of_result(line, operator, kind_of(left), kind_of(right))
-    if kind is ValueType.HEAT:
-        return _product(line, left, right, factors)
-    if kind is ValueType.PLACE:
+    kind = kind_of_result(line, sign, kind_of(left), kind_of(right))
+    if kind is _HEAT:
+        count = left.factors + right.factors
+        if count > factors:
+            raise refused(line, f"more than {factors} Heats are multiplied into one; leave some out")
+        return Made(left.heat * right.heat, f"{left.how} * {right.how}", count)
+    if kind is _PLACE:
         left, right = handed_on(left), handed_on(right)
     try:
-        made = _ARITHMETIC[operator](left, right)
+        made = _ARITHMETIC[sign][2](left, right)
     except ZeroDivisionError:
-        raise refused(line, f"`{operator}` divides by zero; check the number below with `if` first") from None
-    except ValueError:
-        # The one value that refuses to be made is a place at infinity.
+        raise refused(line, f"`{sign}` divides by zero; check the number below with `if` first") from None
+    except ValueError:  # the one value that refuses to be made is a place at infinity
         return bounded(line, float("inf"))
-    if kind is ValueType.NUMBER:
-        return bounded(line, made)
-    if kind is ValueType.PLACE:
-        for coordinate in (made.x, made.y, made.z):
-            bounded(line, coordinate)
+    for number in (made.x, made.y, made.z) if kind is _PLACE else (made,) if kind is _NUMBER else ():
+        bounded(line, number)
     return made
-
-
-_ARITHMETIC = {
-    "+": lambda left, right: left + right,
-    "-": lambda left, right: left - right,
-    "*": lambda left, right: left * right,
-    "/": lambda left, right: left / right,
-    "//": lambda left, right: left // right,
-    "%": lambda left, right: left % right,
-}
-
-
-def _product(line: int, left: Made, right: Made, most: int) -> Made:
-    factors = left.factors + right.factors
-    if factors > most:
-        raise refused(line, f"more than {most} Heats are multiplied into one; leave some out")
-    return Made(left.heat * right.heat, f"{left.how} * {right.how}", factors)
-
-
-def signed(line: int, operator: str, value: Any) -> int | float:
-    """Return a number with a sign before it."""
-    check_sign(line, operator, kind_of(value))
-    return -value if operator == "-" else value
 
 
 def element_of(line: int, values: list[Any] | tuple[Any, ...], index: Any) -> Value:
@@ -167,35 +251,22 @@ def call_function(line: int, function: str, arguments: list[Any]) -> Value:
             return len(arguments[0])
         case "abs":
             return abs(arguments[0])
+        case "range" | "round" if any(type(each) is not int for each in arguments[function == "round" :]):
+            raise refused(line, f"`{function}` counts in whole numbers; use `round` or `//`")
         case "range":
-            return _range(line, arguments)
+            if arguments[2:] == [0]:
+                raise refused(line, "`range` cannot count in steps of 0; give it another step")
+            return range(*arguments)
         case "round":
-            return _rounded(line, arguments)
+            if not all(-15 <= digits <= 15 for digits in arguments[1:]):
+                raise refused(line, f"`round` takes from -15 to 15 digits, not {arguments[1]}")
+            return bounded(line, round(*arguments))
     numbers = arguments if len(arguments) > 1 else list(arguments[0])
     if not numbers:
         raise refused(line, f"`{function}` of nothing has no value; check `len` with `if` first")
     for number in numbers:
-        if kind_of(number) is not ValueType.NUMBER:
-            raise refused(line, f"`{function}` takes numbers, not {kind_of(number)}")
+        check_kind(line, "number", kind_of(number))
     return min(numbers) if function == "min" else max(numbers)
-
-
-def _range(line: int, arguments: list[Any]) -> range:
-    for number in arguments:
-        if type(number) is not int:
-            raise refused(line, f"`range` counts in whole numbers, not in {number}; use `round` or `//`")
-    if len(arguments) == 3 and arguments[2] == 0:
-        raise refused(line, "`range` cannot count in steps of 0; give it another step")
-    return range(*arguments)
-
-
-def _rounded(line: int, arguments: list[Any]) -> int | float:
-    digits = arguments[1] if len(arguments) > 1 else None
-    if digits is None:
-        return bounded(line, round(arguments[0]))
-    if type(digits) is not int or not -15 <= digits <= 15:
-        raise refused(line, f"`round` takes a whole number of digits from -15 to 15, not {digits}")
-    return bounded(line, round(arguments[0], digits))
 
 
 def handed_on(value: Value) -> Any:

@@ -1,13 +1,36 @@
-"""The robot's vocabulary: every skill that a program may call, in one table.
+"""The robot's vocabulary: every skill that a program may call, in one table, and the kinds of value of a program.
 
 `RobotSkills` is that table: each method with its typed signature and docstring is a skill. The interpreter calls
 nothing else, the chat prompt is made from it, plans are written in it, and `avlmaps.navigate` implements it.
 Names are those of the paper and of VLMaps; angles in degrees and metres, since people write programs in them.
 """
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
+from inspect import Parameter as Declared
+from inspect import getdoc, signature
 from math import isfinite
-from typing import Protocol, runtime_checkable
+from types import MappingProxyType, NoneType, UnionType
+from typing import Any, Protocol, Union, get_args, get_origin, get_type_hints, runtime_checkable
+
+ROBOT = "robot"
+
+
+class ValueType(StrEnum):
+    """A kind of value; its word is what errors call it."""
+
+    NOTHING = "None"
+    TRUTH = "a truth value"
+    NUMBER = "a number"
+    STRING = "a string"
+    LIST = "a list"
+    TUPLE = "a tuple"
+    RANGE = "a range"
+    PLACE = "a Place"
+    HEAT = "a Heat"
+    PICTURE = "a Picture"
+    CLIP = "a Clip"
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,3 +238,112 @@ class RobotSkills(Protocol):
     def wait(self, duration_s: float) -> None:
         """Stand still for some seconds, at most 600."""
         ...
+
+
+_TYPES: dict[Any, tuple[ValueType, str]] = {
+    NoneType: (ValueType.NOTHING, "None"),
+    bool: (ValueType.TRUTH, "bool"),
+    float: (ValueType.NUMBER, "float"),
+    str: (ValueType.STRING, "str"),
+    Place: (ValueType.PLACE, "Place"),
+    Heat: (ValueType.HEAT, "Heat"),
+    Picture: (ValueType.PICTURE, "Picture"),
+    Clip: (ValueType.CLIP, "Clip"),
+    list[Place]: (ValueType.LIST, "list[Place]"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One parameter of a skill.
+
+    Attributes:
+        name: its keyword.
+        kinds: which kinds of value it takes.
+        annotation: its type, as in the signature.
+        default: the value that it has when it is not given, as text; None where it must be given.
+    """
+
+    name: str
+    kinds: frozenset[ValueType]
+    annotation: str
+    default: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Skill:
+    """One skill of the robot.
+
+    Attributes:
+        name: what programs call.
+        parameters: by their names, in their order.
+        returns: the kind of its result.
+        returns_text: the type of its result, as in the signature.
+        doc: what it does.
+    """
+
+    name: str
+    parameters: Mapping[str, Parameter]
+    returns: ValueType
+    returns_text: str
+    doc: str
+
+    @property
+    def signature(self) -> str:
+        """The signature as a program's writer reads it."""
+        given = (
+            f"{each.name}: {each.annotation}" + ("" if each.default is None else f" = {each.default}")
+            for each in self.parameters.values()
+        )
+        return f"{self.name}({', '.join(given)}) -> {self.returns_text}"
+
+    @property
+    def alternatives(self) -> tuple[str, ...]:
+        """The parameters of which exactly one is given: several whose default is None; most skills have none."""
+        names = tuple(each.name for each in self.parameters.values() if each.default == "None")
+        return names if len(names) > 1 else ()
+
+    @property
+    def moves(self) -> bool:
+        """Whether the robot moves by it; skills that do return nothing, all others something."""
+        return self.returns is ValueType.NOTHING
+
+
+def skills_of(vocabulary: type) -> Mapping[str, Skill]:
+    """Return the skills that a vocabulary's class declares, in its order.
+
+    Raises:
+        TypeError: a signature has something that a program has no value for.
+    """
+    names = [name for name, member in vars(vocabulary).items() if not name.startswith("_") and callable(member)]
+    return MappingProxyType({name: _skill(name, getattr(vocabulary, name)) for name in names})
+
+
+def _skill(name: str, method: Any) -> Skill:
+    hints = get_type_hints(method)
+    parameters: dict[str, Parameter] = {}
+    for declared in list(signature(method).parameters.values())[1:]:
+        if declared.kind is not Declared.POSITIONAL_OR_KEYWORD:
+            raise TypeError(f"the parameter {declared} of the skill {name} is neither plain nor named")
+        kinds, text = _kinds_of(name, hints[declared.name])
+        default = None if declared.default is Declared.empty else repr(declared.default)
+        parameters[declared.name] = Parameter(declared.name, kinds, text, default)
+    (returns,), returns_text = _kinds_of(name, hints["return"])
+    return Skill(name, parameters, returns, returns_text, " ".join((getdoc(method) or "").split()))
+
+
+def _kinds_of(skill: str, hint: Any) -> tuple[frozenset[ValueType], str]:
+    choices = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
+    try:
+        known = [_TYPES[choice] for choice in choices]
+    except (KeyError, TypeError):
+        raise TypeError(f"a program has no value of the type {hint} in the skill {skill}") from None
+    return frozenset(kind for kind, _ in known), " | ".join(text for _, text in known)
+
+
+SKILLS: Mapping[str, Skill] = skills_of(RobotSkills)
+
+
+def skill_lines(prefix: str = f"{ROBOT}.", skills: Sequence[Skill] | None = None) -> tuple[str, ...]:
+    """Return the table as lines for people and language models: a signature, then what it does."""
+    return tuple(f"{prefix}{skill.signature}: {skill.doc}" for skill in skills or tuple(SKILLS.values()))
