@@ -43,15 +43,12 @@ if TYPE_CHECKING:
     from avlmaps.perception.encoders import Encoders
     from avlmaps.perception.profiles import Profile, profile
     from avlmaps.query.answer import Answer
-    from avlmaps.query.avlmap import AVLMap, QuerySettings
+    from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.contents import Room, SoundEvent, Thing
-    from avlmaps.query.factors import HeatSettings
     from avlmaps.query.goals import Goal
     from avlmaps.query.heatmap import Heatmap
     from avlmaps.query.locate import Located
-    from avlmaps.query.modalities.area import AreaSettings
-    from avlmaps.query.modalities.sound import SoundSettings
-    from avlmaps.query.object_settings import ObjectSettings
+    from avlmaps.query.settings import AreaSettings, HeatSettings, ObjectSettings, QuerySettings, SoundSettings
     from avlmaps.query.voxel_map import VoxelMap
     from avlmaps.recordings.audio import Sound
     from avlmaps.recordings.channels import ChannelSound

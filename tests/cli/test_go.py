@@ -11,7 +11,7 @@ from avlmaps.core.extras import install_command
 from avlmaps.core.motion import Action, Moved
 from avlmaps.core.question import Part
 from avlmaps.query.factors import NearThings
-from avlmaps.query.map_names import MapNames
+from avlmaps.query.findings import MapNames
 from avlmaps_sim.body import SimulatedBody
 from avlmaps_sim.materials import material
 from avlmaps_sim.scene import Scene, SceneBuilder

@@ -22,10 +22,9 @@ from avlmaps.navigate.skills import RobotSettings
 from avlmaps.perception.cache.feature_store import CacheSettings
 from avlmaps.perception.models.settings import ModelSettings, Precision
 from avlmaps.query.asking import Asked
-from avlmaps.query.avlmap import AVLMap, QuerySettings
-from avlmaps.query.modalities.sound import SoundSettings
-from avlmaps.query.rules import Rules
+from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.selection import Wanted
+from avlmaps.query.settings import QuerySettings, Rules, SoundSettings
 from avlmaps.recordings.consistency.verdict import Reason
 from avlmaps.recordings.open import open_recording
 from avlmaps.serve.drive.robots import RobotFile

@@ -15,7 +15,7 @@ from avlmaps.live.settings import LiveSettings
 from avlmaps.maps.audio.settings import HearingSettings, SegmentationSettings
 from avlmaps.maps.fusion.sensor import FusionSettings
 from avlmaps.maps.settings import BuildSettings, FrameSettings
-from avlmaps.query.avlmap import QuerySettings
+from avlmaps.query.settings import QuerySettings
 from avlmaps.recordings.audio import require_rate
 from avlmaps.recordings.channels import ChannelSound
 

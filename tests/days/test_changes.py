@@ -12,10 +12,21 @@ from avlmaps.language.list_questions import Listed, read_list
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.store.life import Life, Stay
 from avlmaps.maps.store.manifest import CameraInfo, RecordingInfo, RigInfo, Visit
-from avlmaps.query.changes import Days, changes_answer, is_meant, last_seen, last_seen_text, text_of, things_at
+from avlmaps.query.changes import (
+    Days,
+    changes_answer,
+    days_of,
+    is_meant,
+    last_seen,
+    last_seen_text,
+    text_of,
+    things_at,
+    usual,
+    usual_place_text,
+    usual_text,
+)
 from avlmaps.query.goals import Goal
 from avlmaps.query.lists import lies
-from avlmaps.query.usual import days_of, usual, usual_place_text, usual_text
 
 CAMERA = CameraInfo(fx=1.0, fy=1.0, cx=0.5, cy=0.5, width=1, height=1)
 ROWS = tuple(tuple(float(value) for value in row) for row in np.eye(4))

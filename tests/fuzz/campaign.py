@@ -159,7 +159,7 @@ def look_into_map(path: Path) -> int:
     if status := _run(Info(path=path, json=True)):
         return status
     from avlmaps.maps.store.reader import open_stored
-    from avlmaps.query.topdown import TopDown
+    from avlmaps.query.plots import TopDown
     from avlmaps.query.voxel_space import Space
 
     stored = open_stored(path)

@@ -20,7 +20,8 @@ from avlmaps.navigate.file_access import Readable, named_files, offered_by
 from avlmaps.navigate.footprint import Outline, middle_between
 from avlmaps.navigate.instances import Destination, nearest
 from avlmaps.navigate.skills import Robot, RobotSettings
-from avlmaps.query.avlmap import AVLMap, QuerySettings
+from avlmaps.query.avlmap import AVLMap
+from avlmaps.query.settings import QuerySettings
 from avlmaps.query.voxel_space import Space
 from helpers.kinematic import KinematicDriver
 from query.query_fakes import FakeViews, furnished_map, keyframes_at, sounds_of

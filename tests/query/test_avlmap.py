@@ -10,8 +10,8 @@ from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import AudioError, BackendError, QueryError
 from avlmaps.core.question import Modality, Part, Question, Role
 from avlmaps.query import locate as locate_module
-from avlmaps.query.avlmap import AVLMap, QuerySettings
-from avlmaps.query.modalities.area import AreaSettings
+from avlmaps.query.avlmap import AVLMap
+from avlmaps.query.settings import AreaSettings, QuerySettings
 from avlmaps.recordings.audio import AudioTrack, Sound
 
 CHAIR = Part(Modality.OBJECT, "chair")

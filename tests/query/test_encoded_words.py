@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from avlmaps.core.errors import BackendError
-from avlmaps.query.encoded_words import encoded_words
+from avlmaps.query.words import encoded_words
 
 
 def refuse(words: list[str]) -> Any:

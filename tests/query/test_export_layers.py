@@ -13,12 +13,10 @@ from query_fakes import furnished_map
 from avlmaps.core.errors import BackendError, QueryError
 from avlmaps.core.frames import FrameName
 from avlmaps.core.poses import from_quaternion
-from avlmaps.query import export_openlex3d
+from avlmaps.query import export
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.query.export_foxglove import write_foxglove
-from avlmaps.query.export_layers import ExportedSound, layers_of
-from avlmaps.query.export_openlex3d import FILES, pcd_bytes, write_openlex3d
-from avlmaps.query.export_rerun import write_rerun
+from avlmaps.query.export import FILES, pcd_bytes, write_openlex3d
+from avlmaps.query.export_viewers import ExportedSound, layers_of, write_foxglove, write_rerun
 
 UPS = st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda up: np.linalg.norm(up) > 0.1)
 
@@ -128,7 +126,7 @@ def test_what_cannot_be_written_leaves_no_folder(tmp_path: Path, monkeypatch: py
     def full(path: Path, content: bytes) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(export_openlex3d, "write_bytes_atomically", full)
+    monkeypatch.setattr(export, "write_bytes_atomically", full)
     (tmp_path / "there").mkdir()
     for folder in (tmp_path / "new" / "out", tmp_path / "there"):
         with pytest.raises(QueryError, match="No space left"):

@@ -21,7 +21,7 @@ from avlmaps.core.errors import AudioError, AvlmapsError, BackendError, MapError
 from avlmaps.core.question import Question
 from avlmaps.maps.settings import GravitySettings
 from avlmaps.query.asking import _OF_A_LIST
-from avlmaps.query.export_layers import layers_of
+from avlmaps.query.export_viewers import layers_of
 from avlmaps.recordings.conformance import example_truth
 from avlmaps.recordings.memory import MemoryRecording
 from helpers.raycast import render

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from avlmaps.maps.store.folder import damaged_files, read
-from avlmaps.query.avlmap import AVLMap, QuerySettings, with_findings
-from avlmaps.query.modalities.area import AreaSettings
+from avlmaps.query.avlmap import AVLMap, with_findings
 from avlmaps.query.room_regions import RoomRegions
 from avlmaps.query.rooms import Rooms
+from avlmaps.query.settings import AreaSettings, QuerySettings
 from helpers.office import office_of
 
 

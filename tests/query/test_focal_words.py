@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from avlmaps.core.camera import Pinhole
-from avlmaps.query.focal import Uncertainty
-from avlmaps.query.locate import Located
+from avlmaps.query.locate import Located, Uncertainty
 
 CAMERA = Pinhole(300.0, 300.0, 160.0, 120.0, 320, 240)
 

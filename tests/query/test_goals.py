@@ -9,11 +9,12 @@ from query_fakes import UP, furnished_map, keyframes_at, sounds_of
 from avlmaps.core.errors import QueryError
 from avlmaps.core.question import Modality, Part, Question, Role
 from avlmaps.maps.grid import GridSpec
-from avlmaps.query.avlmap import AVLMap, QuerySettings
+from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.factors import NearAnchors, NearThings
 from avlmaps.query.goals import Goal
 from avlmaps.query.heatmap import Heatmap
-from avlmaps.query.modalities.area import AreaSettings, modes
+from avlmaps.query.modalities.area import modes
+from avlmaps.query.settings import AreaSettings, QuerySettings
 from avlmaps.query.voxel_space import Space
 from avlmaps_sim.bench.harness.factors import VoxelHeat
 

@@ -9,8 +9,9 @@ from hypothesis.extra import numpy as hnp
 from avlmaps.core.question import Modality, Part, Role
 from avlmaps.maps.grid import GridSpec
 from avlmaps.query import factors
-from avlmaps.query.factors import HeatSettings, NearAnchors, NearThings, anchor_heat, object_heat, stretch_scores
+from avlmaps.query.factors import NearAnchors, NearThings, anchor_heat, object_heat, stretch_scores
 from avlmaps.query.heatmap import Heatmap, product
+from avlmaps.query.settings import HeatSettings
 from avlmaps.query.voxel_space import Blocks, Space
 
 SIZE_M = 0.05

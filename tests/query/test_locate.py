@@ -11,8 +11,7 @@ from avlmaps.core.errors import MapError
 from avlmaps.core.poses import inverse, rotation_angle_rad
 from avlmaps.maps.keyframes.describe import stack_keyframes
 from avlmaps.perception.encoders import Encoders
-from avlmaps.query.focal import camera_of_35mm, focal_35mm_of
-from avlmaps.query.locate import Located, LocateSettings, alike, locate, nearest
+from avlmaps.query.locate import Located, LocateSettings, alike, camera_of_35mm, focal_35mm_of, locate, nearest
 from avlmaps_sim.bench.locate import MapOfPictures, map_of
 from helpers.picture_room import CAMERA, Room, RoomWalk, looking, painting
 

@@ -11,8 +11,8 @@ from avlmaps.core.question import Modality, Part, Role
 from avlmaps.maps.grid import GridSpec
 from avlmaps.perception.embedded.closed_set import features_of, orthonormal_codes
 from avlmaps.perception.protocols import ModelCard, NamedViewEncoder
-from avlmaps.query.factors import HeatSettings
-from avlmaps.query.modalities.area import AreaSettings, area_factor, area_scores, pool_posteriors
+from avlmaps.query.modalities.area import area_factor, area_scores, pool_posteriors
+from avlmaps.query.settings import AreaSettings, HeatSettings
 from avlmaps.query.voxel_space import Space
 
 ROOMS = ("kitchen", "bedroom", "office", "open-plan office")

@@ -11,16 +11,21 @@ from avlmaps.core.question import Modality, Part, Role
 from avlmaps.maps.grid import GridSpec
 from avlmaps.perception.embedded.closed_set import features_of, orthonormal_codes
 from avlmaps.perception.protocols import ModelCard, NamedPixelEncoder
-from avlmaps.query import known_words
-from avlmaps.query.colour_filter import colour_in
-from avlmaps.query.factors import HeatSettings, NearAnchors
+from avlmaps.query import words
+from avlmaps.query.factors import NearAnchors
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.instances import FeatureVoxels
-from avlmaps.query.known_words import KnownClosestWords
-from avlmaps.query.modalities.object import object_factor
-from avlmaps.query.object_settings import ObjectSettings
+from avlmaps.query.modalities.object import colour_in, object_factor
+from avlmaps.query.settings import HeatSettings, ObjectSettings
 from avlmaps.query.voxel_space import Space
-from avlmaps.query.words import ClosestWords, EncodedWord, Vocabulary, least_score_to_count, object_margins
+from avlmaps.query.words import (
+    ClosestWords,
+    EncodedWord,
+    KnownClosestWords,
+    Vocabulary,
+    least_score_to_count,
+    object_margins,
+)
 
 NAMES = ("chair", "dining table", "coffee table", "floor", "other")
 MEANT = {
@@ -258,7 +263,7 @@ def test_no_voxel_wins_that_its_closest_words_rule_out(
     encoded = EncodedWord.of_name(ENCODER, word) if alone and word in NAMES else EncodedWord.of(ENCODER, word)
     chosen = ObjectSettings()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(known_words, "_MOST_PICKED", 1.0)
+        patch.setattr(words, "_MOST_PICKED", 1.0)
         everything = known.whole(feature)
         silent = known.not_competing(ENCODER, encoded, chosen.same_word_cosine)
         rows = known.contenders(ENCODER, encoded, silent, share)

@@ -8,10 +8,9 @@ from avlmaps.core.errors import QueryError
 from avlmaps.core.question import Modality, Part
 from avlmaps.maps.grid import GridSpec
 from avlmaps.perception.protocols import ModelCard
-from avlmaps.query.factors import HeatSettings
 from avlmaps.query.instances import FeatureVoxels, margin_confidence
 from avlmaps.query.modalities.object import object_factor
-from avlmaps.query.object_settings import ObjectSettings
+from avlmaps.query.settings import HeatSettings, ObjectSettings
 from avlmaps.query.voxel_space import Space
 from avlmaps.query.words import ClosestWords, object_margins
 

@@ -14,7 +14,7 @@ from avlmaps.maps.storeys import Storey, Storeys
 from avlmaps.query.answer import Answer, PartAnswer
 from avlmaps.query.asking import on_storey
 from avlmaps.query.goals import Goal
-from avlmaps.query.on_storeys import answer_on_storey, how_many
+from avlmaps.query.lists import answer_on_storey, how_many
 
 INF = float("inf")
 TWO = Storeys((Storey(0, 0.0, 2.5, -INF, 2.6, 40.0), Storey(1, 2.8, 5.3, 2.6, INF, 40.0)))

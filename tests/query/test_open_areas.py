@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 from query_fakes import furnished_map, keyframes_at
 
 from avlmaps.perception.protocols import ModelCard, ScaledEncoder
-from avlmaps.query.avlmap import AVLMap, QuerySettings
-from avlmaps.query.modalities.area import AREA_NAMES, AreaSettings, area_scores, same_place
+from avlmaps.query.avlmap import AVLMap
+from avlmaps.query.modalities.area import AREA_NAMES, area_scores, same_place
+from avlmaps.query.settings import AreaSettings, QuerySettings
 
 _DIM = 64
 

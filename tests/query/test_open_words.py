@@ -9,13 +9,11 @@ from query_fakes import UP, box
 from avlmaps.core.question import Modality, Part
 from avlmaps.maps.grid import GridSpec
 from avlmaps.perception.protocols import ModelCard
-from avlmaps.query.factors import HeatSettings
 from avlmaps.query.instances import FeatureVoxels, fitting, margin_confidence
 from avlmaps.query.modalities.object import object_factor
-from avlmaps.query.object_settings import ObjectSettings
-from avlmaps.query.synonyms import is_a, is_open
+from avlmaps.query.settings import HeatSettings, ObjectSettings
 from avlmaps.query.voxel_space import Space
-from avlmaps.query.words import ClosestWords
+from avlmaps.query.words import ClosestWords, is_a, is_open
 
 WORDS = ("chair", "office chair", "dining table", "sofa", "bed", "lamp", "door", "floor", "other", "couch", "table")
 DIM = len(WORDS) + 8

@@ -5,14 +5,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps.query import oversize
+from avlmaps.query import instances as oversize
 
 VOXEL_M = 0.05
 
 
 def cut(index: np.ndarray, score: np.ndarray, longest: float, instance: np.ndarray | None = None) -> np.ndarray:
     instance = np.zeros(len(index), np.int64) if instance is None else instance
-    found, piece_of = oversize.cut(index, index * VOXEL_M, score.astype(np.float32), instance, longest, 1)
+    found, piece_of = oversize.cut_at_weak(index, index * VOXEL_M, score.astype(np.float32), instance, longest, 1)
     assert len(piece_of) == found.max(initial=-1) + 1
     assert (piece_of[found[found >= 0]] == instance[found >= 0]).all(), "each piece knows what it is of"
     return found
@@ -67,7 +67,7 @@ def test_numbers_have_no_gaps_and_only_what_is_too_long_changes(seed: int, count
     instance = np.unique(rng.integers(0, 4, len(index)), return_inverse=True)[1]
     found = cut(index, rng.random(len(index)), longest, instance)
     assert set(found[found >= 0]) == set(range(found.max(initial=-1) + 1))
-    lengths = oversize.lengths_m(index * VOXEL_M, instance, int(instance.max()) + 1)
+    lengths = oversize.box_lengths_m(index * VOXEL_M, instance, int(instance.max()) + 1)
     for number, length in enumerate(lengths):
         pieces = set(found[instance == number])
         if length <= longest:
@@ -78,7 +78,7 @@ def test_numbers_have_no_gaps_and_only_what_is_too_long_changes(seed: int, count
 
 def test_lengths_are_the_longer_sides_as_seen_from_above() -> None:
     points = np.array([[0.0, 0.0, 0.0], [1.0, 3.0, 9.0], [5.0, 5.0, 0.0]])
-    assert oversize.lengths_m(points, np.array([0, 0, 1]), 3).tolist() == [3.0, 0.0, 0.0]
+    assert oversize.box_lengths_m(points, np.array([0, 0, 1]), 3).tolist() == [3.0, 0.0, 0.0]
 
 
 @given(confidence=st.floats(0.01, 0.99), length=st.floats(0.0, 20.0), longest=st.floats(0.2, 5.0))

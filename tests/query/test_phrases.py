@@ -8,7 +8,7 @@ import pytest
 
 from avlmaps.core.lexicon import EntryKind
 from avlmaps.perception.embedded.pixels import EmbeddedPixels
-from avlmaps.query.unknown_names import unknown_note
+from avlmaps.query.words import unknown_note
 
 ENCODER = EmbeddedPixels()
 # Written by hand before any of them was tried, with no look at what the encoder makes of them; nothing is tuned on the

@@ -13,11 +13,11 @@ from avlmaps.core.errors import QueryError
 from avlmaps.core.question import Modality, Part, Role
 from avlmaps.maps.grid import GridSpec
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.query.factors import HeatSettings, NearThings
+from avlmaps.query.factors import NearThings
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.modalities.image import image_factor
-from avlmaps.query.plots import HEAT_LABEL, aside, plot_map
-from avlmaps.query.topdown import TopDown
+from avlmaps.query.plots import HEAT_LABEL, TopDown, aside, plot_map
+from avlmaps.query.settings import HeatSettings
 from avlmaps.query.voxel_space import Space
 
 CHAIR = Part(Modality.OBJECT, "chair")

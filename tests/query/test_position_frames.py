@@ -16,7 +16,7 @@ from query_fakes import furnished_map
 from avlmaps.core.frames import FrameName
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.export import write_glb, write_ply, write_table
-from avlmaps.query.frames import answer_in
+from avlmaps.query.places import answer_in
 from avlmaps.query.plots import picture_frame
 
 UPS = st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda up: np.linalg.norm(up) > 0.1)

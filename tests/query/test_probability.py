@@ -10,8 +10,7 @@ from training.found.fit import fitted, held_out
 from training.found.rows import balanced, read_rows
 
 from avlmaps.core.question import Modality
-from avlmaps.query.evidence import GoalEvidence, logit
-from avlmaps.query.probability import NUMBERS, probability_of, weights
+from avlmaps.query.goals import NUMBERS, GoalEvidence, logit, probability_of, weights
 from avlmaps_sim.bench.found.suite import brier
 
 logits, logs = st.floats(-4, 4), st.floats(-4, 0)

@@ -11,8 +11,8 @@ from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.perception.embedded.pixels import EmbeddedPixels, EmbeddedViews
 from avlmaps.perception.protocols import FURNISHED as FOLDER
 from avlmaps.perception.protocols import RoomContents, SurveyedEncoder, read_room_contents
-from avlmaps.query.room_contents import commonness
-from avlmaps.query.room_contents import votes as votes_of
+from avlmaps.query.rooms import commonness
+from avlmaps.query.rooms import votes as votes_of
 
 FURNISHED = read_room_contents()
 NAMED = read_room_contents(FOLDER / "embedded")

@@ -12,10 +12,9 @@ from walled_rooms import storeys_at, two_rooms_index
 
 from avlmaps.maps.grid import GridSpec
 from avlmaps.query.floor_plan import FloorPlan
-from avlmaps.query.raster import dilated
 from avlmaps.query.room_regions import NONE, RoomRegions, rooms_of_storey
 from avlmaps.query.rooms import RoomField
-from avlmaps.query.storey_grid import Sights, StoreyGrid, turned, wall_heading
+from avlmaps.query.storey_grid import Sights, StoreyGrid, dilated, turned, wall_heading
 from avlmaps.query.voxel_space import Space
 
 CELL = 0.05

@@ -10,15 +10,13 @@ from query_fakes import FakePixels, FakeSounds, fake_encoders, fake_map, keyfram
 from walled_rooms import storeys_at, two_rooms, two_rooms_index
 
 from avlmaps.perception.protocols import ModelCard, RoomContents, read_room_contents
-from avlmaps.query.avlmap import AVLMap, QuerySettings
+from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.factors import NearAnchors
 from avlmaps.query.floor_plan import FloorPlan
-from avlmaps.query.modalities.area import AreaSettings
 from avlmaps.query.places import describe_place
-from avlmaps.query.room_names import own_names
-from avlmaps.query.rooms import InRooms, NamedVoxels, RoomField, Rooms, RoomSettings, voting_rows
-from avlmaps.query.rules import query_settings
-from avlmaps.query.whereabouts import Whereabouts
+from avlmaps.query.rooms import InRooms, NamedVoxels, RoomField, Rooms, voting_rows
+from avlmaps.query.settings import AreaSettings, QuerySettings, RoomSettings, query_settings
+from avlmaps.query.whereabouts import Whereabouts, own_names
 from avlmaps.view.labels import Labels
 from avlmaps.view.layout import Layout
 

@@ -7,9 +7,7 @@ import pytest
 
 from avlmaps.maps.audio.segmentation import segment
 from avlmaps.maps.settings import DEFAULTS, FrameSettings
-from avlmaps.query.avlmap import QuerySettings
-from avlmaps.query.factors import HeatSettings
-from avlmaps.query.rules import build_settings, query_settings, rules_of
+from avlmaps.query.settings import HeatSettings, QuerySettings, build_settings, query_settings, rules_of
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
 
 

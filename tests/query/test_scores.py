@@ -7,8 +7,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from avlmaps.query import scores as of_voxels
-from avlmaps.query.components import connected, linked
 from avlmaps.query.scores import feature_scores, margins, two_closest
+from avlmaps.query.voxel_space import connected, linked
 
 
 @given(st.integers(0, 60), st.integers(0, 6), st.integers(0, 2**32 - 1))

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import QueryError
-from avlmaps.query.given_places import is_place, place_of
+from avlmaps.query.places import is_place, place_of
 from avlmaps.query.selection import page_of
 
 number = st.floats(-1e6, 1e6)

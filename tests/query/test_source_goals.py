@@ -15,15 +15,13 @@ from avlmaps.language.sentence import Attachments
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.sources.density import Spread
 from avlmaps.maps.types import SourceEvidence
-from avlmaps.query.answer import PartAnswer
+from avlmaps.query.answer import PartAnswer, absent_text, found_text
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.query.factors import HeatSettings
 from avlmaps.query.heatmap import Heatmap
-from avlmaps.query.modalities.sound import SoundSettings
-from avlmaps.query.modalities.source import SourceAnchors, source_factor
+from avlmaps.query.modalities.sound import SourceAnchors, source_factor
+from avlmaps.query.settings import HeatSettings, SoundSettings
 from avlmaps.query.sound_sources import SourceMap
 from avlmaps.query.voxel_space import Space
-from avlmaps.query.wording import absent_text, found_text
 
 SPACE = Space(GridSpec(0.1), np.array([[x, y, 0] for x in range(40) for y in range(40)], np.int32), (0.0, 0.0, 1.0))
 UNIT = st.floats(0.0, 1.0)

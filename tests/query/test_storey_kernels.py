@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps.query.raster import contacts, flooded
+from avlmaps.query.storey_grid import contacts, flooded
 from avlmaps.query.storey_kernels import SIDE, fill_cells, held_share, mark_columns, turned_ends
 
 SEEDS = st.integers(0, 2**32 - 1)

@@ -9,11 +9,8 @@ from walled_rooms import storeys_at, two_rooms
 from avlmaps.core.arrays import Float
 from avlmaps.perception.protocols import RoomContents, read_room_contents
 from avlmaps.query.floor_plan import FloorPlan
-from avlmaps.query.object_settings import ObjectSettings
-from avlmaps.query.room_contents import commonness
-from avlmaps.query.rooms import RoomField
-from avlmaps.query.rules import query_settings
-from avlmaps.query.things_in_rooms import ThingsInRooms, with_rooms
+from avlmaps.query.rooms import RoomField, ThingsInRooms, commonness, with_rooms
+from avlmaps.query.settings import ObjectSettings, query_settings
 
 FURNISHED = read_room_contents()
 KINDS = ("kitchen", "bedroom")

@@ -3,7 +3,7 @@
 import numpy as np
 
 from avlmaps.maps.grid import GridSpec
-from avlmaps.query.topdown import TopDown
+from avlmaps.query.plots import TopDown
 from avlmaps.query.voxel_space import Space
 
 

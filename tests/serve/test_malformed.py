@@ -7,7 +7,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from starlette.testclient import TestClient
 
-from avlmaps.query.given_places import place_of
+from avlmaps.query.places import place_of
 from avlmaps.serve.lanes import RequestError
 from avlmaps.serve.requests import AskQuery, PathQuery, PlaceQuery, ThingsQuery, Uploads, checked, checked_texts
 from avlmaps.serve.settings import Limits

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.optimize import minimize
 from training.found.rows import Row, balanced
 
-from avlmaps.query.probability import FACTORS, factors_of, probability_of
+from avlmaps.query.goals import FACTORS, factors_of, probability_of
 
 COLUMNS = tuple(name for factor, numbers in FACTORS.items() for name in (f"{factor}_bias", *numbers))
 # The ridge draws a number's weight towards 1, and a bias towards 2: most of what is likely passes.

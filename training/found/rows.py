@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from avlmaps.core.question import Modality
-from avlmaps.query.evidence import GoalEvidence
-from avlmaps.query.probability import NUMBERS
+from avlmaps.query.goals import NUMBERS, GoalEvidence
 from avlmaps_sim.bench.found.answers import Judged
 
 ROWS = Path(__file__).parent / "rows.csv"

@@ -32,7 +32,7 @@ from avlmaps.perception.models.settings import model_settings, using_models
 from avlmaps.perception.profiles import profile
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.instances import FeatureVoxels, confident_instances
-from avlmaps.query.object_settings import ObjectSettings
+from avlmaps.query.settings import ObjectSettings
 from avlmaps.query.words import ClosestWords, EncodedWord
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Recording

@@ -140,7 +140,7 @@ def build(verb: "Build") -> dict[str, Any]:
     from avlmaps.maps.settings import SUBMAP_FRAMES, BuildSettings, FrameSettings, FusionSettings, GravitySettings
     from avlmaps.perception.cache.feature_store import CacheSettings
     from avlmaps.query.avlmap import AVLMap, with_findings
-    from avlmaps.query.rules import build_settings
+    from avlmaps.query.settings import build_settings
 
     begin = perf_counter()
     if verb.resume and verb.fresh:

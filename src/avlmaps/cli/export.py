@@ -83,7 +83,7 @@ class Export(MapVerb):
         elif kind in _LAYERED:
             _write_layers(self, avlmap, kind, frame)
         elif kind == ".openlex3d":
-            from avlmaps.query.export_openlex3d import write_openlex3d
+            from avlmaps.query.export import write_openlex3d
 
             written = list(write_openlex3d(self.out, avlmap))
         else:
@@ -161,9 +161,7 @@ def _write_voxels(verb: Export, opened: "AVLMap", kind: str, frame: FrameName) -
 
 
 def _write_layers(verb: Export, opened: "AVLMap", kind: str, frame: FrameName) -> None:
-    from avlmaps.query.export_foxglove import write_foxglove
-    from avlmaps.query.export_layers import layers_of
-    from avlmaps.query.export_rerun import write_rerun
+    from avlmaps.query.export_viewers import layers_of, write_foxglove, write_rerun
 
     layers = layers_of(opened, frame, verb.heat, verb.least)
     (write_rerun if kind == ".rrd" else write_foxglove)(verb.out, layers)

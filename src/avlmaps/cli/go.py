@@ -24,8 +24,9 @@ if TYPE_CHECKING:
     from avlmaps.navigate.driver import Driver
     from avlmaps.navigate.instruct import Outcome
     from avlmaps.navigate.interrupts import Halt
-    from avlmaps.query.avlmap import AVLMap, QuerySettings
+    from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.heatmap import Heatmap
+    from avlmaps.query.settings import QuerySettings
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,8 +145,7 @@ def go(verb: "Go") -> dict[str, Any]:
 
 
 def _query_settings(verb: "Go") -> "QuerySettings":
-    from avlmaps.query.avlmap import QuerySettings
-    from avlmaps.query.modalities.sound import SoundSettings
+    from avlmaps.query.settings import QuerySettings, SoundSettings
 
     return QuerySettings(found_at=verb.found_at, sounds=SoundSettings(at=verb.at))
 

@@ -156,7 +156,7 @@ def plot_named(stored: "StoredMap", plot: Path) -> Path:
 def describe_map(stored: "StoredMap") -> dict[str, Any]:
     """Describe a map: its counts and models, its sounds with names, the rules that it was built by."""
     from avlmaps.query.avlmap import AVLMap
-    from avlmaps.query.description import map_answer
+    from avlmaps.query.selection import map_answer
 
     return map_answer(AVLMap(stored), note=lambda error: say(f"note: the sounds have no names here. {error}"))
 

@@ -18,7 +18,8 @@ from avlmaps.core.progress import say
 if TYPE_CHECKING:
     from avlmaps.core.camera import Pinhole
     from avlmaps.query.asking import Asked
-    from avlmaps.query.avlmap import AVLMap, QuerySettings
+    from avlmaps.query.avlmap import AVLMap
+    from avlmaps.query.settings import QuerySettings
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,11 +82,11 @@ class Query(MapVerb):
         return AVLMap.open(self.map, self._settings())
 
     def _settings(self) -> "QuerySettings":
-        from avlmaps.query.avlmap import QuerySettings
+        from avlmaps.query.settings import QuerySettings
 
         settings = QuerySettings(found_at=self.found_at)
         if self.rules != "ours":
-            from avlmaps.query.rules import query_settings
+            from avlmaps.query.settings import query_settings
 
             settings = query_settings(self.rules, settings)
         return settings if self.at is None else replace(settings, sounds=replace(settings.sounds, at=self.at))
@@ -171,7 +172,7 @@ class Locate(MapVerb):
 
     def answer(self, avlmap: "AVLMap") -> dict[str, Any]:
         """Locate the photo in a map."""
-        from avlmaps.query.focal import focal_35mm_of
+        from avlmaps.query.locate import focal_35mm_of
         from avlmaps.query.modalities.image import read_picture
         from avlmaps.query.schema import locate_answer
 

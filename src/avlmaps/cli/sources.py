@@ -43,7 +43,7 @@ def list_sources(verb: Sources) -> dict[str, Any]:
     from avlmaps.core.frames import FrameName
     from avlmaps.core.poses import FRAME
     from avlmaps.query.avlmap import AVLMap
-    from avlmaps.query.frames import answer_in
+    from avlmaps.query.places import answer_in
 
     require_share(verb.least, "confidence")
     opened = AVLMap.open(verb.map)

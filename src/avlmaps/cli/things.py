@@ -95,7 +95,7 @@ class Things(MapVerb):
 
     def _near(self, avlmap: "AVLMap") -> "str | list[float] | None":
         """Return what things are to be near to; a place in space in the recording's frame."""
-        from avlmaps.query.given_places import is_place, place_of
+        from avlmaps.query.places import is_place, place_of
 
         if self.near is None or not is_place(self.near):
             return self.near

@@ -90,7 +90,7 @@ class MapVerb(ModelVerb):
 
 def shown_in(answer: Mapping[str, Any], frame: str, avlmap: "AVLMap") -> dict[str, Any]:
     """Return an answer with its places in a frame."""
-    from avlmaps.query.frames import answer_in
+    from avlmaps.query.places import answer_in
 
     return dict(answer_in(answer, FrameName(frame), avlmap.space.level_from_recording))
 

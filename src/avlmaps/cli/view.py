@@ -89,8 +89,8 @@ def _require_fitting(verb: View) -> None:
 
 
 def _maps(verb: View) -> "list[AVLMap]":
-    from avlmaps.query.avlmap import AVLMap, QuerySettings
-    from avlmaps.query.modalities.sound import SoundSettings
+    from avlmaps.query.avlmap import AVLMap
+    from avlmaps.query.settings import QuerySettings, SoundSettings
 
     settings = QuerySettings(found_at=verb.found_at, sounds=SoundSettings(at=verb.at))
     return [AVLMap.open(path, settings) for path in (verb.map, verb.other) if path is not None]

@@ -37,7 +37,8 @@ from avlmaps.maps.store.map_data import MapData
 from avlmaps.maps.store.reader import open_stored
 from avlmaps.perception.encoders import Encoders, encoders_of
 from avlmaps.perception.profiles import Profile
-from avlmaps.query.avlmap import AVLMap, QuerySettings
+from avlmaps.query.avlmap import AVLMap
+from avlmaps.query.settings import QuerySettings
 from avlmaps.query.voxel_map import IN_MEMORY, direction, require_kinds
 from avlmaps.recordings.directions import given_directions
 from avlmaps.recordings.memory import given_frame, next_of

@@ -21,7 +21,7 @@ from avlmaps.navigate.footprint import Outline
 from avlmaps.navigate.instances import Destination, likely, nearest, same_thing, tells_one, things_in
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.heatmap import Heatmap
-from avlmaps.query.on_storeys import at_storey, storeys_meant
+from avlmaps.query.lists import at_storey, storeys_meant
 from avlmaps.query.sound_sources import no_sources
 
 

@@ -25,8 +25,8 @@ from avlmaps.navigate.grounding import Heats
 from avlmaps.navigate.motion_log import LoggedMove
 from avlmaps.navigate.skills import Robot, RobotSettings
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.query.room_names import own_names
 from avlmaps.query.sound_sources import no_sources
+from avlmaps.query.whereabouts import own_names
 
 _MOST_PROGRAMS = 6
 _NEAR_M = 1.0  # within this distance a goal counts as reached where the paper judges

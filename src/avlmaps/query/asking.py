@@ -20,13 +20,12 @@ from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import HeardAt, Modality, Part, Question, Role
 from avlmaps.core.wording import coordinates
 from avlmaps.perception.protocols import NamedPixelEncoder
-from avlmaps.query.answer import Alternative, Answer, PartAnswer
+from avlmaps.query.answer import UNDERSTOOD_ONLY, Alternative, Answer, PartAnswer, absent_text, found_text, placed
 from avlmaps.query.factors import Factor, NearAnchors, NearThings
-from avlmaps.query.given_places import distance_m, place_given
 from avlmaps.query.goals import Goal, alike
 from avlmaps.query.heatmap import Heatmap, product
-from avlmaps.query.room_names import own_names
-from avlmaps.query.wording import UNDERSTOOD_ONLY, absent_text, found_text, placed
+from avlmaps.query.places import distance_m, place_given
+from avlmaps.query.whereabouts import own_names
 
 if TYPE_CHECKING:
     from avlmaps.core.camera import Pinhole
@@ -220,7 +219,7 @@ def nearest_first(avlmap: "Queryable", answer: Answer, place: Float[np.ndarray, 
 
 def _ask_of_storeys(avlmap: "Queryable", asked: Asked, files: Files) -> Answer:
     from avlmaps.language.storey_words import asks_how_many_storeys, said_storeys
-    from avlmaps.query.on_storeys import answer_on_storey, how_many
+    from avlmaps.query.lists import answer_on_storey, how_many
 
     if asks_how_many_storeys(asked.sentence):
         return how_many(avlmap)

@@ -18,20 +18,18 @@ from avlmaps.core.numbers import as_whole, checked
 from avlmaps.core.question import HeardAt, Modality, Part, Question, Role
 from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import read_room_contents
+from avlmaps.query.findings import MapNames, MapRooms
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.instances import Instances
-from avlmaps.query.map_names import MapNames
-from avlmaps.query.map_rooms import MapRooms
 from avlmaps.query.modalities.area import area_factor
 from avlmaps.query.modalities.image import image_factor, read_picture, require_fitting
 from avlmaps.query.modalities.sound import read_clip, require_audible, sound_factor, sound_features
 from avlmaps.query.queryable import Attachment, Photo
-from avlmaps.query.room_names import numbered_rooms, region_named
 from avlmaps.query.room_regions import RoomRegions
-from avlmaps.query.rooms import RoomField, Rooms
+from avlmaps.query.rooms import RoomField, Rooms, ThingsInRooms
 from avlmaps.query.settings import QuerySettings
-from avlmaps.query.things_in_rooms import ThingsInRooms
 from avlmaps.query.voxel_space import Space
+from avlmaps.query.whereabouts import numbered_rooms, region_named
 from avlmaps.query.words import ClosestWords
 from avlmaps.recordings.audio import Sound
 
@@ -47,7 +45,7 @@ if TYPE_CHECKING:
     from avlmaps.query.contents import Contents, Room, SoundEvent, Thing, Watch
     from avlmaps.query.editor import Editor
     from avlmaps.query.edits import Edited
-    from avlmaps.query.heat_cache import HeatCache
+    from avlmaps.query.heatmap import HeatCache
     from avlmaps.query.locate import Located
     from avlmaps.query.schema import ChangesAnswer, LastSeenAnswer
     from avlmaps.query.sound_sources import SoundSource, SourceMap
@@ -441,7 +439,7 @@ class AVLMap:
     @checked(QueryError)
     def sees(self, phrase: str) -> bool:
         """Return whether the pixel encoder can look for a phrase: any phrase for an open vocabulary, else its words."""
-        from avlmaps.query.synonyms import is_open
+        from avlmaps.query.words import is_open
 
         encoder = self.stored.encoders.pixels
         return is_open(encoder) or bool(encoder.understood(phrase))
@@ -496,7 +494,7 @@ class AVLMap:
         settings = self.settings.sounds
         _require_place(at)
         if (at or settings.at) == "source" and len(scores):
-            from avlmaps.query.modalities.source import source_factor
+            from avlmaps.query.modalities.sound import source_factor
 
             factor = source_factor(self.space, self.source_map, scores, part, settings, self.settings.heat)
         else:
@@ -748,7 +746,7 @@ class AVLMap:
             nearest_first,
             on_storey,
         )
-        from avlmaps.query.given_places import place_given
+        from avlmaps.query.places import place_given
 
         files, wanted = Files(intrinsics, attachments), as_whole(top)
         if wanted is None:
@@ -799,7 +797,7 @@ def _photo(picture: "str | Path | Photo | UInt8[np.ndarray, 'h w 3']", intrinsic
         return picture
     if not isinstance(picture, str | Path):
         return Photo(np.asarray(picture))
-    from avlmaps.query.focal import focal_35mm_of
+    from avlmaps.query.locate import focal_35mm_of
 
     path = user_path(picture)
     return Photo(read_picture(path), None if intrinsics is not None else focal_35mm_of(path))

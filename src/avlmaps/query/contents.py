@@ -18,11 +18,11 @@ from avlmaps.core.errors import QueryError
 from avlmaps.core.poses import FRAME, plain_point
 from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import NamedPixelEncoder, PixelEncoder
-from avlmaps.query.factors import FOUND_AT
 from avlmaps.query.instances import Instances
-from avlmaps.query.modalities.area import AreaSettings, area_names, modes, pooled_name_shares
+from avlmaps.query.modalities.area import area_names, modes, pooled_name_shares
 from avlmaps.query.modalities.sound import sound_features
 from avlmaps.query.rooms import FEWEST_VIEWS, LEAST_PART
+from avlmaps.query.settings import FOUND_AT, AreaSettings
 from avlmaps.query.voxel_space import Space
 
 if TYPE_CHECKING:
@@ -248,7 +248,7 @@ def require_known(knows: Callable[[str], bool], names: Sequence[str]) -> None:
     Raises:
         QueryError: it does not; the sentence says what was probably meant.
     """
-    from avlmaps.query.unknown_names import unknown_note
+    from avlmaps.query.words import unknown_note
 
     for name in names:
         if not knows(name):

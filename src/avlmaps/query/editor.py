@@ -13,9 +13,8 @@ from avlmaps.core.numbers import checked
 from avlmaps.core.poses import plain_point
 from avlmaps.core.wording import place_text
 from avlmaps.maps.store.edits import LONGEST_NAME, Does, Edit, EditedSpot, World, append_edit, in_force, read_edits
-from avlmaps.query.edits import Edited, apply, means
-from avlmaps.query.found_edits import plain_name, said
-from avlmaps.query.given_places import is_place, place_given, place_of
+from avlmaps.query.edits import Edited, apply, means, plain_name, said
+from avlmaps.query.places import is_place, place_given, place_of
 from avlmaps.query.queryable import Queryable
 
 if TYPE_CHECKING:

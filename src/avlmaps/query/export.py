@@ -1,4 +1,4 @@
-"""Writing a map for other programs: point clouds and meshes (PLY, GLB), occupancy grids (PGM, YAML) and tables (CSV).
+"""A map for other programs: point clouds and meshes (PLY, GLB, PCD), occupancy grids (PGM, YAML) and tables (CSV).
 
 A file says in which frame its coordinates are, metres: the recording's, or the level one, which shares its origin and
 whose z is up. An occupancy grid is a floor plan and is always level; a GLB file is level by default, and then y is up,
@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from jaxtyping import Float, Float32, Int, UInt8
 
+from avlmaps.core.arrays import Float, Float32, Int, UInt8
 from avlmaps.core.errors import BackendError, QueryError
 from avlmaps.core.files import write_bytes_atomically
 from avlmaps.core.frames import FrameName
@@ -23,6 +23,7 @@ from avlmaps.perception.embedded.colours import COLOURS, example_of
 
 if TYPE_CHECKING:
     from avlmaps.maps.obstacles import Obstacles
+    from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.contents import Thing
     from avlmaps.query.schema import ListedThing, SoundAnswer
     from avlmaps.query.voxel_space import Space
@@ -328,3 +329,58 @@ def _write(path: Path, content: bytes) -> Path:
     with explain_write_errors(path):
         write_bytes_atomically(path, content)
     return path
+
+
+FILES = ("embeddings.npy", "index.npy", "point_cloud.pcd")
+
+
+def write_openlex3d(folder: Path, opened: "AVLMap") -> tuple[Path, ...]:
+    """Write the three files; voxels without a feature are left out.
+
+    Raises:
+        QueryError: no voxel has a feature, or a file cannot be written.
+    """
+    voxels = opened.stored.voxels
+    rows = np.flatnonzero(np.asarray(voxels.weight) > 0.0)
+    if not len(rows):
+        raise QueryError("No voxel of the map has a feature, so that there is nothing to evaluate.")
+    contents = (
+        _npy(np.asarray(voxels.feature[rows], np.float32)),
+        _npy(np.arange(len(rows), dtype=np.int64)),
+        pcd_bytes(opened.points[rows].astype(np.float32), opened.colors[rows]),
+    )
+    for name, content in zip(FILES, contents, strict=True):
+        with explain_write_errors(folder / name):
+            write_bytes_atomically(folder / name, content)
+    return tuple(folder / name for name in FILES)
+
+
+def pcd_bytes(points: Float32[np.ndarray, "n 3"], colors: UInt8[np.ndarray, "n 3"]) -> bytes:
+    """Return a binary PCD file (version 0.7 of its public description) of points with colours, metres.
+
+    A colour is four bytes blue, green, red, 0 that are declared as a float.
+    """
+    rows = np.zeros(len(points), np.dtype([("xyz", "<f4", 3), ("bgr0", "u1", 4)]))
+    rows["xyz"] = points
+    rows["bgr0"][:, :3] = colors[:, ::-1]
+    header = [
+        "# .PCD v0.7 - Point Cloud Data file format",
+        "VERSION 0.7",
+        "FIELDS x y z rgb",
+        "SIZE 4 4 4 4",
+        "TYPE F F F F",
+        "COUNT 1 1 1 1",
+        f"WIDTH {len(rows)}",
+        "HEIGHT 1",
+        "VIEWPOINT 0 0 0 1 0 0 0",
+        f"POINTS {len(rows)}",
+        "DATA binary",
+        "",
+    ]
+    return "\n".join(header).encode("ascii") + rows.tobytes()
+
+
+def _npy(array: np.ndarray) -> bytes:
+    stream = io.BytesIO()
+    np.save(stream, array, allow_pickle=False)
+    return stream.getvalue()

@@ -14,15 +14,12 @@ import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Float32, Int
 from avlmaps.core.question import Part, Role
-from avlmaps.query.threads import share
+from avlmaps.query.scores import share
 from avlmaps.query.voxel_space import Space
 
 if TYPE_CHECKING:
     from avlmaps.maps.sources.density import Spread
 
-# From this probability on a query is found (``QuerySettings.found_at``), and a part of it by itself: an instance, a
-# sound, a view, the place of a photo.
-FOUND_AT = 0.5
 # Scores are products of float32 vectors of unit length. Their last digits depend on the order of summation, which
 # depends on the processor and on how many vectors are multiplied at once; a difference below this means nothing.
 ROUNDING = 1e-6
@@ -31,20 +28,6 @@ _FEW_PAIRS = 65_536
 # Pairs of a point and an anchor that are compared at once: some megabytes.
 _PAIRS = 1 << 18
 _SOME_POINTS = 16  # that are looked at together where there are more pairs than that
-
-
-@dataclass(frozen=True, slots=True)
-class HeatSettings:
-    """How fast heat falls with distance (the paper's 0.1 and 0.01 a voxel of 5 cm)."""
-
-    primary_falloff_per_m: float = 2.0
-    """For what is sought: reaches 0.5 m."""
-    context_falloff_per_m: float = 0.2
-    """For what says where it is: reaches 5 m."""
-
-    def falloff_per_m(self, role: Role) -> float:
-        """Return ε for a role."""
-        return self.primary_falloff_per_m if role is Role.PRIMARY else self.context_falloff_per_m
 
 
 class Factor(ABC):

@@ -168,7 +168,7 @@ class FloorPlan:
 
         Every cell of a wall is a region by itself.
         """
-        from avlmaps.query.components import connected
+        from avlmaps.query.voxel_space import connected
 
         a, b = self._neighbours
         same = label[a] == label[b]

@@ -8,7 +8,7 @@ import numpy as np
 from avlmaps.core.arrays import Float, Float32, Int
 from avlmaps.core.registry import Kind
 from avlmaps.perception.protocols import NamedPixelEncoder, ScaledEncoder
-from avlmaps.query.encoded_words import encoded_words
+from avlmaps.query.words import encoded_words
 
 if TYPE_CHECKING:
     from avlmaps.maps.store.reader import StoredMap

@@ -1,14 +1,22 @@
-"""What is here: the names that the voxels of a place are taken for, when they were last seen, what is around."""
+"""Places: as people give them, what is at one, and answers in the frame that a person wants.
 
-from typing import TYPE_CHECKING, Annotated, TypedDict
+A place is x,y,z in metres of the recording frame, or x,y of the level frame, whose z is up; both have one origin
+(docs/conventions.md). Sizes are along the level axes in either.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any, TypedDict, cast
 
 import numpy as np
 from msgspec import Meta
 
 from avlmaps.core.arrays import Float, Int
 from avlmaps.core.errors import QueryError
-from avlmaps.core.poses import FRAME
+from avlmaps.core.frames import FrameName
+from avlmaps.core.poses import FRAME, apply
 from avlmaps.core.question import Modality, Part, Role
+from avlmaps.core.wording import coordinates
 from avlmaps.query.factors import NearThings
 from avlmaps.query.modalities.area import area_names, pooled_name_shares
 from avlmaps.query.naming import VoxelNamer, keyframes_that_saw
@@ -16,6 +24,57 @@ from avlmaps.query.schema import Frame, Position
 
 if TYPE_CHECKING:
     from avlmaps.query.avlmap import AVLMap
+
+
+def place_of(text: str) -> Float[np.ndarray, " n"]:
+    """Return the two or three numbers of a place.
+
+    Raises:
+        QueryError: they are not.
+    """
+    try:
+        numbers = [float(word) for word in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in (2, 3) or not all(math.isfinite(one) and abs(one) <= 1e6 for one in numbers):
+        raise QueryError(f"A place is x,y or x,y,z in metres, such as 1.5,2.0; not {text[:80]!r}.")
+    return np.array(numbers)
+
+
+def place_given(place: str | Sequence[float]) -> Float[np.ndarray, " n"]:
+    """Return the numbers of a place that comes as a text or as a list.
+
+    Raises:
+        QueryError: they are no two or three numbers.
+    """
+    if isinstance(place, str):
+        return place_of(place)
+    try:
+        return place_of(",".join(str(value) for value in place))
+    except TypeError:  # no list
+        return place_of(str(place))
+
+
+def distance_m(
+    level: Callable[[Float[np.ndarray, "m 3"]], Float[np.ndarray, "m 3"]],
+    point: Sequence[float],
+    place: Float[np.ndarray, " n"],
+) -> float:
+    """Return how far a point lies from a place: in space, or level where the place has no height.
+
+    Args:
+        level: turns points of the recording frame into the level one.
+        point: x, y, z, recording frame.
+        place: of two or three numbers.
+    """
+    here = np.array(point)
+    return math.dist(here, place) if len(place) == 3 else math.dist(level(here)[:2], place)
+
+
+def is_place(near: str | Sequence[float]) -> bool:
+    """Return whether what things are near to is meant as a place rather than as the name of a thing."""
+    return not isinstance(near, str) or not any(letter.isalpha() for letter in near)
+
 
 MOST_NAMES = 5
 _MOST_VIEWS = 5
@@ -214,3 +273,54 @@ def last_seen(avlmap: "AVLMap", thing: str, top: int = 3) -> LastSeenAnswer:
                 }
             )
     return {"thing": thing, "found": heat.found, "places": places, "note": factor.note, "frame": FRAME}
+
+
+def answer_in(answer: Mapping[str, Any], frame: FrameName, level_from_recording: Float[np.ndarray, "4 4"]) -> Any:
+    """Return an answer of the command line with all its positions, poses and texts about them in a frame.
+
+    Args:
+        answer: in the recording's frame: with ``position``, ``outline`` and ``world_from_camera`` at any depth.
+        frame: that is wanted.
+        level_from_recording: 4x4, metres.
+    """
+    if frame is FrameName.RECORDING:
+        return dict(answer)
+    spoken: dict[str, str] = {}
+    turned = _turned(answer, np.asarray(level_from_recording, np.float64), spoken)
+    return _spoken(turned, spoken) | {"frame": str(frame)}
+
+
+def _turned(value: Any, level_from_recording: Float[np.ndarray, "4 4"], spoken: dict[str, str]) -> Any:
+    if isinstance(value, Mapping):
+        entries = cast("Mapping[str, Any]", value)
+        return {key: _moved(key, one, level_from_recording, spoken) for key, one in entries.items()}
+    if isinstance(value, list):
+        return [_turned(one, level_from_recording, spoken) for one in cast("list[Any]", value)]
+    return value
+
+
+def _moved(key: str, value: Any, level_from_recording: Float[np.ndarray, "4 4"], spoken: dict[str, str]) -> Any:
+    if key == "position" and value is not None:
+        point = apply(level_from_recording, np.array([value], np.float64))[0]
+        spoken[_words(value)] = _words(point)
+        return [float(number) for number in point]
+    if key == "outline" and value:
+        return apply(level_from_recording, np.array(value, np.float64)).round(3).tolist()
+    if key == "world_from_camera" and value is not None:
+        return (level_from_recording @ np.array(value, np.float64)).tolist()
+    return _turned(value, level_from_recording, spoken)
+
+
+def _spoken(answer: dict[str, Any], spoken: Mapping[str, str]) -> dict[str, Any]:
+    texts = {key: value for key, value in answer.items() if key in ("text", "notes")}
+    for key, value in texts.items():
+        parts = [value] if isinstance(value, str) else value
+        for before, now in spoken.items():
+            parts = [part.replace(before, f"\0{now[1:]}") for part in parts]  # no place is replaced twice
+        parts = [part.replace("\0", "(") for part in parts]
+        answer[key] = parts[0] if isinstance(value, str) else parts
+    return answer
+
+
+def _words(position: Any) -> str:
+    return f"({coordinates(position)})"

@@ -10,15 +10,15 @@ import numpy as np
 from avlmaps.core.arrays import UInt8
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.question import Part
-from avlmaps.query.edit_spots import SeenMap
+from avlmaps.query.edits import SeenMap
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.recordings.audio import Sound
 
 if TYPE_CHECKING:
     from avlmaps.maps.store.life import Life
     from avlmaps.query.contents import Room, SoundEvent, Thing
-    from avlmaps.query.modalities.sound import SoundSettings
     from avlmaps.query.rooms import RoomField, Rooms
+    from avlmaps.query.settings import SoundSettings
 
 
 @dataclass(frozen=True, slots=True, eq=False)

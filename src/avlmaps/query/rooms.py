@@ -1,18 +1,116 @@
-"""What kind of room each place of a map is: views and things vote, and walls bound how far a vote reaches."""
+"""What kind of room each place of a map is: views and things vote, and walls bound how far a vote reaches.
 
-from collections.abc import Callable, Sequence
+The kind of room then speaks for a thing that seems to stand in it: a stove in a bedroom is seldom one.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 
 import numpy as np
 
-from avlmaps.core.arrays import Bool, Float, Float32, Int
-from avlmaps.core.lexicon import EntryKind, lexicon
+from avlmaps.core.arrays import Bool, Float, Float32, Float64, Int
+from avlmaps.core.lexicon import Entry, EntryKind, lexicon
 from avlmaps.perception.protocols import RoomContents
-from avlmaps.query.factors import FOUND_AT, NearAnchors
+from avlmaps.query.factors import NearAnchors
 from avlmaps.query.floor_plan import CELL_M, FloorPlan
-from avlmaps.query.room_contents import votes
 from avlmaps.query.room_regions import NONE, RoomRegions
+from avlmaps.query.settings import FOUND_AT, RoomSettings
+
+# A kind of room in which a thing was never counted holds it as often as this share of the mean of all kinds.
+_ELSEWHERE = 0.1
+
+
+@cache
+def _log_ratios(contents: RoomContents) -> Float64[np.ndarray, "t r"]:
+    return _nats_of(contents, contents.surface_m2)
+
+
+def _nats_of(contents: RoomContents, surface_m2: Float64[np.ndarray, "t r"]) -> Float64[np.ndarray, "t r"]:
+    share = surface_m2 / np.maximum(contents.surface_m2.sum(axis=0), 1e-9)
+    usual = share.mean(axis=1, keepdims=True)
+    return np.log((share + _ELSEWHERE * usual + 1e-9) / ((1.0 + _ELSEWHERE) * usual + 1e-9))
+
+
+def votes(things: Sequence[str], kinds: Sequence[str], contents: RoomContents) -> Float[np.ndarray, "t n"]:
+    """Return by how much, in nats, a square metre of each thing speaks for each kind of room.
+
+    Args:
+        things: names, as an encoder has them; one that the table does not hold speaks for none. A thing speaks against
+            no kind of room that its entry of the lexicon lists.
+        kinds: kinds of room. One that the table does not hold gets the mean vote of those that it holds, which for
+            most things is against it; one that belongs to a kind of the table (a kitchenette) gets that kind's.
+        contents: the table.
+    """
+    ratios, known = _log_ratios(contents), lexicon()
+    row_of = {known.find(name, EntryKind.THING): number for number, name in enumerate(contents.things)}
+    out = np.zeros((len(things), len(kinds)))
+    for number, thing in enumerate(things):
+        entry = known.find(thing, EntryKind.THING)
+        row = row_of.get(entry)
+        if entry is not None and row is not None:
+            out[number] = _not_against(_for_kinds(ratios[row], kinds, contents), kinds, (entry,))
+    return out
+
+
+def commonness(things: Sequence[str], kinds: Sequence[str], contents: RoomContents) -> Float[np.ndarray, " n"] | None:
+    """Return ln of how many times as common things of some names are in rooms of each kind as in rooms on average.
+
+    Their narrower kinds count as well: a kitchen cabinet is a cabinet.
+
+    Args:
+        things: names, all of which are meant.
+        kinds: kinds of room; see ``votes``.
+        contents: the table.
+
+    Returns:
+        Nats; None where the table holds none of them.
+    """
+    is_a = lexicon().is_a
+    rows = [
+        number
+        for number, name in enumerate(contents.things)
+        if any(name == thing or is_a(name, thing, EntryKind.THING) for thing in things)
+    ]
+    surface_m2 = contents.surface_m2[rows].sum(axis=0, keepdims=True)
+    if not surface_m2.any():
+        return None
+    entries = filter(None, (lexicon().find(thing, EntryKind.THING) for thing in things))
+    return _not_against(_for_kinds(_nats_of(contents, surface_m2)[0], kinds, contents), kinds, entries)
+
+
+def _not_against(
+    nats: Float[np.ndarray, " n"], kinds: Sequence[str], entries: Iterable[Entry]
+) -> Float[np.ndarray, " n"]:
+    """Return nats that speak against no kind of room in which the lexicon says that such things stand.
+
+    The homes that are counted have tables to dine at in dining rooms alone; many a kitchen has one.
+    """
+    usual = {room for entry in entries for room in entry.rooms}
+    return np.where([kind in usual for kind in kinds], np.maximum(nats, 0.0), nats)
+
+
+def _for_kinds(
+    nats: Float64[np.ndarray, " r"], kinds: Sequence[str], contents: RoomContents
+) -> Float[np.ndarray, " n"]:
+    columns = _columns(tuple(kinds), contents)
+    return np.array([nats.mean() if column is None else nats[column] for column in columns])
+
+
+@cache
+def _columns(kinds: tuple[str, ...], contents: RoomContents) -> tuple[int | None, ...]:
+    column_of = {lexicon().find(name, EntryKind.ROOM): number for number, name in enumerate(contents.kinds)}
+    return tuple(_column(kind, column_of) for kind in kinds)
+
+
+def _column(kind: str, column_of: Mapping[Entry | None, int]) -> int | None:
+    known = lexicon()
+    entry = known.find(kind, EntryKind.ROOM) or known.head(kind, EntryKind.ROOM)
+    if entry is None:
+        return None
+    family = (entry, *known.wider(entry.name, EntryKind.ROOM))
+    return next((column_of[each] for each in family if each in column_of), None)
+
 
 # Voxels whose names vote: one of q, so that their features' products with the names cost some tens of milliseconds.
 _MOST_PRODUCTS = 200_000_000
@@ -30,23 +128,6 @@ LEAST_PART, _LEAST_PART_M2 = 0.2, 1.0  # of an open plan's floor
 _OPEN = ("kitchen", "living room", "dining room", "office", "reception")  # kinds that may be parts of an open plan
 # Two such rooms side by side are one, seen in two parts.
 _ONE_IF_BESIDE = ("kitchen", "living room", "dining room", *_PASSAGES)
-
-
-@dataclass(frozen=True, slots=True)
-class RoomSettings:
-    """From views and things to kinds of room. Chosen on six development homes."""
-
-    views_m: float = 0.8
-    """Standard deviation of how far a view's vote spreads from the middle of what it saw, metres."""
-    view_weight: float = 1.5
-    """Exponent of the views' mean where two or more of them vote; an average is less confident than views that agree
-    should be. A lone view counts once."""
-    things_m: float = 1.6
-    """Standard deviation of how far the vote of a thing spreads from it, metres."""
-    thing_weight: float = 2.0
-    """Weight of the things' votes, in nats a square metre of their surface; 0 lets views vote alone."""
-    most_nats: float = 6.0
-    """The votes of all things at a place never amount to more than this, since voxels side by side are one thing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -322,3 +403,59 @@ class InRooms(NearAnchors):
     def at(self, points_world: Float[np.ndarray, "m 3"]) -> Float[np.ndarray, " m"]:
         """Return the heat at any points."""
         return np.clip(self.kinds.at(points_world) @ self.weights, 0.0, 1.0).astype(np.float64)
+
+
+# What one room says about one thing lies between these, in nats. Much may stand in an unusual room, and
+# a thing in its usual room may still be another.
+_LEAST_NATS, _MOST_NATS = -3.0, 1.0
+
+
+class ThingsInRooms:
+    """The evidence of the rooms of a map on the things in it.
+
+    Args:
+        field: how likely each place is each kind of room.
+        contents: the things of rooms of each kind.
+    """
+
+    def __init__(self, field: RoomField, contents: RoomContents) -> None:
+        self._field = field
+        self._contents = contents
+        self._nats: dict[tuple[str, ...], Float32[np.ndarray, " c"] | None] = {}
+
+    def nats(
+        self, names: tuple[str, ...], rows: Int[np.ndarray, " a"], instance: Int[np.ndarray, " a"], count: int
+    ) -> Float[np.ndarray, " i"] | None:
+        """Return the mean, over the voxels of each instance, of ln of how many times as common such things are there.
+
+        Returns:
+            Nats in [-3, 1]; None where it is not known in which rooms such things stand.
+        """
+        if names not in self._nats:
+            self._nats[names] = self._of_cells(names)
+        of_cells = self._nats[names]
+        if of_cells is None:
+            return None
+        total = np.bincount(instance, of_cells[self._field.plan.voxel_cells[rows]], minlength=count)
+        mean = total / np.maximum(np.bincount(instance, minlength=count), 1)
+        return np.clip(mean, _LEAST_NATS, _MOST_NATS)
+
+    def _of_cells(self, names: tuple[str, ...]) -> Float32[np.ndarray, " c"] | None:
+        nats = commonness(names, self._field.kinds, self._contents)
+        if nats is None:
+            return None
+        return np.log(np.maximum(self._field.share @ np.exp(nats), 1e-9)).astype(np.float32)
+
+
+def with_rooms(
+    confidence: Float[np.ndarray, " i"], nats: Float[np.ndarray, " i"], cost: float
+) -> Float[np.ndarray, " i"]:
+    """Return confidences after the evidence of rooms: their log-odds raised by it, less a cost.
+
+    Args:
+        confidence: of each instance, in [0, 1].
+        nats: evidence for each, times its weight.
+        cost: nats; most things stand in rooms that speak for them, which the confidence knows already.
+    """
+    odds = np.exp(nats - cost)
+    return confidence * odds / np.maximum(1.0 - confidence + confidence * odds, 1e-12)

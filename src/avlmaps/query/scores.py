@@ -1,15 +1,53 @@
-"""What a search for a word computes of every voxel: its score, the two closest words, the margin.
+"""What a search for a word computes of every voxel: its score, the two closest words, the margin; in shared threads.
 
-All of it is NumPy, a few rows at a time: loading numba takes longer than one question to a map of a home, and compiled
-loops are hardly faster on a larger one (``benchmarks/queries.py``).
+All of it is NumPy, a few rows at a time: loading numba takes longer than one question to a map of a home.
 """
 
-from collections.abc import Iterator
+import itertools
+from collections.abc import Callable, Iterator
+from functools import cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from avlmaps.core.ahead import usable_cores
 from avlmaps.core.arrays import Bool, Float16, Float32, Int
-from avlmaps.query.threads import share
+
+if TYPE_CHECKING:
+    from concurrent.futures import ThreadPoolExecutor
+
+# More threads than this gain little: the loops are bound by memory.
+_MAX_THREADS = 4
+
+
+@cache
+def _pool() -> "ThreadPoolExecutor":
+    from concurrent.futures import ThreadPoolExecutor
+
+    return ThreadPoolExecutor(_threads(), thread_name_prefix="avlmaps-query")
+
+
+@cache
+def _threads() -> int:
+    return max(1, min(_MAX_THREADS, usable_cores()))
+
+
+def share(work: Callable[[int, int], Any], count: int, least: int = 1) -> None:
+    """Call ``work(start, stop)`` for ranges that cover ``range(count)``, on every core when it is worth it.
+
+    Args:
+        work: a function that releases the interpreter's lock for most of its time.
+        count: how many items there are.
+        least: fewer items than this are not worth a thread.
+    """
+    parts = max(1, min(_threads(), count // max(least, 1)))
+    edges = [count * k // parts for k in range(parts + 1)]
+    if parts == 1:
+        work(0, count)
+        return
+    for future in [_pool().submit(work, a, b) for a, b in itertools.pairwise(edges)]:
+        future.result()
+
 
 # Rows that are widened at once: they stay in the processor's cache.
 _WIDENED = 2_048

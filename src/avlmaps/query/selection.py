@@ -1,6 +1,6 @@
-"""The lists of a map, and which of its things are meant: those of a room, near a place or thing, of some names; a page.
+"""What a map holds, as the command line, the server and agents list it: by room, place, name and page.
 
-The command line, the server and agents select by these; the server stores what was computed once.
+The server stores what was computed once.
 """
 
 import math
@@ -11,14 +11,14 @@ from typing import Any, NotRequired, TypedDict, TypeVar
 import numpy as np
 
 from avlmaps.core.arrays import Float
-from avlmaps.core.errors import QueryError
+from avlmaps.core.errors import AvlmapsError, QueryError
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.contents import Watch, listed_rooms, put_storeys, require_known
-from avlmaps.query.given_places import distance_m, is_place, place_given
+from avlmaps.query.places import distance_m, is_place, place_given
 from avlmaps.query.schema import ListedThing, NearAnswer, RoomAnswer, SoundAnswer, ThingAnswer
 from avlmaps.query.sound_sources import with_heard
-from avlmaps.query.unknown_names import unknown_note
 from avlmaps.query.whereabouts import Whereabouts
+from avlmaps.query.words import unknown_note
 
 Row = TypeVar("Row")
 T = TypeVar("T")
@@ -237,3 +237,35 @@ def _near(
         best = next((thing for thing, room in zip(things, own, strict=True) if room in rooms), best)
     about: NearAnswer = {"name": best["name"], "confidence": best["confidence"], "position": best["position"]}
     return np.array(best["position"]), about
+
+
+def map_answer(avlmap: AVLMap, note: Callable[[AvlmapsError], object] = lambda _: None) -> dict[str, Any]:
+    """Return the description of a map that ``avlmaps info`` prints: counts, models, sounds with names, rules.
+
+    Args:
+        avlmap: the map.
+        note: is given the error where the sounds have no names since their model is not here.
+    """
+    from avlmaps.maps.store.reader import describe
+    from avlmaps.query.settings import rules_of
+
+    described = describe(avlmap.stored)
+    try:
+        events = avlmap.sounds()
+    except AvlmapsError as error:
+        note(error)
+    else:
+        described["sounds"] = [
+            {**sound, "names": list(event.names), "confidences": list(event.confidences)}
+            for sound, event in zip(described["sounds"], events, strict=True)
+        ]
+    if avlmap.edited:
+        described |= {"edits": len(avlmap.edited.edits), "notices": [*described["notices"], *_lost_edits(avlmap)]}
+    return {**described, "rules": rules_of(avlmap.stored.info.settings)}
+
+
+def _lost_edits(avlmap: AVLMap) -> list[str]:
+    try:
+        return [str(one) for one in avlmap.edited.lost]
+    except AvlmapsError as error:
+        return [f"The edits are not checked: {error}"]

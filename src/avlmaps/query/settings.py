@@ -1,13 +1,151 @@
-"""What can be chosen about a query."""
+"""What can be chosen about a query, and the rules of the AVLMaps paper: each choice of ours that differs from it.
 
-from dataclasses import dataclass, field
+``build_settings("paper")`` and ``query_settings("paper")`` are all that there is to it; the encoders are another choice
+(the profile). docs/paper-models.md lists the rules one by one, and what of the paper they leave out.
+"""
+
+from dataclasses import dataclass, field, replace
+from typing import Literal
 
 from avlmaps.core.errors import QueryError
 from avlmaps.core.numbers import hold_numbers
-from avlmaps.query.factors import FOUND_AT, HeatSettings
-from avlmaps.query.modalities.area import AreaSettings
-from avlmaps.query.modalities.sound import SoundSettings
-from avlmaps.query.object_settings import ObjectSettings
+from avlmaps.core.question import HeardAt, Role
+from avlmaps.maps.audio.settings import HearingSettings, SegmentationSettings
+from avlmaps.maps.fusion.sensor import PAPERS_VARIANCE_M2
+from avlmaps.maps.settings import DEFAULTS, BuildSettings
+
+# From this probability on a query is found (``QuerySettings.found_at``), and a part of it by itself: an instance, a
+# sound, a view, the place of a photo.
+FOUND_AT = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class HeatSettings:
+    """How fast heat falls with distance (the paper's 0.1 and 0.01 a voxel of 5 cm)."""
+
+    primary_falloff_per_m: float = 2.0
+    """For what is sought: reaches 0.5 m."""
+    context_falloff_per_m: float = 0.2
+    """For what says where it is: reaches 5 m."""
+
+    def falloff_per_m(self, role: Role) -> float:
+        """Return ε for a role."""
+        return self.primary_falloff_per_m if role is Role.PRIMARY else self.context_falloff_per_m
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectSettings:
+    """From a word to instances."""
+
+    same_word_cosine: float = 0.95
+    """A vocabulary word at least this close to the queried one names the same thing and does not compete with it."""
+    least_score: float = 0.5
+    """For an encoder that has no feature for "other": a voxel must score at least this."""
+    margin_yes: float = 0.1
+    """An instance that wins its voxels by this much on average is as likely right as wrong."""
+    margin_yes_logits: float = 1.0
+    """The same for an encoder with a scale for its cosines: the margin times its ``logit_scale``."""
+    area_yes_m2: float = 0.01
+    """Surface below which an instance is probably noise; a mug shows about 0.02 m²."""
+    least_confidence: float = 0.3
+    """Instances below this are noise (one or two voxels of 5 cm) and give no heat; 0 admits all, as the paper does."""
+    least_in_company: float = 0.02
+    """The same where the query has context: then a weak instance there is likelier than a
+    confident one elsewhere."""
+    score_in_company: float = 0.5
+    """And there a voxel counts that scores at least this part of its best rival's score, for an encoder of names."""
+    least_score_in_company: float = 0.0
+    """And at least this, a score of its own."""
+    guess_below: float = 0.05
+    """Where the best of these is less confident, weaker voxels give the guess, for an encoder of names."""
+    score_for_guess: float = 0.2
+    """Then a voxel counts that scores at least this part of its best rival's score, and ``least_for_guess``."""
+    least_for_guess: float = 0.1
+    """A score, √p: 0.1 is a probability of 1 %."""
+    room_weight: float = 0.75
+    """How much the kind of room that a thing stands in counts, for an encoder of names: the thing's log-odds rise by
+    this times ln of how many times as common it is in such rooms. 0: not at all. It and the next were chosen on eight
+    development homes."""
+    room_cost: float = 0.4
+    """Nats that the log-odds lose with that: most things stand where things of their name do."""
+    too_long: float = 1.5
+    """An instance this many times as long as the largest thing of its name is cut where its voxels score least, and
+    is less likely to be what it is called, for an encoder of names; 0: never."""
+    link_m: float = 0.1
+    """Voxels of an object no farther apart than this along every axis belong to one instance."""
+    join_m: float = 0.3
+    """Pieces over one another with no larger gap in height are one thing (the legs and the back of a chair)."""
+
+    @property
+    def share_in_company(self) -> float:
+        """The part of its best rival's score from which a voxel counts where the query has context; 1: it must win."""
+        return min(1.0, self.score_in_company)
+
+    def for_guess(self) -> "ObjectSettings":
+        """Return the settings under which weaker voxels count."""
+        return replace(self, score_in_company=self.score_for_guess, least_score_in_company=self.least_for_guess)
+
+
+@dataclass(frozen=True, slots=True)
+class RoomSettings:
+    """From views and things to kinds of room. Chosen on six development homes."""
+
+    views_m: float = 0.8
+    """Standard deviation of how far a view's vote spreads from the middle of what it saw, metres."""
+    view_weight: float = 1.5
+    """Exponent of the views' mean where two or more of them vote; an average is less confident than views that agree
+    should be. A lone view counts once."""
+    things_m: float = 1.6
+    """Standard deviation of how far the vote of a thing spreads from it, metres."""
+    thing_weight: float = 2.0
+    """Weight of the things' votes, in nats a square metre of their surface; 0 lets views vote alone."""
+    most_nats: float = 6.0
+    """The votes of all things at a place never amount to more than this, since voxels side by side are one thing."""
+
+
+@dataclass(frozen=True, slots=True)
+class AreaSettings:
+    """From views to heat."""
+
+    anchor: Literal["camera", "centre"] = "centre"
+    """Where a keyframe's heat falls from: the camera (the paper), or the middle of what the camera saw (things are
+    found in the right place for 45 % of 191 tasks, with the camera's place for 35 %)."""
+    extent: Literal["rooms", "cones"] = "rooms"
+    """How far an area's heat reaches. ``rooms``: views and things vote on the kind of room of every place, up to the
+    walls (``rooms.py``). ``cones`` (the paper): heat falls off round every keyframe, through walls."""
+    score: Literal["posterior", "min-max"] = "posterior"
+    """``posterior`` asks how likely the name is among all area names; ``min-max`` stretches the cosines (the paper)."""
+    temperature: float | None = None
+    """Of the posterior: a cosine higher by this makes a name e times as likely. By default what the encoder learnt
+    (1 / ``logit_scale``), and 0.05 for one without such a scale."""
+    same_word_cosine: float = 0.95
+    """Another name at least this close to the queried one names the same and does not compete with it. For an encoder
+    with a scale it is measured from the middle of all names: its phrases lie in a cone, kitchen beside garage."""
+    pool_m: float = 0.8
+    """Of ``cones``: views whose anchors are within this distance vote together (``pool_posteriors``): an odd one is
+    outvoted. 0 takes each by itself, as the paper does."""
+    link_m: float = 1.0
+    """Keyframes closer than this to a better one belong to its area."""
+    rooms: RoomSettings = field(default_factory=RoomSettings)
+    """Of ``rooms``: the weights of views and things, and how far they reach."""
+
+    @property
+    def by_room(self) -> bool:
+        """Whether places rather than keyframes are scored; stretched cosines are no probabilities to vote with."""
+        return self.extent == "rooms" and self.score == "posterior"
+
+
+@dataclass(frozen=True, slots=True)
+class SoundSettings:
+    """From scores to heat."""
+
+    normalise: Literal["none", "min-max"] = "none"
+    """``none`` takes the encoder's calibrated scores; ``min-max`` stretches them over the heard sounds (the paper)."""
+    at: HeardAt | None = None
+    """Where the heat of every sound is: where the robot was when it heard it (the paper), or where it came from. None:
+    where a query says, else where the robot was."""
+    prior: Literal["lexicon", "none"] = "lexicon"
+    """Whether things that usually make a sound count as its source, besides what the microphones say."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,3 +169,55 @@ class QuerySettings:
         hold_numbers(self, QueryError)
         if not 0.0 <= self.found_at <= 1.0:
             raise QueryError(f"A query cannot be found at a probability of {self.found_at:g}; it lies between 0 and 1.")
+
+
+Rules = Literal["ours", "paper"]
+
+
+# A sample beyond a fixed threshold is sound, a pause of a second divides two sounds, nothing is widened or cleaned.
+# The published code's threshold is 0: its tracks are silent between the clips. No microphone's track is, nor ours, and
+# with 0 such a track is one sound. The noise of our rooms peaks at 0.018 of full scale.
+PAPER_HEARING = HearingSettings(
+    segmentation=SegmentationSettings(
+        method="silence", silence_threshold=0.02, silence_s=1.0, min_length_s=0.0, max_length_s=86_400.0, padding_s=0.0
+    ),
+    noise_reduction_db=0.0,
+    cut="energy",
+)
+
+
+# Heat falls from the camera's place, through walls; cosines are stretched over the keyframes; each view speaks for
+# itself, and things do not.
+PAPER_AREAS = AreaSettings(anchor="camera", extent="cones", score="min-max", pool_m=0.0)
+
+
+# Scores are stretched over the sounds of the map; no words change that each is where the robot was.
+PAPER_SOUNDS = SoundSettings(normalise="min-max", at="robot")
+
+
+# A voxel is the object where its word is the closest of all; no instance is left out for its confidence; its room
+# and its size have no say.
+PAPER_OBJECTS = ObjectSettings(
+    least_confidence=0.0, least_in_company=0.0, score_in_company=1.0, guess_below=0.0, room_weight=0.0, too_long=0.0
+)
+
+
+def build_settings(rules: Rules, settings: BuildSettings = DEFAULTS) -> BuildSettings:
+    """Return the settings of a build with the parts replaced that the rules decide."""
+    if rules == "ours":
+        return settings
+    fusion = replace(settings.fusion, weight_variance_m2=PAPERS_VARIANCE_M2, sensor="none")
+    return replace(settings, fusion=fusion, hearing=PAPER_HEARING)
+
+
+def query_settings(rules: Rules, settings: QuerySettings | None = None) -> QuerySettings:
+    """Return the settings of a query with the parts replaced that the rules decide."""
+    settings = settings or QuerySettings()
+    if rules == "ours":
+        return settings
+    return replace(settings, objects=PAPER_OBJECTS, sounds=PAPER_SOUNDS, areas=PAPER_AREAS)
+
+
+def rules_of(built_with: BuildSettings) -> Rules:
+    """Return the rules that a map was built by, from the settings in its manifest."""
+    return "paper" if build_settings("paper", built_with) == built_with else "ours"

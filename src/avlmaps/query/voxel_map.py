@@ -20,7 +20,8 @@ from avlmaps.maps.store.folder import read, write
 from avlmaps.maps.store.lock import lock_folder
 from avlmaps.perception.encoders import Encoders, encoders_of
 from avlmaps.perception.profiles import Profile
-from avlmaps.query.avlmap import AVLMap, QuerySettings, with_findings
+from avlmaps.query.avlmap import AVLMap, with_findings
+from avlmaps.query.settings import QuerySettings
 from avlmaps.recordings.memory import given_frame
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import AudioError, RecordingError
 from avlmaps.core.question import MOST_CHARACTERS, HeardAt
 from avlmaps.maps.store.edits import LONGEST_NAME
-from avlmaps.query.focal import focal_35mm_of
+from avlmaps.query.locate import focal_35mm_of
 from avlmaps.query.modalities.sound import require_audible
 from avlmaps.query.queryable import Attachment, Photo
 from avlmaps.recordings.audio import AudioTrack, Sound

@@ -17,8 +17,7 @@ from starlette.responses import Response
 
 from avlmaps.core.files import read_regular, user_path
 from avlmaps.core.wording import option
-from avlmaps.query.avlmap import QuerySettings
-from avlmaps.query.modalities.sound import SoundSettings
+from avlmaps.query.settings import QuerySettings, SoundSettings
 from avlmaps.serve.guard import App
 from avlmaps.serve.lanes import Lane, Privacy, RequestError
 from avlmaps.serve.settings import ServeError, ServeSettings

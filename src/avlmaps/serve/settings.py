@@ -7,7 +7,7 @@ from avlmaps.core.errors import AvlmapsError
 from avlmaps.core.network import is_loopback
 from avlmaps.core.question import HeardAt
 from avlmaps.core.wording import option
-from avlmaps.query.factors import FOUND_AT
+from avlmaps.query.settings import FOUND_AT
 
 DEFAULT_PORT = 8750
 MB = 1 << 20

@@ -21,15 +21,16 @@ from avlmaps.language.questions import parse_sentence
 from avlmaps.maps.store.edits import EDITS
 from avlmaps.maps.store.folder import MANIFEST, stamp
 from avlmaps.maps.store.reader import open_stored
-from avlmaps.query.avlmap import AVLMap, QuerySettings
-from avlmaps.query.heat_cache import HeatCache
+from avlmaps.query.avlmap import AVLMap
+from avlmaps.query.heatmap import HeatCache
+from avlmaps.query.settings import QuerySettings
 from avlmaps.serve.lanes import RequestError, watch_here
 from avlmaps.serve.settings import Limits, ServeError
 
 if TYPE_CHECKING:
     from avlmaps.maps.store.reader import StoredMap
     from avlmaps.navigate.paths import PathFinder
-    from avlmaps.query.topdown import TopDown
+    from avlmaps.query.plots import TopDown
     from avlmaps.serve.tiles import Pyramid
     from avlmaps.view.on_page import MapOnPage
     from avlmaps.view.route import Guide, MakeRobot
@@ -113,7 +114,7 @@ class ServedMap:
     @cached_property
     def top_down(self) -> "TopDown":
         """The map from above."""
-        from avlmaps.query.topdown import TopDown
+        from avlmaps.query.plots import TopDown
 
         return TopDown.of(self.avlmap.space)
 

@@ -15,12 +15,11 @@ from avlmaps.core.files import read_regular, user_path
 from avlmaps.core.poses import FRAME
 from avlmaps.core.question import HeardAt
 from avlmaps.navigate.paths import goals_near
-from avlmaps.query.given_places import place_given
-from avlmaps.query.places import last_seen
+from avlmaps.query.places import last_seen, place_given
 from avlmaps.query.schema import SoundAnswer
 from avlmaps.query.selection import Selected, Wanted, page_of, selected, things_with_rooms
-from avlmaps.query.unknown_names import unknown_note
 from avlmaps.query.whereabouts import Whereabouts
+from avlmaps.query.words import unknown_note
 from avlmaps.serve import work
 from avlmaps.serve.lanes import RequestError
 from avlmaps.serve.pictures import small_picture

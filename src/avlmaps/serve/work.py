@@ -12,10 +12,8 @@ from avlmaps.core.motion import GroundPose
 from avlmaps.core.poses import FRAME
 from avlmaps.navigate.paths import PathAnswer
 from avlmaps.query.answer import Answer
-from avlmaps.query.description import map_answer
 from avlmaps.query.editor import edit_text
-from avlmaps.query.given_places import place_of
-from avlmaps.query.places import PlaceAnswer, column_point, describe_place
+from avlmaps.query.places import PlaceAnswer, column_point, describe_place, place_of
 from avlmaps.query.queryable import Photo
 from avlmaps.query.schema import (
     ChangesAnswer,
@@ -30,7 +28,7 @@ from avlmaps.query.schema import (
     SourcesAnswer,
     locate_answer,
 )
-from avlmaps.query.selection import MapLists, ThingsPage, Wanted, page_of_things
+from avlmaps.query.selection import MapLists, ThingsPage, Wanted, map_answer, page_of_things
 from avlmaps.serve import requests
 from avlmaps.serve.lanes import Cancellation, RequestError, without_folders
 from avlmaps.serve.requests import AskQuery, NoQuery, RehearseQuery, Uploads, ViewQuery, camera_of, numbers_of

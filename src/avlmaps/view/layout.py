@@ -14,7 +14,7 @@ from jaxtyping import Float, Float32, Int
 from avlmaps.core.errors import MapError
 from avlmaps.core.poses import FRAME, from_rotation
 from avlmaps.maps.grid import index_ends
-from avlmaps.query.topdown import camera_path
+from avlmaps.query.plots import camera_path
 
 if TYPE_CHECKING:
     from avlmaps.maps.storeys import Storeys

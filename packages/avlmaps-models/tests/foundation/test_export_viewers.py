@@ -12,9 +12,7 @@ import pytest
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import QueryError
 from avlmaps.core.frames import FrameName
-from avlmaps.query.export_foxglove import CAMERA_FRAME, write_foxglove
-from avlmaps.query.export_layers import ExportedBox, ExportedSound, Layers
-from avlmaps.query.export_rerun import write_rerun
+from avlmaps.query.export_viewers import CAMERA_FRAME, ExportedBox, ExportedSound, Layers, write_foxglove, write_rerun
 
 
 def some_layers() -> Layers:

@@ -13,7 +13,8 @@ from avlmaps.core.registry import Kind, find, load
 from avlmaps.perception.conformance import example_frame
 from avlmaps.perception.profiles import profile
 from avlmaps.perception.protocols import LocalFeatures, PlaceEncoder, ViewEncoder
-from avlmaps.query.modalities.area import AREA_NAMES, AreaSettings, area_scores, same_place
+from avlmaps.query.modalities.area import AREA_NAMES, area_scores, same_place
+from avlmaps.query.settings import AreaSettings
 
 
 @pytest.mark.parametrize(("name", "write"), [("siglip2", write_siglip2), ("clip", write_clip)])

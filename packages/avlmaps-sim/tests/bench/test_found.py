@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import Modality, Role
-from avlmaps.query.evidence import GoalEvidence as QueryEvidence
-from avlmaps.query.probability import FACTORS, probability_of
+from avlmaps.query.goals import FACTORS, probability_of
+from avlmaps.query.goals import GoalEvidence as QueryEvidence
 from avlmaps_sim.bench.found.answers import Judged
 from avlmaps_sim.bench.found.queries import FAR_M, NEAR_M, labelled_queries
 from avlmaps_sim.bench.found.suite import brier, factors_table, kinds_table, reliability_table

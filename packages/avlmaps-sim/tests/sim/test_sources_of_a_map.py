@@ -17,11 +17,10 @@ from avlmaps.maps.store.reader import open_stored
 from avlmaps.navigate.instances import things_in
 from avlmaps.navigate.instruct import given_by
 from avlmaps.navigate.skills import Robot
-from avlmaps.query.avlmap import AVLMap, QuerySettings
+from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.heatmap import Heatmap
-from avlmaps.query.modalities.sound import SoundSettings
-from avlmaps.query.rules import query_settings
 from avlmaps.query.schema import ListedThing
+from avlmaps.query.settings import QuerySettings, SoundSettings, query_settings
 from avlmaps.recordings.audio import AudioTrack, Sound
 from avlmaps.recordings.channels import with_microphones, write_channels
 from avlmaps.recordings.microphones import microphones_named

@@ -1,8 +1,7 @@
 """Where a kind of area is: keyframes whose view is closer to its name than to those of other areas, and their rooms."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from typing import Literal
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,11 +10,11 @@ from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import Part, Role
 from avlmaps.maps.types import Keyframes
 from avlmaps.perception.protocols import NamedViewEncoder, ScaledEncoder, ViewEncoder
-from avlmaps.query.encoded_words import encoded_words
-from avlmaps.query.factors import FOUND_AT, HeatSettings, NearAnchors, stretch_scores
-from avlmaps.query.rooms import InRooms, RoomField, Rooms, RoomSettings
-from avlmaps.query.unknown_names import unknown_note
+from avlmaps.query.factors import NearAnchors, stretch_scores
+from avlmaps.query.rooms import InRooms, RoomField, Rooms
+from avlmaps.query.settings import FOUND_AT, AreaSettings, HeatSettings
 from avlmaps.query.voxel_space import Space
+from avlmaps.query.words import encoded_words, unknown_note
 
 # Names that compete with the queried area.
 AREA_NAMES = (
@@ -26,38 +25,6 @@ AREA_NAMES = (
 
 # For an encoder that has no scale for its cosines.
 _UNKNOWN_TEMPERATURE = 0.05
-
-
-@dataclass(frozen=True, slots=True)
-class AreaSettings:
-    """From views to heat."""
-
-    anchor: Literal["camera", "centre"] = "centre"
-    """Where a keyframe's heat falls from: the camera (the paper), or the middle of what the camera saw (things are
-    found in the right place for 45 % of 191 tasks, with the camera's place for 35 %)."""
-    extent: Literal["rooms", "cones"] = "rooms"
-    """How far an area's heat reaches. ``rooms``: views and things vote on the kind of room of every place, up to the
-    walls (``rooms.py``). ``cones`` (the paper): heat falls off round every keyframe, through walls."""
-    score: Literal["posterior", "min-max"] = "posterior"
-    """``posterior`` asks how likely the name is among all area names; ``min-max`` stretches the cosines (the paper)."""
-    temperature: float | None = None
-    """Of the posterior: a cosine higher by this makes a name e times as likely. By default what the encoder learnt
-    (1 / ``logit_scale``), and 0.05 for one without such a scale."""
-    same_word_cosine: float = 0.95
-    """Another name at least this close to the queried one names the same and does not compete with it. For an encoder
-    with a scale it is measured from the middle of all names: its phrases lie in a cone, kitchen beside garage."""
-    pool_m: float = 0.8
-    """Of ``cones``: views whose anchors are within this distance vote together (``pool_posteriors``): an odd one is
-    outvoted. 0 takes each by itself, as the paper does."""
-    link_m: float = 1.0
-    """Keyframes closer than this to a better one belong to its area."""
-    rooms: RoomSettings = field(default_factory=RoomSettings)
-    """Of ``rooms``: the weights of views and things, and how far they reach."""
-
-    @property
-    def by_room(self) -> bool:
-        """Whether places rather than keyframes are scored; stretched cosines are no probabilities to vote with."""
-        return self.extent == "rooms" and self.score == "posterior"
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,8 @@ from avlmaps.core.arrays import UInt8
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import QueryError
 from avlmaps.core.question import Part
-from avlmaps.query.factors import FOUND_AT, HeatSettings, NearAnchors
+from avlmaps.query.factors import NearAnchors
+from avlmaps.query.settings import FOUND_AT, HeatSettings
 from avlmaps.query.voxel_space import Space
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, Float32, Int, UInt8
 
 from avlmaps.core.camera import Pinhole
-from avlmaps.query.topdown import TopDown
+from avlmaps.query.plots import TopDown
 from avlmaps.query.voxel_space import Space
 from avlmaps_sim.render import Renderer
 from avlmaps_sim.scene import NOTHING, Scene

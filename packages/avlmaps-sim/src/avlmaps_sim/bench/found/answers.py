@@ -8,7 +8,7 @@ from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import Modality, Part, Role
 from avlmaps.core.registry import Kind
-from avlmaps.query.evidence import GoalEvidence
+from avlmaps.query.goals import GoalEvidence
 from avlmaps.query.heatmap import Heatmap, product
 from avlmaps.query.modalities.area import area_names
 from avlmaps_sim.bench.found.queries import LabelledQuery, labelled_queries

@@ -11,8 +11,8 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core.files import write_bytes_atomically
-from avlmaps.query.factors import FOUND_AT
-from avlmaps.query.probability import FACTORS, factor_values
+from avlmaps.query.goals import FACTORS, factor_values
+from avlmaps.query.settings import FOUND_AT
 from avlmaps_sim.bench.found.answers import Judged, judged_job
 from avlmaps_sim.bench.harness.intervals import in_percent, wilson
 from avlmaps_sim.bench.harness.provenance import in_words, provenance

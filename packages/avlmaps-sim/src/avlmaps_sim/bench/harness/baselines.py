@@ -11,7 +11,8 @@ from avlmaps.core.question import Modality, Part, Role
 from avlmaps.perception.embedded import logmel
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.heatmap import Heatmap
-from avlmaps.query.modalities.sound import SoundSettings, sound_factor
+from avlmaps.query.modalities.sound import sound_factor
+from avlmaps.query.settings import SoundSettings
 from avlmaps.recordings.audio import AudioTrack, Sound, resample
 from avlmaps_sim.bench.harness.factors import true_places
 from avlmaps_sim.hearing import Synthesised

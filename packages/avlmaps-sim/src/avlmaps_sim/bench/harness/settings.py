@@ -11,7 +11,7 @@ from avlmaps.core.files import write_bytes_atomically
 from avlmaps.core.wording import option
 from avlmaps.perception.encoders import Encoders, encoders_of
 from avlmaps.perception.profiles import choose_models
-from avlmaps.query.rules import Rules
+from avlmaps.query.settings import Rules
 from avlmaps_sim.bench.harness.clips import unheard_rows
 from avlmaps_sim.bench.harness.models import checksums
 from avlmaps_sim.mixing.clips import find_clips
@@ -58,7 +58,7 @@ class SceneSettings:
         scenes: names of scenes.
         profile: the models that map them.
         models: other backends than the profile's, ``module=backend[@model]``.
-        rules: how they are mapped and queried: ``ours``, or the ``paper``'s (``avlmaps.query.rules``).
+        rules: how they are mapped and queried: ``ours``, or the ``paper``'s (``avlmaps.query.settings``).
         hearing: how sounds reach the microphone; a sound's place is the robot's (``overlay``) or its source's.
         sounds: folder of clips; made by rule if None.
         clips: ``unheard``: those of the folder that the shipped sound encoder was not trained on; ``all``.

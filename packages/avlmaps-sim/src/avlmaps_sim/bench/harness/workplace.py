@@ -22,7 +22,7 @@ from avlmaps.perception.encoders import Encoders, encoders_of
 from avlmaps.perception.profiles import choose_models
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.modalities.image import read_picture
-from avlmaps.query.rules import Rules, build_settings, query_settings
+from avlmaps.query.settings import Rules, build_settings, query_settings
 from avlmaps.recordings.types import Recording
 from avlmaps_sim.bench.harness.clips import unheard_folder
 from avlmaps_sim.bench.harness.evidence import Event, Evidence, Photo

@@ -12,7 +12,7 @@ from avlmaps.core.question import Modality, Part, Role
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.modalities.area import area_factor, area_scores
-from avlmaps.query.rules import PAPER_AREAS
+from avlmaps.query.settings import PAPER_AREAS
 from avlmaps.query.voxel_space import Space
 from avlmaps.recordings.types import Recording
 from avlmaps_sim.bench.harness.baselines import WeakHearing, alike_keyframe

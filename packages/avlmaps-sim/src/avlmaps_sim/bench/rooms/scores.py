@@ -7,9 +7,9 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from avlmaps.core.lexicon import EntryKind, lexicon
-from avlmaps.query.components import connected
-from avlmaps.query.doorways import WIDEST_M
-from avlmaps.query.raster import dilated
+from avlmaps.query.room_regions import WIDEST_M
+from avlmaps.query.storey_grid import dilated
+from avlmaps.query.voxel_space import connected
 from avlmaps_sim.scene import Area
 
 CELL_M = 0.1
