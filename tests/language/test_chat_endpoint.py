@@ -5,15 +5,11 @@ Everything runs against a real HTTP server on this machine, garbage and hostilit
 
 import json
 import logging
-import re
 import socket
-import sys
 from collections.abc import Iterator
 from threading import Event
-from threading import enumerate as enumerate_threads
 from typing import Any
 
-import openai
 import pytest
 from chat_server import (
     ChatServer,
@@ -29,14 +25,12 @@ from chat_server import (
 )
 
 from avlmaps.core.errors import LanguageError
-from avlmaps.core.extras import install_command
 from avlmaps.language.chat import endpoint
 from avlmaps.language.chat.endpoint import Endpoint
 from avlmaps.language.chat.replay import ChatRequest, Message
 from avlmaps.language.chat.settings import ChatSettings
 
 KEY = "sk-test-8c1f0e77a2"
-assert openai.VERSION  # imported here, so that no deadline below pays for it
 
 
 @pytest.fixture
@@ -101,8 +95,6 @@ def test_exactly_the_request_is_sent_and_nothing_of_the_environment(server: Chat
         "max_tokens": 99,
     }
     assert asked.headers["authorization"] == f"Bearer {KEY}"
-    told = {name for name in asked.headers if name.startswith(("x-stainless", "openai"))}
-    assert told == {"x-stainless-raw-response"}  # the client needs that one itself; it holds the word "stream"
     assert "another-service" not in str(asked)
 
 
@@ -221,18 +213,6 @@ def test_the_deadline_holds_while_the_name_of_the_host_is_sought(monkeypatch: py
             Endpoint(ChatSettings(base_url="http://model.test/v1", timeout_s=0.4)).complete(_request())
     finally:
         over.set()
-
-
-def test_whoever_is_late_is_left_and_leaves(server: ChatServer) -> None:
-    server.answer(without_body(b"HTTP/1.1 200 OK\r\n", b"X-n: 1\r\n"), "robot.turn(90)")
-    endpoint = Endpoint(_settings(server, timeout_s=0.4))
-    with pytest.raises(LanguageError, match="no answer within"):
-        endpoint.complete(_request())
-    late = [thread for thread in enumerate_threads() if thread.name == "avlmaps-chat"]
-    for thread in late:
-        thread.join(30)
-        assert not thread.is_alive()
-    assert Endpoint(_settings(server)).complete(_request()).content == "robot.turn(90)"
 
 
 @pytest.mark.parametrize("reply", [half(b'{"choices": [{"message": {"content": "robot.tu', 400), hung_up])
@@ -359,25 +339,14 @@ def test_the_hosted_service_is_not_asked_without_a_key_nor_without_a_model(monke
         Endpoint(ChatSettings(api_key=KEY)).model()
 
 
-def test_without_the_client_the_sentence_says_what_to_install(
-    server: ChatServer, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(sys.modules, "openai", None)
-    with pytest.raises(LanguageError, match=re.escape(install_command("chat"))):
-        Endpoint(_settings(server))
-
-
 def test_the_key_is_neither_logged_nor_shown(server: ChatServer, caplog: pytest.LogCaptureFixture) -> None:
     settings = _settings(server, api_key=KEY)
     assert KEY not in repr(settings)
     server.answer(f"robot.turn(90)  # {KEY}", failed(401, f"bad key {KEY}"))
     with caplog.at_level(logging.DEBUG):
-        for name in ("openai", "httpx", "httpx2", "httpcore", "httpcore2"):
-            caplog.set_level(logging.DEBUG, logger=name)
         endpoint = Endpoint(settings)
         assert endpoint.complete(_request()).content == "robot.turn(90)  # …"
         with pytest.raises(LanguageError, match="bad key …"):
             endpoint.complete(_request())
-    assert caplog.records  # the client does say something
     assert all(KEY not in f"{record.getMessage()} {record.args}" for record in caplog.records)
     assert server.asked[0].headers["authorization"] == f"Bearer {KEY}"

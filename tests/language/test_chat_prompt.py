@@ -11,15 +11,15 @@ from program_equality import same_program
 
 from avlmaps.core.errors import LanguageError
 from avlmaps.language.chat.answer import ModelReply, program_text
-from avlmaps.language.chat.prompt import (
+from avlmaps.language.chat.translator import (
     MOST_COMMAND_CHARACTERS,
+    check_files,
     command_message,
     failed_message,
     program_message,
     system_prompt,
     unusable_message,
 )
-from avlmaps.language.chat.translator import check_files
 from avlmaps.language.program import SKILLS, parse_program, run_program
 from avlmaps.language.program.vocabulary import Clip, Picture, Place
 

@@ -1,7 +1,5 @@
 """Settings come from what is given, then the environment, then the defaults; a key goes only where it belongs."""
 
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -106,8 +104,8 @@ def test_what_is_no_address_is_refused(url: str) -> None:
 @pytest.mark.parametrize(
     ("given", "why"),
     [
-        ({"timeout_s": 0.0}, "cannot be waited for 0.0 s"),
-        ({"timeout_s": float("nan")}, "cannot be waited for nan s"),
+        ({"timeout_s": 0.0}, "timeout_s is 0.0; give"),
+        ({"timeout_s": float("nan")}, "timeout_s is nan; give"),
         ({"rounds": -1}, "rounds is -1; give 0 to 10"),
         ({"retries": 11}, "retries is 11; give 0 to 10"),
         ({"temperature": 2.5}, "temperature is 2.5; give 0 to 2"),
@@ -136,11 +134,3 @@ def test_what_no_setting_can_be_is_refused(given: dict[str, Any], why: str) -> N
 def test_a_variable_that_holds_something_else_is_named(name: str, text: str, wanted: str) -> None:
     with pytest.raises(LanguageError, match=f"The variable AVLMAPS_CHAT_{name} is {text!r}; give .*{wanted}"):
         ChatSettings.from_environment({f"AVLMAPS_CHAT_{name}": text})
-
-
-def test_neither_the_package_nor_its_chat_loads_the_client() -> None:
-    code = (
-        "import sys, avlmaps, avlmaps.language.chat as chat; chat.ChatTranslator(chat.ChatSettings()); "
-        "sys.exit(bool({'openai', 'httpx', 'httpx2', 'pydantic'} & set(sys.modules)))"
-    )
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

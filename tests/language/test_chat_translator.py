@@ -1,6 +1,5 @@
 """From a command to a program through a real HTTP server: corrections, hostility, and runs that are repeated."""
 
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -281,9 +280,7 @@ def test_a_model_may_give_up_on_what_is_left(server: ChatServer) -> None:
 # ---- replay
 
 
-def test_a_recorded_run_is_repeated_without_server_key_or_client(
-    server: ChatServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_recorded_run_is_repeated_without_server_or_key(server: ChatServer, tmp_path: Path) -> None:
     path = tmp_path / "chat.jsonl"
     server.answer("hm", _block(GO), _block("robot.turn(90)"))
     recording = _translator(server, replay=path, api_key=KEY)
@@ -292,7 +289,6 @@ def test_a_recorded_run_is_repeated_without_server_key_or_client(
     assert second is not None
     asked = len(server.asked)
 
-    monkeypatch.setitem(sys.modules, "openai", None)
     replaying = ChatTranslator(ChatSettings(replay=path))  # no key, no address, not even the model's name
     again = replaying.program_for(COMMAND)
     assert again.program == first.program == GO

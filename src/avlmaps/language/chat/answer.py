@@ -1,8 +1,9 @@
 """The program in a model's answer, and nothing else of it: no thoughts, no prose, no half of a block."""
 
 import re
-from dataclasses import dataclass
 from textwrap import dedent
+
+import msgspec
 
 from avlmaps.core.errors import LanguageError
 
@@ -23,8 +24,7 @@ class UnusableAnswerError(LanguageError):
     """An answer holds no program; the model may try once more."""
 
 
-@dataclass(frozen=True, slots=True)
-class ModelReply:
+class ModelReply(msgspec.Struct, frozen=True):
     """The answer of a model.
 
     Attributes:

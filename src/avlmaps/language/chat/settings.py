@@ -1,9 +1,8 @@
 """The settings of a chat translator: which model, where it is, and how long to wait for it."""
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from math import isfinite
 from pathlib import Path
 from typing import Any
 from urllib.parse import SplitResult, urlsplit
@@ -12,9 +11,17 @@ from avlmaps.core.errors import LanguageError
 from avlmaps.core.network import is_loopback
 
 HOSTED_URL = "https://api.openai.com/v1"
-# The key for servers on the same machine, which need none; the client insists on one.
-NO_KEY = "none"
 _PREFIX = "AVLMAPS_CHAT_"
+# The least and the most of a setting that is a number.
+_BOUNDS = {
+    "timeout_s": (0.001, 86400), "retries": (0, 10), "rounds": (0, 10), "max_tokens": (1, 1_000_000),
+    "temperature": (0, 2),
+}  # fmt: skip
+_KINDS = {
+    "timeout_s": (float, "a number of seconds"), "retries": (int, "a whole number"), "rounds": (int, "a whole number"),
+    "temperature": (float, "a number or 'none'"), "max_tokens": (int, "a whole number"),
+    "seed": (int, "a whole number or 'none'"), "replay": (Path, "the path of a file"),
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,7 +38,7 @@ class ChatSettings:
     api_key: str | None = field(default=None, repr=False)
     """The key; servers on the same machine mostly need none. Better set in the environment than on a command line."""
     timeout_s: float = 120.0
-    """Seconds to wait for one answer, with all attempts at it."""
+    """Seconds to wait for the program of one command, with all attempts and corrections."""
     retries: int = 2
     """How often a request is sent again where the server is busy, fails, or breaks off."""
     rounds: int = 2
@@ -58,15 +65,9 @@ class ChatSettings:
             raise LanguageError("The key for the chat model holds characters that no key has; copy it again.")
         if self.temperature is not None:  # 0 and 0.0 are one request
             object.__setattr__(self, "temperature", float(self.temperature))
-        if not (isfinite(self.timeout_s) and 0 < self.timeout_s <= 86400):
-            raise LanguageError(f"A chat model cannot be waited for {self.timeout_s} s; give more than 0, up to 86400.")
-        for name, value, least, most in (
-            ("retries", self.retries, 0, 10),
-            ("rounds", self.rounds, 0, 10),
-            ("max_tokens", self.max_tokens, 1, 1_000_000),
-            ("temperature", self.temperature or 0, 0, 2),
-        ):
-            if not least <= value <= most:
+        for name, (least, most) in _BOUNDS.items():
+            value = getattr(self, name)
+            if value is not None and not least <= value <= most:
                 raise LanguageError(f"The chat setting {name} is {value}; give {least} to {most}.")
 
     @classmethod
@@ -109,17 +110,11 @@ class ChatSettings:
     def shown_url(self) -> str:
         """The address without a user, a password or a query, as errors may show it."""
         split = urlsplit(self.base_url)
-        host = f"[{split.hostname}]" if ":" in (split.hostname or "") else split.hostname
-        return f"{split.scheme}://{host}{f':{split.port}' if split.port else ''}{split.path.rstrip('/')}"
-
-
-def variable(setting: str) -> str:
-    """Return the name of the environment variable that sets a setting."""
-    return _PREFIX + setting.upper()
+        return f"{split.scheme}://{split.netloc.rpartition('@')[2]}{split.path.rstrip('/')}"
 
 
 def _split(url: str) -> SplitResult | None:
-    """Return the parts of an address, None for what is none (a port that is no number, a broken IPv6 address)."""
+    """Return the parts of an address; None where it has a port that is no number, or a broken IPv6 address."""
     try:
         split = urlsplit(url)
         _ = split.port
@@ -128,23 +123,12 @@ def _split(url: str) -> SplitResult | None:
     return split if url.isprintable() and " " not in url else None
 
 
-def _read(name: str, text: str) -> object:
+def _read(name: str, text: str) -> Any:
     """Return the value of a setting from the text of its variable."""
-    kinds: dict[str, tuple[Callable[[str], object], str]] = {
-        "timeout_s": (float, "a number of seconds"),
-        "retries": (int, "a whole number"),
-        "rounds": (int, "a whole number"),
-        "temperature": (_or_none(float), "a number or 'none'"),
-        "max_tokens": (int, "a whole number"),
-        "seed": (_or_none(int), "a whole number or 'none'"),
-        "replay": (Path, "the path of a file"),
-    }
-    kind, wanted = kinds.get(name, (str, "text"))
+    kind, wanted = _KINDS.get(name, (str, "text"))
+    if name in ("temperature", "seed") and text.lower() == "none":
+        return None
     try:
         return kind(text)
     except ValueError:
-        raise LanguageError(f"The variable {variable(name)} is {text!r}; give {wanted}.") from None
-
-
-def _or_none(kind: Callable[[str], object]) -> Callable[[str], object]:
-    return lambda text: None if text.lower() == "none" else kind(text)
+        raise LanguageError(f"The variable {_PREFIX}{name.upper()} is {text!r}; give {wanted}.") from None

@@ -1,28 +1,31 @@
-"""From a command to a program by a chat model, corrected where it cannot be used or where it failed."""
+"""From a command to a program by a chat model, corrected where it cannot be used or where it failed.
+
+The prompt is `prompt.md` with the skills from the one table in it. The command is data: it comes as one JSON string on
+one line, cut to a length, and the prompt says so. That helps an honest model. The interpreter, which knows nothing but
+skills, protects the robot from any other.
+"""
 
 import ast
+import json
 import re
 from collections.abc import Sequence
+from functools import cache
+from importlib.resources import files
+from time import monotonic
 
 from avlmaps.core.errors import LanguageError, ProgramError
 from avlmaps.language.chat.answer import ModelReply, UnusableAnswerError, program_text, quoted, without_thoughts
 from avlmaps.language.chat.endpoint import Endpoint
-from avlmaps.language.chat.prompt import (
-    command_message,
-    failed_message,
-    plain_command,
-    program_message,
-    system_prompt,
-    unusable_message,
-)
 from avlmaps.language.chat.replay import ChatRequest, Message, Replay
 from avlmaps.language.chat.settings import ChatSettings
 from avlmaps.language.commands import check_order
-from avlmaps.language.program import SKILLS, Program, parse_program
+from avlmaps.language.program import SKILLS, Program, parse_program, skill_lines
 from avlmaps.language.program.parser import called
 from avlmaps.language.translator import Translation
 
+MOST_COMMAND_CHARACTERS = 500
 _MOST_SAID_CHARACTERS = 4000
+_MOST_DONE = 40
 _MOVES_NOTHING = (
     "The program does not move the robot, so that nothing would be done; write the movements that the command says, "
     "or `# cannot: ` and the reason."
@@ -41,7 +44,7 @@ class ChatTranslator:
 
     def __init__(self, settings: ChatSettings | None = None) -> None:
         self._settings = settings or ChatSettings.from_environment()
-        self._replay = Replay.open(self._settings.replay) if self._settings.replay else None
+        self._replay = Replay(self._settings.replay) if self._settings.replay else None
         self._endpoint: Endpoint | None = None
         self._model = self._settings.model
         self._command = ""
@@ -91,8 +94,9 @@ class ChatTranslator:
         """Return the program that a conversation leads to, with as many corrections as are left."""
         corrected: list[str] = []
         read = written = 0
+        deadline = monotonic() + self._settings.timeout_s
         while True:
-            answer = self._asked(messages)
+            answer = self._asked(messages, deadline)
             read, written = read + answer.tokens[0], written + answer.tokens[1]
             try:
                 program = program_text(answer)
@@ -112,7 +116,7 @@ class ChatTranslator:
                 corrected.append(_one_sentence(fault))
             self._rounds_used += 1
 
-    def _asked(self, messages: tuple[Message, ...]) -> ModelReply:
+    def _asked(self, messages: tuple[Message, ...], deadline: float) -> ModelReply:
         """Return the answer to a conversation, from the file where there is one."""
         settings, replay = self._settings, self._replay
         replayed = replay if replay and not replay.recording else None
@@ -121,13 +125,13 @@ class ChatTranslator:
         request = ChatRequest(self._model, messages, settings.temperature, settings.seed, settings.max_tokens)
         if replayed:
             return replayed.answer(request)
-        answer = self._server().complete(request)
+        answer = self._server().complete(request, deadline)
         if replay:
             replay.add(request, answer)
         return answer
 
     def _server(self) -> Endpoint:
-        """Return the endpoint, made when it is first needed: a replay needs neither a key nor the client."""
+        """Return the endpoint, made when it is first needed: a replay needs no key."""
         if self._endpoint is None:
             self._endpoint = Endpoint(self._settings)
         return self._endpoint
@@ -205,3 +209,65 @@ def _one_sentence(fault: Exception) -> str:
 
 def _attempts(count: int) -> str:
     return "1 attempt" if count == 1 else f"{count} attempts"
+
+
+@cache
+def system_prompt() -> str:
+    """Return the prompt that precedes any command."""
+    told = files("avlmaps.language.chat").joinpath("prompt.md").read_text(encoding="utf-8")
+    return told.replace("{skills}", "\n".join(f"- {line}" for line in skill_lines()))
+
+
+def command_message(command: str) -> str:
+    """Return the turn that gives a command.
+
+    Raises:
+        LanguageError: the command is empty or too long.
+    """
+    return f"Command: {json.dumps(plain_command(command), ensure_ascii=False)}"
+
+
+def plain_command(command: str) -> str:
+    """Return a command on one line, without control characters or halves of letters.
+
+    Raises:
+        LanguageError: it is empty or too long.
+    """
+    letters = command.encode("utf-8", "replace").decode("utf-8")
+    plain = " ".join("".join(letter for letter in letters if letter.isprintable() or letter.isspace()).split())
+    if not plain:
+        raise LanguageError("The command is empty; say where the robot shall go, such as: go to the sofa.")
+    if len(plain) > MOST_COMMAND_CHARACTERS:
+        raise LanguageError(
+            f"The command has {len(plain)} characters, more than {MOST_COMMAND_CHARACTERS}; say it shorter, or in "
+            "several commands."
+        )
+    return plain
+
+
+def unusable_message(fault: str) -> str:
+    """Return the turn that asks for a corrected program, none of which has run."""
+    return (
+        f"That cannot be used: {_cut(fault)}\nNothing of it was done. Answer with the whole corrected program in one "
+        "Python code block, and nothing else."
+    )
+
+
+def failed_message(error: str, done: Sequence[str]) -> str:
+    """Return the turn that reports that a program failed while it ran, and asks for one that does the rest."""
+    steps = "\n".join(f"- {_cut(step, 200)}" for step in done[-_MOST_DONE:])
+    known = f"These steps were done:\n{steps}\n" if done else "What stands before the step that failed was done.\n"
+    return (
+        f"The program failed while it ran: {_cut(error)}\n{known}The robot stands where they left it, and all names "
+        "are forgotten. Do not repeat movements that were done. Answer with a program for what is left to do, in one "
+        "Python code block, and nothing else; or with `# cannot: ` and the reason, if nothing else can be tried."
+    )
+
+
+def program_message(program: str) -> str:
+    """Return the turn in which a model gave a program."""
+    return f"```python\n{_cut(program, _MOST_SAID_CHARACTERS)}\n```"
+
+
+def _cut(text: str, most: int = 600) -> str:
+    return text if len(text) <= most else text[: most - 1] + "…"
