@@ -165,9 +165,7 @@ def test_each_error_of_the_family_has_a_kind_of_its_own() -> None:
 def test_a_cold_cache_is_announced_once_and_a_warm_one_not(tmp_path: Path) -> None:
     code = (
         "import numpy as np\n"
-        "from avlmaps.core import progress\n"
         "from avlmaps.core.progress import announce_compiling\n"
-        "progress._UNSAID_S = 0.0\n"
         "from avlmaps.query.kernels import sorted_by_number\n"
         "with announce_compiling():\n"
         "    for kind in (np.int64, np.int32):\n"

@@ -9,9 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps.core.inflection import plural_of, singulars_of
 from avlmaps.core.lexicon import Entry, EntryKind, lexicon, noun_of
-from avlmaps.core.spelling import distance, squeezed
+from avlmaps.core.words import distance, plural_of, singulars_of, squeezed
 
 KNOWN = lexicon()
 ENTRIES = KNOWN.entries()

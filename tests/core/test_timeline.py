@@ -134,8 +134,3 @@ def test_gaps_are_told_with_their_place_and_length():
     assert told[0] == "There are no frames for 172798 s after 1.90 s." and "several drives" in told[1]
     assert gap_notices(np.arange(0, 100, 1.5), "frames") == ()
     assert gap_notices(np.array([0.0, 50.0]), "frames") == ()
-
-
-def test_slerp_takes_the_shorter_arc():
-    a, b = np.array([[0.0, 0.0, 0.0, 1.0]]), np.array([[0.0, 0.0, 0.0, -1.0]])
-    assert np.allclose(np.abs(timeline.slerp(a, b, np.array([0.3]))), [[0, 0, 0, 1]])

@@ -17,9 +17,9 @@ from hypothesis import strategies as st
 sys.path.insert(0, str(Path(__file__).parent.parent / "recordings"))
 from recording_scenes import save_depth, shots, write_folder
 
-from avlmaps.core.ahead import run_ahead
 from avlmaps.core.columns import axes_of
 from avlmaps.core.errors import MapError, RecordingError
+from avlmaps.core.machine import run_ahead
 from avlmaps.maps.build import build_map, describe
 from avlmaps.maps.plan import audio_key
 from avlmaps.maps.settings import BuildSettings, FrameSettings

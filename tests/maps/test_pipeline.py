@@ -11,8 +11,8 @@ from build_fakes import SETTINGS, Pixels, Walk, register_fakes
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps.core.ahead import run_ahead
 from avlmaps.core.errors import BackendError
+from avlmaps.core.machine import run_ahead
 from avlmaps.core.registry import Backend, Kind, register
 from avlmaps.maps.build import build_map, encode_frames
 from avlmaps.maps.store.manifest import BadFrame

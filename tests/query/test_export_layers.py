@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from query_fakes import furnished_map
 
 from avlmaps.core.errors import BackendError, QueryError
-from avlmaps.core.frames import FrameName
-from avlmaps.core.poses import from_quaternion
+from avlmaps.core.poses import FrameName, from_quaternion
 from avlmaps.query import export
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.export import FILES, pcd_bytes, write_openlex3d

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from query_fakes import furnished_map
 
-from avlmaps.core.frames import FrameName
+from avlmaps.core.poses import FrameName
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.export import write_glb, write_ply, write_table
 from avlmaps.query.places import answer_in

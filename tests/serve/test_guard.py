@@ -10,7 +10,7 @@ from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 from starlette.testclient import TestClient
 
-from avlmaps.core.network import is_loopback
+from avlmaps.core.machine import is_loopback
 from avlmaps.core.wording import Spelling, option, options_as
 from avlmaps.serve.guard import AccessGuard
 from avlmaps.serve.lanes import Privacy, without_folders

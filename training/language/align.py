@@ -8,7 +8,7 @@ from itertools import pairwise
 from training.language.linearise import Pointers, is_written_well, line_of, line_of_question
 from training.language.rows import Example
 
-from avlmaps.core.inflection import singulars_of, stem_of
+from avlmaps.core.words import singulars_of, stem_of
 from avlmaps.language import lexer
 from avlmaps.language.intents import Ask, Inquiry, TargetKind
 from avlmaps.language.learned.linear import MalformedError, Pointable, Symbol, amount

@@ -9,8 +9,8 @@ from typing import Any
 
 from training.language.rows import Example
 
-from avlmaps.core.inflection import plural_of
 from avlmaps.core.lexicon import EntryKind, lexicon
+from avlmaps.core.words import plural_of
 from avlmaps.language.intents import (
     Beside,
     Clarify,

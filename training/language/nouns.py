@@ -11,7 +11,7 @@ from pathlib import Path
 from training.language.augment import targets_of
 from training.language.pool import HELD_OUT, collected
 
-from avlmaps.core.inflection import singulars_of
+from avlmaps.core.words import singulars_of
 from avlmaps.language.intents import TargetKind
 from avlmaps.language.lexer import WORDS
 from avlmaps.language.names import is_known, may_name

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from training.language.augment import Names
 from training.language.rows import Example
 
-from avlmaps.core.inflection import plural_of
+from avlmaps.core.words import plural_of
 from avlmaps.language.intents import (
     Ask,
     Beside,

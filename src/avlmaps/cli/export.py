@@ -9,7 +9,7 @@ from tyro.conf import arg
 
 from avlmaps.cli.output import UsageError, size_of
 from avlmaps.cli.verb import MapVerb, shown_in
-from avlmaps.core.frames import FrameName
+from avlmaps.core.poses import FrameName
 
 if TYPE_CHECKING:
     from avlmaps.query.avlmap import AVLMap

@@ -12,7 +12,7 @@ from tyro.conf import Positional, arg
 from avlmaps.cli.output import UsageError, query_lines
 from avlmaps.cli.process import require_address_space
 from avlmaps.cli.verb import MapVerb, OptionalPath, OptionalText, idle, shown_in
-from avlmaps.core.frames import FrameName
+from avlmaps.core.poses import FrameName
 from avlmaps.core.progress import say
 
 if TYPE_CHECKING:

@@ -25,7 +25,7 @@ from avlmaps.cli.verbs import read_verb
 from avlmaps.core.errors import AvlmapsError, BackendError
 from avlmaps.core.extras import install_command
 from avlmaps.core.files import user_path
-from avlmaps.core.frames import FrameName
+from avlmaps.core.poses import FrameName
 from avlmaps.core.printable import printable
 from avlmaps.core.progress import end_bars, say
 

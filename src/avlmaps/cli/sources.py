@@ -40,8 +40,7 @@ class Sources(MapVerb):
 
 def list_sources(verb: Sources) -> dict[str, Any]:
     """Return the sources of a map's sounds."""
-    from avlmaps.core.frames import FrameName
-    from avlmaps.core.poses import FRAME
+    from avlmaps.core.poses import FRAME, FrameName
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.places import answer_in
 

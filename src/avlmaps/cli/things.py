@@ -8,7 +8,7 @@ from tyro.conf import arg
 
 from avlmaps.cli.output import UsageError, require_share, table_lines
 from avlmaps.cli.verb import MapVerb, shown_in
-from avlmaps.core.frames import FrameName
+from avlmaps.core.poses import FrameName
 from avlmaps.core.progress import say
 from avlmaps.core.wording import place_text
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Optional
 from tyro.conf import Positional, arg
 
 from avlmaps.cli.output import UsageError, emit
-from avlmaps.core.frames import FrameName
+from avlmaps.core.poses import FrameName
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance

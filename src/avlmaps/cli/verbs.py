@@ -18,7 +18,7 @@ from avlmaps.cli.verb import Verb
 from avlmaps.core.errors import BackendError
 from avlmaps.core.extras import OTHERS, how_to_get
 from avlmaps.core.registry import brought, entry_points
-from avlmaps.core.suggestions import did_you_mean, nearest
+from avlmaps.core.words import did_you_mean, nearest
 
 _DESCRIPTION = """Audio-Visual-Language Maps: one 3D map of what a robot saw and recorded, which you query with words.
 

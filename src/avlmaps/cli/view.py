@@ -123,7 +123,7 @@ def _robot(scene: str) -> "MakeRobot":
 def _serve(verb: View) -> None:
     import secrets
 
-    from avlmaps.core.network import is_loopback
+    from avlmaps.core.machine import is_loopback
     from avlmaps.serve.service import Service, listening_socket
     from avlmaps.serve.settings import Limits, ServeSettings
 

@@ -76,7 +76,6 @@ def offsets_of(lengths: Sequence[int] | Int[np.ndarray, " k"]) -> Int64[np.ndarr
 
 
 def _taken(offsets: Int[np.ndarray, " k1"], rows: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Return the offsets of some rows of a ragged array, and the entries that they have."""
     size: Int[np.ndarray, " r"] = np.diff(offsets)[rows]
     ends = offsets_of(size)
     first: Int[np.ndarray, " m"] = np.repeat(offsets[:-1][rows] - ends[:-1], size)

@@ -36,7 +36,6 @@ def install_command(extra: str = "", *more: str, distribution: str = "avlmaps") 
 
 @cache
 def _clone() -> Path | None:
-    """Return the folder of the project that this package came from; None where it came as a package."""
     from importlib.metadata import PackageNotFoundError, distribution  # slow to load, and errors alone need it
 
     beside = Path(__file__).resolve().parents[3]  # src/avlmaps/core/extras.py

@@ -5,7 +5,6 @@ plural, so "Arm-chairs" is an armchair. How to add a thing stands in ``docs/guid
 """
 
 import tomllib
-import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -13,8 +12,7 @@ from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, Literal
 
-from avlmaps.core.inflection import plural_of, singulars_of
-from avlmaps.core.spelling import Speller, squeezed
+from avlmaps.core.words import Speller, plural_of, singulars_of, squeezed
 
 Range = tuple[float, float]
 Mount = Literal["floor", "wall", "ceiling", "top", "built in"]
@@ -39,27 +37,20 @@ class EntryKind(StrEnum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Entry:
-    """One thing, room or sound.
+    """One thing, room or sound; ``lexicon.toml`` explains what is not listed here.
 
     Attributes:
         name: what answers call it, singular where it has one.
-        kind: thing, room or sound.
-        plural: of the name; the name itself where it has no other.
+        plural: the name itself where it has no other.
         synonyms: other names of the same, British and American.
         learnt: phrases that the encoders which ship were trained with or carry in their notes for it; most are
             synonyms, some name what the encoder takes for it: a tap for a sink.
         wider: the kinds that it belongs to, nearest first, each an entry of its own: a chair is a seat.
         compounds: names of special ones that are no entry of their own: a dining chair is a chair.
-        mount: where it usually is: on the floor, on a wall, on the ceiling, on top of another thing, or built in.
         size_m: the usual width, depth and height, each from least to greatest, metres; None where it varies too much.
-        soft: whether it swallows sound.
         sounds: names of the sounds that it makes, for a thing.
         makers: names of the things that make it, the likeliest first, for a sound.
         rooms: names of the rooms where it usually is; for a sound, where it is also heard without its makers.
-        like: what an encoder that does not know it may take it for, since they look alike: a freezer, a refrigerator.
-        generic: whether it says too little to look for: an object, an appliance; what it is stands beside it.
-        wet: of a room, whether its walls get wet.
-        tiled: of a room, whether its floor is hard.
         spoken: what people mostly say for it where that is not the name, else ``""``.
         split: ``training`` where an encoder which ships was trained to name it; ``held out`` for all others.
     """
@@ -308,7 +299,6 @@ class Lexicon:
 
     @cached_property
     def _sounds_of(self) -> dict[str, tuple[str, ...]]:
-        """The sounds that each thing makes, from what makes each sound."""
         out: dict[str, tuple[str, ...]] = {}
         for name, said in self._said[EntryKind.SOUND].items():
             for maker in _listed(said.get("makers", "")):
@@ -335,12 +325,10 @@ def undescribed(phrase: str) -> str:
 
 
 def _link(words: Sequence[str]) -> int:
-    """Return the index of the word at which the description after the noun begins."""
     return next((at for at, word in enumerate(words) if at and word.lower() in _LINKS), len(words))
 
 
 def _flat(groups: Mapping[str, Any]) -> Iterable[tuple[str, Mapping[str, Any]]]:
-    """Return each entry's name with what its group and itself say of it."""
     for group in groups.values():
         usual = group.get(_DEFAULTS, {})
         for name, said in group.items():
@@ -353,19 +341,10 @@ def _listed(text: str) -> tuple[str, ...]:
 
 
 def _size(text: str) -> tuple[Range, Range, Range]:
-    """Return the three ranges of ``0.4-0.6 x 0.4-0.6 x 0.8-1.1``: width, depth, height."""
     width, depth, height = ((float(low), float(high)) for low, _, high in (p.partition("-") for p in text.split(" x ")))
     return width, depth, height
 
 
 def _ends_with(phrase: str, tail: str) -> bool:
-    """Return whether a phrase is another one, or ends in it: an office chair is a chair."""
     phrase, tail = " ".join(phrase.lower().split()), " ".join(tail.lower().split())
     return bool(tail) and (phrase == tail or phrase.endswith(f" {tail}"))
-
-
-def __getattr__(name: str) -> Any:
-    if name == "Kind":  # its name in earlier releases
-        warnings.warn("lexicon.Kind is EntryKind now; the old name goes in the next release.", DeprecationWarning, 2)
-        return EntryKind
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

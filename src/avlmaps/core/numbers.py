@@ -60,7 +60,6 @@ def as_words(given: Any) -> tuple[str, ...] | None:
 
 
 def _as_kind(given: Any, kind: Any) -> Any:
-    """Return what is given as that kind; None for another one."""
     if kind in _OF:
         return as_number(given) if kind in (float, float | None) else as_whole(given)
     if kind in _WORDS:

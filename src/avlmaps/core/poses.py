@@ -4,6 +4,7 @@ Quaternions are x y z w. Batches are leading axes.
 """
 
 from collections.abc import Sequence
+from enum import StrEnum
 
 import numpy as np
 
@@ -13,6 +14,14 @@ from avlmaps.core.errors import RecordingError
 # A rotation read from a file may be this far from orthonormal (largest entry of RᵀR − I) and still be
 # taken for a rotation written with too few digits; real data (7-Scenes) is off by 2e-4.
 MAX_ROTATION_FAULT = 0.05
+_LAST_ROW = (0.0, 0.0, 0.0, 1.0)
+
+
+class FrameName(StrEnum):
+    """The frame of the positions of an answer or a file."""
+
+    RECORDING = "recording"
+    LEVEL = "level"
 
 
 FRAME = "recording"
@@ -22,57 +31,55 @@ FRAME = "recording"
 def orthonormalize(
     world_from_camera: Float[np.ndarray, "*shape"], name: str, max_fault: float = MAX_ROTATION_FAULT
 ) -> Float[np.ndarray, "4 4"]:
-    """Return the pose with its rotation replaced by the nearest one (in the Frobenius norm).
-
-    Args:
-        world_from_camera: 4x4 pose as read from a file.
-        name: what the pose belongs to, for the error's sentence (such as ``frame 000012``).
-        max_fault: largest entry of RᵀR − I that still counts as rounding.
-
-    Raises:
-        RecordingError: the pose holds NaN or infinity, is not a rigid transform, mirrors, or is off by more.
-    """
+    """Return one pose as ``orthonormalize_all`` does; one of another shape than 4x4 is refused as well."""
     if world_from_camera.shape != (4, 4):
         raise RecordingError(f"The pose of {name} has shape {world_from_camera.shape}; it must be 4x4.")
-    if not np.isfinite(world_from_camera).all():
-        raise RecordingError(f"The pose of {name} holds NaN or infinity; remove that frame or fix its pose.")
-    rotation = world_from_camera[:3, :3]
-    fault = float(np.abs(rotation.T @ rotation - np.eye(3)).max())
-    bottom_is_right = np.allclose(world_from_camera[3], (0.0, 0.0, 0.0, 1.0), atol=1e-6)
-    if fault > max_fault or np.linalg.det(rotation) < 0.0 or not bottom_is_right:
-        if not bottom_is_right:
-            row = " ".join(f"{value:.4g}" for value in world_from_camera[3])
-            turned = fault <= max_fault and bool(np.allclose(world_from_camera[:, 3], (0.0, 0.0, 0.0, 1.0), atol=1e-6))
-            why = "; it looks written column by column: transpose it" if turned else ""
-            raise RecordingError(
-                f"The pose of {name} is not a rigid transform: its last row is {row}, where 0 0 0 1 belongs{why}."
-            )
-        raise RecordingError(
-            f"The pose of {name} is not a rigid transform (its rotation is off orthonormal by {fault:.3g}, determinant "
-            f"{np.linalg.det(rotation):.3g}; at most {max_fault} passes for rounding); fix it or leave the frame out."
-        )
-    u, _, vt = np.linalg.svd(rotation)
-    return from_rotation(u @ vt, world_from_camera[:3, 3])
+    return orthonormalize_all(world_from_camera[None], [name], max_fault)[0]
 
 
 def orthonormalize_all(
     world_from_camera: Float[np.ndarray, "n 4 4"], names: Sequence[str], max_fault: float = MAX_ROTATION_FAULT
 ) -> Float[np.ndarray, "n 4 4"]:
-    """Do what ``orthonormalize`` does for many poses at once; the first pose that is none is named in the error."""
+    """Return poses with their rotations replaced by the nearest ones (in the Frobenius norm).
+
+    Args:
+        world_from_camera: as read from a file.
+        names: what each belongs to, for the error's sentence (such as ``frame 000012``).
+        max_fault: largest entry of RᵀR − I that still counts as rounding.
+
+    Raises:
+        RecordingError: the first that holds NaN or infinity, is not a rigid transform, mirrors, or is off by more.
+    """
     with np.errstate(invalid="ignore", over="ignore"):
         rotation = world_from_camera[:, :3, :3]
         fault = np.abs(np.swapaxes(rotation, 1, 2) @ rotation - np.eye(3)).max(axis=(1, 2), initial=0.0)
         wild = ~(fault <= max_fault) | ~np.isfinite(world_from_camera).all(axis=(1, 2))
-        wild |= np.abs(world_from_camera[:, 3] - (0.0, 0.0, 0.0, 1.0)).max(axis=1, initial=0.0) > 1e-6
-        determinant = np.linalg.det(np.where(wild[:, None, None], np.eye(3), rotation))
-    wild |= determinant < 0.0
-    for index in np.flatnonzero(wild).tolist():
-        orthonormalize(world_from_camera[index], names[index], max_fault)
+        wild |= np.abs(world_from_camera[:, 3] - _LAST_ROW).max(axis=1, initial=0.0) > 1e-6
+        wild |= np.linalg.det(np.where(wild[:, None, None], np.eye(3), rotation)) < 0.0
+    if wild.any():
+        index = int(np.argmax(wild))
+        raise RecordingError(f"The pose of {names[index]} {_why_no_pose(world_from_camera[index], max_fault)}")
     u, _, vt = np.linalg.svd(rotation)
     pose = world_from_camera.copy()
     pose[:, :3, :3] = u @ vt
-    pose[:, 3] = (0.0, 0.0, 0.0, 1.0)
+    pose[:, 3] = _LAST_ROW
     return pose
+
+
+def _why_no_pose(pose: Float[np.ndarray, "4 4"], max_fault: float) -> str:
+    if not np.isfinite(pose).all():
+        return "holds NaN or infinity; remove that frame or fix its pose."
+    rotation = pose[:3, :3]
+    fault = float(np.abs(rotation.T @ rotation - np.eye(3)).max())
+    if not np.allclose(pose[3], _LAST_ROW, atol=1e-6):
+        row = " ".join(f"{value:.4g}" for value in pose[3])
+        turned = fault <= max_fault and bool(np.allclose(pose[:, 3], _LAST_ROW, atol=1e-6))
+        why = "; it looks written column by column: transpose it" if turned else ""
+        return f"is not a rigid transform: its last row is {row}, where 0 0 0 1 belongs{why}."
+    return (
+        f"is not a rigid transform (its rotation is off orthonormal by {fault:.3g}, determinant "
+        f"{np.linalg.det(rotation):.3g}; at most {max_fault} passes for rounding); fix it or leave the frame out."
+    )
 
 
 def inverse(b_from_a: Float[np.ndarray, "*batch 4 4"]) -> Float[np.ndarray, "*batch 4 4"]:

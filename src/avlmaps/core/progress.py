@@ -5,7 +5,6 @@ import sys
 import threading
 from collections.abc import Callable, Generator, Iterable, Iterator, Sized
 from contextlib import AbstractContextManager, contextmanager
-from time import perf_counter
 from typing import Any, TypeVar
 
 from avlmaps.core.printable import printable
@@ -106,14 +105,6 @@ def end_bars() -> None:
         bar.close()
 
 
-def leave_out(seconds: float) -> None:
-    """Leave time that was spent on something else, such as compiling, out of what the open bars estimate."""
-    for bar in _open_bars:
-        for name in ("start_t", "last_print_t"):
-            if hasattr(bar, name):  # a bar that is not shown has none
-                setattr(bar, name, getattr(bar, name) + seconds)
-
-
 def say(message: str) -> None:
     """Print one line on standard error, unless progress is silenced."""
     if not _is_quiet():
@@ -121,45 +112,23 @@ def say(message: str) -> None:
 
 
 NOTICE = "compiling once for this machine, which later runs skip"
-_UNSAID_S = 1.5
-"""Compiling that takes no longer in all is not worth a line."""
 
 
 @contextmanager
 def announce_compiling() -> Generator[None]:
-    """Print one line on standard error where compiling takes its time, and leave that time out of every bar."""
+    """Print one line on standard error when something is compiled."""
     from numba.core import event
 
     class Listener(event.Listener):
-        def __init__(self) -> None:
-            self.depth, self.spent_s, self.begun_s = 0, 0.0, 0.0
-            self.timer: threading.Timer | None = None
-            self.said = threading.Event()
+        said = False
 
         def on_start(self, event: object) -> None:
-            self.depth += 1
-            if self.depth > 1:
-                return
-            self.begun_s = perf_counter()
-            if not self.said.is_set():
-                self.timer = threading.Timer(max(0.0, _UNSAID_S - self.spent_s), self.announce)
-                self.timer.daemon = True
-                self.timer.start()
+            if not self.said:
+                say(NOTICE)
+            self.said = True
 
         def on_end(self, event: object) -> None:
-            self.depth -= 1
-            if self.depth > 0:
-                return
-            took_s = perf_counter() - self.begun_s
-            self.spent_s += took_s
-            leave_out(took_s)
-            if self.timer is not None:
-                self.timer.cancel()
-
-        def announce(self) -> None:
-            if not self.said.is_set():
-                self.said.set()
-                say(NOTICE)
+            pass
 
     install: Callable[..., AbstractContextManager[None]] = event.install_listener  # pyright: ignore[reportUnknownMemberType, reportUnknownVariableType]
     with install("numba:compile", Listener()):

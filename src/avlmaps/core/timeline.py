@@ -9,7 +9,6 @@ from time import time
 
 import numpy as np
 
-from avlmaps.core import poses
 from avlmaps.core.arrays import Bool, Float, Int
 
 DAY_S = 86_400.0
@@ -174,6 +173,8 @@ class Trajectory:
         Raises:
             ValueError: a stamp lies further outside; ask ``covers`` first.
         """
+        from scipy.spatial.transform import Rotation
+
         outside_s = np.maximum(self.stamps_s[0] - stamps_s, stamps_s - self.stamps_s[-1])
         if np.any(~(outside_s <= edge_s)):
             raise ValueError(
@@ -184,32 +185,16 @@ class Trajectory:
         inner = np.flatnonzero((share > 0.0) & (share < 1.0))
         if len(inner):
             a, b, t = self.world_from_body[left[inner]], self.world_from_body[right[inner]], share[inner][:, None]
-            rotation = slerp(poses.to_quaternion(a), poses.to_quaternion(b), share[inner])
-            asked[inner] = poses.from_quaternion((1.0 - t) * a[:, :3, 3] + t * b[:, :3, 3], rotation)
+            turn = Rotation.from_matrix(np.swapaxes(a[:, :3, :3], 1, 2) @ b[:, :3, :3]).as_rotvec()
+            asked[inner, :3, :3] = a[:, :3, :3] @ Rotation.from_rotvec(t * turn).as_matrix()
+            asked[inner, :3, 3] = (1.0 - t) * a[:, :3, 3] + t * b[:, :3, 3]
         return asked
 
     def _between(
         self, stamps_s: Float[np.ndarray, " k"]
     ) -> tuple[Int[np.ndarray, " k"], Int[np.ndarray, " k"], Float[np.ndarray, " k"]]:
-        """Return the poses before and after each stamp, and how far (0 to 1) the stamp is from the one to the other."""
         last = len(self.stamps_s) - 1
         left = np.clip(np.searchsorted(self.stamps_s, stamps_s, side="right") - 1, 0, last)
         right = np.minimum(left + 1, last)
         length_s = np.where(right > left, self.stamps_s[right] - self.stamps_s[left], 1.0)
         return left, right, np.clip((stamps_s - self.stamps_s[left]) / length_s, 0.0, 1.0) * (right > left)
-
-
-def slerp(
-    a_xyzw: Float[np.ndarray, "k 4"], b_xyzw: Float[np.ndarray, "k 4"], share: Float[np.ndarray, " k"]
-) -> Float[np.ndarray, "k 4"]:
-    """Return unit quaternions on the shorter arc from a (share 0) to b (share 1), at constant speed."""
-    cosine = np.einsum("ij,ij->i", a_xyzw, b_xyzw)
-    b = np.where(cosine[:, None] < 0.0, -b_xyzw, b_xyzw)
-    angle = np.arccos(np.clip(np.abs(cosine), 0.0, 1.0))
-    sine = np.sin(angle)
-    near = sine < 1e-6  # so near that the chord is the arc
-    safe = np.where(near, 1.0, sine)
-    weight_a = np.where(near, 1.0 - share, np.sin((1.0 - share) * angle) / safe)
-    weight_b = np.where(near, share, np.sin(share * angle) / safe)
-    blend = weight_a[:, None] * a_xyzw + weight_b[:, None] * b
-    return blend / np.linalg.norm(blend, axis=1, keepdims=True)

@@ -3,8 +3,8 @@
 from functools import cache
 from importlib.resources import files
 
-from avlmaps.core.inflection import forms_of, singulars_of
 from avlmaps.core.lexicon import EntryKind, lexicon
+from avlmaps.core.words import forms_of, singulars_of
 from avlmaps.language.word_classes import listed, load_word_classes
 from avlmaps.perception.embedded.words import is_word
 

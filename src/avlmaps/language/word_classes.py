@@ -11,7 +11,7 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-from avlmaps.core.inflection import forms_of
+from avlmaps.core.words import forms_of
 
 
 @dataclass(frozen=True, slots=True)

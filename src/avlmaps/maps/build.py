@@ -9,10 +9,10 @@ from typing import Protocol
 
 import numpy as np
 
-from avlmaps.core.ahead import run_ahead
 from avlmaps.core.arrays import Float32
 from avlmaps.core.errors import MapError, RecordingError
 from avlmaps.core.files import user_path
+from avlmaps.core.machine import run_ahead
 from avlmaps.core.progress import progress, silence_progress
 from avlmaps.core.registry import Kind
 from avlmaps.core.wording import option

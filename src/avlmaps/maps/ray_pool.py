@@ -15,10 +15,9 @@ from collections.abc import Callable, Generator, Sequence
 from contextlib import suppress
 from typing import Any, Self, TypeVar
 
-from avlmaps.core.ahead import usable_cores
 from avlmaps.core.errors import BackendError, MapError
 from avlmaps.core.extras import install_command
-from avlmaps.core.network import is_loopback
+from avlmaps.core.machine import is_loopback, usable_cores
 from avlmaps.core.wording import flag
 
 J = TypeVar("J")

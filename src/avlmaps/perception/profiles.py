@@ -7,7 +7,7 @@ from typing import Any
 from avlmaps.core.errors import BackendError
 from avlmaps.core.extras import how_to_get
 from avlmaps.core.registry import Kind, brought, entry_points, find
-from avlmaps.core.suggestions import nearest
+from avlmaps.core.words import nearest
 
 ENTRY_POINT_GROUP = "avlmaps.profiles"
 GIVEN = "given:"

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from avlmaps.core.errors import QueryError
-from avlmaps.core.inflection import singulars_of
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.poses import FRAME
 from avlmaps.core.question import Modality, Part, Question, Role
 from avlmaps.core.wording import place_text, the_room
+from avlmaps.core.words import singulars_of
 from avlmaps.query.goals import Goal
 from avlmaps.query.heatmap import Heatmap
 

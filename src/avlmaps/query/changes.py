@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from avlmaps.core.errors import QueryError
-from avlmaps.core.inflection import plural_of
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.poses import FRAME
 from avlmaps.core.wording import place_text, the_room
+from avlmaps.core.words import plural_of
 from avlmaps.query.settings import FOUND_AT
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ import numpy as np
 from avlmaps.core.arrays import Float, Float32, Int, UInt8
 from avlmaps.core.errors import BackendError, QueryError
 from avlmaps.core.files import write_bytes_atomically
-from avlmaps.core.frames import FrameName
+from avlmaps.core.poses import FrameName
 from avlmaps.perception.embedded.colours import COLOURS, example_of
 
 if TYPE_CHECKING:

@@ -17,8 +17,7 @@ from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import BackendError
 from avlmaps.core.extras import install_command
 from avlmaps.core.files import replacing
-from avlmaps.core.frames import FrameName
-from avlmaps.core.poses import inverse, to_quaternion
+from avlmaps.core.poses import FrameName, inverse, to_quaternion
 from avlmaps.query.export import explain_write_errors, heat_colors
 
 if TYPE_CHECKING:

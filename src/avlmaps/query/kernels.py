@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int, Int32, Int64
 from numba import njit
 
-from avlmaps.core.kernel_types import Real, Whole
+from avlmaps.core.machine import Real, Whole
 
 # Blocks within this of the first of them look through the same cones, metres.
 _WIDE_M = 1.6

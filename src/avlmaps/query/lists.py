@@ -9,10 +9,10 @@ import numpy as np
 
 from avlmaps.core.arrays import Bool, Float
 from avlmaps.core.errors import QueryError
-from avlmaps.core.inflection import stem_of
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import HeardAt, Question
 from avlmaps.core.wording import the_room
+from avlmaps.core.words import stem_of
 from avlmaps.language.list_questions import Listed, ListQuestion
 from avlmaps.language.names import sounding_forms
 from avlmaps.language.storey_words import SaidStorey

@@ -13,8 +13,7 @@ from msgspec import Meta
 
 from avlmaps.core.arrays import Float, Int
 from avlmaps.core.errors import QueryError
-from avlmaps.core.frames import FrameName
-from avlmaps.core.poses import FRAME, apply
+from avlmaps.core.poses import FRAME, FrameName, apply
 from avlmaps.core.question import Modality, Part, Role
 from avlmaps.core.wording import coordinates
 from avlmaps.query.factors import NearThings

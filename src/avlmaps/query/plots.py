@@ -11,8 +11,7 @@ from jaxtyping import Bool, Float, Float32, Int, UInt8
 
 from avlmaps.core.errors import QueryError
 from avlmaps.core.files import user_path
-from avlmaps.core.frames import FrameName
-from avlmaps.core.poses import FRAME
+from avlmaps.core.poses import FRAME, FrameName
 from avlmaps.core.printable import plot_text
 from avlmaps.core.question import Modality
 from avlmaps.core.wording import place_text

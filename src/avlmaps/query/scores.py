@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from avlmaps.core.ahead import usable_cores
 from avlmaps.core.arrays import Bool, Float16, Float32, Int
+from avlmaps.core.machine import usable_cores
 
 if TYPE_CHECKING:
     from concurrent.futures import ThreadPoolExecutor

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int32, Int64
 from numba import njit
 
-from avlmaps.core.kernel_types import Real, Whole
+from avlmaps.core.machine import Real, Whole
 
 # Cells are computed from products of floats: a place on the side of two cells belongs to the higher one.
 SIDE = 1e-6

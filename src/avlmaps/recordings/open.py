@@ -8,7 +8,7 @@ from pathlib import Path
 
 from avlmaps.core.errors import RecordingError
 from avlmaps.core.files import lasting_path, user_path
-from avlmaps.core.suggestions import did_you_mean, near_path
+from avlmaps.core.words import did_you_mean, near_path
 from avlmaps.recordings import layout
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.channels import with_microphones

@@ -24,8 +24,8 @@ from mcp.server.context import ServerRequestContext
 from mcp.server.streamable_http_manager import StreamableHTTPASGIApp, StreamableHTTPSessionManager
 from mcp.shared.exceptions import MCPError
 
-from avlmaps.core.suggestions import did_you_mean
 from avlmaps.core.version import __version__
+from avlmaps.core.words import did_you_mean
 from avlmaps.serve.guard import App, Receive, Scope, Send, refuse
 from avlmaps.serve.lanes import Cancellation, Lane, Report, RequestError
 from avlmaps.serve.requests import CLIP, PHOTO, NoQuery, checked

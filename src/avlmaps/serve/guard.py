@@ -15,7 +15,7 @@ from ipaddress import ip_address
 from typing import Any
 from urllib.parse import parse_qsl, quote, unquote, urlencode, urlsplit
 
-from avlmaps.core.network import is_loopback
+from avlmaps.core.machine import is_loopback
 from avlmaps.core.wording import Spelling, asked_as, flag
 from avlmaps.serve.lanes import RequestError
 from avlmaps.serve.settings import ServeSettings

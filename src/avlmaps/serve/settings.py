@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from avlmaps.core.errors import AvlmapsError
-from avlmaps.core.network import is_loopback
+from avlmaps.core.machine import is_loopback
 from avlmaps.core.question import HeardAt
 from avlmaps.core.wording import option
 from avlmaps.query.settings import FOUND_AT

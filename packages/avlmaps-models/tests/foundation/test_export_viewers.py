@@ -11,7 +11,7 @@ import pytest
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import QueryError
-from avlmaps.core.frames import FrameName
+from avlmaps.core.poses import FrameName
 from avlmaps.query.export_viewers import CAMERA_FRAME, ExportedBox, ExportedSound, Layers, write_foxglove, write_rerun
 
 

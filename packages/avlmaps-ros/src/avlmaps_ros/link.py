@@ -10,7 +10,7 @@ import msgspec
 
 from avlmaps.core.errors import BackendError, NavigationError
 from avlmaps.core.extras import install_command
-from avlmaps.core.network import is_loopback
+from avlmaps.core.machine import is_loopback
 from avlmaps_ros.messages import MOST_BYTES, Incoming, sanitize_line, text_in
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import Any
 from urllib.parse import SplitResult, urlsplit
 
 from avlmaps.core.errors import LanguageError
-from avlmaps.core.network import is_loopback
+from avlmaps.core.machine import is_loopback
 
 HOSTED_URL = "https://api.openai.com/v1"
 _PREFIX = "AVLMAPS_CHAT_"

@@ -7,8 +7,8 @@ it. The words between the names say what of them. Those that no question to a ma
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 
-from avlmaps.core.inflection import singulars_of
 from avlmaps.core.lexicon import EntryKind, lexicon
+from avlmaps.core.words import singulars_of
 from avlmaps.language import lexer
 from avlmaps.language.intents import Ask, Inquiry, TargetKind
 from avlmaps.language.learned.said import DETERMINERS, PREPOSITIONS, Claimed, words

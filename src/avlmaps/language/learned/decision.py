@@ -7,8 +7,8 @@ unread; for the others it must be likelier. Where no reading is, a person decide
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from avlmaps.core.inflection import singulars_of, stem_of
 from avlmaps.core.lexicon import EntryKind, lexicon
+from avlmaps.core.words import singulars_of, stem_of
 from avlmaps.language import lexer
 from avlmaps.language.intents import (
     Clarify,

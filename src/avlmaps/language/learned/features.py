@@ -13,8 +13,8 @@ from functools import cache
 import numpy as np
 from jaxtyping import Float32, Int64
 
-from avlmaps.core.inflection import singulars_of
 from avlmaps.core.lexicon import EntryKind, lexicon
+from avlmaps.core.words import singulars_of
 from avlmaps.language import lexer
 from avlmaps.language.lexer import Token
 from avlmaps.language.names import also_things, describing_words, sounding_words

@@ -16,7 +16,7 @@ from enum import Enum, auto
 
 from avlmaps.core.errors import ProgramError
 from avlmaps.core.printable import UNSAFE, printable
-from avlmaps.core.suggestions import nearest
+from avlmaps.core.words import nearest
 from avlmaps.language.program.values import (
     bounded,
     check_comparison,

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float32, Float64, Int8, Int32, Int64, UInt8, UInt16
 from numba import njit
 
-from avlmaps.core.kernel_types import Options, Real, Whole
+from avlmaps.core.machine import Options, Real, Whole
 
 # No "nnan" among them: NaN must stay visible. "reassoc" lets sums over a row be vectorised.
 OPTIONS: Options = {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": {"contract", "nsz", "reassoc"}}

@@ -26,7 +26,7 @@ from avlmaps.core.files import (
     user_path,
     write_bytes_atomically,
 )
-from avlmaps.core.suggestions import near_path
+from avlmaps.core.words import near_path
 from avlmaps.maps.grid import GridSpec
 from avlmaps.maps.store.checkpoints import remove_stages, stage_folders
 from avlmaps.maps.store.edits import EDITS

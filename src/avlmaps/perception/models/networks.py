@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from avlmaps.core.ahead import usable_cores
+from avlmaps.core.machine import usable_cores
 
 
 def open_network(graph: bytes | str, most_threads: int = 1) -> Any:

@@ -13,7 +13,7 @@ from avlmaps.core.arrays import Bool, Float32, Int, UInt8
 from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import Part
-from avlmaps.core.spelling import squeezed
+from avlmaps.core.words import squeezed
 from avlmaps.perception.embedded.colours import COLOURS, ColourWords
 from avlmaps.perception.protocols import NamedPixelEncoder
 from avlmaps.query.factors import NearThings

@@ -16,7 +16,7 @@ from urllib.request import HTTPRedirectHandler, build_opener
 
 from avlmaps.core.errors import BackendError
 from avlmaps.core.files import sync_folder, user_path
-from avlmaps.core.network import is_loopback
+from avlmaps.core.machine import is_loopback
 from avlmaps.core.progress import progress
 from avlmaps.core.wording import option
 from avlmaps.perception.models.published_models import fetched_folder

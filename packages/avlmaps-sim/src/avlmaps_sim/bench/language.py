@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from avlmaps.core.errors import LanguageError, QueryError
-from avlmaps.core.inflection import singulars_of, stem_of
 from avlmaps.core.lexicon import EntryKind, lexicon
+from avlmaps.core.words import singulars_of, stem_of
 from avlmaps.language.list_questions import Listed, ListQuestion
 from avlmaps.language.sentence import Attachments
 from avlmaps_sim.bench.harness.intervals import wilson

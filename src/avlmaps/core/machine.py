@@ -1,11 +1,14 @@
-"""How many cores a process may use, and running a producer ahead of its consumer in one thread."""
+"""This machine: its cores, its names, a thread that makes things ahead of their use, and types of compiled loops."""
 
 import os
 import queue
 import threading
 from collections.abc import Generator, Iterable
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from ipaddress import ip_address
+from typing import Any, Literal, TypedDict, TypeVar
+
+import numpy as np
 
 T = TypeVar("T")
 
@@ -63,3 +66,26 @@ def _hand_over(item: Any, ready: queue.Queue[Any], stop: threading.Event) -> Non
 def usable_cores() -> int:
     """Return how many cores this process may use: those that it is bound to, or all where the system binds none."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def is_loopback(host: str) -> bool:
+    """Return whether only this machine reaches a host name or address; an IPv6 address may stand in brackets."""
+    name = host.strip("[]")
+    try:
+        return ip_address(name).is_loopback
+    except ValueError:
+        return name == "localhost"
+
+
+# Python's own where a loop is called from Python, NumPy's within it.
+Whole = int | np.integer[Any]
+Real = float | np.floating[Any]
+
+
+class Options(TypedDict):
+    """How numba compiles a loop."""
+
+    cache: bool
+    nogil: bool
+    error_model: Literal["python", "numpy"]
+    fastmath: set[str]
