@@ -48,7 +48,7 @@ def in_room(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_sentence_is_obeyed_and_told(answer, built: Path, tmp_path: Path, in_room: None) -> None:
     plot = tmp_path / "way.png"
-    said = answer("go", built, "go to the red thing, then turn left", "--scene", "room", "--plot", plot)
+    said = answer("go", built, "go to the nearest red thing, then turn left", "--scene", "room", "--plot", plot)
     assert {"program", "steps", "actions", "subgoals", "ok"} <= set(said)
     assert said["ok"] is True
     assert said["error"] is None
@@ -69,7 +69,7 @@ def test_the_program_and_the_trace_are_told_as_it_drives(run, built: Path, in_ro
 
 
 def test_nothing_moves_where_a_later_goal_is_not_in_the_map(run, built: Path, in_room: None) -> None:
-    status, out, err = run("go", built, "go to the red thing, then to the piano", "--scene", "room", "--json")
+    status, out, err = run("go", built, "go to the nearest red thing, then to the piano", "--scene", "room", "--json")
     said = json.loads(out)
     assert status == 1 and "I will go to" in err
     assert said["error"]["kind"] in ("goal-not-found", "query")
@@ -86,7 +86,7 @@ def test_a_drive_looks_up_each_goal_once(run, built: Path, in_room: None, monkey
         return seen(self, part, vocabulary)
 
     monkeypatch.setattr(MapNames, "heat", counted)
-    status, _, err = run("go", built, "go to the red thing, then turn left", "--scene", "room")
+    status, _, err = run("go", built, "go to the nearest red thing, then turn left", "--scene", "room")
     assert status == 0, err
     assert asked == ["red thing"]
 
@@ -110,7 +110,7 @@ def test_an_area_that_is_forbidden_while_it_drives_stops_the_robot(
         return act(body, action)
 
     monkeypatch.setattr(SimulatedBody, "act", act_and_edit)
-    status, out, err = run("go", home, "go to the red thing", "--scene", "room", "--json")
+    status, out, err = run("go", home, "go to the nearest red thing", "--scene", "room", "--json")
     said = json.loads(out.splitlines()[-1])
     if not stops:
         assert status == 0 and len(taken) > 6, err
@@ -281,7 +281,7 @@ def test_a_real_robot_is_driven_over_rosbridge_and_let_go_at_the_end(
         "go to where the beeping comes from",
         "go to the red thing near the sound of barking",
         "go to the kitchen",
-        "go to the red thing, then turn left",
+        "go to the nearest red thing, then turn left",
     ],
 )
 def test_a_dry_run_says_of_the_map_what_the_drive_says(run, built: Path, in_room: None, sentence: str) -> None:
@@ -292,3 +292,16 @@ def test_a_dry_run_says_of_the_map_what_the_drive_says(run, built: Path, in_room
     assert dry["missing"] == dry["error"] == drive["error"] and dry["ok"] is drive["ok"]
     told = [*drive["notes"], *([drive["error"]["message"]] if drive["error"] else [])]
     assert dry["notes"] == [one for one in told if "could stop" not in one and one != "the program moved nothing"]
+
+
+def test_things_that_fit_equally_are_asked_about(run, built: Path, in_room: None) -> None:
+    status, out, _ = run("go", built, "go to the red thing", "--scene", "room", "--json")
+    said = json.loads(out)
+    assert status == 1 and said["error"]["kind"] == "several-fit"
+    assert len(said["choices"]) == 2 and "The robot was not moved." in said["error"]["message"]
+    goals = []
+    for number in (1, 2):
+        status, out, err = run("go", built, "go to the red thing", "--scene", "room", "--json", "--choose", number)
+        assert status == 0, err
+        goals.append(json.loads(out)["subgoals"][0]["goal"][:2])
+    assert not np.allclose(*goals, atol=0.5)

@@ -95,7 +95,7 @@ def test_a_robot_that_will_not_stop_is_reported_and_has_its_own_status(go: Start
 @pytest.mark.parametrize(("ros", "kind"), [(2, "nav2"), (1, "move_base")])
 def test_an_operator_who_takes_over_keeps_the_robot_when_the_program_ends(go: Started, ros: int, kind: str) -> None:
     with robot_here(ros) as robot:
-        process = go(robot.url, "go to the red thing, then turn left", kind)
+        process = go(robot.url, "go to the nearest red thing, then turn left", kind)
         assert robot.soon(lambda: bool(robot.goals), START_S)
         sleep(1.0)
         robot.operate()
@@ -110,7 +110,7 @@ def test_an_operator_who_takes_over_keeps_the_robot_when_the_program_ends(go: St
 def test_a_goal_that_is_not_given_up_ends_the_command_with_status_3(go: Started) -> None:
     with robot_here() as robot:
         robot.does[""] = "stubborn"
-        process = go(robot.url, "go to the red thing", goal_timeout_s=1.0, cancel_timeout_s=0.5)
+        process = go(robot.url, "go to the nearest red thing", goal_timeout_s=1.0, cancel_timeout_s=0.5)
         assert robot.soon(lambda: bool(robot.goals), START_S)
         robot.moves_on = True
         out, err = process.communicate(timeout=START_S)

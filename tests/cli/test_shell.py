@@ -60,7 +60,7 @@ def test_each_verb_answers_as_on_the_command_line(piped, answer, built: Path, tm
         "things --least 0.2": ("things", built, "--least", "0.2"),
         f"locate '{photo}'": ("locate", built, photo),
         "info": ("info", built),
-        "go to the red thing, then turn left": ("go", built, "go to the red thing, then turn left", "--dry-run"),
+        "go to a red thing, then turn left": ("go", built, "go to a red thing, then turn left", "--dry-run"),
     }
     status, out, err = piped("\n".join(alike), built, "--json")
     assert status == 0, err
@@ -156,7 +156,7 @@ def test_a_plan_is_driven_only_when_it_is_confirmed(piped, built: Path, monkeypa
 
 
 def test_without_a_scene_nothing_is_driven(piped, built: Path) -> None:
-    status, out, err = piped("go to the red thing\ny\n", built)
+    status, out, err = piped("go to the nearest red thing\ny\n", built)
     assert status == 1, "y is not a question"
     assert "robot.move_to_object" in out and "planned only" in out
     assert "Drive this plan" not in err

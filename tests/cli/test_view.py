@@ -63,7 +63,7 @@ def test_a_robot_drives_what_was_planned(built: Path, monkeypatch: pytest.Monkey
 
     monkeypatch.setattr("avlmaps_sim.scenes.open_scene", lambda spec: scene_of(Room()))
     guide = Guide(AVLMap.open(built), _robot("room"))
-    told = guide.obey("go to the red thing")
+    told = guide.obey("go to the nearest red thing")
     assert told["driven"]["ok"] and told["planned"]["ok"]
     assert told["driven"]["path_m"] == pytest.approx(told["planned"]["path_m"], abs=1.0)
     there = told["driven"]["places"][-1]

@@ -91,9 +91,7 @@ def test_every_program_that_is_written_can_run(step: int) -> None:
 
 def test_a_reference_is_one_instance_in_the_program() -> None:
     program = command_to_program("go to the table, then one metre behind it")
-    assert program == (
-        'table = robot.get_nearest_pos("table")\nrobot.move_to_object(table)\nrobot.move_behind(table, 1)\n'
-    )
+    assert program == ('table = robot.get_pos("table")\nrobot.move_to_object(table)\nrobot.move_behind(table, 1)\n')
 
 
 def test_the_other_one_is_another_instance() -> None:

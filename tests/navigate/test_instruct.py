@@ -85,7 +85,7 @@ def test_a_forbidden_area_that_the_map_does_not_know_is_told_before_the_robot_mo
 
 
 def test_the_outcome_is_the_contract_of_the_command_line() -> None:
-    outcome, _ = told("go to the table, then face the chair")
+    outcome, _ = told("go to the table, then face the nearest chair")
     answer = json.loads(json.dumps(outcome.to_json(), allow_nan=False))
     assert {
         "program",
@@ -96,6 +96,7 @@ def test_the_outcome_is_the_contract_of_the_command_line() -> None:
         "error",
         "error_type",
         "notes",
+        "choices",
         "path_m",
         "elapsed_s",
         "frame",
@@ -112,7 +113,7 @@ def test_what_is_doubtful_about_the_map_is_told_once_before_anything_moves() -> 
     asked = AVLMap(furnished_map())
     asked.stored.info.doubts = ("The poses drift.",)
     lines: list[str] = []
-    planned = Translation('robot.move_to_object("chair")', ("The poses drift.", "a chair is meant"))
+    planned = Translation('robot.move_to_object("table")', ("The poses drift.", "a chair is meant"))
     outcome = instruct(
         "x", asked, KinematicDriver(GroundPose(3.0, 2.0)), Scripted(), translation=planned, tell=lines.append
     )
@@ -145,7 +146,7 @@ def test_a_place_that_is_not_reached_makes_the_outcome_not_ok() -> None:
 
 
 def test_a_program_that_fails_is_repaired_and_told_what_was_done() -> None:
-    translator = Scripted('robot.turn(90)\nrobot.move_to("piano")', "import os", 'robot.move_to_object("chair")')
+    translator = Scripted('robot.turn(90)\nrobot.move_to("piano")', "import os", 'robot.move_to_object("table")')
     outcome, lines = told("play the piano", translator)
     assert outcome.ok
     assert len(outcome.programs) == 3
@@ -177,7 +178,7 @@ def test_a_budget_holds_for_the_robot_too() -> None:
 
 
 def test_the_way_is_drawn_with_start_goals_and_stops(tmp_path) -> None:
-    outcome, _ = told("go to the table, then go to the chair")
+    outcome, _ = told("go to the table, then go to the nearest chair")
     asked = AVLMap(furnished_map())
     figure = draw_path(asked.space, GroundPose(3.0, 2.0), outcome.moves, contacts=np.array([[1.0, 1.0]]), title="there")
     labels = figure.axes[0].get_legend_handles_labels()[1]

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps.core.errors import GoalNotFoundError, ProgramError, QueryError
+from avlmaps.core.errors import GoalNotFoundError, ProgramError, QueryError, SeveralFitError
 from avlmaps.core.motion import GroundPose
 from avlmaps.core.question import Modality, Part, Question
 from avlmaps.language.program import parse_program, run_program
@@ -41,15 +41,37 @@ def xy(place: Place) -> tuple[float, float]:
     return place.x, place.y
 
 
-def test_a_phrase_means_the_best_thing_where_it_is_and_the_nearest_where_the_robot_is() -> None:
-    robot = furnished_robot(4.8, 2.6)
-    assert xy(robot.get_pos("chair")) == pytest.approx(BIG_CHAIR, abs=0.06)
+@pytest.mark.parametrize(
+    ("settings", "best", "nearest"),
+    [
+        (RobotSettings(choose=(1,)), BIG_CHAIR, BIG_CHAIR),
+        (RobotSettings(choose=(2,)), SMALL_CHAIR, SMALL_CHAIR),
+        (RobotSettings(guess=True), BIG_CHAIR, SMALL_CHAIR),
+        (RobotSettings(persist=True), BIG_CHAIR, SMALL_CHAIR),
+    ],
+)
+def test_of_things_that_fit_equally_the_chosen_one_is_meant(
+    settings: RobotSettings, best: tuple[float, float], nearest: tuple[float, float]
+) -> None:
+    robot = furnished_robot(4.8, 2.6, settings)
+    assert xy(robot.get_pos("chair")) == pytest.approx(best, abs=0.06)
     robot.move_to("chair")
-    assert robot.moves[-1].goal[:2] == pytest.approx(BIG_CHAIR, abs=0.06)
-    robot = furnished_robot(4.8, 2.6)
+    assert robot.moves[-1].goal[:2] == pytest.approx(best, abs=0.06)
+    robot = furnished_robot(4.8, 2.6, settings)
     robot.move_to_object("chair")
-    assert robot.moves[-1].stop[:2] == pytest.approx((5.0, 3.0), abs=0.03)
-    robot.move_east("chair", 0.5)
+    assert np.allclose(robot.moves[-1].goal[:2], nearest, atol=0.6)
+
+
+def test_of_things_that_fit_equally_none_is_driven_to_until_one_is_chosen() -> None:
+    robot = furnished_robot(4.8, 2.6)
+    for skill in (robot.get_pos, robot.move_to, robot.move_to_object, robot.face, robot.move_north, robot.get_contour):
+        with pytest.raises(SeveralFitError) as asked:
+            skill("chair")
+        assert len(asked.value.choices) == 2 and not robot.moves
+    with pytest.raises(SeveralFitError):
+        furnished_robot(settings=RobotSettings(choose=(3,))).move_to("chair")
+    chair = robot.get_nearest_pos("chair")
+    robot.move_east(chair, 0.5)
     assert robot.moves[-1].goal[:2] == pytest.approx((SMALL_CHAIR[0] + 0.6, SMALL_CHAIR[1]), abs=0.03)
 
 
@@ -74,7 +96,7 @@ def test_the_outline_goes_round_the_thing_counter_clockwise_on_the_floor() -> No
 def test_the_place_where_the_robot_stands_can_be_kept_and_come_back_to() -> None:
     robot = furnished_robot(3.0, 2.0)
     home = robot.current_pos()
-    robot.move_to("chair")
+    robot.move_to("table")
     robot.move_to(home)
     assert robot.moves[-1].stop == pytest.approx((3.0, 2.0, 0.025))
     assert robot.get_contour(home) == [home]

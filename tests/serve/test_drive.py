@@ -58,8 +58,8 @@ def idle(client: TestClient) -> dict[str, Any]:
 
 
 def test_a_command_is_planned_confirmed_driven_and_logged(client: TestClient, drive: Driven) -> None:
-    told = plan(client, "go to the red thing, then turn left")
-    assert told["reading"] == "I will go to the red thing, then turn left 90 degrees."
+    told = plan(client, "go to the nearest red thing, then turn left")
+    assert told["reading"] == "I will go to the nearest red thing, then turn left 90 degrees."
     assert told["program"].splitlines()[-1] == "robot.turn(-90)"
     assert len(told["path"]) > 5 and told["path_m"] > 0.5
     assert told["path"][0][:2] == pytest.approx([START.x_m, START.y_m], abs=0.01)
@@ -74,7 +74,7 @@ def test_a_command_is_planned_confirmed_driven_and_logged(client: TestClient, dr
     assert drive.machine.body.told[0] == "go_to" and drive.machine.body.told[1].startswith("turn")
     assert drive.events == ["planned", "confirmed", "ended"]
     for entry in drive.entries:
-        assert {"time", "who"} <= entry.keys() and entry["words"] == "go to the red thing, then turn left"
+        assert {"time", "who"} <= entry.keys() and entry["words"] == "go to the nearest red thing, then turn left"
     assert told["token"] not in drive.log.read_text(encoding="utf-8"), "a log that is read confirms nothing"
 
 
@@ -87,7 +87,7 @@ def test_a_goal_of_a_plan_is_looked_up_once(client: TestClient, drive: Driven, m
         return find(avlmap, *given, **parts)
 
     monkeypatch.setattr(AVLMap, "object", counted)
-    told = plan(client, "go to the red thing, then turn left")
+    told = plan(client, "go to the nearest red thing, then turn left")
     assert looked_up
     before = list(looked_up)
     client.post("/drive/confirm", json={"token": told["token"]})

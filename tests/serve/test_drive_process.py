@@ -62,7 +62,7 @@ def test_a_stop_over_http_cancels_the_goal_of_a_real_robot(serve: Started, tmp_p
     with FakeRobot(2, "drive on", GroundPose(4.4, 3.2)) as robot:
         _, client = serve(robot.url)
         assert httpx.post(str(client.base_url) + "/drive/stop").status_code == 401, "a stop needs the token"
-        drive(client, "go to the red thing")
+        drive(client, "go to the nearest red thing")
         assert robot.soon(lambda: bool(robot.goals), 60.0)
         stopped = client.post("/drive/stop", content=b"nonsense")
         assert stopped.status_code == 200 and stopped.json()["stopped"] is True, stopped.text
@@ -78,7 +78,7 @@ def test_a_stop_over_http_cancels_the_goal_of_a_real_robot(serve: Started, tmp_p
 def test_every_end_of_the_server_leaves_no_goal(serve: Started, number: signal.Signals) -> None:
     with FakeRobot(2, "drive on", GroundPose(4.4, 3.2)) as robot:
         process, client = serve(robot.url)
-        drive(client, "go to the red thing")
+        drive(client, "go to the nearest red thing")
         assert robot.soon(lambda: len(robot.published("/avlmaps/heartbeat")) > 1, 60.0)
         robot.moves_on = True
         process.send_signal(number)
@@ -93,7 +93,7 @@ def test_a_robot_that_is_at_its_goal_still_is_not_said_to_stand(serve: Started, 
     """One refuses to cancel; the other answers nothing at all, and pauses."""
     with FakeRobot(2, "drive on", GroundPose(4.4, 3.2)) as robot:
         process, client = serve(robot.url, cancel_timeout_s=1.0, answer_timeout_s=1.0)
-        drive(client, "go to the red thing")
+        drive(client, "go to the nearest red thing")
         assert robot.soon(lambda: len(robot.published("/avlmaps/heartbeat")) > 1, 60.0)
         robot.does[""] = does
         for goal in robot.goals.values():

@@ -207,7 +207,7 @@ def test_a_photo_is_asked_with_and_a_bad_one_refused(page, room: AVLMap, tmp_pat
 @pytest.mark.nightly
 def test_a_command_is_planned_and_stepped_through(page) -> None:
     page.locator("#drive-section summary").first.click()
-    page.fill("#command", "go to the red thing")
+    page.fill("#command", "go to the nearest red thing")
     page.keyboard.press("Enter")
     page.wait_for_selector("#trip .verdict.found")
     assert "move_to" in page.inner_text("#trip pre >> nth=0")

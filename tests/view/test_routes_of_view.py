@@ -99,7 +99,7 @@ def test_memory_stays_flat_over_many_questions(room: AVLMap) -> None:
 
 
 def test_a_command_is_read_and_planned_and_nothing_drives_without_a_scene(call: Call) -> None:
-    told = call("view/rehearse", command="go to the red thing, then wait 30 seconds and turn left").json()
+    told = call("view/rehearse", command="go to the nearest red thing, then wait 30 seconds and turn left").json()
     assert told["driven"] is None and told["planned"]["ok"] is True
     assert "move_to" in told["program"] and told["plan"] and told["readings"]
     places = np.array(told["planned"]["places"])

@@ -1,11 +1,12 @@
 """`avlmaps go`: turn a command into a program, and run it on a simulated or a real robot."""
 
+import sys
 from dataclasses import dataclass, field, replace
 from math import isfinite, radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from tyro.conf import OmitArgPrefixes, Positional, arg
+from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
 from avlmaps.cli.output import AnsweredError, UsageError, emit, error_answer, kind_named, table_lines
 from avlmaps.cli.verb import MapVerb, idle
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from avlmaps.navigate.driver import Driver
     from avlmaps.navigate.instruct import Outcome
     from avlmaps.navigate.interrupts import Halt
+    from avlmaps.navigate.skills import RobotSettings
     from avlmaps.query.avlmap import AVLMap
     from avlmaps.query.heatmap import Heatmap
     from avlmaps.query.settings import QuerySettings
@@ -75,7 +77,9 @@ class Go(MapVerb):
     found_at: Annotated[float, arg(metavar="PROBABILITY")] = 0.5
     """Drive to what is found from this probability on, 0 to 1."""
     guess: bool = False
-    """Go to the best guess where nothing is found."""
+    """Go to the best guess where nothing is found, and to the nearest of several things that fit equally."""
+    choose: Annotated[tuple[int, ...], arg(metavar="NUMBER"), UseAppendAction] = ()
+    """Which of several things that fit equally is meant: its number in the question, one for each question."""
     image: Annotated[Path | None, arg(metavar="FILE")] = None
     """File that "this photo" in the sentence means."""
     sound_clip: Annotated[Path | None, arg(metavar="FILE")] = None
@@ -186,18 +190,18 @@ def _planned(verb: "Go", settings: "QuerySettings") -> dict[str, Any]:
 
 def plan_answer(verb: "Go", translation: "Translation", avlmap: "AVLMap | None") -> dict[str, Any]:
     """Return the answer for a command that is read and not obeyed, with what a drive would report of its map."""
-    told, error, error_type = (), None, None
+    told, error, error_type, choices = (), None, None, ()
     if avlmap is not None:
         from avlmaps.navigate.rehearsal import told_by_map
 
-        told, run = told_by_map(translation.program, avlmap, verb.sentence, guess=verb.guess)
+        told, run, choices = told_by_map(translation.program, avlmap, verb.sentence, robot_settings(verb))
         if run is not None:
             error, error_type = run.error, run.error_type
     return {
         "plan": translation.plan,
         "program": translation.program, "steps": [], "actions": [], "subgoals": [], "ok": error is None,
         "error": error, "error_type": error_type, "notes": list(dict.fromkeys((*translation.notes, *told))),
-        "path_m": 0.0, "elapsed_s": 0.0, "frame": "recording",
+        "choices": list(choices), "path_m": 0.0, "elapsed_s": 0.0, "frame": "recording",
         "missing": None if error is None or error_type is None else error_answer(kind_named(error_type), error),
     }  # fmt: skip
 
@@ -244,12 +248,14 @@ def _obeyed(
     from avlmaps.navigate.instruct import instruct
     from avlmaps.navigate.interrupts import Interrupted
     from avlmaps.navigate.rehearsal import unfound
-    from avlmaps.navigate.skills import RobotSettings
 
-    settings, heats = RobotSettings(guess=verb.guess), dict[tuple[object, ...], "Heatmap"]()
+    settings, heats = robot_settings(verb), dict[tuple[object, ...], "Heatmap"]()
     try:
         if verb.language != "chat":  # a chat model's program may decide while it drives
-            missing = unfound(verb.sentence, translation, avlmap, robot.start, heats, guess=verb.guess)
+            missing = unfound(verb.sentence, translation, avlmap, robot.start, heats, settings)
+            while missing is not None and missing.choices and (number := _choice(verb, missing)):
+                settings = replace(settings, choose=(*settings.choose, number))
+                missing = unfound(verb.sentence, translation, avlmap, robot.start, heats, settings)
             if missing is not None:
                 say(translation.plan)
                 return missing
@@ -262,6 +268,23 @@ def _obeyed(
         raise
     finally:
         robot.close()
+
+
+def robot_settings(verb: "Go") -> "RobotSettings":
+    """Return how the robot takes its skills."""
+    from avlmaps.navigate.skills import RobotSettings
+
+    return RobotSettings(guess=verb.guess, choose=verb.choose)
+
+
+def _choice(verb: "Go", asked: "Outcome") -> int:
+    """Return the number that a person types at a terminal; 0 where nobody is there, or none of the numbers came."""
+    if verb.json or not sys.stdin.isatty():
+        return 0
+    say(asked.error or "")
+    say(f"Which one, 1 to {len(asked.choices)}? Anything else ends the command.")
+    typed = sys.stdin.readline().strip()
+    return int(typed) if typed.isdecimal() and 1 <= int(typed) <= len(asked.choices) else 0
 
 
 def translator_for(verb: "Go", avlmap: "AVLMap | None" = None) -> "Translator":

@@ -133,6 +133,7 @@ class ShellSession:
         self._robot: going.Ready | None = None
         self._last: Query | None = None
         self._names: tuple[str, ...] | None = None
+        self._unchosen: tuple[str, str, tuple[int, ...]] | None = None
         self._lock = Lock()
         self._opened, self._seen = self._open()
 
@@ -168,6 +169,9 @@ class ShellSession:
         word, _, rest = line.partition(" ")
         word, rest = word.lower(), rest.strip()
         with self._lock:
+            if self._unchosen is not None and line.isdecimal():
+                said, after, chosen = self._unchosen
+                return self._go(said, after, confirms, (*chosen, int(line)))
             if word == "go":
                 return self._go(line, rest, confirms)
             if word not in VERBS or not _is_for_verb(word, rest):
@@ -233,20 +237,24 @@ class ShellSession:
 
     _exit = _quit
 
-    def _go(self, line: str, rest: str, confirms: Callable[[str], bool]) -> Reply:
-        """Plan a command, and drive it in the scene where there is one and the user confirms."""
+    def _go(self, line: str, rest: str, confirms: Callable[[str], bool], choose: tuple[int, ...] = ()) -> Reply:
+        """Plan a command, and drive it in the scene where there is one and the user confirms.
+
+        Where it asks which of several things is meant, the next line may be the number.
+        """
         if not rest:
             raise UsageError("go takes a command, such as: go to the sofa, then turn left")
         quoted = len(rest) > 1 and rest[0] == rest[-1] and rest[0] in "'\""
         given = self.given
         command = going.Go(
             map=given.map, sentence=rest[1:-1] if quoted else line, scene=given.scene, body=given.body,
-            guess=given.guess,
+            guess=given.guess, choose=choose,
         )  # fmt: skip
         avlmap = self.opened
         translator = going.translator_for(command, avlmap)
         translation = translator.program_for(command.sentence)
         plan = going.plan_answer(command, translation, avlmap)
+        self._unchosen = (line, rest, choose) if plan["choices"] else None
         if going.failure(plan) is not None:
             return _driven(plan)
         if given.scene is None:

@@ -63,6 +63,18 @@ class GoalNotFoundError(AvlmapsError):
     """The map does not hold the thing that a command names; skills raise it, and the trace records it."""
 
 
+class SeveralFitError(AvlmapsError):
+    """Several things fit a name equally, and the command does not say which is meant.
+
+    Attributes:
+        choices: where each of them is, in words; the first is chosen by 1.
+    """
+
+    def __init__(self, message: str, choices: tuple[str, ...]) -> None:
+        super().__init__(message)
+        self.choices = choices
+
+
 class NonConformanceError(AssertionError):
     """Something brought by a package breaks a promise; the sentence says which."""
 

@@ -33,6 +33,7 @@ _ARGUMENTS: Final = {
     "from": "place",
     "host": "ServeSettings.host",
     "max-bad-share": "FrameSettings.max_bad_share",
+    "choose": "RobotSettings.choose",
     "models": "ModelSettings.folder",
     "device": "ModelSettings.device",
     "out": "path",

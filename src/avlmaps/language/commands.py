@@ -12,10 +12,12 @@ from avlmaps.language.intents import (
     Clarify,
     Face,
     Intent,
+    Pick,
     RefusalReason,
     Refuse,
     Repeat,
     StopAt,
+    Target,
     TargetKind,
     Wait,
     on_targets,
@@ -44,6 +46,12 @@ _CHANGES_STOREY = re.compile(
     r"(?:back |straight |right )?"
     r"(?:up|down|upstairs|downstairs|(?:up |down )?to the [a-z0-9]+ (?:floor|storey|level))\b"
     r"|\b(?:up|down)stairs (?:to|into)\b"
+)
+# Words before and after a name that leave the choice to the robot.
+_ANY_BEFORE = re.compile(r"(?<!\S)(?:nearest|closest|any|an?|some|first|one of (?:the|these|those|my|your|our)) $")
+_ANY_AFTER = re.compile(
+    r" (?:(?:that|which) )?(?:is )?(?:nearest|closest)(?: to (?:you|me|us|here|the robot|where you are))?"
+    r"(?= (?:[,.;:!?]|and|then)(?!\S)|$)"
 )
 
 
@@ -158,7 +166,22 @@ def _read(text: str, given: Attachments | None) -> Command:
         return Command((question,), (), (), "unsure")
     answer = decided(readings, reader.limits)
     notes = (*sentence.notes, *_without_effect(sentence), *answer.notes, *_lost_sides(answer.intents, sentence))
-    return Command(answer.intents, tuple(dict.fromkeys(notes)), readings, answer.why)
+    intents = _picked(answer.intents, " ".join(token.text for token in sentence.tokens))
+    return Command(intents, tuple(dict.fromkeys(notes)), readings, answer.why)
+
+
+def _picked(intents: Sequence[Intent], said: str) -> tuple[Intent, ...]:
+    """Return intents with the nearest picked where any thing of a name will do: "a chair", "the nearest chair"."""
+
+    def nearest(target: Target) -> Target:
+        if target.pick is not Pick.ANY or target.kind not in (TargetKind.OBJECT, TargetKind.AREA):
+            return target
+        at = re.search(rf"(?<!\S){re.escape(target.name.lower())}(?!\S)", said)
+        if at is None or not (_ANY_BEFORE.search(said[: at.start()]) or _ANY_AFTER.match(said[at.end() :])):
+            return target
+        return replace(target, pick=Pick.NEAREST)
+
+    return tuple(on_targets(intent, nearest) for intent in intents)
 
 
 def _back(intent: Intent, stand: StandIns) -> Intent:

@@ -100,7 +100,7 @@ def _turn(degrees: float) -> str:
 
 def phrase(target: Target) -> str:
     """Return a target in words: "the chair nearest to where breathing was heard"."""
-    pick = {Pick.OTHER: "other ", Pick.FARTHEST: "farthest "}.get(target.pick, "")
+    pick = f"{target.pick} " if target.pick is not Pick.ANY else ""
     match target.kind:
         case TargetKind.OBJECT | TargetKind.AREA:
             own = f"the {pick}{target.name}"
@@ -115,5 +115,6 @@ def phrase(target: Target) -> str:
             return "here"
     areas = [one for one in target.near if one.kind is TargetKind.AREA]
     others = [one for one in target.near if one.kind is not TargetKind.AREA]
-    near = f" nearest to {' and '.join(phrase(one) for one in others)}" if others else ""
+    beside = "near" if target.pick is Pick.NEAREST else "nearest to"
+    near = f" {beside} {' and '.join(phrase(one) for one in others)}" if others else ""
     return own + near + "".join(f" in {phrase(one)}" for one in areas)

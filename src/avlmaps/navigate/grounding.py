@@ -1,6 +1,6 @@
 """The things that a program's words, heatmaps and places mean, found by queries to a map."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import product
 from numbers import Real
@@ -9,20 +9,21 @@ from typing import cast
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.core.errors import GoalNotFoundError, ProgramError
+from avlmaps.core.errors import GoalNotFoundError, ProgramError, SeveralFitError
 from avlmaps.core.question import HeardAt
-from avlmaps.core.wording import place_text
+from avlmaps.core.wording import option, place_text, the_room
 from avlmaps.language.program.vocabulary import Clip, Picture, Place, Target
 from avlmaps.language.storey_words import said_storeys
 from avlmaps.maps.store.folder import stamp
 from avlmaps.maps.storeys import said_storeys as storeys_in_words
 from avlmaps.navigate.file_access import Readable
 from avlmaps.navigate.footprint import Outline
-from avlmaps.navigate.instances import Destination, likely, nearest, same_thing, tells_one, things_in
+from avlmaps.navigate.instances import Destination, equal, likely, nearest, same_thing, tells_one, things_in
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.lists import at_storey, storeys_meant
 from avlmaps.query.sound_sources import no_sources
+from avlmaps.query.whereabouts import Whereabouts
 
 
 def text_of(value: object, skill: str) -> str:
@@ -48,6 +49,7 @@ def kind_of(value: object) -> str:
     return f"a {type(value).__name__.lower()}"
 
 
+_MOST_LISTED = 9  # things that fit equally, in the sentence that asks which
 Heats = dict[tuple[object, ...], Heatmap]
 """The answers of one map, as it was opened, by the query."""
 
@@ -61,6 +63,7 @@ class Seeker:
         readable: which files a program may load.
         notes: what a person should know: words half understood, guesses.
         heats: what the map answered; another seeker on the same map need not ask again.
+        choices: the things that fitted equally where the last error asks which is meant.
     """
 
     def __init__(
@@ -71,8 +74,16 @@ class Seeker:
         tell: Callable[[str], None],
         storey: int = 0,
         heats: Heats | None = None,
+        choose: Sequence[int] | None = (),
     ) -> None:
-        """Take a map, a function for each note, the storey that the robot is on, and what the map answered before."""
+        """Take a map, a function for each note, the storey that the robot is on, and what the map answered before.
+
+        ``choose`` answers which of several things that fit equally is meant, one number from 1 for each name in the
+        order of the program. None: the best or the nearest, without a question.
+        """
+        self._asks, self._numbers = choose is not None, list(choose or ())
+        self._meant: dict[str, int] = {}
+        self.choices: tuple[str, ...] = ()
         self._storey, self.heats = storey, {} if heats is None else heats
         self.avlmap = avlmap
         self.guess = guess
@@ -164,22 +175,58 @@ class Seeker:
         return only
 
     def best(self, target: Target) -> Destination:
-        """Return the best thing that a target may mean.
+        """Return the thing that a target means: the likeliest.
 
         Raises:
             GoalNotFoundError: there is none.
+            SeveralFitError: several fit equally, and none was chosen.
         """
         things, _ = self._candidates(target)
-        return self._chosen(things[0], len(things))
+        return self._chosen(self._of_equal(things) if self._asks else things[0], len(things))
 
     def referent(self, target: Target, here: Float[np.ndarray, "2"]) -> Destination:
-        """Return the thing that a target refers to for a robot: the best where it says which one, else the nearest.
+        """Return the thing that a target means for a robot: the likeliest; without questions that nearest to it.
+
+        Raises:
+            GoalNotFoundError: there is none.
+            SeveralFitError: several fit equally, and none was chosen.
+        """
+        return self.best(target) if self._asks else self.nearest(target, here)
+
+    def nearest(self, target: Target, here: Float[np.ndarray, "2"]) -> Destination:
+        """Return the thing nearest to a robot of those that a target may mean.
 
         Raises:
             GoalNotFoundError: there is none.
         """
         things, one = self._candidates(target)
-        return self._chosen(things[0] if one else nearest(things, here), len(things))
+        among = equal(things) if one and self._asks else things
+        return self._chosen(among[0] if one and not self._asks else nearest(among, here), len(things))
+
+    def _of_equal(self, things: list[Destination]) -> Destination:
+        """Return the likeliest thing; of several that fit equally the one that was chosen."""
+        fitting = equal(things)
+        name = fitting[0].name
+        if len(fitting) > 1 and name not in self._meant and self._numbers:
+            self._meant[name] = self._numbers.pop(0)
+        number = 1 if len(fitting) == 1 else self._meant.get(name, 0)
+        if 1 <= number <= len(fitting):
+            return fitting[number - 1]
+        self.choices = self._places_of(fitting)
+        listed = "; ".join(f"{at}: {where}" for at, where in enumerate(self.choices[:_MOST_LISTED], 1))
+        more = f"; and {len(fitting) - _MOST_LISTED} more" if len(fitting) > _MOST_LISTED else ""
+        raise SeveralFitError(
+            f"{len(fitting)} places fit {name} equally: {listed}{more}. Which one? Say the nearest, or what it is "
+            f"near, or choose one by its number ({option('choose', '1')}).",
+            self.choices,
+        )
+
+    def _places_of(self, things: Sequence[Destination]) -> tuple[str, ...]:
+        places = np.array([self.avlmap.space.world(thing.place) for thing in things])
+        where = Whereabouts.of(self.avlmap)
+        rooms = [where.names[room] if room >= 0 else "" for room in where.rooms_of(places).tolist()]
+        texts = zip(places, rooms, strict=True)
+        return tuple(f"{place_text(place)}{f' in {the_room(room)}' if room else ''}" for place, room in texts)
 
     def pair(self, a: Target, b: Target, here: Float[np.ndarray, "2"]) -> tuple[Destination, Destination]:
         """Return the two things that are meant: of several, those nearest to each other and to the robot.
@@ -252,10 +299,11 @@ class Seeker:
         return bool(heat.found)
 
     def place_of(self, target: Target) -> Place:
-        """Return the place of the best thing that a target may mean; a later skill finds the thing again at that place.
+        """Return the place of the thing that a target means; a later skill finds the thing again at that place.
 
         Raises:
             GoalNotFoundError: there is none.
+            SeveralFitError: several fit equally, and none was chosen.
         """
         return self._handed(self.best(target))
 

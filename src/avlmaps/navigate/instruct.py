@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.core.errors import LanguageError, ProgramError
+from avlmaps.core.errors import LanguageError, ProgramError, SeveralFitError
 from avlmaps.core.motion import Action
 from avlmaps.core.poses import FRAME
 from avlmaps.language.learned_translator import LearnedTranslator
@@ -68,6 +68,7 @@ class Outcome:
         error: why it was not obeyed to its end, one sentence; None where it was.
         error_type: the class of that error.
         elapsed_s: from the command to the end.
+        choices: where each of the things is that fit equally, if the error asks which is meant.
     """
 
     command: str
@@ -78,6 +79,7 @@ class Outcome:
     error: str | None
     error_type: str | None
     elapsed_s: float
+    choices: tuple[str, ...] = ()
 
     @property
     def ok(self) -> bool:
@@ -120,6 +122,7 @@ class Outcome:
             "error": self.error,
             "error_type": self.error_type,
             "notes": list(self.notes),
+            "choices": list(self.choices),
             "path_m": round(self.path_m, 3),
             "elapsed_s": round(self.elapsed_s, 3),
             "frame": FRAME,
@@ -185,7 +188,7 @@ def instruct(
     error, error_type = (None, None) if run.last is None else (run.last.error, run.last.error_type)
     return Outcome(
         command, tuple(run.programs), (*run.notes, *robot.seeker.notes), tuple(run.done), tuple(robot.moves), error,
-        error_type, perf_counter() - begin,
+        error_type, perf_counter() - begin, robot.seeker.choices,
     )  # fmt: skip
 
 
@@ -221,7 +224,8 @@ class _Run:
             for line in translation.program.splitlines():
                 self.tell(f"> {line}")
             self.last = self.ran(translation.program)
-            if self.last.error is None or len(self.programs) == _MOST_PROGRAMS or self.brake.pulled:
+            asks = self.last.error_type == SeveralFitError.__name__  # the person answers, and no translator
+            if self.last.error is None or asks or len(self.programs) == _MOST_PROGRAMS or self.brake.pulled:
                 return
             self.tell(f"failed: {self.last.error}")
             translation = self.repaired(translation.program, self.last)

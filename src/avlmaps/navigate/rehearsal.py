@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps.core.errors import GoalNotFoundError, ProgramError, QueryError
+from avlmaps.core.errors import GoalNotFoundError, ProgramError, QueryError, SeveralFitError
 from avlmaps.core.motion import Action, GroundPose, Moved
 from avlmaps.language.learned_translator import LearnedTranslator
 from avlmaps.language.program import Budget, Trace, parse_program, run_program
@@ -62,39 +62,51 @@ class _StandingDriver:
 
 
 def told_by_map(
-    program: str, avlmap: AVLMap, command: str = "", *, guess: bool = False
-) -> tuple[tuple[str, ...], Trace | None]:
-    """Return what a drive would report of the map, and the run that ends early by what the map lacks, if it does.
+    program: str, avlmap: AVLMap, command: str = "", settings: RobotSettings | None = None
+) -> tuple[tuple[str, ...], Trace | None, tuple[str, ...]]:
+    """Return what a drive would report of the map, the run where the map ends it early, and the choices that it asks.
 
     Reported are the map's doubts, how words are taken, what is only a guess, and last of all why it ends early.
     """
-    robot, trace = _asked_of(program, avlmap, command, GroundPose(0.0, 0.0), guess)
+    robot, trace = _asked_of(program, avlmap, command, GroundPose(0.0, 0.0), settings)
     missing = None if trace.error is None or trace.error_type == ProgramError.__name__ else trace
     why = () if missing is None or missing.error is None else (missing.error,)
-    return (*avlmap.doubts_of_drives, *robot.seeker.notes, *why), missing
+    return (*avlmap.doubts_of_drives, *robot.seeker.notes, *why), missing, robot.seeker.choices
 
 
 def unfound(
-    words: str, translation: Translation, avlmap: AVLMap, start: GroundPose, heats: Heats, *, guess: bool = False
+    words: str,
+    translation: Translation,
+    avlmap: AVLMap,
+    start: GroundPose,
+    heats: Heats,
+    settings: RobotSettings | None = None,
 ) -> Outcome | None:
-    """Return the outcome of a program that would drive and then ask for what the map lacks; None for any other.
+    """Return the outcome of a program that the map lets not run to its end; None for any other.
 
-    The program's steps must depend on nothing that a drive would find out. ``heats`` takes what the map answers, for
-    the drive.
+    It would drive and then ask for what the map lacks, or several things fit equally and none was chosen. The program's
+    steps must depend on nothing that a drive would find out. ``heats`` takes what the map answers, for the drive.
     """
-    robot, trace = _asked_of(translation.program, avlmap, words, start, guess, heats)
-    if trace.error is None or trace.error_type not in _ABSENT or not robot.moves:
+    robot, trace = _asked_of(translation.program, avlmap, words, start, settings, heats)
+    asks = trace.error_type == SeveralFitError.__name__
+    if trace.error is None or not (asks or (trace.error_type in _ABSENT and robot.moves)):
         return None
     notes = (*avlmap.doubts_of_drives, *translation.notes, *robot.seeker.notes)
     error = f"{trace.error.rstrip('.')}. The robot was not moved."
-    return Outcome(words, (translation.program,), notes, (), (), error, trace.error_type, 0.0)
+    choices = robot.seeker.choices
+    return Outcome(words, (translation.program,), notes, (), (), error, trace.error_type, 0.0, choices)
 
 
 def _asked_of(
-    program: str, avlmap: AVLMap, command: str, start: GroundPose, guess: bool, heats: Heats | None = None
+    program: str,
+    avlmap: AVLMap,
+    command: str,
+    start: GroundPose,
+    settings: RobotSettings | None,
+    heats: Heats | None = None,
 ) -> tuple[Robot, Trace]:
-    standing, settings, files = _StandingDriver(start), RobotSettings(guess), offered_by(command)
-    robot = Robot(avlmap, standing, settings, files, pause=lambda _: None, heats=heats)
+    files = offered_by(command)
+    robot = Robot(avlmap, _StandingDriver(start), settings, files, pause=lambda _: None, heats=heats)
     return robot, run_program(parse_program(program), robot)
 
 

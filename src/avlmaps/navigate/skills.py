@@ -37,9 +37,11 @@ class RobotSettings:
     """How a robot takes its skills."""
 
     guess: bool = False
-    """Go to the best guess where nothing is found."""
+    """Go to the best guess where nothing is found, and to the nearest of several things that fit equally."""
+    choose: tuple[int, ...] = ()
+    """Which of several things that fit equally is meant: a number from 1 for each name that asks, in their order."""
     persist: bool = False
-    """Continue with a program where a place is not reached, as the paper's evaluation does, instead of stopping."""
+    """Drive as the paper's evaluation does: on where a place is not reached, and to the nearest of several things."""
     waits: bool = True
     """Let the seconds of a `wait` pass; a plan passes over them."""
 
@@ -51,9 +53,9 @@ def _silent(_: str) -> None:
 class Robot:
     """A robot that knows a map and can drive; it implements `avlmaps.language.program.vocabulary.RobotSkills`.
 
-    Where a phrase alone says what is meant, skills that stand in relation to the robot (`face`, `move_to_left`,
-    `move_to_object` ...) take the nearest thing of that name that is found; `move_to`, `get_pos` and
-    `get_contour` take the best. A heatmap of several parts always means its best place.
+    A phrase or a heatmap means the likeliest thing. Where several fit equally the skill fails and asks which; a
+    program that means any of them says so (`get_nearest_pos`). Settings may take the nearest without a question, as the
+    paper's programs do.
 
     Attributes:
         asked: the map.
@@ -88,7 +90,10 @@ class Robot:
         self.driver = driver
         self._pause = pause
         self.settings = settings or RobotSettings()
-        self.seeker = Seeker(asked, self.settings.guess, readable or Readable(), tell, storey_of_walk(asked), heats)
+        choose = None if self.settings.guess or self.settings.persist else self.settings.choose
+        self.seeker = Seeker(
+            asked, self.settings.guess, readable or Readable(), tell, storey_of_walk(asked), heats, choose
+        )
         self.moves: list[LoggedMove] = []
 
     def load_image(self, path: str) -> Picture:
@@ -140,12 +145,12 @@ class Robot:
         return self.seeker.place_of(heat)
 
     def get_pos(self, target: Target) -> Place:
-        """Return the place of the best goal for a phrase or a heatmap."""
-        return self.seeker.place_of(target)
+        """Return the place of the thing that a phrase or a heatmap means; where several fit equally it asks which."""
+        return self.seeker.place_of_thing(self.seeker.best(target))
 
     def get_nearest_pos(self, target: Target) -> Place:
-        """Return the place of the nearest object of that name, or the best of a heatmap; it means the same later."""
-        return self.seeker.place_of_thing(self.seeker.referent(target, self._here))
+        """Return the place of the nearest thing that a phrase or a heatmap may mean; it means the same later."""
+        return self.seeker.place_of_thing(self.seeker.nearest(target, self._here))
 
     def get_all_pos(self, target: Target) -> list[Place]:
         """Return the places of all objects of that name that the map is confident of, the nearest first; [] of none."""
@@ -160,7 +165,7 @@ class Robot:
 
     def get_distance(self, a: Target, b: Target) -> float:
         """Return how many metres of floor are between the nearest points of two things."""
-        one, other = (self.seeker.referent(target, self._here) for target in (a, b))
+        one, other = (self.seeker.nearest(target, self._here) for target in (a, b))
         near, far = one.outline.gap_to(other.outline)
         return float(np.linalg.norm(near - far))
 
@@ -179,7 +184,7 @@ class Robot:
         self._go("move_to", thing, thing.place, face=thing.place if thing.solid else None)
 
     def move_to_object(self, name: Target) -> None:
-        """Drive to the nearest point beside the nearest object of that name."""
+        """Drive to the nearest point beside the object of that name; where several fit equally it asks which."""
         thing = self.seeker.referent(name, self._here)
         beside = np.append(thing.outline.nearest_to(self._here), thing.place[2])
         self._go("move_to_object", thing, beside, face=self._on_floor(thing.outline.centre))

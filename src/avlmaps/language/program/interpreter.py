@@ -7,7 +7,7 @@ from enum import Enum, auto
 from time import monotonic
 from typing import Any
 
-from avlmaps.core.errors import AvlmapsError, ProgramError
+from avlmaps.core.errors import AvlmapsError, ProgramError, SeveralFitError
 from avlmaps.language.program import values
 from avlmaps.language.program.parser import (
     SIGNS,
@@ -159,7 +159,8 @@ class _SkillFailedError(Exception):
     """A skill raised an error that ends the program."""
 
     def __init__(self, line: int, what: str, fault: AvlmapsError) -> None:
-        super().__init__(f"Line {line}, {what}: {fault}")
+        asks = isinstance(fault, SeveralFitError)  # a question to the person, who sees no line
+        super().__init__(str(fault) if asks else f"Line {line}, {what}: {fault}")
         self.fault = fault
 
 

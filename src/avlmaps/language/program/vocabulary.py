@@ -144,11 +144,11 @@ class RobotSkills(Protocol):
         ...
 
     def get_pos(self, target: Target) -> Place:
-        """Return the place of the best goal for a phrase or a heatmap."""
+        """Return the place of the thing that a phrase or a heatmap means; where several fit equally it asks which."""
         ...
 
     def get_nearest_pos(self, target: Target) -> Place:
-        """Return the place of the nearest object of that name, or the best of a heatmap; it means the same later."""
+        """Return the place of the nearest thing that a phrase or a heatmap may mean; it means the same later."""
         ...
 
     def get_all_pos(self, target: Target) -> list[Place]:
@@ -176,7 +176,7 @@ class RobotSkills(Protocol):
         ...
 
     def move_to_object(self, name: Target) -> None:
-        """Drive to the nearest point beside the nearest object of that name."""
+        """Drive to the nearest point beside the object of that name; where several fit equally it asks which."""
         ...
 
     def move_in_between(self, a: Target, b: Target) -> None:

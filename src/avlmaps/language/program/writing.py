@@ -5,7 +5,7 @@ A target that is needed more than once, or in a loop, is looked up once, so that
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from avlmaps.language.intents import (
     Beside,
@@ -133,7 +133,8 @@ class _Writer:
             other = b if a.kind is TargetKind.HERE else a
             self.add(f"robot.move_to((robot.current_pos() + robot.get_pos({self.value(other)})) / 2)")
             return
-        self.add(f"robot.move_in_between({self.value(a)}, {self.value(b)})")
+        pair = (replace(one, pick=Pick.ANY) if one.pick is Pick.NEAREST else one for one in (a, b))
+        self.add(f"robot.move_in_between({', '.join(map(self.value, pair))})")  # it takes those nearest to each other
 
     def beside(self, intent: Beside) -> None:
         target, side, metres = intent.of, intent.side, intent.metres
@@ -185,14 +186,12 @@ class _Writer:
                 at = "1" if target.pick is Pick.OTHER else f"len({every}) - 1"
                 name = self.variable(target.name.split()[-1])
                 self.add(f"{name} = {every}[{at}]")
-            elif target.kind is TargetKind.OBJECT and not target.near:
-                name = self.variable(target.name.split()[-1])
-                self.add(f"{name} = robot.get_nearest_pos({self.query(target)})")
             else:
-                heat = self.query(target)
+                query = self.query(target)
                 name = self.variable(target.name.split()[-1] if not target.is_file else "place")
-                skill = "get_nearest_pos" if target.kind is TargetKind.OBJECT else "get_max_pos_3d"
-                self.add(f"{name} = robot.{skill}({heat})")
+                one = "get_pos" if target.kind is TargetKind.OBJECT else "get_max_pos_3d"
+                skill = "get_nearest_pos" if target.pick is Pick.NEAREST else one
+                self.add(f"{name} = robot.{skill}({query})")
             self.names[target] = name
         return self.names[target]
 
@@ -200,7 +199,7 @@ class _Writer:
         """Return a skill's argument for a target: a phrase, a heatmap's best place, or its variable."""
         if target.kind is TargetKind.HERE:
             return "robot.current_pos()"
-        if target in self.names or self.repeats[target] > 1 or target.pick in (Pick.OTHER, Pick.FARTHEST):
+        if target in self.names or self.repeats[target] > 1 or target.pick is not Pick.ANY:
             return self.bound(target)
         if target.kind is TargetKind.OBJECT and not target.near:
             return _quoted(target.name)

@@ -65,7 +65,9 @@ def drive_agent_server(service: DriveService) -> Server[Any]:
     async def plan(wanted: PlanRequest) -> dict[str, Any]:
         begun = dispatcher.begun
         _require_showable(wanted)
-        return await service.ordered(lambda: dispatcher.plan(wanted.words, wanted.program, _AGENT, begun))
+        return await service.ordered(
+            lambda: dispatcher.plan(wanted.words, wanted.program, _AGENT, begun, wanted.choose)
+        )
 
     async def confirm(wanted: ConfirmRequest) -> dict[str, Any]:
         return await service.ordered(lambda: dispatcher.confirm(wanted.token, _AGENT))

@@ -143,7 +143,9 @@ def _answered(service: DriveService, endpoint: Endpoint) -> Callable[[Request], 
 async def _plan(service: DriveService, request: Request, who: Who) -> Response:
     wanted = await _read(request, PlanRequest)
     begun = service.dispatcher.begun
-    return _json(await service.ordered(lambda: service.dispatcher.plan(wanted.words, wanted.program, who, begun)))
+    return _json(
+        await service.ordered(lambda: service.dispatcher.plan(wanted.words, wanted.program, who, begun, wanted.choose))
+    )
 
 
 async def _confirm(service: DriveService, request: Request, who: Who) -> Response:

@@ -39,7 +39,8 @@ _MOVED_M, _MOVED_RAD = 0.5, 0.35  # a robot that stands elsewhere than its plan 
 _LONGEST_STOP_S, _STOP_AGAIN_S = 15.0, 0.5
 _WATCH_S = 0.5
 _MOST_LINES, _LONGEST_LINE = 50, 500
-_KINDS = {"GoalNotFoundError": "goal-not-found", "NavigationError": "navigation", "ProgramError": "program"}
+_KINDS = {"GoalNotFoundError": "goal-not-found", "NavigationError": "navigation", "ProgramError": "program",
+          "SeveralFitError": "unclear"}  # fmt: skip
 
 
 @dataclass(slots=True)
@@ -96,10 +97,13 @@ class Dispatcher:
         """A mark of now, for plans: one that is requested now is void after the next stop or order."""
         return self._book.cleared
 
-    def plan(self, words: str, program: str, who: Who, begun: int | None = None) -> dict[str, Any]:
+    def plan(
+        self, words: str, program: str, who: Who, begun: int | None = None, choose: tuple[int, ...] = ()
+    ) -> dict[str, Any]:
         """Plan a command or a program on the map, and return the plan with its token.
 
-        ``begun`` is the mark of when it was requested; that of now by default.
+        ``begun`` is the mark of when it was requested; that of now by default. ``choose`` answers the question which of
+        several things is meant.
 
         Raises:
             DriveError: there is no plan, and so no token; the sentence says why.
@@ -108,7 +112,7 @@ class Dispatcher:
         try:
             with self._preparing:
                 self._require_idle()
-                plan = self._planned(words, program)
+                plan = self._planned(words, program, choose)
             with self._lock:
                 token = self._book.add(plan, self._clock(), begun)
         except AvlmapsError as error:
@@ -124,7 +128,7 @@ class Dispatcher:
         # The token stands before the path, which may be long.
         return {"order": plan.order, "token": token, "expires_in_s": self._book.lifetime_s, **plan.to_json()}
 
-    def _planned(self, words: str, program: str) -> OrderPlan:
+    def _planned(self, words: str, program: str, choose: tuple[int, ...]) -> OrderPlan:
         now = self._current()
         translation = self._read(words, program, now)
         obstacles = self._machine.prepare(now.avlmap, now.version)
@@ -133,11 +137,11 @@ class Dispatcher:
         start, heats = self._machine.pose(), Heats()
         outcome = rehearse(
             words, translation, now.avlmap, obstacles, start, shape=self._machine.shape,
-            settings=self._settings, budget=_REHEARSAL, heats=heats,
+            settings=self._settings(choose), budget=_REHEARSAL, heats=heats,
         )  # fmt: skip
         if outcome.error is not None:
             kind = _KINDS.get(outcome.error_type or "", "refused")
-            raise DriveError(f"There is no plan: {outcome.error}", 422, kind)
+            raise DriveError(f"There is no plan: {outcome.error}", 422, kind, outcome.choices)
         path = path_in_world(outcome, now.avlmap, self._floor_m(now))
         return OrderPlan(
             order=secrets.token_hex(8),
@@ -152,6 +156,7 @@ class Dispatcher:
             map=now.name,
             version=now.version,
             robot=self._machine.identity,
+            choose=choose,
             heats=heats,
             of=now.avlmap,
         )
@@ -164,9 +169,8 @@ class Dispatcher:
             return Translation(program)
         return LearnedTranslator(given_by(now.avlmap, said=words)).program_for(words)
 
-    @property
-    def _settings(self) -> RobotSettings:
-        return RobotSettings(guess=self._machine.guess)
+    def _settings(self, choose: tuple[int, ...]) -> RobotSettings:
+        return RobotSettings(guess=self._machine.guess, choose=choose)
 
     def _floor_m(self, now: MapNow) -> float:
         if self._floor is None or self._floor[0] != now.version:
@@ -254,7 +258,7 @@ class Dispatcher:
         try:
             outcome = instruct(
                 order.plan.words, order.now.avlmap, self._machine.driver(order.brake), LearnedTranslator(),
-                settings=self._settings, readable=NO_FILES,
+                settings=self._settings(order.plan.choose), readable=NO_FILES,
                 translation=Translation(order.plan.program, order.plan.notes, order.plan.reading),
                 tell=lambda line: self._tell(order, line), pause=order.brake.pause,
                 heats=order.plan.heats_for(order.now.avlmap),

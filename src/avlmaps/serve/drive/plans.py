@@ -90,6 +90,7 @@ class OrderPlan:
         map: which map.
         version: of the map.
         robot: identity of the robot.
+        choose: which of several things that fit equally are meant.
         heats: what the map answered while it was planned; see ``heats_for``.
         of: that map.
     """
@@ -106,6 +107,7 @@ class OrderPlan:
     map: str
     version: str
     robot: str
+    choose: tuple[int, ...] = ()
     heats: Heats = field(default_factory=dict, repr=False, compare=False)
     of: AVLMap | None = field(default=None, repr=False, compare=False)
 
@@ -198,6 +200,10 @@ class PlanBook:
 
 Words = Annotated[str, Meta(max_length=MOST_CHARACTERS, description="A command, such as 'go to the sofa'.")]
 Program = Annotated[str, Meta(max_length=20_000, description="Skills as a program, instead of a command.")]
+Choose = Annotated[
+    tuple[int, ...],
+    Meta(max_length=20, description="Which of the choices is meant where several things fit equally: its number."),
+]
 Token = Annotated[str, Meta(min_length=1, max_length=200, description="The token of the plan that is confirmed.")]
 
 
@@ -206,6 +212,7 @@ class PlanRequest(Struct, forbid_unknown_fields=True):
 
     words: Words = ""
     program: Program = ""
+    choose: Choose = ()
 
 
 class ConfirmRequest(Struct, forbid_unknown_fields=True):
