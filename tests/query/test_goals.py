@@ -39,6 +39,29 @@ def test_no_two_goals_share_an_instance() -> None:
     assert len({goal.position for goal in goals}) == len(goals) == 2
 
 
+@given(st.integers(0, 2**32 - 1), st.booleans())
+def test_no_two_goals_lie_within_one_thing(seed: int, has_context: bool) -> None:
+    rng = np.random.default_rng(seed)
+    voxels = np.unique(rng.integers(0, 20, (150, 3)), axis=0).astype(np.int32)
+    space = Space(GridSpec(0.05), voxels, np.array([0.0, 0.0, 1.0]))
+    thing = NearThings(
+        space, Part(Modality.OBJECT, "chair", Role.PRIMARY), 2.0, np.ones(len(voxels), bool),
+        np.unique((voxels[:, 0] // 5) * 4 + rng.integers(0, 2, len(voxels)), return_inverse=True)[1],
+        rng.uniform(0.1, 1.0, 8), True,
+    )  # fmt: skip
+    dog = NearAnchors(
+        space, Part(Modality.SOUND, "dog"), 0.2, rng.uniform(0, 1, (1, 3)), np.ones(1), np.zeros(1, int), True
+    )
+    goals = (Heatmap.of(thing) * Heatmap.of(dog) if has_context else Heatmap.of(thing)).goals(top=10)
+    assert goals
+    places = np.array([goal.position for goal in goals])
+    own = thing.instance[[np.argmin(np.linalg.norm(thing.anchors - place, axis=1)) for place in places]]
+    for number in own:
+        points = thing.anchors[thing.instance == number]
+        inside = (places >= points.min(axis=0) - 1e-6) & (places <= points.max(axis=0) + 1e-6)
+        assert inside.all(axis=1).sum() == 1
+
+
 def test_a_sound_decides_between_two_chairs() -> None:
     for x, y, nearest in ((0.3, 0.6, (0.6, 0.6)), (5.0, 3.1, (5.1, 3.1))):
         m = AVLMap(furnished_map(sounds=sounds_of([track(x, y, length_m=0.2)], [0.9])))
@@ -116,9 +139,7 @@ def test_a_thing_is_as_far_in_a_region_as_its_voxels_are(seed) -> None:
     voxels = np.unique(rng.integers(0, 20, (300, 3)), axis=0).astype(np.int32)
     space = Space(GridSpec(0.05), voxels, np.array([0.0, 0.0, 1.0]))
     mask, region = rng.random(len(voxels)) < 0.3, rng.random(len(voxels)).astype(np.float32)
-    mask[:3] = True
-    instance = rng.integers(0, 3, mask.sum())
-    instance[:3] = 0, 1, 2
+    instance = voxels[mask, 0] // 7  # three slabs
     confidence = rng.uniform(0.5, 1.0, 3)
     thing = NearThings(space, Part(Modality.OBJECT, "x", Role.PRIMARY), 2.0, mask, instance, confidence, True)
 

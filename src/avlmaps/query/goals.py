@@ -284,11 +284,15 @@ def _highest(instance: Int[np.ndarray, " m"], heat: Float[np.ndarray, " m"], cou
 
 
 def weigh_goals(factors: Sequence[Factor], shares: Shares, top: int) -> list[tuple[Goal, GoalEvidence]]:
-    """Return up to ``top`` goals, best first by heat times the confidence of the lead's instance, with the evidence."""
+    """Return up to ``top`` goals, best first by heat times the confidence of the lead's instance, with the evidence.
+
+    A thing has one goal: an instance that lies within the extent of a better one is taken for a part of that.
+    """
     lead, is_named = lead_of(factors), all(factor.is_named for factor in factors)
     score = np.round(shares.peak * lead.confidence, 3)  # more digits would be noise; of equals the larger leads
     extent = np.bincount(lead.instance, minlength=len(score))
     ground: list[Float[np.ndarray, 2]] = []
+    extents = _Extents(lead) if isinstance(lead, NearThings) else None
     goals: list[tuple[Goal, GoalEvidence]] = []
     for instance in map(int, np.lexsort((-extent, -score))):
         if len(goals) >= top or score[instance] <= 0.0:
@@ -297,11 +301,35 @@ def weigh_goals(factors: Sequence[Factor], shares: Shares, top: int) -> list[tup
         xy = lead.space.level(position)[:2]
         if lead.flat and any(np.hypot(*(xy - other)) < SEPARATION_M for other in ground):
             continue
+        if extents is not None and not extents.takes(instance, lead.space.level(position)):
+            continue
         ground.append(xy)
         evidence = evidence_of(factors, instance, position, float(shares.peak[instance]))
         probability = probability_of(evidence) if is_named else 0.0
         goals.append((_goal(factors, lead, instance, position, float(score[instance]), probability), evidence))
     return goals
+
+
+class _Extents:
+    """The boxes of a lead's instances, level frame, and the goals that lie in them."""
+
+    def __init__(self, lead: NearThings) -> None:
+        points, shape = lead.space.level(lead.anchors), (len(lead.confidence), 3)
+        self.low, self.high = np.full(shape, np.inf), np.full(shape, -np.inf)
+        for axis in range(3):  # each by itself: NumPy is ten times as fast on numbers as on rows
+            np.minimum.at(self.low[:, axis], lead.instance, points[:, axis])
+            np.maximum.at(self.high[:, axis], lead.instance, points[:, axis])
+        self.goals: dict[int, Float[np.ndarray, 3]] = {}
+
+    def holds(self, instance: int, place: Float[np.ndarray, "3"]) -> bool:
+        return bool((self.low[instance] <= place).all() and (place <= self.high[instance]).all())
+
+    def takes(self, instance: int, place: Float[np.ndarray, "3"]) -> bool:
+        """Return whether the goal of an instance is that of another thing than those before, and remember it."""
+        if any(self.holds(other, place) or self.holds(instance, at) for other, at in self.goals.items()):
+            return False
+        self.goals[instance] = place
+        return True
 
 
 def _position(factors: Sequence[Factor], lead: Factor, shares: Shares, instance: int) -> Float[np.ndarray, "3"]:
