@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from avlmaps.core import poses, timeline
+from avlmaps.core import poses
 from avlmaps.core.timeline import Trajectory, associate, gap_notices, in_order
 
 

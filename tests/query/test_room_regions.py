@@ -14,7 +14,7 @@ from avlmaps.maps.grid import GridSpec
 from avlmaps.query.floor_plan import FloorPlan
 from avlmaps.query.room_regions import NONE, RoomRegions, rooms_of_storey
 from avlmaps.query.rooms import RoomField
-from avlmaps.query.storey_grid import Sights, StoreyGrid, dilated, turned, wall_heading
+from avlmaps.query.storey_grid import Sights, StoreyGrid, contacts, dilated, turned, wall_heading
 from avlmaps.query.voxel_space import Space
 
 CELL = 0.05
@@ -209,3 +209,15 @@ def test_a_room_has_a_distribution_of_names_and_a_dead_end_is_seldom_a_hallway(s
     even = replace(field, share=np.full_like(share, 1 / 3)).whole_rooms(regions)
     assert (even[:, 0] < 0.5 * even[:, 1]).all()
     np.testing.assert_allclose(even[:, 1], even[:, 2])
+
+
+@given(st.integers(1, 9), st.integers(1, 9), st.integers(0, 2**32 - 1))
+def test_contacts_are_counted_side_by_side(rows: int, columns: int, seed: int) -> None:
+    label = np.random.default_rng(seed).integers(0, 4, (rows, columns))
+    expected: dict[tuple[int, int], int] = {}
+    for (i, j), own in np.ndenumerate(label):
+        for other in (*label[i + 1 : i + 2, j], *label[i, j + 1 : j + 2]):
+            if own != other and own > 0 and other > 0:
+                pair = (int(min(own, other)), int(max(own, other)))
+                expected[pair] = expected.get(pair, 0) + 1
+    assert contacts(label) == expected

@@ -330,13 +330,12 @@ def object_heat(
     blocks = blocks.some(blocks.near(things, reach))  # no voxel of another block has any heat
     squared, nearest = np.full(len(blocks.order), limit, np.int32), np.full(len(blocks.order), -1, np.int32)
     if len(things):
-        which = np.arange(len(blocks), dtype=np.int64)
         share(
             lambda a, b: nearest_squared(
                 blocks.index, blocks.starts, blocks.low, blocks.high,
-                things.index, things.starts, things.low, things.high, limit, squared, nearest, which, a, b,
+                things.index, things.starts, things.low, things.high, limit, squared, nearest, a, b,
             ),
-            len(which),
+            len(blocks),
             least=64,
         )  # fmt: skip
     heat, anchor = np.zeros(len(space), np.float32), np.full(len(space), -1, np.int32)

@@ -1,11 +1,10 @@
 """The compiled inner loops of queries. Each has a brute-force twin in the tests.
 
-Loops over voxels take a range, so that threads can share them (they release the interpreter's lock); that
-compiles in a fraction of the time of numba's own parallel mode.
+Loops over voxels take a range of blocks, so that threads can share them (they release the interpreter's lock).
 """
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int, Int32, Int64
+from jaxtyping import Float64, Int, Int32, Int64
 from numba import njit
 
 from avlmaps.core.machine import Real, Whole
@@ -21,20 +20,15 @@ def undominated(horizontal: Float64[np.ndarray, "n 2"], score: Float64[np.ndarra
     Cone j lies under cone i everywhere if s_j <= s_i − ε·d(i, j). That relation carries over, so it is enough
     to compare with the cones selected before.
     """
-    keep = np.zeros(len(score), np.bool_)
-    kept = np.empty(len(score), np.int64)
-    count = 0
+    keep, kept, count = np.zeros(len(score), np.bool_), np.empty(len(score), np.int64), 0
     for j in range(len(score)):
-        if score[j] <= 0.0:
-            break
-        hidden = False
-        for k in range(count):
+        hidden = score[j] <= 0.0
+        k = 0
+        while k < count and not hidden:
             i = kept[k]
             dx, dy = horizontal[j, 0] - horizontal[i, 0], horizontal[j, 1] - horizontal[i, 1]
-            lead = score[i] - score[j]
-            if falloff_per_m * falloff_per_m * (dx * dx + dy * dy) <= lead * lead:
-                hidden = True
-                break
+            hidden = falloff_per_m * falloff_per_m * (dx * dx + dy * dy) <= (score[i] - score[j]) ** 2
+            k += 1
         if not hidden:
             keep[j] = True
             kept[count] = j
@@ -43,21 +37,10 @@ def undominated(horizontal: Float64[np.ndarray, "n 2"], score: Float64[np.ndarra
 
 
 @njit(cache=True, nogil=True)
-def _circle(points: Float64[np.ndarray, "m 2"], first: Whole, last: Whole):
-    low_x = high_x = points[first, 0]
-    low_y = high_y = points[first, 1]
-    for i in range(first + 1, last):
-        low_x, high_x = min(low_x, points[i, 0]), max(high_x, points[i, 0])
-        low_y, high_y = min(low_y, points[i, 1]), max(high_y, points[i, 1])
-    radius = 0.5 * np.sqrt((high_x - low_x) ** 2 + (high_y - low_y) ** 2)
-    return 0.5 * (low_x + high_x), 0.5 * (low_y + high_y), radius
-
-
-@njit(cache=True, nogil=True)
 def _cones_near(
     x: Real,
     y: Real,
-    slack: Real,
+    radius: Real,
     anchors: Float64[np.ndarray, "n 2"],
     score: Float64[np.ndarray, " n"],
     falloff_per_m: Real,
@@ -65,13 +48,10 @@ def _cones_near(
     count: Whole,
     near: Int64[np.ndarray, " n"],
 ):
-    """Write which of ``count`` cones can be the highest somewhere within a circle, and return how many.
-
-    ``slack`` is the falloff times the circle's radius: a cone's heat in it lies that much round its middle's. A
-    cone whose best in the circle stays below another's worst is not highest anywhere in it. Scores fall, so that
-    both passes can stop early; squares are compared to save roots.
-    """
-    worst, squared = 0.0, falloff_per_m * falloff_per_m
+    # Writes which of ``count`` cones can be the highest somewhere within a circle, and returns how many. A cone whose
+    # best in the circle stays below another's worst is not. Scores fall, so that both passes can stop early; squares
+    # are compared to save roots.
+    slack, worst, squared = falloff_per_m * (radius + 1e-9), 0.0, falloff_per_m * falloff_per_m
     for k in range(count):
         a = among[k]
         above = score[a] - slack - worst
@@ -113,14 +93,16 @@ def cone_heat(
     every, near, nearest = np.arange(len(score)), np.empty(len(score), np.int64), np.empty(len(score), np.int64)
     wide_x, wide_y, wide, wide_count = 0.0, 0.0, -1.0, 0
     for b in range(first_block, last_block):
-        x, y, radius = _circle(points, starts[b], starts[b + 1])
+        begin, end = starts[b], starts[b + 1]
+        low_x, high_x = points[begin:end, 0].min(), points[begin:end, 0].max()
+        low_y, high_y = points[begin:end, 1].min(), points[begin:end, 1].max()
+        x, y = 0.5 * (low_x + high_x), 0.5 * (low_y + high_y)
+        radius = 0.5 * np.sqrt((high_x - low_x) ** 2 + (high_y - low_y) ** 2)
         if wide < 0.0 or np.sqrt((x - wide_x) ** 2 + (y - wide_y) ** 2) + radius > wide:
             wide_x, wide_y, wide = x, y, radius + _WIDE_M
-            slack = falloff_per_m * (wide + 1e-9)
-            wide_count = _cones_near(x, y, slack, anchors, score, falloff_per_m, every, len(score), near)
-        slack = falloff_per_m * (radius + 1e-9)
-        count = _cones_near(x, y, slack, anchors, score, falloff_per_m, near, wide_count, nearest)
-        for i in range(starts[b], starts[b + 1]):
+            wide_count = _cones_near(x, y, wide, anchors, score, falloff_per_m, every, len(score), near)
+        count = _cones_near(x, y, radius, anchors, score, falloff_per_m, near, wide_count, nearest)
+        for i in range(begin, end):
             best, who = 0.0, -1
             for k in range(count):
                 a = nearest[k]
@@ -133,132 +115,26 @@ def cone_heat(
 
 
 @njit(cache=True, nogil=True)
-def sorted_by_number(number: Int64[np.ndarray, " n"], count: Whole):
-    """Return the order that sorts numbers from 0 to ``count``, each group in the order in which it comes."""
-    start = np.zeros(count + 1, np.int64)
-    for value in number:
-        start[value + 1] += 1
-    for k in range(count):
-        start[k + 1] += start[k]
-    order = np.empty(len(number), np.int64)
-    for i in range(len(number)):
-        order[start[number[i]]] = i
-        start[number[i]] += 1
-    return order
-
-
-@njit(cache=True, nogil=True)
-def first_of_blocks(
-    index: Int32[np.ndarray, "n 3"],
-    shift: Whole,
-    low: Int64[np.ndarray, "3"],
-    span: Int64[np.ndarray, "3"],
-    chosen: Bool[np.ndarray, " n"],
-    first: Int32[np.ndarray, " blocks"],
-):
-    """Write the first voxel of each block of 2^shift voxels a side, where none of its voxels is chosen.
-
-    Args:
-        index: of the voxels.
-        shift: of the blocks.
-        low: block of the lowest corner,
-        span: and how many there are along each axis.
-        chosen: of the voxels.
-        first: -1 for every block; written.
-    """
-    for i in range(len(index)):
-        x, y, z = (index[i, 0] >> shift) - low[0], (index[i, 1] >> shift) - low[1], (index[i, 2] >> shift) - low[2]
-        block = (x * span[1] + y) * span[2] + z
-        if chosen[i]:
-            first[block] = -2
-        elif first[block] == -1:
-            first[block] = i
-
-
-@njit(cache=True, nogil=True)
-def _box_gap(
-    low_a: Int64[np.ndarray, "3"],
-    high_a: Int64[np.ndarray, "3"],
-    low_b: Int64[np.ndarray, "3"],
-    high_b: Int64[np.ndarray, "3"],
-):
-    least, most = 0, 0
-    for k in range(3):
-        gap = max(low_b[k] - high_a[k], low_a[k] - high_b[k], 0)
-        span = max(high_b[k] - low_a[k], high_a[k] - low_b[k])
-        least += gap * gap
-        most += span * span
-    return least, most
-
-
-@njit(cache=True, nogil=True)
-def _nearest_in(
-    x: Whole,
-    y: Whole,
-    z: Whole,
-    xs: Int32[np.ndarray, " k"],
-    ys: Int32[np.ndarray, " k"],
-    zs: Int32[np.ndarray, " k"],
-    best: Whole,
-):
-    for k in range(len(xs)):
-        dx, dy, dz = xs[k] - x, ys[k] - y, zs[k] - z
-        best = min(best, dx * dx + dy * dy + dz * dz)
-    return best
-
-
-@njit(cache=True, nogil=True)
-def _first_at(
-    x: Whole,
-    y: Whole,
-    z: Whole,
-    xs: Int32[np.ndarray, " k"],
-    ys: Int32[np.ndarray, " k"],
-    zs: Int32[np.ndarray, " k"],
-    squared: Whole,
-):
-    k = 0
-    while (xs[k] - x) ** 2 + (ys[k] - y) ** 2 + (zs[k] - z) ** 2 != squared:
-        k += 1
-    return k
-
-
-@njit(cache=True, nogil=True)
-def _before(rising: Int64[np.ndarray, " n"], value: Whole):
-    low, high = 0, len(rising)
-    while low < high:
-        middle = (low + high) // 2
-        if rising[middle] < value:
-            low = middle + 1
-        else:
-            high = middle
-    return low
-
-
-@njit(cache=True, nogil=True)
 def _things_near(
     box_low: Int64[np.ndarray, "3"],
     box_high: Int64[np.ndarray, "3"],
     low: Int64[np.ndarray, "t 3"],
     high: Int64[np.ndarray, "t 3"],
-    high_before: Int64[np.ndarray, " t"],
-    low_after: Int64[np.ndarray, " t"],
+    first: Whole,
+    last: Whole,
     limit: Whole,
     near: Int64[np.ndarray, " t"],
     gaps: Int64[np.ndarray, " t"],
 ):
-    """Write which blocks of things can hold the nearest to some voxel of a box, nearest block first.
-
-    Those are the blocks whose least distance from the box is within the smallest of all largest distances. Only those
-    within reach along x are looked at, between two places in ``high_before``, the highest x up to each block, and
-    ``low_after``, the lowest x from each block on.
-    """
+    # Writes which blocks of things can hold the nearest to some voxel of a box, the nearest block first, and returns
+    # how many: those whose least distance from the box is within the smallest of all largest distances.
     bound, count = np.int64(limit), 0
-    reach = np.int64(np.ceil(np.sqrt(limit)))
-    first = _before(high_before, box_low[0] - reach)
-    last = _before(low_after, box_high[0] + reach + 1)
     for t in range(first, last):
-        gaps[t], most = _box_gap(box_low, box_high, low[t], high[t])
+        least, most = 0, 0
+        for axis in range(3):
+            least += max(low[t, axis] - box_high[axis], box_low[axis] - high[t, axis], 0) ** 2
+            most += max(high[t, axis] - box_low[axis], box_high[axis] - low[t, axis]) ** 2
+        gaps[t] = least
         bound = min(bound, most)
     for t in range(first, last):
         if gaps[t] <= bound:
@@ -284,27 +160,26 @@ def nearest_squared(
     limit: Whole,
     out: Int[np.ndarray, " n"],
     nearest: Int[np.ndarray, " n"],
-    which: Int64[np.ndarray, " k"],
     first: Whole,
     last: Whole,
 ):
     """Write each voxel's squared distance, in voxels, to the nearest thing, and which it is.
 
-    Where that is ``limit`` or farther, ``limit`` and -1 are written.
-
-    Voxels and things come in blocks: places ``starts[b]:starts[b + 1]`` of (3, n) int32 indices (one row an axis,
-    so that the inner loop is vectorised), in boxes from ``low`` to ``high`` (b, 3) int64. ``which[first:last]``
-    are the blocks of voxels to do.
+    Where that is ``limit`` or farther, ``limit`` and -1 are written. Voxels and things come in blocks: places
+    ``starts[b]:starts[b + 1]`` of int32 indices (one row an axis, so that the inner loop is vectorised), in boxes from
+    ``low`` to ``high``. Blocks of voxels from ``first`` to ``last`` are done.
     """
-    near = np.empty(len(thing_low), np.int64)
-    gaps = np.empty(len(thing_low), np.int64)
+    near, gaps = np.empty(len(thing_low), np.int64), np.empty(len(thing_low), np.int64)
+    # The highest x up to each block of things, and the lowest x from each on: only those within reach are looked at.
     high_before, low_after = thing_high[:, 0].copy(), thing_low[:, 0].copy()
     for t in range(1, len(high_before)):
         high_before[t] = max(high_before[t], high_before[t - 1])
         low_after[-t - 1] = min(low_after[-t - 1], low_after[-t])
-    for c in range(first, last):
-        b = which[c]
-        count = _things_near(low[b], high[b], thing_low, thing_high, high_before, low_after, limit, near, gaps)
+    reach = np.int64(np.ceil(np.sqrt(limit)))
+    for b in range(first, last):
+        begin = np.searchsorted(high_before, low[b, 0] - reach)
+        end = np.searchsorted(low_after, high[b, 0] + reach + 1)
+        count = _things_near(low[b], high[b], thing_low, thing_high, begin, end, limit, near, gaps)
         for i in range(starts[b], starts[b + 1]):
             x, y, z = voxels[0, i], voxels[1, i], voxels[2, i]
             best, block = limit, -1
@@ -313,12 +188,18 @@ def nearest_squared(
                 gap_x = max(thing_low[t, 0] - x, x - thing_high[t, 0], 0)
                 gap_y = max(thing_low[t, 1] - y, y - thing_high[t, 1], 0)
                 gap_z = max(thing_low[t, 2] - z, z - thing_high[t, 2], 0)
-                if gap_x * gap_x + gap_y * gap_y + gap_z * gap_z < best:
-                    a, e = thing_starts[t], thing_starts[t + 1]
-                    nearer = _nearest_in(x, y, z, things[0, a:e], things[1, a:e], things[2, a:e], best)
-                    if nearer < best:
-                        best, block = nearer, t
+                if gap_x * gap_x + gap_y * gap_y + gap_z * gap_z >= best:
+                    continue
+                nearer, a, e = best, thing_starts[t], thing_starts[t + 1]
+                xs, ys, zs = things[0, a:e], things[1, a:e], things[2, a:e]
+                for m in range(len(xs)):
+                    dx, dy, dz = xs[m] - x, ys[m] - y, zs[m] - z
+                    nearer = min(nearer, dx * dx + dy * dy + dz * dz)
+                if nearer < best:
+                    best, block = nearer, t
             out[i], nearest[i] = best, -1
             if block >= 0:  # looked for only now: a search for the smallest alone is vectorised
-                a, e = thing_starts[block], thing_starts[block + 1]
-                nearest[i] = a + _first_at(x, y, z, things[0, a:e], things[1, a:e], things[2, a:e], best)
+                m = thing_starts[block]
+                while (things[0, m] - x) ** 2 + (things[1, m] - y) ** 2 + (things[2, m] - z) ** 2 != best:
+                    m += 1
+                nearest[i] = m

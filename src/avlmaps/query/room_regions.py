@@ -14,24 +14,10 @@ from functools import cached_property
 import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Float32, Int
+from avlmaps.query import storey_grid
 from avlmaps.query.floor_plan import CELL_M as PLAN_CELL_M
 from avlmaps.query.floor_plan import FloorPlan
-from avlmaps.query.storey_grid import (
-    Sights,
-    StoreyGrid,
-    bridged,
-    contacts,
-    dilated,
-    distance,
-    extents,
-    flooded,
-    in_polygon,
-    nearest_label,
-    of_pieces,
-    opened,
-    outline,
-    pieces,
-)
+from avlmaps.query.storey_grid import Cells, Labels, Sights, StoreyGrid, contacts, dilated, distance, of_pieces, pieces
 from avlmaps.query.voxel_space import connected
 
 WIDEST_M = 2.2
@@ -50,88 +36,84 @@ _SHADOW_M, _SHADOW_M2 = 0.22, 2.0  # least width and largest area of what a thin
 _POST_M = 0.6
 _DOOR_M = 1.3  # width of a doorway beside another, with a piece of wall between
 
+NONE = -1
+"""The region of a place in no room."""
+_NARROW_M, _WIDER_M = 0.65, 0.15  # half the width of a door at most, and by how much rooms are wider on both sides
+_LEAST_M2, _LEAST_HALF_M = 1.5, 0.45  # a smaller or narrower region is a nook
+_LEAST_UNENTERED_M2 = 4.0  # so is one of this size that no camera entered: behind a shelf, under a bunk bed
+_GAP_M = 0.3  # unseen floor up to twice this width, and doorways, belong to a region beside them
+_TO_WALL_M = 0.1  # a region reaches onto the faces of its walls
+_REACH_M = 0.6  # a place up to this far from a region belongs to it: a picture on the wall
+_LEAST_CONTACT_M = 0.2  # along which two rooms lie side by side in a doorway
+_STRAIGHT_M = 0.12  # an outline leaves out what is smaller
+_MOST_CORNERS = 60
 
-def without_leaves(
-    wall: Bool[np.ndarray, "nx ny"], free: Bool[np.ndarray, "nx ny"], cell_m: float
-) -> Bool[np.ndarray, "nx ny"]:
-    """Return walls without leaves of doors and other pieces that are thin, short and seen from both sides."""
-    solid = ~(free | _shadows(~(free | wall), cell_m))
-    core = distance(solid, beyond=True) * cell_m > _LEAF_THICKNESS_M - 0.01
+Numbers = Int[np.ndarray, " g"]
+Chosen = Bool[np.ndarray, " g"]
+
+
+def _without_leaves(wall: Cells, free: Cells, cell_m: float) -> Cells:
+    # Leaves of doors and other pieces that are thin, short and seen from both sides are no walls.
+    hidden = pieces(~(free | wall))
+    small = storey_grid.extents(hidden)[:, 2] * cell_m**2 <= _SHADOW_M2
+    shadows = (small & of_pieces(hidden, distance(~(free | wall)) * cell_m >= _SHADOW_M / 2.0))[hidden]
+    core = distance(~(free | shadows), beyond=True) * cell_m > _LEAF_THICKNESS_M - 0.01
     thick = distance(~core, beyond=True) * cell_m <= _LEAF_THICKNESS_M + 0.02
-    out = wall & ~_short(wall & ~thick, _LEAF_M / cell_m)
+    thin = wall & ~thick
+    piece = pieces(thin, diagonally=True)
+    out = wall & ~((_lengths(piece) <= _LEAF_M / cell_m)[piece] & thin)
     piece = pieces(out, diagonally=True)
-    rows, columns, _ = extents(piece).T
-    out &= ~((np.hypot(rows, columns) <= _SCREEN_M / cell_m) & ~of_pieces(piece, thick))[piece]
+    out &= ~((_lengths(piece) <= _SCREEN_M / cell_m) & ~of_pieces(piece, thick))[piece]
     aside = wall & ~out
     return out | (_between_doors(wall, aside, cell_m) | _between_doors(wall.T, aside.T, cell_m).T) & wall
 
 
-def _between_doors(
-    wall: Bool[np.ndarray, "r c"], screen: Bool[np.ndarray, "r c"], cell_m: float
-) -> Bool[np.ndarray, "r c"]:
+def _lengths(piece: Labels) -> Float[np.ndarray, " n"]:
+    rows, columns, _ = storey_grid.extents(piece).T
+    return np.hypot(rows, columns)
+
+
+def _between_doors(wall: Cells, screen: Cells, cell_m: float) -> Cells:
     row, start, end = _runs(_as_rows(wall))
     alone = _sums(dilated(screen, 3, 1))
     is_wall = alone[row, end] - alone[row, start] < 0.5 * (end - start)
     long = (end - start) * cell_m >= _LEAST_WALL_M - 1e-6
     piece = ~is_wall & long & _pillars(row, start, end, is_wall, _DOOR_M / cell_m)
-    return _filled(_Gaps(row, start, end, piece).where(piece), wall.shape)
+    return _Gaps(row, start, end, piece).where(piece).filled(wall.shape)
 
 
-def _shadows(unseen: Bool[np.ndarray, "nx ny"], cell_m: float) -> Bool[np.ndarray, "nx ny"]:
-    piece = pieces(unseen)
-    small = extents(piece)[:, 2] * cell_m**2 <= _SHADOW_M2
-    return (small & of_pieces(piece, distance(unseen) * cell_m >= _SHADOW_M / 2.0))[piece]
+def _posts(wall: Cells, cell_m: float) -> Cells:
+    # What stands alone and is small: a lamp, a plant, a person, a pillar.
+    piece = pieces(wall, diagonally=True)
+    return (storey_grid.extents(piece)[:, :2].max(axis=1) <= _POST_M / cell_m)[piece] & wall
 
 
-def posts(wall: Bool[np.ndarray, "nx ny"], cell_m: float) -> Bool[np.ndarray, "nx ny"]:
-    """Return the walls that stand alone and are small: a lamp, a plant, a person, a pillar."""
-    rows, columns, _ = extents(piece := pieces(wall, diagonally=True)).T
-    return (np.maximum(rows, columns) <= _POST_M / cell_m)[piece] & wall
-
-
-def without_posts(
-    wall: Bool[np.ndarray, "nx ny"], doorway: Bool[np.ndarray, "nx ny"], cell_m: float
-) -> Bool[np.ndarray, "nx ny"]:
-    """Return walls without what stands alone; pillars between doorways stay."""
-    post = posts(wall, cell_m)
+def _without_posts(wall: Cells, doorway: Cells, cell_m: float) -> Cells:
+    post = _posts(wall, cell_m)
     piece = pieces(post, diagonally=True)
-    return wall & (~post | of_pieces(piece, dilated(doorway, 3, 3))[piece])
-
-
-def _short(cells: Bool[np.ndarray, "nx ny"], most: float) -> Bool[np.ndarray, "nx ny"]:
-    rows, columns, _ = extents(piece := pieces(cells, diagonally=True)).T
-    return (np.hypot(rows, columns) <= most)[piece] & cells
+    return wall & (~post | of_pieces(piece, dilated(doorway, 3, 3))[piece])  # pillars between doorways stay
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Gaps:
-    """Gaps along the rows of a grid: cells [a, b) of a row.
+    row: Numbers
+    a: Numbers  # cells [a, b) of the row
+    b: Numbers
+    between: Chosen  # whether a wall ends on both sides, rather than runs across on one
 
-    Attributes:
-        row, a, b: of each.
-        between: whether a wall ends on both sides, rather than runs across on one.
-    """
-
-    row: Int[np.ndarray, " g"]
-    a: Int[np.ndarray, " g"]
-    b: Int[np.ndarray, " g"]
-    between: Bool[np.ndarray, " g"]
-
-    def where(self, chosen: Bool[np.ndarray, " g"]) -> "_Gaps":
+    def where(self, chosen: Chosen) -> "_Gaps":
         return _Gaps(self.row[chosen], self.a[chosen], self.b[chosen], self.between[chosen])
 
+    def filled(self, shape: tuple[int, ...]) -> Cells:
+        change = np.zeros((shape[0], shape[1] + 1), np.int32)
+        np.add.at(change, (self.row, self.a), 1)
+        np.add.at(change, (self.row, self.b), -1)
+        return np.cumsum(change, axis=1)[:, :-1] > 0
 
-def closed_doorways(
-    wall: Bool[np.ndarray, "nx ny"], free: Bool[np.ndarray, "nx ny"], cell_m: float
-) -> Bool[np.ndarray, "nx ny"]:
-    """Return the cells that close the doorways between walls.
 
-    Args:
-        wall: cells with walls, which run along the axes of the grid.
-        free: cells without, that were seen.
-        cell_m: side of a cell.
-    """
-    post = posts(wall, cell_m)
+def _closed_doorways(wall: Cells, free: Cells, cell_m: float) -> Cells:
+    # The cells that close the doorways between walls, which run along the axes of the grid.
+    post = _posts(wall, cell_m)
     gaps = [_gaps(wall, post, free, cell_m), _gaps(wall.T, post.T, free.T, cell_m)]
     out = np.zeros(wall.shape, bool)
     narrower = 0.0
@@ -141,39 +123,29 @@ def closed_doorways(
             width_m = (all_gaps.b - all_gaps.a) * cell_m
             own = all_gaps.where((width_m > narrower + 1e-6) & (width_m <= widest + 1e-6))
             solid, open_ = (wall | out, free) if along == 0 else ((wall | out).T, free.T)
-            doorways = own.where(_leads_somewhere(own, solid, open_, cell_m))
-            found |= _filled(doorways, solid.shape) if along == 0 else _filled(doorways, solid.shape).T
+            closed = own.where(_leads_somewhere(own, solid, open_, cell_m)).filled(solid.shape)
+            found |= closed if along == 0 else closed.T
         out |= found
         narrower = widest
     return out
 
 
-def recesses(
-    wall: Bool[np.ndarray, "nx ny"], free: Bool[np.ndarray, "nx ny"], cell_m: float
-) -> Bool[np.ndarray, "nx ny"]:
-    """Return the cells of recesses: openings between two ends of a wall that end behind it, such as those of windows.
-
-    The sill is low and the pane stands outside of the wall, or lets depth out: a room ends at its wall nevertheless.
-
-    Args:
-        wall: cells with walls, which run along the axes of the grid.
-        free: cells without, that were seen.
-        cell_m: side of a cell.
-    """
-    post = posts(wall, cell_m)
+def _recesses(wall: Cells, free: Cells, cell_m: float) -> Cells:
+    # Openings between two ends of a wall that end behind it, such as those of windows. The sill is low and the pane
+    # stands outside of the wall, or lets depth out: a room ends at its wall nevertheless.
+    post = _posts(wall, cell_m)
     rows = _recesses_of_rows(_gaps(wall, post, free, cell_m, _WIDEST_WINDOW_M), free, cell_m)
     columns = _recesses_of_rows(_gaps(wall.T, post.T, free.T, cell_m, _WIDEST_WINDOW_M), free.T, cell_m)
     return (rows | columns.T) & ~wall
 
 
-def _recesses_of_rows(gaps: _Gaps, free: Bool[np.ndarray, "r c"], cell_m: float) -> Bool[np.ndarray, "r c"]:
+def _recesses_of_rows(gaps: _Gaps, free: Cells, cell_m: float) -> Cells:
     seen, out = _sums(free), np.zeros(free.shape, bool)
     gaps = gaps.where(gaps.between)
     width, last = gaps.b - gaps.a, free.shape[0] - 1
 
-    def share(row: Int[np.ndarray, " g"]) -> Float[np.ndarray, " g"]:
-        """Return how much of each gap is free in another row; nothing is beyond the grid."""
-        at = np.clip(row, 0, last)
+    def share(row: Numbers) -> Float[np.ndarray, " g"]:
+        at = np.clip(row, 0, last)  # nothing is beyond the grid
         return np.where(at == row, (seen[at, gaps.b] - seen[at, gaps.a]) / np.maximum(width, 1), 0.0)
 
     for side in (-1, 1):
@@ -187,23 +159,14 @@ def _recesses_of_rows(gaps: _Gaps, free: Bool[np.ndarray, "r c"], cell_m: float)
     return out
 
 
-def _gaps(
-    wall: Bool[np.ndarray, "r c"],
-    post: Bool[np.ndarray, "r c"],
-    free: Bool[np.ndarray, "r c"],
-    cell_m: float,
-    widest_m: float = WIDEST_M,
-) -> _Gaps:
-    """Return the gaps along rows that lie between walls, one of which ends there and is as thin as a wall.
-
-    What stands alone is the end of a gap only where it lies between two walls.
-    """
+def _gaps(wall: Cells, post: Cells, free: Cells, cell_m: float, widest_m: float = WIDEST_M) -> _Gaps:
+    # The gaps along rows that lie between walls, one of which ends there and is as thin as a wall. What stands alone is
+    # the end of a gap only where it lies between two walls.
     row, start, end = _runs(_as_rows(wall))
     alone = _sums(_as_rows(post))
     long = ((end - start) * cell_m >= _LEAST_WALL_M - 1e-6) & (alone[row, end] == alone[row, start])
     beam = max(3, 2 * (round(_LEAST_WALL_M / cell_m) // 2) - 1)
-    across = dilated(opened(wall & ~post, beam, 1), 3, 1)
-    ends_at = _sums(across)
+    ends_at = _sums(dilated(storey_grid.opened(wall & ~post, beam, 1), 3, 1))
     held = long | (ends_at[row, end] > ends_at[row, start])
     held |= _pillars(row, start, end, held, _DOOR_M / cell_m)
     row, start, end, long = row[held], start[held], end[held], long[held]
@@ -211,39 +174,27 @@ def _gaps(
     row, a, b, before, after = row[q], end[q], start[q + 1], long[q], long[q + 1]
     above, below = _nearest(free.T)
     thickness_m = (below - above - 1).T * cell_m
-    last = wall.shape[1] - 1
     before &= thickness_m[row, np.maximum(a - 3, 0)] <= _MOST_WALL_M
-    after &= thickness_m[row, np.minimum(b + 2, last)] <= _MOST_WALL_M
-    seen = _sums(free)
-    width = b - a
+    after &= thickness_m[row, np.minimum(b + 2, wall.shape[1] - 1)] <= _MOST_WALL_M
+    seen, width = _sums(free), b - a
     wide = (width * cell_m >= _NARROWEST_M - 1e-6) & (width * cell_m <= widest_m + 1e-6)
     good = wide & (before | after) & (seen[row, b] - seen[row, a] >= _SEEN_SHARE * width)
     return _Gaps(row, a, b, before & after).where(good)
 
 
-def _pillars(
-    row: Int[np.ndarray, " q"],
-    start: Int[np.ndarray, " q"],
-    end: Int[np.ndarray, " q"],
-    wall: Bool[np.ndarray, " q"],
-    most: float,
-) -> Bool[np.ndarray, " q"]:
+def _pillars(row: Numbers, start: Numbers, end: Numbers, wall: Chosen, most: float) -> Chosen:
     out = np.zeros(len(row), bool)
     near = (row[1:] == row[:-1]) & (start[1:] - end[:-1] <= most)
     out[1:-1] = near[:-1] & near[1:] & wall[:-2] & wall[2:]
     return out
 
 
-def _leads_somewhere(
-    gaps: _Gaps, solid: Bool[np.ndarray, "r c"], free: Bool[np.ndarray, "r c"], cell_m: float
-) -> Bool[np.ndarray, " g"]:
-    """Return which gaps have floor on both sides that is wider than they are; between two ends of walls one is enough.
-
-    A passage whose own walls are the ends of others is as wide on both sides as here, and no doorway.
-    """
+def _leads_somewhere(gaps: _Gaps, solid: Cells, free: Cells, cell_m: float) -> Chosen:
+    # The floor is wider on both sides; between two ends of walls one is enough. A passage whose own walls are the ends
+    # of others is as wide on both sides as here, and no doorway.
     seen, width, middle = _sums(free), gaps.b - gaps.a, (gaps.a + gaps.b) // 2
     before, after = _nearest(solid)
-    sides: list[tuple[Bool[np.ndarray, " g"], Bool[np.ndarray, " g"]]] = []
+    sides: list[tuple[Chosen, Chosen]] = []
     for side in (-1, 1):
         free_there, wider = np.zeros(len(width), bool), np.zeros(len(width), bool)
         for beside_m in _BESIDE_M:
@@ -257,87 +208,59 @@ def _leads_somewhere(
     return (wide_a & wide_b) | (gaps.between & free_a & free_b & (wide_a | wide_b))
 
 
-def _as_rows(wall: Bool[np.ndarray, "r c"]) -> Bool[np.ndarray, "r c"]:
-    return bridged(dilated(wall, 3, 1), 5)
+def _as_rows(wall: Cells) -> Cells:
+    return storey_grid.bridged(dilated(wall, 3, 1), 5)
 
 
-def _runs(cells: Bool[np.ndarray, "r c"]) -> tuple[Int[np.ndarray, " q"], Int[np.ndarray, " q"], Int[np.ndarray, " q"]]:
+def _runs(cells: Cells) -> tuple[Numbers, Numbers, Numbers]:
     change = np.diff(np.pad(cells, ((0, 0), (1, 1))).astype(np.int8), axis=1)
     row, start = np.nonzero(change == 1)
     return row, start, np.nonzero(change == -1)[1]
 
 
-def _sums(cells: Bool[np.ndarray, "r c"]) -> Int[np.ndarray, "r c1"]:
+def _sums(cells: Cells) -> Int[np.ndarray, "r c1"]:
     return np.pad(np.cumsum(cells, axis=1, dtype=np.int64), ((0, 0), (1, 0)))
 
 
-def _nearest(cells: Bool[np.ndarray, "r c"]) -> tuple[Int[np.ndarray, "r c"], Int[np.ndarray, "r c"]]:
-    count = int(cells.shape[1])
-    column = np.arange(count)
+def _nearest(cells: Cells) -> tuple[Labels, Labels]:
+    column = np.arange(cells.shape[1])
     before = np.maximum.accumulate(np.where(cells, column, -1), axis=1)
-    after = np.minimum.accumulate(np.where(cells, column, count)[:, ::-1], axis=1)[:, ::-1]
+    after = np.minimum.accumulate(np.where(cells, column, len(column))[:, ::-1], axis=1)[:, ::-1]
     return before, after
-
-
-def _filled(gaps: _Gaps, shape: tuple[int, ...]) -> Bool[np.ndarray, "r c"]:
-    change = np.zeros((shape[0], shape[1] + 1), np.int32)
-    np.add.at(change, (gaps.row, gaps.a), 1)
-    np.add.at(change, (gaps.row, gaps.b), -1)
-    return np.cumsum(change, axis=1)[:, :-1] > 0
-
-
-NONE = -1
-"""The region of a place in no room."""
-_NARROW_M, _WIDER_M = 0.65, 0.15  # half the width of a door at most, and by how much rooms are wider on both sides
-_LEAST_M2, _LEAST_HALF_M = 1.5, 0.45  # a smaller or narrower region is a nook
-_LEAST_UNENTERED_M2 = 4.0  # so is one of this size that no camera entered: behind a shelf, under a bunk bed
-_GAP_M = 0.3  # unseen floor up to twice this width, and doorways, belong to a region beside them
-_TO_WALL_M = 0.1  # a region reaches onto the faces of its walls
-_REACH_M = 0.6  # a place up to this far from a region belongs to it: a picture on the wall
-_LEAST_CONTACT_M = 0.2  # along which two rooms lie side by side in a doorway
-_STRAIGHT_M = 0.12  # an outline leaves out what is smaller
-_MOST_CORNERS = 60
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StoreyRooms:
-    """The rooms of one storey.
+    """The rooms of one storey."""
 
-    Attributes:
-        label: number of the room of each cell, from 0; ``NONE`` outside.
-        count: number of rooms.
-        beside: pairs of rooms with an opening between them.
-    """
-
-    label: Int[np.ndarray, "nx ny"]
+    label: Labels  # number of the room of each cell, from 0; ``NONE`` outside
     count: int
-    beside: Int[np.ndarray, "p 2"]
+    beside: Int[np.ndarray, "p 2"]  # pairs of rooms with an opening between them
 
 
 def rooms_of_storey(grid: StoreyGrid) -> StoreyRooms:
     """Part one storey into rooms."""
     cell_m = grid.cell_m
-    wall = without_leaves(grid.wall, grid.free, cell_m)
+    wall = _without_leaves(grid.wall, grid.free, cell_m)
     free = _whole(grid.free & ~wall, wall, cell_m)
-    shut = recesses(wall, free, cell_m)
+    shut = _recesses(wall, free, cell_m)
     wall, free = wall | shut, free & ~shut
-    doorway = closed_doorways(wall, free, cell_m)
-    wall = without_posts(wall, doorway, cell_m)
+    doorway = _closed_doorways(wall, free, cell_m)
+    wall = _without_posts(wall, doorway, cell_m)
     free = _whole(free & ~wall, wall, cell_m)
     inside = free & ~doorway
     half_m = np.where(inside, distance(~(wall | doorway)) * cell_m, 0.0).astype(np.float32)
     label = _parted(inside, half_m, cell_m)
-    label = _grown(label, free | doorway, _GAP_M / cell_m)
+    label = storey_grid.grown(label, free | doorway, _GAP_M / cell_m)
     label = _without_nooks(label, half_m, grid.stood, cell_m)
     label = np.unique(np.append(label.reshape(-1), 0), return_inverse=True)[1][:-1].reshape(label.shape)
     wide = [pair for pair, cells in contacts(label).items() if cells * cell_m >= _LEAST_CONTACT_M - 1e-6]
     beside = np.array(wide, np.int64).reshape(-1, 2) - 1
-    return StoreyRooms(_grown(label, np.ones_like(free), _TO_WALL_M / cell_m) - 1, int(label.max(initial=0)), beside)
+    whole = storey_grid.grown(label, np.ones_like(free), _TO_WALL_M / cell_m) - 1
+    return StoreyRooms(whole, int(label.max(initial=0)), beside)
 
 
-def _whole(
-    free: Bool[np.ndarray, "nx ny"], wall: Bool[np.ndarray, "nx ny"], cell_m: float
-) -> Bool[np.ndarray, "nx ny"]:
+def _whole(free: Cells, wall: Cells, cell_m: float) -> Cells:
     reach = _GAP_M / cell_m
     edge = int(np.ceil(reach)) + 1
     wide = distance(np.pad(~free, edge, constant_values=True), beyond=True) <= reach
@@ -348,35 +271,11 @@ def _whole(
     return filled | ((hole > 0) & ~np.isin(hole, outer))
 
 
-class _Joined:
-    """Numbers of which some are one."""
-
-    def __init__(self) -> None:
-        self.parent = [0]
-        self.peak = [0.0]
-
-    def add(self, count: int, peak: float) -> None:
-        self.parent += range(len(self.parent), len(self.parent) + count)
-        self.peak += [peak] * count
-
-    def root(self, number: int) -> int:
-        while self.parent[number] != number:
-            number = self.parent[number]
-        return number
-
-    def roots(self) -> Int[np.ndarray, " k"]:
-        return np.array([self.root(number) for number in range(len(self.parent))])
-
-
-def _parted(
-    inside: Bool[np.ndarray, "nx ny"], half_m: Float32[np.ndarray, "nx ny"], cell_m: float
-) -> Int[np.ndarray, "nx ny"]:
-    """Part the floor where it narrows to a door's width between wider parts; numbers from 1, 0 outside.
-
-    Cells are taken in by their distance to walls, the farthest first. Two parts that meet where the distance is no more
-    than half a door stay two if both have places that are farther from walls.
-    """
-    label, known = np.zeros(inside.shape, np.int32), _Joined()
+def _parted(inside: Cells, half_m: Float32[np.ndarray, "r c"], cell_m: float) -> Labels:
+    # Parts the floor where it narrows to a door's width between wider parts; numbers from 1, 0 outside. Cells are taken
+    # in by their distance to walls, the farthest first. Two parts that meet where the distance is no more than half a
+    # door stay two if both have places that are farther from walls.
+    label, root, peak = np.zeros(inside.shape, np.int32), np.zeros(1, np.int32), [0.0]
     apart: set[tuple[int, int]] = set()
     for step in range(int(np.ceil((_NARROW_M + _WIDER_M) / cell_m)), -1, -1):
         from_m = step * cell_m
@@ -386,47 +285,35 @@ def _parted(
         fresh[0] = False
         fresh[part[label > 0]] = False
         number = np.zeros(len(fresh), np.int32)
-        number[fresh] = len(known.parent) + np.arange(int(fresh.sum()))
-        known.add(int(fresh.sum()), from_m + cell_m)
-        label = flooded(np.where(number[part] > 0, number[part], label), taken)
-        before = list(known.parent)
+        number[fresh] = len(peak) + np.arange(int(fresh.sum()))
+        peak += [from_m + cell_m] * int(fresh.sum())
+        label = storey_grid.flooded(np.where(number[part] > 0, number[part], label), taken)
+        root = np.arange(len(peak), dtype=np.int32)  # parts that were joined before have one label by now
         for one, other in contacts(label):
-            a, b = known.root(one), known.root(other)
-            low, high = sorted((a, b), key=lambda each: known.peak[each])
-            pair = (min(a, b), max(a, b))
-            if a == b or pair in apart:
+            pair = min(root[one], root[other]), max(root[one], root[other])
+            if pair[0] == pair[1] or pair in apart:
                 continue
-            if from_m <= _NARROW_M + 1e-6 and known.peak[low] >= from_m + _WIDER_M - 1e-6:
+            low, high = sorted(pair, key=lambda each: peak[each])
+            if from_m <= _NARROW_M + 1e-6 and peak[low] >= from_m + _WIDER_M - 1e-6:
                 apart.add(pair)
                 continue
-            known.parent[low] = high
-            rooted = ((known.root(x), known.root(y)) for x, y in apart)
+            root[root == low] = high
+            rooted = ((root[x], root[y]) for x, y in apart)
             apart = {(min(x, y), max(x, y)) for x, y in rooted if x != y}
-        if before != known.parent:
-            label = known.roots().astype(np.int32)[label]
+        label = root[label]
     return label
 
 
-def _grown(label: Int[np.ndarray, "nx ny"], over: Bool[np.ndarray, "nx ny"], reach: float) -> Int[np.ndarray, "nx ny"]:
-    nearest, away = nearest_label(label)
-    return np.where((label == 0) & over & (away <= reach + 1e-3), nearest, label)
-
-
-def _without_nooks(
-    label: Int[np.ndarray, "nx ny"],
-    half_m: Float32[np.ndarray, "nx ny"],
-    stood: Bool[np.ndarray, "nx ny"],
-    cell_m: float,
-) -> Int[np.ndarray, "nx ny"]:
-    """Return labels in which nooks belong to the room beside them, by the longest side; those beside none are gone."""
+def _without_nooks(label: Labels, half_m: Float32[np.ndarray, "r c"], stood: Cells, cell_m: float) -> Labels:
+    # Nooks belong to the room beside them, by the longest side; those beside none are gone.
     while True:
         count = int(label.max()) + 1
         cells = np.bincount(label.reshape(-1), minlength=count)
-        area_m2 = cells * cell_m**2
         widest = np.zeros(count, np.float32)
         np.maximum.at(widest, label.reshape(-1), half_m.reshape(-1))
         entered = np.bincount(label.reshape(-1), stood.reshape(-1), count) > 0
-        nook = ((area_m2 < np.where(entered, _LEAST_M2, _LEAST_UNENTERED_M2)) | (widest < _LEAST_HALF_M)) & (cells > 0)
+        small = cells * cell_m**2 < np.where(entered, _LEAST_M2, _LEAST_UNENTERED_M2)
+        nook = (small | (widest < _LEAST_HALF_M)) & (cells > 0)
         nook[0] = False
         beside: dict[int, tuple[int, int]] = {}
         for (a, b), length in contacts(label).items():
@@ -435,47 +322,28 @@ def _without_nooks(
                     beside[own] = (length, other)
         if not beside:
             return np.where(nook[label], 0, label)
-        known = _Joined()
-        known.add(count - 1, 0.0)
-        for own in sorted(beside, key=lambda each: (cells[each], each)):
-            a, b = known.root(own), known.root(beside[own][1])
-            known.parent[a] = b
-        label = known.roots()[label]
+        label = connected(count, np.array([*beside]), np.array([other for _, other in beside.values()]))[label]
 
 
 @dataclass(frozen=True, eq=False)
 class RoomRegions:
-    """The rooms of all storeys, numbered from 0 over the whole map.
+    """The rooms of all storeys, numbered from 0 over the whole map."""
 
-    Attributes:
-        plan: storeys of the map.
-        grids: of each storey.
-        labels: of each storey, the number of the room of each cell; ``NONE`` outside.
-        count: number of rooms.
-        beside: pairs of rooms with an opening between them.
-    """
-
-    plan: FloorPlan
-    grids: tuple[StoreyGrid, ...]
-    labels: tuple[Int[np.ndarray, "nx ny"], ...]
+    plan: FloorPlan  # storeys of the map
+    grids: tuple[StoreyGrid, ...]  # of each storey
+    labels: tuple[Labels, ...]  # of each storey, the number of the room of each cell; ``NONE`` outside
     count: int
-    beside: Int[np.ndarray, "p 2"]
+    beside: Int[np.ndarray, "p 2"]  # pairs of rooms with an opening between them
 
     @classmethod
     def of(cls, plan: FloorPlan, world_from_camera: Float[np.ndarray, "k 4 4"], width_rad: float) -> "RoomRegions":
-        """Find the rooms of a map.
-
-        Args:
-            plan: its storeys and voxels.
-            world_from_camera: of its keyframes.
-            width_rad: angle of view of their camera, from side to side.
-        """
+        """Find the rooms of a map by its keyframes' poses and their camera's angle of view from side to side."""
         space, storeys = plan.space, range(len(plan.storeys))
         level, poses = space.level_centres(), np.asarray(world_from_camera, np.float64).reshape(-1, 4, 4)
         cameras = plan.storeys_of(poses[:, :3, 3])
         level_from_camera = space.level_from_recording @ poses
         grids: list[StoreyGrid] = []
-        labels: list[Int[np.ndarray, "nx ny"]] = []
+        labels: list[Labels] = []
         beside = [np.zeros((0, 2), np.int64)]
         count = 0
         for storey in storeys:
@@ -505,10 +373,8 @@ class RoomRegions:
     @cached_property
     def areas_m2(self) -> Float[np.ndarray, " r"]:
         """Floor area of each room."""
-        cells = [
-            np.bincount(label[label >= 0], minlength=len(self)) * grid.cell_m**2
-            for grid, label in zip(self.grids, self.labels, strict=True)
-        ]
+        grids = zip(self.grids, self.labels, strict=True)
+        cells = [np.bincount(label[label >= 0], minlength=len(self)) * grid.cell_m**2 for grid, label in grids]
         return np.sum(cells, axis=0).astype(np.float64)
 
     def __len__(self) -> int:
@@ -518,8 +384,7 @@ class RoomRegions:
     def at(self, points_world: Float[np.ndarray, "m 3"]) -> Int[np.ndarray, " m"]:
         """Return the number of the room of each point on its storey, up to 0.6 m away; ``NONE`` beyond."""
         points = np.asarray(points_world, np.float64).reshape(-1, 3)
-        level, storey = self.plan.space.level(points), self.plan.storeys_of(points)
-        return self._of(level[:, :2], storey)
+        return self._of(self.plan.space.level(points)[:, :2], self.plan.storeys_of(points))
 
     def listed_at(self, listed: Sequence[int], points_world: Float[np.ndarray, "m 3"]) -> Int[np.ndarray, " m"]:
         """Return the place in a list of rooms of the one that each point lies in; ``NONE`` for a room not in it."""
@@ -533,14 +398,13 @@ class RoomRegions:
     ) -> Float[np.ndarray, " r"]:
         """Return for each room which share of it and of an area together both hold, in [0, 1].
 
-        Args:
-            middle_world: of the area, metres: on its storey.
-            corners_world: of the area, metres.
+        The area has a middle, which is on its storey, and corners, metres.
         """
         storey = int(self.plan.storeys_of(middle_world[None])[0])
         grid, label = self.grids[storey], self.labels[storey]
         cells = grid.level_of(np.argwhere(np.ones(label.shape, bool)) + 0.5)
-        inside = in_polygon(cells, self.plan.space.level(corners_world)[:, :2]).reshape(label.shape)
+        corners = self.plan.space.level(corners_world)[:, :2]
+        inside = storey_grid.in_polygon(cells, corners).reshape(label.shape)
         both, own = (np.bincount(label[of & (label >= 0)], minlength=len(self)) for of in (inside, label >= 0))
         return both / np.maximum(own + np.count_nonzero(inside) - both, 1)
 
@@ -559,32 +423,29 @@ class RoomRegions:
         return out
 
     @cached_property
-    def _reaching(self) -> tuple[Int[np.ndarray, "nx ny"], ...]:
+    def _reaching(self) -> tuple[Labels, ...]:
         return tuple(
-            _grown(label + 1, np.ones(label.shape, bool), _REACH_M / grid.cell_m) - 1
+            storey_grid.grown(label + 1, np.ones(label.shape, bool), _REACH_M / grid.cell_m) - 1
             for grid, label in zip(self.grids, self.labels, strict=True)
         )
 
     @cached_property
-    def _boxes(self) -> tuple[Int[np.ndarray, " r"], Int[np.ndarray, "r 2"], Int[np.ndarray, "r 2"]]:
-        count = len(self)
-        storey, low, high = np.zeros(count, np.int64), np.full((count, 2), 2**62), np.zeros((count, 2), np.int64)
-        for number, label in enumerate(self.labels):
-            cell = np.nonzero(label >= 0)
-            own = label[cell]
-            storey[own] = number
-            for axis, place in enumerate(cell):
-                np.minimum.at(low[:, axis], own, place)
-                np.maximum.at(high[:, axis], own, place + 1)
-        return storey, low, high
+    def _boxes(self) -> dict[int, tuple[int, tuple[slice, slice]]]:
+        from scipy.ndimage import find_objects
+
+        return {
+            number: (storey, box)
+            for storey, label in enumerate(self.labels)
+            for number, box in enumerate(find_objects(label + 1))
+            if box is not None
+        }
 
     def outline(self, number: int) -> Float[np.ndarray, "k 3"]:
         """Return the corners of a room on its floor, counter-clockwise top-down, recording frame, metres."""
-        storeys, lows, highs = self._boxes
-        storey, low, high = int(storeys[number]), lows[number], highs[number]
-        grid = self.grids[storey]
-        part = self.labels[storey][low[0] : high[0], low[1] : high[1]] == number
-        xy = grid.level_of(low + outline(part, _STRAIGHT_M / grid.cell_m, _MOST_CORNERS))
+        storey, box = self._boxes[number]
+        grid, part = self.grids[storey], self.labels[storey][box] == number
+        low = np.array([one.start for one in box])
+        xy = grid.level_of(low + storey_grid.outline(part, _STRAIGHT_M / grid.cell_m, _MOST_CORNERS))
         ahead = np.roll(xy, -1, axis=0)
         if float(np.sum(xy[:, 0] * ahead[:, 1] - ahead[:, 0] * xy[:, 1])) < 0.0:
             xy = xy[::-1]

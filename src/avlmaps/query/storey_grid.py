@@ -4,6 +4,7 @@ A cell is free where a low voxel lies, such as the floor or a bed, or where a ca
 the camera and the first wall nothing is as high as one. So rooms are whole though half of their floor was never seen.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import cast
 
@@ -11,32 +12,49 @@ import numpy as np
 
 from avlmaps.core.arrays import Bool, Float, Float32, Int
 
+CELL_M = 0.05
+WALL_M = (1.0, 2.0)  # heights between which a wall is seen; see floor_plan
+_CORE_SHARE, _FAINT_SHARE = 0.5, 0.25  # of these heights: a wall, and a wall where it touches one
+_LOW_M = 1.0  # what is lower hides no wall
+_SIGHT_M, _RAY_RAD = 8.0, np.deg2rad(0.75)  # how far cameras look, and how finely
+_LEAST_LEVEL = 0.35  # of a line of sight's horizontal part; a camera that looks down sees no walls
+_STEP, _CHUNK = 0.9, 64  # cells from one look to the next along a line; cameras at once
+_WALL, _EDGE = 1, 2
+_SAME_PLACE_M, _SAME_HEADING_RAD = 0.25, np.deg2rad(10.0)  # cameras that look at the same
+_MOST_CAMERAS = 1500
+_MOST_CELLS = 16_000_000
+_MARGIN_M = 1.0
+_MOST_COLUMNS = 40_000  # of walls whose direction is sought
+_CLEARLY = 1.03
+_SIDE = 1e-6  # a place on the side of two cells belongs to the higher one
+_VOXELS = 1 << 17  # that are sorted into cells at once: they stay in the processor's cache
+
 Cells = Bool[np.ndarray, "r c"]
+Labels = Int[np.ndarray, "r c"]
 
 
-def pieces(cells: Cells, diagonally: bool = False) -> Int[np.ndarray, "r c"]:
+def pieces(cells: Cells, diagonally: bool = False) -> Labels:
     """Return the number of the piece of connected cells that each belongs to, from 1; 0 outside."""
     import cv2
 
     return np.asarray(cv2.connectedComponents(cells.astype(np.uint8), connectivity=8 if diagonally else 4)[1], np.int32)
 
 
-def extents(label: Int[np.ndarray, "r c"]) -> Int[np.ndarray, "n 3"]:
+def extents(label: Labels) -> Int[np.ndarray, "n 3"]:
     """Return of each piece, 0 among them, rows and columns from end to end, and the number of cells."""
-    count = int(label.max(initial=0)) + 1
-    out = np.zeros((count, 3), np.int64)
+    out = np.zeros((int(label.max(initial=0)) + 1, 3), np.int64)
     i, j = np.nonzero(label)
     own = label[i, j]
     for axis, place in enumerate((i, j)):
-        low, high = np.full(count, np.iinfo(np.int64).max), np.full(count, -1, np.int64)
+        low, high = np.full(len(out), np.iinfo(np.int64).max), np.full(len(out), -1, np.int64)
         np.minimum.at(low, own, place)
         np.maximum.at(high, own, place)
         out[:, axis] = np.where(high >= 0, high - low + 1, 0)
-    out[:, 2] = np.bincount(own, minlength=count)
+    out[:, 2] = np.bincount(own, minlength=len(out))
     return out
 
 
-def of_pieces(label: Int[np.ndarray, "r c"], some: Cells) -> Bool[np.ndarray, " n"]:
+def of_pieces(label: Labels, some: Cells) -> Bool[np.ndarray, " n"]:
     """Return which pieces hold any of some cells; 0 does not."""
     held = np.zeros(int(label.max(initial=0)) + 1, bool)
     held[label[some]] = True
@@ -45,12 +63,7 @@ def of_pieces(label: Int[np.ndarray, "r c"], some: Cells) -> Bool[np.ndarray, " 
 
 
 def distance(cells: Cells, beyond: bool = False) -> Float32[np.ndarray, "r c"]:
-    """Return how far each cell is from the nearest one that is not held, in cells; 0 where it is not.
-
-    Args:
-        cells: held ones.
-        beyond: whether cells beyond the grid are held.
-    """
+    """Return how far each cell is from the nearest one that is not held, in cells; ``beyond`` the grid they may be."""
     import cv2
 
     padded = np.pad(cells, 1, constant_values=beyond).astype(np.uint8)
@@ -59,19 +72,14 @@ def distance(cells: Cells, beyond: bool = False) -> Float32[np.ndarray, "r c"]:
     return np.asarray(cv2.distanceTransform(padded, cv2.DIST_L2, cv2.DIST_MASK_PRECISE), np.float32)[1:-1, 1:-1]
 
 
-def nearest_label(label: Int[np.ndarray, "r c"]) -> tuple[Int[np.ndarray, "r c"], Float32[np.ndarray, "r c"]]:
-    """Return the label over 0 nearest to each cell (within 2 %) and how far away it is; 0 and infinity for none."""
-    import cv2
+def grown(label: Labels, over: Cells, reach: float) -> Labels:
+    """Return labels over 0 grown over unlabelled cells: each takes the nearest label up to ``reach`` cells away."""
+    from scipy.ndimage import distance_transform_edt
 
     if not (label > 0).any():
-        return np.zeros_like(label), np.full(label.shape, np.inf, np.float32)
-    found = cv2.distanceTransformWithLabels(
-        (label <= 0).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
-    )
-    away, cell = np.asarray(found[0], np.float32), np.asarray(found[1], np.int64)
-    number = np.zeros(int(cell.max()) + 1, label.dtype)
-    number[cell[label > 0]] = label[label > 0]
-    return number[cell], away
+        return label
+    away, (i, j) = cast("tuple[np.ndarray, np.ndarray]", distance_transform_edt(label <= 0, return_indices=True))
+    return np.where((label == 0) & over & (away <= reach + 1e-3), label[i, j], label)
 
 
 def dilated(cells: Cells, rows: int, columns: int) -> Cells:
@@ -83,32 +91,28 @@ def dilated(cells: Cells, rows: int, columns: int) -> Cells:
 
 def opened(cells: Cells, rows: int, columns: int) -> Cells:
     """Return the cells of boxes of some rows and columns that lie within; both are odd."""
-    import cv2
-
-    box = np.ones((rows, columns), np.uint8)
-    return np.asarray(cv2.morphologyEx(cells.astype(np.uint8), cv2.MORPH_OPEN, box), np.uint8) > 0
+    return dilated(~dilated(~cells, rows, columns), rows, columns)
 
 
 def bridged(cells: Cells, columns: int) -> Cells:
     """Return cells with the gaps along rows closed that are narrower than an odd number of columns."""
-    import cv2
-
-    edge = columns
-    padded = np.pad(cells, ((0, 0), (edge, edge))).astype(np.uint8)
-    box = np.ones((1, columns), np.uint8)
-    return np.asarray(cv2.morphologyEx(padded, cv2.MORPH_CLOSE, box), np.uint8)[:, edge:-edge] > 0
+    wide = dilated(np.pad(cells, ((0, 0), (columns, columns))), 1, columns)
+    return ~dilated(~wide, 1, columns)[:, columns:-columns]
 
 
-def flooded(label: Int[np.ndarray, "r c"], over: Cells) -> Int[np.ndarray, "r c"]:
-    """Return labels grown side by side over cells; where two meet the higher wins."""
-    from avlmaps.query.storey_kernels import flood
-
+def flooded(label: Labels, over: Cells) -> Labels:
+    """Return labels grown side by side over cells, ring by ring; where two meet the higher wins."""
     out = np.array(label, np.int32)
-    flood(out, over & (out == 0))
-    return out
+    while True:
+        beside = np.pad(out, 1)
+        highest = np.max([beside[:-2, 1:-1], beside[2:, 1:-1], beside[1:-1, :-2], beside[1:-1, 2:]], axis=0)
+        ring = over & (out == 0) & (highest > 0)
+        if not ring.any():
+            return out
+        out[ring] = highest[ring]
 
 
-def contacts(label: Int[np.ndarray, "r c"]) -> dict[tuple[int, int], int]:
+def contacts(label: Labels) -> dict[tuple[int, int], int]:
     """Return the pairs of labels over 0 that lie side by side, the lower first, and along how many cells."""
     count = int(label.max(initial=0)) + 1
     keys: list[Int[np.ndarray, " k"]] = []
@@ -123,10 +127,7 @@ def contacts(label: Int[np.ndarray, "r c"]) -> dict[tuple[int, int], int]:
 def outline(cells: Cells, loose: float, most: int) -> Float32[np.ndarray, "k 2"]:
     """Return the corners of the largest piece of cells, in cells from the corner of cell (0, 0), without its holes.
 
-    Args:
-        cells: at least one.
-        loose: how far it may be off, cells.
-        most: corners; the outline is coarser where there would be more.
+    It may be off by ``loose`` cells, and by more where it would have more than ``most`` corners.
     """
     import cv2
 
@@ -153,36 +154,13 @@ def in_polygon(xy: Float[np.ndarray, "n 2"], corners: Float[np.ndarray, "k 2"]) 
     return inside
 
 
-CELL_M = 0.05
-WALL_M = (1.0, 2.0)  # heights between which a wall is seen; see floor_plan
-_CORE_SHARE, _FAINT_SHARE = 0.5, 0.25  # of these heights: a wall, and a wall where it touches one
-_LOW_M = 1.0  # what is lower hides no wall
-_SIGHT_M, _RAY_RAD = 8.0, np.deg2rad(0.75)  # how far cameras look, and how finely
-_LEAST_LEVEL = 0.35  # of a line of sight's horizontal part; a camera that looks down sees no walls
-_STEP, _CHUNK = 0.9, 64  # cells from one look to the next along a line; cameras at once
-_WALL, _EDGE = 1, 2
-_SAME_PLACE_M, _SAME_HEADING_RAD = 0.25, np.deg2rad(10.0)  # cameras that look at the same
-_MOST_CAMERAS = 1500
-_MOST_CELLS = 16_000_000
-_MARGIN_M = 1.0
-_MOST_COLUMNS = 40_000  # of walls whose direction is sought
-_MOST_COLUMN_CELLS = 200_000_000  # of a table of them
-_CLEARLY = 1.03
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Sights:
-    """Cameras that looked over a storey.
+    """Cameras that looked over a storey."""
 
-    Attributes:
-        places: level x and y, metres.
-        headings_rad: of the line of sight, level.
-        width_rad: angle of view from side to side.
-    """
-
-    places: Float[np.ndarray, "k 2"]
-    headings_rad: Float[np.ndarray, " k"]
-    width_rad: float
+    places: Float[np.ndarray, "k 2"]  # level x and y, metres
+    headings_rad: Float[np.ndarray, " k"]  # of the line of sight, level
+    width_rad: float  # angle of view from side to side
 
     @classmethod
     def of(cls, level_from_camera: Float[np.ndarray, "k 4 4"], width_rad: float) -> "Sights":
@@ -198,33 +176,20 @@ class Sights:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StoreyGrid:
-    """Cell (i, j) covers ``origin_m + [i, i + 1) x [j, j + 1) · cell_m`` of the level frame turned by the heading.
+    """Cell (i, j) covers ``origin_m + [i, i + 1) x [j, j + 1) · cell_m`` of the level frame turned by the heading."""
 
-    Attributes:
-        heading_rad: of the walls, counter-clockwise from level +x, within a right angle.
-        origin_m: of the corner of cell (0, 0), turned x and y.
-        cell_m: side of a cell.
-        wall: cells that hold a wall, or what is as high as one.
-        free: cells that do not, and were seen.
-        stood: cells in which a camera was.
-    """
-
-    heading_rad: float
-    origin_m: Float[np.ndarray, "2"]
+    heading_rad: float  # of the walls, counter-clockwise from level +x, within a right angle
+    origin_m: Float[np.ndarray, "2"]  # of the corner of cell (0, 0), turned x and y
     cell_m: float
-    wall: Bool[np.ndarray, "nx ny"]
-    free: Bool[np.ndarray, "nx ny"]
-    stood: Bool[np.ndarray, "nx ny"]
+    wall: Cells  # cells that hold a wall, or what is as high as one
+    free: Cells  # cells that do not, and were seen
+    stood: Cells  # cells in which a camera was
 
     @classmethod
     def of(
-        cls,
-        level: Float[np.ndarray, "n 3"],
-        floor_m: float,
-        sights: Sights,
-        voxel_size_m: float,
+        cls, level: Float[np.ndarray, "n 3"], floor_m: float, sights: Sights, voxel_size_m: float,
         heading_rad: float | None = None,
-    ) -> "StoreyGrid":
+    ) -> "StoreyGrid":  # fmt: skip
         """Sort the voxels of a storey into cells.
 
         Args:
@@ -234,32 +199,37 @@ class StoreyGrid:
             voxel_size_m: side of a voxel.
             heading_rad: of its walls; found if None.
         """
-        from avlmaps.query.storey_kernels import fill_cells, turned_ends
-
-        level = np.ascontiguousarray(level, np.float64)
-        heading = _heading(level, floor_m, voxel_size_m) if heading_rad is None else heading_rad
-        cos, sin = float(np.cos(heading)), float(np.sin(heading))
-        over = turned(sights.places, -heading)
-        ends = np.array(turned_ends(level, cos, sin)).reshape(2, 2)
-        ends = np.array([np.minimum(ends[0], over.min(axis=0, initial=np.inf)),
-                         np.maximum(ends[1], over.max(axis=0, initial=-np.inf))])  # fmt: skip
+        if heading_rad is None:
+            height = level[:, 2] - floor_m
+            heading_rad = wall_heading(level[(height >= WALL_M[0]) & (height < WALL_M[1]), :2], voxel_size_m)
+        over = turned(sights.places, -heading_rad)
+        low, high = np.full(2, np.inf), np.full(2, -np.inf)
+        for places in (over, *(turned(some[:, :2], -heading_rad) for some in _chunks(level))):
+            low, high = (np.minimum(low, places.min(axis=0, initial=np.inf)),
+                         np.maximum(high, places.max(axis=0, initial=-np.inf)))  # fmt: skip
         cell_m = float(max(CELL_M, voxel_size_m))
-        while np.prod(np.ptp(ends, axis=0) / cell_m + 1.0) > _MOST_CELLS:
+        while np.prod((high - low) / cell_m + 1.0) > _MOST_CELLS:
             cell_m *= 2.0
-        low = np.floor((ends[0] - _MARGIN_M) / cell_m)
-        nx, ny = (np.ceil((ends[1] + _MARGIN_M) / cell_m) - low).astype(np.int64).tolist()
-        held, below = np.zeros((nx, ny, _layers(voxel_size_m)), bool), np.zeros((nx, ny), bool)
-        fill_cells(
-            level, cos, sin, float(floor_m), np.array(WALL_M), _LOW_M, float(voxel_size_m), cell_m,
-            low.astype(np.int64), held, below,
-        )  # fmt: skip
-        wall, shape = _walls(held), below.shape
+        low = np.floor((low - _MARGIN_M) / cell_m)
+        nx, ny = (np.ceil((high + _MARGIN_M) / cell_m) - low).astype(np.int64).tolist()
+        layers = max(1, int(np.ceil((WALL_M[1] - WALL_M[0]) / voxel_size_m)))
+        held, below = np.zeros((nx, ny, layers), bool), np.zeros((nx, ny), bool)
+        for some in _chunks(level):
+            height = some[:, 2] - floor_m
+            x, y = (np.floor(turned(some[:, :2], -heading_rad) / cell_m + _SIDE) - low).astype(np.int64).T
+            tall = (height >= WALL_M[0]) & (height < WALL_M[1])
+            layer = np.minimum((height[tall] - WALL_M[0]) / voxel_size_m, layers - 1).astype(np.int64)
+            held[x[tall], y[tall], layer] = True
+            below[x[height < _LOW_M], y[height < _LOW_M]] = True
+        share = held.mean(axis=2)
+        piece = pieces(share >= _FAINT_SHARE, diagonally=True)
+        wall = of_pieces(piece, share >= _CORE_SHARE)[piece]
         over = over / cell_m - low
-        seen = _carved(wall, over, sights.headings_rad - heading, sights.width_rad, _SIGHT_M / cell_m)
-        stood = np.zeros(shape, bool)
+        seen = _carved(wall, over, sights.headings_rad - heading_rad, sights.width_rad, _SIGHT_M / cell_m)
+        stood = np.zeros(below.shape, bool)
         at = np.floor(over).astype(np.int64)
-        stood[tuple(at[((at >= 0) & (at < shape)).all(axis=1)].T)] = True
-        return cls(float(heading), low * cell_m, cell_m, wall, (seen | below) & ~wall, stood)
+        stood[tuple(at[((at >= 0) & (at < below.shape)).all(axis=1)].T)] = True
+        return cls(float(heading_rad), low * cell_m, cell_m, wall, (seen | below) & ~wall, stood)
 
     def cells_of(self, level_xy: Float[np.ndarray, "m 2"]) -> tuple[Int[np.ndarray, "m 2"], Bool[np.ndarray, " m"]]:
         """Return the cell nearest to each place, and which places lie within the grid."""
@@ -273,6 +243,10 @@ class StoreyGrid:
         return turned(self.origin_m + np.asarray(corners, np.float64) * self.cell_m, self.heading_rad)
 
 
+def _chunks(level: Float[np.ndarray, "n 3"]) -> Iterator[Float[np.ndarray, "m 3"]]:
+    return (level[a : a + _VOXELS] for a in range(0, len(level), _VOXELS))
+
+
 def turned(xy: Float[np.ndarray, "m 2"], angle_rad: float) -> Float[np.ndarray, "m 2"]:
     """Return places turned counter-clockwise about the origin."""
     cos, sin = np.cos(angle_rad), np.sin(angle_rad)
@@ -284,10 +258,9 @@ def wall_heading(xy: Float[np.ndarray, "m 2"], cell_m: float) -> float:
 
     Along it, walls fall into few rows and columns of cells.
     """
-    return _heading_of_columns(np.unique(np.floor(np.asarray(xy) / cell_m + 1e-6).astype(np.int64), axis=0), cell_m)
-
-
-def _heading_of_columns(column: Int[np.ndarray, "c 2"], cell_m: float) -> float:
+    column = np.floor(np.asarray(xy) / cell_m + _SIDE).astype(np.int64)
+    low, width = column.min(axis=0, initial=2**62), int(column[:, 1].max(initial=0) - column[:, 1].min(initial=0)) + 1
+    column = low + np.stack(np.divmod(np.unique((column - low) @ np.array([width, 1])), width), axis=1)
     if len(column) < 2:
         return 0.0
     some = (column[:: max(1, len(column) // _MOST_COLUMNS)] + 0.5) * cell_m
@@ -303,42 +276,10 @@ def _packed(xy: Float[np.ndarray, "m 2"], cell_m: float) -> float:
     return float(sum(np.square(count).sum() for count in counts))
 
 
-def _heading(level: Float[np.ndarray, "n 3"], floor_m: float, voxel_size_m: float) -> float:
-    from avlmaps.query.storey_kernels import SIDE, mark_columns, turned_ends
-
-    cell_m = float(voxel_size_m)
-    ends = np.array(turned_ends(level, 1.0, 0.0)).reshape(2, 2)
-    low, high = np.floor(ends / cell_m + SIDE).astype(np.int64)
-    width, depth = (high - low + 1).tolist()
-    if width * depth > _MOST_COLUMN_CELLS:  # a few far voxels: a table would be larger than the map
-        height = level[:, 2] - floor_m
-        return wall_heading(level[(height >= WALL_M[0]) & (height < WALL_M[1]), :2], cell_m)
-    held = np.zeros((width, depth), bool)
-    mark_columns(level, floor_m + WALL_M[0], floor_m + WALL_M[1], cell_m, low, held)
-    return _heading_of_columns(np.argwhere(held) + low, cell_m)
-
-
-def _layers(voxel_size_m: float) -> int:
-    return max(1, int(np.ceil((WALL_M[1] - WALL_M[0]) / voxel_size_m)))
-
-
-def _walls(held: Bool[np.ndarray, "nx ny layers"]) -> Bool[np.ndarray, "nx ny"]:
-    from avlmaps.query.storey_kernels import held_share
-
-    share = np.empty(held.shape[:2])
-    held_share(held, 0, len(held), share)
-    piece = pieces(share >= _FAINT_SHARE, diagonally=True)
-    return of_pieces(piece, share >= _CORE_SHARE)[piece]
-
-
 def _carved(
-    wall: Bool[np.ndarray, "nx ny"],
-    places: Float[np.ndarray, "k 2"],
-    headings_rad: Float[np.ndarray, " k"],
-    width_rad: float,
-    reach: float,
-) -> Bool[np.ndarray, "nx ny"]:
-    """Return the cells between cameras and the first wall along each line of sight; one without a wall clears none."""
+    wall: Cells, places: Float[np.ndarray, "k 2"], headings_rad: Float[np.ndarray, " k"], width_rad: float, reach: float
+) -> Cells:
+    # The cells between cameras and the first wall along each line of sight; one without a wall clears none.
     out = np.zeros(np.array(wall.shape) + 2, bool)
     ends = np.pad(np.where(wall, _WALL, 0), 1, constant_values=_EDGE).astype(np.uint8)
     angles = np.arange(-width_rad / 2.0, width_rad / 2.0, _RAY_RAD)

@@ -98,15 +98,6 @@ _CHUNK = 1 << 17  # voxels whose places are computed at once: they stay in the p
 _MOST_BLOCKS = 64
 
 
-def _grouped(number: Int[np.ndarray, " n"], count: int) -> Int[np.ndarray, " n"]:
-    """Return the order that sorts numbers below ``count``; of equals, the first comes first."""
-    if count > _MOST_BLOCKS * len(number):
-        return np.argsort(number, kind="stable")
-    from avlmaps.query.kernels import sorted_by_number
-
-    return sorted_by_number(number, count)
-
-
 @dataclass(frozen=True, slots=True)
 class Blocks:
     """Voxels in an order where those of one cube of space follow each other.
@@ -141,7 +132,7 @@ class Blocks:
         for a in range(0, n, _CHUNK):
             x, y, z = ((index[a : a + _CHUNK, axis] >> _SHIFT) - least[axis] for axis in range(3))
             number[a : a + _CHUNK] = (x * span[1] + y) * span[2] + z
-        order = _grouped(number, int(span[0]) * int(span[1]) * int(span[2]))
+        order = np.argsort(number, kind="stable")
         number = number[order]
         first = np.flatnonzero(np.append(True, number[1:] != number[:-1]))
         sorted_index = np.ascontiguousarray(index[order].T, np.int32)

@@ -229,20 +229,16 @@ def _one_of_each(index: Int[np.ndarray, "n 3"], shift: int, chosen: np.ndarray) 
     """Return one row of each block of which none is chosen yet: the first of them."""
     if not len(index):
         return np.zeros(0, np.int64)
-    from avlmaps.query.kernels import first_of_blocks
-
     low, high = (end >> shift for end in index_ends(index))
     span = high - low + 1
-    blocks = int(span[0]) * int(span[1]) * int(span[2])
-    if blocks <= _MOST_BLOCKS * len(index):
-        first = np.full(blocks, -1, np.int32)
-        first_of_blocks(np.ascontiguousarray(index), shift, low, span, chosen, first)
-        return first[first >= 0].astype(np.int64)
-    key = np.zeros(len(index), np.int64)  # a few far voxels: a table of all blocks would be larger than the map
+    key = np.zeros(len(index), np.int64)
     for axis in range(3):
         key *= span[axis]
         key += (index[:, axis] >> shift) - low[axis]
-    _, key = np.unique(key, return_inverse=True)
+    if int(span[0]) * int(span[1]) * int(span[2]) > _MOST_BLOCKS * len(index):
+        _, key = np.unique(
+            key, return_inverse=True
+        )  # a few far voxels: a table of all blocks would be larger than the map
     first = np.full(int(key.max()) + 1, -1, np.int64)
     first[key[::-1]] = np.arange(len(index) - 1, -1, -1)  # the last one written stays
     first[key[chosen]] = -1
