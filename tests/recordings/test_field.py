@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from avlmaps.core.errors import RecordingError
-from avlmaps.recordings.consistency.check import check_recording
+from avlmaps.recordings.consistency.suspicions import examine_recording
 from avlmaps.recordings.consistency.verdict import Grade
 from avlmaps.recordings.open import open_recording
 
@@ -46,4 +46,4 @@ def test_corrected_cameras_without_a_size_have_that_of_their_pictures(tmp_path: 
     recording = open_recording(tmp_path / "polywh")
     assert (recording.rig.rgb.width, recording.rig.rgb.height) == (128, 96)
     assert recording.rig.rgb.fx == 92.0
-    assert check_recording(recording).grade is Grade.FINE
+    assert examine_recording(recording).grade is Grade.FINE

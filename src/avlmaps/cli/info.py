@@ -93,7 +93,7 @@ def _consistency(recording: "Recording") -> dict[str, Any] | None:
     from avlmaps.maps.check import judge
 
     try:
-        verdict = judge(recording)
+        verdict = judge(recording, closely=True)
     except AvlmapsError:
         return None
     numbers = {name: getattr(verdict, name) for name in ("agreeing", "seen_through", "likeness", "median_depth_m")}

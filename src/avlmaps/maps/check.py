@@ -17,6 +17,7 @@ from avlmaps.maps.sources.wiring import check_wiring
 from avlmaps.recordings.audio import AudioTrack
 from avlmaps.recordings.channels import useless_channels
 from avlmaps.recordings.consistency.check import check_recording
+from avlmaps.recordings.consistency.suspicions import examine_recording
 from avlmaps.recordings.consistency.verdict import Finding, Grade, Reason, Verdict
 from avlmaps.recordings.layout import DESCRIPTION
 from avlmaps.recordings.plausible import pace_fault, plausible_walk
@@ -50,21 +51,23 @@ def doubts_of(recording: Recording, allowed: Sequence[str]) -> tuple[str, ...]:
     return doubts
 
 
-def judge(recording: Recording, useless: Sequence[str] | None = None) -> Verdict:
+def judge(recording: Recording, useless: Sequence[str] | None = None, *, closely: bool = False) -> Verdict:
     """Check a recording against itself, the up direction that was given against what it shows, and its microphones.
 
     Args:
         recording: to check.
         useless: what ``useless_channels`` says of its sound, where that was read before.
+        closely: whether rare mistakes are looked for as well, and what would not show is said.
 
     Raises:
         RecordingError: it has no frame that can be read.
     """
-    verdict = check_recording(recording)
+    verdict = examine_recording(recording) if closely else check_recording(recording)
     if verdict.refused(()) is not None:  # with such poses nothing is level
         return verdict
     rng = np.random.default_rng(0)
-    tilted = up_doubts(recording, some_frames(recording), rng) or tilted_parts(recording, rng)
+    tilted = up_doubts(recording, some_frames(recording), rng)
+    tilted = tilted or (tilted_parts(recording, rng) if closely else ())
     array = _array_of(recording)
     wired, unsure = ([], []) if array is None else _of_microphones(array, recording.walk, useless)
     findings = (*verdict.findings, *tilted, *wired)

@@ -65,11 +65,6 @@ class Agreement:
         used = self.points >= FEWEST_POINTS
         return float(counts[used].sum() / max(self.points[used].sum(), 1))
 
-    def worst(self, counts: Int[np.ndarray, " p"], quantile: float) -> float:
-        """Return a quantile over pairs of their shares."""
-        used = self.points >= FEWEST_POINTS
-        return float(np.quantile(counts[used] / self.points[used], quantile)) if used.any() else 0.0
-
     @property
     def median_off(self) -> float:
         """Middle of ``off`` of the pairs with enough points; NaN where there is none."""
@@ -265,7 +260,7 @@ def unlike(found: Agreement) -> bool:
     return found.likeness < LEAST_LIKENESS or (bad >= 2 and bad > MOST_BAD_PAIRS * np.isfinite(found.alike).sum())
 
 
-def opposite_pairs(redness: Agreement) -> int:
-    """Return in how many pairs red and blue are exchanged, of an agreement whose likeness is that of red less blue."""
-    count = int((redness.alike < OPPOSITE).sum())
-    return count if count > 1 or bool((redness.alike < SURELY_OPPOSITE).any()) else 0
+def opposite_pairs(alike: Float[np.ndarray, " p"]) -> int:
+    """Return in how many pairs red and blue are exchanged, given how their red less blue correlates."""
+    count = int((alike < OPPOSITE).sum())
+    return count if count > 1 or bool((alike < SURELY_OPPOSITE).any()) else 0

@@ -1,338 +1,452 @@
-"""The check of a recording against itself: a sample of frames, in a second or two, without any model.
+"""The check of a recording at the door of a build: what a stranger's recording really has wrong, in about a second.
 
-Points of one frame must lie on the surface that another frame sees, and look alike there. Thresholds: right
-recordings (rendered homes with people, noise and drift, a real Kinect walk) have at least 0.96 of the points on the
-surface and a likeness of 0.87 at least; docs/recordings.md has the figures.
+Points of one frame must lie on the surface that another frame sees, and look alike there. Thresholds: right recordings
+(rendered homes with people, noise and drift, a real Kinect walk) have at least 0.96 of the points on the surface and a
+likeness of 0.87 at least; docs/recordings.md has the figures. `suspicions.py` looks further.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from avlmaps.core.errors import RecordingError
+from avlmaps.core.camera import Pinhole
+from avlmaps.core.errors import AudioError, RecordingError
+from avlmaps.core.wording import option
+from avlmaps.recordings.channels import level_faults
 from avlmaps.recordings.consistency import agreement as limits
 from avlmaps.recordings.consistency.agreement import APART_SAME_M, FEWEST_POINTS, Agreement, compare, without_occluded
-from avlmaps.recordings.consistency.edges import DepthEdges, Shift, find_edges, shift_of
-from avlmaps.recordings.consistency.flats import Levels, RightAngles, Tilt, find_levels
-from avlmaps.recordings.consistency.jumps import blind_spots, find_exchanged, find_jump, find_parts
-from avlmaps.recordings.consistency.sample import Sample, Surfaces, draw_sample, small_frame, steps_between_all
-from avlmaps.recordings.consistency.single_frames import (
-    of_colour,
-    of_depth,
-    of_intrinsics,
-    of_loudness,
-    of_motion,
-    of_poses,
-    of_sound,
-    warmth_of,
-)
-from avlmaps.recordings.consistency.suspects import (
-    FramesAt,
-    PoseAt,
-    Suspect,
-    Trial,
-    Trials,
-    cause_of,
-    find_cause,
-    find_closer,
-    find_offset,
-)
-from avlmaps.recordings.consistency.verdict import Finding, Grade, Reason, Verdict
-from avlmaps.recordings.corrections import NONE, CorrectedRecording, uncorrected
+from avlmaps.recordings.consistency.readings import LEAST_OFF, Reading, Trial, Trials, cause_of, find_cause, find_closer
+from avlmaps.recordings.consistency.sample import Sample, Surfaces, draw_sample, steps_between_all
+from avlmaps.recordings.consistency.verdict import Reason, Said, Suspicion, Verdict, findings_of
 from avlmaps.recordings.memory import is_of_program
 from avlmaps.recordings.types import Recording
 
+# A camera in a building sees this far, in the middle.
+SUSPICIOUS_DEPTH_M, _IMPOSSIBLE_DEPTH_M = (0.3, 9.0), (0.04, 60.0)
+_LEAST_DEPTH_SHARE, _MOST_EMPTY_FRAMES = 0.05, 0.25
+# Share of pixels whose neighbours lie on one surface with them: less, or hardly any, is noise. In a coarser picture
+# than this the pixels around one look at other surfaces, which differ as noise does.
+_LEAST_SMOOTH, _IMPOSSIBLE_SMOOTH, _FEWEST_COLUMNS = 0.3, 0.1, 64
+_LEAST_COLOURED, _IMPOSSIBLE_COLOURED = 0.6, 0.05
+# Of a camera that sees nothing; dark to the eye, of 255; nothing at all. More black frames are no camera that begins.
+_BLACK, _DARK, _UNVARIED, _MOST_BLACK = 8.0, 20.0, 1.5, 0.1
+# Faster than anybody walks, frame after frame; beyond that pace by as much, one step alone is a jump.
+MOST_SPEED_M_S, _LEAST_JUMP_M = 4.0, 0.5
+_NEAR_IN_TIME_S = 1.0
+# With poses of fewer frames, or on several clocks, much of the drive is not in the map.
+_LEAST_POSED = 0.75
+_RATES_HZ = (8_000, 11_025, 16_000, 22_050, 24_000, 32_000, 44_100, 48_000, 96_000)
+# How far a ratio of lengths may be off one of rates; lengths within a fifth say nothing of it.
+_AS_LONG, _LIKE_ONE, _SHORTEST_DRIVE_S = 0.02, 0.8, 1.0
+_CENTRE_MARGIN, _FOCAL_RANGE, _MOST_ASPECT, _AS_IF_EXCHANGED = 0.2, (0.25, 4.0), 1.15, 0.04
 _STANDS = 0.01  # steps between poses that are one
 
 
-def check_recording(recording: Recording) -> Verdict:
-    """Check a recording against itself."""
-    if len(recording) == 0:
-        raise RecordingError(f"{recording.path} has no frames with a pose; there is nothing to check.")
-    sample = draw_sample(recording)
-    surfaces = Surfaces.of(sample.depth_m)
-    following, distant = sample.only(sample.follows), sample.only(~sample.follows)
-    after = compare(following, surfaces, sample.world_from_camera)
-    after = without_occluded(after, following, surfaces)
-    apart = compare(distant, surfaces, sample.world_from_camera, floor_m=APART_SAME_M)
-    apart = without_occluded(apart, distant, surfaces)
-    redness = compare(sample.of_redness(), surfaces, sample.world_from_camera)
-    found = _Found(
-        after,
-        apart,
-        find_edges(sample),
-        redness,
-        find_levels(sample),
-        RightAngles.of(sample),
-        _trials(recording, sample),
-    )
-    of_program = is_of_program(recording)
-    known = sample.depth_m[sample.depth_m > 0.0]
-    median_m = float(np.median(known)) if known.size else float("nan")
-    findings = [
-        *of_intrinsics(recording, of_program),
-        *of_depth(sample, surfaces, median_m, of_program),
-        *of_colour(sample, surfaces),
-        *of_poses(recording),
-        *of_sound(recording),
-        *of_loudness(recording),
-        *of_motion(recording, after, limits.can_be_judged(after)),
-        *_of_agreement(recording, sample, found, median_m),
-    ]
-    checked, unchecked = limits.can_be_judged(after), ()
-    if not findings:
-        unchecked = blind_spots(
-            recording, after, found.trials, found.edges, found.levels, found.angles, warmth_of(sample)
-        )
-    return Verdict(
-        frames=len(sample),
-        pairs=after.pairs,
-        agreeing=after.same_share if checked else float("nan"),
-        seen_through=after.through_share if checked else float("nan"),
-        likeness=after.likeness,
-        median_depth_m=median_m,
-        findings=tuple(findings),
-        unread=sample.unread,
-        unchecked=unchecked,
-    )
+@dataclass(eq=False)
+class Evidence:
+    """What the check looks at: a sample, its surfaces, and how pairs agree that follow or look from apart."""
 
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Found:
-    """How pairs agree that follow, and from apart; colour at edges; red less blue; floors; walls; what is tried."""
-
+    recording: Recording
+    sample: Sample
+    surfaces: Surfaces
     after: Agreement
     apart: Agreement
-    edges: DepthEdges
-    redness: Agreement
-    levels: Levels
-    angles: RightAngles
-    trials: Trials
+
+    @staticmethod
+    def of(recording: Recording) -> "Evidence":
+        """Draw a sample and compare its pairs.
+
+        Raises:
+            RecordingError: there is no frame, or none of the sample can be read.
+        """
+        if len(recording) == 0:
+            raise RecordingError(f"{recording.path} has no frames with a pose; there is nothing to check.")
+        sample = draw_sample(recording)
+        surfaces = Surfaces.of(sample.depth_m)
+        following, distant = sample.only(sample.follows), sample.only(~sample.follows)
+        after = compare(following, surfaces, sample.world_from_camera)
+        apart = compare(distant, surfaces, sample.world_from_camera, floor_m=APART_SAME_M)
+        after, apart = without_occluded(after, following, surfaces), without_occluded(apart, distant, surfaces)
+        return Evidence(recording, sample, surfaces, after, apart)
+
+    @cached_property
+    def median_m(self) -> float:
+        """Middle of the depths; NaN without any."""
+        known = self.sample.depth_m[self.sample.depth_m > 0.0]
+        return float(np.median(known)) if known.size else float("nan")
+
+    @cached_property
+    def of_program(self) -> bool:
+        """Whether a program gives the frames, so that it has to give others."""
+        return is_of_program(self.recording)
+
+    @property
+    def judged(self) -> bool:
+        """Whether enough pairs see the same place."""
+        return limits.can_be_judged(self.after)
+
+    @property
+    def contradicts(self) -> bool:
+        """Whether points of frames that follow one another do not lie on one surface."""
+        return self.judged and not limits.geometry_agrees(self.after)
+
+    @property
+    def drifts(self) -> bool:
+        """Whether only those of frames from apart do not."""
+        return not self.contradicts and not limits.apart_agrees(self.apart)
+
+    @property
+    def unlike(self) -> Agreement | None:
+        """The pairs whose points lie on one surface and do not look alike, None where they do."""
+        return None if self.contradicts or self.drifts else _unlike(self.after, self.apart)
+
+    @cached_property
+    def level_faults(self) -> tuple[Sequence[str], Sequence[str]]:
+        """What is silent and what is clipped in the track; of an array, its channels are looked at elsewhere."""
+        track = self.recording.audio
+        if track is None or track.microphones is not None:
+            return (), ()
+        try:
+            return level_faults(track)
+        except AudioError:  # hearing says why
+            return (), ()
+
+    @cached_property
+    def trials(self) -> Trials:
+        """Tries other readings."""
+        return Trials(self.recording, self.sample)
+
+    @cached_property
+    def cause(self) -> Trial | None:
+        """The reading with which frames agree that do not, None where no usual mistake explains them."""
+        return find_cause(self.trials, self._explains)
+
+    @property
+    def explanation(self) -> str:
+        """The cause in words; nothing where there is none."""
+        best = self.cause
+        if best is None:
+            return ""
+        if best.reading == Reading(focal=best.reading.focal):
+            from avlmaps.recordings.consistency.suspicions import lens_words
+
+            if lens := lens_words(self):  # another focal length moves what it bends, and leaves flat surfaces flat
+                return lens
+        return cause_of(best.reading, self.recording, self.median_m, self._gain(best))
+
+    def _explains(self, trial: Trial) -> bool:
+        after, apart = trial.after, trial.apart
+        if not limits.can_be_judged(after) or not limits.geometry_agrees(after) or not limits.apart_agrees(apart):
+            return False
+        if _unlike(after, apart) is not None or trial.score < limits.LEAST_AGREEING * 0.9:
+            return False
+        if not limits.geometry_agrees(self.after):
+            return after.same_share > self.after.same_share + 0.5 * (1.0 - self.after.same_share)
+        if not limits.apart_agrees(self.apart):
+            return limits.can_be_judged(apart) and apart.same_share > 0.5 * (1.0 + self.apart.same_share)
+        return True
+
+    def _gain(self, best: Trial) -> str:
+        if (unlike := self.unlike) is None:
+            before, after = (self.after, best.after) if self.contradicts else (self.apart, best.apart)
+            return (
+                f"(seen through {before.through_share:.1%} -> {after.through_share:.1%}, agreeing "
+                f"{before.same_share:.0%} -> {after.same_share:.0%})"
+            )
+        then = best.after if unlike is self.after else best.apart
+        return f"(correlation {unlike.likeness:.2f} -> {then.likeness:.2f})"
 
 
-def _most_unlike(after: Agreement, apart: Agreement) -> Agreement | None:
+def _unlike(after: Agreement, apart: Agreement) -> Agreement | None:
     return next((one for one in (after, apart) if limits.can_be_judged(one) and limits.unlike(one)), None)
 
 
-def _of_agreement(recording: Recording, sample: Sample, found: _Found, median_m: float) -> Iterator[Finding]:
-    after, apart = found.after, found.apart
-    if limits.can_be_judged(after) and not limits.geometry_agrees(after):
-        grade = Grade.IMPOSSIBLE if after.same_share < limits.IMPOSSIBLE_AGREEING else Grade.SUSPICIOUS
+def check_recording(recording: Recording) -> Verdict:
+    """Check a recording against itself, as a build does.
+
+    Raises:
+        RecordingError: there is no frame, or none of the sample can be read.
+    """
+    return door_verdict(Evidence.of(recording))
+
+
+def door_verdict(evidence: Evidence) -> Verdict:
+    """Return what the rows of the door find."""
+    return Verdict(
+        frames=len(evidence.sample),
+        pairs=evidence.after.pairs,
+        agreeing=evidence.after.same_share if evidence.judged else float("nan"),
+        seen_through=evidence.after.through_share if evidence.judged else float("nan"),
+        likeness=evidence.after.likeness,
+        median_depth_m=evidence.median_m,
+        findings=tuple(findings_of(_DOOR, evidence)),
+        unread=evidence.sample.unread,
+    )
+
+
+# Cameras
+
+
+def _cameras(evidence: Evidence) -> Iterator[tuple[Pinhole, str, str, str]]:
+    """Yield each camera, which it is, the size of its pictures, and how to give another."""
+    rig = evidence.recording.rig
+    for what, camera in (("colour", rig.rgb), ("depth", rig.depth))[: 1 if rig.registered else 2]:
+        size, given = f"{camera.width}x{camera.height}", option("intrinsics", "fx,fy,cx,cy")
+        fit = f"Give those of a {size} picture with {given}, or of another size as fx,fy,cx,cy@WxH."
+        fit = f"Give the camera of a {size} picture." if evidence.of_program else fit
+        yield camera, "of the cameras" if rig.registered else f"of the {what} camera", size, fit
+
+
+def _middle(evidence: Evidence) -> Iterator[Said]:
+    for camera, which, size, fit in _cameras(evidence):
+        (w, h), (cx, cy) = (camera.width, camera.height), (camera.cx, camera.cy)
+        off, middle = max(abs(cx / w - 0.5), abs(cy / h - 0.5)), f"The principal point {which} ({cx:.6g}, {cy:.6g})"
+        if off > 0.5:
+            like = f"They look like those of a {2 * cx:.0f}x{2 * cy:.0f} picture. " if min(cx, cy) > 0.0 else ""
+            yield Said(f"{middle} lies outside the {size} picture.", like + fit, sure=True)
+        elif off > 0.5 - _CENTRE_MARGIN:
+            yield Said(f"{middle} lies near the edge of the {size} picture.", fit)
+        if abs(w - h) > 0.1 * w and max(abs(cx - h / 2), abs(cy - w / 2)) < _AS_IF_EXCHANGED * w:
+            remedy = f"cx and cy look exchanged, or the picture was turned. {fit}"
+            yield Said(f"{middle} is the middle of a {h}x{w} picture.", remedy)
+
+
+def _focal(evidence: Evidence) -> Iterator[Said]:
+    for camera, which, size, fit in _cameras(evidence):
+        if not _FOCAL_RANGE[0] <= (wide := camera.fx / camera.width) <= _FOCAL_RANGE[1]:
+            view = f"a view of {2 * np.degrees(np.arctan(0.5 / wide)):.0f} degrees, which no usual depth camera has"
+            yield Said(f"The focal length {which} ({camera.fx:.4g} pixels) gives the {size} picture {view}.", fit)
+        if (aspect := max(camera.fx / camera.fy, camera.fy / camera.fx)) > _MOST_ASPECT:
+            numbers = f"{aspect:.2f} times (fx {camera.fx:.4g}, fy {camera.fy:.4g})"
+            remedy = f"Pixels are square in usual cameras. {fit}"
+            yield Said(f"The focal lengths {which} differ by {numbers}.", remedy)
+
+
+def _without_colour(evidence: Evidence) -> Iterator[Said]:
+    rig, there = evidence.sample.rig, evidence.surfaces.there
+    if rig.registered or not there.any():
+        return
+    frame, at = np.nonzero(there)
+    row, column = evidence.surfaces.row[frame, at], evidence.surfaces.column[frame, at]
+    z = evidence.sample.depth_m[frame, row, column].astype(np.float64)
+    seen = (rig.depth.rays()[row, column] * z[:, None]) @ rig.rgb_from_depth[:3, :3].T + rig.rgb_from_depth[:3, 3]
+    ahead = seen[:, 2] > 0.01
+    at_px = rig.rgb.project(np.where(ahead[:, None], seen, 1.0))
+    share = float((ahead & ((at_px >= 0.0) & (at_px < (rig.rgb.width, rig.rgb.height))).all(axis=1)).mean())
+    if share < _LEAST_COLOURED:
+        sentence = f"The colour camera sees {share:.0%} of what the depth camera sees; the rest has no colour."
+        yield Said(sentence, sure=share < _IMPOSSIBLE_COLOURED)
+
+
+# Depth and colour
+
+
+def _depth(evidence: Evidence) -> Iterator[Said]:
+    share = (evidence.sample.depth_m > 0.0).mean(axis=(1, 2))
+    empty, count = float((share == 0.0).mean()), len(evidence.sample)
+    if empty > _MOST_EMPTY_FRAMES:
+        yield Said(f"{empty:.0%} of the {count} frames that were looked at have no depth at all.")
+    elif float(np.median(share)) < _LEAST_DEPTH_SHARE:
+        yield Said(f"Only {np.median(share):.1%} of the pixels of a frame have a depth (the middle of {count}).")
+    (low, high), median_m, smooth = SUSPICIOUS_DEPTH_M, evidence.median_m, evidence.surfaces.smooth_share
+    if np.isfinite(median_m) and not low <= median_m <= high:
+        unit = f"{option('depth-unit', 'METRES')} says what one stored unit is (0.001: millimetres)"
+        remedy = f"Check its unit: {'depth_m is in metres' if evidence.of_program else unit}."
+        sure = not _IMPOSSIBLE_DEPTH_M[0] <= median_m <= _IMPOSSIBLE_DEPTH_M[1]
+        yield Said(
+            f"The depth is {median_m:.3g} m in the middle, where rooms have {low:g} to {high:g} m.", remedy, sure
+        )
+    if smooth < _LEAST_SMOOTH and evidence.sample.depth_m.shape[2] >= _FEWEST_COLUMNS:
+        on_surface = f"{smooth:.0%} of the pixels lie on a surface with those around"
+        yield Said(f"The depth pictures look like noise: {on_surface}.", sure=smooth < _IMPOSSIBLE_SMOOTH)
+    known = [depth_m[depth_m > 0.0] for depth_m in evidence.sample.depth_m if depth_m.any()]
+    if len(known) >= 3 and float(np.median([np.ptp(depth_m) / depth_m.mean() for depth_m in known])) < 0.01:
+        yield Said("The depth pictures are flat: every pixel has the same depth.", sure=True)
+
+
+def _dark(evidence: Evidence) -> Iterator[Said]:
+    grey, count = evidence.sample.grey, len(evidence.sample)
+    flat = grey.std(axis=(1, 2)) < _UNVARIED
+    black = np.flatnonzero(flat & (grey.mean(axis=(1, 2)) < _BLACK))
+    level, of_them = float(np.median(grey)), f"of the {count} colour pictures that were looked at are"
+    if flat.mean() > 0.5:
+        yield Said(f"{flat.mean():.0%} {of_them} {'black' if level < _BLACK else 'of one colour'}.")
+    elif len(black) > _MOST_BLACK * count:
+        from_s, to_s = evidence.sample.stamps_s[black[[0, -1]]]
+        yield Said(f"{len(black) / count:.0%} {of_them} black, from {from_s:.2f} to {to_s:.2f} s.")
+    elif level < _DARK:
+        yield Said(f"The colour pictures are dark: the middle brightness is {level:.0f} of 255.")
+
+
+# Poses, clocks, sound
+
+
+def _few_posed(evidence: Evidence) -> Iterator[Said]:
+    if (posed := evidence.recording.posed) < _LEAST_POSED:
+        yield Said(f"Only {posed:.0%} of the frames have a pose on one clock; the others are left out.")
+
+
+def _pace(evidence: Evidence) -> Iterator[Said]:
+    recording, outside = evidence.recording, evidence.after.outside
+    if len(recording) < 5:
+        return
+    apart_s = np.diff(recording.stamps_s)
+    moved_m = np.linalg.norm(np.diff(recording.world_from_camera[:, :3, 3], axis=0), axis=1)
+    pace_s, speed = float(np.median(apart_s)), float(np.quantile(moved_m / apart_s, 0.75))
+    far = np.flatnonzero(moved_m > _LEAST_JUMP_M + MOST_SPEED_M_S * apart_s)
+    if speed > MOST_SPEED_M_S:
+        sentence = f"The camera moves at {speed:.3g} m/s in a quarter of the steps or faster, more than anybody walks."
+        yield Said(sentence, "Check that positions are in metres and stamps in seconds.")
+    elif len(far):
+        at = int(far[np.argmax(moved_m[far])])
+        where = f"between {recording.name(at)} and {recording.name(at + 1)}, faster than anybody walks"
+        where += f", and at {len(far) - 1} other places" if len(far) > 1 else ""
+        remedy = "If tracking began again there, the map shows the place twice: cut the recording, or fix the poses."
+        yield Said(f"The poses jump by {moved_m[at]:.3g} m within {apart_s[at]:.2g} s {where}.", remedy)
+    elif len(recording) >= 20 and pace_s < _NEAR_IN_TIME_S and not evidence.judged and outside > 0.0:
+        yield Said(
+            f"Hardly any two frames see the same place ({outside:.0%} of the points of one lie outside of the other's "
+            f"view), although they are {pace_s:.2g} s apart."
+        )
+
+
+def _other_rate(evidence: Evidence) -> Iterator[Said]:
+    track, drive_s = evidence.recording.audio, evidence.recording.duration_s
+    if track is None or drive_s < _SHORTEST_DRIVE_S or _LIKE_ONE < track.duration_s / drive_s < 1.0 / _LIKE_ONE:
+        return
+    longer, late_s = track.duration_s / drive_s, track.start_s - float(evidence.recording.stamps_s[0])
+    meant = [hz for hz in _RATES_HZ if hz != track.rate_hz and abs(longer * track.rate_hz / hz - 1.0) < _AS_LONG]
+    if meant and abs(late_s) < _AS_LONG * drive_s:
+        as_if = f"as if {meant[0]} samples a second were called {track.rate_hz}"
+        remedy = f"If so, write {track.path.name} again with its true rate; else its sounds lie at wrong places."
+        yield Said(f"The sound lasts {track.duration_s:.1f} s and the drive {drive_s:.1f} s, {as_if}.", remedy)
+
+
+def _silent(evidence: Evidence) -> Iterator[Said]:
+    return map(Said, evidence.level_faults[0])
+
+
+def _clipped(evidence: Evidence) -> Iterator[Said]:
+    return map(Said, evidence.level_faults[1])
+
+
+# Frames against frames
+
+
+def _contradiction(evidence: Evidence) -> Iterator[Said]:
+    after = evidence.after
+    if evidence.contradicts:
         sentence = (
             f"Frames that should see the same place do not agree: of the points of one frame {after.same_share:.0%} "
             f"lie on the surface that another sees, and {after.through_share:.1%} are seen through ({after.pairs} "
             "pairs of frames)."
         )
-        cause = _cause(recording, found, median_m)
-        yield Finding(Reason.GEOMETRY, grade, sentence, cause or _other_cause(recording, sample, found))
-    elif not limits.apart_agrees(apart):
-        sentence = (
-            f"Frames that look at the same place from apart do not agree: {apart.same_share:.0%} of their points lie "
-            f"on one surface, and {apart.through_share:.1%} are seen through ({apart.pairs} pairs of frames)."
-        )
-        other = "The poses drift, depth and positions have different scales, or much was moved; check them."
-        cause = _cause(recording, found, median_m)
-        yield Finding(Reason.GEOMETRY, Grade.SUSPICIOUS, sentence, cause or other)
-    elif flat := found.angles.finding(recording, found.levels):
-        yield flat
-    elif limits.can_be_judged(after) and (closer := find_closer(found.trials)) is not None:
-        then = _off(closer.agreement, closer.apart)
-        sentence = (
-            f"The depths of the same points in two frames differ by {_off(after, apart):.1%}, and by {then:.1%} if the "
-            "recording is read in another way."
-        )
-        yield Finding(Reason.GEOMETRY, Grade.SUSPICIOUS, sentence, _words(recording, closer, median_m, ""))
-    elif limits.can_be_judged(after) and (offset := find_offset(found.trials)) is not None:
-        sentence = (
-            f"Flat surfaces are curved in the depth of single frames, as if {abs(offset.suspect.farther_m):.2g} m were "
-            f"{'added to' if offset.suspect.farther_m < 0.0 else 'taken from'} all of it, and without that the depths "
-            f"of the same points in two frames differ by {offset.off:.1%}, not by {_off(after, apart):.1%}."
-        )
-        yield Finding(Reason.GEOMETRY, Grade.SUSPICIOUS, sentence, _words(recording, offset, median_m, ""))
-    elif limits.can_be_judged(after) and (tilt := found.levels.tilt) is not None:
-        sentence = (
-            f"Floors do not stay level while the camera turns: they lie {tilt.off_deg:.1f} degrees off (the middle of "
-            f"{len(found.levels.up)} frames), and {tilt.left_deg:.1f} if the camera sits {_tilt_words(tilt)} than its "
-            "poses say."
-        )
-        yield Finding(Reason.GEOMETRY, Grade.SUSPICIOUS, sentence, _tilt_remedy(tilt, recording))
-    elif misplaced := (
-        find_exchanged(recording, sample, after) or find_jump(recording, sample, after) or find_parts(recording)
-    ):
-        yield misplaced
-    else:
-        yield from _of_colours(recording, sample, found, median_m)
+        sure = after.same_share < limits.IMPOSSIBLE_AGREEING
+        yield Said(sentence, evidence.explanation or _other_cause(evidence), sure)
 
 
-def _of_colours(recording: Recording, sample: Sample, found: _Found, median_m: float) -> Iterator[Finding]:
-    after, apart = found.after, found.apart
-    if differing := _most_unlike(after, apart):
-        grade = Grade.IMPOSSIBLE if after.likeness < limits.IMPOSSIBLE_LIKENESS else Grade.SUSPICIOUS
-        sentence = (
-            "The colour pictures do not show what the depth pictures show: the brightness of the same points in two "
-            f"frames{' from apart' if differing is apart else ''} correlates by {differing.likeness:.2f} where right "
-            f"recordings have {'0.85' if differing is apart else '0.9'} and more, and hardly at all in "
-            f"{int((differing.alike < limits.BAD_LIKENESS).sum())} of {int(np.isfinite(differing.alike).sum())} pairs."
-        )
-        other = "Check that colour and depth of a frame belong together (order of names, clock, intrinsics of colour)."
-        shift = shift_of(found.edges, sample)
-        where = "" if shift is None else " ".join(_shift_words(shift, recording))
-        yield Finding(Reason.COLOUR, grade, sentence, _cause(recording, found, median_m) or where or other)
-    elif opposite := limits.opposite_pairs(found.redness):
-        sentence = (
-            f"Red and blue of the same points are exchanged in {opposite} of "
-            f"{int(np.isfinite(found.redness.alike).sum())} pairs of frames: some colour pictures are RGB, others BGR."
-        )
-        yield Finding(Reason.COLOUR, Grade.SUSPICIOUS, sentence, "Write all pictures in one order of channels.")
-    elif shift := shift_of(found.edges, sample):
-        yield Finding(Reason.COLOUR, Grade.SUSPICIOUS, *_shift_words(shift, recording))
-
-
-def _shift_words(shift: Shift, recording: Recording) -> tuple[str, str]:
-    """Return what is wrong where edges of colour lie beside those of depth, and what to do."""
-    width = recording.rig.rgb.width
-    parts = ((shift.columns * width, "to the right", "to the left"), (shift.rows * width, "below", "above"))
-    where = " and ".join(f"{abs(px):.0f} pixels {more if px > 0.0 else less}" for px, more, less in parts if px)
-    sentence = (
-        f"The edges of colour do not lie on those of depth, but {where} (gradient of colour {shift.gradient:.2f} "
-        f"there, {shift.here:.2f} where depth has them, in standard deviations)."
-    )
-    if shift.metres is not None:
-        x_m, y_m = shift.metres
-        return sentence, (
-            f"The colour camera looks {np.hypot(x_m, y_m):.2g} m beside where rgb_from_depth has it (x {x_m:+.2f}, y "
-            f"{y_m:+.2f} m in its axes); correct rgb_from_depth, or register the depth to colour."
-        )
-    return sentence, (
-        "Colour and depth look shifted against each other, or taken at different moments; check the order and the "
-        "clock of the pictures, rgb_from_depth and the principal points."
-    )
-
-
-def _tilt_words(tilt: Tilt) -> str:
-    parts = (
-        (tilt.down_deg, "farther down", "farther up"),
-        (tilt.right_deg, "lower on its right", "lower on its left"),
-    )
-    words = [f"{abs(by):.0f} degrees {more if by > 0.0 else less}" for by, more, less in parts if abs(by) >= 1.0]
-    return " and ".join(words)
-
-
-def _tilt_remedy(tilt: Tilt, recording: Recording) -> str:
-    camera = recording.rig.depth
-    rows = abs(np.tan(np.radians(tilt.down_deg))) * camera.fy
-    remedy = "Correct the transform from what the poses are of to the camera"
-    if abs(tilt.down_deg) > abs(tilt.right_deg):
-        remedy += f", or cy, if it is {rows:.0f} pixels off in the {camera.width}x{camera.height} pictures"
-    return f"{remedy}."
-
-
-def _off(after: Agreement, apart: Agreement) -> float:
-    return float(np.nanmean(np.concatenate([after.off, apart.off])))
-
-
-def _other_cause(recording: Recording, sample: Sample, found: _Found) -> str:
-    after = found.after
-    if float(steps_between_all(sample.world_from_camera).max(initial=0.0)) < _STANDS:
+def _other_cause(evidence: Evidence) -> str:
+    after, recording = evidence.after, evidence.recording
+    if float(steps_between_all(evidence.sample.world_from_camera).max(initial=0.0)) < _STANDS:
         return "All poses are the same, though the pictures are not: the poses are missing, or those of another camera."
-    if (exchanged := find_exchanged(recording, sample, after)) is not None:
-        return str(exchanged)
-    if (flat := found.angles.finding(recording, found.levels)) is not None:
-        return str(flat)
-    used = after.points >= FEWEST_POINTS
-    share = np.where(used, after.same / np.maximum(after.points, 1), np.nan)
+    share = np.where(after.points >= FEWEST_POINTS, after.same / np.maximum(after.points, 1), np.nan)
     bad, others = limits.bad_pairs(after), share[share >= limits.BAD_PAIR]
     if 0 < bad <= 0.4 * after.pairs and len(others) and float(np.median(others)) > limits.LEAST_AGREEING:
-        pair = sample.only(sample.follows).pairs[int(np.nanargmin(share))]
-        a, b = (recording.name(int(sample.index[i])) for i in pair)
+        pair = evidence.sample.only(evidence.sample.follows).pairs[int(np.nanargmin(share))]
+        a, b = (recording.name(int(evidence.sample.index[i])) for i in pair)
         return (
             f"{bad} of the pairs are far off, the others are right: the poses jump, or frames are exchanged, for "
             f"example between {a} and {b}. Cut the recording there, or fix the order or the poses."
         )
-    if (tilt := found.levels.tilt) is not None:
-        return f"By its floors the camera sits {_tilt_words(tilt)} than its poses say. {_tilt_remedy(tilt, recording)}"
-    return "No usual mistake explains it; check the poses, the depth and the intrinsics, and that they belong together."
+    return ""
 
 
-def _cause(recording: Recording, found: _Found, median_m: float) -> str:
-    best = find_cause(found.trials, lambda trial: _explains(trial, found))
-    if best is None:
-        return ""
-    of_focal_alone = best.suspect == Suspect(focal=best.suspect.focal)
-    if of_focal_alone and (lens := found.angles.lens()) is not None:
-        return str(lens)  # another focal length moves what it bends, and leaves flat surfaces flat
-    return _words(recording, best, median_m, _gain(found, best))
+def _drift(evidence: Evidence) -> Iterator[Said]:
+    if evidence.drifts:
+        apart = evidence.apart
+        yield Said(
+            f"Frames that look at the same place from apart do not agree: {apart.same_share:.0%} of their points lie "
+            f"on one surface, and {apart.through_share:.1%} are seen through ({apart.pairs} pairs of frames).",
+            evidence.explanation,
+        )
 
 
-def _trials(recording: Recording, sample: Sample) -> Trials:
-    given = recording.given if isinstance(recording, CorrectedRecording) else NONE
-    pace_s = float(np.median(np.diff(recording.stamps_s))) if len(recording) > 1 else 0.0
-    return Trials(sample, pose_at(recording, sample), given, frames_at(recording, sample), pace_s)
+def _closer(evidence: Evidence) -> Iterator[Said]:
+    offs = np.concatenate([evidence.after.off, evidence.apart.off])
+    if not evidence.judged or evidence.contradicts or evidence.drifts or not np.nanmean(offs) > LEAST_OFF:
+        return
+    if (best := find_closer(evidence.trials)) is not None:
+        yield Said(
+            f"The depths of the same points in two frames differ by {np.nanmean(offs):.1%}, and by "
+            f"{np.nanmean(best.offs):.1%} if the recording is read in another way.",
+            cause_of(best.reading, evidence.recording, evidence.median_m),
+        )
 
 
-def _words(recording: Recording, best: Trial, median_m: float, gain: str) -> str:
-    stored_unit_m, of_program = recording.stored_depth_unit_m, is_of_program(recording)
-    return cause_of(best.suspect, recording.rig, stored_unit_m, median_m, gain, of_program=of_program)
+def _unlike_colour(evidence: Evidence) -> Iterator[Said]:
+    if (found := evidence.unlike) is not None:
+        bad, pairs = int((found.alike < limits.BAD_LIKENESS).sum()), int(np.isfinite(found.alike).sum())
+        apart, right = (" from apart", "0.85") if found is evidence.apart else ("", "0.9")
+        sentence = (
+            "The colour pictures do not show what the depth pictures show: the brightness of the same points in two "
+            f"frames{apart} correlates by {found.likeness:.2f} where right recordings have {right} and more, and "
+            f"hardly at all in {bad} of {pairs} pairs."
+        )
+        yield Said(sentence, evidence.explanation, evidence.after.likeness < limits.IMPOSSIBLE_LIKENESS)
 
 
-def _gain(found: _Found, best: Trial) -> str:
-    for before, after, right in (
-        (found.after, best.agreement, limits.geometry_agrees(found.after)),
-        (found.apart, best.apart, limits.apart_agrees(found.apart)),
-    ):
-        if not right:
-            return (
-                f"(seen through {before.through_share:.1%} -> {after.through_share:.1%}, "
-                f"agreeing {before.same_share:.0%} -> {after.same_share:.0%})"
-            )
-    after = limits.unlike(found.after)
-    before, then = (found.after, best.agreement) if after else (found.apart, best.apart)
-    return f"(correlation {before.likeness:.2f} -> {then.likeness:.2f})"
-
-
-def _explains(trial: Trial, found: _Found) -> bool:
-    after, apart = trial.agreement, trial.apart
-    if not limits.can_be_judged(after) or not limits.geometry_agrees(after) or not limits.apart_agrees(apart):
-        return False
-    if _most_unlike(after, apart) is not None:
-        return False
-    if trial.score < limits.LEAST_AGREEING * 0.9:
-        return False
-    if not limits.geometry_agrees(found.after):
-        return after.same_share > found.after.same_share + 0.5 * (1.0 - found.after.same_share)
-    if not limits.apart_agrees(found.apart):
-        return limits.can_be_judged(apart) and apart.same_share > 0.5 * (1.0 + found.apart.same_share)
-    return True
-
-
-def frames_at(recording: Recording, sample: Sample) -> FramesAt:
-    """Return a function that reads the pictures of frames that come so many after the sample's."""
-
-    def at(late: int) -> tuple[np.ndarray, np.ndarray] | None:
-        rows = np.clip(sample.index + late, 0, len(recording) - 1)
-        if len(np.unique(rows)) < 0.5 * len(rows):
-            return None
-        try:
-            frames = [small_frame(recording.frame(int(row)), sample.rig) for row in rows]
-        except RecordingError:
-            return None
-        there = sample.index + late == rows  # beyond the ends nothing is known
-        depth_m = np.stack([depth_m if own else 0.0 * depth_m for (depth_m, _), own in zip(frames, there, strict=True)])
-        return depth_m, np.stack([grey for _, grey in frames])
-
-    return at
-
-
-def pose_at(recording: Recording, sample: Sample) -> PoseAt:
-    """Return a function that gives the uncorrected poses of the sample's frames at their stamps plus a delay."""
-    known = uncorrected(recording).walk
-
-    def at(delay_s: float) -> np.ndarray | None:
-        wanted_s = sample.stamps_s + delay_s
-        held_s = np.clip(wanted_s, known.stamps_s[0], known.stamps_s[-1])
-        if float((np.abs(wanted_s - held_s) > 0.05).mean()) > 0.5:
-            return None
-        return known.at(held_s)
-
-    return at
+_DOOR = (
+    Suspicion(Reason.INTRINSICS, _middle),
+    Suspicion(Reason.INTRINSICS, _focal),
+    Suspicion(
+        Reason.INTRINSICS,
+        _without_colour,
+        "Check the intrinsics of both cameras and the transform between them (rgb_from_depth).",
+    ),
+    Suspicion(
+        Reason.DEPTH,
+        _depth,
+        "A map needs depth; check how the depth pictures are stored (16 bits, their unit, order of bytes, no colours, "
+        "no lossy compression).",
+    ),
+    Suspicion(
+        Reason.COLOUR,
+        _dark,
+        "Little or nothing is recognised in such pictures; check the camera and its exposure, or leave them out.",
+    ),
+    Suspicion(
+        Reason.MOTION,
+        _few_posed,
+        "What they show is not in the map: check that pictures and poses are of one drive and one clock.",
+    ),
+    Suspicion(Reason.MOTION, _pace, "Check the poses, the intrinsics and the depth unit."),
+    Suspicion(Reason.SOUND, _other_rate),
+    Suspicion(
+        Reason.SOUND,
+        _silent,
+        "Check the microphone, and which input was recorded: nothing that sounded then is in the map.",
+    ),
+    Suspicion(
+        Reason.SOUND,
+        _clipped,
+        "What is loud may be taken for another sound.",
+    ),
+    Suspicion(
+        Reason.GEOMETRY,
+        _contradiction,
+        "No usual mistake explains it; check the poses, the depth and the intrinsics, and that they belong together.",
+    ),
+    Suspicion(
+        Reason.GEOMETRY,
+        _drift,
+        "The poses drift, depth and positions have different scales, or much was moved; check them.",
+    ),
+    Suspicion(Reason.GEOMETRY, _closer),
+    Suspicion(
+        Reason.COLOUR,
+        _unlike_colour,
+        "Check that colour and depth of a frame belong together (order of names, clock, intrinsics of colour).",
+    ),
+)

@@ -27,6 +27,10 @@ JUMPS = 4
 ACROSS, AHEAD_M, VIEW_RAD, ACROSS_RAD = 8, 2.0, np.radians(22.0), np.radians(70.0)
 # A step this many times the usual one is a jump that is looked at.
 JUMP_RATIO = 4.0
+# Where a recording is parted: the longest times without a frame, this many times the usual pace and this long.
+_MOST_GAPS, _GAP, _GAP_S = 3, 10.0, 2.0
+# A step of the poses this many times the usual one, and beyond this, is odd.
+_ODD_STEP, _ODD_STEP_M, _ODD_STEP_RAD = 4.0, 0.15, np.radians(8.0)
 # Red differs from blue by more than this share of the brightest of the three, or of this brightness (of 255).
 _COLOURED, _DIM = 0.15, 30.0
 # A neighbourhood whose depths differ by more is an edge, of which no point is taken.
@@ -71,12 +75,8 @@ class Sample:
         return len(self.index)
 
     def only(self, chosen: Bool[np.ndarray, " p"] | Int[np.ndarray, " k"]) -> "Sample":
-        """Return the same pictures with some of the pairs."""
+        """Return these pictures with some of the pairs."""
         return replace(self, pairs=self.pairs[chosen], follows=self.follows[chosen])
-
-    def of_redness(self) -> "Sample":
-        """Return the same frames with red less blue for brightness."""
-        return replace(self, grey=self.redness)
 
 
 def draw_sample(recording: Recording) -> Sample:
@@ -93,7 +93,8 @@ def draw_pairs(recording: Recording, pairs: Int[np.ndarray, "p 2"], follows: Boo
         follows: whether those of a pair follow one another.
     """
     index = np.unique(pairs) if len(pairs) else np.arange(min(len(recording), 1))
-    rig = _small_rig(recording.rig)
+    whole = recording.rig
+    rig = Rig(_small(whole.rgb), _small(whole.depth), whole.rgb_from_depth)
     read: list[int] = []
     depth: list[np.ndarray] = []
     grey: list[np.ndarray] = []
@@ -229,8 +230,31 @@ def steps_between_all(pose: Float[np.ndarray, "n 4 4"]) -> Float[np.ndarray, " m
     return away_m / STEP_M + rotation_angle_rad(pose[:-1], pose[1:]) / STEP_RAD
 
 
-def _small_rig(rig: Rig) -> Rig:
-    return Rig(_small(rig.rgb), _small(rig.depth), rig.rgb_from_depth)
+def gaps(recording: Recording) -> list[int]:
+    """Return the last frames before the longest times without any, the longest first."""
+    apart_s = np.diff(recording.stamps_s)
+    if not len(apart_s):
+        return []
+    long = np.flatnonzero(apart_s > max(_GAP_S, _GAP * float(np.median(apart_s))))
+    return long[np.argsort(-apart_s[long], kind="stable")][:_MOST_GAPS].tolist()
+
+
+def seams(recording: Recording) -> list[int]:
+    """Return the last frames before gaps, and before the step of the poses that is oddest."""
+    odd, step = odd_steps(recording), steps_between_all(recording.world_from_camera)
+    oddest = [int(np.argmax(np.where(odd, step, 0.0)))] if odd.any() else []
+    return list(dict.fromkeys([*gaps(recording), *oddest]))
+
+
+def odd_steps(recording: Recording) -> Bool[np.ndarray, " m"]:
+    """Return which steps from a frame to the next are much larger than usual."""
+    pose = recording.world_from_camera
+    if len(pose) < 2:
+        return np.zeros(0, bool)
+    moved_m = np.linalg.norm(np.diff(pose[:, :3, 3], axis=0), axis=1)
+    turned_rad = rotation_angle_rad(pose[:-1], pose[1:])
+    far = moved_m > max(_ODD_STEP * float(np.median(moved_m)), _ODD_STEP_M)
+    return far | (turned_rad > max(_ODD_STEP * float(np.median(turned_rad)), _ODD_STEP_RAD))
 
 
 def _small(camera: Pinhole) -> Pinhole:

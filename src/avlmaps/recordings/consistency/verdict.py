@@ -1,7 +1,9 @@
-"""What the check of a recording finds, how grave it is, and the words for it."""
+"""What the check of a recording finds: rows that may be wrong, findings with their words, and the verdict."""
 
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -48,6 +50,30 @@ class Finding:
         return f"{self.sentence} {self.remedy}"
 
 
+class Said(NamedTuple):
+    """What a measure says: a sentence with numbers, what to do where that differs, and whether it cannot be right."""
+
+    sentence: str
+    remedy: str = ""
+    sure: bool = False
+
+
+class Suspicion(NamedTuple):
+    """One row of what may be wrong: its word, what measures it, and the likely cause with what to do."""
+
+    reason: Reason
+    measure: Callable[[Any], Iterable[Said]]
+    remedy: str = ""
+
+
+def findings_of(rows: Iterable[Suspicion], evidence: Any) -> Iterator[Finding]:
+    """Yield what the rows find in the evidence, in their order."""
+    for reason, measure, remedy in rows:
+        for said in measure(evidence):
+            grade = Grade.IMPOSSIBLE if said.sure else Grade.SUSPICIOUS
+            yield Finding(reason, grade, said.sentence, said.remedy or remedy)
+
+
 @dataclass(frozen=True, slots=True)
 class Verdict:
     """The outcome of the check.
@@ -75,10 +101,8 @@ class Verdict:
     unchecked: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """Put the gravest finding first."""
-        order = (Grade.IMPOSSIBLE, Grade.SUSPICIOUS)
-        findings = sorted(self.findings, key=lambda finding: order.index(finding.grade))
-        object.__setattr__(self, "findings", tuple(findings))
+        gravest_first = sorted(self.findings, key=lambda finding: finding.grade is not Grade.IMPOSSIBLE)
+        object.__setattr__(self, "findings", tuple(gravest_first))
 
     @property
     def grade(self) -> Grade:

@@ -11,7 +11,7 @@ import numpy as np
 from avlmaps.core import poses
 from avlmaps.core.arrays import Float
 from avlmaps.core.errors import AvlmapsError, RecordingError
-from avlmaps.recordings.consistency.check import check_recording
+from avlmaps.recordings.consistency.suspicions import examine_recording
 from avlmaps.recordings.consistency.verdict import Verdict
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Recording
@@ -80,7 +80,7 @@ class Judge:
             self._tree = KDTree(np.concatenate([_points(opened, i, _CLOUD_STEP) for i in range(len(opened))]))
             self.poses = {opened.name(i): opened.world_from_camera[i] for i in range(len(opened))}
             self._rgb = {opened.name(i): opened.frame(i).rgb for i in _spread(len(opened))}
-            self.verdict = check_recording(opened)
+            self.verdict = examine_recording(opened)
 
     def judge(self, situation: Situation, other: Draft, seed: int) -> Case | None:
         """Make a mistake, read what was written and return the outcome; None where the format cannot hold it."""
@@ -94,7 +94,7 @@ class Judge:
     def _outcome(self, path: Path, situation: Situation) -> tuple[Outcome, tuple[str, ...]]:
         try:
             opened = open_recording(path)
-            verdict = check_recording(opened)
+            verdict = examine_recording(opened)
         except AvlmapsError as error:
             return (Outcome.REFUSED if re.search(situation.cause, str(error)) else Outcome.REFUSED_PLAIN), (str(error),)
         notices = tuple(notice for notice in opened.notices if notice not in self.usual)
@@ -140,7 +140,7 @@ def right_case(draft: Draft) -> tuple[Case, Verdict | None]:
     with TemporaryDirectory() as folder:
         opened = open_recording(draft.write(Path(folder) / "walk"))
         try:
-            verdict = check_recording(opened)
+            verdict = examine_recording(opened)
         except RecordingError as error:
             return Case(draft.name, "", "", Outcome.REFUSED_PLAIN, (str(error),)), None
     said = verdict.sentences()

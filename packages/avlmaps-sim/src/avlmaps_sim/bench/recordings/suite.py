@@ -15,7 +15,7 @@ from avlmaps.core.files import write_bytes_atomically
 from avlmaps.core.progress import progress
 from avlmaps.maps.build import build_map
 from avlmaps.perception.cache.feature_store import CacheSettings
-from avlmaps.recordings.consistency.check import check_recording
+from avlmaps.recordings.consistency.suspicions import examine_recording
 from avlmaps.recordings.open import open_recording
 from avlmaps_sim.bench.harness.intervals import in_percent, wilson
 from avlmaps_sim.bench.output import Table, as_csv
@@ -207,7 +207,7 @@ def _cost(paths: Sequence[Path], out: Path) -> Table:
 
 def _cost_of(path: Path, out: Path) -> list[str | int]:
     recording, cache = open_recording(path), CacheSettings(place="off")
-    check_s = _processor_s(lambda: check_recording(recording))
+    check_s = _processor_s(lambda: examine_recording(recording))
     with TemporaryDirectory(dir=out) as folder:
         place = Path(folder) / "home.avlmap"
         build_s = _processor_s(lambda: build_map(recording, place, cache=cache, progress=False))

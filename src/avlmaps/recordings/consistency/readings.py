@@ -1,0 +1,530 @@
+"""Other ways to read a recording: usual mistakes are undone one by one on a sample, until its frames agree."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import cache
+from itertools import product
+
+import numpy as np
+from jaxtyping import Float
+
+from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.errors import RecordingError
+from avlmaps.recordings.consistency.agreement import APART_SAME_M, NOTHING, SAME_M, Agreement, compare
+from avlmaps.recordings.consistency.sample import Sample, Surfaces, small_frame
+from avlmaps.recordings.corrections import (
+    NAMED,
+    NONE,
+    CorrectedRecording,
+    Corrections,
+    GivenCamera,
+    PoseKind,
+    all_axes,
+    opencv_from_axes,
+    reread_poses,
+    uncorrected,
+)
+from avlmaps.recordings.memory import is_of_program
+from avlmaps.recordings.types import Recording
+
+# Pictures that are mirrored from left to right first (or not), then turned by quarters to the left.
+Turn = tuple[bool, int]
+TURNS: dict[Turn, str] = {
+    (False, 1): "turned by 90 degrees",
+    (False, 2): "upside down (turned by 180 degrees)",
+    (False, 3): "turned by 90 degrees",
+    (True, 0): "mirrored",
+    (True, 1): "transposed",
+    (True, 2): "mirrored from top to bottom",
+    (True, 3): "transposed",
+}
+UNITS = (0.5, 2.0, 0.25, 4.0, 0.2, 5.0, 0.1, 10.0, 0.01, 100.0, 0.001, 1000.0)
+_SCALES = (0.87, 1.15, 0.8, 1.25, 0.63, 1.6, 0.4, 2.5, *UNITS)
+_FARTHER_M = (-0.3, -0.15, 0.15, 0.3)
+_OFF_CENTRE, _BESIDE_CENTRE = (-0.12, -0.06, 0.06, 0.12), (-0.03, 0.0, 0.03)
+_FOCAL = (0.5, 0.67, 0.8, 0.9, 1.12, 1.25, 1.5, 2.0)
+_DELAYS_S = tuple(sign * step / 20.0 for step in range(1, 21) for sign in (1.0, -1.0))
+_MOST_LATE, _LONGEST_DELAY_S, _MORE_ALIKE = 8, 5.0, 0.002
+_POSES: tuple[tuple[PoseKind, ...], ...] = (
+    (PoseKind.CAMERA_FROM_WORLD,),
+    (PoseKind.WXYZ,),
+    (PoseKind.WXYZ, PoseKind.CAMERA_FROM_WORLD),
+)
+# A frame of usual size has its depths compared with `SAME_M`; of a scene of another size it is this share.
+_FLOOR_SHARE, _APART_FLOOR_SHARE = SAME_M / 2.5, APART_SAME_M / 2.5
+# A reading must compare this share of the sample's points to be preferred, and this one of those compared as it is.
+_LEAST_COMPARED, _OF_AS_IT_IS = 0.15, 0.5
+_CLEARLY, _AS_GOOD = 0.02, 1.15
+# A scale, delay or focal length explains a recording that agrees where it leaves this share of the differences, in this
+# share of the pairs; smaller differences are noise. Between the steps that are tried, the gain is greater.
+_LEAST_GAIN, _MOST_BETTER, LEAST_OFF, _LEAST_STEP, _FEWEST_PAIRS = 0.5, 0.8, 0.006, 0.7, 6
+_PAIRS, _POINTS = 14, 128
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """One mistake that is undone, or several.
+
+    Attributes:
+        given: what options of the command line undo.
+        scale: factor of the depth.
+        focal: factor of the focal lengths.
+        off_centre: by how much the principal point lies to the right and below, as shares of the picture.
+        centred: whether the principal point is put into the middle, with the focal length in proportion.
+        turn_colour: how colour pictures are turned.
+        turn_depth: how depth pictures are turned.
+        along_ray: whether the depth is the distance along the ray.
+        farther_m: what is added to the depth before it is scaled.
+        depth_late: by how many frames depth pictures come after what they belong to.
+    """
+
+    given: Corrections = NONE
+    scale: float = 1.0
+    focal: float = 1.0
+    off_centre: tuple[float, float] = (0.0, 0.0)
+    centred: bool = False
+    turn_colour: Turn | None = None
+    turn_depth: Turn | None = None
+    along_ray: bool = False
+    farther_m: float = 0.0
+    depth_late: int = 0
+
+
+AS_IT_IS = Reading()
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """A reading, how frames agree with it that follow one another or look from apart, and one number of both."""
+
+    reading: Reading
+    after: Agreement
+    apart: Agreement
+    score: float
+
+    @property
+    def offs(self) -> Float[np.ndarray, " p"]:
+        """Differences of depths of each pair."""
+        return np.concatenate([self.after.off, self.apart.off])
+
+    @property
+    def off(self) -> float:
+        """Their mean; infinite without any."""
+        known = self.offs[np.isfinite(self.offs)]
+        return float(known.mean()) if len(known) else float("inf")
+
+    @property
+    def likeness(self) -> float:
+        """Mean correlation of brightness of both kinds of pairs; 0 where nothing varies."""
+        known = [found.likeness for found in (self.after, self.apart) if np.isfinite(found.likeness)]
+        return float(np.mean(known)) if known else 0.0
+
+
+class Trials:
+    """Tries readings on a few pairs of one sample."""
+
+    def __init__(self, recording: Recording, sample: Sample) -> None:
+        few = [_some(np.flatnonzero(kind)) for kind in (sample.follows, ~sample.follows)]
+        self.recording, self.sample = recording, sample.only(np.concatenate(few))
+        self.given = recording.given if isinstance(recording, CorrectedRecording) else NONE
+        self.pace_s = float(np.median(np.diff(recording.stamps_s))) if len(recording) > 1 else 0.0
+        self._delayed, self._late = cache(self._poses_at), cache(self._depths_of)
+        self._measured, self._pairs = cache(self._measured_so), cache(self._pairs_of)
+        known = sample.depth_m[sample.depth_m > 0.0]
+        self.median_m = float(np.median(known)) if len(known) else 1.0
+        depth = self._measured(AS_IT_IS)
+        self._points = max(int(depth[1].there[self.sample.pairs[:, 0]].sum()), 1) if depth else 1
+        self._compared = int(_LEAST_COMPARED * self._points)
+        as_it_is = self.run(AS_IT_IS, colour=False)
+        seen = int(as_it_is.after.points.sum() + as_it_is.apart.points.sum())
+        self._compared = max(self._compared, int(_OF_AS_IT_IS * seen))
+
+    def run(self, reading: Reading, *, colour: bool = True) -> Trial:
+        """Return how well the sample agrees so; a score of 0 where it cannot be read so.
+
+        Args:
+            reading: that is tried.
+            colour: whether likeness of colour is part of the score.
+        """
+        given = reading.given.over(self.given)
+        pose, rig = self._delayed(given.pose_delay_s or 0.0), rig_of(self.sample.rig, reading)
+        # what is the same for many readings is kept
+        stored = replace(AS_IT_IS, **{name: getattr(reading, name) for name in _OF_PICTURES})
+        pairs, depth = self._pairs(stored), self._measured(replace(stored, turn_colour=None))
+        if rig is None or pose is None or pairs is None or depth is None:
+            return Trial(reading, NOTHING, NOTHING, 0.0)
+        pose, median_m = reread_poses(pose, given), self.median_m * reading.scale
+        after, apart = (
+            compare(kind, depth[1], pose, rig, reading.scale, floor * median_m, colour=colour)
+            for kind, floor in zip(pairs, (_FLOOR_SHARE, _APART_FLOOR_SHARE), strict=True)
+        )
+        return Trial(reading, after, apart, self._score(after, apart))
+
+    def _poses_at(self, delay_s: float) -> Float[np.ndarray, "f 4 4"] | None:
+        known = uncorrected(self.recording).walk
+        wanted_s = self.sample.stamps_s + delay_s
+        held_s = np.clip(wanted_s, known.stamps_s[0], known.stamps_s[-1])
+        return known.at(held_s) if float((np.abs(wanted_s - held_s) > 0.05).mean()) <= 0.5 else None
+
+    def _depths_of(self, late: int) -> Float[np.ndarray, "f h w"] | None:
+        """Return the depth of frames that come so many after the sample's, None where they cannot be read."""
+        if not late:
+            return self.sample.depth_m
+        rows = np.clip(self.sample.index + late, 0, len(self.recording) - 1)
+        if len(np.unique(rows)) < 0.5 * len(rows):
+            return None
+        try:
+            depths = [small_frame(self.recording.frame(int(row)), self.sample.rig)[0] for row in rows]
+        except RecordingError:
+            return None
+        depths_m: Float[np.ndarray, "f h w"] = np.stack(depths)
+        depths_m[self.sample.index + late != rows] = 0.0  # beyond the ends nothing is known
+        return depths_m
+
+    def _measured_so(self, reading: Reading) -> tuple[Float[np.ndarray, "f h w"], Surfaces] | None:
+        depth_m = self._late(reading.depth_late)
+        if depth_m is None:
+            return None
+        if reading.turn_depth is not None:
+            depth_m = _turned(depth_m, reading.turn_depth)
+        if reading.along_ray:
+            depth_m = (depth_m / np.linalg.norm(self.sample.rig.depth.rays(), axis=2)).astype(np.float32)
+        if reading.farther_m:
+            depth_m = np.where(depth_m > 0.0, depth_m + np.float32(reading.farther_m), depth_m)
+        return depth_m, Surfaces.of(depth_m, _POINTS)
+
+    def _pairs_of(self, reading: Reading) -> tuple[Sample, Sample] | None:
+        depth, grey = self._measured(replace(reading, turn_colour=None)), self.sample.grey
+        if depth is None:
+            return None
+        grey = grey if reading.turn_colour is None else _turned(grey, reading.turn_colour)
+        sample = replace(self.sample, depth_m=depth[0], grey=grey)
+        return sample.only(sample.follows), sample.only(~sample.follows)
+
+    def _score(self, after: Agreement, apart: Agreement) -> float:
+        compared = max(int(after.points.sum() + apart.points.sum()), self._compared, 1)
+        score = float(after.same.sum() + apart.same.sum()) / compared
+        if np.isfinite(after.likeness) and after.textured > 0.05 * self._points:
+            score *= 0.5 + 0.5 * max(after.likeness, 0.0)
+        return score
+
+
+_OF_PICTURES = ("turn_colour", "turn_depth", "along_ray", "farther_m", "depth_late")
+
+
+def _turned(pictures: Float[np.ndarray, "f h w"], turn: Turn) -> Float[np.ndarray, "f h w"]:
+    """Turn pictures; a quarter is stretched to the size that they had."""
+    import cv2
+
+    mirror, quarters = turn
+    turned = np.rot90(pictures[:, :, ::-1] if mirror else pictures, quarters, axes=(1, 2))
+    size = (pictures.shape[2], pictures.shape[1])
+    return np.stack([cv2.resize(np.ascontiguousarray(p), size, interpolation=cv2.INTER_NEAREST) for p in turned])
+
+
+def _some(rows: np.ndarray) -> np.ndarray:
+    return rows[np.unique(np.linspace(0, len(rows) - 1, min(_PAIRS, len(rows))).round().astype(int))]
+
+
+def rig_of(rig: Rig, reading: Reading) -> Rig | None:
+    """Return the cameras of a reading, None where there are none or they are what is there already."""
+    if reading.focal == 1.0 and not reading.centred and not any(reading.off_centre):
+        return rig
+
+    def other(camera: Pinhole) -> Pinhole:
+        fx, fy, cx, cy = camera.fx, camera.fy, camera.cx, camera.cy
+        if reading.centred:
+            fx, fy = fx * camera.width / (2.0 * cx), fy * camera.height / (2.0 * cy)
+            cx, cy = camera.width / 2.0, camera.height / 2.0
+        cx, cy = cx - reading.off_centre[0] * camera.width, cy - reading.off_centre[1] * camera.height
+        return Pinhole(fx * reading.focal, fy * reading.focal, cx, cy, camera.width, camera.height)
+
+    try:
+        there = Rig(other(rig.rgb), other(rig.depth), rig.rgb_from_depth)
+    except (ValueError, ZeroDivisionError):
+        return None
+    return None if (there.rgb, there.depth) == (rig.rgb, rig.depth) else there
+
+
+def find_closer(trials: Trials) -> Trial | None:
+    """Return the scale, offset, delay or camera with which depths differ clearly less; None without one.
+
+    With a slow camera, points stay within the tolerance of a surface in spite of such a mistake; their differences show
+    it, and people who walk by do not change that.
+    """
+    as_it_is = trials.run(AS_IT_IS, colour=False)
+    if not LEAST_OFF < as_it_is.off < float("inf"):
+        return None
+    readings = (*_scales(), *_farther(), *_delays(trials.pace_s), *_focal(), *_off_centre())
+    tried = (trials.run(reading, colour=False) for reading in readings)
+    closer = [trial for trial in tried if _is_less_off(trial, as_it_is)]
+    if not closer:
+        return None
+    best = _refined(trials, trials.run(min(closer, key=lambda trial: trial.off).reading))
+    delay_s = best.reading.given.pose_delay_s
+    late = -round(delay_s / trials.pace_s) if delay_s and trials.pace_s > 0.0 else 0
+    if late:  # depth that is late looks like poses that are early, but for colour
+        depth = trials.run(Reading(depth_late=late))
+        alike = depth.likeness > best.likeness + _MORE_ALIKE
+        best = depth if alike and depth.off <= _AS_GOOD * best.off else best
+    return best if is_closer(best, as_it_is) else None
+
+
+def is_closer(trial: Trial, than: Trial) -> bool:
+    """Return whether depths differ by less than half with one reading, so that the other is doubted."""
+    return LEAST_OFF < than.off < float("inf") and trial.off < _LEAST_GAIN * than.off and _is_less_off(trial, than)
+
+
+def _is_less_off(trial: Trial, than: Trial) -> bool:
+    before, after = than.offs, trial.offs
+    both = np.isfinite(before) & np.isfinite(after) if len(before) == len(after) else np.zeros(0, bool)
+    if both.sum() < max(_FEWEST_PAIRS, 0.6 * np.isfinite(before).sum()):
+        return False
+    better = float((after[both] < before[both]).mean())
+    return better >= _MOST_BETTER and float(after[both].mean()) < _LEAST_STEP * float(before[both].mean())
+
+
+def find_cause(trials: Trials, enough: Callable[[Trial], bool]) -> Trial | None:
+    """Return the simplest reading with which the sample agrees, None where no one does.
+
+    Args:
+        trials: of the sample.
+        enough: whether a sample agrees.
+    """
+    single = [trials.run(reading) for reading in _single(trials)]
+    # a delay, scale or focal length between the steps that were tried may fit where none of the steps does
+    for kind in (
+        [trial for trial in single if _is_delayed(trial.reading)],
+        [trial for trial in single if trial.reading.scale != 1.0],
+        [trial for trial in single if trial.reading.focal != 1.0],
+    ):
+        single.append(_refined(trials, max(kind, key=lambda trial: trial.score)))
+    best = _best([trial for trial in single if enough(trial)])
+    if best is None or _is_delayed(best.reading):  # pictures that are late look like poses that are early
+        as_it_is = trials.run(AS_IT_IS, colour=False)
+        late = [trials.run(Reading(depth_late=late)) for late in (1, -1, 2, -2, 3, -3)]
+        best = _best([*(t for t in late if enough(t) and is_closer(t, as_it_is)), *([best] if best else [])])
+    if best is not None:
+        return _refined(trials, best)
+    posed = [
+        trials.run(Reading(Corrections(poses=kinds, camera_axes=axes))) for kinds, axes in product(_POSES, all_axes())
+    ]
+    best = _best([trial for trial in posed if enough(trial)])
+    if best is not None:
+        return best
+    # two mistakes of different kinds: what helped most of how poses are read, with each unit and camera
+    poses = [trial for trial in single if trial.reading.given and not _is_delayed(trial.reading)]
+    helped = sorted([*poses, *posed], key=lambda trial: -trial.score)[:3]
+    others = [{"scale": scale} for scale in UNITS[:8]] + [{"focal": focal} for focal in _FOCAL] + [{"centred": True}]
+    twice = [trials.run(replace(trial.reading, **other)) for trial in helped for other in others]
+    return _best([trial for trial in twice if enough(trial)])
+
+
+def _is_delayed(reading: Reading) -> bool:
+    return bool(reading.given.pose_delay_s)
+
+
+def _best(trials: list[Trial]) -> Trial | None:
+    most = max((trial.score for trial in trials), default=0.0)
+    return next((trial for trial in trials if trial.score >= most - _CLEARLY), None)
+
+
+def _single(trials: Trials) -> Iterator[Reading]:
+    """Yield every reading with one mistake, the simplest first; first of all without what was corrected."""
+    if trials.given.poses:
+        yield Reading(Corrections(poses=(PoseKind.WORLD_FROM_CAMERA,)))
+    if trials.given.camera_axes is not None:
+        yield Reading(Corrections(camera_axes="opencv"))
+    yield from (Reading(Corrections(poses=kinds)) for kinds in _POSES)
+    yield from (Reading(Corrections(camera_axes=name)) for name in NAMED if name != "opencv")
+    yield from _scales()
+    yield Reading(centred=True)
+    yield from _focal()
+    yield from _delays(trials.pace_s)
+    yield from (Reading(Corrections(camera_axes=axes)) for axes in all_axes() if axes not in NAMED.values())
+    yield Reading(along_ray=True)
+    yield from (Reading(turn_colour=turn) for turn in TURNS)
+    yield from (Reading(turn_depth=turn) for turn in TURNS)
+    yield from (Reading(turn_colour=turn, turn_depth=turn) for turn in TURNS)
+
+
+def _scales() -> Iterator[Reading]:
+    return (Reading(scale=scale) for scale in _SCALES)
+
+
+def _farther() -> Iterator[Reading]:
+    return (Reading(farther_m=by_m) for by_m in _FARTHER_M)
+
+
+def _delays(pace_s: float) -> Iterator[Reading]:
+    """Yield delays of up to a second, and beyond it of whole frames where these come seldom."""
+    whole = (sign * step * pace_s for step in range(1, _MOST_LATE + 1) for sign in (1.0, -1.0))
+    delays_s = (*_DELAYS_S, *(delay_s for delay_s in whole if 1.0 < abs(delay_s) <= _LONGEST_DELAY_S))
+    return (Reading(Corrections(pose_delay_s=round(delay_s, 3))) for delay_s in delays_s)
+
+
+def _focal() -> Iterator[Reading]:
+    return (Reading(focal=factor) for factor in _FOCAL)
+
+
+def _off_centre() -> Iterator[Reading]:
+    return (Reading(off_centre=at) for by in _OFF_CENTRE for at in ((by, 0.0), (0.0, by)))
+
+
+def _refined(trials: Trials, best: Trial) -> Trial:
+    """Return the delay, scale, camera or offset near the best at which depths differ least."""
+    reading, tried = best.reading, list[Reading]()
+    if delay_s := reading.given.pose_delay_s:
+        around_s = (round(float(s), 3) for s in delay_s + np.arange(-4, 5) / 100.0)
+        tried = [replace(reading, given=replace(reading.given, pose_delay_s=s)) for s in around_s]
+    elif reading.scale != 1.0:
+        fine = np.geomspace(0.8, 1.25, 9) * reading.scale
+        tried = [replace(reading, scale=float(scale)) for scale in (*_SCALES, *fine.tolist())]
+    elif reading.focal != 1.0:
+        tried = [replace(reading, focal=float(reading.focal * factor)) for factor in np.geomspace(0.88, 1.14, 9)]
+    elif reading.farther_m:
+        tried = [replace(reading, farther_m=reading.farther_m + by_m) for by_m in (-0.1, -0.05, 0.05, 0.1)]
+    elif any(reading.off_centre):
+        at_x, at_y = reading.off_centre
+        tried = [replace(reading, off_centre=(at_x + x, at_y + y)) for x, y in product(_BESIDE_CENTRE, repeat=2)]
+    found = [best, *(trial for trial in map(trials.run, tried) if trial.score >= best.score - _CLEARLY)]
+    least = min(found, key=lambda trial: trial.off)
+    # a usual unit rather than one beside it that fits hardly better
+    usual = [trial for trial in found if trial.reading.scale in UNITS and trial.off <= _AS_GOOD * least.off]
+    return min(usual, key=lambda trial: trial.off) if usual else least
+
+
+# What a reading says, and what undoes it.
+
+# A camera in a building looks at this much, in the middle of what it sees.
+USUAL_DEPTH_M = (0.4, 7.0)
+_CLOSE = 0.06
+# Depth cameras that are not calibrated are off by this factor; more is another unit, or positions without a scale.
+_SLIGHT = 1.2
+# What poses look like, and what a program gives in their place.
+_KINDS = {
+    PoseKind.WXYZ: ("the quaternions look written w first (wxyz)", "poses of quaternions x, y, z, w"),
+    PoseKind.CAMERA_FROM_WORLD: ("the poses look like camera_from_world", "the inverse of each pose"),
+    PoseKind.WORLD_FROM_CAMERA: ("the poses look like world_from_camera", "each pose as it is"),
+}
+_CAMERAS = {"opengl": "an OpenGL camera (y up, z back)", "ros": "a body (x forward)", "opencv": "an OpenCV camera"}
+
+
+def cause_of(reading: Reading, recording: Recording, median_m: float, gain: str = "") -> str:
+    """Return what a recording looks like and what to do about it.
+
+    Args:
+        reading: with which it agrees.
+        recording: as it is read.
+        median_m: middle of its depths, as they are read.
+        gain: how much better the recording agrees, in parentheses, or nothing.
+    """
+    told = list(_told(reading, recording.rig, median_m))
+    looks, todo = " and ".join(look for look, _ in told), [by_hand for _, by_hand in told if by_hand]
+    if options := _options(reading, recording, median_m):
+        if is_of_program(recording):
+            todo.insert(0, f"give frames with {' and '.join(_in_arrays(options, reading.scale))}")
+        else:
+            todo.insert(0, f"build again with {options.words()}")
+    return f"{looks[:1].upper()}{looks[1:]}{' ' * bool(gain)}{gain}: {', '.join(todo)}."
+
+
+def _told(reading: Reading, rig: Rig, median_m: float) -> Iterator[tuple[str, str]]:
+    """Yield what a recording looks like, and what is to be done where no option does it."""
+    given, camera = reading.given, rig.depth
+    yield from ((_KINDS[kind][0], "") for kind in given.poses)
+    if (axes := given.camera_axes) is not None:
+        other = f"a camera with the axes {axes} (turned pictures, or another convention)"
+        yield f"the poses look like those of {_CAMERAS.get(axes, other)}", ""
+    if delay_s := given.pose_delay_s:
+        yield f"the poses look {abs(delay_s):.2g} s {_late(delay_s)}", ""
+    if reading.scale != 1.0:
+        yield _scaled(reading.scale, median_m)
+    if reading.centred:
+        size = f"{2 * camera.cx:.0f}x{2 * camera.cy:.0f}"
+        yield f"the intrinsics look like those of a {size} picture, not {camera.width}x{camera.height}", ""
+    if reading.focal != 1.0:
+        yield f"the focal length looks like {reading.focal:.2f} of what is given", ""
+    if any(reading.off_centre):
+        parts = zip(reading.off_centre, (rig.rgb.width, rig.rgb.height), "xy", strict=True)
+        by = " and ".join(f"{share * size:+.0f} pixels in {axis}" for share, size, axis in parts if share)
+        yield f"the principal point looks {by} off, or the camera turned by as many in its mount", ""
+    yield from _told_of_pictures(reading)
+
+
+def _told_of_pictures(reading: Reading) -> Iterator[tuple[str, str]]:
+    if farther_m := reading.farther_m:
+        large = "large" if farther_m < 0.0 else "small"
+        by_hand = f"write the depth from the camera's centre ({farther_m:+.2g} m)"
+        yield f"the depth looks {abs(farther_m):.2g} m too {large} everywhere", by_hand
+    if late := reading.depth_late:
+        by_hand = f"pair each frame with the depth picture {abs(late)} {'later' if late > 0 else 'earlier'}"
+        yield f"the depth pictures look {abs(late)} frame(s) {_late(late)}", by_hand
+    if reading.along_ray:
+        by_hand = "write the depth along the camera's axis (z)"
+        yield "the depth looks like the distance along the ray, not along the camera's axis", by_hand
+    colour, depth = reading.turn_colour, reading.turn_depth
+    if colour is not None and colour == depth:
+        yield f"the pictures look {TURNS[colour]}", "turn the pictures as the poses have them"
+        return
+    for what, turn, as_is in (("colour", colour, "depth"), ("depth", depth, "colour")):
+        if turn is not None:
+            yield f"the {what} pictures look {TURNS[turn]}", f"turn the {what} pictures as the {as_is} is"
+
+
+def _late(by: float) -> str:
+    return "late" if by > 0 else "early"
+
+
+def _scaled(scale: float, median_m: float) -> tuple[str, str]:
+    times, by_hand = f"{max(scale, 1.0 / scale):.3g} times too", f"multiply the positions by {1.0 / scale:.3g}"
+    small, large = ("small", "large") if scale > 1.0 else ("large", "small")
+    if _is_positions(scale, median_m):
+        return f"the positions look {times} {large} (poses of one camera alone have no scale)", by_hand
+    if _is_unit(scale) and _usual(scale * median_m) and not _usual(median_m):
+        return f"the depth looks {times} {small}", ""
+    return f"the depth looks {times} {small}, or the positions {times} {large}", f"or {by_hand}"
+
+
+def _usual(median_m: float) -> bool:
+    return USUAL_DEPTH_M[0] <= median_m <= USUAL_DEPTH_M[1]
+
+
+def _is_unit(scale: float) -> bool:
+    return any(abs(scale / unit - 1.0) < _CLOSE for unit in UNITS)
+
+
+def _is_positions(scale: float, median_m: float) -> bool:
+    unusual = _usual(median_m) and not _usual(scale * median_m)
+    return unusual or (not _is_unit(scale) and max(scale, 1.0 / scale) > _SLIGHT)
+
+
+def _options(reading: Reading, recording: Recording, median_m: float) -> Corrections:
+    rig, given = recording.rig, reading.given
+    cameras: tuple[GivenCamera, ...] = ()
+    if reading.centred and rig.registered:
+        size = (round(2 * rig.rgb.cx), round(2 * rig.rgb.cy))
+        cameras = (GivenCamera(rig.rgb.fx, rig.rgb.fy, rig.rgb.cx, rig.rgb.cy, size),)
+    elif (other := rig_of(rig, reading) or rig) is not rig:
+        both = (other.rgb,) if rig.registered else (other.rgb, other.depth)
+        cameras = tuple(GivenCamera(camera.fx, camera.fy, camera.cx, camera.cy) for camera in both)
+    of_depth = reading.scale != 1.0 and not _is_positions(reading.scale, median_m)
+    axes = next((name for name, letters in NAMED.items() if letters == given.camera_axes), given.camera_axes)
+    unit_m = recording.stored_depth_unit_m * reading.scale if of_depth else None
+    return replace(given, depth_unit_m=unit_m, intrinsics=cameras, camera_axes=axes)
+
+
+def _in_arrays(options: Corrections, scale: float) -> list[str]:
+    said = [_KINDS[kind][1] for kind in options.poses]
+    if options.depth_unit_m is not None:
+        said.append(f"depth_m times {scale:.3g}")
+    if options.intrinsics:
+        words = Corrections(intrinsics=options.intrinsics).words(lambda _, value: value)
+        said.append(f"a camera of fx, fy, cx, cy {words}")
+    if options.camera_axes is not None:
+        turn = opencv_from_axes(options.camera_axes).T.astype(int).tolist()
+        said.append(f"poses of OpenCV's axes, world_from_camera[:3, :3] @ {turn}")
+    if options.pose_delay_s:
+        when = "later" if options.pose_delay_s > 0.0 else "earlier"
+        said.append(f"the pose of {abs(options.pose_delay_s):.2g} s {when}")
+    return said
