@@ -41,6 +41,7 @@ _RATES_HZ = (8_000, 11_025, 16_000, 22_050, 24_000, 32_000, 44_100, 48_000, 96_0
 # How far a ratio of lengths may be off one of rates; lengths within a fifth say nothing of it.
 _AS_LONG, _LIKE_ONE, _SHORTEST_DRIVE_S = 0.02, 0.8, 1.0
 _CENTRE_MARGIN, _FOCAL_RANGE, _MOST_ASPECT, _AS_IF_EXCHANGED = 0.2, (0.25, 4.0), 1.15, 0.04
+_WORTH_A_TRIAL = 0.75  # of the least differences that another reading explains: those of all points are smaller
 _STANDS = 0.01  # steps between poses that are one
 
 
@@ -375,7 +376,12 @@ def _drift(evidence: Evidence) -> Iterator[Said]:
 
 def _closer(evidence: Evidence) -> Iterator[Said]:
     offs = np.concatenate([evidence.after.off, evidence.apart.off])
-    if not evidence.judged or evidence.contradicts or evidence.drifts or not np.nanmean(offs) > LEAST_OFF:
+    if (
+        not evidence.judged
+        or evidence.contradicts
+        or evidence.drifts
+        or not np.nanmean(offs) > _WORTH_A_TRIAL * LEAST_OFF
+    ):
         return
     if (best := find_closer(evidence.trials)) is not None:
         yield Said(

@@ -293,12 +293,10 @@ def find_cause(trials: Trials, enough: Callable[[Trial], bool]) -> Trial | None:
     """
     single = [trials.run(reading) for reading in _single(trials)]
     # a delay, scale or focal length between the steps that were tried may fit where none of the steps does
-    for kind in (
-        [trial for trial in single if _is_delayed(trial.reading)],
-        [trial for trial in single if trial.reading.scale != 1.0],
-        [trial for trial in single if trial.reading.focal != 1.0],
-    ):
-        single.append(_refined(trials, max(kind, key=lambda trial: trial.score)))
+    delayed = [trial for trial in single if _is_delayed(trial.reading)]
+    scaled = [trial for trial in single if trial.reading.scale != 1.0]
+    focal = [trial for trial in single if trial.reading.focal != 1.0]
+    single += [_refined(trials, max(kind, key=lambda trial: trial.score)) for kind in (delayed, scaled, focal)]
     best = _best([trial for trial in single if enough(trial)])
     if best is None or _is_delayed(best.reading):  # pictures that are late look like poses that are early
         as_it_is = trials.run(AS_IT_IS, colour=False)
