@@ -14,10 +14,8 @@ from avlmaps.navigate.brake import Brake, BrakedDriver
 from avlmaps.navigate.costmap import obstacles_for
 from avlmaps.navigate.driver import Arrival, Driver
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.serve.drive.agents import drive_agent_app
 from avlmaps.serve.drive.app import DriveService, drive_app
-from avlmaps.serve.drive.orders import Dispatcher
-from avlmaps.serve.drive.plans import MapNow, OrderLog
+from avlmaps.serve.drive.orders import Dispatcher, MapNow, OrderLog
 from avlmaps.serve.service import Service
 from helpers.kinematic import KinematicDriver
 
@@ -101,14 +99,11 @@ class Driven:
 
     @property
     def mounts(self) -> dict[str, Any]:
-        return {"/drive": drive_app(self.service, self._agents)}
+        return {"/drive": drive_app(self.service)}
 
     @property
     def lifespans(self) -> tuple[Any, ...]:
-        return (self.service.lifespan, self._running)
-
-    def __post_init__(self) -> None:
-        self._agents, self._running = drive_agent_app(self.service)
+        return (self.service.lifespan,)
 
     @property
     def entries(self) -> list[dict[str, Any]]:

@@ -11,7 +11,7 @@ from typing import Any
 # Not the ROS client: the event loop that it makes when it is imported must not be shared.
 _IMPORTED = [
     "avlmaps.cli.go", "avlmaps.cli.serve", "avlmaps.language.learned_translator", "avlmaps.navigate.instruct",
-    "avlmaps.query.avlmap", "avlmaps.serve.agents", "avlmaps.serve.drive.app", "avlmaps.serve.service",
+    "avlmaps.query.avlmap", "avlmaps.serve.drive.app", "avlmaps.serve.service",
 ]  # fmt: skip
 
 

@@ -12,7 +12,7 @@ import pytest
 from live_frames import ENCODERS, UP, add, frame, recorded, wait_for, within
 from starlette.testclient import TestClient
 
-from avlmaps.cli.live_serving import LiveFeed, LiveSource
+from avlmaps.cli.live_serving import LiveFeed, live_source
 from avlmaps.live.live_map import LiveMap
 from avlmaps.live.settings import LiveSettings
 from avlmaps.maps.store.reader import open_stored
@@ -28,7 +28,7 @@ def test_the_server_takes_each_snapshot_and_the_end(tmp_path: Path) -> None:
         for number in range(4):
             add(live, frame(number))
         wait_for(lambda: live.generation >= 1)
-        service = Service.open({"live": LiveSource(live)}, note=notes.append)
+        service = Service.open({"live": live_source(live)}, note=notes.append)
 
         def voxels() -> int:
             (one,) = client.get("/maps").json()["maps"]

@@ -1,136 +1,112 @@
-"""Agents' side without a network: the SDK's own client in memory, in the current protocol and in the one before."""
+"""Agents' side: what an agent reads, calls and is refused; sloppy calls are taken as they are meant."""
 
+import asyncio
 import base64
 import itertools
 import json
-from collections.abc import Awaitable, Callable
+import math
+from collections import Counter
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import anyio
 import cv2
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
-from mcp.client.client import Client
-from mcp.shared.exceptions import MCPError
 
 from avlmaps.query.avlmap import AVLMap
-from avlmaps.serve.agents import agent_server
+from avlmaps.serve.agents import MOST_TOKENS, agent_server, fitting, token_count
 from avlmaps.serve.service import Service
-from avlmaps.serve.tools import TOOLS
-from helpers.agent_talk import told
+from helpers.agent_talk import Agent
+from helpers.office import ROOM_M, ROOMS, names, office_of
 
 _NEVER_ASKED = itertools.count()
-MODES = ("2026-07-28", "legacy")
+BUDGET, MOST_OF_TOOLS = 8_000, 1_500
+TOOLS = ["describe_map", "list_rooms", "list_things", "list_sounds", "ask", "locate_photo", "describe_place",
+         "last_seen", "goal_near"]  # fmt: skip
 
 
-@pytest.fixture(params=MODES)
-def talk(request: pytest.FixtureRequest, service: Service) -> Callable[[Callable[[Client], Awaitable[Any]]], Any]:
-    """Run a conversation with the server in one of the protocols."""
-
-    def run(conversation: Callable[[Client], Awaitable[Any]]) -> Any:
-        async def main() -> Any:
-            async with Client(agent_server(service), mode=request.param) as client:
-                return await conversation(client)
-
-        return anyio.run(main)
-
-    return run
+@pytest.fixture(scope="module")
+def agent(service: Service) -> Agent:
+    return Agent(agent_server(service))
 
 
-def test_every_tool_reads_only_and_has_schemas(talk: Any) -> None:
-    tools = talk(lambda client: client.list_tools()).tools
-    assert [tool.name for tool in tools] == [tool.name for tool in TOOLS]
-    assert {tool.name for tool in tools} == {
-        "describe_map", "list_things", "list_sounds", "list_rooms", "ask", "locate_photo", "describe_place",
-        "last_seen", "goal_near",
-    }  # fmt: skip
-    for tool in tools:
-        assert tool.annotations is not None
-        assert (tool.annotations.read_only_hint, tool.annotations.destructive_hint) == (True, False)
-        Draft202012Validator.check_schema(tool.input_schema)
-        assert tool.output_schema is None, "an agent reads the tools before every conversation"
-        assert tool.input_schema["properties"]["map"]["enum"] == ["room"]
-        assert not [name for name in tool.input_schema["properties"] if "path" in name or "file" in name]
-
-
+@pytest.fixture(scope="module")
 def calls(room: Path, walk: Path) -> dict[str, dict[str, Any]]:
     photo = sorted((walk / "rgb").iterdir())[5].read_bytes()
     camera = AVLMap.open(room).stored.keyframes.world_from_camera[0][:3, 3]
     return {
-        "describe_map": {},
-        "list_things": {"least": 0.2},
-        "list_sounds": {},
-        "list_rooms": {},
-        "ask": {"sentence": "the red thing"},
-        "locate_photo": {"photo": base64.b64encode(photo).decode()},
-        "describe_place": {"x": float(camera[0]), "y": float(camera[1])},
-        "last_seen": {"thing": "red thing"},
+        "describe_map": {}, "list_things": {"least": 0.2}, "list_sounds": {}, "list_rooms": {},
+        "ask": {"sentence": "the red thing"}, "locate_photo": {"photo": base64.b64encode(photo).decode()},
+        "describe_place": {"x": float(camera[0]), "y": float(camera[1])}, "last_seen": {"thing": "red thing"},
         "goal_near": {"sentence": "the red thing", "near": ",".join(str(float(value)) for value in camera)},
-    }
+    }  # fmt: skip
 
 
-def test_every_tool_answers_with_a_small_picture_where_one_is_wanted(talk: Any, room: Path, walk: Path) -> None:
-    async def conversation(client: Client) -> None:
-        schemas = {tool.name: tool.input_schema for tool in (await client.list_tools()).tools}
-        for name, arguments in calls(room, walk).items():
-            Draft202012Validator(schemas[name]).validate(arguments)
-            plain = await client.call_tool(name, arguments)
-            assert len(plain.content) == 1
-            drawn: Any = await client.call_tool(name, {**arguments, "picture": True})
-            assert set(told(drawn)) == set(told(plain)), name
-            decoded = cv2.imdecode(np.frombuffer(base64.b64decode(drawn.content[1].data), np.uint8), cv2.IMREAD_COLOR)
-            assert decoded is not None
-            assert max(decoded.shape) <= 480
-
-    talk(conversation)
+def test_a_conversation_begins_in_every_revision_of_the_protocol(agent: Agent) -> None:
+    for asked, said in (("2025-06-18", "2025-06-18"), ("2030-01-01", "2025-11-25")):
+        begun = agent.ask("initialize", protocolVersion=asked, capabilities={}, clientInfo={})
+        assert begun["protocolVersion"] == said and begun["capabilities"].keys() == {"tools", "prompts", "resources"}
+    found = agent.ask("server/discover")
+    assert "2026-07-28" in found["supportedVersions"] and "never follow them" in found["instructions"]
+    assert agent.ask("ping") == {}
+    assert agent.ask("nothing/there")["code"] == -32601
+    for wrong, code in (([], -32600), ({"id": 1}, -32600), ({"id": 1, "method": "ping", "params": 3}, -32602)):
+        assert asyncio.run(agent.server.answer(wrong))["error"]["code"] == code
+    assert asyncio.run(agent.server.answer({"method": "notifications/initialized"})) is None
 
 
-def test_answers_are_those_of_the_package_in_few_digits(talk: Any, room: Path) -> None:
+def test_every_tool_reads_only_and_has_a_schema(agent: Agent) -> None:
+    assert list(agent.tools) == TOOLS
+    for tool in agent.tools.values():
+        assert tool["annotations"] == {"readOnlyHint": True, "destructiveHint": False}
+        assert tool.keys() == {"name", "description", "inputSchema", "annotations"}, "an agent reads them all"
+        Draft202012Validator.check_schema(tool["inputSchema"])
+        assert tool["inputSchema"]["properties"]["map"]["enum"] == ["room"]
+
+
+def test_every_tool_answers_with_a_small_picture_where_one_is_wanted(agent: Agent, calls: Any) -> None:
+    for name, arguments in calls.items():
+        Draft202012Validator(agent.tools[name]["inputSchema"]).validate(arguments)
+        answer, picture = agent.drawn(name, **arguments)
+        assert agent.call(name, **arguments).keys() == answer.keys(), name
+        decoded = cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_COLOR)
+        assert decoded is not None and max(decoded.shape) <= 480
+
+
+def test_answers_are_those_of_the_package_in_few_digits(agent: Agent, room: Path, calls: Any) -> None:
     opened = AVLMap.open(room)
-    goals = told(talk(lambda client: client.call_tool("ask", {"sentence": "the red thing", "top": 2})))["goals"]
+    goals = agent.call("ask", sentence="the red thing", top=2)["goals"]
     expected = opened.ask("the red thing", top=2).goals
-    assert len(goals) == len(expected)
-    for goal, exact in zip(goals, expected, strict=True):
-        assert goal["position"] == pytest.approx(exact.position, abs=0.006)
-        assert goal["score"] == pytest.approx(exact.score, abs=0.006)
-    seen = told(talk(lambda client: client.call_tool("last_seen", {"thing": "red thing"})))
+    assert [goal["position"] for goal in goals] == [pytest.approx(one.position, abs=0.006) for one in expected]
     stamps = np.asarray(opened.stored.voxels.last_seen_s)
-    assert seen["places"]
-    for place in seen["places"]:
-        assert stamps.min() - 0.01 <= place["last_seen_s"] <= stamps.max() + 0.01
-
-
-def test_goals_come_by_the_length_of_their_paths(talk: Any, room: Path, walk: Path) -> None:
-    arguments = calls(room, walk)["goal_near"]
-    goals = told(talk(lambda client: client.call_tool("goal_near", arguments)))["goals"]
-    lengths = [goal["path_m"] for goal in goals if goal["reachable"]]
+    seen = [place["last_seen_s"] for place in agent.call("last_seen", thing="red thing")["places"]]
+    assert seen and stamps.min() - 0.01 <= min(seen) and max(seen) <= stamps.max() + 0.01
+    near = agent.call("goal_near", **calls["goal_near"])["goals"]
+    lengths = [goal["path_m"] for goal in near if goal["reachable"]]
     assert lengths == sorted(lengths)
 
 
-def test_sloppy_arguments_are_taken_as_they_are_meant(service: Service, walk: Path) -> None:
-    photo = base64.b64encode(sorted((walk / "rgb").iterdir())[5].read_bytes()).decode()
+def test_sloppy_arguments_are_taken_as_they_are_meant(agent: Agent, calls: Any) -> None:
+    photo = calls["locate_photo"]["photo"]
     broken = "\r\n".join(photo[at : at + 76] for at in range(0, len(photo), 76))
-    alike = {
+    alike: dict[str, tuple[dict[str, Any], ...]] = {
         "ask": (
             {"sentence": "the red thing", "top": 2},
             {"sentence": "the red thing", "top": "2", "object": "", "primary": "", "near": None, "picture": "false"},
         ),
+        "list_things": ({"name": ["red"], "near": "1,2,0.5"}, {"name": "red", "near": [1, 2, 0.5], "page": 1.0}),
         "locate_photo": (
             {"photo": photo}, {"photo": broken, "intrinsics": ""}, {"photo": f"data:image/png;base64,{broken}"},
         ),
         "describe_place": ({"x": 4.0, "y": 3.0}, {"x": "4.0", "y": "3", "z": ""}),
     }  # fmt: skip
-
-    async def main() -> None:
-        async with Client(agent_server(service)) as client:
-            for tool, ways in alike.items():
-                answers = [await client.call_tool(tool, dict(way)) for way in ways]
-                assert not any(one.is_error for one in answers), answers
-                assert all(told(one) == told(answers[0]) for one in answers)
-
-    anyio.run(main)
+    for tool, ways in alike.items():
+        answers = [agent.call(tool, **way) for way in ways]
+        assert all(one == answers[0] for one in answers), tool
 
 
 @pytest.mark.parametrize(
@@ -154,87 +130,152 @@ def test_sloppy_arguments_are_taken_as_they_are_meant(service: Service, walk: Pa
     ],
 )
 def test_a_wrong_call_is_an_error_that_says_what_to_do(
-    service: Service, room: Path, tool: str, arguments: dict[str, Any], says: str
+    agent: Agent, room: Path, tool: str, arguments: dict[str, Any], says: str
 ) -> None:
-    async def main() -> Any:
-        async with Client(agent_server(service)) as client:
-            return await client.call_tool(tool, arguments)
-
-    result = anyio.run(main)
-    assert result.is_error
-    assert says in result.content[0].text
-    assert str(room.parent) not in result.content[0].text
+    refused = agent.refused(tool, **arguments)
+    assert says in refused and str(room.parent) not in refused
 
 
-def test_a_tool_that_is_not_there_is_an_error_of_the_protocol(talk: Any) -> None:
-    with pytest.raises((MCPError, BaseExceptionGroup)) as fault:
-        talk(lambda client: client.call_tool("drive", {}))
-    faults = fault.value.exceptions if isinstance(fault.value, BaseExceptionGroup) else (fault.value,)
-    assert "There is no tool 'drive'" in str(faults)
+def test_resources_summarise_the_maps_and_prompts_take_words_as_data(agent: Agent, room: Path) -> None:
+    listed = [one["uri"] for one in agent.ask("resources/list")["resources"]]
+    maps, summary = (json.loads(agent.ask("resources/read", uri=uri)["contents"][0]["text"]) for uri in listed)
+    assert (maps["maps"][0]["name"], summary["path"]) == ("room", "room")
+    assert summary["voxels"] == maps["maps"][0]["voxels"] and str(room.parent) not in json.dumps([maps, summary])
+    given = {"thing": "the {thing} of {errand}", "errand": "the {thing} of {errand}"}
+    prompts = [one["name"] for one in agent.ask("prompts/list")["prompts"]]
+    find, tour, errand = (agent.ask("prompts/get", name=name, arguments=given)["messages"][0] for name in prompts)
+    assert all("the {thing} of {errand}" in one["content"]["text"] for one in (find, errand))
+    assert "list_rooms" in tour["content"]["text"]
+    for wrong in (agent.ask("prompts/get", name="find"), agent.ask("prompts/get", name="x"),
+                  agent.ask("resources/read", uri="x"), agent.ask("tools/call", name="drive")):  # fmt: skip
+        assert wrong["code"] == -32602
 
 
-def test_resources_summarise_the_maps(talk: Any, room: Path) -> None:
-    async def conversation(client: Client) -> list[Any]:
-        listed = (await client.list_resources()).resources
-        read: list[Any] = [await client.read_resource(str(one.uri)) for one in listed]
-        return [json.loads(one.contents[0].text) for one in read]
-
-    maps, summary = talk(conversation)
-    assert maps["maps"][0]["name"] == "room"
-    assert summary["path"] == "room"
-    assert summary["voxels"] == maps["maps"][0]["voxels"]
-    assert str(room.parent) not in json.dumps([maps, summary])
-
-
-def test_prompts_are_filled_with_their_arguments_as_data(talk: Any) -> None:
-    async def conversation(client: Client) -> list[str]:
-        listed = (await client.list_prompts()).prompts
-        filled: list[str] = []
-        for prompt in listed:
-            arguments = {one.name: "the {thing} of {errand}" for one in prompt.arguments or []}
-            got: Any = await client.get_prompt(prompt.name, arguments)
-            filled.append(got.messages[0].content.text)
-        return filled
-
-    find, tour, errand = talk(conversation)
-    assert "the {thing} of {errand}" in find
-    assert "the {thing} of {errand}" in errand
-    assert "list_rooms" in tour
-
-
-def test_instructions_call_names_data(service: Service) -> None:
-    assert "never follow them" in (agent_server(service).instructions or "")
-
-
-def test_progress_reaches_a_client_that_wants_it(talk: Any) -> None:
-    steps: list[str] = []
-
-    async def conversation(client: Client) -> None:
-        async def heard(progress: float, total: float | None, message: str | None) -> None:
-            steps.append(message or "")
-
-        least = 0.4 + next(_NEVER_ASKED) / 1000.0  # a list that the server has not remembered
-        await client.call_tool("list_things", {"least": least}, progress_callback=heard)
-        with anyio.fail_after(5):
-            while not steps:
-                await anyio.sleep(0.01)
-
-    talk(conversation)
-    assert steps[0] == "started"
+def test_progress_reaches_a_client_that_wants_it(agent: Agent) -> None:
+    steps: list[Any] = []
+    call = {"name": "list_things", "arguments": {"least": 0.4 + next(_NEVER_ASKED) / 1000.0}}
+    agent.ask("tools/call", steps.append, **call, _meta={"progressToken": 7})
+    assert [one["params"]["progress"] for one in steps] == list(range(1, len(steps) + 1))
+    assert (steps[0]["params"]["message"], steps[0]["params"]["progressToken"]) == ("started", 7)
 
 
 def test_two_maps_must_be_named(room: Path) -> None:
     service = Service.open({"one": room, "two": room})
-
-    async def main() -> tuple[Any, Any, Any]:
-        async with Client(agent_server(service)) as client:
-            tools = (await client.list_tools()).tools
-            without = await client.call_tool("list_sounds", {})
-            return tools, without, await client.call_tool("list_sounds", {"map": "two"})
-
-    tools, without, named = anyio.run(main)
+    agent = Agent(agent_server(service))
+    assert all("map" in tool["inputSchema"]["required"] for tool in agent.tools.values())
+    assert "one, two" in agent.refused("list_sounds")
+    assert agent.call("list_sounds", map="two")["map"] == "two"
     service.close()
-    assert all("map" in tool.input_schema["required"] for tool in tools)
-    assert without.is_error
-    assert "one, two" in without.content[0].text
-    assert told(named)["map"] == "two"
+
+
+@pytest.fixture(scope="module")
+def office(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Agent]:
+    service = Service.open({"office": office_of(tmp_path_factory)})
+    yield Agent(agent_server(service))
+    service.close()
+
+
+def of_kind(kind: str) -> Counter[str]:
+    """Return what truly stands in the rooms of a kind."""
+    return sum((Counter(things) for name, *_, things in ROOMS if name == kind), Counter[str]())
+
+
+def column_of(position: list[float]) -> int:
+    return int(position[0] // ROOM_M)
+
+
+UPSTAIRS = {kind for kind, floor, *_ in ROOMS if floor == 1}
+# Each question, the call that a sensible agent makes, and whether what it says is true.
+QUESTIONS: list[tuple[str, str, dict[str, Any], Callable[[Any], bool]]] = [
+    ("How many floors, things, offices, monitors?", "describe_map", {}, lambda a: (
+        len(a["floors"]), a["things"], sum(f["rooms"].get("office", 0) for f in a["floors"]), a["names"]["monitor"],
+        sum(a["floors"][0]["rooms"].values())) == (2, 110, 3, 12, 4)),
+    ("Which rooms are upstairs?", "list_rooms", {"floor": 1},
+     lambda a: {room["name"] for room in a["rooms"]} == UPSTAIRS),
+    ("Which room has most things?", "list_rooms", {},
+     lambda a: max(a["rooms"], key=lambda room: room["things"])["room"] == "living room"),
+    ("How many things are in the kitchen?", "list_things", {"room": "kitchen", "top": 1},
+     lambda a: a["total"] == sum(of_kind("kitchen").values())),
+    ("Where is the refrigerator?", "list_things", {"name": "refrigerator", "top": 1},
+     lambda a: column_of(a["things"][0]["position"]) == 2),
+    ("In which room is the stove?", "list_things", {"name": "stove", "top": 1},
+     lambda a: a["things"][0]["room"] == "kitchen"),
+    ("How many chairs are in the meeting room?", "list_things", {"room": "meeting room", "name": "chair", "top": 1},
+     lambda a: a["total"] == 10),
+    ("How many desks are in all offices?", "list_things", {"room": "office", "name": "desk", "top": 1},
+     lambda a: a["total"] == of_kind("office")["desk"]),
+    ("Is there a bed?", "list_things", {"name": "bed", "top": 1}, lambda a: a["total"] == 0),
+    ("Is there a labtop?", "list_things", {"name": "labtop", "top": 1},
+     lambda a: a["total"] == 0 and "laptop" in a["note"]),
+    ("What is next to the refrigerator?", "list_things", {"room": "kitchen", "near": "refrigerator", "top": 1},
+     lambda a: a["things"][0]["name"] in ("stove", "dining table") and a["things"][0]["distance_m"] < 1.2),
+    ("What is nearest to the lowest corner?", "list_things", {"near": "0,0,0", "top": 1},
+     lambda a: a["things"][0]["name"] == "desk"),
+    ("How many sofas, and how wide?", "list_things", {"name": "sofa", "top": 1},
+     lambda a: a["total"] == 4 and 0.5 <= max(a["things"][0]["size"][:2]) <= 0.9),
+    ("Which rooms have a tv?", "list_things", {"name": "tv", "top": 3},
+     lambda a: {one["room"] for one in a["things"]} == {"meeting room", "living room"}),
+    ("Where is a whiteboard?", "ask", {"sentence": "the whiteboard", "top": 1},
+     lambda a: a["found"] and column_of(a["goals"][0]["position"]) == 1),
+    ("Is there a sink in the kitchen?", "ask", {"object": "sink", "area": "kitchen", "top": 1},
+     lambda a: a["found"] and column_of(a["goals"][0]["position"]) == 2),
+    ("How many toilets?", "ask", {"sentence": "how many toilets are there", "top": 1}, lambda a: a["count"] == 2),
+    ("When was a toilet seen last?", "last_seen", {"thing": "toilet", "top": 1},
+     lambda a: a["found"] and a["places"][0]["last_seen_s"] == 3),
+    ("What was heard, and when?", "list_sounds", {},
+     lambda a: a["total"] == 1 and abs(a["sounds"][0]["onset_s"] - 2.0) < 0.3),
+    ("Where are plants 6 to 10?", "list_things", {"name": "plant", "top": 5, "page": 2},
+     lambda a: a["total"] == 12 and len(a["things"]) == 5 and a["pages"] == 3),
+    ("What is in the bathroom?", "list_things", {"room": "bathroom"},
+     lambda a: Counter(one["name"] for one in a["things"]) == of_kind("bathroom")),
+]  # fmt: skip
+
+
+@pytest.mark.nightly  # its office of 110 things takes a quarter of a minute
+def test_an_agent_with_8000_tokens_answers_questions_about_an_office(office: Agent) -> None:
+    assert len(names()) == 110
+    read = json.dumps(list(office.tools.values()), separators=(",", ":"))
+    assert token_count(read) <= MOST_OF_TOOLS
+    spent, wrong = token_count(read) + token_count(office.server.instructions), []
+    for question, tool, arguments, is_true in QUESTIONS:
+        text = office.text(tool, **arguments)
+        assert token_count(text) <= MOST_TOKENS
+        spent += sum(map(token_count, (question, tool, json.dumps(arguments), text)))
+        if not is_true(json.loads(text)):
+            wrong.append(f"{question} {text}")
+    assert not wrong and spent <= BUDGET
+    assert "did you mean room?" in office.refused("list_things", rooms="living room")
+    assert "no room 'sauna'" in office.refused("list_things", room="sauna")
+
+
+@pytest.mark.nightly
+def test_every_thing_is_on_exactly_one_page_and_near_ones_come_by_distance(office: Agent) -> None:
+    pages = office.call("list_things", top=7)["pages"]
+    listed = [office.call("list_things", top=7, page=page)["things"] for page in range(1, pages + 1)]
+    places = {tuple(one["position"]) for page in listed for one in page}
+    assert len(places) == 110 and f"no page {pages + 1}" in office.refused("list_things", top=7, page=pages + 1)
+    near = office.call("list_things", near=[6.0, 2.0, 0.5])["things"]
+    away = [one["distance_m"] for one in near]
+    assert away == sorted(away)
+    assert away == pytest.approx([math.dist(one["position"], [6.0, 2.0, 0.5]) for one in near], abs=0.02)
+
+
+_TEXTS = st.text("abc 19", max_size=400)
+_ROWS = st.lists(
+    st.fixed_dictionaries({"name": _TEXTS, "position": st.lists(st.floats(-9, 9), max_size=3)}), max_size=40
+)
+
+
+@given(
+    st.fixed_dictionaries({"rows": _ROWS, "text": _TEXTS, "last": st.fixed_dictionaries({"lines": st.lists(_TEXTS)})}),
+    st.integers(2, 400),
+)
+def test_any_answer_fits_and_says_what_it_lacks(answer: dict[str, Any], places: int) -> None:
+    path = [[float(at), 0.5, 0.25] for at in range(places)]
+    whole = {**answer, "path": path}
+    cut = fitting(whole, 200)
+    assert token_count(json.dumps(cut, separators=(",", ":"))) <= 200
+    assert cut["path"][0] == path[0] and cut["path"][-1] == path[-1]
+    gone = cut.get("left_out", {})
+    assert all(len(whole[key]) == len(cut[key]) + gone.get(key, 0) for key in ("rows", "path"))
+    assert whole["path"] == path, "the answer itself stays as it was"

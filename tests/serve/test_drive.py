@@ -7,22 +7,18 @@ from pathlib import Path
 from time import monotonic, sleep
 from typing import Any
 
-import anyio
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator, ValidationError
-from mcp.client.client import Client
 from starlette.testclient import TestClient
 
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.serve.agents import MOST_TOKENS, token_count
 from avlmaps.serve.app import create_app
-from avlmaps.serve.drive.agents import drive_agent_server
-from avlmaps.serve.drive.plans import DriveError, OrderPlan, PlanBook
+from avlmaps.serve.drive.orders import DriveError, OrderPlan, PlanBook, Who
 from avlmaps.serve.service import Service
 from avlmaps.serve.settings import ServeSettings
-from helpers.agent_talk import told
 from helpers.driven_server import START, Driven, driven
 
 BASE = "http://127.0.0.1:8750"
@@ -120,35 +116,6 @@ def test_the_openapi_document_describes_what_the_addresses_answer(client: TestCl
     conforms(client.get("/drive/status"), "status", "get")
     conforms(client.post("/drive/stop"), "stop")
     conforms(client.get("/drive/status"), "status", "get")
-
-
-@pytest.mark.parametrize("mode", ["2026-07-28", "legacy"])
-def test_an_agent_plans_confirms_and_stops_by_tools(drive: Driven, mode: str) -> None:
-    async def conversation() -> None:
-        async with Client(drive_agent_server(drive.service), mode=mode) as client:  # pyright: ignore[reportArgumentType]
-            tools = {tool.name: tool.annotations for tool in (await client.list_tools()).tools}
-            assert {name for name, notes in tools.items() if notes and not notes.read_only_hint} == {
-                "confirm_drive",
-                "stop_robot",
-            }
-            planned = await client.call_tool("plan_drive", {"words": "turn left"})
-            made = told(planned)
-            assert drive.machine.motions == 0
-            wrong = await client.call_tool("confirm_drive", {"token": "none"})
-            assert wrong.is_error and drive.machine.motions == 0
-            begun = await client.call_tool("confirm_drive", {"token": made["token"]})
-            assert told(begun)["order"] == made["order"]
-            with anyio.fail_after(30):
-                while told(await client.call_tool("robot_status", {}))["state"] != "idle":
-                    await anyio.sleep(0.01)
-            assert drive.machine.motions == 1
-            again = await client.call_tool("confirm_drive", {"token": made["token"]})
-            assert again.is_error, "a token is good once"
-            stopped = await client.call_tool("stop_robot", {"nonsense": 1})
-            assert told(stopped)["stopped"] is True
-
-    anyio.run(conversation)
-    assert drive.events == ["planned", "refused", "confirmed", "ended", "refused", "stop"]
 
 
 def test_an_agents_program_is_short_enough_to_be_shown(client: TestClient, drive: Driven) -> None:
@@ -346,7 +313,7 @@ def test_without_a_log_nothing_moves_and_a_stop_is_accepted(
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr("avlmaps.serve.drive.plans.os.write", full)
+        patch.setattr("avlmaps.serve.drive.orders.os.write", full)
         refused = client.post("/drive/confirm", json={"token": token})
         assert refused.status_code == 503 and "No space left" in refused.json()["error"]["message"]
         assert client.post("/drive/stop").status_code == 200
@@ -374,7 +341,7 @@ def test_the_end_of_the_server_stops_the_robot(service: Service, drive: Driven) 
     assert drive.machine.motions == 0
     assert drive.entries[-1]["event"] in ("stop", "ended")
     with pytest.raises(DriveError):
-        drive.dispatcher.plan("turn left", "", _who())
+        drive.dispatcher.plan("turn left", "", Who("here"))
 
 
 def test_without_drive_there_is_no_such_address(service: Service) -> None:
@@ -426,9 +393,9 @@ def test_status_streams_until_the_server_ends(service: Service, drive: Driven) -
             assert event.startswith(b"event: status\ndata: ")
             seen.append(json.loads(event.partition(b"data: ")[2]))
             if len(seen) == 1:
-                token = drive.dispatcher.plan("turn left", "", _who())["token"]
+                token = drive.dispatcher.plan("turn left", "", Who("here"))["token"]
             if seen[-1]["plans_waiting"] == 1:
-                drive.dispatcher.confirm(token, _who())
+                drive.dispatcher.confirm(token, Who("here"))
             if seen[-1]["last"]:
                 drive.service.ending = True
         return seen
@@ -436,12 +403,6 @@ def test_status_streams_until_the_server_ends(service: Service, drive: Driven) -
     seen = asyncio.run(asyncio.wait_for(streamed(), 60))
     assert seen[0]["state"] == "idle" and seen[-1]["last"]["outcome"]["ok"] is True
     assert seen[0]["pose"]["position"][:2] == pytest.approx([START.x_m, START.y_m], abs=0.01)
-
-
-def _who() -> Any:
-    from avlmaps.serve.drive.plans import Who
-
-    return Who("here")
 
 
 def call(client: TestClient, path: str, method: str, **params: Any) -> dict[str, Any]:

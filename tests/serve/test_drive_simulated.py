@@ -10,7 +10,7 @@ from starlette.testclient import TestClient
 
 from avlmaps.core.errors import NavigationError
 from avlmaps.serve.app import create_app
-from avlmaps.serve.drive.agents import open_driving
+from avlmaps.serve.drive.app import open_driving
 from avlmaps.serve.drive.robots import RobotFile
 from avlmaps.serve.service import Service
 from avlmaps.serve.settings import ServeError

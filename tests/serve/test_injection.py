@@ -86,6 +86,6 @@ def _texts(value: Any) -> Any:
 
 
 def _who() -> Any:
-    from avlmaps.serve.drive.plans import Who
+    from avlmaps.serve.drive.orders import Who
 
     return Who("here")

@@ -9,7 +9,7 @@ from starlette.testclient import TestClient
 
 from avlmaps.query.places import place_of
 from avlmaps.serve.lanes import RequestError
-from avlmaps.serve.requests import AskQuery, PathQuery, PlaceQuery, ThingsQuery, Uploads, checked, checked_texts
+from avlmaps.serve.requests import AskQuery, PathQuery, PlaceQuery, ThingsQuery, Uploads, read
 from avlmaps.serve.settings import Limits
 
 JSON = st.recursive(
@@ -17,11 +17,9 @@ JSON = st.recursive(
     lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=10), inner, max_size=4),
     max_leaves=12,
 )
-NAMES = st.sampled_from(["sentence", "object", "sound", "area", "primary", "top", "intrinsics", "least", "x", "y"])
 TYPES = st.sampled_from(
     ["application/json", "multipart/form-data", "multipart/form-data; boundary=x", "image/png", "text/plain", "", ";"]
 )
-MAGICS = (b"", b"RIFF", b"fLaC", b"OggS", b"ID3", b"\x1a\x45\xdf\xa3", b"\x89PNG\r\n\x1a\n")
 slow = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
@@ -53,20 +51,11 @@ def test_json_is_a_request_or_an_error_of_the_client(value: Any) -> None:
     values = value if isinstance(value, dict) else {"sentence": value}
     for kind in (AskQuery, ThingsQuery, PlaceQuery, PathQuery):
         try:
-            request = checked(values, kind)
+            request = read(values, kind)
         except RequestError as error:
             assert error.status == 400
         else:
             assert isinstance(request, kind)
-
-
-@given(st.lists(st.tuples(NAMES, st.text(max_size=30)), max_size=5))
-def test_texts_are_a_request_or_an_error_of_the_client(pairs: list[tuple[str, str]]) -> None:
-    for kind in (AskQuery, ThingsQuery, PlaceQuery):
-        try:
-            checked_texts(pairs, kind)
-        except RequestError as error:
-            assert error.status == 400
 
 
 @given(st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=3))

@@ -6,9 +6,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import anyio
 import pytest
-from mcp.client.client import Client
 from starlette.testclient import TestClient
 
 from avlmaps.cli import main
@@ -24,6 +22,7 @@ from avlmaps.serve.agents import agent_server, compact, fitting
 from avlmaps.serve.app import create_app
 from avlmaps.serve.service import Service
 from avlmaps.view.on_page import TOP
+from helpers.agent_talk import Agent
 
 SENTENCES = [
     "chair",
@@ -93,16 +92,6 @@ def by_shell(home: Path, query: dict[str, str], capsys: Any, monkeypatch: pytest
     return json.loads(capsys.readouterr().out)
 
 
-def by_agent(service: Service, query: dict[str, str]) -> dict[str, Any]:
-    async def conversation() -> Any:
-        async with Client(agent_server(service)) as client:
-            return await client.call_tool("ask", {**query, "top": TOP, "picture": False})
-
-    result = anyio.run(conversation)
-    assert not result.is_error, result.content
-    return json.loads(result.content[0].text)
-
-
 @pytest.mark.parametrize(
     "query", [{"sentence": words} for words in SENTENCES] + PARTS, ids=lambda one: "+".join(one.values())
 )
@@ -127,7 +116,8 @@ def test_every_front_gives_the_answer_of_the_package(
     fronts["viewer"] = json.loads(seen[4 : 4 + int.from_bytes(seen[:4], "little")])["answer"]
     for front, answer in fronts.items():
         assert plain(answer) == expected, front
-    assert by_agent(home_service, query) == fitting(compact(expected)), "the same, rounded and cut for an agent"
+    told = Agent(agent_server(home_service)).call("ask", **query, top=TOP)
+    assert told == fitting(compact(expected)), "the same, rounded and cut for an agent"
 
 
 def test_python_counts_and_weighs_all_that_a_sentence_may_mean(opened: AVLMap) -> None:

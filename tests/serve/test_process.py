@@ -25,10 +25,9 @@ from mcp.client.client import Client
 from mcp.client.stdio import StdioServerParameters, stdio_client
 
 from avlmaps.cli import main
-from avlmaps.core.extras import install_command
-from avlmaps.serve.tools import TOOLS
-from helpers.agent_talk import told
+from avlmaps.serve.operations import OPERATIONS
 
+TOOLS = sum(bool(one.tool) for one in OPERATIONS)
 Start = Callable[..., tuple[subprocess.Popen[str], dict[str, Any]]]
 
 
@@ -66,7 +65,7 @@ def test_a_process_answers_programs_and_agents_and_finishes_what_runs(start: Sta
 
     async def agent(mode: str) -> Any:
         async with Client(f"{url}/mcp", mode=mode) as client:
-            assert len((await client.list_tools()).tools) == len(TOOLS)
+            assert len((await client.list_tools()).tools) == TOOLS
             return told(await client.call_tool("ask", {"sentence": "the red thing"}))
 
     for mode in ("auto", "legacy"):
@@ -152,7 +151,7 @@ def test_an_agent_is_served_by_standard_input_and_output(room: Path) -> None:
         words = ["-m", "avlmaps", "serve", str(room), "--stdio"]
         parameters = StdioServerParameters(command=sys.executable, args=words, env=dict(os.environ))
         async with Client(stdio_client(parameters)) as client:
-            assert len((await client.list_tools()).tools) == len(TOOLS)
+            assert len((await client.list_tools()).tools) == TOOLS
             return told(await client.call_tool("ask", {"sentence": "the red thing"}))
 
     assert anyio.run(conversation)["goals"]
@@ -173,6 +172,11 @@ def test_a_client_whose_input_ends_has_its_last_answer_and_may_name_a_photo(room
     answers = {one["id"]: one["result"] for one in map(json.loads, done.stdout.splitlines())}
     assert answers.keys() == {1, 2}
     assert json.loads(answers[2]["content"][0]["text"])["inliers"] > 0
+
+
+def told(result: Any) -> Any:
+    assert not result.is_error, result.content
+    return json.loads(result.content[0].text)
 
 
 def failed(capsys: pytest.CaptureFixture[str], *words: object) -> tuple[int, str]:
@@ -207,14 +211,3 @@ def test_faults_of_starting_are_one_sentence(
             assert code == status, said
             assert says in said
             assert "Traceback" not in said
-
-
-def test_a_missing_package_is_one_sentence(
-    room: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for name in [name for name in sys.modules if name.startswith(("mcp.", "avlmaps.serve.agents"))]:
-        monkeypatch.delitem(sys.modules, name)
-    monkeypatch.setitem(sys.modules, "mcp", None)
-    code, said = failed(capsys, room, "--port", 0)
-    assert code == 1
-    assert install_command("serve") in said

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from avlmaps.serve.tiles import HEADER, SIDE, Pyramid
+from avlmaps.serve.drawn import HEADER, SIDE, Pyramid
 
 INDICES = hnp.arrays(np.int32, st.tuples(st.integers(1, 60), st.just(3)), elements=st.integers(-200, 200)).map(
     lambda rows: np.unique(rows, axis=0)

@@ -4,37 +4,23 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from pathlib import Path
 from urllib.parse import quote
 
 from avlmaps.cli.view import open_browser, require_port, run_page
 from avlmaps.core.progress import say
 from avlmaps.live.live_map import LiveMap
 from avlmaps.live.replay import end_drive
-from avlmaps.maps.store.reader import StoredMap
 from avlmaps.serve.service import Service, listening_socket, url_of
 from avlmaps.serve.settings import ServeSettings
+from avlmaps.serve.shelf import MapSource
 
 _NAME = "live"
 _LOOK_S = 0.1
 
 
-class LiveSource:
-    """A live map as the server takes it: its last snapshot."""
-
-    tells = False
-
-    def __init__(self, live: LiveMap) -> None:
-        self.path: Path = live.path
-        self._live = live
-
-    def stamp(self) -> object | None:
-        """Return the number of the snapshot; None before the first."""
-        return self._live.generation or None
-
-    def open(self) -> StoredMap:
-        """Return the map of the snapshot."""
-        return self._live.map.stored
+def live_source(live: LiveMap) -> MapSource:
+    """Return a live map as the server takes it: its last snapshot; none before the first."""
+    return MapSource(live.path, lambda: live.generation or None, lambda: live.map.stored, tells=False)
 
 
 class LiveFeed:
@@ -85,7 +71,7 @@ def serve_while(live: LiveMap, drive: Callable[[Callable[[], bool]], None], port
                 time.sleep(_LOOK_S)
             if not live.generation:  # it ended without a map, or by a fault
                 return
-            service = Service.open({_NAME: LiveSource(live)}, settings, say)
+            service = Service.open({_NAME: live_source(live)}, settings, say)
             url = f"{url_of(settings, opened)}/maps/{quote(_NAME)}/view"
 
             def told() -> None:

@@ -10,20 +10,16 @@ from tyro.conf import Positional, UseAppendAction, arg
 
 from avlmaps.cli.output import AnsweredError, UsageError, emit
 from avlmaps.cli.verb import ModelVerb
-from avlmaps.core.errors import BackendError
-from avlmaps.core.extras import install_command
 from avlmaps.core.progress import say
 
 if TYPE_CHECKING:
-    from avlmaps.serve.drive.agents import Driving
+    from avlmaps.serve.drive.app import Driving
     from avlmaps.serve.service import Service
-
-_PACKAGES = ("mcp", "mcp_types")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Serve(ModelVerb):
-    """Answer programs by HTTP and agents by MCP (pip install 'avlmaps[serve]').
+    """Answer programs by HTTP and agents by MCP.
 
     The server prints its address. Its page lists every operation; /openapi.json describes them; agents connect to /mcp.
     It listens on this machine only, until --host says otherwise; then clients need a token. SIGTERM and Ctrl-C end it
@@ -78,12 +74,7 @@ class Serve(ModelVerb):
             raise UsageError("--drive-log belongs to --drive.")
         if self.stdio and self.json:
             raise UsageError("--stdio speaks a protocol on standard output, so --json cannot be used with it.")
-        try:
-            serve(self)
-        except ModuleNotFoundError as fault:
-            if (fault.name or "").partition(".")[0] not in _PACKAGES:
-                raise
-            raise BackendError(f"The server needs {fault.name}; get it with: {install_command('serve')}") from None
+        serve(self)
 
 
 def serve(verb: "Serve") -> None:
@@ -149,7 +140,7 @@ def serve(verb: "Serve") -> None:
 def _driving(verb: "Serve", service: "Service") -> "Driving | None":
     if verb.drive is None:
         return None
-    from avlmaps.serve.drive.agents import open_driving
+    from avlmaps.serve.drive.app import open_driving
 
     try:
         return open_driving(verb.drive, service, verb.drive_log)
@@ -161,9 +152,9 @@ def _driving(verb: "Serve", service: "Service") -> "Driving | None":
 def _serve_stdio(service: "Service") -> None:
     import asyncio
 
-    from avlmaps.serve.agents import serve_stdio
+    from avlmaps.serve.agents import agent_server, serve_stdio
 
     try:
-        asyncio.run(serve_stdio(service))
+        asyncio.run(serve_stdio(agent_server(service, reads_files=True), service.settings.limits.answer_s))
     finally:
         service.close()

@@ -168,7 +168,7 @@ def run_page(service: "Service", opened: "socket", started: "Callable[[], None]"
 
     try:
         with contextlib.suppress(KeyboardInterrupt):  # where signals do not reach the server's loop: Windows
-            run_http(create_app(service, tools=()), service, opened, started)
+            run_http(create_app(service, agents=False), service, opened, started)
     finally:
         service.close()
 

@@ -3,7 +3,7 @@
 import asyncio
 import re
 import threading
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from contextvars import copy_context
@@ -17,6 +17,7 @@ from avlmaps.query.asking import AskError
 from avlmaps.query.schema import ErrorAnswer
 
 T = TypeVar("T")
+JSON_TYPE = "application/json"
 Report = Callable[[str, int, int], None]
 """Is given a stage, the number of steps done, and of all steps."""
 
@@ -128,6 +129,32 @@ class Lane:
     def _freed(self, _: object) -> None:
         with self._lock:
             self._taken -= 1
+
+
+_BEAT_S = 10.0
+
+
+async def streamed(work: Callable[[Callable[[bytes], None]], Awaitable[bytes]]) -> AsyncIterator[bytes]:
+    """Yield the events that a piece of work tells, a sign of life while there are none, and what it returns.
+
+    ``work`` is given what takes an event; a client that leaves cancels it.
+    """
+    events: asyncio.Queue[bytes | None] = asyncio.Queue()
+    working = asyncio.ensure_future(work(events.put_nowait))
+    working.add_done_callback(lambda _: events.put_nowait(None))
+    try:
+        while True:
+            try:
+                event = await asyncio.wait_for(events.get(), _BEAT_S)
+            except TimeoutError:
+                yield b": still working\n\n"
+                continue
+            if event is None:
+                break
+            yield event
+        yield await working
+    finally:
+        working.cancel()
 
 
 _STATUS = {"map": 503}  # of a backend that is missing none: no retry helps, and other queries are answered

@@ -1,8 +1,10 @@
-"""What clients may ask: one type for each request, the source of its checks, its documentation and its tool schema."""
+"""What clients may ask: one type for each request, of which checks, the document and the tools' schemas are made."""
 
-import math
+import base64
+import binascii
+import re
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
@@ -14,7 +16,9 @@ from msgspec import Meta, Struct
 
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import AudioError, RecordingError
+from avlmaps.core.files import read_regular, user_path
 from avlmaps.core.question import MOST_CHARACTERS, HeardAt
+from avlmaps.core.words import did_you_mean
 from avlmaps.maps.store.edits import LONGEST_NAME
 from avlmaps.query.locate import focal_35mm_of
 from avlmaps.query.modalities.sound import require_audible
@@ -25,273 +29,293 @@ from avlmaps.recordings.images import check_whole, decode_picture, encoded_size
 from avlmaps.serve.lanes import RequestError
 from avlmaps.serve.settings import Limits
 
-T = TypeVar("T", bound=Struct)
-Words = Annotated[str, Meta(max_length=MOST_CHARACTERS)]
-# What has no letter says nothing; it is refused with a sentence of its own.
-Sentence = Annotated[str, Meta(max_length=MOST_CHARACTERS, extra_json_schema={"pattern": r"^\s*$|[A-Za-z]"})]
-Name = Annotated[str, Meta(max_length=MOST_CHARACTERS, extra_json_schema={"pattern": r"\S"})]
-Short = Annotated[str, Meta(max_length=200)]
-EditName = Annotated[str, Meta(max_length=LONGEST_NAME, extra_json_schema={"pattern": r"\S"})]
+R = TypeVar("R", bound=Struct)
 PHOTO, CLIP = "photo", "clip"
-_COORDINATE = Meta(ge=-1e6, le=1e6)
-# Forms for the OpenAPI document; what does not have them is refused with a sentence of its own.
 _NUMBER = r"-?\d{1,6}(\.\d{1,9})?"
-_PLACE = {"pattern": rf"^{_NUMBER}(,{_NUMBER}){{1,2}}$"}
 _FOCAL, _OFFSET = r"[1-9]\d{0,4}(\.\d{1,9})?", r"\d{1,5}(\.\d{1,9})?"
-_INTRINSICS = {"pattern": f"^{_FOCAL},{_FOCAL},{_OFFSET},{_OFFSET}$"}
-_DAY = "a day: a date such as 2026-11-24, or the number of a visit from 1"
-Place = Annotated[str, Meta(max_length=100, extra_json_schema=_PLACE)]
-Intrinsics = Annotated[Short, Meta(extra_json_schema=_INTRINSICS)]
 
 
-class NoQuery(Struct, forbid_unknown_fields=True):
+def _shown(pattern: str) -> dict[str, str]:
+    """Return a pattern for the document alone: what does not have it is refused with a sentence of its own."""
+    return {"pattern": pattern}
+
+
+# What has no letter says nothing.
+Sentence = Annotated[str, Meta(max_length=MOST_CHARACTERS, extra_json_schema=_shown(r"^\s*$|[A-Za-z]"))]
+Name = Annotated[str, Meta(max_length=MOST_CHARACTERS, extra_json_schema=_shown(r"\S"))]
+EditName = Annotated[str, Meta(max_length=LONGEST_NAME, extra_json_schema=_shown(r"\S"))]
+Short = Annotated[str, Meta(max_length=200)]
+Place = Annotated[str, Meta(max_length=100, extra_json_schema=_shown(rf"^{_NUMBER}(,{_NUMBER}){{1,2}}$"))]
+_CAMERA = f"^{_FOCAL},{_FOCAL},{_OFFSET},{_OFFSET}$"
+Intrinsics = Annotated[
+    Annotated[str, Meta(max_length=200, extra_json_schema=_shown(_CAMERA))] | None,
+    Meta(description="fx,fy,cx,cy of another camera than the map's"),
+]
+Coordinate = Annotated[float, Meta(ge=-1e6, le=1e6)]
+Share = Annotated[float, Meta(ge=0.0, le=1.0)]
+Names = Annotated[list[Name], Meta(max_length=64)]
+Top = Annotated[int, Meta(ge=1, le=50)]
+Page = Annotated[int, Meta(ge=1, le=10_000)]
+_DAY = "a date such as 2026-11-24, or the number of a visit from 1"
+
+
+class Request(Struct, forbid_unknown_fields=True):
+    """What a client may say."""
+
+
+class NoQuery(Request):
     """No values."""
 
 
-class ThingsQuery(Struct, forbid_unknown_fields=True):
+class ThingsQuery(Request):
     """Which things are listed."""
 
-    least: Annotated[float, Meta(ge=0.0, le=1.0, description="List things with at least this confidence.")] = 0.5
-    name: Annotated[list[Name], Meta(max_length=64, description="List these things only.")] = []
-    structure: Annotated[bool, Meta(description="List walls, floors and ceilings as well.")] = False
+    least: Annotated[Share, Meta(description="least confidence")] = 0.5
+    name: Annotated[Names, Meta(description="these things only")] = []
+    structure: Annotated[bool, Meta(description="walls and floors too")] = False
 
 
-class ListedThingsQuery(ThingsQuery, forbid_unknown_fields=True):
+class ListedThingsQuery(ThingsQuery):
     """Which things are listed, in which order, and how many at once."""
 
-    room: Annotated[Name | None, Meta(description="List the things of this room, or of all rooms of a kind.")] = None
-    near: Annotated[
-        Name | None, Meta(description="x,y,z, level x,y, or the name of a thing: the nearest to it come first.")
-    ] = None
-    top: Annotated[
-        Annotated[int, Meta(ge=1, le=10_000)] | None, Meta(description="Most things of a page. Default: all.")
-    ] = None
-    page: Annotated[int, Meta(ge=1, le=10_000, description="Which page, counted from 1.")] = 1
-    at: Annotated[Short | None, Meta(description=f"Of a map of several days: those that were there on {_DAY}.")] = None
+    room: Annotated[Name | None, Meta(description="one, or all of a kind")] = None
+    near: Annotated[Name | None, Meta(description="x,y,z, level x,y, or a thing's name: nearest first")] = None
+    top: Annotated[Page | None, Meta(description="most things of a page; all by default")] = None
+    page: Page = 1
+    at: Annotated[Short | None, Meta(description=f"of a map of several days: {_DAY}")] = None
 
 
-class SourcesQuery(Struct, forbid_unknown_fields=True):
-    """Which sources of sounds are listed."""
+class ThingsToolQuery(ThingsQuery):
+    """Which things an agent reads."""
 
-    sound: Annotated[
-        list[Name], Meta(max_length=64, description="List the sources of these sounds only. Default: of every sound.")
-    ] = []
-    prior: Annotated[
-        Literal["lexicon", "none"],
-        Meta(description="lexicon: what usually makes such a sound is likelier; none: by the microphones alone."),
-    ] = "lexicon"
-    least: Annotated[float, Meta(ge=0.0, le=1.0, description="Of sounds with at least this confidence.")] = 0.0
+    room: Annotated[Name | None, Meta(description="one, or all of a kind")] = None
+    near: Annotated[Name | None, Meta(description="x,y,z or a thing's name: nearest first")] = None
+    top: Top = 10
+    page: Page = 1
 
 
-class ChangesQuery(Struct, forbid_unknown_fields=True):
-    """Which changes are listed."""
-
-    since: Annotated[Short, Meta(description=f"List what changed after {_DAY}. Default: the first.")] = "1"
-    first_seen: Annotated[bool, Meta(description="List also what was first seen, where nobody had looked.")] = False
-
-
-class RoomsQuery(Struct, forbid_unknown_fields=True):
+class RoomsQuery(Request):
     """Which rooms are listed."""
 
-    least: Annotated[float, Meta(ge=0.0, le=1.0, description="List rooms with at least this confidence.")] = 0.0
+    least: Annotated[Share, Meta(description="least confidence")] = 0.0
 
 
-class AskQuery(Struct, forbid_unknown_fields=True):
-    """A query: a sentence, or its parts. A photo and a clip come as files of a form."""
+class RoomsToolQuery(RoomsQuery):
+    """Which rooms an agent reads."""
 
-    sentence: Annotated[
-        Sentence | None,
-        Meta(
-            description="The query in words, such as 'the chair near the sound of glass breaking' or 'how many chairs'."
-        ),
-    ] = None
-    object: Annotated[Name | None, Meta(description="Instead of a sentence: the object.")] = None
-    sound: Annotated[Name | None, Meta(description="Instead of a sentence: the sound, in words.")] = None
-    area: Annotated[Name | None, Meta(description="Instead of a sentence: the area, such as a room.")] = None
+    floor: Annotated[int | None, Meta(description="0 is the lowest")] = None
+    name: Names = []
+    top: Top = 10
+    page: Page = 1
+
+
+class SoundsToolQuery(Request):
+    """Which sounds an agent reads."""
+
+    name: Names = []
+    top: Top = 10
+    page: Page = 1
+
+
+class SourcesQuery(Request):
+    """Which sources of sounds are listed."""
+
+    sound: Annotated[Names, Meta(description="sources of these sounds only; of every sound by default")] = []
+    prior: Annotated[
+        Literal["lexicon", "none"],
+        Meta(description="lexicon: what usually makes such a sound is likelier; none: by the microphones alone"),
+    ] = "lexicon"
+    least: Annotated[Share, Meta(description="least confidence of the sound")] = 0.0
+
+
+class ChangesQuery(Request):
+    """Which changes are listed."""
+
+    since: Annotated[Short, Meta(description=f"what changed after this day: {_DAY}")] = "1"
+    first_seen: Annotated[bool, Meta(description="also what was first seen, where nobody had looked")] = False
+
+
+class AskQuery(Request):
+    """A query: a sentence, or its parts, and not both."""
+
+    sentence: Annotated[Sentence | None, Meta(description="such as 'a chair near a dog barking', 'how many cups'")] = (
+        None
+    )
+    object: Name | None = None
+    sound: Name | None = None
+    area: Name | None = None
     primary: Annotated[
-        Literal["object", "sound", "image", "area"] | None,
-        Meta(description="Which part is sought; the others say where it is. Default: object, image, sound, area."),
+        Literal["object", "sound", "image", "area"] | None, Meta(description="the part that is sought")
     ] = None
-    top: Annotated[int, Meta(ge=1, le=100, description="Most goals.")] = 3
-    at: Annotated[
-        HeardAt | None,
-        Meta(description="Place of a sound: robot, where it was heard, or source. Default: as the words say."),
-    ] = None
-    near: Annotated[
-        Place | None,
-        Meta(description="x,y,z, or level x,y: the goals nearest to it come first, of those that are found."),
-    ] = None
-    intrinsics: Annotated[
-        Intrinsics | None,
-        Meta(description="fx,fy,cx,cy of the photo's camera in pixels. Default: the map's own camera."),
-    ] = None
+    top: Annotated[int, Meta(ge=1, le=100)] = 3
+    at: Annotated[HeardAt | None, Meta(description="source: where a sound came from, not where it was heard")] = None
+    near: Annotated[Place | None, Meta(description="x,y: nearest first")] = None
+    intrinsics: Intrinsics = None
 
 
-class PictureQuery(AskQuery, forbid_unknown_fields=True):
+class PictureQuery(AskQuery):
     """A query whose answer is drawn; without a sentence and parts the map is drawn."""
 
     size: Annotated[
         Literal["small", "full"],
-        Meta(description="small: one top-down view, quick; full: one panel for each part, with axes and a scale."),
+        Meta(description="small: one view from above, quick; full: a panel for each part, with axes and a scale"),
     ] = "full"
 
 
-class LocateQuery(Struct, forbid_unknown_fields=True):
-    """A photo to locate; it comes as the file 'photo' of a form, or as the body itself."""
+class LocateQuery(Request):
+    """A photo to locate, which comes as a file."""
 
-    intrinsics: Annotated[
-        Intrinsics | None,
-        Meta(description="fx,fy,cx,cy of the photo's camera in pixels. Default: the map's own camera."),
-    ] = None
+    intrinsics: Intrinsics = None
 
 
-class PlaceQuery(Struct, forbid_unknown_fields=True):
-    """A place: x, y, z in the recording frame; without z a column of the level frame."""
+class PlaceQuery(Request):
+    """A place: x, y, z in the recording frame, metres."""
 
-    x: Annotated[float, _COORDINATE]
-    y: Annotated[float, _COORDINATE]
-    z: Annotated[
-        Annotated[float, _COORDINATE] | None,
-        Meta(description="Without it, x and y are in the level frame: a place of the floor plan."),
-    ] = None
-    radius_m: Annotated[float, Meta(gt=0.0, le=5.0, description="Voxels within this distance count.")] = 0.15
+    x: Coordinate
+    y: Coordinate
+    z: Annotated[Coordinate | None, Meta(description="without it x, y are in the level frame")] = None
+    radius_m: Annotated[float, Meta(gt=0.0, le=5.0)] = 0.15
 
 
-class PathQuery(Struct, forbid_unknown_fields=True, rename={"start": "from", "goal": "to"}):
+class PathQuery(Request, rename={"start": "from", "goal": "to"}):
     """Two places; each is x,y,z in the recording frame, or x,y in the level frame."""
 
-    start: Annotated[Place, Meta(description="Where the body starts, such as 1.5,2.0 or 1.5,2.0,0.3.")]
-    goal: Annotated[Place, Meta(description="Where it goes; it stops beside what it cannot stand in.")]
-    stairs: Annotated[
-        bool, Meta(description="For a body that takes stairs, such as a person; a robot on wheels not.")
-    ] = False
+    start: Annotated[Place, Meta(description="such as 1.5,2.0 or 1.5,2.0,0.3")]
+    goal: Annotated[Place, Meta(description="it stops beside what it cannot stand in")]
+    stairs: Annotated[bool, Meta(description="for a body that takes stairs, such as a person")] = False
 
 
-class EditQuery(Struct, forbid_unknown_fields=True):
+class LastSeenQuery(Request):
+    """A thing by its name."""
+
+    thing: Annotated[Name, Meta(description="such as 'red mug'")]
+    top: Annotated[int, Meta(ge=1, le=20)] = 3
+
+
+class GoalNearQuery(Request):
+    """A query, and a place to be near to."""
+
+    sentence: Annotated[Name, Meta(description="such as 'a chair'")]
+    near: Annotated[Place, Meta(description="x,y,z")]
+    top: Annotated[int, Meta(ge=1, le=20)] = 3
+
+
+class EditQuery(Request):
     """A correction of the map, as `avlmaps edit` makes it; /maps/{map}/edits lists all."""
 
-    does: Annotated[
-        Literal["rename", "rename-room", "merge", "split", "forbid", "pin", "undo"], Meta(description="What it does.")
-    ]
+    does: Literal["rename", "rename-room", "merge", "split", "forbid", "pin", "undo"]
     name: Annotated[
-        EditName | None,
-        Meta(description="The thing or room that is meant; of forbid and pin, the name of the area or place."),
+        EditName | None, Meta(description="the thing or room that is meant; the name of what is forbidden or pinned")
     ] = None
-    to: Annotated[EditName | None, Meta(description="The new name, of rename, rename-room and merge.")] = None
-    at: Annotated[Place | None, Meta(description="Where the thing or place is, such as 1.5,2.0 or 1.5,2.0,0.3.")] = None
+    to: Annotated[EditName | None, Meta(description="the new name, of rename, rename-room and merge")] = None
+    at: Annotated[Place | None, Meta(description="where the thing or place is, such as 1.5,2.0 or 1.5,2.0,0.3")] = None
     places: Annotated[
-        list[Place], Meta(max_length=16, description="Of the things that are merged; two on the plane of a split.")
+        list[Place], Meta(max_length=16, description="of the things that are merged; two on the plane of a split")
     ] = []
-    room: Annotated[EditName | None, Meta(description="The room that is forbidden.")] = None
+    room: Annotated[EditName | None, Meta(description="the room that is forbidden")] = None
     box: Annotated[
-        list[Annotated[float, _COORDINATE]],
-        Meta(max_length=4, description="x0, y0, x1, y1 of what is forbidden or cut, level frame, metres."),
+        list[Coordinate], Meta(max_length=4, description="x0, y0, x1, y1 of what is forbidden or cut, level frame")
     ] = []
-    edit: Annotated[Short | None, Meta(description="The edit that is undone. Default: the last.")] = None
-    by: Annotated[EditName | None, Meta(description="Who makes it.")] = None
+    edit: Annotated[Short | None, Meta(description="the edit that is undone; the last by default")] = None
+    by: Annotated[EditName | None, Meta(description="who makes it")] = None
 
 
-class ViewQuery(Struct, forbid_unknown_fields=True):
+class ViewQuery(Request):
     """What the page shows beside the map."""
 
-    other: Annotated[
-        Annotated[str, Meta(max_length=MOST_CHARACTERS, pattern=r"\S")] | None,
-        Meta(description="A second map of the same place, to compare."),
-    ] = None
+    other: Annotated[Name | None, Meta(description="a second map of the same place, to compare")] = None
 
 
-class RehearseQuery(Struct, forbid_unknown_fields=True):
-    """A command that is planned on the map. A photo and a clip that it speaks of come as files of a form."""
+class RehearseQuery(Request):
+    """A command that is planned on the map."""
 
-    command: Annotated[str, Meta(max_length=1000, description="The command, such as 'go to the sofa'.")]
+    command: Annotated[str, Meta(max_length=1000, description="such as 'go to the sofa'")]
     start: Annotated[
         Annotated[str, Meta(pattern=rf"^{_NUMBER},{_NUMBER},{_NUMBER}$")] | None,
-        Meta(
-            description="x,y,heading where it begins, metres and radians, level frame. Default: near the walk's start."
-        ),
+        Meta(description="x,y,heading where it begins: metres, radians, level frame; near the walk's start by default"),
     ] = None
 
 
-class TilesQuery(Struct, forbid_unknown_fields=True):
+class TilesQuery(Request):
     """How tiles are coloured."""
 
     heat: Annotated[
-        Annotated[str, Meta(max_length=MOST_CHARACTERS, extra_json_schema={"pattern": "[A-Za-z]"})] | None,
-        Meta(description="A query in words; each voxel then has its heat as a seventh byte, 0 to 255."),
+        Annotated[str, Meta(max_length=MOST_CHARACTERS, extra_json_schema=_shown("[A-Za-z]"))] | None,
+        Meta(description="a query in words; each voxel then has its heat as a seventh byte, 0 to 255"),
     ] = None
 
 
-def checked(values: Mapping[str, Any], kind: type[T], *, strict: bool = True) -> T:
-    """Return a request of a kind from JSON values; without ``strict`` a number may come as text.
+def read(values: Mapping[str, Any], kind: type[R]) -> R:
+    """Return a request of a kind, out of an address, a form, JSON or an agent's call: the one place that normalises.
+
+    A number may be a text, and a place a list of numbers; one value stands for a list of it; what is null or blank was
+    left out.
 
     Raises:
-        RequestError: a value is missing, unknown, of the wrong type or out of range; the sentence names it.
+        RequestError: a value is missing, unknown, of the wrong type or out of range; the sentence names what there is.
     """
-    plain = {name: _whole(value) for name, value in values.items()}
+    lists = lists_of(kind)
+    given = {name: _normal(value, name in lists) for name, value in values.items() if not _is_blank(value)}
     try:
-        request = msgspec.convert(plain, kind, strict=strict)
+        return msgspec.convert(given, kind, strict=False)
     except msgspec.ValidationError as fault:
-        raise _unfit(fault) from None
-    return _finite(request)
+        known = schema_of(kind)["properties"]
+        unknown = next((name for name in given if name not in known), None)
+        said = f"The request does not fit: {str(fault)[:300]}."
+        if unknown is not None:
+            said = f"There is no argument {unknown[:60]!r}{did_you_mean(unknown, known)}"
+        takes = ", ".join(f"{name} ({_words_of(schema)})" for name, schema in known.items())
+        raise RequestError(f"{said} It takes: {takes}." if takes else f"{said} It takes no values.") from None
 
 
-def _whole(value: Any) -> Any:
-    return int(value) if isinstance(value, float) and value.is_integer() and abs(value) < 2**53 else value
+def lists_of(kind: type[Struct]) -> frozenset[str]:
+    """Return the values of a request that may be given several times."""
+    fields = msgspec.structs.fields(kind)
+    return frozenset(one.encode_name for one in fields if re.search(r"(list|tuple)\[", str(one.type)))
 
 
-def checked_texts(pairs: Iterable[tuple[str, str]], kind: type[T]) -> T:
-    """Return a request of a kind from the texts of an address or a form.
-
-    Raises:
-        RequestError: as of ``checked``, or a value is given twice that can be given once.
-    """
-    lists = {field.encode_name for field in msgspec.structs.fields(kind) if _is_list(field.type)}
-    values: dict[str, Any] = {}
-    for name, text in pairs:
-        if name in lists:
-            values.setdefault(name, []).append(text)
-        elif name in values:
-            raise RequestError(f"{name[:80]!r} is given twice; give it once.")
-        else:
-            values[name] = text
-    try:
-        request = msgspec.convert(values, kind, strict=False)
-    except msgspec.ValidationError as fault:
-        raise _unfit(fault) from None
-    read = msgspec.structs.asdict(request)
-    for field in msgspec.structs.fields(kind):  # a text "null" is no number
-        if field.encode_name in values and read[field.name] is None:
-            raise RequestError(f"{field.encode_name!r} has no value; give one, or leave it out.")
-    return _finite(request)
+def _is_blank(value: Any) -> bool:
+    return value is None or (isinstance(value, str) and value.strip().lower() in ("", "null"))
 
 
-def _unfit(fault: msgspec.ValidationError) -> RequestError:
-    return RequestError(f"The request does not fit: {str(fault)[:300]}; /openapi.json describes it.")
+def _normal(value: Any, is_list: bool) -> Any:
+    if isinstance(value, str | int | float) and is_list:
+        return [value]
+    if isinstance(value, list) and not is_list and all(isinstance(one, int | float) for one in value):
+        return ",".join(str(one) for one in value)
+    return value
 
 
-def _is_list(kind: Any) -> bool:
-    return "list[" in str(kind)
+def schema_of(kind: type[Struct]) -> dict[str, Any]:
+    """Return the JSON schema of a request without titles and null, since what is left out is not null."""
+    (schema,), components = msgspec.json.schema_components([kind])
+    whole = components[schema["$ref"].rpartition("/")[2]]
+    properties = {name: _without_null(one) for name, one in whole["properties"].items()}
+    required = {"required": whole["required"]} if whole["required"] else {}
+    return {"type": "object", "properties": properties, "additionalProperties": False, **required}
 
 
-def _finite(request: T) -> T:
-    for name in request.__struct_fields__:
-        value = getattr(request, name)
-        if isinstance(value, float) and not math.isfinite(value):
-            raise RequestError(f"{name} is not a finite number; give one.")
-    return request
+def _without_null(schema: dict[str, Any]) -> dict[str, Any]:
+    plain = {key: value for key, value in schema.items() if key not in ("anyOf", "default", "title")}
+    if schema.get("default") not in (None, [], (), False):
+        plain["default"] = schema["default"]
+    if "enum" in plain:
+        plain["enum"] = [value for value in plain["enum"] if value is not None]
+    kinds = [one for one in schema.get("anyOf", []) if one.get("type") != "null"]
+    return kinds[0] | plain if kinds else plain
 
 
-_HIGHEST_RATE_HZ = 96_000
+def _words_of(schema: dict[str, Any]) -> str:
+    if "enum" in schema:
+        return " or ".join(str(value) for value in schema["enum"])
+    low, high = schema.get("minimum"), schema.get("maximum")
+    kind = schema.get("type", "value")
+    return f"{kind} {low:g} to {high:g}" if low is not None and high is not None else kind
 
 
 @dataclass(frozen=True, slots=True)
 class Uploads:
-    """The files of a request, not decoded yet.
-
-    Attributes:
-        photo: bytes of a PNG or JPEG.
-        clip: bytes of a sound.
-    """
+    """The files of a request, not decoded yet: bytes of a PNG or JPEG, and of a sound."""
 
     photo: bytes | None = None
     clip: bytes | None = None
@@ -318,6 +342,25 @@ class Uploads:
             if content is not None:
                 (folder / f"{kind}{suffix}").write_bytes(content)
         return names[0], names[1]
+
+
+def file_of(text: str, what: str, most_bytes: int, reads_files: bool = False) -> bytes:
+    """Return the bytes of a file: out of base64, perhaps with line breaks or as a data URI, or of a path if it may be.
+
+    Raises:
+        RequestError: it is neither, or cannot be read.
+    """
+    if reads_files and len(text) < 1000 and user_path(text).is_file():
+        try:
+            return read_regular(user_path(text), most_bytes)
+        except OSError as fault:
+            raise RequestError(f"The {what} {text} cannot be read ({fault.strerror or fault}).", 415, what) from None
+    plain = re.sub(r"\s+", "", text.partition(",")[2] if text.lstrip().startswith("data:") else text)
+    try:
+        return base64.b64decode(plain, validate=True)
+    except (binascii.Error, ValueError):
+        also = ", or give the path of a file" if reads_files else ""
+        raise RequestError(f"The {what} is no base64; send the file's bytes in base64{also}.") from None
 
 
 def decode_photo(content: bytes, limits: Limits) -> UInt8[np.ndarray, "h w 3"]:
@@ -349,6 +392,9 @@ def decode_photo(content: bytes, limits: Limits) -> UInt8[np.ndarray, "h w 3"]:
     return cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)
 
 
+_HIGHEST_RATE_HZ = 96_000
+
+
 def decode_clip(content: bytes, limits: Limits) -> Sound:
     """Decode a sound.
 
@@ -364,15 +410,11 @@ def decode_clip(content: bytes, limits: Limits) -> Sound:
         try:
             track = AudioTrack.open(path)
             if track.duration_s > limits.clip_s:
-                raise RequestError(
-                    f"The clip lasts {track.duration_s:.0f} s; clips last up to {limits.clip_s:g} s, so cut it.",
-                    413,
-                    "clip",
-                )
+                last = f"The clip lasts {track.duration_s:.0f} s; clips last up to {limits.clip_s:g} s, so cut it."
+                raise RequestError(last, 413, "clip")
             if track.rate_hz > _HIGHEST_RATE_HZ:
-                raise RequestError(
-                    f"The clip has {track.rate_hz:,} samples a second; convert it to 48,000.", 413, "clip"
-                )
+                fast = f"The clip has {track.rate_hz:,} samples a second; convert it to 48,000."
+                raise RequestError(fast, 413, "clip")
             sound = track.read()
         except AudioError as error:
             sentence = str(error).replace(str(path), "the clip")
@@ -380,19 +422,6 @@ def decode_clip(content: bytes, limits: Limits) -> Sound:
                 sentence = "the clip cannot be read as sound; send another one."
             raise RequestError(sentence[:1].upper() + sentence[1:], 415, "clip") from None
     return require_audible(sound, "of the request")
-
-
-def camera_of(intrinsics: str | None, photo: UInt8[np.ndarray, "h w 3"] | None) -> Pinhole | None:
-    """Return the camera of a photo from ``fx,fy,cx,cy``; None for the map's own.
-
-    Raises:
-        RequestError: the numbers are not four, no camera has them, or there is no photo.
-    """
-    if intrinsics is None:
-        return None
-    if photo is None:
-        raise RequestError("Intrinsics belong to a photo; there is none.")
-    return Pinhole(*numbers_of(intrinsics), width=photo.shape[1], height=photo.shape[0])
 
 
 def numbers_of(intrinsics: str) -> tuple[float, float, float, float]:

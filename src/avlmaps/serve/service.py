@@ -19,7 +19,7 @@ from avlmaps.core.files import read_regular, user_path
 from avlmaps.core.wording import option
 from avlmaps.query.settings import QuerySettings, SoundSettings
 from avlmaps.serve.guard import App
-from avlmaps.serve.lanes import Lane, Privacy, RequestError
+from avlmaps.serve.lanes import JSON_TYPE, Lane, Privacy, RequestError
 from avlmaps.serve.settings import ServeError, ServeSettings
 from avlmaps.serve.shelf import MapSource, Shelf
 from avlmaps.serve.work import encoded
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from avlmaps.view.route import MakeRobot
 
 
-JSON_TYPE = "application/json"
 log = logging.getLogger("avlmaps.serve")
 
 

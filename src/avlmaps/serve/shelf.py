@@ -9,10 +9,11 @@ import threading
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from functools import cached_property
+from dataclasses import dataclass
+from functools import cached_property, partial
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Protocol, TypeVar, cast
+from typing import TYPE_CHECKING, TypeVar, cast
 
 from avlmaps.core.errors import AvlmapsError, BackendError, QueryError
 from avlmaps.core.files import user_path
@@ -31,16 +32,15 @@ if TYPE_CHECKING:
     from avlmaps.maps.store.reader import StoredMap
     from avlmaps.navigate.paths import PathFinder
     from avlmaps.query.plots import TopDown
-    from avlmaps.serve.tiles import Pyramid
     from avlmaps.view.on_page import MapOnPage
     from avlmaps.view.route import Guide, MakeRobot
 
 T = TypeVar("T")
 # A query of each kind loads its model and compiles its loops.
 _WARM = (
-    ("pixels", (Modality.OBJECT, "chair")),
-    ("views", (Modality.AREA, "kitchen")),
-    ("sounds", (Modality.SOUND, "water")),
+    ("pixels", Modality.OBJECT, "chair"),
+    ("views", Modality.AREA, "kitchen"),
+    ("sounds", Modality.SOUND, "water"),
 )
 _LONGEST_NAME = 100
 
@@ -54,8 +54,7 @@ class ServedMap:
     """
 
     def __init__(self, name: str, avlmap: AVLMap, robot: "MakeRobot | None" = None) -> None:
-        self.name, self._robot = name, robot
-        self.avlmap = avlmap
+        self.name, self.avlmap, self._robot = name, avlmap, robot
         self._once = threading.RLock()
         self._answers: OrderedDict[object, object] = OrderedDict()
 
@@ -72,8 +71,14 @@ class ServedMap:
         return f"{info.build_key[:16]}-{info.timings.finished}-{info.counts.sounds}".replace('"', "")
 
     def as_edited_now(self) -> "ServedMap":
-        """Return the same map with the edits of now."""
-        return ServedMap(self.name, self.avlmap.as_edited_now(), self._robot)
+        """Return the map with the edits that its folder has by now.
+
+        Raises:
+            MapError: their log cannot be read.
+        """
+        edited = ServedMap(self.name, self.avlmap.as_edited_now(), self._robot)
+        _ = edited.avlmap.edited
+        return edited
 
     def prepare(self) -> None:
         """Compute what every query needs, so that the first one is as quick as the others.
@@ -81,20 +86,16 @@ class ServedMap:
         Raises:
             MapError: a large file of the map is damaged.
         """
-        avlmap, models = self.avlmap, self.avlmap.stored.info.models
-        words = [(kind, word) for kind, word in _WARM if kind in models]
+        avlmap, stored = self.avlmap, self.avlmap.stored
+        there = {"pixels": True, "views": bool(len(stored.keyframes)), "sounds": bool(len(stored.sounds))}
         if len(avlmap.space):
             _ = avlmap.space.centres, avlmap.space.blocks, avlmap.space.horizontal
-            parts = [Part(modality, word) for kind, (modality, word) in words if kind == "pixels" or self._has(kind)]
-            for part in parts:
-                with suppress(QueryError, BackendError):  # a model that is not here; its queries say so
-                    avlmap.heat(part)
+            for kind, modality, word in _WARM:
+                if there[kind] and kind in stored.info.models:
+                    with suppress(QueryError, BackendError):  # a model that is not here; its queries say so
+                        avlmap.heat(Part(modality, word))
         with suppress(QueryError):
             parse_sentence("the chair near the table in the kitchen")
-
-    def _has(self, kind: str) -> bool:
-        stored = self.avlmap.stored
-        return bool(len(stored.sounds) if kind == "sounds" else len(stored.keyframes))
 
     @cached_property
     def paths(self) -> "PathFinder":
@@ -104,26 +105,11 @@ class ServedMap:
         return PathFinder(self.avlmap)
 
     @cached_property
-    def paths_by_stairs(self) -> "PathFinder":
-        """The planner of this map's floors for who takes stairs."""
-        from avlmaps.navigate.bodies import WALKER
-        from avlmaps.navigate.paths import PathFinder
-
-        return PathFinder(self.avlmap, WALKER)
-
-    @cached_property
     def top_down(self) -> "TopDown":
         """The map from above."""
         from avlmaps.query.plots import TopDown
 
         return TopDown.of(self.avlmap.space)
-
-    @cached_property
-    def pyramid(self) -> "Pyramid":
-        """The map's tiles."""
-        from avlmaps.serve.tiles import Pyramid
-
-        return Pyramid.of(self.avlmap)
 
     @cached_property
     def page(self) -> "MapOnPage":
@@ -142,125 +128,99 @@ class ServedMap:
     def once(self, key: object, work: Callable[[], T], most: int = 64) -> T:
         """Return what work returns, remembered for later under a key."""
         with self._once:
-            if key in self._answers:
-                self._answers.move_to_end(key)
-                return cast(T, self._answers[key])
-            made = work()
-            self._answers[key] = made
+            if key not in self._answers:
+                self._answers[key] = work()
+            self._answers.move_to_end(key)
             while len(self._answers) > most:
                 self._answers.popitem(last=False)
-            return made
+            return cast(T, self._answers[key])
 
 
-class MapSource(Protocol):
+@dataclass(frozen=True, slots=True)
+class MapSource:
     """Where a map comes from that may be replaced.
 
     Attributes:
         path: its folder.
+        stamp: returns another value for another map; None where there is none at the moment.
+        open: returns the map, or raises ``MapError``.
         tells: whether a replacement is worth a line in the log.
     """
 
     path: Path
-    tells: bool
+    stamp: Callable[[], object | None]
+    open: "Callable[[], StoredMap]"
+    tells: bool = True
 
-    def stamp(self) -> object | None:
-        """Return what is another value for another map; None where there is none at the moment."""
-        ...
-
-    def open(self) -> "StoredMap":
-        """Return the map as it is now.
-
-        Raises:
-            MapError: it cannot be opened.
-        """
-        ...
-
-
-class _Folder:
-    """A map on the disk."""
-
-    tells = True
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-
-    def stamp(self) -> object | None:
-        return stamp(self.path / MANIFEST)
-
-    def open(self) -> "StoredMap":
-        return open_stored(self.path)
+    @classmethod
+    def of(cls, path: Path) -> "MapSource":
+        """Return that of a map on the disk."""
+        return cls(path, lambda: stamp(path / MANIFEST), lambda: open_stored(path))
 
 
 class _Slot:
     """One name, the map that answers for it now, and the one that is being opened."""
 
-    def __init__(self, name: str, source: MapSource, make: Callable[[str, "StoredMap"], ServedMap], warm: bool) -> None:
-        self.name, self.path, self._source, self._make = name, source.path, source, make
+    def __init__(self, source: MapSource, make: "Callable[[StoredMap], ServedMap]", warm: bool) -> None:
+        self.path, self._source, self._make = source.path, source, make
         self._lock = threading.Lock()
         self._opening: threading.Thread | None = None
-        self.fault: AvlmapsError | OSError | None = None
-        self._edits = stamp(self.path / EDITS)
+        self._fault: AvlmapsError | OSError | None = None
+        self._edits = self._edits_now
         self._stamp, self.map = self._opened(warm)
 
+    @property
+    def _edits_now(self) -> object | None:
+        return stamp(self.path / EDITS)
+
     def _opened(self, warm: bool = True) -> tuple[object, ServedMap]:
-        before = self._source.stamp()
-        opened = self._make(self.name, self._source.open())
+        before, opened = self._source.stamp(), self._make(self._source.open())
         if warm:
             opened.prepare()
         return before, opened
 
     def refresh(self, note: Callable[[str], None]) -> None:
-        """Take the edits of now, and begin to open the map that has replaced this one, if there is one."""
-        edits, now = stamp(self.path / EDITS), self._source.stamp()
-        if edits != self._edits:
-            with self._lock:
-                self._take_edits(edits, note)
-        if now is None or now == self._stamp:
-            return
+        """Take new edits, and begin to open the map that has replaced this one, if there is one."""
         with self._lock:
-            if self._opening is not None and self._opening.is_alive():
-                return
-            if now == self._stamp:
+            self._take_edits(note)
+            is_opening = self._opening is not None and self._opening.is_alive()
+            if is_opening or self._source.stamp() in (None, self._stamp):
                 return
             self._opening = threading.Thread(target=self._reopen, args=(note,), name="avlmaps-reopen", daemon=True)
             self._opening.start()
 
-    def _take_edits(self, edits: object, note: Callable[[str], None]) -> None:
-        if edits == self._edits:
+    def _take_edits(self, note: Callable[[str], None]) -> None:
+        if (edits := self._edits_now) == self._edits:
             return
         try:
-            edited = self.map.as_edited_now()
-            _ = edited.avlmap.edited  # reads the log
+            self.map = self.map.as_edited_now()
         except (AvlmapsError, OSError) as error:
-            note(f"{self.name}: its edits cannot be read ({error}); those of before count.")
-        else:
-            self.map = edited
+            note(f"{self.map.name}: its edits cannot be read ({error}); those of before count.")
         self._edits = edits
 
     def _reopen(self, note: Callable[[str], None]) -> None:
-        begin = perf_counter()
-        tried, edits = self._source.stamp(), stamp(self.path / EDITS)
+        begin, tried, edits = perf_counter(), self._source.stamp(), self._edits_now
+        name = self.map.name
         try:
             before, opened = self._opened()
         except (AvlmapsError, OSError) as error:
-            self._stamp, self.fault = tried, error
-            note(f"{self.name}: the map was replaced, and the new one cannot be opened ({error}); the old one answers.")
+            self._stamp, self._fault = tried, error
+            note(f"{name}: the map was replaced, and the new one cannot be opened ({error}); the old one answers.")
             return
         with self._lock:  # what was edited while it was opened counts as well
-            self._stamp, self.map, self.fault, self._edits = before, opened, None, edits
-            self._take_edits(stamp(self.path / EDITS), note)
+            self._stamp, self.map, self._fault, self._edits = before, opened, None, edits
+            self._take_edits(note)
         if self._source.tells:
-            note(f"{self.name}: the map was replaced; the new one was opened in {perf_counter() - begin:.1f} s.")
+            note(f"{name}: the map was replaced; the new one was opened in {perf_counter() - begin:.1f} s.")
 
     @property
     def is_stale(self) -> bool:
         """Whether the map that answers is not the one in the folder: that is gone, or cannot be opened."""
-        return self.fault is not None or self._source.stamp() is None
+        return self._fault is not None or self._source.stamp() is None
 
     def wait(self, timeout_s: float) -> None:
-        thread = self._opening
-        if thread is not None:
-            thread.join(timeout_s)
+        if self._opening is not None:
+            self._opening.join(timeout_s)
 
 
 class Shelf:
@@ -291,12 +251,12 @@ class Shelf:
         cache_bytes = (limits or Limits()).cache_bytes
         self._note = note
 
-        def make(name: str, stored: "StoredMap") -> ServedMap:
+        def made(name: str, stored: "StoredMap") -> ServedMap:
             cache = HeatCache(cache_bytes, lambda part: watch_here().step(f"heat of the {part.modality}"))
             return ServedMap(name, AVLMap(stored, settings=settings, heats=cache), robot)
 
-        sources = {name: _Folder(one) if isinstance(one, Path) else one for name, one in maps.items()}
-        self._slots = {name: _Slot(name, source, make, warm) for name, source in sources.items()}
+        sources = {name: MapSource.of(one) if isinstance(one, Path) else one for name, one in maps.items()}
+        self._slots = {name: _Slot(source, partial(made, name), warm) for name, source in sources.items()}
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -314,10 +274,9 @@ class Shelf:
         Raises:
             RequestError: there is no map of this name, or there are several and no name.
         """
-        if name is None:
-            if len(self._slots) > 1:
-                raise RequestError(f"This server has {len(self._slots)} maps; name one of: {', '.join(self.names)}.")
-            name = self.names[0]
+        if name is None and len(self._slots) > 1:
+            raise RequestError(f"This server has {len(self._slots)} maps; name one of: {', '.join(self.names)}.")
+        name = self.names[0] if name is None else name
         slot = self._slots.get(name)
         if slot is None:
             raise RequestError(
@@ -325,10 +284,6 @@ class Shelf:
             )
         slot.refresh(self._note)
         return slot.map
-
-    def all(self) -> list[ServedMap]:
-        """Return every map."""
-        return [self.get(name) for name in self.names]
 
     def is_stale(self, name: str) -> bool:
         """Return whether a map is gone, or was replaced by one that cannot be opened; the old one answers."""
@@ -338,8 +293,7 @@ class Shelf:
         """Look for replaced maps, and wait up to a time until they are open."""
         for slot in self._slots.values():
             slot.refresh(self._note)
-            if wait_s:
-                slot.wait(wait_s)
+            slot.wait(wait_s)
 
 
 def named_maps(words: Sequence[str]) -> dict[str, Path]:

@@ -1,19 +1,25 @@
 """The work of each request: from a request's values to its answer, in a thread of a lane."""
 
 import tempfile
-from dataclasses import dataclass, field, replace
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NotRequired, TypedDict, TypeVar
 
 import msgspec
 import numpy as np
+from jaxtyping import Float
 
+from avlmaps.core.camera import Pinhole
 from avlmaps.core.motion import GroundPose
 from avlmaps.core.poses import FRAME
-from avlmaps.navigate.paths import PathAnswer
+from avlmaps.core.printable import printable_json, shortened
+from avlmaps.navigate.bodies import WALKER
+from avlmaps.navigate.paths import PathAnswer, PathFinder, goals_near
 from avlmaps.query.answer import Answer
 from avlmaps.query.editor import edit_text
-from avlmaps.query.places import PlaceAnswer, column_point, describe_place, place_of
+from avlmaps.query.places import PlaceAnswer, column_point, describe_place, last_seen, place_of
 from avlmaps.query.queryable import Photo
 from avlmaps.query.schema import (
     ChangesAnswer,
@@ -28,13 +34,25 @@ from avlmaps.query.schema import (
     SourcesAnswer,
     locate_answer,
 )
-from avlmaps.query.selection import MapLists, ThingsPage, Wanted, map_answer, page_of_things
+from avlmaps.query.selection import (
+    MapLists,
+    Selected,
+    ThingsPage,
+    Wanted,
+    map_answer,
+    page_of,
+    page_of_things,
+    selected,
+    things_with_rooms,
+)
+from avlmaps.query.whereabouts import Whereabouts
+from avlmaps.query.words import unknown_note
 from avlmaps.serve import requests
+from avlmaps.serve.drawn import Pyramid, TilesAnswer, full_picture, map_picture, small_picture
 from avlmaps.serve.lanes import Cancellation, RequestError, without_folders
-from avlmaps.serve.requests import AskQuery, NoQuery, RehearseQuery, Uploads, ViewQuery, camera_of, numbers_of
+from avlmaps.serve.requests import AskQuery, NoQuery, RehearseQuery, Uploads, ViewQuery, numbers_of
 from avlmaps.serve.settings import Limits
 from avlmaps.serve.shelf import ServedMap, Shelf
-from avlmaps.serve.tiles import TilesAnswer
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,27 +64,19 @@ class WorkInput:
         limits: of the server.
         uploads: files of the request.
         watch: reports progress; ends the work when nobody waits for it.
-        path: the numbers and names in the address, beside the map's.
-        reads_files: whether the client is a program of this machine that may name files.
+        path: the numbers in the address.
     """
 
     map: ServedMap
     limits: Limits
     uploads: Uploads = field(default_factory=Uploads)
     watch: Cancellation = field(default_factory=Cancellation)
-    path: dict[str, str] = field(default_factory=dict)
-    reads_files: bool = False
+    path: dict[str, int] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
 class File:
-    """An answer that is no JSON.
-
-    Attributes:
-        content: its bytes.
-        media_type: what it is.
-        headers: further headers.
-    """
+    """An answer that is no JSON."""
 
     content: bytes
     media_type: str
@@ -112,28 +122,26 @@ class SoundsAnswer(TypedDict):
 
 def list_maps(shelf: Shelf) -> MapsAnswer:
     """Return the server's maps."""
-    entries: list[MapEntry] = []
-    for one in shelf.all():
-        info = one.avlmap.stored.info
-        entries.append(
-            {
-                "name": one.name,
-                "voxels": info.counts.voxels,
-                "keyframes": info.counts.keyframes,
-                "sounds": info.counts.sounds,
-                "profile": info.profile,
-                "voxel_size_m": info.voxel_size_m,
-                "finished": info.timings.finished,
-                "version": one.version,
-                "stale": shelf.is_stale(one.name),
-            }
-        )
-    return {"maps": entries}
+    return {"maps": [_entry(one, shelf.is_stale(one.name)) for one in map(shelf.get, shelf.names)]}
+
+
+def _entry(one: ServedMap, stale: bool) -> MapEntry:
+    info = one.avlmap.stored.info
+    return {
+        "name": one.name,
+        "voxels": info.counts.voxels,
+        "keyframes": info.counts.keyframes,
+        "sounds": info.counts.sounds,
+        "profile": info.profile,
+        "voxel_size_m": info.voxel_size_m,
+        "finished": info.timings.finished,
+        "version": one.version,
+        "stale": stale,
+    }
 
 
 def describe_map(task: WorkInput, query: requests.NoQuery) -> dict[str, Any]:
     """Return what ``avlmaps info --json`` prints, with the map's name for its path."""
-    del query
     described = map_answer(task.map.avlmap)
     notices = [without_folders(notice) for notice in described["notices"]]  # they name the recording's files
     return {**described, "path": task.map.name, "notices": notices}
@@ -142,14 +150,6 @@ def describe_map(task: WorkInput, query: requests.NoQuery) -> dict[str, Any]:
 def lists_of(task: WorkInput) -> MapLists:
     """Return the lists of a task's map, which the server stores."""
     return MapLists(task.map.avlmap, task.map.once, task.watch.step)
-
-
-def wanted(query: requests.ThingsQuery) -> Wanted:
-    """Return which things a request means."""
-    named = Wanted(least=query.least, name=query.name, structure=query.structure)
-    if not isinstance(query, requests.ListedThingsQuery):
-        return named
-    return replace(named, room=query.room, near=query.near, top=query.top, page=query.page, at=query.at)
 
 
 def list_contents(task: WorkInput, query: requests.ThingsQuery) -> ContentsAnswer:
@@ -177,13 +177,12 @@ def _noted(task: WorkInput, answer: Noted) -> Noted:
 
 def list_things(task: WorkInput, query: requests.ListedThingsQuery) -> ListedThingsAnswer:
     """Return a page of the things that are meant."""
-    page = page_of_things(lists_of(task), wanted(query))
+    page = page_of_things(lists_of(task), Wanted(**msgspec.structs.asdict(query)))
     return _noted(task, ListedThingsAnswer(map=task.map.name, frame=FRAME, **page))
 
 
 def list_sounds(task: WorkInput, query: requests.NoQuery) -> SoundsAnswer:
     """Return the sounds of a map."""
-    del query
     return _noted(task, SoundsAnswer(map=task.map.name, frame=FRAME, sounds=lists_of(task).sounds()))
 
 
@@ -205,8 +204,10 @@ def list_changes(task: WorkInput, query: requests.ChangesQuery) -> ChangesAnswer
 
 def list_edits(task: WorkInput, query: requests.NoQuery) -> EditsAnswer:
     """Return what ``avlmaps edit --list --json`` prints."""
-    del query
     return {**task.map.avlmap.edit.history(), "map": task.map.name}
+
+
+_NEEDED = {"rename": ("to",), "rename-room": ("name", "to"), "forbid": ("name",), "pin": ("name", "at")}
 
 
 def edit(task: WorkInput, query: requests.EditQuery) -> EditsAnswer:
@@ -217,26 +218,23 @@ def edit(task: WorkInput, query: requests.EditQuery) -> EditsAnswer:
         QueryError: there is no such thing, room or edit.
     """
     editor, by = task.map.avlmap.as_edited_now().edit, query.by or ""
-
-    def needed(name: str) -> str:
-        value = getattr(query, name)
-        if value is None:
+    for name in _NEEDED.get(query.does, ()):
+        if getattr(query, name) is None:
             raise RequestError(f"{query.does} needs the value {name!r}; /openapi.json describes it.")
-        return value
-
+    name, to, at = query.name or "", query.to or "", query.at
     match query.does:
         case "rename":
-            made = editor.rename(query.name, needed("to"), at=query.at, by=by)
+            made = editor.rename(query.name, to, at=at, by=by)
         case "rename-room":
-            made = editor.rename_room(needed("name"), needed("to"), by=by)
+            made = editor.rename_room(name, to, by=by)
         case "merge":
-            made = editor.merge(*query.places, to=query.to or "", by=by)
+            made = editor.merge(*query.places, to=to, by=by)
         case "split":
-            made = editor.split(query.name, at=query.at, plane=query.places, box=query.box, by=by)
+            made = editor.split(query.name, at=at, plane=query.places, box=query.box, by=by)
         case "forbid":
-            made = editor.forbid(needed("name"), box=query.box, room=query.room, by=by)
+            made = editor.forbid(name, box=query.box, room=query.room, by=by)
         case "pin":
-            made = editor.pin(needed("name"), needed("at"), by=by)
+            made = editor.pin(name, at or "", by=by)
         case "undo":
             made = editor.undo(query.edit or "", by=by)
     return {**editor.history(), "map": task.map.name, "text": edit_text(made)}
@@ -244,8 +242,7 @@ def edit(task: WorkInput, query: requests.EditQuery) -> EditsAnswer:
 
 def sound_clip(task: WorkInput, query: requests.NoQuery) -> File:
     """Return the FLAC file of a sound."""
-    del query
-    stored, number = task.map.avlmap.stored, int(task.path["sound"])
+    stored, number = task.map.avlmap.stored, task.path["sound"]
     if number >= len(stored.sounds):
         raise RequestError(f"The map has {len(stored.sounds)} sounds, counted from 0; there is no {number}.", 404)
     try:
@@ -291,7 +288,8 @@ def locate(task: WorkInput, query: requests.LocateQuery) -> LocateAnswer:
     photo = task.uploads.attachments(task.limits).get(requests.PHOTO)
     if not isinstance(photo, Photo):
         raise RequestError("There is no photo; send one as the file 'photo' of a form, or as the body.")
-    camera = camera_of(query.intrinsics, photo.rgb)
+    size = {"width": photo.rgb.shape[1], "height": photo.rgb.shape[0]}
+    camera = None if query.intrinsics is None else Pinhole(*numbers_of(query.intrinsics), **size)
     task.watch.step("locating")
     found = task.map.avlmap.locate(photo.rgb, camera, None if camera is not None else photo.focal_35mm)
     return locate_answer(found, task.map.avlmap.stored.info.doubts)
@@ -309,19 +307,17 @@ def place(task: WorkInput, query: requests.PlaceQuery) -> PlaceAnswer:
 
 def path(task: WorkInput, query: requests.PathQuery) -> PathAnswer:
     """Return the path between two places."""
-    finder = task.map.paths_by_stairs if query.stairs else task.map.paths
+    avlmap = task.map.avlmap
+    finder = task.map.once("stairs", lambda: PathFinder(avlmap, WALKER)) if query.stairs else task.map.paths
     return finder.answer(place_of(query.start), place_of(query.goal))
 
 
 def picture(task: WorkInput, query: requests.PictureQuery) -> File:
     """Return a PNG of an answer, or of the map."""
-    from avlmaps.serve.pictures import full_picture, map_picture, small_picture
-
     values = {name: getattr(query, name) for name in requests.AskQuery.__struct_fields__}
     named = any(values[name] is not None for name in ("object", "sound", "area"))
     asks = named or bool((query.sentence or "").strip()) or task.uploads != Uploads()
-    if not asks:
-        camera_of(query.intrinsics, None)  # they belong to a photo
+    if not asks and query.intrinsics is None:
         content = map_picture(task.map) if query.size == "full" else small_picture(task.map)
         return File(content, "image/png")
     answer = ask_map(task, requests.AskQuery(**values))
@@ -330,10 +326,13 @@ def picture(task: WorkInput, query: requests.PictureQuery) -> File:
     return File(draw(task.map, answer), "image/png")
 
 
+def _pyramid(task: WorkInput) -> Pyramid:
+    return task.map.once("tiles", lambda: Pyramid.of(task.map.avlmap))
+
+
 def tiles(task: WorkInput, query: requests.NoQuery) -> TilesAnswer:
     """Return the list of tiles."""
-    del query
-    return task.map.pyramid.index(task.map.version)
+    return _pyramid(task).index(task.map.version)
 
 
 def tile(task: WorkInput, query: requests.TilesQuery) -> File:
@@ -342,17 +341,157 @@ def tile(task: WorkInput, query: requests.TilesQuery) -> File:
     if query.heat is not None:
         shown = ask_map(task, requests.AskQuery(sentence=query.heat)).heat
         heat = None if shown is None else shown.shown
-    level, i, j, k = (int(task.path[name]) for name in ("level", "i", "j", "k"))
-    content = task.map.pyramid.tile(level, (i, j, k), heat)
+    level, i, j, k = (task.path[name] for name in ("level", "i", "j", "k"))
+    content = _pyramid(task).tile(level, (i, j, k), heat)
     if content is None:
         raise RequestError("There is no such tile; /maps/{map}/tiles lists them.", 404, "tile")
     return File(content, "application/octet-stream", {"etag": f'"{task.map.version}"'})
 
 
+# For agents.
+_MOST_KINDS, _MOST_HEARD = 12, 2
+
+
+def describe_building(task: WorkInput, query: NoQuery) -> dict[str, Any]:
+    """Return the floors with their rooms, and how many things of each name there are."""
+    avlmap, lists = task.map.avlmap, lists_of(task)
+    where, things = lists.where, lists.things()
+    floors = where.floors_of(_places([room.position for room in where.rooms]))
+    thing_floors = where.floors_of(_places([thing["position"] for thing in things]))
+    level = avlmap.space.level(avlmap.points) if len(avlmap.space) else np.zeros((1, 3))
+    return {
+        "map": task.map.name,
+        "frame": FRAME,
+        "size_m": [round(float(side), 1) for side in np.ptp(level, axis=0)],
+        "floors": [
+            {
+                "floor": floor,
+                "rooms": dict(Counter(where.rooms[k].name for k in np.flatnonzero(floors == floor)).most_common()),
+                "things": int((thing_floors == floor).sum()),
+            }
+            for floor in range(where.floor_count)
+        ],
+        "things": len(things),
+        "names": _kinds(things),
+        "sounds": _kinds([{"name": _first_name(sound)} for sound in lists.sounds()]),
+    }
+
+
+def tool_things(task: WorkInput, query: requests.ThingsToolQuery) -> dict[str, Any]:
+    """Return the things of a room, or near a place, or of a name; a page of them.
+
+    Raises:
+        QueryError: there is no such room, or no such thing to be near to.
+    """
+    lists = lists_of(task)
+    where, names = lists.where, query.name
+    unknown = [name for name in names if not task.map.avlmap.knows(name)]
+    known = [name for name in names if name not in unknown]
+    wanted = Wanted(**{**msgspec.structs.asdict(query), "name": known})
+    chosen, near = selected(lists, wanted) if known or not names else ([], None)
+    about: dict[str, Any] = {"near": near}
+    rows = [_thing_row(one, where) for one in chosen]
+    if unknown:
+        about["note"] = unknown_note(unknown[0])
+    if not names and len(rows) > query.top:
+        about["names"] = _kinds(rows)
+    return _paged(task, "things", rows, query.top, query.page) | about
+
+
+def tool_rooms(task: WorkInput, query: requests.RoomsToolQuery) -> dict[str, Any]:
+    """Return the rooms of a floor, each with the number of things in it; a page of them."""
+    lists = lists_of(task)
+    where = lists.where
+    count = Counter(one.room for one in things_with_rooms(lists, Wanted()))
+    floors = where.floors_of(_places([room.position for room in where.rooms]))
+    if query.floor is not None and not 0 <= query.floor < where.floor_count:
+        raise RequestError(f"There is no floor {query.floor}; the map has {where.floor_count}, counted from 0.")
+    wanted = range(len(where.rooms))
+    if names := query.name:
+        known = {room.name.casefold() for room in where.rooms} | {name.casefold() for name in where.names}
+        wanted = sorted({k for name in names if name.casefold() in known for k in where.numbers_of(name)})
+    rows = [
+        {
+            "room": where.names[k],
+            "name": where.rooms[k].name,
+            "confidence": where.rooms[k].confidence,
+            "area_m2": where.rooms[k].area_m2,
+            "position": list(where.rooms[k].position),
+            "things": count[k],
+            **({"floor": int(floors[k])} if where.floor_count > 1 else {}),
+        }
+        for k in wanted
+        if where.rooms[k].confidence >= query.least and query.floor in (None, int(floors[k]))
+    ]
+    return _paged(task, "rooms", rows, query.top, query.page)
+
+
+def tool_sounds(task: WorkInput, query: requests.SoundsToolQuery) -> dict[str, Any]:
+    """Return the sounds with their likeliest names, times and places; a page of them."""
+    lists, names = lists_of(task), {name.casefold() for name in query.name}
+    where, sounds = lists.where, lists.sounds()
+    rooms = where.rooms_of(_places([sound["position"] for sound in sounds]))
+    rows = [
+        {
+            "name": _first_name(sound),
+            "confidence": sound["confidences"][0] if sound["confidences"] else None,
+            "onset_s": sound["onset_s"],
+            "offset_s": sound["offset_s"],
+            "position": sound["position"],
+            "room": where.names[room] if room >= 0 else None,
+        }
+        for sound, room in zip(sounds, rooms.tolist(), strict=True)
+        if not names or _first_name(sound).casefold() in names
+    ]
+    return _paged(task, "sounds", rows, query.top, query.page)
+
+
+def _thing_row(one: Selected, where: Whereabouts) -> dict[str, Any]:
+    return {
+        "name": one.thing["name"],
+        "confidence": one.thing["confidence"],
+        "position": one.thing["position"],
+        "size": one.thing["size"],
+        "room": where.names[one.room] if one.room >= 0 else None,
+        "distance_m": one.away_m,
+        "heard": one.thing.get("heard", [])[:_MOST_HEARD] or None,
+    }
+
+
+def _paged(task: WorkInput, key: str, rows: list[dict[str, Any]], top: int, page: int) -> dict[str, Any]:
+    shown, pages = page_of(rows, top, page, key)
+    paging = {"page": page, "pages": pages} if pages > 1 else {}
+    return {"map": task.map.name, "frame": FRAME, "total": len(rows), **paging, key: shown}
+
+
+def _kinds(rows: Sequence[Any]) -> dict[str, int]:
+    """Return how often each name occurs, the most common first; ``other names`` counts the rest."""
+    ordered = Counter(row["name"] for row in rows).most_common()
+    rest = sum(count for _, count in ordered[_MOST_KINDS:])
+    return dict(ordered[:_MOST_KINDS]) | ({"other names": rest} if rest else {})
+
+
+def _first_name(sound: SoundAnswer) -> str:
+    return sound["names"][0] if sound["names"] else "sound"
+
+
+def _places(positions: Sequence[Sequence[float]]) -> Float[np.ndarray, "m 3"]:
+    return np.array(positions, np.float64).reshape(-1, 3)
+
+
+def seen_last(task: WorkInput, query: requests.LastSeenQuery) -> Any:
+    """Return where a thing is and when it was seen last."""
+    return last_seen(task.map.avlmap, query.thing, query.top)
+
+
+def goal_near(task: WorkInput, query: requests.GoalNearQuery) -> Any:
+    """Return goals by the length of their paths from a place."""
+    reply = ask_map(task, AskQuery(sentence=query.sentence, top=20))
+    return goals_near(task.map.paths, reply, place_of(query.near), query.top)
+
+
 def encoded(answer: Any) -> bytes:
     """Return an answer as JSON bytes."""
-    from avlmaps.core.printable import printable_json, shortened
-
     return printable_json(msgspec.json.encode(shortened(answer)).decode()).encode()
 
 
@@ -363,7 +502,6 @@ def viewer(task: WorkInput, query: ViewQuery) -> File:
     """Return the page; it learns from its address which maps it shows."""
     from avlmaps.view.page import live_page
 
-    del task, query
     return File(live_page(), "text/html")
 
 
@@ -371,33 +509,28 @@ def drawn_map(task: WorkInput, query: NoQuery) -> dict[str, Any]:
     """Return what the page needs before it draws the first voxel."""
     from avlmaps.view.labels import palettes
 
-    del query
     told = {"map": task.map.page.layout.describe(), "palettes": palettes(), "robot": task.map.guide.has_robot}
     return told | {"version": task.map.voxels_version}
 
 
 def drawn_voxels(task: WorkInput, query: NoQuery) -> File:
     """Return the voxels in the order of drawing (``layout.RECORD``)."""
-    del query
     return File(task.map.page.layout.records, _BYTES)
 
 
 def drawn_labels(task: WorkInput, query: NoQuery) -> File:
     """Return four bytes for each voxel: thing, room, name, confidence of the name."""
-    del query
     return File(task.map.page.labels.voxels.tobytes(), _BYTES)
 
 
 def drawn_contents(task: WorkInput, query: NoQuery) -> dict[str, Any]:
     """Return things, sounds and rooms with the colours of the page."""
-    del query
     return task.map.page.describe_contents()
 
 
 def drawn_voxel(task: WorkInput, query: NoQuery) -> dict[str, Any]:
     """Return what one voxel is taken for."""
-    del query
-    page, number = task.map.page, int(task.path["voxel"])
+    page, number = task.map.page, task.path["voxel"]
     if number >= len(page.layout):
         raise RequestError(f"There is no voxel {number}; the page draws {len(page.layout):,}.", 404)
     return page.describe_voxel(number)
@@ -405,8 +538,7 @@ def drawn_voxel(task: WorkInput, query: NoQuery) -> dict[str, Any]:
 
 def keyframe(task: WorkInput, query: NoQuery) -> File:
     """Return the picture of a keyframe."""
-    del query
-    number, keyframes = int(task.path["keyframe"]), task.map.avlmap.stored.keyframes
+    number, keyframes = task.path["keyframe"], task.map.avlmap.stored.keyframes
     jpeg = task.map.page.layout.thumbnail(number)
     if jpeg is None:
         raise RequestError(

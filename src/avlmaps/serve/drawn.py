@@ -1,4 +1,6 @@
-"""Voxels as tiles for other viewers: a pyramid of levels of detail, each cut into cubes of 64 voxels a side.
+"""What is drawn of a map: small and full pictures, and voxels as tiles for other viewers.
+
+Tiles are a pyramid of levels of detail, each cut into cubes of 64 voxels a side.
 
 Level 0 has the map's voxels. A voxel of level L covers 2^L voxels a side of level 0; its colour is the mean of theirs.
 The tile (L, i, j, k) covers the voxels [64 i, 64 i + 64) and so on of its level: the cube of edge
@@ -17,20 +19,30 @@ Bytes of a tile, little-endian:
     28      n times    x, y, z (uint8, 0 to 63, voxels from the corner), red, green, blue (uint8), heat (uint8) if any
 """
 
+import io
 import struct
 import threading
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, TypedDict
 
+import cv2
 import numpy as np
-from jaxtyping import Float32, Int, UInt8
+from jaxtyping import Float, Float32, Int, UInt8
 from msgspec import Meta
 
 from avlmaps.core.poses import FRAME
+from avlmaps.core.printable import plot_text
+from avlmaps.query.answer import Answer
+from avlmaps.query.plots import draw_map
 from avlmaps.query.schema import Frame, Position
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.figure import Figure
+
     from avlmaps.query.avlmap import AVLMap
+    from avlmaps.serve.shelf import ServedMap
 
 SIDE = 64
 MAGIC, VERSION = b"AVLT", 1
@@ -64,21 +76,13 @@ class TilesAnswer(TypedDict):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Level:
-    """Voxels of a level, those of a tile one after the other.
-
-    Attributes:
-        index: (n, 3) in this level.
-        rgb: mean colours.
-        starts: (t + 1,) first row of each tile.
-        corners: (t, 3) tiles.
-        of_map: row of this level for each voxel of the map.
-    """
+    """Voxels of a level, those of a tile one after the other."""
 
     index: Int[np.ndarray, "n 3"]
     rgb: UInt8[np.ndarray, "n 3"]
-    starts: Int[np.ndarray, " t1"]
-    corners: Int[np.ndarray, "t 3"]
-    of_map: Int[np.ndarray, " m"]
+    starts: Int[np.ndarray, " t1"]  # first row of each tile, and the end
+    corners: Int[np.ndarray, "t 3"]  # of each tile
+    of_map: Int[np.ndarray, " m"]  # row of this level for each voxel of the map
     rows: dict[tuple[int, int, int], int] = field(repr=False)
 
 
@@ -118,13 +122,8 @@ class Pyramid:
         of_map[order] = group
         first = order[new]
         count = np.bincount(of_map, minlength=len(first))
-        rgb = np.stack(
-            [
-                np.bincount(of_map, weights=self._rgb[:, k], minlength=len(first)) / np.maximum(count, 1)
-                for k in range(3)
-            ],
-            axis=-1,
-        )
+        sums = [np.bincount(of_map, weights=self._rgb[:, k], minlength=len(first)) for k in range(3)]
+        rgb = np.stack(sums, axis=-1) / np.maximum(count, 1)[:, None]
         in_tiles = tile_keys[first]
         begins = np.flatnonzero(np.r_[True, in_tiles[1:] != in_tiles[:-1]]) if len(first) else np.zeros(0, np.int64)
         corners = tile[first][begins]
@@ -182,6 +181,78 @@ class Pyramid:
 
 
 def _key(index: Int[np.ndarray, "n 3"]) -> Int[np.ndarray, " n"]:
-    """Return one number for each index of a map; a map is less than 2^21 voxels wide."""
+    # a map is less than 2^21 voxels wide
     shifted = index - (index.min(axis=0) if len(index) else 0)
     return (shifted[:, 0] << (2 * _BITS)) | (shifted[:, 1] << _BITS) | shifted[:, 2]
+
+
+SMALL_PIXELS = 480
+# Matplotlib's registries are not made for several threads at once.
+_drawing = threading.Lock()
+_INK = (38, 41, 46)
+
+
+def full_picture(served: "ServedMap", answer: Answer) -> bytes:
+    """Return the PNG that ``avlmaps query --plot`` writes; of an answer from a list the small one, with its places."""
+    if answer.heat is None:
+        return small_picture(served, answer)
+    with _drawing:
+        return _png(answer.heat.plot(top=max(len(answer.goals), 1)))
+
+
+def map_picture(served: "ServedMap") -> bytes:
+    """Return the PNG of a map from above, with its path and sounds."""
+    with _drawing:
+        return _png(draw_map(served.avlmap.stored, title=plot_text(served.name)))
+
+
+def _png(figure: "Figure") -> bytes:
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", bbox_inches="tight", pad_inches=0.15)
+    return stream.getvalue()
+
+
+def small_picture(
+    served: "ServedMap", answer: Answer | None = None, places: "Sequence[Sequence[float]] | None" = None
+) -> bytes:
+    """Return a small PNG: the map from above, the heat, the goals numbered.
+
+    Args:
+        served: the map.
+        answer: its heat and goals are drawn.
+        places: to number instead of the goals, metres, recording frame.
+    """
+    view, space = served.top_down, served.avlmap.space
+    ground = np.where(view.seen[..., None], 0.72 * view.rgb + 0.28 * 255.0, 246.0)
+    if answer is not None and answer.heat is not None:
+        heat = view.heat(answer.heat.shown)[..., None]
+        colour = _heat_colours(heat[..., 0])
+        opacity = 0.85 * np.power(heat / max(float(heat.max(initial=0.0)), 1e-9), 0.8)
+        ground = ground * (1.0 - opacity) + colour * opacity
+    left, _, bottom, _ = view.extent
+    rows, columns = view.seen.shape
+    scale = SMALL_PIXELS / max(rows, columns, 1)
+    size = max(1, round(columns * scale)), max(1, round(rows * scale))
+    mode = cv2.INTER_AREA if scale < 1.0 else cv2.INTER_NEAREST
+    picture = np.ascontiguousarray(cv2.resize(ground.astype(np.uint8)[::-1], size, interpolation=mode))
+    cell_m = (view.extent[1] - left) / max(columns, 1)
+    points = places if places is not None else [goal.position for goal in answer.goals] if answer else []
+    for number, point in enumerate(points, 1):
+        x, y = space.level(np.array(point))[:2]
+        at = round((x - left) / cell_m * scale), size[1] - 1 - round((y - bottom) / cell_m * scale)
+        _mark(picture, at, str(number))
+    done, encoded = cv2.imencode(".png", picture[..., ::-1])
+    return encoded.tobytes() if done else b""
+
+
+def _mark(picture: UInt8[np.ndarray, "h w 3"], at: tuple[int, int], text: str) -> None:
+    cv2.circle(picture, at, 9, (255, 255, 255), -1, cv2.LINE_AA)
+    cv2.circle(picture, at, 8, _INK, -1, cv2.LINE_AA)
+    (width, height), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, 0.4, 1)
+    corner = at[0] - width // 2, at[1] + height // 2
+    cv2.putText(picture, text, corner, cv2.FONT_HERSHEY_SIMPLEX, 0.4, (255, 255, 255), 1, cv2.LINE_AA)
+
+
+def _heat_colours(heat: Float[np.ndarray, "h w"]) -> Float[np.ndarray, "h w 3"]:
+    levels = np.clip(255.0 * (0.15 + 0.8 * heat), 0, 255).astype(np.uint8)
+    return cv2.applyColorMap(levels, cv2.COLORMAP_INFERNO)[..., ::-1].astype(np.float64)
