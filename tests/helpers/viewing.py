@@ -41,7 +41,7 @@ def serving(*maps: Path) -> Iterator[Served]:
     settings = ServeSettings(port=0)
     service = Service.open({f"map{k}": path for k, path in enumerate(maps)}, settings, warm=False)
     with listening_socket(settings) as opened:
-        server = uvicorn.Server(uvicorn.Config(create_app(service, tools=()), log_config=None, ws="none"))
+        server = uvicorn.Server(uvicorn.Config(create_app(service, agents=False), log_config=None, ws="none"))
         thread = threading.Thread(target=server.run, kwargs={"sockets": [opened]})
         thread.start()
         while not server.started:

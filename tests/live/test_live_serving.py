@@ -34,7 +34,7 @@ def test_the_server_takes_each_snapshot_and_the_end(tmp_path: Path) -> None:
             (one,) = client.get("/maps").json()["maps"]
             return one["voxels"]
 
-        with TestClient(create_app(service, tools=()), base_url="http://127.0.0.1:8750") as client:
+        with TestClient(create_app(service, agents=False), base_url="http://127.0.0.1:8750") as client:
             first = voxels()
             assert client.get("/maps/live/view").status_code == 200
             for number in range(4, 30):
