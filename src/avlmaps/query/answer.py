@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -198,17 +198,26 @@ def in_words(parts: Sequence[Part]) -> str:
 
 def found_text(parts: Sequence[PartAnswer], goal: Goal, count: int | None = None, alike: Sequence[Goal] = ()) -> str:
     """Return where the first goal of an answer that is found is, how many there are, and which words were no help."""
+    spelt = [replace(one.part, query=_spelt(one)) for one in parts]
     if count is not None:
         text = f"Counted: {count}. The most likely is at {_likely(goal)}."
     elif len(alike) > 1:
         places = " and ".join(f"at {place_of(one)}" for one in alike[:_MOST_NAMED])
         more = f" and {len(alike) - _MOST_NAMED} more" if len(alike) > _MOST_NAMED else ""
         known = f"{places}{more}, probability {alike[0].probability:.2f}"
-        text = f"{len(alike)} places fit {in_words([one.part for one in parts])} equally: {known}. {WHICH}"
+        text = f"{len(alike)} places fit {in_words(spelt)} equally: {known}. {WHICH}"
     else:
-        text = _sentence(f"{in_words([one.part for one in parts])} is most likely at {_likely(goal)}")
+        lead, sought = next(part for part in spelt if part.role is Role.PRIMARY), in_words(spelt)
+        text = f"the most likely of {sought} is" if _is(lead) == "are" else f"{sought} is most likely"
+        text = _sentence(f"{text} at {_likely(goal)}")
     halves = (one.note.split("; ")[0] for one in parts if one.note.startswith(UNDERSTOOD_ONLY))
     return " ".join([text, *map(_sentence, halves)])
+
+
+def _spelt(one: PartAnswer) -> str:
+    """Return the name of a part, spelt as it was understood: "sofa" for "sofaa"."""
+    is_word = len(one.understood.split()) == len(one.part.query.split()) == 1
+    return one.understood if is_word else one.part.query
 
 
 def placed(text: str, goal: Goal) -> str:
@@ -232,7 +241,8 @@ def absent_text(parts: Sequence[PartAnswer], goals: Sequence[Goal], alone: Alter
         where = " ".join(_context_words(one.part) for one in parts if one is not lead)
         why = f"{_not_found(lead.part)} {where}".rstrip()
     if alone is not None and alone.goals and lead.found:
-        goal, what = alone.goals[0], f"the best {_bare(lead.part)}" if lead.part.at != "source" else "the best guess"
+        goal, what = alone.goals[0], "the best guess" if lead.part.at == "source" else f"the best {_bare(lead.part)}"
+        what = what if _is(lead.part) == "is" else "the best of them"
     elif goals:
         goal, what = goals[0], "the best guess"
     else:
