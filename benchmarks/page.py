@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from avlmaps_sim.bench.harness.provenance import outdated
+from avlmaps_sim.bench.harness.figures import outdated
 
 ROOT = Path(__file__).resolve().parents[1]
 FIGURES, PAGE, README = ROOT / "docs" / "benchmarks.json", ROOT / "docs" / "benchmarks.md", ROOT / "README.md"

@@ -26,7 +26,7 @@ sys.path.insert(0, str(HERE))
 
 from avlmaps.core.files import write_bytes_atomically  # noqa: E402
 from avlmaps.core.version import __version__  # noqa: E402
-from avlmaps_sim.bench.harness.models import shipped_checksums  # noqa: E402
+from avlmaps_sim.bench.harness.settings import shipped_checksums  # noqa: E402
 from page import (  # noqa: E402
     ENTRIES,
     FIGURES,

@@ -5,7 +5,7 @@ import pytest
 
 from avlmaps.maps.audio.segmentation import Segment
 from avlmaps.maps.audio.settings import SegmentationSettings
-from avlmaps_sim.bench.harness.intervals import poisson, wilson
+from avlmaps_sim.bench.harness.figures import poisson, wilson
 from avlmaps_sim.bench.segmentation import COLUMNS, Tally, clips_to_test, measure
 
 

@@ -20,8 +20,7 @@ from avlmaps.core import poses
 from avlmaps.maps.store.reader import StoredMap, open_stored
 from avlmaps.recordings.open import open_recording
 from avlmaps_sim.bench.recordings.drafts import Draft, RoomWalk
-from avlmaps_sim.bench.recordings.formats import FOLDER, FORMATS, TUM_CAMERA, Format
-from avlmaps_sim.bench.recordings.outcomes import Judge
+from avlmaps_sim.bench.recordings.outcomes import FOLDER, FORMATS, TUM_CAMERA, Format, Judge
 from avlmaps_sim.bench.recordings.situations import situations
 
 # Of twelve seconds: on a walk of half a metre the noise of a Kinect hides half the scale of the positions.

@@ -12,9 +12,7 @@ from avlmaps.perception.embedded.pixels import EmbeddedPixels
 from avlmaps.perception.embedded.scene_network import DEFAULT_WEIGHTS, SYNTHETIC_WEIGHTS, SceneNetwork, load_network
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Frame, Ground
-from avlmaps_sim.bench.frames import ONCE, measure
-from avlmaps_sim.bench.labelled_folder import LabelledFolder
-from avlmaps_sim.bench.nyu import CLASSES, class_of_kinds
+from avlmaps_sim.bench.frames import CLASSES, ONCE, LabelledFolder, class_of_kinds, measure
 from avlmaps_sim.render import Renderer, View
 from avlmaps_sim.scenes import open_scene
 from avlmaps_sim.sensor import CLEAN, KINECT, Sensor, SensorSettings

@@ -18,7 +18,7 @@ from training.pixels.network import MULTIPLE, RoomNetwork
 from training.pixels.whole import WIDTH, whole_frame
 
 from avlmaps.perception.embedded.scene_network import DEFAULT_WEIGHTS, Notes, checksum_of
-from avlmaps_sim.bench.nyu import SCORED
+from avlmaps_sim.bench.frames import SCORED
 
 PIXELS_PER_FRAME = 400
 # Of the biases that make single pixels likeliest only this share is applied: they favour walls, which fill most of a

@@ -34,7 +34,7 @@ ROOMS = (
 )  # fmt: skip
 
 UNLABELLED = 255
-# Labels of real frames from here on are coarse: class c of ``avlmaps_sim.bench.nyu.CLASSES`` is FIRST_COARSE + c.
+# Labels of real frames from here on are coarse: class c of ``avlmaps_sim.bench.frames.CLASSES`` is FIRST_COARSE + c.
 FIRST_COARSE = 160
 
 

@@ -9,7 +9,7 @@ from training.pixels.light import in_other_light
 from training.pixels.network import MULTIPLE, has_bfloat16
 from training.pixels.shape import channels_of
 
-from avlmaps_sim.bench.nyu import CLASSES, SCORED, class_of_kinds
+from avlmaps_sim.bench.frames import CLASSES, SCORED, class_of_kinds
 
 SMOOTHING = 0.03
 # Labels without a class of their own are loose ("other prop" also where nobody labelled): they count less.

@@ -18,7 +18,7 @@ from training.pixels.losses import groups
 from training.pixels.network import RoomNetwork
 from training.pixels.whole import whole_frame
 
-from avlmaps_sim.bench.nyu import SCORED
+from avlmaps_sim.bench.frames import SCORED
 
 
 @torch.no_grad()

@@ -1,7 +1,7 @@
 """Real labelled frames as shards: ``python -m training.pixels.real --nyuv2 DIR``.
 
 The frames are those of NYU Depth V2's training split, or of any camera, in the layout of
-``avlmaps_sim.bench.labelled_folder``. Their labels are coarse: NYU's class c stands in a shard as ``FIRST_COARSE + c``
+``avlmaps_sim.bench.frames``. Their labels are coarse: NYU's class c stands in a shard as ``FIRST_COARSE + c``
 and teaches the sum of its kinds' probabilities. Neighbouring numbers are often one room, so whole blocks of them are
 held out for development.
 """
@@ -20,8 +20,7 @@ import tyro
 from training.pixels.labels import CATEGORIES, FIRST_COARSE, ROOMS, UNLABELLED
 
 from avlmaps.core.camera import Pinhole
-from avlmaps_sim.bench.labelled_folder import LabelledFolder, LabelledFrame
-from avlmaps_sim.bench.nyu import CLASSES
+from avlmaps_sim.bench.frames import CLASSES, LabelledFolder, LabelledFrame
 
 WIDTH, HEIGHT = 320, 240
 # The frames in their order are cut into blocks of about this size, at gaps in their numbers; each sixth is held out.
@@ -35,7 +34,7 @@ class Options:
     """Where real frames come from and go to."""
 
     nyuv2: Path
-    """Folder of labelled frames (``avlmaps_sim.bench.labelled_folder``), or a file that ``--pack`` wrote."""
+    """Folder of labelled frames (``avlmaps_sim.bench.frames``), or a file that ``--pack`` wrote."""
     out: Path = Path("build/pixels/real")
     """Folder of the shards: ``training`` and ``development`` in it."""
     pack: Path | None = None

@@ -12,7 +12,7 @@ from training.sounds.fit import EncodeWords
 from training.sounds.kinds import CALLED, ESC10, KINDS, NAMES, RECORDED
 
 from avlmaps.perception.embedded.sounds import SoundCalibration, log_odds, sigmoid
-from avlmaps_sim.bench.harness.intervals import wilson
+from avlmaps_sim.bench.harness.figures import wilson
 
 Table = dict[str, Any]
 FIFTY = [KINDS[name][0] for name in RECORDED]

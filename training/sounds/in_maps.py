@@ -34,9 +34,8 @@ from avlmaps_sim.bench.harness.evidence import LEAST_SEEN, Event, Evidence
 from avlmaps_sim.bench.harness.factors import true_things
 from avlmaps_sim.bench.harness.settings import Recorded
 from avlmaps_sim.bench.harness.workplace import SceneJob, called
-from avlmaps_sim.bench.indexing.rules import near_sound_tasks, sound_tasks
 from avlmaps_sim.bench.indexing.runs import DEFAULT_SCENES
-from avlmaps_sim.bench.indexing.tasks import Task, TaskKind
+from avlmaps_sim.bench.indexing.tasks import Task, TaskKind, near_sound_tasks, sound_tasks
 from avlmaps_sim.free_space import STRUCTURE
 from avlmaps_sim.recorder import _soundings, _track, _trip  # pyright: ignore[reportPrivateUsage]
 from avlmaps_sim.scenes import open_scene

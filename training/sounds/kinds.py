@@ -6,8 +6,8 @@ none of them.
 """
 
 from avlmaps.core.lexicon import EntryKind, lexicon
-from avlmaps_sim.bench import sound_categories
-from avlmaps_sim.bench.sound_categories import CATEGORIES, ESC50
+from avlmaps_sim.bench import sound_clips
+from avlmaps_sim.bench.sound_clips import CATEGORIES, ESC50
 
 # Every kind that ``avlmaps_sim.synthesis`` makes; most of them have one to eight real clips as well.
 _MADE = (
@@ -31,7 +31,7 @@ def _called(name: str) -> tuple[str, ...]:
     return entry.learnt if name in _UNSPOKEN else (name, *entry.learnt)
 
 
-ESC10: dict[str, tuple[str, ...]] = {name: _called(name) for name in sound_categories.ESC10}  # about 32 clips each
+ESC10: dict[str, tuple[str, ...]] = {name: _called(name) for name in sound_clips.ESC10}  # about 32 clips each
 MADE: dict[str, tuple[str, ...]] = {name: _called(name) for name in _MADE}
 
 TEMPLATES = ("{}", "the sound of {}", "a recording of {}", "{} sound", "the noise of {}")

@@ -15,7 +15,7 @@ from avlmaps_sim.bench.found.answers import Judged
 from avlmaps_sim.bench.found.queries import FAR_M, NEAR_M, labelled_queries
 from avlmaps_sim.bench.found.suite import brier, factors_table, kinds_table, reliability_table
 from avlmaps_sim.bench.harness.evidence import Event, Evidence
-from avlmaps_sim.bench.indexing.rules import area_tasks, between_m, near_sound_tasks, sound_tasks
+from avlmaps_sim.bench.indexing.tasks import area_tasks, between_m, near_sound_tasks, sound_tasks
 from avlmaps_sim.scene import SceneObject
 from helpers.small_home import HEARD, furnished
 

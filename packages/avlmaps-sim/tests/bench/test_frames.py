@@ -19,17 +19,25 @@ from avlmaps.perception.embedded.scene_network import DEFAULT_WEIGHTS, SYNTHETIC
 from avlmaps.recordings.types import Frame, Ground
 from avlmaps_sim.bench import frames
 from avlmaps_sim.bench.frames import (
+    CAMERA,
+    CLASSES,
+    KINDS_OF_CLASS,
+    MARGIN_PX,
+    METRES_A_STEP,
     ONCE,
+    SCORED,
     SEVERAL,
+    LabelledFolder,
+    LabelledFrame,
     Table,
+    class_of_kinds,
     class_probabilities,
     class_table,
     measure,
+    smooth_depth,
     summary_table,
 )
-from avlmaps_sim.bench.harness.intervals import of_mean
-from avlmaps_sim.bench.labelled_folder import MARGIN_PX, METRES_A_STEP, LabelledFolder, LabelledFrame, smooth_depth
-from avlmaps_sim.bench.nyu import CAMERA, CLASSES, KINDS_OF_CLASS, SCORED, class_of_kinds
+from avlmaps_sim.bench.harness.figures import of_mean
 from avlmaps_sim.bench.suites import BenchError, SuiteInputs, run_suite
 
 with pytest.MonkeyPatch.context() as patch:  # training is beside the package, not in it

@@ -17,21 +17,27 @@ from avlmaps.perception.profiles import choose_models
 from avlmaps.recordings.audio import Sound, write_flac
 from avlmaps.recordings.types import Frame
 from avlmaps.recordings.writer import RecordingWriter
-from avlmaps_sim.bench.harness.chosen import chosen_on
 from avlmaps_sim.bench.harness.clips import unheard_folder, unheard_rows
 from avlmaps_sim.bench.harness.evidence import Box
-from avlmaps_sim.bench.harness.models import shipped_checksums
+from avlmaps_sim.bench.harness.figures import (
+    as_csv,
+    chosen_on,
+    clip_table,
+    in_words,
+    outdated,
+    paper_figures,
+    shown_scene,
+    table_markdown,
+    write_answer,
+)
 from avlmaps_sim.bench.harness.own_recording import OwnRecording, is_recording
-from avlmaps_sim.bench.harness.paper import paper_figures
-from avlmaps_sim.bench.harness.provenance import clip_table, in_words, outdated, shown_scene
-from avlmaps_sim.bench.harness.settings import TaskError
+from avlmaps_sim.bench.harness.settings import TaskError, shipped_checksums
 from avlmaps_sim.bench.indexing import IndexingSettings, run
 from avlmaps_sim.bench.indexing.runs import PAPER_SIZES, _in_turn
+from avlmaps_sim.bench.indexing.scene_queries import cut_out, mixed, surface_regions
 from avlmaps_sim.bench.indexing.tasks import Task, TaskKind
-from avlmaps_sim.bench.indexing.voxel_views import cut_out, mixed, surface_regions
 from avlmaps_sim.bench.navigation import NavigationSettings
 from avlmaps_sim.bench.navigation.runs import run as run_navigation
-from avlmaps_sim.bench.output import as_csv, table_markdown, write_answer
 from avlmaps_sim.mixing.clips import find_clips
 from avlmaps_sim.render import Renderer
 from helpers.small_home import furnished
@@ -222,7 +228,7 @@ def test_every_tenth_frame_of_ones_own_recording_is_a_photo_and_not_in_the_map(o
 
 @pytest.mark.nightly
 def test_ones_own_recording_with_boxes_runs_through_the_tables(own: Path, tmp_path: Path, monkeypatch):
-    monkeypatch.setattr("avlmaps_sim.bench.harness.baselines._EXAMPLES", 2)
+    monkeypatch.setattr("avlmaps_sim.bench.harness.factors._EXAMPLES", 2)
     settings = IndexingSettings(scenes=(str(own),), profile="colours", jobs=1, tasks_a_scene=3, rules="paper")
     outcome = run(settings, tmp_path / "work")
     kinds = {task.kind for task in outcome.tasks.tasks}

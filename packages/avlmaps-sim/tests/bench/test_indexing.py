@@ -13,18 +13,34 @@ from hypothesis import strategies as st
 from avlmaps.core.question import Modality, Part
 from avlmaps.maps.grid import GridSpec
 from avlmaps.query.avlmap import AVLMap
-from avlmaps_sim.bench.harness.baselines import WeakSounds
 from avlmaps_sim.bench.harness.evidence import MARGIN_M, NEAR_M, Box, Event, Evidence, Photo, alone_near
-from avlmaps_sim.bench.harness.factors import near_polygon, true_regions
+from avlmaps_sim.bench.harness.factors import WeakSounds, near_polygon, true_regions
 from avlmaps_sim.bench.harness.settings import Recorded, TaskError
-from avlmaps_sim.bench.harness.true_voxels import TrueVoxels
-from avlmaps_sim.bench.indexing.configurations import CONFIGURATIONS, configurations
-from avlmaps_sim.bench.indexing.metrics import LIMITS_M, Answered, bootstrapped_mean, judged, scored
-from avlmaps_sim.bench.indexing.rules import area_tasks, near_sound_tasks, photo_tasks, sound_tasks
-from avlmaps_sim.bench.indexing.runs import IndexingSettings, run
+from avlmaps_sim.bench.harness.workplace import TrueVoxels
+from avlmaps_sim.bench.indexing.runs import (
+    CONFIGURATIONS,
+    LIMITS_M,
+    Answered,
+    IndexingSettings,
+    bootstrapped_mean,
+    configurations,
+    judged,
+    run,
+    scored,
+)
 from avlmaps_sim.bench.indexing.scene_queries import QueriedScene
-from avlmaps_sim.bench.indexing.tables import tables
-from avlmaps_sim.bench.indexing.tasks import Task, TaskKind, TaskSet, load_tasks, save_tasks
+from avlmaps_sim.bench.indexing.suite import tables
+from avlmaps_sim.bench.indexing.tasks import (
+    Task,
+    TaskKind,
+    TaskSet,
+    area_tasks,
+    load_tasks,
+    near_sound_tasks,
+    photo_tasks,
+    save_tasks,
+    sound_tasks,
+)
 from avlmaps_sim.hearing import Synthesised
 from avlmaps_sim.mesh import Material
 from avlmaps_sim.scene import Area, Scene, SceneBuilder
@@ -380,7 +396,7 @@ def test_a_file_that_is_not_there_is_told(tmp_path: Path):
 @pytest.mark.nightly
 def test_a_whole_run_makes_tables_and_a_second_one_makes_nothing_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     few = WeakSounds.learnt(np.random.default_rng(0), Synthesised().categories[::12])  # the ear has a test of its own
-    monkeypatch.setattr("avlmaps_sim.bench.harness.baselines.weak_ear", lambda seed: few)
+    monkeypatch.setattr("avlmaps_sim.bench.harness.factors.weak_ear", lambda seed: few)
     opened: list[str] = []
 
     def open_spec(spec: str) -> Scene:

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 import avlmaps
-from avlmaps_sim.bench.live.killed import lost_s
-from avlmaps_sim.bench.live.suite import LiveBench, _code, run_live
-from avlmaps_sim.bench.output import BenchError
+from avlmaps_sim.bench.harness.figures import BenchError
+from avlmaps_sim.bench.live.suite import LiveBench, _code, lost_s, run_live
 from helpers.walked_room import write_walk
 
 

@@ -15,16 +15,14 @@ from avlmaps.language.program import parse_program
 from avlmaps.maps.obstacles import CellState, Obstacles
 from avlmaps_sim.bench.harness.evidence import Box, Event, Evidence, Photo
 from avlmaps_sim.bench.harness.settings import Recorded, TaskError
-from avlmaps_sim.bench.indexing.rules import near_sound_tasks, photo_tasks
-from avlmaps_sim.bench.indexing.tasks import TaskKind
+from avlmaps_sim.bench.indexing.tasks import TaskKind, near_sound_tasks, photo_tasks
 from avlmaps_sim.bench.navigation import Episode, Leg, MissionSet, Outcome, load_missions, save_missions
 from avlmaps_sim.bench.navigation.commands import COMMANDS, SPATIAL, command_missions
-from avlmaps_sim.bench.navigation.configurations import CEILING, CONFIGURATIONS, OURS, configurations
 from avlmaps_sim.bench.navigation.episode_runner import Foreknowledge, WatchedBody
 from avlmaps_sim.bench.navigation.episodes import Journal
 from avlmaps_sim.bench.navigation.evidence import Ground
 from avlmaps_sim.bench.navigation.floor import Floor
-from avlmaps_sim.bench.navigation.goals import Goal, GoalKind, beside, between, left_of, room_distance_m
+from avlmaps_sim.bench.navigation.map_variants import CEILING, CONFIGURATIONS, OURS, configurations
 from avlmaps_sim.bench.navigation.metrics import (
     grouped_interval,
     in_a_row,
@@ -33,13 +31,24 @@ from avlmaps_sim.bench.navigation.metrics import (
     path_weight,
     spl,
 )
-from avlmaps_sim.bench.navigation.missions import Mission, Series, allocated, joined
+from avlmaps_sim.bench.navigation.missions import (
+    Goal,
+    GoalKind,
+    Mission,
+    NavigationSettings,
+    Series,
+    allocated,
+    beside,
+    between,
+    joined,
+    left_of,
+    room_distance_m,
+)
 from avlmaps_sim.bench.navigation.phrases import an_object, spoken
 from avlmaps_sim.bench.navigation.rules import image_missions, pair_missions, range_of, sound_missions
 from avlmaps_sim.bench.navigation.runs import SceneFacts
 from avlmaps_sim.bench.navigation.scores import scored
-from avlmaps_sim.bench.navigation.settings import NavigationSettings
-from avlmaps_sim.bench.navigation.tables import TITLE, tables
+from avlmaps_sim.bench.navigation.suite import TITLE, tables
 from avlmaps_sim.synthesis import MAKERS
 from helpers.small_home import HEARD, furnished
 

@@ -17,19 +17,22 @@ from avlmaps.navigate.driver import Arrival
 from avlmaps.perception.encoders import Encoders
 from avlmaps.query.avlmap import AVLMap
 from avlmaps_sim.bench.harness.evidence import Box
-from avlmaps_sim.bench.harness.true_voxels import TrueVoxels
-from avlmaps_sim.bench.navigation.configurations import CEILING, Configuration, configurations
+from avlmaps_sim.bench.harness.workplace import TrueVoxels
 from avlmaps_sim.bench.navigation.episode_runner import Pilot
 from avlmaps_sim.bench.navigation.episodes import Episode
 from avlmaps_sim.bench.navigation.floor import Floor
-from avlmaps_sim.bench.navigation.goals import Goal, GoalKind
-from avlmaps_sim.bench.navigation.map_variants import KnownScene, Perceived, Senses
-from avlmaps_sim.bench.navigation.missions import Mission, Series
+from avlmaps_sim.bench.navigation.map_variants import (
+    CEILING,
+    Configuration,
+    KnownScene,
+    Perceived,
+    Senses,
+    configurations,
+)
+from avlmaps_sim.bench.navigation.missions import Goal, GoalKind, Mission, NavigationSettings, Series
 from avlmaps_sim.bench.navigation.phrases import a_sound, an_object, near_sound
 from avlmaps_sim.bench.navigation.runs import run
-from avlmaps_sim.bench.navigation.settings import NavigationSettings
-from avlmaps_sim.bench.navigation.suite import run_navigation
-from avlmaps_sim.bench.navigation.tables import tables
+from avlmaps_sim.bench.navigation.suite import run_navigation, tables
 from avlmaps_sim.truth import HeardEvent, Truth
 from helpers.small_home import HEARD, furnished
 

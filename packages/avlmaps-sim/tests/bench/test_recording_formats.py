@@ -7,8 +7,7 @@ import pytest
 
 from avlmaps.core.camera import Pinhole, Rig
 from avlmaps_sim.bench.recordings.drafts import Draft, RoomWalk
-from avlmaps_sim.bench.recordings.formats import FOLDER, FORMATS, TUM_CAMERA, Format
-from avlmaps_sim.bench.recordings.outcomes import Judge, Outcome
+from avlmaps_sim.bench.recordings.outcomes import FOLDER, FORMATS, TUM_CAMERA, Format, Judge, Outcome
 from avlmaps_sim.bench.recordings.situations import situations
 
 

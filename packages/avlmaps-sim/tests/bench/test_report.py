@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from avlmaps_sim.bench.harness.models import shipped_checksums
+from avlmaps_sim.bench.harness.settings import shipped_checksums
 
 ROOT = Path(__file__).resolve().parents[4]
 sys.path.insert(0, str(ROOT / "benchmarks"))

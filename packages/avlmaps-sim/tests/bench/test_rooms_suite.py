@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from avlmaps_sim.bench.harness.intervals import median_interval
+from avlmaps_sim.bench.harness.figures import median_interval
 from avlmaps_sim.bench.rooms.scores import CELL_M, Floor, Listed, floors_of, judged
 from avlmaps_sim.scene import Area
 

@@ -10,7 +10,7 @@ from avlmaps.core.errors import AvlmapsError
 from avlmaps.maps.sources.correlation import SPEED_M_S
 from avlmaps.recordings.channels import ChannelSound, read_channels
 from avlmaps.recordings.microphones import microphones_named
-from avlmaps_sim.bench.sources.calibrated import Wrong, calibrated
+from avlmaps_sim.bench.sources.calibrated import USUAL, Wrong, _trial, calibrated, surfaces
 from avlmaps_sim.bench.sources.homes import (
     HomeOutcome,
     Mended,
@@ -30,7 +30,6 @@ from avlmaps_sim.bench.sources.measured import (
     walks_of_ratios,
 )
 from avlmaps_sim.bench.sources.suite import table_of_homes, table_of_mended, table_of_regions
-from avlmaps_sim.bench.sources.sweep import USUAL, _trial, surfaces
 from avlmaps_sim.hearing import AcousticSettings
 from avlmaps_sim.truth import HeardEvent
 from helpers.hearing_scenes import area

@@ -1,6 +1,19 @@
-"""The frame benchmark: what the pixel encoder recognises in single labelled frames, without any map.
+"""Naming the pixels of labelled frames: NYU Depth V2's folder and others in the same layout, against our kinds.
 
-Each of our kinds belongs to one of the classes (``avlmaps_sim.bench.nyu``); the likeliest of the 37 scored classes, by
+Silberman et al., "Indoor Segmentation and Support Inference from RGBD Images", ECCV 2012; the 40 classes are those of
+Gupta et al., "Perceptual Organization and Recognition of Indoor Scenes from RGB-D Images", CVPR 2013. Other data sets
+label in the same classes, ScanNet among them.
+
+| file | what |
+|---|---|
+| `frames.csv` | frame, up_x, up_y, up_z: for each frame up in the axes of its camera (x right, y down), length 1 |
+| `NAME.color.jpg` or `.png` | the picture |
+| `NAME.depth.png` | 16 bit, millimetres, 0 where there is none; registered to the picture and of its size |
+| `NAME.depth8.png` | instead: 8 bit, metres = value / 25.5, in-painted, as NYU's frames are often passed on |
+| `NAME.label.png` | 8 bit: class 1 to 40 of `avlmaps_sim.bench.frames`, 0 unlabelled |
+| `camera.json` | fx, fy, cx, cy, width, height of all pictures, pixels; without it NYU's camera, 640x480 |
+
+Each of our kinds belongs to one of the classes; the likeliest of the 37 scored classes, by
 the sum of its kinds' probabilities, is the answer for a pixel. Every second pixel is scored where it has one of the 37.
 Up is the data set's. The floor is the median height of the labelled floor where that has 800 of 640x480 pixels or
 more, else the one that ``find_ground`` estimates from the frame alone, as a build does from all frames.
@@ -9,20 +22,220 @@ Frames are measured twice: seen once, as maps see each of their many frames, and
 (``perception.embedded.multi_scale``), as single frames are best seen.
 """
 
+import csv
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import cv2
+import msgspec
 import numpy as np
-from jaxtyping import Float32, Int, UInt8
+from jaxtyping import Float, Float32, Int, UInt8
 
+from avlmaps.core.camera import Pinhole, Rig
+from avlmaps.core.errors import RecordingError
+from avlmaps.core.files import DESCRIPTION_BYTES, decode_json, read_regular
 from avlmaps.core.progress import progress
+from avlmaps.maps.gravity.floor import find_ground
 from avlmaps.perception.embedded.pixels import EmbeddedPixels
-from avlmaps_sim.bench.harness.intervals import of_mean
-from avlmaps_sim.bench.labelled_folder import LabelledFolder
-from avlmaps_sim.bench.nyu import CLASSES, SCORED, class_of_kinds
+from avlmaps.recordings.layout import CameraNumbers
+from avlmaps.recordings.types import Frame, Ground
+from avlmaps_sim.bench.harness.figures import of_mean
+
+CLASSES = (
+    "wall", "floor", "cabinet", "bed", "chair", "sofa", "table", "door", "window", "bookshelf", "picture", "counter",
+    "blinds", "desk", "shelves", "curtain", "dresser", "pillow", "mirror", "floor mat", "clothes", "ceiling", "books",
+    "refrigerator", "tv", "paper", "towel", "shower curtain", "box", "whiteboard", "person", "nightstand", "toilet",
+    "sink", "lamp", "bathtub", "bag", "other structure", "other furniture", "other prop",
+)  # fmt: skip
+# Only these are scored; the other three gather what has no class of its own.
+SCORED = 37
+
+# The kinds of each class. Every kind of the embedded pixel encoder stands here once (a test holds that).
+KINDS_OF_CLASS: dict[str, tuple[str, ...]] = {
+    "wall": ("wall", "partition"),
+    "floor": ("floor",),
+    "cabinet": ("cabinet", "kitchen cabinet", "wardrobe", "tv cabinet", "filing cabinet", "locker"),
+    "bed": ("bed", "bunk bed", "crib"),
+    "chair": ("chair", "armchair", "office chair", "stool", "bench"),
+    "sofa": ("sofa",),
+    "table": ("dining table", "coffee table", "side table", "console table", "pool table"),
+    "door": ("door", "folding door"),
+    "window": ("window",),
+    "bookshelf": ("bookshelf",),
+    "picture": ("picture",),
+    "counter": ("kitchen counter", "kitchen island"),
+    "blinds": ("blinds",),
+    "desk": ("desk",),
+    "shelves": ("wall shelf", "shoe rack"),
+    "curtain": ("curtain",),
+    "dresser": ("chest of drawers",),
+    "pillow": ("cushion",),
+    "mirror": ("mirror",),
+    "floor mat": ("carpet", "mat"),
+    "clothes": ("clothing",),
+    "ceiling": ("ceiling",),
+    "books": ("book",),
+    "refrigerator": ("refrigerator",),
+    "tv": ("tv", "monitor"),
+    "paper": ("paper",),
+    "towel": ("towel",),
+    "shower curtain": ("shower curtain",),
+    "box": ("box",),
+    "whiteboard": ("whiteboard",),
+    "person": ("person",),
+    "nightstand": ("nightstand",),
+    "toilet": ("toilet",),
+    "sink": ("sink",),
+    "lamp": ("lamp",),
+    "bathtub": ("bathtub",),
+    "bag": ("bag",),
+    "other structure": ("column", "stairs", "railing", "fireplace", "radiator", "air conditioner", "shower"),
+    "other furniture": ("ottoman", "coat rack", "piano", "play tent", "aquarium", "fitness equipment", "stove",
+                        "dishwasher", "washing machine", "baby stroller", "ironing board"),
+    "other prop": ("microwave", "range hood", "kettle", "toaster", "coffee machine", "fan", "vacuum cleaner",
+                   "water heater", "laptop", "computer", "printer", "loudspeaker", "keyboard", "telephone", "clock",
+                   "chandelier", "plant", "vase", "candle", "bottle", "cup", "bowl", "pot", "basket", "trash can",
+                   "toy", "shoes", "laundry basket", "tableware", "guitar", "dumbbell", "ball", "bicycle",
+                   "rocking horse", "pet bed", "water dispenser", "other"),
+}  # fmt: skip
+
+# The data set's colour camera, undistorted (its toolbox); depth is registered to it.
+CAMERA = Pinhole(518.86, 519.47, 325.58, 253.74, 640, 480)
+
+
+def class_of_kinds(kinds: tuple[str, ...]) -> Int[np.ndarray, " k"]:
+    """Return for each kind the index of its class in ``CLASSES``; a kind that stands nowhere is an other prop."""
+    of = {kind: number for number, name in enumerate(CLASSES) for kind in KINDS_OF_CLASS[name]}
+    return np.array([of.get(kind, len(CLASSES) - 1) for kind in kinds])
+
+
+METRES_A_STEP = 1.0 / 25.5
+# The depth of the outer pixels of NYU's frames was in-painted from nothing.
+MARGIN_PX = 12
+# A floor of a smaller share of the picture does not give the height of the camera: 800 pixels of 640x480.
+LEAST_FLOOR = 800 / (640 * 480)
+_FLOOR = CLASSES.index("floor") + 1
+
+
+@dataclass(frozen=True, slots=True)
+class LabelledFrame:
+    """A frame and its truth.
+
+    Labels are classes 1 to 40, 0 where there is none; where these do not give the camera's height, ``find_ground``
+    estimated it from this frame.
+    """
+
+    frame: Frame
+    label: UInt8[np.ndarray, "h w"]
+    floor_is_labelled: bool
+
+
+class LabelledFolder:
+    """The frames of a folder (see the module) in the order of ``frames.csv``, read one at a time."""
+
+    def __init__(self, folder: Path) -> None:
+        """Read the index and the camera.
+
+        Raises:
+            RecordingError: there is no index, it or the camera's file is damaged, or it names no frame.
+        """
+        self.folder = folder
+        index = folder / "frames.csv"
+        if not index.is_file():
+            raise RecordingError(f"There is no {index}; labelled frames need it: frame, up_x, up_y, up_z.")
+        self._up: dict[str, np.ndarray] = {}
+        with index.open(newline="", encoding="utf-8") as stream:
+            for line, row in enumerate(csv.DictReader(stream), 2):
+                try:
+                    up = np.array([float(row[f"up_{axis}"]) for axis in "xyz"])
+                    name = row["frame"]
+                except (KeyError, TypeError, ValueError) as fault:
+                    raise RecordingError(f"Line {line} of {index} has no frame, up_x, up_y, up_z ({fault}).") from fault
+                length = float(np.linalg.norm(up))
+                if not np.isfinite(length) or abs(length - 1.0) > 0.05:
+                    raise RecordingError(f"Line {line} of {index}: up has length {length:.3g}; it must be 1.")
+                self._up[name] = up / length
+        self.names = tuple(self._up)
+        if not self.names:
+            raise RecordingError(f"{index} names no frame.")
+        self.camera = _camera_of(folder / "camera.json")
+
+    def __len__(self) -> int:
+        """Return the number of frames."""
+        return len(self.names)
+
+    def read(self, number: int) -> LabelledFrame:
+        """Read one frame by its row in the index.
+
+        Raises:
+            RecordingError: a picture is missing, damaged, or of another size or depth.
+        """
+        name = self.names[number]
+        is_png = (self.folder / f"{name}.color.png").is_file()
+        rgb = self._picture(f"{name}.color.{'png' if is_png else 'jpg'}", cv2.IMREAD_COLOR)[..., ::-1]
+        label = self._picture(f"{name}.label.png", cv2.IMREAD_UNCHANGED)
+        if label.ndim != 2 or label.max() > len(CLASSES):
+            raise RecordingError(f"{self.folder / name}.label.png holds other values than classes 0 to 40.")
+        frame = Frame(
+            number, name, 0.0, np.ascontiguousarray(rgb), self._depth_m(name), np.eye(4), Rig(self.camera, self.camera)
+        )
+        return _grounded(frame, label, self._up[name])
+
+    def _depth_m(self, name: str) -> Float32[np.ndarray, "h w"]:
+        if (self.folder / f"{name}.depth.png").is_file():
+            depth_mm = self._picture(f"{name}.depth.png", cv2.IMREAD_UNCHANGED, "uint16")
+            return depth_mm.astype(np.float32) / np.float32(1000.0)
+        return smooth_depth(self._picture(f"{name}.depth8.png", cv2.IMREAD_UNCHANGED))
+
+    def _picture(self, name: str, flags: int, dtype: str = "uint8") -> np.ndarray:
+        path = self.folder / name
+        picture = cv2.imread(str(path), flags)
+        if picture is None:
+            raise RecordingError(f"{path} is missing or damaged.")
+        if picture.shape[:2] != (self.camera.height, self.camera.width) or picture.dtype != dtype:
+            raise RecordingError(
+                f"{path} is {picture.dtype} of {picture.shape}; it must be {dtype} of {self.camera.height} rows and "
+                f"{self.camera.width} columns."
+            )
+        return picture
+
+
+def _camera_of(path: Path) -> Pinhole:
+    if not path.is_file():
+        return CAMERA
+    try:
+        told: CameraNumbers = decode_json(read_regular(path, DESCRIPTION_BYTES), CameraNumbers)
+        return told.camera()
+    except (OSError, msgspec.DecodeError, UnicodeDecodeError, ValueError) as fault:
+        raise RecordingError(f"{path} is no camera ({fault}); it needs fx, fy, cx, cy, width and height.") from fault
+
+
+def smooth_depth(value: UInt8[np.ndarray, "h w"]) -> Float32[np.ndarray, "h w"]:
+    """Return metres of a depth in 8 bit; its steps of 39 mm are smoothed within surfaces, its margin is 0.
+
+    Two bilateral filters, as wide as three steps of depth. The steps are this file format's, not a sensor's.
+    """
+    depth = value.astype(np.float32) * np.float32(METRES_A_STEP)
+    for _ in range(2):
+        depth = cv2.bilateralFilter(depth, d=9, sigmaColor=3.0 * METRES_A_STEP, sigmaSpace=4.0)
+    depth = np.where(value > 0, depth, np.float32(0.0))
+    inside = np.zeros(depth.shape, bool)
+    inside[MARGIN_PX:-MARGIN_PX, MARGIN_PX:-MARGIN_PX] = True
+    return np.where(inside, depth, np.float32(0.0)).astype(np.float32)
+
+
+def _grounded(frame: Frame, label: UInt8[np.ndarray, "h w"], up: Float[np.ndarray, "3"]) -> LabelledFrame:
+    floor = (label == _FLOOR) & (frame.depth_m > 0.0)
+    is_labelled = bool(floor.mean() >= LEAST_FLOOR)
+    if is_labelled:
+        floor_m = float(np.median(frame.rig.depth.backproject(frame.depth_m)[floor] @ up))
+        ground = Ground(up, np.zeros(1), np.array([floor_m]))
+    else:
+        ground = find_ground([frame], up).ground
+    return LabelledFrame(replace(frame, ground=ground), label, is_labelled)
+
 
 STEP = 2
 # How frames are seen.

@@ -18,7 +18,7 @@ from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.words import singulars_of, stem_of
 from avlmaps.language.list_questions import Listed, ListQuestion
 from avlmaps.language.sentence import Attachments
-from avlmaps_sim.bench.harness.intervals import wilson
+from avlmaps_sim.bench.harness.figures import wilson
 
 OUTCOMES = ("right", "harmless", "asked back", "misread")
 _STOPS = frozenset({"refuse", "clarify"})

@@ -17,7 +17,7 @@ from avlmaps.maps.types import Keyframes
 from avlmaps.perception.encoders import Encoders
 from avlmaps.query.locate import Located, LocateSettings, locate
 from avlmaps.recordings.types import Recording, Subset
-from avlmaps_sim.bench.harness.intervals import in_percent, wilson
+from avlmaps_sim.bench.harness.figures import in_percent, wilson
 
 COLUMNS = (
     "map",

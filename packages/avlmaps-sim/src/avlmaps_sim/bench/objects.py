@@ -23,10 +23,16 @@ from jaxtyping import Bool, Float, Int
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.progress import progress
 from avlmaps.query.naming import VoxelNamer
-from avlmaps_sim.bench.harness.chosen import chosen_on
-from avlmaps_sim.bench.harness.intervals import of_mean, wilson
-from avlmaps_sim.bench.harness.provenance import in_words, provenance, shown_scene
-from avlmaps_sim.bench.output import markdown, write_answer
+from avlmaps_sim.bench.harness.figures import (
+    chosen_on,
+    in_words,
+    markdown,
+    of_mean,
+    provenance,
+    shown_scene,
+    wilson,
+    write_answer,
+)
 from avlmaps_sim.scene import SceneObject
 
 if TYPE_CHECKING:

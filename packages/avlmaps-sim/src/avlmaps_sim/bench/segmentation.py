@@ -18,7 +18,7 @@ from avlmaps.core.progress import progress
 from avlmaps.maps.audio.segmentation import Segment, segment
 from avlmaps.maps.audio.settings import SegmentationSettings
 from avlmaps.recordings.audio import AudioTrack, Sound, write_flac
-from avlmaps_sim.bench.harness.intervals import in_percent, poisson, wilson
+from avlmaps_sim.bench.harness.figures import in_percent, poisson, wilson
 from avlmaps_sim.mixing.background import background
 from avlmaps_sim.mixing.clips import Clip, amplify, audible_part, find_clips, gain_for, index_rows
 

@@ -10,9 +10,8 @@ from avlmaps.core.registry import Kind
 from avlmaps.core.wording import option
 from avlmaps.perception.encoders import Encoders, encoders_of
 from avlmaps.perception.profiles import choose_models
-from avlmaps_sim.bench.harness.models import checksums, shipped_checksums
-from avlmaps_sim.bench.harness.provenance import in_words
-from avlmaps_sim.bench.output import BenchError, Table, markdown, write_answer
+from avlmaps_sim.bench.harness.figures import BenchError, Table, in_words, markdown, write_answer
+from avlmaps_sim.bench.harness.settings import checksums, shipped_checksums
 
 if TYPE_CHECKING:
     from avlmaps_sim.bench.harness.settings import SceneSettings

@@ -11,7 +11,7 @@ from time import thread_time
 import numpy as np
 
 from avlmaps.perception.embedded.words import EmbeddedWords
-from avlmaps_sim.bench.harness.intervals import wilson
+from avlmaps_sim.bench.harness.figures import wilson
 
 _FIVE = 5
 # training/words/teacher_figures.json, of the day in it: all-MiniLM-L6-v2 in float32 on the same list, (first, among

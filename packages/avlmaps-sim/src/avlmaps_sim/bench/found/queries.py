@@ -13,8 +13,7 @@ import numpy as np
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import Modality, Part, Role
 from avlmaps_sim.bench.harness.evidence import Box, Evidence, shown_boxes
-from avlmaps_sim.bench.indexing.rules import between_m
-from avlmaps_sim.bench.indexing.tasks import Task, TaskKind
+from avlmaps_sim.bench.indexing.tasks import Task, TaskKind, between_m
 from avlmaps_sim.bench.objects import STRUCTURE
 from avlmaps_sim.mesh import Triple
 from avlmaps_sim.scene import Area

@@ -14,14 +14,12 @@ from avlmaps.core.files import write_bytes_atomically
 from avlmaps.query.goals import FACTORS, factor_values
 from avlmaps.query.settings import FOUND_AT
 from avlmaps_sim.bench.found.answers import Judged, judged_job
-from avlmaps_sim.bench.harness.intervals import in_percent, wilson
-from avlmaps_sim.bench.harness.provenance import in_words, provenance
+from avlmaps_sim.bench.harness.figures import Table, in_percent, in_words, markdown, provenance, wilson, write_answer
 from avlmaps_sim.bench.harness.workers import side_by_side
 from avlmaps_sim.bench.harness.workplace import scene_jobs
 from avlmaps_sim.bench.indexing.runs import IndexingSettings
-from avlmaps_sim.bench.indexing.tables import TITLE
+from avlmaps_sim.bench.indexing.suite import TITLE
 from avlmaps_sim.bench.indexing.tasks import TaskKind
-from avlmaps_sim.bench.output import Table, markdown, write_answer
 
 NOTE = (
     "A first goal is right within 0.5 m of a right place, horizontally. Queries that have no right answer stand beside "

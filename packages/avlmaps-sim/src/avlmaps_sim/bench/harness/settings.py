@@ -1,6 +1,7 @@
-"""Which scenes a suite runs on, how they are recorded and mapped; files of tasks with a schema version."""
+"""Which scenes a suite runs on, how they are recorded and mapped, and the checksums that name the models."""
 
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Literal, TypeVar
 
@@ -8,13 +9,32 @@ import msgspec
 
 from avlmaps.core.errors import AvlmapsError
 from avlmaps.core.files import write_bytes_atomically
+from avlmaps.core.registry import Kind
 from avlmaps.core.wording import option
 from avlmaps.perception.encoders import Encoders, encoders_of
 from avlmaps.perception.profiles import choose_models
 from avlmaps.query.settings import Rules
 from avlmaps_sim.bench.harness.clips import unheard_rows
-from avlmaps_sim.bench.harness.models import checksums
 from avlmaps_sim.mixing.clips import find_clips
+
+
+def checksums(used: Encoders) -> dict[str, str]:
+    """Return the checksum of every model of some encoders, by module. Loads the models: one that is missing raises.
+
+    Raises:
+        BackendError: a model's package or files are missing.
+    """
+    return {kind.value: card.checksum for kind, card in used.cards().items()}
+
+
+@cache
+def shipped_checksums() -> dict[str, str]:
+    """Return the checksums of the models that ship with this package (the profile ``embedded``, and its words)."""
+    from avlmaps.core.registry import load
+
+    words = load(Kind.WORDS, "embedded")
+    return {**checksums(Encoders.named("embedded")), "words": words.card.checksum}  # pyright: ignore[reportAttributeAccessIssue]
+
 
 Clips = Literal["unheard", "all"]
 

@@ -1,4 +1,4 @@
-"""Running the benchmark: first all scenes' tasks are made, then every configuration answers them; scene by scene."""
+"""Running the benchmark: tasks of all scenes, then every configuration of sources of heat; recall and mean distance."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -7,20 +7,207 @@ from pathlib import Path
 from time import perf_counter
 
 import msgspec
+import numpy as np
+from jaxtyping import Float
 
+from avlmaps.core.errors import QueryError
 from avlmaps.core.files import write_bytes_atomically
+from avlmaps.core.question import Role
+from avlmaps.core.registry import Kind
 from avlmaps.core.version import __version__
 from avlmaps.core.wording import option
+from avlmaps.query.heatmap import Heatmap, product
+from avlmaps_sim.bench.harness.figures import wilson
 from avlmaps_sim.bench.harness.settings import SceneSettings, TaskError
 from avlmaps_sim.bench.harness.workers import side_by_side
 from avlmaps_sim.bench.harness.workplace import SceneJob, Workplace, scene_jobs
-from avlmaps_sim.bench.indexing.configurations import CONFIGURATIONS
-from avlmaps_sim.bench.indexing.metrics import Answered, judged
-from avlmaps_sim.bench.indexing.rules import area_tasks, near_sound_tasks, photo_tasks, sound_tasks
 from avlmaps_sim.bench.indexing.scene_queries import QueriedScene
-from avlmaps_sim.bench.indexing.tasks import Task, TaskKind, TaskSet, load_tasks, save_tasks
+from avlmaps_sim.bench.indexing.tasks import (
+    Task,
+    TaskKind,
+    TaskSet,
+    area_tasks,
+    load_tasks,
+    near_sound_tasks,
+    photo_tasks,
+    save_tasks,
+    sound_tasks,
+)
+from avlmaps_sim.mesh import Triple
 from avlmaps_sim.scene import Scene
 from avlmaps_sim.scenes import open_scene
+
+Source = Callable[[QueriedScene, Task, Role], Heatmap | None]
+
+OURS, CEILING = "ours", "true perception"
+
+
+@dataclass(frozen=True, slots=True)
+class Configuration:
+    """A row of a table.
+
+    The first of the ``sources`` is what is sought, the others say where it is; ``role`` is ``baseline`` for single
+    modalities, ``ours``, ``ceiling``, else ``variant``.
+    """
+
+    kind: TaskKind
+    name: str
+    sources: tuple[Source, ...]
+    needs: tuple[Kind, ...] = ()
+    role: str = "variant"
+
+    def answer(self, scene: QueriedScene, task: Task) -> tuple[Triple | None, bool]:
+        """Return the first goal's place and whether the whole was reported as found.
+
+        The place is None where the map has no answer, or knows nothing of a word.
+        """
+        try:
+            heat = [
+                source(scene, task, Role.CONTEXT if number else Role.PRIMARY)
+                for number, source in enumerate(self.sources)
+            ]
+        except QueryError:
+            return None, False
+        whole = product([one for one in heat if one is not None])
+        goals = whole.goals(1)
+        return (goals[0].position, whole.found) if goals else (None, False)
+
+
+_PIXELS, _SOUNDS = (Kind.PIXELS,), (Kind.PIXELS, Kind.SOUNDS)
+_VIEWS = (Kind.PIXELS, Kind.VIEWS)
+_PHOTOS = (Kind.PIXELS, Kind.LOCAL, Kind.PLACE, Kind.MATCHER)
+_object, _sound, _weak = QueriedScene.map_object, QueriedScene.map_sound, QueriedScene.weak_sound
+_area, _true_object, _true_sound = QueriedScene.map_area, QueriedScene.true_object, QueriedScene.true_sound
+
+_AREA_ROWS = (
+    ("object only", (_object,), _PIXELS, "baseline"),
+    ("+ area by the object encoder", (_object, QueriedScene.area_as_object), _PIXELS, "variant"),
+    ("+ whole views in each voxel", (_object, QueriedScene.pixel_views), _VIEWS, "variant"),
+    ("+ ConceptFusion: regions and views in each voxel", (_object, QueriedScene.region_views), _VIEWS, "variant"),
+    ("+ sparse view map by the paper's rules", (_object, QueriedScene.paper_area), _VIEWS, "variant"),
+    ("+ sparse view map (ours)", (_object, _area), _VIEWS, OURS),
+    ("+ true region map", (_object, QueriedScene.true_area), _PIXELS, "variant"),
+    ("true objects + sparse view map", (_true_object, _area), (Kind.VIEWS,), "variant"),
+    (CEILING, (_true_object, QueriedScene.true_area), (), "ceiling"),
+)
+# The primary part stands first: here the sound.
+_SOUND_ROWS = (
+    ("sound only, weaker encoder", (_weak,), (), "baseline"),
+    ("sound only", (_sound,), (Kind.SOUNDS,), "baseline"),
+    ("object + sound, weaker encoder", (_weak, _object), _PIXELS, "variant"),
+    ("object + sound (ours)", (_sound, _object), _SOUNDS, OURS),
+    ("object + true sound", (_true_sound, _object), _PIXELS, "variant"),
+    ("true objects + sound", (_sound, _true_object), (Kind.SOUNDS,), "variant"),
+    (CEILING, (_true_sound, _true_object), (), "ceiling"),
+)
+_PHOTO_ROWS = (
+    ("object only", (_object,), _PIXELS, "baseline"),
+    ("image only", (QueriedScene.map_photo,), _PHOTOS[1:], "baseline"),
+    ("object + most alike keyframe, not located", (_object, QueriedScene.alike_keyframe), _PHOTOS, "variant"),
+    ("object + image (ours)", (_object, QueriedScene.map_photo), _PHOTOS, OURS),
+    ("object + true camera", (_object, QueriedScene.true_camera), _PIXELS, "variant"),
+    ("true objects + image", (_true_object, QueriedScene.map_photo), _PHOTOS[1:], "variant"),
+    (CEILING, (_true_object, QueriedScene.true_camera), (), "ceiling"),
+)
+_NEAR_SOUND_ROWS = (
+    ("object only", (_object,), _PIXELS, "baseline"),
+    ("sound only, weaker encoder", (_weak,), (), "baseline"),
+    ("sound only", (_sound,), (Kind.SOUNDS,), "baseline"),
+    ("object + sound, weaker encoder", (_object, _weak), _PIXELS, "variant"),
+    ("object + sound (ours)", (_object, _sound), _SOUNDS, OURS),
+    ("object + true sound", (_object, _true_sound), _PIXELS, "variant"),
+    ("true objects + sound", (_true_object, _sound), (Kind.SOUNDS,), "variant"),
+    (CEILING, (_true_object, _true_sound), (), "ceiling"),
+)
+_ROWS = {
+    TaskKind.AREA: _AREA_ROWS,
+    TaskKind.SOUND: _SOUND_ROWS,
+    TaskKind.PHOTO: _PHOTO_ROWS,
+    TaskKind.NEAR_SOUND: _NEAR_SOUND_ROWS,
+}
+CONFIGURATIONS: tuple[Configuration, ...] = tuple(
+    Configuration(kind, name, sources, needs, role)
+    for kind, rows in _ROWS.items()
+    for name, sources, needs, role in rows
+)
+
+
+def configurations(kind: TaskKind) -> tuple[Configuration, ...]:
+    """Return the rows of a table, in their order."""
+    return tuple(one for one in CONFIGURATIONS if one.kind is kind)
+
+
+LIMITS_M = (0.5, 1.0, 1.5, 2.0)
+_RESAMPLES = 2000
+
+
+@dataclass(frozen=True, slots=True)
+class Answered:
+    """A configuration's answer to a task.
+
+    ``position`` is the first goal, metres, world. Distances are horizontal, to the nearest point of the nearest
+    target's box and to its middle; for no answer they are the scene's largest.
+    """
+
+    task: str
+    configuration: str
+    position: Triple | None
+    off_m: float
+    centre_m: float
+    found: bool = False
+
+
+def judged(task: Task, configuration: str, position: Triple | None, largest_m: float, found: bool = False) -> Answered:
+    """Compare an answer with the truth; none at all is as wrong as the scene is large."""
+    if position is None:
+        return Answered(task.name, configuration, None, largest_m, largest_m)
+    return Answered(task.name, configuration, position, task.off_m(position), task.centre_off_m(position), found)
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """A configuration's figures over all tasks of a table.
+
+    Hits are off by less than each of ``LIMITS_M``; the interval of the mean is bootstrapped over the tasks.
+    """
+
+    count: int
+    answered: int
+    hits: tuple[int, ...]
+    mean_m: float
+    mean_interval_m: tuple[float, float]
+
+    def recall(self, limit_m: float) -> float:
+        """Return the share of the tasks answered within a distance of ``LIMITS_M``."""
+        return self.hits[LIMITS_M.index(limit_m)] / self.count if self.count else 0.0
+
+    def recall_interval(self, limit_m: float) -> tuple[float, float]:
+        """Return Wilson's 95 % interval of the recall."""
+        return wilson(self.hits[LIMITS_M.index(limit_m)], self.count)
+
+
+def scored(answers: Sequence[Answered], seed: int = 0, *, by_centre: bool = False) -> Score:
+    """Sum up answers, by the nearest face of the right thing or by its centre."""
+    off_m = np.array([answer.centre_m if by_centre else answer.off_m for answer in answers], np.float64)
+    hits = tuple(int((off_m < limit).sum()) for limit in LIMITS_M)
+    answered = sum(answer.position is not None for answer in answers)
+    mean = float(off_m.mean()) if len(off_m) else 0.0
+    return Score(len(answers), answered, hits, mean, bootstrapped_mean(off_m, np.random.default_rng(seed)))
+
+
+def chance(tasks: Sequence[Task]) -> float:
+    """Return the share that is right where one of the candidates of each name is drawn at random."""
+    return float(np.mean([len(task.targets) / (len(task.targets) + task.rivals) for task in tasks])) if tasks else 0.0
+
+
+def bootstrapped_mean(values: Float[np.ndarray, " n"], rng: np.random.Generator) -> tuple[float, float]:
+    """Return the 95 % percentile interval of a mean over resamples; of nothing (0, 0)."""
+    if not len(values):
+        return 0.0, 0.0
+    means = values[rng.integers(len(values), size=(_RESAMPLES, len(values)))].mean(axis=1)
+    low, high = np.percentile(means, (2.5, 97.5))
+    return float(low), float(high)
+
 
 DEFAULT_SCENES = tuple(f"house:{seed}:held-out" for seed in range(1_000_000, 1_000_012))
 # The paper's numbers of tasks; it does not give that of Table V, but its percentages are those of 159.

@@ -1,25 +1,166 @@
-"""One scene under query: its map, its truth, and every source of heat that a configuration may join."""
+"""The queries of a scene by each source of heat, with the view features of every voxel.
+
+ConceptFusion (Jatavallabhula et al., RSS 2023) gives each pixel the feature of its region's cut-out, mixed with that of
+the whole picture, and fuses them into the map. With f_i of region i and f of the whole, all of unit length,
+
+    w = softmax over i of <f_i, f> + (1/R) sum over j != i of <f_i, f_j>
+    feature of region i = w_i f + (1 - w_i) f_i, scaled to unit length
+
+The regions here are those of any profile, without a proposer on torch: connected surface without an edge of depth or
+direction, so that they know no class. Pixels of no region take the feature of the whole view.
+"""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
+import cv2
 import numpy as np
 from jaxtyping import Float32, Int, UInt8
 
+from avlmaps.core.camera import Rig
 from avlmaps.core.errors import QueryError
+from avlmaps.core.poses import apply
+from avlmaps.core.progress import progress
 from avlmaps.core.question import Modality, Part, Role
+from avlmaps.perception.protocols import ViewEncoder
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.modalities.area import area_factor, area_scores
 from avlmaps.query.settings import PAPER_AREAS
 from avlmaps.query.voxel_space import Space
-from avlmaps.recordings.types import Recording
-from avlmaps_sim.bench.harness.baselines import WeakHearing, alike_keyframe
-from avlmaps_sim.bench.harness.factors import VoxelHeat, true_places, true_regions, true_things
+from avlmaps.recordings.types import Frame, Recording
+from avlmaps_sim.bench.harness.factors import (
+    VoxelHeat,
+    WeakHearing,
+    alike_keyframe,
+    true_places,
+    true_regions,
+    true_things,
+)
 from avlmaps_sim.bench.indexing.tasks import Task
-from avlmaps_sim.bench.indexing.voxel_views import region_features, view_features
 from avlmaps_sim.truth import Truth
+
+_STRIDE_PX = 3
+_SEEN_TO_M = 6.0
+_DEPTH_EDGE = 0.04  # of the depth, from one pixel to the next
+_TURN_EDGE = 0.9  # cosine between the normals of neighbours
+_LEAST_SHARE = 0.01  # of the picture that a region covers
+_MOST_REGIONS = 12  # of a picture, the largest
+_Rows = Callable[[Frame, int], tuple[Float32[np.ndarray, "r d"], Int[np.ndarray, "h w"]]]
+
+
+def view_features(avlmap: AVLMap, recording: Recording) -> Float32[np.ndarray, "n d"]:
+    """Return for each voxel the mean view feature of the keyframes that saw it, unit length; zero where none did."""
+    views = avlmap.data.keyframes.view
+
+    def rows(frame: Frame, keyframe: int) -> tuple[Float32[np.ndarray, "r d"], Int[np.ndarray, "h w"]]:
+        return np.asarray(views[keyframe], np.float32)[None], np.zeros(frame.depth_m.shape, np.int64)
+
+    return _spread(avlmap, recording, rows)
+
+
+def region_features(avlmap: AVLMap, recording: Recording) -> Float32[np.ndarray, "n d"]:
+    """Return for each voxel the mean feature of the regions that showed it, unit length; zero for one never shown."""
+    views, encoder = avlmap.data.keyframes.view, avlmap.encoders.views
+
+    def rows(frame: Frame, keyframe: int) -> tuple[Float32[np.ndarray, "r d"], Int[np.ndarray, "h w"]]:
+        whole = np.asarray(views[keyframe], np.float32)
+        label = surface_regions(frame)
+        cut = [cut_out(frame, label == number) for number in range(1, int(label.max()) + 1)]
+        return np.concatenate([whole[None], mixed(whole, _encoded(encoder, cut, len(whole)))]), label
+
+    return _spread(avlmap, recording, rows)
+
+
+def _encoded(encoder: ViewEncoder, cut: list[Frame], dim: int) -> Float32[np.ndarray, "r d"]:
+    return np.concatenate([np.zeros((0, dim), np.float32), *(np.asarray(encoder.encode([one])) for one in cut)])
+
+
+def surface_regions(frame: Frame) -> Int[np.ndarray, "h w"]:
+    """Return the number of each depth pixel's region, from 1, the largest first; 0 for no region."""
+    depth_m, camera = np.asarray(frame.depth_m, np.float64), frame.rig.depth
+    height, width = depth_m.shape
+    rays = camera.resized(width, height).rays()
+    points = rays / rays[..., 2:] * depth_m[..., None]
+    normal = np.cross(np.gradient(points, axis=1), np.gradient(points, axis=0))
+    normal /= np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-12)
+    edge = depth_m <= 0.0
+    for axis in (0, 1):
+        step = np.abs(np.diff(depth_m, axis=axis)) > _DEPTH_EDGE * np.minimum(*_neighbours(depth_m, axis))
+        turn = (np.multiply(*_neighbours(normal, axis))).sum(axis=2) < _TURN_EDGE
+        first = (slice(None, -1), slice(None)) if axis == 0 else (slice(None), slice(None, -1))
+        edge[first] |= step | turn
+    count, parts, facts, _ = cv2.connectedComponentsWithStats((~edge).astype(np.uint8), connectivity=4)
+    area = facts[:, cv2.CC_STAT_AREA]
+    large = [n for n in np.argsort(-area, kind="stable") if n > 0 and area[n] >= _LEAST_SHARE * edge.size]
+    number = np.zeros(count, np.int64)
+    number[large[:_MOST_REGIONS]] = np.arange(1, len(large[:_MOST_REGIONS]) + 1)
+    return number[np.asarray(parts, np.int64)]
+
+
+def _neighbours(values: np.ndarray, axis: int) -> tuple[np.ndarray, np.ndarray]:
+    return (values[:-1], values[1:]) if axis == 0 else (values[:, :-1], values[:, 1:])
+
+
+def cut_out(frame: Frame, mask: np.ndarray) -> Frame:
+    """Return the part of a frame in the box round a mask over its depth picture, as a frame of a smaller camera."""
+    row, column = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    y, x = slice(row[0], row[-1] + 1), slice(column[0], column[-1] + 1)
+    height, width = mask.shape
+    rgb = frame.rgb if frame.rgb.shape[:2] == mask.shape else cv2.resize(frame.rgb, (width, height))
+    camera = frame.rig.depth
+    size = {"width": x.stop - x.start, "height": y.stop - y.start}
+    small = replace(camera, cx=camera.cx - x.start, cy=camera.cy - y.start, **size)
+    depth_m = np.ascontiguousarray(frame.depth_m[y, x])
+    return replace(frame, rgb=np.ascontiguousarray(rgb[y, x]), depth_m=depth_m, rig=Rig(small, small))
+
+
+def mixed(whole: Float32[np.ndarray, " d"], regions: Float32[np.ndarray, "r d"]) -> Float32[np.ndarray, "r d"]:
+    """Return unit features of regions with some of the whole view in each."""
+    if not len(regions):
+        return regions
+    among = regions @ regions.T
+    alike = regions @ whole + (among.sum(axis=1) - np.diagonal(among)) / len(regions)
+    weight = np.exp(alike - alike.max())[:, None]
+    weight /= weight.sum()
+    both = weight * whole + (1.0 - weight) * regions
+    return (both / np.maximum(np.linalg.norm(both, axis=1, keepdims=True), 1e-12)).astype(np.float32)
+
+
+def _spread(avlmap: AVLMap, recording: Recording, rows_of: _Rows) -> Float32[np.ndarray, "n d"]:
+    """Add up rows over the voxels that their pixels lie in: each row counts once a voxel and keyframe."""
+    stored = avlmap.data
+    key = _packed(np.asarray(stored.voxels.index, np.int64))
+    total = np.zeros((len(key), stored.keyframes.view.shape[1]), np.float32)
+    frame_of = np.searchsorted(recording.stamps_s, np.asarray(stored.keyframes.stamp_s) - 1e-6)
+    for keyframe in progress(range(len(frame_of)), "views by voxel", unit="keyframe"):
+        frame = recording.frame(int(min(frame_of[keyframe], len(recording) - 1)))
+        rows, label = rows_of(frame, keyframe)
+        depth_m = frame.depth_m[::_STRIDE_PX, ::_STRIDE_PX].astype(np.float64)
+        row, column = np.nonzero((depth_m > 0.0) & (depth_m < _SEEN_TO_M))
+        z, camera = depth_m[row, column], frame.rig.depth
+        x = (column * _STRIDE_PX + 0.5 - camera.cx) / camera.fx * z
+        y = (row * _STRIDE_PX + 0.5 - camera.cy) / camera.fy * z
+        points = apply(frame.world_from_camera, np.stack([x, y, z], axis=1))
+        which = label[::_STRIDE_PX, ::_STRIDE_PX][row, column]
+        seen, numbers = _once_each(_packed(stored.grid.index_of(points)), which)
+        at = np.minimum(np.searchsorted(key, seen), max(len(key) - 1, 0))
+        known = key[at] == seen
+        np.add.at(total, at[known], rows[numbers[known]])
+    return total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-12)
+
+
+def _once_each(
+    key: Int[np.ndarray, " n"], which: Int[np.ndarray, " n"]
+) -> tuple[Int[np.ndarray, " m"], Int[np.ndarray, " m"]]:
+    pairs = np.unique(np.stack([key, which], axis=1), axis=0)
+    return pairs[:, 0], pairs[:, 1]
+
+
+def _packed(index: Int[np.ndarray, "n 3"]) -> Int[np.ndarray, " n"]:
+    shifted = np.asarray(index, np.int64) + (1 << 20)
+    return (shifted[:, 0] << 42) | (shifted[:, 1] << 21) | shifted[:, 2]
 
 
 @dataclass(eq=False)

@@ -1,19 +1,153 @@
-"""The suite as ``avlmaps bench indexing`` runs it: tables as JSON, Markdown and a picture, and every answer."""
+"""Tables III, IV and V as ``avlmaps bench indexing`` writes them, the paper's own figures beside ours."""
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import msgspec
 
 from avlmaps.core.files import write_bytes_atomically
-from avlmaps_sim.bench.harness.paper import paper_source
-from avlmaps_sim.bench.harness.provenance import in_words, provenance
-from avlmaps_sim.bench.indexing.runs import IndexingSettings, Outcome, run
-from avlmaps_sim.bench.indexing.tables import tables
-from avlmaps_sim.bench.output import markdown, write_answer
+from avlmaps_sim.bench.harness.figures import (
+    chosen_on,
+    clip_table,
+    in_percent,
+    in_words,
+    markdown,
+    paper_figures,
+    paper_source,
+    provenance,
+    shown_scene,
+    wilson,
+    write_answer,
+)
+from avlmaps_sim.bench.indexing.runs import (
+    LIMITS_M,
+    OURS,
+    IndexingSettings,
+    Outcome,
+    Score,
+    chance,
+    configurations,
+    run,
+    scored,
+)
+from avlmaps_sim.bench.indexing.tasks import Task, TaskKind
 
-if TYPE_CHECKING:
-    pass
+TITLE = {
+    TaskKind.AREA: "Table III: an object in an area",
+    TaskKind.SOUND: "Table IV: a sound near an object",
+    TaskKind.PHOTO: "Table V: an object near a photo",
+    TaskKind.NEAR_SOUND: "An object near a sound (not in the paper)",
+}
+_PAPER = "paper (Matterport3D, other data)"
+
+
+def columns() -> list[str]:
+    """Return the names of a table's columns."""
+    recalls = [title for limit in LIMITS_M for title in (f"R@1 < {limit:g} m %", "95 %")]
+    return ["configuration", "tasks", *recalls, "mean m", "95 %", "answered %"]
+
+
+def tables(outcome: Outcome) -> dict[str, dict[str, Any]]:
+    """Return every table, ``{name: {"columns", "rows"}}``."""
+    made = {TITLE[kind]: _table(outcome, kind) for kind in TaskKind}
+    made = {**made, "Ours beside one modality and the ceiling": _figures(outcome)}
+    made = {**made, "Ours reported as found": _found(outcome), "Scenes": _scenes(outcome)}
+    if outcome.tasks.recorded.sounds:
+        made["Clips that were heard"] = clip_table(clip for one in outcome.scenes for clip in one.clips)
+    return made
+
+
+def _table(outcome: Outcome, kind: TaskKind) -> dict[str, Any]:
+    tasks = [task for task in outcome.tasks.tasks if task.kind is kind]
+    coin = ["chance: one of the candidates", len(tasks), _percent(chance(tasks))]
+    rows = [[*coin, *[""] * (len(columns()) - len(coin))]]
+    for one in configurations(kind):
+        answers = outcome.answers(kind, one.name)
+        if answers:
+            rows.append(_row(one.name, scored(answers, outcome.settings.seed)))
+            if one.role == OURS:
+                rows.append(_row(f"{one.name}, by the centre", scored(answers, outcome.settings.seed, by_centre=True)))
+        else:
+            rows.append([one.name, 0, *[""] * (len(columns()) - 2)])
+    table = {"columns": columns(), "rows": [*rows, *_paper_rows(kind)]}
+    chosen = chosen_on(outcome.tasks.scenes)
+    return {**table, "chosen on": chosen} if chosen else table
+
+
+def _row(name: str, score: Score) -> list[Any]:
+    recalls: list[Any] = []
+    for limit in LIMITS_M:
+        recalls += [_percent(score.recall(limit)), in_percent(score.recall_interval(limit))]
+    mean = [round(score.mean_m, 2), "{:.2f} to {:.2f}".format(*score.mean_interval_m)]
+    return [name, score.count, *recalls, *mean, _percent(score.answered / score.count)]
+
+
+def _paper_rows(kind: TaskKind) -> list[list[Any]]:
+    rows: list[list[Any]] = []
+    for row in paper_figures("indexing")["tables"][str(kind)]:
+        recalls = [cell for figure in row["recall_percent"] for cell in ("" if figure is None else figure, "")]
+        mean = "" if row["mean_m"] is None else row["mean_m"]
+        rows.append([f"{row['name']}, {_PAPER}", row["tasks"] or "", *recalls, mean, "", ""])
+    return rows
+
+
+def _figures(outcome: Outcome) -> dict[str, Any]:
+    """Return the recall of ours within 0.5 m beside that of the best single modality and of the ceiling."""
+    rows: list[list[Any]] = []
+    for kind in TaskKind:
+        by_role: dict[str, list[float]] = {}
+        for one in configurations(kind):
+            answers = outcome.answers(kind, one.name)
+            if answers:
+                by_role.setdefault(one.role, []).append(100 * scored(answers).recall(LIMITS_M[0]))
+        ours, ceiling = (by_role.get(role, [None])[0] for role in (OURS, "ceiling"))
+        best = max(by_role.get("baseline", []), default=None)
+        lead = None if ours is None or best is None else ours - best
+        share = None if ours is None or not ceiling else 100 * ours / ceiling
+        rows.append([TITLE[kind], *[_shown(v) for v in (ours, best, lead, ceiling, share)]])
+    titles = ["table", "ours %", "best single modality %", "lead, points", "ceiling %", "of it %"]
+    return {"columns": titles, "rows": rows}
+
+
+def _found(outcome: Outcome) -> dict[str, Any]:
+    """Return how often ours was reported as found where its first goal was within 0.5 m, and where it was not."""
+    rows: list[list[Any]] = []
+    for kind in TaskKind:
+        ours = next(one for one in configurations(kind) if one.role == OURS)
+        answers = outcome.answers(kind, ours.name)
+        cells: list[object] = []
+        for right in (True, False):
+            found = [answer.found for answer in answers if (answer.off_m < LIMITS_M[0]) == right]
+            count, hits = len(found), sum(found)
+            cells += [count, _percent(hits / count), in_percent(wilson(hits, count))] if count else [0, "", ""]
+        rows.append([TITLE[kind], *cells])
+    group = ("of them found %", "95 %")
+    return {"columns": ["table", "first goal within 0.5 m", *group, "farther", *group], "rows": rows}
+
+
+def _scenes(outcome: Outcome) -> dict[str, Any]:
+    rows = [
+        [shown_scene(one.scene), one.frames, one.voxels, f"{one.sounds[0]} of {one.sounds[1]}", *_by_kind(one.tasks)]
+        for one in outcome.scenes
+    ]
+    total = _by_kind(outcome.tasks.tasks)
+    return {
+        "columns": ["scene", "frames", "voxels", "sounds found", *map(str, TaskKind)],
+        "rows": [*rows, ["in all", sum(row[1] for row in rows), sum(row[2] for row in rows), "", *total]],
+    }
+
+
+def _by_kind(tasks: Sequence[Task]) -> list[int]:
+    return [sum(task.kind is kind for task in tasks) for kind in TaskKind]
+
+
+def _percent(share: float) -> float:
+    return round(100.0 * share, 1)
+
+
+def _shown(value: float | None) -> object:
+    return "" if value is None else round(value, 1)
 
 
 NOTE = (

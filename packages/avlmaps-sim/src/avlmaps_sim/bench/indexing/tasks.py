@@ -1,13 +1,18 @@
-"""A task: the query of a scene and the boxes that are right; saved so that others ask the same."""
+"""A task: the query of a scene and the boxes that are right; and the rules that make each truly ambiguous.
 
-from dataclasses import dataclass
+The name of the goal alone never identifies it: the recording shows at least two things of the category, or holds the
+sound at several places. The context does: the right one is near it, and every other is clearly farther.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
 
-from avlmaps_sim.bench.harness.evidence import Box
+from avlmaps_sim.bench.harness.evidence import Box, Evidence, Photo, alone_near, heard_places, shown_boxes
 from avlmaps_sim.bench.harness.settings import Recorded, load_versioned, save_versioned
 from avlmaps_sim.mesh import Triple
 
@@ -115,3 +120,119 @@ def load_tasks(path: Path) -> TaskSet:
         TaskError: there are none, they are of another schema, or damaged.
     """
     return load_versioned(path, TaskSet, SCHEMA_VERSION)
+
+
+APART_M = 1.0  # things in other areas are at least this far from the right things
+LEAST_PIXELS = 0.01  # of a photo that show the thing
+_LEAST_PLACES = 3  # of a sound that is sought, so that a coin does not win
+_A_CATEGORY = 3  # tasks of one category in a scene and table, at most
+_A_SOUND = 10  # the same for a sound that is sought: few sounds play at two places
+
+
+def sound_tasks(evidence: Evidence, rng: np.random.Generator, most: int) -> list[Task]:
+    """Make tasks "the sound of SOUND near the OBJECT" (Table IV): of three places or more, one is near such a thing.
+
+    Any thing of the category may be the near one; a thing that the recording does not show counts as well.
+    """
+    found: list[Task] = []
+    boxes = shown_boxes(evidence)
+    for sound, heard in heard_places(evidence.events).items():
+        for category, own in boxes.items() if len(heard) >= _LEAST_PLACES else ():
+            away = [min(box.distance_m(event.place) for box in own) for event in heard]
+            chosen = alone_near(away)
+            if chosen is not None:
+                event = heard[chosen]
+                rivals = len(heard) - 1
+                found.append(
+                    Task("", TaskKind.SOUND, evidence.scene, sound, category, event.right, rivals, event.place)
+                )
+    return numbered(found, rng, most, _A_SOUND)
+
+
+def near_sound_tasks(evidence: Evidence, rng: np.random.Generator, most: int) -> list[Task]:
+    """Make tasks "the CATEGORY near the sound of SOUND".
+
+    A sound that was heard in two places stands for both, and the nearer one counts for each thing.
+    """
+    found: list[Task] = []
+    for sound, events in heard_places(evidence.events).items():
+        heard = [event.place for event in events]
+        for category, own in evidence.ambiguous().items():
+            away = [[evidence.box(i).distance_m(place) for place in heard] for i in own]
+            chosen = alone_near([min(row) for row in away])
+            if chosen is None or not evidence.shows(own[chosen]):
+                continue
+            place = heard[int(np.argmin(away[chosen]))]
+            found.append(_task(evidence, TaskKind.NEAR_SOUND, category, sound, [own[chosen]], own, place))
+    return numbered(found, rng, most)
+
+
+def photo_tasks(evidence: Evidence, photos: Sequence[Photo], rng: np.random.Generator, most: int) -> list[Task]:
+    """Make tasks "the CATEGORY near this photo"; the thing is in the picture, and one photo serves one task."""
+    found: list[Task] = []
+    for number, photo in enumerate(photos):
+        x, y, z = (float(v) for v in photo.world_from_camera[:3, 3])
+        choices: list[Task] = []
+        for category, own in evidence.ambiguous().items():
+            chosen = alone_near([evidence.box(i).distance_m((x, y, z)) for i in own])
+            if chosen is None or not evidence.shows(own[chosen]) or photo.share[own[chosen]] < LEAST_PIXELS:
+                continue
+            name = f"photo {number}"
+            pose = tuple(tuple(row) for row in photo.world_from_camera.tolist())
+            choices.append(
+                _task(evidence, TaskKind.PHOTO, category, name, [own[chosen]], own, (x, y, z), pose)  # pyright: ignore[reportArgumentType]
+            )
+        if choices:
+            found.append(choices[int(rng.integers(len(choices)))])
+    return numbered(found, rng, most)
+
+
+def area_tasks(evidence: Evidence, rng: np.random.Generator, most: int) -> list[Task]:
+    """Make tasks "the CATEGORY in the AREA": shown in areas of two kinds or more, all those of one kind are right."""
+    found: list[Task] = []
+    for category, own in evidence.ambiguous().items():
+        inside = [i for i in own if evidence.objects[i].area >= 0]
+        kind_of = {i: evidence.areas[evidence.objects[i].area].kind for i in inside}
+        shown = {kind_of[i] for i in inside if evidence.shows(i)}
+        if len(shown) < 2 or len(inside) < len(own):
+            continue
+        for kind in sorted(shown):
+            right = [i for i in inside if kind_of[i] == kind]
+            wrong = [evidence.box(i) for i in inside if kind_of[i] != kind]
+            apart = min(between_m(evidence.box(i), other) for i in right for other in wrong)
+            if apart >= APART_M:
+                found.append(_task(evidence, TaskKind.AREA, category, kind, right, own, None))
+    return numbered(found, rng, most)
+
+
+def numbered(tasks: Sequence[Task], rng: np.random.Generator, most: int, of_one: int = _A_CATEGORY) -> list[Task]:
+    """Draw tasks, few of a category, and name them by their number."""
+    taken: dict[str, int] = {}
+    kept: list[Task] = []
+    for index in rng.permutation(len(tasks)):
+        task = tasks[index]
+        if len(kept) < most and taken.get(task.category, 0) < of_one:
+            taken[task.category] = taken.get(task.category, 0) + 1
+            kept.append(replace(task, name=f"{task.scene}/{task.kind}/{len(kept):02d}"))
+    return kept
+
+
+def _task(
+    evidence: Evidence,
+    kind: TaskKind,
+    category: str,
+    context: str,
+    right: Sequence[int],
+    own: Sequence[int],
+    place: Triple | None,
+    photo: tuple[tuple[float, float, float, float], ...] | None = None,
+) -> Task:
+    rivals = sum(evidence.shows(i) for i in own if i not in right)
+    targets = tuple(evidence.box(i) for i in right)
+    return Task("", kind, evidence.scene, category, context, targets, rivals, place, photo)
+
+
+def between_m(a: Box, b: Box) -> float:
+    """Return the horizontal distance between two boxes."""
+    low_a, high_a, low_b, high_b = (np.asarray(v)[:2] for v in (a.low, a.high, b.low, b.high))
+    return float(np.linalg.norm(np.maximum(np.maximum(low_a - high_b, low_b - high_a), 0.0)))

@@ -1,10 +1,18 @@
 """The navigation benchmark: the paper's Tables I, II and VI and its list of commands, driven in homes made by rule."""
 
 from avlmaps_sim.bench.navigation.episodes import Episode, Leg
-from avlmaps_sim.bench.navigation.goals import Goal, GoalKind
-from avlmaps_sim.bench.navigation.missions import Mission, MissionSet, Series, load_missions, save_missions
+from avlmaps_sim.bench.navigation.missions import (
+    DEFAULT_SCENES,
+    Goal,
+    GoalKind,
+    Mission,
+    MissionSet,
+    NavigationSettings,
+    Series,
+    load_missions,
+    save_missions,
+)
 from avlmaps_sim.bench.navigation.runs import Outcome, run
-from avlmaps_sim.bench.navigation.settings import DEFAULT_SCENES, NavigationSettings
 
 __all__ = [
     "DEFAULT_SCENES",

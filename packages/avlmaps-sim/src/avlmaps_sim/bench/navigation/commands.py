@@ -13,8 +13,7 @@ from jaxtyping import Float
 from avlmaps_sim.bench.harness.evidence import Box, Photo
 from avlmaps_sim.bench.indexing.tasks import Task, TaskKind
 from avlmaps_sim.bench.navigation.evidence import Ground, camera_of, renumbered
-from avlmaps_sim.bench.navigation.goals import Goal, GoalKind, beside, between, left_of
-from avlmaps_sim.bench.navigation.missions import Mission, Series
+from avlmaps_sim.bench.navigation.missions import Goal, GoalKind, Mission, Series, beside, between, left_of
 from avlmaps_sim.bench.navigation.phrases import an_image, heat_of
 from avlmaps_sim.bench.navigation.rules import APART_M, mission, rows_of
 

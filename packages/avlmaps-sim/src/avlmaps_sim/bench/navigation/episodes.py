@@ -8,9 +8,8 @@ from typing import BinaryIO
 
 import msgspec
 
-from avlmaps_sim.bench.navigation.goals import GoalKind
 from avlmaps_sim.bench.navigation.metrics import path_weight
-from avlmaps_sim.bench.navigation.missions import Series
+from avlmaps_sim.bench.navigation.missions import GoalKind, Series
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ import numpy as np
 from avlmaps_sim.bench.harness.evidence import Box, Evidence, Photo, alone_near, shown_boxes
 from avlmaps_sim.bench.indexing.tasks import Task, TaskKind
 from avlmaps_sim.bench.navigation.floor import Floor
-from avlmaps_sim.bench.navigation.goals import Goal
+from avlmaps_sim.bench.navigation.missions import Goal
 from avlmaps_sim.bench.navigation.phrases import (
     PHOTO,
     a_sound,

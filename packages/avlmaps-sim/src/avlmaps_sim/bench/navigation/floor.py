@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from avlmaps.core.motion import GroundPose
-from avlmaps_sim.bench.navigation.goals import SUCCESS_M, Goal
+from avlmaps_sim.bench.navigation.missions import SUCCESS_M, Goal
 from avlmaps_sim.free_space import FreeSpace, floor_heights, free_space
 from avlmaps_sim.scene import Scene
 

@@ -1,4 +1,4 @@
-"""A map as one row of the tables perceives it: each sense ours, a baseline's, true, or none at all."""
+"""A map as one row of the tables perceives it: whose senses drive, with obstacles shared by all rows."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -11,12 +11,20 @@ from jaxtyping import Float, Int, UInt8
 from avlmaps.core.camera import Pinhole
 from avlmaps.core.errors import QueryError
 from avlmaps.core.question import Modality, Part, Role
+from avlmaps.core.registry import Kind
 from avlmaps.query.avlmap import AVLMap
 from avlmaps.query.heatmap import Heatmap
 from avlmaps.query.modalities.image import read_picture
 from avlmaps.query.queryable import Photo
-from avlmaps_sim.bench.harness.baselines import WeakHearing, alike_keyframe
-from avlmaps_sim.bench.harness.factors import VoxelHeat, true_places, true_regions, true_things
+from avlmaps_sim.bench.harness.factors import (
+    VoxelHeat,
+    WeakHearing,
+    alike_keyframe,
+    true_places,
+    true_regions,
+    true_things,
+)
+from avlmaps_sim.bench.navigation.missions import Series
 from avlmaps_sim.bench.navigation.phrases import spoken
 from avlmaps_sim.truth import Truth
 
@@ -160,3 +168,43 @@ def _role(primary: bool) -> Role:
 
 def _plain(words: str) -> str:
     return " ".join(words.replace("_", " ").lower().split()).removeprefix("the ")
+
+
+OURS, CEILING = "ours", "true perception"
+_SOUNDS = (Series.SOUNDS_1, Series.SOUNDS_2, Series.SOUNDS_3)
+_TRUE = Senses("true", "true", "true", "true")
+_PHOTOS = (Kind.LOCAL, Kind.PLACE, Kind.MATCHER)
+
+
+@dataclass(frozen=True, slots=True)
+class Configuration:
+    """A row of a table."""
+
+    name: str
+    senses: Senses
+    series: tuple[Series, ...]
+    needs: tuple[Kind, ...] = ()
+
+
+CONFIGURATIONS: tuple[Configuration, ...] = (
+    Configuration("weaker sound encoder", Senses(sounds="weak"), _SOUNDS),
+    Configuration(OURS, Senses(), _SOUNDS, (Kind.SOUNDS,)),
+    Configuration(CEILING, _TRUE, _SOUNDS),
+    Configuration("objects only", Senses(sounds="none", images="none"), (Series.IMAGES,), (Kind.PIXELS,)),
+    Configuration("image by the most alike keyframe", Senses(images="weak"), (Series.IMAGES,), (Kind.PIXELS, *_PHOTOS)),
+    Configuration(OURS, Senses(), (Series.IMAGES,), (Kind.PIXELS, *_PHOTOS)),
+    Configuration(CEILING, _TRUE, (Series.IMAGES,)),
+    Configuration("objects only", Senses(sounds="none", images="none"), (Series.PAIRS,), (Kind.PIXELS,)),
+    Configuration("sounds only", Senses(objects="none", images="none"), (Series.PAIRS,), (Kind.SOUNDS,)),
+    Configuration("weaker sound encoder", Senses(sounds="weak"), (Series.PAIRS,), (Kind.PIXELS,)),
+    Configuration(OURS, Senses(), (Series.PAIRS,), (Kind.PIXELS, Kind.SOUNDS)),
+    Configuration("true objects, our sounds", Senses(objects="true"), (Series.PAIRS,), (Kind.SOUNDS,)),
+    Configuration(CEILING, _TRUE, (Series.PAIRS,)),
+    Configuration(OURS, Senses(), (Series.COMMANDS, Series.SPATIAL), (Kind.PIXELS, Kind.SOUNDS)),
+    Configuration(CEILING, _TRUE, (Series.COMMANDS, Series.SPATIAL)),
+)
+
+
+def configurations(series: Series) -> tuple[Configuration, ...]:
+    """Return the rows of an experiment, in their order."""
+    return tuple(one for one in CONFIGURATIONS if series in one.series)

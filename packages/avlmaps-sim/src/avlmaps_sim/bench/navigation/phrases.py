@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from avlmaps_sim.bench.harness.evidence import Box
-from avlmaps_sim.bench.navigation.goals import Goal, GoalKind
+from avlmaps_sim.bench.navigation.missions import Goal, GoalKind
 from avlmaps_sim.mesh import Triple
 
 PHOTO = "{photo %d}"

@@ -10,8 +10,7 @@ import numpy as np
 from avlmaps_sim.bench.harness.evidence import Photo
 from avlmaps_sim.bench.indexing.tasks import TaskKind
 from avlmaps_sim.bench.navigation.evidence import Ground, camera_of, renumbered
-from avlmaps_sim.bench.navigation.goals import Goal
-from avlmaps_sim.bench.navigation.missions import Mission, Row, Series
+from avlmaps_sim.bench.navigation.missions import Goal, Mission, Row, Series
 from avlmaps_sim.bench.navigation.phrases import an_image
 from avlmaps_sim.hearing.kinds import kind_of
 

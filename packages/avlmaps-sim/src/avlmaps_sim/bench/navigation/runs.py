@@ -14,18 +14,18 @@ from avlmaps_sim.bench.harness.own_recording import is_recording
 from avlmaps_sim.bench.harness.settings import TaskError
 from avlmaps_sim.bench.harness.workers import side_by_side
 from avlmaps_sim.bench.harness.workplace import SceneJob, scene_jobs
-from avlmaps_sim.bench.navigation.configurations import Configuration, configurations
 from avlmaps_sim.bench.navigation.episodes import Episode, Journal
+from avlmaps_sim.bench.navigation.map_variants import Configuration, configurations
 from avlmaps_sim.bench.navigation.missions import (
     Mission,
     MissionSet,
+    NavigationSettings,
     allocated,
     asked_for,
     load_missions,
     save_missions,
 )
 from avlmaps_sim.bench.navigation.scene_setup import NavigationPlace
-from avlmaps_sim.bench.navigation.settings import NavigationSettings
 from avlmaps_sim.scene import Scene
 from avlmaps_sim.scenes import open_scene
 

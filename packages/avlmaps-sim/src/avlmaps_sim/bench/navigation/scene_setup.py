@@ -14,17 +14,16 @@ from avlmaps.maps.obstacles import Obstacles
 from avlmaps.navigate.bodies import BASE
 from avlmaps.navigate.costmap import obstacles_for
 from avlmaps.navigate.driver import Driver, MapDriver
-from avlmaps_sim.bench.harness.baselines import WeakHearing
+from avlmaps_sim.bench.harness.factors import WeakHearing
 from avlmaps_sim.bench.harness.workplace import SceneJob, Workplace
-from avlmaps_sim.bench.indexing.rules import area_tasks, near_sound_tasks, photo_tasks
+from avlmaps_sim.bench.indexing.tasks import area_tasks, near_sound_tasks, photo_tasks
 from avlmaps_sim.bench.navigation.commands import command_missions
 from avlmaps_sim.bench.navigation.episode_runner import Foreknowledge, Pilot, WatchedBody
 from avlmaps_sim.bench.navigation.evidence import Ground
 from avlmaps_sim.bench.navigation.floor import Floor
 from avlmaps_sim.bench.navigation.map_variants import KnownScene
-from avlmaps_sim.bench.navigation.missions import Mission, Series, numbered
+from avlmaps_sim.bench.navigation.missions import Mission, NavigationSettings, Series, numbered
 from avlmaps_sim.bench.navigation.rules import image_missions, pair_missions, sound_missions
-from avlmaps_sim.bench.navigation.settings import NavigationSettings
 from avlmaps_sim.body import Building, SimulatedBody
 from avlmaps_sim.scene import Scene
 

@@ -3,10 +3,10 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from avlmaps_sim.bench.harness.intervals import in_percent, wilson
+from avlmaps_sim.bench.harness.figures import in_percent, wilson
 from avlmaps_sim.bench.navigation.episodes import Episode, Leg
-from avlmaps_sim.bench.navigation.goals import GoalKind
 from avlmaps_sim.bench.navigation.metrics import grouped_interval, in_a_row, independent
+from avlmaps_sim.bench.navigation.missions import GoalKind
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,11 +17,9 @@ from avlmaps.maps.build import build_map
 from avlmaps.perception.cache.feature_store import CacheSettings
 from avlmaps.recordings.consistency.suspicions import examine_recording
 from avlmaps.recordings.open import open_recording
-from avlmaps_sim.bench.harness.intervals import in_percent, wilson
-from avlmaps_sim.bench.output import Table, as_csv
+from avlmaps_sim.bench.harness.figures import Table, as_csv, in_percent, wilson
 from avlmaps_sim.bench.recordings.drafts import Draft, RoomWalk
-from avlmaps_sim.bench.recordings.formats import FOLDER, FORMATS, TUM_CAMERA
-from avlmaps_sim.bench.recordings.outcomes import Case, Judge, Outcome, right_case
+from avlmaps_sim.bench.recordings.outcomes import FOLDER, FORMATS, TUM_CAMERA, Case, Judge, Outcome, right_case
 from avlmaps_sim.bench.recordings.situations import situations
 from avlmaps_sim.recorder import RecordSettings, record_scene
 from avlmaps_sim.scenes import open_scene

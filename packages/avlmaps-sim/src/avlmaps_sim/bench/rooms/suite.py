@@ -6,12 +6,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from avlmaps_sim.bench.harness.intervals import in_percent, median_interval, of_mean, wilson
-from avlmaps_sim.bench.harness.provenance import in_words, provenance
+from avlmaps_sim.bench.harness.figures import (
+    Table,
+    in_percent,
+    in_words,
+    markdown,
+    median_interval,
+    of_mean,
+    provenance,
+    wilson,
+    write_answer,
+)
 from avlmaps_sim.bench.harness.workers import side_by_side
 from avlmaps_sim.bench.harness.workplace import SceneJob, Workplace, scene_jobs
 from avlmaps_sim.bench.indexing.runs import IndexingSettings
-from avlmaps_sim.bench.output import Table, markdown, write_answer
 from avlmaps_sim.bench.rooms.scores import Floor, Judged, Listed, Matched, floors_of, judged
 from avlmaps_sim.scenes import open_scene
 

@@ -1,19 +1,157 @@
-"""Calibration in place: an array whose geometry is off by centimetres drives past one ticking thing in a bare room."""
+"""One bare room under varied conditions, and an array whose geometry is calibrated in place.
 
-from dataclasses import dataclass
+The room is 6 x 5 x 2.6 m. The robot drives past with a square of four; the sound is bursts of noise of 2 s at a random
+place, and the candidates are the room's surfaces and the air in it.
+"""
+
+from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from jaxtyping import Float
+from scipy.spatial.transform import Rotation
 
 from avlmaps.core.timeline import Trajectory
 from avlmaps.maps.sources.calibrate import ArrayCalibration, calibrate
+from avlmaps.maps.sources.density import CandidateGrid, Density
+from avlmaps.maps.sources.find import find_sources
+from avlmaps.maps.sources.settings import SourceSettings
 from avlmaps.recordings.audio import AudioTrack, Sound
 from avlmaps.recordings.channels import ChannelSound, with_microphones, write_channels
-from avlmaps.recordings.microphones import Microphones
-from avlmaps_sim.bench.sources.sweep import bare_room
+from avlmaps.recordings.microphones import Microphones, microphones_named
+from avlmaps_sim.bench.harness.figures import Table, in_percent, median_interval, wilson
 from avlmaps_sim.hearing import AcousticSettings, Sounding, Source
 from avlmaps_sim.hearing.array import heard_by_array
+from avlmaps_sim.mesh import Material
+from avlmaps_sim.scene import Area, Scene, SceneBuilder
+from avlmaps_sim.shapes import box, sheet
+
+_X_M, _Y_M, _HEIGHT_M, _EAR_M = 6.0, 5.0, 2.6, 1.3
+_RATE_HZ, _SECONDS, _ONSET_S = 16_000, 2.0, 1.5
+_PAINT = Material((0.8, 0.8, 0.75))
+_UP = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """What a trial varies.
+
+    Attributes:
+        rt60_s: how long the room takes to fall by 60 dB.
+        snr_db: of the sound at 1 m against the noise.
+        walked_m: how far the robot drives while it sounds.
+        pose_m: standard deviation of an error of place that a walk has throughout.
+        pose_deg: of heading.
+        others: how many more sources sound at once.
+    """
+
+    rt60_s: float = 0.5
+    snr_db: float = 20.0
+    walked_m: float = 1.0
+    pose_m: float = 0.0
+    pose_deg: float = 0.0
+    others: int = 0
+
+
+USUAL = Condition()
+CONDITIONS: dict[str, Condition] = {
+    "usual: RT60 0.5 s, SNR 20 dB, 1 m driven": USUAL,
+    **{f"RT60 {value:g} s": replace(USUAL, rt60_s=value) for value in (0.2, 0.8, 1.2)},
+    **{f"SNR {value:g} dB": replace(USUAL, snr_db=value) for value in (0.0, 10.0, 30.0)},
+    **{f"{value:g} m driven": replace(USUAL, walked_m=value) for value in (0.0, 0.3, 2.0)},
+    "poses off by 5 cm and 3 degrees": replace(USUAL, pose_m=0.05, pose_deg=3.0),
+    "two sounds at once": replace(USUAL, others=1),
+}
+
+
+def table(trials: int, seed: int) -> Table:
+    """Return error and coverage of each condition."""
+    rows: list[list[object]] = []
+    for name, condition in CONDITIONS.items():
+        found = [_trial(condition, np.random.default_rng([seed, number])) for number in range(trials)]
+        median, low, high = median_interval(np.array([error for error, _ in found]))
+        held = sum(inside for _, inside in found)
+        rows.append([
+            name, trials, round(median, 2), f"{low:.2f} to {high:.2f}", round(100.0 * held / trials, 1),
+            in_percent(wilson(held, trials)),
+        ])  # fmt: skip
+    return {"columns": ["condition", "trials", "median error m", "95 %", "in 90 % region %", "95 %"], "rows": rows}
+
+
+def _trial(condition: Condition, rng: np.random.Generator) -> tuple[float, bool]:
+    """Return the error on the plan of one source, and whether the 90 % region holds it."""
+    places = np.column_stack([
+        rng.uniform(0.5, _X_M - 0.5, condition.others + 1), rng.uniform(0.4, 1.8, condition.others + 1),
+        rng.uniform(0.2, 1.8, condition.others + 1),
+    ])  # fmt: skip
+    middle_x = float(rng.uniform(2.0, 4.0))
+    count = 50
+    stamps_s = np.arange(count) / 10.0
+    at = np.clip((stamps_s - _ONSET_S) / _SECONDS, -0.2, 1.2) - 0.5
+    poses = np.tile(np.eye(4), (count, 1, 1))
+    poses[:, :3, :3] = np.array([[0, 0, 1], [-1, 0, 0], [0, -1, 0]])
+    poses[:, :3, 3] = np.column_stack([middle_x + at * condition.walked_m, np.full(count, 3.2), np.full(count, _EAR_M)])
+    sounding = [_bursts(place, rng) for place in places]
+    array = microphones_named("square4")
+    settings = AcousticSettings(_RATE_HZ, snr_db=condition.snr_db, rt60_s=condition.rt60_s)
+    heard = heard_by_array(bare_room(), sounding, stamps_s, poses, array, count / 10.0, rng, settings)
+    turn = Rotation.from_matrix(_about_z(np.deg2rad(condition.pose_deg) * rng.standard_normal()))
+    believed = poses.copy()
+    believed[:, :3, :3] = turn.as_matrix() @ poses[:, :3, :3]
+    believed[:, :2, 3] += condition.pose_m * rng.standard_normal(2)
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "track.flac"
+        write_channels(path, heard)
+        track = with_microphones(AudioTrack.open(path), array)
+        span = (_ONSET_S, _ONSET_S + _SECONDS)
+        found = find_sources(track, Trajectory(stamps_s, believed), [span], surfaces(), _UP)
+    assert found is not None
+    plan, prior = CandidateGrid.of(found.place), found.prior.astype(np.float64)
+    expected = found.expected[0].astype(np.float64)
+    evidence = found.heard[0].astype(np.float64) + expected
+    density = Density.of(plan, prior, evidence, expected, SourceSettings.of(len(array)))
+    away = np.linalg.norm(places[:, :2] - density.position_m, axis=1)
+    nearest = int(np.argmin(away))
+    return float(away[nearest]), bool(density.region(0.9).ravel()[plan.cell_of(places[nearest][None, :2])[0]])
+
+
+def _bursts(place: Float[np.ndarray, "3"], rng: np.random.Generator) -> Sounding:
+    count = round(_SECONDS * _RATE_HZ)
+    gate = (np.arange(count) + int(rng.integers(4000))) % (_RATE_HZ // 2) < _RATE_HZ // 6
+    clip = Sound((0.1 * rng.standard_normal(count) * gate).astype(np.float32), _RATE_HZ)
+    x, y, z = place.tolist()
+    return Sounding(Source("knocking", (x, y, z), -1, "bursts", clip), _ONSET_S, _ONSET_S + _SECONDS, (0.0, 0.0, 0.0))
+
+
+def _about_z(angle: float) -> Float[np.ndarray, "3 3"]:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def bare_room() -> Scene:
+    """Return a room of 6 x 5 x 2.6 m with nothing in it."""
+    corners = np.array([[0.0, 0.0], [_X_M, 0.0], [_X_M, _Y_M], [0.0, _Y_M]])
+    builder = SceneBuilder("bare room", areas=[Area("bedroom", corners, 0.0, _HEIGHT_M, "bedroom#1")])
+    builder.add("floor", sheet((0.0, 0.0, 0.0), (_X_M, 0.0, 0.0), (0.0, _Y_M, 0.0), _PAINT))
+    for low, high in (
+        ((-0.1, -0.1, 0.0), (_X_M + 0.1, 0.0, _HEIGHT_M)), ((-0.1, _Y_M, 0.0), (_X_M + 0.1, _Y_M + 0.1, _HEIGHT_M)),
+        ((-0.1, 0.0, 0.0), (0.0, _Y_M, _HEIGHT_M)), ((_X_M, 0.0, 0.0), (_X_M + 0.1, _Y_M, _HEIGHT_M)),
+    ):  # fmt: skip
+        builder.add("wall", box(low, high, _PAINT))
+    return builder.build()
+
+
+def surfaces(step_m: float = 0.1) -> Float[np.ndarray, "n 3"]:
+    """Return points on the floor and the walls of the room, metres."""
+
+    def grid(*axes: np.ndarray) -> np.ndarray:
+        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
+
+    x, y, z = (np.arange(0.0, size, step_m) for size in (_X_M, _Y_M, _HEIGHT_M - 0.2))
+    parts = [grid(x, y, np.zeros(1)), *(grid(np.array([side]), y, z) for side in (0.0, _X_M))]
+    return np.concatenate([*parts, *(grid(x, np.array([side]), z) for side in (0.0, _Y_M))])
+
 
 OFF_M, LATE_S = np.array([0.025, 0.025, 0.01]), 80e-6
 """Standard deviations of what is put wrong: each axis of a place, and a channel's delay."""

@@ -1,4 +1,4 @@
-"""Sources in homes: the normal walk with an array, its map, and each sound's source against the truth.
+"""Sources in homes: the normal walk with each array, its map, and each sound's source against the truth.
 
 What sounds is drawn by each home's own number, so that homes differ in their kinds of sound, and twice for each walk.
 """
@@ -33,7 +33,6 @@ from avlmaps.recordings.channels import ChannelSound, read_channels, with_microp
 from avlmaps.recordings.open import open_recording
 from avlmaps.recordings.types import Recording
 from avlmaps_sim.bench.harness.factors import outline_away_m
-from avlmaps_sim.bench.sources.arrays import ARRAYS, RECORDED, track_of
 from avlmaps_sim.bench.sources.calibrated import Wrong, calibrated
 from avlmaps_sim.hearing.acoustic import AcousticSettings
 from avlmaps_sim.hearing.directions import said_directions
@@ -41,6 +40,21 @@ from avlmaps_sim.hearing.impulse import Acoustics
 from avlmaps_sim.recorder import RecordSettings, record_scene, sound_again
 from avlmaps_sim.scene import Area, Scene, SceneObject
 from avlmaps_sim.truth import HeardEvent, Truth, read_truth
+
+RECORDED = "square4"
+ARRAYS: dict[str, tuple[int, ...]] = {"square4": (0, 1, 2, 3), "stereo": (0, 1), "mono": (0,)}
+"""Channels of the square of four that each array has: its two front ones are 0.2 m apart."""
+
+
+def track_of(track: AudioTrack, array: str, folder: Path) -> AudioTrack:
+    """Return a track of the channels of one of ``ARRAYS``, written into a folder."""
+    assert track.microphones is not None
+    chosen = ARRAYS[array]
+    whole = read_channels(track, track.start_s, track.end_s)
+    path = folder / f"{array}.flac"
+    write_channels(path, ChannelSound(whole.samples[list(chosen)], whole.rate_hz))
+    return with_microphones(AudioTrack.open(path, track.start_s), track.microphones.take(chosen))
+
 
 SNR_DB = 20.0
 DEVICE, GIVEN, REFINED = "a device's directions", "square4, put wrong", "square4, put wrong, calibrated"

@@ -17,8 +17,7 @@ from avlmaps.maps.sources.correlation import SPEED_M_S, correlate
 from avlmaps.maps.sources.polarity import signs_of
 from avlmaps.maps.sources.settings import SourceSettings
 from avlmaps.maps.sources.steered import steer, steer_pairs
-from avlmaps_sim.bench.harness.intervals import median_interval
-from avlmaps_sim.bench.output import Table
+from avlmaps_sim.bench.harness.figures import Table, median_interval
 
 SIZE_M = np.array([5.36, 5.85, 2.86])
 SOURCE_M = np.array([3.36, 2.00, 1.50])

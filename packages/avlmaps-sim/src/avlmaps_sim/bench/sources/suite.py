@@ -8,10 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from avlmaps.maps.sources.candidates import CELL_M
-from avlmaps_sim.bench.harness.intervals import in_percent, median_interval, wilson
+from avlmaps_sim.bench.harness.figures import Table, in_percent, median_interval, wilson
 from avlmaps_sim.bench.harness.workers import side_by_side
-from avlmaps_sim.bench.output import Table
-from avlmaps_sim.bench.sources import measured, sweep
+from avlmaps_sim.bench.sources import calibrated, measured
 from avlmaps_sim.bench.sources.homes import GIVEN, REFINED, WAYS, HomeJob, HomeOutcome, Placed, measure_home
 from avlmaps_sim.scenes import open_scene
 
@@ -61,7 +60,7 @@ def run_sources(settings: SourcesBench, out: Path, seed: int) -> dict[str, Table
     if room is not None:
         tables["a measured room"] = room
     if settings.trials:
-        tables["one room, varied"] = sweep.table(settings.trials, seed)
+        tables["one room, varied"] = calibrated.table(settings.trials, seed)
     return tables
 
 
