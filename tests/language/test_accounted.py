@@ -6,8 +6,6 @@ from hypothesis import strategies as st
 
 from avlmaps.language.commands import read_command
 from avlmaps.language.intents import RefusalReason, Refuse
-from avlmaps.language.learned.accounted import has_strange_words
-from avlmaps.language.lexer import tokenise
 from avlmaps.language.verbalise import verbalise
 
 FEW = settings(deadline=None)
@@ -39,12 +37,6 @@ def test_nothing_alive_is_driven_over(over: str, whom: str) -> None:
     assert stops.reason in (RefusalReason.HARM, RefusalReason.FLYING)
 
 
-@FEW
-@given(st.sampled_from(("via", "despite", "amid", "lest", "notwithstanding", "during")), ORDERS)
-def test_a_phrase_that_no_reading_has_is_asked_about(word: str, order: str) -> None:
-    assert read_command(f"{order} {word} the solemn meanwhile").stops is not None
-
-
 @pytest.mark.parametrize(
     "command",
     ["drive over to the sofa", "go via the hall to the bedroom", "go through the kids' room", "go under the table",
@@ -53,9 +45,3 @@ def test_a_phrase_that_no_reading_has_is_asked_about(word: str, order: str) -> N
 )  # fmt: skip
 def test_what_a_reading_has_is_driven(command: str) -> None:
     assert read_command(command).stops is None
-
-
-def test_strange_words_count_in_the_clause_of_an_order() -> None:
-    tokens = tokenise("frobnicate via the window, margaret is late")
-    assert has_strange_words(tokens, frozenset({3}))
-    assert not has_strange_words(tokenise("margaret is late, go to the window"), frozenset({7}))

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from avlmaps.core.errors import LanguageError
+from avlmaps.language.claims import claimed_words, forbidden
 from avlmaps.language.foreign import ASK, language_of
 from avlmaps.language.gate import NoOrder, no_order
 from avlmaps.language.intents import (
@@ -24,10 +25,9 @@ from avlmaps.language.intents import (
     targets_of,
 )
 from avlmaps.language.learned.decision import Weighed, decided
-from avlmaps.language.learned.forbidden import forbidden, is_stop
 from avlmaps.language.learned.name_resolver import EXAMPLE, REFUSALS, NameResolver, weighed
 from avlmaps.language.learned.reader import LearnedReader, learned_reader
-from avlmaps.language.lexer import tokenise
+from avlmaps.language.lexer import Token, tokenise
 from avlmaps.language.own_names import StandIns, stand_ins
 from avlmaps.language.rephrase import behind_remark
 from avlmaps.language.sentence import Attachments, Sentence
@@ -103,6 +103,13 @@ def read_command(text: str, given: Attachments | None = None) -> Command:
     read = _read(text, given)
     closed = None if read.stops is not None or is_stop(tokenise(text)) else no_order(text)
     return read if closed is None else replace(read, intents=(_asked(closed, read.intents),), why="gate")
+
+
+def is_stop(tokens: Sequence[Token]) -> bool:
+    """Return whether a command says to stop, and nothing else: "stop!", "halt, please"."""
+    texts = {token.text for token in tokens if token.kind != "punct"}
+    stops = claimed_words("stops")
+    return not stops.isdisjoint(texts) and texts <= stops | claimed_words("beside_stops") | claimed_words("robots")
 
 
 def check_order(text: str) -> None:

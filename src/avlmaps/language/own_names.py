@@ -9,12 +9,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from avlmaps.core.lexicon import EntryKind, lexicon
+from avlmaps.language.claims import claimed_words
 from avlmaps.language.intents import Target
-from avlmaps.language.learned.said import DETERMINERS, words
 from avlmaps.language.lexer import WORDS, tokenise
 
 OwnName = tuple[str, bool]
 """A name without its article, in lower case, and whether it is that of a room."""
+_DETERMINERS = frozenset({"the", "this", "that", "my", "your", "our", "her", "his", "their", "a", "an", "any", "every"})
 _THINGS = ("lamp", "clock", "vase", "suitcase", "printer", "basket")
 _ROOMS = ("kitchen", "garage", "library", "bathroom", "gym")
 
@@ -45,10 +46,11 @@ class StandIns:
 def is_reserved(name: str) -> bool:
     """Return whether a name would take a word of orders: "stop", "left", "5 m", "near the bed"."""
     said = [token.text for token in tokenise(name) if token.kind != "punct"]
-    said = said[1:] if said[:1] and said[0] in DETERMINERS and len(said) > 1 else said
-    lists = words().lists
-    taken = lists["reserved"] | lists["stops"] | WORDS
-    return bool(said) and (said[0] in lists["leading"] or all(word in taken or word[0].isdigit() for word in said))
+    said = said[1:] if said[:1] and said[0] in _DETERMINERS and len(said) > 1 else said
+    taken = claimed_words("reserved") | claimed_words("stops") | WORDS
+    return bool(said) and (
+        said[0] in claimed_words("leading") or all(word in taken or word[0].isdigit() for word in said)
+    )
 
 
 def stand_ins(text: str, names: Sequence[OwnName]) -> StandIns:

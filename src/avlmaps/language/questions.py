@@ -8,14 +8,13 @@ from avlmaps.core.errors import QueryError
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import MOST_CHARACTERS, Modality, Part, Question
 from avlmaps.language.asking_back import lacks_file
+from avlmaps.language.claims import unmet_by
 from avlmaps.language.foreign import ASK, language_of
 from avlmaps.language.intents import Ask, Inquiry, Pick, Target, TargetKind
 from avlmaps.language.learned.decision import is_doubtful
 from avlmaps.language.learned.limits import ReadingLimits
 from avlmaps.language.learned.name_resolver import NameResolver, kind_of
 from avlmaps.language.learned.reader import Read, learned_reader
-from avlmaps.language.learned.said import Said
-from avlmaps.language.learned.unmet import unmet_by
 from avlmaps.language.list_questions import SUPPORTED
 from avlmaps.language.names import is_entry, is_known, sounding_forms, sounds_like, third_forms
 from avlmaps.language.own_names import stand_ins
@@ -294,11 +293,11 @@ FROM_NOWHERE = "No position is known to count"
 
 def _from_nowhere(sentence: Sentence, targets: Sequence[Target]) -> tuple[str, ...]:
     """Return a note for "the nearest window": a question comes from no place, so that none is the nearest."""
-    said = Said(sentence.tokens)
     if any(near.kind is not TargetKind.AREA for target in targets for near in target.near):
         return ()
+    said = {token.text: None for token in sentence.tokens if token.text in ("nearest", "closest")}
     return tuple(
-        f"{FROM_NOWHERE} '{' '.join(said.texts[begin:end])}' from: the likeliest comes first. Say what "
-        "it is near, or give a place to count from (near)."
-        for begin, end in said.spans("nearest")
+        f"{FROM_NOWHERE} '{word}' from: the likeliest comes first. Say what it is near, or give a place to count from "
+        "(near)."
+        for word in said
     )

@@ -68,6 +68,13 @@ def expanded(text: str) -> list[str]:
     return [phrase for phrase in dict.fromkeys(phrases) if phrase]
 
 
+def pattern_of(text: str) -> str:
+    """Return the regular expression of a list of phrases; it takes a blank behind each word, and a mark before it."""
+    pieces = re.findall(r"[\[\]()|]|[^\s\[\]()|]+", text)
+    made = {"[": "(?:", "]": ")?", "(": "(?:", ")": ")", "|": "|"}
+    return "".join(made.get(piece) or rf"[\^@$]?{re.escape(piece)} " for piece in pieces)
+
+
 def _phrases(pieces: Sequence[str], at: int) -> tuple[list[str], int]:
     """Return the phrases of alternatives, and where they end."""
     found: list[str] = []

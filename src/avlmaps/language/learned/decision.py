@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.words import singulars_of, stem_of
 from avlmaps.language import lexer
+from avlmaps.language.claims import claimed_words
 from avlmaps.language.intents import (
     Clarify,
     Face,
@@ -29,7 +30,6 @@ from avlmaps.language.intents import (
 from avlmaps.language.intents import Move as MoveIntent
 from avlmaps.language.learned.limits import ReadingLimits
 from avlmaps.language.learned.linear import amount_end
-from avlmaps.language.learned.said import words
 from avlmaps.language.lexer import Token
 from avlmaps.language.verbalise import verbalise
 
@@ -42,7 +42,6 @@ DANGERS = (
 )
 _SMALL_WORDS = frozenset({"a", "an", "one", "some", "first", "second", "half", "couple", "few", "several"})
 _WORTH_ASKING = 0.1
-_LARGE = 12
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,7 +141,7 @@ def _plain(target: Target) -> Target:
     near = tuple(sorted({_plain(one) for one in _flat_near(target)}, key=str))
     own = target.name.lower().replace("-", " ").split()
     if target.kind is TargetKind.SOUND:
-        name = " ".join(sorted(stem_of(word) for word in own if word not in words().lists["round_sounds"]))
+        name = " ".join(sorted(stem_of(word) for word in own if word not in claimed_words("round_sounds")))
     elif target.is_file:
         name = target.name
     else:
@@ -163,7 +162,7 @@ def is_doubtful(tokens: Sequence[Token], used: frozenset[int], *, waits: bool = 
         used: the tokens that the reading points at.
         waits: whether the reading has a wait in it, so that the word is no "no, wait".
     """
-    if any(token.text in words().lists["turning"] and not (waits and token.text == "wait") for token in tokens):
+    if any(token.text in claimed_words("turning") and not (waits and token.text == "wait") for token in tokens):
         return True
     covered = {at for start in used for at in range(start, max(start + 1, amount_end(tokens, start)))}
     said = {tokens[at].text for at in covered}
@@ -172,23 +171,9 @@ def is_doubtful(tokens: Sequence[Token], used: frozenset[int], *, waits: bool = 
     )
 
 
-def unread_number(tokens: Sequence[Token], used: frozenset[int]) -> str | None:
-    """Return the first large number that a reading does not use, beside those of a correction; None without.
-
-    Small ones are often no amounts: "these two", "2 the door", "step 3".
-    """
-    if words().lists["corrections"] & {token.text for token in tokens}:
-        return None
-    covered = {at for start in used for at in range(start, max(start + 1, amount_end(tokens, start)))}
-    said = {tokens[at].text for at in covered}
-    unread = (at for at in range(len(tokens)) if at not in covered and tokens[at].text not in said)
-    large = (at for at in unread if any(value > _LARGE for _, value in lexer.number_at(list(tokens), at)))
-    return next((tokens[at].raw for at in large if _is_number(tokens, at)), None)
-
-
 def _is_name(token: Token, said: set[str]) -> bool:
     """Return whether a word is the name of a thing or a room that no reading has."""
-    if token.kind != "word" or token.text in said or token.text in words().lists["no_names"] or len(token.text) < 3:
+    if token.kind != "word" or token.text in said or token.text in claimed_words("no_names") or len(token.text) < 3:
         return False
     return any(lexicon().find(token.text, kind) is not None for kind in (EntryKind.THING, EntryKind.ROOM))
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from avlmaps.core.lexicon import EntryKind, lexicon
 from avlmaps.core.question import HeardAt
 from avlmaps.language.asking_back import missing_file, strange_word, unclear, unknown
+from avlmaps.language.claims import in_direction, unmet
 from avlmaps.language.intents import (
     Beside,
     Between,
@@ -22,11 +23,8 @@ from avlmaps.language.intents import (
     Wait,
     on_targets,
 )  # fmt: skip
-from avlmaps.language.learned.accounted import has_strange_words
-from avlmaps.language.learned.decision import Weighed, is_doubtful, unread_number
+from avlmaps.language.learned.decision import Weighed, is_doubtful
 from avlmaps.language.learned.reader import Read
-from avlmaps.language.learned.unmet import unmet
-from avlmaps.language.learned.ways import in_direction
 from avlmaps.language.lexer import Token
 from avlmaps.language.names import is_known, is_place, may_name, mended, past_forms, sounding_forms
 from avlmaps.language.sentence import Sentence
@@ -148,16 +146,11 @@ def weighed(read: Read, names: NameResolver) -> Weighed:
     if stop is not None:
         stop = Refuse(stop.reason, REFUSALS[stop.reason]) if isinstance(stop, Refuse) else stop
         return Weighed((stop,), read.probability)
-    number = unread_number(names.tokens, read.used)
-    if number is not None:
-        question = f"What is '{number}' for? Say each step with its own distance, angle or time."
-        return Weighed((Clarify(question),), read.probability)
     turned = in_direction(names.tokens, intents)
     if isinstance(turned, Clarify):
         return Weighed((turned,), read.probability)
     intents = turned
     doubtful = is_doubtful(names.tokens, read.used, waits=any(isinstance(one, Wait) for one in intents))
-    doubtful = doubtful or has_strange_words(names.tokens, read.used)
     return Weighed(intents, read.probability, doubtful, tuple(dict.fromkeys(names.notes)))
 
 

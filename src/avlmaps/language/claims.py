@@ -1,0 +1,258 @@
+"""What the words of a sentence claim that no reading holds: rows of `claims.toml`, read by one matcher.
+
+The networks point at names and amounts. Words between those can turn the meaning round ("leave the kitchen", "the chair
+farthest from the door"). A row says which words, of which readings, and what is done: a refusal or a question back, so
+that nothing moves on half of a sentence.
+"""
+
+import re
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+import msgspec
+
+from avlmaps.core.lexicon import EntryKind, lexicon
+from avlmaps.language import lexer
+from avlmaps.language.intents import (
+    Ask,
+    Beside,
+    Circle,
+    Clarify,
+    Face,
+    Inquiry,
+    Intent,
+    Move,
+    RefusalReason,
+    Refuse,
+    Repeat,
+    Side,
+    StopAt,
+    Target,
+    TargetKind,
+    Turn,
+    TurnSense,
+    VisitEach,
+    targets_of,
+)
+from avlmaps.language.names import describes, is_entry, sounding_words, sounds_like
+from avlmaps.language.token import Token
+from avlmaps.language.word_classes import pattern_of
+
+_ANSWERS = "it answers where things and sounds are, how many there are, and whether there is one."
+_MARKS = {TargetKind.AREA: "@", TargetKind.SOUND: "$"}
+_BEGIN = r"(?<![^ ^@$])[\^@$]?"  # of a word
+_HEARD = frozenset({"hear", "heard", "hearing", "sound", "noise"})
+_WAYS = dict.fromkeys(("clockwise", "cw"), TurnSense.CLOCKWISE) | dict.fromkeys(
+    ("counterclockwise", "anticlockwise", "ccw"), TurnSense.COUNTERCLOCKWISE
+)
+_VAGUE = frozenset({"a", "an", "one", "another"})
+_AMOUNTS = {
+    "clock": lexer.clock_at, "m": lexer.length_at, "deg": lexer.angle_at, "s": lexer.duration_at, "n": lexer.number_at,
+}  # fmt: skip
+
+
+class Row(msgspec.Struct, rename={"of": "if"}):
+    """A row of the table: which words, of which readings, and what is done of them; see `claims.toml`."""
+
+    says: str
+    of: frozenset[str] = frozenset()
+    unless: frozenset[str] = frozenset()
+    ask: str = "A map does not know '{said}'; " + _ANSWERS
+    refuse: RefusalReason | None = None
+    choices: tuple[str, ...] = ()
+
+
+@cache
+def _book() -> dict[str, Any]:
+    return tomllib.loads(files("avlmaps.language").joinpath("claims.toml").read_text(encoding="utf-8"))
+
+
+@cache
+def claimed_words(name: str) -> frozenset[str]:
+    """Return the words of a list."""
+    return frozenset(_book()["lists"][name].split())
+
+
+@cache
+def _known() -> Mapping[str, str]:
+    """Return the regular expression of each name that a row may use."""
+    book = _book()
+    known = {name: f"{_BEGIN}(?:{'|'.join(map(re.escape, text.split()))}) " for name, text in book["lists"].items()}
+    known |= {name: f"{_BEGIN}(?:{pattern_of(text)})" for name, text in book["phrases"].items()}
+    for name, text in book["patterns"].items():
+        known[name] = _filled(text, known)
+    return known
+
+
+@cache
+def _rows(table: str) -> Sequence[tuple[Row, re.Pattern[str]]]:
+    rows = msgspec.convert(_book()[table], list[Row])
+    return [(row, re.compile(f"(?<![^ ^@$])(?:{_filled(row.says, _known())})")) for row in rows]
+
+
+@cache
+def _asks() -> re.Pattern[str]:
+    return re.compile(_known()["ask"])
+
+
+def _filled(text: str, known: Mapping[str, str]) -> str:
+    return re.sub(r"\{([a-z_]+)\}", lambda found: f"(?:{known[found[1]]})", text)
+
+
+class _Marked:
+    """A sentence as rows see it: its names with marks, its amounts and files as one word each."""
+
+    def __init__(self, tokens: Sequence[Token], used: frozenset[int] | None, kinds: Mapping[str, str]) -> None:
+        self.tokens, self.text = tokens, " "
+        self._starts: list[tuple[int, int]] = []
+        words, at = list(tokens), 0
+        while at < len(tokens):
+            end, word = self._word(words, at, used, kinds)
+            self._starts.append((len(self.text), at))
+            self.text += f"{word} "
+            at = end
+        self._starts.append((len(self.text), len(tokens)))
+
+    @staticmethod
+    def _word(tokens: list[Token], at: int, used: frozenset[int] | None, kinds: Mapping[str, str]) -> tuple[int, str]:
+        token = tokens[at]
+        if token.kind in ("image", "clip"):
+            return at + 1, "‹file›" if used is None or at in used else "‹file!›"
+        ends = {name: max((end for end, _ in read(tokens, at)), default=at) for name, read in _AMOUNTS.items()}
+        name = max(ends, key=ends.__getitem__)
+        reads = used is None or not used.isdisjoint(range(at, ends[name]))
+        counted = ends[name] < len(tokens) and tokens[ends[name]].text in claimed_words("counted")
+        counts = name != "n" or token.kind == "number" or counted
+        if ends[name] > at and counts and token.text not in kinds and (reads or token.text not in _VAGUE):
+            return ends[name], f"‹{name}›" if reads else f"‹{name}!›"
+        named = used is not None and at in used and (token.text in kinds or not lexer.begins_amount(token))
+        return at + 1, f"{kinds.get(token.text, '^') if named else ''}{token.text}"
+
+    def said(self, start: int, end: int) -> str:
+        """Return the words of the sentence from one character of the text to another."""
+        inside = [at for begin, at in self._starts if begin < end]
+        first = max((at for begin, at in self._starts if begin <= start), default=0)
+        last = min((at for begin, at in self._starts if begin >= end), default=len(self.tokens))
+        return " ".join(token.text for token in self.tokens[first : max(last, inside[-1] if inside else 0)])
+
+
+def _first(table: str, marked: _Marked, facts: frozenset[str]) -> Refuse | Clarify | None:
+    """Return what the first row does that fits; None where none fits."""
+    for row, says in _rows(table):
+        found = says.search(marked.text) if row.of <= facts and row.unless.isdisjoint(facts) else None
+        if found is None:
+            continue
+        if row.refuse is not None:
+            return Refuse(row.refuse)
+        start, end = next((found.span(name) for name in found.groupdict() if found[name]), found.span())
+        said = marked.said(start, end)
+        return Clarify(row.ask.format(said=said), tuple(choice.format(said=said) for choice in row.choices))
+    return None
+
+
+def forbidden(tokens: Sequence[Token]) -> Refuse | Clarify | None:
+    """Return the refusal or question for words that no reading of a command could make good; None without such."""
+    return _first("words", _Marked(tokens, None, {}), frozenset())
+
+
+def unmet(tokens: Sequence[Token], intents: Sequence[Intent], used: frozenset[int]) -> Refuse | Clarify | None:
+    """Return the refusal or question for what a command claims and a reading does not do; None where it does all."""
+    targets = [each for intent in intents for one in targets_of(intent) for each in (one, *one.near)]
+    return _first("command", _Marked(tokens, used, _kinds(targets)), frozenset(_facts(intents, targets)))
+
+
+def unmet_by(tokens: Sequence[Token], inquiry: Inquiry, used: frozenset[int]) -> str | None:
+    """Return the question back for what a question claims and its reading leaves out; None where it does all."""
+    targets = [each for one in inquiry.of for each in (one, *one.near)]
+    marked = _Marked(tokens, used, _kinds(targets))
+    facts = {str(inquiry.ask), *_facts_of_targets(targets)} | ({"several"} if len(inquiry.of) > 1 else set())
+    about = inquiry.of[0]
+    if about.kind in (TargetKind.SOUND, TargetKind.CLIP):
+        facts |= {"sound"} | ({"heard sound"} if _HEARD & {token.text for token in tokens} else set())
+        facts |= {"no sound"} if "heard sound" not in facts and not _sounds(about.name) else set()
+    facts |= {token.kind for token in tokens if token.kind in ("clip", "image")}
+    if inquiry.ask is Ask.EXISTS or _asks().search(marked.text):
+        facts.add("whether")
+    found = _first("question", marked, frozenset(facts))
+    return None if found is None else getattr(found, "question", "A map cannot answer this.")
+
+
+def in_direction(tokens: Sequence[Token], intents: Sequence[Intent]) -> tuple[Intent, ...] | Clarify:
+    """Return intents whose circles run in the direction that is said, or the question which one is meant."""
+    ways = [_WAYS[token.text] for token in tokens if token.text in _WAYS]
+    steps = [step for one in intents for step in (one.body if isinstance(one, Repeat) else (one,))]
+    circles = sum(isinstance(step, Circle) for step in steps)
+    if not circles or not ways or any(isinstance(step, Turn) for step in steps):
+        return tuple(intents)
+    if len(ways) != circles:
+        return Clarify("Which way round? Say it for each: go clockwise around the table.")
+    left = iter(ways)
+
+    def turned(intent: Intent) -> Intent:
+        if isinstance(intent, Repeat):
+            return replace(intent, body=tuple(map(turned, intent.body)))
+        return replace(intent, way=next(left)) if isinstance(intent, Circle) else intent
+
+    return tuple(map(turned, intents))
+
+
+def _sounds(name: str) -> bool:
+    """Return whether a name is that of a sound, or of what is heard."""
+    words = name.split()
+    known = any(lexicon().find(" ".join(words[at:]), EntryKind.SOUND) for at in range(len(words)))
+    told = sounding_words() | claimed_words("ringers")
+    return known or any(sounds_like(word) or word in told for word in words)
+
+
+def _kinds(targets: Sequence[Target]) -> dict[str, str]:
+    """Return the mark of each word of the names of a reading."""
+    return {word: _MARKS.get(target.kind, "^") for target in targets for word in target.name.split()}
+
+
+def _facts_of_targets(targets: Sequence[Target]) -> Iterator[str]:
+    for target in targets:
+        if target.pick:
+            yield str(target.pick)
+        if target.near:
+            yield "room near" if target.kind is TargetKind.AREA else "near"
+            yield "near"
+        if target.kind is TargetKind.SOUND:
+            yield "sound"
+        *before, last = target.name.split() or ("",)
+        if before and any(lexicon().find(target.name, kind) for kind in (EntryKind.THING, EntryKind.ROOM)):
+            yield "entry"
+        elif before and is_entry(" ".join(before)) and not is_entry(target.name):
+            yield from ("stated", "described") if describes(last) and not is_entry(last) else ("stated",)
+    if len(targets) == 1:
+        yield "one name"
+
+
+def _facts(intents: Sequence[Intent], targets: Sequence[Target]) -> Iterator[str]:
+    """Yield what a reading of a command does, in the words of `if` and `unless`."""
+    yield from _facts_of_targets(targets)
+    if len({one for intent in intents for one in targets_of(intent) if one.kind is TargetKind.OBJECT}) < 2:
+        yield "one thing"
+    steps = [step for one in intents for step in (one.body if isinstance(one, Repeat) else (one,))]
+    if len(steps) == 1:
+        yield "one step"
+    for step in steps:
+        match step:
+            case StopAt() | Face(side=Side.BEHIND):
+                yield "kept"
+            case Beside(of=target, side=side, metres=metres):
+                yield from ("beside", str(side), *(["kept"] if metres is not None else []))
+                yield "beside room" if target.kind is TargetKind.AREA else "beside"
+            case Face(side=side):
+                yield str(side)
+            case Move(metres=metres):
+                yield from ("forward",) if metres > 0 else ("back", "kept")
+            case Turn(degrees=degrees) if degrees and degrees % 180.0:
+                yield from ("turn", "left" if degrees < 0 else "right")
+            case VisitEach():
+                yield "each"
+            case _:
+                pass
