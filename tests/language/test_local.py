@@ -5,8 +5,10 @@ import re
 import sys
 import threading
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -14,13 +16,26 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from avlmaps.core.errors import BackendError, LanguageError
-from avlmaps.language.commands import UnclearError, read_command
-from avlmaps.language.intents import Beside, Circle, Face, Go, Return, Side, StopAt, Target, TargetKind, VisitEach
+from avlmaps.language.commands import Command, UnclearError, read_command
+from avlmaps.language.intents import (
+    Beside,
+    Circle,
+    Clarify,
+    Face,
+    Go,
+    Return,
+    Side,
+    StopAt,
+    Target,
+    TargetKind,
+    VisitEach,
+)
 from avlmaps.language.lexer import tokenise
 from avlmaps.language.local import LocalModel, LocalTranslator, both, examples, grammar, meaning, prompt
 from avlmaps.language.program import SKILLS, parse_program
 from avlmaps.language.program.writing import write_program
 from avlmaps.language.sentence import Sentence
+from avlmaps.language.verbalise import verbalise
 
 SOFA = Target(TargetKind.OBJECT, "sofa")
 
@@ -49,11 +64,6 @@ def server() -> Iterator[str]:
     yield f"http://127.0.0.1:{http.server_port}"
     http.shutdown()
     http.server_close()
-
-
-def _translated(server: str, command: str, program: str) -> LocalTranslator:
-    _Server.program = program
-    return LocalTranslator(LocalModel(server))
 
 
 def test_every_example_means_something_and_its_words_are_in_its_sentence() -> None:
@@ -143,23 +153,42 @@ def test_the_nearest_examples_stand_before_the_command() -> None:
     assert prompt("go to the sofa")[:700] == text[:700]  # what is always shown is computed once
 
 
-def test_what_both_read_is_driven(server: str) -> None:
-    told = _translated(server, "", 'robot.move_to_object("sofa")\n\n').program_for("go to the sofa")
-    assert told.program == 'robot.move_to_object("sofa")\n' and told.plan == "I will go to the sofa."
-    assert any("likewise" in note for note in told.notes)
+def test_a_sure_reader_asks_no_model() -> None:
+    translator = LocalTranslator(LocalModel("http://127.0.0.1:9"))
+    assert translator.program_for("go to the sofa").program == 'robot.move_to_object("sofa")\n'
+
+
+def _unsure(probability: float, *, drives: bool) -> Command:
+    """Return a command that the reader takes as "go to the sofa", or asks about, with "face the sofa" behind it."""
+    first, second = (read_command(text).readings[0] for text in ("go to the sofa", "face the sofa"))
+    readings = (replace(first, probability=probability), replace(second, probability=1.0 - probability))
+    return Command(first.intents if drives else (Clarify("?"),), (), readings, "read" if drives else "unsure")
+
+
+@pytest.mark.parametrize(
+    ("probability", "drives", "model", "wanted"),
+    [
+        (0.8, True, "go to the sofa", "I will go to the sofa."),
+        (0.8, True, "face the sofa", ("I will go to the sofa.", "I will face the sofa.")),
+        (0.6, False, "face the sofa", "I will face the sofa."),
+        (0.6, False, "go to the bed", ("I will go to the bed.",)),
+    ],
+)
+def test_what_both_read_is_driven_and_else_a_person_is_asked(
+    probability: float, drives: bool, model: str, wanted: Any
+) -> None:
+    told = both(_unsure(probability, drives=drives), read_command(model).readings[0])
+    said = told.stops.choices if isinstance(told.stops, Clarify) else verbalise(told.intents)
+    assert said == wanted
+
+
+@pytest.mark.parametrize(("program", "kind"), [('robot.move_to_object("sofa")\n\n', Go), ("nonsense", None)])
+def test_a_server_is_asked_for_the_program(server: str, program: str, kind: Any) -> None:
+    _Server.program = program
+    proposed = LocalTranslator(LocalModel(server)).proposed("go to the sofa")
+    assert kind is None if proposed is None else isinstance(proposed.intents[0], kind)
     assert _Server.asked["cache_prompt"] is True and _Server.asked["temperature"] == 0.0
-
-
-def test_where_they_differ_a_person_is_asked(server: str) -> None:
-    with pytest.raises(UnclearError, match="two things") as asked:
-        _translated(server, "", 'robot.face("sofa")\n\n').program_for("go to the sofa")
-    assert asked.value.choices == ("I will go to the sofa.", "I will face the sofa.")
-
-
-@pytest.mark.parametrize("program", ["nonsense", 'robot.move_to_object("frobnicator")\n\n'])
-def test_what_means_nothing_or_names_nothing_changes_nothing(server: str, program: str) -> None:
-    translator = _translated(server, "", program)
-    assert translator.read("go to the sofa").intents == read_command("go to the sofa").intents
+    assert _Server.asked["prompt"].endswith("# go to the sofa\n")
 
 
 @pytest.mark.parametrize(
@@ -170,25 +199,19 @@ def test_no_model_is_asked_about_a_danger_or_what_is_no_order(command: str) -> N
         LocalTranslator(LocalModel("http://127.0.0.1:9")).program_for(command)
 
 
-def test_an_unsure_reader_drives_only_by_a_reading_of_its_own() -> None:
-    command = "park yourself betwixt sofa and telly like"
-    read, other = read_command(command), read_command("go to the sofa")
-    if read.stops is not None and not any(one.intents == other.intents for one in read.readings):
-        told = both(read, _weighed("go to the sofa"))
-        assert told.stops is not None and told.stops.choices == ("I will go to the sofa.",)  # type: ignore[union-attr]
-
-
-def _weighed(command: str) -> Any:
-    return read_command(command).readings[0]
+def _broken(_: Any) -> None:
+    raise RuntimeError("broken file")
 
 
 def test_faults_say_what_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "xllamacpp", None)
+    library = SimpleNamespace(CommonParams=lambda: SimpleNamespace(model=SimpleNamespace()), Server=_broken)
+    monkeypatch.setitem(sys.modules, "xllamacpp", library)
     (tmp_path / "no.gguf").write_bytes(b"no model")
     (tmp_path / "yes.gguf").write_bytes(b"GGUF....")
-    for model, said in ((tmp_path / "none.gguf", "cannot be read"), (tmp_path / "no.gguf", "no GGUF")):
+    for model, said in (("none", "cannot be read"), ("no", "no GGUF"), ("yes", "cannot be loaded")):
         with pytest.raises(BackendError, match=said):
-            LocalModel(str(model))
+            LocalModel(str(tmp_path / f"{model}.gguf"))
+    monkeypatch.setitem(sys.modules, "xllamacpp", None)
     with pytest.raises(BackendError, match=r"pip install .*\[llm\]"):
         LocalModel(str(tmp_path / "yes.gguf"))
     with pytest.raises(LanguageError, match="llama-server"):

@@ -13,12 +13,12 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from hashlib import sha256
 from importlib import import_module
 from importlib.resources import files
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
-from urllib.error import URLError
 from urllib.request import Request, urlopen
 
 from avlmaps.core.errors import BackendError, LanguageError
@@ -28,7 +28,6 @@ from avlmaps.language.intents import (
     Beside,
     Between,
     Circle,
-    Clarify,
     Face,
     Go,
     Intent,
@@ -47,7 +46,7 @@ from avlmaps.language.intents import (
     on_targets,
     targets_of,
 )  # fmt: skip
-from avlmaps.language.learned.decision import Weighed, is_same
+from avlmaps.language.learned.decision import Weighed, is_same, which
 from avlmaps.language.learned.linear import amount, amount_end
 from avlmaps.language.learned.name_resolver import NameResolver, weighed
 from avlmaps.language.learned.reader import Read
@@ -59,9 +58,15 @@ from avlmaps.language.program.writing import write_program
 from avlmaps.language.sentence import Attachments, Sentence
 from avlmaps.language.translator import Translation
 from avlmaps.language.verbalise import verbalise
+from avlmaps.perception.user_folder import cache_folder
 
 _ALWAYS, _NEAREST = 6, 4  # examples: the first ones, whose state is kept, and the nearest ones
+_SURE = 0.9  # the probability from which on the reader needs no second opinion
 _MOST_TOKENS, _TIMEOUT_S, _CONTEXT = 160, 300.0, 2048
+_TAKES = (
+    "--llm takes a GGUF file (docs/guides/local-model.md), or the address of a llama.cpp server "
+    "(llama-server -m FILE.gguf), such as http://localhost:8080."
+)
 _HEAD = "# Programs for a robot. It is told to do this, and does it:\n\n"
 _TARGETS = frozenset({ValueType.STRING, ValueType.PLACE, ValueType.HEAT})
 _ARTICLES = frozenset({"a", "an", "the"})
@@ -286,9 +291,19 @@ class LocalModel:
             BackendError: the file is missing or no GGUF, or xllamacpp is not installed.
         """
         self.shown = model
-        is_address = model.startswith(("http://", "https://"))
-        self._server: Any = None if is_address else _served(Path(model).expanduser())
-        self.url = model.rstrip("/") if is_address else self._server.listening_address
+        self._server: Any = None
+        self.url = model.rstrip("/")
+        if not model.startswith(("http://", "https://")):
+            file = Path(model).expanduser()
+            self._server = _served(file)
+            self.url = self._server.listening_address
+            self._begin(f"{file.name}-{file.stat().st_size}-{sha256(_head().encode()).hexdigest()[:16]}.state")
+
+    def _begin(self, state: str) -> None:
+        """Load the state behind what every prompt begins with; compute and keep it where there is none yet."""
+        if self._post("/slots/0?action=restore", {"filename": state}) is None:
+            self._post("/completion", {"prompt": _head(), "n_predict": 0, "cache_prompt": True})
+            self._post("/slots/0?action=save", {"filename": state})
 
     def write(self, command: str, tokens: Sequence[Token]) -> Written:
         """Return the program that the model writes for a command.
@@ -296,47 +311,51 @@ class LocalModel:
         Raises:
             LanguageError: it does not answer.
         """
-        body = {
+        said = self._post("/completion", {
             "prompt": prompt(command), "grammar": grammar(tokens), "temperature": 0.0, "n_predict": _MOST_TOKENS,
             "cache_prompt": True,
-        }  # fmt: skip
-        headers = {"Content-Type": "application/json"}
-        request = Request(f"{self.url}/completion", json.dumps(body).encode(), headers)
+        })  # fmt: skip
+        if said is None:
+            raise LanguageError(f"The language model {self.shown} does not answer; {_TAKES}")
+        return Written(str(said["content"]), (int(said["tokens_evaluated"]), int(said["tokens_predicted"])))
+
+    def _post(self, path: str, body: Mapping[str, Any]) -> dict[str, Any] | None:
+        request = Request(self.url + path, json.dumps(body).encode(), {"Content-Type": "application/json"})
         try:
             with urlopen(request, timeout=_TIMEOUT_S) as answer:
-                told = json.load(answer)
-            return Written(str(told["content"]), (int(told["tokens_evaluated"]), int(told["tokens_predicted"])))
-        except (URLError, OSError, ValueError, KeyError) as fault:
-            raise LanguageError(
-                f"The language model {self.shown} does not answer ({fault}); --llm takes a GGUF file, or the address "
-                "of a llama.cpp server (llama-server -m FILE.gguf), such as http://localhost:8080."
-            ) from fault
+                return json.load(answer)
+        except (OSError, ValueError):
+            return None
 
 
 def _served(file: Path) -> Any:
+    """Return a server of llama.cpp in this process.
+
+    Raises:
+        BackendError: the file is missing, no GGUF or cannot be loaded, or xllamacpp is not installed.
+    """
     try:
         with file.open("rb") as opened:
             is_gguf = opened.read(4) == b"GGUF"
-    except OSError as fault:
-        raise BackendError(
-            f"The language model {file} cannot be read ({fault.strerror}); --llm takes a GGUF file, such as "
-            "Qwen2.5-Coder 1.5B Instruct (docs/guides/local-model.md)."
-        ) from fault
-    if not is_gguf:
-        raise BackendError(f"{file} is no GGUF file; --llm takes one, as llama.cpp reads it.")
-    try:
         library: Any = import_module("xllamacpp")
+    except OSError as fault:
+        raise BackendError(f"The language model {file} cannot be read ({fault.strerror}); {_TAKES}") from fault
     except ImportError as fault:
         raise BackendError(
-            f"A language model needs llama.cpp: {install_command('llm')}; or give --llm the address of a server."
+            f"--llm FILE needs llama.cpp: {install_command('llm')}; a server's address does not."
         ) from fault
+    if not is_gguf:
+        raise BackendError(f"{file} is no GGUF file; {_TAKES}")
+    states = cache_folder() / "llm"
+    states.mkdir(parents=True, exist_ok=True)
     parameters = library.CommonParams()
     parameters.model.path, parameters.n_ctx, parameters.n_parallel = str(file), _CONTEXT, 1
     parameters.verbosity, parameters.warmup, parameters.port = -1, False, 0
+    parameters.slot_save_path, parameters.endpoint_slots = f"{states}/", True
     try:
         return library.Server(parameters)
     except RuntimeError as fault:
-        raise BackendError(f"{file} cannot be loaded ({fault}); take another GGUF file.") from fault
+        raise BackendError(f"{file} cannot be loaded ({fault}); {_TAKES}") from fault
 
 
 # The translator.
@@ -364,9 +383,7 @@ class LocalTranslator:
         """
         check_order(command)
         read = read_command(command, self.given)
-        if read.why in ("danger", "gate", "words") or isinstance(read.stops, Refuse):
-            return read
-        return both(read, self.proposed(command))
+        return read if is_settled(read) else both(read, self.proposed(command))
 
     def proposed(self, command: str) -> Weighed | None:
         """Return what the model makes of a command, checked; None where it means nothing."""
@@ -398,26 +415,23 @@ class LocalTranslator:
         return None
 
 
+def is_settled(read: Command) -> bool:
+    """Return whether a reader needs no second opinion: it refuses, single words decide, or it is sure."""
+    if read.stops is None:
+        return sum(one.probability for one in read.readings if is_same(one.intents, read.intents)) >= _SURE
+    return read.why in ("danger", "gate", "words") or isinstance(read.stops, Refuse)
+
+
 def both(read: Command, proposed: Weighed | None) -> Command:
-    """Return what a reader and a model make of a command: what both say, or a question."""
+    """Return what a reader that is not sure and a model make of a command: what both read, or a question."""
     if proposed is None or proposed.stops is not None:
         return read
-    if read.stops is None:
-        if is_same(read.intents, proposed.intents):
-            return replace(read, notes=(*read.notes, "The language model reads it likewise."))
-        return _asked(read, (read.intents, proposed.intents))
     likely = [one for one in read.readings if one.stops is None and is_same(one.intents, proposed.intents)]
-    if likely and not proposed.doubtful:
-        return replace(read, intents=likely[0].intents, notes=(*read.notes, *likely[0].notes), why="read")
-    return _asked(read, (proposed.intents,))
-
-
-def _asked(read: Command, meanings: Sequence[Sequence[Intent]]) -> Command:
-    choices = tuple(map(verbalise, meanings))
-    question = f"Is this what you mean? {choices[0]}" if len(choices) == 1 else (
-        f"This can mean two things. 1: {choices[0]} 2: {choices[1]} Which one?"
-    )  # fmt: skip
-    return replace(read, intents=(Clarify(question, choices),), why="unsure")
+    if likely and (read.stops is not None or is_same(read.intents, proposed.intents)):
+        notes = (*read.notes, *likely[0].notes, "The language model reads it likewise.")
+        return replace(read, intents=likely[0].intents, notes=tuple(dict.fromkeys(notes)), why="read")
+    meanings = (proposed.intents,) if read.stops is not None else (read.intents, proposed.intents)
+    return replace(read, intents=(which(tuple(map(verbalise, meanings))),), why="unsure")
 
 
 def _used(intents: Sequence[Intent], tokens: Sequence[Token]) -> frozenset[int]:

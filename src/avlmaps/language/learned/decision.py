@@ -93,13 +93,12 @@ def decided(readings: Sequence[Weighed], limits: ReadingLimits) -> Decision:
     alike = sum(one.probability for one in readings if one.stops is None and is_same(one.intents, best.intents))
     if alike >= (limits.doubtful if best.doubtful else limits.command):
         return Decision(best.intents, "read", best.notes)
-    return Decision((_which(readings),), "unsure")
+    likely = (verbalise(one.intents) for one in readings if one.stops is None and one.probability >= _WORTH_ASKING)
+    return Decision((which(tuple(dict.fromkeys(likely))[:2]),), "unsure")
 
 
-def _which(readings: Sequence[Weighed]) -> Clarify:
-    """Return the question which reading is meant."""
-    said = (verbalise(one.intents) for one in readings if one.stops is None and one.probability >= _WORTH_ASKING)
-    choices = tuple(dict.fromkeys(said))[:2]
+def which(choices: tuple[str, ...]) -> Clarify:
+    """Return the question which of up to two meanings is the right one."""
     if len(choices) == 2:
         return Clarify(f"This can mean two things. 1: {choices[0]} 2: {choices[1]} Which one?", choices)
     if choices:
